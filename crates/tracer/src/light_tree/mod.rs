@@ -171,7 +171,7 @@ impl LightTree {
 
     /// Where a point begins to ask: what parts all lights, unless it need not ([`ALL`]).
     fn start(&self, viewer: &Viewer) -> usize {
-        let goes_on = |whole: &Node| !whole.is_end(0, whole.way(0, viewer)[0]);
+        let goes_on = |whole: &Node| !whole.is_end(0, whole.squared(0, viewer));
         usize::from(self.nodes.first().is_some_and(goes_on))
     }
 
@@ -205,19 +205,15 @@ impl LightTree {
     }
 
     /// What all lights may send to a point that faces them, in units of the tree.
-    fn sent(&self, viewer: &Viewer) -> f32 {
-        let Some(whole) = self.nodes.first() else { return 0.0 };
-        let [squared, _] = whole.way(0, viewer);
-        match whole.is_isotropic {
-            true => whole.isotropic(0, squared),
-            false => whole.directed(0, viewer.point, squared),
-        }
+    fn sent(&self, viewer: &Viewer) -> f64 {
+        let open = Viewer { is_one_sided: false, ..*viewer };
+        self.nodes.first().map_or(0.0, |whole| whole.view(&open).importance[0])
     }
 
     /// What its lights may send to a point (m) that faces them all (W/m²).
     pub(crate) fn importance(&self, from: DVec3) -> f64 {
         let Extent { scale, intensity, .. } = self.extent;
-        let sent = f64::from(self.sent(&self.extent.viewer(&Receiver::open(from))));
+        let sent = self.sent(&self.extent.viewer(&Receiver::open(from)));
         (sent * intensity * scale * scale).min(f64::MAX.sqrt())
     }
 

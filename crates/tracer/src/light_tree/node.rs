@@ -127,59 +127,11 @@ impl Node {
         self.branches[lane] = branch;
     }
 
-    /// The squared distance to the centre of a branch, and its height above the viewer's horizon.
+    /// The squared distance to the centre of a branch.
     #[inline(always)]
-    pub(super) fn way(&self, k: usize, viewer: &Viewer) -> [f32; 2] {
-        let (mut squared, mut above) = (0.0, 0.0);
-        for axis in 0..3 {
-            let way = self.centre[axis][k] - viewer.point[axis];
-            squared += way * way;
-            above += way * viewer.normal[axis];
-        }
-        [squared, above]
-    }
-
-    /// What a branch may send to a point at a squared distance, where all shine to all sides.
-    #[inline(always)]
-    pub(super) fn isotropic(&self, k: usize, squared: f32) -> f32 {
-        let near = self.intensity[k] / squared;
-        let near = if near < MOST_IMPORTANCE { near } else { MOST_IMPORTANCE };
-        let is_within = squared <= self.radius[k] * self.radius[k];
-        if is_within { self.within[k] } else { near }
-    }
-
-    /// The same where they shine ahead.
-    #[inline(always)]
-    pub(super) fn directed(&self, k: usize, from: [f32; 3], squared: f32) -> f32 {
-        let inverse = 1.0 / squared.sqrt();
-        let near = self.intensity[k] * inverse * inverse;
-        let near = if near < MOST_IMPORTANCE { near } else { MOST_IMPORTANCE };
-        // The angle to the axis, less the cone's, less the ball's.
-        let along = |axis: usize| (from[axis] - self.centre[axis][k]) * self.axis[axis][k];
-        let along = along(0) + along(1) + along(2);
-        let cosine = (along * inverse).clamp(-1.0, 1.0);
-        let angle = less([cosine, other(cosine)], [self.cone[0][k], self.cone[1][k]]);
-        let sine = self.radius[k] * inverse;
-        let [cosine, _] = less(angle, [other(sine), sine]);
-        // A light at the very end of its reach is met by a bound with room for rounding.
-        let reaches = cosine + ROOM > self.cos_reach[k];
-        let facing = if cosine > ROOM { cosine } else { ROOM };
-        let outside = if reaches { near * facing } else { 0.0 };
-        let is_within = squared <= self.radius[k] * self.radius[k];
-        if is_within { self.within[k] } else { outside }
-    }
-
-    /// The most that the cosine is under which a point gets the light of a branch: at this height of its centre
-    /// above the point's horizon and this squared distance.
-    #[inline(always)]
-    fn received(&self, k: usize, above: f32, squared: f32) -> f32 {
-        let inverse = 1.0 / squared.sqrt();
-        let (sine, along) = (self.radius[k] * inverse, (above * inverse).clamp(-1.0, 1.0));
-        let [cosine, _] = less([along, other(along)], [other(sine), sine]);
-        let facing = if cosine > ROOM { cosine } else { ROOM };
-        let facing = if cosine > -ROOM { facing } else { 0.0 };
-        let is_within = squared <= self.radius[k] * self.radius[k];
-        if is_within { 1.0 } else { facing }
+    pub(super) fn squared(&self, k: usize, viewer: &Viewer) -> f32 {
+        let way = |axis: usize| self.centre[axis][k] - viewer.point[axis];
+        way(0) * way(0) + way(1) * way(1) + way(2) * way(2)
     }
 
     /// Whether one of the lights of a branch at this squared distance is chosen by intensity.
@@ -190,35 +142,77 @@ impl Node {
     }
 
     /// What the viewer has of each branch: what the branch may send, to a factor, and the squared distance.
+    ///
+    /// All is worked out for all branches, and from local arrays: else compilers do it branch by branch.
     #[inline(always)]
     pub(super) fn view(&self, viewer: &Viewer) -> View {
-        let (mut squared, mut above, mut importance) = ([0.0; WIDTH], [0.0; WIDTH], [0.0; WIDTH]);
-        for k in 0..WIDTH {
-            [squared[k], above[k]] = self.way(k, viewer);
+        let (mut squared, mut above, mut along) = ([0.0; WIDTH], [0.0; WIDTH], [0.0; WIDTH]);
+        for axis in 0..3 {
+            let (centre, own) = (self.centre[axis], self.axis[axis]);
+            let (from, normal) = (viewer.point[axis], viewer.normal[axis]);
+            for k in 0..WIDTH {
+                let way = centre[k] - from;
+                squared[k] += way * way;
+                above[k] += way * normal;
+                along[k] -= way * own[k];
+            }
         }
-        if self.is_isotropic {
+        let (radius, intensity, within) = (self.radius, self.intensity, self.within);
+        let (mut inverse, mut sent, mut ball) = ([0.0; WIDTH], [0.0; WIDTH], [[0.0; WIDTH]; 2]);
+        for k in 0..WIDTH {
+            inverse[k] = 1.0 / squared[k].sqrt();
+        }
+        for k in 0..WIDTH {
+            let near = intensity[k] * inverse[k] * inverse[k];
+            sent[k] = if near < MOST_IMPORTANCE { near } else { MOST_IMPORTANCE };
+        }
+        // The half-angle of the branch's ball.
+        for k in 0..WIDTH {
+            ball[1][k] = radius[k] * inverse[k];
+            ball[0][k] = other(ball[1][k]);
+        }
+        if !self.is_isotropic {
+            let (cone, reach) = (self.cone, self.cos_reach);
             for k in 0..WIDTH {
-                importance[k] = self.isotropic(k, squared[k]);
+                // The angle to the axis, less the cone's, less the ball's.
+                let cosine = cosine(along[k] * inverse[k]);
+                let angle = less([cosine, other(cosine)], [cone[0][k], cone[1][k]]);
+                let [cosine, _] = less(angle, [ball[0][k], ball[1][k]]);
+                // A light at the very end of its reach is met by a bound with room for rounding.
+                let facing = if cosine > ROOM { cosine } else { ROOM };
+                sent[k] = if cosine + ROOM > reach[k] { sent[k] * facing } else { 0.0 };
             }
-        } else {
-            for k in 0..WIDTH {
-                importance[k] = self.directed(k, viewer.point, squared[k]);
-            }
+        }
+        for k in 0..WIDTH {
+            sent[k] = if squared[k] <= radius[k] * radius[k] { within[k] } else { sent[k] };
         }
         if viewer.is_one_sided {
+            // The most that the cosine is under which the point gets the light.
             for k in 0..WIDTH {
-                importance[k] *= self.received(k, above[k], squared[k]);
+                let cosine = cosine(above[k] * inverse[k]);
+                let [cosine, _] = less([cosine, other(cosine)], [ball[0][k], ball[1][k]]);
+                let facing = if cosine > ROOM { cosine } else { ROOM };
+                let facing = if cosine > -ROOM { facing } else { 0.0 };
+                let is_within = squared[k] <= radius[k] * radius[k];
+                sent[k] *= if is_within { 1.0 } else { facing };
             }
         }
-        View { importance: importance.map(f64::from), squared }
+        View { importance: sent.map(f64::from), squared }
     }
+}
+
+/// A cosine that rounding may have put beyond 1.
+#[inline(always)]
+fn cosine(x: f32) -> f32 {
+    let x = if x < 1.0 { x } else { 1.0 };
+    if x > -1.0 { x } else { -1.0 }
 }
 
 /// The sine to a cosine, or the other way round; 0 where rounding went beyond 1.
 #[inline(always)]
 fn other(cosine: f32) -> f32 {
     let rest = 1.0 - cosine * cosine;
-    if rest > 0.0 { rest.sqrt() } else { 0.0 }
+    (if rest > 0.0 { rest } else { 0.0 }).sqrt()
 }
 
 /// Cosine and sine of the first angle less the second, 0 at least.
@@ -242,15 +236,11 @@ impl View {
     /// The sums of what the branches up to each send.
     #[inline(always)]
     pub(super) fn sums(&self) -> [f64; WIDTH] {
-        let mut sums = self.importance;
+        let [a, b, c, d, e, f, g, h] = self.importance;
         // By halves: three steps one after the other in place of seven.
-        for step in [1, 2, 4] {
-            let before = sums;
-            for k in step..WIDTH {
-                sums[k] = before[k] + before[k - step];
-            }
-        }
-        sums
+        let (ab, ef) = (a + b, e + f);
+        let (abcd, efgh) = (ab + (c + d), ef + (g + h));
+        [a, ab, ab + c, abcd, abcd + e, abcd + ef, abcd + (ef + g), abcd + efgh]
     }
 
     /// A branch by `u` in 0..1, what is left of `u`, and its share; `None` where none sends anything.
