@@ -230,7 +230,8 @@ impl CameraSpec {
         }
         // The frame's pose is that at which data layers see the middle of the picture.
         let (shutter, trajectory) = self.built_time()?;
-        let mut time = CameraTime { shutter, motion: None, things_move: false };
+        let mut time =
+            CameraTime { shutter, motion: None, things_move: false, lights_change: false };
         let middle = time.middle(self.sensor().resolution[1]);
         let mut still = self.clone();
         if let Some(trajectory) = &trajectory {

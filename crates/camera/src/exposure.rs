@@ -23,6 +23,8 @@ pub struct CameraTime {
     pub motion: Option<Trajectory>,
     /// Whether anything of the scene moves while the shutter is open.
     pub things_move: bool,
+    /// Whether some light changes with time.
+    pub lights_change: bool,
 }
 
 impl CameraTime {
@@ -54,6 +56,21 @@ impl Camera {
         self
     }
 
+    /// The same camera in a scene of which some light changes with time, or none.
+    #[must_use]
+    pub fn under_changing_lights(mut self, lights_change: bool) -> Self {
+        if let Some(time) = &mut self.time {
+            Arc::make_mut(time).lights_change = lights_change;
+        }
+        self
+    }
+
+    /// Whether some light of the scene changes with time.
+    #[must_use]
+    pub fn lights_change(&self) -> bool {
+        self.time.as_deref().is_some_and(|time| time.lights_change)
+    }
+
     /// When the first row opens and the last one closes (s); no time without a shutter.
     #[must_use]
     pub fn exposure_span(&self) -> [f64; 2] {
@@ -70,6 +87,13 @@ impl Camera {
     #[must_use]
     pub fn rows_differ(&self) -> bool {
         self.is_timed() && self.shutter().is_some_and(Shutter::rows_differ)
+    }
+
+    /// Whether pixels of different rows get light of different moments.
+    #[must_use]
+    pub fn light_of_rows_differs(&self) -> bool {
+        let changes = self.is_timed() || self.lights_change();
+        changes && self.shutter().is_some_and(Shutter::rows_differ)
     }
 
     /// The pose at a time of the frame's clock (s).

@@ -249,6 +249,10 @@ impl SceneFile {
         let KeptCamera { geometry, camera, origin: camera_origin, files: camera_files, .. } = built;
         let things_move = geometry.moving_within(camera.exposure_span()).next().is_some();
         let camera = camera.among_moving_things(things_move);
+        let mut emission = parts.materials.iter().filter_map(|material| material.emission.as_ref());
+        let lights_change = parts.lights.iter().any(|light| light.modulation.is_some())
+            || emission.any(|emission| emission.modulation.is_some());
+        let camera = camera.under_changing_lights(lights_change);
         // Every file that the scene is made of.
         let opened = parts.stats.files.iter().map(|(path, _)| path.clone());
         let images = parts.textures.iter().filter_map(Texture::file);
@@ -274,6 +278,7 @@ impl SceneFile {
         let sensor = self.sensor_behind(&camera)?;
         notes.extend(self.lens_notes(&camera, options.strictness)?);
         notes.extend(shutter::notes(&camera));
+        notes.extend(shutter::dark_lights(&camera, &parts.lights, &parts.materials));
         Ok(Scene {
             path: self.path().to_owned(),
             geometry,

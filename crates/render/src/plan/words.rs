@@ -48,6 +48,9 @@ fn explain_shutter(scene: &Scene) -> Option<Decision> {
             "the camera moves: samples of light have times of their row's exposure"
         }
         (true, _) => "something moves: samples of light have times of their row's exposure",
+        (false, _) if scene.camera.lights_change() => {
+            "nothing moves, and lights change: rays have no times, and each row gets the light of its exposure, exactly"
+        }
         (false, true) => "nothing moves: rays have no times, and nothing is paid",
         (false, false) => {
             "nothing moves: rays have no times, and light is multiplied by what the shutter lets through"
