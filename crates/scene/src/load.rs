@@ -53,6 +53,8 @@ impl SceneFile {
             let [width, height] = size;
             self.take(&budget, film, || format!("a picture of {width} x {height} pixels"))?;
         }
+        let slots = self.slots(&options.opener)?;
+        self.check_pixels(&slots, size)?;
         let mut named = OwnParts {
             materials: &own.materials,
             files: Vec::new(),
@@ -75,6 +77,7 @@ impl SceneFile {
         parts.settle_backs(self.spec.cull_backfaces);
         parts.files = instance_files;
         parts.files.extend(own.files);
+        parts.files.extend(slots.into_iter().flat_map(|slot| slot.files));
         for (index, object) in objects.iter().enumerate() {
             self.check_overrides(&parts, object, index)?;
             // The copies are spoken for, as far as each places one mesh.
@@ -277,7 +280,8 @@ impl SceneFile {
         }
         let sensor = self.sensor_behind(&camera)?;
         notes.extend(self.lens_notes(&camera, options.strictness)?);
-        notes.extend(shutter::notes(&camera));
+        let is_whole = self.spec.serial.is_empty();
+        notes.extend(shutter::notes(&camera).into_iter().filter(|_| is_whole));
         notes.extend(shutter::dark_lights(&camera, &parts.lights, &parts.materials));
         Ok(Scene {
             path: self.path().to_owned(),

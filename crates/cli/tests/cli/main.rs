@@ -43,6 +43,7 @@ mod render; // pictures with a closed-form answer
 mod run; // running the command and reading what it left
 mod schema; // the schema by another validator
 mod sensor; // presets, curves, series of a characterisation
+mod serial; // exposures in slots
 mod shards; // renders that are divided or killed, and their pictures
 mod spectral_files; // light in bands by others' readers and writers
 mod spectrum_command; // curves in numbers and drawings

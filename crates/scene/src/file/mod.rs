@@ -8,6 +8,7 @@ mod frames;
 mod lens;
 mod object;
 mod samples;
+mod serial;
 mod settings;
 mod spec;
 
@@ -32,6 +33,7 @@ pub use object::{
 pub use samples::{
     LEAST_SAMPLES, RelativeErrorSpec, SETS, SamplesSpec, SensorNoiseSpec, TimeSpec, Until,
 };
+pub use serial::{PixelsSpec, SlotSpec};
 pub use settings::{
     AccelName, Auto, BuildQuality, Exposure, LightPrecision, LightRow, PlanSpec, RenderSpec,
     ToneMap, TracerRow, TracerSpec,
@@ -208,6 +210,7 @@ impl SceneFile {
             Some((path, why)) => Err(file.fault(&path, why)),
             None => {
                 file.check_times()?;
+                file.check_serial()?;
                 Ok(file)
             }
         }

@@ -105,9 +105,10 @@ impl SceneFile {
         lights.chain(self.spec.materials.values().filter_map(MaterialSpec::modulation))
     }
 
-    /// Whether some object has a motion, or some light a modulation.
+    /// Whether some object has a motion, some light a modulation, or the exposure several slots.
     fn changes(&self) -> bool {
-        self.objects_move() || self.modulations().next().is_some()
+        let has_slots = !self.spec.serial.is_empty();
+        has_slots || self.objects_move() || self.modulations().next().is_some()
     }
 
     /// Refuses frames without times of what moves through poses or transforms, which have them.
