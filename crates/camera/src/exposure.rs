@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::{Camera, CameraRays, FilmSamples, Pose, Shutter, Trajectory};
+use crate::{Camera, CameraRays, FilmSamples, Kinematics, Pose, Shutter, Trajectory};
 use etendue_geometry::{RayBatch, RaysMut};
 
 /// Steps in which the row of a point is found that a moving camera sees; each is nearer by the ratio of the picture's
@@ -21,6 +21,8 @@ pub struct CameraTime {
     pub shutter: Shutter,
     /// The camera's motion, where it moves while the shutter is open.
     pub motion: Option<Trajectory>,
+    /// The same, whether it moves then or not.
+    pub trajectory: Option<Trajectory>,
     /// Whether anything of the scene moves while the shutter is open.
     pub things_move: bool,
     /// Whether some light changes with time.
@@ -100,6 +102,15 @@ impl Camera {
     #[must_use]
     pub fn pose_at(&self, time: f64) -> Pose {
         self.motion().map_or(*self.pose(), |motion| motion.at(time))
+    }
+
+    /// How the camera stands and moves at a time of the frame's clock (s), whether its shutter is open or not.
+    #[must_use]
+    pub fn kinematics(&self, time: f64) -> Kinematics {
+        match self.time.as_deref().and_then(|time| time.trajectory.as_ref()) {
+            Some(trajectory) => trajectory.kinematics(time),
+            None => Kinematics::still(*self.pose()),
+        }
     }
 
     /// The moment (s) at which data layers see what is at a place (rows from the top edge).

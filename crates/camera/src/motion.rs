@@ -9,7 +9,7 @@ use glam::{DMat3, DQuat, DVec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{CameraError, Pose, PoseSpec};
+use crate::{CameraError, Convention, Pose, PoseSpec};
 use etendue_geometry::units::Seconds;
 
 /// A rotation by less than this (radians) has no axis that is known.
@@ -108,6 +108,34 @@ pub struct Kinematics {
     pub acceleration: DVec3,
     /// Its angular velocity (rad/s).
     pub angular_velocity: DVec3,
+}
+
+impl Kinematics {
+    /// Of a camera that stands still.
+    #[must_use]
+    pub fn still(pose: Pose) -> Self {
+        let [velocity, acceleration, angular_velocity] = [DVec3::ZERO; 3];
+        Self { pose, velocity, acceleration, angular_velocity }
+    }
+
+    /// A vector of the world along the camera's axes in a convention.
+    #[must_use]
+    pub fn along_camera(&self, vector: DVec3, convention: Convention) -> DVec3 {
+        convention.ours_from_theirs() * (self.pose.rotation.transpose() * vector)
+    }
+
+    /// What an inertial unit reads that is fixed to the camera at `at` (m, from its origin), with axes of the camera in
+    /// a convention: the angular velocity (rad/s), and the specific force (m/s²): the acceleration without that of
+    /// what falls (`gravity`, m/s², in the world).
+    ///
+    /// At `at` the acceleration is a + ω × (ω × r): ways turn at constant speed, so that ω has no derivative but at poses.
+    #[must_use]
+    pub fn inertial(&self, convention: Convention, at: DVec3, gravity: DVec3) -> [DVec3; 2] {
+        let turn = self.angular_velocity;
+        let arm = self.pose.rotation * (convention.ours_from_theirs() * at);
+        let acceleration = self.acceleration + turn.cross(turn.cross(arm));
+        [turn, acceleration - gravity].map(|vector| self.along_camera(vector, convention))
+    }
 }
 
 impl CameraMotionSpec {
@@ -284,12 +312,6 @@ impl Trajectory {
     /// The pose at a time (s), and how it changes there; at a pose of a list, of the way that begins there.
     #[must_use]
     pub fn kinematics(&self, time: f64) -> Kinematics {
-        let still = |pose| Kinematics {
-            pose,
-            velocity: DVec3::ZERO,
-            acceleration: DVec3::ZERO,
-            angular_velocity: DVec3::ZERO,
-        };
         match self {
             Self::Velocity { start, velocity, angular_velocity } => Kinematics {
                 pose: Pose {
@@ -303,10 +325,12 @@ impl Trajectory {
             Self::Keys(keys) => {
                 let after = keys.partition_point(|key| key.time <= time);
                 if after == 0 {
-                    return still(keys[0].pose);
+                    return Kinematics::still(keys[0].pose);
                 }
                 let key = &keys[after - 1];
-                let Some(next) = keys.get(after) else { return still(key.pose) };
+                let Some(next) = keys.get(after) else {
+                    return Kinematics::still(key.pose);
+                };
                 let length = next.time - key.time;
                 let since = time - key.time;
                 let s = since / length;

@@ -83,7 +83,7 @@ fn an_exposure_is_the_sum_of_its_slots_before_noise() {
             _ => 1.0,
         };
         let part = rendered(&part, &[]);
-        for (k, name) in ["picture", "direct", "light.key", "light.other"].into_iter().enumerate() {
+        for (k, name) in ["picture", "direct", "light_key", "light_other"].into_iter().enumerate() {
             let values = part.array(name);
             let shared = values.iter().enumerate().map(|(i, value)| {
                 let pixel = i / 3;
@@ -140,7 +140,7 @@ fn noise_is_drawn_once() {
     let scene = json!({
         "etendue": 1, "tracer": { "type": "direct" }, "lights": [],
         "camera": { "type": "orthographic", "height": 1, "pose": { "from": [0, 0, 3], "look_at": [0, 0, 0] },
-            "sensor": { "type": "raw", "cfa": "mono", "resolution": [side, side], "read_noise": read_noise,
+            "sensor": { "type": "raw", "cfa": "w", "resolution": [side, side], "read_noise": read_noise,
                         "system_gain": 1, "bit_depth": 16, "black_level": 1000, "full_well": 60000,
                         "dark_current": 0, "quantum_efficiency": 0.5, "exposure": 0.016 } },
         "objects": [{ "shape": "rectangle", "width": 9, "height": 9, "material": "lamp" }],
@@ -185,7 +185,7 @@ fn what_is_no_slot_is_refused_by_its_place() {
     let mut coded = with(json!([{ "duration": "6 ms" }, { "duration": "6 ms" }]));
     coded["camera"]["shutter"]["code"] = json!("10");
     let mut facing = with(json!([{}]));
-    facing["tracer"] = json!("facing");
+    facing["tracer"] = json!({ "type": "facing" });
     facing["layers"] = json!([]);
     for (scene, place, words) in [
         (with(json!([{ "duration": "13 ms" }])), "serial[0]", "exposure"),

@@ -5,6 +5,7 @@ mod camera;
 mod check;
 mod document;
 mod frames;
+mod imu;
 mod lens;
 mod object;
 mod samples;
@@ -26,6 +27,7 @@ pub use accuracy::{AccuracySetting, AccuracySpec, AccuracyUse};
 pub use camera::SensorFile;
 pub use document::{OverrideError, Place};
 pub use frames::{CameraPath, FramesSpec, RigCameraSpec, TrajectoryFormat};
+pub use imu::ImuSpec;
 pub use lens::{ReadLens, is_lens, lens_schema, rays_schema, read_lens, read_lens_at, trace_rays};
 pub use object::{
     AnimationSpec, InstancesSpec, ObjectMotionSpec, ObjectSpec, Scale, Source, TransformSpec, Up,

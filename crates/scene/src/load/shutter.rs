@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::SceneError;
-use crate::file::{ObjectMotionSpec, ObjectSpec, SceneFile, join_index};
+use crate::file::{ImuSpec, ObjectMotionSpec, ObjectSpec, SceneFile, join_index};
 use crate::frames::Frame;
 use crate::import::{Note, NoteKind};
 use etendue_camera::{Camera, CameraMotionSpec, CameraSpec, ShutterKind};
@@ -42,6 +42,9 @@ impl SceneFile {
         {
             let why = format!("{rate} frames a second; give a number above 0");
             return Err(self.fault("render.rate", why));
+        }
+        if let Some((key, why)) = render.imu.as_ref().and_then(ImuSpec::fault) {
+            return Err(self.fault(&format!("render.imu.{key}"), why));
         }
         let camera = self.spec.camera.as_ref();
         let is_timed = |it: &&CameraSpec| it.shutter().is_some() || it.motion().is_some();
