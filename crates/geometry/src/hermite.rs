@@ -156,8 +156,7 @@ mod tests {
                 };
                 for s in [0.0, 0.2, 0.7, 1.0] {
                     let time = from + s * (to - from);
-                    let velocity =
-                        DVec3::new(4.0, -1.0, 0.5) - DVec3::new(0.6, 9.8, -4.0) * time;
+                    let velocity = DVec3::new(4.0, -1.0, 0.5) - DVec3::new(0.6, 9.8, -4.0) * time;
                     let acceleration = -DVec3::new(0.6, 9.8, -4.0);
                     // Roundings of numbers of some tens, over times of a tenth.
                     assert!((points.place(i) + way.at(s) - Thrown::at(time)).length() < 1e-13);

@@ -1,12 +1,12 @@
 //! Rigid and stretching motion within an exposure: where a body is at any time, exactly in f64.
 //!
-//! Between keys the translation is linear or a cubic (Catmull & Rom, *A class of local interpolating
-//! splines*, 1974, with the three-point tangents of uneven times), the rotation goes the shorter way at
+//! Between keys the translation is linear or a cubic ([`crate::hermite`]), the rotation goes the shorter way at
 //! constant speed (Shoemake, *Animating rotation with quaternion curves*, 1985) and the scale is linear.
 //! A steady motion has a velocity and a spin, of any number of revolutions, about an axis through a point.
 
 use glam::{DMat3, DQuat, DVec3};
 
+use crate::hermite::{self, Interpolation, Points, Way};
 use crate::{Bounds, Transform};
 
 /// How a body moves: times are in s from the frame's time.
@@ -28,16 +28,6 @@ struct Key {
     low: DVec3,
     rotation: DQuat,
     scale: DVec3,
-}
-
-/// How translations go between keys.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Interpolation {
-    /// Along straight lines.
-    #[default]
-    Linear,
-    /// Along a Catmull–Rom spline.
-    Cubic,
 }
 
 /// A constant velocity and a constant spin, which are those of the body at all times; at time 0 it is
@@ -260,11 +250,7 @@ impl Motion {
                 continue;
             }
             let seconds = b.time - a.time;
-            let [m, n] = self.tangents(i);
-            let chord = (b.translation - a.translation) / seconds;
-            // The derivative's control points (Farin, *Curves and Surfaces for CAGD*, 4.3).
-            let middle = chord * 3.0 - m - n;
-            let along = m.length().max(n.length()).max(middle.length());
+            let along = self.way(i).fastest();
             let stretch = a.stretch().max(b.stretch());
             let turn = a.rotation.angle_between(b.rotation) / seconds;
             let stretching = (b.scale - a.scale).abs().max_element() / seconds;
@@ -275,26 +261,14 @@ impl Motion {
         fastest * (1.0 + 1e-9)
     }
 
-    /// The velocities (m/s) at both ends of the way from key `i` to the next one.
-    fn tangents(&self, i: usize) -> [DVec3; 2] {
-        let place = |k: usize| self.keys[k].translation;
-        let slope =
-            |k: usize| (place(k + 1) - place(k)) / (self.keys[k + 1].time - self.keys[k].time);
-        if self.interpolation == Interpolation::Linear {
-            return [slope(i); 2];
+    /// The way of the translation from key `i` to the next one.
+    fn way(&self, i: usize) -> Way {
+        let [a, b] = [&self.keys[i], &self.keys[i + 1]];
+        Way {
+            length: b.time - a.time,
+            across: b.translation - a.translation,
+            slopes: hermite::slopes(&Places(&self.keys), i, self.interpolation),
         }
-        let last = self.keys.len() - 1;
-        let tangent = |k: usize| {
-            if k == 0 || k == last {
-                return slope(k.min(last - 1));
-            }
-            let (before, after) = (
-                self.keys[k].time - self.keys[k - 1].time,
-                self.keys[k + 1].time - self.keys[k].time,
-            );
-            (slope(k - 1) * after + slope(k) * before) / (before + after)
-        };
-        [tangent(i), tangent(i + 1)]
     }
 
     fn key_at(&self, time: f64) -> Key {
@@ -304,16 +278,7 @@ impl Motion {
         let Some(&b) = self.keys.get(next) else { return a };
         let seconds = b.time - a.time;
         let s = (time - a.time) / seconds;
-        let way = b.translation - a.translation;
-        let straight = way * s;
-        let moved = match self.interpolation {
-            Interpolation::Linear => straight,
-            Interpolation::Cubic => {
-                // Hermite's cubic as the chord and what the tangents add to it.
-                let [m, n] = self.tangents(i).map(|tangent| tangent * seconds - way);
-                straight + (m * (1.0 - s) - n * s) * (s * (1.0 - s))
-            }
-        };
+        let moved = self.way(i).at(s);
         Key {
             time,
             translation: a.translation,
@@ -321,6 +286,23 @@ impl Motion {
             rotation: turned(a.rotation, b.rotation, s),
             scale: a.scale.lerp(b.scale, s),
         }
+    }
+}
+
+/// The translations of keys.
+struct Places<'a>(&'a [Key]);
+
+impl Points for Places<'_> {
+    fn count(&self) -> usize {
+        self.0.len()
+    }
+
+    fn time(&self, i: usize) -> f64 {
+        self.0[i].time
+    }
+
+    fn place(&self, i: usize) -> DVec3 {
+        self.0[i].translation
     }
 }
 

@@ -299,6 +299,7 @@ impl SceneFile {
             camera_origin,
             cameras: parts.cameras,
             picture: self.spec.picture(),
+            slots: self.spec.serial.len(),
             layers: self.spec.all_layers(),
             render: self.spec.render.clone(),
             plan: self.spec.plan,

@@ -161,7 +161,9 @@ impl Plan {
             sampled(passes.light)
         };
         let rays = pixels
-            * (u64::from(passes.centre) + sampled(passes.mean) + lit * RAYS_A_SAMPLE_OF_LIGHT);
+            * (u64::from(passes.centre)
+                + sampled(passes.mean)
+                + lit * RAYS_A_SAMPLE_OF_LIGHT * scene.slots.max(1) as u64);
         // How well to build for so many rays, and how exactly to trace.
         let triangles = scene.geometry.triangles_unique();
         let quality = forced_quality(scene).unwrap_or_else(|| quality_for(rays, triangles));

@@ -56,7 +56,13 @@ fn explain_shutter(scene: &Scene) -> Option<Decision> {
             "nothing moves: rays have no times, and light is multiplied by what the shutter lets through"
         }
     };
-    Some(Decision::new(Kind::Shutter, shutter.words(), format!("{why}{bodies}")))
+    let slots = match scene.slots {
+        0 => String::new(),
+        count => format!(
+            "; its {count} slots are rendered one after another, and their light is added up"
+        ),
+    };
+    Some(Decision::new(Kind::Shutter, shutter.words(), format!("{why}{bodies}{slots}")))
 }
 
 impl Plan {
