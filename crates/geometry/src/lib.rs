@@ -18,6 +18,7 @@
 //! | [`disk`] | the unit square on the unit disk |
 //! | [`mesh`] | a triangle mesh and its vertex attributes, owned by a `Vec` or by a mapped file |
 //! | [`hermite`] | the curve through points at uneven times |
+//! | [`joint`] | frames that move in each other |
 //! | [`motion`] | where a body is at each time of an exposure |
 //! | [`transform`] | affine maps whose translation keeps 106 bits |
 //! | [`units`] | lengths, angles and times with their units, as files write them |
@@ -28,6 +29,7 @@ pub mod block;
 pub mod coplanar;
 pub mod disk;
 pub mod hermite;
+pub mod joint;
 pub mod mesh;
 pub mod motion;
 pub mod transform;
@@ -38,6 +40,7 @@ pub use batch::{Detail, HitBatch, HitPrecision, MISS, PlacedTriangle, RayBatch, 
 pub use block::{RayBlock, RayBlocks};
 pub use coplanar::Coplanar;
 pub use hermite::Interpolation;
+pub use joint::{Between, Joint, Link, Track};
 pub use mesh::{Buffer, Mesh, Positions, Vertices};
 pub use motion::{Motion, MotionError, Steady};
 pub use transform::Transform;

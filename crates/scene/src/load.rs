@@ -282,6 +282,7 @@ impl SceneFile {
         notes.extend(self.lens_notes(&camera, options.strictness)?);
         let is_whole = self.spec.serial.is_empty();
         notes.extend(shutter::notes(&camera).into_iter().filter(|_| is_whole));
+        notes.extend(shutter::held(&camera, &geometry));
         notes.extend(shutter::dark_lights(&camera, &parts.lights, &parts.materials));
         Ok(Scene {
             path: self.path().to_owned(),

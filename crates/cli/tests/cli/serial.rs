@@ -140,7 +140,7 @@ fn noise_is_drawn_once() {
     let scene = json!({
         "etendue": 1, "tracer": { "type": "direct" }, "lights": [],
         "camera": { "type": "orthographic", "height": 1, "pose": { "from": [0, 0, 3], "look_at": [0, 0, 0] },
-            "sensor": { "type": "raw", "cfa": "w", "resolution": [side, side], "read_noise": read_noise,
+            "sensor": { "type": "raw", "cfa": "wwww", "resolution": [side, side], "read_noise": read_noise,
                         "system_gain": 1, "bit_depth": 16, "black_level": 1000, "full_well": 60000,
                         "dark_current": 0, "quantum_efficiency": 0.5, "exposure": 0.016 } },
         "objects": [{ "shape": "rectangle", "width": 9, "height": 9, "material": "lamp" }],

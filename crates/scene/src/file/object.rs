@@ -136,6 +136,10 @@ pub struct AnimationSpec {
     /// Which of the file's animations, by name or by number from 0; the first when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
+    /// Whether it goes on from there while the shutter is open: nodes move. Skins and morph targets that would are
+    /// refused.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub plays: bool,
 }
 
 /// Which axis of a file's coordinates points up.

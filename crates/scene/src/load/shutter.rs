@@ -7,6 +7,7 @@ use crate::file::{ImuSpec, ObjectMotionSpec, ObjectSpec, SceneFile, join_index};
 use crate::frames::Frame;
 use crate::import::{Note, NoteKind};
 use etendue_camera::{Camera, CameraMotionSpec, CameraSpec, ShutterKind};
+use etendue_geometry::Geometry;
 use etendue_geometry::units::Seconds;
 use etendue_sensor::Sensor;
 use etendue_tracer::{Clock, Light, LightSpec, Material, MaterialSpec, Modulation, ModulationSpec};
@@ -99,7 +100,8 @@ impl SceneFile {
 
     /// Whether some object has a motion.
     fn objects_move(&self) -> bool {
-        self.spec.objects.iter().any(|object| object.motion.is_some())
+        let plays = |object: &ObjectSpec| object.animation.as_ref().is_some_and(|it| it.plays);
+        self.spec.objects.iter().any(|object| object.motion.is_some() || plays(object))
     }
 
     /// What says how lights change with time, and from when on.
@@ -165,6 +167,24 @@ pub(crate) fn notes(camera: &Camera) -> Vec<Note> {
         ))];
     }
     Vec::new()
+}
+
+/// A note where the keys of an animation that plays begin or end while the shutter is open.
+pub(crate) fn held(camera: &Camera, geometry: &Geometry) -> Option<Note> {
+    let [open, close] = camera.exposure_span();
+    let motions = geometry.placements.iter().filter_map(|placement| placement.motion.as_ref());
+    let [first, last] = motions
+        .filter_map(|motion| motion.played_span())
+        .find(|[first, last]| open < close && (*first > open || *last < close))?;
+    Some(Note {
+        kind: NoteKind::Irregular,
+        subject: "animation".to_owned(),
+        message: format!(
+            "its keys last from {first} s to {last} s of the frame, and the shutter is open from {open} s to {close} s: \
+             before and after them nodes stand still"
+        ),
+        count: 1,
+    })
 }
 
 /// A note for each light that is dark as long as the shutter is open.
