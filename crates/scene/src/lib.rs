@@ -37,6 +37,7 @@ mod materials;
 pub mod memory;
 mod parts;
 pub mod scene;
+pub mod serial;
 pub mod shape;
 mod sniff;
 mod words;

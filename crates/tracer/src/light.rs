@@ -12,7 +12,7 @@ use crate::light_tree::Cluster;
 use crate::projector::Projector;
 use crate::reference::SceneView;
 use crate::sky::Sky;
-use crate::{ClearSky, Color, LightGroup, TextureUse};
+use crate::{ClearSky, Color, LightGroup, Modulation, TextureUse};
 
 /// A light of the scene, beside its emissive surfaces.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +27,8 @@ pub struct Light {
     pub spectrum: Option<Arc<Curve>>,
     /// The group that it is of, if it names one.
     pub group: Option<LightGroup>,
+    /// How its strength changes with time, in the frame's clock; `None` when it does not.
+    pub modulation: Option<Arc<Modulation>>,
 }
 
 impl Light {
@@ -41,7 +43,14 @@ impl Light {
         illuminant: None,
         spectrum: None,
         group: None,
+        modulation: None,
     };
+
+    /// A light of equal energy that is of no group, and as strong all the time.
+    #[must_use]
+    pub fn steady(kind: LightKind, color: Color) -> Self {
+        Self { kind, color, illuminant: None, spectrum: None, group: None, modulation: None }
+    }
 
     /// Its intensity in the middle, or of what is measured the mean, over the three colours (W/sr).
     pub(crate) fn intensity(&self) -> f64 {

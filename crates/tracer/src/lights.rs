@@ -18,7 +18,7 @@ use crate::sampling::{Frame, cone_direction, triangle_point};
 use crate::sky::{Sky, uniform_direction};
 use crate::spectral::Spectral;
 use crate::target::{Chosen, Target, TargetKind};
-use crate::{LightGroup, Material, Paint};
+use crate::{LightGroup, Material, Modulation, Paint};
 
 /// All lights of a scene, ready to be chosen from.
 #[derive(Debug)]
@@ -103,9 +103,15 @@ impl Lights {
         };
         let tints = around.materials.iter().map(tint).collect::<Result<_, _>>()?;
         let sampler = LightSampler::new(&candidates, around.geometry.loose_bounds());
-        let of_material = |material: &Material| material.emission.as_ref().and_then(|e| e.group);
+        let part = |group: Option<LightGroup>, modulation: &Option<Arc<Modulation>>| {
+            (group.unwrap_or(LightGroup::OTHER), modulation.clone())
+        };
+        let of_material = |material: &Material| match &material.emission {
+            Some(emission) => part(emission.group, &emission.modulation),
+            None => (LightGroup::OTHER, None),
+        };
         let groups = Groups::of(
-            lights.iter().map(|light| light.group),
+            lights.iter().map(|light| part(light.group, &light.modulation)),
             around.materials.iter().map(of_material),
         );
         let lights = lights.to_vec();
@@ -224,16 +230,17 @@ impl Lights {
         self.triangles.len()
     }
 
-    /// How many groups of lights there are.
+    /// What of their light can be told apart, by the numbers of [`crate::transport::Parts::Groups`]: the lights of
+    /// one group that change with time alike.
     #[must_use]
-    pub fn group_count(&self) -> usize {
-        self.groups.count()
+    pub fn parts(&self) -> &[(LightGroup, Option<Arc<Modulation>>)] {
+        self.groups.parts()
     }
 
-    /// The number of a group; `None` of one that no light is of.
+    /// Whether any of them changes with time.
     #[must_use]
-    pub fn group_number(&self, group: LightGroup) -> Option<usize> {
-        self.groups.number(group)
+    pub fn are_modulated(&self) -> bool {
+        self.parts().iter().any(|(_, modulation)| modulation.is_some())
     }
 
     /// The group of the sky.

@@ -227,6 +227,11 @@ fn inputs() -> Vec<Input> {
         &json!({"glass_catalogs": ["own.agf"]}),
     );
     add(&["LensFile.glass_catalogs"], scene(&camera(&own)), &[("own.agf", AGF)], vec![longer(AGF)]);
+    // Pixels of a slot.
+    let slots = json!({"serial": [{"pixels": "pixels.png"}, {}], "camera": {"type": "pinhole",
+        "pose": {"from": [0, 0, 3], "look_at": [0, 0, 0]}, "sensor": {"resolution": [2, 2]},
+        "shutter": {"exposure": 0.01}}});
+    add(&["PixelsSpec"], scene(&slots), &[("pixels.png", &grey)], vec![longer(&grey)]);
     // The camera itself.
     let pinhole = |fov: u32| {
         json!({"type": "pinhole", "fov": fov, "sensor": {"resolution": [4, 4]},

@@ -32,6 +32,7 @@ mod memory; // refused before it is taken
 mod messages; // what is wrong, in plain words
 mod models; // simpler models of a lens, and OpenCV's fitted to it
 mod motion; // what moves while the shutter is open, crossed with all else
+mod moving_sets; // rolling shutters in data sets of frames, readings of an inertial unit
 mod openings_and_glasses; // f-numbers that a lens lacks, glasses of earlier catalogues and of one's own
 mod orbit; // a data set of a real model
 mod overwriting; // inputs, results of an earlier run, and files of others
@@ -43,6 +44,7 @@ mod render; // pictures with a closed-form answer
 mod run; // running the command and reading what it left
 mod schema; // the schema by another validator
 mod sensor; // presets, curves, series of a characterisation
+mod serial; // exposures in slots
 mod shards; // renders that are divided or killed, and their pictures
 mod spectral_files; // light in bands by others' readers and writers
 mod spectrum_command; // curves in numbers and drawings

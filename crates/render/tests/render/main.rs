@@ -11,6 +11,7 @@ mod light_field;
 mod light_parts;
 mod light_sampling;
 mod many_lights;
+mod modulation;
 mod moving;
 mod overruled;
 mod overruled_camera;

@@ -13,7 +13,9 @@ use super::{
 };
 use crate::clear_sky::SUN_DIAMETER;
 use crate::goniometric::{Goniometric, Photometry};
-use crate::{ClearSky, EnvironmentImage, Light, LightGroup, LightKind, Paint, Projector};
+use crate::{
+    ClearSky, EnvironmentImage, Light, LightGroup, LightKind, ModulationSpec, Paint, Projector,
+};
 
 /// A light as the scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -31,6 +33,9 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
+        /// How its strength changes with time; not at all when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        modulation: Option<ModulationSpec>,
     },
     /// A point that shines into a cone.
     Spot {
@@ -54,6 +59,9 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
+        /// How its strength changes with time; not at all when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        modulation: Option<ModulationSpec>,
     },
     /// Parallel light, as from the sun.
     Directional {
@@ -72,6 +80,9 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
+        /// How its strength changes with time; not at all when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        modulation: Option<ModulationSpec>,
     },
     /// A point that shines by a measured distribution.
     Goniometric {
@@ -95,6 +106,9 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
+        /// How its strength changes with time; not at all when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        modulation: Option<ModulationSpec>,
     },
     /// A point that throws an image, as for structured light.
     Projector {
@@ -124,6 +138,9 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
+        /// How its strength changes with time; not at all when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        modulation: Option<ModulationSpec>,
     },
     /// Light from all around.
     Environment {
@@ -150,6 +167,9 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
+        /// How its strength changes with time; not at all when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        modulation: Option<ModulationSpec>,
     },
     /// A clear sky with its sun, and the ground below the horizon. It is the scene's environment.
     Sky {
@@ -177,6 +197,9 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
+        /// How its strength changes with time; not at all when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        modulation: Option<ModulationSpec>,
     },
 }
 
@@ -206,13 +229,22 @@ impl LightSpec {
     ///
     /// On the first value that describes no light.
     pub fn build(&self, supply: &mut dyn Supply) -> Result<Vec<Light>, Fault> {
+        let modulation = match self.modulation() {
+            Some(modulation) => Some(Arc::new(modulation.build()?)),
+            None => None,
+        };
+        let group = self.group();
+        let lights = self.shining(supply)?.into_iter();
+        Ok(lights.map(|light| Light { group, modulation: modulation.clone(), ..light }).collect())
+    }
+
+    /// The light, of no group and as strong all the time.
+    fn shining(&self, supply: &mut dyn Supply) -> Result<Vec<Light>, Fault> {
         let (key, color, illuminant) = match self {
-            Self::Sky { turbidity, sun, ground_albedo, scale, up, visible, group: _ } => {
+            Self::Sky { turbidity, sun, ground_albedo, scale, up, visible, .. } => {
                 let sky = ClearSky::new(*turbidity, sun.elevation, *ground_albedo, sun.shines);
                 let sky = sky.ok_or_else(|| Fault::new("", "is no sky that the model knows"))?;
-                let lights = shining(sky, sun.azimuth, *scale, (*up, *visible))?;
-                let group = self.group();
-                return Ok(lights.into_iter().map(|light| Light { group, ..light }).collect());
+                return shining(sky, sun.azimuth, *scale, (*up, *visible));
             }
             Self::Point { intensity, illuminant, .. }
             | Self::Spot { intensity, illuminant, .. }
@@ -276,7 +308,21 @@ impl LightSpec {
                 LightKind::Environment { image, turn, visible: *visible }
             }
         };
-        Ok(vec![Light { kind, color, illuminant: curve, spectrum: None, group: self.group() }])
+        Ok(vec![Light { illuminant: curve, ..Light::steady(kind, color) }])
+    }
+
+    /// How its strength changes with time, if it does.
+    #[must_use]
+    pub fn modulation(&self) -> Option<&ModulationSpec> {
+        match self {
+            Self::Point { modulation, .. }
+            | Self::Spot { modulation, .. }
+            | Self::Directional { modulation, .. }
+            | Self::Goniometric { modulation, .. }
+            | Self::Projector { modulation, .. }
+            | Self::Environment { modulation, .. }
+            | Self::Sky { modulation, .. } => modulation.as_ref(),
+        }
     }
 
     /// The group that it is of, if it names one.
@@ -318,21 +364,19 @@ fn shining(
     }
     // Clockwise from above.
     let turn = tilted(up, -azimuth)?;
+    let disk = LightKind::Directional {
+        along: -(turn * sky.toward_sun()),
+        cos_radius: (0.5 * SUN_DIAMETER).to_radians().cos(),
+    };
     let sun = Light {
-        kind: LightKind::Directional {
-            along: -(turn * sky.toward_sun()),
-            cos_radius: (0.5 * SUN_DIAMETER).to_radians().cos(),
-        },
-        color: sky.sun().map(|part| part * scale),
-        illuminant: None,
         spectrum: sky.sun_spectrum().scaled(scale).ok().map(Arc::new),
-        group: None,
+        ..Light::steady(disk, sky.sun().map(|part| part * scale))
     };
     let shines = sky.is_sunlit();
     let image = EnvironmentImage::ClearSky(Box::new(sky));
     let kind = LightKind::Environment { image, turn, visible };
     let color = [scale; 3];
-    let dome = Light { kind, color, illuminant: None, spectrum: None, group: None };
+    let dome = Light::steady(kind, color);
     Ok(if shines { vec![dome, sun] } else { vec![dome] })
 }
 

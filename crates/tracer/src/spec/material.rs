@@ -13,7 +13,9 @@ use super::{
 use crate::bsdf::SECOND_COSINE;
 use crate::material::Alpha;
 use crate::scattering::{Absorption, Glass, GltfSurface};
-use crate::{Conductor, Emission, LightGroup, Material, Paint, Scattering, SceneCurve};
+use crate::{
+    Conductor, Emission, LightGroup, Material, ModulationSpec, Paint, Scattering, SceneCurve,
+};
 
 /// A material as the scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -125,6 +127,9 @@ pub enum MaterialSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
+        /// How its strength changes with time; not at all when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        modulation: Option<ModulationSpec>,
     },
     /// Matte squares of two colours over the surface's texture coordinates.
     Checker {
@@ -250,7 +255,7 @@ impl MaterialSpec {
                 Material::new(name, paint("color", color, supply)?, scattering)
             }
             Self::Gltf { .. } => self.gltf(name, supply)?,
-            Self::Emissive { radiance, illuminant, two_sided, group } => {
+            Self::Emissive { radiance, illuminant, two_sided, group, modulation } => {
                 let (radiance, illuminant) =
                     radiant_paint(("radiance", radiance), *illuminant, supply)?;
                 let emission = Emission {
@@ -259,6 +264,10 @@ impl MaterialSpec {
                     illuminant,
                     two_sided: *two_sided,
                     group: *group,
+                    modulation: match modulation {
+                        Some(modulation) => Some(Arc::new(modulation.build()?)),
+                        None => None,
+                    },
                 };
                 let plain = Material::new(name, radiance, Scattering::Black);
                 Material { emission: Some(emission), ..plain }
@@ -324,6 +333,20 @@ impl MaterialSpec {
         let plain = Material::new(name, paint, Scattering::Gltf(Box::new(surface)));
         let alpha = if *opacity < 1.0 { Alpha::Blend { factor: *opacity } } else { Alpha::Opaque };
         Ok(Material { alpha, ..plain })
+    }
+
+    /// How its strength changes with time, if it shines and does.
+    #[must_use]
+    pub fn modulation(&self) -> Option<&ModulationSpec> {
+        match self {
+            Self::Emissive { modulation, .. } => modulation.as_ref(),
+            Self::Matte { .. }
+            | Self::Mirror { .. }
+            | Self::Metal { .. }
+            | Self::Dielectric { .. }
+            | Self::Gltf { .. }
+            | Self::Checker { .. } => None,
+        }
     }
 
     /// The group of lights that it is of, if it shines and names one.
