@@ -218,7 +218,7 @@ pub(crate) fn field(
         .map(|i| aim(beam, sphere, outline, pupil.place(i)))
         .collect();
     let is_lit = |i: usize| aimed[i].is_some_and(|ray| ray.throughput > 0.0);
-    let clear: Vec<[f64; 2]> = (0..cells * cells)
+    let clear: Vec<([f64; 2], DVec2)> = (0..cells * cells)
         .into_par_iter()
         .map(|i| {
             let around = neighbours(i, cells);
@@ -231,18 +231,19 @@ pub(crate) fn field(
                     };
                     cell(beam, middle, ray.turn * step)
                 }
-                Some(ray) if lit > 0 => [ray.throughput, ray.throughput.sqrt()],
-                _ => [0.0; 2],
+                Some(ray) if lit > 0 => ([ray.throughput, ray.throughput.sqrt()], DVec2::ZERO),
+                _ => ([0.0; 2], DVec2::ZERO),
             }
         })
         .collect();
     let length = 1.0 / (wavelength * 1e-6);
     for i in 0..cells * cells {
         let around = || neighbours(i, cells).into_iter().find_map(|other| aimed[other]);
-        let [passes, amplitude] = clear[i];
+        let ([passes, amplitude], lean) = clear[i];
         let Some(ray) = aimed[i].or_else(|| around().filter(|_| passes > 0.0)) else { continue };
         let density = ray.turn.determinant().abs();
         pupil.clear[i] = passes;
+        pupil.lean[i] = lean * step;
         pupil.power[i] = passes * density;
         pupil.amplitude[i] = amplitude * density.sqrt();
         pupil.waves[i] = ray.ahead * length;
@@ -273,17 +274,19 @@ fn neighbours(i: usize, cells: usize) -> Vec<usize> {
     near(row).flat_map(|row| near(column).map(move |column| row * cells + column)).collect()
 }
 
-/// What passes of a cell, and the mean of its root.
-fn cell(beam: &Beam<'_>, middle: DVec2, turn: DMat2) -> [f64; 2] {
+/// What passes of a cell, the mean of its root, and the middle of that from the cell's own (in cells).
+fn cell(beam: &Beam<'_>, middle: DVec2, turn: DMat2) -> ([f64; 2], DVec2) {
     let offset = |k: u32| (f64::from(k) + 0.5) / f64::from(FINE) - 0.5;
-    let (mut sum, mut roots) = (0.0, 0.0);
+    let (mut sum, mut roots, mut lean) = (0.0, 0.0, DVec2::ZERO);
     for k in 0..FINE * FINE {
         let at = DVec2::new(offset(k % FINE), offset(k / FINE));
         let passes = beam.throughput(middle + turn * at);
         sum += passes;
         roots += passes.sqrt();
+        lean += at * passes.sqrt();
     }
-    [sum, roots].map(|sum| sum / f64::from(FINE * FINE))
+    let lean = if roots > 0.0 { lean / roots } else { lean };
+    ([sum, roots].map(|sum| sum / f64::from(FINE * FINE)), lean)
 }
 
 /// The ray that meets the sphere at `target`.

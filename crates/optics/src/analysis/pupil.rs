@@ -26,6 +26,8 @@ pub struct PupilField {
     pub chief_slopes: DVec2,
     /// What passes of the light of each cell (0..=1).
     pub clear: Vec<f64>,
+    /// From the middle of each cell to the middle of its clear part (optical direction cosines).
+    pub lean: Vec<DVec2>,
     /// Amplitude: the root of what a cell's middle has of power, times the share that is clear.
     pub amplitude: Vec<f64>,
     /// Power of each cell.
@@ -55,6 +57,7 @@ impl PupilField {
             index,
             chief_slopes: DVec2::ZERO,
             clear: zeros(),
+            lean: places(),
             amplitude: zeros(),
             power: zeros(),
             waves: zeros(),
@@ -81,9 +84,12 @@ impl PupilField {
             let place = pupil.place(i) / numerical_aperture;
             let fine = step / numerical_aperture / f64::from(FINE);
             let offset = |k: u32| (f64::from(k) + 0.5 - 0.5 * f64::from(FINE)) * fine;
-            let places = (0..FINE * FINE)
-                .filter(|k| passes(place + DVec2::new(offset(k % FINE), offset(k / FINE))));
-            let clear = places.count() as f64 / f64::from(FINE * FINE);
+            let offsets = (0..FINE * FINE).map(|k| DVec2::new(offset(k % FINE), offset(k / FINE)));
+            let lit: Vec<DVec2> = offsets.filter(|&offset| passes(place + offset)).collect();
+            let clear = lit.len() as f64 / f64::from(FINE * FINE);
+            if clear > 0.0 {
+                pupil.lean[i] = lit.iter().sum::<DVec2>() / lit.len() as f64 * numerical_aperture;
+            }
             (pupil.clear[i], pupil.amplitude[i], pupil.power[i]) = (clear, clear, clear);
             pupil.waves[i] = waves(place);
             let h = 1e-5;
@@ -107,6 +113,12 @@ impl PupilField {
     /// The cells that pass light.
     pub fn lit(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.clear.len()).filter(|&i| self.clear[i] > 0.0)
+    }
+
+    /// The waves in the middle of a cell's clear part.
+    pub(super) fn mean_waves(&self, i: usize) -> f64 {
+        // ∂W/∂p is where the ray lands.
+        self.waves[i] + self.landing[i].dot(self.lean[i]) / (self.wavelength * 1e-6)
     }
 
     /// All power.

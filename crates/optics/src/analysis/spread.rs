@@ -114,7 +114,7 @@ impl WeightedFields {
             let length = field.wavelength * 1e-6;
             let mut sum = Complex64::ZERO;
             for i in field.lit() {
-                let waves = field.waves[i] - field.place(i).dot(place) / length;
+                let waves = field.mean_waves(i) - field.place(i).dot(place) / length;
                 sum += Complex64::from_polar(averaged(field, i), std::f64::consts::TAU * waves);
             }
             let cycles = place * (field.step / length);
@@ -189,7 +189,7 @@ impl PointSpread {
                 .map(|i| {
                     let p = field.place(i) / field.index;
                     let direction = p.extend((1.0 - p.length_squared()).max(0.0).sqrt());
-                    (direction, averaged(field, i), field.waves[i])
+                    (direction, averaged(field, i), field.mean_waves(i))
                 })
                 .collect();
             let scale = weight * norm(field);
@@ -282,7 +282,7 @@ fn spectrum(field: &PupilField, size: usize) -> Vec<Complex64> {
     let offset = size / 2 - field.cells / 2;
     for i in field.lit() {
         let (row, column) = (i / field.cells + offset, i % field.cells + offset);
-        let angle = std::f64::consts::TAU * field.waves[i];
+        let angle = std::f64::consts::TAU * field.mean_waves(i);
         grid[row * size + column] = Complex64::from_polar(averaged(field, i), angle);
     }
     transform(&mut grid, size);

@@ -29,7 +29,7 @@ pub const NYQUIST: f64 = 0.5;
 const COMFORTABLE: f64 = 0.1;
 
 /// Cells a side of a grid that is chosen, in the least.
-pub const USUAL_CELLS: usize = 128;
+pub const USUAL_CELLS: usize = 192;
 
 /// The sphere that a wavefront is compared with.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
@@ -112,7 +112,7 @@ pub struct Wavefront {
 /// How many cells a pupil gets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Cells {
-    /// As many as the wavefront needs, at least 128 a side.
+    /// As many as the wavefront needs, at least 192 a side.
     #[default]
     Needed,
     /// A number a side; an error when they are too few.

@@ -1,6 +1,6 @@
 //! Point spread and transfer functions of pupils that have closed forms or one-dimensional integrals.
 //!
-//! The tolerance is 1e-4 of the peak, and of the modulation, throughout: what sums over 128 to 192
+//! The tolerance is 1e-4 of the peak, and of the modulation, throughout: what sums over 128 to 256
 //! cells across a pupil leave of its edge.
 
 use std::f64::consts::{FRAC_2_PI, PI, TAU};
@@ -78,13 +78,14 @@ fn a_clear_circle_makes_airys_pattern() {
     let (place, ratio) = strehl(&fields);
     assert!(place.length() < 1e-9 && (ratio - 1.0).abs() < 1e-9, "{place} {ratio}");
     // All rays land on one point.
-    assert_eq!(geometric_modulation(&fields, 1000.0), [1.0; 2]);
+    let all = geometric_modulation(&fields, 1000.0);
+    assert!(all.iter().all(|value| (value - 1.0).abs() < 1e-9), "{all:?}");
 }
 
 #[test]
 fn an_annulus_has_a_sharper_peak_and_brighter_rings() {
     let inner = 0.5;
-    let fields = pupil(192, inner, |_| 0.0);
+    let fields = pupil(256, inner, |_| 0.0);
     let spread = PointSpread::by_fft(&fields, 1);
     let amplitude = |x: f64| (jinc(x) - inner * inner * jinc(inner * x)) / (1.0 - inner * inner);
     let off = worst_spread(&spread, 20.0, |p| amplitude(TAU * p.length()).powi(2));
@@ -172,11 +173,11 @@ fn single_zernike_terms_spread_light_as_sums_over_rings_say() {
     for (index, waves) in [(4, 0.6), (5, 0.5), (6, -0.5), (7, 0.4), (8, 0.4), (9, 0.5), (10, 0.4), (16, 0.3)] {
         let term = terms[index - 1];
         let shape = move |p: DVec2| waves * term.value(p);
-        let fields = pupil(128, 0.0, shape);
+        let fields = pupil(192, 0.0, shape);
         let spread = PointSpread::by_fft(&fields, 1);
         let some = (0..spread.values.len()).filter(|i| {
             let place = spread.place(*i) * NA / LENGTH;
-            place.length() < 2.5 && i % 3 == 0
+            place.length() < 2.5 && i % 7 == 0
         });
         for i in some {
             let expected = by_rings(&shape, spread.place(i) * NA / LENGTH);

@@ -36,7 +36,7 @@ fn a_hyperbola_behind_a_plane_makes_a_perfect_sphere_of_a_parallel_beam() {
     let wave = wavefront(&train, ObjectPoint::field(0.0), 6.0 + 50.0);
     assert!(wave.pupil.statistics().peak_to_valley < NO_WAVES, "{:?}", wave.pupil.statistics());
     // Off the axis it has coma, and much.
-    let wave = wavefront(&train, ObjectPoint::field(0.5), 6.0 + 50.0);
+    let wave = wavefront(&train, ObjectPoint::field(0.1), 6.0 + 50.0);
     assert!(wave.pupil.statistics().peak_to_valley > 1.0);
 }
 
@@ -179,7 +179,7 @@ fn the_centre_of_the_pattern_is_that_of_the_rays() {
     let spot = pupil.lit().map(|i| pupil.landing[i].length()).fold(0.0, f64::max);
     // The edge of the pupil has no slope of its own, and cells there count less.
     assert!((waves - rays).length() < 0.02 * spot, "{waves} {rays} of {spot}");
-    assert!(rays.y.abs() > 0.05 * spot, "coma is there to be seen: {rays} of {spot}");
+    assert!(rays.y.abs() > 0.03 * spot, "coma is there to be seen: {rays} of {spot}");
 }
 
 #[test]
