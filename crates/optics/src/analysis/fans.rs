@@ -30,6 +30,14 @@ pub struct Fans {
     pub field: String,
     /// The wavelength (nm).
     pub wavelength: f64,
+    /// Where the chief ray is begun (mm): a point of the plane in which rays from infinity start in step,
+    /// or the object point.
+    pub origin: [f64; 3],
+    /// The chief ray's direction there.
+    pub direction: [f64; 3],
+    /// Half the paraxial entrance pupil, by which `pupil` is counted: mm on that plane, or a direction
+    /// cosine at a near object.
+    pub half_pupil: f64,
     /// Along y in the pupil: those rays that pass.
     pub tangential: Vec<FanRay>,
     /// Along x.
@@ -80,9 +88,13 @@ pub fn fans(
         };
         (-HALF..=HALF).filter_map(ray).collect()
     };
+    let start = beam.start().ok_or(AnalysisError::NoChiefRay { field: object.name() })?;
     Ok(Fans {
         field: object.name(),
         wavelength: at.wavelength(),
+        origin: start.position,
+        direction: start.direction,
+        half_pupil: beam.reach(),
         tangential: fan(DVec2::Y),
         sagittal: fan(DVec2::X),
     })

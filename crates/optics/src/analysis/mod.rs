@@ -6,6 +6,7 @@
 //! | [`pupil`] | the field in the exit pupil on a grid of cells: amplitude, power and waves |
 //! | [`aim`](mod@aim) | rays to the middles of those cells, and how much of each cell is clear |
 //! | [`wavefront`] | optical path differences against a reference sphere, and their statistics |
+//! | [`colours`] | one point at several wavelengths |
 //! | [`zernike`] | Zernike polynomials, Fringe and Noll, and their fit to a wavefront |
 //! | [`least_squares`] | a small linear fit |
 //! | [`spread`] | point spread functions by FFT and by Huygens' sum, encircled energy, lines |
@@ -13,15 +14,18 @@
 //! | [`astigmatism`] | sagittal and tangential foci by Coddington's equations |
 //! | [`seidel`](mod@seidel) | Seidel's and the chromatic sums by surface |
 //! | [`conjugate`] | where the object is: by distance, magnification, numerical aperture |
+//! | [`report`] | all of it in one piece; its tables, figures and page |
 //! | [`transfer`] | modulation transfer, by diffraction and by rays |
 
 pub mod aim;
 pub mod astigmatism;
+pub mod colours;
 pub mod conjugate;
 pub mod fans;
 pub mod least_squares;
 pub mod object;
 pub mod pupil;
+pub mod report;
 pub mod seidel;
 pub mod spread;
 pub mod transfer;

@@ -26,7 +26,7 @@ const LEAST_RADIUS: f64 = 1e-3;
 pub const NYQUIST: f64 = 0.5;
 
 /// The change from cell to cell that grids are chosen for (waves).
-const COMFORTABLE: f64 = 0.1;
+pub(super) const COMFORTABLE: f64 = 0.1;
 
 /// Cells a side of a grid that is chosen, in the least.
 pub const USUAL_CELLS: usize = 192;
