@@ -6,7 +6,7 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-aspheres bench-bands bench-gaps bench-decisions bench-window docs-figures docs-charts \
+.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens lens-waves bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-aspheres bench-bands bench-gaps bench-decisions bench-window docs-figures docs-charts \
 	docs-stability generated gallery light-fields fingerprints fuzz fuzz-smoke fuzz-seeds sanitize clean
 
 help:
@@ -22,6 +22,7 @@ help:
 	@echo "make dist          a tarball, a .deb and a wheel in out/dist, tried in bare Debian 12 and 13 roots"
 	@echo "make bench         measure everything, write docs/benchmarks.md"
 	@echo "make bench-peers   add other programs at the same job, from PyPI"
+	@echo "make lens-waves    lenses in waves beside optiland, from PyPI"
 	@echo "make bench-lens    time rays through a lens against optiland, from PyPI"
 	@echo "make bench-python  rays from Python against Rust, Open3D and embreex; frames against their rays"
 	@echo "make bench-light   light against Mitsuba 3, from PyPI; writes docs/benchmarks-light.md"
@@ -122,6 +123,10 @@ bench-cycles: setup
 bench-lens:
 	cargo build --release -p etendue-optics --example trace_lens
 	scripts/bench-peers.sh lens_peers.py $(ARGS)
+
+lens-waves:
+	cargo build --release -p etendue-cli --no-default-features
+	scripts/bench-peers.sh lens_waves.py $(ARGS)
 
 bench-sensor:
 	cargo build --release -p etendue-sensor --example expose_frame

@@ -54,3 +54,4 @@ mod tools; // check, plan, schema, version
 mod validation; // the page of effects, their sources and their tests
 mod view; // the window, as far as there is none
 mod views; // where a camera without a pose stands, and which way is up
+mod waves; // wavefronts, MTF and reports of lenses, and what they are refused
