@@ -5,7 +5,7 @@ use etendue_scene::file::SETS;
 use etendue_scene::{MemoryForecast, Scene};
 use etendue_sensor::{Sensor, SensorKind};
 use etendue_spectrum::Bands;
-use etendue_tracer::{ClearSky, EnvironmentImage, LayerSpec, Material, texture};
+use etendue_tracer::{ClearSky, EnvironmentImage, EnvironmentMap, LayerSpec, Material, texture};
 
 use crate::film::bytes_of_plane;
 use crate::images::{environment, wanted_images};
@@ -155,6 +155,14 @@ fn images(scene: &Scene, plan: &Plan) -> u64 {
             )]
             let bytes = (decodable(texture::decoded_bytes(path)) as f64 * ENVIRONMENT) as u64;
             textures.saturating_add(bytes)
+        }
+        Some(EnvironmentImage::Cube(cube)) => {
+            let [width, height] = cube.size();
+            let looks = match plan.layers.contains(&LayerSpec::Radiance) {
+                true => EnvironmentMap::LOOK_BYTES * (width * height) as u64,
+                false => 0,
+            };
+            textures.saturating_add(cube.bytes_in(&plan.bands)).saturating_add(looks)
         }
         Some(EnvironmentImage::ClearSky(_)) if plan.layers.contains(&LayerSpec::Radiance) => {
             textures.saturating_add(ClearSky::map_bytes(plan.bands != Bands::Rgb))

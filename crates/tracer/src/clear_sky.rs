@@ -191,7 +191,7 @@ impl ClearSky {
     #[must_use]
     pub fn map_bytes(spectral: bool) -> u64 {
         let spectra = if spectral { size_of::<[f32; spectral_sky::COUNT]>() } else { 0 };
-        (SIZE[0] * SIZE[1] * (size_of::<[f32; 3]>() + 2 * size_of::<f64>() + spectra)) as u64
+        (SIZE[0] * SIZE[1]) as u64 * (EnvironmentMap::LOOK_BYTES + spectra as u64)
     }
 }
 

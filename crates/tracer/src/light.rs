@@ -12,7 +12,7 @@ use crate::light_tree::Cluster;
 use crate::projector::Projector;
 use crate::reference::SceneView;
 use crate::sky::Sky;
-use crate::{ClearSky, Color, LightGroup, TextureUse};
+use crate::{ClearSky, Color, Cube, LightGroup, TextureUse};
 
 /// A light of the scene, beside its emissive surfaces.
 #[derive(Debug, Clone, PartialEq)]
@@ -155,6 +155,8 @@ pub enum EnvironmentImage {
     ClearSky(Box<ClearSky>),
     /// A file.
     File(std::path::PathBuf),
+    /// Light by wavelength.
+    Cube(Arc<Cube>),
 }
 
 impl EnvironmentImage {

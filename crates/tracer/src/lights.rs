@@ -17,7 +17,7 @@ use crate::sampling::{Frame, cone_direction, triangle_point};
 use crate::sky::{Sky, uniform_direction};
 use crate::spectral::Spectral;
 use crate::target::{Chosen, Target, TargetKind};
-use crate::{LightGroup, Material, Paint};
+use crate::{LightGroup, Material, Paint, SceneCube};
 
 /// All lights of a scene, ready to be chosen from.
 #[derive(Debug)]
@@ -95,6 +95,9 @@ impl Lights {
             }
         }
         let tint = |material: &Material| -> Result<Option<Vec<f64>>, NoOverlap> {
+            if let Some(SceneCube { cube, .. }) = material.emitted_cube() {
+                cube.overlaps(spectral.bands())?;
+            }
             match material.emission.as_ref().and_then(|e| e.illuminant.as_ref()) {
                 Some(illuminant) => spectral.emission(illuminant).map(Some),
                 None => Ok(None),

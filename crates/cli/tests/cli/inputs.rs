@@ -183,6 +183,9 @@ fn inputs() -> Vec<Input> {
     let (one, two) = (cube(0.5), cube(0.25));
     let bands = json!({"cube": "c.npy", "bands": [400, 500, 600, 700, 800]});
     add(&["CubeSpec.cube"], scene(&matte(bands)), &[("c.npy", &one)], vec![two]);
+    let sky = json!({"lights": [{"type": "environment", "image":
+        {"cube": "c.npy", "bands": [400, 500, 600, 700, 800]}}]});
+    add(&["SkyCubeSpec.cube"], scene(&sky), &[("c.npy", &cube(0.5))], vec![cube(0.25)]);
     let header: &[u8] = b"ENVI\nsamples = 1\nlines = 1\nbands = 2\ndata type = 1\ninterleave = bsq\nheader offset = 0\n\
         reflectance scale factor = 255\nwavelength units = nm\nwavelength = {450, 550}\n";
     let texel: &[u8] = &[50, 90];

@@ -28,12 +28,18 @@ pub(super) fn illumination(scene: &Scene) -> Illumination {
             (None, Some(EnvironmentImage::ClearSky(sky))) => {
                 sky.typical_spectra().into_iter().for_each(&mut add);
             }
+            // Any place of a cube is a sum of these.
+            (None, Some(EnvironmentImage::Cube(cube))) => {
+                cube.parts().into_iter().for_each(&mut add);
+            }
             (None, _) => add(of(&light.illuminant)),
         }
         let image = match &light.kind {
             LightKind::Environment { image, .. } => match image {
                 EnvironmentImage::Studio | EnvironmentImage::File(_) => true,
-                EnvironmentImage::Constant | EnvironmentImage::ClearSky(_) => false,
+                EnvironmentImage::Constant
+                | EnvironmentImage::ClearSky(_)
+                | EnvironmentImage::Cube(_) => false,
             },
             LightKind::Projector(projector) => is_coloured(&projector.image),
             LightKind::Point(_)
@@ -106,6 +112,10 @@ pub(super) fn light(scene: &Scene, bands: &Bands) -> Vec<f64> {
                 // The zenith stands for the dome, whose radiance falls on a floor π times.
                 let zenith = sky.dome_spectrum(DVec3::Y);
                 add(of_curve(&zenith), Some(PI * light.color[0]));
+            }
+            (None, Some(EnvironmentImage::Cube(cube))) => {
+                let mean = cube.mean_over_the_sphere();
+                add(mean.map(|mean| of_curve(&mean)).unwrap_or_default(), None);
             }
             (None, _) => add(tinted(&light.color, &light.illuminant), None),
         }

@@ -3,17 +3,20 @@
 use std::sync::Arc;
 
 use etendue_geometry::glam::{DMat3, DQuat, DVec3};
-use etendue_spectrum::Illuminant;
+use etendue_spectrum::{Grid, Illuminant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Bound, ColorSpec, Emitted, Fault, PaintSpec, Supply, emitted, in_bounds, one, radiant_paint,
-    white,
+    Bound, ColorSpec, CubeSpec, Emitted, Fault, PaintSpec, Supply, emitted, in_bounds, one,
+    radiant_paint, unit_scale, white,
 };
 use crate::clear_sky::SUN_DIAMETER;
 use crate::goniometric::{Goniometric, Photometry};
-use crate::{ClearSky, EnvironmentImage, Light, LightGroup, LightKind, Paint, Projector};
+use crate::texture::{Filter, Wrap};
+use crate::{
+    ClearSky, Cube, CubeKind, EnvironmentImage, Light, LightGroup, LightKind, Paint, Projector,
+};
 
 /// A light as the scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -130,10 +133,10 @@ pub enum LightSpec {
         /// Radiance, linear RGB; multiplies the image.
         #[serde(default = "white")]
         radiance: ColorSpec,
-        /// A latitude-longitude image (HDR, EXR, PNG or JPEG), relative to the scene file. Its middle
+        /// A latitude-longitude image (HDR, EXR, PNG or JPEG), relative to the scene file, or a cube. Its middle
         /// is at −Z, its top at +Y.
         #[serde(default)]
-        image: Option<String>,
+        image: Option<SkyImageSpec>,
         /// Turns the image about its top (degrees, counter-clockwise from above).
         #[serde(default)]
         rotate: f64,
@@ -178,6 +181,28 @@ pub enum LightSpec {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
     },
+}
+
+/// A latitude-longitude image of light from all around.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum SkyImageSpec {
+    /// A file of colours: HDR, EXR, PNG or JPEG, relative to the scene file.
+    Colors(String),
+    /// A file of light by wavelength.
+    Cube(SkyCubeSpec),
+}
+
+/// A file of light by wavelength, of 0 or more, from all around: dark beyond the outer edges of its bands.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SkyCubeSpec {
+    /// The file, relative to the scene file: NPY, `[row][column][band]`; ENVI, by its header or its numbers; or EXR
+    /// with channels `S0.550,0nm` (Fichet et al. 2021).
+    pub cube: String,
+    /// The wavelengths of the bands (nm) of an NPY file; the others say their own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bands: Option<Grid>,
 }
 
 /// Where the sun of a sky stands.
@@ -264,12 +289,25 @@ impl LightSpec {
                 let shape = (*fov, *aspect, image);
                 LightKind::Projector(Box::new(projector(ends, DVec3::from(*up), shape)?))
             }
-            Self::Environment { image, rotate, up, visible, .. } => {
+            Self::Environment { image, rotate, up, visible, radiance, .. } => {
                 let image = match image {
                     None => EnvironmentImage::Constant,
-                    Some(written) => {
+                    Some(SkyImageSpec::Colors(written)) => {
                         let found = supply.file(written).map_err(|why| Fault::new("image", why))?;
                         EnvironmentImage::File(found)
+                    }
+                    Some(SkyImageSpec::Cube(spec)) => {
+                        let stray = match (radiance, &curve) {
+                            (ColorSpec::Curve(_), _) => Some("radiance"),
+                            (ColorSpec::Rgb(_), Some(_)) => Some("illuminant"),
+                            (ColorSpec::Rgb(_), None) => None,
+                        };
+                        if let Some(key) = stray {
+                            let why = "is a spectrum beside a cube of `image`, which has spectra of its own: leave \
+                                       one of them out";
+                            return Err(Fault::new(key, why));
+                        }
+                        EnvironmentImage::Cube(sky_cube(spec, supply)?)
                     }
                 };
                 let turn = tilted(*up, *rotate)?;
@@ -292,6 +330,19 @@ impl LightSpec {
             | Self::Sky { group, .. } => *group,
         }
     }
+}
+
+/// The cube of a sky.
+fn sky_cube(spec: &SkyCubeSpec, supply: &mut dyn Supply) -> Result<Arc<Cube>, Fault> {
+    let spec = CubeSpec {
+        cube: spec.cube.clone(),
+        bands: spec.bands.clone(),
+        wrap: Wrap::default(),
+        filter: Filter::default(),
+        repeat: unit_scale(),
+    };
+    let below = |fault: Fault| Fault::new(format!("image.{}", fault.key), fault.why);
+    Ok(Arc::new(supply.cube(&spec, CubeKind::Light).map_err(below)?))
 }
 
 fn unit(key: &str, v: DVec3) -> Result<DVec3, Fault> {

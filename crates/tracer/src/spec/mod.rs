@@ -14,7 +14,7 @@ use etendue_spectrum::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use self::light::{LightSpec, SunSpec};
+pub use self::light::{LightSpec, SkyCubeSpec, SkyImageSpec, SunSpec};
 pub use self::material::{AbbeSpec, AbsorptionSpec, IorSpec, MaterialSpec};
 use crate::texture::{Filter, Wrap};
 use crate::{Color, Cube, CubeKind, Ior, Paint, SceneCube, SceneCurve};
