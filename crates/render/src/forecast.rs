@@ -115,12 +115,17 @@ fn bytes_of_layer(layer: LayerSpec, plan: &Plan) -> u64 {
 /// Bytes a pixel of what a sensor makes of the light: its bands, the numbers, their preview, and
 /// expected values and variances.
 fn bytes_of_sensor(scene: &Scene, sensor: &Sensor, plan: &Plan) -> u64 {
-    let (bands, depth) = (plan.bands.count() as u64, sensor.depth() as u64);
+    let bands = plan.bands.count() as u64;
+    bytes_exposed(sensor, bands, if expose::has_spectrum(scene) { bands } else { 0 })
+}
+
+/// Bytes a pixel of light in so many bands, of so many of another copy of it, and of what a sensor makes of it.
+pub(crate) fn bytes_exposed(sensor: &Sensor, bands: u64, cube: u64) -> u64 {
+    let depth = sensor.depth() as u64;
     let channels = match sensor.spec().kind {
         SensorKind::Raw => 3,
         SensorKind::Rgb | SensorKind::Multispectral => depth,
     };
-    let cube = if expose::has_spectrum(scene) { bands } else { 0 };
     let numbers = U16 * depth * if depth > 1 { 2 } else { 1 };
     // Demosaiced, then in linear sRGB, pixel by pixel and plane by plane.
     let preview = F32 * (channels + 3 + 3) + PNG;

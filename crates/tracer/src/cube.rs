@@ -98,11 +98,8 @@ impl Cube {
         let mut cube = Self { kind, size, axis, values, looks: Vec::new(), wrap, filter };
         let color = |part: &Curve| match kind {
             CubeKind::Reflectance => rgb::colour(&part.held_over(360.0, 830.0)),
-            // As of any lamp, before equal energy; none where it is invisible.
-            CubeKind::Light => match Bands::Rgb.from_curve(part, Outside::Zero) {
-                Ok(color) => std::array::from_fn(|k| color[k]),
-                Err(_) => [0.0; 3],
-            },
+            // As of any lamp, before equal energy; none where it is invisible. Of a part it may well be negative.
+            CubeKind::Light => rgb::colour(part),
         };
         let colors: Vec<Color> = cube.parts().iter().map(color).collect();
         let look = |texel: &[f32]| {

@@ -265,6 +265,13 @@ fn what_is_no_cube_is_refused_with_its_place() {
         assert!(message.contains("materials.a."), "{message}");
         assert!(!bench.path("out").exists(), "{material}: something was left behind");
     }
+    // A lamp that nothing of is rendered.
+    let far = wall(&light("good.hdr"), &[900.0, 950.0, 1000.0]);
+    bench.write("scene.json", far.to_string().as_bytes());
+    let output = bench.run(&["render", "scene.json", "-o", "out"]);
+    let message = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("400..=800 nm") && message.contains("do not overlap"), "{message}");
     let mut thrown = wall(&of("good.hdr"), &BANDS);
     thrown["lights"] = json!([{ "type": "projector", "intensity": [1, 1, 1], "at": [0, 0, 2], "look_at": [0, 0, 0],
                                 "image": { "cube": "good.hdr" } }]);

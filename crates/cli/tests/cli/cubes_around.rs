@@ -141,12 +141,12 @@ fn a_cube_of_an_image_s_curves_is_that_image() {
     let plane = |k: usize| colors.map(|color| color[k] as f32).to_vec();
     exr(&bench, "sky.exr", &[("R", plane(0)), ("G", plane(1)), ("B", plane(2))]);
     // 5 nm, over all visible light.
-    let own = edges(360.0, 5.0, 94);
+    let own = edges(357.5, 5.0, 95);
     let texels = colors.map(|color| {
         let curve = rgb::spectrum(color);
         own.windows(2).map(|edge| curve.held(0.5 * (edge[0] + edge[1])) as f32).collect::<Vec<_>>()
     });
-    bench.write("sky.npy", &npy(&[1, 6, 94], &texels.concat()));
+    bench.write("sky.npy", &npy(&[1, 6, 95], &texels.concat()));
     let around = |image: Value| json!([{ "type": "environment", "image": image, "rotate": 40 }]);
     let cube = || json!({ "cube": "sky.npy", "bands": own });
     let bands = edges(400.0, 10.0, 31);
@@ -164,7 +164,7 @@ fn a_cube_of_an_image_s_curves_is_that_image() {
                 None => {
                     bench.write("scene.json", scene.to_string().as_bytes());
                     bench.render(&["--outputs", "npy"]);
-                    bench.array("radiance")
+                    bench.array("picture")
                 }
             }
         };

@@ -153,7 +153,7 @@ fn inputs() -> Vec<Input> {
     let paint: [(&str, &[u8]); 1] = [("paint.png", PAINT)];
     add(&["ImageSpec.image"], scene(&painted), &paint, vec![longer(PAINT)]);
     let sky = json!({"lights": [{"type": "environment", "image": "paint.png"}]});
-    add(&["LightSpec.image"], scene(&sky), &paint, vec![longer(PAINT)]);
+    add(&["SkyImageSpec"], scene(&sky), &paint, vec![longer(PAINT)]);
     let lamp = json!({"lights": [{"type": "goniometric", "at": [0, 2, 0], "file": "lamp.ies"}]});
     add(&["LightSpec.file"], scene(&lamp), &[("lamp.ies", IES)], vec![longer(IES)]);
     // Curves of surfaces, metals, lights and sensors, and cubes of them.

@@ -22,6 +22,7 @@ mod hidden; // meshes of one point, nodes scaled to 0
 mod ids; // numbers of objects, copies, nodes and materials, and their names
 mod images; // textures and environments of every kind and size
 mod inputs; // every key of the schema that names a file: guarded, kept, and in the hash
+mod lamps; // spectra, lumens and luminances of what shines
 mod leniency; // comments, schema addresses, resolutions as words, quiet
 mod lens; // tables, drawings and files of lenses, and what is refused
 mod lens_pictures; // pictures through lenses, with closed-form answers

@@ -63,10 +63,16 @@ pub(super) fn illumination(scene: &Scene) -> Illumination {
     let most = most_scattered(scene);
     for (material, _) in scene.materials.iter().zip(used).filter(|(_, used)| *used) {
         if let Some(emission) = &material.emission {
-            match material.emitted_cube() {
+            match &emission.radiance {
                 // Every texel is a sum of these.
-                Some(cube) => cube.cube.parts().into_iter().for_each(&mut add),
-                None => add(of(&emission.illuminant)),
+                Paint::Cube { cube, .. } => cube.cube.parts().into_iter().for_each(&mut add),
+                Paint::Checker { curves: Some(curves), .. } => {
+                    curves.iter().for_each(|one| add(Curve::clone(&one.curve)));
+                }
+                Paint::Plain(_)
+                | Paint::Curve { .. }
+                | Paint::Checker { curves: None, .. }
+                | Paint::Image { .. } => add(of(&emission.illuminant)),
             }
             coloured_light |= is_coloured(&emission.radiance);
         }
@@ -128,6 +134,10 @@ pub(super) fn light(scene: &Scene, bands: &Bands) -> Vec<f64> {
         let color = match &emission.radiance {
             Paint::Cube { cube, .. } => {
                 add(cube.cube.mean().map(|mean| of_curve(&mean)).unwrap_or_default(), None);
+                continue;
+            }
+            Paint::Checker { curves: Some(curves), .. } => {
+                curves.iter().for_each(|one| add(of_curve(&one.curve), None));
                 continue;
             }
             Paint::Plain(color) => *color,

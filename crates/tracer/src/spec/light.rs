@@ -8,8 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Bound, ColorSpec, CubeSpec, Emitted, Fault, PaintSpec, Supply, emitted, in_bounds, one,
-    radiant_paint, unit_scale, white,
+    Bound, ColorSpec, CubeSpec, Emitted, Fault, PaintSpec, Supply, emitted, in_bounds, luminous,
+    one, radiant_paint, share_of, unit_scale, white,
 };
 use crate::clear_sky::SUN_DIAMETER;
 use crate::goniometric::{Goniometric, Photometry};
@@ -28,6 +28,10 @@ pub enum LightSpec {
         at: [f64; 3],
         /// Radiant intensity, linear RGB: at 1 m it gives this irradiance.
         intensity: ColorSpec,
+        /// Luminous flux (lm): brings the intensity to it, which then says the spectrum alone.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 0.0))]
+        lumens: Option<f64>,
         /// The spectrum that the intensity multiplies; equal energy when absent.
         #[serde(default)]
         illuminant: Option<Illuminant>,
@@ -43,6 +47,10 @@ pub enum LightSpec {
         look_at: [f64; 3],
         /// Radiant intensity within the inner cone, linear RGB.
         intensity: ColorSpec,
+        /// Luminous flux (lm): brings the intensity to it, which then says the spectrum alone.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 0.0))]
+        lumens: Option<f64>,
         /// Half-angle of the cone (degrees, at most 90).
         #[serde(default = "default_cone")]
         #[schemars(range(min = 0.0, max = 90.0))]
@@ -92,6 +100,10 @@ pub enum LightSpec {
         /// Multiplies the file's candela: linear RGB.
         #[serde(default = "white")]
         intensity: ColorSpec,
+        /// Luminous flux (lm): brings the intensity to it, which then says the spectrum alone.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 0.0))]
+        lumens: Option<f64>,
         /// The spectrum that the intensity multiplies; equal energy when absent.
         #[serde(default)]
         illuminant: Option<Illuminant>,
@@ -282,8 +294,8 @@ impl LightSpec {
                     return Err(Fault::new("image", why));
                 }
                 let (image, spectrum) = radiant_paint(("image", image), None, supply)?;
-                if spectrum.is_some() {
-                    let why = "is a curve; a projector's spectrum is that of its `intensity`";
+                if spectrum.is_some() || !image.curves().is_empty() {
+                    let why = "has a curve; a projector's spectrum is that of its `intensity`";
                     return Err(Fault::new("image", why));
                 }
                 let shape = (*fov, *aspect, image);
@@ -314,7 +326,30 @@ impl LightSpec {
                 LightKind::Environment { image, turn, visible: *visible }
             }
         };
+        let color = match self.lumens() {
+            None => color,
+            Some(lumens) => {
+                let own = luminous(&color, curve.as_deref()) * kind.spread().unwrap_or(0.0);
+                let scale = share_of("lumens", lumens, own)?;
+                let scaled = color.map(|part| part * scale);
+                in_bounds("lumens", &scaled, Bound::None)?;
+                scaled
+            }
+        };
         Ok(vec![Light { kind, color, illuminant: curve, spectrum: None, group: self.group() }])
+    }
+
+    /// The luminous flux that it is to have (lm), if it says so.
+    fn lumens(&self) -> Option<f64> {
+        match self {
+            Self::Point { lumens, .. }
+            | Self::Spot { lumens, .. }
+            | Self::Goniometric { lumens, .. } => *lumens,
+            Self::Directional { .. }
+            | Self::Projector { .. }
+            | Self::Environment { .. }
+            | Self::Sky { .. } => None,
+        }
     }
 
     /// The group that it is of, if it names one.
