@@ -8,7 +8,9 @@ use etendue_scene::Scene;
 use etendue_sensor::{Factor, Illumination, Times};
 use etendue_spectrum::{Bands, Curve, Outside, rgb};
 use etendue_tracer::transport::Follow;
-use etendue_tracer::{Color, EnvironmentImage, LightKind, Material, Paint, Scattering, Spectral};
+use etendue_tracer::{
+    Color, Emission, EnvironmentImage, LightKind, Material, Paint, Scattering, Spectral,
+};
 
 /// Lights, filters, colours, bodies and metals of a scene.
 pub(super) fn illumination(scene: &Scene) -> Illumination {
@@ -264,7 +266,12 @@ fn reflects_colour(material: &Material) -> bool {
         );
         sheen || specular
     });
-    // The colour of a measured metal is for looking.
+    // The colour of a lamp of curves is for looking.
+    let shines = |emission: &Emission| !emission.radiance.curves().is_empty();
+    if material.emission.as_ref().is_some_and(shines) {
+        return false;
+    }
+    // So is that of a measured metal.
     let named = matches!(material.scattering, Scattering::Metal { named: Some(_), .. });
     layers || (!named && is_coloured(&material.base_color))
 }
