@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use etendue_geometry::glam::{DMat3, DQuat, DVec3};
-use etendue_spectrum::{Grid, Illuminant};
+use etendue_spectrum::{Curve, Grid, Illuminant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -13,9 +13,8 @@ use super::{
 };
 use crate::clear_sky::SUN_DIAMETER;
 use crate::goniometric::{Goniometric, Photometry};
-use crate::texture::{Filter, Wrap};
 use crate::{
-    ClearSky, Cube, CubeKind, EnvironmentImage, Light, LightGroup, LightKind, Paint, Projector,
+    ClearSky, Color, CubeKind, EnvironmentImage, Light, LightGroup, LightKind, Paint, Projector,
 };
 
 /// A light as the scene file writes it.
@@ -302,41 +301,32 @@ impl LightSpec {
                 LightKind::Projector(Box::new(projector(ends, DVec3::from(*up), shape)?))
             }
             Self::Environment { image, rotate, up, visible, radiance, .. } => {
-                let image = match image {
-                    None => EnvironmentImage::Constant,
-                    Some(SkyImageSpec::Colors(written)) => {
-                        let found = supply.file(written).map_err(|why| Fault::new("image", why))?;
-                        EnvironmentImage::File(found)
-                    }
-                    Some(SkyImageSpec::Cube(spec)) => {
-                        let stray = match (radiance, &curve) {
-                            (ColorSpec::Curve(_), _) => Some("radiance"),
-                            (ColorSpec::Rgb(_), Some(_)) => Some("illuminant"),
-                            (ColorSpec::Rgb(_), None) => None,
-                        };
-                        if let Some(key) = stray {
-                            let why = "is a spectrum beside a cube of `image`, which has spectra of its own: leave \
-                                       one of them out";
-                            return Err(Fault::new(key, why));
-                        }
-                        EnvironmentImage::Cube(sky_cube(spec, supply)?)
-                    }
+                let stray = match (radiance, &curve) {
+                    (ColorSpec::Curve(_), _) => Some("radiance"),
+                    (ColorSpec::Rgb(_), Some(_)) => Some("illuminant"),
+                    (ColorSpec::Rgb(_), None) => None,
                 };
+                let image = sky_image(image.as_ref(), stray, supply)?;
                 let turn = tilted(*up, *rotate)?;
                 LightKind::Environment { image, turn, visible: *visible }
             }
         };
-        let color = match self.lumens() {
-            None => color,
-            Some(lumens) => {
-                let own = luminous(&color, curve.as_deref()) * kind.spread().unwrap_or(0.0);
-                let scale = share_of("lumens", lumens, own)?;
-                let scaled = color.map(|part| part * scale);
-                in_bounds("lumens", &scaled, Bound::None)?;
-                scaled
-            }
-        };
+        let color = self.brought_to_flux(color, (&kind, curve.as_deref()))?;
         Ok(vec![Light { kind, color, illuminant: curve, spectrum: None, group: self.group() }])
+    }
+
+    /// The colour of a light of this kind and curve with the luminous flux that it is to have.
+    fn brought_to_flux(
+        &self,
+        color: Color,
+        (kind, curve): (&LightKind, Option<&Curve>),
+    ) -> Result<Color, Fault> {
+        let Some(lumens) = self.lumens() else { return Ok(color) };
+        let own = luminous(&color, curve) * kind.spread().unwrap_or(0.0);
+        let scale = share_of("lumens", lumens, own)?;
+        let scaled = color.map(|part| part * scale);
+        in_bounds("lumens", &scaled, Bound::None)?;
+        Ok(scaled)
     }
 
     /// The luminous flux that it is to have (lm), if it says so.
@@ -367,17 +357,28 @@ impl LightSpec {
     }
 }
 
-/// The cube of a sky.
-fn sky_cube(spec: &SkyCubeSpec, supply: &mut dyn Supply) -> Result<Arc<Cube>, Fault> {
-    let spec = CubeSpec {
-        cube: spec.cube.clone(),
-        bands: spec.bands.clone(),
-        wrap: Wrap::default(),
-        filter: Filter::default(),
-        repeat: unit_scale(),
+/// The image of an environment; a cube goes with no spectrum of the key `stray`.
+fn sky_image(
+    image: Option<&SkyImageSpec>,
+    stray: Option<&str>,
+    supply: &mut dyn Supply,
+) -> Result<EnvironmentImage, Fault> {
+    let SkyCubeSpec { cube, bands } = match image {
+        None => return Ok(EnvironmentImage::Constant),
+        Some(SkyImageSpec::Colors(written)) => {
+            let found = supply.file(written).map_err(|why| Fault::new("image", why))?;
+            return Ok(EnvironmentImage::File(found));
+        }
+        Some(SkyImageSpec::Cube(spec)) => spec.clone(),
     };
+    if let Some(key) = stray {
+        let why = "is a spectrum beside a cube of `image`, which has spectra of its own: leave one of them out";
+        return Err(Fault::new(key, why));
+    }
+    let (wrap, filter) = Default::default();
+    let spec = CubeSpec { cube, bands, wrap, filter, repeat: unit_scale() };
     let below = |fault: Fault| Fault::new(format!("image.{}", fault.key), fault.why);
-    Ok(Arc::new(supply.cube(&spec, CubeKind::Light).map_err(below)?))
+    Ok(EnvironmentImage::Cube(Arc::new(supply.cube(&spec, CubeKind::Light).map_err(below)?)))
 }
 
 fn unit(key: &str, v: DVec3) -> Result<DVec3, Fault> {

@@ -251,18 +251,20 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let throughput = &now.throughput[start..start + self.count()];
             let light =
                 radiance[lane * self.count()..(lane + 1) * self.count()].iter().zip(throughput);
-            let (light, value) = (light.enumerate(), away.value[lane]);
+            let value = away.value[lane];
             match bsdfs.get(lane) {
                 None => {
-                    let color = &colors[lane];
-                    shadows
-                        .contribution
-                        .extend(light.map(|(k, (l, t))| l * t * value * self.band(color, k)));
+                    let all = &mut shadows.contribution;
+                    let start = all.len();
+                    all.extend(light.map(|(l, t)| l * t * value));
+                    self.tinted(&colors[lane], &mut all[start..]);
                 }
                 Some(bsdf) => {
                     let weights = weights[lane];
                     shadows.contribution.extend(
-                        light.map(|(k, (l, t))| l * t * value * self.in_band(bsdf, weights, k)),
+                        light
+                            .enumerate()
+                            .map(|(k, (l, t))| l * t * value * self.in_band(bsdf, weights, k)),
                     );
                 }
             }
@@ -301,9 +303,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 continue;
             }
             let throughput = &mut now.throughput[i * self.count()..(i + 1) * self.count()];
-            for (k, band) in throughput.iter_mut().enumerate() {
-                *band *= self.band(&patch.colors[lane], k);
-            }
+            self.tinted(&patch.colors[lane], throughput);
             state.cone = None;
             state.pdf = pdf;
             state.is_last = is_last;
