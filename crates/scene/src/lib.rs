@@ -25,6 +25,7 @@
 mod cache;
 mod cubes;
 pub mod doctor;
+mod envi;
 pub mod error;
 pub mod escape;
 mod facing;
@@ -44,6 +45,7 @@ mod words;
 
 pub use cache::Cache;
 pub use doctor::{Diagnosis, MemoryForecast};
+pub use envi::{EnviFault, read_envi};
 pub use error::SceneError;
 pub use file::{FileKind, SceneFile, SceneSpec, scene_schema};
 pub use frames::{Frame, Frames, RigCamera, Start};

@@ -12,7 +12,7 @@ use crate::light_tree::Cluster;
 use crate::projector::Projector;
 use crate::reference::SceneView;
 use crate::sky::Sky;
-use crate::{ClearSky, Color, LightGroup, Modulation, TextureUse};
+use crate::{ClearSky, Color, Cube, LightGroup, Modulation, TextureUse};
 
 /// A light of the scene, beside its emissive surfaces.
 #[derive(Debug, Clone, PartialEq)]
@@ -132,6 +132,20 @@ pub enum LightKind {
 }
 
 impl LightKind {
+    /// The solid angle over which it shines, each direction as much as it is bright there beside the middle (sr, of
+    /// measured lights cd·sr); `None` of what is far away, and of what throws an image.
+    pub(crate) fn spread(&self) -> Option<f64> {
+        match self {
+            Self::Point(_) => Some(4.0 * PI),
+            // Full within the inner cone, and between the cones the mean of a square over equal parts of the sphere.
+            Self::Spot { cos_outer, cos_inner, .. } => {
+                Some(2.0 * PI * ((1.0 - cos_inner) + (cos_inner - cos_outer) / 3.0))
+            }
+            Self::Goniometric(measured) => Some(4.0 * PI * measured.photometry.mean()),
+            Self::Projector(_) | Self::Directional { .. } | Self::Environment { .. } => None,
+        }
+    }
+
     /// Where it is and shines, with an intensity (W/sr); `None` of what is far away.
     pub(crate) fn cluster(&self, intensity: f64, around: &SceneView<'_>) -> Option<Cluster> {
         let (at, axis, cone, reach) = match self {
@@ -164,6 +178,8 @@ pub enum EnvironmentImage {
     ClearSky(Box<ClearSky>),
     /// A file.
     File(std::path::PathBuf),
+    /// Light by wavelength.
+    Cube(Arc<Cube>),
 }
 
 impl EnvironmentImage {

@@ -168,6 +168,10 @@ pub(crate) struct ExposeArguments {
     /// Kinds of file to write
     #[arg(long, value_name = "LIST", default_value = "png,npy,dng")]
     pub(crate) outputs: String,
+    /// Refuse pictures that may need more memory than this in all, program and mapped files included, e.g. 800M
+    /// or 4G (bytes, 1024-based), before work on them starts; without it, more than the system has free
+    #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
+    pub(crate) memory_limit: Option<u64>,
     /// Let a scene name a camera file outside its own folder
     #[arg(long)]
     pub(crate) allow_outside: bool,

@@ -5,6 +5,7 @@ mod bad_input; // refused with exit code 2, one message, and nothing written
 mod bad_light; // materials, textures and lights that make no sense
 mod bench; // speed against accuracy on a tiny scene
 mod cubes; // surfaces and lamps by wavelength, from files of every form
+mod cubes_around; // light by wavelength from all around
 mod denoise; // pictures without their noise, where Open Image Denoise is there
 mod emva; // the characterisation of what the command writes
 mod expose; // pictures from elsewhere on a sensor
@@ -21,6 +22,7 @@ mod hidden; // meshes of one point, nodes scaled to 0
 mod ids; // numbers of objects, copies, nodes and materials, and their names
 mod images; // textures and environments of every kind and size
 mod inputs; // every key of the schema that names a file: guarded, kept, and in the hash
+mod lamps; // spectra, lumens and luminances of what shines
 mod leniency; // comments, schema addresses, resolutions as words, quiet
 mod lens; // tables, drawings and files of lenses, and what is refused
 mod lens_pictures; // pictures through lenses, with closed-form answers

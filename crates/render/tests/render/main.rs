@@ -19,5 +19,6 @@ mod passes;
 mod second_readers;
 mod shutter;
 mod spectra;
+mod spectral_surfaces;
 mod steps;
 mod textures;
