@@ -6,8 +6,8 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-aspheres bench-bands bench-gaps bench-decisions bench-window docs-figures docs-charts \
-	docs-stability generated gallery light-fields fingerprints fuzz fuzz-smoke fuzz-seeds sanitize clean
+.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens lens-waves bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-aspheres bench-bands bench-gaps bench-decisions bench-window docs-figures docs-charts \
+	docs-stability generated gallery spectra light-fields fingerprints fuzz fuzz-smoke fuzz-seeds sanitize clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
@@ -22,6 +22,7 @@ help:
 	@echo "make dist          a tarball, a .deb and a wheel in out/dist, tried in bare Debian 12 and 13 roots"
 	@echo "make bench         measure everything, write docs/benchmarks.md"
 	@echo "make bench-peers   add other programs at the same job, from PyPI"
+	@echo "make lens-waves    lenses in waves beside optiland, from PyPI"
 	@echo "make bench-lens    time rays through a lens against optiland, from PyPI"
 	@echo "make bench-python  rays from Python against Rust, Open3D and embreex; frames against their rays"
 	@echo "make bench-light   light against Mitsuba 3, from PyPI; writes docs/benchmarks-light.md"
@@ -33,13 +34,14 @@ help:
 	@echo "make bench-memory   the same for the forecast of memory, and for copies, large shapes and frames"
 	@echo "make bench-masks   what a ray through a mask of small openings costs; writes a part of docs/cameras.md"
 	@echo "make bench-aspheres  what setting a camera up behind steep aspheres takes; writes a part of docs/limits.md"
-	@echo "make bench-bands   how long a lens that disperses takes beside a pinhole; writes a part of docs/cameras.md"
+	@echo "make bench-bands   what bands cost beside RGB, and a lens that disperses; writes parts of docs/spectra.md, cameras.md"
 	@echo "make bench-gaps    what finding the thinnest gap of a million triangles takes; writes a part of docs/light.md"
 	@echo "make bench-window  how soon and how often the window shows pictures; writes a part of docs/window.md"
 	@echo "make bench-decisions  what decisions of the plan save, each against the fuller model"
 	@echo "make generated     schemas, tables of keys and the page of the command line, as the program writes them"
 	@echo "make gallery       render the pictures of docs/gallery.md, and write there what they took"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
+	@echo "make spectra       the pictures of docs/spectra.md, and what they lose by colours of three numbers"
 	@echo "make light-fields  the walk of docs/light-fields.md in a venv, its pictures, and another decoder's opinion"
 	@echo "make docs-charts   measure docs/speed-and-accuracy.md anew, with its charts"
 	@echo "make docs-stability  take every method to where it fails, at full scale, write docs/stability.md"
@@ -123,6 +125,10 @@ bench-lens:
 	cargo build --release -p etendue-optics --example trace_lens
 	scripts/bench-peers.sh lens_peers.py $(ARGS)
 
+lens-waves:
+	cargo build --release -p etendue-cli --no-default-features
+	scripts/bench-peers.sh lens_waves.py $(ARGS)
+
 bench-sensor:
 	cargo build --release -p etendue-sensor --example expose_frame
 	scripts/bench-peers.sh sensor_peers.py $(ARGS)
@@ -172,7 +178,7 @@ bench-window:
 docs-charts: setup
 	cargo run --release -p etendue-benches --bin charts -- $(ARGS)
 
-docs-figures: setup docs-charts docs-stability light-fields gallery
+docs-figures: setup docs-charts docs-stability light-fields gallery spectra
 	cargo run --release -p etendue-cli -- render scenes/first-light.json -o out/docs-figures \
 		--set 'camera.sensor.resolution=[640,640]' --samples 16 --outputs png
 	install -D -m 644 out/docs-figures/picture.png docs/images/first-light.png
@@ -195,6 +201,11 @@ generated: setup
 gallery: setup
 	cargo build --release -p etendue-cli
 	python3 benches/gallery.py $(ARGS)
+
+# The pictures of docs/spectra.md and the gallery's chart, and their colour errors.
+spectra: setup
+	cargo build --release -p etendue-cli
+	python3 benches/spectra.py
 
 # The Python of docs/light-fields.md and its pictures, and plenopticam's views against ours. ARGS go to the render.
 light-fields: setup

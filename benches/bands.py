@@ -1,8 +1,10 @@
-"""Renders a room through a double Gauss and through a pinhole with as many bands, and prints how many times as long the lens takes.
+"""Renders a room in more bands and through a lens, and prints how many times as long that takes: through a pinhole in 8 and
+31 bands beside red, green and blue, and through a double Gauss beside a pinhole with as many bands.
 
 Both are rendered in turn, and the median of the processor time of all rounds is compared: with the paths of the scene
 shared by the bands, and with each band traced by itself. The time is that of a render of many samples less that of one
-of few, so that start and camera do not count. The table goes into docs/cameras.md. `--command` names another build than the release one.
+of few, so that start and camera do not count. The tables go into docs/spectra.md and docs/cameras.md. `--command` names
+another build than the release one, `--only` one of the two.
 """
 
 import argparse
@@ -21,6 +23,9 @@ COMMAND = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release" 
 
 # Numbers of bands, and how many times as long as a pinhole the lens may take.
 GOALS = {3: 1.6, 8: 1.8, 31: 2.0}
+
+# Numbers of bands, and how many times as long as red, green and blue they may take.
+GOALS_OF_BANDS = {8: 1.2, 31: 1.6}
 
 
 def quad(at, turn, material):
@@ -73,14 +78,46 @@ def seconds(command, spec, settings, folder):
     return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
 
 
+def net(arguments, lens, bands, settings, folder):
+    """Processor time of the samples between the two renders."""
+    few, many = (seconds(arguments.command, scene(lens, bands, samples, arguments.side), settings, folder)
+                 for samples in arguments.samples)
+    return many - few
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--side", type=int, default=128, help="pixels a side")
     parser.add_argument("--samples", type=int, nargs=2, default=[4, 68], help="those of the two renders")
     parser.add_argument("--command", type=Path, default=COMMAND)
-    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "cameras.md")
+    parser.add_argument("--only", choices=["bands", "lens"])
     arguments = parser.parse_args()
+    about = (f"{section.machine()}; a room, paths of five bounces, {arguments.side} × {arguments.side} pixels, "
+             f"{arguments.samples[1] - arguments.samples[0]} samples, the median of {arguments.rounds} rounds.")
+    for part, measure, page in [("bands", of_bands, "spectra.md"), ("lens", of_lens, "cameras.md")]:
+        if arguments.only in (None, part):
+            section.put(ROOT / "docs" / page, "bands", "\n".join([about, "", *measure(arguments)]))
+
+
+def of_bands(arguments):
+    """The table of bands beside red, green and blue."""
+    times = {bands: [] for bands in (3, *GOALS_OF_BANDS)}
+    with tempfile.TemporaryDirectory() as folder:
+        for _ in range(arguments.rounds):
+            for bands, found in times.items():
+                found.append(net(arguments, False, bands, [], Path(folder)))
+    middle = {bands: statistics.median(found) for bands, found in times.items()}
+    lines = ["| bands | times red, green and blue | goal | |", "|---|---|---|---|"]
+    for bands, goal in GOALS_OF_BANDS.items():
+        ratio = middle[bands] / middle[3]
+        lines.append(f"| {bands} | {ratio:.2f} | {goal} | {'met' if ratio <= goal else '**missed**'} |")
+        print(lines[-1], times, flush=True)
+    return lines
+
+
+def of_lens(arguments):
+    """The table of a lens beside a pinhole."""
     apart = ["--set", "plan.shared_paths=false"]
     ways = {"pinhole": (False, []), "shared": (True, []), "apart": (True, apart)}
     lines = ["| bands | paths shared, times a pinhole | goal | | each band by itself |", "|---|---|---|---|---|"]
@@ -90,17 +127,13 @@ def main():
             times = {way: [] for way in ways}
             for _ in range(arguments.rounds):
                 for way, (lens, settings) in ways.items():
-                    few, many = (seconds(arguments.command, scene(lens, bands, samples, arguments.side), settings, folder)
-                                 for samples in arguments.samples)
-                    times[way].append(many - few)
+                    times[way].append(net(arguments, lens, bands, settings, folder))
             middle = {way: statistics.median(found) for way, found in times.items()}
             shared, by_itself = (middle[way] / middle["pinhole"] for way in ("shared", "apart"))
             verdict = "met" if shared <= goal else "**missed**"
             lines.append(f"| {bands} | {shared:.2f} | {goal} | {verdict} | {by_itself:.2f} |")
             print(lines[-1], times, flush=True)
-    about = (f"{section.machine()}; a room, paths of five bounces, {arguments.side} × {arguments.side} pixels, "
-             f"{arguments.samples[1] - arguments.samples[0]} samples, the median of {arguments.rounds} rounds.")
-    section.put(arguments.output, "bands", "\n".join([about, "", *lines]))
+    return lines
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@ curves, by colours of three numbers beside it, and the colour errors that these 
 
     python3 benches/spectra.py
 
-It needs numpy. Pictures go to docs/images/spectra.
+Pictures go to docs/images/spectra.
 """
 
 import json
@@ -13,9 +13,11 @@ import sys
 import zlib
 from pathlib import Path
 
-import numpy as np
-
 import program
+
+program.enter("peers", ["numpy"])
+
+import numpy as np  # noqa: E402
 
 ROOT = program.ROOT
 OUT = ROOT / "out" / "spectra"

@@ -230,7 +230,13 @@ impl CameraSpec {
         }
         // The frame's pose is that at which data layers see the middle of the picture.
         let (shutter, trajectory) = self.built_time()?;
-        let mut time = CameraTime { shutter, motion: None, things_move: false };
+        let mut time = CameraTime {
+            shutter,
+            motion: None,
+            trajectory: None,
+            things_move: false,
+            lights_change: false,
+        };
         let middle = time.middle(self.sensor().resolution[1]);
         let mut still = self.clone();
         if let Some(trajectory) = &trajectory {
@@ -243,7 +249,9 @@ impl CameraSpec {
         };
         if let Some(trajectory) = trajectory {
             camera.pose = trajectory.at(middle);
-            time.motion = Some(trajectory).filter(|it| !it.is_still(time.shutter.whole_span()));
+            let stands = trajectory.is_still(time.shutter.whole_span());
+            time.motion = (!stands).then(|| trajectory.clone());
+            time.trajectory = Some(trajectory);
         }
         if !camera.pose.is_finite() {
             return Err(CameraError::new("motion", "leads to where numbers end"));

@@ -67,6 +67,18 @@ pub struct ShutterFile {
     /// the frame it is empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub camera_from_world_of_rows: Vec<[[f64; 4]; 4]>,
+    /// How the camera moves in the pose of the frame; absent where it stands still.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<VelocityFile>,
+}
+
+/// How a camera moves, along its own axes (OpenCV's).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct VelocityFile {
+    /// Its velocity (m/s).
+    pub linear_m_s: [f64; 3],
+    /// Its angular velocity (rad/s).
+    pub angular_rad_s: [f64; 3],
 }
 
 /// What is known of a camera's lens.
@@ -212,6 +224,13 @@ impl ShutterFile {
             truth_at: shutter.truth_at(),
             top_and_bottom_s: [time(0), time(rows - 1)],
             camera_from_world_of_rows: if differ { (0..rows).map(pose).collect() } else { vec![] },
+            velocity: camera.motion().map(|motion| {
+                let now = motion.kinematics(shutter.truth(0.5 * f64::from(rows)));
+                let along = |vector| now.along_camera(vector, Convention::Opencv).to_array();
+                let [linear_m_s, angular_rad_s] =
+                    [now.velocity, now.angular_velocity].map(along).map(|v| v.map(|x| x + 0.0));
+                VelocityFile { linear_m_s, angular_rad_s }
+            }),
         })
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::{Camera, CameraRays, FilmSamples, Pose, Shutter, Trajectory};
+use crate::{Camera, CameraRays, FilmSamples, Kinematics, Pose, Shutter, Trajectory};
 use etendue_geometry::{RayBatch, RaysMut};
 
 /// Steps in which the row of a point is found that a moving camera sees; each is nearer by the ratio of the picture's
@@ -21,8 +21,12 @@ pub struct CameraTime {
     pub shutter: Shutter,
     /// The camera's motion, where it moves while the shutter is open.
     pub motion: Option<Trajectory>,
+    /// The same, whether it moves then or not.
+    pub trajectory: Option<Trajectory>,
     /// Whether anything of the scene moves while the shutter is open.
     pub things_move: bool,
+    /// Whether some light changes with time.
+    pub lights_change: bool,
 }
 
 impl CameraTime {
@@ -54,6 +58,21 @@ impl Camera {
         self
     }
 
+    /// The same camera in a scene of which some light changes with time, or none.
+    #[must_use]
+    pub fn under_changing_lights(mut self, lights_change: bool) -> Self {
+        if let Some(time) = &mut self.time {
+            Arc::make_mut(time).lights_change = lights_change;
+        }
+        self
+    }
+
+    /// Whether some light of the scene changes with time.
+    #[must_use]
+    pub fn lights_change(&self) -> bool {
+        self.time.as_deref().is_some_and(|time| time.lights_change)
+    }
+
     /// When the first row opens and the last one closes (s); no time without a shutter.
     #[must_use]
     pub fn exposure_span(&self) -> [f64; 2] {
@@ -72,10 +91,26 @@ impl Camera {
         self.is_timed() && self.shutter().is_some_and(Shutter::rows_differ)
     }
 
+    /// Whether pixels of different rows get light of different moments.
+    #[must_use]
+    pub fn light_of_rows_differs(&self) -> bool {
+        let changes = self.is_timed() || self.lights_change();
+        changes && self.shutter().is_some_and(Shutter::rows_differ)
+    }
+
     /// The pose at a time of the frame's clock (s).
     #[must_use]
     pub fn pose_at(&self, time: f64) -> Pose {
         self.motion().map_or(*self.pose(), |motion| motion.at(time))
+    }
+
+    /// How the camera stands and moves at a time of the frame's clock (s), whether its shutter is open or not.
+    #[must_use]
+    pub fn kinematics(&self, time: f64) -> Kinematics {
+        match self.time.as_deref().and_then(|time| time.trajectory.as_ref()) {
+            Some(trajectory) => trajectory.kinematics(time),
+            None => Kinematics::still(*self.pose()),
+        }
     }
 
     /// The moment (s) at which data layers see what is at a place (rows from the top edge).

@@ -41,7 +41,7 @@ pub use lens::{
     RealLensCameraSpec, SharedPaths, ThinLensCameraSpec,
 };
 pub use light_field::{LightField, LightFieldSpec, ViewGrid};
-pub use motion::{CameraMotionSpec, Interpolation, Kinematics, MotionAxes, Trajectory};
+pub use motion::{CameraMotionSpec, Kinematics, MotionAxes, Trajectory};
 pub use opencv_fit::OpencvFit;
 pub use pinhole::{Orthographic, OrthographicSpec, Pinhole, PinholeSpec};
 pub use pixel_block::PixelBlock;

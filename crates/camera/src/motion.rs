@@ -1,15 +1,14 @@
 //! A moving camera: its pose as an exact function of time, with its derivatives.
 //!
-//! Translation between two poses is linear, or cubic: Hermite's curve whose slope at a pose is that of the parabola
-//! through it and its two neighbours (uneven times allowed; at both ends, the end's parabola). Rotation turns about one
-//! axis at constant speed (slerp: Shoemake, "Animating rotation with quaternion curves", 1985). Before the first and
+//! Translation between two poses is linear, or cubic ([`etendue_geometry::hermite`]). Rotation turns about one axis at constant speed (slerp: Shoemake, "Animating rotation with quaternion curves", 1985). Before the first and
 //! after the last pose the camera stands still.
 
 use glam::{DMat3, DQuat, DVec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{CameraError, Pose, PoseSpec};
+use crate::{CameraError, Convention, Pose, PoseSpec};
+use etendue_geometry::hermite::{self, Interpolation, Points, Way};
 use etendue_geometry::units::Seconds;
 
 /// A rotation by less than this (radians) has no axis that is known.
@@ -59,17 +58,6 @@ pub enum MotionAxes {
     World,
 }
 
-/// How a place runs between two poses.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Interpolation {
-    /// In a straight line at constant speed.
-    #[default]
-    Linear,
-    /// Along a cubic, without a corner at the poses.
-    Cubic,
-}
-
 /// The pose as a function of time (s, in the frame's clock).
 #[derive(Debug, Clone, PartialEq)]
 pub enum Trajectory {
@@ -108,6 +96,34 @@ pub struct Kinematics {
     pub acceleration: DVec3,
     /// Its angular velocity (rad/s).
     pub angular_velocity: DVec3,
+}
+
+impl Kinematics {
+    /// Of a camera that stands still.
+    #[must_use]
+    pub fn still(pose: Pose) -> Self {
+        let [velocity, acceleration, angular_velocity] = [DVec3::ZERO; 3];
+        Self { pose, velocity, acceleration, angular_velocity }
+    }
+
+    /// A vector of the world along the camera's axes in a convention.
+    #[must_use]
+    pub fn along_camera(&self, vector: DVec3, convention: Convention) -> DVec3 {
+        convention.ours_from_theirs() * (self.pose.rotation.transpose() * vector)
+    }
+
+    /// What an inertial unit reads that is fixed to the camera at `at` (m, from its origin), with axes of the camera in
+    /// a convention: the angular velocity (rad/s), and the specific force (m/s²): the acceleration without that of
+    /// what falls (`gravity`, m/s², in the world).
+    ///
+    /// At `at` the acceleration is a + ω × (ω × r): ways turn at constant speed, so that ω has no derivative but at poses.
+    #[must_use]
+    pub fn inertial(&self, convention: Convention, at: DVec3, gravity: DVec3) -> [DVec3; 2] {
+        let turn = self.angular_velocity;
+        let arm = self.pose.rotation * (convention.ours_from_theirs() * at);
+        let acceleration = self.acceleration + turn.cross(turn.cross(arm));
+        [turn, acceleration - gravity].map(|vector| self.along_camera(vector, convention))
+    }
 }
 
 impl CameraMotionSpec {
@@ -195,6 +211,26 @@ impl CameraMotionSpec {
     }
 }
 
+/// The places of poses.
+struct Places<'a> {
+    poses: &'a [Pose],
+    times: &'a [f64],
+}
+
+impl Points for Places<'_> {
+    fn count(&self) -> usize {
+        self.poses.len()
+    }
+
+    fn time(&self, i: usize) -> f64 {
+        self.times[i]
+    }
+
+    fn place(&self, i: usize) -> DVec3 {
+        self.poses[i].position
+    }
+}
+
 /// The poses with their ways on.
 fn keys(
     poses: &[Pose],
@@ -203,33 +239,14 @@ fn keys(
     revolutions: &[i32],
 ) -> Result<Vec<PoseKey>, CameraError> {
     let last = poses.len() - 1;
-    let chord = |i: usize| (poses[i + 1].position - poses[i].position) / (times[i + 1] - times[i]);
-    // The slope at a pose of the parabola through it and its neighbours.
-    let slope = |i: usize| match (i, last) {
-        (_, 1) => chord(0),
-        (0, _) => {
-            let [a, b] = [times[1] - times[0], times[2] - times[1]];
-            chord(0) + (chord(0) - chord(1)) * (a / (a + b))
-        }
-        (i, _) if i == last => {
-            let [a, b] = [times[i] - times[i - 1], times[i - 1] - times[i - 2]];
-            chord(i - 1) + (chord(i - 1) - chord(i - 2)) * (a / (a + b))
-        }
-        (i, _) => {
-            let [a, b] = [times[i] - times[i - 1], times[i + 1] - times[i]];
-            (chord(i - 1) * b + chord(i) * a) / (a + b)
-        }
-    };
+    let places = Places { poses, times };
     let way = |i: usize| -> Result<PoseKey, CameraError> {
         let key =
             PoseKey { time: times[i], pose: poses[i], slopes: [DVec3::ZERO; 2], turn: DVec3::ZERO };
         if i == last {
             return Ok(key);
         }
-        let slopes = match translation {
-            Interpolation::Linear => [chord(i); 2],
-            Interpolation::Cubic => [slope(i), slope(i + 1)],
-        };
+        let slopes = hermite::slopes(&places, i, translation);
         let between = DQuat::from_mat3(&(poses[i + 1].rotation * poses[i].rotation.transpose()));
         let between = if between.w < 0.0 { -between } else { between };
         let sine = DVec3::new(between.x, between.y, between.z);
@@ -284,12 +301,6 @@ impl Trajectory {
     /// The pose at a time (s), and how it changes there; at a pose of a list, of the way that begins there.
     #[must_use]
     pub fn kinematics(&self, time: f64) -> Kinematics {
-        let still = |pose| Kinematics {
-            pose,
-            velocity: DVec3::ZERO,
-            acceleration: DVec3::ZERO,
-            angular_velocity: DVec3::ZERO,
-        };
         match self {
             Self::Velocity { start, velocity, angular_velocity } => Kinematics {
                 pose: Pose {
@@ -303,27 +314,24 @@ impl Trajectory {
             Self::Keys(keys) => {
                 let after = keys.partition_point(|key| key.time <= time);
                 if after == 0 {
-                    return still(keys[0].pose);
+                    return Kinematics::still(keys[0].pose);
                 }
                 let key = &keys[after - 1];
-                let Some(next) = keys.get(after) else { return still(key.pose) };
+                let Some(next) = keys.get(after) else {
+                    return Kinematics::still(key.pose);
+                };
                 let length = next.time - key.time;
                 let since = time - key.time;
                 let s = since / length;
-                let [p0, p1] = [key.pose.position, next.pose.position];
-                let chord = (p1 - p0) / length;
-                // Hermite's cubic from p0: its bow over the chord, of which straight lines have none.
-                let [m0, m1] = key.slopes.map(|slope| slope - chord);
-                let bow = (m0 * (1.0 - s) - m1 * s) * (s * (1.0 - s) * length);
-                let bend = m0 * ((1.0 - s) * (1.0 - 3.0 * s)) + m1 * (s * (3.0 * s - 2.0));
-                let curve = (m0 * (6.0 * s - 4.0) + m1 * (6.0 * s - 2.0)) / length;
+                let across = next.pose.position - key.pose.position;
+                let way = Way { length, across, slopes: key.slopes };
                 Kinematics {
                     pose: Pose {
                         rotation: turned(key.turn * since) * key.pose.rotation,
-                        position: p0 + chord * since + bow,
+                        position: key.pose.position + way.at(s),
                     },
-                    velocity: chord + bend,
-                    acceleration: curve,
+                    velocity: way.velocity(s),
+                    acceleration: way.acceleration(s),
                     angular_velocity: key.turn,
                 }
             }

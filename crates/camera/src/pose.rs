@@ -24,7 +24,7 @@ pub enum Convention {
 
 impl Convention {
     /// From this convention's camera frame to ours; its own inverse.
-    fn ours_from_theirs(self) -> DMat3 {
+    pub(crate) fn ours_from_theirs(self) -> DMat3 {
         match self {
             Self::Opengl | Self::Gltf => DMat3::IDENTITY,
             Self::Opencv => DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0)),

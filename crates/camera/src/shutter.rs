@@ -340,6 +340,17 @@ impl Shutter {
         open + (self.open[k][0] + (elapsed - self.before[k])).min(self.open[k][1])
     }
 
+    /// The intervals (s) in which the row at a place (rows from the top edge) is open: one without length of a shutter
+    /// that sees an instant.
+    #[must_use]
+    pub fn open_intervals(&self, place: f64) -> Vec<[f64; 2]> {
+        let [open, close] = self.span(place);
+        match self.open.is_empty() {
+            true => vec![[open, close]],
+            false => self.open.iter().map(|part| part.map(|time| open + time)).collect(),
+        }
+    }
+
     /// The share of the exposure of the first row for which the row at a place (rows from the top edge) is open: what
     /// its light is multiplied by, so that a sensor that exposes for that time collects what comes through. 1 for an
     /// instant.

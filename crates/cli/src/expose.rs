@@ -1,6 +1,7 @@
 //! `etendue expose`: what a sensor makes of pictures from elsewhere.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use etendue::{ExposeOptions, ExposedImage, LightImage, Outputs, places, write_frames};
 use etendue_files::{Opener, Reach};
@@ -38,18 +39,28 @@ pub(crate) fn run(arguments: &ExposeArguments) -> Result<(), Fault> {
         stop::made(&arguments.output);
     }
     let open = |(frame, path): &(Option<u32>, PathBuf)| -> Result<_, etendue::Error> {
-        let image = LightImage::open(path, arguments.wavelengths.as_deref())?;
+        let image =
+            LightImage::open(path, arguments.wavelengths.as_deref(), arguments.memory_limit)?;
         let options = ExposeOptions {
             unit: arguments.unit,
             f_number: arguments.f_number,
             magnification: arguments.magnification,
             seed: arguments.seed,
             frame: frame.unwrap_or(0),
+            memory: arguments.memory_limit,
         };
         Ok((*frame, image.on(&sensor, &options)?)) as Result<(Option<u32>, ExposedImage), _>
     };
     let progress = Phases::new(arguments.quiet).progress(!arguments.quiet);
-    let written = write_frames(images.iter().map(open), &arguments.output, outputs, &progress);
+    let (mut done, of) = (0, images.len());
+    let mut told = |frame: Option<u32>, time: Duration| {
+        done += 1;
+        if let Some(number) = frame.filter(|_| !arguments.quiet) {
+            say(&format!("frame {number} ({done} of {of}): {:.2} s", time.as_secs_f64()));
+        }
+    };
+    let all = images.iter().map(open);
+    let written = write_frames(all, &arguments.output, outputs, (&progress, &mut told));
     drop(progress);
     if written.is_err() && folder_is_new {
         // Goes only when nothing was written into it.

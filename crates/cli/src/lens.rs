@@ -14,14 +14,19 @@ use crate::arguments::LensArguments;
 use crate::fault::{Fault, Versioned, print_json, print_json_line, print_text};
 use crate::opencv;
 use crate::progress::say;
+use crate::waves;
 
 pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
+    waves::check(arguments)?;
     let reach = if arguments.allow_outside { Reach::Anywhere } else { Reach::OwnFolder };
     let glasses = read_glasses(&arguments.glass_catalogs)?;
     let mut lens = read_lens_at(&arguments.lens, reach, arguments.configuration, &glasses)?;
     let files: &[&str] = if arguments.fit_opencv { &[opencv::FILE] } else { &DRAWINGS };
-    let drawn = arguments.output.iter().flat_map(|dir| files.iter().map(|name| dir.join(name)));
-    let results: Vec<_> = drawn.chain(arguments.save.clone()).collect();
+    let in_waves: &[&str] = if waves::are_asked(arguments) { &waves::FILES } else { &[] };
+    let names = || files.iter().chain(in_waves);
+    let drawn = arguments.output.iter().flat_map(|dir| names().map(|name| dir.join(name)));
+    let results: Vec<_> =
+        drawn.chain(arguments.save.clone()).chain(arguments.report.clone()).collect();
     lens.inputs.extend(arguments.rays.iter().chain(&arguments.glass_catalogs).cloned());
     places::keep_apart(&lens.inputs, &results)?;
     let to = Transaction::at_once().keeping(&lens.inputs);
@@ -76,12 +81,22 @@ fn report(lens: &ReadLens, arguments: &LensArguments, to: &Transaction) -> Resul
     let mut report = LensReport::new(&lens.train, &inquiry)
         .map_err(|error| Fault::refused(format!("{}: {error}", arguments.lens.display())))?;
     report.notes.splice(..0, lens.notes.iter().cloned());
+    let waves = match waves::are_asked(arguments) {
+        true => Some(waves::analyse(lens, &report, arguments)?),
+        false => None,
+    };
     if let Some(folder) = &arguments.output {
         draw(&lens.train, &report, (to, folder), arguments.quiet)?;
     }
+    if let Some(waves) = &waves {
+        waves::write((&lens.train, &report), waves, arguments, to)?;
+    }
     if arguments.json {
         warn(&report.out_of_range, arguments)?;
-        print_json(&Versioned::new(&report))
+        match &waves {
+            Some(waves) => print_json(&Versioned::new(&waves::With { report: &report, waves })),
+            None => print_json(&Versioned::new(&report)),
+        }
     } else {
         if arguments.strict {
             warn(&report.out_of_range, arguments)?;
@@ -91,7 +106,10 @@ fn report(lens: &ReadLens, arguments: &LensArguments, to: &Transaction) -> Resul
         for text in report.notes.iter_mut().chain(&mut report.out_of_range) {
             *text = one_line(text).into_owned();
         }
-        print_text(&report.to_string())
+        match waves {
+            Some(waves) => print_text(&format!("{report}{waves}")),
+            None => print_text(&report.to_string()),
+        }
     }
 }
 

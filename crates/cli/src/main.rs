@@ -17,6 +17,7 @@ mod sensor;
 mod sequence;
 mod spectrum;
 mod stop;
+mod waves;
 
 use std::io::Write as _;
 use std::path::Path;

@@ -90,6 +90,9 @@ pub(crate) fn render(
     let inputs = session.inputs();
     let beside = places::recorded(ledger, &inputs, |to| dataset.write(to, out))?;
     files.extend(beside);
+    if !arguments.quiet {
+        dataset.notes().iter().for_each(|note| say(&format!("note: {note}")));
+    }
     if let Some(path) = &arguments.report {
         sidecar::write_json(&Transaction::at_once().keeping(&inputs), path, &reports)?;
     }

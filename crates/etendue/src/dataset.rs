@@ -7,7 +7,9 @@ use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use etendue_camera::{CameraFile, Convention, PixelOrigin, ProjectionName};
+use etendue_camera::{
+    CameraFile, Convention, PixelOrigin, ProjectionName, Readout, ShutterKind, TruthAt,
+};
 use etendue_files::{MANIFEST, SOFTWARE, Transaction};
 use etendue_geometry::glam::{DMat3, DQuat};
 use etendue_render::denoise::DENOISED;
@@ -70,6 +72,7 @@ impl Dataset {
     ) -> Result<(), Error> {
         let files = layer_files(scene, pattern, frame.number, outputs);
         let of = |layer: &str, kind: &str| Some(files.get(layer)?.get(kind)?.clone());
+        let clock = scene.render.time.is_some() || scene.render.rate.is_some();
         let matrix = scene.camera.pose().world_from_camera(Convention::Opengl);
         let at = self.entries.partition_point(|entry| entry.number < frame.number);
         self.entries.insert(
@@ -77,7 +80,7 @@ impl Dataset {
             Entry {
                 number: frame.number,
                 rig: frame.rig.clone(),
-                time: frame.time,
+                time: frame.time.or(clock.then(|| scene.render.time())),
                 folder: pattern.own_folder(frame.number),
                 name: pattern.place(frame.number, "picture"),
                 camera: scene.camera.opencv(),
@@ -123,6 +126,54 @@ impl Dataset {
         Ok(files)
     }
 
+    /// What a user should know of what the formats of others have no place for.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        let why = self.timing().err();
+        let note = |why| {
+            format!(
+                "{TRANSFORMS}: the format has exposures in the middle of which the poses are and rows that are read from \
+                 the top, the same for all frames, and {why}: it has no `exposure_time`, `rolling_shutter_time` and \
+                 velocities, which stand in {INDEX} and in each camera.json"
+            )
+        };
+        why.map(note).into_iter().filter(|_| self.entries.iter().all(Entry::has_k)).collect()
+    }
+
+    /// How all frames are exposed, as `transforms.json` for moving cameras has it (Seiskari et al., "Gaussian Splatting on
+    /// the Move", 2024): a row y of h is taken (y / h - 1/2) times the readout after the frame's pose. `None` where no camera
+    /// moves, and why not where the format has no place for it.
+    fn timing(&self) -> Result<Option<Timing>, &'static str> {
+        if self.entries.iter().all(|entry| entry.velocities().is_none()) {
+            return Ok(None);
+        }
+        let of = |entry: &Entry| {
+            let Some(shutter) = &entry.camera.shutter else {
+                return Err("some frames have no shutter");
+            };
+            let readout = f64::from(entry.camera.resolution[1]) * shutter.line_time_s;
+            let is_rolling = shutter.kind != ShutterKind::Global && readout > 0.0;
+            match (shutter.kind, shutter.truth_at, shutter.readout) {
+                (ShutterKind::GlobalReset, ..) if is_rolling => {
+                    Err("rows of a global reset are open for different times")
+                }
+                (_, TruthAt::Open | TruthAt::Close, _) if shutter.exposure_s > 0.0 => {
+                    Err("`camera.shutter.truth_at` is not in the middle")
+                }
+                (_, _, Readout::Up) if is_rolling => Err("rows are read from the bottom"),
+                _ => Ok(Timing { exposure: shutter.exposure_s, readout }),
+            }
+        };
+        let mut timings = self.entries.iter().map(of);
+        let first = timings.next().transpose()?;
+        for timing in timings {
+            if Some(timing?) != first {
+                return Err("frames are exposed for different times");
+            }
+        }
+        Ok(first)
+    }
+
     /// Of the files of `folder`. A mask whose numbers are too large for its format was not written.
     fn index(&self, folder: &Path) -> Value {
         let frame = |entry: &Entry| {
@@ -138,6 +189,11 @@ impl Dataset {
                 "camera_from_world": entry.camera.camera_from_world, "convention": "opencv",
                 "seed": entry.seed, "samples": entry.samples, "scene_hash": entry.scene_hash,
             });
+            if let Some((first, last, order)) = entry.readout() {
+                frame["viewmat"] = json!(first);
+                frame["viewmat_rs"] = json!(last);
+                frame["rolling_shutter"] = json!(order);
+            }
             if let Some(RigCamera { moment, camera, name, .. }) = &entry.rig {
                 frame["moment"] = json!(moment);
                 frame["rig_camera"] = json!({ "number": camera, "name": name });
@@ -154,6 +210,7 @@ impl Dataset {
     }
 
     fn transforms(&self) -> Value {
+        let timing = self.timing().ok().flatten();
         let frame = |entry: &Entry| {
             let mut frame = Map::new();
             let name = entry.picture.clone().unwrap_or_else(|| entry.name.clone());
@@ -164,6 +221,10 @@ impl Dataset {
             }
             if let Some(time) = entry.time {
                 frame.insert("time".to_owned(), json!(time));
+            }
+            if let (Some(_), Some([linear, angular])) = (timing, entry.velocities()) {
+                frame.insert("camera_linear_velocity".to_owned(), json!(linear));
+                frame.insert("camera_angular_velocity".to_owned(), json!(angular));
             }
             let Intrinsics { focal: [fx, fy], centre: [cx, cy], distortion, is_fisheye } =
                 entry.intrinsics();
@@ -192,6 +253,10 @@ impl Dataset {
         if let Some(model) = models().next().filter(|model| models().all(|other| other == *model)) {
             all.insert("camera_model".to_owned(), model.clone());
         }
+        if let Some(Timing { exposure, readout }) = timing {
+            all.insert("exposure_time".to_owned(), json!(exposure));
+            all.insert("rolling_shutter_time".to_owned(), json!(readout));
+        }
         all.insert("frames".to_owned(), Value::Array(frames));
         Value::Object(all)
     }
@@ -200,6 +265,14 @@ impl Dataset {
     fn colmap(&self) -> [(&'static str, String); 3] {
         let mut cameras: Vec<String> = Vec::new();
         let mut images = String::from("# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n");
+        if self.entries.iter().any(|entry| entry.velocities().is_some()) {
+            // Writing to a string cannot fail.
+            let _ = writeln!(
+                images,
+                "# Cameras move while their shutters are open, of which this format knows nothing: poses are those of the \
+                 middle row; {INDEX} has more."
+            );
+        }
         for (number, entry) in (1..).zip(&self.entries) {
             let camera = entry.colmap_camera();
             let id = cameras.iter().position(|known| *known == camera).unwrap_or_else(|| {
@@ -267,6 +340,14 @@ fn layer_files(
     names.map(endings).collect()
 }
 
+/// How a picture is exposed (s).
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Timing {
+    exposure: f64,
+    /// From the first row to behind the last.
+    readout: f64,
+}
+
 /// Pixels from the corner of the top left one.
 struct Intrinsics {
     focal: [f64; 2],
@@ -279,6 +360,26 @@ struct Intrinsics {
 impl Entry {
     fn has_k(&self) -> bool {
         self.camera.k.is_some()
+    }
+
+    /// The poses (world to camera, OpenCV's axes) of the row that is read out first and of that which is read out last,
+    /// and their order as gsplat calls it, which goes from one to the other with the rows; `None` where all rows have
+    /// one pose.
+    fn readout(&self) -> Option<([[f64; 4]; 4], [[f64; 4]; 4], &'static str)> {
+        let shutter = self.camera.shutter.as_ref()?;
+        let rows = &shutter.camera_from_world_of_rows;
+        let [top, bottom] = [*rows.first()?, *rows.last()?];
+        Some(match shutter.readout {
+            Readout::Down => (top, bottom, "ROLLING_TOP_TO_BOTTOM"),
+            Readout::Up => (bottom, top, "ROLLING_BOTTOM_TO_TOP"),
+        })
+    }
+
+    /// The velocity (m/s) and the angular velocity (rad/s) along OpenGL's axes of the camera, where it moves.
+    fn velocities(&self) -> Option<[[f64; 3]; 2]> {
+        let velocity = self.camera.shutter.as_ref()?.velocity?;
+        let gl = |[x, y, z]: [f64; 3]| [x, 0.0 - y, 0.0 - z];
+        Some([gl(velocity.linear_m_s), gl(velocity.angular_rad_s)])
     }
 
     fn intrinsics(&self) -> Intrinsics {

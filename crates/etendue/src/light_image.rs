@@ -14,6 +14,7 @@ use etendue_render::expose::{
 };
 use etendue_render::output::LayerFile;
 use etendue_scene::file::{RenderSpec, SensorFile};
+use etendue_scene::memory::Budget;
 use etendue_sensor::{Radiometry, Sensor, SensorSpec};
 use etendue_spectrum::{Bands, Grid};
 use serde_json::Value;
@@ -55,7 +56,12 @@ pub struct ExposeOptions {
     pub seed: Option<u64>,
     /// The number of the frame, from 0: others have noise of their own.
     pub frame: u32,
+    /// How much memory may be taken in all (bytes); `None` for what the system has free.
+    pub memory: Option<u64>,
 }
+
+/// The program itself, its libraries, and buffers of files that are written (bytes).
+const BESIDE: u64 = 16 << 20;
 
 /// What a file says beside its values.
 #[derive(Debug, Default)]
@@ -108,12 +114,18 @@ impl Sidecar {
 
 impl LightImage {
     /// Reads the picture at `path`; of an ENVI cube either of its two files is named. `wavelengths` are the
-    /// middles of the bands (nm) of an array that does not say them.
+    /// middles of the bands (nm) of an array that does not say them; `memory` (bytes) is how much may be taken in
+    /// all, or what the system has free.
     ///
     /// # Errors
     ///
-    /// When it cannot be read, is no picture of light, or its bands make no sense.
-    pub fn open(path: &Path, wavelengths: Option<&[f64]>) -> Result<Self, Error> {
+    /// When it cannot be read, is no picture of light, takes more memory, or its bands make no sense.
+    pub fn open(
+        path: &Path,
+        wavelengths: Option<&[f64]>,
+        memory: Option<u64>,
+    ) -> Result<Self, Error> {
+        let limits = Limits::within(memory);
         let refused = |why: String| refused(path, why);
         let head =
             etendue_files::read_head(path, 16).map_err(|error| refused(error.to_string()))?;
@@ -123,17 +135,17 @@ impl LightImage {
             return Err(refused(why.to_owned()));
         }
         if is_npy {
-            return Self::of_array(path, wavelengths).map_err(refused);
+            return Self::of_array(path, wavelengths, memory).map_err(refused);
         }
         if envi::is_header(&head) || envi::is_data(path) {
-            let (cube, inputs) = read_envi(path)?;
+            let (cube, inputs) = read_envi(path, limits)?;
             return Self::of_cube(path, inputs, cube).map_err(refused);
         }
         let bytes =
             etendue_files::read(path, MOST_BYTES).map_err(|error| refused(error.to_string()))?;
         let inputs = vec![path.to_owned()];
         if etendue_image::is_exr(&bytes) {
-            let channels = etendue_image::exr_channels(&bytes, Limits::default());
+            let channels = etendue_image::exr_channels(&bytes, limits);
             let channels = channels.map_err(|error| refused(error.to_string()))?;
             if cube::is_spectral(&channels) {
                 let cube = Cube::from_exr(channels).map_err(|error| refused(error.to_string()))?;
@@ -142,7 +154,7 @@ impl LightImage {
             }
             return Self::of_colors(path, channels).map_err(refused);
         }
-        let raster = etendue_image::decode(&bytes, Limits::default());
+        let raster = etendue_image::decode(&bytes, limits);
         let raster = raster.map_err(|error| {
             refused(format!("{error}; pictures of light are EXR, NPY, ENVI and Radiance files"))
         })?;
@@ -214,13 +226,23 @@ impl LightImage {
     }
 
     /// An NPY array: rows and columns of one number, of three, or of one a band.
-    fn of_array(path: &Path, wavelengths: Option<&[f64]>) -> Result<Self, String> {
+    fn of_array(
+        path: &Path,
+        wavelengths: Option<&[f64]>,
+        memory: Option<u64>,
+    ) -> Result<Self, String> {
         let map = MappedFile::open(path).map_err(|error| error.to_string())?;
         let array = npy::read(map.bytes(), |shape| match shape {
             [0, ..] | [_, 0, ..] | [_, _, 0] => {
                 Err(format!("has no value: its shape is {shape:?}"))
             }
-            [rows, columns] | [rows, columns, _] if *rows <= 65_535 && *columns <= 65_535 => Ok(()),
+            [rows, columns] | [rows, columns, _] if *rows <= 65_535 && *columns <= 65_535 => {
+                let depth = shape.get(2).copied().unwrap_or(1);
+                let values = (*rows as u64 * *columns as u64).saturating_mul(depth as u64);
+                // As it is read, and as films hold it.
+                let bytes = values.saturating_mul((size_of::<f64>() + size_of::<f32>()) as u64);
+                fits(memory, bytes, [*columns, *rows, depth])
+            }
             other => Err(format!(
                 "has the shape {other:?} instead of rows × columns or rows × columns × bands, of at most 65535 a \
                  side"
@@ -388,6 +410,10 @@ impl LightImage {
         let mut notes: Vec<String> = self.notes.clone();
         let sensor = for_light(sensor, (unit, self.pixel_pitch), &path)?;
         notes.extend(self.judge_size(&sensor)?);
+        let [columns, rows] = self.picture.size;
+        let bytes = SensorLight::bytes_of(&sensor, &self.picture);
+        fits(options.memory, bytes, [columns, rows, self.picture.depth()])
+            .map_err(|why| refused(&path, why))?;
         let seed = match (options.seed, self.noise_seed) {
             (Some(seed), _) => frame_seed(seed, options.frame),
             (None, Some(seed)) => seed,
@@ -539,28 +565,18 @@ fn for_light(
 }
 
 /// The ENVI cube of which `path` is one of the two files, and both.
-pub(crate) fn read_envi(path: &Path) -> Result<(Cube, Vec<PathBuf>), Error> {
-    let is_file = |path: &PathBuf| path.is_file();
-    let head =
-        etendue_files::read_head(path, 16).map_err(|error| refused(path, error.to_string()))?;
-    let (header, data) = match envi::is_header(&head) {
-        true => (Some(path.to_owned()), envi::data_names(path).find(is_file)),
-        false => (envi::header_names(path).find(is_file), Some(path.to_owned())),
-    };
-    let header = header.ok_or_else(|| {
-        refused(path, "has no ENVI header beside it, of the same name and `.hdr`".to_owned())
-    })?;
-    let data = data.ok_or_else(|| {
-        let why = "is an ENVI header without its numbers, a file of the same name and .img, .dat or another ending";
-        refused(&header, why.to_owned())
-    })?;
-    let text = etendue_files::read(&header, envi::MOST_HEADER_BYTES);
-    let text = text.map_err(|error| refused(&header, error.to_string()))?;
-    let parsed = envi::Header::parse(&text).map_err(|error| refused(&header, error.to_string()))?;
-    let map = MappedFile::open(&data).map_err(|error| refused(&data, error.to_string()))?;
-    let cube = parsed.decode(map.bytes(), Limits::default());
-    let cube = cube.map_err(|error| refused(&header, error.to_string()))?;
-    Ok((cube, vec![header, data]))
+pub(crate) fn read_envi(path: &Path, limits: Limits) -> Result<(Cube, Vec<PathBuf>), Error> {
+    let partner = |names: Vec<PathBuf>| Ok(names.into_iter().find(|name| name.is_file()));
+    etendue_scene::read_envi((path, path), limits, partner)
+        .map_err(|fault| refused(&fault.path, fault.why))
+}
+
+/// Refuses to take so many bytes for a picture of so many columns, rows and values a pixel.
+fn fits(memory: Option<u64>, bytes: u64, [columns, rows, depth]: [usize; 3]) -> Result<(), String> {
+    let taken = Budget::new(memory).take(bytes.saturating_add(BESIDE));
+    taken.map_err(|error| {
+        format!("a picture of {columns} x {rows} pixels of {depth} values {error}")
+    })
 }
 
 fn refused(path: &Path, why: impl std::fmt::Display) -> Error {

@@ -10,6 +10,7 @@ use etendue_oidn::Denoiser;
 use etendue_render::denoise::{self, DENOISED};
 use etendue_render::expose::{self, BandFilm, SensorLight};
 use etendue_render::light_field::{self, LightFieldSet};
+use etendue_render::output::imu::{self, IMU};
 use etendue_render::output::{Layer, LayerFile, Outputs, Picture, exr, sidecar};
 use etendue_render::report::seconds;
 use etendue_render::{Images, Plan, RenderError, Report};
@@ -297,6 +298,9 @@ impl Rendering {
         }
         sidecar::write_json(to, &place("camera.json".to_owned()), &camera.opencv())?;
         sidecar::write(to, &place("layers.json".to_owned()), picture)?;
+        if let Some(imu) = &self.scene.render.imu {
+            notes.extend(imu::write((to, &place(IMU.to_owned())), &self.scene, imu)?);
+        }
         Ok((files, notes))
     }
 }
@@ -314,6 +318,7 @@ fn files_of(
     let always = ["layers.exr", "camera.json", "layers.json", MANIFEST].map(str::to_owned);
     let layers = layers.into_iter().flat_map(move |layer| layer_files(&layer, outputs));
     let beside = expose::file_names(scene).into_iter().chain(light_field::file_names(scene));
+    let beside = beside.chain(scene.render.imu.as_ref().map(|_| IMU.to_owned()));
     always.into_iter().chain(layers).chain(beside)
 }
 

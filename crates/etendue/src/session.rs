@@ -3,6 +3,7 @@
 mod opening;
 mod prepare;
 mod render;
+mod serial;
 
 use std::fmt;
 use std::path::{Path, PathBuf};

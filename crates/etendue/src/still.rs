@@ -59,7 +59,7 @@ impl Still {
             etendue_files::read(path, MOST_BYTES).map_err(|error| refused(error.to_string()))?;
         let limits = Limits::default();
         if envi::is_header(&bytes) || envi::is_data(path) {
-            let (cube, _) = read_envi(path)?;
+            let (cube, _) = read_envi(path, Limits::default())?;
             return Self::of_cube(cube).map_err(|error| refused(error.to_string()));
         }
         if etendue_image::is_exr(&bytes) {

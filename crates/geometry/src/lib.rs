@@ -17,6 +17,8 @@
 //! | [`block`] | [`RayBlock`], sixteen rays in single precision |
 //! | [`disk`] | the unit square on the unit disk |
 //! | [`mesh`] | a triangle mesh and its vertex attributes, owned by a `Vec` or by a mapped file |
+//! | [`hermite`] | the curve through points at uneven times |
+//! | [`joint`] | frames that move in each other |
 //! | [`motion`] | where a body is at each time of an exposure |
 //! | [`transform`] | affine maps whose translation keeps 106 bits |
 //! | [`units`] | lengths, angles and times with their units, as files write them |
@@ -26,6 +28,8 @@ pub mod batch;
 pub mod block;
 pub mod coplanar;
 pub mod disk;
+pub mod hermite;
+pub mod joint;
 pub mod mesh;
 pub mod motion;
 pub mod transform;
@@ -35,8 +39,10 @@ pub mod world;
 pub use batch::{Detail, HitBatch, HitPrecision, MISS, PlacedTriangle, RayBatch, RaysMut};
 pub use block::{RayBlock, RayBlocks};
 pub use coplanar::Coplanar;
+pub use hermite::Interpolation;
+pub use joint::{Between, Joint, Link, Track};
 pub use mesh::{Buffer, Mesh, Positions, Vertices};
-pub use motion::{Interpolation, Motion, MotionError, Steady};
+pub use motion::{Motion, MotionError, Steady};
 pub use transform::Transform;
 pub use world::{AreaTest, Bounds, Geometry, Placement, is_degenerate};
 

@@ -1,12 +1,13 @@
 //! Rigid and stretching motion within an exposure: where a body is at any time, exactly in f64.
 //!
-//! Between keys the translation is linear or a cubic (Catmull & Rom, *A class of local interpolating
-//! splines*, 1974, with the three-point tangents of uneven times), the rotation goes the shorter way at
+//! Between keys the translation is linear or a cubic ([`crate::hermite`]), the rotation goes the shorter way at
 //! constant speed (Shoemake, *Animating rotation with quaternion curves*, 1985) and the scale is linear.
 //! A steady motion has a velocity and a spin, of any number of revolutions, about an axis through a point.
 
 use glam::{DMat3, DQuat, DVec3};
 
+use crate::hermite::{self, Interpolation, Points, Way};
+use crate::joint::Link;
 use crate::{Bounds, Transform};
 
 /// How a body moves: times are in s from the frame's time.
@@ -15,6 +16,8 @@ pub struct Motion {
     keys: Vec<Key>,
     interpolation: Interpolation,
     steady: Option<Steady>,
+    /// Frames that move in each other, the outermost first.
+    links: Vec<Link>,
     /// What is applied first.
     inner: Transform,
 }
@@ -28,16 +31,6 @@ struct Key {
     low: DVec3,
     rotation: DQuat,
     scale: DVec3,
-}
-
-/// How translations go between keys.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Interpolation {
-    /// Along straight lines.
-    #[default]
-    Linear,
-    /// Along a Catmull–Rom spline.
-    Cubic,
 }
 
 /// A constant velocity and a constant spin, which are those of the body at all times; at time 0 it is
@@ -177,12 +170,30 @@ impl Motion {
         Self { inner: self.inner.then_inner(inner), ..self.clone() }
     }
 
+    /// The motion of what hangs on this by `links`, the outermost first.
+    #[must_use]
+    pub fn then_links(&self, links: &[Link]) -> Self {
+        let mut all = self.clone();
+        all.links.push(Link::Fixed(self.inner));
+        all.links.extend_from_slice(links);
+        Self { inner: Transform::IDENTITY, ..all }
+    }
+
+    /// From when until when its frames have keys (s), where they have any.
+    #[must_use]
+    pub fn played_span(&self) -> Option<[f64; 2]> {
+        let times = || self.links.iter().flat_map(Link::times);
+        Some([times().reduce(f64::min)?, times().reduce(f64::max)?])
+    }
+
     /// The transform at `time` (s).
     #[must_use]
     pub fn at(&self, time: f64) -> Transform {
+        let hung = |inner: Transform, link: &Link| link.at(time).then_inner(&inner);
+        let inner = self.links.iter().rev().fold(self.inner, hung);
         let inner = match &self.steady {
-            Some(steady) => steady.at(time).then_inner(&self.inner),
-            None => self.inner,
+            Some(steady) => steady.at(time).then_inner(&inner),
+            None => inner,
         };
         if self.keys.is_empty() { inner } else { self.key_at(time).transform().then_inner(&inner) }
     }
@@ -191,10 +202,11 @@ impl Motion {
     #[must_use]
     pub fn span(&self) -> [f64; 2] {
         let is_steady = self.steady.is_some_and(|steady| steady.moves());
-        match (self.keys.first(), self.keys.last()) {
-            (Some(first), Some(last)) if !is_steady => [first.time, last.time],
-            _ => [f64::NEG_INFINITY, f64::INFINITY],
-        }
+        let keys = self.keys.first().zip(self.keys.last());
+        let keys = keys.map(|(first, last)| [first.time, last.time]);
+        let spans = keys.into_iter().chain(self.played_span()).filter(|_| !is_steady);
+        let joined = spans.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]);
+        joined.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])
     }
 
     /// Whether anything differs at two times of `exposure` (s, first and last).
@@ -204,7 +216,8 @@ impl Motion {
         open < close
             && (self.steady.is_some_and(|steady| steady.moves())
                 || self.keys.windows(2).any(|k| overlaps(&k[0], &k[1]) && !k[0].is_at(&k[1]))
-                || (self.interpolation == Interpolation::Cubic && self.keys.len() > 2))
+                || (self.interpolation == Interpolation::Cubic && self.keys.len() > 2)
+                || self.links.iter().any(|link| link.moves_within([open, close])))
     }
 
     /// A bound of the factor by which any length is stretched at any time.
@@ -213,7 +226,8 @@ impl Motion {
         let [x, y, z] =
             [self.inner.linear.x_axis, self.inner.linear.y_axis, self.inner.linear.z_axis];
         let inner = DVec3::new(x.length(), y.length(), z.length()).length();
-        inner * self.keys.iter().map(Key::stretch).reduce(f64::max).unwrap_or(1.0)
+        let links: f64 = self.links.iter().map(Link::stretch).product();
+        inner * links * self.keys.iter().map(Key::stretch).reduce(f64::max).unwrap_or(1.0)
     }
 
     /// A box (m) around all places of the box `local` between the times of `exposure` (s, first and last).
@@ -224,8 +238,11 @@ impl Motion {
             return swept;
         }
         let mut times = vec![open];
-        times.extend(self.keys.iter().map(|key| key.time).filter(|&t| open < t && t < close));
+        let keys = self.keys.iter().map(|key| key.time);
+        let keys = keys.chain(self.links.iter().flat_map(Link::times));
+        times.extend(keys.filter(|&t| open < t && t < close));
         times.push(close);
+        times.sort_by(f64::total_cmp);
         let reach =
             local.corners().iter().fold(0.0f64, |r, &p| r.max(self.inner.point(p).length()));
         for span in times.windows(2) {
@@ -246,10 +263,11 @@ impl Motion {
 
     /// At most how fast (m/s) any point moves that `inner` brings within `reach` (m) of its frame's origin.
     fn speed(&self, reach: f64, [open, close]: [f64; 2]) -> f64 {
-        let (mut reach, mut speed) = (reach, 0.0);
+        let outward = |bounds, link: &Link| link.bounds(bounds, [open, close]);
+        let [mut reach, mut speed] = self.links.iter().rev().fold([reach, 0.0], outward);
         if let Some(steady) = &self.steady {
             let radius = reach + steady.about.length();
-            speed = steady.velocity.length() + steady.rate.abs() * radius;
+            speed += steady.velocity.length() + steady.rate.abs() * radius;
             let time = open.abs().max(close.abs());
             reach += 2.0 * steady.about.length() + steady.velocity.length() * time;
         }
@@ -260,11 +278,7 @@ impl Motion {
                 continue;
             }
             let seconds = b.time - a.time;
-            let [m, n] = self.tangents(i);
-            let chord = (b.translation - a.translation) / seconds;
-            // The derivative's control points (Farin, *Curves and Surfaces for CAGD*, 4.3).
-            let middle = chord * 3.0 - m - n;
-            let along = m.length().max(n.length()).max(middle.length());
+            let along = self.way(i).fastest();
             let stretch = a.stretch().max(b.stretch());
             let turn = a.rotation.angle_between(b.rotation) / seconds;
             let stretching = (b.scale - a.scale).abs().max_element() / seconds;
@@ -275,26 +289,14 @@ impl Motion {
         fastest * (1.0 + 1e-9)
     }
 
-    /// The velocities (m/s) at both ends of the way from key `i` to the next one.
-    fn tangents(&self, i: usize) -> [DVec3; 2] {
-        let place = |k: usize| self.keys[k].translation;
-        let slope =
-            |k: usize| (place(k + 1) - place(k)) / (self.keys[k + 1].time - self.keys[k].time);
-        if self.interpolation == Interpolation::Linear {
-            return [slope(i); 2];
+    /// The way of the translation from key `i` to the next one.
+    fn way(&self, i: usize) -> Way {
+        let [a, b] = [&self.keys[i], &self.keys[i + 1]];
+        Way {
+            length: b.time - a.time,
+            across: b.translation - a.translation,
+            slopes: hermite::slopes(&Places(&self.keys), i, self.interpolation),
         }
-        let last = self.keys.len() - 1;
-        let tangent = |k: usize| {
-            if k == 0 || k == last {
-                return slope(k.min(last - 1));
-            }
-            let (before, after) = (
-                self.keys[k].time - self.keys[k - 1].time,
-                self.keys[k + 1].time - self.keys[k].time,
-            );
-            (slope(k - 1) * after + slope(k) * before) / (before + after)
-        };
-        [tangent(i), tangent(i + 1)]
     }
 
     fn key_at(&self, time: f64) -> Key {
@@ -304,16 +306,7 @@ impl Motion {
         let Some(&b) = self.keys.get(next) else { return a };
         let seconds = b.time - a.time;
         let s = (time - a.time) / seconds;
-        let way = b.translation - a.translation;
-        let straight = way * s;
-        let moved = match self.interpolation {
-            Interpolation::Linear => straight,
-            Interpolation::Cubic => {
-                // Hermite's cubic as the chord and what the tangents add to it.
-                let [m, n] = self.tangents(i).map(|tangent| tangent * seconds - way);
-                straight + (m * (1.0 - s) - n * s) * (s * (1.0 - s))
-            }
-        };
+        let moved = self.way(i).at(s);
         Key {
             time,
             translation: a.translation,
@@ -321,6 +314,23 @@ impl Motion {
             rotation: turned(a.rotation, b.rotation, s),
             scale: a.scale.lerp(b.scale, s),
         }
+    }
+}
+
+/// The translations of keys.
+struct Places<'a>(&'a [Key]);
+
+impl Points for Places<'_> {
+    fn count(&self) -> usize {
+        self.0.len()
+    }
+
+    fn time(&self, i: usize) -> f64 {
+        self.0[i].time
+    }
+
+    fn place(&self, i: usize) -> DVec3 {
+        self.0[i].translation
     }
 }
 
@@ -376,7 +386,7 @@ impl Steady {
 
 /// The rotation a share `s` of the way from `a` to `b`, which are in one half of the sphere: as `a` and a
 /// turn about one axis, which is exact for the least angles, too.
-fn turned(a: DQuat, b: DQuat, s: f64) -> DQuat {
+pub(crate) fn turned(a: DQuat, b: DQuat, s: f64) -> DQuat {
     let way = a.conjugate() * b;
     let sine = way.xyz().length();
     if sine == 0.0 {

@@ -11,10 +11,12 @@
 //!
 //! | module | idea |
 //! |---|---|
+//! | [`analysis`] | lenses in waves: wavefronts, Zernike terms, point spread and transfer functions |
 //! | [`element`] | surfaces, apertures, filters, thin lenses, and how rays pass them |
 //! | [`glass`] | the catalogue and the formulas of dispersion |
 //! | [`train`] | elements in a row: focus, pupils, paraxial and real-ray analysis, Zemax files, drawings |
 
+pub mod analysis;
 pub mod element;
 pub mod glass;
 pub mod train;

@@ -26,7 +26,7 @@ impl LightImage {
             let why = format!("{}: there is no such file", path.display());
             return Err(pyo3::exceptions::PyFileNotFoundError::new_err(why));
         }
-        let open = || etendue::LightImage::open(path, wavelengths.as_deref());
+        let open = || etendue::LightImage::open(path, wavelengths.as_deref(), None);
         let image = interruptible(py, 0, &Stop::default(), open)?.map_err(raised)?;
         Ok(Self { image })
     }
@@ -86,7 +86,7 @@ impl LightImage {
         frame: u32,
     ) -> PyResult<ExposedImage> {
         let unit = unit.map(LightUnit::parse).transpose().map_err(refused)?;
-        let options = ExposeOptions { unit, f_number, magnification, seed, frame };
+        let options = ExposeOptions { unit, f_number, magnification, seed, frame, memory: None };
         let expose = || self.image.clone().on(&sensor.file, &options);
         let exposed = interruptible(py, 0, &Stop::default(), expose)?.map_err(raised)?;
         Ok(ExposedImage { exposed })

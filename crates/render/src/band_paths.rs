@@ -48,7 +48,7 @@ impl BandPaths {
                 "pixels differ in their samples, and light lands beside the pixel it starts from";
             return Self::Apart(why.to_owned());
         }
-        if scene.camera.rows_differ() {
+        if scene.camera.light_of_rows_differs() {
             let why = "rows are seen at different times, and light lands on other rows than it starts from";
             return Self::Apart(why.to_owned());
         }

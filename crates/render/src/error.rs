@@ -48,8 +48,8 @@ pub enum RenderError {
     Memory(#[from] NoMemory),
     /// A light's spectrum is of no use to the sensor.
     #[error(
-        "a light's illuminant: {0}; give the light `equal_energy`, `a` or {{\"black_body\": kelvin}}, \
-         which reach further, or the sensor a quantum_efficiency or bands that see it"
+        "a light's spectrum: {0}; give the light `equal_energy`, `a` or {{\"black_body\": kelvin}}, \
+         which reach further, or a curve or cube that does, or the sensor a quantum_efficiency or bands that see it"
     )]
     Lights(String),
     /// The environment is no image that can be read, or an image of the scene is too large.

@@ -5,7 +5,7 @@ use etendue_scene::file::SETS;
 use etendue_scene::{MemoryForecast, Scene};
 use etendue_sensor::{Sensor, SensorKind};
 use etendue_spectrum::Bands;
-use etendue_tracer::{ClearSky, EnvironmentImage, LayerSpec, Material, texture};
+use etendue_tracer::{ClearSky, EnvironmentImage, EnvironmentMap, LayerSpec, Material, texture};
 
 use crate::film::bytes_of_plane;
 use crate::images::{environment, wanted_images};
@@ -43,10 +43,13 @@ pub(crate) fn forecast(scene: &Scene, plan: &Plan, outputs: Outputs) -> MemoryFo
     let sensor = scene.sensor.as_ref().filter(|_| scene.picture.is_some());
     let sensor = sensor.map_or(0, |sensor| bytes_of_sensor(scene, sensor, plan));
     let film = plan.layers.iter().map(|layer| bytes_of_layer(*layer, plan)).sum();
+    // Of slots there is the light of one, and the sum of all in f64.
+    let lit = plan.layers.iter().filter(|layer| layer.is_light() && scene.slots > 0);
+    let slots: u64 = lit.map(|layer| 3 * bytes_of_layer(*layer, plan)).sum();
     MemoryForecast {
         images: images(scene, plan),
         film: each(film),
-        sums: each(bytes_of_sums(plan)),
+        sums: each(bytes_of_sums(plan) + slots),
         sensor: each(if sensor > 0 { sensor.max(woven) } else { 0 }),
         files: each(look.max(png + denoised).max(if sensor > 0 { 0 } else { woven })),
         views: views(scene, plan, outputs),
@@ -115,12 +118,17 @@ fn bytes_of_layer(layer: LayerSpec, plan: &Plan) -> u64 {
 /// Bytes a pixel of what a sensor makes of the light: its bands, the numbers, their preview, and
 /// expected values and variances.
 fn bytes_of_sensor(scene: &Scene, sensor: &Sensor, plan: &Plan) -> u64 {
-    let (bands, depth) = (plan.bands.count() as u64, sensor.depth() as u64);
+    let bands = plan.bands.count() as u64;
+    bytes_exposed(sensor, bands, if expose::has_spectrum(scene) { bands } else { 0 })
+}
+
+/// Bytes a pixel of light in so many bands, of so many of another copy of it, and of what a sensor makes of it.
+pub(crate) fn bytes_exposed(sensor: &Sensor, bands: u64, cube: u64) -> u64 {
+    let depth = sensor.depth() as u64;
     let channels = match sensor.spec().kind {
         SensorKind::Raw => 3,
         SensorKind::Rgb | SensorKind::Multispectral => depth,
     };
-    let cube = if expose::has_spectrum(scene) { bands } else { 0 };
     let numbers = U16 * depth * if depth > 1 { 2 } else { 1 };
     // Demosaiced, then in linear sRGB, pixel by pixel and plane by plane.
     let preview = F32 * (channels + 3 + 3) + PNG;
@@ -155,6 +163,14 @@ fn images(scene: &Scene, plan: &Plan) -> u64 {
             )]
             let bytes = (decodable(texture::decoded_bytes(path)) as f64 * ENVIRONMENT) as u64;
             textures.saturating_add(bytes)
+        }
+        Some(EnvironmentImage::Cube(cube)) => {
+            let [width, height] = cube.size();
+            let looks = match plan.layers.contains(&LayerSpec::Radiance) {
+                true => EnvironmentMap::LOOK_BYTES * (width * height) as u64,
+                false => 0,
+            };
+            textures.saturating_add(cube.bytes_in(&plan.bands)).saturating_add(looks)
         }
         Some(EnvironmentImage::ClearSky(_)) if plan.layers.contains(&LayerSpec::Radiance) => {
             textures.saturating_add(ClearSky::map_bytes(plan.bands != Bands::Rgb))

@@ -108,6 +108,7 @@ impl Images {
             }
             EnvironmentImage::Studio
             | EnvironmentImage::ClearSky(_)
+            | EnvironmentImage::Cube(_)
             | EnvironmentImage::Constant => None,
         };
         faults.into_iter().flatten().next().or_else(environment)
@@ -126,6 +127,7 @@ impl Images {
             EnvironmentImage::File(path) => Stamp::of(path),
             EnvironmentImage::Studio
             | EnvironmentImage::ClearSky(_)
+            | EnvironmentImage::Cube(_)
             | EnvironmentImage::Constant => None,
         };
         self.sky = Some((image.clone(), stamp, spectral));
@@ -135,6 +137,7 @@ impl Images {
             (Some(known), _) => Arc::clone(known),
             (None, EnvironmentImage::Studio) => Arc::new(EnvironmentMap::studio()),
             (None, EnvironmentImage::ClearSky(sky)) => Arc::new(sky.map(spectral)),
+            (None, EnvironmentImage::Cube(cube)) => Arc::new(EnvironmentMap::of_cube(cube)),
             (None, EnvironmentImage::File(path)) => Arc::new(EnvironmentMap::read(path, limits)?),
             (None, EnvironmentImage::Constant) => return Ok(()),
         };

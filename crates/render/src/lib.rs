@@ -38,6 +38,7 @@ mod radiance;
 pub mod render;
 pub mod report;
 mod samples;
+pub mod serial;
 mod shard;
 mod sparkles;
 mod stopping;

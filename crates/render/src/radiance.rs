@@ -1,10 +1,13 @@
 //! The radiance pass: the tracer says what light the rays of the camera carry.
 
 use std::ops::Range;
+use std::sync::Arc;
 
-use etendue_camera::{BandGroup, Camera, PixelSamples, squares_of_pair};
+use etendue_camera::{
+    BandGroup, Camera, CameraRays, FilmSamples, PixelSamples, squares_of_pair,
+};
 use etendue_tracer::transport::{Parts, RaySamples};
-use etendue_tracer::{LayerSpec, LightingContext, Rules, Samples};
+use etendue_tracer::{LayerSpec, LightGroup, LightingContext, Modulation, Rules, Samples};
 
 use crate::samples::{Averaged, CAMERA_PAIRS, Memory};
 
@@ -28,19 +31,6 @@ pub(crate) struct LightPass<'a> {
 }
 
 impl LightPass<'_> {
-    /// Whether a layer counts light of the group of this number: that which one surface scattered at most,
-    /// and the rest.
-    fn counts(&self, layer: LayerSpec, group: usize) -> [bool; 2] {
-        match layer {
-            LayerSpec::Direct => [true, false],
-            LayerSpec::Indirect => [false, true],
-            LayerSpec::LightGroup { group: wanted } => {
-                [self.stage.lights.group_number(wanted) == Some(group); 2]
-            }
-            _ => [true; 2],
-        }
-    }
-
     /// Counts what the samples of each pixel bring, that stand side by side.
     fn count_sparkles(&self, memory: &mut Memory) {
         let Memory { numbers, values, traffic, .. } = memory;
@@ -63,11 +53,48 @@ impl LightPass<'_> {
         }
     }
 
-    /// Adds up the parts of each ray's light, `[ray][part][band]`, that each layer counts.
-    fn gather(&self, parts: &[f64], groups: usize, values: &mut Vec<f64>) {
+    /// Multiplies the parts of each ray's light, `[ray][part][band]`, by the factors of lights that change with time:
+    /// where rays have times those of then, else the means over the time for which the ray's row is open, exactly.
+    fn modulate(&self, rays: &CameraRays, film: &FilmSamples, parts: &mut [f64]) {
         let count = self.stage.spectral.count();
+        let groups = self.stage.lights.parts();
+        let (mut of, mut factors) = (f64::NAN, Vec::new());
+        for (i, ray) in parts.chunks_exact_mut((1 + 2 * groups.len()) * count).enumerate() {
+            // Rays of one row, without times, have the same.
+            let now = match rays.rays.times().is_empty() {
+                true => film.rows[rays.sample[i] as usize].floor() + 0.5,
+                false => rays.rays.time(i),
+            };
+            if now != of {
+                of = now;
+                let open = match (rays.rays.times().is_empty(), self.camera.shutter()) {
+                    (false, _) => vec![[now; 2]],
+                    (true, Some(shutter)) => shutter.open_intervals(now),
+                    (true, None) => vec![[0.0; 2]],
+                };
+                let factor = |modulation: &Arc<Modulation>| modulation.mean_over(&open);
+                let all =
+                    groups.iter().map(|(_, modulation)| modulation.as_ref().map_or(1.0, factor));
+                factors.clear();
+                factors.extend(all);
+            }
+            let (whole, parts) = ray.split_at_mut(count);
+            whole.fill(0.0);
+            for (parts, factor) in parts.chunks_exact_mut(2 * count).zip(&factors) {
+                for (k, band) in parts.iter_mut().enumerate() {
+                    *band *= factor;
+                    whole[k % count] += *band;
+                }
+            }
+        }
+    }
+
+    /// Adds up the parts of each ray's light, `[ray][part][band]`, that each layer counts.
+    fn gather(&self, parts: &[f64], values: &mut Vec<f64>) {
+        let count = self.stage.spectral.count();
+        let groups = self.stage.lights.parts();
         values.clear();
-        for ray in parts.chunks_exact((1 + 2 * groups) * count) {
+        for ray in parts.chunks_exact((1 + 2 * groups.len()) * count) {
             for &layer in &self.layers {
                 if layer == LayerSpec::Radiance {
                     values.extend_from_slice(&ray[..count]);
@@ -75,13 +102,23 @@ impl LightPass<'_> {
                 }
                 let start = values.len();
                 values.resize(start + count, 0.0);
-                let counted = (0..groups).flat_map(|group| self.counts(layer, group));
+                let counted = groups.iter().flat_map(|(group, _)| counts(layer, *group));
                 let parts = ray[count..].chunks_exact(count).zip(counted);
                 for (part, _) in parts.filter(|(_, counts)| *counts) {
                     values[start..].iter_mut().zip(part).for_each(|(sum, band)| *sum += band);
                 }
             }
         }
+    }
+}
+
+/// Whether a layer counts light of a group: that which one surface scattered at most, and the rest.
+fn counts(layer: LayerSpec, group: LightGroup) -> [bool; 2] {
+    match layer {
+        LayerSpec::Direct => [true, false],
+        LayerSpec::Indirect => [false, true],
+        LayerSpec::LightGroup { group: wanted } => [wanted == group; 2],
+        _ => [true; 2],
     }
 }
 
@@ -127,15 +164,21 @@ impl Averaged for LightPass<'_> {
     }
 
     fn trace(&self, bands: &Range<usize>, memory: &mut Memory) {
-        let Memory { rays, numbers, scratch, values, light_in_parts, traffic, .. } = memory;
+        let Memory { rays, film, numbers, scratch, values, light_in_parts, traffic, .. } = memory;
         numbers.of_ray.clone_from(&rays.sample);
-        let groups = self.stage.lights.group_count();
-        let parts = if self.layers.len() > 1 { Parts::Groups(groups) } else { Parts::Whole };
+        let lights = self.stage.lights;
+        let parts = match self.layers.len() > 1 || lights.are_modulated() {
+            true => Parts::Groups(lights.parts().len()),
+            false => Parts::Whole,
+        };
         let beam = RaySamples { rays: &rays.rays, samples: numbers, bands: bands.clone(), parts };
         let light = if parts == Parts::Whole { &mut *values } else { &mut *light_in_parts };
         traffic.light += self.tracer.radiance(&self.stage, &beam, scratch, light);
+        if lights.are_modulated() {
+            self.modulate(rays, film, light_in_parts);
+        }
         if parts != Parts::Whole {
-            self.gather(light_in_parts, groups, values);
+            self.gather(light_in_parts, values);
         }
         if self.groups.len() == 1 {
             self.count_sparkles(memory);

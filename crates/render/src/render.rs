@@ -338,6 +338,22 @@ pub(crate) fn empty_film(scene: &Scene, plan: &Plan) -> Result<Vec<FilmLayer>, N
 }
 
 impl Film {
+    /// One on which nothing was traced, without layers, of a share of a picture of so many columns and rows.
+    pub(crate) fn without_layers(resolution: [u32; 2], shard: Shard, samples: u32) -> Self {
+        Self {
+            layers: Vec::new(),
+            resolution,
+            shard,
+            counts: RayCounts::default(),
+            passed: Passed { samples, is_complete: true, counts: None },
+            trace_time: Duration::ZERO,
+            sums: Vec::new(),
+            centres: Vec::new(),
+            notes: Vec::new(),
+            camera: None,
+        }
+    }
+
     /// Whether it has all samples that were wanted: a film of a render that was stopped has not.
     #[must_use]
     pub fn is_complete(&self) -> bool {

@@ -135,7 +135,8 @@ pub(crate) struct Memory {
     pub(crate) scratch: Scratch,
     pub(crate) traffic: RayCounts,
     landings: BandLandings,
-    film: FilmSamples,
+    /// Where the samples of the batch lie.
+    pub(crate) film: FilmSamples,
     /// `[pixel of the tile][set][layer][band]`.
     sums: Vec<Sum>,
     order: Vec<u32>,

@@ -83,11 +83,16 @@ impl RayCounts {
     /// Adds what one thread traced, and the statuses of its rays.
     pub(crate) fn add(all: &Mutex<Self>, own: Self, statuses: &StatusCounts) {
         let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
-        all.chief_rays += own.chief_rays;
-        all.light += own.light;
-        all.sparkles.merge(&own.sparkles);
-        all.statuses.merge(&own.statuses);
+        all.merge(&own);
         all.statuses.merge(statuses);
+    }
+
+    /// Adds what was traced elsewhere.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        self.chief_rays += other.chief_rays;
+        self.light += other.light;
+        self.sparkles.merge(&other.sparkles);
+        self.statuses.merge(&other.statuses);
     }
 }
 

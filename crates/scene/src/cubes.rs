@@ -6,6 +6,7 @@ use etendue_files::{FindError, InputFolder, MappedFile};
 use etendue_image::{BandAxis, Cube as Picture, Limits, MOST_BYTES, Quantity, envi, npy};
 use etendue_tracer::spec::CubeSpec;
 
+use crate::envi::read_envi;
 use crate::error::not_found;
 use etendue_tracer::{Cube, CubeKind};
 
@@ -34,7 +35,7 @@ pub(crate) fn read(
     }
     let (Picture { size, axis, values, quantity, .. }, files) = match is_exr {
         true => (exr(&path, kind)?, vec![path]),
-        false => envi_pair((&spec.cube, path, &head), folder)?,
+        false => envi_pair((&spec.cube, &path), folder)?,
     };
     if kind == CubeKind::Light && quantity == Quantity::Reflectance {
         return Err("holds what is reflected, which gives off no light".to_owned());
@@ -81,12 +82,12 @@ fn exr(path: &Path, kind: CubeKind) -> Result<Picture, String> {
     })
 }
 
-/// The ENVI cube of one of its two files, by its name as written, its path and its first bytes; and the paths of both.
+/// The ENVI cube of one of its two files, by its name as written and its path; and the paths of both.
 fn envi_pair(
-    (written, path, head): (&str, PathBuf, &[u8]),
+    (written, path): (&str, &Path),
     folder: &InputFolder,
 ) -> Result<(Picture, Vec<PathBuf>), String> {
-    let partner = |names: Vec<PathBuf>| -> Result<Option<PathBuf>, String> {
+    let partner = |names: Vec<PathBuf>| {
         for name in names.iter().filter_map(|name| name.to_str()) {
             match folder.find(name) {
                 Ok(found) => return Ok(Some(found.path)),
@@ -96,19 +97,5 @@ fn envi_pair(
         }
         Ok(None)
     };
-    let written = Path::new(written);
-    let (header, data) = match envi::is_header(head) {
-        true => (Some(path), partner(envi::data_names(written).collect())?),
-        false => (partner(envi::header_names(written).collect())?, Some(path)),
-    };
-    let header = header.ok_or("has no ENVI header beside it, of the same name and `.hdr`")?;
-    let data = data.ok_or(
-        "is an ENVI header without its numbers, a file of the same name and .img, .dat or another ending",
-    )?;
-    let text = etendue_files::read(&header, envi::MOST_HEADER_BYTES);
-    let text = text.map_err(|error| error.to_string())?;
-    let parsed = envi::Header::parse(&text).map_err(|error| error.to_string())?;
-    let map = MappedFile::open(&data).map_err(|error| error.to_string())?;
-    let cube = parsed.decode(map.bytes(), Limits::default()).map_err(|error| error.to_string())?;
-    Ok((cube, vec![header, data]))
+    read_envi((Path::new(written), path), Limits::default(), partner).map_err(|fault| fault.why)
 }

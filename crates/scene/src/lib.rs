@@ -25,6 +25,7 @@
 mod cache;
 mod cubes;
 pub mod doctor;
+mod envi;
 pub mod error;
 pub mod escape;
 mod facing;
@@ -37,12 +38,14 @@ mod materials;
 pub mod memory;
 mod parts;
 pub mod scene;
+pub mod serial;
 pub mod shape;
 mod sniff;
 mod words;
 
 pub use cache::Cache;
 pub use doctor::{Diagnosis, MemoryForecast};
+pub use envi::{EnviFault, read_envi};
 pub use error::SceneError;
 pub use file::{FileKind, SceneFile, SceneSpec, scene_schema};
 pub use frames::{Frame, Frames, RigCamera, Start};

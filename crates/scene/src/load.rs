@@ -53,6 +53,8 @@ impl SceneFile {
             let [width, height] = size;
             self.take(&budget, film, || format!("a picture of {width} x {height} pixels"))?;
         }
+        let slots = self.slots(&options.opener)?;
+        self.check_pixels(&slots, size)?;
         let mut named = OwnParts {
             materials: &own.materials,
             files: Vec::new(),
@@ -75,6 +77,7 @@ impl SceneFile {
         parts.settle_backs(self.spec.cull_backfaces);
         parts.files = instance_files;
         parts.files.extend(own.files);
+        parts.files.extend(slots.into_iter().flat_map(|slot| slot.files));
         for (index, object) in objects.iter().enumerate() {
             self.check_overrides(&parts, object, index)?;
             // The copies are spoken for, as far as each places one mesh.
@@ -249,6 +252,10 @@ impl SceneFile {
         let KeptCamera { geometry, camera, origin: camera_origin, files: camera_files, .. } = built;
         let things_move = geometry.moving_within(camera.exposure_span()).next().is_some();
         let camera = camera.among_moving_things(things_move);
+        let mut emission = parts.materials.iter().filter_map(|material| material.emission.as_ref());
+        let lights_change = parts.lights.iter().any(|light| light.modulation.is_some())
+            || emission.any(|emission| emission.modulation.is_some());
+        let camera = camera.under_changing_lights(lights_change);
         // Every file that the scene is made of.
         let opened = parts.stats.files.iter().map(|(path, _)| path.clone());
         let images = parts.textures.iter().filter_map(Texture::file);
@@ -273,7 +280,10 @@ impl SceneFile {
         }
         let sensor = self.sensor_behind(&camera)?;
         notes.extend(self.lens_notes(&camera, options.strictness)?);
-        notes.extend(shutter::notes(&camera));
+        let is_whole = self.spec.serial.is_empty();
+        notes.extend(shutter::notes(&camera).into_iter().filter(|_| is_whole));
+        notes.extend(shutter::held(&camera, &geometry));
+        notes.extend(shutter::dark_lights(&camera, &parts.lights, &parts.materials));
         Ok(Scene {
             path: self.path().to_owned(),
             geometry,
@@ -290,6 +300,7 @@ impl SceneFile {
             camera_origin,
             cameras: parts.cameras,
             picture: self.spec.picture(),
+            slots: self.spec.serial.len(),
             layers: self.spec.all_layers(),
             render: self.spec.render.clone(),
             plan: self.spec.plan,

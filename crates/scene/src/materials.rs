@@ -1,13 +1,15 @@
 //! The scene file's own materials and lights, and the files and glasses that they name.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use etendue_files::InputFolder;
 use etendue_optics::glass::{AgfCatalogue, GlassSpec};
 use etendue_spectrum::Curve;
 use etendue_tracer::spec::{CubeSpec, Fault, ImageSpec, IorSpec, Supply};
 use etendue_tracer::{
-    Cube, CubeKind, ImageSource, Ior, Light, LightKind, Material, Paint, Texture, TextureUse,
+    Cube, CubeKind, ImageSource, Ior, Light, LightKind, Material, Modulation, Paint, Texture,
+    TextureUse,
 };
 use serde_json::Value;
 
@@ -46,7 +48,11 @@ impl SceneFile {
             };
             let fault =
                 |Fault { key, why }| self.fault(&below(&join("materials", name), &key), why);
-            own.materials.push(spec.build(name, &mut supply).map_err(fault)?);
+            let mut material = spec.build(name, &mut supply).map_err(fault)?;
+            if let Some(emission) = &mut material.emission {
+                start_at(&mut emission.modulation, self.spec.render.time());
+            }
+            own.materials.push(material);
         }
         Ok(own)
     }
@@ -66,7 +72,9 @@ impl SceneFile {
             let curves = &mut 0;
             let mut supply = Named { folder, glasses, wanted, textures, files, curves };
             let fault = |Fault { key, why }| self.fault(&below(&at, &key), why);
-            let built = spec.build(&mut supply).map_err(fault)?;
+            let time = self.spec.render.time();
+            let mut built = spec.build(&mut supply).map_err(fault)?;
+            built.iter_mut().for_each(|light| start_at(&mut light.modulation, time));
             let is_sky = |l: &Light| matches!(l.kind, LightKind::Environment { .. });
             if built.iter().any(is_sky) && lights.iter().any(is_sky) {
                 return Err(self.fault(&at, "a second environment; a scene has one at most"));
@@ -74,6 +82,13 @@ impl SceneFile {
             lights.extend(built);
         }
         Ok(Some(lights))
+    }
+}
+
+/// Puts a light's modulation into the clock of a frame whose time is `time` (s).
+fn start_at(modulation: &mut Option<Arc<Modulation>>, time: f64) {
+    if let Some(modulation) = modulation {
+        *modulation = Arc::new(modulation.from_time(time));
     }
 }
 

@@ -145,10 +145,7 @@ impl Parts {
                     node,
                     material,
                     world_from_mesh: copy.then_inner(&placement.model_from_mesh),
-                    motion: object
-                        .motions
-                        .get(k as usize)
-                        .map(|motion| Arc::new(motion.then_inner(&placement.model_from_mesh))),
+                    motion: moved(object.motions.get(k as usize), copy, placement).map(Arc::new),
                 });
             self.geometry.placements.extend(copies);
         }
@@ -194,6 +191,19 @@ impl Parts {
         });
         true
     }
+}
+
+/// How a placement of a copy that stands at `copy` moves, where it or the copy does.
+fn moved(own: Option<&Motion>, copy: &Transform, placement: &ImportedPlacement) -> Option<Motion> {
+    let motion = match own {
+        Some(motion) => motion.clone(),
+        None if placement.links.is_empty() => return None,
+        None => Motion::default().then_inner(copy),
+    };
+    Some(match placement.links.is_empty() {
+        true => motion.then_inner(&placement.model_from_mesh),
+        false => motion.then_links(&placement.links),
+    })
 }
 
 /// The numbers that the placements of one object get.

@@ -57,6 +57,8 @@ pub struct Scene {
     pub cameras: Vec<SceneCamera>,
     /// The layer that holds the picture, if there is to be one.
     pub picture: Option<LayerSpec>,
+    /// The slots of its exposure; 0 where that is in one piece.
+    pub slots: usize,
     /// All layers to render, each once: the picture first.
     pub layers: Vec<LayerSpec>,
     /// How to render.

@@ -16,9 +16,10 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::spec::{ChannelSet, Channels};
 use crate::{CfaSpec, RawImage, Sensor};
 use etendue_spectrum::Bands;
-use etendue_spectrum::colour::srgb_encode;
+use etendue_spectrum::colour::{SRGB_FROM_XYZ, XYZ_FROM_SRGB, srgb_encode, transpose};
 
 /// How missing colours are found.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -133,11 +134,17 @@ fn mirrored(i: isize, len: usize) -> usize {
 }
 
 impl Sensor {
-    /// What every channel makes of white light (equal energy), the most sensitive being 1.
+    /// What every channel makes of white light, the most sensitive being 1: of equal energy, and of a colorimeter that
+    /// of sRGB, which is daylight (D65).
     #[must_use]
     pub fn white_response(&self) -> Vec<f64> {
-        let all: Vec<f64> =
-            self.response.channels.iter().map(|channel| channel.primaries.iter().sum()).collect();
+        let all: Vec<f64> = match self.is_colorimeter() {
+            true => XYZ_FROM_SRGB.map(|row| row.iter().sum()).into(),
+            false => {
+                let channels = self.response.channels.iter();
+                channels.map(|channel| channel.primaries.iter().sum()).collect()
+            }
+        };
         let most = all.iter().copied().fold(0.0, f64::max);
         all.into_iter().map(|value| value / most).collect()
     }
@@ -165,10 +172,16 @@ impl Sensor {
 
     /// Weights of each channel in linear sRGB, one row a channel: white light becomes (1, 1, 1) when
     /// the most sensitive channel is 1. For three and more channels the colours of the render's RGB
-    /// assets come back exactly (the least-squares inverse of the response to them); fewer are grey.
+    /// assets come back exactly (the least-squares inverse of the response to them); fewer are grey. Of a
+    /// colorimeter they are the matrix of IEC 61966-2-1.
     #[must_use]
     pub fn srgb_from_channels(&self) -> Vec<[f64; 3]> {
         let white = self.white_response();
+        if self.is_colorimeter() {
+            let most =
+                XYZ_FROM_SRGB.map(|row| row.iter().sum::<f64>()).into_iter().fold(0.0, f64::max);
+            return transpose(*SRGB_FROM_XYZ).map(|row| row.map(|part| part * most)).into();
+        }
         if let Bands::Spectral(_) | Bands::Weighted(_) = self.bands()
             && self.channels().len() == self.bands().count()
             && self.is_one_band_a_channel()
@@ -195,6 +208,11 @@ impl Sensor {
             self.response.channels.iter().map(|channel| channel.primaries).collect();
         let most = rows.iter().map(|row| row.iter().sum::<f64>()).fold(0.0, f64::max);
         rows.into_iter().map(|row| row.map(|value| value / most)).collect()
+    }
+
+    /// Whether its channels are X, Y and Z.
+    fn is_colorimeter(&self) -> bool {
+        matches!(self.spec().channels, Some(Channels::Set(ChannelSet::Cie1931)))
     }
 
     fn is_one_band_a_channel(&self) -> bool {

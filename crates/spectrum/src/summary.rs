@@ -5,15 +5,16 @@
 //! * XYZ, xy, uv and the correlated colour temperature: CIE 015:2018, "Colorimetry", sections 7 and 9.5. The
 //!   temperature is that of the black body whose chromaticity (u, 2/3 v') is nearest; it is told where that is
 //!   nearer than 0.05, as the CIE demands.
-//! * Luminous efficacy: 683 lm/W times ∫ S ȳ dλ over ∫ S dλ (BIPM, SI Brochure, 2019).
+//! * Luminous efficacy: 683.002 lm/W times ∫ S ȳ dλ over ∫ S dλ (CIE 018:2019, "The Basis of Physical Photometry").
 
 use crate::colour::{FINE_OBSERVER, chromaticity};
 use crate::curve::integral;
 use crate::illuminant::planck;
 use crate::{Curve, PLANCK, SPEED_OF_LIGHT};
 
-/// The greatest luminous efficacy (lm/W): that of light of 540 THz.
-pub const LUMINOUS_EFFICACY: f64 = 683.0;
+/// The greatest luminous efficacy (lm/W), that of light of 555 nm: 683 lm/W of light of 540 THz, over the observer's ȳ
+/// there.
+pub const LUMINOUS_EFFICACY: f64 = 683.002;
 
 /// A curve in a few numbers.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,9 +1,10 @@
 //! Textures by wavelength: a reflectance or a radiance at each texel, in bands.
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use etendue_image::BandAxis;
-use etendue_spectrum::{Bands, Curve, Outside, rgb};
+use etendue_spectrum::{Bands, Curve, NoOverlap, Outside, rgb};
 
 use crate::Color;
 use crate::spec::BRIGHTEST;
@@ -97,11 +98,8 @@ impl Cube {
         let mut cube = Self { kind, size, axis, values, looks: Vec::new(), wrap, filter };
         let color = |part: &Curve| match kind {
             CubeKind::Reflectance => rgb::colour(&part.held_over(360.0, 830.0)),
-            // As of any lamp, before equal energy; none where it is invisible.
-            CubeKind::Light => match Bands::Rgb.from_curve(part, Outside::Zero) {
-                Ok(color) => std::array::from_fn(|k| color[k]),
-                Err(_) => [0.0; 3],
-            },
+            // As of any lamp, before equal energy; none where it is invisible. Of a part it may well be negative.
+            CubeKind::Light => rgb::colour(part),
         };
         let colors: Vec<Color> = cube.parts().iter().map(color).collect();
         let look = |texel: &[f32]| {
@@ -136,14 +134,39 @@ impl Cube {
         (0..middles.len()).map(part).collect()
     }
 
+    /// Columns and rows.
+    #[must_use]
+    pub fn size(&self) -> [usize; 2] {
+        self.size
+    }
+
+    /// What each texel looks like: linear RGB, row by row from the top.
+    pub(crate) fn looks(&self) -> &[[f32; 3]] {
+        &self.looks
+    }
+
     /// The mean of all texels in each band, as a curve; `None` where all is dark.
     #[must_use]
     pub fn mean(&self) -> Option<Curve> {
-        let mut sums = vec![0.0; self.axis.len()];
-        for texel in self.values.chunks_exact(sums.len()) {
-            sums.iter_mut().zip(texel).for_each(|(sum, value)| *sum += f64::from(*value));
+        self.mean_of_rows(|_| 1.0)
+    }
+
+    /// As [`Self::mean`] over all directions, of which it is the latitude-longitude map.
+    #[must_use]
+    pub fn mean_over_the_sphere(&self) -> Option<Curve> {
+        let rows = self.size[1] as f64;
+        self.mean_of_rows(|row| (PI * (row as f64 + 0.5) / rows).sin())
+    }
+
+    /// The mean of the texels in each band, each as much as its row weighs.
+    fn mean_of_rows(&self, weight: impl Fn(usize) -> f64) -> Option<Curve> {
+        let (mut sums, mut all) = (vec![0.0; self.axis.len()], 0.0);
+        for (k, texel) in self.values.chunks_exact(sums.len()).enumerate() {
+            let weight = weight(k / self.size[0]);
+            all += weight;
+            sums.iter_mut().zip(texel).for_each(|(sum, value)| *sum += weight * f64::from(*value));
         }
-        let means = sums.iter().map(|sum| sum / self.looks.len() as f64);
+        let means = sums.iter().map(|sum| sum / all);
         let [from, to] = self.range();
         let mut points: Vec<[f64; 2]> =
             self.axis.wavelengths().iter().zip(means).map(|(nm, mean)| [*nm, mean]).collect();
@@ -166,6 +189,19 @@ impl Cube {
     pub fn range(&self) -> [f64; 2] {
         let edges = self.axis.edges();
         [edges[0], edges[edges.len() - 1]]
+    }
+
+    /// Whether it shines in any of the bands' wavelengths.
+    ///
+    /// # Errors
+    ///
+    /// When its own bands miss them.
+    pub(crate) fn overlaps(&self, bands: &Bands) -> Result<(), NoOverlap> {
+        let [[low, high], [from, to]] = [self.range(), bands.range()];
+        match high <= from || low >= to {
+            true => Err(NoOverlap { curve: [low, high], bands: [from, to] }),
+            false => Ok(()),
+        }
     }
 
     /// Bytes of a render in `bands`: the cube, its looks and, beside it, its file while it is read or its texels in

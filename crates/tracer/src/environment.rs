@@ -10,12 +10,12 @@ use std::path::Path;
 use etendue_geometry::glam::DVec3;
 use etendue_image::Limits;
 
-use crate::Color;
 use crate::angles;
 use crate::sampling::{GridCell, GridDistribution, ONE_BELOW, linear_place};
 use crate::spec::BRIGHTEST;
 use crate::spectral_sky::{self, Spectrum};
 use crate::texture::{ImageError, read_file, read_image};
+use crate::{Color, Cube};
 
 /// The most cells of the grid that directions are chosen on, across and down.
 const CELLS: [usize; 2] = [2048, 1024];
@@ -34,6 +34,9 @@ pub struct EnvironmentMap {
 }
 
 impl EnvironmentMap {
+    /// Bytes of a texel that is looked at, and of the cell of the table that directions are chosen by.
+    pub const LOOK_BYTES: u64 = (size_of::<[f32; 3]>() + 2 * size_of::<f64>()) as u64;
+
     /// Reads an HDR, EXR, PNG or JPEG file. 8- and 16-bit images are taken for sRGB.
     ///
     /// # Errors
@@ -50,6 +53,12 @@ impl EnvironmentMap {
             [r, g, b].map(|c| c as f32)
         };
         Ok(Self::new(raster.size(), (0..raster.len()).map(linear).collect()))
+    }
+
+    /// What a cube of light from all directions looks like.
+    #[must_use]
+    pub fn of_cube(cube: &Cube) -> Self {
+        Self::new(cube.size(), cube.looks().to_vec())
     }
 
     /// From linear RGB, row by row from the top.
@@ -138,9 +147,21 @@ impl EnvironmentMap {
         colors
     }
 
-    /// Radiance at a [`place`] and the wavelengths of a clear sky, where the map has them.
-    pub(crate) fn spectrum_at(&self, at: [f64; 2]) -> Option<Spectrum> {
-        (!self.spectra.is_empty()).then(|| self.interpolated(&self.spectra, at))
+    /// Radiance at a [`place`] and the wavelengths of a clear sky; 0 of a map that has colours alone.
+    pub(crate) fn spectrum_at(&self, at: [f64; 2]) -> Spectrum {
+        self.interpolated(&self.spectra, at)
+    }
+
+    /// What texels of some bands have at a [`place`], `[row][column][band]`: each of `out`, which are as many as a
+    /// texel has.
+    pub(crate) fn bands_at(&self, texels: &[f32], [u, v]: [f64; 2], out: &mut [f64]) {
+        let count = out.len();
+        let about = Corners::of([[u], [v]], self.size());
+        let corners = about.numbers.map(|[number]| &texels[number as usize * count..][..count]);
+        let at = [about.across[0], about.down[0]];
+        for (i, out) in out.iter_mut().enumerate() {
+            *out = between(corners.map(|texel| f64::from(texel[i])), at);
+        }
     }
 
     /// Values of texels at a [`place`].
@@ -245,7 +266,7 @@ fn blurred(bright: &[f64], [columns, rows]: [usize; 2]) -> Vec<f64> {
 struct Cells {
     /// Columns and rows.
     size: [usize; 2],
-    /// The mean of the three colours of each.
+    /// The mean over the colours or bands of each.
     bright: Vec<f32>,
 }
 
@@ -279,22 +300,31 @@ pub struct MapSampler {
     patches: GridDistribution,
     /// By row of patches, the density over the unit square where the brightness is 1.
     scale: Vec<f64>,
-    /// Mean radiance over all directions, the mean of the three colours.
+    /// Mean radiance over all directions, the mean over colours or bands.
     pub mean: f64,
 }
 
 impl MapSampler {
-    /// For `map`.
+    /// For `map`, by the mean of its three colours.
     #[must_use]
     pub fn new(map: &EnvironmentMap) -> Self {
-        let size = [map.width.clamp(1, CELLS[0]), map.height.clamp(1, CELLS[1])];
+        let bright = map.texels.iter().map(|texel| f64::from(texel[0] + texel[1] + texel[2]) / 3.0);
+        Self::by_brightness(map.size(), bright)
+    }
+
+    /// For a map of so many columns and rows by how bright each of its texels is, row by row from the top.
+    pub(crate) fn by_brightness(
+        [width, height]: [usize; 2],
+        texels: impl Iterator<Item = f64>,
+    ) -> Self {
+        let size = [width.clamp(1, CELLS[0]), height.clamp(1, CELLS[1])];
         let [columns, rows] = size;
         let mut bright = vec![0.0; columns * rows];
-        for (k, texel) in map.texels.iter().enumerate() {
-            let (x, y) = (k % map.width * columns / map.width, k / map.width * rows / map.height);
-            bright[y * columns + x] += f64::from(texel[0] + texel[1] + texel[2]) / 3.0;
+        for (k, texel) in texels.enumerate() {
+            let (x, y) = (k % width * columns / width, k / width * rows / height);
+            bright[y * columns + x] += texel;
         }
-        let texels_a_cell = map.texels.len() as f64 / bright.len() as f64;
+        let texels_a_cell = (width * height) as f64 / bright.len() as f64;
         bright.iter_mut().for_each(|bright| *bright /= texels_a_cell);
         let sine = |v: f64| (PI * v / rows as f64).sin();
         let bands = bright.chunks(columns).enumerate();

@@ -1,10 +1,13 @@
-//! Groups of lights, each of which a picture may show by itself.
+//! Groups of lights, each of which a picture may show by itself, and parts of them that change with time.
 
 use std::borrow::Cow;
 use std::fmt;
+use std::sync::Arc;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
+
+use crate::Modulation;
 
 /// The most letters of a name: what fits into the names of channels in files.
 const MOST: usize = 24;
@@ -88,11 +91,14 @@ impl JsonSchema for LightGroup {
     }
 }
 
-/// Which group each light of a scene is of.
+/// What of the light of a ray is told apart: that of a group, and of it what changes with time alike.
+type Part = (LightGroup, Option<Arc<Modulation>>);
+
+/// Which part each light of a scene is of.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Groups {
-    /// All that there are, in order; [`LightGroup::OTHER`] among them.
-    names: Vec<LightGroup>,
+    /// All that there are, each group's side by side; that of [`LightGroup::OTHER`] without modulation among them.
+    parts: Vec<Part>,
     /// By the lights' numbers.
     of_light: Vec<u32>,
     /// By the materials' numbers.
@@ -102,39 +108,36 @@ pub(crate) struct Groups {
 impl Groups {
     /// Those of lights and materials.
     pub(crate) fn of(
-        lights: impl Iterator<Item = Option<LightGroup>> + Clone,
-        materials: impl Iterator<Item = Option<LightGroup>> + Clone,
+        lights: impl Iterator<Item = Part> + Clone,
+        materials: impl Iterator<Item = Part> + Clone,
     ) -> Self {
-        let mut names: Vec<LightGroup> =
-            lights.clone().chain(materials.clone()).flatten().collect();
-        names.push(LightGroup::OTHER);
-        names.sort_unstable();
-        names.dedup();
-        let number = |group: Option<LightGroup>| {
-            let found = names.binary_search(&group.unwrap_or(LightGroup::OTHER));
+        let mut parts: Vec<Part> = vec![(LightGroup::OTHER, None)];
+        for part in lights.clone().chain(materials.clone()) {
+            if !parts.contains(&part) {
+                parts.push(part);
+            }
+        }
+        parts.sort_by_key(|(group, modulation)| (*group, modulation.is_some()));
+        let number = |part: Part| {
+            let found = parts.iter().position(|other| *other == part);
             u32::try_from(found.unwrap_or(0)).unwrap_or(0)
         };
         let (of_light, of_material) =
             (lights.map(number).collect(), materials.map(number).collect());
-        Self { names, of_light, of_material }
+        Self { parts, of_light, of_material }
     }
 
-    /// How many there are.
-    pub(crate) fn count(&self) -> usize {
-        self.names.len()
+    /// All that there are.
+    pub(crate) fn parts(&self) -> &[Part] {
+        &self.parts
     }
 
-    /// The number of a group.
-    pub(crate) fn number(&self, group: LightGroup) -> Option<usize> {
-        self.names.binary_search(&group).ok()
-    }
-
-    /// The group of a light.
+    /// The part that a light is of.
     pub(crate) fn of_light(&self, light: usize) -> u32 {
         self.of_light.get(light).copied().unwrap_or(0)
     }
 
-    /// The group of a surface that shines.
+    /// The part that a surface which shines is of.
     pub(crate) fn of_material(&self, material: u32) -> u32 {
         self.of_material.get(material as usize).copied().unwrap_or(0)
     }

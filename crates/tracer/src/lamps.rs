@@ -128,7 +128,11 @@ pub(crate) fn triangle_power(
         Paint::Plain(_) | Paint::Curve { .. } => 0.0,
         // Light that nobody sees, too.
         Paint::Cube { cube, .. } => cube.cube.brightest(),
-        Paint::Checker { colors, .. } => mean(&colors[0]).max(mean(&colors[1])),
+        Paint::Checker { colors, curves, .. } => {
+            let unseen = curves.iter().flat_map(|both| both.each_ref());
+            let unseen = unseen.map(|one| one.curve.extent()[1]).fold(0.0, f64::max);
+            mean(&colors[0]).max(mean(&colors[1])).max(unseen)
+        }
         Paint::Image { factor, .. } => 0.05 * mean(factor),
     };
     sides * PI * area * emission.strength * (radiance / 4.0).max(0.1 * least)

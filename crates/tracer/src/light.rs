@@ -12,7 +12,7 @@ use crate::light_tree::Cluster;
 use crate::projector::Projector;
 use crate::reference::SceneView;
 use crate::sky::Sky;
-use crate::{ClearSky, Color, LightGroup, TextureUse};
+use crate::{ClearSky, Color, Cube, LightGroup, Modulation, TextureUse};
 
 /// A light of the scene, beside its emissive surfaces.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +27,8 @@ pub struct Light {
     pub spectrum: Option<Arc<Curve>>,
     /// The group that it is of, if it names one.
     pub group: Option<LightGroup>,
+    /// How its strength changes with time, in the frame's clock; `None` when it does not.
+    pub modulation: Option<Arc<Modulation>>,
 }
 
 impl Light {
@@ -41,7 +43,14 @@ impl Light {
         illuminant: None,
         spectrum: None,
         group: None,
+        modulation: None,
     };
+
+    /// A light of equal energy that is of no group, and as strong all the time.
+    #[must_use]
+    pub fn steady(kind: LightKind, color: Color) -> Self {
+        Self { kind, color, illuminant: None, spectrum: None, group: None, modulation: None }
+    }
 
     /// Its intensity in the middle, or of what is measured the mean, over the three colours (W/sr).
     pub(crate) fn intensity(&self) -> f64 {
@@ -123,6 +132,20 @@ pub enum LightKind {
 }
 
 impl LightKind {
+    /// The solid angle over which it shines, each direction as much as it is bright there beside the middle (sr, of
+    /// measured lights cd·sr); `None` of what is far away, and of what throws an image.
+    pub(crate) fn spread(&self) -> Option<f64> {
+        match self {
+            Self::Point(_) => Some(4.0 * PI),
+            // Full within the inner cone, and between the cones the mean of a square over equal parts of the sphere.
+            Self::Spot { cos_outer, cos_inner, .. } => {
+                Some(2.0 * PI * ((1.0 - cos_inner) + (cos_inner - cos_outer) / 3.0))
+            }
+            Self::Goniometric(measured) => Some(4.0 * PI * measured.photometry.mean()),
+            Self::Projector(_) | Self::Directional { .. } | Self::Environment { .. } => None,
+        }
+    }
+
     /// Where it is and shines, with an intensity (W/sr); `None` of what is far away.
     pub(crate) fn cluster(&self, intensity: f64, around: &SceneView<'_>) -> Option<Cluster> {
         let (at, axis, cone, reach) = match self {
@@ -155,6 +178,8 @@ pub enum EnvironmentImage {
     ClearSky(Box<ClearSky>),
     /// A file.
     File(std::path::PathBuf),
+    /// Light by wavelength.
+    Cube(Arc<Cube>),
 }
 
 impl EnvironmentImage {

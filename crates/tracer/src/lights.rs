@@ -13,12 +13,12 @@ use crate::lamps::{self, AreaLight, triangle_power};
 use crate::light::{EnvironmentImage, Light, LightKind, irradiance, power, spot_falloff};
 use crate::light_sampler::{Candidate, LightSampler, Receiver};
 use crate::material::Alpha;
-use crate::reference::{SceneView, SurfacePoint};
+use crate::reference::{SceneView, SurfacePoint, squares_at};
 use crate::sampling::{Frame, cone_direction, triangle_point};
 use crate::sky::{Sky, uniform_direction};
 use crate::spectral::Spectral;
 use crate::target::{Chosen, Target, TargetKind};
-use crate::{LightGroup, Material, Paint};
+use crate::{LightGroup, Material, Modulation, Paint, SceneCurve};
 
 /// All lights of a scene, ready to be chosen from.
 #[derive(Debug)]
@@ -27,8 +27,8 @@ pub struct Lights {
     /// The bands of each light, one light after the other.
     bands: Vec<f64>,
     pub(crate) sky: Option<Sky>,
-    /// The bands by which each material's emission is multiplied, where it has an illuminant.
-    tints: Vec<Option<Vec<f64>>>,
+    /// The spectrum of each material's emission.
+    tints: Vec<EmissionBands>,
     /// For each placement, where its triangles start among the choices.
     first: Vec<Option<u32>>,
     /// Some emissive surface moves: no place on it is chosen, and paths come upon it by themselves.
@@ -41,6 +41,37 @@ pub struct Lights {
     lamps: Vec<Option<AreaLight>>,
     lamp_bands: Vec<f64>,
     groups: Groups,
+}
+
+/// The spectrum of what a surface gives off, in bands.
+#[derive(Debug)]
+enum EmissionBands {
+    /// That of its paint.
+    Own,
+    /// Its paint times an illuminant.
+    Times(Vec<f64>),
+    /// The squares of a checker of curves.
+    Squares([Vec<f64>; 2]),
+}
+
+impl EmissionBands {
+    /// That of a material.
+    fn of(material: &Material, spectral: &Spectral) -> Result<Self, NoOverlap> {
+        let Some(emission) = &material.emission else { return Ok(Self::Own) };
+        match (&emission.radiance, &emission.illuminant) {
+            (Paint::Cube { cube, .. }, _) => {
+                cube.cube.overlaps(spectral.bands())?;
+                Ok(Self::Own)
+            }
+            (Paint::Checker { curves: Some(curves), .. }, _) => {
+                let [first, second] = &**curves;
+                let bands = |one: &SceneCurve| spectral.emission(&one.curve);
+                Ok(Self::Squares([bands(first)?, bands(second)?]))
+            }
+            (_, Some(illuminant)) => spectral.emission(illuminant).map(Self::Times),
+            (_, None) => Ok(Self::Own),
+        }
+    }
 }
 
 impl Lights {
@@ -95,17 +126,18 @@ impl Lights {
                 triangles.push(id);
             }
         }
-        let tint = |material: &Material| -> Result<Option<Vec<f64>>, NoOverlap> {
-            match material.emission.as_ref().and_then(|e| e.illuminant.as_ref()) {
-                Some(illuminant) => spectral.emission(illuminant).map(Some),
-                None => Ok(None),
-            }
-        };
+        let tint = |material: &Material| EmissionBands::of(material, spectral);
         let tints = around.materials.iter().map(tint).collect::<Result<_, _>>()?;
         let sampler = LightSampler::new(&candidates, around.geometry.loose_bounds());
-        let of_material = |material: &Material| material.emission.as_ref().and_then(|e| e.group);
+        let part = |group: Option<LightGroup>, modulation: &Option<Arc<Modulation>>| {
+            (group.unwrap_or(LightGroup::OTHER), modulation.clone())
+        };
+        let of_material = |material: &Material| match &material.emission {
+            Some(emission) => part(emission.group, &emission.modulation),
+            None => (LightGroup::OTHER, None),
+        };
         let groups = Groups::of(
-            lights.iter().map(|light| light.group),
+            lights.iter().map(|light| part(light.group, &light.modulation)),
             around.materials.iter().map(of_material),
         );
         let lights = lights.to_vec();
@@ -224,16 +256,17 @@ impl Lights {
         self.triangles.len()
     }
 
-    /// How many groups of lights there are.
+    /// What of their light can be told apart, by the numbers of [`crate::transport::Parts::Groups`]: the lights of
+    /// one group that change with time alike.
     #[must_use]
-    pub fn group_count(&self) -> usize {
-        self.groups.count()
+    pub fn parts(&self) -> &[(LightGroup, Option<Arc<Modulation>>)] {
+        self.groups.parts()
     }
 
-    /// The number of a group; `None` of one that no light is of.
+    /// Whether any of them changes with time.
     #[must_use]
-    pub fn group_number(&self, group: LightGroup) -> Option<usize> {
-        self.groups.number(group)
+    pub fn are_modulated(&self) -> bool {
+        self.parts().iter().any(|(_, modulation)| modulation.is_some())
     }
 
     /// The group of the sky.
@@ -396,9 +429,18 @@ impl Lights {
             }
             return true;
         }
+        if let (EmissionBands::Squares([a, b]), Paint::Checker { squares, .. }) =
+            (&self.tints[number], &emission.radiance)
+        {
+            let [first, second] = squares_at(spot, *squares).shares();
+            for ((band, a), b) in radiance.iter_mut().zip(a).zip(b) {
+                *band = there * emission.strength * (first * a + second * b);
+            }
+            return true;
+        }
         let [r, g, b, _] = around.paint(&emission.radiance, spot);
         spectral.spread(&[r, g, b].map(|c| c * emission.strength * there), radiance);
-        if let Some(tint) = &self.tints[number] {
+        if let EmissionBands::Times(tint) = &self.tints[number] {
             radiance.iter_mut().zip(tint).for_each(|(band, tint)| *band *= tint);
         }
         true

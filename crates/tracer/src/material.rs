@@ -7,7 +7,7 @@ use etendue_spectrum::Curve;
 
 use crate::scattering::{Absorption, GltfSurface, Scattering};
 use crate::texture::Encoding;
-use crate::{LightGroup, SceneCube, SceneCurve, TextureUse};
+use crate::{LightGroup, Modulation, SceneCube, SceneCurve, TextureUse};
 
 /// Linear RGB with the sRGB primaries, 0..=1 for reflectances.
 pub type Color = [f64; 3];
@@ -59,6 +59,8 @@ pub struct Emission {
     pub two_sided: bool,
     /// The group of lights that it is of, if it names one.
     pub group: Option<LightGroup>,
+    /// How its strength changes with time, in the frame's clock; `None` when it does not.
+    pub modulation: Option<Arc<Modulation>>,
 }
 
 /// Where a surface lets rays pass as if it were not there.

@@ -339,15 +339,26 @@ impl SceneView<'_> {
 }
 
 /// The squares of a checker that a place sees.
-enum Squares {
+pub(crate) enum Squares {
     /// A mean of both, by how far the first is above a half.
     Mean(f64),
     /// One of them.
     One(usize),
 }
 
+impl Squares {
+    /// The share of each.
+    pub(crate) fn shares(&self) -> [f64; 2] {
+        match self {
+            Self::Mean(wave) => [0.5 + wave, 0.5 - wave],
+            Self::One(0) => [1.0, 0.0],
+            Self::One(_) => [0.0, 1.0],
+        }
+    }
+}
+
 /// The squares of a checker, of so many along one unit of the texture coordinates, that a place sees.
-fn squares_at(spot: &SurfacePoint<'_>, squares: f64) -> Squares {
+pub(crate) fn squares_at(spot: &SurfacePoint<'_>, squares: f64) -> Squares {
     let [u, v] = spot.uv(0);
     if let Some([a, b]) = spot.extent(0) {
         let mean =

@@ -23,11 +23,47 @@ pub(crate) struct Sky {
     /// Which of the lights it is.
     pub(crate) index: usize,
     map: Option<(Arc<EnvironmentMap>, MapSampler)>,
-    /// What makes bands of its spectra, where it has some and they are wanted.
-    rows: Vec<Spectrum>,
+    spectra: Spectra,
     world_from_map: DMat3,
     /// The camera sees it.
     pub(crate) visible: bool,
+}
+
+/// What the bands of a sky are made of.
+#[derive(Debug)]
+enum Spectra {
+    /// Its colours.
+    Colors,
+    /// The spectra of a clear sky: a row for each band.
+    ClearSky(Vec<Spectrum>),
+    /// The texels of a cube in these bands, `[row][column][band]`.
+    Texels(Vec<f32>),
+}
+
+impl Spectra {
+    /// Those of `image` in the bands of a render.
+    fn of(image: &EnvironmentImage, spectral: &Spectral) -> Result<Self, NoOverlap> {
+        if spectral.is_rgb() {
+            return Ok(Self::Colors);
+        }
+        Ok(match image {
+            EnvironmentImage::ClearSky(_) => Self::ClearSky(spectral_sky::rows(spectral.bands())?),
+            EnvironmentImage::Cube(cube) => {
+                cube.overlaps(spectral.bands())?;
+                Self::Texels(cube.in_bands(spectral.bands()))
+            }
+            EnvironmentImage::Constant | EnvironmentImage::Studio | EnvironmentImage::File(_) => {
+                Self::Colors
+            }
+        })
+    }
+
+    /// What directions of `map` are chosen by: how bright it is in the bands, which need not be seen.
+    fn sampler(&self, map: &EnvironmentMap, count: usize) -> MapSampler {
+        let Self::Texels(texels) = self else { return MapSampler::new(map) };
+        let mean = |texel: &[f32]| texel.iter().map(|v| f64::from(*v)).sum::<f64>() / count as f64;
+        MapSampler::by_brightness(map.size(), texels.chunks_exact(count).map(mean))
+    }
 }
 
 /// Directions that are asked together; kept for the next.
@@ -59,35 +95,26 @@ impl Sky {
     ///
     /// # Errors
     ///
-    /// When a clear sky is known at no wavelength of the bands.
+    /// When a clear sky or a cube is known at no wavelength of the bands.
     pub(crate) fn of(
         lights: &[Light],
         map: Option<Arc<EnvironmentMap>>,
         spectral: &Spectral,
     ) -> Result<Option<Self>, NoOverlap> {
-        let has_spectra = |light: &Light| {
-            let image = EnvironmentImage::of(light);
-            matches!(image, Some(EnvironmentImage::ClearSky(_))) && !spectral.is_rgb()
-        };
-        let rows = match lights.iter().any(has_spectra) {
-            true => spectral_sky::rows(spectral.bands())?,
-            false => Vec::new(),
-        };
-        let sampled = |map: Arc<EnvironmentMap>| {
-            let sampler = MapSampler::new(&map);
-            (map, sampler)
-        };
-        let first = lights.iter().enumerate().find_map(|(index, light)| match light.kind {
-            LightKind::Environment { turn, visible, .. } => Some((index, turn, visible)),
+        let first = lights.iter().enumerate().find_map(|(index, light)| match &light.kind {
+            LightKind::Environment { image, turn, visible } => {
+                Some((index, image, *turn, *visible))
+            }
             _ => None,
         });
-        Ok(first.map(|(index, world_from_map, visible)| Self {
-            index,
-            map: map.map(sampled),
-            rows,
-            world_from_map,
-            visible,
-        }))
+        let Some((index, image, world_from_map, visible)) = first else { return Ok(None) };
+        let spectra = Spectra::of(image, spectral)?;
+        let sampled = |map: Arc<EnvironmentMap>| {
+            let sampler = spectra.sampler(&map, spectral.count());
+            (map, sampler)
+        };
+        let map = map.map(sampled);
+        Ok(Some(Self { index, map, spectra, world_from_map, visible }))
     }
 
     /// The mean over all directions of what its image has, or 1.
@@ -194,18 +221,16 @@ impl Lights {
     ) {
         let Some(sky) = &self.sky else { return };
         let own = self.bands_of(sky.index, radiance.len());
-        let spectrum = match (&sky.map, sky.rows.is_empty()) {
-            (Some((map, _)), false) => map.spectrum_at(at),
-            _ => None,
-        };
-        for (i, (band, own)) in radiance.iter_mut().zip(own).enumerate() {
-            let seen = match &spectrum {
-                Some(values) => {
-                    sky.rows[i].iter().zip(values).map(|(row, value)| row * value).sum()
+        match (&sky.spectra, &sky.map) {
+            (Spectra::ClearSky(rows), Some((map, _))) => {
+                let values = map.spectrum_at(at);
+                for (band, row) in radiance.iter_mut().zip(rows) {
+                    *band = row.iter().zip(values).map(|(row, value)| row * value).sum();
                 }
-                None => spectral.band(color, i),
-            };
-            *band = own * seen;
+            }
+            (Spectra::Texels(texels), Some((map, _))) => map.bands_at(texels, at, radiance),
+            (Spectra::Colors, _) | (_, None) => spectral.spread(color, radiance),
         }
+        radiance.iter_mut().zip(own).for_each(|(band, own)| *band *= own);
     }
 }

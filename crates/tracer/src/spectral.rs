@@ -14,7 +14,8 @@ const SHARES: usize = 32;
 #[derive(Debug, Clone)]
 pub struct Spectral {
     bands: Bands,
-    from_rgb: Vec<[f64; 3]>,
+    /// What red, green and blue are in each band.
+    from_rgb: [Vec<f64>; 3],
     is_rgb: bool,
     /// The [`Bands::wavelength`] of each band (nm): of weighted bands it is an integral, and paths ask for it at
     /// every surface.
@@ -34,9 +35,11 @@ impl Spectral {
     #[must_use]
     pub fn new(bands: &Bands) -> Self {
         let from_rgb = bands.from_rgb();
-        let quantiles = (0..from_rgb.len()).map(|i| bands.quantiles(i, SHARES)).collect();
+        let count = from_rgb.len();
+        let from_rgb = std::array::from_fn(|k| from_rgb.iter().map(|row| row[k]).collect());
+        let quantiles = (0..count).map(|i| bands.quantiles(i, SHARES)).collect();
         let metals = Metal::ALL.iter().flat_map(|&metal| reflectances(metal, bands)).collect();
-        let wavelengths = (0..from_rgb.len()).map(|i| bands.wavelength(i)).collect();
+        let wavelengths = (0..count).map(|i| bands.wavelength(i)).collect();
         Self {
             is_rgb: *bands == Bands::Rgb,
             from_rgb,
@@ -115,6 +118,28 @@ impl Spectral {
         }
     }
 
+    /// Multiplies light in all bands by a tint: to the bit as [`Self::tint`] band by band.
+    #[inline]
+    pub(crate) fn times(&self, tint: &Tint, light: &mut [f64]) {
+        let rows = self.from_rgb.each_ref().map(Vec::as_slice);
+        let known = |number: u32| {
+            let start = number as usize * self.count();
+            self.curves.get(start..start + self.count())
+        };
+        let one_by_one = |light: &mut [f64]| {
+            light.iter_mut().enumerate().for_each(|(i, band)| *band *= self.tint(tint, i));
+        };
+        match tint.spectrum {
+            _ if self.is_rgb => one_by_one(light),
+            TintSpectrum::White => times_color(rows, &tint.color, light),
+            TintSpectrum::Curve { number, .. } => match known(number) {
+                Some(curve) => times_curve(rows, (&tint.color, curve), light),
+                None => one_by_one(light),
+            },
+            TintSpectrum::Texel { .. } | TintSpectrum::Mixed { .. } => one_by_one(light),
+        }
+    }
+
     /// The bands.
     #[must_use]
     pub fn bands(&self) -> &Bands {
@@ -124,7 +149,7 @@ impl Spectral {
     /// How many bands a ray has.
     #[must_use]
     pub fn count(&self) -> usize {
-        self.from_rgb.len()
+        self.wavelengths.len()
     }
 
     /// Whether the bands are linear red, green and blue.
@@ -156,8 +181,8 @@ impl Spectral {
         if self.is_rgb {
             return color[i];
         }
-        let row = &self.from_rgb[i];
-        row[0] * color[0] + row[1] * color[1] + row[2] * color[2]
+        let [red, green, blue] = &self.from_rgb;
+        red[i] * color[0] + green[i] * color[1] + blue[i] * color[2]
     }
 
     /// A colour in all bands.
@@ -185,6 +210,29 @@ impl Spectral {
     }
 }
 
+/// Multiplies light in bands by a colour, by the rows of red, green and blue.
+#[multiversion::multiversion(targets = "simd")]
+fn times_color([red, green, blue]: [&[f64]; 3], color: &Color, light: &mut [f64]) {
+    let [r, g, b] = *color;
+    for (((band, red), green), blue) in light.iter_mut().zip(red).zip(green).zip(blue) {
+        *band *= red * r + green * g + blue * b;
+    }
+}
+
+/// The same by a colour times a curve, of which there is a mean a band.
+#[multiversion::multiversion(targets = "simd")]
+fn times_curve(
+    [red, green, blue]: [&[f64]; 3],
+    (color, curve): (&Color, &[f64]),
+    light: &mut [f64],
+) {
+    let [r, g, b] = *color;
+    let bands = light.iter_mut().zip(red).zip(green).zip(blue).zip(curve);
+    for ((((band, red), green), blue), mean) in bands {
+        *band *= (red * r + green * g + blue * b) * mean;
+    }
+}
+
 /// The means of a curve over bands, which goes on beyond its ends as it is there.
 fn held_in(bands: &Bands, curve: &Curve) -> Vec<f64> {
     bands
@@ -197,4 +245,42 @@ fn reflectances(named: Metal, bands: &Bands) -> Vec<[f64; 2]> {
     let at = |cosine| held_in(bands, &named.reflectance(cosine));
     let (face_on, second) = (at(1.0), at(metal::SECOND_COSINE));
     face_on.iter().zip(&second).map(|(&f, &s)| [f, metal::dip(f, s)]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use etendue_spectrum::Grid;
+
+    use super::*;
+    use crate::{Paint, Scattering, SceneCurve};
+
+    #[test]
+    fn light_is_multiplied_as_band_by_band_to_the_bit() {
+        let curve = Curve::sampled(vec![[380.0, 0.1], [520.0, 0.9], [780.0, 0.3]]).unwrap();
+        let curve = SceneCurve { number: 1, curve: Arc::new(curve) };
+        let paint = Paint::Curve { look: [0.2, 0.5, 0.3], curve: curve.clone() };
+        let materials = [Material::new("a", paint, Scattering::Matte)];
+        let color = [0.31, 0.47, 0.83];
+        let tints = [
+            Tint::from(color),
+            Tint { color: [1.0; 3], spectrum: curve.spectrum() },
+            Tint { color, spectrum: curve.spectrum() },
+            // Of a curve that nobody has.
+            Tint { color, spectrum: SceneCurve { number: 9, ..curve }.spectrum() },
+        ];
+        for count in [1, 3, 8, 31] {
+            let bands = Bands::Spectral(Grid::equal(400.0, 700.0, count).unwrap());
+            for bands in [bands, Bands::Rgb] {
+                let spectral = Spectral::of(&bands, &materials);
+                let light = |i: usize| 0.7 + 0.01 * i as f64;
+                for tint in &tints {
+                    let mut found: Vec<f64> = (0..spectral.count()).map(light).collect();
+                    spectral.times(tint, &mut found);
+                    for (i, found) in found.into_iter().enumerate() {
+                        assert_eq!(found, light(i) * spectral.tint(tint, i), "band {i} of {count}");
+                    }
+                }
+            }
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! Cameras: the rays that they send out, and what is refused.
 
 mod coarser;
+mod imu;
 mod lens_camera;
 mod light_field;
 mod opencv_fit;

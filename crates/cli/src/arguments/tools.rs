@@ -21,7 +21,9 @@ Examples:
   etendue lens scenes/lenses/double-gauss.json --rays rays.json --json
   etendue lens scenes/lenses/double-gauss.json -o out/double-gauss
   etendue lens bought.zmx --save bought.json
-  etendue lens scenes/double-gauss.json --fit-opencv";
+  etendue lens scenes/double-gauss.json --fit-opencv
+  etendue lens scenes/lenses/double-gauss.json --report out/double-gauss.html
+  etendue lens scenes/lenses/achromat.json --waves --magnification -0.5 --fields 0,5 -o out/achromat";
 
 #[derive(Debug, Args)]
 pub(crate) struct LensArguments {
@@ -53,6 +55,35 @@ pub(crate) struct LensArguments {
     /// From one pixel to the next, such as "4 um"; as wide as fills the image circle when absent
     #[arg(long, value_name = "PITCH", value_parser = parse::pitch, requires = "fit_opencv")]
     pub(crate) pixel_pitch: Option<f64>,
+    /// Analyse it in waves, too: wavefronts, Zernike terms, MTF, Strehl's ratio, encircled energy, ray fans,
+    /// Seidel's sums, field curvature; with -o as figures and tables (.csv) as well
+    #[arg(long, conflicts_with_all = ["rays", "fit_opencv"])]
+    pub(crate) waves: bool,
+    /// Write all of that with its figures on one page; implies --waves
+    #[arg(long, value_name = "FILE.html", conflicts_with_all = ["rays", "fit_opencv"])]
+    pub(crate) report: Option<PathBuf>,
+    /// For waves, what each wavelength counts for, in the order of --wavelengths; alike when absent
+    #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) weights: Option<Vec<f64>>,
+    /// For waves, frequencies of the MTF in cycles/mm; twentieths of the limit when absent
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub(crate) frequencies: Option<Vec<f64>>,
+    /// For waves, cells over the pupil, a side; as many as the wavefronts need when absent
+    #[arg(long, value_name = "N")]
+    pub(crate) cells: Option<usize>,
+    /// For waves, the image plane where the wavefront on the axis is flattest, and not the sensor's
+    #[arg(long)]
+    pub(crate) best_focus: bool,
+    /// For waves, put the object this far in front of the first vertex, "0.5 m"; fields are its heights in
+    /// mm, and the sensor stands at its image unless --focus puts it elsewhere
+    #[arg(long, value_name = "DISTANCE", value_parser = parse::focus, conflicts_with = "magnification")]
+    pub(crate) object_distance: Option<Focus>,
+    /// For waves, put the object where its image is this many times as large: -0.5
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub(crate) magnification: Option<f64>,
+    /// For waves, set the stop by the numerical aperture of a near object's light
+    #[arg(long, value_name = "NA", conflicts_with = "f_number")]
+    pub(crate) numerical_aperture: Option<f64>,
     /// Field angles in degrees; the file's own or shares of the field of view when absent
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) fields: Option<Vec<f64>>,
@@ -137,6 +168,10 @@ pub(crate) struct ExposeArguments {
     /// Kinds of file to write
     #[arg(long, value_name = "LIST", default_value = "png,npy,dng")]
     pub(crate) outputs: String,
+    /// Refuse pictures that may need more memory than this in all, program and mapped files included, e.g. 800M
+    /// or 4G (bytes, 1024-based), before work on them starts; without it, more than the system has free
+    #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
+    pub(crate) memory_limit: Option<u64>,
     /// Let a scene name a camera file outside its own folder
     #[arg(long)]
     pub(crate) allow_outside: bool,

@@ -12,7 +12,7 @@ use crate::expose::npy;
 use crate::run::{Bench, text};
 
 /// The texels of two columns and one row, by bands.
-const TEXELS: [[f32; 4]; 2] = [[0.1, 0.8, 0.2, 0.6], [0.9, 0.3, 0.5, 0.0]];
+pub(crate) const TEXELS: [[f32; 4]; 2] = [[0.1, 0.8, 0.2, 0.6], [0.9, 0.3, 0.5, 0.0]];
 
 /// A wall of two texels that fills the picture, before a sensor of bands between `edges` (nm).
 fn wall(material: &Value, edges: &[f64]) -> Value {
@@ -31,14 +31,14 @@ fn wall(material: &Value, edges: &[f64]) -> Value {
 }
 
 /// The light of each pixel, `[row][column][band]`.
-fn seen(bench: &Bench, scene: &Value) -> Vec<f64> {
+pub(crate) fn seen(bench: &Bench, scene: &Value) -> Vec<f64> {
     bench.write("scene.json", scene.to_string().as_bytes());
     bench.render(&["--outputs", "npy", "--report", "report.json"]);
     bench.array("spectrum")
 }
 
 /// An EXR file of one row, a channel for each name.
-fn exr(bench: &Bench, name: &str, channels: &[(&str, Vec<f32>)]) {
+pub(crate) fn exr(bench: &Bench, name: &str, channels: &[(&str, Vec<f32>)]) {
     let size = (channels[0].1.len(), 1);
     let list = channels
         .iter()
@@ -50,12 +50,12 @@ fn exr(bench: &Bench, name: &str, channels: &[(&str, Vec<f32>)]) {
 }
 
 /// The four bands of [`TEXELS`] as channels of these names.
-fn planes(names: [&str; 4]) -> Vec<(&str, Vec<f32>)> {
+pub(crate) fn planes(names: [&str; 4]) -> Vec<(&str, Vec<f32>)> {
     (0..4).map(|k| (names[k], TEXELS.map(|texel| texel[k]).to_vec())).collect()
 }
 
 /// An ENVI cube of two columns, one row and four bands by pixels, of f32.
-fn envi(bench: &Bench, name: &str, more: &str, values: [[f32; 4]; 2]) {
+pub(crate) fn envi(bench: &Bench, name: &str, more: &str, values: [[f32; 4]; 2]) {
     let header = format!(
         "ENVI\nsamples = 2\nlines = 1\nbands = 4\ndata type = 4\ninterleave = bip\nbyte order = 0\n{more}"
     );
@@ -64,9 +64,9 @@ fn envi(bench: &Bench, name: &str, more: &str, values: [[f32; 4]; 2]) {
     bench.write(&format!("{name}.img"), &bytes);
 }
 
-const EVEN: &str = "wavelength units = Nanometers\nwavelength = {450, 550, 650, 750}\n";
+pub(crate) const EVEN: &str = "wavelength units = Nanometers\nwavelength = {450, 550, 650, 750}\n";
 
-const BANDS: [f64; 5] = [400.0, 500.0, 600.0, 700.0, 800.0];
+pub(crate) const BANDS: [f64; 5] = [400.0, 500.0, 600.0, 700.0, 800.0];
 
 #[test]
 fn cubes_of_all_forms_are_one_surface_and_one_lamp() {
@@ -265,6 +265,13 @@ fn what_is_no_cube_is_refused_with_its_place() {
         assert!(message.contains("materials.a."), "{message}");
         assert!(!bench.path("out").exists(), "{material}: something was left behind");
     }
+    // A lamp that nothing of is rendered.
+    let far = wall(&light("good.hdr"), &[900.0, 950.0, 1000.0]);
+    bench.write("scene.json", far.to_string().as_bytes());
+    let output = bench.run(&["render", "scene.json", "-o", "out"]);
+    let message = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("400..=800 nm") && message.contains("do not overlap"), "{message}");
     let mut thrown = wall(&of("good.hdr"), &BANDS);
     thrown["lights"] = json!([{ "type": "projector", "intensity": [1, 1, 1], "at": [0, 0, 2], "look_at": [0, 0, 0],
                                 "image": { "cube": "good.hdr" } }]);

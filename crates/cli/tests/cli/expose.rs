@@ -286,7 +286,12 @@ fn folders_of_frames_are_exposed_as_the_frames_of_a_render() {
         bench.write(&format!("pictures/{name}.npy"), &grey);
     }
     bench.write("one.npy", &grey);
-    exposed(&bench, "pictures", "scene.json", &["--unit", "1", "--seed", "5"]);
+    let told = exposed(&bench, "pictures", "scene.json", &["--unit", "1", "--seed", "5"]);
+    for (number, done) in [(0, 1), (1, 2), (2, 3)] {
+        assert!(told.contains(&format!("frame {number} ({done} of 3): ")), "{told}");
+    }
+    let quiet = exposed(&bench, "pictures", "scene.json", &["--unit", "1", "--seed", "5", "-q"]);
+    assert_eq!(quiet, "");
     let raws: Vec<Vec<u8>> = (0..3)
         .map(|i| fs::read(bench.path(&format!("again/frames/{i:06}/raw.npy"))).unwrap())
         .collect();
@@ -314,6 +319,60 @@ fn a_preset_takes_a_radiance_picture_whole() {
     for name in ["raw.png", "raw.dng", "raw.preview.png", "sensor.json", "etendue-manifest.json"] {
         assert!(bench.path("again").join(name).exists(), "{name}");
     }
+}
+
+/// Of every kind of file, before it is read or before the sensor is asked.
+#[test]
+fn pictures_that_take_too_much_memory_are_refused_before_the_work() {
+    let bench = Bench::new();
+    // 48 MiB of numbers.
+    bench.write("large.npy", &npy(&[2048, 2048, 3], &vec![0.25; 2048 * 2048 * 3]));
+    let sensor = json!({ "type": "rgb", "noise": "none" });
+    bench.write("sensor.json", sensor.to_string().as_bytes());
+    let expose = |limit: &str| {
+        bench.run(&[
+            "expose",
+            "large.npy",
+            "--sensor",
+            "sensor.json",
+            "-o",
+            "again",
+            "--unit",
+            "1",
+            "--memory-limit",
+            limit,
+        ])
+    };
+    // An array of 48 MiB is read as 96, and held as f32 beside them; with the sensor it is no more than 600.
+    for limit in ["32M", "128M", "200M"] {
+        let output = expose(limit);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{limit}: {message}");
+        for words in ["large.npy: a picture of 2048 x 2048 pixels", "--memory-limit allows"] {
+            assert!(message.contains(words), "expected \"{words}\" in: {message}");
+        }
+        assert!(!bench.path("again").exists(), "{limit}: something was left behind");
+    }
+    let output = expose("1G");
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    // A header alone tells.
+    envi(&bench, "vast", "wavelength units = nm\nwavelength = {500, 600}\n", 64);
+    let vast = std::fs::read_to_string(bench.path("vast.hdr")).unwrap();
+    let vast = vast.replace("samples = 4", "samples = 40000").replace("lines = 2", "lines = 40000");
+    bench.write("vast.hdr", vast.as_bytes());
+    let output = bench.run(&[
+        "expose",
+        "vast.hdr",
+        "--sensor",
+        "sensor.json",
+        "-o",
+        "again",
+        "--unit",
+        "1",
+        "--memory-limit",
+        "1G",
+    ]);
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
 }
 
 /// ENVI files of one band more or less; the numbers are zeros.

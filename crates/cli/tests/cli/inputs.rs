@@ -153,7 +153,7 @@ fn inputs() -> Vec<Input> {
     let paint: [(&str, &[u8]); 1] = [("paint.png", PAINT)];
     add(&["ImageSpec.image"], scene(&painted), &paint, vec![longer(PAINT)]);
     let sky = json!({"lights": [{"type": "environment", "image": "paint.png"}]});
-    add(&["LightSpec.image"], scene(&sky), &paint, vec![longer(PAINT)]);
+    add(&["SkyImageSpec"], scene(&sky), &paint, vec![longer(PAINT)]);
     let lamp = json!({"lights": [{"type": "goniometric", "at": [0, 2, 0], "file": "lamp.ies"}]});
     add(&["LightSpec.file"], scene(&lamp), &[("lamp.ies", IES)], vec![longer(IES)]);
     // Curves of surfaces, metals, lights and sensors, and cubes of them.
@@ -183,6 +183,9 @@ fn inputs() -> Vec<Input> {
     let (one, two) = (cube(0.5), cube(0.25));
     let bands = json!({"cube": "c.npy", "bands": [400, 500, 600, 700, 800]});
     add(&["CubeSpec.cube"], scene(&matte(bands)), &[("c.npy", &one)], vec![two]);
+    let sky = json!({"lights": [{"type": "environment", "image":
+        {"cube": "c.npy", "bands": [400, 500, 600, 700, 800]}}]});
+    add(&["SkyCubeSpec.cube"], scene(&sky), &[("c.npy", &cube(0.5))], vec![cube(0.25)]);
     let header: &[u8] = b"ENVI\nsamples = 1\nlines = 1\nbands = 2\ndata type = 1\ninterleave = bsq\nheader offset = 0\n\
         reflectance scale factor = 255\nwavelength units = nm\nwavelength = {450, 550}\n";
     let texel: &[u8] = &[50, 90];
@@ -227,6 +230,11 @@ fn inputs() -> Vec<Input> {
         &json!({"glass_catalogs": ["own.agf"]}),
     );
     add(&["LensFile.glass_catalogs"], scene(&camera(&own)), &[("own.agf", AGF)], vec![longer(AGF)]);
+    // Pixels of a slot.
+    let slots = json!({"serial": [{"pixels": "pixels.png"}, {}], "camera": {"type": "pinhole",
+        "pose": {"from": [0, 0, 3], "look_at": [0, 0, 0]}, "sensor": {"resolution": [2, 2]},
+        "shutter": {"exposure": 0.01}}});
+    add(&["PixelsSpec"], scene(&slots), &[("pixels.png", &grey)], vec![longer(&grey)]);
     // The camera itself.
     let pinhole = |fov: u32| {
         json!({"type": "pinhole", "fov": fov, "sensor": {"resolution": [4, 4]},

@@ -5,6 +5,7 @@ mod bad_input; // refused with exit code 2, one message, and nothing written
 mod bad_light; // materials, textures and lights that make no sense
 mod bench; // speed against accuracy on a tiny scene
 mod cubes; // surfaces and lamps by wavelength, from files of every form
+mod cubes_around; // light by wavelength from all around
 mod denoise; // pictures without their noise, where Open Image Denoise is there
 mod emva; // the characterisation of what the command writes
 mod expose; // pictures from elsewhere on a sensor
@@ -21,6 +22,7 @@ mod hidden; // meshes of one point, nodes scaled to 0
 mod ids; // numbers of objects, copies, nodes and materials, and their names
 mod images; // textures and environments of every kind and size
 mod inputs; // every key of the schema that names a file: guarded, kept, and in the hash
+mod lamps; // spectra, lumens and luminances of what shines
 mod leniency; // comments, schema addresses, resolutions as words, quiet
 mod lens; // tables, drawings and files of lenses, and what is refused
 mod lens_pictures; // pictures through lenses, with closed-form answers
@@ -32,6 +34,7 @@ mod memory; // refused before it is taken
 mod messages; // what is wrong, in plain words
 mod models; // simpler models of a lens, and OpenCV's fitted to it
 mod motion; // what moves while the shutter is open, crossed with all else
+mod moving_sets; // rolling shutters in data sets of frames, readings of an inertial unit
 mod openings_and_glasses; // f-numbers that a lens lacks, glasses of earlier catalogues and of one's own
 mod orbit; // a data set of a real model
 mod overwriting; // inputs, results of an earlier run, and files of others
@@ -43,6 +46,7 @@ mod render; // pictures with a closed-form answer
 mod run; // running the command and reading what it left
 mod schema; // the schema by another validator
 mod sensor; // presets, curves, series of a characterisation
+mod serial; // exposures in slots
 mod shards; // renders that are divided or killed, and their pictures
 mod spectral_files; // light in bands by others' readers and writers
 mod spectrum_command; // curves in numbers and drawings
@@ -52,3 +56,4 @@ mod tools; // check, plan, schema, version
 mod validation; // the page of effects, their sources and their tests
 mod view; // the window, as far as there is none
 mod views; // where a camera without a pose stands, and which way is up
+mod waves; // wavefronts, MTF and reports of lenses, and what they are refused

@@ -251,21 +251,26 @@ fn copies_are_in_the_forecast_and_no_render_passes_its_limit() {
     }
 }
 
-/// The law of [`forecasts_are_within_half_as_much_again_of_the_peak`] for a surface by wavelength, which is held as it
-/// is and once more in the sensor's bands.
+/// The law of [`forecasts_are_within_half_as_much_again_of_the_peak`] for a surface and for an environment by wavelength,
+/// which are held as they are and once more in the sensor's bands.
 #[test]
 fn cubes_are_in_the_forecast() {
     let bench = Bench::new();
     let values = vec![0.25; 512 * 512 * 24];
     bench.write("cube.npy", &crate::expose::npy(&[512, 512, 24], &values));
-    for sensor in [
+    let cube = json!({"cube": "cube.npy", "bands": {"from": 400, "to": 700, "count": 24}});
+    let sensors = [
         json!({"resolution": [64, 64]}),
         json!({"type": "multispectral", "resolution": [64, 64], "bands": {"from": 400, "to": 700, "count": 24}}),
-    ] {
-        let scene = json!({"etendue": 1, "tracer": {"type": "direct"},
+    ];
+    for (sensor, around) in sensors.iter().flat_map(|sensor| [(sensor, false), (sensor, true)]) {
+        let color = if around { json!([0.5, 0.5, 0.5]) } else { cube.clone() };
+        let mut scene = json!({"etendue": 1, "tracer": {"type": "direct"},
             "camera": {"type": "pinhole", "sensor": sensor}, "objects": [{"shape": "rectangle", "material": "a"}],
-            "materials": {"a": {"type": "matte", "color":
-                {"cube": "cube.npy", "bands": {"from": 400, "to": 700, "count": 24}}}}});
+            "materials": {"a": {"type": "matte", "color": color}}});
+        if around {
+            scene["lights"] = json!([{"type": "environment", "image": cube}]);
+        }
         bench.write("scene.json", scene.to_string().as_bytes());
         let check = bench.run(&["check", "scene.json", "--json"]);
         let check: serde_json::Value = serde_json::from_slice(&check.stdout).expect("JSON");

@@ -1,6 +1,9 @@
 //! A rolling shutter, a camera that moves and turns, objects that do, and a sensor: crossed with all that divides a
 //! render, decides how it is traced, or exposes it.
 
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
 use serde_json::{Value, json};
 
 use crate::run::{Bench, read_npy, text};
@@ -111,4 +114,108 @@ fn samples_that_stop_see_what_moves() {
         [json!(64), json!({ "relative_error": 0.05, "min": 8, "max": 512 })].map(mean);
     // 2800 pixels of an error of a twentieth at most: 0.1 % of the mean, and four times that.
     assert!((stopped / even - 1.0).abs() < 4e-3, "{stopped}, not {even}");
+}
+
+/// What is kept of a moving scene on the way is gone on from after a kill.
+#[test]
+fn what_moves_goes_on_after_kills() {
+    let bench = scene(&json!(600));
+    let arguments = [
+        "render",
+        "scene.json",
+        "-o",
+        "out",
+        "-q",
+        "--threads",
+        "1",
+        "--checkpoint",
+        "0.001",
+        "--set",
+        "lights[0].modulation={\"type\":\"sine\",\"frequency\":300}",
+    ];
+    let file = bench.path("out/checkpoint.film");
+    let kept = || file.metadata().and_then(|data| data.modified()).ok();
+    let mut kills = 0;
+    for _ in 0..4 {
+        let before = kept();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_etendue"));
+        let command = command.args(arguments).current_dir(bench.path(""));
+        let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("runs");
+        while kept() == before && child.try_wait().expect("a child").is_none() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        child.kill().expect("a child");
+        kills += u32::from(!child.wait().expect("a child").success());
+    }
+    assert!(kills >= 2, "{kills} of 4 were killed");
+    run(&bench, &arguments);
+    let whole: Vec<&str> =
+        arguments.iter().map(|word| if *word == "out" { "whole" } else { word }).collect();
+    run(&bench, &[&whole[..7], &whole[9..]].concat());
+    for name in ["picture.npy", "raw.npy", "depth.npy"] {
+        assert!(bytes(&bench, "out", name) == bytes(&bench, "whole", name), "{name}");
+    }
+}
+
+/// No place is chosen on a lamp that moves, and weights against that are 1: a lamp that hardly moves lights as one that
+/// stands still, on which places are.
+#[test]
+fn lamps_that_move_light_as_those_that_stand_still() {
+    let mean = |motion: Value| {
+        let mut scene = json!({
+            "etendue": 1, "tracer": { "type": "path" }, "lights": [],
+            "camera": { "type": "pinhole", "fov": 50, "pose": { "from": [0, 1, 4], "look_at": [0, 0.5, 0] },
+                        "sensor": { "resolution": [24, 24] }, "shutter": { "exposure": "10 ms" } },
+            "objects": [
+                { "shape": "rectangle", "width": 8, "height": 8, "transform": { "rotate": [1, 0, 0, -90] } },
+                { "shape": "sphere", "radius": 0.4, "transform": { "translate": [0.6, 0.4, 0] } },
+                { "shape": "box", "size": [1.5, 0.4, 1.5], "material": "lamp", "transform": { "translate": [0, 2, 0] } }
+            ],
+            "materials": { "lamp": { "type": "emissive", "radiance": [3, 3, 3] } },
+            "render": { "samples": 512 }
+        });
+        if !motion.is_null() {
+            scene["objects"][2]["motion"] = motion;
+        }
+        let bench = Bench::with_scene(&scene.to_string());
+        run(&bench, &["render", "scene.json", "-o", "out"]);
+        let pixels = bench.array("picture");
+        pixels.iter().sum::<f64>() / pixels.len() as f64
+    };
+    let [moving, still] =
+        [json!({ "type": "velocity", "velocity": [1e-6, 0, 0] }), Value::Null].map(mean);
+    // 576 pixels of 512 samples, of which one in five comes upon the lamp: 1 / √(0.2 · 295 000), and four times that.
+    assert!((moving / still - 1.0).abs() < 4.0 * 0.0042, "{moving}, not {still}");
+}
+
+/// Copies of an object that moves are objects that do.
+#[test]
+fn copies_move_along() {
+    let depth = |objects: Value| {
+        let scene = json!({
+            "etendue": 1, "layers": ["depth"],
+            "camera": { "type": "pinhole", "fov": 60, "pose": { "from": [0, 0, 5], "look_at": [0, 0, 0] },
+                        "sensor": { "resolution": [48, 36] },
+                        "shutter": { "type": "rolling", "line_time": "1 ms", "exposure": "1 ms" } },
+            "objects": objects
+        });
+        let bench = Bench::with_scene(&scene.to_string());
+        run(&bench, &["render", "scene.json", "-o", "out"]);
+        bench.array("depth")
+    };
+    let motion = json!({ "type": "velocity", "velocity": [30, 0, 0], "angular_velocity": [0, 0, 3000], "about": [0, 0, 0] });
+    let places = [[-1.0, 0.3, 0.0], [0.2, -0.8, 0.5], [1.1, 0.9, -1.0]];
+    let list = places.map(|place| json!({ "translate": place }));
+    let whole = depth(
+        json!([{ "shape": "box", "size": [0.8, 0.5, 0.3], "instances": list, "motion": motion }]),
+    );
+    let each = places.map(|place| {
+        json!({ "shape": "box", "size": [0.8, 0.5, 0.3], "transform": { "translate": place }, "motion": motion })
+    });
+    let each = depth(json!(each));
+    assert!(whole.iter().any(|depth| depth.is_finite() && *depth > 0.0));
+    for (i, (found, due)) in whole.iter().zip(&each).enumerate() {
+        // Last bits of where the frame of the copy is.
+        assert!(found == due || (found - due).abs() < 1e-12, "{i}: {found} {due}");
+    }
 }

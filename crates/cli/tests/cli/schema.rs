@@ -77,6 +77,32 @@ fn what_the_schema_forbids_the_program_refuses_and_the_reverse() {
         (false, r#""etendue": 1, "render": {"samples": -1}"#),
         (false, r#""etendue": 1, "render": {"exposure": "bright"}"#),
         (false, r#""etendue": 1, "materials": {"m": {"type": "matte", "color": "red"}}"#),
+        // Light by wavelength.
+        (
+            true,
+            r#""etendue": 1, "lights": [{"type": "point", "at": [0, 2, 0], "intensity": {"illuminant": "a"}, "lumens": 800}]"#,
+        ),
+        (
+            true,
+            r#""etendue": 1, "materials": {"m": {"type": "emissive", "radiance": {"line": 555}, "luminance": 250}}"#,
+        ),
+        (
+            true,
+            r#""etendue": 1, "materials": {"m": {"type": "emissive", "radiance": {"checker": [{"line": 555}, [1, 1, 1]]}}}"#,
+        ),
+        (
+            false,
+            r#""etendue": 1, "lights": [{"type": "point", "at": [0, 2, 0], "intensity": [1, 1, 1], "lumens": -1}]"#,
+        ),
+        (
+            false,
+            r#""etendue": 1, "lights": [{"type": "directional", "direction": [0, -1, 0], "irradiance": [1, 1, 1], "lumens": 1}]"#,
+        ),
+        (
+            false,
+            r#""etendue": 1, "lights": [{"type": "environment", "image": {"cube": "a.hdr", "wrap": "repeat"}}]"#,
+        ),
+        (false, r#""etendue": 1, "lights": [{"type": "environment", "image": 5}]"#),
     ] {
         let comma = if rest.is_empty() { "" } else { ", " };
         let scene = format!("{{{rest}{comma}{objects}}}");
@@ -84,5 +110,62 @@ fn what_the_schema_forbids_the_program_refuses_and_the_reverse() {
         assert_eq!(found.is_ok(), is_valid, "the schema of {scene}: {found:?}");
         let output = Bench::with_scene(&scene).run(&["check", "scene.json"]);
         assert_eq!(output.status.success(), is_valid, "{scene}: {}", text(&output.stderr));
+    }
+}
+
+#[test]
+fn what_the_schemas_of_lenses_and_rays_forbid_the_program_refuses_and_the_reverse() {
+    let bench = Bench::new();
+    let lens = r#"{"elements": [
+        {"type": "aperture", "shape": "circular", "radius": 2, "thickness": 1, "stop": true},
+        {"type": "surface", "radius": 50, "thickness": 5, "glass": "N-BK7", "semi_diameter": 4},
+        {"type": "surface", "radius": -50, "semi_diameter": 4}]}"#;
+    let held = |validator: &Validator, (is_valid, file): (bool, &str), arguments: &[&str]| {
+        let found = validator.validate(&serde_json::from_str(file).expect("JSON"));
+        assert_eq!(found.is_ok(), is_valid, "the schema of {file}: {found:?}");
+        let output = bench.run(arguments);
+        assert_eq!(output.status.success(), is_valid, "{file}: {}", text(&output.stderr));
+    };
+    let validator = Validator::of("lens");
+    for (is_valid, from, to) in [
+        (true, "", ""),
+        (true, r#""glass": "N-BK7""#, r#""glass": {"nd": 1.5168, "vd": 64.17}"#),
+        (true, r#""thickness": 5"#, r#""thickness": "5 mm""#),
+        (true, r#"{"elements""#, r#"{"comment": "a remark", "elements""#),
+        (false, "elements", "parts"),
+        (false, r#""semi_diameter": 4}]"#, r#""semi_diameter": 4, "colour": "red"}]"#),
+        (false, r#""type": "aperture""#, r#""type": "hole""#),
+        (false, r#""radius": 50"#, r#""radius": [50]"#),
+        (false, r#""stop": true"#, r#""stop": 1"#),
+        (false, r#", "semi_diameter": 4}]"#, "}]"),
+    ] {
+        let changed = lens.replace(from, to);
+        assert!(from.is_empty() || changed != lens, "{from}");
+        let changed = if from.is_empty() { lens.to_owned() } else { changed };
+        bench.write("lens.json", changed.as_bytes());
+        held(&validator, (is_valid, &changed), &["lens", "lens.json"]);
+    }
+    bench.write("lens.json", lens.as_bytes());
+    let validator = Validator::of("rays");
+    let ray = r#"{"from": "object", "clip": true, "rays": [
+        {"origin": [0, 1, -10], "direction": [0, 0, 1], "wavelength": 550}]}"#;
+    for (is_valid, from, to) in [
+        (true, "object", "sensor"),
+        (true, "[0, 0, 1]", "[0, 0, 3]"),
+        (false, "object", "image"),
+        (false, r#""clip": true, "#, ""),
+        (false, "[0, 1, -10]", "[0, 1]"),
+        (false, r#", "wavelength": 550"#, ""),
+        (false, "550", r#""green""#),
+        (false, "wavelength", "colour"),
+    ] {
+        let changed = ray.replace(from, to);
+        assert!(changed != ray, "{from}");
+        bench.write("rays.json", changed.as_bytes());
+        held(
+            &validator,
+            (is_valid, &changed),
+            &["lens", "lens.json", "--rays", "rays.json", "--json"],
+        );
     }
 }

@@ -74,7 +74,7 @@ impl TimeForecast {
     pub fn counted(prospect: &Prospect<'_>, machine: &Calibration) -> Self {
         let Prospect { scene, plan, load, .. } = *prospect;
         let trace = match plan.stopping {
-            Stopping::Time(time) => time.as_secs_f64(),
+            Stopping::Time(time) => scene.slots.max(1) as f64 * time.as_secs_f64(),
             _ => plan.rays as f64 * machine.ray,
         };
         let views = 0.0;
@@ -108,9 +108,10 @@ impl TimeForecast {
         let load = counted.load + start.elapsed().as_secs_f64();
         let until = Instant::now() + LONGEST_PILOT;
         let pilot = Pilot { scene, accel: &*accel, images: &images, until };
+        let slots = scene.slots.max(1) as f64;
         let trace = match plan.stopping {
-            Stopping::Time(time) => time.as_secs_f64(),
-            _ => pilot.picture(&scene.camera)?,
+            Stopping::Time(time) => slots * time.as_secs_f64(),
+            _ => slots * pilot.picture(&scene.camera)?,
         };
         let views = match (scene.camera.lens(), scene.camera.reference_views()) {
             (Some(_), Ok(views)) if scene.picture.is_some() => {

@@ -95,13 +95,17 @@ impl Session {
         progress: &Progress,
     ) -> Result<Film, Error> {
         self.prepare(progress)?;
-        let LoadedScene { scene, plan, neighbours, .. } = self.loaded()?;
+        let LoadedScene { scene, plan, .. } = self.loaded()?;
         let identity = match (&shard, &self.checkpoint) {
             (None, None) if shares.is_empty() => Identity::new(),
             (None, Some(_)) if shares.is_empty() => self.kept_identity(scene, plan)?,
             _ => self.identity(scene, plan)?,
         };
         let course = Course { shard, shares, checkpoint: self.checkpoint.clone(), identity };
+        if let Some(film) = self.trace_slots(&course, progress)? {
+            return Ok(film);
+        }
+        let LoadedScene { scene, plan, neighbours, .. } = self.loaded()?;
         let (accel, start) = (self.built()?, Instant::now());
         let header = header(scene, &fingerprints(scene, neighbours)?);
         let others: Vec<FollowedFrame<'_>> =

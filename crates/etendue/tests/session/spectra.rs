@@ -57,7 +57,7 @@ fn both_forms_of_light_in_bands_are_looked_at_and_exposed() {
         let bands = reading.iter().find(|(layer, _)| layer == "Spectrum").unwrap();
         assert!(bands.1.ends_with("W.m^-2.nm^-1"), "{name}: {reading:?}");
 
-        let image = LightImage::open(&path, None).unwrap();
+        let image = LightImage::open(&path, None, None).unwrap();
         assert_eq!((image.size(), image.unit()), ([6, 4], Some("W.m^-2.nm^-1")));
         let PixelLight::Bands(film) = image.light() else { panic!("{name} has no bands") };
         assert_eq!(film.bands.grid().unwrap().edges(), [400.0, 450.0, 505.0, 700.0, 1500.0]);
@@ -66,7 +66,7 @@ fn both_forms_of_light_in_bands_are_looked_at_and_exposed() {
     }
     // What a user says of the unit counts, and not the file.
     let doubled = ExposeOptions { unit: Some(LightUnit::Irradiance(2.0)), ..Default::default() };
-    let image = LightImage::open(&out.join("spectrum.hdr"), None).unwrap();
+    let image = LightImage::open(&out.join("spectrum.hdr"), None, None).unwrap();
     let more = image.on(&file, &doubled).unwrap().raw(exposure).unwrap();
     assert!(more.values.iter().zip(&raw.values).any(|(a, b)| a > b));
 }

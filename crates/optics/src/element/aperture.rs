@@ -299,6 +299,15 @@ impl Picture {
     }
 }
 
+/// The columns and rows of a grey picture file (PNG, EXR), and its values, which lie in 0 to 1, from the top left on.
+///
+/// # Errors
+///
+/// When there is none, it is coloured or transparent, or a value is beyond: the sentence goes on after the file's name.
+pub fn grey_picture(path: &Path) -> Result<([usize; 2], Vec<f64>), String> {
+    read(path).map(|(size, values, _)| (size, values))
+}
+
 type Pixels = ([usize; 2], Vec<f64>, f64);
 
 fn read(path: &Path) -> Result<Pixels, String> {

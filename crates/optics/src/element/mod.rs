@@ -32,7 +32,9 @@ use serde_json::{Map, Value};
 use crate::glass::AgfCatalogue;
 use etendue_geometry::units::{Degrees, Millimetres};
 
-pub use aperture::{ApertureSpec, CircularSpec, MaskSpec, Opening, Picture, PolygonSpec};
+pub use aperture::{
+    ApertureSpec, CircularSpec, MaskSpec, Opening, Picture, PolygonSpec, grey_picture,
+};
 pub use biconic::{Biconic, BiconicSpec};
 pub use lattice::{Grid, Lattice, LatticeCell};
 pub(crate) use losses::Loss;

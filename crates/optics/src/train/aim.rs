@@ -156,7 +156,7 @@ pub(crate) fn slopes_near(
 }
 
 /// Steps from the axis outwards, each begun where the last two point.
-fn follow<F: Fn(DVec2) -> Option<DVec2>>(
+pub(crate) fn follow<F: Fn(DVec2) -> Option<DVec2>>(
     at: impl Fn(f64) -> F,
     start: DVec2,
     scale: f64,
@@ -173,7 +173,7 @@ fn follow<F: Fn(DVec2) -> Option<DVec2>>(
 }
 
 /// A zero of `f`, or `None`. `scale` is the unknowns' own size.
-fn solve(f: impl Fn(DVec2) -> Option<DVec2>, start: DVec2, scale: f64) -> Option<DVec2> {
+pub(crate) fn solve(f: impl Fn(DVec2) -> Option<DVec2>, start: DVec2, scale: f64) -> Option<DVec2> {
     let (mut x, mut value) = (start, f(start)?);
     for _ in 0..40 {
         if value.length() <= 0.01 * ON_TARGET {

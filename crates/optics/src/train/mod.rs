@@ -10,6 +10,7 @@
 //! | [`opening`] | the widest beam that the rims let through |
 //! | [`aim`] | chief rays: aimed at the stop's centre |
 //! | [`analysis`] | spots, distortion, relative illumination, colour |
+//! | [`optical_path`] | optical path lengths along rays |
 //! | [`pupil`] | the exit pupil as seen from the sensor, and samples of it |
 //! | [`report`] | all of it in one piece |
 //! | [`drawing`] | pictures of it |
@@ -22,6 +23,7 @@ pub mod file;
 pub mod focus;
 pub mod lenslets;
 pub mod opening;
+pub mod optical_path;
 pub mod paraxial;
 pub mod pupil;
 pub mod report;

@@ -204,7 +204,7 @@ impl OpticalTrain {
         all
     }
 
-    fn gap_before(&self, indices: &[f64], i: usize) -> Abcd {
+    pub(crate) fn gap_before(&self, indices: &[f64], i: usize) -> Abcd {
         match i.checked_sub(1) {
             Some(previous) => {
                 let gap = self.elements[i].frame.vertex.z - self.elements[previous].frame.vertex.z;
@@ -214,7 +214,7 @@ impl OpticalTrain {
         }
     }
 
-    fn power(&self, indices: &[f64], i: usize) -> f64 {
+    pub(crate) fn power(&self, indices: &[f64], i: usize) -> f64 {
         self.elements[i].part.power(indices[i], indices[i + 1])
     }
 }

@@ -122,6 +122,16 @@ impl MonochromaticTrain {
         self.indices[i + 1]
     }
 
+    /// The index of the medium before element `i`.
+    pub(crate) fn index_before(&self, i: usize) -> f64 {
+        self.indices[i]
+    }
+
+    /// The elements as light from the object meets them.
+    pub(crate) fn forward_steps(&self) -> &[Step] {
+        &self.forward
+    }
+
     fn steps(&self, from: Side) -> &[Step] {
         match from {
             Side::Object => &self.forward,

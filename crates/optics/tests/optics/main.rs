@@ -9,6 +9,7 @@ mod openings;
 mod optics_reference;
 mod reports;
 mod small_openings;
+mod waves;
 mod zemax_commands;
 
 use etendue_optics::train::{LensFile, OpticalTrain};

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::{BandFilm, ExposeError, SensorLight};
 use crate::film::filled;
+use crate::forecast::bytes_exposed;
 
 /// A picture of light from anywhere.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,10 +26,30 @@ pub enum PixelLight {
     Bands(BandFilm),
 }
 
+impl PictureLight {
+    /// Values of a pixel.
+    #[must_use]
+    pub fn depth(&self) -> usize {
+        match &self.light {
+            PixelLight::Colors(planes) => planes.len(),
+            PixelLight::Bands(film) => film.bands.count(),
+        }
+    }
+}
+
 /// The smallest share of a sensor's response to white light that it is told of when it is lost.
 const TOLD: f64 = 1e-3;
 
 impl SensorLight {
+    /// Bytes that exposing `picture` takes, the picture itself included: it is held as it was read and in the sensor's
+    /// bands.
+    #[must_use]
+    pub fn bytes_of(sensor: &Sensor, picture: &PictureLight) -> u64 {
+        let bands = picture.depth() as u64;
+        let [columns, rows] = picture.size.map(|side| side as u64);
+        columns.saturating_mul(rows).saturating_mul(bytes_exposed(sensor, bands, bands))
+    }
+
     /// `picture` as it falls on `sensor`, which takes the picture's size: its values times `factor`, which makes
     /// irradiance (W·m⁻²·nm⁻¹) of them, or 1 in digital radiometry. `seeds` are of the samples and of temporal noise,
     /// `header` goes into the files.

@@ -8,7 +8,9 @@ use etendue_scene::Scene;
 use etendue_sensor::{Factor, Illumination, Times};
 use etendue_spectrum::{Bands, Curve, Outside, rgb};
 use etendue_tracer::transport::Follow;
-use etendue_tracer::{Color, EnvironmentImage, LightKind, Material, Paint, Scattering, Spectral};
+use etendue_tracer::{
+    Color, Emission, EnvironmentImage, LightKind, Material, Paint, Scattering, Spectral,
+};
 
 /// Lights, filters, colours, bodies and metals of a scene.
 pub(super) fn illumination(scene: &Scene) -> Illumination {
@@ -28,12 +30,18 @@ pub(super) fn illumination(scene: &Scene) -> Illumination {
             (None, Some(EnvironmentImage::ClearSky(sky))) => {
                 sky.typical_spectra().into_iter().for_each(&mut add);
             }
+            // Any place of a cube is a sum of these.
+            (None, Some(EnvironmentImage::Cube(cube))) => {
+                cube.parts().into_iter().for_each(&mut add);
+            }
             (None, _) => add(of(&light.illuminant)),
         }
         let image = match &light.kind {
             LightKind::Environment { image, .. } => match image {
                 EnvironmentImage::Studio | EnvironmentImage::File(_) => true,
-                EnvironmentImage::Constant | EnvironmentImage::ClearSky(_) => false,
+                EnvironmentImage::Constant
+                | EnvironmentImage::ClearSky(_)
+                | EnvironmentImage::Cube(_) => false,
             },
             LightKind::Projector(projector) => is_coloured(&projector.image),
             LightKind::Point(_)
@@ -57,10 +65,16 @@ pub(super) fn illumination(scene: &Scene) -> Illumination {
     let most = most_scattered(scene);
     for (material, _) in scene.materials.iter().zip(used).filter(|(_, used)| *used) {
         if let Some(emission) = &material.emission {
-            match material.emitted_cube() {
+            match &emission.radiance {
                 // Every texel is a sum of these.
-                Some(cube) => cube.cube.parts().into_iter().for_each(&mut add),
-                None => add(of(&emission.illuminant)),
+                Paint::Cube { cube, .. } => cube.cube.parts().into_iter().for_each(&mut add),
+                Paint::Checker { curves: Some(curves), .. } => {
+                    curves.iter().for_each(|one| add(Curve::clone(&one.curve)));
+                }
+                Paint::Plain(_)
+                | Paint::Curve { .. }
+                | Paint::Checker { curves: None, .. }
+                | Paint::Image { .. } => add(of(&emission.illuminant)),
             }
             coloured_light |= is_coloured(&emission.radiance);
         }
@@ -107,6 +121,10 @@ pub(super) fn light(scene: &Scene, bands: &Bands) -> Vec<f64> {
                 let zenith = sky.dome_spectrum(DVec3::Y);
                 add(of_curve(&zenith), Some(PI * light.color[0]));
             }
+            (None, Some(EnvironmentImage::Cube(cube))) => {
+                let mean = cube.mean_over_the_sphere();
+                add(mean.map(|mean| of_curve(&mean)).unwrap_or_default(), None);
+            }
             (None, _) => add(tinted(&light.color, &light.illuminant), None),
         }
     }
@@ -118,6 +136,10 @@ pub(super) fn light(scene: &Scene, bands: &Bands) -> Vec<f64> {
         let color = match &emission.radiance {
             Paint::Cube { cube, .. } => {
                 add(cube.cube.mean().map(|mean| of_curve(&mean)).unwrap_or_default(), None);
+                continue;
+            }
+            Paint::Checker { curves: Some(curves), .. } => {
+                curves.iter().for_each(|one| add(of_curve(&one.curve), None));
                 continue;
             }
             Paint::Plain(color) => *color,
@@ -244,7 +266,12 @@ fn reflects_colour(material: &Material) -> bool {
         );
         sheen || specular
     });
-    // The colour of a measured metal is for looking.
+    // The colour of a lamp of curves is for looking.
+    let shines = |emission: &Emission| !emission.radiance.curves().is_empty();
+    if material.emission.as_ref().is_some_and(shines) {
+        return false;
+    }
+    // So is that of a measured metal.
     let named = matches!(material.scattering, Scattering::Metal { named: Some(_), .. });
     layers || (!named && is_coloured(&material.base_color))
 }

@@ -37,6 +37,7 @@
 pub mod conventions;
 pub mod envi;
 pub mod exr;
+pub mod imu;
 pub mod npy;
 pub mod pfm;
 pub mod png;

@@ -11,6 +11,7 @@ use etendue_report::Decision;
 use etendue_scene::file::BuildQuality;
 use etendue_scene::import::Wanted;
 use etendue_scene::{MemoryForecast, Scene};
+use etendue_sensor::BandChoice;
 use etendue_spectrum::Bands;
 use etendue_tracer::{LayerSpec, Needs, TextureScope};
 
@@ -131,6 +132,16 @@ impl Plan {
     /// The plan for `scene`, written as `outputs`.
     #[must_use]
     pub fn new(scene: &Scene, outputs: Outputs) -> Self {
+        Self::of(scene, outputs, expose::bands(scene))
+    }
+
+    /// The plan for `scene` as one part of a picture whose light is kept in these bands.
+    #[must_use]
+    pub fn in_bands(scene: &Scene, outputs: Outputs, bands: &Bands) -> Self {
+        Self::of(scene, outputs, BandChoice::untried(bands.clone()))
+    }
+
+    fn of(scene: &Scene, outputs: Outputs, chosen: BandChoice) -> Self {
         // What the layers need of hits, and how many rays that takes.
         let layers = scene.layers.clone();
         let needs = needs(&layers);
@@ -141,7 +152,6 @@ impl Plan {
         let [width, height] = scene.camera.resolution();
         let pixels = u64::from(width) * u64::from(height);
         let samples = spec.most();
-        let chosen = expose::bands(scene);
         let band_paths = BandPaths::of(scene, &chosen.bands, stopping, lens && passes.light);
         let apart = scene.camera.band_groups(&chosen.bands).len() as u64;
         let sampled = |yes| if yes { u64::from(spec.typical()) * apart } else { 0 };
@@ -151,7 +161,9 @@ impl Plan {
             sampled(passes.light)
         };
         let rays = pixels
-            * (u64::from(passes.centre) + sampled(passes.mean) + lit * RAYS_A_SAMPLE_OF_LIGHT);
+            * (u64::from(passes.centre)
+                + sampled(passes.mean)
+                + lit * RAYS_A_SAMPLE_OF_LIGHT * scene.slots.max(1) as u64);
         // How well to build for so many rays, and how exactly to trace.
         let triangles = scene.geometry.triangles_unique();
         let quality = forced_quality(scene).unwrap_or_else(|| quality_for(rays, triangles));

@@ -48,12 +48,21 @@ fn explain_shutter(scene: &Scene) -> Option<Decision> {
             "the camera moves: samples of light have times of their row's exposure"
         }
         (true, _) => "something moves: samples of light have times of their row's exposure",
+        (false, _) if scene.camera.lights_change() => {
+            "nothing moves, and lights change: rays have no times, and each row gets the light of its exposure, exactly"
+        }
         (false, true) => "nothing moves: rays have no times, and nothing is paid",
         (false, false) => {
             "nothing moves: rays have no times, and light is multiplied by what the shutter lets through"
         }
     };
-    Some(Decision::new(Kind::Shutter, shutter.words(), format!("{why}{bodies}")))
+    let slots = match scene.slots {
+        0 => String::new(),
+        count => format!(
+            "; its {count} slots are rendered one after another, and their light is added up"
+        ),
+    };
+    Some(Decision::new(Kind::Shutter, shutter.words(), format!("{why}{bodies}{slots}")))
 }
 
 impl Plan {

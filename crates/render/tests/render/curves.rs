@@ -89,7 +89,7 @@ fn thirty_one_bands_hold_the_reflectances_of_all_patches() {
 }
 
 /// The bands and a picture's values in them, of pixels in each patch: `[patch][band]`.
-fn seen(scene: &Scene, pixels: &[usize]) -> (Bands, Vec<Vec<f64>>) {
+pub(crate) fn seen(scene: &Scene, pixels: &[usize]) -> (Bands, Vec<Vec<f64>>) {
     let plan = Plan::new(scene, Outputs::from_list("exr").unwrap());
     let count = plan.bands.count();
     let done = rendered(scene, &plan);
@@ -103,7 +103,7 @@ fn seen(scene: &Scene, pixels: &[usize]) -> (Bands, Vec<Vec<f64>>) {
 }
 
 /// Electrons of each channel of the scene's sensor where it sees light in bands.
-fn counted(scene: &Scene, (bands, light): (&Bands, &[f64])) -> Vec<f64> {
+pub(crate) fn counted(scene: &Scene, (bands, light): (&Bands, &[f64])) -> Vec<f64> {
     let sensor = scene.sensor.clone().unwrap().in_bands(bands.clone()).unwrap();
     let channel =
         |c: usize| sensor.electrons_per_unit(c).iter().zip(light).map(|(e, l)| e * l).sum();
@@ -111,7 +111,7 @@ fn counted(scene: &Scene, (bands, light): (&Bands, &[f64])) -> Vec<f64> {
 }
 
 /// CIELAB of XYZ before a white (CIE 015:2018, section 8.2.1).
-fn lab(xyz: [f64; 3], white: [f64; 3]) -> [f64; 3] {
+pub(crate) fn lab(xyz: [f64; 3], white: [f64; 3]) -> [f64; 3] {
     let f = |t: f64| match t > (6.0f64 / 29.0).powi(3) {
         true => t.cbrt(),
         false => t * (29.0f64 / 6.0).powi(2) / 3.0 + 4.0 / 29.0,
@@ -121,7 +121,7 @@ fn lab(xyz: [f64; 3], white: [f64; 3]) -> [f64; 3] {
 }
 
 /// CIEDE2000 (Sharma, Wu and Dalal 2005).
-fn delta_e([l1, a1, b1]: [f64; 3], [l2, a2, b2]: [f64; 3]) -> f64 {
+pub(crate) fn delta_e([l1, a1, b1]: [f64; 3], [l2, a2, b2]: [f64; 3]) -> f64 {
     let c = 0.5 * (a1.hypot(b1) + a2.hypot(b2));
     let g = 0.5 * (1.0 - (c.powi(7) / (c.powi(7) + 25f64.powi(7))).sqrt());
     let (a1, a2) = ((1.0 + g) * a1, (1.0 + g) * a2);

@@ -38,7 +38,14 @@ pub(crate) fn load_json(folder: &Path, scene: Value) -> Scene {
 /// A surface that shines by 1 on both sides.
 pub(crate) fn glow() -> Emission {
     let radiance = Paint::Plain([1.0; 3]);
-    Emission { radiance, strength: 1.0, illuminant: None, two_sided: true, group: None }
+    Emission {
+        radiance,
+        strength: 1.0,
+        illuminant: None,
+        two_sided: true,
+        group: None,
+        modulation: None,
+    }
 }
 
 /// What rays meet: the structure, and images without a fault.

@@ -5,9 +5,11 @@ mod camera;
 mod check;
 mod document;
 mod frames;
+mod imu;
 mod lens;
 mod object;
 mod samples;
+mod serial;
 mod settings;
 mod spec;
 
@@ -25,6 +27,7 @@ pub use accuracy::{AccuracySetting, AccuracySpec, AccuracyUse};
 pub use camera::SensorFile;
 pub use document::{OverrideError, Place};
 pub use frames::{CameraPath, FramesSpec, RigCameraSpec, TrajectoryFormat};
+pub use imu::ImuSpec;
 pub use lens::{ReadLens, is_lens, lens_schema, rays_schema, read_lens, read_lens_at, trace_rays};
 pub use object::{
     AnimationSpec, InstancesSpec, ObjectMotionSpec, ObjectSpec, Scale, Source, TransformSpec, Up,
@@ -32,6 +35,7 @@ pub use object::{
 pub use samples::{
     LEAST_SAMPLES, RelativeErrorSpec, SETS, SamplesSpec, SensorNoiseSpec, TimeSpec, Until,
 };
+pub use serial::{PixelsSpec, SlotSpec};
 pub use settings::{
     AccelName, Auto, BuildQuality, Exposure, LightPrecision, LightRow, PlanSpec, RenderSpec,
     ToneMap, TracerRow, TracerSpec,
@@ -208,6 +212,7 @@ impl SceneFile {
             Some((path, why)) => Err(file.fault(&path, why)),
             None => {
                 file.check_times()?;
+                file.check_serial()?;
                 Ok(file)
             }
         }

@@ -3,9 +3,8 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use etendue_camera::Interpolation;
 use etendue_geometry::units::Seconds;
-use etendue_geometry::{Motion, MotionError, Steady, Transform};
+use etendue_geometry::{Interpolation, Motion, MotionError, Steady, Transform};
 use glam::{DMat3, DQuat, DVec3};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error as _;
@@ -112,10 +111,6 @@ impl ObjectMotionSpec {
                     })?);
                 }
                 let times: Vec<f64> = times.iter().map(|at| at.0 - time).collect();
-                let interpolation = match translation {
-                    Interpolation::Linear => etendue_geometry::Interpolation::Linear,
-                    Interpolation::Cubic => etendue_geometry::Interpolation::Cubic,
-                };
                 let fault = |error: MotionError| {
                     let key = match &error {
                         MotionError::Count { .. }
@@ -126,7 +121,7 @@ impl ObjectMotionSpec {
                     };
                     (key, error.to_string())
                 };
-                Motion::through(&times, &built, interpolation).map_err(fault)
+                Motion::through(&times, &built, *translation).map_err(fault)
             }
         }
     }
@@ -141,6 +136,10 @@ pub struct AnimationSpec {
     /// Which of the file's animations, by name or by number from 0; the first when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
+    /// Whether it goes on from there while the shutter is open: nodes move. Skins and morph targets that would are
+    /// refused.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub plays: bool,
 }
 
 /// Which axis of a file's coordinates points up.

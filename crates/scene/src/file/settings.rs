@@ -6,7 +6,7 @@ use etendue_tracer::{LayerSpec, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::SamplesSpec;
+use super::{ImuSpec, SamplesSpec};
 
 /// What the picture shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
@@ -135,6 +135,9 @@ pub struct RenderSpec {
     /// Frames a second, by which frames without a time of their own are taken.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate: Option<f64>,
+    /// An inertial unit on the camera, whose readings are written beside the picture.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub imu: Option<ImuSpec>,
     /// What finds the hits; the best that was built in when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accel: Option<AccelName>,
@@ -323,6 +326,7 @@ impl Default for RenderSpec {
             frozen_noise,
             time: None,
             rate: None,
+            imu: None,
             accel,
             exposure,
             tone_map,

@@ -16,7 +16,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
 use super::camera::CameraSource;
-use super::{AccuracySpec, FramesSpec, ObjectSpec, PlanSpec, RenderSpec, TracerSpec, Up};
+use super::{AccuracySpec, FramesSpec, ObjectSpec, PlanSpec, RenderSpec, SlotSpec, TracerSpec, Up};
 use etendue_camera::CameraSpec;
 use etendue_optics::train::NOTES;
 use etendue_sensor::SensorSpec;
@@ -67,6 +67,10 @@ pub struct SceneSpec {
     /// The pictures to be made of it; one when absent.
     #[serde(default)]
     pub frames: Option<FramesSpec>,
+    /// The slots of its exposure, whose light the sensor adds up: with cameras, masks, filters or lights of their own.
+    /// It is in one piece when there are none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub serial: Vec<SlotSpec>,
 }
 
 impl SceneSpec {

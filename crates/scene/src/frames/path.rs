@@ -118,11 +118,14 @@ pub(super) fn animation_frames(
     };
     let objects = moving(file, objects.as_deref())?;
     let frame = |(number, time): (usize, f64)| {
-        let moment = AnimationSpec { time: Seconds(time), name: name.clone() };
-        // Numbers and words always serialise.
-        let value = serde_json::to_value(&moment).unwrap_or_default();
-        let setting =
-            |object: &usize| (join(&join_index("objects", *object), "animation"), value.clone());
+        let setting = |object: &usize| {
+            let own = file.spec.objects.get(*object).and_then(|spec| spec.animation.as_ref());
+            let plays = own.is_some_and(|own| own.plays);
+            let moment = AnimationSpec { time: Seconds(time), name: name.clone(), plays };
+            // Numbers and words always serialise.
+            let value = serde_json::to_value(&moment).unwrap_or_default();
+            (join(&join_index("objects", *object), "animation"), value)
+        };
         Frame {
             number,
             time: Some(time),

@@ -29,7 +29,7 @@ use rayon::prelude::*;
 use crate::memory::Budget;
 use crate::sniff::what_it_is;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Bounds, Mesh, Positions, Transform, Vertices};
+use etendue_geometry::{Bounds, Link, Mesh, Positions, Transform, Vertices};
 use etendue_tracer::{Light, LightKind, Material, Texture};
 use files::Files;
 
@@ -107,6 +107,8 @@ pub struct Play {
     pub which: Option<String>,
     /// When (s): before the first key and after the last, things stand as there.
     pub time: f64,
+    /// Whether it goes on from there: placements then have links.
+    pub plays: bool,
 }
 
 /// What a model file holds.
@@ -145,6 +147,9 @@ pub struct ImportedPlacement {
     pub node: u32,
     /// Which copy, of a node that names many places for its mesh (`EXT_mesh_gpu_instancing`).
     pub instance: Option<u32>,
+    /// How it moves, from the mesh's frame to the model's, the outermost frame first, in s from the moment that is shown;
+    /// empty where it stands still.
+    pub links: Vec<Link>,
 }
 
 impl ImportedPlacement {
@@ -157,6 +162,7 @@ impl ImportedPlacement {
             name: String::new(),
             node: 0,
             instance: None,
+            links: Vec::new(),
         }
     }
 }

@@ -21,11 +21,11 @@ use etendue_sensor::Sensor;
 use etendue_spectrum::Bands;
 
 impl SceneFile {
-    pub(super) fn camera_spec(&self) -> CameraSpec {
+    pub(crate) fn camera_spec(&self) -> CameraSpec {
         self.timed_camera(self.spec.camera.clone().unwrap_or_default())
     }
 
-    pub(super) fn camera_fault(&self, error: &CameraError) -> SceneError {
+    pub(crate) fn camera_fault(&self, error: &CameraError) -> SceneError {
         let dot = if error.at.is_empty() { "" } else { "." };
         self.fault(&format!("camera{dot}{}", error.at), error.why.as_str())
     }

@@ -106,13 +106,13 @@ impl SceneFile {
 
     /// The moment of a model's animation that is shown.
     pub(super) fn play(&self, spec: &ObjectSpec, at: &str) -> Result<Option<Play>, SceneError> {
-        let Some(AnimationSpec { time, name }) = &spec.animation else { return Ok(None) };
+        let Some(AnimationSpec { time, name, plays }) = &spec.animation else { return Ok(None) };
         if !time.0.is_finite() {
             return Err(self.fault(&join(at, "animation.time"), "is not finite"));
         }
         match &spec.source {
             Source::File(path) if !names_no_up(path) => {
-                Ok(Some(Play { which: name.clone(), time: time.0 }))
+                Ok(Some(Play { which: name.clone(), time: time.0, plays: *plays }))
             }
             Source::File(_) | Source::Shape(_) => {
                 Err(self.fault(&join(at, "animation"), "only glTF files have animations"))

@@ -1,17 +1,21 @@
 //! When a scene's picture is taken: the frame's time, the shutter, and the camera's motion in the frame's clock.
 
+use std::sync::Arc;
+
 use crate::SceneError;
-use crate::file::{ObjectMotionSpec, ObjectSpec, SceneFile};
+use crate::file::{ImuSpec, ObjectMotionSpec, ObjectSpec, SceneFile, join_index};
 use crate::frames::Frame;
 use crate::import::{Note, NoteKind};
 use etendue_camera::{Camera, CameraMotionSpec, CameraSpec, ShutterKind};
+use etendue_geometry::Geometry;
 use etendue_geometry::units::Seconds;
 use etendue_sensor::Sensor;
+use etendue_tracer::{Clock, Light, LightSpec, Material, MaterialSpec, Modulation, ModulationSpec};
 
 impl SceneFile {
     /// The camera as the file has it, with its exposure from the sensor and its motion in the frame's clock.
     pub(crate) fn timed_camera(&self, mut spec: CameraSpec) -> CameraSpec {
-        if spec.shutter().is_none() && spec.motion().is_none() && !self.objects_move() {
+        if spec.shutter().is_none() && spec.motion().is_none() && !self.changes() {
             return spec;
         }
         let shutter = spec.shutter_mut().get_or_insert_default();
@@ -40,9 +44,12 @@ impl SceneFile {
             let why = format!("{rate} frames a second; give a number above 0");
             return Err(self.fault("render.rate", why));
         }
+        if let Some((key, why)) = render.imu.as_ref().and_then(ImuSpec::fault) {
+            return Err(self.fault(&format!("render.imu.{key}"), why));
+        }
         let camera = self.spec.camera.as_ref();
         let is_timed = |it: &&CameraSpec| it.shutter().is_some() || it.motion().is_some();
-        let Some(camera) = camera.filter(|it| is_timed(it) || self.objects_move()) else {
+        let Some(camera) = camera.filter(|it| is_timed(it) || self.changes()) else {
             return Ok(());
         };
         let given = camera.shutter().and_then(|shutter| shutter.exposure);
@@ -73,8 +80,8 @@ impl SceneFile {
     ) -> Result<(), SceneError> {
         let first = sensor.shots().next().map(|shot| shot.exposure);
         let differ = sensor.shots().any(|shot| Some(shot.exposure) != first);
-        if differ && given.is_none() && (camera.motion().is_some() || self.objects_move()) {
-            let why = "the light is rendered once for all of them, and what moves is blurred otherwise in each; give \
+        if differ && given.is_none() && (camera.motion().is_some() || self.changes()) {
+            let why = "the light is rendered once for all of them, and what moves or changes is otherwise in each; give \
                        the exposures to `frames`, such as [{\"camera.sensor.exposure\": 0.01}], or the shutter one \
                        `exposure`";
             return Err(self.fault("camera.sensor.exposures", why));
@@ -93,7 +100,20 @@ impl SceneFile {
 
     /// Whether some object has a motion.
     fn objects_move(&self) -> bool {
-        self.spec.objects.iter().any(|object| object.motion.is_some())
+        let plays = |object: &ObjectSpec| object.animation.as_ref().is_some_and(|it| it.plays);
+        self.spec.objects.iter().any(|object| object.motion.is_some() || plays(object))
+    }
+
+    /// What says how lights change with time, and from when on.
+    fn modulations(&self) -> impl Iterator<Item = &ModulationSpec> {
+        let lights = self.spec.lights.iter().flatten().filter_map(LightSpec::modulation);
+        lights.chain(self.spec.materials.values().filter_map(MaterialSpec::modulation))
+    }
+
+    /// Whether some object has a motion, some light a modulation, or the exposure several slots.
+    fn changes(&self) -> bool {
+        let has_slots = !self.spec.serial.is_empty();
+        has_slots || self.objects_move() || self.modulations().next().is_some()
     }
 
     /// Refuses frames without times of what moves through poses or transforms, which have them.
@@ -106,12 +126,13 @@ impl SceneFile {
             matches!(object.motion, Some(ObjectMotionSpec::Transforms { .. }))
         };
         let needs = matches!(motion, Some(CameraMotionSpec::Poses { .. }))
-            || self.spec.objects.iter().any(through);
+            || self.spec.objects.iter().any(through)
+            || self.modulations().any(|modulation| modulation.clock() == Clock::Scene);
         let is_timed = self.spec.render.rate.is_some() || frames.iter().all(has_time);
         if !needs || is_timed {
             return Ok(());
         }
-        let why = "something moves, and nobody says when each frame is taken; give `render.rate` (frames a second), \
+        let why = "something moves or changes, and nobody says when each frame is taken; give `render.rate` (frames a second), \
                    or each frame its `render.time`";
         Err(self.fault("frames", why))
     }
@@ -119,7 +140,7 @@ impl SceneFile {
     /// Whether frames are taken at their times.
     pub(crate) fn has_clock(&self) -> bool {
         let camera = self.spec.camera.as_ref();
-        camera.is_some_and(|camera| camera.motion().is_some()) || self.objects_move()
+        camera.is_some_and(|camera| camera.motion().is_some()) || self.changes()
     }
 }
 
@@ -133,7 +154,7 @@ pub(crate) fn notes(camera: &Camera) -> Vec<Note> {
     };
     let Some(shutter) = camera.shutter() else { return Vec::new() };
     let Some(motion) = camera.motion() else {
-        return match shutter.is_fully_open() && !camera.is_timed() {
+        return match shutter.is_fully_open() && !camera.is_timed() && !camera.lights_change() {
             true => vec![note("nothing moves while it is open, so that it changes nothing".into())],
             false => Vec::new(),
         };
@@ -146,4 +167,43 @@ pub(crate) fn notes(camera: &Camera) -> Vec<Note> {
         ))];
     }
     Vec::new()
+}
+
+/// A note where the keys of an animation that plays begin or end while the shutter is open.
+pub(crate) fn held(camera: &Camera, geometry: &Geometry) -> Option<Note> {
+    let [open, close] = camera.exposure_span();
+    let motions = geometry.placements.iter().filter_map(|placement| placement.motion.as_ref());
+    let [first, last] = motions
+        .filter_map(|motion| motion.played_span())
+        .find(|[first, last]| open < close && (*first > open || *last < close))?;
+    Some(Note {
+        kind: NoteKind::Irregular,
+        subject: "animation".to_owned(),
+        message: format!(
+            "its keys last from {first} s to {last} s of the frame, and the shutter is open from {open} s to {close} s: \
+             before and after them nodes stand still"
+        ),
+        count: 1,
+    })
+}
+
+/// A note for each light that is dark as long as the shutter is open.
+pub(crate) fn dark_lights(camera: &Camera, lights: &[Light], materials: &[Material]) -> Vec<Note> {
+    let [open, close] = camera.exposure_span();
+    let lamps = (0..).zip(lights).map(|(i, light)| (join_index("lights", i), &light.modulation));
+    let surfaces = materials.iter().filter_map(|material| {
+        Some((material.name.clone(), &material.emission.as_ref()?.modulation))
+    });
+    let is_dark = |(_, modulation): &(String, &Option<Arc<Modulation>>)| {
+        modulation.as_ref().is_some_and(|modulation| modulation.mean([open, close]) <= 0.0)
+    };
+    let note = |(subject, _)| Note {
+        kind: NoteKind::Irregular,
+        subject,
+        message: format!(
+            "its `modulation` leaves it dark while the shutter is open, from {open} s to {close} s of the frame"
+        ),
+        count: 1,
+    };
+    lamps.chain(surfaces).filter(is_dark).map(note).collect()
 }

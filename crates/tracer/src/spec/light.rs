@@ -3,17 +3,20 @@
 use std::sync::Arc;
 
 use etendue_geometry::glam::{DMat3, DQuat, DVec3};
-use etendue_spectrum::Illuminant;
+use etendue_spectrum::{Curve, Grid, Illuminant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Bound, ColorSpec, Emitted, Fault, PaintSpec, Supply, emitted, in_bounds, one, radiant_paint,
-    white,
+    Bound, ColorSpec, CubeSpec, Emitted, Fault, PaintSpec, Supply, emitted, in_bounds, luminous,
+    one, radiant_paint, share_of, unit_scale, white,
 };
 use crate::clear_sky::SUN_DIAMETER;
 use crate::goniometric::{Goniometric, Photometry};
-use crate::{ClearSky, EnvironmentImage, Light, LightGroup, LightKind, Paint, Projector};
+use crate::{
+    ClearSky, Color, CubeKind, EnvironmentImage, Light, LightGroup, LightKind, ModulationSpec, Paint,
+    Projector,
+};
 
 /// A light as the scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -25,12 +28,19 @@ pub enum LightSpec {
         at: [f64; 3],
         /// Radiant intensity, linear RGB: at 1 m it gives this irradiance.
         intensity: ColorSpec,
+        /// Luminous flux (lm): brings the intensity to it, which then says the spectrum alone.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 0.0))]
+        lumens: Option<f64>,
         /// The spectrum that the intensity multiplies; equal energy when absent.
         #[serde(default)]
         illuminant: Option<Illuminant>,
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
+        /// How its strength changes with time; not at all when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        modulation: Option<ModulationSpec>,
     },
     /// A point that shines into a cone.
     Spot {
@@ -40,6 +50,10 @@ pub enum LightSpec {
         look_at: [f64; 3],
         /// Radiant intensity within the inner cone, linear RGB.
         intensity: ColorSpec,
+        /// Luminous flux (lm): brings the intensity to it, which then says the spectrum alone.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 0.0))]
+        lumens: Option<f64>,
         /// Half-angle of the cone (degrees, at most 90).
         #[serde(default = "default_cone")]
         #[schemars(range(min = 0.0, max = 90.0))]
@@ -54,6 +68,9 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
+        /// How its strength changes with time; not at all when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        modulation: Option<ModulationSpec>,
     },
     /// Parallel light, as from the sun.
     Directional {
@@ -72,6 +89,9 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
+        /// How its strength changes with time; not at all when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        modulation: Option<ModulationSpec>,
     },
     /// A point that shines by a measured distribution.
     Goniometric {
@@ -89,12 +109,19 @@ pub enum LightSpec {
         /// Multiplies the file's candela: linear RGB.
         #[serde(default = "white")]
         intensity: ColorSpec,
+        /// Luminous flux (lm): brings the intensity to it, which then says the spectrum alone.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 0.0))]
+        lumens: Option<f64>,
         /// The spectrum that the intensity multiplies; equal energy when absent.
         #[serde(default)]
         illuminant: Option<Illuminant>,
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
+        /// How its strength changes with time; not at all when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        modulation: Option<ModulationSpec>,
     },
     /// A point that throws an image, as for structured light.
     Projector {
@@ -124,16 +151,19 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
+        /// How its strength changes with time; not at all when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        modulation: Option<ModulationSpec>,
     },
     /// Light from all around.
     Environment {
         /// Radiance, linear RGB; multiplies the image.
         #[serde(default = "white")]
         radiance: ColorSpec,
-        /// A latitude-longitude image (HDR, EXR, PNG or JPEG), relative to the scene file. Its middle
+        /// A latitude-longitude image (HDR, EXR, PNG or JPEG), relative to the scene file, or a cube. Its middle
         /// is at −Z, its top at +Y.
         #[serde(default)]
-        image: Option<String>,
+        image: Option<SkyImageSpec>,
         /// Turns the image about its top (degrees, counter-clockwise from above).
         #[serde(default)]
         rotate: f64,
@@ -150,6 +180,9 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
+        /// How its strength changes with time; not at all when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        modulation: Option<ModulationSpec>,
     },
     /// A clear sky with its sun, and the ground below the horizon. It is the scene's environment.
     Sky {
@@ -177,7 +210,32 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
+        /// How its strength changes with time; not at all when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        modulation: Option<ModulationSpec>,
     },
+}
+
+/// A latitude-longitude image of light from all around.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum SkyImageSpec {
+    /// A file of colours: HDR, EXR, PNG or JPEG, relative to the scene file.
+    Colors(String),
+    /// A file of light by wavelength.
+    Cube(SkyCubeSpec),
+}
+
+/// A file of light by wavelength, of 0 or more, from all around: dark beyond the outer edges of its bands.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SkyCubeSpec {
+    /// The file, relative to the scene file: NPY, `[row][column][band]`; ENVI, by its header or its numbers; or EXR
+    /// with channels `S0.550,0nm` (Fichet et al. 2021).
+    pub cube: String,
+    /// The wavelengths of the bands (nm) of an NPY file; the others say their own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bands: Option<Grid>,
 }
 
 /// Where the sun of a sky stands.
@@ -206,13 +264,22 @@ impl LightSpec {
     ///
     /// On the first value that describes no light.
     pub fn build(&self, supply: &mut dyn Supply) -> Result<Vec<Light>, Fault> {
+        let modulation = match self.modulation() {
+            Some(modulation) => Some(Arc::new(modulation.build()?)),
+            None => None,
+        };
+        let group = self.group();
+        let lights = self.shining(supply)?.into_iter();
+        Ok(lights.map(|light| Light { group, modulation: modulation.clone(), ..light }).collect())
+    }
+
+    /// The light, of no group and as strong all the time.
+    fn shining(&self, supply: &mut dyn Supply) -> Result<Vec<Light>, Fault> {
         let (key, color, illuminant) = match self {
-            Self::Sky { turbidity, sun, ground_albedo, scale, up, visible, group: _ } => {
+            Self::Sky { turbidity, sun, ground_albedo, scale, up, visible, .. } => {
                 let sky = ClearSky::new(*turbidity, sun.elevation, *ground_albedo, sun.shines);
                 let sky = sky.ok_or_else(|| Fault::new("", "is no sky that the model knows"))?;
-                let lights = shining(sky, sun.azimuth, *scale, (*up, *visible))?;
-                let group = self.group();
-                return Ok(lights.into_iter().map(|light| Light { group, ..light }).collect());
+                return shining(sky, sun.azimuth, *scale, (*up, *visible));
             }
             Self::Point { intensity, illuminant, .. }
             | Self::Spot { intensity, illuminant, .. }
@@ -257,26 +324,67 @@ impl LightSpec {
                     return Err(Fault::new("image", why));
                 }
                 let (image, spectrum) = radiant_paint(("image", image), None, supply)?;
-                if spectrum.is_some() {
-                    let why = "is a curve; a projector's spectrum is that of its `intensity`";
+                if spectrum.is_some() || !image.curves().is_empty() {
+                    let why = "has a curve; a projector's spectrum is that of its `intensity`";
                     return Err(Fault::new("image", why));
                 }
                 let shape = (*fov, *aspect, image);
                 LightKind::Projector(Box::new(projector(ends, DVec3::from(*up), shape)?))
             }
-            Self::Environment { image, rotate, up, visible, .. } => {
-                let image = match image {
-                    None => EnvironmentImage::Constant,
-                    Some(written) => {
-                        let found = supply.file(written).map_err(|why| Fault::new("image", why))?;
-                        EnvironmentImage::File(found)
-                    }
+            Self::Environment { image, rotate, up, visible, radiance, .. } => {
+                let stray = match (radiance, &curve) {
+                    (ColorSpec::Curve(_), _) => Some("radiance"),
+                    (ColorSpec::Rgb(_), Some(_)) => Some("illuminant"),
+                    (ColorSpec::Rgb(_), None) => None,
                 };
+                let image = sky_image(image.as_ref(), stray, supply)?;
                 let turn = tilted(*up, *rotate)?;
                 LightKind::Environment { image, turn, visible: *visible }
             }
         };
-        Ok(vec![Light { kind, color, illuminant: curve, spectrum: None, group: self.group() }])
+        let color = self.brought_to_flux(color, (&kind, curve.as_deref()))?;
+        Ok(vec![Light { illuminant: curve, ..Light::steady(kind, color) }])
+    }
+
+    /// How its strength changes with time, if it does.
+    #[must_use]
+    pub fn modulation(&self) -> Option<&ModulationSpec> {
+        match self {
+            Self::Point { modulation, .. }
+            | Self::Spot { modulation, .. }
+            | Self::Directional { modulation, .. }
+            | Self::Goniometric { modulation, .. }
+            | Self::Projector { modulation, .. }
+            | Self::Environment { modulation, .. }
+            | Self::Sky { modulation, .. } => modulation.as_ref(),
+        }
+    }
+
+    /// The colour of a light of this kind and curve with the luminous flux that it is to have.
+    fn brought_to_flux(
+        &self,
+        color: Color,
+        (kind, curve): (&LightKind, Option<&Curve>),
+    ) -> Result<Color, Fault> {
+        let Some(lumens) = self.lumens() else { return Ok(color) };
+        let own = luminous(&color, curve) * kind.spread().unwrap_or(0.0);
+        let scale = share_of("lumens", lumens, own)?;
+        let scaled = color.map(|part| part * scale);
+        in_bounds("lumens", &scaled, Bound::None)?;
+        Ok(scaled)
+    }
+
+    /// The luminous flux that it is to have (lm), if it says so.
+    fn lumens(&self) -> Option<f64> {
+        match self {
+            Self::Point { lumens, .. }
+            | Self::Spot { lumens, .. }
+            | Self::Goniometric { lumens, .. } => *lumens,
+            Self::Directional { .. }
+            | Self::Projector { .. }
+            | Self::Environment { .. }
+            | Self::Sky { .. } => None,
+        }
     }
 
     /// The group that it is of, if it names one.
@@ -292,6 +400,30 @@ impl LightSpec {
             | Self::Sky { group, .. } => *group,
         }
     }
+}
+
+/// The image of an environment; a cube goes with no spectrum of the key `stray`.
+fn sky_image(
+    image: Option<&SkyImageSpec>,
+    stray: Option<&str>,
+    supply: &mut dyn Supply,
+) -> Result<EnvironmentImage, Fault> {
+    let SkyCubeSpec { cube, bands } = match image {
+        None => return Ok(EnvironmentImage::Constant),
+        Some(SkyImageSpec::Colors(written)) => {
+            let found = supply.file(written).map_err(|why| Fault::new("image", why))?;
+            return Ok(EnvironmentImage::File(found));
+        }
+        Some(SkyImageSpec::Cube(spec)) => spec.clone(),
+    };
+    if let Some(key) = stray {
+        let why = "is a spectrum beside a cube of `image`, which has spectra of its own: leave one of them out";
+        return Err(Fault::new(key, why));
+    }
+    let (wrap, filter) = Default::default();
+    let spec = CubeSpec { cube, bands, wrap, filter, repeat: unit_scale() };
+    let below = |fault: Fault| Fault::new(format!("image.{}", fault.key), fault.why);
+    Ok(EnvironmentImage::Cube(Arc::new(supply.cube(&spec, CubeKind::Light).map_err(below)?)))
 }
 
 fn unit(key: &str, v: DVec3) -> Result<DVec3, Fault> {
@@ -318,21 +450,19 @@ fn shining(
     }
     // Clockwise from above.
     let turn = tilted(up, -azimuth)?;
+    let disk = LightKind::Directional {
+        along: -(turn * sky.toward_sun()),
+        cos_radius: (0.5 * SUN_DIAMETER).to_radians().cos(),
+    };
     let sun = Light {
-        kind: LightKind::Directional {
-            along: -(turn * sky.toward_sun()),
-            cos_radius: (0.5 * SUN_DIAMETER).to_radians().cos(),
-        },
-        color: sky.sun().map(|part| part * scale),
-        illuminant: None,
         spectrum: sky.sun_spectrum().scaled(scale).ok().map(Arc::new),
-        group: None,
+        ..Light::steady(disk, sky.sun().map(|part| part * scale))
     };
     let shines = sky.is_sunlit();
     let image = EnvironmentImage::ClearSky(Box::new(sky));
     let kind = LightKind::Environment { image, turn, visible };
     let color = [scale; 3];
-    let dome = Light { kind, color, illuminant: None, spectrum: None, group: None };
+    let dome = Light::steady(kind, color);
     Ok(if shines { vec![dome, sun] } else { vec![dome] })
 }
 

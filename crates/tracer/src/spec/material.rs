@@ -7,13 +7,16 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    ColorSpec, Fault, PaintSpec, Reflectance, Supply, checker, curve, default_checker_squares,
-    look, one, paint, radiant_paint, reflectance,
+    Bound, ColorSpec, Fault, PaintSpec, Reflectance, Supply, checker, curve,
+    default_checker_squares, in_bounds, look, luminous, one, paint, radiant_paint, reflectance,
+    share_of,
 };
 use crate::bsdf::SECOND_COSINE;
 use crate::material::Alpha;
 use crate::scattering::{Absorption, Glass, GltfSurface};
-use crate::{Conductor, Emission, LightGroup, Material, Paint, Scattering, SceneCurve};
+use crate::{
+    Conductor, Emission, LightGroup, Material, ModulationSpec, Paint, Scattering, SceneCurve,
+};
 
 /// A material as the scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -114,17 +117,25 @@ pub enum MaterialSpec {
     },
     /// A surface that shines and reflects nothing.
     Emissive {
-        /// Radiance: linear RGB (not below zero), or an image.
+        /// Radiance: linear RGB (not below zero), a curve, an image, a cube or squares of two of the first.
         radiance: PaintSpec,
         /// The spectrum that the radiance multiplies; equal energy when absent.
         #[serde(default)]
         illuminant: Option<Illuminant>,
+        /// Luminance (cd/m²): brings the radiance to it, which then says the spectrum alone; of an image where that is
+        /// white.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 0.0))]
+        luminance: Option<f64>,
         /// The back shines too.
         #[serde(default)]
         two_sided: bool,
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
+        /// How its strength changes with time; not at all when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        modulation: Option<ModulationSpec>,
     },
     /// Matte squares of two colours over the surface's texture coordinates.
     Checker {
@@ -250,17 +261,40 @@ impl MaterialSpec {
                 Material::new(name, paint("color", color, supply)?, scattering)
             }
             Self::Gltf { .. } => self.gltf(name, supply)?,
-            Self::Emissive { radiance, illuminant, two_sided, group } => {
-                let (radiance, illuminant) =
+            Self::Emissive { radiance, illuminant, luminance, two_sided, group, modulation } => {
+                let (mut radiance, illuminant) =
                     radiant_paint(("radiance", radiance), *illuminant, supply)?;
+                if let Some(wanted) = *luminance {
+                    let (Paint::Plain(color) | Paint::Image { factor: color, .. }) = &mut radiance
+                    else {
+                        let why = "is of one spectrum, a colour's, a curve's or that of an image's factor, and `radiance` \
+                                   is a checker or a cube: give those their radiance themselves";
+                        return Err(Fault::new("luminance", why));
+                    };
+                    let own = luminous(color, illuminant.as_deref());
+                    let scale = share_of("luminance", wanted, own)?;
+                    *color = color.map(|part| part * scale);
+                    in_bounds("luminance", color, Bound::None)?;
+                }
                 let emission = Emission {
                     radiance: radiance.clone(),
                     strength: 1.0,
                     illuminant,
                     two_sided: *two_sided,
                     group: *group,
+                    modulation: match modulation {
+                        Some(modulation) => Some(Arc::new(modulation.build()?)),
+                        None => None,
+                    },
                 };
-                let plain = Material::new(name, radiance, Scattering::Black);
+                // What it looks like, of which nothing is reflected.
+                let look = match radiance {
+                    Paint::Checker { colors, squares, .. } => {
+                        Paint::Checker { colors, curves: None, squares }
+                    }
+                    other => other,
+                };
+                let plain = Material::new(name, look, Scattering::Black);
                 Material { emission: Some(emission), ..plain }
             }
             Self::Checker { colors, squares } => {
@@ -324,6 +358,20 @@ impl MaterialSpec {
         let plain = Material::new(name, paint, Scattering::Gltf(Box::new(surface)));
         let alpha = if *opacity < 1.0 { Alpha::Blend { factor: *opacity } } else { Alpha::Opaque };
         Ok(Material { alpha, ..plain })
+    }
+
+    /// How its strength changes with time, if it shines and does.
+    #[must_use]
+    pub fn modulation(&self) -> Option<&ModulationSpec> {
+        match self {
+            Self::Emissive { modulation, .. } => modulation.as_ref(),
+            Self::Matte { .. }
+            | Self::Mirror { .. }
+            | Self::Metal { .. }
+            | Self::Dielectric { .. }
+            | Self::Gltf { .. }
+            | Self::Checker { .. } => None,
+        }
     }
 
     /// The group of lights that it is of, if it shines and names one.

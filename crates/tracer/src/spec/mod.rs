@@ -8,13 +8,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use etendue_image::linear_from_srgb;
+use etendue_spectrum::colour::FINE_OBSERVER;
+use etendue_spectrum::summary::LUMINOUS_EFFICACY;
 use etendue_spectrum::{
-    Bands, Curve, CurveError, CurveFault, CurveSpec, Grid, Illuminant, Outside, rgb,
+    Bands, Curve, CurveError, CurveFault, CurveSpec, Grid, Illuminant, Outside, integral, rgb,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use self::light::{LightSpec, SunSpec};
+pub use self::light::{LightSpec, SkyCubeSpec, SkyImageSpec, SunSpec};
 pub use self::material::{AbbeSpec, AbsorptionSpec, IorSpec, MaterialSpec};
 use crate::texture::{Filter, Wrap};
 use crate::{Color, Cube, CubeKind, Ior, Paint, SceneCube, SceneCurve};
@@ -259,6 +261,19 @@ fn emitted(
 
 /// A curve of a light.
 fn emission(key: &str, curve: &Curve) -> Result<Emitted, Fault> {
+    let high = brightest(key, curve)?;
+    let color = Bands::Rgb.from_curve(curve, Outside::Zero).unwrap_or_default();
+    let seen = color.iter().sum::<f64>() / 3.0;
+    let grey = if seen > 0.0 { seen } else { high };
+    if grey <= 0.0 {
+        return Ok(Emitted { color: [0.0; 3], curve: None });
+    }
+    let unit = curve.scaled(1.0 / grey).map_err(|e| Fault::new(key, e.to_string()))?;
+    Ok(Emitted { color: [grey; 3], curve: Some(Arc::new(unit)) })
+}
+
+/// The greatest value of a curve of a light.
+fn brightest(key: &str, curve: &Curve) -> Result<f64, Fault> {
     let [low, high] = curve.extent();
     if low < 0.0 {
         return Err(Fault::new(
@@ -269,14 +284,7 @@ fn emission(key: &str, curve: &Curve) -> Result<Emitted, Fault> {
     if high > BRIGHTEST {
         return Err(Fault::new(key, format!("is above {BRIGHTEST:e}; pictures hold no more")));
     }
-    let color = Bands::Rgb.from_curve(curve, Outside::Zero).unwrap_or_default();
-    let seen = color.iter().sum::<f64>() / 3.0;
-    let grey = if seen > 0.0 { seen } else { high };
-    if grey <= 0.0 {
-        return Ok(Emitted { color: [0.0; 3], curve: None });
-    }
-    let unit = curve.scaled(1.0 / grey).map_err(|e| Fault::new(key, e.to_string()))?;
-    Ok(Emitted { color: [grey; 3], curve: Some(Arc::new(unit)) })
+    Ok(high)
 }
 
 /// A curve as the scene gives it.
@@ -393,21 +401,11 @@ fn radiant_paint(
             (cube_paint((key, cube), CubeKind::Light, supply)?, None)
         }
         PaintSpec::Checker(CheckerSpec { checker, squares }) => {
-            let mut colors = [[0.0; 3]; 2];
-            for (color, spec) in colors.iter_mut().zip(checker) {
-                let ColorSpec::Rgb(given) = spec else {
-                    let why = "has a curve, where light has one spectrum: give colours, and the \
-                               spectrum by `illuminant`";
-                    return Err(Fault::new(format!("{key}.checker"), why));
-                };
-                in_bounds(&format!("{key}.checker"), given, Bound::None)?;
-                *color = *given;
-            }
             if squares.is_nan() || *squares <= 0.0 {
                 let why = format!("{squares} is not above zero");
                 return Err(Fault::new(format!("{key}.squares"), why));
             }
-            (Paint::Checker { colors, curves: None, squares: *squares }, checked(illuminant)?)
+            radiant_checker(key, (checker, *squares), illuminant, supply)?
         }
         PaintSpec::Image(image) => {
             let factor = format!("{key}.factor");
@@ -415,6 +413,77 @@ fn radiant_paint(
             (image_paint(key, image, (color, None), supply)?, curve)
         }
     })
+}
+
+/// Luminous quantity of a colour times a curve (lm for W/nm, and so on): 683.002 lm/W times ∫ S V dλ, of which V is
+/// the CIE 1931 observer's ȳ (CIE 018:2019, equation 1).
+fn luminous(color: &Color, curve: Option<&Curve>) -> f64 {
+    let own = rgb::spectrum(*color);
+    let seen = &FINE_OBSERVER[1];
+    let [from, to] = seen.range();
+    LUMINOUS_EFFICACY
+        * match curve {
+            None => integral(&[&own, seen], from, to),
+            Some(curve) => {
+                let [low, high] = curve.range();
+                let flat = curve.as_flat().is_some();
+                let (from, to) = if flat { (from, to) } else { (from.max(low), to.min(high)) };
+                if from < to { integral(&[&own, curve, seen], from, to) } else { 0.0 }
+            }
+        }
+}
+
+/// What a light that has so much of a photometric quantity is multiplied by to have as much as is `wanted`.
+fn share_of(key: &str, wanted: f64, own: f64) -> Result<f64, Fault> {
+    if !(wanted >= 0.0 && wanted.is_finite()) {
+        return Err(Fault::new(key, format!("{wanted} is no amount of light")));
+    }
+    if own > 0.0 {
+        return Ok(wanted / own);
+    }
+    let why = "is wanted of light that the eye does not see: give its spectrum visible light, or its power itself";
+    Err(Fault::new(key, why))
+}
+
+/// Squares of two lights, and the curve that multiplies both, where neither is one.
+fn radiant_checker(
+    key: &str,
+    (specs, squares): (&[ColorSpec; 2], f64),
+    illuminant: Option<Illuminant>,
+    supply: &mut dyn Supply,
+) -> Result<(Paint, Option<Arc<Curve>>), Fault> {
+    let (mut colors, mut curves) = ([[0.0; 3]; 2], [None, None]);
+    for (k, spec) in specs.iter().enumerate() {
+        let key = format!("{key}.checker[{k}]");
+        match spec {
+            ColorSpec::Rgb(given) => {
+                in_bounds(&key, given, Bound::None)?;
+                colors[k] = *given;
+            }
+            ColorSpec::Curve(spec) => {
+                let curve = curve(&key, spec, supply)?;
+                brightest(&key, &curve)?;
+                let color = Bands::Rgb.from_curve(&curve, Outside::Zero).unwrap_or_default();
+                colors[k] = std::array::from_fn(|i| color.get(i).copied().unwrap_or(0.0));
+                curves[k] = Some(curve);
+            }
+        }
+    }
+    if curves.iter().all(Option::is_none) {
+        return Ok((Paint::Checker { colors, curves: None, squares }, checked(illuminant)?));
+    }
+    if illuminant.is_some() {
+        let why = format!("is given beside a curve of `{key}`, which has its own spectrum");
+        return Err(Fault::new("illuminant", format!("{why}: leave one of them out")));
+    }
+    let [first, second] = curves;
+    // A colour beside a curve is the curve that colours become.
+    let mut of = |given: Option<Curve>, color: Color| SceneCurve {
+        number: supply.curve_number(),
+        curve: Arc::new(given.unwrap_or_else(|| rgb::spectrum(color))),
+    };
+    let curves = Some(Box::new([of(first, colors[0]), of(second, colors[1])]));
+    Ok((Paint::Checker { colors, curves, squares }, None))
 }
 
 fn in_bounds(key: &str, color: &Color, bound: Bound) -> Result<(), Fault> {

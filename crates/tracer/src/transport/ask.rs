@@ -123,22 +123,23 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             }
             let light = radiance[lane * count..(lane + 1) * count].iter();
             let throughput = &now.carried.throughput[i * count..(i + 1) * count];
-            let bands = light.zip(throughput).enumerate();
+            let bands = light.zip(throughput);
             let all = &mut shadows.carried.throughput;
             match kind {
                 SurfaceKind::Black | SurfaceKind::Smooth => {}
                 SurfaceKind::Matte => {
-                    let color = &patch.colors[lane];
-                    all.extend(bands.map(|(k, (l, t))| l * t * value * self.band(color, k)));
+                    let start = all.len();
+                    all.extend(bands.map(|(l, t)| l * t * value));
+                    self.tinted(&patch.colors[lane], &mut all[start..]);
                 }
                 SurfaceKind::Sheet => {
                     let weights = patch.sheets.weights(lane);
                     let share = |k| self.in_band_of_sheet(patch, lane, weights, k);
-                    all.extend(bands.map(|(k, (l, t))| l * t * value * share(k)));
+                    all.extend(bands.enumerate().map(|(k, (l, t))| l * t * value * share(k)));
                 }
                 SurfaceKind::Other => {
                     let share = |k| self.in_band(&patch.bsdfs[lane], patch.weights[lane], k);
-                    all.extend(bands.map(|(k, (l, t))| l * t * value * share(k)));
+                    all.extend(bands.enumerate().map(|(k, (l, t))| l * t * value * share(k)));
                 }
             }
         }

@@ -288,6 +288,24 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         if RGB { tint.color[k] } else { self.ctx.spectral.tint(tint, k) }
     }
 
+    /// Multiplies light in all bands by a colour, with its curve.
+    #[inline(always)]
+    fn tinted(&self, tint: &Tint, light: &mut [f64]) {
+        match RGB {
+            true => light.iter_mut().zip(tint.color).for_each(|(band, part)| *band *= part),
+            false => self.stage.spectral.times(tint, light),
+        }
+    }
+
+    /// Multiplies light in all bands by a colour, with its curve.
+    #[inline(always)]
+    fn tinted(&self, tint: &Tint, light: &mut [f64]) {
+        match RGB {
+            true => light.iter_mut().zip(tint.color).for_each(|(band, part)| *band *= part),
+            false => self.ctx.spectral.times(tint, light),
+        }
+    }
+
     /// The light of band `k` that met several facets, which return `mean` of all light where they reflect all of it:
     /// `deep` of colours, and of a curve what its own mean in the band makes.
     #[inline(always)]

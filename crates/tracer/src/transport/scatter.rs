@@ -92,9 +92,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let bands = throughput.iter_mut().enumerate();
             match kind {
                 SurfaceKind::Black | SurfaceKind::Other => {}
-                SurfaceKind::Matte => {
-                    bands.for_each(|(k, band)| *band *= self.band(&patch.colors[lane], k));
-                }
+                SurfaceKind::Matte => self.tinted(&patch.colors[lane], throughput),
                 SurfaceKind::Sheet => {
                     let weights = patch.sheets.weights(lane);
                     bands.for_each(|(k, band)| {

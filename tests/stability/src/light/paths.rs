@@ -87,6 +87,7 @@ fn roulette(scale: Scale) -> Result<Outcome> {
                 illuminant: None,
                 two_sided: true,
                 group: None,
+                modulation: None,
             });
         }
         let seen = Pixels::of(&scene)?;

@@ -1,9 +1,11 @@
 //! Animations at one moment: what their channels make of the nodes' translations, rotations, scales and
 //! weights (glTF 2.0, section 3.11; interpolation by its appendix C).
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use etendue_geometry::glam::DQuat;
+use etendue_geometry::glam::{DQuat, DVec4};
+use etendue_geometry::{self as geometry, Between, Joint};
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
@@ -75,6 +77,8 @@ pub(super) struct Moved {
     node: usize,
     property: Property,
     values: Vec<f64>,
+    /// Its keys.
+    track: Track,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -117,17 +121,17 @@ pub(super) fn moved(
             return Err(reader.absent(place, "sampler", channel.sampler, count));
         };
         let place = format!("animations[{number}].samplers[{}]", channel.sampler);
-        let values = Track::read(reader, sampler, property, &place)?.at(play.time);
-        moved.push(Moved { node, property, values });
+        let track = Track::read(reader, sampler, property, &place)?;
+        moved.push(Moved { node, property, values: track.at(play.time), track });
     }
     Ok(moved)
 }
 
 /// Puts what moved in place of what the nodes have at rest.
-pub(super) fn apply(file: &Path, moved: Vec<Moved>, nodes: &mut [Node]) -> Result<(), ImportError> {
-    for Moved { node: index, property, values } in moved {
-        let node = &mut nodes[index];
-        if node.matrix.is_some() && property != Property::Weights {
+pub(super) fn apply(file: &Path, moved: &[Moved], nodes: &mut [Node]) -> Result<(), ImportError> {
+    for Moved { node: index, property, values, .. } in moved {
+        let node = &mut nodes[*index];
+        if node.matrix.is_some() && *property != Property::Weights {
             let reason = "it has a matrix and is animated, which moves translation, rotation and scale; \
                           export the file again";
             return Err(damaged(file, format!("nodes[{index}]"), reason));
@@ -136,10 +140,65 @@ pub(super) fn apply(file: &Path, moved: Vec<Moved>, nodes: &mut [Node]) -> Resul
             (Property::Translation, &[x, y, z]) => node.translation = Some([x, y, z]),
             (Property::Scale, &[x, y, z]) => node.scale = Some([x, y, z]),
             (Property::Rotation, &[x, y, z, w]) => node.rotation = Some([x, y, z, w]),
-            _ => node.weights = Some(values),
+            _ => node.weights = Some(values.clone()),
         }
     }
     Ok(())
+}
+
+/// What moves while an animation plays.
+#[derive(Debug, Default)]
+pub(super) struct Playing {
+    /// The nodes whose frames do, in s from the moment that is shown.
+    pub(super) joints: BTreeMap<usize, Joint>,
+    /// The nodes whose morph targets do.
+    pub(super) morphed: BTreeSet<usize>,
+}
+
+/// What goes on from the moment `time` (s), of nodes that stand as they do then.
+pub(super) fn playing(
+    file: &Path,
+    moved: Vec<Moved>,
+    time: f64,
+    nodes: &[Node],
+) -> Result<Playing, ImportError> {
+    let mut playing = Playing::default();
+    for Moved { node: index, property, track, .. } in
+        moved.into_iter().filter(|it| it.track.changes())
+    {
+        if property == Property::Weights {
+            playing.morphed.insert(index);
+            continue;
+        }
+        let node = &nodes[index];
+        let joint = playing.joints.entry(index).or_insert_with(|| {
+            let rest = |value: Option<[f64; 3]>, other: [f64; 3]| {
+                let [x, y, z] = value.unwrap_or(other);
+                geometry::Track::constant(DVec4::new(x, y, z, 0.0))
+            };
+            let rotation = node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]);
+            Joint {
+                translation: rest(node.translation, [0.0; 3]),
+                rotation: geometry::Track::constant(DVec4::from(rotation)),
+                scale: rest(node.scale, [1.0; 3]),
+            }
+        });
+        let track = track.from_time(time);
+        match property {
+            Property::Translation => joint.translation = track,
+            Property::Rotation => joint.rotation = track,
+            Property::Scale | Property::Weights => joint.scale = track,
+        }
+    }
+    for (index, joint) in &playing.joints {
+        if let Some(why) = joint.fault() {
+            let reason = format!(
+                "{why} while its animation plays; leave `plays` out, or export it otherwise"
+            );
+            return Err(damaged(file, format!("nodes[{index}]"), reason));
+        }
+    }
+    Ok(playing)
 }
 
 /// The animation by name or number, the first when none is named.
@@ -264,6 +323,36 @@ impl Track {
                 };
                 (0..self.width).map(hermite).collect()
             }
+        }
+    }
+
+    /// Whether its value is another at some time.
+    fn changes(&self) -> bool {
+        let first = self.key(0);
+        let is_cubic = self.interpolation == Interpolation::CubicSpline && self.times.len() > 1;
+        is_cubic || (1..self.times.len()).any(|key| self.key(key) != first)
+    }
+
+    /// The same as a track of a joint, in s from `time` on.
+    fn from_time(&self, time: f64) -> geometry::Track {
+        let vector = |numbers: &[f64]| {
+            let number = |k: usize| numbers.get(k).copied().unwrap_or(0.0);
+            DVec4::new(number(0), number(1), number(2), number(3))
+        };
+        let key = |key: usize| match self.interpolation {
+            Interpolation::CubicSpline => [0, 1, 2].map(|part| vector(self.part(key, part))),
+            Interpolation::Step | Interpolation::Linear => {
+                [DVec4::ZERO, vector(self.key(key)), DVec4::ZERO]
+            }
+        };
+        geometry::Track {
+            between: match self.interpolation {
+                Interpolation::Step => Between::Step,
+                Interpolation::Linear => Between::Linear,
+                Interpolation::CubicSpline => Between::Cubic,
+            },
+            times: self.times.iter().map(|key| key - time).collect(),
+            keys: (0..self.times.len()).map(key).collect(),
         }
     }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use super::chains::Chains;
 use super::document::{Document, Node};
 use super::pose::{Pose, trs};
 use super::primitive::Shapes;
@@ -15,7 +16,7 @@ use crate::import::{
     Import, ImportError, ImportedCamera, ImportedLight, ImportedPlacement, Projection,
 };
 use etendue_geometry::glam::{DQuat, DVec3};
-use etendue_geometry::{Placement, Transform, Vertices};
+use etendue_geometry::{Link, Placement, Transform, Vertices};
 
 /// What stands in the scene.
 #[derive(Default)]
@@ -133,7 +134,7 @@ fn placed_camera(
 /// Places the primitives of each mesh at each of its nodes, and at each instance of those.
 pub(super) fn place(
     reader: &Reader<'_>,
-    scene: &Scene,
+    (scene, chains): (&Scene, &Chains<'_>),
     shapes: &Shapes,
     import: &mut Import,
 ) -> Result<(), ImportError> {
@@ -150,7 +151,12 @@ pub(super) fn place(
             // glTF 2.0, section 3.7.3.3: only the joints place a skinned mesh.
             let model_from_node =
                 if primitive.skinned { Transform::IDENTITY } else { placed.model_from_node };
+            let links = chains.of(placed.node);
             for (k, node_from_instance) in (0..).zip(&instances) {
+                let mut links = links.clone();
+                if !links.is_empty() {
+                    links.push(Link::Fixed(*node_from_instance));
+                }
                 import.placements.push(ImportedPlacement {
                     mesh: primitive.mesh,
                     material: primitive.material,
@@ -158,6 +164,7 @@ pub(super) fn place(
                     name: name.clone(),
                     node: u32::try_from(placed.node).unwrap_or(u32::MAX),
                     instance: has(node).then_some(k),
+                    links,
                 });
             }
         }

@@ -125,5 +125,5 @@ pub(super) fn placed(
             return Err(damaged(path, place(), reason));
         }
     };
-    Ok(Some(Light { kind, color, illuminant: None, spectrum: None, group: None }))
+    Ok(Some(Light::steady(kind, color)))
 }

@@ -343,5 +343,12 @@ fn emission(
         Some(image) => Paint::Image { factor, curve: None, image },
         None => Paint::Plain(factor),
     };
-    Ok(Some(Emission { radiance, strength, illuminant: None, two_sided: true, group: None }))
+    Ok(Some(Emission {
+        radiance,
+        strength,
+        illuminant: None,
+        two_sided: true,
+        group: None,
+        modulation: None,
+    }))
 }

@@ -11,6 +11,7 @@
 mod accessor;
 mod animation;
 mod buffers;
+mod chains;
 mod deform;
 mod document;
 mod draco;
@@ -30,6 +31,7 @@ use super::files::Files;
 use super::{Import, ImportError, Options, Wanted, error};
 use crate::memory::of_json;
 use buffers::Buffers;
+use chains::Chains;
 use document::Document;
 
 /// What the parts of the reader share.
@@ -97,12 +99,16 @@ pub(super) fn import(
     let mut import = Import::default();
     extensions::check(path, &document, wanted, &mut import.notes)?;
 
+    let mut playing = animation::Playing::default();
     if let Some(play) = &options.animation {
         let buffers = Buffers::open(path, files, &document, container.binary.clone())?;
         let reader =
             Reader { file: path, files, document: &document, buffers: &buffers, wanted, options };
         let moved = animation::moved(&reader, play, &mut import)?;
-        animation::apply(path, moved, &mut document.nodes)?;
+        animation::apply(path, &moved, &mut document.nodes)?;
+        if play.plays {
+            playing = animation::playing(path, moved, play.time, &document.nodes)?;
+        }
     }
     let scene = hierarchy::walk(path, &document, &mut import.notes)?;
     let buffers = Buffers::open(path, files, &document, container.binary)?;
@@ -110,7 +116,9 @@ pub(super) fn import(
         Reader { file: path, files, document: &document, buffers: &buffers, wanted, options };
     let shapes = primitive::load(&reader, &scene, &mut import)?;
     material::load(&reader, &mut import)?;
-    hierarchy::place(&reader, &scene, &shapes, &mut import)?;
+    let chains = Chains::new(&reader, &playing);
+    chains.check(&scene, &mut import)?;
+    hierarchy::place(&reader, (&scene, &chains), &shapes, &mut import)?;
     import.cameras = scene.cameras;
     if wanted.light {
         import.lights = scene.lights;

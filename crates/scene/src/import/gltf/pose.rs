@@ -140,7 +140,7 @@ fn is_hidden(node: &Node) -> bool {
 }
 
 /// From the node's frame to its parent's, as the file has it.
-fn local(path: &Path, node: &Node, index: usize) -> Result<Transform, ImportError> {
+pub(super) fn local(path: &Path, node: &Node, index: usize) -> Result<Transform, ImportError> {
     let place = || format!("nodes[{index}]");
     let transform = match node.matrix {
         Some(matrix) => affine(&matrix).ok_or_else(|| {

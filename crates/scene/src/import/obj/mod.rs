@@ -144,6 +144,7 @@ fn place(
         model_from_mesh: Transform::IDENTITY,
         name: segment.name.clone(),
         node,
+        links: Vec::new(),
         instance: None,
     });
     import.meshes.push(admitted.mesh);

@@ -285,6 +285,7 @@ fn nearest(material: &tobj::Material, plain: Material) -> Material {
         illuminant: None,
         two_sided: true,
         group: None,
+        modulation: None,
     };
     let own = material.emissive.filter(|color| !dark(*color));
     let ambient = material.ambient.filter(|color| color.iter().any(|v| *v > 1.0));

@@ -87,6 +87,7 @@ pub(super) fn import(
         model_from_mesh: Transform::IDENTITY,
         name,
         node: 0,
+        links: Vec::new(),
         instance: None,
     });
     Ok(import)

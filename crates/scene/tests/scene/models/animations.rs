@@ -1,6 +1,7 @@
 //! Moments of animations, with closed forms.
 
 use etendue_geometry::glam::{DQuat, DVec3};
+use etendue_geometry::{Bounds, Motion};
 use etendue_scene::import::{Import, Options, Play, Wanted, import};
 use serde_json::json;
 
@@ -32,7 +33,7 @@ fn animated(path: &str, kind: Option<&str>, output: impl FnOnce(&mut Builder) ->
 fn at(bytes: &[u8], time: f64) -> Import {
     let folder = folder();
     let path = write(&folder, "a.glb", bytes);
-    let animation = Some(Play { which: Some("move".to_owned()), time });
+    let animation = Some(Play { which: Some("move".to_owned()), time, plays: false });
     import(&path, Wanted::EVERYTHING, &Options { animation, ..Options::default() }).unwrap()
 }
 
@@ -124,8 +125,10 @@ fn a_pointer_to_a_node_is_that_node() {
                         "channels": [{"sampler": 0, "target": target}]}]
     }));
     let path = write(&folder, "b.glb", bytes);
-    let options =
-        Options { animation: Some(Play { which: None, time: 3.0 }), ..Options::default() };
+    let options = Options {
+        animation: Some(Play { which: None, time: 3.0, plays: false }),
+        ..Options::default()
+    };
     let import = import(&path, Wanted::EVERYTHING, &options).unwrap();
     assert_eq!(import.placements[0].model_from_mesh.translation, DVec3::new(0.0, 5.0, 0.0));
 }
@@ -135,7 +138,7 @@ fn broken_animations_are_refused_when_they_are_played() {
     let refused = |bytes: &[u8], which: &str, words: &str| {
         let folder = folder();
         let path = write(&folder, "a.glb", bytes);
-        let animation = Some(Play { which: Some(which.to_owned()), time: 0.0 });
+        let animation = Some(Play { which: Some(which.to_owned()), time: 0.0, plays: false });
         let options = Options { animation, ..Options::default() };
         let error = import(&path, Wanted::EVERYTHING, &options).unwrap_err().to_string();
         assert!(error.contains(words) && error.contains("a.glb"), "{error}");
@@ -153,4 +156,109 @@ fn broken_animations_are_refused_when_they_are_played() {
     refused(&wide, "move", "3 components where 4");
     let other = animated("translation", Some("BEZIER"), |b| b.floats(&[[1.0_f32; 3]; 3]));
     refused(&other, "move", "BEZIER");
+}
+
+/// A square below two nodes that move: the outer turns and is stretched, the inner goes by a spline and steps.
+fn nested() -> Vec<u8> {
+    let mut builder = Builder::default();
+    let positions = builder.floats(&SQUARE);
+    let input = builder.floats(&KEYS.map(|key| [key]));
+    let late = builder.floats(&[[1.5_f32], [3.0]]);
+    #[expect(clippy::cast_possible_truncation, reason = "as files have them")]
+    let turn = |axis: DVec3, angle: f64| {
+        DQuat::from_axis_angle(axis.normalize(), angle).to_array().map(|x| x as f32)
+    };
+    let turns = builder.floats(&[
+        turn(DVec3::Z, 0.1),
+        turn(DVec3::new(1.0, 2.0, 0.5), 2.9),
+        turn(DVec3::new(-1.0, 0.5, 0.5), -1.4),
+    ]);
+    let scales = builder.floats(&[[1.0_f32, 2.0, 1.0], [3.0, 1.0, 0.5]]);
+    let ways: Vec<[f32; 3]> = (0..9_u8).map(|k| [f32::from(k), 1.0, -0.5 * f32::from(k)]).collect();
+    let ways = builder.floats(&ways);
+    let spins: Vec<[f32; 4]> = [
+        [[0.1, 0.2, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], [0.3, 0.0, 0.1, 0.0]],
+        [[0.1, 0.1, 0.0, 0.0], [0.6, 0.0, 0.0, 0.8], [0.0, 0.1, 0.1, 0.0]],
+        [[0.0, 0.1, 0.0, 0.1], [0.0, 0.6, 0.0, 0.8], [0.0, 0.0, 0.0, 0.0]],
+    ]
+    .concat();
+    let spins = builder.floats(&spins);
+    let steps = builder.floats(&[[1.0_f32; 3], [2.0; 3]]);
+    let sampler = |input: usize, output: usize, kind: &str| json!({ "input": input, "output": output, "interpolation": kind });
+    let target = |k: usize, node: usize, path: &str| json!({ "sampler": k, "target": { "node": node, "path": path } });
+    builder.glb(json!({
+        "nodes": [{"children": [1], "translation": [10, 0, 0]},
+                  {"children": [2], "rotation": [0, 0.6, 0, 0.8]}, {"mesh": 0}],
+        "scenes": [{"nodes": [0]}], "scene": 0,
+        "meshes": [{"primitives": [{"attributes": {"POSITION": positions}}]}],
+        "animations": [{"name": "move",
+            "samplers": [sampler(input, turns, "LINEAR"), sampler(late, scales, "LINEAR"),
+                sampler(input, ways, "CUBICSPLINE"), sampler(input, spins, "CUBICSPLINE"), sampler(late, steps, "STEP")],
+            "channels": [target(0, 0, "rotation"), target(1, 0, "scale"), target(2, 2, "translation"),
+                target(3, 2, "rotation"), target(4, 2, "scale")]}]
+    }))
+}
+
+fn playing(bytes: &[u8], time: f64) -> Import {
+    let folder = folder();
+    let path = write(&folder, "a.glb", bytes);
+    let animation = Some(Play { which: Some("move".to_owned()), time, plays: true });
+    import(&path, Wanted::EVERYTHING, &Options { animation, ..Options::default() }).unwrap()
+}
+
+/// Frames that move in each other are, at each time, where the moments of the animation have them; and the box that the
+/// square sweeps has all of it.
+#[test]
+fn what_plays_goes_through_the_moments_of_its_animation() {
+    let bytes = nested();
+    let shown = 1.2;
+    let motion = Motion::default().then_links(&playing(&bytes, shown).placements[0].links);
+    assert!(at(&bytes, shown).placements[0].links.is_empty(), "nothing plays unless asked");
+    let [first, last] = motion.played_span().unwrap();
+    assert!((first - (1.0 - shown)).abs() < 1e-15 && (last - (4.0 - shown)).abs() < 1e-15);
+    let local = Bounds { min: DVec3::ZERO, max: DVec3::new(1.0, 1.0, 0.0) };
+    let exposure = [-0.7, 3.3];
+    let swept = motion.swept(local, exposure);
+    for step in 0..=400 {
+        let time = exposure[0] + 4.0 * f64::from(step) / 400.0;
+        let [played, due] =
+            [motion.at(time), at(&bytes, shown + time).placements[0].model_from_mesh];
+        for corner in [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0)] {
+            let off = (played.point(corner) - due.point(corner)).length();
+            // Roundings of f64 of numbers up to some tens; a step falls on either side of its time.
+            assert!(off < 1e-12 || (time + shown - 3.0).abs() < 1e-12, "{time}: {off}");
+            let point = played.point(corner);
+            assert!(point.cmpge(swept.min).all() && point.cmple(swept.max).all(), "{time} {point}");
+        }
+    }
+    // Before the first key and after the last it stands still.
+    assert!(motion.moves_within([0.0, 0.1]) && !motion.moves_within([3.0, 5.0]));
+}
+
+#[test]
+fn what_cannot_play_is_refused_by_its_node() {
+    let bad = animated("scale", None, |b| b.floats(&[[1.0; 3], [-1.0, 1.0, 1.0], [1.0; 3]]));
+    let folder = folder();
+    let refused = |bytes: &[u8]| {
+        let path = write(&folder, "bad.glb", bytes);
+        let animation = Some(Play { which: Some("move".to_owned()), time: 1.0, plays: true });
+        import(&path, Wanted::EVERYTHING, &Options { animation, ..Options::default() })
+            .unwrap_err()
+            .to_string()
+    };
+    let error = refused(&bad);
+    assert!(error.contains("nodes[1]") && error.contains("scale passes through 0"), "{error}");
+    let mut builder = Builder::default();
+    let positions = builder.floats(&SQUARE);
+    let target = builder.floats(&SQUARE);
+    let input = builder.floats(&[[0.0_f32], [1.0]]);
+    let output = builder.floats(&[[0.0_f32], [1.0]]);
+    let morphed = builder.glb(json!({
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": positions}, "targets": [{"POSITION": target}]}]}],
+        "animations": [{"name": "move", "samplers": [{"input": input, "output": output}],
+                        "channels": [{"sampler": 0, "target": {"node": 0, "path": "weights"}}]}]
+    }));
+    let error = refused(&morphed);
+    assert!(error.contains("nodes[0]") && error.contains("morph targets"), "{error}");
 }

@@ -1,0 +1,236 @@
+//! Exposures in slots: sums of their parts, noise that is drawn once, and what is refused.
+
+use serde_json::{Value, json};
+
+use crate::run::{Bench, read_npy, text};
+
+const SIZE: [usize; 2] = [12, 10];
+
+/// The exposure (s).
+const EXPOSURE: f64 = 0.012;
+
+/// A ball that flies before a checkered wall, and a camera that moves through a rolling shutter.
+fn scene() -> Value {
+    json!({
+        "etendue": 1,
+        "tracer": { "type": "path" },
+        "layers": ["depth", "time", "direct", "light_groups"],
+        "camera": {
+            "type": "pinhole", "fov": 50, "pose": { "from": [0, 0, 3], "look_at": [0, 0, 0] },
+            "shutter": { "type": "rolling", "line_time": "100 us" },
+            "motion": { "type": "velocity", "velocity": [5, 0, 0] },
+            "sensor": { "type": "raw", "cfa": "rggb", "resolution": SIZE, "read_noise": 3, "system_gain": 0.5,
+                        "exposure": EXPOSURE }
+        },
+        "lights": [
+            { "type": "point", "at": [1, 2, 3], "intensity": [9, 8, 7], "group": "key",
+              "modulation": { "type": "sine", "frequency": 90 } },
+            { "type": "environment", "radiance": [0.2, 0.3, 0.4] }
+        ],
+        "objects": [
+            { "shape": "rectangle", "width": 6, "height": 6, "material": "tiles", "transform": { "translate": [0, 0, -1] } },
+            { "shape": "sphere", "radius": 0.5, "motion": { "type": "velocity", "velocity": [0, 30, 0] } }
+        ],
+        "materials": { "tiles": { "type": "checker" } },
+        "render": { "samples": 16, "seed": 7 }
+    })
+}
+
+fn slots() -> Value {
+    json!([
+        { "duration": "2 ms" },
+        { "duration": "5 ms", "pixels": [[1, 0.25], [0, 0.5]], "set": { "camera.pose.from": [0.3, 0.1, 3] } },
+        { "start": "6 ms", "pixels": [[0, 1, 0.5]], "set": { "camera.fov": 40, "lights[1].radiance": [1, 0, 0] } }
+    ])
+}
+
+/// When each of the slots lasts: the third for what the others leave, from within the second on.
+const SPANS: [[f64; 2]; 3] = [[0.0, 0.002], [0.002, 0.007], [0.006, 0.011]];
+
+fn rendered(scene: &Value, more: &[&str]) -> Bench {
+    let bench = Bench::with_scene(&scene.to_string());
+    run(&bench, &[&["render", "scene.json", "-o", "out"], more].concat());
+    bench
+}
+
+fn run(bench: &Bench, arguments: &[&str]) {
+    let output = bench.run(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
+}
+
+/// Set by hand, each slot is a picture of its own: of the shutter's open interval, with its seed.
+#[test]
+fn an_exposure_is_the_sum_of_its_slots_before_noise() {
+    let mut serial = scene();
+    serial["serial"] = slots();
+    let whole = rendered(&serial, &[]);
+    let mut sums: Vec<(&str, Vec<f64>)> = Vec::new();
+    for (number, span) in SPANS.iter().enumerate() {
+        let mut part = scene();
+        part["camera"]["shutter"]["open"] = json!([span]);
+        part["render"]["seed"] = json!(7 + number);
+        match number {
+            1 => part["camera"]["pose"]["from"] = json!([0.3, 0.1, 3]),
+            2 => {
+                part["camera"]["fov"] = json!(40);
+                part["lights"][1]["radiance"] = json!([1, 0, 0]);
+            }
+            _ => {}
+        }
+        let share = |x: usize, y: usize| match number {
+            1 => [[1.0, 0.25], [0.0, 0.5]][y % 2][x % 2],
+            2 => [0.0, 1.0, 0.5][x % 3],
+            _ => 1.0,
+        };
+        let part = rendered(&part, &[]);
+        for (k, name) in ["picture", "direct", "light_key", "light_other"].into_iter().enumerate() {
+            let values = part.array(name);
+            let shared = values.iter().enumerate().map(|(i, value)| {
+                let pixel = i / 3;
+                share(pixel % SIZE[0], pixel / SIZE[0]) * value
+            });
+            match sums.get_mut(k) {
+                None => sums.push((name, shared.collect())),
+                Some((_, sums)) => sums.iter_mut().zip(shared).for_each(|(sum, part)| *sum += part),
+            }
+        }
+    }
+    for (name, due) in &sums {
+        let found = whole.array(name);
+        assert_eq!(found.len(), due.len(), "{name}");
+        assert!(due.iter().any(|value| *value > 0.0), "{name}");
+        for (found, due) in found.iter().zip(due) {
+            // The sum of three numbers is rounded to f32 once.
+            assert!((found - due).abs() <= 6e-8 * due, "{name}: {found}, not {due}");
+        }
+    }
+    // What is no light is of the scene by itself.
+    let mut plain = scene();
+    plain["serial"] = json!([]);
+    let plain = rendered(&plain, &[]);
+    for name in ["depth", "time"] {
+        let [found, due] = [&whole, &plain].map(|bench| bench.array(name));
+        assert!(found.iter().zip(&due).all(|(a, b)| a.to_bits() == b.to_bits()), "{name}");
+    }
+}
+
+#[test]
+fn rows_of_an_exposure_in_slots_are_put_together() {
+    let mut serial = scene();
+    serial["serial"] = slots();
+    serial["camera"]["sensor"]["resolution"] = json!([12, 40]);
+    let bench = rendered(&serial, &["--threads", "1"]);
+    run(&bench, &["render", "scene.json", "-o", "threads", "--threads", "3"]);
+    for share in ["1/2", "2/2"] {
+        run(&bench, &["render", "scene.json", "-o", "rows", "--shard", share]);
+    }
+    run(&bench, &["merge", "merged", "rows/shard-1-of-2.film", "rows/shard-2-of-2.film"]);
+    for file in ["picture.npy", "raw.npy", "depth.npy"] {
+        let [whole, threads, merged] = ["out", "threads", "merged"]
+            .map(|folder| std::fs::read(bench.path(folder).join(file)).unwrap());
+        assert!(whole == threads && whole == merged, "{file}");
+    }
+}
+
+/// A white wall in 16 slots: the variance in electrons is the mean and the read noise once, not 16 times.
+#[test]
+fn noise_is_drawn_once() {
+    let read_noise = 30.0;
+    let side = 64;
+    let scene = json!({
+        "etendue": 1, "tracer": { "type": "direct" }, "lights": [],
+        "camera": { "type": "orthographic", "height": 1, "pose": { "from": [0, 0, 3], "look_at": [0, 0, 0] },
+            "sensor": { "type": "raw", "cfa": "wwww", "resolution": [side, side], "read_noise": read_noise,
+                        "system_gain": 1, "bit_depth": 16, "black_level": 1000, "full_well": 60000,
+                        "dark_current": 0, "quantum_efficiency": 0.5, "exposure": 0.016 } },
+        "objects": [{ "shape": "rectangle", "width": 9, "height": 9, "material": "lamp" }],
+        "materials": { "lamp": { "type": "emissive", "radiance": [0.02, 0.02, 0.02] } },
+        "render": { "samples": 1 }
+    });
+    let mut serial = scene.clone();
+    serial["serial"] = json!(vec![json!({}); 16]);
+    let statistics = |scene: &Value| {
+        let bench = rendered(scene, &[]);
+        let numbers = read_npy(&bench.path("out").join("raw.npy"));
+        let n = numbers.len() as f64;
+        let mean = numbers.iter().sum::<f64>() / n;
+        let variance = numbers.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        [mean - 1000.0, variance]
+    };
+    let [mean, variance] = statistics(&serial);
+    let due = mean + read_noise * read_noise;
+    // The variance of n values is off by √(2/n): four times that. A draw a slot would be 16 · 900.
+    let n = (side * side) as f64;
+    assert!(mean > 100.0, "{mean}");
+    assert!(
+        (variance / due - 1.0).abs() < 4.0 * (2.0 / n).sqrt(),
+        "{variance}, not {due} of {mean}"
+    );
+    let [whole, _] = statistics(&scene);
+    // Both means are off by √(due / n).
+    assert!((mean - whole).abs() < 6.0 * (due / n).sqrt(), "{mean} {whole}");
+}
+
+#[test]
+fn what_is_no_slot_is_refused_by_its_place() {
+    let with = |slots: Value| {
+        let mut scene = scene();
+        scene["serial"] = slots;
+        scene
+    };
+    let mut instant = with(json!([{}]));
+    instant["camera"]["sensor"] = json!({ "resolution": SIZE });
+    let mut reset = with(json!([{}]));
+    reset["camera"]["shutter"]["type"] = json!("global_reset");
+    let mut coded = with(json!([{ "duration": "6 ms" }, { "duration": "6 ms" }]));
+    coded["camera"]["shutter"]["code"] = json!("10");
+    let mut facing = with(json!([{}]));
+    facing["tracer"] = json!({ "type": "facing" });
+    facing["layers"] = json!([]);
+    for (scene, place, words) in [
+        (with(json!([{ "duration": "13 ms" }])), "serial[0]", "exposure"),
+        (with(json!([{ "duration": "12 ms" }, {}])), "serial[1].duration", "leave"),
+        (with(json!([{ "start": -1 }])), "serial[0].start", "within"),
+        (
+            with(json!([{ "set": { "camera.sensor.resolution": [1, 1] } }])),
+            "serial[0].set",
+            "whole exposure",
+        ),
+        (with(json!([{ "set": { "camera": {} } }])), "serial[0].set", "whole exposure"),
+        (with(json!([{ "set": { "render.seed": 1 } }])), "serial[0].set", "whole exposure"),
+        (with(json!([{ "set": { "camera.f_stop": 1 } }])), "serial[0]", "f_stop"),
+        (with(json!([{ "pixels": [[1], [1, 0]] }])), "serial[0].pixels", "tile"),
+        (with(json!([{ "pixels": [[2]] }])), "serial[0].pixels", "0 to 1"),
+        (with(json!([{ "pixels": "none.png" }])), "serial[0].pixels", "none.png"),
+        (instant, "serial", "exposure"),
+        (reset, "serial", "global reset"),
+        (coded, "serial[1]", "closed"),
+        (facing, "serial", "tracer"),
+    ] {
+        let bench = Bench::with_scene(&scene.to_string());
+        let output = bench.run(&["render", "scene.json", "-o", "out"]);
+        let error = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{place}: {error}");
+        assert!(error.contains(place) && error.contains(words), "{place}: {error}");
+    }
+    let bench = Bench::with_scene(&with(json!([{}])).to_string());
+    for (arguments, word) in [
+        (&["--checkpoint", "1"][..], "--checkpoint"),
+        (&["--shard", "1/2", "--shard-by", "samples"], "--shard-by"),
+    ] {
+        let output = bench.run(&[&["render", "scene.json", "-o", "out"], arguments].concat());
+        let error = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{word}: {error}");
+        assert!(error.contains("serial") && error.contains(word), "{word}: {error}");
+    }
+    // A mask of another size than the sensor.
+    let bench = Bench::with_scene(&with(json!([{ "pixels": "small.png" }])).to_string());
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 2, 2);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.write_header().unwrap().write_image_data(&[255; 4]).unwrap();
+    bench.write("small.png", &bytes);
+    let output = bench.run(&["render", "scene.json", "-o", "out"]);
+    let error = text(&output.stderr);
+    assert!(error.contains("serial[0].pixels") && error.contains("2 x 2"), "{error}");
+}

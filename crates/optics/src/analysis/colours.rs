@@ -1,0 +1,68 @@
+//! One object point at several wavelengths, on grids that have one pitch in the image.
+
+use glam::DVec3;
+
+use super::aim::{self, Sampling};
+use super::object::{Beam, ObjectPoint};
+use super::pupil::RIM;
+use super::wavefront::{COMFORTABLE, Cells, ReferenceSphere, USUAL_CELLS, Wavefront, chief_point};
+use super::{AnalysisError, LEAST_CELLS, MOST_CELLS};
+use crate::train::{MonochromaticTrain, OpticalTrain};
+
+/// Cells a side of the grid that says how many are needed.
+const COARSE: usize = 64;
+
+/// The wavefronts of a point at each of the wavelengths of `lenses`, all about the place where the
+/// chief ray of the first meets the plane at `image_z` (mm): lateral colour is in them. As many cells a
+/// side as the roughest of them needs; a cell's side over the wavelength is the same in all.
+///
+/// # Errors
+///
+/// When there is no light or no sphere, or the cells are too few.
+pub fn wavefronts(
+    train: &OpticalTrain,
+    lenses: &[MonochromaticTrain],
+    object: ObjectPoint,
+    image_z: f64,
+    cells: Cells,
+) -> Result<Vec<Wavefront>, AnalysisError> {
+    let mut beams = Vec::with_capacity(lenses.len());
+    for at in lenses {
+        beams.push(Beam::new(train, at, object)?);
+    }
+    let Some(first) = beams.first() else { return Ok(Vec::new()) };
+    let centre: DVec3 = chief_point(first, image_z);
+    // What each lights, and how rough it is.
+    let mut parts = Vec::with_capacity(beams.len());
+    let mut needed = USUAL_CELLS;
+    for beam in &beams {
+        let sphere = ReferenceSphere::about(train, beam.at, centre)?;
+        let outline = aim::outline(beam, &sphere)?;
+        if cells == Cells::Needed {
+            let coarse = aim::field(beam, &sphere, &outline, Sampling::cells(COARSE, &outline))?;
+            let count = coarse.needed_cells(COMFORTABLE);
+            if count > MOST_CELLS {
+                let waves = coarse.statistics().peak_to_valley;
+                return Err(AnalysisError::TooRough { needed: count, waves });
+            }
+            needed = needed.max(count);
+        }
+        parts.push((beam, sphere, outline));
+    }
+    let count = match cells {
+        Cells::Needed => needed.next_multiple_of(32).min(MOST_CELLS),
+        Cells::Given(count) if !(LEAST_CELLS..=MOST_CELLS).contains(&count) => {
+            return Err(AnalysisError::Cells(count));
+        }
+        Cells::Given(count) => count,
+    };
+    let over = |(beam, _, outline): &(&Beam<'_>, ReferenceSphere, aim::Outline)| {
+        outline.half / beam.at.wavelength()
+    };
+    let widest = parts.iter().map(over).fold(0.0, f64::max) / (0.5 * count as f64 - RIM);
+    let wavefront = |(beam, sphere, outline): (&Beam<'_>, ReferenceSphere, aim::Outline)| {
+        let sampling = Sampling { cells: count, step: widest * beam.at.wavelength() };
+        Wavefront::sampled(beam, sphere, &outline, sampling)
+    };
+    parts.into_iter().map(wavefront).collect()
+}

@@ -1,0 +1,143 @@
+//! Lenses in waves: what an optical bench measures.
+//!
+//! | module | idea |
+//! |---|---|
+//! | [`object`] | points of the object, their chief rays, and rays over the pupil |
+//! | [`pupil`] | the field in the exit pupil on a grid of cells: amplitude, power and waves |
+//! | [`aim`](mod@aim) | rays to the middles of those cells, and how much of each cell is clear |
+//! | [`wavefront`] | optical path differences against a reference sphere, and their statistics |
+//! | [`colours`] | one point at several wavelengths |
+//! | [`zernike`] | Zernike polynomials, Fringe and Noll, and their fit to a wavefront |
+//! | [`least_squares`] | a small linear fit |
+//! | [`spread`] | point spread functions by FFT and by Huygens' sum, encircled energy, lines |
+//! | [`fans`] | transverse and longitudinal aberrations along two lines of the pupil |
+//! | [`astigmatism`] | sagittal and tangential foci by Coddington's equations |
+//! | [`seidel`](mod@seidel) | Seidel's and the chromatic sums by surface |
+//! | [`conjugate`] | where the object is: by distance, magnification, numerical aperture |
+//! | [`report`] | all of it in one piece; its tables, figures and page |
+//! | [`transfer`] | modulation transfer, by diffraction and by rays |
+
+pub mod aim;
+pub mod astigmatism;
+pub mod colours;
+pub mod conjugate;
+pub mod fans;
+pub mod least_squares;
+pub mod object;
+pub mod pupil;
+pub mod report;
+pub mod seidel;
+pub mod spread;
+pub mod transfer;
+pub mod wavefront;
+pub mod zernike;
+
+use crate::glass::GlassError;
+use crate::train::FocusError;
+
+pub use object::ObjectPoint;
+pub use pupil::PupilField;
+pub use spread::PointSpread;
+pub use transfer::Transfer;
+pub use wavefront::{ReferenceSphere, Wavefront};
+pub use zernike::{ZernikeFit, ZernikeOrder};
+
+/// Why a lens cannot be analysed in waves.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AnalysisError {
+    /// A glass without index.
+    #[error(transparent)]
+    Glass(#[from] GlassError),
+    /// No place for the sensor.
+    #[error(transparent)]
+    Focus(#[from] FocusError),
+    /// No chief ray.
+    #[error(
+        "no ray of the object point at {field} passes the middle of the stop: the field is beyond \
+         the image circle"
+    )]
+    NoChiefRay {
+        /// The object point, in words.
+        field: String,
+    },
+    /// No light.
+    #[error(
+        "no light of the object point at {field} passes the lens: the field is beyond the image \
+         circle; give a smaller one"
+    )]
+    Dark {
+        /// The object point, in words.
+        field: String,
+    },
+    /// Nothing ends the beam.
+    #[error("nothing limits the beam: give the stop a radius, or a surface a semi_diameter")]
+    Unlimited,
+    /// The exit pupil lies in the image, or the image at infinity.
+    #[error(
+        "the reference sphere has no radius: the exit pupil lies in the plane of the image \
+         (z = {z} mm); move the sensor"
+    )]
+    NoSphere {
+        /// The image's z (mm).
+        z: f64,
+    },
+    /// No such object.
+    #[error("{key}: {why}")]
+    Object {
+        /// The option or key that asks for it.
+        key: &'static str,
+        /// Why there is none.
+        why: String,
+    },
+    /// An array of lenslets.
+    #[error(
+        "elements[{0}] is a microlens array: behind it there is no one wavefront; analyse the lens \
+         without it"
+    )]
+    Lenslets(usize),
+    /// A grid too coarse for the wavefront.
+    #[error(
+        "{cells} x {cells} cells over the pupil are too few: the wavefront changes by {steepest:.2} \
+         waves from one cell to the next, and half a wave is the most; it needs {needed} cells a side"
+    )]
+    Coarse {
+        /// Cells a side.
+        cells: usize,
+        /// The greatest change from cell to cell (waves).
+        steepest: f64,
+        /// Cells a side that would do.
+        needed: usize,
+    },
+    /// More cells than there may be.
+    #[error(
+        "the wavefront needs {needed} x {needed} cells over the pupil, and {MOST_CELLS} a side are \
+         the most: it is {waves:.0} waves from its sphere; refocus, stop down or take a smaller field"
+    )]
+    TooRough {
+        /// Cells a side that would do.
+        needed: usize,
+        /// Peak to valley (waves).
+        waves: f64,
+    },
+    /// Numbers of cells out of range.
+    #[error("{0} cells over the pupil: take from {LEAST_CELLS} to {MOST_CELLS}")]
+    Cells(usize),
+    /// Weights that make no mean.
+    #[error("the weights {0}: give one number from 0 on for each wavelength, not all of them 0")]
+    Weights(String),
+    /// Too many terms for the pupil.
+    #[error("{terms} Zernike terms cannot be told apart on the {rays} lit cells of the pupil")]
+    Singular {
+        /// Terms.
+        terms: usize,
+        /// Lit cells.
+        rays: usize,
+    },
+}
+
+/// The least number of cells over the pupil.
+pub const LEAST_CELLS: usize = 16;
+
+/// The greatest number of cells over the pupil.
+pub const MOST_CELLS: usize = 1024;

@@ -1,0 +1,419 @@
+//! What a lens does in waves, in one piece: for tables, JSON and figures.
+
+pub mod figures;
+mod page;
+mod text;
+
+use glam::DVec2;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::astigmatism::{FieldFoci, foci};
+use super::colours::wavefronts;
+use super::conjugate::{Conjugate, Planes};
+use super::fans::{Fans, GridPoint, distortion_grid, fans};
+use super::object::ObjectPoint;
+use super::seidel::{SeidelTable, seidel};
+use super::spread::{PointSpread, WeightedFields, strehl};
+use super::transfer::{Transfer, geometric_modulation};
+use super::wavefront::{Cells, ReferenceSphere, Wavefront};
+use super::zernike::{FRINGE_TERMS, ZernikeFit, ZernikeOrder};
+use super::AnalysisError;
+use crate::train::{Focus, MonochromaticTrain, OpticalTrain};
+
+pub use page::page;
+
+/// Frequencies of a table (shares of the limit).
+const SHARES: u32 = 20;
+
+/// Planes through focus, and how far they reach: in units of λN², twice the depth of focus.
+const PLANES: i32 = 10;
+
+/// Radii of encircled energy, up to this many radii of the Airy disc.
+const RADII: u32 = 40;
+
+/// Field points of the curve of foci.
+const FOCI: u32 = 12;
+
+/// Points a side of the distortion grid.
+const GRID: u32 = 9;
+
+/// What is asked of a lens, and where each answer came from.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct WaveInquiry {
+    /// Wavelengths (nm), the main one first.
+    pub wavelengths: Vec<f64>,
+    /// What each counts for; alike when empty.
+    pub weights: Vec<f64>,
+    /// Field angles (degrees), or heights (mm) of a near object.
+    pub fields: Vec<f64>,
+    /// Whether a field without light is an error, and no note.
+    pub fields_are_asked: bool,
+    /// Where the object is.
+    pub conjugate: Conjugate,
+    /// Where the sensor is.
+    pub focus: Focus,
+    /// Whether the image plane is moved to where the wavefront on the axis is flattest.
+    pub best_focus: bool,
+    /// Cells over the pupil.
+    pub cells: Cells,
+    /// Frequencies (cycles/mm); shares of the limit on the axis when empty.
+    pub frequencies: Vec<f64>,
+    /// Where fields, wavelengths, weights and the object come from.
+    pub taken: Taken,
+}
+
+/// Where a report's premises come from: `option`, `file` or `default`.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, JsonSchema)]
+pub struct Taken {
+    /// Of the fields.
+    pub fields: &'static str,
+    /// Of the wavelengths.
+    pub wavelengths: &'static str,
+    /// Of the weights.
+    pub weights: &'static str,
+    /// Of the object's place.
+    pub object: &'static str,
+}
+
+/// What a lens does in waves.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct WaveReport {
+    /// Where the premises come from.
+    pub taken: Taken,
+    /// Object and image.
+    pub planes: Planes,
+    /// From the sensor's plane to `planes.image_z` (mm): other than 0 with the best focus.
+    pub refocused: f64,
+    /// Wavelengths (nm), the main one first.
+    pub wavelengths: Vec<f64>,
+    /// What each counts for; 1 in all.
+    pub weights: Vec<f64>,
+    /// Fields that light reaches.
+    pub fields: Vec<FieldWaves>,
+    /// Seidel's sums for the widest field; `null` when a pupil is at infinity.
+    pub seidel: Option<SeidelTable>,
+    /// Foci of narrow fans up to the widest field; empty unless the lens is round.
+    pub foci: Vec<FieldFoci>,
+    /// Distortion over a square with the widest field in its corners.
+    pub distortion_grid: Vec<GridPoint>,
+    /// What is missing, and why.
+    pub notes: Vec<String>,
+}
+
+/// One field in waves.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct FieldWaves {
+    /// The angle (degrees), or the height of a near object (mm).
+    pub field: f64,
+    /// In words.
+    pub name: String,
+    /// The reference sphere, about where the main wavelength's chief ray meets the image plane.
+    pub sphere: ReferenceSphere,
+    /// Cells over the pupil, a side.
+    pub cells: usize,
+    /// The greatest change of a wavefront from cell to cell, of all wavelengths (waves).
+    pub steepest: f64,
+    /// Root mean square of the main wavelength's waves about their mean.
+    pub rms: f64,
+    /// From the least to the greatest.
+    pub peak_to_valley: f64,
+    /// Root mean square about the sphere that fits best, and that sphere's centre (mm).
+    pub best_fit: BestFit,
+    /// The Fringe set at the main wavelength.
+    pub fringe: ZernikeFit,
+    /// Noll's set at the main wavelength, as many terms.
+    pub noll: ZernikeFit,
+    /// Strehl's ratio of all wavelengths together.
+    pub strehl: f64,
+    /// Where the brightest point is, from the sphere's centre (mm in x and y).
+    pub brightest: [f64; 2],
+    /// 1 over the width of the cone of light in y and in x (direction cosines): f-numbers.
+    pub working_f_number: [f64; 2],
+    /// 1.22 λN of the main wavelength, N the mean of those (mm).
+    pub airy_radius: f64,
+    /// Area of the lit pupil in direction cosines over that of the first field: relative illumination.
+    pub relative_pupil: f64,
+    /// Modulation.
+    pub mtf: Vec<Modulation>,
+    /// Share of light within a radius (mm) about the brightest point.
+    pub encircled: Vec<[f64; 2]>,
+    /// Irradiance of a line along x against y, and of one along y against x (mm, 1/mm), of power 1.
+    pub line_spread: [Vec<[f64; 2]>; 2],
+    /// Modulation through focus, at a quarter of the limit.
+    pub through_focus: ThroughFocus,
+    /// Ray fans by wavelength.
+    pub fans: Vec<Fans>,
+}
+
+/// The sphere of least root mean square.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct BestFit {
+    /// Its centre (mm).
+    pub centre: [f64; 3],
+    /// Root mean square there (waves).
+    pub rms: f64,
+}
+
+/// Modulation at a frequency.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Modulation {
+    /// Cycles/mm.
+    pub frequency: f64,
+    /// Of waves along y.
+    pub tangential: f64,
+    /// Of waves along x.
+    pub sagittal: f64,
+    /// Along y, by rays.
+    pub geometric_tangential: f64,
+    /// Along x, by rays.
+    pub geometric_sagittal: f64,
+}
+
+/// Modulation at planes before and behind the image's.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ThroughFocus {
+    /// Cycles/mm.
+    pub frequency: f64,
+    /// Defocus (mm), and modulation along y and x; `null` where the cells are too few.
+    pub planes: Vec<(f64, Option<[f64; 2]>)>,
+}
+
+/// One problem's premises.
+struct Bench<'a> {
+    train: &'a OpticalTrain,
+    lenses: Vec<MonochromaticTrain>,
+    weights: Vec<f64>,
+    planes: Planes,
+    cells: Cells,
+    frequencies: Vec<f64>,
+}
+
+impl WaveReport {
+    /// Looks at a lens in waves.
+    ///
+    /// # Errors
+    ///
+    /// When there is no image, a field that was asked for has no light, the weights make no mean, or
+    /// the cells are too few for a wavefront.
+    pub fn new(train: &OpticalTrain, inquiry: &WaveInquiry) -> Result<Self, AnalysisError> {
+        let weights = inquiry.weights()?;
+        let mut planes = inquiry.conjugate.planes(train, inquiry.focus)?;
+        let lenses = inquiry.wavelengths.iter().map(|&nm| train.at(nm));
+        let lenses = lenses.collect::<Result<Vec<_>, _>>()?;
+        let mut refocused = 0.0;
+        if inquiry.best_focus {
+            refocused = best_focus(train, &lenses, &planes, &weights)?;
+            planes.image_z += refocused;
+        }
+        let mut bench = Bench {
+            train,
+            lenses,
+            weights: weights.clone(),
+            planes,
+            cells: inquiry.cells,
+            frequencies: inquiry.frequencies.clone(),
+        };
+        let (mut fields, mut notes): (Vec<FieldWaves>, Vec<String>) = (Vec::new(), Vec::new());
+        let mut first_area = None;
+        for &field in &inquiry.fields {
+            match bench.field(field, &mut first_area) {
+                Ok(waves) => fields.push(waves),
+                Err(error) if inquiry.fields_are_asked => return Err(error),
+                Err(error) => {
+                    notes.push(format!("no waves of {}: {error}", planes.point(field).name()));
+                }
+            }
+        }
+        if fields.is_empty() {
+            return Err(AnalysisError::Dark { field: "all fields".to_owned() });
+        }
+        let widest = fields.iter().map(|f| f.field).fold(0.0_f64, |a, b| if b.abs() > a.abs() { b } else { a });
+        let colours = inquiry.wavelengths.iter().copied();
+        let ends = [colours.clone().fold(f64::INFINITY, f64::min), colours.fold(0.0, f64::max)];
+        let seidel = match seidel(train, &planes.point(widest), ends) {
+            Ok(table) => Some(table),
+            Err(error) => {
+                notes.push(format!("no Seidel sums: {error}"));
+                None
+            }
+        };
+        let foci = bench.foci(widest)?;
+        if foci.is_empty() {
+            notes.push("no field curvature: the lens is not round about its axis".to_owned());
+        }
+        let distortion_grid = bench.grid(widest)?;
+        Ok(Self {
+            taken: inquiry.taken.clone(),
+            planes,
+            refocused,
+            wavelengths: inquiry.wavelengths.clone(),
+            weights,
+            fields,
+            seidel,
+            foci,
+            distortion_grid,
+            notes,
+        })
+    }
+}
+
+impl WaveInquiry {
+    /// Weights of a sum of 1.
+    fn weights(&self) -> Result<Vec<f64>, AnalysisError> {
+        let count = self.wavelengths.len();
+        let weights = match self.weights.is_empty() {
+            true => vec![1.0; count],
+            false => self.weights.clone(),
+        };
+        let sum: f64 = weights.iter().sum();
+        let are_weights = weights.iter().all(|weight| *weight >= 0.0 && weight.is_finite());
+        if weights.len() != count || !are_weights || sum <= 0.0 {
+            let words: Vec<String> = weights.iter().map(f64::to_string).collect();
+            let what = format!("{} for {count} wavelengths make no mean", words.join(", "));
+            return Err(AnalysisError::Weights(what));
+        }
+        Ok(weights.into_iter().map(|weight| weight / sum).collect())
+    }
+}
+
+/// From the image plane to the mean, by weight, of where the wavefronts on the axis are flattest (mm).
+fn best_focus(
+    train: &OpticalTrain,
+    lenses: &[MonochromaticTrain],
+    planes: &Planes,
+    weights: &[f64],
+) -> Result<f64, AnalysisError> {
+    let mut sum = 0.0;
+    for (at, weight) in lenses.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
+        let wave = Wavefront::new(train, at, planes.point(0.0), planes.image_z, Cells::Needed)?;
+        sum += weight * (wave.best_fit()?.sphere.centre[2] - planes.image_z);
+    }
+    Ok(sum)
+}
+
+impl Bench<'_> {
+    fn field(&mut self, field: f64, area: &mut Option<f64>) -> Result<FieldWaves, AnalysisError> {
+        let object = self.planes.point(field);
+        let image_z = self.planes.image_z;
+        let waves = wavefronts(self.train, &self.lenses, object, image_z, self.cells)?;
+        let Some(main) = waves.first().cloned() else {
+            return Err(AnalysisError::Dark { field: object.name() });
+        };
+        let pupils: Vec<_> = waves.into_iter().map(|wave| wave.pupil).collect();
+        let steepest = pupils.iter().map(super::PupilField::steepest).fold(0.0, f64::max);
+        let fields = WeightedFields::new(pupils, &self.weights)?;
+        let statistics = main.pupil.statistics();
+        let fit = |order| ZernikeFit::new(&main.pupil, order, FRINGE_TERMS);
+        let (fringe, noll) = (fit(ZernikeOrder::Fringe)?, fit(ZernikeOrder::Noll)?);
+        let spread = PointSpread::by_fft(&fields, 1);
+        let transfer = Transfer::of(&spread);
+        let (brightest, ratio) = strehl(&fields);
+        let widths = widths(&main);
+        let working_f_number = widths.map(|width| 1.0 / width);
+        let mean = 2.0 / (widths[0] + widths[1]);
+        let airy_radius = 1.22 * main.pupil.wavelength * 1e-6 * mean;
+        if self.frequencies.is_empty() {
+            let limit = round(widths[0] / (main.pupil.wavelength * 1e-6));
+            self.frequencies =
+                (0..=SHARES).map(|k| limit * f64::from(k) / f64::from(SHARES)).collect();
+        }
+        let lit: f64 = main.pupil.clear.iter().sum::<f64>() * main.pupil.step.powi(2);
+        let relative_pupil = lit / *area.get_or_insert(lit);
+        let radii: Vec<f64> =
+            (0..=RADII).map(|k| 5.0 * airy_radius * f64::from(k) / f64::from(RADII)).collect();
+        let encircled = transfer.encircled(brightest, &radii);
+        let encircled = radii.iter().zip(encircled).map(|(radius, share)| [*radius, share]);
+        let [along_x, along_y] = spread.lines();
+        let near = |line: Vec<[f64; 2]>| -> Vec<[f64; 2]> {
+            line.into_iter().filter(|[at, _]| at.abs() <= 12.0 * airy_radius).collect()
+        };
+        let frequency = round(0.25 * widths[0] / (main.pupil.wavelength * 1e-6));
+        let depth = 2.0 * main.pupil.wavelength * 1e-6 * mean * mean;
+        let at_chief = main.sphere.centre;
+        let centre = DVec2::new(at_chief[0], at_chief[1]);
+        let of_colour = |at| fans(self.train, at, object, image_z, Some(centre));
+        let fans = self.lenses.iter().map(of_colour).collect::<Result<Vec<_>, _>>()?;
+        let best = main.clone().best_fit()?;
+        Ok(FieldWaves {
+            field,
+            name: object.name(),
+            sphere: main.sphere,
+            cells: main.pupil.cells,
+            steepest,
+            rms: statistics.rms,
+            peak_to_valley: statistics.peak_to_valley,
+            best_fit: BestFit { centre: best.sphere.centre, rms: best.pupil.statistics().rms },
+            fringe,
+            noll,
+            strehl: ratio,
+            brightest: brightest.into(),
+            working_f_number,
+            airy_radius,
+            relative_pupil,
+            mtf: self.frequencies.iter().map(|&f| modulation(&transfer, &fields, f)).collect(),
+            encircled: encircled.collect(),
+            line_spread: [near(along_y), near(along_x)],
+            through_focus: through_focus(&fields, frequency, depth),
+            fans,
+        })
+    }
+
+    fn foci(&self, widest: f64) -> Result<Vec<FieldFoci>, AnalysisError> {
+        let Some(at) = self.lenses.first() else { return Ok(Vec::new()) };
+        let mut all = Vec::new();
+        for k in 0..=FOCI {
+            let point = self.planes.point(widest * f64::from(k) / f64::from(FOCI));
+            match foci(self.train, at, point, self.planes.image_z)? {
+                Some(one) => all.push(one),
+                None => return Ok(Vec::new()),
+            }
+        }
+        Ok(all)
+    }
+
+    fn grid(&self, widest: f64) -> Result<Vec<GridPoint>, AnalysisError> {
+        let Some(at) = self.lenses.first() else { return Ok(Vec::new()) };
+        let corner = self.planes.point(widest);
+        let efl = self.train.paraxial(at.wavelength())?.efl;
+        let is_wide = matches!(corner, ObjectPoint::Infinity { .. }) && widest.abs() >= 85.0;
+        let scale = self.planes.magnification.or(efl).filter(|_| !is_wide && widest != 0.0);
+        Ok(scale.map_or_else(Vec::new, |scale| {
+            distortion_grid(self.train, at, &corner, (self.planes.image_z, scale), GRID)
+        }))
+    }
+}
+
+fn modulation(transfer: &Transfer, fields: &WeightedFields, frequency: f64) -> Modulation {
+    let [tangential, sagittal] = transfer.modulation(frequency);
+    let [geometric_tangential, geometric_sagittal] = geometric_modulation(fields, frequency);
+    Modulation { frequency, tangential, sagittal, geometric_tangential, geometric_sagittal }
+}
+
+fn through_focus(fields: &WeightedFields, frequency: f64, depth: f64) -> ThroughFocus {
+    let plane = |k: i32| {
+        let defocus = 2.0 * depth * f64::from(k) / f64::from(PLANES);
+        let there = fields.at_focus(defocus).ok();
+        (defocus, there.map(|fields| Transfer::diffraction(&fields).modulation(frequency)))
+    };
+    ThroughFocus { frequency, planes: (-PLANES..=PLANES).map(plane).collect() }
+}
+
+/// Widths of the lit pupil in y and in x (direction cosines).
+fn widths(wave: &Wavefront) -> [f64; 2] {
+    let pupil = &wave.pupil;
+    [DVec2::Y, DVec2::X].map(|along| {
+        // Each line of cells is as long as it is clear.
+        let mut lines = vec![0.0_f64; pupil.cells];
+        for i in pupil.lit() {
+            let line = if along == DVec2::Y { i % pupil.cells } else { i / pupil.cells };
+            lines[line] += pupil.clear[i].min(1.0);
+        }
+        lines.into_iter().fold(0.0, f64::max) * pupil.step
+    })
+}
+
+/// Two significant digits: frequencies that are chosen need no more.
+fn round(frequency: f64) -> f64 {
+    format!("{frequency:.1e}").parse().unwrap_or(frequency)
+}

@@ -1,0 +1,228 @@
+//! Optical path differences against a reference sphere.
+//!
+//! The sphere's centre is the image point and it passes the middle of the paraxial exit pupil. W is
+//! the path of the chief ray to the sphere less that of a ray: positive where the wavefront is ahead
+//! (W. T. Welford, *Aberrations of Optical Systems*, 1986, ch. 7).
+
+use glam::{DVec2, DVec3};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::aim::{self, Sampling};
+use super::least_squares::LeastSquares;
+use super::object::{Beam, ObjectPoint};
+use super::pupil::PupilField;
+use super::{AnalysisError, MOST_CELLS};
+use crate::train::optical_path::PathEnd;
+use crate::train::{MonochromaticTrain, OpticalTrain};
+
+/// Radii beyond are as good as infinite: an exit pupil at infinity gets this (mm).
+const FLAT: f64 = 1e5;
+
+/// The least radius that can be worked with (mm).
+const LEAST_RADIUS: f64 = 1e-3;
+
+/// The greatest change of a wavefront from one cell to the next at which its phase is known (waves).
+pub const NYQUIST: f64 = 0.5;
+
+/// The change from cell to cell that grids are chosen for (waves).
+pub(super) const COMFORTABLE: f64 = 0.1;
+
+/// Cells a side of a grid that is chosen, in the least.
+pub const USUAL_CELLS: usize = 192;
+
+/// The sphere that a wavefront is compared with.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct ReferenceSphere {
+    /// The image point (mm).
+    pub centre: [f64; 3],
+    /// From the exit pupil's middle to the centre (mm); negative when the pupil is behind it, and
+    /// 1e5 when it is farther than that.
+    pub radius: f64,
+    /// The index before the image.
+    pub index: f64,
+}
+
+impl ReferenceSphere {
+    /// About an image point (mm).
+    ///
+    /// # Errors
+    ///
+    /// When the exit pupil lies in it, or a glass has no index.
+    pub fn about(
+        train: &OpticalTrain,
+        at: &MonochromaticTrain,
+        centre: DVec3,
+    ) -> Result<Self, AnalysisError> {
+        let pupil = train.paraxial(at.wavelength())?.exit_pupil.z;
+        let radius = match pupil {
+            Some(z) => {
+                let way = centre - DVec3::new(0.0, 0.0, z);
+                way.length().copysign(way.z).clamp(-FLAT, FLAT)
+            }
+            None => FLAT,
+        };
+        if radius.abs() < LEAST_RADIUS {
+            return Err(AnalysisError::NoSphere { z: centre.z });
+        }
+        Ok(Self { centre: centre.into(), radius, index: at.index_before_sensor() })
+    }
+
+    /// Where a ray meets it: the optical direction cosines of the way from there to the centre, and
+    /// the optical path to there from where the ray left the lens (mm).
+    pub(crate) fn meet(&self, end: &PathEnd) -> Option<(DVec2, f64)> {
+        let (from, direction) = (DVec3::from(end.ray.position), DVec3::from(end.ray.direction));
+        let way = from - DVec3::from(self.centre);
+        let b = way.dot(direction);
+        let foot = way - direction * b;
+        let half2 = self.radius * self.radius - foot.length_squared();
+        if half2 <= 0.0 {
+            return None;
+        }
+        // The crossing on the pupil's side of the centre.
+        let half = half2.sqrt().copysign(self.radius);
+        let place = foot - direction * half;
+        let cosines = place.truncate() * (-self.index / self.radius);
+        Some((cosines, self.index * (-b - half)))
+    }
+}
+
+/// Which point the sphere is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Reference {
+    /// Where the chief ray meets the image plane.
+    #[default]
+    ChiefRay,
+    /// The point near it, also along the axis, at which the root mean square of the waves is least.
+    BestFit,
+}
+
+/// A wavefront on its reference sphere.
+#[derive(Debug, Clone)]
+pub struct Wavefront {
+    /// Where it comes from.
+    pub object: ObjectPoint,
+    /// What it is compared with.
+    pub sphere: ReferenceSphere,
+    /// The field on the sphere.
+    pub pupil: PupilField,
+}
+
+/// How many cells a pupil gets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Cells {
+    /// As many as the wavefront needs, at least 192 a side.
+    #[default]
+    Needed,
+    /// A number a side; an error when they are too few.
+    Given(usize),
+}
+
+impl Wavefront {
+    /// The wavefront of an object point about the point where its chief ray meets the plane at
+    /// `image_z` (mm).
+    ///
+    /// # Errors
+    ///
+    /// When there is no light or no sphere, or the cells are too few: the error says how many it
+    /// needs.
+    pub fn new(
+        train: &OpticalTrain,
+        at: &MonochromaticTrain,
+        object: ObjectPoint,
+        image_z: f64,
+        cells: Cells,
+    ) -> Result<Self, AnalysisError> {
+        let beam = Beam::new(train, at, object)?;
+        let centre = chief_point(&beam, image_z);
+        Self::about(&beam, centre, cells)
+    }
+
+    /// The wavefront of a beam about a given point (mm).
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::new`].
+    pub fn about(beam: &Beam<'_>, centre: DVec3, cells: Cells) -> Result<Self, AnalysisError> {
+        let sphere = ReferenceSphere::about(beam.train, beam.at, centre)?;
+        let outline = aim::outline(beam, &sphere)?;
+        let count = match cells {
+            Cells::Given(count) => count,
+            Cells::Needed => {
+                let coarse = aim::field(beam, &sphere, &outline, Sampling::cells(64, &outline))?;
+                let needed = coarse.needed_cells(COMFORTABLE).max(USUAL_CELLS);
+                // A transform of lengths without large factors is quick.
+                let needed = needed.next_multiple_of(32);
+                if needed > MOST_CELLS {
+                    let waves = coarse.statistics().peak_to_valley;
+                    return Err(AnalysisError::TooRough { needed, waves });
+                }
+                needed
+            }
+        };
+        Self::sampled(beam, sphere, &outline, Sampling::cells(count, &outline))
+    }
+
+    /// The wavefront on a grid that is given.
+    pub(crate) fn sampled(
+        beam: &Beam<'_>,
+        sphere: ReferenceSphere,
+        outline: &aim::Outline,
+        sampling: Sampling,
+    ) -> Result<Self, AnalysisError> {
+        let pupil = aim::field(beam, &sphere, outline, sampling)?;
+        let steepest = pupil.steepest();
+        if steepest > NYQUIST {
+            let needed = pupil.needed_cells(COMFORTABLE);
+            return Err(AnalysisError::Coarse { cells: sampling.cells, steepest, needed });
+        }
+        Ok(Self { object: beam.object, sphere, pupil })
+    }
+
+    /// The same about the point of least root mean square.
+    ///
+    /// # Errors
+    ///
+    /// When the lit cells do not tell a shift from a turn.
+    pub fn best_fit(mut self) -> Result<Self, AnalysisError> {
+        let shift = self.best_shift()?;
+        let centre = DVec3::from(self.sphere.centre) + shift;
+        self.pupil = self.pupil.moved(shift);
+        // The sphere still passes the exit pupil: its radius changes by the shift along the way.
+        self.sphere.radius = (self.sphere.radius + shift.z).clamp(-FLAT, FLAT);
+        self.sphere.centre = centre.into();
+        Ok(self)
+    }
+
+    /// From the sphere's centre to the point of least root mean square (mm).
+    fn best_shift(&self) -> Result<DVec3, AnalysisError> {
+        let pupil = &self.pupil;
+        let length = pupil.wavelength * 1e-6;
+        let mut fit = LeastSquares::new(4);
+        let (middle, radius) = pupil.circle();
+        let axial = |p: DVec2| {
+            (pupil.index * pupil.index - p.length_squared()).max(0.0).sqrt()
+        };
+        // In units of the pupil's radius, and of the depth of its cap.
+        let depth = 0.5 * radius * radius / pupil.index;
+        let mut count = 0;
+        for i in pupil.lit() {
+            let place = pupil.place(i);
+            let p = (place - middle) / radius;
+            let row = [1.0, p.x, p.y, (axial(place) - axial(middle)) / depth];
+            fit.add(&row, pupil.waves[i] * length, pupil.clear[i]);
+            count += 1;
+        }
+        let singular = AnalysisError::Singular { terms: 4, rays: count };
+        let found = fit.solve().ok_or(singular)?;
+        Ok(DVec3::new(found[1] / radius, found[2] / radius, found[3] / depth))
+    }
+}
+
+/// Where a beam's chief ray meets the plane at `z` (mm).
+pub(crate) fn chief_point(beam: &Beam<'_>, z: f64) -> DVec3 {
+    let ray = beam.chief_end.ray;
+    let (from, direction) = (DVec3::from(ray.position), DVec3::from(ray.direction));
+    from + direction * ((z - from.z) / direction.z)
+}

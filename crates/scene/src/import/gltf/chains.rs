@@ -1,0 +1,110 @@
+//! The frames of nodes that move in each other while an animation plays.
+
+use etendue_geometry::{Link, Transform};
+
+use super::Reader;
+use super::animation::Playing;
+use super::hierarchy::Scene;
+use super::pose::local;
+use crate::import::error::{Note, NoteKind, push};
+use crate::import::{Import, ImportError};
+
+/// What each node hangs on.
+pub(super) struct Chains<'a> {
+    reader: &'a Reader<'a>,
+    playing: &'a Playing,
+    parents: Vec<Option<usize>>,
+}
+
+impl<'a> Chains<'a> {
+    /// Those of a document whose nodes have one parent each.
+    pub(super) fn new(reader: &'a Reader<'a>, playing: &'a Playing) -> Self {
+        let nodes = &reader.document.nodes;
+        let mut parents = vec![None; nodes.len()];
+        for (parent, node) in nodes.iter().enumerate() {
+            for &child in &node.children {
+                if let Some(place) = parents.get_mut(child) {
+                    *place = Some(parent);
+                }
+            }
+        }
+        Self { reader, playing, parents }
+    }
+
+    /// The node and all above it; each once, also where broken nodes go round.
+    fn above(&self, node: usize) -> Vec<usize> {
+        let mut path = Vec::new();
+        let mut open = Some(node);
+        while let Some(node) = open.filter(|node| !path.contains(node)) {
+            path.push(node);
+            open = self.parents.get(node).copied().flatten();
+        }
+        path
+    }
+
+    fn moves(&self, node: usize) -> bool {
+        !self.playing.joints.is_empty()
+            && self.above(node).iter().any(|node| self.playing.joints.contains_key(node))
+    }
+
+    /// From the node's frame to the model's, the outermost frame first; nothing of a node that stands still.
+    pub(super) fn of(&self, node: usize) -> Vec<Link> {
+        if !self.moves(node) {
+            return Vec::new();
+        }
+        let mut links: Vec<Link> = Vec::new();
+        for node in self.above(node).into_iter().rev() {
+            if let Some(joint) = self.playing.joints.get(&node) {
+                links.push(Link::Joint(Box::new(joint.clone())));
+                continue;
+            }
+            // Of a document that is shown, all nodes have finite transforms.
+            let own = local(self.reader.file, &self.reader.document.nodes[node], node);
+            let own = own.unwrap_or(Transform::IDENTITY);
+            match links.last_mut() {
+                Some(Link::Fixed(before)) => *before = before.then_inner(&own),
+                _ => links.push(Link::Fixed(own)),
+            }
+        }
+        links
+    }
+
+    /// Refuses what deforms or shines while it moves; a camera stands still, with a note.
+    ///
+    /// # Errors
+    ///
+    /// When a mesh that is shown has a skin with joints that move or morph targets that do, or a light hangs on a node
+    /// that moves; the message names the node.
+    pub(super) fn check(&self, scene: &Scene, import: &mut Import) -> Result<(), ImportError> {
+        let document = self.reader.document;
+        let refused = |node: usize, why: &str| {
+            let reason = format!(
+                "{why} while its animation plays, which is not rendered within an exposure; leave `plays` out, so that \
+                 all stands still in the moment that is shown"
+            );
+            Err(self.reader.damaged(format!("nodes[{node}]"), reason))
+        };
+        for placed in &scene.meshes {
+            let skin = placed.shape.skin.and_then(|skin| document.skins.get(skin));
+            let mut joints = skin.into_iter().flat_map(|skin| &skin.joints);
+            if joints.any(|joint| self.moves(*joint)) {
+                return refused(placed.node, "the joints of its skin move");
+            }
+            if self.playing.morphed.contains(&placed.node) {
+                return refused(placed.node, "its morph targets move");
+            }
+        }
+        for &node in scene.pose.shown.iter().filter(|node| self.moves(**node)) {
+            let shown = &document.nodes[node];
+            if self.reader.wanted.light && shown.extensions.contains_key("KHR_lights_punctual") {
+                return refused(node, "its light moves");
+            }
+            if shown.camera.is_some() {
+                let message = "its camera stands still within an exposure, as it is in the moment that is shown";
+                let note = Note::new(NoteKind::Unsupported, &format!("nodes[{node}]"), message);
+                push(&mut import.notes, note);
+            }
+        }
+        Ok(())
+    }
+}
