@@ -293,15 +293,6 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     fn tinted(&self, tint: &Tint, light: &mut [f64]) {
         match RGB {
             true => light.iter_mut().zip(tint.color).for_each(|(band, part)| *band *= part),
-            false => self.stage.spectral.times(tint, light),
-        }
-    }
-
-    /// Multiplies light in all bands by a colour, with its curve.
-    #[inline(always)]
-    fn tinted(&self, tint: &Tint, light: &mut [f64]) {
-        match RGB {
-            true => light.iter_mut().zip(tint.color).for_each(|(band, part)| *band *= part),
             false => self.ctx.spectral.times(tint, light),
         }
     }
