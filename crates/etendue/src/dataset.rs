@@ -340,6 +340,9 @@ fn layer_files(
     names.map(endings).collect()
 }
 
+/// By rows.
+type Matrix = [[f64; 4]; 4];
+
 /// How a picture is exposed (s).
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Timing {
@@ -365,7 +368,7 @@ impl Entry {
     /// The poses (world to camera, OpenCV's axes) of the row that is read out first and of that which is read out last,
     /// and their order as gsplat calls it, which goes from one to the other with the rows; `None` where all rows have
     /// one pose.
-    fn readout(&self) -> Option<([[f64; 4]; 4], [[f64; 4]; 4], &'static str)> {
+    fn readout(&self) -> Option<(Matrix, Matrix, &'static str)> {
         let shutter = self.camera.shutter.as_ref()?;
         let rows = &shutter.camera_from_world_of_rows;
         let [top, bottom] = [*rows.first()?, *rows.last()?];

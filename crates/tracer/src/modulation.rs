@@ -1,7 +1,7 @@
 //! How the strength of a light changes with time: flashes, lamps on mains, pulses of a driver, measured waveforms.
 //!
 //! A factor multiplies all that the light gives off. Its mean over an interval is exact: a sine's by the sum formula,
-//! `1 + d sinc(f T) sin 2π(f t_m + φ)` about the middle t_m of an interval of length T, that of a curve by trapezoids.
+//! `1 + d sinc(f T) sin 2π(f t_m + φ)` about the middle `t_m` of an interval of length T, that of a curve by trapezoids.
 
 use std::f64::consts::{PI, TAU};
 

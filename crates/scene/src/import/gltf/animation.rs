@@ -183,7 +183,7 @@ pub(super) fn playing(
                 scale: rest(node.scale, [1.0; 3]),
             }
         });
-        let track = track.from_time(time);
+        let track = track.since(time);
         match property {
             Property::Translation => joint.translation = track,
             Property::Rotation => joint.rotation = track,
@@ -334,7 +334,7 @@ impl Track {
     }
 
     /// The same as a track of a joint, in s from `time` on.
-    fn from_time(&self, time: f64) -> geometry::Track {
+    fn since(&self, time: f64) -> geometry::Track {
         let vector = |numbers: &[f64]| {
             let number = |k: usize| numbers.get(k).copied().unwrap_or(0.0);
             DVec4::new(number(0), number(1), number(2), number(3))

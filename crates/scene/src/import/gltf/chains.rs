@@ -101,7 +101,7 @@ impl<'a> Chains<'a> {
             }
             if shown.camera.is_some() {
                 let message = "its camera stands still within an exposure, as it is in the moment that is shown";
-                let note = Note::new(NoteKind::Unsupported, &format!("nodes[{node}]"), message);
+                let note = Note::new(NoteKind::Unsupported, format!("nodes[{node}]"), message);
                 push(&mut import.notes, note);
             }
         }
