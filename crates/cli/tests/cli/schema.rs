@@ -137,7 +137,6 @@ fn what_the_schemas_of_lenses_and_rays_forbid_the_program_refuses_and_the_revers
         (false, r#""type": "aperture""#, r#""type": "hole""#),
         (false, r#""radius": 50"#, r#""radius": [50]"#),
         (false, r#""stop": true"#, r#""stop": 1"#),
-        (false, r#", "semi_diameter": 4}]"#, "}]"),
     ] {
         let changed = lens.replace(from, to);
         assert!(from.is_empty() || changed != lens, "{from}");
