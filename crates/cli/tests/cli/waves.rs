@@ -170,7 +170,7 @@ fn what_cannot_be_analysed_is_refused_by_name() {
         &["lens.json", "20 x 20 cells", "it needs"],
     );
     refused(&["lens.json", "--cells", "3"], &["3 cells", "from 16"]);
-    refused(&["lens.json", "--waves", "--fields", "89"], &["89", "beyond the image circle"]);
+    refused(&["lens.json", "--waves", "--fields", "120"], &["120", "beyond the image circle"]);
     refused(
         &["lens.json", "--wavelengths", "550,600", "--weights", "0,0"],
         &["weights 0, 0", "not all of them 0"],
