@@ -80,8 +80,9 @@ pub(crate) fn analyse(
     report: &LensReport,
     arguments: &LensArguments,
 ) -> Result<WaveReport, Fault> {
-    let refused =
-        |error: &dyn std::fmt::Display| Fault::refused(format!("{}: {error}", arguments.lens.display()));
+    let refused = |error: &dyn std::fmt::Display| {
+        Fault::refused(format!("{}: {error}", arguments.lens.display()))
+    };
     let conjugate = conjugate(arguments);
     let focus = match (conjugate, arguments.focus) {
         (_, Some(focus)) => focus,
@@ -91,7 +92,8 @@ pub(crate) fn analyse(
     let mut train = lens.train.clone();
     let planes = conjugate.planes(&train, focus).map_err(|error| refused(&error))?;
     if let Some(aperture) = arguments.numerical_aperture {
-        train = with_numerical_aperture(train, &planes, aperture).map_err(|error| refused(&error))?;
+        train =
+            with_numerical_aperture(train, &planes, aperture).map_err(|error| refused(&error))?;
     }
     let (wavelengths, of_wavelengths) = wavelengths(lens, report, arguments);
     let (fields, of_fields) = match (&arguments.fields, planes.magnification) {

@@ -98,10 +98,7 @@ impl Outline {
 }
 
 /// What of the sphere a beam lights.
-pub(crate) fn outline(
-    beam: &Beam<'_>,
-    sphere: &ReferenceSphere,
-) -> Result<Outline, AnalysisError> {
+pub(crate) fn outline(beam: &Beam<'_>, sphere: &ReferenceSphere) -> Result<Outline, AnalysisError> {
     let no_sphere = AnalysisError::NoSphere { z: sphere.centre[2] };
     let (middle, rest) = sphere.meet(&beam.chief_end).ok_or(no_sphere.clone())?;
     let path = beam.chief_end.length + rest;
@@ -129,8 +126,8 @@ pub(crate) fn outline(
     }
     // The middles of cells lie up to one cell inside.
     let spread = rays.iter().filter(|ray| ray.2);
-    let cells = spread.clone().count() as f64;
-    half *= 1.0 + 1.5 / cells.sqrt().max(4.0);
+    let lit = spread.count();
+    half *= 1.0 + 1.5 / (lit as f64).sqrt().max(4.0);
     let mut fits = [LeastSquares::new(TERMS), LeastSquares::new(TERMS)];
     for (place, cosines, _) in rays {
         let share = (cosines - middle) / half;
@@ -141,7 +138,7 @@ pub(crate) fn outline(
             fits[1].add(&row, place.y, 1.0);
         }
     }
-    let singular = AnalysisError::Singular { terms: TERMS, rays: cells as usize };
+    let singular = AnalysisError::Singular { terms: TERMS, rays: lit };
     let [x, y] = fits.map(LeastSquares::solve);
     let coefficients = [x.ok_or(singular.clone())?, y.ok_or(singular)?];
     let mut outline = Outline { middle, path, half, coefficients };

@@ -97,9 +97,10 @@ pub fn foci(
     };
     Ok(Some(FieldFoci {
         field: object.name(),
-        height: chief_point(&beam, image_z).truncate().length().copysign(
-            chief_point(&beam, image_z).y,
-        ),
+        height: chief_point(&beam, image_z)
+            .truncate()
+            .length()
+            .copysign(chief_point(&beam, image_z).y),
         tangential: focus(vergence[1]),
         sagittal: focus(vergence[0]),
         chief_angle: direction.truncate().length().atan2(direction.z).to_degrees(),

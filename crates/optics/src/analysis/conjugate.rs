@@ -143,8 +143,7 @@ pub fn with_numerical_aperture(
     }
     // Where the real ray of that slope crosses the stop, whatever the rims are.
     let at = train.at(train.wavelength())?;
-    let direction =
-        DVec3::new(0.0, numerical_aperture, (1.0 - numerical_aperture.powi(2)).sqrt());
+    let direction = DVec3::new(0.0, numerical_aperture, (1.0 - numerical_aperture.powi(2)).sqrt());
     let ray = crate::element::Ray::new(DVec3::new(0.0, 0.0, z), direction);
     let crossing = ray.and_then(|ray| at.crossing(crate::train::Side::Object, train.stop(), ray));
     let Some([x, y]) = crossing else {

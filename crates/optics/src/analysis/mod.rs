@@ -136,6 +136,13 @@ pub enum AnalysisError {
     },
 }
 
+impl AnalysisError {
+    /// Whether another field may do without it: no light arrives, or too rough.
+    fn is_of_the_field(&self) -> bool {
+        matches!(self, Self::Dark { .. } | Self::NoChiefRay { .. } | Self::TooRough { .. })
+    }
+}
+
 /// The least number of cells over the pupil.
 pub const LEAST_CELLS: usize = 16;
 

@@ -104,7 +104,8 @@ impl Launch {
     fn ray(&self, at: DVec2) -> Option<Ray> {
         if self.is_near {
             let rest = 1.0 - at.length_squared();
-            return (rest > 0.0).then_some(())
+            return (rest > 0.0)
+                .then_some(())
                 .and_then(|()| Ray::new(self.origin, at.extend(rest.sqrt())));
         }
         let place = self.origin + self.across[0] * at.x + self.across[1] * at.y;

@@ -130,12 +130,15 @@ impl PupilField {
     /// The circle about the chief ray that the lit cells just fit in: middle and radius.
     #[must_use]
     pub fn circle(&self) -> (DVec2, f64) {
+        // An edge cell ends half of its clear width beyond the middle of its clear part: by a straight
+        // edge at any angle to a few hundredths of a cell, if it is not a mere corner.
+        const CORNER: f64 = 0.3;
         let reach = |i: usize| {
-            // The part of an edge cell that is lit is taken to lie inwards.
-            let inwards = (0.5 - self.clear[i].min(1.0)) * self.step;
-            (self.place(i) - self.middle).length() - inwards.max(-0.5 * self.step)
+            let clear = self.clear[i].min(1.0);
+            (self.place(i) + self.lean[i] - self.middle).length() + 0.5 * clear * self.step
         };
-        (self.middle, self.lit().map(reach).fold(self.step, f64::max))
+        let whole = self.lit().filter(|&i| self.clear[i] >= CORNER);
+        (self.middle, whole.map(reach).fold(self.step, f64::max))
     }
 
     /// Mean and root mean square of the waves over the lit cells, and their range: (mean, rms about
@@ -153,8 +156,7 @@ impl PupilField {
             }
         }
         let mean = sum / weight;
-        let square: f64 =
-            self.lit().map(|i| self.clear[i] * (self.waves[i] - mean).powi(2)).sum();
+        let square: f64 = self.lit().map(|i| self.clear[i] * (self.waves[i] - mean).powi(2)).sum();
         let peak_to_valley = (greatest - least).max(0.0);
         WaveStatistics { mean, rms: (square / weight).sqrt(), peak_to_valley }
     }
@@ -176,6 +178,7 @@ impl PupilField {
 
     /// Cells a side of this pupil that would keep the wavefront's steps within `limit` waves.
     #[must_use]
+    #[expect(clippy::cast_possible_truncation, reason = "below 1e9")]
     pub fn needed_cells(&self, limit: f64) -> usize {
         let rim = 2.0 * RIM;
         let needed = (self.cells as f64 - rim) * self.steepest() / limit + rim;

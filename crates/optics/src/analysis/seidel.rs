@@ -104,10 +104,8 @@ pub fn seidel(
         }
         let (n, n1) = (indices[i], indices[i + 1]);
         let power = train.power(&indices, i);
-        let bent = |ray: Paraxial| Paraxial {
-            slope: (n * ray.slope - power * ray.height) / n1,
-            ..ray
-        };
+        let bent =
+            |ray: Paraxial| Paraxial { slope: (n * ray.slope - power * ray.height) / n1, ..ray };
         let sums = match &element.part {
             Part::Surface(surface) => {
                 let dispersion = (short[i + 1] - long[i + 1]) / n1 - (short[i] - long[i]) / n;
@@ -137,10 +135,7 @@ pub fn seidel(
 }
 
 /// The marginal and the chief ray at the first vertex.
-fn rays(
-    train: &OpticalTrain,
-    object: &ObjectPoint,
-) -> Result<(Paraxial, Paraxial), AnalysisError> {
+fn rays(train: &OpticalTrain, object: &ObjectPoint) -> Result<(Paraxial, Paraxial), AnalysisError> {
     let pupil = train.paraxial(train.wavelength())?.entrance_pupil;
     let (Some(z), Some(diameter)) = (pupil.z, pupil.diameter) else {
         return Err(AnalysisError::Unlimited);

@@ -57,7 +57,8 @@ impl WeightedFields {
         let are_weights = weights.iter().all(|w| *w >= 0.0 && w.is_finite());
         if fields.len() != weights.len() || !are_weights || sum <= 0.0 {
             let words: Vec<String> = weights.iter().map(f64::to_string).collect();
-            let what = format!("{} for {} wavelengths make no mean", words.join(", "), fields.len());
+            let what =
+                format!("{} for {} wavelengths make no mean", words.join(", "), fields.len());
             return Err(AnalysisError::Weights(what));
         }
         let weighted = fields.into_iter().zip(weights).filter(|(_, weight)| **weight > 0.0);
@@ -201,12 +202,12 @@ impl PointSpread {
                 let mut field_there = Complex64::ZERO;
                 for &(direction, amplitude, waves) in &cells {
                     // The way from the sphere less its radius, without losing digits.
-                    let square = 2.0 * sphere.radius * direction.dot(place) + place.length_squared();
+                    let square =
+                        2.0 * sphere.radius * direction.dot(place) + place.length_squared();
                     let way = (sphere.radius * sphere.radius + square).max(0.0).sqrt();
                     let rest = square / (way.copysign(sphere.radius) + sphere.radius);
                     let phase = waves - field.index * rest / length;
-                    field_there +=
-                        Complex64::from_polar(amplitude, std::f64::consts::TAU * phase);
+                    field_there += Complex64::from_polar(amplitude, std::f64::consts::TAU * phase);
                 }
                 let cycles = place.truncate() * (field.step / length);
                 let through = sinc(cycles.x) * sinc(cycles.y);

@@ -124,9 +124,8 @@ impl Transfer {
                 rings[k] * libm::j1(std::f64::consts::TAU * frequency * radius)
             };
             // Simpson's rule; there is nothing left at the last frequency.
-            let sum: f64 = (0..rings.len())
-                .map(|k| value(k) * if k % 2 == 0 { 2.0 } else { 4.0 })
-                .sum();
+            let sum: f64 =
+                (0..rings.len()).map(|k| value(k) * if k % 2 == 0 { 2.0 } else { 4.0 }).sum();
             (std::f64::consts::TAU * radius * sum * step / 3.0).clamp(0.0, 1.0)
         };
         radii.iter().map(within).collect()
@@ -138,6 +137,7 @@ const NODES: usize = 6;
 
 /// The nodes about a place, and what each counts for in Lagrange's polynomial. Left and right of 0
 /// they are taken from one side, for the function has a peak there.
+#[expect(clippy::cast_possible_truncation, reason = "nodes of a grid of at most a few thousand")]
 fn nodes(at: f64) -> [(i64, f64); NODES] {
     let side = if at < 0.0 { -1.0 } else { 1.0 };
     let far = at.abs();

@@ -201,9 +201,7 @@ impl Wavefront {
         let length = pupil.wavelength * 1e-6;
         let mut fit = LeastSquares::new(4);
         let (middle, radius) = pupil.circle();
-        let axial = |p: DVec2| {
-            (pupil.index * pupil.index - p.length_squared()).max(0.0).sqrt()
-        };
+        let axial = |p: DVec2| (pupil.index * pupil.index - p.length_squared()).max(0.0).sqrt();
         // In units of the pupil's radius, and of the depth of its cap.
         let depth = 0.5 * radius * radius / pupil.index;
         let mut count = 0;

@@ -113,10 +113,9 @@ impl ZernikeTerm {
         let mut sum = 0.0;
         for s in 0..=(n - m) / 2 {
             let sign = if s % 2 == 0 { 1.0 } else { -1.0 };
-            let below =
-                factorial(s) * factorial((n + m) / 2 - s) * factorial((n - m) / 2 - s);
-            sum += sign * factorial(n - s) / below
-                * rho.powi(i32::try_from(n - 2 * s).unwrap_or(0));
+            let below = factorial(s) * factorial((n + m) / 2 - s) * factorial((n - m) / 2 - s);
+            sum +=
+                sign * factorial(n - s) / below * rho.powi(i32::try_from(n - 2 * s).unwrap_or(0));
         }
         sum
     }
@@ -126,7 +125,8 @@ impl ZernikeTerm {
     pub fn name(self) -> String {
         let order = self.m.unsigned_abs();
         let rank = (self.n - order) / 2;
-        let axis = |cosine: &'static str, sine: &'static str| if self.m < 0 { sine } else { cosine };
+        let axis =
+            |cosine: &'static str, sine: &'static str| if self.m < 0 { sine } else { cosine };
         let (kind, first) = match order {
             0 => match rank {
                 0 => return "piston".to_owned(),

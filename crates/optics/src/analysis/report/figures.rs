@@ -75,8 +75,7 @@ fn through_focus(report: &WaveReport) -> String {
             let planes = field.through_focus.planes.iter();
             planes.filter_map(move |(defocus, m)| m.map(|m| [*defocus, m[axis]]))
         };
-        let name =
-            format!("{}, {} cycles/mm", field.name, short(field.through_focus.frequency));
+        let name = format!("{}, {} cycles/mm", field.name, short(field.through_focus.frequency));
         [curve(name, i, Stroke::Solid, axis(0)), curve("", i, Stroke::Dashed, axis(1))]
     };
     let series = report.fields.iter().enumerate().flat_map(of).collect();
@@ -132,9 +131,8 @@ fn fan_charts(
 }
 
 fn ray_fans(report: &WaveReport) -> String {
-    let value = |ray: &super::super::fans::FanRay, axis: usize| {
-        1e3 * if axis == 0 { ray.y } else { ray.x }
-    };
+    let value =
+        |ray: &super::super::fans::FanRay, axis: usize| 1e3 * if axis == 0 { ray.y } else { ray.x };
     fan_charts(report, "Ray fan", "from the chief ray (\u{b5}m)", value)
 }
 

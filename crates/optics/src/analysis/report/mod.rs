@@ -8,6 +8,7 @@ use glam::DVec2;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::AnalysisError;
 use super::astigmatism::{FieldFoci, foci};
 use super::colours::wavefronts;
 use super::conjugate::{Conjugate, Planes};
@@ -18,7 +19,6 @@ use super::spread::{PointSpread, WeightedFields, strehl};
 use super::transfer::{Transfer, geometric_modulation};
 use super::wavefront::{Cells, ReferenceSphere, Wavefront};
 use super::zernike::{FRINGE_TERMS, ZernikeFit, ZernikeOrder};
-use super::AnalysisError;
 use crate::train::{Focus, MonochromaticTrain, OpticalTrain};
 
 pub use page::page;
@@ -219,7 +219,9 @@ impl WaveReport {
         for &field in &inquiry.fields {
             match bench.field(field, &mut first_area) {
                 Ok(waves) => fields.push(waves),
-                Err(error) if inquiry.fields_are_asked => return Err(error),
+                Err(error) if inquiry.fields_are_asked || !error.is_of_the_field() => {
+                    return Err(error);
+                }
                 Err(error) => {
                     notes.push(format!("no waves of {}: {error}", planes.point(field).name()));
                 }
@@ -228,7 +230,10 @@ impl WaveReport {
         if fields.is_empty() {
             return Err(AnalysisError::Dark { field: "all fields".to_owned() });
         }
-        let widest = fields.iter().map(|f| f.field).fold(0.0_f64, |a, b| if b.abs() > a.abs() { b } else { a });
+        let widest = fields
+            .iter()
+            .map(|f| f.field)
+            .fold(0.0_f64, |a, b| if b.abs() > a.abs() { b } else { a });
         let colours = inquiry.wavelengths.iter().copied();
         let ends = [colours.clone().fold(f64::INFINITY, f64::min), colours.fold(0.0, f64::max)];
         let seidel = match seidel(train, &planes.point(widest), ends) {

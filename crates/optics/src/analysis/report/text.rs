@@ -42,8 +42,18 @@ impl WaveReport {
     fn fields_table(&self) -> Table {
         let unit = if self.planes.object_z.is_none() { "deg" } else { "mm" };
         let mut table = Table::new(&[
-            "field", "image y", "RMS", "P-V", "best RMS", "best focus", "Strehl", "f-number t",
-            "f-number s", "Airy radius", "illumination", "cells",
+            "field",
+            "image y",
+            "RMS",
+            "P-V",
+            "best RMS",
+            "best focus",
+            "Strehl",
+            "f-number t",
+            "f-number s",
+            "Airy radius",
+            "illumination",
+            "cells",
         ])
         .with_units(&[unit, "mm", "waves", "waves", "waves", "mm", "", "", "", "um", "%", "a side"])
         .indented(2);
@@ -77,7 +87,9 @@ impl WaveReport {
         for (i, term) in first.fringe.coefficients.iter().enumerate() {
             let mut cells = vec![Cell::count(term.index as u64), Cell::word(term.name.clone())];
             let waves = self.fields.iter().map(|field| field.fringe.coefficients[i].waves);
-            cells.extend(waves.map(|waves| Cell::number(waves, format!("{waves:.4}"))));
+            // No minus before zeros.
+            let shown = |waves: f64| format!("{:.4}", (waves * 1e4).round() / 1e4 + 0.0);
+            cells.extend(waves.map(|waves| Cell::number(waves, shown(waves))));
             table.push(cells);
         }
         table
@@ -90,7 +102,12 @@ impl WaveReport {
         let all = seidel.surfaces.iter().enumerate().map(|(i, sums)| (i.to_string(), sums));
         for (name, s) in all.chain([("all".to_owned(), &seidel.total)]) {
             let values = [
-                s.spherical, s.coma, s.astigmatism, s.petzval, s.distortion, s.longitudinal_colour,
+                s.spherical,
+                s.coma,
+                s.astigmatism,
+                s.petzval,
+                s.distortion,
+                s.longitudinal_colour,
                 s.lateral_colour,
             ];
             let shown = values.map(|value| Cell::number(value, format!("{value:.6}")));

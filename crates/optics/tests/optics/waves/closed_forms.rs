@@ -44,7 +44,8 @@ const LIMIT: f64 = 2.0 * NA / LENGTH;
 
 /// The greatest differences from `expected`, a function of place over λ/NA.
 fn worst_spread(spread: &PointSpread, reach: f64, expected: impl Fn(DVec2) -> f64) -> f64 {
-    let places = (0..spread.values.len()).map(|i| (spread.place(i) * NA / LENGTH, spread.values[i]));
+    let places =
+        (0..spread.values.len()).map(|i| (spread.place(i) * NA / LENGTH, spread.values[i]));
     let near = places.filter(|(place, _)| place.length() < reach);
     near.map(|(place, value)| (value / spread.perfect - expected(place)).abs()).fold(0.0, f64::max)
 }
@@ -170,7 +171,9 @@ fn by_rings(waves: &dyn Fn(DVec2) -> f64, place: DVec2) -> f64 {
 fn single_zernike_terms_spread_light_as_sums_over_rings_say() {
     let terms = ZernikeOrder::Fringe.terms(16);
     // Defocus, both kinds of astigmatism and of coma, spherical, trefoil, and a higher one.
-    for (index, waves) in [(4, 0.6), (5, 0.5), (6, -0.5), (7, 0.4), (8, 0.4), (9, 0.5), (10, 0.4), (16, 0.3)] {
+    for (index, waves) in
+        [(4, 0.6), (5, 0.5), (6, -0.5), (7, 0.4), (8, 0.4), (9, 0.5), (10, 0.4), (16, 0.3)]
+    {
         let term = terms[index - 1];
         let shape = move |p: DVec2| waves * term.value(p);
         let fields = pupil(192, 0.0, shape);
@@ -188,8 +191,9 @@ fn single_zernike_terms_spread_light_as_sums_over_rings_say() {
         let fit = ZernikeFit::new(&field(128, 0.0, shape), ZernikeOrder::Fringe, 16).unwrap();
         for coefficient in &fit.coefficients {
             let expected = if coefficient.index == index { waves } else { 0.0 };
-            // The unit circle is found to a thousandth from lit cells.
-            assert!((coefficient.waves - expected).abs() < 2e-2 * waves.abs(), "{coefficient:?}");
+            // The unit circle is found to a twentieth of a cell, 5e-4 of its radius, and the slope of
+            // these terms there is at most 20.
+            assert!((coefficient.waves - expected).abs() < 1e-2 * waves.abs(), "{coefficient:?}");
         }
     }
 }

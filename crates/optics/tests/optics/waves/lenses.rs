@@ -51,9 +51,8 @@ fn an_ideal_lens_has_no_waves_at_any_field_and_conjugate() {
         assert!((strehl(&fields).1 - 1.0).abs() < 1e-6, "{field}");
     }
     for magnification in [-0.2, -1.0, -3.0] {
-        let planes = Conjugate::Magnification(magnification)
-            .planes(&train, Focus::AsWritten)
-            .unwrap();
+        let planes =
+            Conjugate::Magnification(magnification).planes(&train, Focus::AsWritten).unwrap();
         // 1/s + 1/s' = 1/f.
         let object = 50.0 * (1.0 - 1.0 / magnification);
         assert!((planes.object_z.unwrap() + object).abs() < 1e-9, "{planes:?}");
@@ -187,8 +186,7 @@ fn huygens_and_fft_agree_through_glass() {
     let train = preset("double-gauss").with_f_number(4.0).unwrap();
     let image = train.sensor_z(Focus::Infinity).unwrap();
     let at = train.at(train.wavelength()).unwrap();
-    let wave =
-        Wavefront::new(&train, &at, ObjectPoint::field(6.0), image, Cells::Needed).unwrap();
+    let wave = Wavefront::new(&train, &at, ObjectPoint::field(6.0), image, Cells::Needed).unwrap();
     let fft = PointSpread::by_fft(&WeightedFields::one(wave.pupil.clone()), 1);
     let sum = PointSpread::by_huygens(&[(&wave.pupil, &wave.sphere, 1.0)], 32, fft.pitch);
     let peak = fft.values.iter().copied().fold(0.0, f64::max);
@@ -205,9 +203,8 @@ fn what_cannot_be_analysed_is_refused_with_what_it_needs() {
     let train = preset("double-gauss");
     let at = train.at(train.wavelength()).unwrap();
     let image = train.sensor_z(Focus::Infinity).unwrap();
-    let try_with = |field: f64, cells| {
-        Wavefront::new(&train, &at, ObjectPoint::field(field), image, cells)
-    };
+    let try_with =
+        |field: f64, cells| Wavefront::new(&train, &at, ObjectPoint::field(field), image, cells);
     let coarse = try_with(14.0, Cells::Given(16)).unwrap_err();
     let AnalysisError::Coarse { cells: 16, needed, .. } = coarse else { panic!("{coarse:?}") };
     assert!(coarse.to_string().contains(&format!("it needs {needed} cells a side")), "{coarse}");

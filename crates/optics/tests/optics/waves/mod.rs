@@ -1,5 +1,5 @@
 //! Lenses in waves, against closed forms.
 
-mod closed_forms;
 mod aberrations;
+mod closed_forms;
 mod lenses;
