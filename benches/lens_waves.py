@@ -17,13 +17,14 @@ import sys
 import program
 
 LENSES = program.ROOT / "scenes" / "lenses"
-# The f-number, and the fields (degrees).
+# The f-number, and the fields (degrees). Optiland takes the paraxial pupil for the beam, which the real one
+# is not behind strong front groups: there the stops are small.
 CASES = {
     "achromat": (4.5, [0, 0.5, 1]),
     "cooke-triplet": (8, [0, 5, 10]),
     "double-gauss": (5.6, [0, 4, 8]),
-    "singlet": (8, [0, 1, 2]),
-    "telephoto": (8, [0, 2, 4]),
+    "singlet": (10, [0, 1, 2]),
+    "telephoto": (16, [0, 2, 4]),
     "asphere": (4, [0, 1, 2]),
 }
 NM = 587.56

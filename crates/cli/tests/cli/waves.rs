@@ -180,7 +180,7 @@ fn what_cannot_be_analysed_is_refused_by_name() {
         &["1, 2 for 1 wavelengths"],
     );
     refused(&["lens.json", "--wavelengths", "550", "--weights", "-1"], &["weights -1"]);
-    refused(&["lens.json", "--waves", "--wavelengths", "30"], &["N-BK7"]);
+    refused(&["lens.json", "--waves", "--wavelengths", "550,9000"], &["N-BK7"]);
     refused(&["lens.json", "--magnification", "0"], &["magnification", "other than 0"]);
     refused(&["lens.json", "--magnification", "0.5"], &["magnification", "negative"]);
     refused(&["lens.json", "--object-distance", "20 mm"], &["no real image"]);

@@ -34,7 +34,7 @@ pub fn wavefronts(
     let centre: DVec3 = chief_point(first, image_z);
     // What each lights, and how rough it is.
     let mut parts = Vec::with_capacity(beams.len());
-    let mut needed = USUAL_CELLS;
+    let mut counts = Vec::with_capacity(beams.len());
     for beam in &beams {
         let sphere = ReferenceSphere::about(train, beam.at, centre)?;
         let outline = aim::outline(beam, &sphere)?;
@@ -45,21 +45,27 @@ pub fn wavefronts(
                 let waves = coarse.statistics().peak_to_valley;
                 return Err(AnalysisError::TooRough { needed: count, waves });
             }
-            needed = needed.max(count);
+            counts.push(count);
         }
         parts.push((beam, sphere, outline));
     }
+    let over = |(beam, _, outline): &(&Beam<'_>, ReferenceSphere, aim::Outline)| {
+        outline.half / beam.at.wavelength()
+    };
+    let widest = parts.iter().map(over).fold(0.0, f64::max);
+    // The pupil of a long wavelength has fewer of the cells than that of a short one.
+    let scaled = counts.iter().zip(&parts).map(|(count, part)| *count as f64 * widest / over(part));
+    let needed = scaled.fold(USUAL_CELLS as f64, f64::max);
     let count = match cells {
-        Cells::Needed => needed.next_multiple_of(32).min(MOST_CELLS),
+        Cells::Needed if needed > MOST_CELLS as f64 => MOST_CELLS,
+        #[expect(clippy::cast_possible_truncation, reason = "at most 1024")]
+        Cells::Needed => (needed.ceil() as usize).next_multiple_of(32),
         Cells::Given(count) if !(LEAST_CELLS..=MOST_CELLS).contains(&count) => {
             return Err(AnalysisError::Cells(count));
         }
         Cells::Given(count) => count,
     };
-    let over = |(beam, _, outline): &(&Beam<'_>, ReferenceSphere, aim::Outline)| {
-        outline.half / beam.at.wavelength()
-    };
-    let widest = parts.iter().map(over).fold(0.0, f64::max) / (0.5 * count as f64 - RIM);
+    let widest = widest / (0.5 * count as f64 - RIM);
     let wavefront = |(beam, sphere, outline): (&Beam<'_>, ReferenceSphere, aim::Outline)| {
         let sampling = Sampling { cells: count, step: widest * beam.at.wavelength() };
         Wavefront::sampled(beam, sphere, &outline, sampling)

@@ -21,8 +21,9 @@ impl LeastSquares {
         for i in 0..self.terms {
             let scaled = weight * row[i];
             self.right[i] += scaled * value;
-            for j in 0..=i {
-                self.matrix[i * self.terms + j] += scaled * row[j];
+            let sums = &mut self.matrix[i * self.terms..];
+            for (sum, other) in sums.iter_mut().zip(&row[..=i]) {
+                *sum += scaled * other;
             }
         }
     }
@@ -33,14 +34,14 @@ impl LeastSquares {
         /// A pivot this small a share of its row's own is lost in rounding.
         const LOST: f64 = 1e-13;
         let n = self.terms;
-        let own: Vec<f64> = (0..n).map(|i| self.matrix[i * n + i]).collect();
         for i in 0..n {
+            let own = self.matrix[i * n + i];
             for j in 0..=i {
                 let (row, other) = (&self.matrix[i * n..], &self.matrix[j * n..]);
                 let sum: f64 = (0..j).map(|k| row[k] * other[k]).sum();
                 let rest = self.matrix[i * n + j] - sum;
                 self.matrix[i * n + j] = match i == j {
-                    true if rest > LOST * own[i] => rest.sqrt(),
+                    true if rest > LOST * own => rest.sqrt(),
                     true => return None,
                     false => rest / self.matrix[j * n + j],
                 };

@@ -1,11 +1,11 @@
 //! Seidel's sums and the chromatic sums, surface by surface.
 //!
 //! With A = n (h c + u) of the marginal and Ā of the chief ray, the invariant H = n (u h̄ − ū h) and Δ the
-//! change at a surface: S_I = −A² h Δ(u/n), S_II = −A Ā h Δ(u/n), S_III = −Ā² h Δ(u/n),
-//! S_IV = −H² c Δ(1/n), S_V = Ā (h̄ (Ā h − H) c Δ(1/n) − Ā² h Δ(1/n²)), C_I = A h Δ(δn/n),
-//! C_II = Ā h Δ(δn/n); a fourth-order difference G from the sphere of the vertex' curvature adds
-//! 8 G Δn h⁴ to S_I, times h̄/h for each sum from there to S_III, and (h̄/h)³ to S_V (W. T. Welford,
-//! *Aberrations of Optical Systems*, 1986, ch. 8 to 10; S_V in the form that A = 0 does no harm).
+//! change at a surface: `S_I` = −A² h Δ(u/n), `S_II` = −A Ā h Δ(u/n), `S_III` = −Ā² h Δ(u/n),
+//! `S_IV` = −H² c Δ(1/n), `S_V` = Ā (h̄ (Ā h − H) c Δ(1/n) − Ā² h Δ(1/n²)), `C_I` = A h Δ(δn/n),
+//! `C_II` = Ā h Δ(δn/n); a fourth-order difference G from the sphere of the vertex' curvature adds
+//! 8 G Δn h⁴ to `S_I`, times h̄/h for each sum from there to `S_III`, and (h̄/h)³ to `S_V` (W. T. Welford,
+//! *Aberrations of Optical Systems*, 1986, ch. 8 to 10; `S_V` in the form that A = 0 does no harm).
 //!
 //! Heights and slopes are u = dy/dz. The ideal thin lens adds nothing.
 
@@ -20,19 +20,19 @@ use crate::train::OpticalTrain;
 /// Sums of one surface, or of all (mm).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, JsonSchema)]
 pub struct SeidelSums {
-    /// S_I.
+    /// `S_I`.
     pub spherical: f64,
-    /// S_II.
+    /// `S_II`.
     pub coma: f64,
-    /// S_III.
+    /// `S_III`.
     pub astigmatism: f64,
-    /// S_IV: Petzval's.
+    /// `S_IV`: Petzval's.
     pub petzval: f64,
-    /// S_V.
+    /// `S_V`.
     pub distortion: f64,
-    /// C_I: from the shortest to the longest wavelength.
+    /// `C_I`: from the shortest to the longest wavelength.
     pub longitudinal_colour: f64,
-    /// C_II.
+    /// `C_II`.
     pub lateral_colour: f64,
 }
 
