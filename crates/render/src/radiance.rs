@@ -3,9 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use etendue_camera::{
-    BandGroup, Camera, CameraRays, FilmSamples, PixelSamples, squares_of_pair,
-};
+use etendue_camera::{BandGroup, Camera, CameraRays, FilmSamples, PixelSamples, squares_of_pair};
 use etendue_tracer::transport::{Parts, RaySamples};
 use etendue_tracer::{LayerSpec, LightGroup, LightingContext, Modulation, Rules, Samples};
 

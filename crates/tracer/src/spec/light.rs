@@ -14,8 +14,8 @@ use super::{
 use crate::clear_sky::SUN_DIAMETER;
 use crate::goniometric::{Goniometric, Photometry};
 use crate::{
-    ClearSky, Color, CubeKind, EnvironmentImage, Light, LightGroup, LightKind, ModulationSpec, Paint,
-    Projector,
+    ClearSky, Color, CubeKind, EnvironmentImage, Light, LightGroup, LightKind, ModulationSpec,
+    Paint, Projector,
 };
 
 /// A light as the scene file writes it.

@@ -41,28 +41,22 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         {
             return;
         }
-        let squares = || {
-            let mut squares = [[0.5; 2]; LANES];
+        let numbers = |draw| {
+            let mut numbers = [[0.5; 2]; LANES];
             for (&lane, &(_, k)) in workspace.picked.iter().zip(&patch.path) {
-                squares[lane] = workspace.number(Draw::Direction, k);
+                numbers[lane] = workspace.number(draw, k);
             }
-            squares
+            numbers
         };
-        let choices = || {
-            let mut choices = [0.5; LANES];
-            for (&lane, &(_, k)) in workspace.picked.iter().zip(&patch.path) {
-                choices[lane] = workspace.number(Draw::Choice, k)[1];
-            }
-            choices
-        };
+        let choices = || numbers(Draw::Choice).map(|[_, choice]| choice);
         match kind {
             SurfaceKind::Black => return,
             SurfaceKind::Matte => {
-                let squares = squares();
+                let squares = numbers(Draw::Direction);
                 kernels::scatter(patch, &squares);
             }
             SurfaceKind::Sheet => {
-                let (squares, choices) = (squares(), choices());
+                let (squares, choices) = (numbers(Draw::Direction), choices());
                 let Patch { sheets, seen, away, .. } = patch;
                 let normals = [&seen.normal, &seen.shading];
                 let found = (&mut away.along, &mut away.value);
