@@ -1,8 +1,8 @@
 //! Light transport: one tracer, whatever the surfaces, the accelerator and the precision.
 //!
-//! All paths of a batch take their next step together ([`trace`](self::trace)): closest hits of all, emission that they
+//! All paths of a batch take their next step together (`trace.rs`): closest hits of all, emission that they
 //! meet, then for each that goes on one light to ask (a shadow ray) and one direction to follow. Rays that ended are
-//! left out, so each batch that reaches the accelerator is full. The rays are in [`rays`] as the accelerator takes
+//! left out, so each batch that reaches the accelerator is full. The rays are in `rays.rs` as the accelerator takes
 //! them: in blocks of sixteen of single precision, or in batches of either precision.
 //!
 //! # Sources
