@@ -76,7 +76,8 @@ pub(crate) fn settle(
     }
     let spectral = Spectral::of(&Bands::Rgb, &scene.materials);
     // The scene by its own lights alone.
-    let lights = Lights::new(&lighting.lights, lighting.map.clone(), &surroundings, &spectral)
+    let seen = (&surroundings, scene.camera.exposure_span());
+    let lights = Lights::new(&lighting.lights, lighting.map.clone(), seen, &spectral)
         .map_err(|error| RenderError::Lights(error.to_string()))?;
     let placed = PlacedSurfaces::of(&scene.geometry, &scene.materials, &spectral);
     let stage = LightingContext {

@@ -229,7 +229,8 @@ fn light_of(
     let map = images.environment.clone();
     let found = lighting::settle(scene, map, rules, seen, &|share| watch.goes_on(share))?;
     notes.extend(found.note);
-    let lights = Lights::new(&found.lights, found.map, &seen.1, spectral)
+    let seen = (&seen.1, scene.camera.exposure_span());
+    let lights = Lights::new(&found.lights, found.map, seen, spectral)
         .map_err(|error| RenderError::Lights(error.to_string()))?;
     Ok(Some((rules, lights)))
 }

@@ -76,7 +76,8 @@ impl EmissionBands {
 
 impl Lights {
     /// The lights of a scene whose emissive surfaces are those of `around`; `map` is the decoded
-    /// image of the environment, if it has one.
+    /// image of the environment, if it has one. Those that change with time are chosen by their mean over `span`, in
+    /// which the camera sees light (s from the frame's time).
     ///
     /// # Errors
     ///
@@ -84,9 +85,19 @@ impl Lights {
     pub fn new(
         lights: &[Light],
         map: Option<Arc<EnvironmentMap>>,
-        around: &SceneView<'_>,
+        (around, span): (&SceneView<'_>, [f64; 2]),
         spectral: &Spectral,
     ) -> Result<Self, NoOverlap> {
+        /// Of a light that is seen for a short time the least of its strength that it is chosen by: the rows in which
+        /// it is seen would be noise.
+        const LEAST_MEAN: f64 = 0.05;
+        let mean = |modulation: &Option<Arc<Modulation>>| match modulation {
+            None => 1.0,
+            Some(modulation) => match modulation.mean(span) {
+                mean if mean > 0.0 => mean.max(LEAST_MEAN),
+                _ => 0.0,
+            },
+        };
         let count = spectral.count();
         let mut bands = vec![0.0; lights.len() * count];
         for (light, bands) in lights.iter().zip(bands.chunks_mut(count)) {
@@ -100,9 +111,12 @@ impl Lights {
             }
         }
         let sky = Sky::of(lights, map, spectral)?;
-        let candidate = |light: &Light| match light.kind.cluster(light.intensity(), around) {
-            Some(cluster) => Candidate::near(power(light, around), cluster),
-            None => Candidate::Far { irradiance: irradiance(light, sky.as_ref()) },
+        let candidate = |light: &Light| {
+            let mean = mean(&light.modulation);
+            match light.kind.cluster(mean * light.intensity(), around) {
+                Some(cluster) => Candidate::near(mean * power(light, around), cluster),
+                None => Candidate::Far { irradiance: mean * irradiance(light, sky.as_ref()) },
+            }
         };
         let mut candidates: Vec<Candidate> = lights.iter().map(candidate).collect();
         let mut first = Vec::with_capacity(around.geometry.placements.len());
@@ -116,9 +130,10 @@ impl Lights {
             first.push(if emits { u32::try_from(candidates.len()).ok() } else { None });
             let Some(material) = material.filter(|_| emits) else { continue };
             let mesh = around.geometry.mesh_of(placement);
+            let mean = material.emission.as_ref().map_or(1.0, |e| mean(&e.modulation));
             for triangle in 0..mesh.triangles.len() {
                 let id = [number, u32::try_from(triangle).unwrap_or(u32::MAX)];
-                let power = triangle_power(around, placement, triangle, material);
+                let power = mean * triangle_power(around, placement, triangle, material);
                 candidates.push(match lamps::cluster(around, id, power) {
                     Some(cluster) => Candidate::near(power, cluster),
                     None => Candidate::Dark,
