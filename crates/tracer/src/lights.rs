@@ -88,15 +88,8 @@ impl Lights {
         (around, span): (&SceneView<'_>, [f64; 2]),
         spectral: &Spectral,
     ) -> Result<Self, NoOverlap> {
-        /// Of a light that is seen for a short time the least of its strength that it is chosen by: the rows in which
-        /// it is seen would be noise.
-        const LEAST_MEAN: f64 = 0.05;
-        let mean = |modulation: &Option<Arc<Modulation>>| match modulation {
-            None => 1.0,
-            Some(modulation) => match modulation.mean(span) {
-                mean if mean > 0.0 => mean.max(LEAST_MEAN),
-                _ => 0.0,
-            },
+        let mean = |modulation: &Option<Arc<Modulation>>| {
+            modulation.as_ref().map_or(1.0, |modulation| modulation.weight(span))
         };
         let count = spectral.count();
         let mut bands = vec![0.0; lights.len() * count];

@@ -351,6 +351,16 @@ impl Modulation {
         }
     }
 
+    /// By what its light is chosen among others where it is seen over an interval of the frame's clock (s): the mean, but
+    /// at least a twentieth of light that is seen at all, or the rows that see it would be noise.
+    pub(crate) fn weight(&self, interval: [f64; 2]) -> f64 {
+        const LEAST: f64 = 0.05;
+        match self.mean(interval) {
+            mean if mean > 0.0 => mean.max(LEAST),
+            _ => 0.0,
+        }
+    }
+
     /// The mean over several intervals of the frame's clock (s), each by its length; of moments alone, that over them.
     #[must_use]
     pub fn mean_over(&self, intervals: &[[f64; 2]]) -> f64 {
