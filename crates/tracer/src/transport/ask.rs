@@ -106,7 +106,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 continue;
             }
             let along = at(&away.along, lane);
-            let ends = [now.rays.triangle(i), targets.id[lane]];
+            let ends = || [now.rays.triangle(i), targets.id[lane]];
             shadows.rays.push([at(&away.start, lane), along], away.reach[lane], ends);
             let group = || lights.group_of(scene, [targets.id[lane][0], targets.light[lane]]);
             let bounces = now.bounces(step.number, i);

@@ -36,8 +36,9 @@ pub(super) trait Rays: Debug + Default {
     /// Takes the camera's rays.
     fn take(&mut self, ctx: &LightingContext<'_>, rays: &RayBatch);
 
-    /// Appends a ray that counts hits as far as `reach` (m), which leaves the first of `ends` and ends on the second.
-    fn push(&mut self, ray: [DVec3; 2], reach: f64, ends: [PlacedTriangle; 2]);
+    /// Appends a ray that counts hits as far as `reach` (m), which leaves the first of `ends` and ends on the second,
+    /// if that counts.
+    fn push(&mut self, ray: [DVec3; 2], reach: f64, ends: impl FnOnce() -> [PlacedTriangle; 2]);
 
     /// Says when each ray is (s from the frame's time).
     fn set_times(&mut self, times: impl Iterator<Item = f64>);
@@ -116,7 +117,12 @@ impl Rays for Blocks {
     }
 
     #[inline(always)]
-    fn push(&mut self, [start, along]: [DVec3; 2], reach: f64, _ends: [PlacedTriangle; 2]) {
+    fn push(
+        &mut self,
+        [start, along]: [DVec3; 2],
+        reach: f64,
+        _ends: impl FnOnce() -> [PlacedTriangle; 2],
+    ) {
         let round = |v: DVec3| [v.x, v.y, v.z].map(single);
         self.rays.push(round(start - self.origin), round(along), single(reach));
     }
@@ -261,11 +267,16 @@ impl Rays for Batch {
         self.rays.precision = ctx.precision;
     }
 
-    fn push(&mut self, [start, along]: [DVec3; 2], reach: f64, ends: [PlacedTriangle; 2]) {
+    fn push(
+        &mut self,
+        [start, along]: [DVec3; 2],
+        reach: f64,
+        ends: impl FnOnce() -> [PlacedTriangle; 2],
+    ) {
         match self.rays.precision {
             HitPrecision::Single => self.rays.push_between(start, along, 0.0, reach),
             HitPrecision::Double => {
-                self.rays.push_between_triangles(start, along, [0.0, reach], ends);
+                self.rays.push_between_triangles(start, along, [0.0, reach], ends());
             }
         }
     }

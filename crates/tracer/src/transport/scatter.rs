@@ -182,14 +182,13 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             }
             throughput.iter_mut().for_each(|band| *band /= survival);
         }
-        let left = now.rays.triangle(i);
         let carried = if asks {
             onward.last.push(ray[0], ray[1]);
-            onward.of_last.left.push(left);
+            onward.of_last.left.push(now.rays.triangle(i));
             &mut onward.of_last
         } else {
-            let coplanar = coincident.get(i).copied().unwrap_or(Coincident::NONE);
-            let ends = [left, [coplanar.placement, coplanar.triangle]];
+            let coplanar = || coincident.get(i).copied().unwrap_or(Coincident::NONE);
+            let ends = || [now.rays.triangle(i), coplanar().id()];
             onward.next.rays.push(ray, f64::INFINITY, ends);
             if step.is_mixed {
                 onward.next.carried.cones.push(cone);
@@ -219,8 +218,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     ) {
         let Workspace { now, onward, coincident, .. } = workspace;
         let Departure { ray, way, cone, media } = departure;
-        let coplanar = coincident.get(i).copied().unwrap_or(Coincident::NONE);
-        let ends = [now.rays.triangle(i), [coplanar.placement, coplanar.triangle]];
+        let coplanar = || coincident.get(i).copied().unwrap_or(Coincident::NONE);
+        let ends = || [now.rays.triangle(i), coplanar().id()];
         onward.next.rays.push(ray, f64::INFINITY, ends);
         let carried = &mut onward.next.carried;
         carried.ray.push(now.carried.ray[i]);

@@ -120,7 +120,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                     MISS => [[MISS; 2]; 2],
                     placement => [hit.id, [placement, coplanar.triangle]],
                 };
-                behind.push([origin, direction], left.max(0.0), ends);
+                behind.push([origin, direction], left.max(0.0), || ends);
                 open[still] = open[k];
                 still += 1;
             }
@@ -226,7 +226,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let distance = offset.length();
             // Points that fall together see each other: a ray of no length meets nothing.
             let along = if distance > 0.0 { offset / distance } else { DVec3::Z };
-            shadows.rays.push([from, along], distance, [left[i], hit.id]);
+            shadows.rays.push([from, along], distance, || [left[i], hit.id]);
             let group = || lights.group_of_placement(scene, hit.id[0]);
             let row = self.parts.row(ray[i], scatterings, group);
             note(&mut shadows.carried, row, radiance, (i, weight));
@@ -238,7 +238,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         lights.environment(spectral, wanted, asked, radiance, |number, of_sky, light| {
             let i = missed[number] as usize;
             let ends = [last.origin(i), last.direction(i)];
-            shadows.rays.push(ends, f64::INFINITY, [left[i], [MISS; 2]]);
+            shadows.rays.push(ends, f64::INFINITY, || [left[i], [MISS; 2]]);
             let row = self.parts.row(ray[i], scatterings, || lights.group_of_sky());
             note(&mut shadows.carried, row, light, (i, ways[i].weight_against(of_sky)));
         });

@@ -453,7 +453,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let cone = self.cone_at_hit(step, now, i);
         let surfaces = now.carried.passages.get(i).map_or(0, |passage| passage.surfaces);
         let passage = Passage { surfaces: surfaces + 1, from: Some(now.from(i)) };
-        onward.next.rays.push([start, now.rays.direction(i)], f64::INFINITY, ends);
+        onward.next.rays.push([start, now.rays.direction(i)], f64::INFINITY, || ends);
         let to = &mut onward.next.carried;
         to.ray.push(now.carried.ray[i]);
         to.ways.push(now.carried.ways[i]);
