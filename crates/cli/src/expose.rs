@@ -53,14 +53,14 @@ pub(crate) fn run(arguments: &ExposeArguments) -> Result<(), Fault> {
     };
     let progress = Phases::new(arguments.quiet).progress(!arguments.quiet);
     let (mut done, of) = (0, images.len());
-    let mut told = |frame: Option<u32>, time: Duration| {
+    let mut report = |frame: Option<u32>, time: Duration| {
         done += 1;
         if let Some(number) = frame.filter(|_| !arguments.quiet) {
             say(&format!("frame {number} ({done} of {of}): {:.2} s", time.as_secs_f64()));
         }
     };
     let all = images.iter().map(open);
-    let written = write_frames(all, &arguments.output, outputs, (&progress, &mut told));
+    let written = write_frames(all, &arguments.output, outputs, (&progress, &mut report));
     drop(progress);
     if written.is_err() && folder_is_new {
         // Goes only when nothing was written into it.

@@ -317,9 +317,9 @@ fn files_of(
 ) -> impl Iterator<Item = String> {
     let always = ["layers.exr", "camera.json", "layers.json", MANIFEST].map(str::to_owned);
     let layers = layers.into_iter().flat_map(move |layer| layer_files(&layer, outputs));
-    let beside = expose::file_names(scene).into_iter().chain(light_field::file_names(scene));
-    let beside = beside.chain(scene.render.imu.as_ref().map(|_| IMU.to_owned()));
-    always.into_iter().chain(layers).chain(beside)
+    let others = expose::file_names(scene).into_iter().chain(light_field::file_names(scene));
+    let others = others.chain(scene.render.imu.as_ref().map(|_| IMU.to_owned()));
+    always.into_iter().chain(layers).chain(others)
 }
 
 /// The files that a render leaves of these layers whatever they hold. A mask is not among them: its numbers

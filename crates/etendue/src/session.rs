@@ -17,7 +17,7 @@ use etendue_optics::glass::AgfCatalogue;
 use etendue_render::expose::SPECTRUM;
 use etendue_render::output::{LayerFile, Outputs};
 use etendue_render::{Checkpoint, Images, Plan, Seconds, denoise};
-use etendue_scene::file::{FramesSpec, SceneFile};
+use etendue_scene::file::{FramesSpec, SceneFile, texts_of};
 use etendue_scene::{Cache, Frame, Frames, Scene, SceneError, Start};
 use etendue_tracer::LayerSpec;
 use serde_json::Value;
@@ -355,7 +355,7 @@ impl Session {
         if let Ok(folder) = self.opener.folder(self.file.folder()) {
             let settings = frames.iter().flat_map(|frame| &frame.settings);
             let values = settings.filter(|(path, _)| path != POSE).map(|(_, value)| value);
-            values.flat_map(words_of).for_each(|word| drop(folder.find(word)));
+            values.flat_map(texts_of).for_each(|word| drop(folder.find(word)));
         }
         let inputs = self.opener.found();
         let beside: Vec<PathBuf> = Dataset::file_names().map(|name| out.join(name)).collect();
@@ -411,16 +411,6 @@ impl Session {
 
 /// What frames of a path set, and nothing else.
 const POSE: &str = "camera.pose";
-
-/// The texts in a value.
-fn words_of(value: &Value) -> Vec<&str> {
-    match value {
-        Value::String(word) => vec![word],
-        Value::Array(list) => list.iter().flat_map(words_of).collect(),
-        Value::Object(members) => members.values().flat_map(words_of).collect(),
-        Value::Null | Value::Bool(_) | Value::Number(_) => Vec::new(),
-    }
-}
 
 /// Refuses files that none of `layers` is written as, nor the light of the `scene`'s sensor.
 fn refuse_idle(outputs: Outputs, layers: &[LayerSpec], scene: &Value) -> Result<(), Error> {

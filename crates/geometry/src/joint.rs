@@ -67,7 +67,7 @@ impl Track {
 
     /// The keys between which a time lies, and the share of the way between them; before the first and after the last
     /// one, that key alone.
-    fn around(&self, time: f64) -> (usize, Option<(usize, f64)>) {
+    fn segment(&self, time: f64) -> (usize, Option<(usize, f64)>) {
         let after = self.times.partition_point(|&key| key <= time);
         if after == 0 || after == self.times.len() {
             return (after.saturating_sub(1), None);
@@ -78,7 +78,9 @@ impl Track {
 
     /// The value of straight lines and cubics at a time (s).
     fn at(&self, time: f64) -> DVec4 {
-        let (i, Some((k, s))) = self.around(time) else { return self.keys[self.around(time).0][1] };
+        let (i, Some((k, s))) = self.segment(time) else {
+            return self.keys[self.segment(time).0][1];
+        };
         let [_, from, out] = self.keys[i];
         let [into, to, _] = self.keys[k];
         match self.between {
@@ -97,7 +99,7 @@ impl Track {
 
     /// The rotation at a time (s).
     fn rotation(&self, time: f64) -> DQuat {
-        match (self.between, self.around(time)) {
+        match (self.between, self.segment(time)) {
             (Between::Linear, (i, Some((k, s)))) => {
                 let [a, b] = [i, k].map(|key| DQuat::from_vec4(self.keys[key][1]).normalize());
                 turned(a, if a.dot(b) < 0.0 { -b } else { b }, s)

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use crate::SceneError;
 use crate::error::not_found;
-use crate::file::{PixelsSpec, SceneFile, SlotSpec, join_index};
+use crate::file::{PixelsSpec, SceneFile, SlotSpec, join_index, texts_of};
 use etendue_camera::{Shutter, ShutterKind};
 
 /// The most slots of an exposure.
@@ -203,7 +203,7 @@ impl SceneFile {
             self.fault(&at, why)
         })?;
         // Any word that it sets may be a file's name; those that are none are not found.
-        let words = slot.set.values().flat_map(words_of);
+        let words = slot.set.values().flat_map(texts_of);
         let mut files: Vec<PathBuf> =
             words.filter_map(|word| Some(folder.find(word).ok()?.path)).collect();
         let pixels = match &slot.pixels {
@@ -278,15 +278,5 @@ fn check_tile(rows: &[Vec<f64>]) -> Result<(), String> {
     match rows.iter().flatten().find(|value| !(0.0..=1.0).contains(*value)) {
         Some(value) => Err(format!("has the number {value}; a pixel takes 0 to 1 of the light")),
         None => Ok(()),
-    }
-}
-
-/// The texts in a value.
-fn words_of(value: &Value) -> Vec<&str> {
-    match value {
-        Value::String(word) => vec![word],
-        Value::Array(list) => list.iter().flat_map(words_of).collect(),
-        Value::Object(members) => members.values().flat_map(words_of).collect(),
-        Value::Null | Value::Bool(_) | Value::Number(_) => Vec::new(),
     }
 }

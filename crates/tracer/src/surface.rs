@@ -36,12 +36,12 @@ impl<'a> SurfaceInteraction<'a> {
         (origin, direction): (DVec3, DVec3),
         (t, normal): (f64, DVec3),
     ) -> Option<Self> {
-        let around = &ctx.scene;
+        let scene = &ctx.scene;
         let placed = ctx.placed.get(own)?;
-        let material = around.material(&spot)?;
+        let material = scene.material(&spot)?;
         let anchor = ctx.anchor(origin + direction * t, normal, origin, placed);
         let front = normal.dot(direction) <= 0.0;
-        let (base, alpha) = around.base_tint(ctx.spectral, material, &spot);
+        let (base, alpha) = scene.base_tint(ctx.spectral, material, &spot);
         let media = if front { [MISS, own] } else { [own, MISS] };
         Some(Self { spot, placed, material, anchor, front, base, alpha, wo: -direction, media })
     }
@@ -55,13 +55,8 @@ impl<'a> SurfaceInteraction<'a> {
     }
 
     /// How it scatters light of the wavelength (nm).
-    pub(crate) fn bsdf(
-        &self,
-        around: &SceneView<'_>,
-        spectral: &Spectral,
-        wavelength: f64,
-    ) -> Bsdf {
-        self.material.scattering.bsdf(self, around, (spectral, wavelength))
+    pub(crate) fn bsdf(&self, scene: &SceneView<'_>, spectral: &Spectral, wavelength: f64) -> Bsdf {
+        self.material.scattering.bsdf(self, scene, (spectral, wavelength))
     }
 
     /// The base colour alone, the share of light that a surface can reflect.
@@ -70,27 +65,27 @@ impl<'a> SurfaceInteraction<'a> {
     }
 
     /// Index behind the surface over the index in front, as seen from its ray, at a wavelength (nm).
-    pub(crate) fn eta(&self, around: &SceneView<'_>, wavelength: f64) -> f64 {
-        let index = |medium| around.index(medium).map_or(1.0, |ior| ior.at(wavelength));
+    pub(crate) fn eta(&self, scene: &SceneView<'_>, wavelength: f64) -> f64 {
+        let index = |medium| scene.index(medium).map_or(1.0, |ior| ior.at(wavelength));
         let [here, behind] = self.media.map(index);
         behind / here
     }
 
     /// Whether the media on its sides part wavelengths.
-    pub(crate) fn disperses(&self, around: &SceneView<'_>) -> bool {
+    pub(crate) fn disperses(&self, scene: &SceneView<'_>) -> bool {
         let disperses = |ior: &Ior| matches!(ior, Ior::Dispersive(_));
-        self.media.into_iter().filter_map(|medium| around.index(medium)).any(disperses)
+        self.media.into_iter().filter_map(|medium| scene.index(medium)).any(disperses)
     }
 
     /// The geometric and the shading normal on the viewer's side; the latter is the geometric one where the
     /// viewer would see its back.
-    pub(crate) fn normals(&self, around: &SceneView<'_>) -> (DVec3, DVec3) {
+    pub(crate) fn normals(&self, scene: &SceneView<'_>) -> (DVec3, DVec3) {
         let (turn, front) = (self.placed.turn.as_ref(), self.anchor.normal);
         let geometric = if self.front { front } else { -front };
         if !self.placed.is_tilted {
             return (geometric, geometric);
         }
-        let normal = self.spot.tilted_normal(around, self.material, turn, front);
+        let normal = self.spot.tilted_normal(scene, self.material, turn, front);
         (geometric, facing(if self.front { normal } else { -normal }, geometric, self.wo))
     }
 }
@@ -100,25 +95,25 @@ impl SurfacePoint<'_> {
     /// normals into the world.
     pub(crate) fn tilted_normal(
         &self,
-        around: &SceneView<'_>,
+        scene: &SceneView<'_>,
         material: &Material,
         turn: Option<&DMat3>,
         front: DVec3,
     ) -> DVec3 {
         let normal = self.turned_normal(turn, front).unwrap_or(front);
         match &material.normal_map {
-            Some(map) => self.mapped_normal(around, map, normal),
+            Some(map) => self.mapped_normal(scene, map, normal),
             None => normal,
         }
     }
 
     /// The normal tilted by a normal map: +x along u, +y up the image, against v (glTF 2.0, section
     /// 3.9.3).
-    fn mapped_normal(&self, around: &SceneView<'_>, map: &NormalMap, normal: DVec3) -> DVec3 {
+    fn mapped_normal(&self, scene: &SceneView<'_>, map: &NormalMap, normal: DVec3) -> DVec3 {
         let Some([tangent, bitangent]) = self.tangents(map.image.uv_set as usize, normal) else {
             return normal;
         };
-        let Some(texel) = around.lookup(&map.image, self) else { return normal };
+        let Some(texel) = scene.lookup(&map.image, self) else { return normal };
         let [x, y, z, _] = texel.map(|c| 2.0 * c - 1.0);
         let tilted = tangent * (x * map.scale) + bitangent * (y * map.scale) + normal * z;
         tilted.try_normalize().unwrap_or(normal)

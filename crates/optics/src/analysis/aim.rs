@@ -218,10 +218,10 @@ pub(crate) fn field(
     let clear: Vec<([f64; 2], DVec2)> = (0..cells * cells)
         .into_par_iter()
         .map(|i| {
-            let around = neighbours(i, cells);
-            let lit = around.iter().filter(|&&other| is_lit(other)).count();
-            match aimed[i].or_else(|| around.iter().find_map(|&other| aimed[other])) {
-                Some(ray) if lit > 0 && lit < around.len() => {
+            let others = neighbours(i, cells);
+            let lit = others.iter().filter(|&&other| is_lit(other)).count();
+            match aimed[i].or_else(|| others.iter().find_map(|&other| aimed[other])) {
+                Some(ray) if lit > 0 && lit < others.len() => {
                     let middle = match aimed[i] {
                         Some(ray) => ray.place,
                         None => outline.guess((pupil.place(i) - outline.middle) / outline.half).0,
@@ -235,9 +235,9 @@ pub(crate) fn field(
         .collect();
     let length = 1.0 / (wavelength * 1e-6);
     for i in 0..cells * cells {
-        let around = || neighbours(i, cells).into_iter().find_map(|other| aimed[other]);
+        let nearby = || neighbours(i, cells).into_iter().find_map(|other| aimed[other]);
         let ([passes, amplitude], lean) = clear[i];
-        let Some(ray) = aimed[i].or_else(|| around().filter(|_| passes > 0.0)) else { continue };
+        let Some(ray) = aimed[i].or_else(|| nearby().filter(|_| passes > 0.0)) else { continue };
         let density = ray.turn.determinant().abs();
         pupil.clear[i] = passes;
         pupil.lean[i] = lean * step;

@@ -256,8 +256,8 @@ pub fn strehl(fields: &WeightedFields) -> (DVec2, f64) {
     let mut best = fields.irradiance(place);
     let mut step = 0.5 * spread.pitch;
     for _ in 0..HALVINGS {
-        let around = [DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y].map(|d| place + d * step);
-        let values = around.map(|place| fields.irradiance(place));
+        let places = [DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y].map(|d| place + d * step);
+        let values = places.map(|place| fields.irradiance(place));
         // The top of the parabola through three points, in x and in y.
         let top = |low: f64, high: f64| {
             let bend = low + high - 2.0 * best;

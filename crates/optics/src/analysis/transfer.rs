@@ -193,11 +193,11 @@ fn smoothed_cone(x: i64, y: i64) -> f64 {
 /// The same less a twelfth of its second differences.
 fn sharpened_cone(x: i64, y: i64) -> f64 {
     let own = smoothed_cone(x, y);
-    let around = smoothed_cone(x + 1, y)
+    let neighbours = smoothed_cone(x + 1, y)
         + smoothed_cone(x - 1, y)
         + smoothed_cone(x, y + 1)
         + smoothed_cone(x, y - 1);
-    own - (around - 4.0 * own) / 12.0
+    own - (neighbours - 4.0 * own) / 12.0
 }
 
 /// Modulation by rays alone, of waves along y and along x.

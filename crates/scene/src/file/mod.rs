@@ -9,7 +9,6 @@ mod imu;
 mod lens;
 mod object;
 mod samples;
-mod serial;
 mod settings;
 mod spec;
 
@@ -26,7 +25,9 @@ use serde_json::{Value, json};
 pub use accuracy::{AccuracySetting, AccuracySpec, AccuracyUse};
 pub use camera::SensorFile;
 pub use document::{OverrideError, Place};
-pub use frames::{CameraPath, FramesSpec, RigCameraSpec, TrajectoryFormat};
+pub use frames::{
+    CameraPath, FramesSpec, PixelsSpec, RigCameraSpec, SlotSpec, TrajectoryFormat, texts_of,
+};
 pub use imu::ImuSpec;
 pub use lens::{ReadLens, is_lens, lens_schema, rays_schema, read_lens, read_lens_at, trace_rays};
 pub use object::{
@@ -35,7 +36,6 @@ pub use object::{
 pub use samples::{
     LEAST_SAMPLES, RelativeErrorSpec, SETS, SamplesSpec, SensorNoiseSpec, TimeSpec, Until,
 };
-pub use serial::{PixelsSpec, SlotSpec};
 pub use settings::{
     AccelName, Auto, BuildQuality, Exposure, LightPrecision, LightRow, PlanSpec, RenderSpec,
     ToneMap, TracerRow, TracerSpec,

@@ -1,7 +1,6 @@
 //! What a lens does in waves, in one piece: for tables, JSON and figures.
 
 pub mod figures;
-mod page;
 mod text;
 
 use glam::DVec2;
@@ -21,7 +20,7 @@ use super::wavefront::{Cells, ReferenceSphere, Wavefront};
 use super::zernike::{FRINGE_TERMS, ZernikeFit, ZernikeOrder};
 use crate::train::{Focus, MonochromaticTrain, OpticalTrain};
 
-pub use page::page;
+pub use figures::page;
 
 /// Frequencies of a table (shares of the limit).
 const SHARES: u32 = 20;
