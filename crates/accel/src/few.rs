@@ -1,5 +1,6 @@
 //! Scenes of few triangles: each ray against each of their edges, sixteen rays at a time. Below some dozens of
-//! triangles that takes less time than going down a tree.
+//! triangles that takes less time than going down a tree. Runs of triangles whose box no ray of a block meets are
+//! left out.
 //!
 //! Rays are those of single precision, and what they meet is worked out in double precision.
 //!
@@ -8,9 +9,11 @@
 //! a ray and a triangle with Plücker coordinates", Ray Tracing News 13.1, 2000; K. Shoemake, "Plücker coordinate
 //! tutorial", Ray Tracing News 11.1, 1998).
 
-use etendue_geometry::block::LANES;
+use std::ops::Range;
+
+use etendue_geometry::block::{Floats, LANES};
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Geometry, MISS, RayBatch, RayBlock, RayBlocks, is_degenerate};
+use etendue_geometry::{Bounds, Geometry, MISS, RayBatch, RayBlock, RayBlocks, is_degenerate};
 
 use crate::single::{F32Frame, Rays32, round};
 
@@ -39,12 +42,27 @@ struct FewTriangle {
     triangle: u32,
 }
 
+/// The most triangles of a run: those of a box.
+const RUN: usize = 12;
+
+/// Triangles that follow each other in the list, with the edges that they have among them and their box.
+#[derive(Debug)]
+struct Run {
+    edges: Range<usize>,
+    triangles: Range<usize>,
+    /// Number of the first triangle.
+    first: u32,
+    /// From and to, in the frame, and a little beyond.
+    bounds: [[f32; 3]; 2],
+}
+
 /// A scene of few triangles.
 #[derive(Debug)]
 pub(crate) struct FewTriangles {
     frame: F32Frame,
     edges: Vec<PluckerEdge>,
     triangles: Vec<FewTriangle>,
+    runs: Vec<Run>,
 }
 
 impl FewTriangles {
@@ -54,8 +72,9 @@ impl FewTriangles {
             return None;
         }
         let frame = F32Frame::of(geometry.loose_bounds());
-        let mut few = Self { frame, edges: Vec::new(), triangles: Vec::new() };
+        let mut few = Self { frame, edges: Vec::new(), triangles: Vec::new(), runs: Vec::new() };
         let mut ends: Vec<[[f64; 3]; 2]> = Vec::new();
+        let mut bounds = Bounds::EMPTY;
         for (number, placement) in (0_u32..).zip(&geometry.placements) {
             let mesh = geometry.mesh_of(placement);
             let place = &placement.world_from_mesh;
@@ -68,9 +87,14 @@ impl FewTriangles {
                 if is_degenerate(wide) || normal.length_squared() == 0.0 {
                     continue;
                 }
+                let first = match few.runs.last() {
+                    Some(run) if run.triangles.len() < RUN => run.edges.start,
+                    _ => few.begin_run(&mut bounds),
+                };
                 let mut edge = |k: usize| {
                     let [a, b] = [corners[(k + 1) % 3], corners[(k + 2) % 3]];
-                    let found = ends.iter().position(|ends| *ends == [a, b] || *ends == [b, a]);
+                    let is_own = |ends: &[[f64; 3]; 2]| *ends == [a, b] || *ends == [b, a];
+                    let found = ends[first..].iter().position(is_own).map(|k| first + k);
                     let at = found.unwrap_or_else(|| {
                         ends.push([a, b]);
                         few.edges.push(PluckerEdge::between(a, b));
@@ -86,9 +110,35 @@ impl FewTriangles {
                     placement: number,
                     triangle: u32::try_from(triangle).unwrap_or(MISS),
                 });
+                wide.iter().for_each(|&corner| bounds.include(corner));
+                few.end_run(bounds);
             }
         }
         Some(few)
+    }
+
+    /// Begins a run behind all others; the number of its first edge.
+    fn begin_run(&mut self, bounds: &mut Bounds) -> usize {
+        let (edge, triangle) = (self.edges.len(), self.triangles.len());
+        *bounds = Bounds::EMPTY;
+        self.runs.push(Run {
+            edges: edge..edge,
+            triangles: triangle..triangle,
+            first: u32::try_from(triangle).unwrap_or(MISS),
+            bounds: [[0.0; 3]; 2],
+        });
+        edge
+    }
+
+    /// Sets the last run to what has been added since it began, within these bounds.
+    fn end_run(&mut self, bounds: Bounds) {
+        let Some(run) = self.runs.last_mut() else { return };
+        (run.edges.end, run.triangles.end) = (self.edges.len(), self.triangles.len());
+        // Some roundings of the largest coordinate.
+        let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
+        let beyond = DVec3::splat(largest * 4.0 * f64::from(f32::EPSILON));
+        run.bounds =
+            [bounds.min - beyond, bounds.max + beyond].map(|corner| corner.to_array().map(round));
     }
 
     /// What origins of blocks are relative to (m, world).
@@ -156,23 +206,78 @@ struct Best {
     number: [u32; LANES],
 }
 
+/// The rays of a block.
+struct BlockLines {
+    origin: [Doubles; 3],
+    /// Plücker coordinates.
+    direction: [Doubles; 3],
+    moment: [Doubles; 3],
+    /// Of the directions.
+    inverse: [Floats; 3],
+}
+
+impl BlockLines {
+    #[inline(always)]
+    fn of(block: &RayBlock) -> Self {
+        let origin = block.origin.map(|axis| axis.map(f64::from));
+        let direction = block.direction.map(|axis| axis.map(f64::from));
+        let ([ox, oy, oz], [dx, dy, dz]) = (&origin, &direction);
+        let (mut mx, mut my, mut mz) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            mx[i] = oy[i] * dz[i] - oz[i] * dy[i];
+            my[i] = oz[i] * dx[i] - ox[i] * dz[i];
+            mz[i] = ox[i] * dy[i] - oy[i] * dx[i];
+        }
+        let inverse = block.direction.map(|axis| axis.map(|d| 1.0 / d));
+        Self { origin, direction, moment: [mx, my, mz], inverse }
+    }
+}
+
+/// What three roundings may do to the distance of a box, as a share of it, with room.
+const SLACK: f32 = 1e-6;
+
+/// Whether any ray of a block meets a box. Where a ray runs in the plane of a side, what is not a number parts
+/// nothing: the box is a little larger than what is in it.
+#[inline(always)]
+fn reaches([from, to]: [[f32; 3]; 2], block: &RayBlock, lines: &BlockLines) -> bool {
+    let (mut enter, mut exit) = (block.t_min, block.t_max);
+    for axis in 0..3 {
+        let (origin, inverse) = (&block.origin[axis], &lines.inverse[axis]);
+        for i in 0..LANES {
+            let a = (from[axis] - origin[i]) * inverse[i];
+            let b = (to[axis] - origin[i]) * inverse[i];
+            let (near, far) = if a < b { (a, b) } else { (b, a) };
+            enter[i] = if near > enter[i] { near } else { enter[i] };
+            exit[i] = if far < exit[i] { far } else { exit[i] };
+        }
+    }
+    let mut any = 0_u32;
+    for i in 0..LANES {
+        any |= u32::from(enter[i] * (1.0 - SLACK) <= exit[i] * (1.0 + SLACK));
+    }
+    any != 0
+}
+
 /// On which side each ray passes each edge: the sign of what is found here.
 #[inline(always)]
-fn sides(edges: &[PluckerEdge], block: &RayBlock, sides: &mut [Doubles]) {
-    let [ox, oy, oz] = block.origin.map(|axis| axis.map(f64::from));
-    let [dx, dy, dz] = block.direction.map(|axis| axis.map(f64::from));
-    let (mut mx, mut my, mut mz) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-    for i in 0..LANES {
-        mx[i] = oy[i] * dz[i] - oz[i] * dy[i];
-        my[i] = oz[i] * dx[i] - ox[i] * dz[i];
-        mz[i] = ox[i] * dy[i] - oy[i] * dx[i];
-    }
+fn sides(edges: &[PluckerEdge], lines: &BlockLines, sides: &mut [Doubles]) {
+    let ([dx, dy, dz], [mx, my, mz]) = (&lines.direction, &lines.moment);
     for (PluckerEdge { along, moment }, side) in edges.iter().zip(sides) {
         for i in 0..LANES {
             let of_moment = dx[i] * moment[0] + dy[i] * moment[1] + dz[i] * moment[2];
             side[i] = of_moment + (mx[i] * along[0] + my[i] * along[1] + mz[i] * along[2]);
         }
     }
+}
+
+#[inline(always)]
+fn least(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn most(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// Whether any ray passes all three edges on one side.
@@ -187,35 +292,40 @@ fn is_inside(lowest: &Doubles, highest: &Doubles) -> bool {
 
 #[multiversion::multiversion(targets = "simd")]
 fn closest(few: &FewTriangles, block: &RayBlock, of_edges: &mut [Doubles], best: &mut Best) {
-    let origin = block.origin.map(|axis| axis.map(f64::from));
+    let lines = BlockLines::of(block);
     let t_min = block.t_min.map(f64::from);
-    sides(&few.edges, block, of_edges);
-    for (number, triangle) in (0_u32..).zip(&few.triangles) {
-        let [first, second, third] = triangle.edges.map(|(edge, _)| &of_edges[edge]);
-        let [sa, sb, sc] = triangle.edges.map(|(_, sign)| sign);
-        let (mut lowest, mut highest) = ([0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
-            let (a, b, c) = (first[i] * sa, second[i] * sb, third[i] * sc);
-            lowest[i] = a.min(b).min(c);
-            highest[i] = a.max(b).max(c);
-        }
-        if !is_inside(&lowest, &highest) {
+    let [x, y, z] = &lines.origin;
+    for run in &few.runs {
+        if !reaches(run.bounds, block, &lines) {
             continue;
         }
-        let [nx, ny, nz] = triangle.normal;
-        for i in 0..LANES {
-            let (a, b, c) = (first[i] * sa, second[i] * sb, third[i] * sc);
-            let sum = a + b + c;
-            let over = 1.0 / sum;
-            let height =
-                triangle.offset - (origin[0][i] * nx + origin[1][i] * ny + origin[2][i] * nz);
-            let t = height * over;
-            let is_inside = (lowest[i] >= 0.0) | (highest[i] <= 0.0);
-            let counts = is_inside & (sum != 0.0) & (t > t_min[i]) & (t <= best.t[i]);
-            best.t[i] = if counts { t } else { best.t[i] };
-            best.u[i] = if counts { b * over } else { best.u[i] };
-            best.v[i] = if counts { c * over } else { best.v[i] };
-            best.number[i] = if counts { number } else { best.number[i] };
+        sides(&few.edges[run.edges.clone()], &lines, &mut of_edges[run.edges.clone()]);
+        for (number, triangle) in (run.first..).zip(&few.triangles[run.triangles.clone()]) {
+            let [first, second, third] = triangle.edges.map(|(edge, _)| &of_edges[edge]);
+            let [sa, sb, sc] = triangle.edges.map(|(_, sign)| sign);
+            let (mut lowest, mut highest) = ([0.0; LANES], [0.0; LANES]);
+            for i in 0..LANES {
+                let (a, b, c) = (first[i] * sa, second[i] * sb, third[i] * sc);
+                lowest[i] = least(least(a, b), c);
+                highest[i] = most(most(a, b), c);
+            }
+            if !is_inside(&lowest, &highest) {
+                continue;
+            }
+            let [nx, ny, nz] = triangle.normal;
+            for i in 0..LANES {
+                let (a, b, c) = (first[i] * sa, second[i] * sb, third[i] * sc);
+                let sum = a + b + c;
+                let over = 1.0 / sum;
+                let height = triangle.offset - (x[i] * nx + y[i] * ny + z[i] * nz);
+                let t = height * over;
+                let is_inside = (lowest[i] >= 0.0) | (highest[i] <= 0.0);
+                let counts = is_inside & (sum != 0.0) & (t > t_min[i]) & (t <= best.t[i]);
+                best.t[i] = if counts { t } else { best.t[i] };
+                best.u[i] = if counts { b * over } else { best.u[i] };
+                best.v[i] = if counts { c * over } else { best.v[i] };
+                best.number[i] = if counts { number } else { best.number[i] };
+            }
         }
     }
 }
@@ -227,30 +337,35 @@ fn occluded(
     of_edges: &mut [Doubles],
     blocked: &mut [u32; LANES],
 ) {
-    let origin = block.origin.map(|axis| axis.map(f64::from));
+    let lines = BlockLines::of(block);
     let [t_min, t_max] = [block.t_min, block.t_max].map(|limits| limits.map(f64::from));
-    sides(&few.edges, block, of_edges);
-    for triangle in &few.triangles {
-        let [first, second, third] = triangle.edges.map(|(edge, _)| &of_edges[edge]);
-        let [sa, sb, sc] = triangle.edges.map(|(_, sign)| sign);
-        let (mut lowest, mut highest, mut sums) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
-            let (a, b, c) = (first[i] * sa, second[i] * sb, third[i] * sc);
-            lowest[i] = a.min(b).min(c);
-            highest[i] = a.max(b).max(c);
-            sums[i] = a + b + c;
-        }
-        if !is_inside(&lowest, &highest) {
+    let [x, y, z] = &lines.origin;
+    for run in &few.runs {
+        if !reaches(run.bounds, block, &lines) {
             continue;
         }
-        let [nx, ny, nz] = triangle.normal;
-        for i in 0..LANES {
-            let height =
-                triangle.offset - (origin[0][i] * nx + origin[1][i] * ny + origin[2][i] * nz);
-            let t = height / sums[i];
-            let is_inside = (lowest[i] >= 0.0) | (highest[i] <= 0.0);
-            let counts = is_inside & (sums[i] != 0.0) & (t > t_min[i]) & (t <= t_max[i]);
-            blocked[i] |= u32::from(counts);
+        sides(&few.edges[run.edges.clone()], &lines, &mut of_edges[run.edges.clone()]);
+        for triangle in &few.triangles[run.triangles.clone()] {
+            let [first, second, third] = triangle.edges.map(|(edge, _)| &of_edges[edge]);
+            let [sa, sb, sc] = triangle.edges.map(|(_, sign)| sign);
+            let (mut lowest, mut highest, mut sums) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+            for i in 0..LANES {
+                let (a, b, c) = (first[i] * sa, second[i] * sb, third[i] * sc);
+                lowest[i] = least(least(a, b), c);
+                highest[i] = most(most(a, b), c);
+                sums[i] = a + b + c;
+            }
+            if !is_inside(&lowest, &highest) {
+                continue;
+            }
+            let [nx, ny, nz] = triangle.normal;
+            for i in 0..LANES {
+                let height = triangle.offset - (x[i] * nx + y[i] * ny + z[i] * nz);
+                let t = height / sums[i];
+                let is_inside = (lowest[i] >= 0.0) | (highest[i] <= 0.0);
+                let counts = is_inside & (sums[i] != 0.0) & (t > t_min[i]) & (t <= t_max[i]);
+                blocked[i] |= u32::from(counts);
+            }
         }
     }
 }

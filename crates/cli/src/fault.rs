@@ -93,7 +93,7 @@ impl From<EmvaError> for Fault {
     fn from(error: EmvaError) -> Self {
         match error {
             EmvaError::Stopped => Self::failed(STOPPED),
-            EmvaError::Write { .. } => Self::Failed(error.into()),
+            EmvaError::Write(error) => error.into(),
             error => Self::Refused(error.into()),
         }
     }

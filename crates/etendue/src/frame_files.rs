@@ -203,6 +203,7 @@ impl FramePattern {
         remove_recorded(out, &record_of(out, number));
     }
 
+    #[expect(clippy::disallowed_methods, reason = "files that are whole already move")]
     fn take_to_places(
         &self,
         out: &Path,

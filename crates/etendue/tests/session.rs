@@ -1,4 +1,5 @@
 //! One session, many pictures.
+#![allow(clippy::disallowed_methods, reason = "tests set their stage by hand")]
 
 #[path = "session/checkpoints.rs"]
 mod checkpoints;

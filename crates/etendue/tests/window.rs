@@ -1,4 +1,5 @@
 //! What a window asks of the library: previews, places, scenes that are saved.
+#![allow(clippy::disallowed_methods, reason = "tests set their stage by hand")]
 
 use std::fs;
 use std::path::Path;

@@ -10,6 +10,7 @@
 //! | `transaction` | sets of files that take their names together, and never that of an input: [`Transaction`] |
 //! | `part` | files that are whole or not there; devices, pipes and standard streams are written to and not replaced |
 //! | `manifest` | what a command wrote into a folder and below it, so that the next run can remove it |
+#![allow(clippy::disallowed_methods, reason = "this is where files are written")]
 
 mod manifest;
 mod mapped;

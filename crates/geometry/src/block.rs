@@ -151,7 +151,7 @@ impl RayBlocks {
     }
 
     /// Appends a ray from `origin` (m) along the unit `direction` that counts hits from 0 to `t_max` (m).
-    #[inline]
+    #[inline(always)]
     pub fn push(&mut self, origin: [f32; 3], direction: [f32; 3], t_max: f32) {
         let (number, lane) = (self.len / LANES, self.len % LANES);
         if lane == 0 {

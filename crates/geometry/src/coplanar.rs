@@ -43,28 +43,29 @@ pub struct Coplanar {
 #[derive(Debug, Clone, Default)]
 struct Overlapping {
     all: Vec<PlacedTriangle>,
-    /// Of each its extent (m) along the axis along which they reach farthest, by which they are in order; and that of
-    /// the widest.
-    extents: Vec<[f64; 2]>,
+    /// The box of each (m), as much larger as planes may be apart.
+    boxes: Vec<Bounds>,
+    /// The axis along which they reach farthest, by whose lower ends they are in order; and how wide the widest is.
     axis: usize,
     widest: f64,
 }
 
 impl Overlapping {
-    /// Puts the triangles in order, each once.
-    fn settle(&mut self, geometry: &Geometry) {
+    /// Puts the triangles, whose planes may be so far apart (m), in order, each once.
+    fn settle(&mut self, geometry: &Geometry, apart: f64) {
         self.all.sort_unstable();
         self.all.dedup();
-        let boxes = |id: &PlacedTriangle| Bounds::of_points(corners(geometry, *id));
-        let whole = self.all.iter().map(boxes).fold(Bounds::EMPTY, Bounds::union);
-        self.axis = (whole.max - whole.min).max_position();
-        let extent = |id: &PlacedTriangle| {
-            let own = boxes(id);
-            [own.min[self.axis], own.max[self.axis]]
+        let boxed = |id: &PlacedTriangle| {
+            let own = Bounds::of_points(corners(geometry, *id));
+            Bounds { min: own.min - apart, max: own.max + apart }
         };
-        self.all.sort_by(|a, b| extent(a)[0].total_cmp(&extent(b)[0]));
-        self.extents = self.all.iter().map(extent).collect();
-        self.widest = self.extents.iter().map(|[from, to]| to - from).fold(0.0, f64::max);
+        let whole = self.all.iter().map(boxed).fold(Bounds::EMPTY, Bounds::union);
+        let axis = (whole.max - whole.min).max_position();
+        self.all.sort_by(|a, b| boxed(a).min[axis].total_cmp(&boxed(b).min[axis]));
+        self.boxes = self.all.iter().map(boxed).collect();
+        self.widest =
+            self.boxes.iter().map(|own| own.max[axis] - own.min[axis]).fold(0.0, f64::max);
+        self.axis = axis;
     }
 }
 
@@ -163,7 +164,7 @@ impl Coplanar {
                 }
             }
         }
-        found.others.values_mut().for_each(|others| others.settle(geometry));
+        found.others.values_mut().for_each(|others| others.settle(geometry, apart));
         if !found.others.is_empty() {
             found.has_others = vec![false; geometry.placements.len()];
             found.others.keys().for_each(|id| found.has_others[id[0] as usize] = true);
@@ -247,12 +248,15 @@ impl Coplanar {
         let others = Some(id[0]).filter(|&own| self.has_others(own));
         let others = others.and_then(|_| self.others.get(&id));
         others.into_iter().flat_map(move |others| {
-            let Overlapping { all, extents, axis, widest } = others;
-            let at = point[*axis];
-            let first = extents.partition_point(|[from, _]| from + widest + slack < at);
-            let near = extents[first..].iter().take_while(move |[from, _]| from - slack <= at);
+            let &Overlapping { ref all, ref boxes, axis, widest } = others;
+            let at = point[axis];
+            let first = boxes.partition_point(|own| own.min[axis] + widest + slack < at);
+            let near = boxes[first..].iter().take_while(move |own| own.min[axis] - slack <= at);
+            let is_near = move |own: &Bounds| {
+                (own.min - slack).cmple(point).all() && (own.max + slack).cmpge(point).all()
+            };
             let near = all[first..].iter().zip(near);
-            near.filter(move |(_, [_, to])| at <= to + slack).map(|(&other, _)| other)
+            near.filter(move |(_, own)| is_near(own)).map(|(&other, _)| other)
         })
     }
 

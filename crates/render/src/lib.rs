@@ -13,6 +13,7 @@
 //! | [`output`] | the named layers of a render, and EXR, PNG, NPY and JSON files of them |
 //! | [`report`] | what a render did and what it cost |
 //! | [`Watch`] | who is told how far a render is, and may stop it |
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests set their stage by hand"))]
 
 mod adaptive;
 mod band_paths;

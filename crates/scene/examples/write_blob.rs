@@ -3,6 +3,7 @@
 //! ```sh
 //! cargo run --release -p etendue-scene --example write_blob -- 10000000 blob.glb
 //! ```
+#![allow(clippy::disallowed_methods, reason = "an example writes what it is told to")]
 
 use std::fs::File;
 use std::io::{BufWriter, Error, Result, Write};

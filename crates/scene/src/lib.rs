@@ -21,6 +21,7 @@
 //! | [`escape`] | text out of files on its way to a terminal |
 //! | [`memory`] | how much memory there may be, and an account of it |
 //! | [`doctor`] | what a scene holds and what is wrong with it, without rendering |
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests set their stage by hand"))]
 
 mod cache;
 mod cubes;

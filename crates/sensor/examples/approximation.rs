@@ -4,6 +4,7 @@
 //! ```sh
 //! cargo run --release -p etendue-sensor --example approximation -- docs/images/normal-approximation.svg
 //! ```
+#![allow(clippy::disallowed_methods, reason = "an example writes what it is told to")]
 
 use std::fmt::Write as _;
 

@@ -16,10 +16,11 @@
 //! A sensor before an even light of known photons: what a characterisation looks at.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::io::{self, Write as _};
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::{fs, io};
 
+use etendue_files::{Transaction, WriteError, prepare_folder};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use rayon::prelude::*;
@@ -102,13 +103,8 @@ pub enum EmvaError {
     #[error("writing the series was stopped")]
     Stopped,
     /// A file could not be written.
-    #[error("cannot write {path}: {source}")]
-    Write {
-        /// Which.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    Write(#[from] WriteError),
 }
 
 /// Exposure times, photons and file names of a series, before any image is made.
@@ -199,17 +195,24 @@ impl Series {
         done: impl Fn(usize) -> bool + Sync,
     ) -> Result<(), EmvaError> {
         let light = options.light(sensor)?;
-        fs::create_dir_all(folder).map_err(failed(folder))?;
+        prepare_folder(folder)?;
+        let files = Transaction::at_once();
+        let write = |name: &str, bytes: &[u8]| {
+            files.write(&folder.join(name), |part| part.write_all(bytes))
+        };
         let finished = AtomicUsize::new(0);
         self.pictures().into_par_iter().try_for_each(|picture| {
             let image = light.frame(picture.photons, picture.shot, options.seed)?;
-            write_whole(&folder.join(picture.name), &png(&image).map_err(failed(folder))?)?;
+            let path = folder.join(picture.name);
+            let bytes = png(&image).map_err(|source| WriteError::io(&path, source))?;
+            write(picture.name, &bytes)?;
             let go_on = done(finished.fetch_add(1, Ordering::Relaxed) + 1);
             if go_on { Ok(()) } else { Err(EmvaError::Stopped) }
         })?;
-        write_whole(&folder.join(DESCRIPTOR), self.descriptor().as_bytes())?;
+        write(DESCRIPTOR, self.descriptor().as_bytes())?;
         let json = serde_json::to_vec_pretty(&self.manifest).map_err(io::Error::from);
-        write_whole(&folder.join(MANIFEST), &json.map_err(failed(folder))?)
+        write(MANIFEST, &json.map_err(|source| WriteError::io(folder, source))?)?;
+        Ok(())
     }
 
     /// The descriptor of the reference implementation.
@@ -278,10 +281,6 @@ fn nanoseconds(seconds: f64) -> u64 {
     (seconds * 1e9).round().max(1.0) as u64
 }
 
-fn failed(path: &Path) -> impl Fn(io::Error) -> EmvaError {
-    move |source| EmvaError::Write { path: path.to_owned(), source }
-}
-
 /// A grey 16-bit PNG of an image's first channel.
 fn png(image: &RawImage) -> Result<Vec<u8>, io::Error> {
     let too_large = |_| io::Error::other("the image is too large for PNG");
@@ -294,23 +293,6 @@ fn png(image: &RawImage) -> Result<Vec<u8>, io::Error> {
         .write_image(&bytes, width, height, ExtendedColorType::L16)
         .map_err(io::Error::other)?;
     Ok(out)
-}
-
-/// Writes beside the name and renames, so that nobody sees half a file. Pipes and devices are
-/// written to.
-fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), EmvaError> {
-    if fs::metadata(path).is_ok_and(|found| !found.is_file()) {
-        return fs::write(path, bytes).map_err(failed(path));
-    }
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".part");
-    let beside = PathBuf::from(beside);
-    let written = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, path));
-    written.map_err(|source| {
-        // Best effort: the error that matters is the one returned.
-        let _ = fs::remove_file(&beside);
-        EmvaError::Write { path: path.to_owned(), source }
-    })
 }
 
 /// Less than this is no quantum efficiency that could be measured.

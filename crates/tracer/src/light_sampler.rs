@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 use etendue_geometry::Bounds;
 use etendue_geometry::glam::DVec3;
 
-use crate::light_tree::{self, Cluster, LightTree};
+use crate::light_tree::{self, Choice, Cluster, LightTree, Walker};
 use crate::sampling::{DiscreteDistribution, ONE_BELOW};
 
 /// The least chance of a light near by, and of one far away, where there are both.
@@ -32,11 +32,6 @@ pub(crate) struct Receiver {
 }
 
 impl Receiver {
-    /// A point (m) that gets light from all sides.
-    pub(crate) fn open(point: DVec3) -> Self {
-        Self { point, normal: DVec3::ZERO }
-    }
-
     /// Whether it gets light from one side alone.
     #[inline(always)]
     pub(crate) fn is_one_sided(&self) -> bool {
@@ -66,6 +61,22 @@ impl Candidate {
     /// A light that has a place, with its power (W).
     pub(crate) fn near(power: f64, cluster: Cluster) -> Self {
         Self::Near { power, cluster }
+    }
+}
+
+/// Lights that are chosen for some points together. Memory is kept.
+#[derive(Debug, Default)]
+pub(crate) struct Choices {
+    pub(crate) all: Vec<Choice>,
+    /// Those that go down the tree, and the chance with which each of all does.
+    walkers: Vec<Walker>,
+    shares: Vec<f64>,
+}
+
+impl Choices {
+    /// Appends one for a point, by `u` in 0..1.
+    pub(crate) fn push(&mut self, receiver: Receiver, u: f64) {
+        self.all.push(Choice { receiver, u, light: 0, chance: 0.0 });
     }
 }
 
@@ -123,39 +134,58 @@ impl LightSampler {
 
     /// The chance with which a light of the tree is chosen for the point `from` (m), and none of the others.
     fn share_of_tree(&self, tree: &LightTree, from: DVec3) -> f64 {
-        if self.others.is_empty() {
-            return 1.0;
-        }
-        match tree.importance(from) {
-            near if near > 0.0 => (near / (near + self.far)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE),
-            _ => 0.0,
-        }
+        if self.others.is_empty() { 1.0 } else { self.share(tree.importance(from)) }
     }
 
-    /// A light for a point by `u` in 0..1: its number, what is left of `u`, and its chance.
-    #[inline]
-    pub(crate) fn pick(&self, receiver: &Receiver, u: f64) -> Option<(usize, f64, f64)> {
-        let Some(tree) = &self.tree else { return self.pick_other(u) };
-        let share = self.share_of_tree(tree, receiver.point);
-        if u < share {
-            let (index, rest, chance) = tree.pick(receiver, u / share)?;
-            return Some((index, rest, share * chance));
+    /// The same, where the tree may send so much (W/m²).
+    #[inline(always)]
+    fn share(&self, near: f64) -> f64 {
+        let share = (near / (near + self.far)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE);
+        if near > 0.0 { share } else { 0.0 }
+    }
+
+    /// Chooses a light for each of some points.
+    pub(crate) fn pick(&self, choices: &mut Choices) {
+        let Choices { all, walkers, shares } = choices;
+        let Some(tree) = &self.tree else {
+            all.iter_mut().for_each(|choice| self.pick_other(choice));
+            return;
+        };
+        walkers.clear();
+        shares.clear();
+        if self.others.is_empty() {
+            shares.resize(all.len(), 1.0);
+        } else {
+            tree.importance_to(all, shares);
+            shares.iter_mut().for_each(|near| *near = self.share(*near));
         }
-        let rest = ((u - share) / (1.0 - share)).min(ONE_BELOW);
-        let (index, rest, chance) = self.pick_other(rest)?;
-        Some((index, rest, (1.0 - share) * chance))
+        for ((number, choice), &share) in all.iter_mut().enumerate().zip(&*shares) {
+            if choice.u < share {
+                choice.u /= share;
+                walkers.push(Walker::new(number));
+            } else {
+                choice.u = ((choice.u - share) / (1.0 - share)).min(ONE_BELOW);
+                self.pick_other(choice);
+                choice.chance *= 1.0 - share;
+            }
+        }
+        tree.pick(all, walkers);
+        for walker in &*walkers {
+            all[walker.number].chance *= shares[walker.number];
+        }
     }
 
     #[inline(always)]
-    fn pick_other(&self, u: f64) -> Option<(usize, f64, f64)> {
-        match self.others.len() {
-            0 => None,
-            1 => Some((0, u, 1.0)),
+    fn pick_other(&self, choice: &mut Choice) {
+        (choice.light, choice.chance) = match self.others.len() {
+            0 => (0, 0.0),
+            1 => (0, 1.0),
             _ => {
-                let (index, rest) = self.others.pick(u);
-                Some((index, rest, self.others.probability(index)))
+                let (light, rest) = self.others.pick(choice.u);
+                choice.u = rest;
+                (light, self.others.probability(light))
             }
-        }
+        };
     }
 
     /// The chance with which [`Self::pick`] picks light `index` for a point.
@@ -201,6 +231,18 @@ mod tests {
         Candidate::near(PI, cluster)
     }
 
+    /// A point that gets light from all sides.
+    fn open(point: DVec3) -> Receiver {
+        Receiver { point, normal: DVec3::ZERO }
+    }
+
+    fn one(sampler: &LightSampler, from: Receiver, u: f64) -> Choice {
+        let mut choices = Choices::default();
+        choices.push(from, u);
+        sampler.pick(&mut choices);
+        choices.all[0]
+    }
+
     fn scene() -> Bounds {
         Bounds { min: DVec3::splat(-50.0), max: DVec3::splat(50.0) }
     }
@@ -215,15 +257,15 @@ mod tests {
         let expected =
             [(1.0, 0.25), (0.5, 4.0 / 7.0), (0.4, 6.25 / 9.25), (0.1, 0.75), (-1.0, 0.0)];
         for (height, share) in expected {
-            let from = Receiver::open(DVec3::Y * height);
+            let from = open(DVec3::Y * height);
             let mut counts = [0_u32; 5];
             let n = 10_000_u32;
             for k in 0..n {
                 let u = (f64::from(k) + 0.5) / f64::from(n);
-                let (index, rest, chance) = sampler.pick(&from, u).unwrap();
-                assert!((0.0..1.0).contains(&rest));
-                assert!((chance - sampler.chance(&from, index)).abs() < 1e-12);
-                counts[index] += 1;
+                let Choice { light, u, chance, .. } = one(&sampler, from, u);
+                assert!((0.0..1.0).contains(&u));
+                assert!((chance - sampler.chance(&from, light)).abs() < 1e-12);
+                counts[light] += 1;
             }
             let chances = [0, 1, 2, 3, 4].map(|k| sampler.chance(&from, k));
             assert!((chances[1] - share).abs() < 1e-12, "{height}: {chances:?}");
@@ -242,9 +284,10 @@ mod tests {
     #[test]
     fn a_few_lamps_alone_are_chosen_by_power_and_none_is_dark() {
         let sampler = LightSampler::new(&[lamp(), lamp()], scene());
-        assert_eq!(sampler.chance(&Receiver::open(DVec3::NEG_Y), 0), 0.5);
+        assert_eq!(sampler.chance(&open(DVec3::NEG_Y), 0), 0.5);
         assert!(sampler.are_several() && !sampler.is_empty());
         assert!(LightSampler::new(&[Candidate::Dark], scene()).is_empty());
-        assert!(LightSampler::new(&[], scene()).pick(&Receiver::open(DVec3::ZERO), 0.5).is_none());
+        let dark = one(&LightSampler::new(&[], scene()), open(DVec3::ZERO), 0.5);
+        assert_eq!(dark.chance, 0.0);
     }
 }

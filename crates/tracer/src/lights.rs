@@ -11,7 +11,7 @@ use crate::environment::EnvironmentMap;
 use crate::group::Groups;
 use crate::lamps::{self, AreaLight, triangle_power};
 use crate::light::{EnvironmentImage, Light, LightKind, irradiance, power, spot_falloff};
-use crate::light_sampler::{Candidate, LightSampler, Receiver};
+use crate::light_sampler::{Candidate, Choices, LightSampler, Receiver};
 use crate::material::Alpha;
 use crate::reference::{SceneView, SurfacePoint, squares_at};
 use crate::sampling::{Frame, cone_direction, triangle_point};
@@ -167,10 +167,9 @@ impl Lights {
         Ok(all)
     }
 
-    /// A light for a point by `u` in 0..1: its number, what is left of `u`, and its chance.
-    #[inline(always)]
-    pub(crate) fn pick(&self, receiver: &Receiver, u: f64) -> Option<(usize, f64, f64)> {
-        self.sampler.pick(receiver, u)
+    /// Chooses a light for each of some points.
+    pub(crate) fn pick(&self, choices: &mut Choices) {
+        self.sampler.pick(choices);
     }
 
     /// What [`Self::pick`] picks by, where that is a short list: the sum of the chances of all lights before
@@ -189,6 +188,14 @@ impl Lights {
         let number = index.checked_sub(self.lights.len())?;
         let lamp = self.lamps.get(number)?.as_ref().filter(|lamp| lamp.is_plain)?;
         Some((lamp, &self.lamp_bands[number * count..(number + 1) * count]))
+    }
+
+    /// All lights and their bands, if they are few triangles that are kept ready and shine alike all over.
+    pub(crate) fn few_triangles(&self) -> Option<(&[Option<AreaLight>], &[f64])> {
+        let is_plain = |lamp: &Option<AreaLight>| lamp.as_ref().is_some_and(|lamp| lamp.is_plain);
+        let are_few = self.lights.is_empty() && self.few().is_some();
+        let are_plain = are_few && !self.lamps.is_empty() && self.lamps.iter().all(is_plain);
+        are_plain.then_some((&self.lamps, &self.lamp_bands))
     }
 
     /// The number among all lights of a triangle that shines.

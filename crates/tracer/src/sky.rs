@@ -15,7 +15,6 @@ use crate::lights::Lights;
 use crate::sampling::{Frame, cosine_direction, sphere_direction};
 use crate::spectral::Spectral;
 use crate::spectral_sky::{self, Spectrum};
-use crate::target::{Target, TargetKind};
 
 /// The environment, ready to be asked.
 #[derive(Debug)]
@@ -122,12 +121,12 @@ impl Sky {
         self.map.as_ref().map_or(1.0, |(_, sampler)| sampler.mean)
     }
 
-    /// Chooses the directions of the lanes that were pushed, by brightness: `each` gets a lane, its
-    /// direction as a target, its place on the map, and the colour there.
+    /// Chooses the directions of the lanes that were pushed, by brightness: `each` gets a lane, its unit
+    /// direction with the density of that (1/sr), its place on the map, and the colour there.
     pub(crate) fn choose(
         &self,
         asked: &mut Asked,
-        mut each: impl FnMut(usize, Option<Target>, ([f64; 2], &Color)),
+        mut each: impl FnMut(usize, (DVec3, f64), ([f64; 2], &Color)),
     ) {
         let Some((map, sampler)) = &self.map else { return };
         let Asked { lanes, squares, there, .. } = asked;
@@ -135,9 +134,7 @@ impl Sky {
         let lit = there.places.iter().copied().zip(&there.colors);
         let chosen = there.directions.iter().zip(&there.densities);
         for ((&(lane, chance), (&local, &pdf)), lit) in lanes.iter().zip(chosen).zip(lit) {
-            let bare = Target::bare(TargetKind::Far, self.world_from_map * local, pdf * chance);
-            let target = Target { light: u32::try_from(self.index).unwrap_or(u32::MAX), ..bare };
-            each(lane, (pdf > 0.0).then_some(target), lit);
+            each(lane, (self.world_from_map * local, pdf * chance), lit);
         }
     }
 }
@@ -162,12 +159,12 @@ fn uniform_density(receiver: &Receiver, direction: DVec3) -> f64 {
 
 impl Lights {
     /// Radiance that comes to a point from each unit direction without meeting anything, and the density
-    /// (1/sr), chance included, with which [`Self::choose`] gives that direction for that point. Both go to
-    /// `each`, with the number of the pair.
+    /// (1/sr), chance included, with which [`Self::choose`] gives that direction for that point; 0 without a point.
+    /// Both go to `each`, with the number of the pair.
     pub(crate) fn environment(
         &self,
         spectral: &Spectral,
-        wanted: impl Iterator<Item = (Receiver, DVec3)>,
+        wanted: impl Iterator<Item = (Option<Receiver>, DVec3)>,
         asked: &mut Asked,
         radiance: &mut [f64],
         mut each: impl FnMut(usize, f64, &mut [f64]),
@@ -177,8 +174,10 @@ impl Lights {
         let Some((map, sampler)) = &sky.map else {
             for (number, (receiver, direction)) in wanted.enumerate() {
                 radiance.copy_from_slice(own);
-                let density = uniform_density(&receiver, direction);
-                each(number, density * self.chance(&receiver, sky.index), radiance);
+                let density = receiver.map_or(0.0, |receiver| {
+                    uniform_density(&receiver, direction) * self.chance(&receiver, sky.index)
+                });
+                each(number, density, radiance);
             }
             return;
         };
@@ -187,7 +186,7 @@ impl Lights {
         chances.clear();
         there.directions.clear();
         for (receiver, world) in wanted {
-            chances.push(self.chance(&receiver, sky.index));
+            chances.push(receiver.map_or(0.0, |receiver| self.chance(&receiver, sky.index)));
             there.directions.push(map_from_world * world);
         }
         sampler.look_up(map, there);

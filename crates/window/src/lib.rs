@@ -9,6 +9,7 @@
 //! | `form` | widgets for any value that a JSON Schema describes |
 //! | `canvas` | the picture: shown, moved about in, clicked |
 //! | `panels` | what stands around it |
+#![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests set their stage by hand"))]
 
 mod app;
 mod canvas;

@@ -1,4 +1,5 @@
 //! The built command, as a user runs it.
+#![allow(clippy::disallowed_methods, reason = "tests set their stage by hand")]
 
 mod assets; // real models from outside the repository
 mod bad_input; // refused with exit code 2, one message, and nothing written

@@ -1,4 +1,5 @@
 //! Whole renders: from the text of a scene to the values of its layers.
+#![allow(clippy::disallowed_methods, reason = "tests set their stage by hand")]
 
 mod adaptive;
 mod band_paths;

@@ -1,4 +1,5 @@
 //! Scenes and models from files: what is read, what is mended, what is refused.
+#![allow(clippy::disallowed_methods, reason = "tests set their stage by hand")]
 
 mod accuracy;
 mod assets;

@@ -57,26 +57,61 @@ const ALL: usize = 0;
 /// Half-angle (radians) of a cone within which lights shine the same way.
 const ALIKE: f64 = 0.3;
 
-/// Goes down from a node by `u` in 0..1 to a branch of which one light is chosen by intensity: that, what is left
-/// of `u`, and its chance.
+/// A light that is asked for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Choice {
+    pub(crate) receiver: Receiver,
+    /// By which it is chosen, in 0..1; then what is left of that.
+    pub(crate) u: f64,
+    /// Its number.
+    pub(crate) light: usize,
+    /// With which it is chosen; 0 where none shines.
+    pub(crate) chance: f64,
+}
+
+/// A choice on its way down the tree.
+#[derive(Debug, Default)]
+pub(crate) struct Walker {
+    /// Which of the choices it is.
+    pub(crate) number: usize,
+    viewer: Viewer,
+    /// The node that it is at; [`END`] once it has a branch of which a light is chosen by intensity, or none.
+    at: usize,
+    u: f64,
+    /// That of the branch.
+    chance: f64,
+    branch: Branch,
+}
+
+/// No node.
+const END: usize = usize::MAX;
+
+impl Walker {
+    /// Of the choice of that number; where it begins is set by the tree.
+    pub(crate) fn new(number: usize) -> Self {
+        Self { number, at: END, ..Self::default() }
+    }
+}
+
+/// Brings all walkers down, step by step: a step of one does not wait for that of another.
 #[multiversion::multiversion(targets = "simd")]
-fn descend(
-    nodes: &[Node],
-    mut at: usize,
-    viewer: &Viewer,
-    mut u: f64,
-) -> Option<(Branch, f64, f64)> {
-    let mut chance = 1.0;
-    loop {
-        let node = nodes.get(at)?;
-        let view = node.view(viewer);
-        let (lane, rest, share) = view.pick(u)?;
-        (u, chance) = (rest, chance * share);
-        let branch = node.branches[lane];
-        if node.is_end(lane, view.squared[lane]) {
-            return Some((branch, u, chance));
+fn descend(nodes: &[Node], walkers: &mut [Walker]) {
+    let mut is_under_way = true;
+    while is_under_way {
+        is_under_way = false;
+        for walker in walkers.iter_mut() {
+            let Some(node) = nodes.get(walker.at) else { continue };
+            let view = node.view(&walker.viewer);
+            let Some((lane, rest, share)) = view.pick(walker.u) else {
+                (walker.chance, walker.at) = (0.0, END);
+                continue;
+            };
+            (walker.u, walker.chance) = (rest, walker.chance * share);
+            walker.branch = node.branches[lane];
+            let is_end = node.is_end(lane, view.squared[lane]);
+            walker.at = if is_end { END } else { walker.branch.node as usize };
+            is_under_way |= !is_end;
         }
-        at = branch.node as usize;
     }
 }
 
@@ -95,6 +130,19 @@ fn descend_to(nodes: &[Node], mut at: usize, viewer: &Viewer, place: u32) -> Opt
             return Some((branch, chance));
         }
         at = branch.node as usize;
+    }
+}
+
+/// Points asked side by side.
+const LANES: usize = 16;
+
+/// What all lights of a tree may send to each point that chooses one and faces them all (W/m²).
+#[multiversion::multiversion(targets = "simd")]
+fn importance_to(tree: &LightTree, choices: &[Choice], importance: &mut Vec<f64>) {
+    for some in choices.chunks(LANES) {
+        let mut points = [DVec3::ZERO; LANES];
+        points.iter_mut().zip(some).for_each(|(point, choice)| *point = choice.receiver.point);
+        importance.extend_from_slice(&tree.importances(points)[..some.len()]);
     }
 }
 
@@ -159,7 +207,8 @@ impl LightTree {
             all = all.union(&grown.cluster);
             is_points &= grown.is_points;
         }
-        let reach_as_far = node.cos_reach[..count].iter().all(|&cos| cos == node.cos_reach[0]);
+        let reach_as_far =
+            node.clusters.cos_reach[..count].iter().all(|&cos| cos == node.clusters.cos_reach[0]);
         let alike = is_points || (all.cone <= ALIKE && reach_as_far);
         self.nodes[at] = node;
         // Beside others that are brighter by 10¹⁶ they have no share that a sum would tell.
@@ -175,24 +224,38 @@ impl LightTree {
         usize::from(self.nodes.first().is_some_and(goes_on))
     }
 
-    /// A light for a point by `u` in 0..1: its number, what is left of `u`, and its chance. `None` where none
-    /// shines.
-    pub(crate) fn pick(&self, receiver: &Receiver, u: f64) -> Option<(usize, f64, f64)> {
-        let viewer = self.extent.viewer(receiver);
-        let (branch, u, chance) = match self.start(&viewer) {
-            ALL if self.sent(&viewer) > 0.0 => (self.nodes[ALL].branches[0], u, 1.0),
-            ALL => return None,
-            at => descend(&self.nodes, at, &viewer, u)?,
-        };
-        let [begin, end] = branch.lights.map(|k| k as usize);
-        if end - begin == 1 {
-            return Some((self.order[begin] as usize, u, chance));
+    /// Makes those of `choices` that have walkers.
+    pub(crate) fn pick(&self, choices: &mut [Choice], walkers: &mut [Walker]) {
+        for walker in walkers.iter_mut() {
+            let Choice { receiver, u, .. } = &choices[walker.number];
+            let viewer = self.extent.viewer(receiver);
+            (walker.at, walker.u, walker.chance) = (self.start(&viewer), *u, 1.0);
+            if walker.at == ALL {
+                let shines = self.sent(&viewer) > 0.0;
+                (walker.at, walker.chance) = (END, f64::from(u8::from(shines)));
+                walker.branch = self.nodes.first().map_or_else(Branch::default, |n| n.branches[0]);
+            }
+            walker.viewer = viewer;
         }
-        let place = self.below[begin] + u * (self.below[end] - self.below[begin]);
-        let k = begin + self.below[begin + 1..end].partition_point(|&sum| sum <= place);
-        let rest = (place - self.below[k]) / (self.below[k + 1] - self.below[k]);
-        let chance = chance * self.share(k, [begin, end]);
-        (chance > 0.0).then_some((self.order[k] as usize, rest.clamp(0.0, ONE_BELOW), chance))
+        descend(&self.nodes, walkers);
+        for walker in walkers.iter() {
+            let choice = &mut choices[walker.number];
+            (choice.chance, choice.u) = (walker.chance, walker.u);
+            if walker.chance == 0.0 {
+                continue;
+            }
+            let [begin, end] = walker.branch.lights.map(|k| k as usize);
+            if end - begin == 1 {
+                choice.light = self.order[begin] as usize;
+                continue;
+            }
+            let place = self.below[begin] + walker.u * (self.below[end] - self.below[begin]);
+            let k = begin + self.below[begin + 1..end].partition_point(|&sum| sum <= place);
+            let rest = (place - self.below[k]) / (self.below[k + 1] - self.below[k]);
+            choice.light = self.order[k] as usize;
+            choice.u = rest.clamp(0.0, ONE_BELOW);
+            choice.chance *= self.share(k, [begin, end]);
+        }
     }
 
     /// The share of the `k`-th light in the intensity of those of a branch.
@@ -206,15 +269,37 @@ impl LightTree {
 
     /// What all lights may send to a point that faces them, in units of the tree.
     fn sent(&self, viewer: &Viewer) -> f64 {
-        let open = Viewer { is_one_sided: false, ..*viewer };
-        self.nodes.first().map_or(0.0, |whole| whole.view(&open).importance[0])
+        let Some(whole) = self.nodes.first() else { return 0.0 };
+        let ([sent], _) = whole.clusters.first::<1>().sent(&viewer.point.map(|x| [x]), None);
+        f64::from(sent)
     }
 
     /// What its lights may send to a point (m) that faces them all (W/m²).
     pub(crate) fn importance(&self, from: DVec3) -> f64 {
+        let [importance] = self.importances([from]);
+        importance
+    }
+
+    /// Appends the same of the points of some choices.
+    pub(crate) fn importance_to(&self, choices: &[Choice], importance: &mut Vec<f64>) {
+        importance_to(self, choices, importance);
+    }
+
+    /// The same of some points.
+    #[inline(always)]
+    fn importances<const N: usize>(&self, from: [DVec3; N]) -> [f64; N] {
+        let Some(whole) = self.nodes.first() else { return [0.0; N] };
+        let mut points = [[0.0; N]; 3];
+        for (k, from) in from.into_iter().enumerate() {
+            let local = self.extent.local(from);
+            for axis in 0..3 {
+                points[axis][k] = local[axis];
+            }
+        }
+        let (sent, _) = whole.clusters.first::<N>().sent(&points, None);
         let Extent { scale, intensity, .. } = self.extent;
-        let sent = self.sent(&self.extent.viewer(&Receiver::open(from)));
-        (sent * intensity * scale * scale).min(f64::MAX.sqrt())
+        let most = f64::MAX.sqrt();
+        sent.map(|sent| (f64::from(sent) * intensity * scale * scale).min(most))
     }
 
     /// Whether a light is in it.

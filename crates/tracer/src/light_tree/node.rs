@@ -24,24 +24,27 @@ const FARTHEST: f64 = 1e6;
 /// What rounding may take from a cosine in single precision, with room.
 const ROOM: f32 = 1e-5;
 
-/// A number of each branch.
-type Lanes = [f32; WIDTH];
+/// Clusters of lights, as they are asked side by side; what is not there has no intensity.
+#[derive(Debug, Clone)]
+pub(super) struct Clusters<const N: usize> {
+    centre: [[f32; N]; 3],
+    /// Half the diagonal.
+    radius: [f32; N],
+    axis: [[f32; N]; 3],
+    /// Cosine and sine of the cone.
+    cone: [[f32; N]; 2],
+    pub(super) cos_reach: [f32; N],
+    intensity: [f32; N],
+    /// What it may send to points between its lights.
+    within: [f32; N],
+    /// All shine to all sides.
+    is_isotropic: bool,
+}
 
-/// Clusters of lights, as they are asked; what is not there has no intensity.
+/// The branches of a node.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Node {
-    pub(super) centre: [Lanes; 3],
-    /// Half the diagonal.
-    pub(super) radius: Lanes,
-    pub(super) axis: [Lanes; 3],
-    /// Cosine and sine of the cone.
-    pub(super) cone: [Lanes; 2],
-    pub(super) cos_reach: Lanes,
-    pub(super) intensity: Lanes,
-    /// What it may send to points between its lights.
-    pub(super) within: Lanes,
-    /// All shine to all sides.
-    pub(super) is_isotropic: bool,
+    pub(super) clusters: Clusters<WIDTH>,
     pub(super) branches: [Branch; WIDTH],
 }
 
@@ -68,7 +71,7 @@ pub(super) struct Extent {
 }
 
 /// A point that asks for light, as nodes see it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Viewer {
     pub(super) point: [f32; 3],
     pub(super) normal: [f32; 3],
@@ -88,7 +91,7 @@ impl Extent {
         Self { centre: all.bounds.centre(), scale, intensity: all.intensity }
     }
 
-    fn local(&self, point: DVec3) -> Vec3 {
+    pub(super) fn local(&self, point: DVec3) -> Vec3 {
         let limit = DVec3::splat(FARTHEST);
         ((point - self.centre) * self.scale).clamp(-limit, limit).as_vec3()
     }
@@ -108,8 +111,23 @@ fn single(x: f64) -> f32 {
     x as f32
 }
 
-impl Node {
-    pub(super) fn set(&mut self, lane: usize, extent: &Extent, cluster: &Cluster, branch: Branch) {
+impl<const N: usize> Default for Clusters<N> {
+    fn default() -> Self {
+        Self {
+            centre: [[0.0; N]; 3],
+            radius: [0.0; N],
+            axis: [[0.0; N]; 3],
+            cone: [[0.0; N]; 2],
+            cos_reach: [0.0; N],
+            intensity: [0.0; N],
+            within: [0.0; N],
+            is_isotropic: false,
+        }
+    }
+}
+
+impl Clusters<WIDTH> {
+    fn set(&mut self, lane: usize, extent: &Extent, cluster: &Cluster) {
         let (sin, cos) = cluster.cone.sin_cos();
         let radius = single(0.5 * cluster.bounds.diagonal() * extent.scale);
         let centre = extent.local(cluster.bounds.centre());
@@ -124,13 +142,34 @@ impl Node {
         let within = self.intensity[lane] / (radius * radius).max(f32::MIN_POSITIVE);
         self.within[lane] = within.min(MOST_IMPORTANCE);
         self.is_isotropic = cluster.cone >= PI && (lane == 0 || self.is_isotropic);
+    }
+
+    /// The first of them, many times.
+    #[inline(always)]
+    pub(super) fn first<const N: usize>(&self) -> Clusters<N> {
+        Clusters {
+            centre: self.centre.map(|lanes| [lanes[0]; N]),
+            radius: [self.radius[0]; N],
+            axis: self.axis.map(|lanes| [lanes[0]; N]),
+            cone: self.cone.map(|lanes| [lanes[0]; N]),
+            cos_reach: [self.cos_reach[0]; N],
+            intensity: [self.intensity[0]; N],
+            within: [self.within[0]; N],
+            is_isotropic: self.is_isotropic,
+        }
+    }
+}
+
+impl Node {
+    pub(super) fn set(&mut self, lane: usize, extent: &Extent, cluster: &Cluster, branch: Branch) {
+        self.clusters.set(lane, extent, cluster);
         self.branches[lane] = branch;
     }
 
     /// The squared distance to the centre of a branch.
     #[inline(always)]
     pub(super) fn squared(&self, k: usize, viewer: &Viewer) -> f32 {
-        let way = |axis: usize| self.centre[axis][k] - viewer.point[axis];
+        let way = |axis: usize| self.clusters.centre[axis][k] - viewer.point[axis];
         way(0) * way(0) + way(1) * way(1) + way(2) * way(2)
     }
 
@@ -138,42 +177,62 @@ impl Node {
     #[inline(always)]
     pub(super) fn is_end(&self, lane: usize, squared: f32) -> bool {
         let Branch { node, alike, .. } = self.branches[lane];
-        node == MISS || (alike && squared > FAR * self.radius[lane] * self.radius[lane])
+        let radius = self.clusters.radius[lane];
+        node == MISS || (alike && squared > FAR * radius * radius)
     }
 
     /// What the viewer has of each branch: what the branch may send, to a factor, and the squared distance.
-    ///
-    /// All is worked out for all branches, and from local arrays: else compilers do it branch by branch.
     #[inline(always)]
     pub(super) fn view(&self, viewer: &Viewer) -> View {
-        let (mut squared, mut above, mut along) = ([0.0; WIDTH], [0.0; WIDTH], [0.0; WIDTH]);
+        let normal = viewer.normal.map(|x| [x; WIDTH]);
+        let normal = viewer.is_one_sided.then_some(&normal);
+        let (sent, squared) = self.clusters.sent(&viewer.point.map(|x| [x; WIDTH]), normal);
+        View { importance: sent.map(f64::from), squared }
+    }
+}
+
+impl<const N: usize> Clusters<N> {
+    /// What each may send to a point, to a factor, and the squared distance; the normals of the points are asked where
+    /// they get light from one side alone.
+    ///
+    /// All is worked out for all of them, and from local arrays: else compilers do it one by one.
+    #[inline(always)]
+    pub(super) fn sent(
+        &self,
+        points: &[[f32; N]; 3],
+        normals: Option<&[[f32; N]; 3]>,
+    ) -> ([f32; N], [f32; N]) {
+        let (mut squared, mut above, mut along) = ([0.0; N], [0.0; N], [0.0; N]);
         for axis in 0..3 {
-            let (centre, own) = (self.centre[axis], self.axis[axis]);
-            let (from, normal) = (viewer.point[axis], viewer.normal[axis]);
-            for k in 0..WIDTH {
-                let way = centre[k] - from;
+            let (centre, own, from) = (self.centre[axis], self.axis[axis], points[axis]);
+            for k in 0..N {
+                let way = centre[k] - from[k];
                 squared[k] += way * way;
-                above[k] += way * normal;
                 along[k] -= way * own[k];
+            }
+            if let Some(normals) = normals {
+                for k in 0..N {
+                    above[k] += (centre[k] - from[k]) * normals[axis][k];
+                }
             }
         }
         let (radius, intensity, within) = (self.radius, self.intensity, self.within);
-        let (mut inverse, mut sent, mut ball) = ([0.0; WIDTH], [0.0; WIDTH], [[0.0; WIDTH]; 2]);
-        for k in 0..WIDTH {
+        let (mut inverse, mut sent, mut ball) = ([0.0; N], [0.0; N], [[0.0; N]; 2]);
+        for k in 0..N {
             inverse[k] = 1.0 / squared[k].sqrt();
         }
-        for k in 0..WIDTH {
+        for k in 0..N {
             let near = intensity[k] * inverse[k] * inverse[k];
             sent[k] = if near < MOST_IMPORTANCE { near } else { MOST_IMPORTANCE };
         }
         // The half-angle of the branch's ball.
-        for k in 0..WIDTH {
+        for k in 0..N {
             ball[1][k] = radius[k] * inverse[k];
             ball[0][k] = other(ball[1][k]);
         }
         if !self.is_isotropic {
             let (cone, reach) = (self.cone, self.cos_reach);
-            for k in 0..WIDTH {
+            for k in 0..N {
                 // The angle to the axis, less the cone's, less the ball's.
                 let cosine = cosine(along[k] * inverse[k]);
                 let angle = less([cosine, other(cosine)], [cone[0][k], cone[1][k]]);
@@ -183,12 +242,12 @@ impl Node {
                 sent[k] = if cosine + ROOM > reach[k] { sent[k] * facing } else { 0.0 };
             }
         }
-        for k in 0..WIDTH {
+        for k in 0..N {
             sent[k] = if squared[k] <= radius[k] * radius[k] { within[k] } else { sent[k] };
         }
-        if viewer.is_one_sided {
+        if normals.is_some() {
             // The most that the cosine is under which the point gets the light.
-            for k in 0..WIDTH {
+            for k in 0..N {
                 let cosine = cosine(above[k] * inverse[k]);
                 let [cosine, _] = less([cosine, other(cosine)], [ball[0][k], ball[1][k]]);
                 let facing = if cosine > ROOM { cosine } else { ROOM };
@@ -197,7 +256,7 @@ impl Node {
                 sent[k] *= if is_within { 1.0 } else { facing };
             }
         }
-        View { importance: sent.map(f64::from), squared }
+        (sent, squared)
     }
 }
 
@@ -229,7 +288,7 @@ pub(super) struct View {
     /// What the branch may send, to a factor.
     pub(super) importance: [f64; WIDTH],
     /// The squared distance to its centre.
-    pub(super) squared: Lanes,
+    pub(super) squared: [f32; WIDTH],
 }
 
 impl View {

@@ -14,8 +14,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     pub(super) fn choose_lights<R: Rays>(&self, workspace: &mut Workspace<R>, patch: &mut Patch) {
         let LightingContext { lights, scene, spectral, .. } = self.ctx;
         let count = self.count();
-        let Patch { picks, seen, bsdfs, targets, radiance, path, .. } = patch;
-        radiance.resize(LANES * count, 0.0);
+        patch.radiance.resize(LANES * count, 0.0);
+        let Patch { picks, choices, seen, bsdfs, path, .. } = patch;
         workspace.asked.clear();
         for (&lane, &(_, k)) in workspace.picked.iter().zip(&*path) {
             [picks.square[0][lane], picks.square[1][lane]] = workspace.number(Draw::Light, k);
@@ -26,16 +26,15 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         } else {
             // What scatters light of single directions asks none.
             let asks = |lane: &&usize| bsdfs.get(**lane).is_none_or(|bsdf| !bsdf.is_delta());
+            choices.all.clear();
             for &lane in workspace.picked.iter().filter(asks) {
-                let u = &mut picks.square[0][lane];
-                match lights.pick(&seen.receiver(lane, bsdfs.get(lane)), *u) {
-                    Some((index, rest, chance)) => {
-                        picks.index[lane] = u32::try_from(index).unwrap_or(u32::MAX);
-                        // What is left of the number that chose the light chooses the place: both stay even.
-                        (*u, picks.chance[lane]) = (rest, chance);
-                    }
-                    None => picks.chance[lane] = 0.0,
-                }
+                choices.push(seen.receiver(lane, bsdfs.get(lane)), picks.square[0][lane]);
+            }
+            lights.pick(choices);
+            for (&lane, choice) in workspace.picked.iter().filter(asks).zip(&choices.all) {
+                picks.index[lane] = u32::try_from(choice.light).unwrap_or(u32::MAX);
+                // What is left of the number that chose the light chooses the place: both stay even.
+                (picks.square[0][lane], picks.chance[lane]) = (choice.u, choice.chance);
             }
         }
         for (lane, bsdf) in bsdfs.iter().enumerate() {
@@ -46,6 +45,16 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let squares = picks.square;
         kernels::spread_over_triangles(picks);
         // A place on it.
+        if let Some((lamps, bands)) = lights.few_triangles() {
+            kernels::place_on_triangles(patch, lamps);
+            for &lane in &workspace.picked {
+                let own = patch.picks.index[lane] as usize * count;
+                let radiance = &mut patch.radiance[lane * count..(lane + 1) * count];
+                radiance.copy_from_slice(&bands[own..own + count]);
+            }
+            return;
+        }
+        let Patch { picks, seen, bsdfs, targets, radiance, .. } = patch;
         for &lane in &workspace.picked {
             let (index, chance) = (picks.index[lane] as usize, picks.chance[lane]);
             let radiance = &mut radiance[lane * count..(lane + 1) * count];
@@ -68,8 +77,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             }
         }
         let Some(sky) = &lights.sky else { return };
-        sky.choose(&mut workspace.asked, |lane, target, there| {
-            targets.set(lane, target.as_ref());
+        let number = u32::try_from(sky.index).unwrap_or(u32::MAX);
+        sky.choose(&mut workspace.asked, |lane, (direction, density), there| {
+            targets.set_far(lane, number, direction, density);
             let radiance = &mut radiance[lane * count..(lane + 1) * count];
             lights.spread_sky(spectral, there, radiance);
         });

@@ -10,6 +10,7 @@ use etendue_geometry::{RayBlock, disk};
 
 use super::patch::{BESIDE, LANES, Patch, Picks};
 use crate::bsdf::fresnel::schlick_weight;
+use crate::lamps::AreaLight;
 use crate::sampling::ONE_BELOW;
 use crate::surface::facing;
 
@@ -160,6 +161,51 @@ pub(super) fn spread_over_triangles(picks: &mut Picks) {
         u[i] = root * (1.0 - v[i]);
         v[i] *= root;
     }
+}
+
+/// Places on the triangles that were picked, which are few, as [`super::patch::Targets::set_triangle`] has them.
+#[multiversion::multiversion(targets = "simd")]
+pub(super) fn place_on_triangles(patch: &mut Patch, lamps: &[Option<AreaLight>]) {
+    let Patch { picks, targets, .. } = patch;
+    let [second, third] = &picks.square;
+    for (number, lamp) in (0_u32..).zip(lamps) {
+        let Some(lamp) = lamp else { continue };
+        let [corner, rest] = lamp.corner;
+        let edges = lamp.shape.edges;
+        for axis in 0..3 {
+            let [of_corner, of_rest, of_across] = &mut targets.place;
+            for i in 0..LANES {
+                let across = edges[0][axis] * second[i] + edges[1][axis] * third[i];
+                let is_own = picks.index[i] == number;
+                of_corner[axis][i] = if is_own { corner[axis] } else { of_corner[axis][i] };
+                of_rest[axis][i] = if is_own { rest[axis] } else { of_rest[axis][i] };
+                of_across[axis][i] = if is_own { across } else { of_across[axis][i] };
+            }
+            let (of_normal, of_magnitudes) = (&mut targets.normal, &mut targets.magnitudes);
+            let (normal, magnitudes) = (lamp.shape.normal[axis], lamp.magnitudes[axis]);
+            for i in 0..LANES {
+                let is_own = picks.index[i] == number;
+                of_normal[axis][i] = if is_own { normal } else { of_normal[axis][i] };
+                of_magnitudes[axis][i] = if is_own { magnitudes } else { of_magnitudes[axis][i] };
+            }
+        }
+        let (area, two_sided) = (lamp.shape.area, if lamp.two_sided { 1.0 } else { 0.0 });
+        for i in 0..LANES {
+            let is_own = picks.index[i] == number;
+            let density =
+                if picks.chance[i] > 0.0 { picks.chance[i] / area } else { f64::INFINITY };
+            targets.density[i] = if is_own { density } else { targets.density[i] };
+            targets.two_sided[i] = if is_own { two_sided } else { targets.two_sided[i] };
+        }
+        for i in 0..LANES {
+            if picks.index[i] == number {
+                targets.id[i] = lamp.id;
+            }
+        }
+    }
+    targets.is_far = [0.0; LANES];
+    targets.is_delta = [0.0; LANES];
+    targets.is_triangle = [1.0; LANES];
 }
 
 /// Rays from the hits to what they aim at, and the densities of their directions.

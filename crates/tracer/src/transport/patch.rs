@@ -7,7 +7,7 @@ use super::media::Crossing;
 use crate::bsdf::sheets::Sheets;
 use crate::bsdf::{Bsdf, Weights};
 use crate::lamps::AreaLight;
-use crate::light_sampler::Receiver;
+use crate::light_sampler::{Choices, Receiver};
 use crate::spawn::Anchor;
 use crate::target::{Target, TargetKind};
 use crate::{Color, ConductorId, Tint};
@@ -33,6 +33,7 @@ pub(super) struct Patch {
     pub(super) seen: Seen,
     pub(super) away: Away,
     pub(super) picks: Picks,
+    pub(super) choices: Choices,
     pub(super) targets: Targets,
     /// The colours of matte surfaces.
     pub(super) colors: Vec<Tint>,
@@ -252,6 +253,18 @@ impl Targets {
         self.density[lane] = chance / triangle.shape.area;
         (self.is_far[lane], self.is_delta[lane], self.is_triangle[lane]) = (0.0, 0.0, 1.0);
         self.two_sided[lane] = f64::from(u8::from(triangle.two_sided));
+    }
+
+    /// Sets what a lane aims at: a unit direction of this density (1/sr) to a light of that number; nothing where
+    /// the density is 0.
+    #[inline(always)]
+    pub(super) fn set_far(&mut self, lane: usize, light: u32, direction: DVec3, density: f64) {
+        self.id[lane] = [MISS; 2];
+        self.light[lane] = light;
+        put(&mut self.place[0], lane, direction);
+        put(&mut self.normal, lane, DVec3::ZERO);
+        self.density[lane] = if density > 0.0 { density } else { f64::INFINITY };
+        (self.is_far[lane], self.is_delta[lane], self.is_triangle[lane]) = (1.0, 0.0, 0.0);
     }
 
     /// Sets what a lane aims at; at nothing when there is no light.

@@ -172,6 +172,8 @@ pub(super) struct Workspace<R> {
     pub(super) open: Vec<u32>,
     /// Hits of last directions.
     pub(super) hits: HitBatch,
+    /// The placement that each path hit, or [`MISS`](etendue_geometry::MISS).
+    pub(super) placements: Vec<u32>,
     /// Boundaries of other bodies in the place of each hit; empty where bodies do not touch.
     pub(super) coincident: Vec<Coincident>,
     /// Paths that go on by the kind of surface that they met, in the order of [`KINDS`]; of them one after the

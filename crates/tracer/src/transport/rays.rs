@@ -70,6 +70,9 @@ pub(super) trait Rays: Debug + Default {
     /// The placement that it hit, or [`MISS`](etendue_geometry::MISS).
     fn placement(&self, i: usize) -> u32;
 
+    /// Refills `placements` with the same of all rays.
+    fn placements(&self, placements: &mut Vec<u32>);
+
     /// The placement's triangle that it hit.
     fn triangle(&self, i: usize) -> PlacedTriangle;
 
@@ -180,6 +183,12 @@ impl Rays for Blocks {
     fn placement(&self, i: usize) -> u32 {
         let (block, lane) = self.at(i);
         block.placement[lane]
+    }
+
+    fn placements(&self, placements: &mut Vec<u32>) {
+        placements.clear();
+        self.rays.blocks().iter().for_each(|block| placements.extend_from_slice(&block.placement));
+        placements.truncate(self.rays.len());
     }
 
     #[inline(always)]
@@ -321,6 +330,11 @@ impl Rays for Batch {
 
     fn placement(&self, i: usize) -> u32 {
         self.hits.placement[i]
+    }
+
+    fn placements(&self, placements: &mut Vec<u32>) {
+        placements.clear();
+        placements.extend_from_slice(&self.hits.placement[..self.rays.len()]);
     }
 
     fn triangle(&self, i: usize) -> PlacedTriangle {

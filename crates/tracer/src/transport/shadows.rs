@@ -233,7 +233,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         }
         let wanted = missed.iter().map(|&i| {
             let i = i as usize;
-            (ways[i].receiver(last.origin(i)), last.direction(i))
+            let receiver = (!ways[i].is_specular).then(|| ways[i].receiver(last.origin(i)));
+            (receiver, last.direction(i))
         });
         lights.environment(spectral, wanted, asked, radiance, |number, of_sky, light| {
             let i = missed[number] as usize;

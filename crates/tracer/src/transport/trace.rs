@@ -100,11 +100,12 @@ impl<const RGB: bool> Tracing<'_, RGB> {
 
     /// Finds the closest hit of each path, and takes what media absorb on the way.
     fn find_hits<R: Rays>(&mut self, workspace: &mut Workspace<R>, coherent: bool) {
-        let Workspace { now, coincident, .. } = workspace;
+        let Workspace { now, placements, coincident, .. } = workspace;
         if !self.times.is_empty() {
             now.rays.set_times(now.carried.ray.iter().map(|&ray| self.times[ray as usize]));
         }
         now.rays.closest(self.ctx, coherent);
+        now.rays.placements(placements);
         self.tally.rays += now.rays.len() as u64;
         if self.ctx.traits.has_media {
             self.absorb(now);
@@ -125,7 +126,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
 
     /// Adds the light that paths met by themselves, and lists those that go on.
     fn meet<R: Rays>(&mut self, step: &Step<'_>, workspace: &mut Workspace<R>, out: &mut [f64]) {
-        let Workspace { now, kinds, alive, missed, asked, radiance, .. } = workspace;
+        let Workspace { now, placements, kinds, alive, missed, asked, radiance, .. } = workspace;
         let LightingContext { lights, spectral, scene, .. } = self.ctx;
         let count = self.count();
         alive.clear();
@@ -134,10 +135,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let sky = lights.sky.as_ref();
         let Carried { ray, ways, throughput, .. } = &now.carried;
         let carried = |i: usize| &throughput[i * count..(i + 1) * count];
-        for i in 0..now.rays.len() {
-            let number = u32::try_from(i).unwrap_or(u32::MAX);
+        for ((number, i), &placement) in (0_u32..).zip(0..).zip(&*placements) {
             let bounces = now.bounces(step.number, i);
-            let Some(placed) = self.ctx.placed.get(now.rays.placement(i)) else {
+            let Some(placed) = self.ctx.placed.get(placement) else {
                 if sky.is_some_and(|sky| sky.visible || bounces > 0) {
                     missed.push(number);
                 }
@@ -171,10 +171,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let i = i as usize;
             // The camera's rays are not all traced: those that cannot hit anything are other ones in blocks.
             if step.number == 0 {
-                let origin = Receiver::open(step.camera.rays.origin(i));
-                return (origin, step.camera.rays.direction(i));
+                return (None, step.camera.rays.direction(i));
             }
-            (ways[i].receiver(now.from(i)), now.rays.direction(i))
+            let receiver = (!ways[i].is_specular).then(|| ways[i].receiver(now.from(i)));
+            (receiver, now.rays.direction(i))
         });
         lights.environment(spectral, wanted, asked, radiance, |number, of_sky, light| {
             let i = missed[number] as usize;
@@ -319,7 +319,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             patch.colors.resize(patch.count, Tint::BLACK);
             workspace.picked.clear();
             for (lane, i) in run.enumerate() {
-                let placed = self.ctx.placed.get(workspace.now.rays.placement(i));
+                let placed = self.ctx.placed.get(workspace.placements[i]);
                 let is_matte = |placed: &&PlacedSurface| placed.kind == SurfaceKind::Matte;
                 let Some(placed) = placed.filter(is_matte) else { continue };
                 if workspace.now.carried.ways[i].is_last {
@@ -375,7 +375,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         picked.clear();
         for (lane, (i, k)) in paths.enumerate() {
             let now = &workspace.now;
-            let Some(placed) = self.ctx.placed.get(now.rays.placement(i)) else { continue };
+            let Some(placed) = self.ctx.placed.get(workspace.placements[i]) else { continue };
             match kind {
                 SurfaceKind::Black => continue,
                 SurfaceKind::Matte => self.look_up_matte(step, now, patch, (i, lane), placed),
