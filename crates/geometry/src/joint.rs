@@ -233,6 +233,14 @@ impl Link {
         }
     }
 
+    /// Bytes of it and its keys.
+    pub(crate) fn heap_bytes(&self) -> usize {
+        let key = size_of::<f64>() + size_of::<[DVec4; 3]>();
+        let keys: usize = self.tracks().map(|track| track.keys.len() * key).sum();
+        let joint = if matches!(self, Self::Joint(_)) { size_of::<Joint>() } else { 0 };
+        size_of::<Self>() + joint + keys
+    }
+
     /// What moves it; nothing of a frame that stands still.
     pub fn tracks(&self) -> impl Iterator<Item = &Track> {
         let joint = match self {

@@ -10,6 +10,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Geometry, Motion, Placement, Transform};
 
 use crate::SceneError;
+use crate::doctor::memory::STEP_BYTES;
 use crate::file::SceneFile;
 use crate::import::{Deformer, NoSteps};
 use crate::memory::{Budget, TooMuch};
@@ -23,9 +24,6 @@ const NEAREST: f64 = 0.01;
 
 /// Of more placements than these the nearest one counts for all points.
 const MOST_PLACES: usize = 16;
-
-/// Bytes of the structure of a mesh a triangle and step: at most one and a half nodes with this leaf size, of six numbers of f32.
-const BOX_BYTES: u64 = 36;
 
 impl SceneFile {
     /// The geometry with the steps of what changes its shape while the camera's shutter is open.
@@ -47,7 +45,7 @@ impl SceneFile {
                 geometry.placements.iter().filter(|placement| placement.mesh == number).collect();
             let mesh = &mut all.meshes[number as usize];
             let eyes = Eyes::new(&places, mesh.bounds, camera);
-            let bytes = BOX_BYTES * mesh.triangles.len() as u64;
+            let bytes = STEP_BYTES * mesh.triangles.len() as u64;
             let mut count = 0_u32;
             let mut take = |step: u64| {
                 count += 1;
