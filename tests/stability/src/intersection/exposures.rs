@@ -191,7 +191,7 @@ fn lamps(scale: Scale) -> Result<Outcome> {
         let scene = |lamp: Value, samples: u32, seed: u32| {
             json!({
                 "etendue": 1, "tracer": { "type": "path" }, "lights": [],
-                "camera": { "type": "orthographic", "height": 0.02, "pose": { "from": [0, 3, 0], "look_at": [0, 0, 0], "up": [0, 0, 1] },
+                "camera": { "type": "orthographic", "height": 0.02, "pose": { "from": [-3, 2, 0], "look_at": [0, 0, 0] },
                             "sensor": { "resolution": [16, 16] }, "shutter": { "exposure": 1 } },
                 "materials": { "lamp": { "type": "emissive", "radiance": [1, 1, 1], "two_sided": true } },
                 "render": { "samples": samples, "seed": seed },
@@ -201,14 +201,14 @@ fn lamps(scale: Scale) -> Result<Outcome> {
         let lamp =
             json!({ "shape": "rectangle", "width": side, "height": side, "material": "lamp" });
         let mut moving = lamp.clone();
-        moving["transform"] = json!({ "translate": [1.2, 0.8, -0.5] });
+        moving["transform"] = json!({ "translate": [0.6, 0.6, -0.5] });
         moving["motion"] = json!({ "type": "velocity", "velocity": [0, 0, 1], "angular_velocity": [0, degrees, 0] });
         let moving = Pixels::read(&scene(moving, samples, 0).to_string())?;
         let (mut mean, mut squares) = (0.0, 0.0);
         for k in 0..MOMENTS {
             let time = (f64::from(k) + 0.5) / f64::from(MOMENTS);
             let mut still = lamp.clone();
-            still["transform"] = json!({ "translate": [1.2, 0.8, -0.5 + time], "rotate": [0, 1, 0, degrees * time] });
+            still["transform"] = json!({ "translate": [0.6, 0.6, -0.5 + time], "rotate": [0, 1, 0, degrees * time] });
             let still = Pixels::read(&scene(still, samples / MOMENTS, k + 1).to_string())?;
             mean += still.mean() / f64::from(MOMENTS);
             squares += (still.standard_error() / f64::from(MOMENTS)).powi(2);
