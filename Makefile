@@ -6,8 +6,8 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens lens-waves bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-aspheres bench-bands bench-gaps bench-decisions bench-window docs-figures docs-charts \
-	docs-stability generated gallery spectra light-fields fingerprints fuzz fuzz-smoke fuzz-seeds sanitize clean
+.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens lens-waves bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-aspheres bench-bands bench-time bench-gaps bench-decisions bench-window docs-figures docs-charts \
+	docs-stability docs-time generated gallery spectra light-fields fingerprints fuzz fuzz-smoke fuzz-seeds sanitize clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
@@ -35,12 +35,14 @@ help:
 	@echo "make bench-masks   what a ray through a mask of small openings costs; writes a part of docs/cameras.md"
 	@echo "make bench-aspheres  what setting a camera up behind steep aspheres takes; writes a part of docs/limits.md"
 	@echo "make bench-bands   what bands cost beside RGB, and a lens that disperses; writes parts of docs/spectra.md, cameras.md"
+	@echo "make bench-time    what shutters, moving cameras, copies and shapes cost; writes a part of docs/time.md"
 	@echo "make bench-gaps    what finding the thinnest gap of a million triangles takes; writes a part of docs/light.md"
 	@echo "make bench-window  how soon and how often the window shows pictures; writes a part of docs/window.md"
 	@echo "make bench-decisions  what decisions of the plan save, each against the fuller model"
 	@echo "make generated     schemas, tables of keys and the page of the command line, as the program writes them"
 	@echo "make gallery       render the pictures of docs/gallery.md, and write there what they took"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
+	@echo "make docs-time     render the pictures of docs/time.md anew"
 	@echo "make spectra       the pictures of docs/spectra.md, and what they lose by colours of three numbers"
 	@echo "make light-fields  the walk of docs/light-fields.md in a venv, its pictures, and another decoder's opinion"
 	@echo "make docs-charts   measure docs/speed-and-accuracy.md anew, with its charts"
@@ -160,6 +162,10 @@ bench-bands: setup
 	cargo build --release -p etendue-cli
 	python3 benches/bands.py $(ARGS)
 
+bench-time: setup
+	cargo build --release -p etendue-cli
+	python3 benches/motion.py $(ARGS)
+
 bench-gaps: setup
 	cargo build --release -p etendue-cli -p etendue-benches
 	python3 benches/gap_probes.py $(ARGS)
@@ -186,10 +192,19 @@ docs-figures: setup docs-charts docs-stability light-fields gallery spectra
 	install -D -m 644 out/docs-figures/sampling/raw.preview.png docs/images/sampling/sensor-noise.png
 	install -D -m 644 out/docs-figures/sampling/sample_count.preview.png docs/images/sampling/sensor-noise-map.png
 	cargo run --release -p etendue-sensor --example approximation -- docs/images/normal-approximation.svg
-	for scene in moving rolling; do \
-		cargo run --release -p etendue-cli -- render scenes/time/$$scene.json -o out/docs-figures/time \
-			--samples 256 --outputs png && \
+	$(MAKE) docs-time
+
+# The pictures of docs/time.md; COMMAND names another build than the release one.
+COMMAND ?= cargo run --release -p etendue-cli --
+docs-time:
+	for scene in moving rolling flicker serial pose; do \
+		$(COMMAND) render scenes/time/$$scene.json -o out/docs-figures/time --samples 256 --outputs png && \
 		install -D -m 644 out/docs-figures/time/picture.png docs/images/time/$$scene.png || exit 1; \
+	done
+	for moment in 0.001 0.049 0.0966; do \
+		$(COMMAND) render scenes/time/pose.json -o out/docs-figures/time --samples 256 --outputs png \
+			--set camera.shutter=null --set render.time=$$moment && \
+		install -D -m 644 out/docs-figures/time/picture.png docs/images/time/pose-$$moment.png || exit 1; \
 	done
 
 # What the program writes into the repository, which the tests hold against it: schema/, docs/keys.md,

@@ -301,7 +301,7 @@ impl Boxes {
 }
 
 /// A ray prepared for box tests.
-struct Slabs {
+pub(crate) struct Slabs {
     origin: DVec3,
     inverse: DVec3,
     pad: DVec3,
@@ -309,7 +309,7 @@ struct Slabs {
 }
 
 impl Slabs {
-    fn new(ray: &LocalRay, t_min: f64) -> Self {
+    pub(crate) fn new(ray: &LocalRay, t_min: f64) -> Self {
         // Small enough to move no point of a box by a rounding, and its reciprocal times any
         // coordinate of a frame is finite.
         let least = 1e-150 * ray.direction.abs().max_element();
@@ -323,7 +323,7 @@ impl Slabs {
     /// The distance at which the ray enters the widened box; `None` when it misses it, or only
     /// meets it outside `t_min..=t_max`.
     #[inline]
-    fn enter(&self, bounds: Bounds, t_max: f64) -> Option<f64> {
+    pub(crate) fn enter(&self, bounds: Bounds, t_max: f64) -> Option<f64> {
         let a = (bounds.min - self.pad - self.origin) * self.inverse;
         let b = (bounds.max + self.pad - self.origin) * self.inverse;
         let near = a.min(b).max_element().max(self.t_min);

@@ -16,6 +16,7 @@
 mod bvh;
 #[cfg(feature = "embree")]
 mod checked;
+mod deforming;
 #[cfg(feature = "embree")]
 mod embree;
 mod exact;

@@ -2,8 +2,8 @@
 //! which a ray is carried at its time in f64.
 //!
 //! What stands still is in one structure of the backend, which is as it would be without the others. The
-//! mesh of each moving placement has a structure in the mesh's frame, shared by all that place it. A ray
-//! asks it when it meets the box that the body sweeps while the shutter is open. All backends agree, and
+//! mesh of each moving placement has a structure in the mesh's frame, shared by all that place it: the backend's, or, of a
+//! mesh that changes its shape, [one of its own](crate::deforming). A ray asks it when it meets the box that the body sweeps while the shutter is open. All backends agree, and
 //! hits are as exact as those of a body that stands at the place where it is at the ray's time.
 
 use std::borrow::Cow;
@@ -17,6 +17,7 @@ use etendue_geometry::{
     Positions, RayBatch, Transform, Vertices,
 };
 
+use crate::deforming::Deforming;
 use crate::{Accel, BuildError, BuildOptions, BuildReport, Counts};
 
 /// Builds a structure of one backend.
@@ -60,6 +61,8 @@ struct Body {
     motion: Arc<Motion>,
     /// Where it is while the shutter is open (m, world).
     swept: Bounds,
+    /// Its mesh changes its shape, so that its structure wants times.
+    deforms: bool,
 }
 
 /// Rays of a body, in its frame.
@@ -97,22 +100,29 @@ impl Moving {
             moves[i] = true;
             let placement = &geometry.placements[i];
             let mesh = geometry.mesh_of(placement);
-            let bounds = mesh.bounds;
+            let bounds = mesh.bounds_at_all_times();
             if bounds.is_empty() {
                 continue;
             }
             let shape = match of_mesh[placement.mesh as usize] {
                 Some(shape) => shape,
                 None => {
-                    let alone = Geometry::alone(mesh.clone(), Transform::IDENTITY);
-                    shapes.push(build(Arc::new(alone), options)?);
+                    shapes.push(match &mesh.steps {
+                        Some(steps) => Box::new(Deforming::build(mesh, steps, options)?),
+                        None => {
+                            let alone = Geometry::alone(mesh.clone(), Transform::IDENTITY);
+                            build(Arc::new(alone), options)?
+                        }
+                    });
                     shapes.len() - 1
                 }
             };
             of_mesh[placement.mesh as usize] = Some(shape);
+            let deforms = mesh.steps.is_some();
             let swept = motion.swept(bounds, options.exposure);
             let placement = u32::try_from(i).unwrap_or(MISS);
-            bodies.push(Body { placement, shape, motion: Arc::clone(motion), swept });
+            let motion = Arc::clone(motion);
+            bodies.push(Body { placement, shape, motion, swept, deforms });
         }
         let still = build(Arc::new(still), options)?;
         let mut report = still.report();
@@ -187,6 +197,10 @@ impl Moving {
                 }
             }
             carried.from.push((i, stretch, place.normal_matrix()));
+        }
+        if body.deforms {
+            let times = carried.from.iter().map(|(i, ..)| rays.time(*i));
+            carried.rays.set_times(times);
         }
     }
 }

@@ -4,6 +4,8 @@
 
 #[path = "contract/accuracy.rs"]
 mod accuracy;
+#[path = "contract/deforming.rs"]
+mod deforming;
 #[path = "contract/degenerate.rs"]
 mod degenerate;
 #[path = "contract/meshes.rs"]

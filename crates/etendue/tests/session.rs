@@ -7,6 +7,8 @@ mod checkpoints;
 mod frame_noise;
 #[path = "session/glasses.rs"]
 mod glasses;
+#[path = "session/moving.rs"]
+mod moving;
 #[path = "session/outputs.rs"]
 mod outputs;
 #[path = "session/spectra.rs"]

@@ -76,8 +76,9 @@ impl Track {
         (after - 1, Some((after, (time - from) / (to - from))))
     }
 
-    /// The value of straight lines and cubics at a time (s).
-    fn at(&self, time: f64) -> DVec4 {
+    /// The value at a time (s), of quaternions of any length.
+    #[must_use]
+    pub fn at(&self, time: f64) -> DVec4 {
         let (i, Some((k, s))) = self.segment(time) else {
             return self.keys[self.segment(time).0][1];
         };
@@ -172,7 +173,9 @@ impl Track {
         self.ways(times).map(of_way).fold(0.0, f64::max)
     }
 
-    fn moves_within(&self, times: [f64; 2]) -> bool {
+    /// Whether the value changes between some times (s).
+    #[must_use]
+    pub fn moves_within(&self, times: [f64; 2]) -> bool {
         self.ways(times).any(|i| {
             let ([a, b, c, d], _) = self.hull(i);
             match self.between {
@@ -222,24 +225,40 @@ impl Joint {
 
 impl Link {
     /// From the frame to its parent's at a time (s).
-    pub(crate) fn at(&self, time: f64) -> Transform {
+    #[must_use]
+    pub fn at(&self, time: f64) -> Transform {
         match self {
             Self::Fixed(transform) => *transform,
             Self::Joint(joint) => joint.at(time),
         }
     }
 
-    /// The times of its keys (s).
-    pub(crate) fn times(&self) -> impl Iterator<Item = f64> {
+    /// Bytes of it and its keys.
+    pub(crate) fn heap_bytes(&self) -> usize {
+        let key = size_of::<f64>() + size_of::<[DVec4; 3]>();
+        let keys: usize = self.tracks().map(|track| track.keys.len() * key).sum();
+        let joint = if matches!(self, Self::Joint(_)) { size_of::<Joint>() } else { 0 };
+        size_of::<Self>() + joint + keys
+    }
+
+    /// What moves it; nothing of a frame that stands still.
+    pub fn tracks(&self) -> impl Iterator<Item = &Track> {
         let joint = match self {
             Self::Fixed(_) => None,
             Self::Joint(joint) => Some(joint),
         };
-        let tracks = joint.into_iter().flat_map(|joint| joint.tracks());
+        joint.into_iter().flat_map(|joint| joint.tracks())
+    }
+
+    /// The times of its keys (s).
+    pub(crate) fn times(&self) -> impl Iterator<Item = f64> {
+        let tracks = self.tracks();
         tracks.filter(|track| track.times.len() > 1).flat_map(|track| track.times.iter().copied())
     }
 
-    pub(crate) fn moves_within(&self, times: [f64; 2]) -> bool {
+    /// Whether it moves between some times (s).
+    #[must_use]
+    pub fn moves_within(&self, times: [f64; 2]) -> bool {
         match self {
             Self::Fixed(_) => false,
             Self::Joint(joint) => joint.tracks().iter().any(|track| track.moves_within(times)),

@@ -20,6 +20,7 @@
 //! | [`hermite`] | the curve through points at uneven times |
 //! | [`joint`] | frames that move in each other |
 //! | [`motion`] | where a body is at each time of an exposure |
+//! | [`steps`] | which shape a mesh has at each time of an exposure |
 //! | [`transform`] | affine maps whose translation keeps 106 bits |
 //! | [`units`] | lengths, angles and times with their units, as files write them |
 //! | [`world`] | meshes and their placements, axis-aligned boxes, and which triangles have an area |
@@ -32,6 +33,7 @@ pub mod hermite;
 pub mod joint;
 pub mod mesh;
 pub mod motion;
+pub mod steps;
 pub mod transform;
 pub mod units;
 pub mod world;
@@ -43,6 +45,7 @@ pub use hermite::Interpolation;
 pub use joint::{Between, Joint, Link, Track};
 pub use mesh::{Buffer, Mesh, Positions, Vertices};
 pub use motion::{Motion, MotionError, Steady};
+pub use steps::{Moment, Steps, StepsError};
 pub use transform::Transform;
 pub use world::{AreaTest, Bounds, Geometry, Placement, is_degenerate};
 

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use bytemuck::AnyBitPattern;
 use glam::DVec3;
 
-use crate::{Bounds, is_degenerate};
+use crate::{Bounds, Steps, is_degenerate};
 use etendue_files::MappedFile;
 
 /// `N` f32 values a vertex, possibly interleaved with others.
@@ -149,6 +149,8 @@ pub struct Mesh {
     pub bounds: Bounds,
     /// How many triangles are points or lines ([`is_degenerate`]): accelerators leave them out.
     pub degenerate: u64,
+    /// Its shapes while the shutter is open; `None` where it has one, that of `positions`.
+    pub steps: Option<Arc<Steps>>,
 }
 
 impl Mesh {
@@ -177,6 +179,7 @@ impl Mesh {
             colors: None,
             bounds,
             degenerate,
+            steps: None,
         }
     }
 
@@ -224,7 +227,12 @@ impl Mesh {
                 false
             }
         };
-        positions && self.triangles.is_same(&other.triangles)
+        let steps = match (&self.steps, &other.steps) {
+            (Some(own), Some(other)) => Arc::ptr_eq(own, other),
+            (None, None) => true,
+            (Some(_), None) | (None, Some(_)) => false,
+        };
+        positions && steps && self.triangles.is_same(&other.triangles)
     }
 
     /// Whether all values are those of `other`, in the same place in memory.
@@ -274,6 +282,21 @@ impl Mesh {
         self.triangles[i].map(|corner| self.positions.get(corner as usize))
     }
 
+    /// The corners of triangle `i` (m), in the mesh's frame, at `time` (s from the frame's time).
+    #[must_use]
+    #[inline]
+    pub fn corners_at(&self, i: usize, time: f64) -> [DVec3; 3] {
+        let Some(steps) = &self.steps else { return self.corners(i) };
+        let moment = steps.moment(time);
+        self.triangles[i].map(|corner| steps.corner(moment, corner as usize))
+    }
+
+    /// The box around all triangles that have an area (m), in the mesh's frame, at all times.
+    #[must_use]
+    pub fn bounds_at_all_times(&self) -> Bounds {
+        self.steps.as_ref().map_or(self.bounds, |steps| steps.bounds().union(self.bounds))
+    }
+
     /// Bytes of vertices and indices that are in no mapped file.
     #[must_use]
     pub fn heap_bytes(&self) -> usize {
@@ -284,7 +307,8 @@ impl Mesh {
         let normals = self.normals.as_ref().map_or(0, |normals| normals.floats().heap_bytes());
         let colors = self.colors.as_ref().map_or(0, |colors| colors.floats().heap_bytes());
         let uvs: usize = self.uvs.iter().map(|uvs| uvs.floats().heap_bytes()).sum();
-        positions + self.triangles.heap_bytes() + normals + uvs + colors
+        let steps = self.steps.as_ref().map_or(0, |steps| steps.heap_bytes());
+        positions + self.triangles.heap_bytes() + normals + uvs + colors + steps
     }
 }
 

@@ -220,6 +220,13 @@ impl Motion {
                 || self.links.iter().any(|link| link.moves_within([open, close])))
     }
 
+    /// Bytes of its keys and of the frames that it hangs on, beside the motion itself.
+    #[must_use]
+    pub fn heap_bytes(&self) -> usize {
+        let links: usize = self.links.iter().map(Link::heap_bytes).sum();
+        size_of_val(&self.keys[..]) + links
+    }
+
     /// A bound of the factor by which any length is stretched at any time.
     #[must_use]
     pub fn stretch(&self) -> f64 {

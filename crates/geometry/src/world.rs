@@ -26,7 +26,8 @@ pub struct Placement {
     pub material: u32,
     /// From the mesh's frame to the world (m), at the frame's time.
     pub world_from_mesh: Transform,
-    /// The same at other times; `None` for what stands still.
+    /// The same at other times; `None` for what stands still. A mesh that changes its shape has one where it is placed,
+    /// also where that goes nowhere.
     pub motion: Option<Arc<Motion>>,
 }
 
@@ -102,18 +103,21 @@ impl Geometry {
         &self.meshes[placement.mesh as usize]
     }
 
-    /// Whether any placement has a motion.
+    /// Whether any placement has a motion, as all have whose mesh changes its shape.
     #[must_use]
     pub fn moves(&self) -> bool {
         self.placements.iter().any(|placement| placement.motion.is_some())
     }
 
     /// The placements that move between the times of `exposure` (s from the frame's time, first and last), by their
-    /// numbers.
+    /// numbers: those that are carried and those whose mesh changes its shape.
     pub fn moving_within(&self, exposure: [f64; 2]) -> impl Iterator<Item = (usize, &Arc<Motion>)> {
         let all = self.placements.iter().enumerate();
         let motions = all.filter_map(|(i, placement)| Some((i, placement.motion.as_ref()?)));
-        motions.filter(move |(_, motion)| motion.moves_within(exposure))
+        motions.filter(move |(i, motion)| {
+            let deforms = || self.mesh_of(&self.placements[*i]).steps.is_some();
+            exposure[0] < exposure[1] && (motion.moves_within(exposure) || deforms())
+        })
     }
 
     /// How often each mesh is placed.

@@ -14,6 +14,12 @@ use etendue_tracer::layer::{FrameStep, OtherFrame, Seen, Sight};
 /// interpolated and its ray aimed with roundings of 10⁻¹⁵, which grazing surfaces stretch.
 const SAME_DEPTH: f64 = 1e-9;
 
+/// Looks for the row of a moving point; what moves by less than a row while one is read needs a few.
+const STEPS: usize = 60;
+
+/// Moments (s) that differ by less are one.
+const SAME_MOMENT: f64 = 1e-12;
+
 /// Another frame that layers are compared with.
 #[derive(Debug, Clone)]
 pub struct FollowedFrame<'a> {
@@ -39,7 +45,8 @@ impl<'a> FollowedFrame<'a> {
     #[must_use]
     pub fn new(step: FrameStep, scene: &Scene, other: &'a Scene, accel: &'a dyn Accel) -> Self {
         let (from, geometry) = (&*scene.geometry, &*other.geometry);
-        let motions = (!from.has_surfaces_of(geometry)).then(|| {
+        let moves = from.moves() || geometry.moves();
+        let motions = (moves || !from.has_surfaces_of(geometry)).then(|| {
             let there: HashMap<Name, u32> =
                 (0..).zip(names(geometry)).map(|(i, n)| (n, i)).collect();
             let of = |(name, placement)| match there.get(&name) {
@@ -62,8 +69,8 @@ impl<'a> FollowedFrame<'a> {
         self.motions.as_ref().map_or((Motion::Still, number), |motions| motions[number as usize])
     }
 
-    /// From the other camera to the point of hit `i` (m).
-    fn offset(&self, seen: &Seen<'_>, i: usize) -> Option<DVec3> {
+    /// From the other camera, in its frame's pose, to the point of hit `i` (m) at `time` (s from the other frame's time).
+    fn offset(&self, seen: &Seen<'_>, i: usize, time: f64) -> Option<DVec3> {
         let (traced, origin) = (seen.traced, self.camera.pose().position);
         let number = traced.hits.placement[i];
         if number == MISS {
@@ -78,15 +85,33 @@ impl<'a> FollowedFrame<'a> {
             }
             Motion::Moved => {
                 let placement = &self.geometry.placements[number as usize];
-                let corners =
-                    self.geometry.mesh_of(placement).corners(traced.hits.triangle[i] as usize);
+                let mesh = self.geometry.mesh_of(placement);
+                let corners = mesh.corners_at(traced.hits.triangle[i] as usize, time);
                 let (u, v) = (traced.hits.u[i], traced.hits.v[i]);
                 let local =
                     corners[0] + u * (corners[1] - corners[0]) + v * (corners[2] - corners[0]);
-                Some(placement.world_from_mesh.point_from(local, origin))
+                Some(placement.world_from_mesh_at(time).point_from(local, origin))
             }
             Motion::Gone => None,
         }
+    }
+
+    /// The place in the other picture where the point of hit `i` arrives: the row says when it is seen, and that where
+    /// it is.
+    fn place(&self, seen: &Seen<'_>, i: usize) -> Option<[f64; 2]> {
+        let [_, rows] = self.camera.resolution().map(f64::from);
+        let mut time = self.camera.truth_time(0.5 * rows);
+        let mut place = None;
+        for _ in 0..STEPS {
+            let found = self.camera.place_of(self.offset(seen, i, time)?)?;
+            place = Some(found);
+            let then = self.camera.truth_time(found[1]);
+            if (then - time).abs() < SAME_MOMENT {
+                break;
+            }
+            time = then;
+        }
+        place
     }
 
     fn is_in_picture(&self, [column, row]: [f64; 2]) -> bool {
@@ -135,7 +160,8 @@ fn motion(from: &Geometry, placement: &Placement, to: &Geometry, number: u32) ->
     if !is_same_mesh && mesh.triangles[..] != mesh_there.triangles[..] {
         return Motion::Gone;
     }
-    match is_same_mesh && placement.world_from_mesh == there.world_from_mesh {
+    let moves = placement.motion.is_some() || there.motion.is_some();
+    match is_same_mesh && !moves && placement.world_from_mesh == there.world_from_mesh {
         true => Motion::Still,
         false => Motion::Moved,
     }
@@ -149,7 +175,7 @@ impl OtherFrame for FollowedFrame<'_> {
     fn follow(&self, seen: &Seen<'_>, places: &mut Vec<Option<[f64; 2]>>) {
         places.clear();
         let rays = 0..seen.traced.rays.len();
-        places.extend(rays.map(|i| self.camera.place_of(self.offset(seen, i)?)));
+        places.extend(rays.map(|i| self.place(seen, i)));
     }
 
     fn look_for(&self, seen: &Seen<'_>, sights: &mut Vec<Sight>) {
@@ -168,7 +194,7 @@ impl OtherFrame for FollowedFrame<'_> {
         self.camera.rays_through(&at(0), &at(1), &mut rays);
         self.accel.closest(&rays, &mut hits);
         for (ray, &i) in asked.iter().enumerate() {
-            let Some(offset) = self.offset(seen, i) else { continue };
+            let Some(offset) = self.offset(seen, i, rays.time(ray)) else { continue };
             let start = rays.origin(ray) - self.camera.pose().position;
             let distance = (offset - start).dot(rays.direction(ray));
             let (_, number) = self.motion(seen.traced.hits.placement[i]);

@@ -1,6 +1,7 @@
 //! From a scene file to a scene: each model once, in parallel, then put together.
 
 pub(crate) mod camera;
+mod deforming;
 mod objects;
 mod shutter;
 
@@ -92,7 +93,7 @@ impl SceneFile {
         if self.spec.picture() == Some(LayerSpec::Radiance) && lights.is_none() {
             parts.studio_if_dark = !parts.light_by_default();
         }
-        let scene = self.finish(parts, &folder, options, kept, since)?;
+        let scene = self.finish(parts, &folder, options, (&budget, kept), since)?;
         kept.sweep();
         Ok(scene)
     }
@@ -245,11 +246,12 @@ impl SceneFile {
         parts: Parts,
         folder: &InputFolder,
         options: &LoadOptions<'_>,
-        kept: &Cache,
+        (budget, kept): (&Budget, &Cache),
         since: SystemTime,
     ) -> Result<Scene, SceneError> {
         let built = self.kept_camera(parts.geometry, &parts.cameras, (folder, options), kept)?;
         let KeptCamera { geometry, camera, origin: camera_origin, files: camera_files, .. } = built;
+        let geometry = self.deformed(geometry, &parts.deformers, &camera, budget)?;
         let things_move = geometry.moving_within(camera.exposure_span()).next().is_some();
         let camera = camera.among_moving_things(things_move);
         let mut emission = parts.materials.iter().filter_map(|material| material.emission.as_ref());
@@ -282,7 +284,7 @@ impl SceneFile {
         notes.extend(self.lens_notes(&camera, options.strictness)?);
         let is_whole = self.spec.serial.is_empty();
         notes.extend(shutter::notes(&camera).into_iter().filter(|_| is_whole));
-        notes.extend(shutter::held(&camera, &geometry));
+        notes.extend(shutter::held(&camera, &geometry, &parts.deformers));
         notes.extend(shutter::dark_lights(&camera, &parts.lights, &parts.materials));
         Ok(Scene {
             path: self.path().to_owned(),

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use crate::error::not_found;
 use crate::file::{InstancesSpec, TransformSpec, join, join_index};
 use crate::identity::Register;
-use crate::import::{self, Import, ImportedPlacement, Note, NoteKind};
+use crate::import::{self, Deformer, Import, ImportedPlacement, Note, NoteKind};
 use crate::load::camera::SceneCamera;
 use crate::memory::has_room;
 use crate::scene::LoadStats;
@@ -49,6 +49,8 @@ struct Home {
 #[derive(Default)]
 pub(crate) struct Parts {
     pub(crate) geometry: Geometry,
+    /// How meshes change their shapes, by their indices.
+    pub(crate) deformers: BTreeMap<u32, Arc<Deformer>>,
     pub(crate) register: Register,
     pub(crate) materials: Vec<Material>,
     pub(crate) textures: Vec<Texture>,
@@ -90,6 +92,9 @@ impl Parts {
             meshes: self.geometry.meshes.len(),
             materials: self.materials.len(),
         });
+        let first_mesh = u32::try_from(self.geometry.meshes.len()).unwrap_or(u32::MAX);
+        let deformers = import.deformers.into_iter();
+        self.deformers.extend(deformers.map(|(mesh, it)| (first_mesh.saturating_add(mesh), it)));
         self.geometry.meshes.extend(import.meshes);
         let first_texture = u32::try_from(self.textures.len()).unwrap_or(u32::MAX);
         self.materials.extend(import.materials.into_iter().map(|mut material| {

@@ -77,7 +77,7 @@ impl SurfacePoint<'_> {
         let Footprint { direction, width } = self.footprint?;
         let uvs = self.mesh.uvs.get(set)?;
         let linear = &self.linear();
-        let [p0, p1, p2] = self.mesh.corners(self.triangle);
+        let [p0, p1, p2] = self.mesh.corners_at(self.triangle, self.time);
         let (e1, e2) = (*linear * (p1 - p0), *linear * (p2 - p0));
         let cross = e1.cross(e2);
         let squared = cross.length_squared();

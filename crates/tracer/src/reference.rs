@@ -439,7 +439,7 @@ impl<'a> SurfacePoint<'a> {
     /// [`Self::shading_normal`] with the placement's matrix for normals, or none where it turns
     /// nothing; of a placement that moves its own is taken, at its time.
     pub(crate) fn turned_normal(&self, turn: Option<&DMat3>, geometric: DVec3) -> Option<DVec3> {
-        let local = DVec3::from(self.mix(self.mesh.normals.as_ref()?));
+        let local = self.local_normal()?;
         let world = match &self.placement.motion {
             None => turn.map_or(local, |turn| *turn * local),
             Some(motion) => motion.at(self.time).normal_matrix() * local,
@@ -449,13 +449,24 @@ impl<'a> SurfacePoint<'a> {
         Some(if world.dot(geometric) < 0.0 { -world } else { world })
     }
 
+    /// The mesh's own normal in its frame, of any length, at the time.
+    fn local_normal(&self) -> Option<DVec3> {
+        let Some(steps) = &self.mesh.steps else {
+            return Some(DVec3::from(self.mix(self.mesh.normals.as_ref()?)));
+        };
+        let moment = steps.moment(self.time);
+        let [a, b, c] = self.mesh.triangles[self.triangle];
+        let [a, b, c] = [a, b, c].map(|corner| steps.normal(moment, corner as usize));
+        Some(a? * self.weights[0] + b? * self.weights[1] + c? * self.weights[2])
+    }
+
     /// How the world's places change along the texture coordinates of a set: the directions of
     /// growing u and of growing v. `None` where they do not tell.
     #[must_use]
     pub fn texture_axes(&self, set: usize) -> Option<[DVec3; 2]> {
         let uvs = self.mesh.uvs.get(set)?;
         let linear = &self.linear();
-        let [p0, p1, p2] = self.mesh.corners(self.triangle);
+        let [p0, p1, p2] = self.mesh.corners_at(self.triangle, self.time);
         let (e1, e2) = (*linear * (p1 - p0), *linear * (p2 - p0));
         let [a, b, c] =
             self.mesh.triangles[self.triangle].map(|k| uvs.get(k as usize).map(f64::from));

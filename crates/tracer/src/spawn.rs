@@ -73,7 +73,8 @@ impl Anchor {
 #[must_use]
 pub fn magnitudes(placement: &Placement, mesh: &Mesh) -> DVec3 {
     let place = &placement.world_from_mesh;
-    let corner = mesh.bounds.min.abs().max(mesh.bounds.max.abs());
+    let bounds = mesh.bounds_at_all_times();
+    let corner = bounds.min.abs().max(bounds.max.abs());
     if let Some(motion) = &placement.motion {
         return DVec3::splat(2.0 * motion.stretch() * corner.length());
     }

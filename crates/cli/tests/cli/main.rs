@@ -7,6 +7,7 @@ mod bad_light; // materials, textures and lights that make no sense
 mod bench; // speed against accuracy on a tiny scene
 mod cubes; // surfaces and lamps by wavelength, from files of every form
 mod cubes_around; // light by wavelength from all around
+mod deforming; // skins and morph targets while the shutter is open
 mod denoise; // pictures without their noise, where Open Image Denoise is there
 mod emva; // the characterisation of what the command writes
 mod expose; // pictures from elsewhere on a sensor

@@ -17,6 +17,10 @@ const EMBREE_PER_TRIANGLE: u64 = 92;
 /// copies of one object; `benches/memory.py`, with `--accel bvh`, too.
 const PER_COPY: u64 = 1000;
 
+/// Bytes of a placement that moves while the shutter is open, beside what placements have: its motion, twice for the scene
+/// and while it is loaded, and what the structure keeps of it. Counted of the types; its keys and links come on top of it.
+const PER_MOVING: u64 = 500;
+
 /// Bytes of the program itself with its libraries and the threads' working memory: 24 to 31 MiB are the
 /// peak of renders of a few pixels.
 const PROGRAM: u64 = 26 << 20;
@@ -39,6 +43,8 @@ pub struct MemoryForecast {
     pub structure: u64,
     /// Placements of meshes that are placed more than once, in the scene and in the structure.
     pub copies: u64,
+    /// Placements that move while the shutter is open, and the boxes of meshes that change their shapes then.
+    pub moving: u64,
     /// Images of materials and of the environment, decoded.
     pub images: u64,
     /// The planes of the picture and its layers, spectral bands included.
@@ -63,18 +69,28 @@ impl MemoryForecast {
         let structure =
             structure(scene.geometry.triangles_unique()) + Coplanar::bytes_at_most(&scene.geometry);
         let copies = copies(scene.placed_copies());
+        let moving = moving(scene);
         let film = film(scene.camera.resolution(), &scene.layers);
         let mapped = scene.stats.bytes_mapped;
         let is_measured = scene.camera.lens().is_some() && scene.camera.light_field().is_none();
         let program = PROGRAM + if is_measured { LENS } else { 0 };
-        Self { program, geometry, mapped, structure, copies, film, ..Self::default() }.summed()
+        let forecast =
+            Self { program, geometry, mapped, structure, copies, moving, film, ..Self::default() };
+        forecast.summed()
     }
 
     /// With the total of its parts.
     #[must_use]
     pub fn summed(mut self) -> Self {
-        let lasting =
-            [self.program, self.geometry, self.structure, self.copies, self.images, self.film];
+        let lasting = [
+            self.program,
+            self.geometry,
+            self.structure,
+            self.copies,
+            self.moving,
+            self.images,
+            self.film,
+        ];
         let passing = self.sums.max(self.sensor).saturating_add(self.files).max(self.views);
         self.total = lasting.into_iter().fold(passing, u64::saturating_add);
         self
@@ -100,6 +116,25 @@ pub(crate) fn copies(placements: u64) -> u64 {
     }
 }
 
+/// Bytes of what moves while the shutter is open, beside the steps of shapes, which are geometry.
+fn moving(scene: &Scene) -> u64 {
+    let span = scene.camera.exposure_span();
+    let motions: u64 = scene
+        .geometry
+        .moving_within(span)
+        .map(|(_, motion)| PER_MOVING + motion.heap_bytes() as u64)
+        .sum();
+    let boxes = scene.geometry.meshes.iter().filter_map(|mesh| {
+        let steps = mesh.steps.as_ref()?.times().len() as u64;
+        Some(steps.saturating_mul(STEP_BYTES.saturating_mul(mesh.triangles.len() as u64)))
+    });
+    motions.saturating_add(boxes.sum())
+}
+
+/// Bytes a triangle and step of the structure of a mesh that changes its shape: at most one and a half nodes of six numbers of
+/// f32.
+pub(crate) const STEP_BYTES: u64 = 36;
+
 /// The least that `layers` of a picture of so many columns and rows take (bytes): planes of f32.
 pub(crate) fn film([width, height]: [u32; 2], layers: &[LayerSpec]) -> u64 {
     let pixels = u64::from(width) * u64::from(height);
@@ -115,6 +150,7 @@ impl MemoryForecast {
             ("geometry", self.geometry),
             ("structure", self.structure),
             ("copies", self.copies),
+            ("motion", self.moving),
             ("images", self.images),
             ("layers", self.film),
             ("sums of passes", self.sums),

@@ -78,6 +78,7 @@ pub(super) fn admit(
         triangles,
         bounds,
         degenerate,
+        steps: None,
     };
     Ok(Admitted { mesh, dropped: survey.broken, notes: gate.notes })
 }

@@ -13,6 +13,7 @@
 //! Whether f32 is enough for coordinates that a file gives in more digits.
 
 mod admit;
+mod deformer;
 mod error;
 mod files;
 mod gltf;
@@ -21,6 +22,7 @@ mod ply;
 mod polygon;
 mod text;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -34,6 +36,8 @@ use etendue_tracer::{Light, LightKind, Material, Texture};
 use files::Files;
 
 pub(crate) use admit::count_degenerate;
+pub use deformer::Deformer;
+pub(crate) use deformer::NoSteps;
 pub use error::{ImportError, Note, NoteKind};
 
 /// What the render will look at; the rest of the file is left alone.
@@ -116,6 +120,9 @@ pub struct Play {
 pub struct Import {
     /// Each mesh (a glTF primitive, an OBJ group of one material) once.
     pub meshes: Vec<Mesh>,
+    /// How some of them, by their indices, change their shapes from the moment that is shown on; nothing where no
+    /// animation plays.
+    pub deformers: BTreeMap<u32, Arc<Deformer>>,
     /// Where they stand.
     pub placements: Vec<ImportedPlacement>,
     /// The materials that placements name.

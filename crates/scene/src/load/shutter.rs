@@ -1,11 +1,12 @@
 //! When a scene's picture is taken: the frame's time, the shutter, and the camera's motion in the frame's clock.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::SceneError;
 use crate::file::{ImuSpec, ObjectMotionSpec, ObjectSpec, SceneFile, join_index};
 use crate::frames::Frame;
-use crate::import::{Note, NoteKind};
+use crate::import::{Deformer, Note, NoteKind};
 use etendue_camera::{Camera, CameraMotionSpec, CameraSpec, ShutterKind};
 use etendue_geometry::Geometry;
 use etendue_geometry::units::Seconds;
@@ -170,18 +171,24 @@ pub(crate) fn notes(camera: &Camera) -> Vec<Note> {
 }
 
 /// A note where the keys of an animation that plays begin or end while the shutter is open.
-pub(crate) fn held(camera: &Camera, geometry: &Geometry) -> Option<Note> {
+pub(crate) fn held(
+    camera: &Camera,
+    geometry: &Geometry,
+    deformers: &BTreeMap<u32, Arc<Deformer>>,
+) -> Option<Note> {
     let [open, close] = camera.exposure_span();
     let motions = geometry.placements.iter().filter_map(|placement| placement.motion.as_ref());
+    let deformers = deformers.values().filter_map(|deformer| deformer.played_span());
     let [first, last] = motions
         .filter_map(|motion| motion.played_span())
+        .chain(deformers)
         .find(|[first, last]| open < close && (*first > open || *last < close))?;
     Some(Note {
         kind: NoteKind::Irregular,
         subject: "animation".to_owned(),
         message: format!(
             "its keys last from {first} s to {last} s of the frame, and the shutter is open from {open} s to {close} s: \
-             before and after them nodes stand still"
+             before and after them all stands still"
         ),
         count: 1,
     })

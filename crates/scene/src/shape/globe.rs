@@ -90,6 +90,7 @@ impl Globe {
             colors: None,
             bounds,
             degenerate,
+            steps: None,
         })
     }
 

@@ -1,6 +1,7 @@
 //! Rays and triangles.
 
 mod directions;
+mod exposures;
 mod field;
 mod leaks;
 mod limits;
@@ -38,5 +39,9 @@ pub const METHOD: Method = Method {
         limits::BESIDE_A_WALL,
         limits::INSTRUCTION_SETS,
         motion::MOTION,
+        exposures::SHUT_OUT,
+        exposures::WHOLE_TURNS,
+        exposures::COPIES,
+        exposures::LAMPS,
     ],
 };

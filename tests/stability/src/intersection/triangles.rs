@@ -314,6 +314,7 @@ fn in_a_hole(folder: &std::path::Path, triangles: u64) -> Result<Arc<Geometry>> 
         colors: None,
         bounds: Bounds { min: DVec3::NEG_ONE, max: DVec3::ONE },
         degenerate: 0,
+        steps: None,
     };
     let placements = vec![placed(0, Transform::IDENTITY)];
     Ok(Arc::new(Geometry { meshes: vec![mesh], placements }))

@@ -1,7 +1,7 @@
 //! Animations at one moment: what their channels make of the nodes' translations, rotations, scales and
 //! weights (glTF 2.0, section 3.11; interpolation by its appendix C).
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use etendue_geometry::glam::{DQuat, DVec4};
@@ -151,8 +151,8 @@ pub(super) fn apply(file: &Path, moved: &[Moved], nodes: &mut [Node]) -> Result<
 pub(super) struct Playing {
     /// The nodes whose frames do, in s from the moment that is shown.
     pub(super) joints: BTreeMap<usize, Joint>,
-    /// The nodes whose morph targets do.
-    pub(super) morphed: BTreeSet<usize>,
+    /// The weights of the nodes whose morph targets do, by target.
+    pub(super) morphed: BTreeMap<usize, Vec<geometry::Track>>,
 }
 
 /// What goes on from the moment `time` (s), of nodes that stand as they do then.
@@ -167,7 +167,7 @@ pub(super) fn playing(
         moved.into_iter().filter(|it| it.track.changes())
     {
         if property == Property::Weights {
-            playing.morphed.insert(index);
+            playing.morphed.insert(index, track.each_since(time));
             continue;
         }
         let node = &nodes[index];
@@ -335,10 +335,20 @@ impl Track {
 
     /// The same as a track of a joint, in s from `time` on.
     fn since(&self, time: f64) -> geometry::Track {
-        let vector = |numbers: &[f64]| {
+        self.picked_since(time, |numbers: &[f64]| {
             let number = |k: usize| numbers.get(k).copied().unwrap_or(0.0);
             DVec4::new(number(0), number(1), number(2), number(3))
-        };
+        })
+    }
+
+    /// The same as a track of each of its numbers, in s from `time` on.
+    fn each_since(&self, time: f64) -> Vec<geometry::Track> {
+        let of = |k: usize| self.picked_since(time, move |numbers| DVec4::X * numbers[k]);
+        (0..self.width).map(of).collect()
+    }
+
+    /// A track of what `vector` picks of its numbers, in s from `time` on.
+    fn picked_since(&self, time: f64, vector: impl Fn(&[f64]) -> DVec4) -> geometry::Track {
         let key = |key: usize| match self.interpolation {
             Interpolation::CubicSpline => [0, 1, 2].map(|part| vector(self.part(key, part))),
             Interpolation::Step | Interpolation::Linear => {

@@ -3,7 +3,6 @@
 use etendue_geometry::{Link, Transform};
 
 use super::Reader;
-use super::animation::Playing;
 use super::hierarchy::Scene;
 use super::pose::local;
 use crate::import::error::{Note, NoteKind, push};
@@ -12,13 +11,12 @@ use crate::import::{Import, ImportError};
 /// What each node hangs on.
 pub(super) struct Chains<'a> {
     reader: &'a Reader<'a>,
-    playing: &'a Playing,
     parents: Vec<Option<usize>>,
 }
 
 impl<'a> Chains<'a> {
     /// Those of a document whose nodes have one parent each.
-    pub(super) fn new(reader: &'a Reader<'a>, playing: &'a Playing) -> Self {
+    pub(super) fn new(reader: &'a Reader<'a>) -> Self {
         let nodes = &reader.document.nodes;
         let mut parents = vec![None; nodes.len()];
         for (parent, node) in nodes.iter().enumerate() {
@@ -28,7 +26,7 @@ impl<'a> Chains<'a> {
                 }
             }
         }
-        Self { reader, playing, parents }
+        Self { reader, parents }
     }
 
     /// The node and all above it; each once, also where broken nodes go round.
@@ -43,8 +41,8 @@ impl<'a> Chains<'a> {
     }
 
     fn moves(&self, node: usize) -> bool {
-        !self.playing.joints.is_empty()
-            && self.above(node).iter().any(|node| self.playing.joints.contains_key(node))
+        !self.reader.playing.joints.is_empty()
+            && self.above(node).iter().any(|node| self.reader.playing.joints.contains_key(node))
     }
 
     /// From the node's frame to the model's, the outermost frame first; nothing of a node that stands still.
@@ -54,7 +52,7 @@ impl<'a> Chains<'a> {
         }
         let mut links: Vec<Link> = Vec::new();
         for node in self.above(node).into_iter().rev() {
-            if let Some(joint) = self.playing.joints.get(&node) {
+            if let Some(joint) = self.reader.playing.joints.get(&node) {
                 links.push(Link::Joint(Box::new(joint.clone())));
                 continue;
             }
@@ -69,12 +67,11 @@ impl<'a> Chains<'a> {
         links
     }
 
-    /// Refuses what deforms or shines while it moves; a camera stands still, with a note.
+    /// Refuses what shines while it moves; a camera stands still, with a note.
     ///
     /// # Errors
     ///
-    /// When a mesh that is shown has a skin with joints that move or morph targets that do, or a light hangs on a node
-    /// that moves; the message names the node.
+    /// When a light hangs on a node that moves; the message names the node.
     pub(super) fn check(&self, scene: &Scene, import: &mut Import) -> Result<(), ImportError> {
         let document = self.reader.document;
         let refused = |node: usize, why: &str| {
@@ -84,16 +81,6 @@ impl<'a> Chains<'a> {
             );
             Err(self.reader.damaged(format!("nodes[{node}]"), reason))
         };
-        for placed in &scene.meshes {
-            let skin = placed.shape.skin.and_then(|skin| document.skins.get(skin));
-            let mut joints = skin.into_iter().flat_map(|skin| &skin.joints);
-            if joints.any(|joint| self.moves(*joint)) {
-                return refused(placed.node, "the joints of its skin move");
-            }
-            if self.playing.morphed.contains(&placed.node) {
-                return refused(placed.node, "its morph targets move");
-            }
-        }
         for &node in scene.pose.shown.iter().filter(|node| self.moves(**node)) {
             let shown = &document.nodes[node];
             if self.reader.wanted.light && shown.extensions.contains_key("KHR_lights_punctual") {

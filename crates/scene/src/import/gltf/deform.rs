@@ -9,13 +9,15 @@ use json::mesh::{MorphTarget, Semantic};
 use rayon::prelude::*;
 
 use super::Reader;
+use super::chains::Chains;
 use super::hierarchy::Shape;
 use super::pose::{Pose, exists};
 use super::primitive::Part;
+use crate::import::deformer::{Deformer, Influences, Joints, Morph, number};
 use crate::import::error::NoteKind;
 use crate::import::{ImportError, Strictness, precise_enough, single};
-use etendue_geometry::glam::{DMat3, DVec3};
-use etendue_geometry::{Positions, Transform, Vertices};
+use etendue_geometry::glam::{DMat3, DVec3, DVec4};
+use etendue_geometry::{Link, Positions, Track, Transform, Vertices};
 
 /// How far the sum of a vertex's weights may be from 1 before it is said: numbers of three digits
 /// are, and 8 bits, whose sum exporters make 255, are not.
@@ -29,15 +31,12 @@ pub(super) struct Corners {
     pub skinned: bool,
     /// Whether the skin turned the triangles inside out.
     pub mirrored: bool,
+    /// How they go on from there, where they do.
+    pub deformer: Option<Deformer>,
 }
 
-/// Bytes that a position or normal takes while it is moved: as it is moved, and as it is kept.
-const BYTES_PER_VECTOR: u64 = 2 * size_of::<DVec3>() as u64;
-
-/// The numbers and weights of the joints that carry each vertex, four a set.
-struct Influences {
-    sets: Vec<[Vertices<4>; 2]>,
-}
+/// Bytes that a position or normal takes while it is moved: as the file has it, as it is moved, and as it is kept.
+const BYTES_PER_VECTOR: u64 = 3 * size_of::<DVec3>() as u64;
 
 impl Part<'_> {
     /// The primitive's `positions` and `normals` as `shape` has them; the very same when it neither
@@ -56,75 +55,92 @@ impl Part<'_> {
         let weights = self.target_weights(shape)?;
         if influences.is_none() && weights.is_empty() {
             let positions = Positions::F32(positions);
-            return Ok(Corners { positions, normals, skinned: false, mirrored: false });
+            return Ok(Corners {
+                positions,
+                normals,
+                skinned: false,
+                mirrored: false,
+                deformer: None,
+            });
         }
         let vertices = (positions.len() + normals.as_ref().map_or(0, Vertices::len)) as u64;
         self.reader.files.take(vertices * BYTES_PER_VECTOR, || self.place.clone())?;
-        let mut points = doubles(&positions);
-        self.morph(&mut points, &weights, "POSITION", |target| &target.positions)?;
-        let mut directions = normals.as_ref().map(doubles);
-        if let Some(directions) = &mut directions {
-            self.morph(directions, &weights, "NORMAL", |target| &target.normals)?;
+        let count = positions.len();
+        let mut morphs = Vec::new();
+        for (target, weight) in weights {
+            let points = self.moves(target, "POSITION", count, |target| &target.positions)?;
+            let turned = match &normals {
+                Some(_) => self.moves(target, "NORMAL", count, |target| &target.normals)?,
+                None => None,
+            };
+            morphs.push(Morph { weight, points, normals: turned });
         }
-        if let (Some(skin), Some(influences)) = (skin, &influences) {
-            influences.apply(skin, &mut points, directions.as_deref_mut());
-        }
-        let unit = |normal: DVec3| normal.normalize_or_zero().to_array().map(single);
+        let skinned = influences.is_some();
+        let mirrored = skinned && skin.is_some_and(Skin::mirrors);
+        let skin = skin.zip(influences).map(|(skin, own)| (skin.model_from_bound.clone(), own));
+        let deformer = Deformer {
+            points: doubles(&positions),
+            normals: normals.as_ref().map(doubles),
+            morphs,
+            skin,
+            kept: std::sync::Mutex::default(),
+        };
+        let (points, directions) = deformer.shape(0.0);
         let normals = directions.map(|directions| {
+            let unit = |normal: DVec3| normal.normalize_or_zero().to_array().map(single);
             let units: Vec<[f32; 3]> = directions.into_par_iter().map(unit).collect();
             Vertices::from_arrays(&units)
         });
         let points: Vec<[f64; 3]> = points.into_par_iter().map(|p| p.to_array()).collect();
-        let skinned = influences.is_some();
-        let mirrored = skinned && skin.is_some_and(Skin::mirrors);
-        Ok(Corners { positions: precise_enough(&points), normals, skinned, mirrored })
+        let plays = deformer.played_span().is_some();
+        let deformer = plays.then_some(deformer);
+        Ok(Corners { positions: precise_enough(&points), normals, skinned, mirrored, deformer })
     }
 
-    /// The morph targets that `shape` gives a weight, with it.
-    fn target_weights(&mut self, shape: &Shape) -> Result<Vec<(usize, f64)>, ImportError> {
+    /// The morph targets to which `shape` gives a weight at some time, with it.
+    fn target_weights(&mut self, shape: &Shape) -> Result<Vec<(usize, Track)>, ImportError> {
         let targets = self.primitive.targets.as_ref().map_or(0, Vec::len);
-        let weights: Vec<f64> = shape.weights().collect();
+        let weights: Vec<Track> = match self.reader.playing.morphed.get(&shape.played_by()) {
+            Some(tracks) => tracks.clone(),
+            None => shape.weights().map(|w| Track::constant(DVec4::X * w)).collect(),
+        };
         if weights.len() != targets && !weights.is_empty() {
             let reason = format!("{} weights for {targets} morph targets", weights.len());
             self.irregular(&reason, "left out where they have no target")?;
         }
-        Ok(weights.into_iter().take(targets).enumerate().filter(|&(_, w)| w != 0.0).collect())
+        let counts =
+            |(_, weight): &(usize, Track)| weight.keys.iter().any(|key| *key != [DVec4::ZERO; 3]);
+        Ok(weights.into_iter().take(targets).enumerate().filter(counts).collect())
     }
 
-    /// Adds the targets' displacements of one attribute by their `weights`.
-    fn morph(
+    /// What a target adds to one attribute of all `count` vertices; `None` where it leaves that alone.
+    fn moves(
         &mut self,
-        values: &mut [DVec3],
-        weights: &[(usize, f64)],
+        number: usize,
         attribute: &str,
+        count: usize,
         of: impl Fn(&MorphTarget) -> &Option<json::Index<json::Accessor>>,
-    ) -> Result<(), ImportError> {
-        for &(number, weight) in weights {
-            let target = self.primitive.targets.as_ref().and_then(|targets| targets.get(number));
-            let Some(index) = target.and_then(|target| of(target).as_ref()) else { continue };
-            let place = format!("{}.targets[{number}].{attribute}", self.place);
-            let accessor = self.reader.accessor(index.value(), &place)?;
-            let moves = match accessor.floats::<3>(0.0) {
-                Some(moves) if accessor.components == 3 => moves,
-                _ => {
-                    let reason = format!("it has {} components, not 3", accessor.components);
-                    return Err(self.reader.damaged(place, reason + "; export the file again"));
-                }
-            };
-            if moves.len() != values.len() {
-                let reason = format!(
-                    "morph target {number} moves {} of {} vertices' {attribute}",
-                    moves.len(),
-                    values.len()
-                );
-                self.irregular(&reason, "left where they are")?;
-                continue;
+    ) -> Result<Option<Vertices<3>>, ImportError> {
+        let target = self.primitive.targets.as_ref().and_then(|targets| targets.get(number));
+        let Some(index) = target.and_then(|target| of(target).as_ref()) else { return Ok(None) };
+        let place = format!("{}.targets[{number}].{attribute}", self.place);
+        let accessor = self.reader.accessor(index.value(), &place)?;
+        let moves = match accessor.floats::<3>(0.0) {
+            Some(moves) if accessor.components == 3 => moves,
+            _ => {
+                let reason = format!("it has {} components, not 3", accessor.components);
+                return Err(self.reader.damaged(place, reason + "; export the file again"));
             }
-            values.par_iter_mut().enumerate().for_each(|(i, value)| {
-                *value += weight * DVec3::from(moves.get(i).map(f64::from));
-            });
+        };
+        if moves.len() != count {
+            let reason = format!(
+                "morph target {number} moves {} of {count} vertices' {attribute}",
+                moves.len()
+            );
+            self.irregular(&reason, "left where they are")?;
+            return Ok(None);
         }
-        Ok(())
+        Ok(Some(moves))
     }
 
     /// The joints of each vertex; `None`, with a note, for a primitive that names none.
@@ -169,7 +185,7 @@ impl Part<'_> {
         influences: &Influences,
         vertices: usize,
     ) -> Result<(), ImportError> {
-        let count = skin.model_from_bound.len();
+        let count = skin.model_from_bound.0.len();
         let absent = |i: usize| {
             let is_absent = |&(joint, _): &(f32, f64)| number(joint, count).is_none();
             Some((i, influences.of(i).find(is_absent)?.0))
@@ -218,58 +234,6 @@ impl Part<'_> {
     }
 }
 
-impl Influences {
-    /// The joints of vertex `i` that weigh something, with their weights.
-    fn of(&self, i: usize) -> impl Iterator<Item = (f32, f64)> {
-        let set = move |[joints, weights]: &[Vertices<4>; 2]| {
-            let (joints, weights) = (joints.get(i), weights.get(i));
-            std::array::from_fn::<_, 4, _>(|k| (joints[k], f64::from(weights[k])))
-        };
-        self.sets.iter().flat_map(set).filter(|&(_, weight)| weight != 0.0)
-    }
-
-    /// The sum of the weights of vertex `i`.
-    fn total(&self, i: usize) -> f64 {
-        self.of(i).map(|(_, weight)| weight).sum()
-    }
-
-    /// The mean of the joint matrices of vertex `i` by their weights: linear blend skinning.
-    fn blend(&self, skin: &Skin, i: usize) -> Transform {
-        let joints = &skin.model_from_bound;
-        let total = self.total(i);
-        if total == 0.0 {
-            return joints[0];
-        }
-        let (mut linear, mut translation) = (DMat3::ZERO, DVec3::ZERO);
-        for (joint, weight) in self.of(i) {
-            if let Some(joint) = number(joint, joints.len()) {
-                let joint = &joints[joint];
-                linear += joint.linear * (weight / total);
-                translation += joint.offset_from(DVec3::ZERO) * (weight / total);
-            }
-        }
-        Transform::new(linear, translation)
-    }
-
-    /// Moves all vertices, and turns their normals.
-    fn apply(&self, skin: &Skin, points: &mut [DVec3], normals: Option<&mut [DVec3]>) {
-        points.par_iter_mut().enumerate().for_each(|(i, point)| {
-            *point = self.blend(skin, i).point(*point);
-        });
-        if let Some(normals) = normals {
-            normals.par_iter_mut().enumerate().for_each(|(i, normal)| {
-                *normal = self.blend(skin, i).normal_matrix() * *normal;
-            });
-        }
-    }
-}
-
-/// The number of a joint that is one of `count`.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 65 535")]
-fn number(joint: f32, count: usize) -> Option<usize> {
-    (joint >= 0.0 && joint < count as f32).then_some(joint as usize)
-}
-
 fn doubles(values: &Vertices<3>) -> Vec<DVec3> {
     (0..values.len()).into_par_iter().map(|i| DVec3::from(values.get(i).map(f64::from))).collect()
 }
@@ -280,14 +244,15 @@ const MOST_JOINTS: usize = 1 << 16;
 /// How far the last row of an inverse bind matrix may be from 0 0 0 1: exporters invert in f32.
 const LAST_ROW: f32 = 1e-3;
 
-/// A skin in a pose.
+/// A skin in a pose, and how it goes on from there.
 pub(super) struct Skin {
     /// From the mesh's frame, as bound, to the model's, by joint (m).
-    pub model_from_bound: Vec<Transform>,
+    pub model_from_bound: Joints,
 }
 
 impl Skin {
-    /// Skin `index`, which node `user` wears, with its joints standing as in `pose`.
+    /// Skin `index`, which node `user` wears, with its joints standing as in `pose`, and going on by
+    /// `chains`.
     ///
     /// # Errors
     ///
@@ -297,7 +262,7 @@ impl Skin {
         reader: &Reader<'_>,
         index: usize,
         user: usize,
-        pose: &Pose,
+        (pose, chains): (&Pose, &Chains<'_>),
     ) -> Result<Self, ImportError> {
         let document = reader.document;
         let Some(skin) = document.skins.get(index) else {
@@ -331,14 +296,19 @@ impl Skin {
             if !moved.is_finite() {
                 return Err(reader.damaged(place(), "its joint matrix is not finite"));
             }
-            model_from_bound.push(moved);
+            let mut links = chains.of(joint);
+            match links.is_empty() {
+                true => links.push(Link::Fixed(moved)),
+                false => links.push(Link::Fixed(joint_from_bound)),
+            }
+            model_from_bound.push(links);
         }
-        Ok(Self { model_from_bound })
+        Ok(Self { model_from_bound: Joints(model_from_bound) })
     }
 
     /// Whether the joints turn triangles inside out.
     pub(super) fn mirrors(&self) -> bool {
-        self.model_from_bound.iter().all(|joint| joint.linear.determinant() < 0.0)
+        self.model_from_bound.at(0.0).iter().all(|joint| joint.linear.determinant() < 0.0)
     }
 }
 

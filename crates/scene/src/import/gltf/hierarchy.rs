@@ -6,6 +6,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use super::animation::Playing;
 use super::chains::Chains;
 use super::document::{Document, Node};
 use super::pose::{Pose, trs};
@@ -42,11 +43,14 @@ pub(super) struct Shape {
     pub skin: Option<usize>,
     /// The bits of the weights; none when all are 0.
     weights: Vec<u64>,
+    /// The node whose weights change while the animation plays.
+    played_by: Option<usize>,
 }
 
 impl Shape {
-    /// `mesh` as `node` shows it: the node's weights go before the mesh's own.
-    fn of(document: &Document, node: &Node, mesh: usize) -> Self {
+    /// `mesh` as node `index` shows it: the node's weights go before the mesh's own.
+    fn of(document: &Document, index: usize, mesh: usize, playing: &Playing) -> Self {
+        let node = &document.nodes[index];
         let own = document.root.meshes.get(mesh).and_then(|mesh| mesh.weights.as_ref());
         let weights: Vec<f64> = match (&node.weights, own) {
             (Some(weights), _) => weights.clone(),
@@ -56,7 +60,13 @@ impl Shape {
         let moves = weights.iter().any(|&weight| weight != 0.0);
         let weights =
             if moves { weights.into_iter().map(f64::to_bits).collect() } else { Vec::new() };
-        Self { mesh, skin: node.skin, weights }
+        let played_by = playing.morphed.contains_key(&index).then_some(index);
+        Self { mesh, skin: node.skin, weights, played_by }
+    }
+
+    /// The node whose weights change while the animation plays; no node's number where none do.
+    pub(super) fn played_by(&self) -> usize {
+        self.played_by.unwrap_or(usize::MAX)
     }
 
     /// The weights of the morph targets; none when all are 0.
@@ -69,6 +79,7 @@ impl Shape {
 pub(super) fn walk(
     path: &Path,
     document: &Document,
+    playing: &Playing,
     notes: &mut Vec<Note>,
 ) -> Result<Scene, ImportError> {
     let pose = Pose::at_rest(path, document)?;
@@ -78,7 +89,7 @@ pub(super) fn walk(
         let model_from_node = pose.of(index).unwrap_or_default();
         let hidden = pose.hidden[index];
         if let Some(mesh) = node.mesh.filter(|_| !hidden) {
-            let shape = Shape::of(document, node, mesh);
+            let shape = Shape::of(document, index, mesh, playing);
             scene.meshes.push(PlacedMesh { node: index, shape, model_from_node });
         }
         if let Some(camera) = node.camera {
@@ -151,7 +162,7 @@ pub(super) fn place(
             // glTF 2.0, section 3.7.3.3: only the joints place a skinned mesh.
             let model_from_node =
                 if primitive.skinned { Transform::IDENTITY } else { placed.model_from_node };
-            let links = chains.of(placed.node);
+            let links = if primitive.skinned { Vec::new() } else { chains.of(placed.node) };
             for (k, node_from_instance) in (0..).zip(&instances) {
                 let mut links = links.clone();
                 if !links.is_empty() {

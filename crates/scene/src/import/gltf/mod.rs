@@ -30,6 +30,7 @@ use std::path::Path;
 use super::files::Files;
 use super::{Import, ImportError, Options, Wanted, error};
 use crate::memory::of_json;
+use animation::Playing;
 use buffers::Buffers;
 use chains::Chains;
 use document::Document;
@@ -43,6 +44,8 @@ pub(super) struct Reader<'a> {
     buffers: &'a Buffers,
     wanted: Wanted,
     options: &'a Options,
+    /// What goes on from the moment that is shown.
+    playing: &'a Playing,
 }
 
 impl Reader<'_> {
@@ -99,24 +102,33 @@ pub(super) fn import(
     let mut import = Import::default();
     extensions::check(path, &document, wanted, &mut import.notes)?;
 
-    let mut playing = animation::Playing::default();
+    let mut playing = Playing::default();
     if let Some(play) = &options.animation {
         let buffers = Buffers::open(path, files, &document, container.binary.clone())?;
-        let reader =
-            Reader { file: path, files, document: &document, buffers: &buffers, wanted, options };
-        let moved = animation::moved(&reader, play, &mut import)?;
+        let moved = {
+            let (document, buffers, playing) = (&document, &buffers, &playing);
+            let reader = Reader { file: path, files, document, buffers, wanted, options, playing };
+            animation::moved(&reader, play, &mut import)?
+        };
         animation::apply(path, &moved, &mut document.nodes)?;
         if play.plays {
             playing = animation::playing(path, moved, play.time, &document.nodes)?;
         }
     }
-    let scene = hierarchy::walk(path, &document, &mut import.notes)?;
+    let scene = hierarchy::walk(path, &document, &playing, &mut import.notes)?;
     let buffers = Buffers::open(path, files, &document, container.binary)?;
-    let reader =
-        Reader { file: path, files, document: &document, buffers: &buffers, wanted, options };
-    let shapes = primitive::load(&reader, &scene, &mut import)?;
+    let reader = Reader {
+        file: path,
+        files,
+        document: &document,
+        buffers: &buffers,
+        wanted,
+        options,
+        playing: &playing,
+    };
+    let chains = Chains::new(&reader);
+    let shapes = primitive::load(&reader, (&scene, &chains), &mut import)?;
     material::load(&reader, &mut import)?;
-    let chains = Chains::new(&reader, &playing);
     chains.check(&scene, &mut import)?;
     hierarchy::place(&reader, (&scene, &chains), &shapes, &mut import)?;
     import.cameras = scene.cameras;

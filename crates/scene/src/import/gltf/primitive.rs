@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::sync::Arc;
 
 use etendue_geometry::{Buffer, Positions, Vertices};
 use gltf::json;
@@ -11,10 +12,12 @@ use rayon::prelude::*;
 
 use super::Reader;
 use super::accessor::Accessor;
+use super::chains::Chains;
 use super::deform::{Corners, Skin};
 use super::draco::{Compressed, Decoded};
 use super::hierarchy::{Scene, Shape};
 use crate::import::admit::{Admitted, Candidate, admit, cost};
+use crate::import::deformer::Deformer;
 use crate::import::error::{self, Note, NoteKind};
 use crate::import::{Import, ImportError, Strictness};
 
@@ -57,6 +60,7 @@ impl Shapes {
 struct Read {
     skinned: bool,
     admitted: Admitted,
+    deformer: Option<Deformer>,
     copied: u64,
     mapped: u64,
     notes: Vec<Note>,
@@ -65,7 +69,7 @@ struct Read {
 /// Loads the meshes that `scene` shows. Materials are numbered as in the document.
 pub(super) fn load(
     reader: &Reader<'_>,
-    scene: &Scene,
+    (scene, chains): (&Scene, &Chains<'_>),
     import: &mut Import,
 ) -> Result<Shapes, ImportError> {
     let meshes = &reader.document.root.meshes;
@@ -78,7 +82,7 @@ pub(super) fn load(
         *shown = true;
     }
     note_unused(&shown, &mut import.notes);
-    let skins = skins(reader, scene)?;
+    let skins = skins(reader, (scene, chains))?;
     let mut shapes = Shapes::of(scene);
     let wanted: Vec<(usize, usize, &Primitive)> = (shapes.shapes.iter().enumerate())
         .flat_map(|(s, shape)| {
@@ -109,13 +113,16 @@ pub(super) fn load(
 }
 
 /// The skins that nodes of `scene` wear.
-fn skins(reader: &Reader<'_>, scene: &Scene) -> Result<BTreeMap<usize, Skin>, ImportError> {
+fn skins(
+    reader: &Reader<'_>,
+    (scene, chains): (&Scene, &Chains<'_>),
+) -> Result<BTreeMap<usize, Skin>, ImportError> {
     let mut skins = BTreeMap::new();
     for placed in &scene.meshes {
         if let Some(index) = placed.shape.skin
             && let Entry::Vacant(entry) = skins.entry(index)
         {
-            entry.insert(Skin::read(reader, index, placed.node, &scene.pose)?);
+            entry.insert(Skin::read(reader, index, placed.node, (&scene.pose, chains))?);
         }
     }
     Ok(skins)
@@ -131,6 +138,7 @@ fn take(read: Read, import: &mut Import, reader: &Reader<'_>) -> Result<u32, Imp
     for note in read.notes.into_iter().chain(read.admitted.notes) {
         error::push(&mut import.notes, note);
     }
+    import.deformers.extend(read.deformer.map(|deformer| (index, Arc::new(deformer))));
     import.meshes.push(read.admitted.mesh);
     Ok(index)
 }
@@ -189,7 +197,7 @@ fn read(
     let uvs = if wanted.uvs { part.uvs(&positions)? } else { Vec::new() };
     let colors =
         if wanted.colors { part.vertex_data(&Semantic::Colors(0), 1.0, &positions)? } else { None };
-    let Corners { positions, normals, skinned, mirrored } =
+    let Corners { positions, normals, skinned, mirrored, deformer } =
         part.deformed(shape, skin, positions, normals)?;
     let triangles = if mirrored { turned_over(&triangles) } else { triangles };
     let (mut copied, mut mapped) = cost(&triangles, triangles.len());
@@ -207,7 +215,7 @@ fn read(
     let candidate =
         Candidate { name, place: part.place, positions, triangles, normals, uvs, colors };
     let admitted = admit(candidate, reader.file, reader.options)?;
-    Ok(Some(Read { skinned, admitted, copied, mapped, notes: part.notes }))
+    Ok(Some(Read { skinned, admitted, deformer, copied, mapped, notes: part.notes }))
 }
 
 /// A primitive being read.
@@ -358,7 +366,7 @@ impl<'a> Part<'a> {
         let positions = Positions::F32(Vertices::from_arrays(&[]));
         let mesh = etendue_geometry::Mesh::new(name, positions, Vec::new().into());
         let admitted = Admitted { mesh, dropped: 0, notes: Vec::new() };
-        Read { skinned: false, admitted, copied: 0, mapped: 0, notes: self.notes }
+        Read { skinned: false, admitted, deformer: None, copied: 0, mapped: 0, notes: self.notes }
     }
 }
 

@@ -8,6 +8,7 @@ mod draco;
 mod gltf;
 mod obj;
 mod packed;
+mod playing;
 mod ply;
 mod skins;
 
