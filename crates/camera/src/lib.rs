@@ -17,6 +17,7 @@ pub mod distortion;
 pub mod exposure;
 pub mod framing;
 pub mod intrinsics;
+mod falloff;
 pub mod lens;
 pub mod light_field;
 pub mod motion;
@@ -34,6 +35,7 @@ pub use camera::{Camera, CameraSpec, PixelExtent, Projection};
 pub use camera_file::{CameraFile, ProjectionName};
 pub use distortion::{Distortion, DistortionSpec};
 pub use exposure::CameraTime;
+pub use falloff::FalloffSpec;
 pub use framing::{Subject, SupportFunction, Viewpoint};
 pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin, SensorSpec};
 pub use lens::{

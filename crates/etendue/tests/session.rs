@@ -10,6 +10,8 @@ mod glasses;
 mod outputs;
 #[path = "session/spectra.rs"]
 mod spectra;
+#[path = "session/unseen.rs"]
+mod unseen;
 
 use std::fs;
 use std::path::Path;

@@ -43,6 +43,7 @@ mod shard;
 mod sparkles;
 mod stopping;
 mod tiles;
+pub mod tolerance;
 mod watch;
 
 pub use adaptive::SampleCounts;
@@ -53,10 +54,10 @@ pub use film::{NoMemory, Precision};
 pub use film_file::{FilmError, FilmFile, FilmHeader, Identity};
 pub use images::Images;
 pub use other_frame::FollowedFrame;
-pub use plan::Plan;
+pub use plan::{Plan, Unseen};
 pub use render::{
-    Course, Film, Prepared, Progress, Rendered, accelerators, build, finish, rebuild, render,
-    sample_set, trace,
+    Course, Film, Prepared, Progress, Rendered, accelerators, build, build_without, finish,
+    rebuild, render, sample_set, trace,
 };
 pub use report::{Report, Seconds};
 pub use shard::{Shard, ShardBy};

@@ -22,3 +22,5 @@ mod spectra;
 mod spectral_surfaces;
 mod steps;
 mod textures;
+mod tolerance;
+mod unseen;
