@@ -49,8 +49,8 @@ impl Field {
     pub const FINE: Self = Self { size: [9, 7], rays: 1024, bands: usize::MAX };
     /// What a render does before it begins.
     pub const QUICK: Self = Self { size: [9, 7], rays: 256, bands: 3 };
-    /// What a choice is verified by: places in between, and more rays.
-    pub const BETWEEN: Self = Self { size: [16, 12], rays: 1024, bands: 5 };
+    /// What a choice is verified by: places in between, and more bands.
+    pub const BETWEEN: Self = Self { size: [16, 12], rays: 256, bands: 5 };
 }
 
 /// A place of the picture.
