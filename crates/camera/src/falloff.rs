@@ -69,10 +69,15 @@ impl FalloffSpec {
         let Self { axis, a1, a2, a3 } = *self;
         let keys = [("axis", axis), ("a1", a1), ("a2", a2), ("a3", a3)];
         if let Some((key, value)) = keys.into_iter().find(|(_, value)| !value.is_finite()) {
-            return Err(CameraError::new(format!("falloff.{key}"), format!("{value} is not finite")));
+            return Err(CameraError::new(
+                format!("falloff.{key}"),
+                format!("{value} is not finite"),
+            ));
         }
         if axis <= 0.0 {
-            let why = format!("is {axis}: the picture would be black; give the light on the axis, such as 1");
+            let why = format!(
+                "is {axis}: the picture would be black; give the light on the axis, such as 1"
+            );
             return Err(CameraError::new("falloff.axis", why));
         }
         Ok(())
@@ -88,9 +93,8 @@ pub(crate) fn square_of(k: &Intrinsics, [column, row]: [f64; 2]) -> f64 {
 /// The solution of four equations, by elimination with the largest pivot; `None` where there is not one.
 fn solved(mut rows: [[f64; 5]; 4]) -> Option<[f64; 4]> {
     for column in 0..4 {
-        let pivot = (column..4).max_by(|&a, &b| {
-            rows[a][column].abs().total_cmp(&rows[b][column].abs())
-        })?;
+        let pivot =
+            (column..4).max_by(|&a, &b| rows[a][column].abs().total_cmp(&rows[b][column].abs()))?;
         rows.swap(column, pivot);
         let lead = rows[column];
         if lead[column].abs() < 1e-12 {
@@ -115,7 +119,8 @@ mod tests {
     #[test]
     fn a_fit_finds_the_polynomial_that_its_places_are_of() {
         let spec = PinholeSpec { sensor: SensorSpec::new([60, 40]), ..PinholeSpec::default() };
-        let camera = CameraSpec::Pinhole(spec).build(|| Bounds::EMPTY, &|name: &str| Err(name.into()));
+        let camera =
+            CameraSpec::Pinhole(spec).build(|| Bounds::EMPTY, &|name: &str| Err(name.into()));
         let camera = camera.unwrap();
         let Projection::Pinhole(pinhole) = camera.projection() else { panic!("no pinhole") };
         let wanted = FalloffSpec { axis: 0.9, a1: -1.3, a2: 0.8, a3: -0.1 };

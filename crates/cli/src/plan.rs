@@ -47,21 +47,19 @@ fn compare_models(arguments: &PlanArguments) -> Result<(), Fault> {
     let (scene, accel) = session.scene_and_accel(&phases.progress(false))?;
     let progress = phases.begin("models");
     let told = |share| progress(share);
-    let of_scene = scene.tolerance.map(|spec| Tolerance {
-        pixels: spec.displacement.0,
-        light: Some(spec.light.0),
-    });
+    let of_scene = scene
+        .tolerance
+        .map(|spec| Tolerance { pixels: spec.displacement.0, light: Some(spec.light.0) });
     let by_itself = Tolerance { pixels: 0.5, light: None };
     let judged = arguments.scene.tolerance.or(of_scene).unwrap_or(by_itself);
-    let compared =
-        tolerance::compare(scene, accel, judged, &told).map_err(|error| {
-            match Fault::from(error) {
-                Fault::Refused(why) => {
-                    Fault::refused(format!("{}: {why}", arguments.scene.scene.display()))
-                }
-                fault => fault,
+    let compared = tolerance::compare(scene, accel, judged, &told).map_err(|error| {
+        match Fault::from(error) {
+            Fault::Refused(why) => {
+                Fault::refused(format!("{}: {why}", arguments.scene.scene.display()))
             }
-        })?;
+            fault => fault,
+        }
+    })?;
     if arguments.json {
         print_json(&Versioned::new(&compared))
     } else {

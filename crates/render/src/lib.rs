@@ -15,6 +15,7 @@
 //! | [`Watch`] | who is told how far a render is, and may stop it |
 
 mod adaptive;
+mod alike;
 mod band_paths;
 mod checkpoint;
 pub mod denoise;

@@ -25,13 +25,13 @@ use crate::images::Images;
 use crate::other_frame::FollowedFrame;
 use crate::output::{Development, Layer, Picture, PictureError};
 use crate::passes::Passed;
+use crate::plan::Unseen;
 use crate::radiance::LightPass;
 use crate::samples::{Sampling, Sum, short_passes};
 use crate::shard::{Shard, must_be_whole};
 use crate::stopping::Stopping;
 use crate::tiles::{Done, Job, RayCounts};
 use crate::watch::{Watch, Watcher};
-use crate::plan::Unseen;
 use crate::{Plan, expose, lighting, names};
 
 /// Told the share done (0..=1) now and then; answering `false` stops.
@@ -298,7 +298,8 @@ pub fn trace(
     let shared = shared.and_then(LensCamera::opened_paths);
     // Lights, the studio among them where all else leaves the scene dark.
     let surroundings = surroundings(scene, images, scene.render.samples.typical());
-    let spectral = Spectral::of(&plan.bands, &scene.materials);
+    let traced = if plan.alike { &Bands::Grey } else { &plan.bands };
+    let spectral = Spectral::of(traced, &scene.materials);
     let mut notes = Vec::new();
     let seen = (accel, surroundings);
     let lit = light_of((scene, plan), images, seen, &spectral, &mut notes, watch)?;
@@ -319,6 +320,7 @@ pub fn trace(
         tracer: *rules,
         camera: &light_camera,
         groups: light_camera.band_groups(&plan.bands),
+        count: plan.bands.count(),
         rows: shared.map(|shared| shared.rows),
         layers: plan.layers.iter().copied().filter(|layer| layer.is_light()).collect(),
     });

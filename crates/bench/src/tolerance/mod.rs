@@ -15,8 +15,8 @@ use etendue_scene::Scene;
 use serde::Serialize;
 use serde_json::Value;
 
-pub use etendue_render::tolerance::{Finding, Place, Tolerance, Worst};
 use etendue_render::tolerance::{Field, FullView, has_mask};
+pub use etendue_render::tolerance::{Finding, Place, Tolerance, Worst};
 
 use crate::pictures::Studio;
 use crate::{BenchError, Progress};

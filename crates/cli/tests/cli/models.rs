@@ -86,12 +86,15 @@ fn plan_names_the_cheapest_model_within_a_tolerance() {
     let words = bench.run(&["plan", "scene.json", "--models", "--tolerance", "0.5 px,2 %"]);
     let words = text(&words.stdout);
     // Every model tells the keys that take it.
-    for key in [r#"{"plan":{"dispersion":false}} takes it"#, r#""falloff":{"#, r#""type":"thin_lens""#] {
+    for key in
+        [r#"{"plan":{"dispersion":false}} takes it"#, r#""falloff":{"#, r#""type":"thin_lens""#]
+    {
         assert!(words.contains(key), "{key}: {words}");
     }
     assert!(words.contains("cheapest within 0.5 px and 2 % of light: "), "{words}");
     let opencv = &all["scenes"][1];
-    let mut taken: Value = serde_json::from_slice(&std::fs::read(bench.path("scene.json")).unwrap()).unwrap();
+    let mut taken: Value =
+        serde_json::from_slice(&std::fs::read(bench.path("scene.json")).unwrap()).unwrap();
     taken["camera"] = opencv["camera"].clone();
     bench.write("taken.json", taken.to_string().as_bytes());
     let output = bench.run(&["render", "taken.json", "-o", "taken", "--outputs", "npy"]);

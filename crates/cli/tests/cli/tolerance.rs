@@ -44,10 +44,22 @@ fn a_tolerance_is_obeyed_told_and_verified() {
     bench.render(&["--outputs", "npy"]);
     let full = bench.array("picture");
     let output = bench.run(&[
-        "render", "scene.json", "-o", "out", "--outputs", "npy", "--tolerance", "0.5 px, 4 %", "--verify",
+        "render",
+        "scene.json",
+        "-o",
+        "out",
+        "--outputs",
+        "npy",
+        "--tolerance",
+        "0.5 px, 4 %",
+        "--verify",
     ]);
     assert!(output.status.success(), "{}", text(&output.stderr));
-    assert!(text(&output.stderr).contains("verified: within the tolerance"), "{}", text(&output.stderr));
+    assert!(
+        text(&output.stderr).contains("verified: within the tolerance"),
+        "{}",
+        text(&output.stderr)
+    );
     let own = bench.array("picture");
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let off = mean(&own) / mean(&full) - 1.0;
@@ -60,15 +72,34 @@ fn what_makes_no_tolerance_is_refused_with_its_place_and_a_remedy() {
     for (arguments, words) in [
         (&["--tolerance", "0.5 px"][..], &["tolerance", "light"][..]),
         (&["--tolerance", "2 %"], &["0.5 px"]),
-        (&["--set", "tolerance={\"displacement\": \"0.5 px\", \"light\": 0}"], &["tolerance.light", "2 %"]),
-        (&["--set", "tolerance={\"displacement\": \"0.5 m\", \"light\": 0.1}"], &["tolerance.displacement", "0.5 px"]),
-        (&["--set", "tolerance={\"displacement\": -1, \"light\": 0.1}"], &["tolerance.displacement", "above 0"]),
-        (&["--set", "tolerance={\"displacement\": 1, \"light\": \"100 %\"}"], &["tolerance.light", "below 1"]),
-        (&["--tolerance", "1 px,1 %", "--set", "plan.dispersion=true"], &["plan.dispersion", "leave one of"]),
+        (
+            &["--set", "tolerance={\"displacement\": \"0.5 px\", \"light\": 0}"],
+            &["tolerance.light", "2 %"],
+        ),
+        (
+            &["--set", "tolerance={\"displacement\": \"0.5 m\", \"light\": 0.1}"],
+            &["tolerance.displacement", "0.5 px"],
+        ),
+        (
+            &["--set", "tolerance={\"displacement\": -1, \"light\": 0.1}"],
+            &["tolerance.displacement", "above 0"],
+        ),
+        (
+            &["--set", "tolerance={\"displacement\": 1, \"light\": \"100 %\"}"],
+            &["tolerance.light", "below 1"],
+        ),
+        (
+            &["--tolerance", "1 px,1 %", "--set", "plan.dispersion=true"],
+            &["plan.dispersion", "leave one of"],
+        ),
         (&["--verify"], &["--tolerance \"0.5 px, 2 %\""]),
-        (&["--set", "camera={\"type\": \"pinhole\", \"falloff\": {\"axis\": 0}}"], &["falloff.axis", "such as 1"]),
+        (
+            &["--set", "camera={\"type\": \"pinhole\", \"falloff\": {\"axis\": 0}}"],
+            &["falloff.axis", "such as 1"],
+        ),
     ] {
-        let output = bench.run(&[&["render", "scene.json", "-o", "out", "--quiet"], arguments].concat());
+        let output =
+            bench.run(&[&["render", "scene.json", "-o", "out", "--quiet"], arguments].concat());
         let told = text(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
         assert!(words.iter().all(|word| told.contains(word)), "{arguments:?}: {told}");

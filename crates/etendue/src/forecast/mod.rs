@@ -115,8 +115,7 @@ impl TimeForecast {
         // As far as what is taken of a tolerance follows light.
         let mut followed = scene.clone();
         let fewer = plan.taken.as_ref().and_then(|taken| taken.bounces);
-        if let (Some(fewer), Some(TracerSpec::Path { max_bounces })) =
-            (fewer, &mut followed.tracer)
+        if let (Some(fewer), Some(TracerSpec::Path { max_bounces })) = (fewer, &mut followed.tracer)
         {
             *max_bounces = fewer.bounces;
         }

@@ -19,6 +19,7 @@ use etendue_tracer::{LayerSpec, Needs, TextureScope};
 
 pub use self::unseen::Unseen;
 use self::words::Grounds;
+use crate::alike::are_alike;
 use crate::band_paths::BandPaths;
 use crate::denoise::DENOISED;
 use crate::expose;
@@ -72,6 +73,8 @@ pub struct Plan {
     pub pupil: bool,
     /// How the bands of light go through the camera's lens.
     pub band_paths: BandPaths,
+    /// Whether the light of the scene is the same in all bands, of which one is traced for all.
+    pub alike: bool,
     /// Rays in all.
     pub rays: u64,
     /// Build time against traversal speed.
@@ -200,6 +203,10 @@ impl Plan {
             not_as_asked,
             passes: sample_passes(scene, passes, chosen.bands.count(), stopping),
             pupil: (lens && passes.mean) || is_lit,
+            alike: chosen.bands.count() > 3
+                && passes.light
+                && (band_paths.are_shared() || apart(lit_by) == 1)
+                && are_alike(scene),
             band_paths,
             rays,
             quality,

@@ -132,11 +132,8 @@ impl Hull {
         };
         let (columns, rows) = (middles(width, step[0]), middles(height, step[1]));
         let pose = *camera.pose();
-        let nothing = Self {
-            pose,
-            origins: Bounds::EMPTY,
-            slopes: [[f64::INFINITY, f64::NEG_INFINITY]; 2],
-        };
+        let nothing =
+            Self { pose, origins: Bounds::EMPTY, slopes: [[f64::INFINITY, f64::NEG_INFINITY]; 2] };
         let of_row = |row: &f64| {
             let mut rays = RayBatch::default();
             camera.rays_through(&columns, &vec![*row; columns.len()], &mut rays);
@@ -194,11 +191,10 @@ impl Hull {
                 let [least, most] = self.slopes[axis];
                 // The slope counts for the distance from the plane, too.
                 let steep = |slope: f64| 1.0 / slope.hypot(1.0);
-                beyond(&|c| {
-                    (c[axis] - max[axis] - most * depth(c, most < 0.0)) * steep(most)
-                }) || beyond(&|c| {
-                    (min[axis] - c[axis] + least * depth(c, least > 0.0)) * steep(least)
-                })
+                beyond(&|c| (c[axis] - max[axis] - most * depth(c, most < 0.0)) * steep(most))
+                    || beyond(&|c| {
+                        (min[axis] - c[axis] + least * depth(c, least > 0.0)) * steep(least)
+                    })
             })
     }
 }

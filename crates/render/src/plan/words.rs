@@ -83,6 +83,12 @@ impl Plan {
             decisions.push(self.explain_passes());
         }
         let (bands, because) = expose::explain_bands(scene, grounds.bands);
+        let because = match self.alike {
+            true => format!(
+                "{because}; nothing in the scene tells them apart, and one is traced for all"
+            ),
+            false => because,
+        };
         decisions.push(Decision::new(Kind::Wavelengths, bands, because));
         decisions.extend(expose::explain_sensor(scene));
         decisions.extend(explain_shutter(scene));
@@ -376,7 +382,8 @@ impl Plan {
         let fewer = self.taken.as_ref().and_then(|taken| taken.bounces);
         match fewer {
             Some(TakenBounces { bounces, .. }) => {
-                let because = format!("{}; {} by itself, and `tolerance` allows less", own.reason, own.value);
+                let because =
+                    format!("{}; {} by itself, and `tolerance` allows less", own.reason, own.value);
                 Decision::new(Kind::Bounces, format!("at most {bounces}"), because)
                     .by_key("tolerance")
                     .forced(true)

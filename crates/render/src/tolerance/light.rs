@@ -16,10 +16,10 @@ use crate::{Images, Plan, RenderError, Watch, render};
 pub(super) const BLOCK: u32 = 8;
 
 /// The longer side of the small pictures, at most.
-const SIDE: u32 = 40;
+const SIDE: u32 = 28;
 
 /// Samples of their pixels.
-const SAMPLES: u32 = 16;
+const SAMPLES: u32 = 64;
 
 /// The share of blocks that are to be within the tolerance.
 pub(super) const MOST_BLOCKS: f64 = 0.99;
@@ -51,8 +51,10 @@ pub(super) fn fewest(
         scene.tracer = Some(TracerSpec::Path { max_bounces: bounces });
         values(&scene, &camera, prepared, (SAMPLES, None), watch)
     };
-    let all = small(max_bounces)?;
-    let share = |bounces: u32| Ok::<_, RenderError>(differing(&small(bounces)?, &all));
+    let width = camera.resolution()[0] as usize;
+    let all = pooled(&small(max_bounces)?, width);
+    let share =
+        |bounces: u32| Ok::<_, RenderError>(differing(&pooled(&small(bounces)?, width), &all));
     // What longer paths bring falls with their length: between a number that is too few and one that will do.
     let (mut few, mut enough) = (0, (max_bounces, 0.0));
     let mut next = 2;
@@ -108,6 +110,22 @@ pub(super) fn values(
         sums.iter_mut().enumerate().for_each(|(i, sum)| *sum += channel.values.at(i));
     }
     Ok(sums)
+}
+
+/// The sums of each pixel and its neighbours to the right and below: what long paths bring is noisy, and changes little
+/// from block to block.
+fn pooled(values: &[f64], width: usize) -> Vec<f64> {
+    let at = |x: usize, y: usize| values.get(y * width + x).copied().unwrap_or(0.0);
+    let rows = values.len() / width.max(1);
+    let few = |side: usize| side.saturating_sub(1).max(1);
+    let places = (0..few(rows)).flat_map(|y| (0..few(width)).map(move |x| (x, y)));
+    let beside = |x: usize| (x + 1).min(width - 1);
+    places
+        .map(|(x, y)| {
+            let below = (y + 1).min(rows - 1);
+            at(x, y) + at(beside(x), y) + at(x, below) + at(beside(x), below)
+        })
+        .collect()
 }
 
 /// The share of light by which 99 % of the values of `own` differ from those of `all` at most; of black ones, none.

@@ -149,8 +149,7 @@ impl FullView {
         let mut notes = Vec::new();
         if places.iter().all(|place| place.depths.is_empty()) {
             let in_focus = scene.camera.lens().map(|lens| lens.focused().object_distance());
-            notes
-                .push("the camera sees no surface: compared at the distance in focus".to_owned());
+            notes.push("the camera sees no surface: compared at the distance in focus".to_owned());
             let depth = in_focus.unwrap_or(f64::INFINITY).abs();
             places.iter_mut().for_each(|place| place.depths.push(depth));
         }
@@ -198,9 +197,8 @@ impl FullView {
         models.extend(near);
         let undispersed = lens_models::undispersed(full);
         let groups = |camera: &Camera| camera.band_groups(&self.bands).len();
-        let draws = |camera: &Camera| {
-            camera.lens().map_or(1, |lens| lens.wavelengths_a_group(&self.bands))
-        };
+        let draws =
+            |camera: &Camera| camera.lens().map_or(1, |lens| lens.wavelengths_a_group(&self.bands));
         let (own, other) = (full, &undispersed.camera);
         if groups(other) < groups(own) || draws(other) < draws(own) {
             models.push(undispersed);
@@ -230,12 +228,7 @@ impl FullView {
         self.compared("full", &self.seen, tolerance)
     }
 
-    fn compared(
-        &self,
-        model: &'static str,
-        own: &[PlaceView],
-        tolerance: Tolerance,
-    ) -> Finding {
+    fn compared(&self, model: &'static str, own: &[PlaceView], tolerance: Tolerance) -> Finding {
         let [mut chief_ray, mut centroid, mut blur, mut colour, mut light] = [Worst::default(); 5];
         let scale = self.scale;
         for ((own, full), place) in own.iter().zip(&self.seen).zip(&self.places) {

@@ -12,7 +12,8 @@ use crate::steps::{layer, load_json, trace};
 fn around(camera: &Value, accel: &str) -> Value {
     let mut state = 7_u64;
     let mut random = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 40) as f64 / f64::from(1 << 24) - 0.5
     };
     let objects: Vec<Value> = (0..120)

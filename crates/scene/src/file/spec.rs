@@ -17,7 +17,8 @@ use serde_json::{Map, Value, json};
 
 use super::camera::CameraSource;
 use super::{
-    AccuracySpec, FramesSpec, ObjectSpec, PlanSpec, RenderSpec, SlotSpec, ToleranceSpec, TracerSpec, Up,
+    AccuracySpec, FramesSpec, ObjectSpec, PlanSpec, RenderSpec, SlotSpec, ToleranceSpec,
+    TracerSpec, Up,
 };
 use etendue_camera::CameraSpec;
 use etendue_optics::train::NOTES;

@@ -141,14 +141,18 @@ impl JsonSchema for ShareSpec {
 
 impl ToleranceSpec {
     /// What contradicts it: the path, and why.
-    pub(super) fn contradiction(plan: &PlanSpec, has_slots: bool) -> Option<(&'static str, String)> {
+    pub(super) fn contradiction(
+        plan: &PlanSpec,
+        has_slots: bool,
+    ) -> Option<(&'static str, String)> {
         if plan.dispersion == Some(true) {
             let why = "contradicts `tolerance`, which decides whether rays of all bands run together; leave one of \
                        them out";
             return Some(("plan.dispersion", why.to_owned()));
         }
         has_slots.then(|| {
-            let why = "is of one camera, and the slots of `serial` have one each; leave one of them out";
+            let why =
+                "is of one camera, and the slots of `serial` have one each; leave one of them out";
             ("tolerance", why.to_owned())
         })
     }
