@@ -200,7 +200,7 @@ fn one_band_of_a_grey_scene_is_traced_for_all() {
             "camera": camera, "tracer": { "type": "path", "max_bounces": 4 }, "layers": ["direct"],
             "plan": { "light_precision": "double" },
             "lights": [{ "type": "environment", "radiance": [0.7, 0.7, 0.7] },
-                { "type": "point", "position": [1, 2, 1], "intensity": [3, 3, 3] }],
+                { "type": "point", "at": [1, 2, 1], "intensity": [3, 3, 3] }],
             "materials": { "grey": { "type": "matte", "color": color },
                 "glass": { "type": "dielectric", "ior": 1.5 },
                 "checks": { "type": "checker", "colors": [[0.2, 0.2, 0.2], [0.9, 0.9, 0.9]] } },

@@ -17,9 +17,9 @@ fn around(camera: &Value, accel: &str) -> Value {
         (state >> 40) as f64 / f64::from(1 << 24) - 0.5
     };
     let objects: Vec<Value> = (0..120)
-        .map(|_| {
+        .map(|seed| {
             let [x, y, z] = std::array::from_fn(|_| 9.0 * random());
-            json!({ "shape": "blob", "triangles": 200, "seed": 1, "radius": 0.4,
+            json!({ "shape": "blob", "triangles": 200, "seed": seed, "radius": 0.4,
                 "transform": { "translate": [x, y, z], "rotate": [1, 1, 0, 300.0 * random()],
                     "scale": [1.0, 0.3 + random().abs(), 1.0] } })
         })
