@@ -42,15 +42,17 @@ pub struct Field {
     pub rays: u32,
     /// Bands, at most, that are looked at: the first, the last, and some in between.
     pub bands: usize,
+    /// Whether the pupil is measured at one wavelength alone.
+    pub rough: bool,
 }
 
 impl Field {
     /// What a user who compares models gets.
-    pub const FINE: Self = Self { size: [9, 7], rays: 1024, bands: usize::MAX };
+    pub const FINE: Self = Self { size: [9, 7], rays: 1024, bands: usize::MAX, rough: false };
     /// What a render does before it begins.
-    pub const QUICK: Self = Self { size: [9, 7], rays: 256, bands: 3 };
+    pub const QUICK: Self = Self { size: [9, 7], rays: 256, bands: 3, rough: true };
     /// What a choice is verified by: places in between, and more bands.
-    pub const BETWEEN: Self = Self { size: [16, 12], rays: 256, bands: 5 };
+    pub const BETWEEN: Self = Self { size: [16, 12], rays: 256, bands: 5, rough: false };
 }
 
 /// A place of the picture.
@@ -123,7 +125,7 @@ pub struct FullView {
     camera: Camera,
     bands: Bands,
     chosen: Vec<usize>,
-    rays: u32,
+    field: Field,
     /// Pixels of a slope of 1.
     scale: f64,
     /// Places of the picture that are compared.
@@ -154,12 +156,11 @@ impl FullView {
             places.iter_mut().for_each(|place| place.depths.push(depth));
         }
         let chosen = some_of(bands.count(), field.bands);
-        let camera = open(&scene.camera, bands)?;
-        let rays = field.rays;
-        let seen = seen((&camera, bands), &chosen, &places, rays);
+        let camera = open(&scene.camera, bands, field.rough)?;
+        let seen = seen((&camera, bands), &chosen, &places, field.rays);
         let scale = lens_models::scale(&scene.camera).unwrap_or(f64::NAN);
         let bands = bands.clone();
-        Ok(Self { camera, bands, chosen, rays, scale, places, seen, notes })
+        Ok(Self { camera, bands, chosen, field, scale, places, seen, notes })
     }
 
     /// The light of OpenCV's camera in the places of this one: a polynomial of the distance from the axis, by least
@@ -217,8 +218,9 @@ impl FullView {
         camera: &Camera,
         tolerance: Tolerance,
     ) -> Result<Finding, RenderError> {
-        let camera = open(camera, &self.bands)?;
-        let own = seen((&camera, &self.bands), &self.chosen, &self.places, self.rays);
+        let Field { rays, rough, .. } = self.field;
+        let camera = open(camera, &self.bands, rough)?;
+        let own = seen((&camera, &self.bands), &self.chosen, &self.places, rays);
         Ok(self.compared(model, &own, tolerance))
     }
 
@@ -279,8 +281,9 @@ fn with_falloff(full: &Camera, spec: CameraSpec, falloff: FalloffSpec) -> Option
     lens_models::model("falloff", full, &CameraSpec::Pinhole(spec)).ok()
 }
 
-fn open(camera: &Camera, bands: &Bands) -> Result<Camera, RenderError> {
-    camera.opened(bands).map_err(|error| RenderError::Camera(error.why))
+fn open(camera: &Camera, bands: &Bands, rough: bool) -> Result<Camera, RenderError> {
+    let opened = if rough { camera.opened_roughly(bands) } else { camera.opened(bands) };
+    opened.map_err(|error| RenderError::Camera(error.why))
 }
 
 /// Of so many bands a few numbers: the first, the last, and even ones in between.
@@ -329,7 +332,8 @@ pub struct TakenBounces {
     pub share: f64,
 }
 
-/// Samples of light from which on looking for something cheaper can pay: finding out takes as long as some 10⁵.
+/// Samples of light in three bands from which on looking for something cheaper can pay: finding out takes as long as
+/// some 10⁵.
 const WORTH: u64 = 200_000;
 
 /// What of the tolerance of `scene` is taken: the simplest camera model within it, and of the light that this leaves
@@ -353,7 +357,8 @@ pub fn choose(
     }
     let [width, height] = scene.camera.resolution().map(u64::from);
     let samples = width * height * u64::from(scene.render.samples.typical());
-    if samples < WORTH {
+    // What a sample takes grows with its bands.
+    if samples.saturating_mul(plan.bands.count().max(3) as u64 / 3) < WORTH {
         let why = format!("{samples} samples of light are too few for looking to pay");
         taken.notes.push(why);
         return Ok(Some(taken));
