@@ -27,6 +27,7 @@ pub mod tolerance;
 
 use etendue_accel::BuildError;
 use etendue_render::RenderError;
+use etendue_render::tolerance::lens_models::NoModels;
 
 /// Told the share done (0..=1) now and then; answering `false` stops.
 pub type Progress<'a> = &'a dyn Fn(f64) -> bool;
@@ -63,4 +64,10 @@ pub enum BenchError {
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,
+}
+
+impl From<NoModels> for BenchError {
+    fn from(NoModels(why): NoModels) -> Self {
+        Self::NoLens(why)
+    }
 }

@@ -78,7 +78,9 @@ fn the_tolerance_decides_which_model_is_the_cheapest() {
     // The blur is 0.31 pixels and the corners lack 26 % of the light.
     assert_eq!(cheapest(0.3, None), "thin");
     assert_eq!(cheapest(0.35, None), "pinhole");
-    assert_eq!(cheapest(0.35, Some(0.2)), "thin");
+    // A pinhole with the falloff of the lens has its light, and not its blur.
+    assert_eq!(cheapest(0.35, Some(0.2)), "falloff");
+    assert_eq!(cheapest(0.3, Some(0.2)), "thin");
     assert_eq!(cheapest(0.35, Some(0.4)), "pinhole");
 }
 

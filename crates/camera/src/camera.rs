@@ -109,6 +109,7 @@ impl CameraSpec {
             fov: Some(Degrees(fov.to_degrees())),
             intrinsics: None,
             distortion: None,
+            falloff: None,
             pose: Some(PoseSpec::from(pose)),
             shutter: None,
             motion: None,
@@ -473,6 +474,12 @@ impl Camera {
         Self { projection, ..self.clone() }
     }
 
+    /// The same camera, in its place and with its pixels, shutter and motion, whose rays run as those of `other`.
+    #[must_use]
+    pub fn seen_through(&self, other: &Self) -> Self {
+        Self { projection: other.projection.clone(), ..self.clone() }
+    }
+
     /// The camera with all measured that sampling its pupil for `bands` needs; to be done once,
     /// before [`Self::sample_rays`] is asked from many threads.
     ///
@@ -487,6 +494,20 @@ impl Camera {
             | Projection::Views(_)) => other.clone(),
         };
         Ok(Self { projection, ..self.clone() })
+    }
+
+    /// The same as [`opened`](Self::opened) with the pupil measured at one wavelength alone, which takes a few times
+    /// less: what others pass beside it is not seen.
+    ///
+    /// # Errors
+    ///
+    /// When no light gets through.
+    pub fn opened_roughly(&self, bands: &Bands) -> Result<Self, CameraError> {
+        let mut opened = self.clone();
+        if let Projection::Lens(lens) = &self.projection {
+            opened.projection = Projection::Lens(Arc::new(lens.opened_roughly(bands)?));
+        }
+        Ok(opened)
     }
 
     /// The same as [`opened`](Self::opened) with the filters of lens and lenslets clear.
@@ -600,6 +621,12 @@ impl Camera {
         out.drop_unseen();
         out.weight.clear();
         out.weight.resize(out.rays.len(), 1.0);
+        if let Projection::Pinhole(pinhole) = &self.projection {
+            for (weight, &sample) in out.weight.iter_mut().zip(&out.sample) {
+                let i = sample as usize;
+                *weight = pinhole.light_at([samples.columns[i], samples.rows[i]]);
+            }
+        }
     }
 
     /// The rays of `samples` that all bands share behind a lens that tells wavelengths apart, and where the

@@ -15,6 +15,7 @@ pub mod camera_file;
 pub mod curve_files;
 pub mod distortion;
 pub mod exposure;
+mod falloff;
 pub mod framing;
 pub mod intrinsics;
 pub mod lens;
@@ -34,6 +35,7 @@ pub use camera::{Camera, CameraSpec, PixelExtent, Projection};
 pub use camera_file::{CameraFile, ProjectionName};
 pub use distortion::{Distortion, DistortionSpec};
 pub use exposure::CameraTime;
+pub use falloff::FalloffSpec;
 pub use framing::{Subject, SupportFunction, Viewpoint};
 pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin, SensorSpec};
 pub use lens::{

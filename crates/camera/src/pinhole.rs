@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::distortion::{Distortion, DistortionSpec};
+use crate::falloff::{FalloffSpec, square_of};
 use crate::framing::{self, FieldExtent, Subject};
 use crate::{
     CameraError, CameraMotionSpec, Intrinsics, IntrinsicsSpec, PixelOrigin, Pose, PoseSpec,
@@ -35,6 +36,9 @@ pub struct PinholeSpec {
     /// Lens distortion, beside `intrinsics`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distortion: Option<DistortionSpec>,
+    /// How light falls off from the axis; it does not when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub falloff: Option<FalloffSpec>,
     /// Where the camera stands; when absent, the whole scene is framed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose: Option<PoseSpec>,
@@ -54,6 +58,7 @@ pub struct PinholeSpec {
 pub struct Pinhole {
     intrinsics: Intrinsics,
     distortion: Option<Distortion>,
+    falloff: Option<FalloffSpec>,
     pixel_origin: PixelOrigin,
 }
 
@@ -91,7 +96,8 @@ impl PinholeSpec {
             Some(spec) => spec.pixel_origin,
             None => PixelOrigin::Center,
         };
-        let pinhole = Pinhole { intrinsics, distortion, pixel_origin };
+        self.falloff.as_ref().map_or(Ok(()), FalloffSpec::check)?;
+        let pinhole = Pinhole { intrinsics, distortion, falloff: self.falloff, pixel_origin };
         // Without a pose the whole subject is framed.
         let pose = match &self.pose {
             Some(pose) => pose.build()?,
@@ -137,6 +143,11 @@ impl Pinhole {
     #[must_use]
     pub fn distortion(&self) -> Option<&Distortion> {
         self.distortion.as_ref()
+    }
+
+    /// The relative light of a place of the picture (column and row, pixels from the corner).
+    pub(crate) fn light_at(&self, place: [f64; 2]) -> f64 {
+        self.falloff.map_or(1.0, |falloff| falloff.at(square_of(&self.intrinsics, place)))
     }
 
     /// What the file counted the principal point from; the centre when it gave a field of view.

@@ -204,6 +204,10 @@ pub(crate) struct SceneArguments {
     /// The accelerator that finds the hits
     #[arg(long, value_parser = parse::accelerators())]
     pub(crate) accel: Option<String>,
+    /// What the picture may be off by, such as "0.5 px, 2 %": what is cheapest within it is taken of the lens and
+    /// of the bounces of light. With `plan --models` the share of light may be left out, and is not judged then
+    #[arg(long, value_name = "PIXELS, SHARE", value_parser = parse::tolerance)]
+    pub(crate) tolerance: Option<Tolerance>,
     /// A glass catalogue in Zemax' AGF format, searched before the built-in one; the last one given is
     /// searched first
     #[arg(long = "glass-catalog", value_name = "FILE")]
@@ -297,6 +301,10 @@ pub(crate) struct RenderArguments {
     /// Write times, rays, memory and fingerprints as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) report: Option<PathBuf>,
+    /// After the render, render a small part with everything, and say how far what was taken of the scene's
+    /// `tolerance` is from it
+    #[arg(long, conflicts_with_all = ["shard", "frames"])]
+    pub(crate) verify: bool,
     /// Of a scene with `frames`, render these alone, e.g. 10..20 (without the last)
     #[arg(long, value_name = "FROM..TO", value_parser = parse::frames)]
     pub(crate) frames: Option<std::ops::Range<usize>>,
@@ -383,9 +391,9 @@ pub(crate) struct PlanArguments {
     /// name the cheapest within the tolerance; times the picture through each
     #[arg(long)]
     pub(crate) models: bool,
-    /// What a model may be off by: pixels, and a share of the light when that is to be judged as well
-    #[arg(long, value_name = "PIXELS[,SHARE]", default_value = "0.5 px", requires = "models", value_parser = parse::tolerance)]
-    pub(crate) tolerance: Tolerance,
+    /// Render a small part with everything, and print how far what is taken of the tolerance is from it
+    #[arg(long, conflicts_with = "models")]
+    pub(crate) verify: bool,
     /// Print JSON for machines
     #[arg(long)]
     pub(crate) json: bool,
@@ -472,6 +480,11 @@ impl SceneArguments {
         }
         if let Some(accel) = &self.accel {
             set("render.accel", accel.clone());
+        }
+        if let Some(Tolerance { pixels, light }) = self.tolerance {
+            // Without a share of light the scene says what is missing.
+            let light = light.map_or_else(String::new, |light| format!(",\"light\":{light}"));
+            set("tolerance", format!("{{\"displacement\":{pixels}{light}}}"));
         }
         overrides
     }

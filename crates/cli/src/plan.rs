@@ -1,13 +1,13 @@
 //! `etendue plan`: what a render would do, and why.
 
 use etendue::{Calibration, Options, Session, TimeForecast};
-use etendue_bench::tolerance;
+use etendue_bench::tolerance::{self, Tolerance};
 use etendue_report::{Decision, DecisionKind, DecisionValue, Tabled};
 
-use crate::arguments::PlanArguments;
+use crate::arguments::{PlanArguments, SceneArguments};
 use crate::fault::{Fault, Versioned, print_json, print_text};
-use crate::progress::Phases;
-use crate::render::options;
+use crate::progress::{Phases, say};
+use crate::render::{options, verified};
 use crate::stop;
 
 pub(crate) fn run(arguments: &PlanArguments) -> Result<(), Fault> {
@@ -19,6 +19,9 @@ pub(crate) fn run(arguments: &PlanArguments) -> Result<(), Fault> {
     let mut session = Session::open_with(&arguments.scene.scene, options)?;
     let frames = session.frames(&progress)?;
     let mut plan = session.plan(&progress)?.clone();
+    if arguments.verify {
+        say(&verified(&mut session, &progress)?);
+    }
     let machine = Calibration::of_this_machine()?;
     let time = TimeForecast::new(&session.prospect(&progress)?, &machine);
     plan.decisions.push(time.decision());
@@ -38,19 +41,25 @@ pub(crate) fn run(arguments: &PlanArguments) -> Result<(), Fault> {
 fn compare_models(arguments: &PlanArguments) -> Result<(), Fault> {
     stop::listen();
     let phases = Phases::new(arguments.json);
-    let mut session = Session::open_with(&arguments.scene.scene, options(&arguments.scene))?;
+    // The tolerance is what models are judged by here, not what is taken of the scene's.
+    let own = SceneArguments { tolerance: None, ..arguments.scene.clone() };
+    let mut session = Session::open_with(&arguments.scene.scene, options(&own))?;
     let (scene, accel) = session.scene_and_accel(&phases.progress(false))?;
     let progress = phases.begin("models");
     let told = |share| progress(share);
-    let compared =
-        tolerance::compare(scene, accel, arguments.tolerance, &told).map_err(|error| {
-            match Fault::from(error) {
-                Fault::Refused(why) => {
-                    Fault::refused(format!("{}: {why}", arguments.scene.scene.display()))
-                }
-                fault => fault,
+    let of_scene = scene
+        .tolerance
+        .map(|spec| Tolerance { pixels: spec.displacement.0, light: Some(spec.light.0) });
+    let by_itself = Tolerance { pixels: 0.5, light: None };
+    let judged = arguments.scene.tolerance.or(of_scene).unwrap_or(by_itself);
+    let compared = tolerance::compare(scene, accel, judged, &told).map_err(|error| {
+        match Fault::from(error) {
+            Fault::Refused(why) => {
+                Fault::refused(format!("{}: {why}", arguments.scene.scene.display()))
             }
-        })?;
+            fault => fault,
+        }
+    })?;
     if arguments.json {
         print_json(&Versioned::new(&compared))
     } else {

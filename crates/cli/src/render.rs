@@ -60,13 +60,31 @@ pub(crate) fn options(arguments: &SceneArguments) -> Options {
     }
 }
 
+/// What a small part with everything says of what was taken of the scene's tolerance.
+pub(crate) fn verified(session: &mut Session, progress: &Progress) -> Result<String, Fault> {
+    match session.verify(progress)? {
+        Some(verified) => Ok(format!("note: {verified}")),
+        None => Err(Fault::refused(
+            "--verify compares what is taken of a `tolerance` with everything, and the scene has none; give it one, \
+             such as --tolerance \"0.5 px, 2 %\"",
+        )),
+    }
+}
+
 fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     let folder = &arguments.output;
     // Whether it can be written is better known now than after the render.
     places::folder(folder)?;
     let mut session = open(arguments, outputs)?;
     let progress = Phases::new(arguments.quiet).progress(!arguments.quiet);
+    if arguments.verify && session.scene(&progress)?.tolerance.is_none() {
+        // Before hours are spent on it.
+        verified(&mut session, &progress)?;
+    }
     if let Some(frames) = session.frames(&progress)? {
+        if arguments.verify {
+            return Err(Fault::refused("--verify is of one picture, and the scene has `frames`"));
+        }
         return sequence::render(arguments, &mut session, &frames, outputs, &progress);
     }
     if arguments.resume || arguments.frames.is_some() || arguments.pattern.is_some() {
@@ -86,7 +104,10 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
         expect(TimeForecast::counted(&session.prospect(&progress)?, &machine).trace);
     }
     let rendering = session.render(&progress)?;
-    write(arguments, &rendering, outputs, progress)?;
+    write(arguments, &rendering, outputs, progress.clone())?;
+    if arguments.verify {
+        say(&verified(&mut session, &progress)?);
+    }
     checkpoint.map_or(Ok(()), remove)
 }
 

@@ -55,6 +55,7 @@ pub use etendue_render::light_field::LightFieldViews;
 pub use etendue_render::output::{
     Channel, DistanceScale, Layer, Look, Outputs, Picture, Screen, Values,
 };
+pub use etendue_render::tolerance::Verified;
 pub use etendue_render::{Checkpoint, Plan, Report, Shard, ShardBy, SoFar};
 pub use etendue_report::{Decision, DecisionKind, DecisionValue, Saving, Tabled};
 pub use etendue_scene::file::scene_schema;

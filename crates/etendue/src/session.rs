@@ -305,13 +305,17 @@ impl Session {
         Ok(&self.loaded()?.scene)
     }
 
-    /// What a render will do, and why.
+    /// What a render will do, and why. Of a scene with a tolerance, what is taken of it is found, which takes the
+    /// structure and the images.
     ///
     /// # Errors
     ///
-    /// As [`Self::scene`].
+    /// As [`Self::scene`], and of a scene with a tolerance as [`Self::prepare`].
     pub fn plan(&mut self, progress: &Progress) -> Result<&Plan, Error> {
         self.load(progress)?;
+        if self.loaded()?.scene.tolerance.is_some() {
+            self.prepare(progress)?;
+        }
         Ok(&self.loaded()?.plan)
     }
 
@@ -333,7 +337,8 @@ impl Session {
     /// tolerated; when it is stopped.
     pub fn prepare(&mut self, progress: &Progress) -> Result<(), Error> {
         self.build(progress)?;
-        self.decode(progress)
+        self.decode(progress)?;
+        self.take(progress)
     }
 
     /// Checks, before the first of `frames` is rendered into `out`, that no file of any of them, nor of the data

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use etendue_accel::{Accel, BuildOptions};
 use etendue_geometry::{Geometry, HitPrecision};
-use etendue_render::{Plan, RenderError};
+use etendue_render::{Plan, RenderError, Unseen};
 use etendue_scene::Scene;
 use etendue_scene::file::AccelName;
 
@@ -31,6 +31,8 @@ struct Built {
     exposure: [f64; 2],
     /// Nothing of it is of one before.
     is_new: bool,
+    /// What was left out of it.
+    unseen: Option<Unseen>,
 }
 
 /// Whether a picture depends on how the structure was built.
@@ -38,34 +40,65 @@ fn wants_new(plan: &Plan) -> bool {
     plan.light_precision == HitPrecision::Single && plan.layers.iter().any(|l| l.is_averaged())
 }
 
+/// Whether a structure without `lacks` answers rays that cannot meet what is `unseen`.
+fn serves(lacks: Option<&Unseen>, unseen: Option<&Unseen>) -> bool {
+    match (lacks, unseen) {
+        (None, _) => true,
+        (Some(_), None) => false,
+        (Some(lacks), Some(unseen)) => unseen.is_served_without(lacks),
+    }
+}
+
 impl Structures {
-    /// The structure over the surfaces of `scene`, if there is one that will do.
-    pub(crate) fn over(&self, scene: &Scene, plan: &Plan) -> Option<Arc<dyn Accel>> {
+    /// Whether `accel` has all of the surfaces of its scene.
+    pub(crate) fn is_whole(&self, accel: &Arc<dyn Accel>) -> bool {
+        let is_own = |built: &&Built| Arc::ptr_eq(&built.accel, accel);
+        self.built.iter().find(is_own).is_none_or(|built| built.unseen.is_none())
+    }
+
+    /// The structure over the surfaces of `scene`, if there is one that will do where these are `unseen`.
+    pub(crate) fn over(
+        &self,
+        scene: &Scene,
+        plan: &Plan,
+        unseen: Option<&Unseen>,
+    ) -> Option<Arc<dyn Accel>> {
         let is_own = |built: &Built| built.is_new && built.accel.report().quality == plan.quality;
-        let serves = |built: &&Built| {
+        let will_do = |built: &&Built| {
             built.is_over(scene)
+                && serves(built.unseen.as_ref(), unseen)
                 && built.refine == plan.refine
                 && (!wants_new(plan) || is_own(built))
         };
-        self.built.iter().find(serves).map(|built| Arc::clone(&built.accel))
+        self.built.iter().find(will_do).map(|built| Arc::clone(&built.accel))
     }
 
-    /// Builds the structure over `scene`, with what the last one has of it where that will do.
+    /// Builds the structure over `scene`, with what the last one has of it where that will do. What is `unseen` is
+    /// left out, unless something else of the same surfaces was before: who looks elsewhere once will do so again.
     pub(crate) fn build(
         &mut self,
         scene: &Scene,
         plan: &Plan,
+        unseen: Option<&Unseen>,
         options: &BuildOptions,
     ) -> Result<Arc<dyn Accel>, RenderError> {
         let name = scene.render.accel;
+        let unseen = unseen.filter(|_| !self.built.iter().any(|built| built.is_over(scene)));
         let is_alike = |built: &&Built| built.name == name && built.refine == plan.refine;
-        let before = self.built.iter().find(|built| is_alike(built) && !wants_new(plan));
+        let is_whole = |built: &&Built| built.unseen.is_none() && unseen.is_none();
+        let fits = |built: &&Built| is_alike(built) && is_whole(built) && !wants_new(plan);
+        let before = self.built.iter().find(fits);
         let is_new = before.is_none();
-        let accel = etendue_render::rebuild(scene, plan, options, before.map(|b| &*b.accel))?;
+        let accel = match unseen {
+            Some(unseen) => etendue_render::build_without(unseen, scene, plan, options)?,
+            None => etendue_render::rebuild(scene, plan, options, before.map(|b| &*b.accel))?,
+        };
         let accel: Arc<dyn Accel> = Arc::from(accel);
         let geometry = Arc::clone(&scene.geometry);
         let (refine, exposure) = (plan.refine, scene.camera.exposure_span());
-        let built = Built { accel: Arc::clone(&accel), geometry, name, refine, exposure, is_new };
+        let unseen = unseen.cloned();
+        let accel_too = Arc::clone(&accel);
+        let built = Built { accel: accel_too, geometry, name, refine, exposure, is_new, unseen };
         self.built.insert(0, built);
         Ok(accel)
     }

@@ -13,6 +13,8 @@ mod moving;
 mod outputs;
 #[path = "session/spectra.rs"]
 mod spectra;
+#[path = "session/unseen.rs"]
+mod unseen;
 
 use std::fs;
 use std::path::Path;

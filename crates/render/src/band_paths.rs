@@ -1,7 +1,7 @@
 //! Whether the bands of a picture's light share the paths of the scene behind a lens that sends each its own
 //! way: what it is decided by, and in words.
 
-use etendue_camera::SharedPaths;
+use etendue_camera::{Camera, SharedPaths};
 use etendue_report::{Decision, DecisionKind, Size};
 use etendue_scene::Scene;
 use etendue_spectrum::Bands;
@@ -28,9 +28,14 @@ pub enum BandPaths {
 }
 
 impl BandPaths {
-    /// The choice for `scene`, whose picture is of light in `bands` where it `is_lit`.
-    pub(crate) fn of(scene: &Scene, bands: &Bands, stopping: Stopping, is_lit: bool) -> Self {
-        let lens = scene.camera.lens().filter(|_| is_lit);
+    /// The choice for `scene` through `camera`, whose picture is of light in `bands` where it `is_lit`.
+    pub(crate) fn of(
+        (scene, camera): (&Scene, &Camera),
+        bands: &Bands,
+        stopping: Stopping,
+        is_lit: bool,
+    ) -> Self {
+        let lens = camera.lens().filter(|_| is_lit);
         let Some(lens) = lens.filter(|lens| lens.band_groups(bands).len() > 1) else {
             return Self::Alike;
         };

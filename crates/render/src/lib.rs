@@ -16,6 +16,7 @@
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests set their stage by hand"))]
 
 mod adaptive;
+mod alike;
 mod band_paths;
 mod checkpoint;
 pub mod denoise;
@@ -44,6 +45,7 @@ mod shard;
 mod sparkles;
 mod stopping;
 mod tiles;
+pub mod tolerance;
 mod watch;
 
 pub use adaptive::SampleCounts;
@@ -54,10 +56,10 @@ pub use film::{NoMemory, Precision};
 pub use film_file::{FilmError, FilmFile, FilmHeader, Identity};
 pub use images::Images;
 pub use other_frame::FollowedFrame;
-pub use plan::Plan;
+pub use plan::{Plan, Unseen};
 pub use render::{
-    Course, Film, Prepared, Progress, Rendered, accelerators, build, finish, rebuild, render,
-    sample_set, trace,
+    Course, Film, Prepared, Progress, Rendered, accelerators, build, build_without, finish,
+    rebuild, render, sample_set, trace,
 };
 pub use report::{Report, Seconds};
 pub use shard::{Shard, ShardBy};

@@ -149,6 +149,7 @@ fn dark_share(
             tracer,
             camera: &camera,
             groups,
+            count: Bands::Rgb.count(),
             rows: None,
             layers: vec![LayerSpec::Radiance],
         }),

@@ -20,6 +20,8 @@ pub(crate) struct LightPass<'a> {
     pub(crate) tracer: Rules,
     /// The camera, opened for these bands.
     pub(crate) camera: &'a Camera,
+    /// How many bands there are on the film: as many as are traced, or all of them like the one that is.
+    pub(crate) count: usize,
     /// The bands that the camera sends separate ways.
     pub(crate) groups: Vec<BandGroup>,
     /// Where the bands share rays all the same: how many rows from its own each lands, at most.
@@ -110,6 +112,16 @@ impl LightPass<'_> {
     }
 }
 
+/// Puts so many of each value in its place.
+fn repeat_each(values: &mut Vec<f64>, count: usize) {
+    let few = values.len();
+    values.resize(few * count, 0.0);
+    for i in (0..few).rev() {
+        let value = values[i];
+        values[i * count..(i + 1) * count].fill(value);
+    }
+}
+
 /// Whether a layer counts light of a group: that which one surface scattered at most, and the rest.
 fn counts(layer: LayerSpec, group: LightGroup) -> [bool; 2] {
     match layer {
@@ -154,7 +166,7 @@ impl Averaged for LightPass<'_> {
     }
 
     fn shape(&self) -> [usize; 2] {
-        [self.layers.len(), self.stage.spectral.count()]
+        [self.layers.len(), self.count]
     }
 
     fn batch(&self) -> u32 {
@@ -169,7 +181,9 @@ impl Averaged for LightPass<'_> {
             true => Parts::Groups(lights.parts().len()),
             false => Parts::Whole,
         };
-        let beam = RaySamples { rays: &rays.rays, samples: numbers, bands: bands.clone(), parts };
+        let is_one_for_all = self.stage.spectral.count() != self.count;
+        let bands = if is_one_for_all { 0..self.stage.spectral.count() } else { bands.clone() };
+        let beam = RaySamples { rays: &rays.rays, samples: numbers, bands, parts };
         let light = if parts == Parts::Whole { &mut *values } else { &mut *light_in_parts };
         traffic.light += self.tracer.radiance(&self.stage, &beam, scratch, light);
         if lights.are_modulated() {
@@ -177,6 +191,9 @@ impl Averaged for LightPass<'_> {
         }
         if parts != Parts::Whole {
             self.gather(light_in_parts, values);
+        }
+        if is_one_for_all {
+            repeat_each(values, self.count);
         }
         if self.groups.len() == 1 {
             self.count_sparkles(memory);

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use etendue_accel::{Accel, BuildError, BuildOptions, build_moving};
 use etendue_camera::{Camera, LensCamera, PixelExtent};
+use etendue_geometry::Geometry;
 use etendue_optics::element::StatusCounts;
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, LightRow, SETS};
@@ -24,6 +25,7 @@ use crate::images::Images;
 use crate::other_frame::FollowedFrame;
 use crate::output::{Development, Layer, Picture, PictureError};
 use crate::passes::Passed;
+use crate::plan::Unseen;
 use crate::radiance::LightPass;
 use crate::samples::{Sampling, Sum, short_passes};
 use crate::shard::{Shard, must_be_whole};
@@ -88,7 +90,29 @@ pub fn build(
     plan: &Plan,
     options: &BuildOptions,
 ) -> Result<Box<dyn Accel>, RenderError> {
-    let geometry = Arc::clone(&scene.geometry);
+    build_over(Arc::clone(&scene.geometry), scene, plan, options)
+}
+
+/// As [`build`], without what no ray of the picture can meet: for that picture's rays alone.
+///
+/// # Errors
+///
+/// As [`build`].
+pub fn build_without(
+    unseen: &Unseen,
+    scene: &Scene,
+    plan: &Plan,
+    options: &BuildOptions,
+) -> Result<Box<dyn Accel>, RenderError> {
+    build_over(Arc::new(unseen.left_out_of(&scene.geometry)), scene, plan, options)
+}
+
+fn build_over(
+    geometry: Arc<Geometry>,
+    scene: &Scene,
+    plan: &Plan,
+    options: &BuildOptions,
+) -> Result<Box<dyn Accel>, RenderError> {
     let options = options_for(scene, plan, options);
     let name = scene.render.accel.unwrap_or(accelerators()[0]);
     if options.isa.is_some() && name != AccelName::Embree {
@@ -225,7 +249,9 @@ fn light_of(
     let light = light.filter(|_| plan.layers.contains(&LayerSpec::Radiance));
     let Some(LightRow { rules, .. }) = light else { return Ok(None) };
     let roulette = rules.roulette.map(|_| scene.accuracy.roulette_after);
-    let rules = Rules { roulette, ..rules };
+    let fewer = plan.taken.as_ref().and_then(|taken| taken.bounces);
+    let bounces = fewer.map_or(rules.bounces, |fewer| fewer.bounces.min(rules.bounces));
+    let rules = Rules { roulette, bounces, ..rules };
     let map = images.environment.clone();
     let found = lighting::settle(scene, map, rules, seen, &|share| watch.goes_on(share))?;
     notes.extend(found.note);
@@ -252,17 +278,28 @@ pub fn trace(
     let mut layers = empty_film(scene, plan)?;
     let start = Instant::now();
     // Cameras opened for the wavelengths of data and of light.
-    let open = |bands: &Bands| match plan.pupil {
-        true => scene.camera.opened(bands).map_err(|e| RenderError::Camera(e.why)),
-        false => Ok(scene.camera.clone()),
+    let open = |camera: &Camera, bands: &Bands| match plan.pupil {
+        true => camera.opened(bands).map_err(|e| RenderError::Camera(e.why)),
+        false => Ok(camera.clone()),
     };
-    let camera = open(&Bands::Rgb)?;
-    let light_camera = if plan.bands == Bands::Rgb { camera.clone() } else { open(&plan.bands)? };
+    let lit_by = plan.light_camera(scene);
+    let is_own = std::ptr::eq(lit_by, &raw const scene.camera);
+    // Beside another camera of light, the scene's own is looked through for averaged colours alone.
+    let averages = plan.layers.iter().any(|layer| layer.is_averaged() && !layer.is_light());
+    let camera = match is_own || averages {
+        true => open(&scene.camera, &Bands::Rgb)?,
+        false => scene.camera.clone(),
+    };
+    let light_camera = match is_own && plan.bands == Bands::Rgb {
+        true => camera.clone(),
+        false => open(lit_by, &plan.bands)?,
+    };
     let shared = light_camera.lens().filter(|_| plan.band_paths.are_shared());
     let shared = shared.and_then(LensCamera::opened_paths);
     // Lights, the studio among them where all else leaves the scene dark.
     let surroundings = surroundings(scene, images, scene.render.samples.typical());
-    let spectral = Spectral::of(&plan.bands, &scene.materials);
+    let traced = if plan.alike { &Bands::Grey } else { &plan.bands };
+    let spectral = Spectral::of(traced, &scene.materials);
     let mut notes = Vec::new();
     let seen = (accel, surroundings);
     let lit = light_of((scene, plan), images, seen, &spectral, &mut notes, watch)?;
@@ -283,6 +320,7 @@ pub fn trace(
         tracer: *rules,
         camera: &light_camera,
         groups: light_camera.band_groups(&plan.bands),
+        count: plan.bands.count(),
         rows: shared.map(|shared| shared.rows),
         layers: plan.layers.iter().copied().filter(|layer| layer.is_light()).collect(),
     });

@@ -25,6 +25,8 @@ pub enum DecisionKind {
     Shutter,
     /// Denoising of the picture.
     Denoising,
+    /// What the picture may be off by, and what is taken of it.
+    Tolerance,
     /// Rays of each band's own.
     RaysOfBands,
     /// Paths through the scene that bands of a lens share.
@@ -43,6 +45,8 @@ pub enum DecisionKind {
     Textures,
     /// The filter of images.
     TextureFilter,
+    /// Surfaces that are built.
+    Geometry,
     /// Build time against traversal speed.
     BuildQuality,
     /// Hits solved again in f64.
@@ -74,6 +78,7 @@ impl DecisionKind {
             Self::Sensor => ("sensor", None),
             Self::Shutter => ("shutter", Some("camera.shutter")),
             Self::Denoising => ("denoising", None),
+            Self::Tolerance => ("tolerance", Some("tolerance")),
             Self::RaysOfBands => ("rays of a wavelength", Some("plan.dispersion")),
             Self::PathsOfBands => ("paths of a band", Some("plan.shared_paths")),
             Self::Pupil => ("pupil", None),
@@ -83,6 +88,7 @@ impl DecisionKind {
             Self::Lights => ("lights", None),
             Self::Textures => ("materials and textures", Some("plan.textures")),
             Self::TextureFilter => ("texture filter", Some("plan.texture_filter")),
+            Self::Geometry => ("surfaces", Some("plan.unseen")),
             Self::BuildQuality => ("build quality", Some("plan.build_quality")),
             Self::Refinement => ("refinement", Some("plan.refine")),
             Self::DataLayers => ("data layers", Some("--outputs")),

@@ -307,6 +307,7 @@ impl SceneFile {
             render: self.spec.render.clone(),
             plan: self.spec.plan,
             accuracy: self.spec.accuracy,
+            tolerance: self.spec.tolerance,
             notes,
             stats: parts.stats,
             inputs,

@@ -10,7 +10,7 @@ use std::time::SystemTime;
 use rayon::prelude::*;
 
 use crate::cache::Cache;
-use crate::file::{AccuracySpec, PlanSpec, RenderSpec, TracerSpec};
+use crate::file::{AccuracySpec, PlanSpec, RenderSpec, ToleranceSpec, TracerSpec};
 use crate::identity::{Copies, Ingredients, SceneNode};
 use crate::import::{Note, Strictness};
 use crate::{CameraOrigin, SceneCamera, SceneError, SceneHash};
@@ -67,6 +67,8 @@ pub struct Scene {
     pub plan: PlanSpec,
     /// Numbers that trade accuracy for speed.
     pub accuracy: AccuracySpec,
+    /// What the picture may be off by; nothing when absent.
+    pub tolerance: Option<ToleranceSpec>,
     /// What was dropped, ignored or missing on the way.
     pub notes: Vec<Note>,
     /// What loading cost.

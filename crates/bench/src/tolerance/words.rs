@@ -16,8 +16,10 @@ impl fmt::Display for Comparison {
             self.range()
         )?;
         write!(f, "{}", Table::of_rows(self.models.iter().map(cells).collect()))?;
-        for finding in self.models.iter().filter(|finding| finding.model != "full") {
-            writeln!(f, "\n{}: {}", finding.model, where_it_misses(finding))?;
+        for (finding, scene) in self.models.iter().zip(&self.scenes) {
+            if finding.model != "full" {
+                writeln!(f, "\n{}: {}; {scene} takes it", finding.model, where_it_misses(finding))?;
+            }
         }
         writeln!(f)?;
         for note in &self.notes {
@@ -51,11 +53,7 @@ impl Comparison {
             }
             _ => String::new(),
         };
-        let key = match self.cheapest {
-            "undispersed" => ", which is `\"plan\": {\"dispersion\": false}`",
-            _ => "",
-        };
-        write!(f, "cheapest within {pixels} px{light}: {}{key}{saving}", self.cheapest)
+        write!(f, "cheapest within {pixels} px{light}: {}{saving}", self.cheapest)
     }
 }
 

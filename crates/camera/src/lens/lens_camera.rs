@@ -227,6 +227,14 @@ impl LensCamera {
         Ok(Self { opened: Some(Arc::new(opened)), ..self.clone() })
     }
 
+    /// The same with its exit pupil measured at one wavelength alone, for looking at a few rays of single bands:
+    /// what other wavelengths pass beside it is left out.
+    pub(crate) fn opened_roughly(&self, bands: &Bands) -> Result<Self, CameraError> {
+        let train = self.focused.train();
+        let opened = self.open_at(bands, train, Some(train.wavelength()))?;
+        Ok(Self { opened: Some(Arc::new(opened)), ..self.clone() })
+    }
+
     /// The same with filters clear.
     pub(crate) fn opened_clear(&self, bands: &Bands) -> Result<Self, CameraError> {
         let clear = without_filters(self.focused.train());
@@ -235,6 +243,16 @@ impl LensCamera {
 
     /// The lens opened, of which `train` is as much as light of `bands` is to meet.
     fn open(&self, bands: &Bands, train: &OpticalTrain) -> Result<Opened, CameraError> {
+        self.open_at(bands, train, None)
+    }
+
+    /// The same with the pupil measured at `one` wavelength (nm), or at those of the bands.
+    fn open_at(
+        &self,
+        bands: &Bands,
+        train: &OpticalTrain,
+        one: Option<f64>,
+    ) -> Result<Opened, CameraError> {
         let fault = |why: String| CameraError::new("", why);
         for (i, element) in train.elements().iter().enumerate() {
             for curve in element.part.curves() {
@@ -254,6 +272,9 @@ impl LensCamera {
             few.dedup();
             measured.extend(few);
             groups.push(OpenedGroup { lenses });
+        }
+        if let Some(nm) = one {
+            measured = vec![nm];
         }
         let half_size = self.focused.film().half_size().to_array();
         let z = self.focused.sensor_z();

@@ -192,6 +192,7 @@ fn as_spec(camera: &Camera, (intrinsics, distortion): &OpencvModel) -> CameraSpe
     CameraSpec::Pinhole(PinholeSpec {
         fov: None,
         intrinsics: Some(IntrinsicsSpec { fx, fy, cx, cy, skew: 0.0, pixel_origin: origin }),
+        falloff: None,
         distortion: Some(distortion.clone()),
         pose: Some(PoseSpec::from(*camera.pose())),
         shutter: None,

@@ -327,7 +327,11 @@ fn options_that_mean_nothing_are_refused() {
     }
     let twice = "camera={\"type\": \"pinhole\", \"fov\": 3, \"fov\": 40}";
     refused(&bench, &["--set", twice], &["fov stands here a second time"]);
-    refused_command(&bench, &["plan", "scene.json", "--tolerance", "1 px"], &["--models"]);
+    refused_command(
+        &bench,
+        &["plan", "scene.json", "--tolerance", "1 px"],
+        &["tolerance", "light"],
+    );
 }
 
 #[test]

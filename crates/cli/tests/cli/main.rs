@@ -54,6 +54,7 @@ mod spectral_files; // light in bands by others' readers and writers
 mod spectrum_command; // curves in numbers and drawings
 mod stale; // a render of one kind into the folder of another
 mod stopping; // Ctrl-C and what it leaves
+mod tolerance;
 mod tools; // check, plan, schema, version
 mod validation; // the page of effects, their sources and their tests
 mod view; // the window, as far as there is none

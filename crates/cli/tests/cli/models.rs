@@ -79,12 +79,24 @@ fn plan_names_the_cheapest_model_within_a_tolerance() {
     let all = printed(&bench, &["plan", "scene.json", "--models", "--json"]);
     let names: Vec<&str> =
         all["models"].as_array().unwrap().iter().map(|m| m["model"].as_str().unwrap()).collect();
-    assert_eq!(names, ["pinhole", "opencv", "thin", "thick", "undispersed", "full"]);
+    assert_eq!(names, ["pinhole", "opencv", "falloff", "thin", "thick", "undispersed", "full"]);
     // A pixel is an eighth of that of the example: nothing that the train does shows but distortion and blur.
     assert_eq!(all["cheapest"], "opencv", "{all}");
     assert!(all["saving"].as_f64().is_some_and(f64::is_finite), "{all}");
     let words = bench.run(&["plan", "scene.json", "--models", "--tolerance", "0.5 px,2 %"]);
     let words = text(&words.stdout);
-    let cheapest = "cheapest within 0.5 px and 2 % of light: undispersed, which is `\"plan\": {\"dispersion\": false}`";
-    assert!(words.contains(cheapest), "{words}");
+    // Every model tells the keys that take it.
+    for key in
+        [r#"{"plan":{"dispersion":false}} takes it"#, r#""falloff":{"#, r#""type":"thin_lens""#]
+    {
+        assert!(words.contains(key), "{key}: {words}");
+    }
+    assert!(words.contains("cheapest within 0.5 px and 2 % of light: "), "{words}");
+    let opencv = &all["scenes"][1];
+    let mut taken: Value =
+        serde_json::from_slice(&std::fs::read(bench.path("scene.json")).unwrap()).unwrap();
+    taken["camera"] = opencv["camera"].clone();
+    bench.write("taken.json", taken.to_string().as_bytes());
+    let output = bench.run(&["render", "taken.json", "-o", "taken", "--outputs", "npy"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
 }

@@ -13,9 +13,10 @@ use std::time::{Duration, Instant};
 
 use etendue_accel::BuildOptions;
 use etendue_render::output::Outputs;
-use etendue_render::{Images, Plan, Stopping, build};
+use etendue_render::{Images, Plan, Stopping, build, build_without};
 use etendue_report::{Decision, DecisionKind, DecisionValue, Span, listed};
 use etendue_scene::Scene;
+use etendue_scene::file::TracerSpec;
 use etendue_sensor::SensorKind;
 use etendue_tracer::LayerSpec;
 use serde::Serialize;
@@ -101,17 +102,28 @@ impl TimeForecast {
         let Prospect { scene, plan, .. } = *prospect;
         let start = Instant::now();
         let threads = rayon::current_num_threads();
-        let accel = build(scene, plan, &BuildOptions { threads, ..BuildOptions::default() })?;
+        let options = BuildOptions { threads, ..BuildOptions::default() };
+        let accel = match &plan.unseen {
+            Some(unseen) => build_without(unseen, scene, plan, &options)?,
+            None => build(scene, plan, &options)?,
+        };
         let build = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let images = Images::decode(scene, plan, None)?;
         let load = counted.load + start.elapsed().as_secs_f64();
         let until = Instant::now() + LONGEST_PILOT;
-        let pilot = Pilot { scene, accel: &*accel, images: &images, until };
+        // As far as what is taken of a tolerance follows light.
+        let mut followed = scene.clone();
+        let fewer = plan.taken.as_ref().and_then(|taken| taken.bounces);
+        if let (Some(fewer), Some(TracerSpec::Path { max_bounces })) = (fewer, &mut followed.tracer)
+        {
+            *max_bounces = fewer.bounces;
+        }
+        let pilot = Pilot { scene: &followed, accel: &*accel, images: &images, until };
         let slots = scene.slots.max(1) as f64;
         let trace = match plan.stopping {
             Stopping::Time(time) => slots * time.as_secs_f64(),
-            _ => slots * pilot.picture(&scene.camera)?,
+            _ => slots * pilot.picture(plan.light_camera(scene))?,
         };
         let views = match (scene.camera.lens(), scene.camera.reference_views()) {
             (Some(_), Ok(views)) if scene.picture.is_some() => {
@@ -151,8 +163,9 @@ impl TimeForecast {
 
 /// The time of the build (s).
 fn build_time(scene: &Scene, plan: &Plan, machine: &Calibration) -> f64 {
-    let triangles = scene.geometry.triangles_unique() as f64 * machine.build_of(plan.quality);
-    triangles + scene.placed_copies() as f64 * machine.copy
+    let unseen = plan.unseen.as_ref().map_or(0, |unseen| unseen.triangles());
+    let triangles = scene.geometry.triangles_unique().saturating_sub(unseen);
+    triangles as f64 * machine.build_of(plan.quality) + scene.placed_copies() as f64 * machine.copy
 }
 
 fn pixels(scene: &Scene) -> f64 {

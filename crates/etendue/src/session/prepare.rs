@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use etendue_accel::{Accel, BuildOptions};
 use etendue_render::output::Outputs;
+use etendue_render::tolerance::{self, Verified};
 use etendue_render::{Plan, denoise, plan};
 use etendue_scene::escape::one_line;
 use etendue_scene::file::SceneFile;
@@ -120,6 +121,17 @@ impl Session {
 
     /// Builds the structures, unless there are such over the same surfaces.
     pub(super) fn build(&mut self, progress: &Progress) -> Result<(), Error> {
+        self.build_for(false, progress)
+    }
+
+    /// The same for the rays of the picture alone: what they cannot meet may be left out. Of several frames each
+    /// sees something else, and all have one structure.
+    pub(super) fn build_for_picture(&mut self, progress: &Progress) -> Result<(), Error> {
+        let is_single = self.file.spec.frames.is_none();
+        self.build_for(is_single, progress)
+    }
+
+    fn build_for(&mut self, picture: bool, progress: &Progress) -> Result<(), Error> {
         self.load(progress)?;
         let start = Instant::now();
         let options = BuildOptions {
@@ -134,6 +146,10 @@ impl Session {
         let LoadedScene { scene, plan, accel, neighbours, .. } = loaded;
         let structures = &mut self.structures;
         let mut is_new = false;
+        let unseen = plan.unseen.as_ref().filter(|_| picture);
+        if accel.as_ref().is_some_and(|accel| unseen.is_none() && !structures.is_whole(accel)) {
+            *accel = None;
+        }
         // What is free now was judged when the structure was built; a limit holds for every picture.
         if self.options.memory_limit.is_some() {
             fits(scene, plan, self.options.memory_limit)?;
@@ -141,11 +157,11 @@ impl Session {
         let others = neighbours.iter_mut().map(|other| (&other.scene, &mut other.accel));
         for (scene, accel) in std::iter::once((&*scene, accel)).chain(others) {
             if accel.is_none() {
-                *accel = structures.over(scene, plan);
+                *accel = structures.over(scene, plan, unseen);
             }
             if accel.is_none() {
                 fits(scene, plan, self.options.memory_limit)?;
-                *accel = Some(structures.build(scene, plan, &options)?);
+                *accel = Some(structures.build(scene, plan, unseen, &options)?);
                 is_new = true;
             }
         }
@@ -176,6 +192,39 @@ impl Session {
         }
         self.seconds.decode += start.elapsed().as_secs_f64();
         Ok(())
+    }
+}
+
+impl Session {
+    /// Takes what is cheapest within the scene's tolerance, unless it was.
+    pub(super) fn take(&mut self, progress: &Progress) -> Result<(), Error> {
+        let LoadedScene { scene, plan, .. } = self.loaded()?;
+        if scene.tolerance.is_none() || plan.taken.is_some() {
+            return Ok(());
+        }
+        let start = Instant::now();
+        let watch = |share: f64| progress.goes_on(Phase::Build, share);
+        let taken = tolerance::choose(scene, plan, self.built()?, &self.images, &watch)?;
+        let plan = Plan::taking(scene, self.options.outputs, taken);
+        if let Some(loaded) = &mut self.loaded {
+            loaded.plan = plan;
+        }
+        self.seconds.build += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Renders a small part of the scene with everything, and compares it with what is taken of its tolerance;
+    /// `None` of a scene without one.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::prepare`].
+    pub fn verify(&mut self, progress: &Progress) -> Result<Option<Verified>, Error> {
+        self.prepare(progress)?;
+        let LoadedScene { scene, plan, .. } = self.loaded()?;
+        let Some(taken) = &plan.taken else { return Ok(None) };
+        let watch = |share: f64| progress.goes_on(Phase::Render, share);
+        Ok(Some(tolerance::verify(scene, taken, self.built()?, &self.images, &watch)?))
     }
 }
 

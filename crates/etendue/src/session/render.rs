@@ -94,7 +94,9 @@ impl Session {
         shares: &[FilmFile],
         progress: &Progress,
     ) -> Result<Film, Error> {
-        self.prepare(progress)?;
+        self.build_for_picture(progress)?;
+        self.decode(progress)?;
+        self.take(progress)?;
         let LoadedScene { scene, plan, .. } = self.loaded()?;
         let identity = match (&shard, &self.checkpoint) {
             (None, None) if shares.is_empty() => Identity::new(),

@@ -1,11 +1,13 @@
 //! The plan: the one place where it is decided what a scene needs, and why. What is off costs
 //! nothing: it is not read, not traced, not written.
 
+mod unseen;
 mod words;
 
 use std::ops::Range;
 
 use etendue_accel::Quality;
+use etendue_camera::Camera;
 use etendue_geometry::{Detail, HitPrecision};
 use etendue_report::Decision;
 use etendue_scene::file::BuildQuality;
@@ -15,7 +17,9 @@ use etendue_sensor::BandChoice;
 use etendue_spectrum::Bands;
 use etendue_tracer::{LayerSpec, Needs, TextureScope};
 
+pub use self::unseen::Unseen;
 use self::words::Grounds;
+use crate::alike::are_alike;
 use crate::band_paths::BandPaths;
 use crate::denoise::DENOISED;
 use crate::expose;
@@ -25,6 +29,7 @@ use crate::output::Outputs;
 use crate::precision::light_precision;
 use crate::samples::{self, BYTES_OF_SUM};
 use crate::stopping::{Stopping, judged_passes};
+use crate::tolerance::Taken;
 
 /// What of the models has to be read for `layers`: decided before they are opened.
 #[must_use]
@@ -68,10 +73,14 @@ pub struct Plan {
     pub pupil: bool,
     /// How the bands of light go through the camera's lens.
     pub band_paths: BandPaths,
+    /// Whether the light of the scene is the same in all bands, of which one is traced for all.
+    pub alike: bool,
     /// Rays in all.
     pub rays: u64,
     /// Build time against traversal speed.
     pub quality: Quality,
+    /// What no ray can meet, and need not be built.
+    pub unseen: Option<Unseen>,
     /// Whether hits are solved again in f64.
     pub refine: bool,
     /// How finely data layers are kept.
@@ -84,6 +93,8 @@ pub struct Plan {
     pub bands: Bands,
     /// What it will take, by counts and headers alone: within 1.5 of the peak of the example scenes.
     pub memory: MemoryForecast,
+    /// What is taken of the scene's tolerance.
+    pub taken: Option<Taken>,
     /// The decisions, with their reasons.
     pub decisions: Vec<Decision>,
 }
@@ -132,16 +143,22 @@ impl Plan {
     /// The plan for `scene`, written as `outputs`.
     #[must_use]
     pub fn new(scene: &Scene, outputs: Outputs) -> Self {
-        Self::of(scene, outputs, expose::bands(scene))
+        Self::taking(scene, outputs, None)
+    }
+
+    /// The same with what is `taken` of the scene's tolerance ([`crate::tolerance::choose`]).
+    #[must_use]
+    pub fn taking(scene: &Scene, outputs: Outputs, taken: Option<Taken>) -> Self {
+        Self::of(scene, outputs, expose::bands(scene), taken)
     }
 
     /// The plan for `scene` as one part of a picture whose light is kept in these bands.
     #[must_use]
     pub fn in_bands(scene: &Scene, outputs: Outputs, bands: &Bands) -> Self {
-        Self::of(scene, outputs, BandChoice::untried(bands.clone()))
+        Self::of(scene, outputs, BandChoice::untried(bands.clone()), None)
     }
 
-    fn of(scene: &Scene, outputs: Outputs, chosen: BandChoice) -> Self {
+    fn of(scene: &Scene, outputs: Outputs, chosen: BandChoice, taken: Option<Taken>) -> Self {
         // What the layers need of hits, and how many rays that takes.
         let layers = scene.layers.clone();
         let needs = needs(&layers);
@@ -152,17 +169,17 @@ impl Plan {
         let [width, height] = scene.camera.resolution();
         let pixels = u64::from(width) * u64::from(height);
         let samples = spec.most();
-        let band_paths = BandPaths::of(scene, &chosen.bands, stopping, lens && passes.light);
-        let apart = scene.camera.band_groups(&chosen.bands).len() as u64;
-        let sampled = |yes| if yes { u64::from(spec.typical()) * apart } else { 0 };
-        let lit = if band_paths.are_shared() {
-            sampled(passes.light) / apart
-        } else {
-            sampled(passes.light)
-        };
+        let model = taken.as_ref().and_then(|taken| taken.camera.as_ref());
+        let lit_by = model.map_or(&scene.camera, |model| &model.camera);
+        let is_lit = lit_by.has_pupil() && passes.light;
+        let band_paths = BandPaths::of((scene, lit_by), &chosen.bands, stopping, is_lit);
+        let apart = |camera: &Camera| camera.band_groups(&chosen.bands).len() as u64;
+        let sampled = |yes, apart| if yes { u64::from(spec.typical()) * apart } else { 0 };
+        let apart_in_light = if band_paths.are_shared() { 1 } else { apart(lit_by) };
+        let lit = sampled(passes.light, apart_in_light);
         let rays = pixels
             * (u64::from(passes.centre)
-                + sampled(passes.mean)
+                + sampled(passes.mean, apart(&scene.camera))
                 + lit * RAYS_A_SAMPLE_OF_LIGHT * scene.slots.max(1) as u64);
         // How well to build for so many rays, and how exactly to trace.
         let triangles = scene.geometry.triangles_unique();
@@ -185,16 +202,22 @@ impl Plan {
             stopping,
             not_as_asked,
             passes: sample_passes(scene, passes, chosen.bands.count(), stopping),
-            pupil: lens && (passes.mean || passes.light),
+            pupil: (lens && passes.mean) || is_lit,
+            alike: chosen.bands.count() > 3
+                && passes.light
+                && (band_paths.are_shared() || apart(lit_by) == 1)
+                && are_alike(scene),
             band_paths,
             rays,
             quality,
+            unseen: unseen(scene, passes),
             refine: scene.plan.refine != Some(false),
             precision,
             light_precision,
             denoised: outputs.denoised,
             bands: chosen.bands.clone(),
             memory: MemoryForecast::default(),
+            taken,
             decisions: Vec::new(),
         };
         // Memory and reasons follow from all other decisions.
@@ -203,6 +226,13 @@ impl Plan {
         let grounds = Grounds { scene, bands, needs, passes, triangles, why_precision };
         plan.decisions = plan.explain(&grounds);
         plan
+    }
+
+    /// The camera that light is sampled by.
+    #[must_use]
+    pub fn light_camera<'a>(&'a self, scene: &'a Scene) -> &'a Camera {
+        let taken = self.taken.as_ref().and_then(|taken| taken.camera.as_ref());
+        taken.map_or(&scene.camera, |taken| &taken.camera)
     }
 
     /// The layers of the picture by the names that they will have in files; the picture's is empty.
@@ -230,6 +260,18 @@ fn forced_quality(scene: &Scene) -> Option<Quality> {
         BuildQuality::Medium => Quality::Medium,
         BuildQuality::High => Quality::High,
     })
+}
+
+/// What no ray can meet, where all are chief rays whose hits do not depend on how the structure was built.
+fn unseen(scene: &Scene, passes: Passes) -> Option<Unseen> {
+    let is_alone = passes.centre && !passes.mean && !passes.light;
+    // Layers that compare frames look from the other frame's camera, too.
+    let compares = scene.layers.iter().any(|layer| layer.step().is_some());
+    let is_allowed = scene.plan.unseen != Some(true) && scene.plan.refine != Some(false);
+    let is_single = scene.slots == 0 && !compares;
+    (is_alone && is_allowed && is_single)
+        .then(|| Unseen::of(&scene.geometry, &scene.camera))
+        .flatten()
 }
 
 /// Which rays have to be traced.

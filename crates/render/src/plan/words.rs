@@ -16,6 +16,7 @@ use super::{
     MOST_BYTES_OF_SUMS, Passes, Plan, RAYS_A_SAMPLE_OF_LIGHT, RAYS_PER_TRIANGLE, quality_for,
 };
 use crate::film::Precision;
+use crate::tolerance::{TakenBounces, TakenCamera};
 use crate::{expose, samples};
 
 /// What decisions are made by, beside the plan.
@@ -82,16 +83,24 @@ impl Plan {
             decisions.push(self.explain_passes());
         }
         let (bands, because) = expose::explain_bands(scene, grounds.bands);
+        let because = match self.alike {
+            true => format!(
+                "{because}; nothing in the scene tells them apart, and one is traced for all"
+            ),
+            false => because,
+        };
         decisions.push(Decision::new(Kind::Wavelengths, bands, because));
         decisions.extend(expose::explain_sensor(scene));
         decisions.extend(explain_shutter(scene));
         decisions.extend(self.explain_denoising());
+        decisions.extend(self.explain_tolerance(scene));
         decisions.extend(self.explain_lens(scene));
         decisions.extend(self.band_paths.decision(scene));
-        decisions.push(explain_bounces(scene, needs));
+        decisions.push(self.explain_bounces(scene, needs));
         decisions.extend(explain_surfaces(needs));
         decisions.extend(needs.light.then(|| explain_lights(scene)));
         decisions.extend(self.explain_textures(scene, needs));
+        decisions.extend(self.explain_unseen(scene, grounds.triangles));
         decisions.push(self.explain_quality(scene, grounds.triangles));
         decisions.extend(self.explain_precision(grounds));
         decisions.extend(scene.accuracy.decisions());
@@ -163,6 +172,32 @@ impl Plan {
             false => because,
         };
         Decision::new(Kind::BuildQuality, quality_name(self.quality), because).forced(is_forced)
+    }
+
+    /// What is not built, because nothing looks at it.
+    fn explain_unseen(&self, scene: &Scene, triangles: u64) -> Option<Decision> {
+        let is_forced = scene.plan.unseen.is_some();
+        let Some(unseen) = &self.unseen else {
+            let because = "the scene has all of it built, whether it is looked at or not";
+            let all = Decision::new(Kind::Geometry, "all", because).forced(true);
+            return (scene.plan.unseen == Some(true)).then_some(all);
+        };
+        let of = scene.geometry.placements.len();
+        let choice = format!("{} of {of} meshes not built", unseen.placements());
+        let because = format!(
+            "no chief ray of the data layers can meet them, with {} of {triangles} triangles, and nothing else \
+             is traced",
+            unseen.triangles()
+        );
+        let share = unseen.triangles() as f64 / triangles.max(1) as f64;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a share of a number of bytes"
+        )]
+        let bytes = (self.memory.structure as f64 * share) as u64;
+        let saving = (bytes > 0).then_some(Saving { bytes, images: None });
+        Some(Decision::new(Kind::Geometry, choice, because).forced(is_forced).saving(saving))
     }
 
     /// What is read of materials, and how images are looked up.
@@ -256,8 +291,9 @@ impl Plan {
 
     /// How wavelengths and the pupil of the camera's lens are sampled.
     fn explain_lens(&self, scene: &Scene) -> [Decision; 2] {
-        let lens = scene.camera.lens();
-        let groups = scene.camera.band_groups(&self.bands).len();
+        let camera = self.light_camera(scene);
+        let lens = camera.lens();
+        let groups = camera.band_groups(&self.bands).len();
         let each = lens.map_or(1, |lens| lens.wavelengths_a_group(&self.bands));
         let apart = groups > 1 || each > 1;
         let rays = if apart && self.pupil { "their own" } else { "shared" };
@@ -267,7 +303,11 @@ impl Plan {
                 .to_owned(),
             false => wavelengths(apart, self.pupil, each),
         };
-        let (is_on, because) = match scene.camera.projection() {
+        let (is_on, because) = match camera.projection() {
+            Projection::Pinhole(_) if scene.camera.has_pupil() => {
+                let why = "the model that is taken of the lens has no aperture: every ray of light is a chief ray";
+                (self.pupil, why.to_owned())
+            }
             Projection::Views(_) if self.pupil => {
                 (true, "each view is averaged over its own part of the opening".to_owned())
             }
@@ -305,7 +345,55 @@ fn quality_name(quality: Quality) -> &'static str {
     }
 }
 
-/// How far light is followed.
+impl Plan {
+    /// What is taken of the scene's tolerance.
+    fn explain_tolerance(&self, scene: &Scene) -> Option<Decision> {
+        let tolerance = scene.tolerance?;
+        let choice =
+            format!("{} px, {} % of light", tolerance.displacement.0, 100.0 * tolerance.light.0);
+        let Some(taken) = &self.taken else {
+            let because = "what is taken of it is found when the scene is built";
+            return Some(Decision::new(Kind::Tolerance, choice, because).forced(true));
+        };
+        let camera = taken.camera.as_ref().map(|TakenCamera { finding, .. }| {
+            format!(
+                "the lens as `{}`, displaced by {:.3} px at most and {:.2} % of light",
+                finding.model,
+                finding.displacement(),
+                100.0 * finding.light.value
+            )
+        });
+        let bounces = taken.bounces.map(|TakenBounces { bounces, share }| {
+            format!(
+                "{bounces} surfaces of a path, which leave out {:.2} % of light in 99 % of blocks of 8 × 8 pixels",
+                100.0 * share
+            )
+        });
+        let all: Vec<String> = camera.into_iter().chain(bounces).collect();
+        let what = if all.is_empty() { "nothing".to_owned() } else { all.join("; ") };
+        let notes: String = taken.notes.iter().map(|note| format!("; {note}")).collect();
+        let because = format!("the cheapest within it are taken: {what}{notes}");
+        Some(Decision::new(Kind::Tolerance, choice, because).forced(true))
+    }
+
+    /// How far light is followed.
+    fn explain_bounces(&self, scene: &Scene, needs: Needs) -> Decision {
+        let own = explain_bounces(scene, needs);
+        let fewer = self.taken.as_ref().and_then(|taken| taken.bounces);
+        match fewer {
+            Some(TakenBounces { bounces, .. }) => {
+                let because =
+                    format!("{}; {} by itself, and `tolerance` allows less", own.reason, own.value);
+                Decision::new(Kind::Bounces, format!("at most {bounces}"), because)
+                    .by_key("tolerance")
+                    .forced(true)
+            }
+            None => own,
+        }
+    }
+}
+
+/// How far light is followed, by the tracer.
 fn explain_bounces(scene: &Scene, needs: Needs) -> Decision {
     match scene.tracer.filter(|_| needs.light).map(TracerSpec::row) {
         Some(TracerRow { name, light: Some(light), .. }) => {

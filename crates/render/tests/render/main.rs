@@ -23,3 +23,5 @@ mod spectra;
 mod spectral_surfaces;
 mod steps;
 mod textures;
+mod tolerance;
+mod unseen;

@@ -190,3 +190,54 @@ fn passes_change_no_bit() {
     let full = rendered(&scene, |plan| plan.passes = std::iter::once(0..64).collect());
     assert_eq!(bits(&own, ""), bits(&full, ""));
 }
+
+/// Grey surfaces and lights have the same light in all bands: one that is traced for all is what each would have by
+/// itself, to the rounding of the sums that make a band of a colour.
+#[test]
+fn one_band_of_a_grey_scene_is_traced_for_all() {
+    let scene = |color: [f64; 3], camera: Value| {
+        let scene = json!({
+            "camera": camera, "tracer": { "type": "path", "max_bounces": 4 }, "layers": ["direct"],
+            "plan": { "light_precision": "double" },
+            "lights": [{ "type": "environment", "radiance": [0.7, 0.7, 0.7] },
+                { "type": "point", "at": [1, 2, 1], "intensity": [3, 3, 3] }],
+            "materials": { "grey": { "type": "matte", "color": color },
+                "glass": { "type": "dielectric", "ior": 1.5 },
+                "checks": { "type": "checker", "colors": [[0.2, 0.2, 0.2], [0.9, 0.9, 0.9]] } },
+            "objects": [{ "shape": "sphere", "radius": 0.5, "material": "glass" },
+                { "shape": "sphere", "radius": 0.3, "material": "grey", "transform": { "translate": [0.7, 0.1, 0.2] } },
+                { "shape": "rectangle", "width": 6, "height": 6, "material": "checks",
+                  "transform": { "translate": [0, -0.5, 0], "rotate": [1, 0, 0, -90] } }],
+            "render": { "samples": 16 },
+        });
+        load_json(tempfile::tempdir().unwrap().path(), scene)
+    };
+    let sensor = json!({ "type": "multispectral", "resolution": [24, 18],
+        "bands": { "from": 400, "to": 700, "count": 30 } });
+    let pose = json!({ "from": [0, 0.5, 3], "look_at": [0, 0, 0] });
+    let pinhole = json!({ "type": "pinhole", "pose": pose, "sensor": sensor });
+    // Behind a lens that disperses, bands share the paths of the scene and land apart.
+    let lens = json!({ "type": "lens", "focus_distance": 3, "sensor_height": 24, "pose": pose, "sensor": sensor,
+        "lens": { "elements": [
+            { "type": "surface", "radius": 51.68, "thickness": 6, "glass": { "nd": 1.5168, "vd": 64.2 }, "semi_diameter": 8 },
+            { "type": "surface", "radius": -51.68, "thickness": 1, "semi_diameter": 8 },
+            { "type": "aperture", "shape": "circular", "radius": 5, "stop": true }] } });
+    for camera in [pinhole.clone(), lens] {
+        let scene = scene([0.5; 3], camera);
+        let plan = Plan::new(&scene, Outputs::from_list("npy").unwrap());
+        assert!(plan.alike && plan.bands.count() == 30);
+        let own = steps::rendered(&scene, &plan).picture;
+        let all = steps::rendered(&scene, &Plan { alike: false, ..plan }).picture;
+        for name in ["Spectrum", "Direct"] {
+            let (own, all) = (layer(&own, name), layer(&all, name));
+            assert!(own.len() >= 24 * 18 * 3 && own.iter().any(|value| *value > 0.1), "{name}");
+            for (a, b) in own.iter().zip(&all) {
+                // Some surfaces, each a sum of three that is 1 to 2⁻⁵³; files of spectra are kept in f32.
+                assert!((a - b).abs() <= 1e-6 * b.abs() + 1e-12, "{name}: {a} {b}");
+            }
+        }
+    }
+    // A little colour of one surface, and each band is its own.
+    let scene = scene([0.5, 0.5, 0.5001], pinhole);
+    assert!(!Plan::new(&scene, Outputs::ALL).alike);
+}

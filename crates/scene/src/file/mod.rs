@@ -11,6 +11,7 @@ mod object;
 mod samples;
 mod settings;
 mod spec;
+mod tolerance;
 
 use std::collections::BTreeMap;
 use std::io;
@@ -41,6 +42,7 @@ pub use settings::{
     ToneMap, TracerRow, TracerSpec,
 };
 pub use spec::{FormatVersion, SceneSpec, scene_schema};
+pub use tolerance::{DisplacementSpec, ShareSpec, ToleranceSpec};
 
 pub(crate) use check::{kind_of, nearest, suggest};
 pub(crate) use document::{join, join_index};
@@ -206,6 +208,12 @@ impl SceneFile {
             .or_else(|| {
                 let (path, why) =
                     spec.accuracy.contradiction(&spec.plan, file.has_given_bands())?;
+                Some((path.to_owned(), why))
+            })
+            .or_else(|| {
+                let has_slots = !spec.serial.is_empty();
+                spec.tolerance?;
+                let (path, why) = ToleranceSpec::contradiction(&spec.plan, has_slots)?;
                 Some((path.to_owned(), why))
             });
         match fault {

@@ -164,6 +164,10 @@ pub struct PlanSpec {
     /// How much time the build of the structure may take; by the number of rays when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub build_quality: Option<BuildQuality>,
+    /// Whether surfaces that no ray of the data layers can meet are built into the structure all the same (true). They
+    /// are left out when absent, where nothing but data layers is traced; the files are the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unseen: Option<bool>,
     /// Whether hits that data layers and light in f64 are made of are solved again in f64 (true), or taken
     /// as Embree finds them in f32.
     #[serde(default, skip_serializing_if = "Option::is_none")]

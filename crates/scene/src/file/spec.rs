@@ -16,7 +16,10 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
 use super::camera::CameraSource;
-use super::{AccuracySpec, FramesSpec, ObjectSpec, PlanSpec, RenderSpec, SlotSpec, TracerSpec, Up};
+use super::{
+    AccuracySpec, FramesSpec, ObjectSpec, PlanSpec, RenderSpec, SlotSpec, ToleranceSpec,
+    TracerSpec, Up,
+};
 use etendue_camera::CameraSpec;
 use etendue_optics::train::NOTES;
 use etendue_sensor::SensorSpec;
@@ -64,6 +67,10 @@ pub struct SceneSpec {
     /// Numbers that trade accuracy for speed.
     #[serde(default, skip_serializing_if = "AccuracySpec::is_default")]
     pub accuracy: AccuracySpec,
+    /// What the picture may be off by, of which the plan takes what is cheapest. Nothing is approximated when
+    /// absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<ToleranceSpec>,
     /// The pictures to be made of it; one when absent.
     #[serde(default)]
     pub frames: Option<FramesSpec>,

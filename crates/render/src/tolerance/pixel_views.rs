@@ -4,20 +4,14 @@
 //! pupil, a + b/z: its slope, and its offset in the pupil's plane over the depth. The mean and the variance
 //! of a pixel's rays at every depth follow from their moments, and nothing is traced twice.
 //!
-//! Beside it the two other measurements of a comparison: the depths of the scene where the camera looks, and
-//! the cost of each model, which is the time of the scene's own picture through it on this machine.
+//! Beside it the depths of the scene where the camera looks.
 
-use super::super::cameras::LensModel;
-use super::{FIELD, Place};
-use crate::pictures::{Sampling, Studio};
-use crate::timing::{Series, order};
-use crate::{BenchError, Progress};
+use super::Place;
 use etendue_accel::Accel;
 use etendue_camera::{Camera, CameraRays, FilmSamples, Pose, Sampler};
 use etendue_geometry::glam::{DVec2, DVec3};
 use etendue_geometry::{Detail, HitBatch, RayBatch};
 use etendue_scene::Scene;
-use etendue_scene::file::LightPrecision;
 use etendue_spectrum::Bands;
 use etendue_tracer::LightKind;
 use etendue_tracer::light::EnvironmentImage;
@@ -111,9 +105,14 @@ impl PlaceView {
     }
 }
 
-/// What `camera`, opened for `bands`, sees from each of `places`, by `rays` of each band or group of
-/// bands.
-pub(super) fn seen(camera: &Camera, bands: &Bands, places: &[Place], rays: u32) -> Vec<PlaceView> {
+/// What `camera`, opened for `bands`, sees from each of `places` in the bands that are `chosen`, by `rays` of each
+/// band or group of bands.
+pub(super) fn seen(
+    (camera, bands): (&Camera, &Bands),
+    chosen: &[usize],
+    places: &[Place],
+    rays: u32,
+) -> Vec<PlaceView> {
     let (columns, rows): (Vec<f64>, Vec<f64>) =
         places.iter().map(|place| (place.column, place.row)).unzip();
     let mut chief = RayBatch::default();
@@ -129,6 +128,10 @@ pub(super) fn seen(camera: &Camera, bands: &Bands, places: &[Place], rays: u32) 
         // The same places of the pupil for every camera, and everywhere.
         let points = Sampler::Sobol.pixel(0, 0, 0, rays);
         for (number, group) in groups.iter().enumerate() {
+            let of_group = chosen.iter().filter(|band| group.bands.contains(band)).count();
+            if of_group == 0 {
+                continue;
+            }
             samples.clear();
             samples.group = number;
             for k in 0..rays {
@@ -143,7 +146,7 @@ pub(super) fn seen(camera: &Camera, bands: &Bands, places: &[Place], rays: u32) 
                 })
                 .collect();
             let band = BandRays::of(&lines, rays as usize);
-            seen.bands.extend(group.bands.clone().map(|_| band));
+            seen.bands.extend(std::iter::repeat_n(band, of_group));
         }
         all.push(seen);
     }
@@ -156,9 +159,9 @@ const ACROSS: u32 = 8;
 /// Places of the picture, each with the depths (m) that its neighbourhood shows: the nearest, the middle one
 /// and the farthest; infinity where an environment's image is seen. A place whose neighbourhood shows nothing
 /// has none.
-pub(super) fn places(scene: &Scene, accel: &dyn Accel) -> Vec<Place> {
+pub(super) fn places(scene: &Scene, accel: &dyn Accel, size: [u32; 2]) -> Vec<Place> {
     let [width, height] = scene.camera.resolution().map(f64::from);
-    let [columns, rows] = FIELD;
+    let [columns, rows] = size;
     let share = |i: u32, count: u32| f64::from(i) / f64::from(count - 1);
     let is_pictured = |kind: &LightKind| matches!(kind, LightKind::Environment { image, .. } if *image != EnvironmentImage::Constant);
     let sees_infinity = scene.lights.iter().any(|light| is_pictured(&light.kind));
@@ -214,52 +217,4 @@ fn around(
     let mut few = vec![depths[0], depths[last / 2], depths[last]];
     few.dedup();
     few
-}
-
-/// Samples a pixel of the shorter and the longer picture: their difference has none of what is done once.
-const SAMPLES: [u32; 2] = [2, 8];
-
-/// Rounds in which every model takes its turn.
-const ROUNDS: usize = 3;
-
-/// Pixels that a model is timed on, at least.
-const PIXELS: u64 = 20_000;
-
-/// The time of one sample of one pixel through each of `models` (s): of tracing the scene's picture on all
-/// threads, the median of the rounds.
-pub(super) fn seconds_a_sample(
-    studio: &mut Studio<'_>,
-    models: &[LensModel],
-    progress: Progress<'_>,
-) -> Result<Vec<f64>, BenchError> {
-    let mut series = vec![Series::default(); models.len()];
-    let [few, many] = SAMPLES;
-    for round in 0..ROUNDS {
-        for who in order(round, models.len()) {
-            if !progress((round * models.len() + who) as f64 / (ROUNDS * models.len()) as f64) {
-                return Err(BenchError::Stopped);
-            }
-            let [width, height] = models[who].1.resolution().map(u64::from);
-            #[expect(clippy::cast_possible_truncation, reason = "a share of a side")]
-            let factor = (width * height / PIXELS).isqrt().max(1) as u32;
-            let camera = models[who].1.coarser(factor);
-            let [width, height] = camera.resolution().map(f64::from);
-            let mut take = |samples| {
-                let sampling = Sampling {
-                    samples,
-                    sampler: Sampler::Sobol,
-                    seed: round as u64,
-                    precision: LightPrecision::Auto,
-                };
-                studio.take(&camera, sampling).map(|taken| taken.seconds)
-            };
-            if round == 0 {
-                // Caches and threads wake.
-                take(few)?;
-            }
-            let (short, long) = (take(few)?, take(many)?);
-            series[who].0.push((long - short).max(0.0) / (width * height * f64::from(many - few)));
-        }
-    }
-    Ok(series.iter().map(Series::median).collect())
 }

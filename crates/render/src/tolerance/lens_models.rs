@@ -1,0 +1,251 @@
+//! Simpler models of a camera's lens, registered: the same pixel of each looks along the same paraxial chief ray.
+//!
+//! | model | what it keeps of the lens |
+//! |---|---|
+//! | `pinhole` | where its entrance pupil is, and the scale of the picture |
+//! | `opencv` | also its distortion, as [`OpencvFit`] fits it |
+//! | `falloff` | also how its light falls off from the axis |
+//! | `thin` | of the lens near its axis: focal length, f-number and the plane in focus, so blur |
+//! | `thick` | also how far its pupils are from its principal planes |
+//! | `undispersed` | all of it, as at its design wavelength |
+//!
+//! `thin` and `thick` are the approximations of C. Kolb, D. Mitchell and P. Hanrahan, "A realistic camera model
+//! for computer graphics", 1995.
+
+use etendue_camera::lens::PlacedSpec;
+use etendue_camera::lens::focused::View;
+use etendue_camera::{
+    Camera, CameraSpec, IntrinsicsSpec, LensCamera, OpencvFit, PinholeSpec, PixelOrigin, PoseSpec,
+    SensorSpec, ThinLensCameraSpec,
+};
+use etendue_geometry::Bounds;
+use etendue_geometry::units::{Micrometres, Millimetres};
+use etendue_optics::element::{ElementSpec, PartSpec};
+use serde_json::{Value, json};
+
+/// Why a camera has no models.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("there are no models of the camera's lens: {0}")]
+pub struct NoModels(
+    /// In words.
+    pub &'static str,
+);
+
+/// A model of a lens.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LensModel {
+    /// `pinhole`, `opencv`, `falloff`, `thin`, `thick` or `undispersed`.
+    pub name: &'static str,
+    /// With the pose, resolution, shutter and motion of the camera.
+    pub camera: Camera,
+    /// The keys of a scene that take it.
+    pub scene: Value,
+}
+
+/// Models, the simplest first.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LensModels {
+    /// Those that there are.
+    pub models: Vec<LensModel>,
+    /// What is missing for which reason, in sentences.
+    pub notes: Vec<String>,
+}
+
+impl LensModels {
+    /// Adds the camera that `full` is with the projection of `spec`, or why there is none.
+    fn add(&mut self, name: &'static str, full: &Camera, spec: Result<CameraSpec, String>) {
+        let model = spec.and_then(|spec| model(name, full, &spec));
+        match model {
+            Ok(model) => self.models.push(model),
+            Err(why) => self.notes.push(format!("no `{name}` model of this lens: {why}")),
+        }
+    }
+}
+
+/// The model that `full` is with the projection of `spec`.
+pub(super) fn model(
+    name: &'static str,
+    full: &Camera,
+    spec: &CameraSpec,
+) -> Result<LensModel, String> {
+    let camera = spec.build(|| Bounds::EMPTY, &|name: &str| Err(name.to_owned()));
+    let camera = full.seen_through(&camera.map_err(|error| error.to_string())?);
+    let scene = serde_json::to_value(spec).map_err(|error| error.to_string())?;
+    Ok(LensModel { name, camera, scene: json!({ "camera": scene }) })
+}
+
+/// The models of a camera's lens that keep what is known near its axis: pinhole, thin and thick lens.
+///
+/// # Errors
+///
+/// [`NoModels`] when the camera has no lens, or one without a finite entrance pupil or focal length.
+pub fn near_axis(full: &Camera) -> Result<LensModels, NoModels> {
+    let lens = full.lens().ok_or(NoModels("the camera has none"))?;
+    let gauss = Gauss::of(full, lens)?;
+    let mut found = LensModels::default();
+    found.add("pinhole", full, Ok(CameraSpec::Pinhole(gauss.pinhole())));
+    let lens = |spec: Result<ThinLensCameraSpec, &str>| {
+        spec.map(CameraSpec::ThinLens).map_err(str::to_owned)
+    };
+    found.add("thin", full, lens(gauss.thin()));
+    found.add("thick", full, lens(gauss.thick()));
+    Ok(found)
+}
+
+/// OpenCV's camera for a camera's lens, fitted to a tolerance (pixels).
+///
+/// # Errors
+///
+/// When there is none, in words.
+pub fn opencv(full: &Camera, tolerance: f64) -> Result<(LensModel, CameraSpec), String> {
+    let fit = OpencvFit::new(full, tolerance).map_err(|error| error.to_string())?;
+    Ok((model("opencv", full, &fit.camera)?, fit.camera))
+}
+
+/// All of the lens, as at its design wavelength.
+#[must_use]
+pub fn undispersed(full: &Camera) -> LensModel {
+    let scene = json!({ "plan": { "dispersion": false } });
+    LensModel { name: "undispersed", camera: full.without_dispersion(), scene }
+}
+
+/// Pixels of a picture for a slope of 1 near the axis; `None` of a camera without a lens, or with a
+/// telecentric one.
+#[must_use]
+pub fn scale(camera: &Camera) -> Option<f64> {
+    match camera.lens()?.focused().view() {
+        View::Perspective(k) => Some(k.focal[0]),
+        View::Parallel { .. } => None,
+    }
+}
+
+/// What is known of a lens near its axis.
+struct Gauss {
+    pose: PoseSpec,
+    resolution: [u32; 2],
+    /// Focal length of the picture (pixels).
+    scale: f64,
+    /// Where the axis meets the sensor (pixels from the corner).
+    centre: [f64; 2],
+    /// Focal length and diameter of the entrance pupil (mm).
+    focal: f64,
+    pupil: f64,
+    /// From the front principal plane back to the entrance pupil (mm).
+    pupil_behind_front: f64,
+    /// From the rear principal plane back to the exit pupil, and its diameter (mm).
+    exit: Option<[f64; 2]>,
+    /// The plane in focus (m) from the entrance pupil.
+    focus: f64,
+}
+
+impl Gauss {
+    fn of(full: &Camera, lens: &LensCamera) -> Result<Self, NoModels> {
+        let focused = lens.focused();
+        let paraxial = focused.paraxial();
+        let View::Perspective(k) = focused.view() else {
+            return Err(NoModels("its entrance pupil is at infinity"));
+        };
+        let missing = NoModels("it has no focal length or no entrance pupil");
+        let (Some(focal), Some(front), Some(rear), Some(z), Some(pupil)) = (
+            paraxial.efl,
+            paraxial.front_principal_z,
+            paraxial.rear_principal_z,
+            paraxial.entrance_pupil.z,
+            paraxial.entrance_pupil.diameter,
+        ) else {
+            return Err(missing);
+        };
+        let exit = paraxial.exit_pupil.z.zip(paraxial.exit_pupil.diameter);
+        Ok(Self {
+            pose: PoseSpec::from(*full.pose()),
+            resolution: full.resolution(),
+            scale: k.focal[0],
+            centre: k.centre,
+            focal,
+            pupil,
+            pupil_behind_front: z - front,
+            exit: exit.map(|(z, diameter)| [z - rear, diameter]),
+            focus: focused.object_distance(),
+        })
+    }
+
+    fn pinhole(&self) -> PinholeSpec {
+        let [cx, cy] = self.centre;
+        let intrinsics = IntrinsicsSpec {
+            fx: self.scale,
+            fy: self.scale,
+            cx,
+            cy,
+            skew: 0.0,
+            pixel_origin: PixelOrigin::Corner,
+        };
+        PinholeSpec {
+            intrinsics: Some(intrinsics),
+            pose: Some(self.pose.clone()),
+            sensor: SensorSpec::new(self.resolution),
+            ..PinholeSpec::default()
+        }
+    }
+
+    /// A thin lens that stands where the entrance pupil is.
+    fn thin(&self) -> Result<ThinLensCameraSpec, &'static str> {
+        self.lens(0.0, Vec::new())
+    }
+
+    /// A thin lens in the principal planes' place, and the stop where a pupil is.
+    fn thick(&self) -> Result<ThinLensCameraSpec, &'static str> {
+        // Of the two images of the stop, one is on its own side of the lens, where a stop can stand.
+        let (at, diameter) = match self.exit {
+            _ if self.pupil_behind_front <= 0.0 => (self.pupil_behind_front, self.pupil),
+            Some([z, diameter]) if z >= 0.0 => (z, diameter),
+            _ => return Err("its pupils are on the wrong sides of the principal planes"),
+        };
+        let stop = ElementSpec::new(PartSpec::circular(0.5 * diameter), 0.0).as_stop();
+        let stop = PlacedSpec { at: Millimetres(at), element: stop };
+        self.lens(self.pupil_behind_front, vec![stop])
+    }
+
+    /// A thin lens whose entrance pupil lies `pupil` (mm) behind it, and what else is on its axis.
+    /// Its pixels are as large as the scale of the picture asks for.
+    fn lens(
+        &self,
+        pupil: f64,
+        elements: Vec<PlacedSpec>,
+    ) -> Result<ThinLensCameraSpec, &'static str> {
+        // From the lens to the plane in focus, and to its image (mm).
+        let object = 1e3 * self.focus - pupil;
+        let image =
+            if object.is_finite() { 1.0 / (1.0 / self.focal - 1.0 / object) } else { self.focal };
+        // A slope of 1 through the pupil meets the lens at −pupil, is bent, and goes on to the image.
+        let height = image * (1.0 + pupil / self.focal) - pupil;
+        let pitch = (height / self.scale).abs();
+        if !(pitch > 0.0 && pitch.is_finite() && image > 0.0) {
+            return Err("a thin lens of its focal length has no image there");
+        }
+        let middle = self.resolution.map(|side| 0.5 * f64::from(side));
+        let sensor_decentre = [self.centre[0] - middle[0], self.centre[1] - middle[1]];
+        let sensor_decentre = sensor_decentre.map(|pixels| pixels * pitch);
+        let is_alone = elements.is_empty();
+        Ok(ThinLensCameraSpec {
+            focal_length: Some(Millimetres(self.focal)),
+            aperture: None,
+            elements,
+            f_number: is_alone.then_some(self.focal.abs() / self.pupil),
+            focus_distance: None,
+            sensor_distance: Some(Millimetres(image)),
+            fov: None,
+            sensor_height: None,
+            sensor_tilt: Default::default(),
+            // Behind a lens the picture is upside down.
+            sensor_decentre: [Millimetres(sensor_decentre[0]), Millimetres(-sensor_decentre[1])],
+            losses: Default::default(),
+            pose: Some(self.pose.clone()),
+            shutter: None,
+            motion: None,
+            sensor: SensorSpec {
+                resolution: self.resolution,
+                pixel_pitch: Some(Micrometres(1e3 * pitch)),
+            },
+        })
+    }
+}

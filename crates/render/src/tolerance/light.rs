@@ -1,0 +1,142 @@
+//! The fewest surfaces to which light has to be followed: by small pictures of the scene, whose pixels are the blocks
+//! that the tolerance speaks of. All of them draw the same random numbers, so that what a path brings beyond a surface
+//! is the difference of two of them, without noise of its own.
+
+use etendue_accel::Accel;
+use etendue_camera::Camera;
+use etendue_scene::Scene;
+use etendue_scene::file::{SamplesSpec, TracerSpec};
+use etendue_tracer::LayerSpec;
+
+use super::{Taken, TakenBounces, lens_models};
+use crate::output::Outputs;
+use crate::{Images, Plan, RenderError, Watch, render};
+
+/// Blocks of the picture whose light is compared (pixels a side).
+pub(super) const BLOCK: u32 = 8;
+
+/// The longer side of the small pictures, at most.
+const SIDE: u32 = 28;
+
+/// Samples of their pixels.
+const SAMPLES: u32 = 64;
+
+/// The share of blocks that are to be within the tolerance.
+pub(super) const MOST_BLOCKS: f64 = 0.99;
+
+/// The fewest surfaces whose longer paths bring at most the share `light` in 99 % of blocks; `None` where the scene
+/// follows light no farther than that.
+pub(super) fn fewest(
+    scene: &Scene,
+    prepared: (&dyn Accel, &Images),
+    light: f64,
+    notes: &mut Vec<String>,
+    watch: &dyn Watch,
+) -> Result<Option<TakenBounces>, RenderError> {
+    let Some(TracerSpec::Path { max_bounces }) = scene.tracer else { return Ok(None) };
+    if max_bounces < 2 {
+        return Ok(None);
+    }
+    let camera = match lens_models::near_axis(&scene.camera) {
+        // What a lens does beside is nothing to bounces.
+        Ok(found) if found.models.first().is_some_and(|model| model.name == "pinhole") => {
+            found.models[0].camera.clone()
+        }
+        _ => scene.camera.clone(),
+    };
+    let [width, height] = camera.resolution();
+    let camera = camera.coarser(width.max(height).div_ceil(SIDE).max(BLOCK));
+    let small = |bounces: u32| {
+        let mut scene = scene.clone();
+        scene.tracer = Some(TracerSpec::Path { max_bounces: bounces });
+        values(&scene, &camera, prepared, (SAMPLES, None), watch)
+    };
+    let width = camera.resolution()[0] as usize;
+    let all = pooled(&small(max_bounces)?, width);
+    let share =
+        |bounces: u32| Ok::<_, RenderError>(differing(&pooled(&small(bounces)?, width), &all));
+    // What longer paths bring falls with their length: between a number that is too few and one that will do.
+    let (mut few, mut enough) = (0, (max_bounces, 0.0));
+    let mut next = 2;
+    while next < enough.0 {
+        let found = share(next)?;
+        if found <= light {
+            enough = (next, found);
+            break;
+        }
+        few = next;
+        next *= 2;
+    }
+    while enough.0 - few > 1 {
+        let middle = few + (enough.0 - few) / 2;
+        let found = share(middle)?;
+        match found <= light {
+            true => enough = (middle, found),
+            false => few = middle,
+        }
+    }
+    if enough.0 >= max_bounces {
+        notes.push("the last surfaces of paths bring more light than it allows".to_owned());
+        return Ok(None);
+    }
+    Ok(Some(TakenBounces { bounces: enough.0, share: enough.1 }))
+}
+
+/// The light of a picture of `scene` through `camera`, by pixels: red, green and blue added up.
+pub(super) fn values(
+    scene: &Scene,
+    camera: &Camera,
+    (accel, images): (&dyn Accel, &Images),
+    (samples, taken): (u32, Option<Taken>),
+    watch: &dyn Watch,
+) -> Result<Vec<f64>, RenderError> {
+    let mut scene = scene.clone();
+    scene.camera = camera.clone();
+    scene.sensor = None;
+    scene.render.samples = SamplesSpec::Count(samples);
+    scene.layers = vec![LayerSpec::Radiance];
+    let outputs = Outputs { npy: true, ..Outputs::NONE };
+    let plan = Plan::taking(&scene, outputs, taken);
+    let goes_on = |_: f64| watch.goes_on(0.0);
+    let done = render(&scene, &plan, accel, images, Vec::new(), &goes_on)?;
+    if done.samples < done.samples_wanted {
+        return Err(RenderError::Stopped);
+    }
+    let [width, height] = camera.resolution().map(|side| side as usize);
+    let layer = done.picture.layer("");
+    let channels = layer.into_iter().flat_map(|layer| &layer.channels);
+    let mut sums = vec![0.0; width * height];
+    for channel in channels {
+        sums.iter_mut().enumerate().for_each(|(i, sum)| *sum += channel.values.at(i));
+    }
+    Ok(sums)
+}
+
+/// The sums of each pixel and its neighbours to the right and below: what long paths bring is noisy, and changes little
+/// from block to block.
+fn pooled(values: &[f64], width: usize) -> Vec<f64> {
+    let at = |x: usize, y: usize| values.get(y * width + x).copied().unwrap_or(0.0);
+    let rows = values.len() / width.max(1);
+    let few = |side: usize| side.saturating_sub(1).max(1);
+    let places = (0..few(rows)).flat_map(|y| (0..few(width)).map(move |x| (x, y)));
+    let beside = |x: usize| (x + 1).min(width - 1);
+    places
+        .map(|(x, y)| {
+            let below = (y + 1).min(rows - 1);
+            at(x, y) + at(beside(x), y) + at(x, below) + at(beside(x), below)
+        })
+        .collect()
+}
+
+/// The share of light by which 99 % of the values of `own` differ from those of `all` at most; of black ones, none.
+pub(super) fn differing(own: &[f64], all: &[f64]) -> f64 {
+    let share = |(own, all): (&f64, &f64)| match *all > 0.0 {
+        true => (own - all).abs() / all,
+        false => 0.0,
+    };
+    let mut shares: Vec<f64> = own.iter().zip(all).map(share).collect();
+    shares.sort_by(f64::total_cmp);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of them")]
+    let place = (MOST_BLOCKS * shares.len() as f64).ceil() as usize;
+    shares.get(place.saturating_sub(1)).copied().unwrap_or(0.0)
+}

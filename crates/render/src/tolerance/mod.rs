@@ -1,0 +1,423 @@
+//! The cheapest that stays within a tolerance: models of the camera's lens compared with all of it by what a pixel
+//! sees, and the surfaces that light is followed to by what the last ones add.
+//!
+//! Nothing is approximated unless a scene has the key `tolerance`: [`choose`] then says what is taken of it,
+//! [`crate::Plan::taking`] plans with that, and [`verify`] renders a small part with everything.
+
+pub mod lens_models;
+mod light;
+mod pixel_views;
+mod verify;
+
+use etendue_accel::Accel;
+use etendue_camera::{Camera, CameraSpec, FalloffSpec, LensCamera};
+use etendue_optics::element::Opening;
+use etendue_scene::Scene;
+use etendue_scene::file::ToleranceSpec;
+use etendue_spectrum::Bands;
+use etendue_tracer::LayerSpec;
+use serde::Serialize;
+
+use self::lens_models::{LensModel, LensModels, NoModels};
+use self::pixel_views::{PlaceView, places, seen};
+use crate::{Images, Plan, RenderError, Watch};
+
+pub use self::verify::{Verified, verify};
+
+/// What a model may be off by.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Tolerance {
+    /// Of places, blur and shifts of colour (pixels).
+    pub pixels: f64,
+    /// Of light, as a share of that on the axis; not judged when absent.
+    pub light: Option<f64>,
+}
+
+/// How finely models are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Field {
+    /// Columns and rows of places, the picture's corners among them.
+    pub size: [u32; 2],
+    /// Rays of a place and a group of bands.
+    pub rays: u32,
+    /// Bands, at most, that are looked at: the first, the last, and some in between.
+    pub bands: usize,
+    /// Whether the pupil is measured at one wavelength alone.
+    pub rough: bool,
+}
+
+impl Field {
+    /// What a user who compares models gets.
+    pub const FINE: Self = Self { size: [9, 7], rays: 1024, bands: usize::MAX, rough: false };
+    /// What a render does before it begins.
+    pub const QUICK: Self = Self { size: [9, 7], rays: 256, bands: 3, rough: true };
+    /// What a choice is verified by: places in between, and more bands.
+    pub const BETWEEN: Self = Self { size: [16, 12], rays: 256, bands: 5, rough: false };
+}
+
+/// A place of the picture.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Place {
+    /// Its column (pixels from the outer corner of the top left pixel).
+    pub column: f64,
+    /// Its row.
+    pub row: f64,
+    /// Depths (m) that are seen around it, the nearest first.
+    #[serde(serialize_with = "finite_or_null")]
+    pub depths: Vec<f64>,
+}
+
+/// What a model misses, and what it costs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// `pinhole`, `opencv`, `falloff`, `thin`, `thick`, `undispersed` or `full`.
+    pub model: &'static str,
+    /// How far chief rays are from the train's (pixels).
+    pub chief_ray: Worst,
+    /// How far the middle of a pixel's light is (pixels).
+    pub centroid: Worst,
+    /// The difference of the blur, the root mean square radius of a pixel's light in a band (pixels).
+    pub blur: Worst,
+    /// The difference of where a band lies among all bands (pixels).
+    pub colour: Worst,
+    /// The difference of a pixel's light in a band, as a share of that on the axis.
+    pub light: Worst,
+    /// Whether it stays within the tolerance.
+    pub is_within: bool,
+    /// The time of a sample of a pixel (s); `null` without a picture to time.
+    pub seconds_a_sample: Option<f64>,
+    /// How many times as fast as the full train that is.
+    pub speed: Option<f64>,
+}
+
+impl Finding {
+    /// The greatest displacement, of whatever kind (pixels).
+    #[must_use]
+    pub fn displacement(&self) -> f64 {
+        let all = [self.chief_ray, self.centroid, self.blur, self.colour];
+        all.into_iter().map(|worst| worst.value).fold(0.0, f64::max)
+    }
+}
+
+/// The greatest difference, and where it is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Worst {
+    /// As the quantity says.
+    pub value: f64,
+    /// The column and row of its place (pixels from the corner).
+    pub at: [f64; 2],
+    /// Its depth (m); `null` for infinity, or where the depth plays no part.
+    pub depth: Option<f64>,
+}
+
+impl Worst {
+    fn raise(&mut self, value: f64, place: &Place, nearness: Option<f64>) {
+        if value > self.value {
+            let depth = nearness.map(|nearness| 1.0 / nearness).filter(|depth| depth.is_finite());
+            *self = Self { value, at: [place.column, place.row], depth };
+        }
+    }
+}
+
+/// What pixels see through all of a camera's lens, which its models are compared with.
+#[derive(Debug, Clone)]
+pub struct FullView {
+    camera: Camera,
+    bands: Bands,
+    chosen: Vec<usize>,
+    field: Field,
+    /// Pixels of a slope of 1.
+    scale: f64,
+    /// Places of the picture that are compared.
+    pub places: Vec<Place>,
+    seen: Vec<PlaceView>,
+    /// What a user should know of it, in sentences.
+    pub notes: Vec<String>,
+}
+
+impl FullView {
+    /// Of the camera of `scene` in `bands`, at the depths that it has behind `accel`.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Camera`] when no light gets through the lens.
+    pub fn new(
+        scene: &Scene,
+        accel: &dyn Accel,
+        bands: &Bands,
+        field: Field,
+    ) -> Result<Self, RenderError> {
+        let mut places = places(scene, accel, field.size);
+        let mut notes = Vec::new();
+        if places.iter().all(|place| place.depths.is_empty()) {
+            let in_focus = scene.camera.lens().map(|lens| lens.focused().object_distance());
+            notes.push("the camera sees no surface: compared at the distance in focus".to_owned());
+            let depth = in_focus.unwrap_or(f64::INFINITY).abs();
+            places.iter_mut().for_each(|place| place.depths.push(depth));
+        }
+        let chosen = some_of(bands.count(), field.bands);
+        let camera = open(&scene.camera, bands, field.rough)?;
+        let seen = seen((&camera, bands), &chosen, &places, field.rays);
+        let scale = lens_models::scale(&scene.camera).unwrap_or(f64::NAN);
+        let bands = bands.clone();
+        Ok(Self { camera, bands, chosen, field, scale, places, seen, notes })
+    }
+
+    /// The light of OpenCV's camera in the places of this one: a polynomial of the distance from the axis, by least
+    /// squares.
+    fn falloff(&self, camera: &Camera) -> Option<FalloffSpec> {
+        let light = |seen: &PlaceView| {
+            let bands = seen.bands.iter().map(|band| band.light);
+            bands.sum::<f64>() / seen.bands.len().max(1) as f64
+        };
+        let places = self.places.iter().zip(&self.seen);
+        let lit: Vec<([f64; 2], f64)> =
+            places.map(|(place, seen)| ([place.column, place.row], light(seen))).collect();
+        FalloffSpec::fitted(camera, &lit)
+    }
+
+    /// All models of the lens, the simplest first, and what is missing.
+    ///
+    /// # Errors
+    ///
+    /// [`NoModels`] as [`lens_models::near_axis`].
+    pub fn models(&self, tolerance: Tolerance) -> Result<LensModels, NoModels> {
+        let full = &self.camera;
+        let LensModels { models: mut near, mut notes } = lens_models::near_axis(full)?;
+        let after = near.iter().take_while(|model| model.name == "pinhole").count();
+        let mut models: Vec<LensModel> = near.drain(..after).collect();
+        match lens_models::opencv(full, tolerance.pixels) {
+            Ok((model, spec)) => {
+                let falloff = self.falloff(&model.camera);
+                models.push(model);
+                let with = falloff.and_then(|falloff| with_falloff(full, spec, falloff));
+                models.extend(with);
+            }
+            Err(error) => notes.push(format!("no `opencv` model of this lens: {error}")),
+        }
+        models.extend(near);
+        let undispersed = lens_models::undispersed(full);
+        let groups = |camera: &Camera| camera.band_groups(&self.bands).len();
+        let draws =
+            |camera: &Camera| camera.lens().map_or(1, |lens| lens.wavelengths_a_group(&self.bands));
+        let (own, other) = (full, &undispersed.camera);
+        if groups(other) < groups(own) || draws(other) < draws(own) {
+            models.push(undispersed);
+        }
+        Ok(LensModels { models, notes })
+    }
+
+    /// What `camera` misses of it.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Camera`] when no light gets through.
+    pub fn finding(
+        &self,
+        model: &'static str,
+        camera: &Camera,
+        tolerance: Tolerance,
+    ) -> Result<Finding, RenderError> {
+        let Field { rays, rough, .. } = self.field;
+        let camera = open(camera, &self.bands, rough)?;
+        let own = seen((&camera, &self.bands), &self.chosen, &self.places, rays);
+        Ok(self.compared(model, &own, tolerance))
+    }
+
+    /// The lens against itself.
+    #[must_use]
+    pub fn itself(&self, tolerance: Tolerance) -> Finding {
+        self.compared("full", &self.seen, tolerance)
+    }
+
+    fn compared(&self, model: &'static str, own: &[PlaceView], tolerance: Tolerance) -> Finding {
+        let [mut chief_ray, mut centroid, mut blur, mut colour, mut light] = [Worst::default(); 5];
+        let scale = self.scale;
+        for ((own, full), place) in own.iter().zip(&self.seen).zip(&self.places) {
+            // Light depends on the place alone.
+            for (a, b) in own.bands.iter().zip(&full.bands) {
+                light.raise((a.light - b.light).abs(), place, None);
+            }
+            // Chief rays, blur and colour also on the depth.
+            for &depth in &place.depths {
+                let nearness = 1.0 / depth;
+                let at = Some(nearness);
+                if let (Some(a), Some(b)) = (own.chief, full.chief) {
+                    chief_ray.raise(scale * (a.at(nearness) - b.at(nearness)).length(), place, at);
+                }
+                let (Some(a), Some(b)) = (own.centroid(nearness), full.centroid(nearness)) else {
+                    continue;
+                };
+                centroid.raise(scale * (a - b).length(), place, at);
+                for (c, d) in own.bands.iter().zip(&full.bands) {
+                    if let (Some(p), Some(q)) = (c.centroid(nearness), d.centroid(nearness)) {
+                        blur.raise(scale * (c.blur(nearness) - d.blur(nearness)).abs(), place, at);
+                        colour.raise(scale * ((p - a) - (q - b)).length(), place, at);
+                    }
+                }
+            }
+        }
+        let in_pixels = [chief_ray, centroid, blur, colour];
+        let is_within = in_pixels.iter().all(|worst| worst.value <= tolerance.pixels)
+            && tolerance.light.is_none_or(|most| light.value <= most);
+        Finding {
+            model,
+            chief_ray,
+            centroid,
+            blur,
+            colour,
+            light,
+            is_within,
+            seconds_a_sample: None,
+            speed: None,
+        }
+    }
+}
+
+/// OpenCV's camera with a falloff.
+fn with_falloff(full: &Camera, spec: CameraSpec, falloff: FalloffSpec) -> Option<LensModel> {
+    let CameraSpec::Pinhole(mut spec) = spec else { return None };
+    spec.falloff = Some(falloff);
+    lens_models::model("falloff", full, &CameraSpec::Pinhole(spec)).ok()
+}
+
+fn open(camera: &Camera, bands: &Bands, rough: bool) -> Result<Camera, RenderError> {
+    let opened = if rough { camera.opened_roughly(bands) } else { camera.opened(bands) };
+    opened.map_err(|error| RenderError::Camera(error.why))
+}
+
+/// Of so many bands a few numbers: the first, the last, and even ones in between.
+fn some_of(count: usize, most: usize) -> Vec<usize> {
+    if count <= most {
+        return (0..count).collect();
+    }
+    (0..most).map(|k| k * (count - 1) / (most - 1).max(1)).collect()
+}
+
+/// Whether the pattern of a mask in the lens shows in what is out of focus.
+#[must_use]
+pub fn has_mask(lens: &LensCamera) -> bool {
+    let elements = lens.focused().train().elements();
+    elements.iter().any(|element| matches!(element.part.opening(), Some(Opening::Image(_))))
+}
+
+/// What is taken of a scene's tolerance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Taken {
+    /// The tolerance.
+    pub tolerance: ToleranceSpec,
+    /// The camera that light is sampled by, in the place of the scene's.
+    pub camera: Option<TakenCamera>,
+    /// How far light is followed, less than the scene's tracer does.
+    pub bounces: Option<TakenBounces>,
+    /// Why not more is, in sentences.
+    pub notes: Vec<String>,
+}
+
+/// A simpler model of a lens that is taken.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TakenCamera {
+    /// The camera.
+    pub camera: Camera,
+    /// What it misses.
+    pub finding: Finding,
+}
+
+/// Fewer surfaces to which light is followed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TakenBounces {
+    /// How many.
+    pub bounces: u32,
+    /// The share of light that the others bring, in 99 % of blocks of 8 × 8 pixels.
+    pub share: f64,
+}
+
+/// Samples of light in three bands from which on looking for something cheaper can pay: finding out takes as long as
+/// some 10⁵.
+const WORTH: u64 = 200_000;
+
+/// What of the tolerance of `scene` is taken: the simplest camera model within it, and of the light that this leaves
+/// the fewest surfaces. Says nothing of a scene without a tolerance.
+///
+/// # Errors
+///
+/// As a render: when no light gets through the lens, or `watch` asks to stop.
+pub fn choose(
+    scene: &Scene,
+    plan: &Plan,
+    accel: &dyn Accel,
+    images: &Images,
+    watch: &dyn Watch,
+) -> Result<Option<Taken>, RenderError> {
+    let Some(tolerance) = scene.tolerance else { return Ok(None) };
+    let mut taken = Taken { tolerance, camera: None, bounces: None, notes: Vec::new() };
+    if !plan.layers.contains(&LayerSpec::Radiance) {
+        taken.notes.push("no light is rendered: data layers are exact".to_owned());
+        return Ok(Some(taken));
+    }
+    let [width, height] = scene.camera.resolution().map(u64::from);
+    let samples = width * height * u64::from(scene.render.samples.typical());
+    // What a sample takes grows with its bands.
+    if samples.saturating_mul(plan.bands.count().max(3) as u64 / 3) < WORTH {
+        let why = format!("{samples} samples of light are too few for looking to pay");
+        taken.notes.push(why);
+        return Ok(Some(taken));
+    }
+    taken.camera = simplest(scene, plan, accel, tolerance, &mut taken.notes)?;
+    let left = taken.camera.as_ref().map_or(0.0, |camera| camera.finding.light.value);
+    let left = (tolerance.light.0 - left).max(0.0);
+    taken.bounces = light::fewest(scene, (accel, images), left, &mut taken.notes, watch)?;
+    Ok(Some(taken))
+}
+
+/// The simplest model of the camera's lens within the tolerance.
+fn simplest(
+    scene: &Scene,
+    plan: &Plan,
+    accel: &dyn Accel,
+    spec: ToleranceSpec,
+    notes: &mut Vec<String>,
+) -> Result<Option<TakenCamera>, RenderError> {
+    let Some(lens) = scene.camera.lens() else { return Ok(None) };
+    if lens.lenslets().is_some() || scene.camera.light_field().is_some() {
+        notes.push("lenslets cut the picture up, which no simpler lens does".to_owned());
+        return Ok(None);
+    }
+    let tolerance = spec.tolerance();
+    let view = FullView::new(scene, accel, &plan.bands, Field::QUICK)?;
+    let models = match view.models(tolerance) {
+        Ok(found) => found.models,
+        Err(error) => {
+            notes.push(error.to_string());
+            return Ok(None);
+        }
+    };
+    let is_masked = has_mask(lens);
+    for LensModel { name, camera, .. } in models {
+        // The root mean square of a blur says nothing of the pattern in it.
+        if is_masked && ["thin", "thick"].contains(&name) {
+            continue;
+        }
+        let Ok(finding) = view.finding(name, &camera, tolerance) else { continue };
+        if finding.is_within {
+            return Ok(Some(TakenCamera { camera, finding }));
+        }
+    }
+    notes.push("no simpler model of the lens is within it".to_owned());
+    Ok(None)
+}
+
+/// The tolerance of a scene as models are judged by.
+trait Judged {
+    fn tolerance(&self) -> Tolerance;
+}
+
+impl Judged for ToleranceSpec {
+    fn tolerance(&self) -> Tolerance {
+        Tolerance { pixels: self.displacement.0, light: Some(self.light.0) }
+    }
+}
+
+fn finite_or_null<S: serde::Serializer>(values: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(values.iter().map(|x| x.is_finite().then_some(*x)))
+}

@@ -1,0 +1,106 @@
+//! What was taken of a tolerance against everything: places of the picture between those that were looked at, and a
+//! small picture both ways.
+
+use std::fmt;
+
+use etendue_accel::Accel;
+use etendue_scene::Scene;
+use serde::Serialize;
+
+use super::light::{BLOCK, differing, values};
+use super::{Field, FullView, Judged, Taken, TakenCamera};
+use crate::{Images, Plan, RenderError, Watch};
+
+/// The longer side of the small pictures, at most.
+const SIDE: u32 = 64;
+
+/// Samples of their pixels.
+const SAMPLES: u32 = 256;
+
+/// What was found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Verified {
+    /// The greatest displacement (pixels), and that which is allowed.
+    pub displacement: [f64; 2],
+    /// Places of the picture where it was measured.
+    pub places: usize,
+    /// The share of light by which 99 % of blocks of pixels differ, and that which is allowed.
+    pub light: [f64; 2],
+    /// The same between two pictures with everything and other random numbers: what noise alone makes.
+    pub noise: f64,
+    /// Blocks that were compared.
+    pub blocks: usize,
+}
+
+impl Verified {
+    /// Whether both are as allowed, of light but for its noise.
+    #[must_use]
+    pub fn is_within(&self) -> bool {
+        let [displacement, most] = self.displacement;
+        let [light, share] = self.light;
+        // Independent errors add up by their squares.
+        displacement <= most && light <= share.hypot(self.noise)
+    }
+}
+
+impl fmt::Display for Verified {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { displacement: [displacement, pixels], places, light, noise, blocks } = self;
+        let [light, share] = light.map(|share| 100.0 * share);
+        let is_within = if self.is_within() { "within the tolerance" } else { "MORE than allowed" };
+        write!(
+            f,
+            "verified: {is_within}: places displaced by {displacement:.3} px at most ({pixels} allowed, {places} \
+             places looked at); light differs by {light:.2} % in 99 % of {blocks} blocks ({share} allowed), where \
+             noise alone makes {:.2} %",
+            100.0 * noise
+        )
+    }
+}
+
+/// Renders a small part of `scene` with everything and with what was `taken`, and compares both.
+///
+/// # Errors
+///
+/// As a render.
+pub fn verify(
+    scene: &Scene,
+    taken: &Taken,
+    accel: &dyn Accel,
+    images: &Images,
+    watch: &dyn Watch,
+) -> Result<Verified, RenderError> {
+    let tolerance = taken.tolerance.tolerance();
+    // Places between those that the choice was made by.
+    let (mut displacement, mut places) = (0.0, 0);
+    if let Some(TakenCamera { camera, finding }) = &taken.camera {
+        let bands = Plan::new(scene, crate::output::Outputs::ALL).bands;
+        let view = FullView::new(scene, accel, &bands, Field::BETWEEN)?;
+        displacement = view.finding(finding.model, camera, tolerance)?.displacement();
+        places = view.places.len();
+    }
+    // A small picture, whose pixels are blocks of the large one.
+    let [width, height] = scene.camera.resolution();
+    let factor = width.max(height).div_ceil(SIDE).max(BLOCK);
+    let full = scene.camera.coarser(factor);
+    let own = Taken {
+        camera: taken.camera.as_ref().map(|taken| TakenCamera {
+            camera: taken.camera.coarser(factor),
+            finding: taken.finding.clone(),
+        }),
+        ..taken.clone()
+    };
+    let prepared = (accel, images);
+    let all = values(scene, &full, prepared, (SAMPLES, None), watch)?;
+    let less = values(scene, &full, prepared, (SAMPLES, Some(own)), watch)?;
+    let mut other = scene.clone();
+    other.render.seed ^= 0x9e37_79b9_7f4a_7c15;
+    let again = values(&other, &full, prepared, (SAMPLES, None), watch)?;
+    Ok(Verified {
+        displacement: [displacement, tolerance.pixels],
+        places,
+        light: [differing(&less, &all), taken.tolerance.light.0],
+        noise: differing(&again, &all),
+        blocks: all.len(),
+    })
+}

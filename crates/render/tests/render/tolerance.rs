@@ -1,0 +1,168 @@
+//! What is taken of a tolerance against everything: the picture differs by no more than was allowed, and by more where
+//! the tolerance is not kept.
+
+use std::path::Path;
+
+use etendue_render::output::Outputs;
+use etendue_render::tolerance::{Taken, TakenBounces, choose, lens_models};
+use etendue_render::{BandPaths, Plan};
+use etendue_report::DecisionKind;
+use etendue_scene::Scene;
+use etendue_scene::file::SamplesSpec;
+use serde_json::{Value, json};
+
+use crate::steps::{channels, load_json, prepare, trace};
+
+/// A ball on the ground before the double Gauss.
+fn lens_scene(f_number: f64, tolerance: &Value) -> Scene {
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+    let scene = json!({
+        "camera": { "type": "lens", "lens": "lenses/double-gauss.json", "f_number": f_number,
+            "focus_distance": "2.4 m", "sensor_height": "24 mm", "sensor": { "resolution": [96, 64] },
+            "pose": { "from": [0, 0.6, 2.4], "look_at": [0, 0.3, 0] } },
+        "tracer": { "type": "path", "max_bounces": 3 }, "tolerance": tolerance,
+        "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
+        "materials": { "white": { "type": "matte", "color": [0.7, 0.7, 0.7] } },
+        "objects": [{ "shape": "sphere", "radius": 0.3, "material": "white",
+                "transform": { "translate": [0, 0.3, 0] } },
+            { "shape": "rectangle", "width": 12, "height": 12, "material": "white",
+              "transform": { "rotate": [1, 0, 0, -90] } }],
+        "render": { "samples": 36 },
+    });
+    load_json(&scenes, scene)
+}
+
+/// A closed room of grey walls with a lamp.
+fn room(albedo: f64, tolerance: &Value) -> Scene {
+    let scene = json!({
+        "camera": { "type": "pinhole", "fov": 60, "sensor": { "resolution": [160, 120] },
+            "pose": { "from": [1.2, 0.1, 1.1], "look_at": [-1, -0.3, -1] } },
+        "tracer": { "type": "path" }, "lights": [],
+        "materials": { "grey": { "type": "matte", "color": [albedo, albedo, albedo] },
+            "lamp": { "type": "emissive", "radiance": [5, 5, 5] } },
+        "objects": [{ "shape": "box", "size": [4, 3, 4], "material": "grey" },
+            { "shape": "sphere", "radius": 0.3, "material": "grey", "transform": { "translate": [-0.5, -1, 0] } },
+            { "shape": "rectangle", "width": 1, "height": 1, "material": "lamp",
+              "transform": { "translate": [0, 1.49, 0], "rotate": [1, 0, 0, 90] } }],
+        "render": { "samples": 64 },
+    });
+    let mut scene = scene;
+    if !tolerance.is_null() {
+        scene["tolerance"] = tolerance.clone();
+    }
+    load_json(tempfile::tempdir().unwrap().path(), scene)
+}
+
+fn allowed(pixels: &str, light: &str) -> Value {
+    json!({ "displacement": pixels, "light": light })
+}
+
+fn taken(scene: &Scene) -> Taken {
+    let plan = Plan::new(scene, Outputs::ALL);
+    let (accel, images) = prepare(scene, &plan);
+    choose(scene, &plan, &*accel, &images, &|_: f64| true).unwrap().unwrap()
+}
+
+/// The light of blocks of 8 × 8 pixels with what is `taken`.
+fn blocks(scene: &Scene, taken: Option<Taken>) -> Vec<f64> {
+    let plan = Plan::taking(scene, Outputs::ALL, taken);
+    let (accel, images) = prepare(scene, &plan);
+    let done = trace(scene, &plan, &*accel, &images);
+    let [width, height] = scene.camera.resolution().map(|side| side as usize);
+    let columns = width / 8;
+    let mut sums = vec![0.0; columns * (height / 8)];
+    for channel in channels(&done.picture, "") {
+        for (i, value) in channel.iter().enumerate() {
+            sums[i / width / 8 * columns + i % width / 8] += value;
+        }
+    }
+    sums
+}
+
+/// The difference of light that 99 % of blocks have at most.
+fn difference(own: &[f64], all: &[f64]) -> f64 {
+    let mut shares: Vec<f64> = own.iter().zip(all).map(|(a, b)| (a - b).abs() / b).collect();
+    shares.sort_by(f64::total_cmp);
+    shares[shares.len() * 99 / 100 - 1]
+}
+
+#[test]
+fn a_lens_stopped_down_is_taken_as_opencv_has_it_with_its_falloff() {
+    let scene = lens_scene(16.0, &allowed("0.5 px", "2 %"));
+    let taken = taken(&scene);
+    let camera = taken.camera.as_ref().expect("a simpler camera");
+    assert_eq!(camera.finding.model, "falloff", "{:?}", camera.finding);
+    assert!(camera.finding.displacement() <= 0.5 && camera.finding.light.value <= 0.02);
+    // Shutter, place and pixels are the scene's.
+    assert_eq!(camera.camera.pose(), scene.camera.pose());
+    let full = blocks(&scene, None);
+    let own = blocks(&scene, Some(taken.clone()));
+    // Even blocks hold 2304 samples of a light that varies by its own size at edges alone: noise of less than
+    // 1.5 %, which adds to the 2 % by its square. An edge in a block moves by less than 0.1 of its 8 pixels.
+    let found = difference(&own, &full);
+    assert!(found < 0.025, "{found}");
+    // Without the falloff the corners are a fifth too bright, and the same comparison tells it.
+    let mut bare = taken.clone();
+    let (opencv, _) = lens_models::opencv(&scene.camera, 0.5).unwrap();
+    bare.camera.as_mut().unwrap().camera = opencv.camera;
+    let found = difference(&blocks(&scene, Some(bare)), &full);
+    assert!(found > 0.1, "{found}");
+    // The plan has one group of bands and no pupil.
+    let plan = Plan::taking(&scene, Outputs::ALL, Some(taken.clone()));
+    assert!(!plan.pupil && plan.band_paths == BandPaths::Alike, "{:?}", plan.band_paths);
+    let row = plan.decisions.iter().find(|row| row.kind == DecisionKind::Tolerance).unwrap();
+    assert!(
+        row.reason.contains("`falloff`") && row.value.to_string() == "0.5 px, 2 % of light",
+        "{row:?}"
+    );
+}
+
+#[test]
+fn a_lens_wide_open_is_taken_as_it_is_but_for_its_colours() {
+    // Blur of half a pixel: of all models, the lens without its dispersion alone has it.
+    let own = taken(&lens_scene(2.8, &allowed("0.1 px", "3 %")));
+    assert_eq!(own.camera.map(|camera| camera.finding.model), Some("undispersed"));
+}
+
+#[test]
+fn light_is_followed_to_as_few_surfaces_as_the_tolerance_allows() {
+    for (albedo, percent) in [(0.3, 2.0), (0.6, 5.0)] {
+        let scene = room(albedo, &allowed("0.5 px", &format!("{percent} %")));
+        let own = taken(&scene);
+        let TakenBounces { bounces, share } = own.bounces.expect("fewer bounces");
+        // Walls of albedo ρ leave about ρⁿ of the light for paths of more than n surfaces: 2 % and 5 % of it are
+        // left after 3.2 and 5.9.
+        let about = (percent / 100.0_f64).ln() / albedo.ln();
+        assert!((f64::from(bounces) - about).abs() < 2.5, "{bounces} for {about}");
+        assert!(share <= percent / 100.0);
+        let full = blocks(&scene, None);
+        let with = |bounces| {
+            let taken = Taken { bounces: Some(TakenBounces { bounces, share }), ..own.clone() };
+            difference(&blocks(&scene, Some(taken)), &full)
+        };
+        // Pictures of the same random numbers differ by what is left out, and by how the last surface looks for
+        // light: a fifth of it.
+        let found = with(bounces);
+        assert!(found < 1.2 * percent / 100.0, "{found} of {bounces} bounces");
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few")]
+        let fewer = about.ceil() as u32 - 2;
+        let less = with(fewer);
+        assert!(less > percent / 100.0, "{less} of {fewer} bounces");
+    }
+}
+
+#[test]
+fn nothing_is_taken_without_a_tolerance_or_where_looking_does_not_pay() {
+    let mut scene = room(0.5, &Value::Null);
+    assert!(scene.tolerance.is_none());
+    let plan = Plan::new(&scene, Outputs::ALL);
+    let (accel, images) = prepare(&scene, &plan);
+    let found = choose(&scene, &plan, &*accel, &images, &|_: f64| true).unwrap();
+    assert!(found.is_none() && plan.taken.is_none());
+    // Numbers are pixels and shares; a picture of few samples is rendered sooner than looked at.
+    scene = room(0.5, &json!({ "displacement": 1, "light": 0.02 }));
+    assert_eq!(scene.tolerance.map(|it| (it.displacement.0, it.light.0)), Some((1.0, 0.02)));
+    scene.render.samples = SamplesSpec::Count(1);
+    let few = taken(&scene);
+    assert!(few.bounces.is_none() && few.notes[0].contains("too few"), "{few:?}");
+}
