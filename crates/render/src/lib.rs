@@ -18,6 +18,7 @@ mod adaptive;
 mod band_paths;
 mod checkpoint;
 pub mod denoise;
+mod diffraction;
 mod error;
 pub mod expose;
 mod film;

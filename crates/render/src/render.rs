@@ -30,7 +30,7 @@ use crate::shard::{Shard, must_be_whole};
 use crate::stopping::Stopping;
 use crate::tiles::{Done, Job, RayCounts};
 use crate::watch::{Watch, Watcher};
-use crate::{Plan, expose, lighting, names};
+use crate::{Plan, diffraction, expose, lighting, names};
 
 /// Told the share done (0..=1) now and then; answering `false` stops.
 pub type Progress = Arc<dyn Fn(f64) -> bool + Send + Sync>;
@@ -260,12 +260,23 @@ pub fn trace(
     let light_camera = if plan.bands == Bands::Rgb { camera.clone() } else { open(&plan.bands)? };
     let shared = light_camera.lens().filter(|_| plan.band_paths.are_shared());
     let shared = shared.and_then(LensCamera::opened_paths);
+    // Light that is spread as waves are is traced by itself.
+    let spread = match diffraction::is_wanted(scene, plan) {
+        true => {
+            let prepared = Prepared { accel, images, others };
+            Some(diffraction::spread_light(scene, plan, prepared, course, &light_camera, watch)?)
+        }
+        false => None,
+    };
     // Lights, the studio among them where all else leaves the scene dark.
     let surroundings = surroundings(scene, images, scene.render.samples.typical());
     let spectral = Spectral::of(&plan.bands, &scene.materials);
     let mut notes = Vec::new();
     let seen = (accel, surroundings);
-    let lit = light_of((scene, plan), images, seen, &spectral, &mut notes, watch)?;
+    let lit = match spread {
+        Some(_) => None,
+        None => light_of((scene, plan), images, seen, &spectral, &mut notes, watch)?,
+    };
     // What light passes ask of the scene.
     let emitters = lit.as_ref().and_then(|_| Emitters::of(&scene.geometry, &scene.materials));
     let placed = PlacedSurfaces::of(&scene.geometry, &scene.materials, &spectral);
@@ -322,10 +333,15 @@ pub fn trace(
     };
     // What was traced, and what a user should know of it.
     let watcher = Watcher::new(watch, job.rays(&layers));
-    let Done { traffic: counts, passed, sums, centres } = job.run(&mut layers, &watcher)?;
+    let Done { traffic: mut counts, passed, sums, centres } = job.run(&mut layers, &watcher)?;
     notes.extend(job.keeper.as_ref().and_then(Keeper::fault));
     let trace_time = start.elapsed() + course.shares.iter().map(FilmFile::trace_time).sum();
     drop(job);
+    if let Some(spread) = spread {
+        counts.merge(&spread.counts);
+        notes.extend(spread.notes);
+        diffraction::put(&mut layers, spread.layers);
+    }
     let (camera, resolution) = (Some(camera), scene.camera.resolution());
     Ok(Film { layers, resolution, shard, counts, passed, trace_time, sums, centres, notes, camera })
 }

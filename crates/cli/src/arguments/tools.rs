@@ -1,4 +1,4 @@
-//! Arguments of `etendue lens`, `etendue expose`, `etendue spectrum` and `etendue bench`.
+//! Arguments of `etendue lens`, `etendue expose`, `etendue spectrum`, `etendue edge` and `etendue bench`.
 
 use std::path::PathBuf;
 
@@ -208,6 +208,48 @@ pub(crate) struct SpectrumArguments {
     /// Print JSON for machines
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+pub(super) const EDGE_HELP: &str = "\
+By the method e-SFR of ISO 12233: the edge may lie at 0.5 to 44 degrees from rows or columns, 5 are
+best, and is to cross the region from side to side. Integers of PNG and JPEG files are taken for sRGB
+and made linear; those of raw frames are light already: --raw.
+
+Examples:
+  etendue edge out/slanted/layers.exr --region 200,150,120,160
+  etendue edge out/slanted/raw.png --raw --mosaic 0,0 --pitch \"3.45 um\" --json
+  etendue edge photo.png --region 40,60,200,240 -o out/edge";
+
+#[derive(Debug, Args)]
+pub(crate) struct EdgeArguments {
+    /// A picture (.exr, .png, .hdr, .jpg, or an ENVI cube)
+    #[arg(value_name = "IMAGE")]
+    pub(crate) image: PathBuf,
+    /// Left column, top row, width and height of the region (pixels); all of the picture when absent
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse::region)]
+    pub(crate) region: Option<[usize; 4]>,
+    /// The layer of an EXR file; the picture when absent
+    #[arg(long, value_name = "NAME", default_value = "")]
+    pub(crate) layer: String,
+    /// Take the integers of the file as light, as those of raw frames are
+    #[arg(long)]
+    pub(crate) raw: bool,
+    /// Take every second pixel of every second row alone, from this column and row on: one colour of a
+    /// mosaic
+    #[arg(long, value_name = "COLUMN,ROW", value_parser = parse::mosaic)]
+    pub(crate) mosaic: Option<[usize; 2]>,
+    /// From one pixel to the next, such as "3.45 um", for cycles/mm
+    #[arg(long, value_name = "PITCH", value_parser = parse::pitch)]
+    pub(crate) pitch: Option<f64>,
+    /// Draw edge.svg and write edge.csv into this folder, made when it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Print JSON for machines
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Show no list of files
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
 }
 
 pub(super) const BENCH_HELP: &str = "\

@@ -126,13 +126,13 @@ impl WeightedFields {
 }
 
 /// What makes |Σ a|² an irradiance of a power of 1 (1/mm²).
-fn norm(field: &PupilField) -> f64 {
+pub(super) fn norm(field: &PupilField) -> f64 {
     let step = field.step / (field.wavelength * 1e-6);
     step * step / field.total_power()
 }
 
 /// The mean amplitude of a cell over which the wavefront is inclined.
-fn averaged(field: &PupilField, i: usize) -> f64 {
+pub(super) fn averaged(field: &PupilField, i: usize) -> f64 {
     let n = field.cells;
     let (row, column) = (i / n, i % n);
     // By the difference to the lit cells on both sides.

@@ -16,7 +16,7 @@ use super::{
     MOST_BYTES_OF_SUMS, Passes, Plan, RAYS_A_SAMPLE_OF_LIGHT, RAYS_PER_TRIANGLE, quality_for,
 };
 use crate::film::Precision;
-use crate::{expose, samples};
+use crate::{diffraction, expose, samples};
 
 /// What decisions are made by, beside the plan.
 pub(super) struct Grounds<'a> {
@@ -88,6 +88,7 @@ impl Plan {
         decisions.extend(self.explain_denoising());
         decisions.extend(self.explain_lens(scene));
         decisions.extend(self.band_paths.decision(scene));
+        decisions.extend(diffraction::decision(scene, self));
         decisions.push(explain_bounces(scene, needs));
         decisions.extend(explain_surfaces(needs));
         decisions.extend(needs.light.then(|| explain_lights(scene)));
