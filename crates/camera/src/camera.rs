@@ -509,7 +509,7 @@ impl Camera {
         Ok(opened)
     }
 
-    /// The same view on pixels `factor` times as large. Columns and rows that do not fill a pixel are
+    /// The same view on pixels `factor` times as large, by rays alone. Columns and rows that do not fill a pixel are
     /// left out on the right and below, and at least one is left.
     #[must_use]
     pub fn coarser(&self, factor: u32) -> Self {
@@ -518,7 +518,9 @@ impl Camera {
         let projection = match &self.projection {
             Projection::Pinhole(pinhole) => Projection::Pinhole(pinhole.coarser(times)),
             Projection::Orthographic(parallel) => Projection::Orthographic(parallel.coarser(times)),
-            Projection::Lens(lens) => Projection::Lens(Arc::new(lens.coarser(times))),
+            Projection::Lens(lens) => {
+                Projection::Lens(Arc::new(lens.without_diffraction().coarser(times)))
+            }
             Projection::Views(views) => Projection::Views(Arc::new(views.coarser(times))),
         };
         let sensor = SensorSpec {

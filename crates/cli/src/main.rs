@@ -12,6 +12,7 @@ mod merge;
 mod opencv;
 mod plan;
 mod progress;
+mod psf;
 mod render;
 mod room;
 mod sensor;

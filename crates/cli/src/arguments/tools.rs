@@ -84,6 +84,21 @@ pub(crate) struct LensArguments {
     /// For waves, set the stop by the numerical aperture of a near object's light
     #[arg(long, value_name = "NA", conflicts_with = "f_number")]
     pub(crate) numerical_aperture: Option<f64>,
+    /// Write point spread functions by depth, field and wavelength into the folder of -o, as psf.npy,
+    /// psf.exr and psf.json: shares of a point's light by cell
+    #[arg(long, requires = "output", conflicts_with_all = ["rays", "fit_opencv", "object_distance",
+          "magnification", "numerical_aperture", "best_focus"])]
+    pub(crate) psf: bool,
+    /// Distances of their points from the entrance pupil along the axis, "infinity,2 m"; the one in focus
+    /// when absent
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::focus, requires = "psf")]
+    pub(crate) depths: Option<Vec<Focus>>,
+    /// A side of their cells, such as a pixel's "3.45 um"; a quarter of the finest detail when absent
+    #[arg(long, value_name = "PITCH", value_parser = parse::pitch, requires = "psf")]
+    pub(crate) psf_pitch: Option<f64>,
+    /// Cells a side, an odd number; as many as hold all of the light when absent
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4095), requires = "psf")]
+    pub(crate) psf_size: Option<u32>,
     /// Field angles in degrees; the file's own or shares of the field of view when absent
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) fields: Option<Vec<f64>>,
