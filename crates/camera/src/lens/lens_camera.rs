@@ -391,8 +391,13 @@ impl LensCamera {
         let (direction, clip) = match &self.lenslets {
             Some(lenslets) => (lenslets.direction(start)?, Clip::On),
             None => {
-                let train = self.focused.train();
-                (self.chief.direction((train, frame), &self.design, film)?, Clip::Off)
+                let lens = (self.focused.train(), frame);
+                let direction = match self.spread {
+                    // Samples of light are many, and no data.
+                    SpreadBy::Nothing => self.chief.direction_nearly(lens, &self.design, film)?,
+                    _ => self.chief.direction(lens, &self.design, film)?,
+                };
+                (direction, Clip::Off)
             }
         };
         let end = self.design.run(Side::Sensor, clip, Ray::new(start, direction)?);

@@ -31,6 +31,9 @@ const FINE: f64 = 1.0 / 3.0;
 /// Points in larger cells are this share of λN apart, at most.
 const FINER: f64 = 1.0 / 6.0;
 
+/// On cells of more λN, all light lands where rays do.
+const COARSE: f64 = 4.0;
+
 /// Where cells lie: how a step to the right and one down in the picture run on the image plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CellGrid {
@@ -66,7 +69,7 @@ impl CellSpread {
         let unit = fields.iter().map(airy_unit).fold(0.0, f64::max);
         let least = fields.iter().map(airy_unit).fold(f64::INFINITY, f64::min);
         let far = fields.iter().map(landing_reach).fold(0.0, f64::max);
-        let is_of_rays = far > FARTHEST_WAVES;
+        let is_of_rays = far > FARTHEST_WAVES || grid.pitch > COARSE * unit;
         let core = match is_of_rays {
             true => cells((far + 2.0) * unit),
             false => cells((far + REACH) * unit),
