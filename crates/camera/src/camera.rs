@@ -553,7 +553,10 @@ impl Camera {
         let camera = self.with_lens(|lens| lens.along_chief_rays(f64::from(finer)));
         let sensor = SensorSpec {
             resolution: self.sensor.resolution.map(|side| side.saturating_mul(finer)),
-            pixel_pitch: self.sensor.pixel_pitch.map(|pitch| Micrometres(pitch.0 / f64::from(finer))),
+            pixel_pitch: self
+                .sensor
+                .pixel_pitch
+                .map(|pitch| Micrometres(pitch.0 / f64::from(finer))),
         };
         Self { sensor, ..camera }
     }

@@ -57,9 +57,7 @@ pub(crate) fn run(arguments: &EdgeArguments) -> Result<(), Fault> {
     }
     let lattice = match arguments.mosaic {
         // Counted in the picture, not in the region.
-        Some([column, row]) => {
-            Lattice { step: [2, 2], first: [(column + x) % 2, (row + y) % 2] }
-        }
+        Some([column, row]) => Lattice { step: [2, 2], first: [(column + x) % 2, (row + y) % 2] },
         None => Lattice::ALL,
     };
     let mut channels = Vec::new();
@@ -68,8 +66,9 @@ pub(crate) fn run(arguments: &EdgeArguments) -> Result<(), Fault> {
             .flat_map(|row| &values[row * width + x..row * width + x + columns])
             .copied()
             .collect();
-        let edge = slanted_edge(&part, [columns, rows], lattice)
-            .map_err(|error| refused(format!("channel {channel}, region {x},{y},{columns},{rows}: {error}")))?;
+        let edge = slanted_edge(&part, [columns, rows], lattice).map_err(|error| {
+            refused(format!("channel {channel}, region {x},{y},{columns},{rows}: {error}"))
+        })?;
         let a_millimetre = |frequency: f64| arguments.pitch.map(|pitch| frequency / pitch * 1e3);
         let mtf50_mm = edge.mtf50.and_then(a_millimetre);
         channels.push(MeasuredChannel { channel, edge, mtf50_mm });

@@ -6,7 +6,9 @@ use etendue_files::Transaction;
 use etendue_geometry::glam::DVec3;
 use etendue_optics::analysis::between::airy_unit;
 use etendue_optics::analysis::wavefront::Cells;
-use etendue_optics::analysis::{AnalysisError, CellGrid, CellSpread, ObjectPoint, PupilField, Wavefront};
+use etendue_optics::analysis::{
+    AnalysisError, CellGrid, CellSpread, ObjectPoint, PupilField, Wavefront,
+};
 use etendue_optics::train::{Focus, LensReport};
 use etendue_render::output::{Channel, Layer, Look, Picture, Values, exr, npy, sidecar};
 use etendue_scene::file::ReadLens;
@@ -67,7 +69,8 @@ pub(crate) fn write(
     to: &Transaction,
 ) -> Result<(), Fault> {
     let Some(folder) = &arguments.output else { return Ok(()) };
-    let refused = |why: String| Fault::refused(format!("{}: --psf: {why}", arguments.lens.display()));
+    let refused =
+        |why: String| Fault::refused(format!("{}: --psf: {why}", arguments.lens.display()));
     let (wavelengths, _) = waves::wavelengths(lens, report, arguments);
     let Some(sensor_z) = report.sensor_z else {
         return Err(refused("the lens has no place for a sensor; give --focus".to_owned()));
@@ -90,11 +93,15 @@ pub(crate) fn write(
     let pitch = arguments.psf_pitch.map_or(finest / FINE, |pitch| 1e-3 * pitch);
     // The sensor is looked at as a picture of it would be, x to the right and y upwards.
     let grid = CellGrid { pitch, turn: 1.0, most: MOST_HALF };
-    let spreads: Vec<CellSpread> =
-        points.iter().map(|point| CellSpread::of(std::slice::from_ref(&point.pupil), &grid)).collect();
+    let spreads: Vec<CellSpread> = points
+        .iter()
+        .map(|point| CellSpread::of(std::slice::from_ref(&point.pupil), &grid))
+        .collect();
     let half = match arguments.psf_size {
         Some(size) if size % 2 == 1 => size as usize / 2,
-        Some(size) => return Err(refused(format!("--psf-size {size} has no middle: give an odd number"))),
+        Some(size) => {
+            return Err(refused(format!("--psf-size {size} has no middle: give an odd number")));
+        }
         None => spreads.iter().map(|spread| spread.half).max().unwrap_or(0),
     };
     let side = 2 * half + 1;
@@ -139,13 +146,12 @@ fn depths(report: &LensReport, arguments: &LensArguments) -> Result<Vec<Option<f
         return Ok(vec![focused]);
     };
     if report.paraxial.entrance_pupil.z.is_none() {
-        return Err("--depths: the entrance pupil is at infinity, and depths are counted from it".to_owned());
+        return Err("--depths: the entrance pupil is at infinity, and depths are counted from it"
+            .to_owned());
     }
     let depth = |focus: &Focus| match *focus {
         Focus::Infinity => Ok(None),
-        Focus::Distance(metres) if metres > 0.0 => {
-            Ok(metres.is_finite().then_some(1e3 * metres))
-        }
+        Focus::Distance(metres) if metres > 0.0 => Ok(metres.is_finite().then_some(1e3 * metres)),
         _ => Err("--depths: expected distances above 0, such as \"infinity,2 m\"".to_owned()),
     };
     asked.iter().map(depth).collect()
@@ -201,8 +207,11 @@ fn files(
     // A layer for each depth and field, a channel for each wavelength.
     let mut layers: Vec<Layer> = Vec::new();
     for (k, plane) in planes.into_iter().enumerate() {
-        let (depth, field, nm) =
-            (k / (fields * wavelengths), k / wavelengths % fields, meaning.wavelengths[k % wavelengths]);
+        let (depth, field, nm) = (
+            k / (fields * wavelengths),
+            k / wavelengths % fields,
+            meaning.wavelengths[k % wavelengths],
+        );
         let name = format!("PSF.d{depth}f{field}");
         let channel = format!("{nm}nm").replace('.', "_");
         let channel = Channel { name: channel, values: Values::F32(plane) };
@@ -211,16 +220,25 @@ fn files(
             None => {
                 let about = [
                     ("definition", meaning.definition.to_owned()),
-                    ("depth", meaning.depths[depth].map_or("infinity".into(), |mm| format!("{mm} mm"))),
+                    (
+                        "depth",
+                        meaning.depths[depth].map_or("infinity".into(), |mm| format!("{mm} mm")),
+                    ),
                     ("field", format!("{} degrees", meaning.fields[field])),
                     ("pitch", format!("{} um", meaning.pitch)),
                 ];
                 let about = about.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
-                layers.push(Layer { name, look: Look::Cube, channels: vec![channel], meaning: about });
+                layers.push(Layer {
+                    name,
+                    look: Look::Cube,
+                    channels: vec![channel],
+                    meaning: about,
+                });
             }
         }
     }
-    let picture = Picture::new(side, side, layers, Vec::new()).map_err(|error| Fault::failed(error.to_string()))?;
+    let picture = Picture::new(side, side, layers, Vec::new())
+        .map_err(|error| Fault::failed(error.to_string()))?;
     exr::write(to, &folder.join(FILES[1]), &picture, &exr::Options::default())?;
     sidecar::write_json(to, &folder.join(FILES[2]), meaning)?;
     Ok(())

@@ -172,7 +172,8 @@ impl Still {
         let raster = self.codes.as_ref()?;
         let channels = self.layers().first()?.channels.iter().enumerate();
         let full = if matches!(raster.samples(), Samples::U8(_)) { 255.0 } else { 65_535.0 };
-        let values = |k: usize| (0..raster.len()).map(|i| (raster.texel(i)[k] * full).round()).collect();
+        let values =
+            |k: usize| (0..raster.len()).map(|i| (raster.texel(i)[k] * full).round()).collect();
         Some(channels.map(|(k, channel)| (channel.name.clone(), values(k))).collect())
     }
 

@@ -261,13 +261,8 @@ pub fn trace(
     let shared = light_camera.lens().filter(|_| plan.band_paths.are_shared());
     let shared = shared.and_then(LensCamera::opened_paths);
     // Light that is spread as waves are is traced by itself.
-    let spread = match diffraction::is_wanted(scene, plan) {
-        true => {
-            let prepared = Prepared { accel, images, others };
-            Some(diffraction::spread_light(scene, plan, prepared, course, &light_camera, watch)?)
-        }
-        false => None,
-    };
+    let whole = Prepared { accel, images, others };
+    let spread = diffraction::spread_light(scene, plan, whole, course, &light_camera, watch)?;
     // Lights, the studio among them where all else leaves the scene dark.
     let surroundings = surroundings(scene, images, scene.render.samples.typical());
     let spectral = Spectral::of(&plan.bands, &scene.materials);
@@ -337,11 +332,7 @@ pub fn trace(
     notes.extend(job.keeper.as_ref().and_then(Keeper::fault));
     let trace_time = start.elapsed() + course.shares.iter().map(FilmFile::trace_time).sum();
     drop(job);
-    if let Some(spread) = spread {
-        counts.merge(&spread.counts);
-        notes.extend(spread.notes);
-        diffraction::put(&mut layers, spread.layers);
-    }
+    diffraction::put(&mut layers, spread, &mut counts, &mut notes);
     let (camera, resolution) = (Some(camera), scene.camera.resolution());
     Ok(Film { layers, resolution, shard, counts, passed, trace_time, sums, centres, notes, camera })
 }

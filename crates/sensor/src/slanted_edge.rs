@@ -97,7 +97,9 @@ pub enum EdgeError {
         noise: f64,
     },
     /// Clipped, or several edges.
-    #[error("the edge leaves the region, or there are several: choose one that one edge crosses from side to side")]
+    #[error(
+        "the edge leaves the region, or there are several: choose one that one edge crosses from side to side"
+    )]
     NotOne,
     /// Not slanted, or too much.
     #[error(
@@ -123,7 +125,8 @@ pub fn slanted_edge(
 ) -> Result<SlantedEdge, EdgeError> {
     let [width, height] = size;
     let step = lattice.step.map(|step| step.max(1));
-    if size.iter().zip(step).any(|(&side, step)| side / step < FEWEST) || values.len() < width * height
+    if size.iter().zip(step).any(|(&side, step)| side / step < FEWEST)
+        || values.len() < width * height
     {
         return Err(EdgeError::Small(size));
     }
@@ -157,7 +160,11 @@ pub fn slanted_edge(
             .map(|line| (0..along.len()).map(|k| at(k, line)).collect())
             .collect(),
     };
-    grid.measure(is_upright, if is_upright { width } else { height }, if is_upright { height } else { width })
+    grid.measure(
+        is_upright,
+        if is_upright { width } else { height },
+        if is_upright { height } else { width },
+    )
 }
 
 /// Lines across the edge.
@@ -183,7 +190,12 @@ impl Edge {
 }
 
 impl Lines {
-    fn measure(&self, is_upright: bool, width: usize, height: usize) -> Result<SlantedEdge, EdgeError> {
+    fn measure(
+        &self,
+        is_upright: bool,
+        width: usize,
+        height: usize,
+    ) -> Result<SlantedEdge, EdgeError> {
         let mut edge: Option<Edge> = None;
         let mut straightness = 0.0;
         for _ in 0..LOOKS {
@@ -252,9 +264,8 @@ impl Lines {
             }
         }
         let [low, high] = sides.map(|(count, sum, _)| sum / count);
-        let variance = sides.map(|(count, sum, square)| {
-            (square / count - (sum / count).powi(2)).max(0.0)
-        });
+        let variance =
+            sides.map(|(count, sum, square)| (square / count - (sum / count).powi(2)).max(0.0));
         let (step, noise) = ((high - low).abs(), variance[0].max(variance[1]).sqrt());
         // The mean of many pixels differs by much less than one of them.
         let of_mean = noise / sides[0].0.min(sides[1].0).max(1.0).sqrt();
@@ -324,9 +335,10 @@ fn told(spread: &[[f64; 2]], known: Told) -> SlantedEdge {
     let ends = [mean(&spread[..tenth]), mean(&spread[count - tenth..])];
     let levels = [ends[0].min(ends[1]), ends[0].max(ends[1])];
     let step = levels[1] - levels[0];
-    let (least, most) = spread.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), at| {
-        (least.min(at[1]), most.max(at[1]))
-    });
+    let (least, most) =
+        spread.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), at| {
+            (least.min(at[1]), most.max(at[1]))
+        });
     let overshoot = (levels[0] - least).max(most - levels[1]).max(0.0) / step;
     // Differences over two quarters, under the window.
     let reach = spread[count - 1][0];

@@ -32,8 +32,8 @@ pub use band_paths::{BandLandings, SharedPaths};
 pub use chief::LensletChiefs;
 pub use focused::Focused;
 pub use lens_camera::{BandGroup, LensCamera};
-pub use waves::WaveLens;
 pub use source::{LensSource, PlacedSpec};
 pub use spec::{
     ChromaticRealLensCameraSpec, LensCameraSpec, RealLensCameraSpec, ThinLensCameraSpec,
 };
+pub use waves::WaveLens;

@@ -117,7 +117,9 @@ impl<'a> WaveLens<'a> {
             (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
         let disperses = train.is_dispersive() && !camera.one_wavelength;
         let nodes = match disperses && high - low > NARROW {
-            true => (0..NODES).map(|k| low + (high - low) * k as f64 / (NODES - 1) as f64).collect(),
+            true => {
+                (0..NODES).map(|k| low + (high - low) * k as f64 / (NODES - 1) as f64).collect()
+            }
             false if disperses => vec![0.5 * (low + high)],
             false => vec![train.wavelength()],
         };

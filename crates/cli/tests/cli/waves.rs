@@ -202,12 +202,27 @@ fn point_spread_functions_are_written_by_depth_field_and_wavelength() {
     let bench = Bench::new();
     bench.write("lens.json", IDEAL.as_bytes());
     let arguments = [
-        "lens", "lens.json", "--psf", "-o", "out", "--depths", "infinity,20 m", "--fields", "0,1",
-        "--wavelengths", "500,600", "--psf-pitch", "0.3125 um", "--psf-size", "201", "-q",
+        "lens",
+        "lens.json",
+        "--psf",
+        "-o",
+        "out",
+        "--depths",
+        "infinity,20 m",
+        "--fields",
+        "0,1",
+        "--wavelengths",
+        "500,600",
+        "--psf-pitch",
+        "0.3125 um",
+        "--psf-size",
+        "201",
+        "-q",
     ];
     let output = bench.run(&arguments);
     assert!(output.status.success(), "{}", text(&output.stderr));
-    let meaning: Value = serde_json::from_slice(&std::fs::read(bench.path("out/psf.json")).unwrap()).unwrap();
+    let meaning: Value =
+        serde_json::from_slice(&std::fs::read(bench.path("out/psf.json")).unwrap()).unwrap();
     assert_eq!(meaning["shape"], serde_json::json!([2, 2, 2, 201, 201]));
     assert_eq!(meaning["depths"], serde_json::json!([null, 20000.0]));
     let values = bench.array("psf");
@@ -241,7 +256,10 @@ fn point_spread_functions_that_cannot_be_are_refused() {
     for (arguments, words) in [
         (vec!["--psf"], "--output"),
         (vec!["--psf", "-o", "out", "--psf-size", "64"], "odd"),
-        (vec!["--psf", "-o", "out", "--fields", "0,1,2,3", "--psf-size", "4095"], "1024 are the most"),
+        (
+            vec!["--psf", "-o", "out", "--fields", "0,1,2,3", "--psf-size", "4095"],
+            "1024 are the most",
+        ),
         (vec!["--depths", "2 m"], "--psf"),
     ] {
         let output = bench.run(&[&["lens", "lens.json"], &arguments[..]].concat());
@@ -258,9 +276,10 @@ fn write_edge(bench: &Bench, name: &str) {
     for y in 0..height {
         for x in 0..width {
             let from = f64::from(x) + 0.5 - 60.2 - slope * (f64::from(y) + 0.5 - 70.0);
-            let share = 0.5 * libm::erfc(-from * slope.atan().cos() / sigma / std::f64::consts::SQRT_2);
+            let share =
+                0.5 * libm::erfc(-from * slope.atan().cos() / sigma / std::f64::consts::SQRT_2);
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "16 bits")]
-            let code = (2_000.0 + 60_000.0 * share).round() as u16;
+            let code = (2_000.0_f64 + 60_000.0 * share).round() as u16;
             data.extend(code.to_be_bytes());
         }
     }
@@ -315,11 +334,9 @@ fn the_plan_says_whether_waves_would_show() {
               "objects": [{{"shape": "rectangle", "width": 1, "height": 1}}]}}"#
         )
     };
-    for (f_number, on, words) in [
-        (22.0, false, "waves would show"),
-        (2.0, false, "hardly show"),
-        (22.0, true, "chief rays"),
-    ] {
+    for (f_number, on, words) in
+        [(22.0, false, "waves would show"), (2.0, false, "hardly show"), (22.0, true, "chief rays")]
+    {
         let bench = Bench::with_scene(&scene(f_number, on));
         let output = bench.run(&["plan", "scene.json"]);
         assert!(output.status.success(), "{}", text(&output.stderr));

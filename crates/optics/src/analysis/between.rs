@@ -70,9 +70,8 @@ impl FieldsBetween {
         }
         // One grid over all of them.
         let middle = parts.get(parts.len() / 2).map_or(DVec2::ZERO, |part| part.2.middle);
-        let reach = |outline: &aim::Outline| {
-            outline.half + (outline.middle - middle).abs().max_element()
-        };
+        let reach =
+            |outline: &aim::Outline| outline.half + (outline.middle - middle).abs().max_element();
         let half = parts.iter().map(|part| reach(&part.2)).fold(0.0, f64::max);
         let traced = |cells: usize| -> Result<Vec<PupilField>, AnalysisError> {
             let step = half / (0.5 * cells as f64 - super::pupil::RIM);
@@ -86,7 +85,11 @@ impl FieldsBetween {
         // Where rays land, in wavelengths times the f-number.
         let far = fields.iter().map(landing_reach).filter(|far| *far <= FARTHEST_WAVES);
         let far = far.fold(0.0, f64::max);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small count")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a small count"
+        )]
         let needed = ((2.0 * (far + BESIDE)).ceil() as usize).next_multiple_of(4);
         if needed > MOST_CELLS {
             return Err(AnalysisError::TooRough { needed, waves: far });
@@ -161,8 +164,7 @@ fn lagrange(nodes: &[f64], at: f64) -> Vec<f64> {
 
 /// Which node is nearest to a place.
 fn closest(nodes: &[f64], at: f64) -> usize {
-    let by_distance = |a: &usize, b: &usize| {
-        (nodes[*a] - at).abs().total_cmp(&(nodes[*b] - at).abs())
-    };
+    let by_distance =
+        |a: &usize, b: &usize| (nodes[*a] - at).abs().total_cmp(&(nodes[*b] - at).abs());
     (0..nodes.len()).min_by(by_distance).unwrap_or(0)
 }

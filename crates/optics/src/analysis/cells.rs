@@ -105,7 +105,8 @@ impl CellSpread {
                 let value = match margin {
                     0 => own,
                     _ => {
-                        let around = means[at - 1] + means[at + 1] + means[at - wide] + means[at + wide];
+                        let around =
+                            means[at - 1] + means[at + 1] + means[at - wide] + means[at + wide];
                         (own - (around - 4.0 * own) / 24.0).max(0.0)
                     }
                 };
@@ -167,9 +168,8 @@ fn add_waves(field: &PupilField, grid: &CellGrid, half: usize, points: usize, ce
     };
     // The sum over columns of cells first, for all columns of points, and then that over rows.
     let (right, down) = (grid.turn, -grid.turn);
-    let by_column: Vec<Complex64> = (0..n)
-        .flat_map(|i| (0..count).map(move |c| wave(pupil(i), right * place(c))))
-        .collect();
+    let by_column: Vec<Complex64> =
+        (0..n).flat_map(|i| (0..count).map(move |c| wave(pupil(i), right * place(c)))).collect();
     let mut rows: Vec<(usize, Vec<Complex64>)> = Vec::new();
     for j in 0..n {
         let lit: Vec<usize> = (0..n).filter(|i| field.amplitude[j * n + i] > 0.0).collect();

@@ -136,9 +136,7 @@ impl Window {
             let place = node as f64 * step;
             let first = (place - step).max(0.0).floor() as usize;
             let last = ((place + step).ceil() as usize).min(size);
-            let share = |cell: usize| {
-                (1.0 - (cell as f64 + 0.5 - place).abs() / step).max(0.0)
-            };
+            let share = |cell: usize| (1.0 - (cell as f64 + 0.5 - place).abs() / step).max(0.0);
             (first, (first..last).map(share).collect::<Vec<f64>>())
         };
         let (left, columns) = along(node % side, size[0]);
@@ -189,7 +187,12 @@ impl Window {
     }
 
     /// The planes spread, on pixels.
-    fn spread(&self, planes: Vec<Vec<f64>>, spread: &CellSpread, picture: &CellPicture) -> Vec<Block> {
+    fn spread(
+        &self,
+        planes: Vec<Vec<f64>>,
+        spread: &CellSpread,
+        picture: &CellPicture,
+    ) -> Vec<Block> {
         let [width, height] = self.size();
         let half = spread.half;
         let size = [width, height].map(|side| quick(side + 2 * half));
@@ -276,7 +279,8 @@ struct Transform {
 impl Transform {
     fn new(size: [usize; 2]) -> Self {
         let mut planner = FftPlanner::new();
-        let plans = size.map(|side| [planner.plan_fft_forward(side), planner.plan_fft_inverse(side)]);
+        let plans =
+            size.map(|side| [planner.plan_fft_forward(side), planner.plan_fft_inverse(side)]);
         Self { size, plans }
     }
 

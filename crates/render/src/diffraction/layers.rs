@@ -12,7 +12,7 @@ const STEP: f64 = 0.35;
 const LINEAR: f64 = 3.5;
 
 /// The most layers in front of focus, and behind it.
-const MOST: f64 = 60.0;
+const MOST: u8 = 60;
 
 /// Cells by their layers.
 #[derive(Debug, Clone)]
@@ -36,7 +36,7 @@ impl DepthLayers {
             false => 0.0,
         };
         let number = |depth: f32| number_of(waves * (near(depth) - focus));
-        let mut sums = vec![(0.0, 0_u64); 2 * MOST as usize + 1];
+        let mut sums = vec![(0.0, 0_u64); 2 * usize::from(MOST) + 1];
         for &depth in depths {
             let (sum, count) = &mut sums[number(depth)];
             *sum += near(depth);
@@ -69,7 +69,8 @@ fn number_of(waves: f64) -> usize {
         true => far / STEP,
         false => LINEAR / STEP + (far / LINEAR).ln() * LINEAR / STEP,
     };
-    (MOST + steps.min(MOST).copysign(waves)).round() as usize
+    let most = f64::from(MOST);
+    (most + steps.min(most).copysign(waves)).round() as usize
 }
 
 #[cfg(test)]
@@ -95,6 +96,6 @@ mod tests {
             let (deep, far) = (pair[1] - pair[0], pair[0].abs().min(pair[1].abs()));
             assert!(deep <= STEP.max(0.107 * far) + 2e-3, "{pair:?}");
         }
-        assert_eq!(number_of(0.0), MOST as usize);
+        assert_eq!(number_of(0.0), usize::from(MOST));
     }
 }

@@ -53,8 +53,20 @@ pub(crate) struct SpreadLight {
 }
 
 /// Whether the plan's picture is of light that is spread as waves are.
-pub(crate) fn is_wanted(scene: &Scene, plan: &Plan) -> bool {
+fn is_wanted(scene: &Scene, plan: &Plan) -> bool {
     scene.camera.diffracts() && plan.layers.contains(&LayerSpec::Radiance)
+}
+
+/// Bytes a pixel of its cells' light, depths and layers.
+pub(crate) fn bytes(scene: &Scene, plan: &Plan) -> u64 {
+    let Some(lens) = scene.camera.lens().filter(|_| is_wanted(scene, plan)) else { return 0 };
+    let bands = plan.bands.count();
+    let shortest = (0..bands).map(|band| plan.bands.wavelength(band)).fold(f64::INFINITY, f64::min);
+    let pitch = 1e-3 * lens.focused().pixel_pitch();
+    let cells = u64::from(cells_a_pixel(pitch, lens.airy_unit(shortest)));
+    let lit = plan.layers.iter().filter(|layer| layer.is_light()).count();
+    let each = size_of::<f32>() * (lit * bands + 1) + 1;
+    cells * cells * each as u64
 }
 
 /// Refuses what light that is spread over the picture cannot be.
@@ -68,7 +80,9 @@ fn check(scene: &Scene, plan: &Plan, course: &Course<'_>) -> Result<(), RenderEr
         );
     }
     if camera.shutter().is_some_and(|shutter| !shutter.is_fully_open()) || camera.lights_change() {
-        return refused("the shutter is closed for a part of the time; leave it out, or `diffraction`");
+        return refused(
+            "the shutter is closed for a part of the time; leave it out, or `diffraction`",
+        );
     }
     if plan.stopping.is_adaptive() || matches!(plan.stopping, Stopping::Time(_)) {
         return refused(
@@ -108,7 +122,7 @@ fn cells_a_pixel(pitch: f64, finest: f64) -> u32 {
     cells.clamp(1.0, f64::from(MOST_CELLS)) as u32
 }
 
-/// Traces the light of `scene` and spreads it. `opened` is the camera, opened for the plan's bands.
+/// Traces the light of `scene` and spreads it, where that is [wanted](is_wanted). `opened` is the camera, opened for the plan's bands.
 ///
 /// # Errors
 ///
@@ -120,7 +134,10 @@ pub(crate) fn spread_light(
     course: &Course<'_>,
     opened: &Camera,
     watch: &dyn Watch,
-) -> Result<SpreadLight, RenderError> {
+) -> Result<Option<SpreadLight>, RenderError> {
+    if !is_wanted(scene, plan) {
+        return Ok(None);
+    }
     check(scene, plan, course)?;
     let fault = |why: String| RenderError::Diffraction(why);
     let Some(lens) = opened.lens() else { return Err(fault("the camera has no lens".to_owned())) };
@@ -148,7 +165,8 @@ pub(crate) fn spread_light(
         planes.iter_mut().zip(own).for_each(|(planes, plane)| planes.push(plane));
     }
     let notes = std::mem::take(&mut film.notes);
-    Ok(SpreadLight { layers: lit.into_iter().zip(planes).collect(), counts: film.counts, notes })
+    let layers = lit.into_iter().zip(planes).collect();
+    Ok(Some(SpreadLight { layers, counts: film.counts, notes }))
 }
 
 /// The scene along chief rays on cells: light and depths; which layers of light; and its film, emptied.
@@ -234,9 +252,17 @@ fn illumination(opened: &Camera, plan: &Plan, resolution: [u32; 2]) -> Vec<Illum
     by_band
 }
 
-/// Puts light that was spread onto its layers of the film.
-pub(crate) fn put(film: &mut [FilmLayer], light: Vec<(LayerSpec, Vec<Vec<f32>>)>) {
-    for (spec, planes) in light {
+/// Puts light that was spread onto its layers of the film, and what it took to the rest.
+pub(crate) fn put(
+    film: &mut [FilmLayer],
+    spread: Option<SpreadLight>,
+    counts: &mut RayCounts,
+    notes: &mut Vec<String>,
+) {
+    let Some(spread) = spread else { return };
+    counts.merge(&spread.counts);
+    notes.extend(spread.notes);
+    for (spec, planes) in spread.layers {
         let Some(layer) = film.iter_mut().find(|layer| layer.spec == spec) else { continue };
         for ((_, values), plane) in layer.named_planes_mut().zip(planes) {
             *values = match values {

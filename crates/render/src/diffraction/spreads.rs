@@ -74,7 +74,11 @@ impl Spreads {
         };
         let fields = (0..side * side).into_par_iter().map(fields).collect::<Result<_, _>>()?;
         let most = resolution.map(|side| f64::from(side) * cells).into_iter().fold(1.0, f64::max);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a picture's size")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a picture's size"
+        )]
         let grid = CellGrid { pitch: pitch / cells, turn: lens.turn(), most: most as usize };
         Ok(Self {
             side,

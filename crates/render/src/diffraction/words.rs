@@ -35,16 +35,21 @@ fn because(scene: &Scene, lens: &LensCamera) -> String {
     let pixels = disc / lens.focused().pixel_pitch();
     let size = format!("at {GREEN:.0} nm the Airy disc is {disc:.2} um wide, {pixels:.2} pixels");
     let blur = blur(scene, lens);
-    let against = blur.map_or_else(String::new, |[least, most]| match most < 10.0 * least.max(0.1) {
-        _ if most < 0.1 => "; everything is in focus".to_owned(),
-        true => format!("; what is there is blurred over {most:.1} pixels at most"),
-        false => format!("; blur is from {least:.1} to {most:.1} pixels"),
-    });
+    let against =
+        blur.map_or_else(String::new, |[least, most]| match most < 10.0 * least.max(0.1) {
+            _ if most < 0.1 => "; everything is in focus".to_owned(),
+            true => format!("; what is there is blurred over {most:.1} pixels at most"),
+            false => format!("; blur is from {least:.1} to {most:.1} pixels"),
+        });
     let sharpest = blur.map_or(0.0, |blur| blur[0]);
     let shows = pixels > SHOWS && pixels > 0.5 * sharpest;
     let verdict = match (lens.diffracts(), shows) {
-        (true, true) => "light is spread by the lens' point spread functions along chief rays: what parts of the pupil see differently is lost",
-        (true, false) => "light is spread as waves are, which hardly shows: by rays it would look the same",
+        (true, true) => {
+            "light is spread by the lens' point spread functions along chief rays: what parts of the pupil see differently is lost"
+        }
+        (true, false) => {
+            "light is spread as waves are, which hardly shows: by rays it would look the same"
+        }
         (false, true) => "light is spread by rays alone, and waves would show: set it to true",
         (false, false) => "light is spread by rays alone, and waves would hardly show",
     };

@@ -149,7 +149,8 @@ fn a_rendered_edge_has_the_modulation_of_the_lens() {
             let own = Transfer::diffraction(&WeightedFields::one(wavefront.pupil));
             let picture = green(&text);
             // Without the rows and columns beyond which the picture is taken to go on.
-            let region: Vec<f64> = (10..170).flat_map(|y| picture[y * 240 + 10..][..220].to_vec()).collect();
+            let region: Vec<f64> =
+                (10..170).flat_map(|y| picture[y * 240 + 10..][..220].to_vec()).collect();
             let edge = slanted_edge(&region, [220, 160], Lattice::ALL).unwrap();
             let mut worst = 0.0_f64;
             for k in 1..=10 {
@@ -209,11 +210,11 @@ fn what_goes_with_no_diffraction_is_refused() {
     assert!(matches!(&error, RenderError::Diffraction(why) if why.contains("--shard")), "{error}");
     let mut adaptive = load(&lamp(3.45, 8.0, 1.0, 4));
     adaptive.render.samples =
-        serde_json::from_str(r#"{"relative_error": 0.1, "min": 4, "max": 64}"#)
-            .unwrap();
+        serde_json::from_str(r#"{"relative_error": 0.1, "min": 4, "max": 64}"#).unwrap();
     let plan = Plan::new(&adaptive, Outputs::NONE);
     let prepared = Prepared { accel: &*accel, images: &images, others: &[] };
-    let error = etendue_render::trace(&adaptive, &plan, prepared, &[], &Course::default(), &|_: f64| true)
-        .unwrap_err();
+    let error =
+        etendue_render::trace(&adaptive, &plan, prepared, &[], &Course::default(), &|_: f64| true)
+            .unwrap_err();
     assert!(matches!(&error, RenderError::Diffraction(why) if why.contains("samples")), "{error}");
 }

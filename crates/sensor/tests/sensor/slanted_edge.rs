@@ -45,7 +45,10 @@ fn an_edge_that_is_known_is_measured() {
                 let own = (-2.0 * (std::f64::consts::PI * sigma * f).powi(2)).exp();
                 let expected = if mean { own * edge.modulation_of_pixels(f) } else { own };
                 let measured = edge.modulation_at(f);
-                assert!((measured - expected).abs() < 5e-3, "{slope} {sigma} {f}: {measured} {expected}");
+                assert!(
+                    (measured - expected).abs() < 5e-3,
+                    "{slope} {sigma} {f}: {measured} {expected}"
+                );
             }
         }
     }
