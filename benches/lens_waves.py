@@ -17,14 +17,15 @@ import sys
 import program
 
 LENSES = program.ROOT / "scenes" / "lenses"
-# The f-number, and the fields (degrees). Optiland takes the paraxial pupil for the beam, which the real one
-# is not behind strong front groups: there the stops are small.
+# The f-number, and the fields (degrees). Optiland's beam fills the paraxial entrance pupil on the axis, of which
+# the real image of the stop is another size behind strong front groups: its pupil is made as wide as the
+# real ray that meets the rim of our stop.
 CASES = {
     "achromat": (4.5, [0, 0.5, 1]),
     "cooke-triplet": (8, [0, 5, 10]),
     "double-gauss": (5.6, [0, 4, 8]),
     "singlet": (10, [0, 1, 2]),
-    "telephoto": (16, [0, 2, 4]),
+    "telephoto": (8, [0, 2, 4]),
     "asphere": (4, [0, 1, 2]),
 }
 NM = 587.56
@@ -79,7 +80,20 @@ def optic_of(report, written):
     for field in report["waves"]["fields"]:
         optic.add_field(y=field["field"])
     optic.add_wavelength(NM * 1e-3, is_primary=True)
+    fill_stop(optic, report)
     return optic
+
+
+def fill_stop(optic, report):
+    """Widens the entrance pupil until the marginal ray on the axis meets the rim of the stop."""
+    stop = report["stop"]
+    rim = report["elements"][stop]["semi_diameter"]
+    diameter = report["paraxial"]["entrance_pupil"]["diameter"]
+    for _ in range(8):
+        optic.trace_generic(0, 0, 0, 1, NM * 1e-3)
+        height = abs(float(optic.surface_group.y[stop + 1][0]))
+        diameter *= rim / height
+        optic.set_aperture("EPD", diameter)
 
 
 def paths(optic, field):

@@ -389,7 +389,11 @@ impl Camera {
     /// Whether rays are spread over a pupil.
     #[must_use]
     pub fn has_pupil(&self) -> bool {
-        matches!(self.projection, Projection::Lens(_) | Projection::Views(_))
+        match &self.projection {
+            Projection::Lens(lens) => lens.has_spread_rays(),
+            Projection::Views(_) => true,
+            Projection::Pinhole(_) | Projection::Orthographic(_) => false,
+        }
     }
 
     /// The projected solid angle (sr) that a pixel's value is relative to, of cameras with a pupil.
@@ -488,8 +492,11 @@ impl Camera {
     /// When no light gets through at these wavelengths: the error names what blocks it.
     pub fn opened(&self, bands: &Bands) -> Result<Self, CameraError> {
         let projection = match &self.projection {
-            Projection::Lens(lens) => Projection::Lens(Arc::new(lens.opened(bands)?)),
-            other @ (Projection::Pinhole(_)
+            Projection::Lens(lens) if lens.has_spread_rays() => {
+                Projection::Lens(Arc::new(lens.opened(bands)?))
+            }
+            other @ (Projection::Lens(_)
+            | Projection::Pinhole(_)
             | Projection::Orthographic(_)
             | Projection::Views(_)) => other.clone(),
         };
@@ -523,7 +530,7 @@ impl Camera {
         Ok(opened)
     }
 
-    /// The same view on pixels `factor` times as large. Columns and rows that do not fill a pixel are
+    /// The same view on pixels `factor` times as large, by rays alone. Columns and rows that do not fill a pixel are
     /// left out on the right and below, and at least one is left.
     #[must_use]
     pub fn coarser(&self, factor: u32) -> Self {
@@ -532,7 +539,9 @@ impl Camera {
         let projection = match &self.projection {
             Projection::Pinhole(pinhole) => Projection::Pinhole(pinhole.coarser(times)),
             Projection::Orthographic(parallel) => Projection::Orthographic(parallel.coarser(times)),
-            Projection::Lens(lens) => Projection::Lens(Arc::new(lens.coarser(times))),
+            Projection::Lens(lens) => {
+                Projection::Lens(Arc::new(lens.without_diffraction().coarser(times)))
+            }
             Projection::Views(views) => Projection::Views(Arc::new(views.coarser(times))),
         };
         let sensor = SensorSpec {
@@ -543,6 +552,45 @@ impl Camera {
             Arc::new(CameraTime { shutter: time.shutter.coarser(times), ..CameraTime::clone(time) })
         });
         Self { pose: self.pose, sensor, projection, light_field: self.light_field.clone(), time }
+    }
+
+    /// Whether light of its pictures is to be spread as waves are.
+    #[must_use]
+    pub fn diffracts(&self) -> bool {
+        self.lens().is_some_and(LensCamera::diffracts)
+    }
+
+    /// The same whose light is spread by rays alone.
+    #[must_use]
+    pub fn without_diffraction(&self) -> Self {
+        self.with_lens(LensCamera::without_diffraction)
+    }
+
+    /// The same through chief rays alone, with `finer` times as many columns and rows: what its lens
+    /// shows before light is spread, at an illumination of 1 all over.
+    #[must_use]
+    pub fn along_chief_rays(&self, finer: u32) -> Self {
+        let finer = finer.max(1);
+        let camera = self.with_lens(|lens| lens.along_chief_rays(f64::from(finer)));
+        let sensor = SensorSpec {
+            resolution: self.sensor.resolution.map(|side| side.saturating_mul(finer)),
+            pixel_pitch: self
+                .sensor
+                .pixel_pitch
+                .map(|pitch| Micrometres(pitch.0 / f64::from(finer))),
+        };
+        Self { sensor, ..camera }
+    }
+
+    fn with_lens(&self, change: impl Fn(&LensCamera) -> LensCamera) -> Self {
+        match &self.projection {
+            Projection::Lens(lens) => {
+                Self { projection: Projection::Lens(Arc::new(change(lens))), ..self.clone() }
+            }
+            Projection::Pinhole(_) | Projection::Orthographic(_) | Projection::Views(_) => {
+                self.clone()
+            }
+        }
     }
 
     /// Place and axes. `z` depths are measured from its position along its forward axis.
@@ -609,7 +657,9 @@ impl Camera {
     }
 
     fn sample_still(&self, samples: &FilmSamples, out: &mut CameraRays) {
-        if let Projection::Lens(lens) = &self.projection {
+        if let Projection::Lens(lens) = &self.projection
+            && lens.has_spread_rays()
+        {
             return lens.sample_rays(&self.pose, samples, out);
         }
         if let Projection::Views(views) = &self.projection {

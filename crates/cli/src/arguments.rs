@@ -15,7 +15,7 @@ use etendue_scene::import::Strictness;
 use etendue_tracer::LayerSpec;
 
 pub(crate) use tools::{
-    BenchArguments, ExposeArguments, LensArguments, PartArgument, SpectrumArguments,
+    BenchArguments, EdgeArguments, ExposeArguments, LensArguments, PartArgument, SpectrumArguments,
 };
 
 /// Simulates computational cameras: what a sensor records of a scene, with exact ground truth beside
@@ -66,6 +66,9 @@ pub(crate) enum Command {
     /// Analyse a lens, or trace given rays through it
     #[command(after_help = tools::LENS_HELP)]
     Lens(LensArguments),
+    /// Measure the modulation transfer (MTF) of a camera from a picture of a slanted edge (ISO 12233)
+    #[command(after_help = tools::EDGE_HELP)]
+    Edge(EdgeArguments),
     /// Measure speed against accuracy on a scene: every accelerator, on this machine
     #[command(after_help = tools::BENCH_HELP)]
     Bench(BenchArguments),

@@ -14,6 +14,7 @@ use crate::arguments::LensArguments;
 use crate::fault::{Fault, Versioned, print_json, print_json_line, print_text};
 use crate::opencv;
 use crate::progress::say;
+use crate::psf;
 use crate::waves;
 
 pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
@@ -23,7 +24,8 @@ pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
     let mut lens = read_lens_at(&arguments.lens, reach, arguments.configuration, &glasses)?;
     let files: &[&str] = if arguments.fit_opencv { &[opencv::FILE] } else { &DRAWINGS };
     let in_waves: &[&str] = if waves::are_asked(arguments) { &waves::FILES } else { &[] };
-    let names = || files.iter().chain(in_waves);
+    let of_points: &[&str] = if arguments.psf { &psf::FILES } else { &[] };
+    let names = || files.iter().chain(in_waves).chain(of_points);
     let drawn = arguments.output.iter().flat_map(|dir| names().map(|name| dir.join(name)));
     let results: Vec<_> =
         drawn.chain(arguments.save.clone()).chain(arguments.report.clone()).collect();
@@ -87,6 +89,9 @@ fn report(lens: &ReadLens, arguments: &LensArguments, to: &Transaction) -> Resul
     };
     if let Some(folder) = &arguments.output {
         draw(&lens.train, &report, (to, folder), arguments.quiet)?;
+    }
+    if arguments.psf {
+        psf::write(lens, &report, arguments, to)?;
     }
     if let Some(waves) = &waves {
         waves::write((&lens.train, &report), waves, arguments, to)?;

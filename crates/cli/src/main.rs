@@ -4,6 +4,7 @@
 mod arguments;
 mod bench;
 mod check;
+mod edge;
 mod expose;
 mod fault;
 mod lens;
@@ -11,6 +12,7 @@ mod merge;
 mod opencv;
 mod plan;
 mod progress;
+mod psf;
 mod render;
 mod room;
 mod sensor;
@@ -55,6 +57,7 @@ fn main() -> ExitCode {
         Some(Command::Sensor(arguments)) => sensor::run(&arguments),
         Some(Command::Expose(arguments)) => expose::run(&arguments),
         Some(Command::Spectrum(arguments)) => spectrum::run(&arguments),
+        Some(Command::Edge(arguments)) => edge::run(&arguments),
         Some(Command::View(arguments)) => view(&arguments),
         Some(Command::Lens(arguments)) => lens::run(&arguments),
         Some(Command::Schema { of }) => print_schema(of),

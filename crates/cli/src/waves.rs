@@ -154,7 +154,7 @@ fn frequencies(arguments: &LensArguments) -> Result<Vec<f64>, Fault> {
 }
 
 /// Wavelengths, the main one first, and where they come from.
-fn wavelengths(
+pub(crate) fn wavelengths(
     lens: &ReadLens,
     report: &LensReport,
     arguments: &LensArguments,

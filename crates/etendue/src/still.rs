@@ -160,6 +160,23 @@ impl Still {
         self.picture.layers()
     }
 
+    /// Columns and rows.
+    #[must_use]
+    pub fn size(&self) -> [usize; 2] {
+        [self.picture.width(), self.picture.height()]
+    }
+
+    /// The file's own integers, where it has them: those of each channel but alpha, with its name.
+    #[must_use]
+    pub fn numbers(&self) -> Option<Vec<(String, Vec<f64>)>> {
+        let raster = self.codes.as_ref()?;
+        let channels = self.layers().first()?.channels.iter().enumerate();
+        let full = if matches!(raster.samples(), Samples::U8(_)) { 255.0 } else { 65_535.0 };
+        let values =
+            |k: usize| (0..raster.len()).map(|i| (raster.texel(i)[k] * full).round()).collect();
+        Some(channels.map(|(k, channel)| (channel.name.clone(), values(k))).collect())
+    }
+
     /// What a user should know.
     #[must_use]
     pub fn notes(&self) -> &[String] {

@@ -46,6 +46,9 @@ pub enum RenderError {
     /// The system has less memory than the film takes.
     #[error(transparent)]
     Memory(#[from] NoMemory),
+    /// The picture cannot be spread as waves are.
+    #[error("camera.diffraction: {0}")]
+    Diffraction(String),
     /// A light's spectrum is of no use to the sensor.
     #[error(
         "a light's spectrum: {0}; give the light `equal_energy`, `a` or {{\"black_body\": kelvin}}, \

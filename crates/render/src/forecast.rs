@@ -12,7 +12,7 @@ use crate::images::{environment, wanted_images};
 use crate::light_field::refocused_bytes;
 use crate::output::Outputs;
 use crate::samples::BYTES_OF_SUM;
-use crate::{Plan, denoise, expose};
+use crate::{Plan, denoise, diffraction, expose};
 
 const F32: u64 = size_of::<f32>() as u64;
 const U16: u64 = size_of::<u16>() as u64;
@@ -42,7 +42,8 @@ pub(crate) fn forecast(scene: &Scene, plan: &Plan, outputs: Outputs) -> MemoryFo
     let denoised = if plan.denoised { denoise::BYTES } else { 0 };
     let sensor = scene.sensor.as_ref().filter(|_| scene.picture.is_some());
     let sensor = sensor.map_or(0, |sensor| bytes_of_sensor(scene, sensor, plan));
-    let film = plan.layers.iter().map(|layer| bytes_of_layer(*layer, plan)).sum();
+    let film: u64 = plan.layers.iter().map(|layer| bytes_of_layer(*layer, plan)).sum();
+    let film = film + diffraction::bytes(scene, plan);
     // Of slots there is the light of one, and the sum of all in f64.
     let lit = plan.layers.iter().filter(|layer| layer.is_light() && scene.slots > 0);
     let slots: u64 = lit.map(|layer| 3 * bytes_of_layer(*layer, plan)).sum();

@@ -20,6 +20,7 @@ mod alike;
 mod band_paths;
 mod checkpoint;
 pub mod denoise;
+mod diffraction;
 mod error;
 pub mod expose;
 mod film;

@@ -32,7 +32,7 @@ use crate::shard::{Shard, must_be_whole};
 use crate::stopping::Stopping;
 use crate::tiles::{Done, Job, RayCounts};
 use crate::watch::{Watch, Watcher};
-use crate::{Plan, expose, lighting, names};
+use crate::{Plan, diffraction, expose, lighting, names};
 
 /// Told the share done (0..=1) now and then; answering `false` stops.
 pub type Progress = Arc<dyn Fn(f64) -> bool + Send + Sync>;
@@ -296,13 +296,19 @@ pub fn trace(
     };
     let shared = light_camera.lens().filter(|_| plan.band_paths.are_shared());
     let shared = shared.and_then(LensCamera::opened_paths);
+    // Light that is spread as waves are is traced by itself.
+    let whole = Prepared { accel, images, others };
+    let spread = diffraction::spread_light(scene, plan, whole, course, &light_camera, watch)?;
     // Lights, the studio among them where all else leaves the scene dark.
     let surroundings = surroundings(scene, images, scene.render.samples.typical());
     let traced = if plan.alike { &Bands::Grey } else { &plan.bands };
     let spectral = Spectral::of(traced, &scene.materials);
     let mut notes = Vec::new();
     let seen = (accel, surroundings);
-    let lit = light_of((scene, plan), images, seen, &spectral, &mut notes, watch)?;
+    let lit = match spread {
+        Some(_) => None,
+        None => light_of((scene, plan), images, seen, &spectral, &mut notes, watch)?,
+    };
     // What light passes ask of the scene.
     let emitters = lit.as_ref().and_then(|_| Emitters::of(&scene.geometry, &scene.materials));
     let placed = PlacedSurfaces::of(&scene.geometry, &scene.materials, &spectral);
@@ -360,10 +366,11 @@ pub fn trace(
     };
     // What was traced, and what a user should know of it.
     let watcher = Watcher::new(watch, job.rays(&layers));
-    let Done { traffic: counts, passed, sums, centres } = job.run(&mut layers, &watcher)?;
+    let Done { traffic: mut counts, passed, sums, centres } = job.run(&mut layers, &watcher)?;
     notes.extend(job.keeper.as_ref().and_then(Keeper::fault));
     let trace_time = start.elapsed() + course.shares.iter().map(FilmFile::trace_time).sum();
     drop(job);
+    diffraction::put(&mut layers, spread, &mut counts, &mut notes);
     let (camera, resolution) = (Some(camera), scene.camera.resolution());
     Ok(Film { layers, resolution, shard, counts, passed, trace_time, sums, centres, notes, camera })
 }

@@ -33,6 +33,8 @@ pub enum DecisionKind {
     PathsOfBands,
     /// Rays spread over a pupil.
     Pupil,
+    /// Light spread as waves are.
+    Diffraction,
     /// The surfaces up to which light is followed.
     Bounces,
     /// Normals and places on triangles of hits.
@@ -82,6 +84,7 @@ impl DecisionKind {
             Self::RaysOfBands => ("rays of a wavelength", Some("plan.dispersion")),
             Self::PathsOfBands => ("paths of a band", Some("plan.shared_paths")),
             Self::Pupil => ("pupil", None),
+            Self::Diffraction => ("diffraction", Some("camera.diffraction")),
             Self::Bounces => ("shadows and bounces", None),
             Self::Surface => ("surface", None),
             Self::VertexNormals => ("vertex normals", None),

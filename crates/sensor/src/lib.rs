@@ -24,6 +24,7 @@
 //! | [`demosaic`] | missing colours |
 //! | [`dng`] | raw files |
 //! | [`emva`] | the image series of a characterisation |
+//! | [`slanted_edge`] | the modulation transfer of a camera from a picture of an edge |
 //! | [`photon_transfer`] | photon-transfer and SNR curves |
 //! | [`approximation`] | where the normal distribution is no substitute |
 
@@ -47,6 +48,7 @@ mod presets;
 mod response;
 pub mod sensor;
 mod settings;
+pub mod slanted_edge;
 pub mod spec;
 
 pub use bands::{BandChoice, Factor, Illumination, Times};

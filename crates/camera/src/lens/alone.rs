@@ -21,6 +21,7 @@ pub(crate) fn alone(
         sensor_tilt: Default::default(),
         sensor_decentre: Default::default(),
         losses: *train.losses(),
+        diffraction: false,
         pose: None,
         sensor,
     };

@@ -68,6 +68,20 @@ impl ChiefTable {
         Some(slopes.extend(-1.0).normalize())
     }
 
+    /// The same without solving for it, of a lens with rotational symmetry: the line through nodes is right
+    /// to a millionth of the way to the stop. Of others as [`Self::direction`].
+    pub(crate) fn direction_nearly(
+        &self,
+        lens: (&OpticalTrain, &Frame),
+        at: &MonochromaticTrain,
+        film: DVec2,
+    ) -> Option<DVec3> {
+        match self.half_size {
+            None => Some(self.nearly(film)?.extend(-1.0).normalize()),
+            Some(_) => self.direction(lens, at, film),
+        }
+    }
+
     /// The slopes of that direction to about a millionth.
     pub(crate) fn nearly(&self, film: DVec2) -> Option<DVec2> {
         match self.half_size {

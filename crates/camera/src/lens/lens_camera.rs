@@ -56,7 +56,21 @@ pub struct LensCamera {
     pub(super) solid_angle: f64,
     pub(super) opened: Option<Arc<Opened>>,
     /// Rays of all bands run as at the design wavelength.
-    one_wavelength: bool,
+    pub(super) one_wavelength: bool,
+    /// How light is spread on the sensor.
+    pub(super) spread: SpreadBy,
+}
+
+/// By what light of a point is spread on the sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum SpreadBy {
+    /// By rays of the whole pupil.
+    #[default]
+    Rays,
+    /// By waves, whoever renders adds them up.
+    Waves,
+    /// Not at all: each place sees along its chief ray.
+    Nothing,
 }
 
 /// The exit pupil measured at the wavelengths that are wanted.
@@ -80,7 +94,9 @@ pub(super) struct OpenedGroup {
 impl PartialEq for LensCamera {
     fn eq(&self, other: &Self) -> bool {
         // All else follows from it.
-        self.focused == other.focused && self.one_wavelength == other.one_wavelength
+        self.focused == other.focused
+            && self.one_wavelength == other.one_wavelength
+            && self.spread == other.spread
     }
 }
 
@@ -125,8 +141,18 @@ impl LensCamera {
         let solid_angle = unvignetted(focused.train(), &design, &focused);
         let straight = unbent.at(unbent.wavelength()).unwrap_or_else(|_| design.clone());
         let chief = ChiefTable::new(&unbent, &frame, half, &straight);
-        let (opened, one_wavelength) = Default::default();
-        Ok(Self { focused, design, chief, lenslets, lit, solid_angle, opened, one_wavelength })
+        let (opened, one_wavelength, spread) = Default::default();
+        Ok(Self {
+            focused,
+            design,
+            chief,
+            lenslets,
+            lit,
+            solid_angle,
+            opened,
+            one_wavelength,
+            spread,
+        })
     }
 
     /// The lens and its sensor.
@@ -187,8 +213,16 @@ impl LensCamera {
         Self { one_wavelength: true, opened: None, ..self.clone() }
     }
 
+    /// The same whose light is spread another way.
+    pub(super) fn spread_by(self, spread: SpreadBy) -> Self {
+        Self { spread, ..self }
+    }
+
     /// Whether rays of other wavelengths run differently, or lose another share on the way.
     fn tells_wavelengths_apart(&self) -> bool {
+        if self.spread == SpreadBy::Nothing {
+            return false;
+        }
         let train = self.focused.train();
         let mut curves = train.elements().iter().flat_map(|element| element.part.curves());
         curves.any(|curve| curve.as_flat().is_none()) || self.runs_apart()
@@ -368,7 +402,7 @@ impl LensCamera {
     /// The chief ray of a place on the sensor (mm) behind the lens, on the object's side: a point on
     /// the last element that it meets, and its direction. `None` outside of the image circle, and
     /// where the stop's centre cannot be seen.
-    fn chief_ray(&self, film: DVec2) -> Option<(DVec3, DVec3)> {
+    pub(super) fn chief_ray(&self, film: DVec2) -> Option<(DVec3, DVec3)> {
         if !self.lit.contains(film) {
             return None;
         }
@@ -378,8 +412,13 @@ impl LensCamera {
         let (direction, clip) = match &self.lenslets {
             Some(lenslets) => (lenslets.direction(start)?, Clip::On),
             None => {
-                let train = self.focused.train();
-                (self.chief.direction((train, frame), &self.design, film)?, Clip::Off)
+                let lens = (self.focused.train(), frame);
+                let direction = match self.spread {
+                    // Samples of light are many, and no data.
+                    SpreadBy::Nothing => self.chief.direction_nearly(lens, &self.design, film)?,
+                    _ => self.chief.direction(lens, &self.design, film)?,
+                };
+                (direction, Clip::Off)
             }
         };
         let end = self.design.run(Side::Sensor, clip, Ray::new(start, direction)?);
@@ -486,7 +525,7 @@ pub(super) fn place_of(u: f64, count: usize) -> usize {
 }
 
 /// Curves of filters that are the same all over and pass some wavelengths better than others.
-fn uniform_filters(train: &OpticalTrain) -> Vec<&Curve> {
+pub(super) fn uniform_filters(train: &OpticalTrain) -> Vec<&Curve> {
     let filters = train.elements().iter().filter_map(|element| element.part.uniform_curve());
     filters.filter(|curve| curve.as_flat().is_none()).collect()
 }

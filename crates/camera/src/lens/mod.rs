@@ -13,6 +13,7 @@
 //! | `paths` | rays of a pixel on their way through the lens |
 //! | `alone` | a lens by itself as a camera |
 //! | `rays` | weighted rays of the pupil for pictures |
+//! | [`waves`] | how light is spread on the sensor as waves, and what of it arrives |
 //! | `band_paths` | one ray of the scene for all bands, and where each band's light of it lands |
 
 mod alone;
@@ -24,6 +25,7 @@ mod paths;
 mod rays;
 pub mod source;
 pub mod spec;
+pub mod waves;
 
 pub(crate) use alone::alone;
 pub use band_paths::{BandLandings, SharedPaths};
@@ -34,3 +36,4 @@ pub use source::{LensSource, PlacedSpec};
 pub use spec::{
     ChromaticRealLensCameraSpec, LensCameraSpec, RealLensCameraSpec, ThinLensCameraSpec,
 };
+pub use waves::WaveLens;

@@ -204,6 +204,7 @@ pub(crate) struct Setup<'a> {
     pub(crate) sensor_tilt: [Degrees; 2],
     pub(crate) sensor_decentre: [Millimetres; 2],
     pub(crate) losses: LossesSpec,
+    pub(crate) diffraction: bool,
     pub(crate) pose: Option<&'a PoseSpec>,
     pub(crate) sensor: &'a SensorSpec,
 }

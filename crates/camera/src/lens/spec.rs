@@ -55,6 +55,10 @@ macro_rules! camera_with_a_lens {
             /// What glass takes from light; nothing when absent.
             #[serde(default, skip_serializing_if = "is_zero")]
             pub losses: LossesSpec,
+            /// Whether light of pictures is spread as waves are, by the lens' own point spread functions,
+            /// instead of as rays are.
+            #[serde(default, skip_serializing_if = "is_zero")]
+            pub diffraction: bool,
             /// Where the entrance pupil stands; when absent, the whole scene is framed and what is
             /// in its middle is in focus.
             #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -93,6 +97,7 @@ macro_rules! camera_with_a_lens {
                     sensor_tilt: self.sensor_tilt,
                     sensor_decentre: self.sensor_decentre,
                     losses: self.losses,
+                    diffraction: self.diffraction,
                     pose: self.pose.as_ref(),
                     sensor: &self.sensor,
                 })
@@ -194,6 +199,15 @@ camera_with_a_lens! {
 
 /// Focuses a lens and finds it a place.
 pub(crate) fn place<'a>(
+    train: &OpticalTrain,
+    setup: &Setup<'_>,
+    subject: impl FnOnce() -> Subject<'a>,
+) -> Result<(Pose, LensCamera), CameraError> {
+    let (pose, lens) = focused_at(train, setup, subject)?;
+    Ok((pose, if setup.diffraction { lens.with_diffraction()? } else { lens }))
+}
+
+fn focused_at<'a>(
     train: &OpticalTrain,
     setup: &Setup<'_>,
     subject: impl FnOnce() -> Subject<'a>,

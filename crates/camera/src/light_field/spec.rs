@@ -183,6 +183,7 @@ impl LightFieldSpec {
             sensor_tilt: [Degrees(0.0); 2],
             sensor_decentre: [Millimetres(0.0); 2],
             losses: self.losses,
+            diffraction: false,
             pose: self.pose.as_ref(),
             sensor: &self.sensor,
         };
@@ -203,6 +204,7 @@ impl LightFieldSpec {
         let train = match (&self.focal_length, &self.lens) {
             (Some(Millimetres(focal_length)), None) => {
                 let thin = ThinLensCameraSpec {
+                    diffraction: false,
                     focal_length: self.focal_length,
                     aperture: self.aperture.clone(),
                     elements: self.elements.clone(),

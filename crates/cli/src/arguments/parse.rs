@@ -146,6 +146,25 @@ pub(super) fn pitch(text: &str) -> Result<f64, String> {
     }
 }
 
+/// `40,60,200,240`.
+pub(super) fn region(text: &str) -> Result<[usize; 4], String> {
+    let numbers: Option<Vec<usize>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[x, y, width, height]) if width > 0 && height > 0 => Ok([x, y, width, height]),
+        _ => Err("expected the left column, the top row, width and height, such as 40,60,200,240"
+            .to_owned()),
+    }
+}
+
+/// `0,1`.
+pub(super) fn mosaic(text: &str) -> Result<[usize; 2], String> {
+    let numbers: Option<Vec<usize>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[column @ 0..=1, row @ 0..=1]) => Ok([column, row]),
+        _ => Err("expected a column and a row of 0 or 1, such as 0,1".to_owned()),
+    }
+}
+
 /// `2.8`.
 pub(super) fn f_number(text: &str) -> Result<f64, String> {
     positive(text).ok_or_else(|| "expected an f-number above 0, such as 2.8".to_owned())

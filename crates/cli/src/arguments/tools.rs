@@ -1,4 +1,4 @@
-//! Arguments of `etendue lens`, `etendue expose`, `etendue spectrum` and `etendue bench`.
+//! Arguments of `etendue lens`, `etendue expose`, `etendue spectrum`, `etendue edge` and `etendue bench`.
 
 use std::path::PathBuf;
 
@@ -84,6 +84,21 @@ pub(crate) struct LensArguments {
     /// For waves, set the stop by the numerical aperture of a near object's light
     #[arg(long, value_name = "NA", conflicts_with = "f_number")]
     pub(crate) numerical_aperture: Option<f64>,
+    /// Write point spread functions by depth, field and wavelength into the folder of -o, as psf.npy,
+    /// psf.exr and psf.json: shares of a point's light by cell
+    #[arg(long, requires = "output", conflicts_with_all = ["rays", "fit_opencv", "object_distance",
+          "magnification", "numerical_aperture", "best_focus"])]
+    pub(crate) psf: bool,
+    /// Distances of their points from the entrance pupil along the axis, "infinity,2 m"; the one in focus
+    /// when absent
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::focus, requires = "psf")]
+    pub(crate) depths: Option<Vec<Focus>>,
+    /// A side of their cells, such as a pixel's "3.45 um"; a quarter of the finest detail when absent
+    #[arg(long, value_name = "PITCH", value_parser = parse::pitch, requires = "psf")]
+    pub(crate) psf_pitch: Option<f64>,
+    /// Cells a side, an odd number; as many as hold all of the light when absent
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4095), requires = "psf")]
+    pub(crate) psf_size: Option<u32>,
     /// Field angles in degrees; the file's own or shares of the field of view when absent
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) fields: Option<Vec<f64>>,
@@ -208,6 +223,48 @@ pub(crate) struct SpectrumArguments {
     /// Print JSON for machines
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+pub(super) const EDGE_HELP: &str = "\
+By the method e-SFR of ISO 12233: the edge may lie at 0.5 to 44 degrees from rows or columns, 5 are
+best, and is to cross the region from side to side. Integers of PNG and JPEG files are taken for sRGB
+and made linear; those of raw frames are light already: --raw.
+
+Examples:
+  etendue edge out/slanted/layers.exr --region 200,150,120,160
+  etendue edge out/slanted/raw.png --raw --mosaic 0,0 --pitch \"3.45 um\" --json
+  etendue edge photo.png --region 40,60,200,240 -o out/edge";
+
+#[derive(Debug, Args)]
+pub(crate) struct EdgeArguments {
+    /// A picture (.exr, .png, .hdr, .jpg, or an ENVI cube)
+    #[arg(value_name = "IMAGE")]
+    pub(crate) image: PathBuf,
+    /// Left column, top row, width and height of the region (pixels); all of the picture when absent
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse::region)]
+    pub(crate) region: Option<[usize; 4]>,
+    /// The layer of an EXR file; the picture when absent
+    #[arg(long, value_name = "NAME", default_value = "")]
+    pub(crate) layer: String,
+    /// Take the integers of the file as light, as those of raw frames are
+    #[arg(long)]
+    pub(crate) raw: bool,
+    /// Take every second pixel of every second row alone, from this column and row on: one colour of a
+    /// mosaic
+    #[arg(long, value_name = "COLUMN,ROW", value_parser = parse::mosaic)]
+    pub(crate) mosaic: Option<[usize; 2]>,
+    /// From one pixel to the next, such as "3.45 um", for cycles/mm
+    #[arg(long, value_name = "PITCH", value_parser = parse::pitch)]
+    pub(crate) pitch: Option<f64>,
+    /// Draw edge.svg and write edge.csv into this folder, made when it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Print JSON for machines
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Show no list of files
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
 }
 
 pub(super) const BENCH_HELP: &str = "\

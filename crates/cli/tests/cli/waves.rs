@@ -194,3 +194,159 @@ fn what_cannot_be_analysed_is_refused_by_name() {
     let output = bench.run(&["lens", "lens.json", "--waves", "--json"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
 }
+
+/// An ideal lens' point spread function at f/5 on cells of an eighth of λN is Airy's, in focus; out of focus
+/// it is wider, and all of its light is there.
+#[test]
+fn point_spread_functions_are_written_by_depth_field_and_wavelength() {
+    let bench = Bench::new();
+    bench.write("lens.json", IDEAL.as_bytes());
+    let arguments = [
+        "lens",
+        "lens.json",
+        "--psf",
+        "-o",
+        "out",
+        "--depths",
+        "infinity,20 m",
+        "--fields",
+        "0,1",
+        "--wavelengths",
+        "500,600",
+        "--psf-pitch",
+        "0.3125 um",
+        "--psf-size",
+        "201",
+        "-q",
+    ];
+    let output = bench.run(&arguments);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let meaning: Value =
+        serde_json::from_slice(&std::fs::read(bench.path("out/psf.json")).unwrap()).unwrap();
+    assert_eq!(meaning["shape"], serde_json::json!([2, 2, 2, 201, 201]));
+    assert_eq!(meaning["depths"], serde_json::json!([null, 20000.0]));
+    let values = bench.array("psf");
+    let plane = |k: usize| &values[k * 201 * 201..(k + 1) * 201 * 201];
+    // λN/8: the middle has π/4 of a cell in λN², less what tangents in the place of sines change at f/5
+    // (1.5 % of power at the rim).
+    let middle = plane(0)[100 * 201 + 100];
+    let expected = std::f64::consts::FRAC_PI_4 / 64.0;
+    assert!((middle / expected - 1.0).abs() < 0.02, "{middle} {expected}");
+    // The first dark ring, at 1.22 λN.
+    let ring = plane(0)[100 * 201 + 110];
+    assert!(ring < 2e-3 * middle, "{ring}");
+    // In 20 m: 12.5 mm² / 0.5 µm / 20 m are 1.25 waves.
+    assert!(plane(4)[100 * 201 + 100] < 0.2 * middle);
+    for (k, held) in meaning["held"].as_array().unwrap().iter().enumerate() {
+        let sum: f64 = plane(k).iter().sum();
+        assert!((sum - number(held)).abs() < 1e-6);
+        // 12.5 λN on each side hold all but 2 %.
+        assert!(sum > 0.97 && sum < 1.0 + 1e-6, "{sum}");
+    }
+    assert!(bench.path("out/psf.exr").exists());
+    // One degree off the axis the chief ray lands on 50 mm tan 1°.
+    let middles = meaning["middles"].as_array().unwrap();
+    assert!((number(&middles[2][1]) - 50.0 * 1.0_f64.to_radians().tan()).abs() < 1e-6);
+}
+
+#[test]
+fn point_spread_functions_that_cannot_be_are_refused() {
+    let bench = Bench::new();
+    bench.write("lens.json", IDEAL.as_bytes());
+    for (arguments, words) in [
+        (vec!["--psf"], "--output"),
+        (vec!["--psf", "-o", "out", "--psf-size", "64"], "odd"),
+        (
+            vec!["--psf", "-o", "out", "--fields", "0,1,2,3", "--psf-size", "4095"],
+            "1024 are the most",
+        ),
+        (vec!["--depths", "2 m"], "--psf"),
+    ] {
+        let output = bench.run(&[&["lens", "lens.json"], &arguments[..]].concat());
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(text(&output.stderr).contains(words), "{}", text(&output.stderr));
+    }
+}
+
+/// A 16-bit picture of an edge that a Gaussian spreads, turned by 5 degrees.
+fn write_edge(bench: &Bench, name: &str) {
+    let (width, height, sigma): (u32, u32, f64) = (120, 140, 1.0);
+    let slope = 5.0_f64.to_radians().tan();
+    let mut data = Vec::new();
+    for y in 0..height {
+        for x in 0..width {
+            let from = f64::from(x) + 0.5 - 60.2 - slope * (f64::from(y) + 0.5 - 70.0);
+            let share =
+                0.5 * libm::erfc(-from * slope.atan().cos() / sigma / std::f64::consts::SQRT_2);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "16 bits")]
+            let code = (2_000.0_f64 + 60_000.0 * share).round() as u16;
+            data.extend(code.to_be_bytes());
+        }
+    }
+    let mut file = std::fs::File::create(bench.path(name)).unwrap();
+    let mut encoder = png::Encoder::new(&mut file, width, height);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    encoder.write_header().unwrap().write_image_data(&data).unwrap();
+}
+
+#[test]
+fn an_edge_is_measured_and_what_is_none_is_refused() {
+    let bench = Bench::new();
+    write_edge(&bench, "raw.png");
+    let arguments = ["edge", "raw.png", "--raw", "--pitch", "4 um", "--json", "-o", "out", "-q"];
+    let output = bench.run(&arguments);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let measured: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let channel = &measured["channels"][0];
+    assert!((number(&channel["angle"]) - 5.0).abs() < 0.02, "{}", channel["angle"]);
+    for row in channel["modulation"].as_array().unwrap().iter().take(51) {
+        let frequency = number(&row[0]);
+        let expected = (-2.0 * (std::f64::consts::PI * frequency).powi(2)).exp();
+        assert!((number(&row[1]) - expected).abs() < 5e-3, "{row}");
+    }
+    // exp(−2π²ν²) is a half at ν = √(ln 2 / 2) / π, 0.1874 cycles a pixel of 4 µm.
+    assert!((number(&channel["mtf50"]) - 0.1874).abs() < 1e-3);
+    assert!((number(&channel["mtf50_mm"]) - 46.85).abs() < 0.3);
+    assert!(bench.path("out/edge.svg").exists() && bench.path("out/edge.csv").exists());
+    for (arguments, words) in [
+        (vec!["--region", "100,0,40,40"], "beyond"),
+        (vec!["--region", "0,0,30,60"], "edge"),
+        (vec!["--region", "40,40"], "expected"),
+        (vec!["--layer", "Depth"], "--layer Depth"),
+    ] {
+        let output = bench.run(&[&["edge", "raw.png"], &arguments[..]].concat());
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(text(&output.stderr).contains(words), "{}", text(&output.stderr));
+    }
+}
+
+/// Diffraction is refused behind lenslets and where there is no one point of view, by name; the plan says
+/// whether it would show.
+#[test]
+fn the_plan_says_whether_waves_would_show() {
+    let scene = |f_number: f64, on: bool| {
+        format!(
+            r#"{{"etendue": 1, "tracer": {{"type": "path"}}, "camera": {{"type": "thin_lens", "focal_length": 50,
+                "f_number": {f_number}, "focus_distance": 2, "diffraction": {on},
+                "pose": {{"from": [0, 0, 2], "look_at": [0, 0, 0]}},
+                "sensor": {{"resolution": [32, 24], "pixel_pitch": 3.45}}}},
+              "objects": [{{"shape": "rectangle", "width": 1, "height": 1}}]}}"#
+        )
+    };
+    for (f_number, on, words) in
+        [(22.0, false, "waves would show"), (2.0, false, "hardly show"), (22.0, true, "chief rays")]
+    {
+        let bench = Bench::with_scene(&scene(f_number, on));
+        let output = bench.run(&["plan", "scene.json"]);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert!(text(&output.stdout).contains(words), "{}", text(&output.stdout));
+    }
+    let bench = Bench::with_scene(&scene(8.0, true).replace(
+        r#""focus_distance": 2,"#,
+        r#""sensor_distance": 51.3, "elements": [{"at": 50, "type": "aperture", "shape": "circular", "radius": 3, "stop": true}],"#,
+    ));
+    let output = bench.run(&["check", "scene.json"]);
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stdout));
+    assert!(text(&output.stderr).contains("telecentric"), "{}", text(&output.stderr));
+}

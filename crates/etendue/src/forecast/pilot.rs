@@ -50,6 +50,8 @@ impl Pilot<'_> {
     /// The time (s) of tracing the scene's picture through `camera`: what is done once, what each pixel
     /// takes, and each of its samples, by strips of it.
     pub(super) fn picture(&self, camera: &Camera) -> Result<f64, Error> {
+        // Waves are spread over whole pictures alone: what rays take is nearly all of the time.
+        let camera = &camera.without_diffraction();
         // A lens' pupil is measured once for a picture, and here once for all.
         let start = Instant::now();
         let plan = Plan::new(self.scene, Outputs::ALL);

@@ -52,12 +52,15 @@ pub(crate) struct Sampling {
     pub(crate) cells: usize,
     /// A cell's side (optical direction cosines).
     pub(crate) step: f64,
+    /// The middle of cell (`cells`/2, `cells`/2) (optical direction cosines).
+    pub(crate) middle: DVec2,
 }
 
 impl Sampling {
     /// So many cells over an outline.
     pub(crate) fn cells(cells: usize, outline: &Outline) -> Self {
-        Self { cells, step: outline.half / (0.5 * cells as f64 - RIM) }
+        let step = outline.half / (0.5 * cells as f64 - RIM);
+        Self { cells, step, middle: outline.middle }
     }
 }
 
@@ -202,12 +205,12 @@ pub(crate) fn field(
     outline: &Outline,
     sampling: Sampling,
 ) -> Result<PupilField, AnalysisError> {
-    let Sampling { cells, step } = sampling;
+    let Sampling { cells, step, middle } = sampling;
     if !(LEAST_CELLS..=MOST_CELLS).contains(&cells) {
         return Err(AnalysisError::Cells(cells));
     }
     let wavelength = beam.at.wavelength();
-    let mut pupil = PupilField::dark(wavelength, cells, step, outline.middle, sphere.index);
+    let mut pupil = PupilField::dark(wavelength, cells, step, middle, sphere.index);
     let chief = DVec3::from(beam.chief_end.ray.direction);
     pupil.chief_slopes = chief.truncate() / chief.z;
     let aimed: Vec<Option<CellRay>> = (0..cells * cells)

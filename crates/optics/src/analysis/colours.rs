@@ -67,7 +67,8 @@ pub fn wavefronts(
     };
     let widest = widest / (0.5 * count as f64 - RIM);
     let wavefront = |(beam, sphere, outline): (&Beam<'_>, ReferenceSphere, aim::Outline)| {
-        let sampling = Sampling { cells: count, step: widest * beam.at.wavelength() };
+        let step = widest * beam.at.wavelength();
+        let sampling = Sampling { cells: count, step, middle: outline.middle };
         Wavefront::sampled(beam, sphere, &outline, sampling)
     };
     parts.into_iter().map(wavefront).collect()

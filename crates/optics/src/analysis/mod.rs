@@ -10,6 +10,8 @@
 //! | [`zernike`] | Zernike polynomials, Fringe and Noll, and their fit to a wavefront |
 //! | [`least_squares`] | a small linear fit |
 //! | [`spread`] | point spread functions by FFT and by Huygens' sum, encircled energy, lines |
+//! | [`between`] | fields at a few depths and wavelengths, and those between them |
+//! | [`cells`] | point spread functions as shares of light on square cells, such as pixels |
 //! | [`fans`] | transverse and longitudinal aberrations along two lines of the pupil |
 //! | [`astigmatism`] | sagittal and tangential foci by Coddington's equations |
 //! | [`seidel`](mod@seidel) | Seidel's and the chromatic sums by surface |
@@ -19,6 +21,8 @@
 
 pub mod aim;
 pub mod astigmatism;
+pub mod between;
+pub mod cells;
 pub mod colours;
 pub mod conjugate;
 pub mod fans;
@@ -35,6 +39,8 @@ pub mod zernike;
 use crate::glass::GlassError;
 use crate::train::FocusError;
 
+pub use between::FieldsBetween;
+pub use cells::{CellGrid, CellSpread};
 pub use object::ObjectPoint;
 pub use pupil::PupilField;
 pub use spread::PointSpread;

@@ -40,6 +40,18 @@ pub struct PointSpread {
 #[derive(Debug, Clone)]
 pub struct WeightedFields(Vec<(PupilField, f64)>);
 
+/// Weights of so many wavelengths, as shares of their sum.
+pub(super) fn shares(weights: &[f64], wavelengths: usize) -> Result<Vec<f64>, AnalysisError> {
+    let sum: f64 = weights.iter().sum();
+    let are_weights = weights.iter().all(|weight| *weight >= 0.0 && weight.is_finite());
+    if weights.len() != wavelengths || !are_weights || sum <= 0.0 {
+        let words: Vec<String> = weights.iter().map(f64::to_string).collect();
+        let what = format!("{} for {wavelengths} wavelengths make no mean", words.join(", "));
+        return Err(AnalysisError::Weights(what));
+    }
+    Ok(weights.iter().map(|weight| weight / sum).collect())
+}
+
 /// sin πx / πx.
 pub(super) fn sinc(x: f64) -> f64 {
     let angle = std::f64::consts::PI * x;
@@ -53,16 +65,9 @@ impl WeightedFields {
     ///
     /// When there are not as many weights as fields, one is negative or none, or they sum to nothing.
     pub fn new(fields: Vec<PupilField>, weights: &[f64]) -> Result<Self, AnalysisError> {
-        let sum: f64 = weights.iter().sum();
-        let are_weights = weights.iter().all(|w| *w >= 0.0 && w.is_finite());
-        if fields.len() != weights.len() || !are_weights || sum <= 0.0 {
-            let words: Vec<String> = weights.iter().map(f64::to_string).collect();
-            let what =
-                format!("{} for {} wavelengths make no mean", words.join(", "), fields.len());
-            return Err(AnalysisError::Weights(what));
-        }
-        let weighted = fields.into_iter().zip(weights).filter(|(_, weight)| **weight > 0.0);
-        Ok(Self(weighted.map(|(field, weight)| (field, weight / sum)).collect()))
+        let shares = shares(weights, fields.len())?;
+        let weighted = fields.into_iter().zip(shares).filter(|(_, weight)| *weight > 0.0);
+        Ok(Self(weighted.collect()))
     }
 
     /// One field alone.
@@ -126,13 +131,13 @@ impl WeightedFields {
 }
 
 /// What makes |Σ a|² an irradiance of a power of 1 (1/mm²).
-fn norm(field: &PupilField) -> f64 {
+pub(super) fn norm(field: &PupilField) -> f64 {
     let step = field.step / (field.wavelength * 1e-6);
     step * step / field.total_power()
 }
 
 /// The mean amplitude of a cell over which the wavefront is inclined.
-fn averaged(field: &PupilField, i: usize) -> f64 {
+pub(super) fn averaged(field: &PupilField, i: usize) -> f64 {
     let n = field.cells;
     let (row, column) = (i / n, i % n);
     // By the difference to the lit cells on both sides.

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::film::Precision;
 use crate::tolerance::{TakenBounces, TakenCamera};
-use crate::{expose, samples};
+use crate::{diffraction, expose, samples};
 
 /// What decisions are made by, beside the plan.
 pub(super) struct Grounds<'a> {
@@ -96,6 +96,7 @@ impl Plan {
         decisions.extend(self.explain_tolerance(scene));
         decisions.extend(self.explain_lens(scene));
         decisions.extend(self.band_paths.decision(scene));
+        decisions.extend(diffraction::decision(scene, self));
         decisions.push(self.explain_bounces(scene, needs));
         decisions.extend(explain_surfaces(needs));
         decisions.extend(needs.light.then(|| explain_lights(scene)));

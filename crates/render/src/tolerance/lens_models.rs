@@ -227,6 +227,7 @@ impl Gauss {
         let sensor_decentre = sensor_decentre.map(|pixels| pixels * pitch);
         let is_alone = elements.is_empty();
         Ok(ThinLensCameraSpec {
+            diffraction: false,
             focal_length: Some(Millimetres(self.focal)),
             aperture: None,
             elements,

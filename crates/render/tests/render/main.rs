@@ -5,6 +5,7 @@ mod adaptive;
 mod band_paths;
 mod blocks;
 mod curves;
+mod diffraction;
 mod dispersion;
 mod known_radiance;
 mod layers;

@@ -8,3 +8,4 @@ mod light;
 mod noise;
 mod raw_file;
 mod refused;
+mod slanted_edge;

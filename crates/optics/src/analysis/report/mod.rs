@@ -14,7 +14,7 @@ use super::conjugate::{Conjugate, Planes};
 use super::fans::{Fans, GridPoint, distortion_grid, fans};
 use super::object::ObjectPoint;
 use super::seidel::{SeidelTable, seidel};
-use super::spread::{PointSpread, WeightedFields, strehl};
+use super::spread::{PointSpread, WeightedFields, shares, strehl};
 use super::transfer::{Transfer, geometric_modulation};
 use super::wavefront::{Cells, ReferenceSphere, Wavefront};
 use super::zernike::{FRINGE_TERMS, ZernikeFit, ZernikeOrder};
@@ -270,14 +270,7 @@ impl WaveInquiry {
             true => vec![1.0; count],
             false => self.weights.clone(),
         };
-        let sum: f64 = weights.iter().sum();
-        let are_weights = weights.iter().all(|weight| *weight >= 0.0 && weight.is_finite());
-        if weights.len() != count || !are_weights || sum <= 0.0 {
-            let words: Vec<String> = weights.iter().map(f64::to_string).collect();
-            let what = format!("{} for {count} wavelengths make no mean", words.join(", "));
-            return Err(AnalysisError::Weights(what));
-        }
-        Ok(weights.into_iter().map(|weight| weight / sum).collect())
+        shares(&weights, count)
     }
 }
 

@@ -1,0 +1,245 @@
+//! `etendue lens --psf`: point spread functions by depth, field and wavelength, as files.
+
+use std::path::Path;
+
+use etendue_files::Transaction;
+use etendue_geometry::glam::DVec3;
+use etendue_optics::analysis::between::airy_unit;
+use etendue_optics::analysis::wavefront::Cells;
+use etendue_optics::analysis::{
+    AnalysisError, CellGrid, CellSpread, ObjectPoint, PupilField, Wavefront,
+};
+use etendue_optics::train::{Focus, LensReport};
+use etendue_render::output::{Channel, Layer, Look, Picture, Values, exr, npy, sidecar};
+use etendue_scene::file::ReadLens;
+use serde::Serialize;
+
+use crate::arguments::LensArguments;
+use crate::fault::Fault;
+use crate::progress::say;
+use crate::waves;
+
+/// What is written.
+pub(crate) const FILES: [&str; 3] = ["psf.npy", "psf.exr", "psf.json"];
+
+/// Cells across the finest detail, where nothing is said.
+const FINE: f64 = 4.0;
+
+/// The most cells from the middle to a side that light is looked for on.
+const MOST_HALF: usize = 2047;
+
+/// The most bytes of all of them.
+const MOST_BYTES: usize = 1 << 30;
+
+/// What the arrays are.
+#[derive(Debug, Serialize)]
+struct Meaning {
+    version: u32,
+    /// `[depth][field][wavelength][row][column]`
+    axes: [&'static str; 5],
+    shape: [usize; 5],
+    definition: &'static str,
+    /// µm
+    pitch: f64,
+    /// mm; `null` for infinity
+    depths: Vec<Option<f64>>,
+    /// degrees
+    fields: Vec<f64>,
+    /// nm
+    wavelengths: Vec<f64>,
+    sensor_z: f64,
+    /// Of each function in the order of the array: where its chief ray meets the sensor (mm), which the
+    /// middle cell's middle is.
+    middles: Vec<[f64; 2]>,
+    /// The share of the light that lies on the cells.
+    held: Vec<f64>,
+}
+
+/// One point's light.
+struct Point {
+    pupil: PupilField,
+    middle: [f64; 2],
+}
+
+/// Writes the point spread functions into the folder.
+pub(crate) fn write(
+    lens: &ReadLens,
+    report: &LensReport,
+    arguments: &LensArguments,
+    to: &Transaction,
+) -> Result<(), Fault> {
+    let Some(folder) = &arguments.output else { return Ok(()) };
+    let refused =
+        |why: String| Fault::refused(format!("{}: --psf: {why}", arguments.lens.display()));
+    let (wavelengths, _) = waves::wavelengths(lens, report, arguments);
+    let Some(sensor_z) = report.sensor_z else {
+        return Err(refused("the lens has no place for a sensor; give --focus".to_owned()));
+    };
+    let depths = depths(report, arguments).map_err(refused)?;
+    let fields = report.fields.clone();
+    let mut points = Vec::new();
+    for &depth in &depths {
+        for &field in &fields {
+            for &nm in &wavelengths {
+                let point = point(lens, report, sensor_z, (depth, field, nm)).map_err(|error| {
+                    let at = depth.map_or("infinity".to_owned(), |mm| format!("{mm} mm"));
+                    refused(format!("field {field}, {nm} nm, {at}: {error}"))
+                })?;
+                points.push(point);
+            }
+        }
+    }
+    let finest = points.iter().map(|point| airy_unit(&point.pupil)).fold(f64::INFINITY, f64::min);
+    let pitch = arguments.psf_pitch.map_or(finest / FINE, |pitch| 1e-3 * pitch);
+    // The sensor is looked at as a picture of it would be, x to the right and y upwards.
+    let grid = CellGrid { pitch, turn: 1.0, most: MOST_HALF };
+    let spreads: Vec<CellSpread> = points
+        .iter()
+        .map(|point| CellSpread::of(std::slice::from_ref(&point.pupil), &grid))
+        .collect();
+    let half = match arguments.psf_size {
+        Some(size) if size % 2 == 1 => size as usize / 2,
+        Some(size) => {
+            return Err(refused(format!("--psf-size {size} has no middle: give an odd number")));
+        }
+        None => spreads.iter().map(|spread| spread.half).max().unwrap_or(0),
+    };
+    let side = 2 * half + 1;
+    let bytes = spreads.len().saturating_mul(side * side * size_of::<f32>());
+    if bytes > MOST_BYTES {
+        return Err(refused(format!(
+            "{} functions of {side} x {side} cells take {} MiB, and 1024 are the most: give a --psf-size, \
+             a larger --psf-pitch, or fewer fields",
+            spreads.len(),
+            bytes >> 20
+        )));
+    }
+    let cropped: Vec<Vec<f32>> = spreads.iter().map(|spread| cropped(spread, half)).collect();
+    let held = cropped.iter().map(|plane| plane.iter().map(|&v| f64::from(v)).sum()).collect();
+    let meaning = Meaning {
+        version: 1,
+        axes: ["depth", "field", "wavelength", "row", "column"],
+        shape: [depths.len(), fields.len(), wavelengths.len(), side, side],
+        definition: "share of a point's light on each cell, by diffraction; rows go down, against y",
+        pitch: 1e3 * pitch,
+        depths,
+        fields,
+        wavelengths,
+        sensor_z,
+        middles: points.iter().map(|point| point.middle).collect(),
+        held,
+    };
+    files(to, folder, &meaning, cropped)?;
+    if !arguments.quiet {
+        FILES.iter().for_each(|name| say(&format!("wrote {}", folder.join(name).display())));
+    }
+    Ok(())
+}
+
+/// Distances from the entrance pupil (mm); none for infinity.
+fn depths(report: &LensReport, arguments: &LensArguments) -> Result<Vec<Option<f64>>, String> {
+    let Some(asked) = &arguments.depths else {
+        let focused = match arguments.focus {
+            Some(Focus::Distance(metres)) if metres.is_finite() => Some(1e3 * metres),
+            _ => None,
+        };
+        return Ok(vec![focused]);
+    };
+    if report.paraxial.entrance_pupil.z.is_none() {
+        return Err("--depths: the entrance pupil is at infinity, and depths are counted from it"
+            .to_owned());
+    }
+    let depth = |focus: &Focus| match *focus {
+        Focus::Infinity => Ok(None),
+        Focus::Distance(metres) if metres > 0.0 => Ok(metres.is_finite().then_some(1e3 * metres)),
+        _ => Err("--depths: expected distances above 0, such as \"infinity,2 m\"".to_owned()),
+    };
+    asked.iter().map(depth).collect()
+}
+
+fn point(
+    lens: &ReadLens,
+    report: &LensReport,
+    sensor_z: f64,
+    (depth, field, nm): (Option<f64>, f64, f64),
+) -> Result<Point, AnalysisError> {
+    let at = lens.train.at(nm)?;
+    let pupil = report.paraxial.entrance_pupil.z.unwrap_or(0.0);
+    let object = match depth {
+        None => ObjectPoint::field(field),
+        // Its light goes towards (0, tan, 1) through the pupil's middle.
+        Some(depth) => {
+            let place = DVec3::new(0.0, -depth * field.to_radians().tan(), pupil - depth);
+            ObjectPoint::Near { place }
+        }
+    };
+    let front = Wavefront::new(&lens.train, &at, object, sensor_z, Cells::Needed)?;
+    let [x, y, _] = front.sphere.centre;
+    Ok(Point { pupil: front.pupil, middle: [x, y] })
+}
+
+/// The cells up to `half` from the middle.
+#[expect(clippy::cast_possible_truncation, reason = "shares below 1")]
+fn cropped(spread: &CellSpread, half: usize) -> Vec<f32> {
+    let (side, own) = (2 * half + 1, 2 * spread.half + 1);
+    let mut plane = vec![0.0; side * side];
+    for row in 0..side {
+        for column in 0..side {
+            let from = |k: usize| (k + spread.half).checked_sub(half).filter(|&k| k < own);
+            if let (Some(r), Some(c)) = (from(row), from(column)) {
+                plane[row * side + column] = spread.shares[r * own + c] as f32;
+            }
+        }
+    }
+    plane
+}
+
+fn files(
+    to: &Transaction,
+    folder: &Path,
+    meaning: &Meaning,
+    planes: Vec<Vec<f32>>,
+) -> Result<(), Fault> {
+    let shape: Vec<u64> = meaning.shape.iter().map(|&side| side as u64).collect();
+    let all: Vec<f32> = planes.iter().flatten().copied().collect();
+    npy::write_array(to, &folder.join(FILES[0]), &shape, &all)?;
+    let [_, fields, wavelengths, side, _] = meaning.shape;
+    // A layer for each depth and field, a channel for each wavelength.
+    let mut layers: Vec<Layer> = Vec::new();
+    for (k, plane) in planes.into_iter().enumerate() {
+        let (depth, field, nm) = (
+            k / (fields * wavelengths),
+            k / wavelengths % fields,
+            meaning.wavelengths[k % wavelengths],
+        );
+        let name = format!("PSF.d{depth}f{field}");
+        let channel = format!("{nm}nm").replace('.', "_");
+        let channel = Channel { name: channel, values: Values::F32(plane) };
+        match layers.last_mut().filter(|layer| layer.name == name) {
+            Some(layer) => layer.channels.push(channel),
+            None => {
+                let about = [
+                    ("definition", meaning.definition.to_owned()),
+                    (
+                        "depth",
+                        meaning.depths[depth].map_or("infinity".into(), |mm| format!("{mm} mm")),
+                    ),
+                    ("field", format!("{} degrees", meaning.fields[field])),
+                    ("pitch", format!("{} um", meaning.pitch)),
+                ];
+                let about = about.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
+                layers.push(Layer {
+                    name,
+                    look: Look::Cube,
+                    channels: vec![channel],
+                    meaning: about,
+                });
+            }
+        }
+    }
+    let picture = Picture::new(side, side, layers, Vec::new())
+        .map_err(|error| Fault::failed(error.to_string()))?;
+    exr::write(to, &folder.join(FILES[1]), &picture, &exr::Options::default())?;
+    sidecar::write_json(to, &folder.join(FILES[2]), meaning)?;
+    Ok(())
+}

@@ -1,0 +1,170 @@
+//! Fields of one direction at a few depths and wavelengths, and those between them.
+//!
+//! The path difference of a cell of the pupil changes smoothly with the wavelength, and with the
+//! nearness of the object, 1 over its distance, in which defocus is linear. So polynomials through
+//! two or three of each have all between, as long as the cells are the same: the reference sphere
+//! and the grid over it are those of the place where the light lands, whatever sends it.
+
+use glam::{DVec2, DVec3};
+
+use super::aim::{self, Sampling};
+use super::object::Beam;
+use super::pupil::PupilField;
+use super::{AnalysisError, MOST_CELLS, ObjectPoint, ReferenceSphere};
+use crate::train::{MonochromaticTrain, OpticalTrain};
+
+/// Cells a side that a grid has in the least.
+const USUAL: usize = 128;
+
+/// The greatest distance from the chief ray at which rays land that are added up as waves, in
+/// wavelengths times the f-number; beyond, diffraction changes nothing that a picture shows.
+pub const FARTHEST_WAVES: f64 = 60.0;
+
+/// Wavelengths times the f-number of the image that a grid has to hold beside where rays land.
+const BESIDE: f64 = 42.0;
+
+/// Fields at all of some wavelengths and nearnesses.
+#[derive(Debug, Clone)]
+pub struct FieldsBetween {
+    /// Wavelengths (nm).
+    wavelengths: Vec<f64>,
+    /// Nearnesses (1/mm).
+    nearness: Vec<f64>,
+    /// Each wavelength's at all nearnesses.
+    fields: Vec<PupilField>,
+}
+
+/// What the fields are of.
+#[derive(Clone, Copy)]
+#[allow(missing_debug_implementations, reason = "holds a function")]
+pub struct Seen<'a> {
+    /// The lens.
+    pub train: &'a OpticalTrain,
+    /// The same at each of the wavelengths.
+    pub lenses: &'a [MonochromaticTrain],
+    /// Nearnesses (1/mm), ascending.
+    pub nearness: &'a [f64],
+    /// The point of a nearness.
+    pub object: &'a dyn Fn(f64) -> ObjectPoint,
+    /// The point of the image (mm) that the fields are about.
+    pub image: DVec3,
+}
+
+impl FieldsBetween {
+    /// Traces the fields. The grid has as many cells as their own image needs.
+    ///
+    /// # Errors
+    ///
+    /// When there is no light, no chief ray or no sphere, or the wavefront is too rough for the most
+    /// cells.
+    pub fn new(seen: &Seen<'_>) -> Result<Self, AnalysisError> {
+        let Seen { train, lenses, nearness, object, image } = *seen;
+        let mut parts = Vec::new();
+        for lens in lenses {
+            for &near in nearness {
+                let beam = Beam::new(train, lens, object(near))?;
+                let sphere = ReferenceSphere::about(train, lens, image)?;
+                let outline = aim::outline(&beam, &sphere)?;
+                parts.push((beam, sphere, outline));
+            }
+        }
+        // One grid over all of them.
+        let middle = parts.get(parts.len() / 2).map_or(DVec2::ZERO, |part| part.2.middle);
+        let reach =
+            |outline: &aim::Outline| outline.half + (outline.middle - middle).abs().max_element();
+        let half = parts.iter().map(|part| reach(&part.2)).fold(0.0, f64::max);
+        let traced = |cells: usize| -> Result<Vec<PupilField>, AnalysisError> {
+            let step = half / (0.5 * cells as f64 - super::pupil::RIM);
+            let sampling = Sampling { cells, step, middle };
+            let field = |(beam, sphere, outline): &(Beam<'_>, ReferenceSphere, aim::Outline)| {
+                aim::field(beam, sphere, outline, sampling)
+            };
+            parts.iter().map(field).collect()
+        };
+        let mut fields = traced(USUAL)?;
+        // Where rays land, in wavelengths times the f-number.
+        let far = fields.iter().map(landing_reach).filter(|far| *far <= FARTHEST_WAVES);
+        let far = far.fold(0.0, f64::max);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a small count"
+        )]
+        let needed = ((2.0 * (far + BESIDE)).ceil() as usize).next_multiple_of(4);
+        if needed > MOST_CELLS {
+            return Err(AnalysisError::TooRough { needed, waves: far });
+        }
+        if needed > USUAL {
+            fields = traced(needed)?;
+        }
+        let wavelengths = lenses.iter().map(MonochromaticTrain::wavelength).collect();
+        Ok(Self { wavelengths, nearness: nearness.to_vec(), fields })
+    }
+
+    /// The field at a wavelength (nm) and a nearness (1/mm).
+    #[must_use]
+    pub fn at(&self, wavelength: f64, nearness: f64) -> PupilField {
+        let by_wavelength = lagrange(&self.wavelengths, wavelength);
+        let by_nearness = lagrange(&self.nearness, nearness);
+        let weight = |k: usize| {
+            let depths = self.nearness.len();
+            by_wavelength[k / depths] * by_nearness[k % depths]
+        };
+        // The openings are those of the field next to it.
+        let (nearest, depth) =
+            (closest(&self.wavelengths, wavelength), closest(&self.nearness, nearness));
+        let mut field = self.fields[nearest * self.nearness.len() + depth].clone();
+        for i in 0..field.clear.len() {
+            if field.clear[i] <= 0.0 {
+                continue;
+            }
+            let mut waves = 0.0;
+            let mut landing = DVec2::ZERO;
+            for (k, own) in self.fields.iter().enumerate() {
+                // No ray of that depth or wavelength crosses the cell.
+                if own.clear[i] <= 0.0 && own.slopes[i] == DVec2::ZERO {
+                    field.clear[i] = 0.0;
+                }
+                // As a path, which is nearly the same for all wavelengths.
+                waves += weight(k) * own.waves[i] * own.wavelength / wavelength;
+                landing += weight(k) * own.landing[i];
+            }
+            if field.clear[i] <= 0.0 {
+                (field.amplitude[i], field.power[i]) = (0.0, 0.0);
+            }
+            (field.waves[i], field.landing[i]) = (waves, landing);
+        }
+        field.wavelength = wavelength;
+        field
+    }
+}
+
+/// How far from the sphere's centre rays land, at most, in wavelengths times the f-number.
+#[must_use]
+pub fn landing_reach(field: &PupilField) -> f64 {
+    let open = field.lit().filter(|&i| field.clear[i] > 0.5);
+    let reach = open.map(|i| field.landing[i].length()).fold(0.0, f64::max);
+    reach / airy_unit(field)
+}
+
+/// The wavelength times the f-number (mm), by the circle that the pupil fits in.
+#[must_use]
+pub fn airy_unit(field: &PupilField) -> f64 {
+    field.wavelength * 1e-6 / (2.0 * field.circle().1)
+}
+
+/// What each node counts for in the polynomial through all, at a place.
+fn lagrange(nodes: &[f64], at: f64) -> Vec<f64> {
+    let weight = |k: usize| {
+        let others = (0..nodes.len()).filter(|&other| other != k);
+        others.map(|other| (at - nodes[other]) / (nodes[k] - nodes[other])).product()
+    };
+    (0..nodes.len()).map(weight).collect()
+}
+
+/// Which node is nearest to a place.
+fn closest(nodes: &[f64], at: f64) -> usize {
+    let by_distance =
+        |a: &usize, b: &usize| (nodes[*a] - at).abs().total_cmp(&(nodes[*b] - at).abs());
+    (0..nodes.len()).min_by(by_distance).unwrap_or(0)
+}

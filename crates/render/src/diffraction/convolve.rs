@@ -1,0 +1,322 @@
+//! Layers of a picture on cells, each spread and laid over those behind it, on pixels.
+//!
+//! Spreads differ over the picture: light belongs to the nodes around it by shares that add up to 1, and
+//! each node's light is spread by the node's own, by FFT. What is behind a layer's edge, and beyond the picture's, is not known: a spread
+//! picture is divided by the spread of where it is known, so that it goes on there as it is seen.
+
+use rayon::prelude::*;
+use rustfft::num_complex::Complex64;
+use rustfft::{Fft, FftPlanner};
+use std::sync::Arc;
+
+use super::Illumination;
+use super::layers::DepthLayers;
+use super::spreads::Spreads;
+use etendue_optics::analysis::CellSpread;
+
+/// Where less than this share of a spread is known, nothing is.
+const KNOWN: f64 = 1e-6;
+
+/// The scene along chief rays on cells of pixels.
+pub(crate) struct CellPicture {
+    /// Columns and rows of cells.
+    pub(crate) size: [usize; 2],
+    /// Cells a side of a pixel.
+    pub(crate) cells: usize,
+    /// Light by layer and band.
+    pub(crate) light: Vec<Vec<Vec<f32>>>,
+    /// Depths (m).
+    pub(crate) depths: Vec<f32>,
+}
+
+/// What is spread of one layer: its light, where it is, and where it could be seen.
+struct Planes {
+    light: Vec<Vec<f64>>,
+    covers: Vec<f64>,
+    known: Vec<f64>,
+}
+
+/// The light of a band on pixels, for each layer of light, spread and multiplied by what arrives.
+pub(crate) fn composed(
+    picture: &CellPicture,
+    (layers, spreads): (&DepthLayers, &Spreads),
+    band: usize,
+    arrives: &Illumination,
+) -> Vec<Vec<f32>> {
+    let pixels = picture.size.map(|side| side / picture.cells);
+    let count = pixels[0] * pixels[1];
+    let mut out = vec![vec![0.0_f64; count]; picture.light.len()];
+    // What is black in front of nothing else changes nothing.
+    let mut shines = vec![false; layers.nearness.len()];
+    for light in &picture.light {
+        for (&layer, &light) in layers.of_cell.iter().zip(&light[band]) {
+            shines[usize::from(layer)] |= light != 0.0;
+        }
+    }
+    let first = shines.iter().position(|shines| *shines).unwrap_or(shines.len());
+    for layer in first..layers.nearness.len() {
+        let Planes { light, covers, known } =
+            spread_layer(picture, (layers, spreads), (layer, band), arrives);
+        for i in 0..count {
+            if known[i] <= KNOWN {
+                continue;
+            }
+            let behind = 1.0 - (covers[i] / known[i]).clamp(0.0, 1.0);
+            for (out, light) in out.iter_mut().zip(&light) {
+                out[i] = light[i] / known[i] + behind * out[i];
+            }
+        }
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "as the film is kept")]
+    let single = |plane: Vec<f64>| plane.into_iter().map(|value| value.max(0.0) as f32).collect();
+    out.into_iter().map(single).collect()
+}
+
+/// A layer's light, cover and knowledge, spread over the pixels.
+fn spread_layer(
+    picture: &CellPicture,
+    (layers, spreads): (&DepthLayers, &Spreads),
+    (layer, band): (usize, usize),
+    arrives: &Illumination,
+) -> Planes {
+    let pixels = picture.size.map(|side| side / picture.cells);
+    let count = pixels[0] * pixels[1];
+    let blocks: Vec<Vec<Block>> = (0..spreads.side * spreads.side)
+        .into_par_iter()
+        .map(|node| {
+            let window = Window::of(node, spreads.side, picture.size);
+            let filled = window.filled(picture, layers, (layer, band), arrives);
+            if filled.iter().all(|plane| plane.iter().all(|value| *value == 0.0)) {
+                return Vec::new();
+            }
+            let spread = spreads.spread(node, layer, band);
+            window.spread(filled, &spread, picture)
+        })
+        .collect();
+    let planes = picture.light.len() + 2;
+    let mut sums = vec![vec![0.0; count]; planes];
+    for node in blocks {
+        for (sum, block) in sums.iter_mut().zip(node) {
+            block.add_to(sum, pixels[0]);
+        }
+    }
+    let known = sums.pop().unwrap_or_default();
+    let covers = sums.pop().unwrap_or_default();
+    Planes { light: sums, covers, known }
+}
+
+/// Pixels of a part of the picture.
+struct Block {
+    left: usize,
+    top: usize,
+    width: usize,
+    values: Vec<f64>,
+}
+
+impl Block {
+    fn add_to(&self, sum: &mut [f64], width: usize) {
+        for (row, values) in self.values.chunks(self.width.max(1)).enumerate() {
+            let start = (self.top + row) * width + self.left;
+            sum[start..start + self.width].iter_mut().zip(values).for_each(|(sum, v)| *sum += v);
+        }
+    }
+}
+
+/// The cells that light of a node belongs to, with its share of each column and row.
+struct Window {
+    start: [usize; 2],
+    shares: [Vec<f64>; 2],
+}
+
+impl Window {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside a picture")]
+    fn of(node: usize, side: usize, size: [usize; 2]) -> Self {
+        let along = |node: usize, size: usize| {
+            let step = size as f64 / (side - 1) as f64;
+            let place = node as f64 * step;
+            let first = (place - step).max(0.0).floor() as usize;
+            let last = ((place + step).ceil() as usize).min(size);
+            let share = |cell: usize| (1.0 - (cell as f64 + 0.5 - place).abs() / step).max(0.0);
+            (first, (first..last).map(share).collect::<Vec<f64>>())
+        };
+        let (left, columns) = along(node % side, size[0]);
+        let (top, rows) = along(node / side, size[1]);
+        Self { start: [left, top], shares: [columns, rows] }
+    }
+
+    fn size(&self) -> [usize; 2] {
+        [self.shares[0].len(), self.shares[1].len()]
+    }
+
+    /// Light of each layer of light, cover, and what is known, by cell.
+    fn filled(
+        &self,
+        picture: &CellPicture,
+        layers: &DepthLayers,
+        (layer, band): (usize, usize),
+        arrives: &Illumination,
+    ) -> Vec<Vec<f64>> {
+        let [width, height] = self.size();
+        let kinds = picture.light.len();
+        let mut planes = vec![vec![0.0; width * height]; kinds + 2];
+        let fine = picture.cells as f64;
+        for row in 0..height {
+            let y = self.start[1] + row;
+            for column in 0..width {
+                let x = self.start[0] + column;
+                let at = y * picture.size[0] + x;
+                let own = usize::from(layers.of_cell[at]);
+                // What lies in front hides what is here.
+                if own > layer {
+                    continue;
+                }
+                let share = self.shares[0][column] * self.shares[1][row];
+                let to = row * width + column;
+                planes[kinds + 1][to] = share;
+                if own == layer {
+                    planes[kinds][to] = share;
+                    let place = [x, y].map(|cell| (cell as f64 + 0.5) / fine);
+                    let share = share * arrives.at(place);
+                    for (plane, light) in planes.iter_mut().zip(&picture.light) {
+                        plane[to] = share * f64::from(light[band][at]);
+                    }
+                }
+            }
+        }
+        planes
+    }
+
+    /// The planes spread, on pixels.
+    fn spread(
+        &self,
+        planes: Vec<Vec<f64>>,
+        spread: &CellSpread,
+        picture: &CellPicture,
+    ) -> Vec<Block> {
+        let [width, height] = self.size();
+        let half = spread.half;
+        let size = [width, height].map(|side| quick(side + 2 * half));
+        let transform = Transform::new(size);
+        let side = 2 * half + 1;
+        let mut kernel = vec![Complex64::ZERO; size[0] * size[1]];
+        for (i, share) in spread.shares.iter().enumerate() {
+            kernel[i / side * size[0] + i % side] = Complex64::from(*share);
+        }
+        let kernel = transform.forward(kernel);
+        let mut spread = Vec::with_capacity(planes.len());
+        // Two real planes at a time, as one of complex numbers: the spread is real.
+        for pair in planes.chunks(2) {
+            let mut grid = vec![Complex64::ZERO; size[0] * size[1]];
+            for row in 0..height {
+                for column in 0..width {
+                    let value = |plane: &Vec<f64>| plane[row * width + column];
+                    let both = Complex64::new(value(&pair[0]), pair.get(1).map_or(0.0, value));
+                    grid[row * size[0] + column] = both;
+                }
+            }
+            let mut grid = transform.forward(grid);
+            grid.iter_mut().zip(&kernel).for_each(|(value, by)| *value *= by);
+            let grid = transform.back(grid);
+            spread.push(self.binned(&grid, size, half, picture, |value| value.re));
+            if pair.len() > 1 {
+                spread.push(self.binned(&grid, size, half, picture, |value| value.im));
+            }
+        }
+        spread
+    }
+
+    /// A spread plane's cells inside the picture, as means over pixels.
+    fn binned(
+        &self,
+        grid: &[Complex64],
+        size: [usize; 2],
+        half: usize,
+        picture: &CellPicture,
+        part: impl Fn(&Complex64) -> f64,
+    ) -> Block {
+        let n = picture.cells;
+        // Cells of the picture that the light gets to: cell c of it is c + half - start of the grid.
+        let range = |axis: usize| {
+            let (start, len) = (self.start[axis], self.size()[axis]);
+            (start.saturating_sub(half), (start + len + half).min(picture.size[axis]))
+        };
+        let ([x0, x1], [y0, y1]) = ([range(0).0, range(0).1], [range(1).0, range(1).1]);
+        let (left, top) = (x0 / n, y0 / n);
+        let width = x1.div_ceil(n) - left;
+        let rows = y1.div_ceil(n) - top;
+        let mut values = vec![0.0; width * rows];
+        let scale = 1.0 / (n * n) as f64;
+        for y in y0..y1 {
+            let line = &grid[(y + half - self.start[1]) * size[0]..][..size[0]];
+            let to = &mut values[(y / n - top) * width..][..width];
+            for x in x0..x1 {
+                to[x / n - left] += scale * part(&line[x + half - self.start[0]]);
+            }
+        }
+        Block { left, top, width, values }
+    }
+}
+
+/// The least length from `least` on that a transform is quick for.
+fn quick(least: usize) -> usize {
+    let is_quick = |mut length: usize| {
+        for factor in [2, 3, 5] {
+            while length.is_multiple_of(factor) {
+                length /= factor;
+            }
+        }
+        length == 1
+    };
+    (least.max(1)..).find(|&length| is_quick(length)).unwrap_or(least)
+}
+
+/// Two-dimensional transforms of one size.
+struct Transform {
+    size: [usize; 2],
+    plans: [[Arc<dyn Fft<f64>>; 2]; 2],
+}
+
+impl Transform {
+    fn new(size: [usize; 2]) -> Self {
+        let mut planner = FftPlanner::new();
+        let plans =
+            size.map(|side| [planner.plan_fft_forward(side), planner.plan_fft_inverse(side)]);
+        Self { size, plans }
+    }
+
+    /// The transform, columns and rows exchanged.
+    fn forward(&self, mut grid: Vec<Complex64>) -> Vec<Complex64> {
+        self.plans[0][0].process(&mut grid);
+        let mut turned = transposed(&grid, self.size[0]);
+        self.plans[1][0].process(&mut turned);
+        turned
+    }
+
+    /// Its inverse.
+    fn back(&self, mut turned: Vec<Complex64>) -> Vec<Complex64> {
+        self.plans[1][1].process(&mut turned);
+        let mut grid = transposed(&turned, self.size[1]);
+        self.plans[0][1].process(&mut grid);
+        let scale = 1.0 / (self.size[0] * self.size[1]) as f64;
+        grid.iter_mut().for_each(|value| *value *= scale);
+        grid
+    }
+}
+
+/// Rows of so many values as columns.
+fn transposed(grid: &[Complex64], width: usize) -> Vec<Complex64> {
+    /// Squares of values that stay in the nearest cache.
+    const SQUARE: usize = 16;
+    let height = grid.len() / width.max(1);
+    let mut turned = vec![Complex64::ZERO; grid.len()];
+    for top in (0..height).step_by(SQUARE) {
+        for left in (0..width).step_by(SQUARE) {
+            for y in top..(top + SQUARE).min(height) {
+                for x in left..(left + SQUARE).min(width) {
+                    turned[x * height + y] = grid[y * width + x];
+                }
+            }
+        }
+    }
+    turned
+}

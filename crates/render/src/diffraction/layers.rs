@@ -1,0 +1,101 @@
+//! Cells sorted by depth into layers over each of which the spread hardly changes.
+//!
+//! Layers are even in waves of defocus near focus, and in its logarithm farther away. Nearness is 1 over
+//! the distance along the axis, in which defocus is linear.
+
+use etendue_camera::LensCamera;
+
+/// Waves of defocus from one layer to the next, near focus.
+const STEP: f64 = 0.35;
+
+/// From so many waves on, layers are a tenth of the defocus deep.
+const LINEAR: f64 = 3.5;
+
+/// The most layers in front of focus, and behind it.
+const MOST: u8 = 60;
+
+/// Cells by their layers.
+#[derive(Debug, Clone)]
+pub(crate) struct DepthLayers {
+    /// The layer of each cell, from the rearmost on.
+    pub(crate) of_cell: Vec<u8>,
+    /// The mean nearness (1/m) of each.
+    pub(crate) nearness: Vec<f64>,
+    /// Waves of defocus for each 1/m.
+    pub(crate) waves: f64,
+}
+
+impl DepthLayers {
+    /// Sorts cells by their depths (m, infinite where there is nothing), for a lens at a wavelength (nm).
+    pub(crate) fn of(depths: &[f32], lens: &LensCamera, wavelength: f64) -> Self {
+        let waves = lens.waves_of_defocus(wavelength);
+        let focus = lens.focused().object_distance();
+        let focus = if focus.is_finite() && focus != 0.0 { 1.0 / focus } else { 0.0 };
+        let near = |depth: f32| match depth > 0.0 && depth.is_finite() {
+            true => 1.0 / f64::from(depth),
+            false => 0.0,
+        };
+        let number = |depth: f32| number_of(waves * (near(depth) - focus));
+        let mut sums = vec![(0.0, 0_u64); 2 * usize::from(MOST) + 1];
+        for &depth in depths {
+            let (sum, count) = &mut sums[number(depth)];
+            *sum += near(depth);
+            *count += 1;
+        }
+        let mut own = vec![0_u8; sums.len()];
+        let mut nearness = Vec::new();
+        for ((sum, count), own) in sums.iter().zip(&mut own) {
+            *own = u8::try_from(nearness.len()).unwrap_or(u8::MAX);
+            if *count > 0 {
+                nearness.push(sum / *count as f64);
+            }
+        }
+        let of_cell = depths.iter().map(|&depth| own[number(depth)]).collect();
+        Self { of_cell, nearness, waves }
+    }
+
+    /// The least and the greatest nearness of a layer (1/m).
+    pub(crate) fn span(&self) -> [f64; 2] {
+        let first = self.nearness.first().copied().unwrap_or(0.0);
+        [first, self.nearness.last().copied().unwrap_or(first)]
+    }
+}
+
+/// The layer of so many waves of defocus, counted from the rearmost that there may be.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 120")]
+fn number_of(waves: f64) -> usize {
+    let far = waves.abs();
+    let steps = match far < LINEAR {
+        true => far / STEP,
+        false => LINEAR / STEP + (far / LINEAR).ln() * LINEAR / STEP,
+    };
+    let most = f64::from(MOST);
+    (most + steps.min(most).copysign(waves)).round() as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn layers_are_a_third_of_a_wave_or_a_tenth_of_the_defocus_deep() {
+        let mut last = number_of(-1000.0);
+        assert_eq!(last, 0);
+        let mut edges = Vec::new();
+        for k in -100_000..=100_000 {
+            let waves = f64::from(k) * 1e-3;
+            let number = number_of(waves);
+            assert!(number == last || number == last + 1, "{waves}");
+            if number != last {
+                edges.push(waves);
+            }
+            last = number;
+        }
+        // From one edge to the next; 2e-3 for the steps in which they are looked for.
+        for pair in edges.windows(2) {
+            let (deep, far) = (pair[1] - pair[0], pair[0].abs().min(pair[1].abs()));
+            assert!(deep <= STEP.max(0.107 * far) + 2e-3, "{pair:?}");
+        }
+        assert_eq!(number_of(0.0), usize::from(MOST));
+    }
+}

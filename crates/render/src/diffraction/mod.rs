@@ -1,0 +1,274 @@
+//! Diffraction in the picture: the scene along chief rays, on cells of pixels, whose light is then spread
+//! by the lens' point spread functions in waves. Nothing is spread by rays, so nothing is spread twice.
+//!
+//! 1. Cells a third of the finest detail that the lens can draw, but at least a third of a pixel, are
+//!    rendered along chief rays, with their depths.
+//! 2. Light is multiplied by what of it arrives, which the lens' rays say as they do without diffraction.
+//! 3. Cells are sorted by depth into layers, over each of which the spread hardly changes.
+//! 4. From the rearmost to the foremost, each layer's light and its coverage are spread, and it is laid over
+//!    what is behind it. What a layer in front hides of another is taken to go on as what is seen of it.
+//!
+//! So what the pupil's parts see differently, around edges of things and in mirrors, is lost.
+
+mod convolve;
+mod layers;
+mod spreads;
+mod words;
+
+use etendue_camera::{Camera, WaveLens};
+use etendue_scene::Scene;
+use etendue_scene::file::SamplesSpec;
+use etendue_tracer::LayerSpec;
+
+use crate::error::RenderError;
+use crate::film::FilmLayer;
+use crate::output::{Outputs, Values};
+use crate::render::{Course, Film, Prepared, trace};
+use crate::stopping::Stopping;
+use crate::tiles::RayCounts;
+use crate::watch::{SoFar, Watch};
+use crate::{Plan, Shard};
+
+use self::convolve::{CellPicture, composed};
+use self::layers::DepthLayers;
+use self::spreads::Spreads;
+
+pub(crate) use self::words::decision;
+
+/// The most cells that a pixel has a side.
+const MOST_CELLS: u32 = 3;
+
+/// Cells across the finest detail that a lens can draw.
+const CELLS_OF_DETAIL: f64 = 3.0;
+
+/// Tracing takes this share of the work, as a rule.
+const TRACING: f64 = 0.8;
+
+/// Light spread over the film, and what it took.
+pub(crate) struct SpreadLight {
+    /// The planes of each layer of light, band by band.
+    pub(crate) layers: Vec<(LayerSpec, Vec<Vec<f32>>)>,
+    pub(crate) counts: RayCounts,
+    pub(crate) notes: Vec<String>,
+}
+
+/// Whether the plan's picture is of light that is spread as waves are.
+fn is_wanted(scene: &Scene, plan: &Plan) -> bool {
+    scene.camera.diffracts() && plan.layers.contains(&LayerSpec::Radiance)
+}
+
+/// Bytes a pixel of its cells' light, depths and layers.
+pub(crate) fn bytes(scene: &Scene, plan: &Plan) -> u64 {
+    let Some(lens) = scene.camera.lens().filter(|_| is_wanted(scene, plan)) else { return 0 };
+    let bands = plan.bands.count();
+    let shortest = (0..bands).map(|band| plan.bands.wavelength(band)).fold(f64::INFINITY, f64::min);
+    let pitch = 1e-3 * lens.focused().pixel_pitch();
+    let cells = u64::from(cells_a_pixel(pitch, lens.airy_unit(shortest)));
+    let lit = plan.layers.iter().filter(|layer| layer.is_light()).count();
+    let each = size_of::<f32>() * (lit * bands + 1) + 1;
+    cells * cells * each as u64
+}
+
+/// Refuses what light that is spread over the picture cannot be.
+fn check(scene: &Scene, plan: &Plan, course: &Course<'_>) -> Result<(), RenderError> {
+    let camera = &scene.camera;
+    let refused = |why: &str| Err(RenderError::Diffraction(why.to_owned()));
+    if camera.is_timed() || camera.light_of_rows_differs() || scene.slots > 0 {
+        return refused(
+            "something moves, or rows see different moments; leave out `motion` and `shutter`, or \
+             `diffraction`",
+        );
+    }
+    if camera.shutter().is_some_and(|shutter| !shutter.is_fully_open()) || camera.lights_change() {
+        return refused(
+            "the shutter is closed for a part of the time; leave it out, or `diffraction`",
+        );
+    }
+    if plan.stopping.is_adaptive() || matches!(plan.stopping, Stopping::Time(_)) {
+        return refused(
+            "light lands beside the pixel that it starts from, so no pixel can be told when it has \
+             enough; give `render.samples` a number",
+        );
+    }
+    let is_whole = course.shard.is_none_or(|shard| shard == Shard::ALL);
+    if !is_whole || course.checkpoint.is_some() || !course.shares.is_empty() {
+        return refused(
+            "light of the whole picture is spread at once: leave out --shard and --checkpoint, or \
+             `diffraction`",
+        );
+    }
+    Ok(())
+}
+
+/// Passes on a part of the work, and no pictures: those on the way are of cells.
+struct Part<'a> {
+    watch: &'a dyn Watch,
+    from: f64,
+    to: f64,
+}
+
+impl Watch for Part<'_> {
+    fn goes_on(&self, share: f64) -> bool {
+        self.watch.goes_on(self.from + (self.to - self.from) * share.clamp(0.0, 1.0))
+    }
+
+    fn look(&self, _so_far: &SoFar<'_>) {}
+}
+
+/// How many cells a pixel has a side.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 3")]
+fn cells_a_pixel(pitch: f64, finest: f64) -> u32 {
+    let cells = (CELLS_OF_DETAIL * pitch / finest - 1e-9).ceil();
+    cells.clamp(1.0, f64::from(MOST_CELLS)) as u32
+}
+
+/// Traces the light of `scene` and spreads it, where that is [wanted](is_wanted). `opened` is the camera, opened for the plan's bands.
+///
+/// # Errors
+///
+/// As [`trace`]; when the scene asks for what goes with no diffraction, or the lens has no waves.
+pub(crate) fn spread_light(
+    scene: &Scene,
+    plan: &Plan,
+    prepared: Prepared<'_>,
+    course: &Course<'_>,
+    opened: &Camera,
+    watch: &dyn Watch,
+) -> Result<Option<SpreadLight>, RenderError> {
+    if !is_wanted(scene, plan) {
+        return Ok(None);
+    }
+    check(scene, plan, course)?;
+    let fault = |why: String| RenderError::Diffraction(why);
+    let Some(lens) = opened.lens() else { return Err(fault("the camera has no lens".to_owned())) };
+    let waves = WaveLens::new(lens, &plan.bands).map_err(|error| fault(error.why))?;
+    let all = || waves.wavelengths().iter().flatten().copied();
+    let shortest = all().fold(f64::INFINITY, f64::min);
+    let pitch = 1e-3 * lens.focused().pixel_pitch();
+    let cells = cells_a_pixel(pitch, lens.airy_unit(shortest));
+    // Light along chief rays, and depths.
+    let (picture, lit, mut film) = cell_picture(scene, plan, prepared, cells, watch)?;
+    let [columns, rows] = scene.camera.resolution();
+    let illumination = illumination(opened, plan, [columns, rows]);
+    let mean = all().sum::<f64>() / all().count().max(1) as f64;
+    let layers = DepthLayers::of(&picture.depths, lens, mean);
+    let spreads = Spreads::new(&waves, &layers, [columns, rows], f64::from(cells), pitch)
+        .map_err(|error| fault(error.to_string()))?;
+    let bands = plan.bands.count();
+    let mut planes: Vec<Vec<Vec<f32>>> = vec![Vec::new(); lit.len()];
+    for (band, arrives) in illumination.iter().enumerate() {
+        let part = Part { watch, from: TRACING, to: 1.0 };
+        if !part.goes_on(band as f64 / bands.max(1) as f64) {
+            return Err(RenderError::Stopped);
+        }
+        let own = composed(&picture, (&layers, &spreads), band, arrives);
+        planes.iter_mut().zip(own).for_each(|(planes, plane)| planes.push(plane));
+    }
+    let notes = std::mem::take(&mut film.notes);
+    let layers = lit.into_iter().zip(planes).collect();
+    Ok(Some(SpreadLight { layers, counts: film.counts, notes }))
+}
+
+/// The scene along chief rays on cells: light and depths; which layers of light; and its film, emptied.
+fn cell_picture(
+    scene: &Scene,
+    plan: &Plan,
+    prepared: Prepared<'_>,
+    cells: u32,
+    watch: &dyn Watch,
+) -> Result<(CellPicture, Vec<LayerSpec>, Film), RenderError> {
+    let mut fine = scene.clone();
+    fine.camera = scene.camera.along_chief_rays(cells);
+    fine.sensor = None;
+    fine.layers = plan.layers.iter().copied().filter(|layer| layer.is_light()).collect();
+    let lit = fine.layers.clone();
+    fine.layers.push(LayerSpec::Depth);
+    fine.render.samples = SamplesSpec::Count(plan.samples.div_ceil(cells * cells).max(1));
+    let mut fine_plan = Plan::in_bands(&fine, Outputs::NONE, &plan.bands);
+    // Nobody sees it on the way.
+    fine_plan.passes = std::iter::once(0..fine_plan.samples).collect();
+    let prepared = Prepared { others: &[], ..prepared };
+    let part = Part { watch, from: 0.0, to: TRACING };
+    let mut film = trace(&fine, &fine_plan, prepared, &[], &Course::default(), &part)?;
+    let mut depths = Vec::new();
+    let mut light = Vec::new();
+    for layer in std::mem::take(&mut film.layers) {
+        let is_light = layer.spec.is_light();
+        let planes = layer.into_planes().into_iter().map(|values| match values {
+            Values::F32(values) => values,
+            #[expect(clippy::cast_possible_truncation, reason = "single precision does")]
+            Values::F64(values) => values.into_iter().map(|value| value as f32).collect(),
+            Values::U16(_) | Values::U32(_) => Vec::new(),
+        });
+        match is_light {
+            true => light.push(planes.collect()),
+            false => depths = planes.flatten().collect(),
+        }
+    }
+    let size = fine.camera.resolution().map(|side| side as usize);
+    Ok((CellPicture { size, cells: cells as usize, light, depths }, lit, film))
+}
+
+/// What of light arrives: a grid over the picture that is interpolated in.
+#[derive(Debug, Clone)]
+pub(crate) struct Illumination {
+    values: Vec<f64>,
+    size: [f64; 2],
+}
+
+/// Places a side of the grid of what arrives.
+const PLACES: u32 = 25;
+
+impl Illumination {
+    /// What arrives at a place of the picture (pixels from the corner).
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the grid")]
+    pub(crate) fn at(&self, [column, row]: [f64; 2]) -> f64 {
+        let last = f64::from(PLACES - 1);
+        let part = |at: f64, size: f64| {
+            let at = (at / size * last).clamp(0.0, last);
+            let low = at.floor().min(last - 1.0);
+            (low as usize, at - low)
+        };
+        let (x, right) = part(column, self.size[0]);
+        let (y, down) = part(row, self.size[1]);
+        let value = |x: usize, y: usize| self.values[y * PLACES as usize + x];
+        let line = |y: usize| value(x, y) * (1.0 - right) + value(x + 1, y) * right;
+        line(y) * (1.0 - down) + line(y + 1) * down
+    }
+}
+
+/// What arrives of each band.
+fn illumination(opened: &Camera, plan: &Plan, resolution: [u32; 2]) -> Vec<Illumination> {
+    let size = resolution.map(f64::from);
+    let share = |k: u32| f64::from(k) / f64::from(PLACES - 1);
+    let places: Vec<[f64; 2]> = (0..PLACES * PLACES)
+        .map(|k| [share(k % PLACES) * size[0], share(k / PLACES) * size[1]])
+        .collect();
+    let mut by_band = Vec::new();
+    for (number, group) in opened.band_groups(&plan.bands).into_iter().enumerate() {
+        let values = opened.illumination(&places, number);
+        by_band.extend(group.bands.map(|_| Illumination { values: values.clone(), size }));
+    }
+    by_band
+}
+
+/// Puts light that was spread onto its layers of the film, and what it took to the rest.
+pub(crate) fn put(
+    film: &mut [FilmLayer],
+    spread: Option<SpreadLight>,
+    counts: &mut RayCounts,
+    notes: &mut Vec<String>,
+) {
+    let Some(spread) = spread else { return };
+    counts.merge(&spread.counts);
+    notes.extend(spread.notes);
+    for (spec, planes) in spread.layers {
+        let Some(layer) = film.iter_mut().find(|layer| layer.spec == spec) else { continue };
+        for ((_, values), plane) in layer.named_planes_mut().zip(planes) {
+            *values = match values {
+                Values::F64(_) => Values::F64(plane.into_iter().map(f64::from).collect()),
+                _ => Values::F32(plane),
+            };
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! The spread of light by place of the picture, depth and band: at nodes over the picture, between which
+//! light belongs to the four around it, to each by its share.
+
+use etendue_camera::WaveLens;
+use etendue_optics::analysis::{AnalysisError, CellGrid, CellSpread, FieldsBetween};
+use rayon::prelude::*;
+
+use super::layers::DepthLayers;
+
+/// Nodes a side behind a lens whose aberrations change over the picture, and behind an ideal one.
+const NODES: usize = 5;
+const IDEAL_NODES: usize = 3;
+
+/// Wavelengths of a band that are added up, at most.
+const WAVELENGTHS: usize = 3;
+
+/// Waves of defocus that one depth may stand for.
+const ONE_DEPTH: f64 = 0.02;
+
+/// How far towards the middle a dark node looks each time.
+const INWARDS: f64 = 0.88;
+
+/// Nodes over a picture with the fields of each.
+pub(crate) struct Spreads {
+    /// Nodes a side.
+    pub(crate) side: usize,
+    fields: Vec<Option<FieldsBetween>>,
+    /// The wavelengths (nm) of each band.
+    bands: Vec<Vec<f64>>,
+    /// Of each layer (1/mm).
+    nearness: Vec<f64>,
+    grid: CellGrid,
+}
+
+impl Spreads {
+    /// Traces the fields of all nodes.
+    ///
+    /// # Errors
+    ///
+    /// When the waves of a lens cannot be told.
+    pub(crate) fn new(
+        lens: &WaveLens<'_>,
+        layers: &DepthLayers,
+        resolution: [u32; 2],
+        cells: f64,
+        pitch: f64,
+    ) -> Result<Self, AnalysisError> {
+        let side = if lens.is_ideal() { IDEAL_NODES } else { NODES };
+        let [low, high] = layers.span();
+        let nearness = match (high - low) * layers.waves > ONE_DEPTH {
+            true => vec![low, 0.5 * (low + high), high],
+            false => vec![0.5 * (low + high)],
+        };
+        let size = resolution.map(f64::from);
+        let share = |k: usize| k as f64 / (side - 1) as f64;
+        let fields = |k: usize| {
+            let from_middle =
+                [share(k % side) - 0.5, share(k / side) - 0.5].map(|share| share.clamp(-0.5, 0.5));
+            let mut inwards = 1.0;
+            loop {
+                let place = [0, 1].map(|axis| (0.5 + inwards * from_middle[axis]) * size[axis]);
+                match lens.fields(place, &nearness) {
+                    Ok(fields) => return Ok(Some(fields)),
+                    // The nearest place with light has its spread.
+                    Err(
+                        AnalysisError::Dark { .. }
+                        | AnalysisError::NoChiefRay { .. }
+                        | AnalysisError::Singular { .. },
+                    ) if inwards > 0.1 => inwards *= INWARDS,
+                    Err(AnalysisError::Dark { .. }) => return Ok(None),
+                    Err(error) => return Err(error),
+                }
+            }
+        };
+        let fields = (0..side * side).into_par_iter().map(fields).collect::<Result<_, _>>()?;
+        let most = resolution.map(|side| f64::from(side) * cells).into_iter().fold(1.0, f64::max);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a picture's size"
+        )]
+        let grid = CellGrid { pitch: pitch / cells, turn: lens.turn(), most: most as usize };
+        Ok(Self {
+            side,
+            fields,
+            bands: lens.wavelengths().iter().map(|all| few(all)).collect(),
+            nearness: layers.nearness.iter().map(|near| 1e-3 * near).collect(),
+            grid,
+        })
+    }
+
+    /// The spread of a node's light of a layer in a band.
+    pub(crate) fn spread(&self, node: usize, layer: usize, band: usize) -> CellSpread {
+        let Some(fields) = &self.fields[node] else { return CellSpread::point() };
+        let near = self.nearness[layer];
+        let fields: Vec<_> = self.bands[band].iter().map(|&nm| fields.at(nm, near)).collect();
+        CellSpread::of(&fields, &self.grid)
+    }
+}
+
+/// Wavelengths that stand for as many, each for a run of them.
+fn few(all: &[f64]) -> Vec<f64> {
+    let count = all.len().clamp(1, WAVELENGTHS);
+    let run = |k: usize| &all[k * all.len() / count..(k + 1) * all.len() / count];
+    let mean = |run: &[f64]| run.iter().sum::<f64>() / run.len().max(1) as f64;
+    (0..count).map(|k| mean(run(k))).collect()
+}

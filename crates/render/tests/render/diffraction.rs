@@ -1,0 +1,220 @@
+//! Light spread as waves are: known patterns, no light lost, and what is refused.
+
+use etendue_geometry::glam::DVec3;
+use etendue_optics::analysis::spread::WeightedFields;
+use etendue_optics::analysis::wavefront::Cells;
+use etendue_optics::analysis::{ObjectPoint, Transfer, Wavefront};
+use etendue_render::output::Outputs;
+use etendue_render::{Course, Plan, Prepared, RenderError, Shard};
+use etendue_sensor::slanted_edge::{Lattice, slanted_edge};
+use etendue_spectrum::{Bands, Grid};
+
+use crate::steps::{channels, load, prepare, rendered};
+
+/// The wavelength of a narrow band (nm).
+const GREEN: f64 = 550.0;
+
+/// The light of a scene in one narrow band.
+fn green(text: &str) -> Vec<f64> {
+    let scene = load(text);
+    let mut plan = Plan::new(&scene, Outputs::NONE);
+    plan.bands = Bands::Spectral(Grid::equal(GREEN - 0.05, GREEN + 0.05, 1).unwrap());
+    let done = rendered(&scene, &plan);
+    let film = done.band_film.unwrap();
+    film.values.iter().map(|&value| f64::from(value)).collect()
+}
+
+/// J₁ by Bessel's integral, which the trapezoid rule takes without error.
+fn j1(x: f64) -> f64 {
+    let angle = |k: u32| std::f64::consts::PI * (f64::from(k) + 0.5) / 128.0;
+    (0..128).map(|k| (angle(k) - x * angle(k).sin()).cos()).sum::<f64>() / 128.0
+}
+
+/// The irradiance of an Airy pattern of power 1 at a distance, in units of λN (G. B. Airy, 1835).
+fn airy(r: f64) -> f64 {
+    let v = std::f64::consts::PI * r;
+    let ring = if v < 1e-6 { 1.0 } else { 2.0 * j1(v) / v };
+    std::f64::consts::FRAC_PI_4 * ring * ring
+}
+
+const SIDE: usize = 512;
+
+/// A black plane a tenth of a millimetre behind: a cell that shows a bit of a lamp is as far away as it.
+const BACKDROP: &str = r#"{"shape": "rectangle", "width": 40, "height": 40, "material": "black",
+    "transform": {"translate": [0, 0, -1e-4]}}"#;
+
+/// A lamp of a width in pixels, in the middle of one, before an ideal lens.
+fn lamp(pitch: f64, f_number: f64, width: f64, samples: u32) -> String {
+    // 50 mm, in focus at 5 m: 100 - 1 times as large there.
+    let magnified = (5000.0 - 50.0) / 50.0;
+    let pixel = pitch * 1e-6 * magnified;
+    let (side, at) = (width * pixel, 0.5 * pixel);
+    format!(
+        r#"{{"etendue": 1, "tracer": {{"type": "path", "max_bounces": 1}}, "lights": [],
+        "camera": {{"type": "thin_lens", "focal_length": 50, "f_number": {f_number},
+            "focus_distance": 5, "pose": {{"from": [0, 0, 5], "look_at": [0, 0, 0]}}, "diffraction": true,
+            "sensor": {{"resolution": [{SIDE}, {SIDE}], "pixel_pitch": {pitch}}}}},
+        "objects": [{{"shape": "rectangle", "width": {side}, "height": {side}, "material": "lamp",
+            "transform": {{"translate": [{at}, {at}, 0]}}}}, {BACKDROP}],
+        "materials": {{"black": {{"type": "matte", "color": [0, 0, 0]}}, "lamp": {{"type": "emissive", "radiance": [1, 1, 1]}}}},
+        "render": {{"samples": {samples}}}}}"#
+    )
+}
+
+/// The Airy pattern of a lamp on pixels. The pattern is seen through the lamp and the pixel, two boxes, each
+/// of which has its own width in each direction.
+#[test]
+fn a_lamp_is_the_airy_pattern_on_pixels() {
+    // Three pixels that see a lamp of this width have its second moment and their own together (the root of
+    // w³ − 11 w + 12, here to a whole number of the samples' strata).
+    let width = 1.0 + 2.0 * 9.0 / 64.0;
+    let (pitch, f_number) = (2.4, 22.0);
+    let picture = green(&lamp(pitch, f_number, width, 64));
+    let unit = GREEN * 1e-3 * f_number * 5000.0 / 4950.0;
+    let pixel = pitch / unit;
+    let expected = |column: f64, row: f64| -> f64 {
+        const N: i32 = 24;
+        let reach = 0.5 * (1.0 + width);
+        let step = reach / f64::from(N);
+        let share = |k: i32| (reach - f64::from(k.abs()) * step).min(1.0_f64.min(width));
+        let mut sum = 0.0;
+        for y in -N..=N {
+            for x in -N..=N {
+                let at = [column + f64::from(x) * step, row + f64::from(y) * step];
+                sum += share(x) * share(y) * airy(pixel * at[0].hypot(at[1]));
+            }
+        }
+        sum * (pixel * step).powi(2)
+    };
+    let peak = expected(0.0, 0.0);
+    let mut worst = 0.0_f64;
+    let middle = SIDE as f64 / 2.0;
+    for row in SIDE / 2 - 40..SIDE / 2 + 40 {
+        for column in SIDE / 2 - 40..SIDE / 2 + 40 {
+            // Up is towards smaller rows.
+            let (x, y) = (column as f64 - middle, row as f64 - middle + 1.0);
+            worst = worst.max((picture[row * SIDE + column] - expected(x, y)).abs() / peak);
+        }
+    }
+    // A thousandth: the fourth moments of what three pixels see and of the lamp differ, which is 7e-4 of the
+    // peak where a pixel is a fifth of λN, and the share of the pattern beyond the picture's edge is 1e-4.
+    assert!(worst < 1e-3, "{worst}");
+}
+
+/// All of a lamp's light arrives.
+#[test]
+fn no_light_is_lost() {
+    for (f_number, pitch) in [(22.0, 3.2), (2.8, 3.45)] {
+        let sum: f64 = green(&lamp(pitch, f_number, 1.0, 36)).iter().sum();
+        // A pixel of radiance 1 on the axis; what lands beyond the picture's edge is 1e-5 of the light.
+        assert!((sum - 1.0).abs() < 1e-4, "f/{f_number}: {sum}");
+    }
+}
+
+/// The edge of a bright half, turned by 5 degrees, seen through a double Gauss at 1.6 m, in focus at
+/// another distance.
+fn edge(f_number: f64, pitch: f64, focus: f64) -> String {
+    let lens = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/lenses/double-gauss.json");
+    let lens = std::fs::read_to_string(lens).unwrap();
+    format!(
+        r#"{{"etendue": 1, "tracer": {{"type": "path", "max_bounces": 1}}, "lights": [],
+        "camera": {{"type": "lens", "lens": {lens}, "f_number": {f_number}, "diffraction": true,
+            "focus_distance": {focus}, "pose": {{"from": [0, 0, 1.6], "look_at": [0, 0, 0]}},
+            "sensor": {{"resolution": [240, 180], "pixel_pitch": {pitch}}}}},
+        "objects": [{{"shape": "rectangle", "width": 1, "height": 4, "material": "lamp",
+            "transform": {{"translate": [0.5019, 0.0436, 0], "rotate": [0, 0, 1, 5]}}}}, {BACKDROP}],
+        "materials": {{"black": {{"type": "matte", "color": [0, 0, 0]}}, "lamp": {{"type": "emissive", "radiance": [1, 1, 1]}}}},
+        "render": {{"samples": 72}}}}"#
+    )
+}
+
+/// The edge that a camera renders, measured as ISO 12233 does, has the modulation that the lens has by
+/// itself: in focus and two waves off, from where aberrations rule to where diffraction does.
+#[test]
+fn a_rendered_edge_has_the_modulation_of_the_lens() {
+    for (f_number, pitch) in [(2.8, 2.4), (8.0, 3.45), (22.0, 6.0)] {
+        for waves in [0.0, 2.0] {
+            let still = load(&edge(f_number, pitch, 1.6));
+            let lens = still.camera.lens().unwrap();
+            let focus = 1.0 / (1.0 / 1.6 + waves / lens.waves_of_defocus(GREEN));
+            let text = edge(f_number, pitch, focus);
+            let scene = load(&text);
+            let focused = scene.camera.lens().unwrap().focused();
+            let train = focused.train();
+            let at = train.at(GREEN).unwrap();
+            let place = DVec3::new(0.0, 0.0, focused.origin() - 1600.0);
+            let object = ObjectPoint::Near { place };
+            let wavefront =
+                Wavefront::new(train, &at, object, focused.sensor_z(), Cells::Needed).unwrap();
+            let own = Transfer::diffraction(&WeightedFields::one(wavefront.pupil));
+            let picture = green(&text);
+            // Without the rows and columns beyond which the picture is taken to go on.
+            let region: Vec<f64> =
+                (10..170).flat_map(|y| picture[y * 240 + 10..][..220].to_vec()).collect();
+            let edge = slanted_edge(&region, [220, 160], Lattice::ALL).unwrap();
+            let mut worst = 0.0_f64;
+            for k in 1..=10 {
+                let f = 0.05 * f64::from(k);
+                let expected = own.modulation(f / pitch * 1e3)[1];
+                let measured = edge.modulation_at(f) / edge.modulation_of_pixels(f);
+                println!("f/{f_number} {waves} waves {f:.2}: {measured:.4} {expected:.4}");
+                worst = worst.max((measured - expected).abs());
+            }
+            // A hundredth: cells of a third of a pixel leave half of that at half a cycle a pixel, the rest
+            // is samples along the edge and the depth of the grid of fields.
+            assert!(worst < 0.01, "f/{f_number}, {waves} waves off: {worst}");
+        }
+    }
+}
+
+/// Light of all directions lights the picture as it does by rays: falloff and vignetting are the same.
+#[test]
+fn even_light_falls_off_as_by_rays() {
+    let text = |diffraction: bool| {
+        let lens = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/lenses/double-gauss.json");
+        let lens = std::fs::read_to_string(lens).unwrap();
+        format!(
+            r#"{{"etendue": 1, "tracer": {{"type": "path", "max_bounces": 1}}, "lights": [],
+            "camera": {{"type": "lens", "lens": {lens}, "f_number": 4, "diffraction": {diffraction},
+                "focus_distance": 2, "sensor_height": 24, "pose": {{"from": [0, 0, 2], "look_at": [0, 0, 0]}},
+                "sensor": {{"resolution": [36, 24]}}}},
+            "objects": [{{"shape": "rectangle", "width": 9, "height": 9, "material": "lamp"}}],
+            "materials": {{"lamp": {{"type": "emissive", "radiance": [1, 1, 1]}}}},
+            "render": {{"samples": 256}}}}"#
+        )
+    };
+    let [waves, rays] = [true, false].map(|diffraction| {
+        let picture = rendered(
+            &load(&text(diffraction)),
+            &Plan::new(&load(&text(diffraction)), Outputs::NONE),
+        );
+        channels(&picture.picture, "")
+    });
+    let worst = waves.iter().flatten().zip(rays.iter().flatten()).map(|(a, b)| (a - b).abs());
+    let worst = worst.fold(0.0, f64::max);
+    // 256 samples of the pupil by rays, and a grid of 25 places a side of what arrives.
+    assert!(worst < 0.01, "{worst}");
+    assert!(waves[1][0] < 0.8 * waves[1][36 * 12 + 18]);
+}
+
+/// What waves cannot be spread over is refused by name.
+#[test]
+fn what_goes_with_no_diffraction_is_refused() {
+    let scene = load(&lamp(3.45, 8.0, 1.0, 4));
+    let plan = Plan::new(&scene, Outputs::NONE);
+    let (accel, images) = prepare(&scene, &plan);
+    let prepared = Prepared { accel: &*accel, images: &images, others: &[] };
+    let course = Course { shard: Some(Shard::new(1, 2).unwrap()), ..Course::default() };
+    let error =
+        etendue_render::trace(&scene, &plan, prepared, &[], &course, &|_: f64| true).unwrap_err();
+    assert!(matches!(&error, RenderError::Diffraction(why) if why.contains("--shard")), "{error}");
+    let mut adaptive = load(&lamp(3.45, 8.0, 1.0, 4));
+    adaptive.render.samples =
+        serde_json::from_str(r#"{"relative_error": 0.1, "min": 4, "max": 64}"#).unwrap();
+    let plan = Plan::new(&adaptive, Outputs::NONE);
+    let prepared = Prepared { accel: &*accel, images: &images, others: &[] };
+    let error =
+        etendue_render::trace(&adaptive, &plan, prepared, &[], &Course::default(), &|_: f64| true)
+            .unwrap_err();
+    assert!(matches!(&error, RenderError::Diffraction(why) if why.contains("samples")), "{error}");
+}
