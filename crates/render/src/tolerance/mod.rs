@@ -383,6 +383,10 @@ fn simplest(
         notes.push("lenslets cut the picture up, which no simpler lens does".to_owned());
         return Ok(None);
     }
+    if scene.camera.diffracts() {
+        notes.push("light is spread by the waves of this very lens".to_owned());
+        return Ok(None);
+    }
     let tolerance = spec.tolerance();
     let view = FullView::new(scene, accel, &plan.bands, Field::QUICK)?;
     let models = match view.models(tolerance) {

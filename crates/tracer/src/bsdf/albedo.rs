@@ -24,10 +24,12 @@ pub(super) const ROUGHNESSES: usize = 48;
 pub(super) const OBLIQUITIES: usize = 96;
 
 /// The least roughness of the table; smoother sheets differ at μ < 10⁻⁴ alone.
+#[cfg(test)]
 const SMOOTHEST: f64 = 1e-6;
 
 /// Facets that each entry is averaged over: a lattice by the golden ratio, all of whose points differ along
 /// both axes, as the viewer's azimuth changes nothing face on.
+#[cfg(test)]
 const FACETS: u32 = 1024;
 
 #[derive(Debug)]
@@ -38,9 +40,22 @@ pub(super) struct AlbedoTable {
     pub(super) means: Vec<[f64; 3]>,
 }
 
-pub(super) static TABLE: LazyLock<AlbedoTable> = LazyLock::new(AlbedoTable::new);
+pub(super) static TABLE: LazyLock<AlbedoTable> = LazyLock::new(AlbedoTable::kept);
+
+/// The table as [`AlbedoTable::new`] made it: numbers of 64 bits, the lowest byte first, entries and then means. A
+/// test makes it anew, and writes it with `ETENDUE_GENERATE=1`.
+const KEPT: &[u8] = include_bytes!("albedo.bin");
 
 impl AlbedoTable {
+    /// The one of the program, for making one takes as long as a small picture.
+    fn kept() -> Self {
+        let (numbers, _) = KEPT.as_chunks();
+        let numbers: Vec<f64> = numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
+        let (entries, means) = numbers.split_at(2 * ROUGHNESSES * OBLIQUITIES);
+        Self { entries: entries.as_chunks().0.to_vec(), means: means.as_chunks().0.to_vec() }
+    }
+
+    #[cfg(test)]
     fn new() -> Self {
         let mut entries = Vec::with_capacity(ROUGHNESSES * OBLIQUITIES);
         let mut means = Vec::with_capacity(ROUGHNESSES);
@@ -79,6 +94,7 @@ pub(super) fn cosine(place: f64, alpha: f64) -> f64 {
 }
 
 /// ∫ 2 μ E dμ = ∫ 4 x³ E dx, x = √μ, of the interpolation, by the midpoint rule.
+#[cfg(test)]
 fn mean(row: &[[f64; 2]], alpha: f64) -> [f64; 3] {
     const STEPS: u32 = 512;
     let mut sum = [0.0; 3];
@@ -103,6 +119,7 @@ pub(super) fn lacking(returned: f64) -> f64 {
 }
 
 /// The place in 0..=1 of knot `k` of `COUNT`.
+#[cfg(test)]
 fn knot<const COUNT: usize>(k: usize) -> f64 {
     k as f64 / (COUNT - 1) as f64
 }
@@ -224,4 +241,30 @@ pub(super) fn place(x: f64, count: usize) -> (usize, f64) {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range")]
     let knot = (scaled as usize).min(count - 2);
     (knot, scaled - knot as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[expect(clippy::disallowed_methods, reason = "a file of the source is made")]
+    fn the_table_that_is_kept_is_the_one_that_is_made() {
+        let (made, kept) = (AlbedoTable::new(), AlbedoTable::kept());
+        let numbers = |table: &AlbedoTable| {
+            [table.entries.as_flattened(), table.means.as_flattened()].concat()
+        };
+        let (made, kept) = (numbers(&made), numbers(&kept));
+        if std::env::var_os("ETENDUE_GENERATE").is_some() {
+            let path = concat!(env!("CARGO_MANIFEST_DIR"), "/src/bsdf/albedo.bin");
+            let bytes: Vec<u8> = made.iter().flat_map(|number| number.to_le_bytes()).collect();
+            std::fs::write(path, bytes).unwrap();
+            return;
+        }
+        assert_eq!(made.len(), kept.len());
+        for (made, kept) in made.iter().zip(&kept) {
+            // Libraries' sines differ by a unit in the last place, and a thousand are summed.
+            assert!((made - kept).abs() < 1e-12, "{made} {kept}");
+        }
+    }
 }
