@@ -123,7 +123,8 @@ def main():
             for name, spec in all_scenes.items():
                 few, many = (seconds(arguments.command, spec, samples, folder) for samples in arguments.samples)
                 times[name].append(many - few)
-    lines = [f"`make bench-time ARGS=\"--rounds {arguments.rounds}\"`: {section.machine()}; a room, paths of five bounces, "
+    words = f"--rounds {arguments.rounds} --side {arguments.side} --samples {arguments.samples[0]} {arguments.samples[1]}"
+    lines = [f"`make bench-time ARGS=\"{words}\"`: {section.machine()}; a room, paths of five bounces, "
              f"{arguments.side} × {arguments.side} pixels, {arguments.samples[1] - arguments.samples[0]} samples; median of the rounds, "
              "with the least and the greatest.", "",
              "| | beside | times as long a sample | goal |", "|---|---|---|---|"]

@@ -34,7 +34,7 @@ pub struct Exact {
 
 /// A tree with f64 boxes.
 #[derive(Debug, Default)]
-struct Boxes {
+pub(crate) struct Boxes {
     nodes: Vec<ExactNode>,
     /// In leaf order: placement and triangle, or a number of an instance twice.
     items: Vec<[u32; 2]>,
@@ -225,7 +225,7 @@ impl Boxes {
     }
 
     /// The same tree, with boxes from the leaves up.
-    fn around(tree: Tree, bounds: impl Fn([u32; 2]) -> Bounds + Sync) -> Self {
+    pub(crate) fn around(tree: Tree, bounds: impl Fn([u32; 2]) -> Bounds + Sync) -> Self {
         let items: Vec<[u32; 2]> = tree.refs.par_iter().map(|r| [r.first, r.second]).collect();
         drop(tree.refs);
         let leaf = |node: &Node| {
@@ -249,14 +249,14 @@ impl Boxes {
         self.nodes.first().map_or(Bounds::EMPTY, |root| root.bounds)
     }
 
-    fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         self.nodes.capacity() * size_of::<ExactNode>()
             + self.items.capacity() * size_of::<[u32; 2]>()
     }
 
     /// Shows the items of all leaves whose box the ray meets between `t_min` and `t_max`, which
     /// `see` may lower, until `see` answers `false`.
-    fn visit(
+    pub(crate) fn visit(
         &self,
         ray: &LocalRay,
         t_min: f64,

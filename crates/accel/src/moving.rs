@@ -18,7 +18,10 @@ use etendue_geometry::{
 };
 
 use crate::deforming::Deforming;
-use crate::{Accel, BuildError, BuildOptions, BuildReport, Counts};
+use crate::exact::Boxes;
+use crate::parts::{LocalRay, outward};
+use crate::tree::{LeafSize, MAX_DEPTH, Ref, Tree};
+use crate::{Accel, BuildError, BuildOptions, BuildReport, BuildWatch, Counts};
 
 /// Builds a structure of one backend.
 pub type Build<'a> = &'a dyn Fn(Arc<Geometry>, &BuildOptions) -> Result<Box<dyn Accel>, BuildError>;
@@ -47,9 +50,13 @@ struct Moving {
     /// One for each mesh that moves.
     shapes: Vec<Box<dyn Accel>>,
     bodies: Vec<Body>,
+    /// Over the boxes that they sweep.
+    tree: Boxes,
     /// Of each placement, whether it moves.
     moves: Vec<bool>,
     exposure: [f64; 2],
+    /// The largest coordinate of a box (m).
+    size: f64,
     report: BuildReport,
 }
 
@@ -124,6 +131,7 @@ impl Moving {
             let motion = Arc::clone(motion);
             bodies.push(Body { placement, shape, motion, swept, deforms });
         }
+        let tree = over(&bodies, options)?;
         let still = build(Arc::new(still), options)?;
         let mut report = still.report();
         for shape in &shapes {
@@ -131,10 +139,13 @@ impl Moving {
             report.bytes += bytes;
             report.copied_bytes += copied_bytes;
         }
-        report.bytes += (bodies.capacity() * size_of::<Body>()) as u64;
+        report.bytes += (bodies.capacity() * size_of::<Body>() + tree.bytes()) as u64;
         report.backend = format!("{}, {} moving", report.backend, bodies.len());
         report.time = start.elapsed();
-        Ok(Self { still, shapes, bodies, moves, exposure: options.exposure, report })
+        let far = |body: &Body| body.swept.min.abs().max(body.swept.max.abs()).max_element();
+        let size = bodies.iter().map(far).fold(0.0, f64::max);
+        let exposure = options.exposure;
+        Ok(Self { still, shapes, bodies, tree, moves, exposure, size, report })
     }
 
     /// The rays with those triangles at their ends that stand still.
@@ -150,10 +161,40 @@ impl Moving {
         Cow::Owned(own)
     }
 
-    /// Carries those `rays` into the frame of `body` that meet it no farther than `t_max` says.
+    /// The bodies whose boxes each ray meets no farther than `t_max` says, with it: in order.
+    fn near(&self, rays: &RayBatch, t_max: impl Fn(usize) -> Option<f64>) -> Vec<[u32; 2]> {
+        let [open, close] = self.exposure;
+        let (mut near, mut stack) = (Vec::new(), Vec::with_capacity(MAX_DEPTH));
+        for i in 0..rays.len() {
+            let Some(mut t_max) = t_max(i) else { continue };
+            let ray = u32::try_from(i).unwrap_or(MISS);
+            if !(open..=close).contains(&rays.time(i)) {
+                // It may be anywhere then.
+                near.extend((0..self.bodies.len()).map(|body| [number(body), ray]));
+                continue;
+            }
+            let (origin, direction) = (rays.origin(i), rays.direction(i));
+            let pad = 8.0 * f64::EPSILON * origin.abs().max_element().max(self.size);
+            let local = LocalRay { origin, direction, pad };
+            self.tree.visit(
+                &local,
+                rays.t_min()[i],
+                &mut t_max,
+                &mut stack,
+                &mut |[body, _], _| {
+                    near.push([body, ray]);
+                    true
+                },
+            );
+        }
+        near.sort_unstable();
+        near
+    }
+
+    /// Carries those of the rays `near` a body into its frame that meet it no farther than `t_max` says.
     fn carry(
         &self,
-        body: &Body,
+        (body, near): (&Body, &[[u32; 2]]),
         rays: &RayBatch,
         t_max: impl Fn(usize) -> Option<f64>,
         carried: &mut Carried,
@@ -165,7 +206,7 @@ impl Moving {
         carried.rays.precision = HitPrecision::Double;
         carried.from.clear();
         let [open, close] = self.exposure;
-        for i in 0..rays.len() {
+        for i in near.iter().map(|&[_, ray]| ray as usize) {
             let Some(t_max) = t_max(i) else { continue };
             let (origin, direction, time) = (rays.origin(i), rays.direction(i), rays.time(i));
             let limits = [rays.t_min()[i], t_max];
@@ -205,6 +246,22 @@ impl Moving {
     }
 }
 
+/// A body's number.
+fn number(body: usize) -> u32 {
+    u32::try_from(body).unwrap_or(MISS)
+}
+
+/// A tree over the boxes that bodies sweep.
+fn over(bodies: &[Body], options: &BuildOptions) -> Result<Boxes, BuildError> {
+    let watch = BuildWatch::new(options, bodies.len() as u64);
+    let refs = bodies.iter().enumerate().map(|(i, body)| {
+        let (lo, hi) = outward([body.swept.min, body.swept.max]);
+        Ref { lo, first: number(i), hi, second: number(i) }
+    });
+    let tree = Tree::build(refs.collect(), LeafSize { most: 1, block: 1 }, &watch)?;
+    Ok(Boxes::around(tree, |[i, _]| bodies[i as usize].swept))
+}
+
 /// Whether a ray meets a box at distances (m) within `limits`, rounding in favour of yes.
 fn meets(bounds: Bounds, origin: DVec3, direction: DVec3, [t_min, t_max]: [f64; 2]) -> bool {
     let size = origin.abs().max(bounds.min.abs()).max(bounds.max.abs()).max_element();
@@ -231,14 +288,16 @@ impl Accel for Moving {
         hits.set_times(rays.times());
         let mut carried = Carried::default();
         carried.hits.detail = hits.detail;
-        for body in &self.bodies {
-            let reach = |i: usize| {
-                let t = hits.t[i].min(rays.t_max()[i]);
-                // As far as what is in the same place.
-                let t = t + ONE_PLACE * t.abs().max(rays.origin(i).abs().max_element());
-                Some(if t.is_nan() { f64::INFINITY } else { t.min(rays.t_max()[i]) })
-            };
-            self.carry(body, rays, reach, &mut carried);
+        let reach = |hits: &HitBatch, i: usize| {
+            let t = hits.t[i].min(rays.t_max()[i]);
+            // As far as what is in the same place.
+            let t = t + ONE_PLACE * t.abs().max(rays.origin(i).abs().max_element());
+            Some(if t.is_nan() { f64::INFINITY } else { t.min(rays.t_max()[i]) })
+        };
+        let near = self.near(rays, |i| reach(hits, i));
+        for near in near.chunk_by(|a, b| a[0] == b[0]) {
+            let body = &self.bodies[near[0][0] as usize];
+            self.carry((body, near), rays, |i| reach(hits, i), &mut carried);
             if carried.from.is_empty() {
                 continue;
             }
@@ -275,9 +334,11 @@ impl Accel for Moving {
     fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>) {
         self.still.occluded(&self.with_still_ends(rays), blocked);
         let mut carried = Carried::default();
-        for body in &self.bodies {
-            let reach = |i: usize| (!blocked[i]).then(|| rays.t_max()[i]);
-            self.carry(body, rays, reach, &mut carried);
+        let reach = |blocked: &[bool], i: usize| (!blocked[i]).then(|| rays.t_max()[i]);
+        let near = self.near(rays, |i| reach(blocked, i));
+        for near in near.chunk_by(|a, b| a[0] == b[0]) {
+            let body = &self.bodies[near[0][0] as usize];
+            self.carry((body, near), rays, |i| reach(blocked, i), &mut carried);
             if carried.from.is_empty() {
                 continue;
             }

@@ -287,3 +287,23 @@ fn too_many_steps_are_refused_by_their_mesh() {
     assert!(words.contains("memory"), "{words}");
     assert!(!bench.path("out").exists());
 }
+
+/// The plan says how many steps there are and why, and the forecast has their memory and that of motion.
+#[test]
+fn the_plan_tells_of_steps_and_of_their_memory() {
+    let bench = bench(&scene(&json!({ "exposure": LENGTH }), &json!({})), write_arm);
+    let output = bench.run(&["plan", "scene.json"]);
+    let words = text(&output.stdout);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(words.contains("1 meshes change their shapes, in up to"), "{words}");
+    assert!(words.contains("thousandth of a pixel") && words.contains(" motion"), "{words}");
+    // Parallel rays of 40 pixels a metre; a stretch of √3 counts at most: r θ² / 8 n² of 10⁻³ pixels.
+    let steps: f64 = words
+        .split("in up to ")
+        .nth(1)
+        .and_then(|rest| rest.split(' ').next())
+        .and_then(|count| count.parse().ok())
+        .expect("a number of steps");
+    let least = std::f64::consts::FRAC_PI_2 * (2.0 * 40.0 / 8e-3_f64).sqrt();
+    assert!((least..2.0 * least).contains(&steps), "{steps} steps, {least} at least");
+}

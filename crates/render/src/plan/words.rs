@@ -44,6 +44,20 @@ fn explain_shutter(scene: &Scene) -> Option<Decision> {
             placed.len()
         ),
     };
+    let steps: Vec<usize> = scene
+        .geometry
+        .meshes
+        .iter()
+        .filter_map(|mesh| Some(mesh.steps.as_ref()?.times().len()))
+        .collect();
+    let shapes = match steps.iter().max() {
+        None => String::new(),
+        Some(most) => format!(
+            "; {} meshes change their shapes, in up to {most} steps, so many that no corner is farther than a \
+             thousandth of a pixel from the straight lines between them",
+            steps.len()
+        ),
+    };
     let why = match (scene.camera.is_timed(), shutter.is_fully_open()) {
         (true, _) if scene.camera.motion().is_some() => {
             "the camera moves: samples of light have times of their row's exposure"
@@ -63,7 +77,7 @@ fn explain_shutter(scene: &Scene) -> Option<Decision> {
             "; its {count} slots are rendered one after another, and their light is added up"
         ),
     };
-    Some(Decision::new(Kind::Shutter, shutter.words(), format!("{why}{bodies}{slots}")))
+    Some(Decision::new(Kind::Shutter, shutter.words(), format!("{why}{bodies}{shapes}{slots}")))
 }
 
 impl Plan {

@@ -17,9 +17,9 @@ const EMBREE_PER_TRIANGLE: u64 = 92;
 /// copies of one object; `benches/memory.py`, with `--accel bvh`, too.
 const PER_COPY: u64 = 1000;
 
-/// Bytes of a placement that moves while the shutter is open, beside what placements have: its motion, twice for the scene
-/// and while it is loaded, and what the structure keeps of it. Counted of the types; its keys and links come on top of it.
-const PER_MOVING: u64 = 500;
+/// Bytes of a placement that moves while the shutter is open, beside what copies have: its motion, with what the structure keeps of
+/// it in place of an instance. Counted of the types; keys and links come on top of it.
+const PER_MOVING: u64 = 300;
 
 /// Bytes of the program itself with its libraries and the threads' working memory: 24 to 31 MiB are the
 /// peak of renders of a few pixels.

@@ -136,8 +136,7 @@ pub struct AnimationSpec {
     /// Which of the file's animations, by name or by number from 0; the first when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Whether it goes on from there while the shutter is open: nodes move. Skins and morph targets that would are
-    /// refused.
+    /// Whether it goes on from there while the shutter is open: nodes move, and skins and morph targets change shapes.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub plays: bool,
 }
