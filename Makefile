@@ -38,7 +38,7 @@ help:
 	@echo "make bench-time    what shutters, moving cameras, copies and shapes cost; writes a part of docs/time.md"
 	@echo "make bench-gaps    what finding the thinnest gap of a million triangles takes; writes a part of docs/light.md"
 	@echo "make bench-window  how soon and how often the window shows pictures; writes a part of docs/window.md"
-	@echo "make bench-decisions  what decisions of the plan save, each against the fuller model"
+	@echo "make bench-decisions  what decisions of the plan save, each against the fuller model, and what overriding it by hand would"
 	@echo "make generated     schemas, tables of keys and the page of the command line, as the program writes them"
 	@echo "make gallery       render the pictures of docs/gallery.md, and write there what they took"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"

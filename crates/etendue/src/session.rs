@@ -315,6 +315,7 @@ impl Session {
         self.load(progress)?;
         if self.loaded()?.scene.tolerance.is_some() {
             self.prepare(progress)?;
+            self.take(progress)?;
         }
         Ok(&self.loaded()?.plan)
     }
@@ -337,8 +338,7 @@ impl Session {
     /// tolerated; when it is stopped.
     pub fn prepare(&mut self, progress: &Progress) -> Result<(), Error> {
         self.build(progress)?;
-        self.decode(progress)?;
-        self.take(progress)
+        self.decode(progress)
     }
 
     /// Checks, before the first of `frames` is rendered into `out`, that no file of any of them, nor of the data

@@ -18,6 +18,7 @@
 mod adaptive;
 mod alike;
 mod band_paths;
+mod build;
 mod checkpoint;
 pub mod denoise;
 mod diffraction;
@@ -51,6 +52,7 @@ mod watch;
 
 pub use adaptive::SampleCounts;
 pub use band_paths::BandPaths;
+pub use build::{accelerators, build, build_without, rebuild};
 pub use checkpoint::Checkpoint;
 pub use error::RenderError;
 pub use film::{NoMemory, Precision};
@@ -58,10 +60,7 @@ pub use film_file::{FilmError, FilmFile, FilmHeader, Identity};
 pub use images::Images;
 pub use other_frame::FollowedFrame;
 pub use plan::{Plan, Unseen};
-pub use render::{
-    Course, Film, Prepared, Progress, Rendered, accelerators, build, build_without, finish,
-    rebuild, render, sample_set, trace,
-};
+pub use render::{Course, Film, Prepared, Progress, Rendered, finish, render, sample_set, trace};
 pub use report::{Report, Seconds};
 pub use shard::{Shard, ShardBy};
 pub use stopping::Stopping;

@@ -1,14 +1,13 @@
-//! From a loaded scene to a picture: build, decode, trace.
+//! From a loaded scene to a picture: decode, trace.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use etendue_accel::{Accel, BuildError, BuildOptions, build_moving};
+use etendue_accel::Accel;
 use etendue_camera::{Camera, LensCamera, PixelExtent};
-use etendue_geometry::Geometry;
 use etendue_optics::element::StatusCounts;
 use etendue_scene::Scene;
-use etendue_scene::file::{AccelName, LightRow, SETS};
+use etendue_scene::file::{LightRow, SETS};
 use etendue_spectrum::Bands;
 use etendue_tracer::layer::OtherFrame;
 use etendue_tracer::{
@@ -25,7 +24,6 @@ use crate::images::Images;
 use crate::other_frame::FollowedFrame;
 use crate::output::{Development, Layer, Picture, PictureError};
 use crate::passes::Passed;
-use crate::plan::Unseen;
 use crate::radiance::LightPass;
 use crate::samples::{Sampling, Sum, short_passes};
 use crate::shard::{Shard, must_be_whole};
@@ -61,96 +59,6 @@ pub struct Rendered {
     pub trace_time: Duration,
     /// What a user should know of the picture.
     pub notes: Vec<String>,
-}
-
-/// The accelerators that this program was built with, the best first.
-#[must_use]
-pub fn accelerators() -> &'static [AccelName] {
-    if cfg!(feature = "embree") {
-        &[AccelName::Embree, AccelName::Bvh, AccelName::Exact]
-    } else {
-        &[AccelName::Bvh, AccelName::Exact]
-    }
-}
-
-/// What a build of the structure over `scene` is told.
-fn options_for(scene: &Scene, plan: &Plan, options: &BuildOptions) -> BuildOptions {
-    let exposure = scene.camera.exposure_span();
-    BuildOptions { quality: plan.quality, refine: plan.refine, exposure, ..options.clone() }
-}
-
-/// Builds `scene`'s acceleration structure with the backend that it names, or else the best.
-///
-/// # Errors
-///
-/// When the backend is not built in, cannot be told the options, or cannot build: memory, size, or a
-/// stop.
-pub fn build(
-    scene: &Scene,
-    plan: &Plan,
-    options: &BuildOptions,
-) -> Result<Box<dyn Accel>, RenderError> {
-    build_over(Arc::clone(&scene.geometry), scene, plan, options)
-}
-
-/// As [`build`], without what no ray of the picture can meet: for that picture's rays alone.
-///
-/// # Errors
-///
-/// As [`build`].
-pub fn build_without(
-    unseen: &Unseen,
-    scene: &Scene,
-    plan: &Plan,
-    options: &BuildOptions,
-) -> Result<Box<dyn Accel>, RenderError> {
-    build_over(Arc::new(unseen.left_out_of(&scene.geometry)), scene, plan, options)
-}
-
-fn build_over(
-    geometry: Arc<Geometry>,
-    scene: &Scene,
-    plan: &Plan,
-    options: &BuildOptions,
-) -> Result<Box<dyn Accel>, RenderError> {
-    let options = options_for(scene, plan, options);
-    let name = scene.render.accel.unwrap_or(accelerators()[0]);
-    if options.isa.is_some() && name != AccelName::Embree {
-        return Err(RenderError::NotEmbree);
-    }
-    if cfg!(not(feature = "embree")) && name == AccelName::Embree {
-        return Err(RenderError::Absent("Embree"));
-    }
-    let one = |geometry, options: &BuildOptions| -> Result<Box<dyn Accel>, BuildError> {
-        Ok(match name {
-            #[cfg(feature = "embree")]
-            AccelName::Embree => Box::new(etendue_accel::Embree::build(geometry, options)?),
-            AccelName::Exact => Box::new(etendue_accel::Exact::build(geometry, options)?),
-            _ => Box::new(etendue_accel::Bvh::build(geometry, options)?),
-        })
-    };
-    Ok(build_moving(geometry, &options, &one)?)
-}
-
-/// As [`build`], after `before` was built for the same scene, of which parts have changed since: what of
-/// it has not is kept, where the backend can.
-///
-/// # Errors
-///
-/// As [`build`].
-pub fn rebuild(
-    scene: &Scene,
-    plan: &Plan,
-    options: &BuildOptions,
-    before: Option<&dyn Accel>,
-) -> Result<Box<dyn Accel>, RenderError> {
-    let with_quality = options_for(scene, plan, options);
-    let again = |before: &dyn Accel| before.rebuilt(Arc::clone(&scene.geometry), &with_quality);
-    let stands = scene.geometry.moving_within(with_quality.exposure).next().is_none();
-    match before.filter(|_| stands).and_then(again) {
-        Some(rebuilt) => Ok(rebuilt?),
-        None => build(scene, plan, options),
-    }
 }
 
 /// What was made ready for a frame.
@@ -261,23 +169,8 @@ fn light_of(
     Ok(Some((rules, lights)))
 }
 
-/// Traces what a `course` wants onto a film.
-///
-/// # Errors
-///
-/// As [`render`]; when what was kept is of another render.
-pub fn trace(
-    scene: &Scene,
-    plan: &Plan,
-    Prepared { accel, images, others }: Prepared<'_>,
-    header: &[(String, String)],
-    course: &Course<'_>,
-    watch: &dyn Watch,
-) -> Result<Film, RenderError> {
-    course.allows(plan.stopping)?;
-    let mut layers = empty_film(scene, plan)?;
-    let start = Instant::now();
-    // Cameras opened for the wavelengths of data and of light.
+/// The camera opened for the wavelengths of data, and that of light for those of light.
+fn opened_cameras(scene: &Scene, plan: &Plan) -> Result<[Camera; 2], RenderError> {
     let open = |camera: &Camera, bands: &Bands| match plan.pupil {
         true => camera.opened(bands).map_err(|e| RenderError::Camera(e.why)),
         false => Ok(camera.clone()),
@@ -294,6 +187,26 @@ pub fn trace(
         true => camera.clone(),
         false => open(lit_by, &plan.bands)?,
     };
+    Ok([camera, light_camera])
+}
+
+/// Traces what a `course` wants onto a film.
+///
+/// # Errors
+///
+/// As [`render`]; when what was kept is of another render.
+pub fn trace(
+    scene: &Scene,
+    plan: &Plan,
+    Prepared { accel, images, others }: Prepared<'_>,
+    header: &[(String, String)],
+    course: &Course<'_>,
+    watch: &dyn Watch,
+) -> Result<Film, RenderError> {
+    course.allows(plan.stopping)?;
+    let mut layers = empty_film(scene, plan)?;
+    let start = Instant::now();
+    let [camera, light_camera] = opened_cameras(scene, plan)?;
     let shared = light_camera.lens().filter(|_| plan.band_paths.are_shared());
     let shared = shared.and_then(LensCamera::opened_paths);
     // Light that is spread as waves are is traced by itself.

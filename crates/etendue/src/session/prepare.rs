@@ -221,6 +221,7 @@ impl Session {
     /// As [`Self::prepare`].
     pub fn verify(&mut self, progress: &Progress) -> Result<Option<Verified>, Error> {
         self.prepare(progress)?;
+        self.take(progress)?;
         let LoadedScene { scene, plan, .. } = self.loaded()?;
         let Some(taken) = &plan.taken else { return Ok(None) };
         let watch = |share: f64| progress.goes_on(Phase::Render, share);

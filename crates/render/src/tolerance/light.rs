@@ -19,7 +19,10 @@ pub(super) const BLOCK: u32 = 8;
 const SIDE: u32 = 28;
 
 /// Samples of their pixels.
-const SAMPLES: u32 = 64;
+const SAMPLES: u32 = 32;
+
+/// The numbers of surfaces among which the fewest are looked for.
+const STEPS: [u32; 11] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24];
 
 /// The share of blocks that are to be within the tolerance.
 pub(super) const MOST_BLOCKS: f64 = 0.99;
@@ -56,23 +59,15 @@ pub(super) fn fewest(
     let share =
         |bounces: u32| Ok::<_, RenderError>(differing(&pooled(&small(bounces)?, width), &all));
     // What longer paths bring falls with their length: between a number that is too few and one that will do.
-    let (mut few, mut enough) = (0, (max_bounces, 0.0));
-    let mut next = 2;
-    while next < enough.0 {
-        let found = share(next)?;
-        if found <= light {
-            enough = (next, found);
-            break;
-        }
-        few = next;
-        next *= 2;
-    }
-    while enough.0 - few > 1 {
-        let middle = few + (enough.0 - few) / 2;
-        let found = share(middle)?;
+    let steps: Vec<u32> = STEPS.into_iter().filter(|&step| step < max_bounces).collect();
+    let (mut low, mut high) = (0, steps.len());
+    let mut enough = (max_bounces, 0.0);
+    while low < high {
+        let middle = low + (high - low) / 2;
+        let found = share(steps[middle])?;
         match found <= light {
-            true => enough = (middle, found),
-            false => few = middle,
+            true => (enough, high) = ((steps[middle], found), middle),
+            false => low = middle + 1,
         }
     }
     if enough.0 >= max_bounces {
@@ -112,20 +107,17 @@ pub(super) fn values(
     Ok(sums)
 }
 
-/// The sums of each pixel and its neighbours to the right and below: what long paths bring is noisy, and changes little
-/// from block to block.
+/// The sums of each pixel and the eight around it: what long paths bring is noisy, and changes little from block to
+/// block.
 fn pooled(values: &[f64], width: usize) -> Vec<f64> {
-    let at = |x: usize, y: usize| values.get(y * width + x).copied().unwrap_or(0.0);
     let rows = values.len() / width.max(1);
-    let few = |side: usize| side.saturating_sub(1).max(1);
-    let places = (0..few(rows)).flat_map(|y| (0..few(width)).map(move |x| (x, y)));
-    let beside = |x: usize| (x + 1).min(width - 1);
-    places
-        .map(|(x, y)| {
-            let below = (y + 1).min(rows - 1);
-            at(x, y) + at(beside(x), y) + at(x, below) + at(beside(x), below)
-        })
-        .collect()
+    let around = |at: usize, side: usize| at.saturating_sub(1)..(at + 2).min(side);
+    let sum = |x: usize, y: usize| -> f64 {
+        let row = |y: usize| values[y * width..][around(x, width)].iter().sum::<f64>();
+        around(y, rows).map(row).sum()
+    };
+    let places = (0..rows).flat_map(|y| (0..width).map(move |x| (x, y)));
+    places.map(|(x, y)| sum(x, y)).collect()
 }
 
 /// The share of light by which 99 % of the values of `own` differ from those of `all` at most; of black ones, none.

@@ -50,7 +50,7 @@ impl Field {
     /// What a user who compares models gets.
     pub const FINE: Self = Self { size: [9, 7], rays: 1024, bands: usize::MAX, rough: false };
     /// What a render does before it begins.
-    pub const QUICK: Self = Self { size: [9, 7], rays: 256, bands: 3, rough: true };
+    pub const QUICK: Self = Self { size: [9, 7], rays: 512, bands: 3, rough: true };
     /// What a choice is verified by: places in between, and more bands.
     pub const BETWEEN: Self = Self { size: [16, 12], rays: 256, bands: 5, rough: false };
 }

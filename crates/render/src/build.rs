@@ -1,0 +1,101 @@
+//! The structure over a scene's surfaces, by the backend that the scene names.
+
+use std::sync::Arc;
+
+use etendue_accel::{Accel, BuildError, BuildOptions, build_moving};
+use etendue_geometry::Geometry;
+use etendue_scene::Scene;
+use etendue_scene::file::AccelName;
+
+use crate::error::RenderError;
+use crate::plan::{Plan, Unseen};
+
+/// The accelerators that this program was built with, the best first.
+#[must_use]
+pub fn accelerators() -> &'static [AccelName] {
+    if cfg!(feature = "embree") {
+        &[AccelName::Embree, AccelName::Bvh, AccelName::Exact]
+    } else {
+        &[AccelName::Bvh, AccelName::Exact]
+    }
+}
+
+/// What a build of the structure over `scene` is told.
+fn options_for(scene: &Scene, plan: &Plan, options: &BuildOptions) -> BuildOptions {
+    let exposure = scene.camera.exposure_span();
+    BuildOptions { quality: plan.quality, refine: plan.refine, exposure, ..options.clone() }
+}
+
+/// Builds `scene`'s acceleration structure with the backend that it names, or else the best.
+///
+/// # Errors
+///
+/// When the backend is not built in, cannot be told the options, or cannot build: memory, size, or a
+/// stop.
+pub fn build(
+    scene: &Scene,
+    plan: &Plan,
+    options: &BuildOptions,
+) -> Result<Box<dyn Accel>, RenderError> {
+    build_over(Arc::clone(&scene.geometry), scene, plan, options)
+}
+
+/// As [`build`], without what no ray of the picture can meet: for that picture's rays alone.
+///
+/// # Errors
+///
+/// As [`build`].
+pub fn build_without(
+    unseen: &Unseen,
+    scene: &Scene,
+    plan: &Plan,
+    options: &BuildOptions,
+) -> Result<Box<dyn Accel>, RenderError> {
+    build_over(Arc::new(unseen.left_out_of(&scene.geometry)), scene, plan, options)
+}
+
+fn build_over(
+    geometry: Arc<Geometry>,
+    scene: &Scene,
+    plan: &Plan,
+    options: &BuildOptions,
+) -> Result<Box<dyn Accel>, RenderError> {
+    let options = options_for(scene, plan, options);
+    let name = scene.render.accel.unwrap_or(accelerators()[0]);
+    if options.isa.is_some() && name != AccelName::Embree {
+        return Err(RenderError::NotEmbree);
+    }
+    if cfg!(not(feature = "embree")) && name == AccelName::Embree {
+        return Err(RenderError::Absent("Embree"));
+    }
+    let one = |geometry, options: &BuildOptions| -> Result<Box<dyn Accel>, BuildError> {
+        Ok(match name {
+            #[cfg(feature = "embree")]
+            AccelName::Embree => Box::new(etendue_accel::Embree::build(geometry, options)?),
+            AccelName::Exact => Box::new(etendue_accel::Exact::build(geometry, options)?),
+            _ => Box::new(etendue_accel::Bvh::build(geometry, options)?),
+        })
+    };
+    Ok(build_moving(geometry, &options, &one)?)
+}
+
+/// As [`build`], after `before` was built for the same scene, of which parts have changed since: what of
+/// it has not is kept, where the backend can.
+///
+/// # Errors
+///
+/// As [`build`].
+pub fn rebuild(
+    scene: &Scene,
+    plan: &Plan,
+    options: &BuildOptions,
+    before: Option<&dyn Accel>,
+) -> Result<Box<dyn Accel>, RenderError> {
+    let with_quality = options_for(scene, plan, options);
+    let again = |before: &dyn Accel| before.rebuilt(Arc::clone(&scene.geometry), &with_quality);
+    let stands = scene.geometry.moving_within(with_quality.exposure).next().is_none();
+    match before.filter(|_| stands).and_then(again) {
+        Some(rebuilt) => Ok(rebuilt?),
+        None => build(scene, plan, options),
+    }
+}
