@@ -77,6 +77,28 @@ pub(crate) fn write(
     };
     let depths = depths(report, arguments).map_err(refused)?;
     let fields = report.fields.clone();
+    let asked = match arguments.psf_size {
+        Some(size) if size % 2 == 1 => Some(size as usize / 2),
+        Some(size) => {
+            return Err(refused(format!("--psf-size {size} has no middle: give an odd number")));
+        }
+        None => None,
+    };
+    let count = depths.len() * fields.len() * wavelengths.len();
+    // A side, where there is room for all of them.
+    let check = |half: usize| {
+        let side = 2 * half + 1;
+        let bytes = count.saturating_mul(side * side * size_of::<f32>());
+        match bytes > MOST_BYTES {
+            true => Err(refused(format!(
+                "{count} functions of {side} x {side} cells take {} MiB, and 1024 are the most: give \
+                 a smaller --psf-size, a larger --psf-pitch, or fewer fields",
+                bytes >> 20
+            ))),
+            false => Ok(side),
+        }
+    };
+    asked.map(check).transpose()?;
     let mut points = Vec::new();
     for &depth in &depths {
         for &field in &fields {
@@ -97,23 +119,8 @@ pub(crate) fn write(
         .iter()
         .map(|point| CellSpread::of(std::slice::from_ref(&point.pupil), &grid))
         .collect();
-    let half = match arguments.psf_size {
-        Some(size) if size % 2 == 1 => size as usize / 2,
-        Some(size) => {
-            return Err(refused(format!("--psf-size {size} has no middle: give an odd number")));
-        }
-        None => spreads.iter().map(|spread| spread.half).max().unwrap_or(0),
-    };
-    let side = 2 * half + 1;
-    let bytes = spreads.len().saturating_mul(side * side * size_of::<f32>());
-    if bytes > MOST_BYTES {
-        return Err(refused(format!(
-            "{} functions of {side} x {side} cells take {} MiB, and 1024 are the most: give a --psf-size, \
-             a larger --psf-pitch, or fewer fields",
-            spreads.len(),
-            bytes >> 20
-        )));
-    }
+    let half = asked.or_else(|| spreads.iter().map(|spread| spread.half).max()).unwrap_or(0);
+    let side = check(half)?;
     let cropped: Vec<Vec<f32>> = spreads.iter().map(|spread| cropped(spread, half)).collect();
     let held = cropped.iter().map(|plane| plane.iter().map(|&v| f64::from(v)).sum()).collect();
     let meaning = Meaning {

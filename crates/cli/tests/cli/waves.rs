@@ -257,7 +257,7 @@ fn point_spread_functions_that_cannot_be_are_refused() {
         (vec!["--psf"], "--output"),
         (vec!["--psf", "-o", "out", "--psf-size", "64"], "odd"),
         (
-            vec!["--psf", "-o", "out", "--fields", "0,1,2,3", "--psf-size", "4095"],
+            vec!["--psf", "-o", "out", "--fields", "0,1,2,3,4,5,6,7", "--psf-size", "4095"],
             "1024 are the most",
         ),
         (vec!["--depths", "2 m"], "--psf"),
@@ -343,7 +343,7 @@ fn the_plan_says_whether_waves_would_show() {
         assert!(text(&output.stdout).contains(words), "{}", text(&output.stdout));
     }
     let bench = Bench::with_scene(&scene(8.0, true).replace(
-        r#""focus_distance": 2,"#,
+        r#""f_number": 8, "focus_distance": 2,"#,
         r#""sensor_distance": 51.3, "elements": [{"at": 50, "type": "aperture", "shape": "circular", "radius": 3, "stop": true}],"#,
     ));
     let output = bench.run(&["check", "scene.json"]);

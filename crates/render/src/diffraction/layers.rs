@@ -79,8 +79,8 @@ mod tests {
 
     #[test]
     fn layers_are_a_third_of_a_wave_or_a_tenth_of_the_defocus_deep() {
-        let mut last = number_of(-1000.0);
-        assert_eq!(last, 0);
+        assert_eq!([number_of(-1000.0), number_of(1000.0)], [0, 2 * usize::from(MOST)]);
+        let mut last = number_of(-100.0);
         let mut edges = Vec::new();
         for k in -100_000..=100_000 {
             let waves = f64::from(k) * 1e-3;

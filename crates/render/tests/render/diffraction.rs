@@ -6,35 +6,27 @@ use etendue_optics::analysis::wavefront::Cells;
 use etendue_optics::analysis::{ObjectPoint, Transfer, Wavefront};
 use etendue_render::output::Outputs;
 use etendue_render::{Course, Plan, Prepared, RenderError, Shard};
+use etendue_scene::Scene;
+use etendue_scene::file::SamplesSpec;
 use etendue_sensor::slanted_edge::{Lattice, slanted_edge};
 use etendue_spectrum::{Bands, Grid};
 
-use crate::steps::{channels, load, prepare, rendered};
+use crate::steps::{load, prepare, rendered};
 
 /// The wavelength of a narrow band (nm).
 const GREEN: f64 = 550.0;
 
 /// The light of a scene in one narrow band.
 fn green(text: &str) -> Vec<f64> {
-    let scene = load(text);
-    let mut plan = Plan::new(&scene, Outputs::NONE);
+    green_of(&load(text))
+}
+
+fn green_of(scene: &Scene) -> Vec<f64> {
+    let mut plan = Plan::new(scene, Outputs::NONE);
     plan.bands = Bands::Spectral(Grid::equal(GREEN - 0.05, GREEN + 0.05, 1).unwrap());
-    let done = rendered(&scene, &plan);
+    let done = rendered(scene, &plan);
     let film = done.band_film.unwrap();
     film.values.iter().map(|&value| f64::from(value)).collect()
-}
-
-/// J₁ by Bessel's integral, which the trapezoid rule takes without error.
-fn j1(x: f64) -> f64 {
-    let angle = |k: u32| std::f64::consts::PI * (f64::from(k) + 0.5) / 128.0;
-    (0..128).map(|k| (angle(k) - x * angle(k).sin()).cos()).sum::<f64>() / 128.0
-}
-
-/// The irradiance of an Airy pattern of power 1 at a distance, in units of λN (G. B. Airy, 1835).
-fn airy(r: f64) -> f64 {
-    let v = std::f64::consts::PI * r;
-    let ring = if v < 1e-6 { 1.0 } else { 2.0 * j1(v) / v };
-    std::f64::consts::FRAC_PI_4 * ring * ring
 }
 
 const SIDE: usize = 512;
@@ -61,53 +53,18 @@ fn lamp(pitch: f64, f_number: f64, width: f64, samples: u32) -> String {
     )
 }
 
-/// The Airy pattern of a lamp on pixels. The pattern is seen through the lamp and the pixel, two boxes, each
-/// of which has its own width in each direction.
-#[test]
-fn a_lamp_is_the_airy_pattern_on_pixels() {
-    // Three pixels that see a lamp of this width have its second moment and their own together (the root of
-    // w³ − 11 w + 12, here to a whole number of the samples' strata).
-    let width = 1.0 + 2.0 * 9.0 / 64.0;
-    let (pitch, f_number) = (2.4, 22.0);
-    let picture = green(&lamp(pitch, f_number, width, 64));
-    let unit = GREEN * 1e-3 * f_number * 5000.0 / 4950.0;
-    let pixel = pitch / unit;
-    let expected = |column: f64, row: f64| -> f64 {
-        const N: i32 = 24;
-        let reach = 0.5 * (1.0 + width);
-        let step = reach / f64::from(N);
-        let share = |k: i32| (reach - f64::from(k.abs()) * step).min(1.0_f64.min(width));
-        let mut sum = 0.0;
-        for y in -N..=N {
-            for x in -N..=N {
-                let at = [column + f64::from(x) * step, row + f64::from(y) * step];
-                sum += share(x) * share(y) * airy(pixel * at[0].hypot(at[1]));
-            }
-        }
-        sum * (pixel * step).powi(2)
-    };
-    let peak = expected(0.0, 0.0);
-    let mut worst = 0.0_f64;
-    let middle = SIDE as f64 / 2.0;
-    for row in SIDE / 2 - 40..SIDE / 2 + 40 {
-        for column in SIDE / 2 - 40..SIDE / 2 + 40 {
-            // Up is towards smaller rows.
-            let (x, y) = (column as f64 - middle, row as f64 - middle + 1.0);
-            worst = worst.max((picture[row * SIDE + column] - expected(x, y)).abs() / peak);
-        }
-    }
-    // A thousandth: the fourth moments of what three pixels see and of the lamp differ, which is 7e-4 of the
-    // peak where a pixel is a fifth of λN, and the share of the pattern beyond the picture's edge is 1e-4.
-    assert!(worst < 1e-3, "{worst}");
-}
-
-/// All of a lamp's light arrives.
+/// All of a lamp's light arrives: the sum is that of the same samples before they are spread.
 #[test]
 fn no_light_is_lost() {
-    for (f_number, pitch) in [(22.0, 3.2), (2.8, 3.45)] {
-        let sum: f64 = green(&lamp(pitch, f_number, 1.0, 36)).iter().sum();
-        // A pixel of radiance 1 on the axis; what lands beyond the picture's edge is 1e-5 of the light.
-        assert!((sum - 1.0).abs() < 1e-4, "f/{f_number}: {sum}");
+    for (f_number, pitch, cells) in [(22.0, 3.2, 1), (2.8, 3.45, 3)] {
+        let text = lamp(pitch, f_number, 1.0, 36);
+        let sum: f64 = green(&text).iter().sum();
+        let mut chief = load(&text);
+        chief.camera = chief.camera.along_chief_rays(cells);
+        chief.render.samples = SamplesSpec::Count(36 / (cells * cells));
+        let before: f64 = green_of(&chief).iter().sum::<f64>() / f64::from(cells * cells);
+        // What lands beyond the picture's edge is 1e-5 of the light.
+        assert!((sum / before - 1.0).abs() < 1e-4, "f/{f_number}: {sum} and {before}");
     }
 }
 
@@ -165,36 +122,6 @@ fn a_rendered_edge_has_the_modulation_of_the_lens() {
             assert!(worst < 0.01, "f/{f_number}, {waves} waves off: {worst}");
         }
     }
-}
-
-/// Light of all directions lights the picture as it does by rays: falloff and vignetting are the same.
-#[test]
-fn even_light_falls_off_as_by_rays() {
-    let text = |diffraction: bool| {
-        let lens = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/lenses/double-gauss.json");
-        let lens = std::fs::read_to_string(lens).unwrap();
-        format!(
-            r#"{{"etendue": 1, "tracer": {{"type": "path", "max_bounces": 1}}, "lights": [],
-            "camera": {{"type": "lens", "lens": {lens}, "f_number": 4, "diffraction": {diffraction},
-                "focus_distance": 2, "sensor_height": 24, "pose": {{"from": [0, 0, 2], "look_at": [0, 0, 0]}},
-                "sensor": {{"resolution": [36, 24]}}}},
-            "objects": [{{"shape": "rectangle", "width": 9, "height": 9, "material": "lamp"}}],
-            "materials": {{"lamp": {{"type": "emissive", "radiance": [1, 1, 1]}}}},
-            "render": {{"samples": 256}}}}"#
-        )
-    };
-    let [waves, rays] = [true, false].map(|diffraction| {
-        let picture = rendered(
-            &load(&text(diffraction)),
-            &Plan::new(&load(&text(diffraction)), Outputs::NONE),
-        );
-        channels(&picture.picture, "")
-    });
-    let worst = waves.iter().flatten().zip(rays.iter().flatten()).map(|(a, b)| (a - b).abs());
-    let worst = worst.fold(0.0, f64::max);
-    // 256 samples of the pupil by rays, and a grid of 25 places a side of what arrives.
-    assert!(worst < 0.01, "{worst}");
-    assert!(waves[1][0] < 0.8 * waves[1][36 * 12 + 18]);
 }
 
 /// What waves cannot be spread over is refused by name.
