@@ -24,6 +24,9 @@ const SAMPLES: u32 = 32;
 /// The numbers of surfaces among which the fewest are looked for.
 const STEPS: [u32; 11] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24];
 
+/// What the share of nine blocks together is multiplied by: single ones among them have more.
+const SAFETY: f64 = 2.0;
+
 /// The share of blocks that are to be within the tolerance.
 pub(super) const MOST_BLOCKS: f64 = 0.99;
 
@@ -56,8 +59,10 @@ pub(super) fn fewest(
     };
     let width = camera.resolution()[0] as usize;
     let all = pooled(&small(max_bounces)?, width);
-    let share =
-        |bounces: u32| Ok::<_, RenderError>(differing(&pooled(&small(bounces)?, width), &all));
+    let share = |bounces: u32| {
+        let found = differing(&pooled(&small(bounces)?, width), &all);
+        Ok::<_, RenderError>(SAFETY * found)
+    };
     // What longer paths bring falls with their length: between a number that is too few and one that will do.
     let steps: Vec<u32> = STEPS.into_iter().filter(|&step| step < max_bounces).collect();
     let (mut low, mut high) = (0, steps.len());

@@ -131,9 +131,10 @@ fn light_is_followed_to_as_few_surfaces_as_the_tolerance_allows() {
         let own = taken(&scene);
         let TakenBounces { bounces, share } = own.bounces.expect("fewer bounces");
         // Walls of albedo ρ leave about ρⁿ of the light for paths of more than n surfaces: 2 % and 5 % of it are
-        // left after 3.2 and 5.9.
+        // left after 3.2 and 5.9; half of it, to which the choice is held, after 3.9 and 7.2, of steps up to 2 wide.
         let about = (percent / 100.0_f64).ln() / albedo.ln();
-        assert!((f64::from(bounces) - about).abs() < 2.5, "{bounces} for {about}");
+        let beyond = f64::from(bounces) - about;
+        assert!(beyond > -1.0 && beyond < 4.5, "{bounces} for {about}");
         assert!(share <= percent / 100.0);
         let full = blocks(&scene, None);
         let with = |bounces| {
