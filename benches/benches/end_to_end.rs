@@ -1,4 +1,8 @@
 //! How long does it take from a scene to its layers, without reading or writing files?
+#![allow(
+    clippy::disallowed_methods,
+    reason = "programs of measurements and tests write their own files"
+)]
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use etendue_accel::BuildOptions;

@@ -1,5 +1,9 @@
 //! How long do the tracers of light take? A matte blob through a thin lens, under a point light and
 //! under a lamp, by direct light and by paths.
+#![allow(
+    clippy::disallowed_methods,
+    reason = "programs of measurements and tests write their own files"
+)]
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use etendue_accel::BuildOptions;

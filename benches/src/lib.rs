@@ -15,6 +15,10 @@
 //! | [`field`] | all contestants on one scene |
 //! | [`effort`] | how heavy the meshes are, how often everything is timed |
 //! | [`files`] | the meshes as GLB, OBJ and PLY, and a scene around them |
+#![allow(
+    clippy::disallowed_methods,
+    reason = "programs of measurements and tests write their own files"
+)]
 
 pub mod contest;
 pub mod effort;

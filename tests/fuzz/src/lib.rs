@@ -11,6 +11,10 @@
 //!
 //! A target passes when it returns, whatever the reader said. A panic, an abort, more memory than
 //! [`run::MOST_MEMORY`] or more processor time than [`run::MOST_TIME`] for one input is a failure.
+#![allow(
+    clippy::disallowed_methods,
+    reason = "programs of measurements and tests write their own files"
+)]
 
 pub mod guided;
 pub mod mutate;

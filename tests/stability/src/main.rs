@@ -1,5 +1,9 @@
 //! Runs every case at full scale and writes `docs/stability.md`. With `--quick` at the scale of the tests;
 //! with a word, runs the cases that have it in their names and writes nothing.
+#![allow(
+    clippy::disallowed_methods,
+    reason = "programs of measurements and tests write their own files"
+)]
 
 use std::path::Path;
 use std::process::ExitCode;

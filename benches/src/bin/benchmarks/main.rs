@@ -6,6 +6,10 @@
 //! benchmarks memory SCENE                      memory after each stage of a render, as JSON
 //! benchmarks light-rays SCENE                  what the accelerator takes of a picture of light, as JSON
 //! ```
+#![allow(
+    clippy::disallowed_methods,
+    reason = "programs of measurements and tests write their own files"
+)]
 
 mod build;
 mod findings;

@@ -5,6 +5,10 @@
 //! ```
 //!
 //! To be run in the repository's root, where `scenes/` is.
+#![allow(
+    clippy::disallowed_methods,
+    reason = "programs of measurements and tests write their own files"
+)]
 
 mod distance;
 mod page;

@@ -5,6 +5,10 @@
 //! mean over the picture. The variance of a picture is measured from two of other
 //! seeds, never from a picture's own samples: per pixel and channel, the half of their squared difference,
 //! carried to digital numbers and divided by the sensor's own variance.
+#![allow(
+    clippy::disallowed_methods,
+    reason = "programs of measurements and tests write their own files"
+)]
 
 mod study;
 
