@@ -33,7 +33,7 @@ fn counts_are_of_what_is_placed() {
     assert_eq!(found.objects[1].triangles, 12);
     assert_eq!(found.memory.film, 4 * 64 * 48 * 4, "z and three of the normal");
     assert_eq!(found.memory.structure, 92 * 12, "one mesh");
-    assert_eq!(found.memory.copies, 750 * 2, "placed twice");
+    assert_eq!(found.memory.copies, 1000 * 2, "placed twice");
     assert_eq!(found.findings.len(), 1, "the material that nothing uses: {:?}", found.findings);
     let json = serde_json::to_value(&found).unwrap();
     assert_eq!(json["triangles"], 24);
