@@ -211,7 +211,7 @@ fn what_moves_keeps_its_light() {
     if !denoises(&bench, "what_moves_keeps_its_light", &[]) {
         return;
     }
-    let clean = bench.array("picture");
+    let clean = bench.array("denoised");
     let sum = |values: &[f64]| shown(values).iter().sum::<f64>();
     let (found, due) = (sum(&clean), sum(&noisy));
     // The denoiser's own bias, of some thousandths on still rooms.
