@@ -9,6 +9,7 @@
 #![forbid(unsafe_code)]
 
 use std::fmt;
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -16,7 +17,7 @@ use etendue_geometry::glam::Vec3;
 use etendue_geometry::{Bounds, Geometry, HitBatch, Mesh, Moment, RayBatch, Steps, Transform};
 use rayon::prelude::*;
 
-use crate::exact::Slabs;
+use crate::exact::{Slabs, descend};
 use crate::nearest::{Nearest, PlacementView, Query, Triangle};
 use crate::parts::{LocalRay, outward};
 use crate::tree::{LeafSize, MAX_DEPTH, Node, Ref, Tree};
@@ -100,40 +101,19 @@ impl Deforming {
         let ray = LocalRay { origin: query.origin, direction: query.direction, pad };
         let slabs = Slabs::new(&ray, query.t_min);
         let mut t_max = query.t_max;
-        stack.clear();
-        if !self.nodes.is_empty()
-            && let Some(near) = slabs.enter(self.bounds(0, moment), t_max)
-        {
-            stack.push((0, near));
-        }
         let mesh = &self.geometry.meshes[0];
-        while let Some((number, near)) = stack.pop() {
-            if near > t_max {
-                continue;
-            }
-            let i = number as usize;
-            let node = &self.nodes[i];
-            if let Some(range) = node.leaf() {
-                for &number in &self.triangles[range] {
-                    let corner = |corner: u32| self.steps.corner(moment, corner as usize);
-                    let corners = mesh.triangles[number as usize].map(corner);
-                    match see(&Triangle { placement: 0, number, corners }) {
-                        Some(limit) => t_max = limit,
-                        None => return,
-                    }
-                }
-                continue;
-            }
-            let children = [i + 1, i + node.right()];
-            let [a, b] = children.map(|child| {
-                let near = slabs.enter(self.bounds(child, moment), t_max);
-                #[expect(clippy::cast_possible_truncation, reason = "nodes are numbered in u32")]
-                near.map(|near| (child as u32, near))
-            });
-            let a_first = matches!((a, b), (Some(a), Some(b)) if a.1 < b.1);
-            let (far, close) = if a_first { (b, a) } else { (a, b) };
-            stack.extend(far);
-            stack.extend(close);
+        let node = |i: usize| (&self.nodes[i], self.bounds(i, moment));
+        let leaf = |range: Range<usize>, t_max: &mut f64| {
+            self.triangles[range].iter().all(|&number| {
+                let corner = |corner: u32| self.steps.corner(moment, corner as usize);
+                let corners = mesh.triangles[number as usize].map(corner);
+                let limit = see(&Triangle { placement: 0, number, corners });
+                *t_max = limit.unwrap_or(*t_max);
+                limit.is_some()
+            })
+        };
+        if !self.nodes.is_empty() {
+            descend(&slabs, &mut t_max, stack, node, leaf);
         }
     }
 }

@@ -10,6 +10,7 @@
 #![forbid(unsafe_code)]
 
 use std::fmt;
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -196,7 +197,7 @@ impl Boxes {
         watch: &BuildWatch<'_>,
     ) -> Result<Self, BuildError> {
         let tree = Tree::build(part.refs(geometry), LEAF, watch)?;
-        Ok(Self::around(tree, |[placement, triangle]| {
+        Ok(Self::refitted(tree, |[placement, triangle]| {
             let mut bounds = Bounds::EMPTY;
             part.corners(geometry, placement, triangle).into_iter().for_each(|p| bounds.include(p));
             bounds
@@ -221,11 +222,11 @@ impl Boxes {
             Ref { lo, first: i, hi, second: i }
         });
         let tree = Tree::build(refs.collect(), LEAF, watch)?;
-        Ok(Self::around(tree, |[i, _]| bounds(i)))
+        Ok(Self::refitted(tree, |[i, _]| bounds(i)))
     }
 
     /// The same tree, with boxes from the leaves up.
-    pub(crate) fn around(tree: Tree, bounds: impl Fn([u32; 2]) -> Bounds + Sync) -> Self {
+    pub(crate) fn refitted(tree: Tree, bounds: impl Fn([u32; 2]) -> Bounds + Sync) -> Self {
         let items: Vec<[u32; 2]> = tree.refs.par_iter().map(|r| [r.first, r.second]).collect();
         drop(tree.refs);
         let leaf = |node: &Node| {
@@ -265,38 +266,49 @@ impl Boxes {
         see: &mut impl FnMut([u32; 2], &mut f64) -> bool,
     ) {
         let slabs = Slabs::new(ray, t_min);
-        stack.clear();
-        if let Some(root) = self.nodes.first()
-            && let Some(near) = slabs.enter(root.bounds, *t_max)
-        {
-            stack.push((0, near));
+        let node = |i: usize| (&self.nodes[i].node, self.nodes[i].bounds);
+        let leaf = |range: Range<usize>, t_max: &mut f64| {
+            self.items[range].iter().all(|&item| see(item, t_max))
+        };
+        if !self.nodes.is_empty() {
+            descend(&slabs, t_max, stack, node, leaf);
         }
-        while let Some((i, near)) = stack.pop() {
-            if near > *t_max {
-                continue;
-            }
-            let i = i as usize;
-            let node = &self.nodes[i].node;
-            if let Some(range) = node.leaf() {
-                for &item in &self.items[range] {
-                    if !see(item, t_max) {
-                        return;
-                    }
-                }
-                continue;
-            }
-            let children = [i + 1, i + node.right()];
-            let [a, b] = children.map(|child| {
-                let near = slabs.enter(self.nodes[child].bounds, *t_max);
-                // Nodes are numbered in u32.
-                #[expect(clippy::cast_possible_truncation, reason = "nodes are numbered in u32")]
-                near.map(|near| (child as u32, near))
-            });
-            let a_first = matches!((a, b), (Some(a), Some(b)) if a.1 < b.1);
-            let (far, close) = if a_first { (b, a) } else { (a, b) };
-            stack.extend(far);
-            stack.extend(close);
+    }
+}
+
+/// Goes down a tree from its root, nearer children first: shows all leaves whose box the ray meets up to `t_max`, which
+/// `leaf` may lower, until `leaf` answers `false`.
+#[inline(always)]
+pub(crate) fn descend<'t>(
+    slabs: &Slabs,
+    t_max: &mut f64,
+    stack: &mut Vec<(u32, f64)>,
+    node: impl Fn(usize) -> (&'t Node, Bounds),
+    mut leaf: impl FnMut(Range<usize>, &mut f64) -> bool,
+) {
+    stack.clear();
+    stack.extend(slabs.enter(node(0).1, *t_max).map(|near| (0, near)));
+    while let Some((i, near)) = stack.pop() {
+        if near > *t_max {
+            continue;
         }
+        let i = i as usize;
+        let (own, _) = node(i);
+        if let Some(range) = own.leaf() {
+            if !leaf(range, t_max) {
+                return;
+            }
+            continue;
+        }
+        let [a, b] = [i + 1, i + own.right()].map(|child| {
+            let near = slabs.enter(node(child).1, *t_max);
+            #[expect(clippy::cast_possible_truncation, reason = "nodes are numbered in u32")]
+            near.map(|near| (child as u32, near))
+        });
+        let a_first = matches!((a, b), (Some(a), Some(b)) if a.1 < b.1);
+        let (far, close) = if a_first { (b, a) } else { (a, b) };
+        stack.extend(far);
+        stack.extend(close);
     }
 }
 

@@ -259,7 +259,7 @@ fn over(bodies: &[Body], options: &BuildOptions) -> Result<Boxes, BuildError> {
         Ref { lo, first: number(i), hi, second: number(i) }
     });
     let tree = Tree::build(refs.collect(), LeafSize { most: 1, block: 1 }, &watch)?;
-    Ok(Boxes::around(tree, |[i, _]| bodies[i as usize].swept))
+    Ok(Boxes::refitted(tree, |[i, _]| bodies[i as usize].swept))
 }
 
 /// Whether a ray meets a box at distances (m) within `limits`, rounding in favour of yes.
