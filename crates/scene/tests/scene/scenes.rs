@@ -43,10 +43,13 @@ fn every_example_scene_reads_and_loads() {
     for path in scenes {
         let scene = load(&path, &[]);
         assert!(scene.geometry.triangles() > 0, "{}", path.display());
-        // The slanted edge is a crop on purpose.
-        let is_meant = |message: &str| message.contains("a crop of nearly any sensor");
-        let notes: Vec<_> = scene.notes.iter().filter(|n| !is_meant(&n.message)).collect();
-        assert!(notes.is_empty(), "{}: {notes:?}", path.display());
+        // The slanted edge is a crop on purpose, and that alone is said of it.
+        if path.ends_with("slanted-edge.json") {
+            let [note] = &scene.notes[..] else { panic!("{:?}", scene.notes) };
+            assert!(note.message.contains("a crop of nearly any sensor"), "{note:?}");
+            continue;
+        }
+        assert!(scene.notes.is_empty(), "{}: {:?}", path.display(), scene.notes);
     }
 }
 
