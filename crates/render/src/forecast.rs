@@ -43,13 +43,12 @@ pub(crate) fn forecast(scene: &Scene, plan: &Plan, outputs: Outputs) -> MemoryFo
     let sensor = scene.sensor.as_ref().filter(|_| scene.picture.is_some());
     let sensor = sensor.map_or(0, |sensor| bytes_of_sensor(scene, sensor, plan));
     let film: u64 = plan.layers.iter().map(|layer| bytes_of_layer(*layer, plan)).sum();
-    let film = film + diffraction::bytes(scene, plan);
     // Of slots there is the light of one, and the sum of all in f64.
     let lit = plan.layers.iter().filter(|layer| layer.is_light() && scene.slots > 0);
     let slots: u64 = lit.map(|layer| 3 * bytes_of_layer(*layer, plan)).sum();
     MemoryForecast {
         images: images(scene, plan),
-        film: each(film),
+        film: each(film).saturating_add(diffraction::bytes(scene, plan)),
         sums: each(bytes_of_sums(plan) + slots),
         sensor: each(if sensor > 0 { sensor.max(woven) } else { 0 }),
         files: each(look.max(png + denoised).max(if sensor > 0 { 0 } else { woven })),

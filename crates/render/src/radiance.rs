@@ -183,9 +183,9 @@ impl Averaged for LightPass<'_> {
         };
         let is_one_for_all = self.stage.spectral.count() != self.count;
         let bands = if is_one_for_all { 0..self.stage.spectral.count() } else { bands.clone() };
-        let beam = RaySamples { rays: &rays.rays, samples: numbers, bands, parts };
+        let samples = RaySamples { rays: &rays.rays, samples: numbers, bands, parts };
         let light = if parts == Parts::Whole { &mut *values } else { &mut *light_in_parts };
-        traffic.light += self.tracer.radiance(&self.stage, &beam, scratch, light);
+        traffic.light += self.tracer.radiance(&self.stage, &samples, scratch, light);
         if lights.are_modulated() {
             self.modulate(rays, film, light_in_parts);
         }

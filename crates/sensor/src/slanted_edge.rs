@@ -221,7 +221,8 @@ impl Lines {
             return Err(EdgeError::NotOne);
         }
         let spread = self.edge_spread(edge, cosine, reach)?;
-        Ok(told(&spread, Told { edge, is_upright, straightness, middle: 0.5 * height as f64 }))
+        let fit = EdgeFit { edge, is_upright, straightness, middle: 0.5 * height as f64 };
+        Ok(fit.with_spread(&spread))
     }
 
     /// Where the edge crosses each line: (line, place).
@@ -320,58 +321,63 @@ fn straight(places: &[(f64, f64)]) -> Edge {
     Edge { start: x - slope * y, slope }
 }
 
-/// What is known of the edge beside its spread.
-struct Told {
+/// Where an edge lies.
+struct EdgeFit {
     edge: Edge,
     is_upright: bool,
+    /// Root mean square of the lines' centroids from it (pixels).
     straightness: f64,
+    /// The region's middle line (pixels).
     middle: f64,
 }
 
-fn told(spread: &[[f64; 2]], known: Told) -> SlantedEdge {
-    let count = spread.len();
-    let tenth = (count / 10).max(1);
-    let mean = |part: &[[f64; 2]]| part.iter().map(|at| at[1]).sum::<f64>() / part.len() as f64;
-    let ends = [mean(&spread[..tenth]), mean(&spread[count - tenth..])];
-    let levels = [ends[0].min(ends[1]), ends[0].max(ends[1])];
-    let step = levels[1] - levels[0];
-    let (least, most) =
-        spread.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), at| {
-            (least.min(at[1]), most.max(at[1]))
+impl EdgeFit {
+    /// The edge with what its edge spread function tells.
+    fn with_spread(&self, spread: &[[f64; 2]]) -> SlantedEdge {
+        let count = spread.len();
+        let tenth = (count / 10).max(1);
+        let mean = |part: &[[f64; 2]]| part.iter().map(|at| at[1]).sum::<f64>() / part.len() as f64;
+        let ends = [mean(&spread[..tenth]), mean(&spread[count - tenth..])];
+        let levels = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+        let step = levels[1] - levels[0];
+        let (least, most) =
+            spread.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), at| {
+                (least.min(at[1]), most.max(at[1]))
+            });
+        let overshoot = (levels[0] - least).max(most - levels[1]).max(0.0) / step;
+        // Differences over two quarters, under the window.
+        let reach = spread[count - 1][0];
+        let window = |distance: f64| {
+            let beyond = (distance.abs() / reach - 0.5).max(0.0) / 0.5;
+            0.5 + 0.5 * (std::f64::consts::PI * beyond.min(1.0)).cos()
+        };
+        let lines: Vec<[f64; 2]> = (1..count - 1)
+            .map(|k| {
+                let distance = spread[k][0];
+                let slope = (spread[k + 1][1] - spread[k - 1][1]) * 0.5 * FINE;
+                [distance, slope * window(distance) / (ends[1] - ends[0])]
+            })
+            .collect();
+        let mut edge = SlantedEdge {
+            angle: self.edge.slope.atan().to_degrees(),
+            is_upright: self.is_upright,
+            position: self.edge.at(self.middle),
+            straightness: self.straightness,
+            levels,
+            contrast: step / (levels[0] + levels[1]),
+            overshoot,
+            line_spread: lines,
+            modulation: Vec::new(),
+            mtf50: None,
+        };
+        edge.modulation =
+            (0..=100).map(|k| f64::from(k) * 0.01).map(|f| [f, edge.modulation_at(f)]).collect();
+        edge.mtf50 = edge.modulation.windows(2).find(|pair| pair[1][1] < 0.5).map(|pair| {
+            let [[low, a], [high, b]] = [pair[0], pair[1]];
+            low + (high - low) * ((a - 0.5) / (a - b)).clamp(0.0, 1.0)
         });
-    let overshoot = (levels[0] - least).max(most - levels[1]).max(0.0) / step;
-    // Differences over two quarters, under the window.
-    let reach = spread[count - 1][0];
-    let window = |distance: f64| {
-        let beyond = (distance.abs() / reach - 0.5).max(0.0) / 0.5;
-        0.5 + 0.5 * (std::f64::consts::PI * beyond.min(1.0)).cos()
-    };
-    let lines: Vec<[f64; 2]> = (1..count - 1)
-        .map(|k| {
-            let distance = spread[k][0];
-            let slope = (spread[k + 1][1] - spread[k - 1][1]) * 0.5 * FINE;
-            [distance, slope * window(distance) / (ends[1] - ends[0])]
-        })
-        .collect();
-    let mut edge = SlantedEdge {
-        angle: known.edge.slope.atan().to_degrees(),
-        is_upright: known.is_upright,
-        position: known.edge.at(known.middle),
-        straightness: known.straightness,
-        levels,
-        contrast: step / (levels[0] + levels[1]),
-        overshoot,
-        line_spread: lines,
-        modulation: Vec::new(),
-        mtf50: None,
-    };
-    edge.modulation =
-        (0..=100).map(|k| f64::from(k) * 0.01).map(|f| [f, edge.modulation_at(f)]).collect();
-    edge.mtf50 = edge.modulation.windows(2).find(|pair| pair[1][1] < 0.5).map(|pair| {
-        let [[low, a], [high, b]] = [pair[0], pair[1]];
-        low + (high - low) * ((a - 0.5) / (a - b)).clamp(0.0, 1.0)
-    });
-    edge
+        edge
+    }
 }
 
 impl SlantedEdge {

@@ -1,7 +1,7 @@
 //! How light is spread on the sensor as waves: fields of the pupil by place of the picture, depth and
 //! wavelength; and what of the light arrives there, which is the same as by rays.
 
-use etendue_optics::analysis::between::{FieldsBetween, Seen};
+use etendue_optics::analysis::between::{FieldSource, FieldsBetween};
 use etendue_optics::analysis::{AnalysisError, ObjectPoint};
 use etendue_optics::element::Part;
 use etendue_optics::train::{MonochromaticTrain, OpticalTrain};
@@ -81,6 +81,13 @@ impl LensCamera {
         0.5e-6 * wavelength / numerical_aperture
     }
 
+    /// Whether it has no aberrations, and how many wavelengths its fields are traced at, at most.
+    #[must_use]
+    pub fn waves_to_trace(&self) -> (bool, usize) {
+        let train = self.focused.train();
+        (is_ideal(train), if train.is_dispersive() && !self.one_wavelength { NODES } else { 1 })
+    }
+
     /// Waves of defocus (at the rim, at a wavelength in nm) of something whose nearness differs from
     /// the one in focus by 1/m.
     #[must_use]
@@ -88,6 +95,13 @@ impl LensCamera {
         let diameter = self.focused.paraxial().entrance_pupil.diameter.unwrap_or(0.0);
         125.0 * diameter * diameter / wavelength
     }
+}
+
+fn is_ideal(train: &OpticalTrain) -> bool {
+    train.elements().iter().all(|element| match &element.part {
+        Part::ThinLens(_) | Part::Aperture(_) | Part::Filter(_) => true,
+        Part::Surface(_) | Part::Biconic(_) | Part::MicrolensArray(_) => false,
+    })
 }
 
 /// A lens at the wavelengths of bands, to be asked for fields.
@@ -168,7 +182,7 @@ impl<'a> WaveLens<'a> {
         };
         let nearness: Vec<f64> = nearness.iter().map(|near| 1e-3 * near).collect();
         let image: DVec3 = film.frame.point(place.extend(0.0));
-        FieldsBetween::new(&Seen {
+        FieldsBetween::new(&FieldSource {
             train: &self.train,
             lenses: &self.lenses,
             nearness: &nearness,
@@ -180,10 +194,7 @@ impl<'a> WaveLens<'a> {
     /// Whether it has no aberrations: nothing but ideal lenses, openings and filters.
     #[must_use]
     pub fn is_ideal(&self) -> bool {
-        self.train.elements().iter().all(|element| match &element.part {
-            Part::ThinLens(_) | Part::Aperture(_) | Part::Filter(_) => true,
-            Part::Surface(_) | Part::Biconic(_) | Part::MicrolensArray(_) => false,
-        })
+        is_ideal(&self.train)
     }
 
     /// −1 where the picture is turned on the sensor; else 1.

@@ -168,7 +168,12 @@ fn copies_of_models_may_change_while_they_are_rendered() {
 fn forecasts_are_within_half_as_much_again_of_the_peak() {
     let scenes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     let fewer = ["--set", "render.samples=8"];
-    let cases: [(&str, &[&str]); 9] = [
+    let waves = [
+        "--set=camera.diffraction=true",
+        "--set=camera.sensor.resolution=[80,64]",
+        "--set=render.samples=9",
+    ];
+    let cases: [(&str, &[&str]); 10] = [
         ("cube.json", &[]),
         ("first-light.json", &[]),
         ("instances.json", &[]),
@@ -179,6 +184,7 @@ fn forecasts_are_within_half_as_much_again_of_the_peak() {
         ("light-field-focused.json", &fewer),
         // Copies whose boxes meet.
         ("forest.json", &fewer),
+        ("gallery/coded-aperture-stopped.json", &waves),
     ];
     let bench = Bench::new();
     for (name, more) in cases {

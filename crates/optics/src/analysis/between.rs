@@ -37,7 +37,7 @@ pub struct FieldsBetween {
 /// What the fields are of.
 #[derive(Clone, Copy)]
 #[allow(missing_debug_implementations, reason = "holds a function")]
-pub struct Seen<'a> {
+pub struct FieldSource<'a> {
     /// The lens.
     pub train: &'a OpticalTrain,
     /// The same at each of the wavelengths.
@@ -51,14 +51,17 @@ pub struct Seen<'a> {
 }
 
 impl FieldsBetween {
+    /// Bytes of a field at one wavelength and nearness, on the usual grid.
+    pub const FIELD_BYTES: usize = USUAL * USUAL * (4 * size_of::<f64>() + 3 * size_of::<DVec2>());
+
     /// Traces the fields. The grid has as many cells as their own image needs.
     ///
     /// # Errors
     ///
     /// When there is no light, no chief ray or no sphere, or the wavefront is too rough for the most
     /// cells.
-    pub fn new(seen: &Seen<'_>) -> Result<Self, AnalysisError> {
-        let Seen { train, lenses, nearness, object, image } = *seen;
+    pub fn new(source: &FieldSource<'_>) -> Result<Self, AnalysisError> {
+        let FieldSource { train, lenses, nearness, object, image } = *source;
         let mut parts = Vec::new();
         for lens in lenses {
             for &near in nearness {

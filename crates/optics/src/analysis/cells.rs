@@ -61,6 +61,13 @@ impl CellSpread {
         Self { half: 0, shares: vec![1.0] }
     }
 
+    /// Cells on each side of the middle one of what lands near it, where λN is so many cells and there are `most`.
+    #[must_use]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts of cells")]
+    pub fn half_of_sharp(unit: f64, most: usize) -> usize {
+        ((REACH * RING * unit).ceil().max(1.0) as usize).min(most.max(1))
+    }
+
     /// The spread of fields about one centre, which count alike.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts of cells")]
@@ -105,9 +112,9 @@ impl CellSpread {
                 let value = match margin {
                     0 => own,
                     _ => {
-                        let around =
+                        let neighbours =
                             means[at - 1] + means[at + 1] + means[at - wide] + means[at + wide];
-                        (own - (around - 4.0 * own) / 24.0).max(0.0)
+                        (own - (neighbours - 4.0 * own) / 24.0).max(0.0)
                     }
                 };
                 let from = |k: usize| k as f64 - core as f64;

@@ -57,16 +57,21 @@ fn is_wanted(scene: &Scene, plan: &Plan) -> bool {
     scene.camera.diffracts() && plan.layers.contains(&LayerSpec::Radiance)
 }
 
-/// Bytes a pixel of its cells' light, depths and layers.
+/// Bytes of a picture: its cells' light, depths and layers, and what spreads them.
 pub(crate) fn bytes(scene: &Scene, plan: &Plan) -> u64 {
     let Some(lens) = scene.camera.lens().filter(|_| is_wanted(scene, plan)) else { return 0 };
     let bands = plan.bands.count();
     let shortest = (0..bands).map(|band| plan.bands.wavelength(band)).fold(f64::INFINITY, f64::min);
     let pitch = 1e-3 * lens.focused().pixel_pitch();
-    let cells = u64::from(cells_a_pixel(pitch, lens.airy_unit(shortest)));
+    let cells = cells_a_pixel(pitch, lens.airy_unit(shortest));
     let lit = plan.layers.iter().filter(|layer| layer.is_light()).count();
     let each = size_of::<f32>() * (lit * bands + 1) + 1;
-    cells * cells * each as u64
+    let resolution = scene.camera.resolution();
+    let [columns, rows] = resolution.map(|side| u64::from(side) * u64::from(cells));
+    let longest = (0..bands).map(|band| plan.bands.wavelength(band)).fold(0.0, f64::max);
+    let unit = lens.airy_unit(longest) * f64::from(cells) / pitch;
+    // Beside light, what a layer covers and what is known.
+    columns * rows * each as u64 + spreads::bytes(lens, resolution, (cells, unit), lit + 2)
 }
 
 /// Refuses what light that is spread over the picture cannot be.

@@ -1,9 +1,10 @@
 //! The spread of light by place of the picture, depth and band: at nodes over the picture, between which
 //! light belongs to the four around it, to each by its share.
 
-use etendue_camera::WaveLens;
+use etendue_camera::{LensCamera, WaveLens};
 use etendue_optics::analysis::{AnalysisError, CellGrid, CellSpread, FieldsBetween};
 use rayon::prelude::*;
+use rustfft::num_complex::Complex64;
 
 use super::layers::DepthLayers;
 
@@ -30,6 +31,35 @@ pub(crate) struct Spreads {
     /// Of each layer (1/mm).
     nearness: Vec<f64>,
     grid: CellGrid,
+}
+
+/// Depths at which fields are traced, at most.
+const DEPTHS: usize = 3;
+
+/// Bytes of the fields of all nodes, and of what is made of them on the way to so many `planes` of pixels: for each
+/// thread the transforms of a node's cells, and the pixels that all nodes light. `cells` a pixel, of which λN has
+/// `unit`, of a lens that draws sharply.
+pub(crate) fn bytes(
+    lens: &LensCamera,
+    resolution: [u32; 2],
+    (cells, unit): (u32, f64),
+    planes: usize,
+) -> u64 {
+    /// The spread, a plane, its transform and the scratch of that.
+    const TRANSFORMS: usize = 4;
+    let (is_ideal, wavelengths) = lens.waves_to_trace();
+    let side = if is_ideal { IDEAL_NODES } else { NODES };
+    let fields =
+        (side * side * wavelengths * DEPTHS + 2 * WAVELENGTHS) * FieldsBetween::FIELD_BYTES;
+    let size = resolution.map(|pixels| pixels as usize * cells as usize);
+    let half = CellSpread::half_of_sharp(unit, size[0].max(size[1]));
+    let window = |size: usize| size.min(2 * size / (side - 1)) + 2 * half;
+    let cells_of_node = window(size[0]) * window(size[1]);
+    let threads = rayon::current_num_threads();
+    let transforms = threads * cells_of_node * (TRANSFORMS * size_of::<Complex64>() + 8 * planes);
+    let lit = |size: usize| window(size).min(size) / cells as usize;
+    let pixels = side * side * planes * size_of::<f64>() * lit(size[0]) * lit(size[1]);
+    (fields + transforms + pixels) as u64
 }
 
 impl Spreads {

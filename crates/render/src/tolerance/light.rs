@@ -116,10 +116,10 @@ pub(super) fn values(
 /// block.
 fn pooled(values: &[f64], width: usize) -> Vec<f64> {
     let rows = values.len() / width.max(1);
-    let around = |at: usize, side: usize| at.saturating_sub(1)..(at + 2).min(side);
+    let neighbours = |at: usize, side: usize| at.saturating_sub(1)..(at + 2).min(side);
     let sum = |x: usize, y: usize| -> f64 {
-        let row = |y: usize| values[y * width..][around(x, width)].iter().sum::<f64>();
-        around(y, rows).map(row).sum()
+        let row = |y: usize| values[y * width..][neighbours(x, width)].iter().sum::<f64>();
+        neighbours(y, rows).map(row).sum()
     };
     let places = (0..rows).flat_map(|y| (0..width).map(move |x| (x, y)));
     places.map(|(x, y)| sum(x, y)).collect()

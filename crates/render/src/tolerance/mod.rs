@@ -387,7 +387,7 @@ fn simplest(
         notes.push("light is spread by the waves of this very lens".to_owned());
         return Ok(None);
     }
-    let tolerance = spec.tolerance();
+    let tolerance = Tolerance::from(spec);
     let view = FullView::new(scene, accel, &plan.bands, Field::QUICK)?;
     let models = match view.models(tolerance) {
         Ok(found) => found.models,
@@ -412,13 +412,9 @@ fn simplest(
 }
 
 /// The tolerance of a scene as models are judged by.
-trait Judged {
-    fn tolerance(&self) -> Tolerance;
-}
-
-impl Judged for ToleranceSpec {
-    fn tolerance(&self) -> Tolerance {
-        Tolerance { pixels: self.displacement.0, light: Some(self.light.0) }
+impl From<ToleranceSpec> for Tolerance {
+    fn from(spec: ToleranceSpec) -> Self {
+        Self { pixels: spec.displacement.0, light: Some(spec.light.0) }
     }
 }
 

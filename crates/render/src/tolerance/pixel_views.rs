@@ -170,7 +170,7 @@ pub(super) fn places(scene: &Scene, accel: &dyn Accel, size: [u32; 2]) -> Vec<Pl
         for column in 0..columns {
             let at = [share(column, columns) * width, share(row, rows) * height];
             let size = [width / f64::from(columns - 1), height / f64::from(rows - 1)];
-            let depths = around(&scene.camera, accel, (at, size), sees_infinity);
+            let depths = depths_in_cell(&scene.camera, accel, (at, size), sees_infinity);
             places.push(Place { column: at[0], row: at[1], depths });
         }
     }
@@ -178,7 +178,7 @@ pub(super) fn places(scene: &Scene, accel: &dyn Accel, size: [u32; 2]) -> Vec<Pl
 }
 
 /// The depths (m) in a cell of the picture of a middle and a size (pixels).
-fn around(
+fn depths_in_cell(
     camera: &Camera,
     accel: &dyn Accel,
     (middle, size): ([f64; 2], [f64; 2]),

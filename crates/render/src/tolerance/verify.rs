@@ -8,7 +8,7 @@ use etendue_scene::Scene;
 use serde::Serialize;
 
 use super::light::{BLOCK, differing, values};
-use super::{Field, FullView, Judged, Taken, TakenCamera};
+use super::{Field, FullView, Taken, TakenCamera, Tolerance};
 use crate::{Images, Plan, RenderError, Watch};
 
 /// The longer side of the small pictures, at most.
@@ -28,7 +28,7 @@ pub struct Verified {
     pub light: [f64; 2],
     /// The same between two pictures with everything and other random numbers: what noise alone makes.
     pub noise: f64,
-    /// Blocks that were compared.
+    /// Blocks that were compared; none where nothing was taken.
     pub blocks: usize,
 }
 
@@ -46,6 +46,11 @@ impl Verified {
 impl fmt::Display for Verified {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { displacement: [displacement, pixels], places, light, noise, blocks } = self;
+        if *blocks == 0 {
+            return f.write_str(
+                "verified: nothing was taken, so the picture is the one with everything",
+            );
+        }
         let [light, share] = light.map(|share| 100.0 * share);
         let is_within = if self.is_within() { "within the tolerance" } else { "MORE than allowed" };
         write!(
@@ -70,7 +75,11 @@ pub fn verify(
     images: &Images,
     watch: &dyn Watch,
 ) -> Result<Verified, RenderError> {
-    let tolerance = taken.tolerance.tolerance();
+    let tolerance = Tolerance::from(taken.tolerance);
+    if taken.camera.is_none() && taken.bounces.is_none() {
+        let [displacement, light] = [[0.0, tolerance.pixels], [0.0, taken.tolerance.light.0]];
+        return Ok(Verified { displacement, places: 0, light, noise: 0.0, blocks: 0 });
+    }
     // Places between those that the choice was made by.
     let (mut displacement, mut places) = (0.0, 0);
     if let Some(TakenCamera { camera, finding }) = &taken.camera {
