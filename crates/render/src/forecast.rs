@@ -115,8 +115,8 @@ fn bytes_of_layer(layer: LayerSpec, plan: &Plan) -> u64 {
     planes as u64 * bytes_of_plane(layer, plan.precision)
 }
 
-/// Bytes a pixel of what a sensor makes of the light: its bands, the numbers, their preview, and
-/// expected values and variances.
+/// Bytes a pixel of what a sensor makes of the light: its bands, the numbers, their preview, expected
+/// values and variances, and what is merged of exposures.
 fn bytes_of_sensor(scene: &Scene, sensor: &Sensor, plan: &Plan) -> u64 {
     let bands = plan.bands.count() as u64;
     bytes_exposed(sensor, bands, if expose::has_spectrum(scene) { bands } else { 0 })
@@ -136,7 +136,12 @@ pub(crate) fn bytes_exposed(sensor: &Sensor, bands: u64, cube: u64) -> u64 {
         Some(true) => 2 * size_of::<f64>() as u64 * depth + F32 * depth,
         _ => 0,
     };
-    F32 * (bands + cube) + numbers + preview.max(moments)
+    // Of each number its sums, which exposures of it count, and what is written.
+    let merged = match sensor.spec().hdr {
+        Some(true) => 4 * size_of::<f64>() as u64 * depth + 3 * F32 * depth,
+        _ => 0,
+    };
+    F32 * (bands + cube) + numbers + preview.max(moments).max(merged)
 }
 
 /// Bytes of the images that the plan's materials look at, and of the environment.

@@ -11,7 +11,7 @@ use crate::SensorError;
 /// A rectangle of filter letters that repeats over the sensor from its top left pixel.
 ///
 /// In JSON: a word of four letters for two by two pixels read row by row (`"rggb"`, `"grbg"`,
-/// `"rgbw"`), or a list of rows (`["rgbw", "bwrg"]`).
+/// `"rgbw"`), a list of rows (`["rgbw", "bwrg"]`), or one of the [names](Self::NAMED).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CfaSpec {
     /// Rows of equal length, at least one letter each.
@@ -22,6 +22,30 @@ pub struct CfaSpec {
 const LONGEST_SIDE: usize = 64;
 
 impl CfaSpec {
+    /// Patterns that have a name: four pixels of a colour together; Fujifilm's of six by six pixels; one of RGB-IR
+    /// sensors, of which `i` wants a curve; and one of cars', with clear pixels in place of green ones.
+    pub const NAMED: [(&str, &[&str]); 4] = [
+        ("quad_bayer", &["rrgg", "rrgg", "ggbb", "ggbb"]),
+        ("x_trans", &["gbggrg", "rgrbgb", "gbggrg", "grggbg", "bgbrgr", "grggbg"]),
+        ("rgb_ir", &["bgrg", "gigi", "rgbg", "gigi"]),
+        ("rccb", &["rw", "wb"]),
+    ];
+
+    /// A pattern by its name, or of two by two letters.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::two_by_two`].
+    pub fn of_word(word: &str) -> Result<Self, SensorError> {
+        let named = Self::NAMED.iter().find(|(name, _)| *name == word);
+        match named {
+            Some((_, rows)) => {
+                Self::from_rows(rows.iter().map(|row| row.chars().collect()).collect())
+            }
+            None => Self::two_by_two(word),
+        }
+    }
+
     /// Two by two letters, read row by row.
     ///
     /// # Errors
@@ -32,8 +56,9 @@ impl CfaSpec {
         if letters.len() != 4 {
             return Err(SensorError::Pattern(format!(
                 "`{word}` has {} letters; a pattern of two by two pixels has four, others are a \
-                 list of rows",
-                letters.len()
+                 list of rows or one of {}",
+                letters.len(),
+                Self::NAMED.map(|(name, _)| name).join(", ")
             )));
         }
         Self::from_rows(letters.chunks(2).map(<[char]>::to_vec).collect())
@@ -114,11 +139,13 @@ impl<'de> Visitor<'de> for CfaVisitor {
     type Value = CfaSpec;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a word of four filter letters such as \"rggb\", or a list of rows of letters")
+        f.write_str(
+            "a word of four filter letters such as \"rggb\", a name, or a list of rows of letters",
+        )
     }
 
     fn visit_str<E: de::Error>(self, word: &str) -> Result<CfaSpec, E> {
-        CfaSpec::two_by_two(word).map_err(|error| E::custom(error.why()))
+        CfaSpec::of_word(word).map_err(|error| E::custom(error.why()))
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<CfaSpec, A::Error> {
@@ -138,8 +165,12 @@ impl JsonSchema for CfaSpec {
     fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
         let rows = generator.subschema_for::<Vec<String>>();
         schemars::json_schema!({
-            "description": "Filter letters: two by two pixels read row by row, or a list of rows.",
-            "anyOf": [{ "type": "string", "minLength": 4, "maxLength": 4 }, rows],
+            "description": "Filter letters: two by two pixels read row by row, a named pattern, or a list of rows.",
+            "anyOf": [
+                { "type": "string", "minLength": 4, "maxLength": 4 },
+                { "enum": Self::NAMED.map(|(name, _)| name) },
+                rows,
+            ],
         })
     }
 }
@@ -163,6 +194,17 @@ mod tests {
         assert_eq!((wide.period(), wide.at(3, 5)), ([2, 4], 'w'));
         let text = serde_json::to_string(&wide).unwrap();
         assert_eq!(serde_json::from_str::<CfaSpec>(&text).unwrap(), wide);
+        // Of Fujifilm's 36 pixels 20 are green, and each row and column has all three colours.
+        let fuji = CfaSpec::of_word("x_trans").unwrap();
+        let count = |letter| (0..36).filter(|k| fuji.at(k / 6, k % 6) == letter).count();
+        assert_eq!(['r', 'g', 'b'].map(count), [8, 20, 8]);
+        for k in 0..6 {
+            for letter in ['r', 'g', 'b'] {
+                assert!((0..6).any(|x| fuji.at(k, x) == letter));
+                assert!((0..6).any(|y| fuji.at(y, k) == letter));
+            }
+        }
+        assert_eq!(CfaSpec::of_word("rccb").unwrap().to_string(), "rwwb");
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! | stage | symbols |
 //! |---|---|
 //! | [`photo_response`] | `μₑ ← μₑ·(1 + PRNU·z)` |
-//! | [`dark_signal`] | `μ = μₑ + μ_I·T` |
+//! | [`dark_signal`] | `μ = μₑ + μ_I·T`, of each pixel its own with DCNU |
 //! | [`shot_noise`] | `n ~ Poisson(μ)`, or its approximation |
 //! | [`full_well`] | `n ← min(n, capacity)` |
 //! | [`read_out`] | `n + σ_read·z + DSNU·z′ + row + column` |
@@ -25,6 +25,8 @@
 use crate::film::InvalidValues;
 use crate::moments::PixelLaw;
 use crate::normal::{ln, pair};
+use serde::Serialize;
+
 use crate::philox::{PhiloxKey, Site, Stage, unit32, unit52};
 use crate::poisson::{FINISHED_TOGETHER, OpenPixel, PD_FROM, finish, first_try, small_means};
 use crate::spec::NoiseModel;
@@ -62,8 +64,13 @@ pub(crate) struct Chain {
     pub(crate) prnu: f64,
     /// Standard deviation of the offset (e⁻).
     pub(crate) dsnu: f64,
+    /// Relative standard deviation of the dark signal.
+    pub(crate) dcnu: f64,
     /// Share of hot pixels, and the mean of their extra dark signal (e⁻).
-    pub(crate) hot: Option<[f64; 2]>,
+    pub(crate) hot: [f64; 2],
+    /// Shares of pixels that collect nothing, and that are always saturated.
+    pub(crate) dead: f64,
+    pub(crate) stuck: f64,
     /// The seed of temporal noise.
     pub(crate) temporal: PhiloxKey,
     /// The serial number.
@@ -84,6 +91,24 @@ impl BlockPlace {
     fn at(self, i: usize) -> u32 {
         self.column.wrapping_add(i as u32)
     }
+
+    /// The counter of what is the same in every frame.
+    #[inline(always)]
+    fn fixed(self, i: usize, stage: Stage) -> [u32; 4] {
+        Site { frame: 0, ..self.site }.counter(self.at(i), stage, 0)
+    }
+}
+
+/// What is wrong with a pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Defect {
+    /// It has much more dark current than others.
+    Hot,
+    /// It collects no electrons.
+    Dead,
+    /// It is always saturated.
+    Stuck,
 }
 
 /// Exposes one block: mean photo-electrons in, digital numbers out. `offset` holds what rows and
@@ -101,10 +126,10 @@ pub(crate) fn expose(
         full_well(chain.full_well, mean);
         return convert(chain, mean, out);
     }
-    if chain.has_pattern() {
-        pattern(chain, place, mean, offset);
+    match chain.has_pattern() {
+        true => pattern(chain, place, mean, offset),
+        false => dark_signal(chain.dark, mean),
     }
-    dark_signal(chain.dark, mean);
     let mut normals = [[0.0; BLOCK]; 2];
     let mut units = [0.0; BLOCK];
     deviates(&chain.temporal, place, &mut normals, &mut units);
@@ -118,19 +143,19 @@ pub(crate) fn expose(
 }
 
 /// Mean and variance over frames (DN, DN²) of the first `count` pixels of a block: mean photo-electrons
-/// in, mean out. `shared` is the variance of row and column offsets (e⁻²).
+/// in, mean out. `shared` is the variance of row and column offsets that change from frame to frame (e⁻²), `offset`
+/// what rows and columns add in each (e⁻), which is used up.
 pub(crate) fn moments(
     chain: &Chain,
     shared: f64,
     (place, count): (BlockPlace, usize),
-    mean: &mut BlockValues,
+    (mean, offset): (&mut BlockValues, &mut BlockValues),
     variance: &mut BlockValues,
 ) {
-    let mut offset = [0.0; BLOCK];
-    if chain.has_pattern() && chain.noise != NoiseModel::None {
-        pattern(chain, place, mean, &mut offset);
+    match chain.has_pattern() && chain.noise != NoiseModel::None {
+        true => pattern(chain, place, mean, offset),
+        false => dark_signal(chain.dark, mean),
     }
-    dark_signal(chain.dark, mean);
     let read_noise = (chain.read_noise * chain.read_noise + shared).sqrt();
     for i in 0..count {
         let law = PixelLaw {
@@ -148,8 +173,28 @@ pub(crate) fn moments(
 }
 
 impl Chain {
+    /// What is wrong with a pixel, by its number in 0..1 that says so.
+    #[inline(always)]
+    fn defect(&self, chance: f64) -> Option<Defect> {
+        let [hot, _] = self.hot;
+        match chance {
+            x if x < hot => Some(Defect::Hot),
+            x if x < hot + self.dead => Some(Defect::Dead),
+            x if x < hot + self.dead + self.stuck => Some(Defect::Stuck),
+            _ => None,
+        }
+    }
+
+    /// What is wrong with the pixel of a column of a site.
+    pub(crate) fn defect_at(&self, site: Site, column: u32) -> Option<Defect> {
+        let place = BlockPlace { site, column };
+        let [.., word] = self.pattern.words(place.fixed(0, Stage::Pattern));
+        self.defect(unit32(word))
+    }
+
     fn has_pattern(&self) -> bool {
-        self.prnu > 0.0 || self.dsnu > 0.0 || self.hot.is_some()
+        let all = [self.prnu, self.dsnu, self.dcnu * self.dark, self.hot[0], self.dead, self.stuck];
+        all.iter().any(|&part| part > 0.0)
     }
 }
 
@@ -169,25 +214,51 @@ fn deviates(
     }
 }
 
-/// PRNU, DSNU and hot pixels: the same in every frame of a sensor.
+/// What a stuck pixel holds more than any other (e⁻).
+const STUCK: f64 = 1e18;
+
+/// PRNU, DSNU, the dark signal with DCNU, and defective pixels: the same in every frame of a sensor.
 #[inline(always)]
 fn pattern(chain: &Chain, place: BlockPlace, mean: &mut BlockValues, offset: &mut BlockValues) {
-    let site = Site { frame: 0, ..place.site };
     let mut chance = [0.0; BLOCK];
     for i in 0..BLOCK {
-        let [a, b, c, d] = chain.pattern.words(site.counter(place.at(i), Stage::Pattern, 0));
+        let [a, b, c, d] = chain.pattern.words(place.fixed(i, Stage::Pattern));
         let [response, dark] = pair([a, b, c]);
         mean[i] = photo_response(chain.prnu, response, mean[i]);
         offset[i] += chain.dsnu * dark;
         chance[i] = unit32(d);
     }
-    if let Some([share, extra]) = chain.hot {
+    let [share, extra] = chain.hot;
+    if share > 0.0 {
         for (i, mean) in mean.iter_mut().enumerate() {
             if chance[i] < share {
-                let words = chain.pattern.words(site.counter(place.at(i), Stage::HotPixel, 0));
+                let words = chain.pattern.words(place.fixed(i, Stage::HotPixel));
                 *mean -= extra * ln(unit52(words[0], words[1]));
             }
         }
+    }
+    match chain.dcnu > 0.0 {
+        true => uneven_dark_signal(chain, place, mean),
+        false => dark_signal(chain.dark, mean),
+    }
+    if chain.dead + chain.stuck > 0.0 {
+        for i in 0..BLOCK {
+            match chain.defect(chance[i]) {
+                Some(Defect::Dead) => mean[i] = 0.0,
+                Some(Defect::Stuck) => offset[i] = STUCK,
+                Some(Defect::Hot) | None => {}
+            }
+        }
+    }
+}
+
+/// `μ = μₑ + μ_I·T·(1 + DCNU·z)`; a dark current cannot be negative.
+#[inline(always)]
+fn uneven_dark_signal(chain: &Chain, place: BlockPlace, mean: &mut BlockValues) {
+    for i in 0..BLOCK {
+        let [a, b, c, _] = chain.pattern.words(place.fixed(i, Stage::DarkCurrent));
+        let [z, _] = pair([a, b, c]);
+        mean[i] += chain.dark * (1.0 + chain.dcnu * z).max(0.0);
     }
 }
 

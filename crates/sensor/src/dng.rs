@@ -28,6 +28,18 @@ pub enum DngError {
     Write(#[from] tiff::TiffError),
 }
 
+/// What a DNG says beside the numbers.
+#[derive(Debug, Clone, Copy)]
+pub struct DngDetails<'a> {
+    /// What the file calls the camera.
+    pub model: &'a str,
+    /// What each of [`Sensor::channels`] makes of a white surface in the scene's light, to any factor
+    /// ([`Sensor::white_under`], or [`Sensor::white_response`] for equal energy).
+    pub white: &'a [f64],
+    /// s
+    pub exposure: f64,
+}
+
 /// Colour filter array, of the photometric interpretations.
 const CFA: u16 = 32_803;
 /// Linear raw, for monochrome sensors.
@@ -36,9 +48,7 @@ const LINEAR_RAW: u16 = 34_892;
 const D65: u16 = 21;
 
 impl Sensor {
-    /// Writes an image of this sensor, a `raw` one, as DNG. `model` is what the file calls the camera,
-    /// `white` what each of [`Self::channels`] makes of a white surface in the scene's light, to any factor
-    /// ([`Self::white_under`], or [`Self::white_response`] for equal energy).
+    /// Writes an image of this sensor, a `raw` one, as DNG.
     ///
     /// # Errors
     ///
@@ -47,7 +57,7 @@ impl Sensor {
     pub fn write_dng(
         &self,
         image: &RawImage,
-        (model, white): (&str, &[f64]),
+        DngDetails { model, white, exposure }: DngDetails<'_>,
         out: impl Write + Seek,
     ) -> Result<(), DngError> {
         if image.depth != 1 {
@@ -88,6 +98,19 @@ impl Sensor {
         directory.write_tag(unknown(50_708), model)?;
         directory.write_tag(unknown(50_714), rational(self.black_level()))?;
         directory.write_tag(unknown(50_717), self.white_level_of_file())?;
+        if let Some(profile) = self.noise_profile(exposure) {
+            directory.write_tag(unknown(51_041), profile.as_slice())?;
+        }
+        // Of TIFF/EP, on which DNG stands.
+        directory.write_tag(unknown(33_434), duration(exposure))?;
+        if let Some(iso) = self.spec().iso.filter(|iso| (1.0..=65_535.0).contains(iso)) {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "see above"
+            )]
+            directory.write_tag(unknown(34_855), iso.round() as u16)?;
+        }
         // The mosaic of filters, the matrix from XYZ to the camera's colours, and its white.
         if let Some([rows, columns, codes @ ..]) = pattern.as_deref() {
             let period = [u16::from(*rows), u16::from(*columns)];
@@ -102,6 +125,15 @@ impl Sensor {
         }
         directory.finish()?;
         Ok(())
+    }
+
+    /// `NoiseProfile`: the slope and the offset of the variance over the signal, both as shares of the range from
+    /// black to white. `None` where nobody counts electrons.
+    fn noise_profile(&self, exposure: f64) -> Option<[f64; 2]> {
+        let range = self.saturation_level() - self.black_level();
+        let dark = self.system_gain() * self.dark_noise(exposure);
+        let counts = self.settings.counts && range > 0.0;
+        counts.then(|| [self.system_gain() / range, (dark * dark + 1.0 / 12.0) / (range * range)])
     }
 
     /// The period and then TIFF/EP's numbers for the filters: red 0, green 1, blue 2; nothing for a
@@ -208,6 +240,14 @@ impl Sensor {
 fn rational(value: f64) -> Rational {
     let SRational { n, .. } = signed(value);
     Rational { n: n.unsigned_abs(), d: 10_000 }
+}
+
+/// A time (s), to nine digits of short ones.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a cast saturates")]
+fn duration(seconds: f64) -> Rational {
+    let d = [1_000_000_000, 1_000_000, 1_000, 1].into_iter();
+    let d = d.into_iter().find(|&d| seconds * f64::from(d) < f64::from(u32::MAX)).unwrap_or(1);
+    Rational { n: (seconds * f64::from(d)).round() as u32, d }
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "a cast saturates; levels are below 65536")]

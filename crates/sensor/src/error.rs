@@ -48,6 +48,13 @@ pub enum SensorError {
         /// The gain (DN/e⁻).
         gain: f64,
     },
+    /// A setting of the amplifier that the sensor does not have.
+    UnknownIso {
+        /// Its number.
+        iso: f64,
+        /// Those that there are.
+        known: Vec<f64>,
+    },
     /// A colour filter array that is not a rectangle of letters.
     Pattern(String),
     /// A channel of a multispectral sensor that cannot be called so.
@@ -126,6 +133,7 @@ impl SensorError {
             Self::Dark { .. } => "quantum_efficiency",
             Self::Pattern(_) | Self::UnknownFilter { .. } => "cfa",
             Self::Channel { .. } => "channels",
+            Self::UnknownIso { .. } => "iso",
             Self::BlindAt { .. } | Self::Film { .. } | Self::Steps { .. } => "",
         }
     }
@@ -146,6 +154,14 @@ impl SensorError {
                 Readable(*full_well),
                 Readable(*gain)
             ),
+            Self::UnknownIso { iso, known } => {
+                let known: Vec<String> = known.iter().map(f64::to_string).collect();
+                format!(
+                    "there is no setting {}: sensor.iso_settings has {}",
+                    Readable(*iso),
+                    known.join(", ")
+                )
+            }
             Self::Pattern(why) => why.clone(),
             Self::Channel { index, why } => format!("the name of channel {index} {why}"),
             Self::UnknownFilter { letter } => format!(

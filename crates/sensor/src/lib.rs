@@ -37,6 +37,7 @@ pub mod dng;
 pub mod emva;
 mod error;
 pub mod film;
+mod hdr;
 mod inertial;
 mod moments;
 mod normal;
@@ -53,10 +54,14 @@ pub mod spec;
 
 pub use bands::{BandChoice, Factor, Illumination, Times};
 pub use cfa::CfaSpec;
+pub use chain::Defect;
 pub use error::SensorError;
 pub use film::{Exposure, Film, InvalidValues, Moments, NoiseFloor, RawImage};
+pub use hdr::HdrImage;
 pub use inertial::{InertialError, InertialNoise, InertialNoiseSpec};
 pub use philox::mixed_seed;
 pub use preset::{Model, Preset};
 pub use sensor::Sensor;
-pub use spec::{ChannelSet, ChannelSpec, Channels, NoiseModel, Radiometry, SensorKind, SensorSpec};
+pub use spec::{
+    ChannelSet, ChannelSpec, Channels, IsoSetting, NoiseModel, Radiometry, SensorKind, SensorSpec,
+};

@@ -88,16 +88,18 @@ pub(crate) enum Stage {
     Temporal = 1,
     /// Further tries at electrons.
     Electrons = 2,
-    /// The row's offset.
+    /// The row's offset: of a frame, or of all.
     Row = 3,
-    /// The column's offset.
+    /// The column's offset, likewise.
     Column = 4,
-    /// PRNU, DSNU and whether the pixel is hot.
+    /// PRNU, DSNU and what is wrong with the pixel.
     Pattern = 5,
     /// How hot.
     HotPixel = 6,
     /// Keys of other sequences. It is no pixel's: stages of pixels stand in the highest bits.
     PhiloxKey = 7,
+    /// DCNU.
+    DarkCurrent = 8,
 }
 
 /// Channels that a counter has room for.

@@ -4,7 +4,7 @@ use etendue_geometry::units::Micrometres;
 use etendue_spectrum::{Bands, Curve};
 use rayon::prelude::*;
 
-use crate::chain::{self, BLOCK, BlockPlace, BlockValues, Chain, Responsivity};
+use crate::chain::{self, BLOCK, BlockPlace, BlockValues, Chain, Defect, Responsivity};
 use crate::film::{Exposure, Film, InvalidValues, Moments, RawImage};
 use crate::normal::pair;
 use crate::philox::{PhiloxKey, Site, Stage};
@@ -338,6 +338,23 @@ impl Sensor {
         Ok(Moments { width, height, depth, mean, variance, invalid })
     }
 
+    /// The pixels with which something is wrong, row by row: column, row, channel of the image, and what.
+    pub fn defects(&self) -> impl Iterator<Item = ([u32; 2], usize, Defect)> + '_ {
+        let chain = self.chain(0.0, 0);
+        let [width, height] = self.settings.resolution;
+        let any = self.settings.dead + self.settings.stuck + chain.hot[0] > 0.0;
+        let rows = if any { 0..height } else { 0..0 };
+        let pixels = rows.flat_map(move |row| (0..width).map(move |column| [column, row]));
+        pixels.flat_map(move |at @ [column, row]| {
+            let chain = chain.clone();
+            (0..self.depth()).filter_map(move |channel| {
+                #[expect(clippy::cast_possible_truncation, reason = "channels have 12 bits")]
+                let site = Site { row, channel: channel as u16, frame: 0 };
+                Some((at, channel, chain.defect_at(site, column)?))
+            })
+        })
+    }
+
     fn check(&self, film: Film<'_>) -> Result<(usize, usize, usize), SensorError> {
         let [width, height] = self.settings.resolution.map(|side| side as usize);
         let bands = self.response.bands.count();
@@ -360,7 +377,10 @@ impl Sensor {
             white: s.white(),
             prnu: s.prnu,
             dsnu: s.dsnu,
-            hot: s.hot_pixels.map(hot),
+            dcnu: s.dcnu,
+            hot: s.hot_pixels.map_or([0.0; 2], hot),
+            dead: s.dead,
+            stuck: s.stuck,
             temporal: PhiloxKey::temporal(seed, s.serial),
             pattern: PhiloxKey::new(s.serial),
         }
@@ -375,8 +395,9 @@ struct Exposing<'a> {
     chain: Chain,
     /// What bands are worth are multiplied by this: T in physical mode.
     factor: f64,
-    /// What each column adds in this frame (e⁻); empty when nothing.
+    /// What each column adds (e⁻), in this frame and in all; empty when nothing.
     columns: Vec<f64>,
+    fixed_columns: Vec<f64>,
 }
 
 impl<'a> Exposing<'a> {
@@ -386,24 +407,56 @@ impl<'a> Exposing<'a> {
             Radiometry::Digital => 1.0,
             Radiometry::Physical => shot.exposure,
         };
-        let sigma = sensor.settings.column_noise;
-        let noisy = sigma > 0.0 && chain.noise != NoiseModel::None;
-        let site = Site { row: 0, channel: 0, frame: shot.frame };
-        let offset = |column| sigma * one_normal(&chain.temporal, site, column, Stage::Column);
-        let width = if noisy { sensor.settings.resolution[0] } else { 0 };
-        let columns = (0..width).map(offset).collect();
-        Self { sensor, film, frame: shot.frame, factor, columns, chain }
+        let mut exposing = Self {
+            sensor,
+            film,
+            frame: shot.frame,
+            factor,
+            columns: Vec::new(),
+            fixed_columns: Vec::new(),
+            chain,
+        };
+        exposing.fixed_columns = exposing.offsets_of_columns(Lasting::Always);
+        exposing.columns = exposing.offsets_of_columns(Lasting::OneFrame);
+        let fixed = exposing.fixed_columns.iter();
+        match exposing.columns.is_empty() {
+            true => exposing.columns = fixed.copied().collect(),
+            false => exposing.columns.iter_mut().zip(fixed).for_each(|(own, fixed)| *own += fixed),
+        }
+        exposing
+    }
+
+    /// What each column adds (e⁻); empty when nothing.
+    fn offsets_of_columns(&self, lasting: Lasting) -> Vec<f64> {
+        let s = &self.sensor.settings;
+        let sigma = match lasting {
+            Lasting::OneFrame => s.column_noise,
+            Lasting::Always => s.column_pattern,
+        };
+        if sigma <= 0.0 || self.chain.noise == NoiseModel::None {
+            return Vec::new();
+        }
+        let (key, site) = self.key_and_site(0, lasting);
+        (0..s.resolution[0])
+            .map(|column| sigma * one_normal(key, site, column, Stage::Column))
+            .collect()
+    }
+
+    /// By what numbers a row or column is drawn.
+    fn key_and_site(&self, row: usize, lasting: Lasting) -> (&PhiloxKey, Site) {
+        let site = self.site(row, 0);
+        match lasting {
+            Lasting::OneFrame => (&self.chain.temporal, site),
+            Lasting::Always => (&self.chain.pattern, Site { frame: 0, ..site }),
+        }
     }
 
     fn row(&self, row: usize, out: &mut [u16]) -> InvalidValues {
         let depth = self.sensor.depth();
-        let row_offset = self.row_offset(row);
+        let of_row = Lasting::ALL.map(|lasting| self.row_offset(row, lasting)).iter().sum();
         let mut numbers = [0; BLOCK];
         self.blocks(row, |place, start, channel, count, mean| {
-            let mut offset = [row_offset; BLOCK];
-            for (offset, column) in offset.iter_mut().zip(self.columns.iter().skip(start)) {
-                *offset += column;
-            }
+            let mut offset = with_columns(of_row, &self.columns, start);
             chain::expose(&self.chain, place, mean, &mut offset, &mut numbers);
             let out = out[start * depth + channel..].iter_mut().step_by(depth);
             out.zip(&numbers[..count]).for_each(|(out, number)| *out = *number);
@@ -419,9 +472,12 @@ impl<'a> Exposing<'a> {
         let depth = self.sensor.depth();
         let s = &self.sensor.settings;
         let shared = s.row_noise * s.row_noise + s.column_noise * s.column_noise;
+        let of_row = self.row_offset(row, Lasting::Always);
         let mut variance = [0.0; BLOCK];
         self.blocks(row, |place, start, channel, count, mean| {
-            chain::moments(&self.chain, shared, (place, count), mean, &mut variance);
+            let mut offset = with_columns(of_row, &self.fixed_columns, start);
+            let means = (&mut *mean, &mut offset);
+            chain::moments(&self.chain, shared, (place, count), means, &mut variance);
             let at = start * depth + channel;
             #[expect(clippy::cast_possible_truncation, reason = "DN need not more than f32")]
             for i in 0..count {
@@ -443,15 +499,20 @@ impl<'a> Exposing<'a> {
         let film = &self.film.values[row * width * bands..][..width * bands];
         let responsivities: Vec<Responsivity> =
             (0..self.sensor.depth()).map(|channel| self.responsivity(row, channel)).collect();
+        let share = self.sensor.settings.crosstalk;
         let mut invalid = InvalidValues::default();
         let mut mean = [0.0; BLOCK];
-        for start in (0..width).step_by(BLOCK) {
-            let count = BLOCK.min(width - start);
-            let values = &film[start * bands..][..count * bands];
-            for (channel, responsivity) in responsivities.iter().enumerate() {
+        for (channel, responsivity) in responsivities.iter().enumerate() {
+            let mixed = (share > 0.0).then(|| self.with_crosstalk(row, channel));
+            for start in (0..width).step_by(BLOCK) {
+                let count = BLOCK.min(width - start);
+                let values = &film[start * bands..][..count * bands];
                 let seen = responsivity.gather(values, start, &mut mean[..count]);
                 if channel == 0 {
                     invalid = invalid.sum(seen);
+                }
+                if let Some(mixed) = &mixed {
+                    mean[..count].copy_from_slice(&mixed[start..start + count]);
                 }
                 // What is left of a short block repeats its last pixel and is thrown away.
                 let last = mean[count - 1];
@@ -462,6 +523,27 @@ impl<'a> Exposing<'a> {
             }
         }
         invalid
+    }
+
+    /// Mean photo-electrons of a row's pixels, of which each of their four neighbours collects a share. Beyond an
+    /// edge the picture goes on as it ends.
+    fn with_crosstalk(&self, row: usize, channel: usize) -> Vec<f64> {
+        let [width, height] = self.sensor.settings.resolution.map(|side| side as usize);
+        let bands = self.sensor.response.bands.count();
+        let of_row = |row: usize| {
+            let mut mean = vec![0.0; width];
+            let values = &self.film.values[row * width * bands..][..width * bands];
+            self.responsivity(row, channel).gather(values, 0, &mut mean);
+            mean
+        };
+        let own = of_row(row);
+        let [above, below] = [row.saturating_sub(1), (row + 1).min(height - 1)].map(of_row);
+        let share = self.sensor.settings.crosstalk;
+        let mixed = (0..width).map(|x| {
+            let beside = own[x.saturating_sub(1)] + own[(x + 1).min(width - 1)];
+            own[x] * (1.0 - 4.0 * share) + share * (beside + above[x] + below[x])
+        });
+        mixed.collect()
     }
 
     /// What bands are worth along a row: by the filters' turns, or in one channel of the image.
@@ -481,14 +563,39 @@ impl<'a> Exposing<'a> {
         Site { row: row as u32, channel: channel as u16, frame: self.frame }
     }
 
-    /// What the row adds in this frame (e⁻).
-    fn row_offset(&self, row: usize) -> f64 {
-        let sigma = self.sensor.settings.row_noise;
+    /// What the row adds (e⁻).
+    fn row_offset(&self, row: usize, lasting: Lasting) -> f64 {
+        let s = &self.sensor.settings;
+        let sigma = match lasting {
+            Lasting::OneFrame => s.row_noise,
+            Lasting::Always => s.row_pattern,
+        };
         if sigma <= 0.0 || self.chain.noise == NoiseModel::None {
             return 0.0;
         }
-        sigma * one_normal(&self.chain.temporal, self.site(row, 0), 0, Stage::Row)
+        let (key, site) = self.key_and_site(row, lasting);
+        sigma * one_normal(key, site, 0, Stage::Row)
     }
+}
+
+/// For how long an offset is what it is.
+#[derive(Debug, Clone, Copy)]
+enum Lasting {
+    OneFrame,
+    Always,
+}
+
+impl Lasting {
+    const ALL: [Self; 2] = [Self::OneFrame, Self::Always];
+}
+
+/// What rows and columns add to the pixels of a block from column `start` on.
+fn with_columns(of_row: f64, columns: &[f64], start: usize) -> BlockValues {
+    let mut offset = [of_row; BLOCK];
+    for (offset, column) in offset.iter_mut().zip(columns.iter().skip(start)) {
+        *offset += column;
+    }
+    offset
 }
 
 fn one_normal(key: &PhiloxKey, site: Site, column: u32, stage: Stage) -> f64 {

@@ -1,5 +1,7 @@
 //! A spec with every gap filled, by the model or by an ideal sensor, and every number checked.
 
+use std::borrow::Cow;
+
 use etendue_spectrum::Curve;
 
 use crate::spec::{Filters, HotPixels, NoiseModel, Radiometry, SensorKind, SensorSpec};
@@ -40,6 +42,14 @@ pub(crate) struct SensorSettings {
     pub(crate) dsnu: f64,
     pub(crate) row_noise: f64,
     pub(crate) column_noise: f64,
+    pub(crate) row_pattern: f64,
+    pub(crate) column_pattern: f64,
+    pub(crate) dcnu: f64,
+    /// Shares of pixels.
+    pub(crate) dead: f64,
+    pub(crate) stuck: f64,
+    /// Share of electrons that each of four neighbours gets.
+    pub(crate) crosstalk: f64,
     /// At least one.
     pub(crate) exposures: Vec<f64>,
     /// At least one.
@@ -64,6 +74,7 @@ impl SensorSettings {
 
     /// Fills and checks a spec.
     pub(crate) fn new(spec: &SensorSpec) -> Result<Self, SensorError> {
+        let spec = &*at_its_iso(spec)?;
         let preset = spec.model.map(Model::preset);
         let counts = spec.system_gain.is_some() || preset.is_some();
         let noise =
@@ -95,6 +106,12 @@ impl SensorSettings {
             dsnu: spec.dsnu.or(preset.map(|p| p.dsnu.value)).unwrap_or(0.0),
             row_noise: spec.row_noise.unwrap_or(0.0),
             column_noise: spec.column_noise.unwrap_or(0.0),
+            row_pattern: spec.row_pattern.unwrap_or(0.0),
+            column_pattern: spec.column_pattern.unwrap_or(0.0),
+            dcnu: spec.dcnu.unwrap_or(0.0),
+            dead: spec.dead_pixels.unwrap_or(0.0),
+            stuck: spec.stuck_pixels.unwrap_or(0.0),
+            crosstalk: spec.crosstalk.unwrap_or(0.0),
             exposures: match &spec.exposures {
                 Some(several) => several.iter().map(|time| time.0).collect(),
                 None => vec![spec.exposure.map_or(0.01, |time| time.0)],
@@ -105,6 +122,7 @@ impl SensorSettings {
             radiometry: spec.radiometry.unwrap_or_default(),
             notes: Vec::new(),
         };
+        settings.amplify(spec)?;
         // Values that contradict one another are refused, and the dark current is brought to the
         // temperature.
         settings.check_pixels()?;
@@ -114,6 +132,19 @@ impl SensorSettings {
         settings.check_use(spec)?;
         settings.warm(spec)?;
         Ok(settings)
+    }
+
+    /// Takes the gain and the noise of the read-out behind the amplifier.
+    fn amplify(&mut self, spec: &SensorSpec) -> Result<(), SensorError> {
+        let factor = spec.analog_gain.unwrap_or(1.0);
+        within("analog_gain", factor, [1e-6, 1e6], "a factor above 0 (1e-6 to 1e6)")?;
+        self.gain *= factor;
+        let of_converter = spec.converter_noise.unwrap_or(0.0);
+        within("converter_noise", of_converter, [0.0, 65_535.0], "DN, 0 or more, up to 65535")?;
+        if of_converter > 0.0 && self.gain > 0.0 {
+            self.read_noise = self.read_noise.hypot(of_converter / self.gain);
+        }
+        Ok(())
     }
 
     fn check_pixels(&self) -> Result<(), SensorError> {
@@ -140,6 +171,8 @@ impl SensorSettings {
             ("dsnu", self.dsnu),
             ("row_noise", self.row_noise),
             ("column_noise", self.column_noise),
+            ("row_pattern", self.row_pattern),
+            ("column_pattern", self.column_pattern),
         ] {
             within(key, value, [0.0, MOST_ELECTRONS], demand)?;
         }
@@ -149,10 +182,18 @@ impl SensorSettings {
             SensorError::unless((0.0..=1.0).contains(&value), key, value, "a fraction in 0..=1")
         };
         share("prnu", self.prnu)?;
+        share("dcnu", self.dcnu)?;
+        share("dead_pixels", self.dead)?;
+        share("stuck_pixels", self.stuck)?;
+        let of_each = "a share of electrons in 0..=0.2: four neighbours get it each";
+        within("crosstalk", self.crosstalk, [0.0, 0.2], of_each)?;
         if let Some(hot) = self.hot_pixels {
             share("hot_pixels.share", hot.share)?;
             within("hot_pixels.dark_current", hot.dark_current, [0.0, MOST_CURRENT], demand)?;
         }
+        let sum = self.dead + self.stuck + self.hot_pixels.map_or(0.0, |hot| hot.share);
+        let demand = "hot, dead and stuck pixels that are all of them at most together";
+        SensorError::unless(sum <= 1.0, "stuck_pixels", self.stuck, demand)?;
         Ok(())
     }
 
@@ -192,6 +233,17 @@ impl SensorSettings {
         )?;
         let frames = f64::from(self.frames);
         SensorError::unless((1..=100_000).contains(&self.frames), "frames", frames, "1 to 100000")?;
+        if spec.hdr == Some(true) {
+            if self.exposures.len() as f64 * frames < 2.0 {
+                let why = "sensor.hdr merges several: name their times";
+                return Err(SensorError::Missing { key: "exposures", why });
+            }
+            if self.radiometry == Radiometry::Digital {
+                let why =
+                    "with radiometry `digital` longer exposures have no more light; set `physical`";
+                return Err(SensorError::Misplaced { key: "hdr", why });
+            }
+        }
         if spec.exposure.is_some() && spec.exposures.is_some() {
             let why = "sensor.exposures says it all";
             return Err(SensorError::Misplaced { key: "exposure", why });
@@ -232,6 +284,9 @@ impl SensorSettings {
             spec.dsnu,
             spec.row_noise,
             spec.column_noise,
+            spec.row_pattern,
+            spec.column_pattern,
+            spec.converter_noise,
             spec.hot_pixels.map(|hot| hot.share),
         ];
         let wants_electrons = self.noise != NoiseModel::None
@@ -284,6 +339,44 @@ impl SensorSettings {
         }
         Ok(())
     }
+}
+
+/// The spec with the numbers of the ISO setting that holds.
+fn at_its_iso(spec: &SensorSpec) -> Result<Cow<'_, SensorSpec>, SensorError> {
+    let Some(all) = &spec.iso_settings else {
+        if spec.iso.is_some() {
+            let why = "sensor.iso names one of them";
+            return Err(SensorError::Missing { key: "iso_settings", why });
+        }
+        return Ok(Cow::Borrowed(spec));
+    };
+    if spec.system_gain.is_some() {
+        let why = "sensor.iso_settings has the gain of each setting";
+        return Err(SensorError::Misplaced { key: "system_gain", why });
+    }
+    let Some(first) = all.first() else {
+        let why = "name one setting at least";
+        return Err(SensorError::Missing { key: "iso_settings", why });
+    };
+    for (index, setting) in all.iter().enumerate() {
+        within("iso_settings.iso", setting.iso, [1e-3, 1e9], "a number above 0 (1e-3 to 1e9)")?;
+        if all[..index].iter().any(|other| other.iso == setting.iso) {
+            let demand = "settings of different numbers";
+            return Err(SensorError::Value { key: "iso_settings.iso", value: setting.iso, demand });
+        }
+    }
+    let iso = spec.iso.unwrap_or(first.iso);
+    let Some(setting) = all.iter().find(|setting| setting.iso == iso) else {
+        let known = all.iter().map(|setting| setting.iso).collect();
+        return Err(SensorError::UnknownIso { iso, known });
+    };
+    Ok(Cow::Owned(SensorSpec {
+        system_gain: Some(setting.system_gain),
+        read_noise: setting.read_noise.or(spec.read_noise),
+        full_well: setting.full_well.or(spec.full_well),
+        black_level: setting.black_level.or(spec.black_level),
+        ..spec.clone()
+    }))
 }
 
 fn positive(key: &'static str, value: f64, demand: &'static str) -> Result<(), SensorError> {

@@ -37,9 +37,21 @@ pub struct SensorSpec {
     /// `none` and radiometry `digital`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub system_gain: Option<f64>,
-    /// Standard deviation of the read-out, `σ_read` (e⁻, ≥ 0; default 0).
+    /// Factor of the amplifier between pixel and converter (> 0; default 1): it multiplies K.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub analog_gain: Option<f64>,
+    /// Settings of the amplifier that were measured one by one, as ISO speeds or conversion gains.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iso_settings: Option<Vec<IsoSetting>>,
+    /// Which of `iso_settings` holds (default: the first).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iso: Option<f64>,
+    /// Standard deviation of the read-out, `σ_read`, before the amplifier (e⁻, ≥ 0; default 0).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub read_noise: Option<f64>,
+    /// Standard deviation of what the converter adds, behind the amplifier (DN, ≥ 0; default 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub converter_noise: Option<f64>,
     /// Dark current `μ_I` at `dark_current_temperature` (e⁻/s, ≥ 0; default 0).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dark_current: Option<f64>,
@@ -73,9 +85,29 @@ pub struct SensorSpec {
     /// The same for columns (e⁻, ≥ 0; default 0).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub column_noise: Option<f64>,
+    /// The same for rows, of an offset that is the same in every frame (e⁻, ≥ 0; default 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub row_pattern: Option<f64>,
+    /// The same for columns (e⁻, ≥ 0; default 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub column_pattern: Option<f64>,
+    /// Dark current non-uniformity: relative standard deviation of the pixels' dark currents
+    /// (0..=1; default 0). The pattern grows with the time and the temperature.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dcnu: Option<f64>,
     /// Pixels with much more dark current than the others.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hot_pixels: Option<HotPixels>,
+    /// The share of pixels that collect no electrons (0..=1; default 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dead_pixels: Option<f64>,
+    /// The share of pixels that are always saturated (0..=1; default 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stuck_pixels: Option<f64>,
+    /// The share of a pixel's electrons that is collected by each of its four neighbours
+    /// (0..=0.2; default 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub crosstalk: Option<f64>,
     /// Exposure time T (s, > 0; default 0.01).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exposure: Option<Seconds>,
@@ -85,6 +117,9 @@ pub struct SensorSpec {
     /// Frames of each exposure (≥ 1; default 1). They share the fixed pattern, not the noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frames: Option<u32>,
+    /// Also merge all exposures to one picture of electrons a second (default false).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hdr: Option<bool>,
     /// How electrons are drawn (default: `poisson` with a model or a gain, else `none`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<NoiseModel>,
@@ -175,6 +210,25 @@ pub struct HotPixels {
     pub share: f64,
     /// The mean of their extra dark current, which is distributed exponentially (e⁻/s, ≥ 0).
     pub dark_current: f64,
+}
+
+/// A setting of the amplifier, and what was measured at it. What is absent is as of the sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct IsoSetting {
+    /// Its ISO speed, or any number by which it is known (> 0).
+    pub iso: f64,
+    /// System gain K (DN/e⁻, > 0).
+    pub system_gain: f64,
+    /// Standard deviation of the read-out (e⁻, ≥ 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub read_noise: Option<f64>,
+    /// Electrons a pixel holds (e⁻, > 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub full_well: Option<f64>,
+    /// What no light reads as (DN).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub black_level: Option<f64>,
 }
 
 /// A channel of a multispectral sensor.

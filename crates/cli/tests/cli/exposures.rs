@@ -194,3 +194,68 @@ fn png16(bench: &Bench, name: &str) -> (u8, Vec<u16>) {
     let values = bytes.as_chunks().0.iter().map(|&b| u16::from_be_bytes(b)).collect();
     (info.bit_depth as u8, values)
 }
+
+/// A bracket merged: a bright and a dark wall, of which no single exposure has both, in the electrons that the light
+/// makes; what is told of each pixel's noise is its noise, and defects are listed.
+#[test]
+fn a_bracket_is_merged() {
+    let sensor = |keys: Value| {
+        let mut sensor = json!({
+            "type": "raw", "resolution": [64, 64], "system_gain": 0.25, "bit_depth": 12, "black_level": 40,
+            "read_noise": 3, "full_well": 15000, "exposures": ["1 s", "10 ms", "0.1 ms"], "hdr": true,
+            "radiometry": "physical",
+        });
+        for (key, value) in keys.as_object().unwrap() {
+            sensor[key] = value.clone();
+        }
+        sensor
+    };
+    let rates: Vec<f64> = [1e-3, 1e-6]
+        .map(|light| {
+            let bench = wall([light; 3], &sensor(json!({})));
+            bench.render(&[]);
+            let (rate, sigma) = (bench.array("raw_hdr"), bench.array("raw_hdr_sigma"));
+            let mean = rate.iter().sum::<f64>() / 4096.0;
+            let spread = (rate.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / 4095.0).sqrt();
+            // 4096 pixels: a deviation is known to 1/√(2n), times five, and a told one by the pixel's own rate.
+            assert!((spread / (sigma.iter().sum::<f64>() / 4096.0) - 1.0).abs() < 0.06);
+            let sidecar = bench.json("out/sensor.json");
+            assert_eq!(sidecar["hdr"], json!(["raw_hdr.npy", "raw_hdr_sigma.npy"]));
+            assert!(sidecar["defects"].is_null());
+            mean
+        })
+        .into();
+    // The light is a thousand times less, within the noise of the darker one.
+    assert!((rates[0] / rates[1] / 1000.0 - 1.0).abs() < 0.05, "{rates:?}");
+    // What the shortest cannot hold is said.
+    let bench = wall([1e-3; 3], &sensor(json!({ "exposures": ["1000 s", "2000 s"] })));
+    let told = bench.run(&["render", "scene.json", "-o", "out"]);
+    assert!(text(&told.stderr).contains("hdr: 4096 of 4096 numbers are saturated"), "{told:?}");
+    assert!(bench.array("raw_hdr_sigma").iter().all(|sigma| *sigma == f64::INFINITY));
+    // Dead pixels are listed where they are.
+    let bench = wall([1e-3; 3], &sensor(json!({ "dead_pixels": 0.01 })));
+    bench.render(&[]);
+    let defects = bench.json("out/sensor.json")["defects"].clone();
+    let defects = defects.as_array().unwrap();
+    assert!((15..75).contains(&defects.len()), "{}", defects.len());
+    let (rate, at) = (bench.array("raw_hdr"), &defects[0]);
+    let place = at["row"].as_u64().unwrap() * 64 + at["column"].as_u64().unwrap();
+    assert_eq!(at["kind"], "dead");
+    assert!(rate[usize::try_from(place).unwrap()].abs() < 0.01 * rates[0]);
+    // What cannot be merged is refused, by key.
+    for (keys, word) in [
+        (
+            json!({ "radiometry": "digital" }),
+            "camera.sensor.hdr: is of no use here: with radiometry `digital`",
+        ),
+        (
+            json!({ "exposures": ["1 s"] }),
+            "camera.sensor.exposures: is missing: sensor.hdr merges several",
+        ),
+    ] {
+        let bench = wall([1e-3; 3], &sensor(keys));
+        let output = bench.run(&["render", "scene.json", "-o", "out"]);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(text(&output.stderr).contains(word), "{}", text(&output.stderr));
+    }
+}

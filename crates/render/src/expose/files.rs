@@ -3,8 +3,10 @@
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use etendue_sensor::dng::DngError;
-use etendue_sensor::{Exposure, Film, InvalidValues, RawImage, Sensor, SensorKind, SensorSpec};
+use etendue_sensor::dng::{DngDetails, DngError};
+use etendue_sensor::{
+    Defect, Exposure, Film, InvalidValues, NoiseModel, RawImage, Sensor, SensorKind, SensorSpec,
+};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -177,7 +179,9 @@ impl ExposureWriter<'_> {
         // An image that no DNG can hold is not written, and that is no fault.
         let written = self.files.write(&path, |part| {
             let mut out = BufWriter::new(part);
-            match self.sensor.write_dng(image, (model, &self.light.white), &mut out) {
+            let white = &self.light.white;
+            let details = DngDetails { model, white, exposure: shot.exposure };
+            match self.sensor.write_dng(image, details, &mut out) {
                 Ok(()) => out.flush(),
                 Err(DngError::NotRaw(why)) => {
                     refused = Some(why);
@@ -203,6 +207,38 @@ impl ExposureWriter<'_> {
                 Ok(Some(name))
             }
         }
+    }
+
+    /// Merges all exposures, and writes electrons a second with their standard deviation.
+    pub(super) fn merged(&mut self, shots: &[Exposure]) -> Result<[String; 2], ExposeError> {
+        let light = self.light;
+        let image = self.sensor.merged(shots, |shot| light.expose(shot))?;
+        if image.saturated > 0 {
+            let of = image.rate.len();
+            self.exposed.notes.push(format!(
+                "hdr: {} of {of} numbers are saturated in the shortest exposure: raw_hdr.npy has what they are at \
+                 least, raw_hdr_sigma.npy has infinity; add a shorter one",
+                image.saturated
+            ));
+        }
+        let depth = image.depth;
+        let times: Vec<String> = shots.iter().map(|shot| shot.exposure.to_string()).collect();
+        for ((name, definition), values) in HDR_NAMES.into_iter().zip([image.rate, image.sigma]) {
+            let plane = |k: usize| values.iter().skip(k).step_by(depth).copied().collect();
+            let planes = (0..depth).map(|k| Values::F32(plane(k))).collect();
+            let meaning = [
+                ("definition", definition.to_owned()),
+                ("unit", "e-/s".to_owned()),
+                ("exposures", format!("{} s", times.join(", "))),
+            ];
+            let meaning = meaning.map(|(key, text)| (key.to_owned(), text)).into();
+            let channels = self.named(planes);
+            let layer = Layer { name: "Hdr".to_owned(), look: Look::Cube, channels, meaning };
+            let header = self.light.header.clone();
+            let picture = Picture::new(image.width, image.height, vec![layer], header)?;
+            npy::write(self.files, &self.place(name), &picture, "Hdr")?;
+        }
+        Ok(HDR_NAMES.map(|(name, _)| name.to_owned()))
     }
 
     /// Writes expected value and variance of an exposure time, numbered as the exposure is.
@@ -236,6 +272,12 @@ impl ExposureWriter<'_> {
     }
 }
 
+/// The files of all exposures merged, and what is in them.
+pub(super) const HDR_NAMES: [(&str, &str); 2] = [
+    ("raw_hdr.npy", "photo-electrons a second, of all exposures by the weights of least noise"),
+    ("raw_hdr_sigma.npy", "their standard deviation"),
+];
+
 /// Names of the files of expected value and variance.
 pub(super) type MomentFiles = [String; 2];
 
@@ -261,12 +303,18 @@ pub(super) struct Sidecar<'a> {
     system_gain_dn_per_electron: f64,
     channels: Vec<&'a str>,
     white_balance: Vec<f64>,
+    /// Pixels with which something is wrong, row by row.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    defects: Vec<DefectivePixel>,
     bands: Vec<String>,
     seed: u64,
     noise_seed: u64,
     pub(super) invalid: InvalidValues,
     pub(super) notes: Vec<String>,
     pub(super) shots: Vec<ShotFiles>,
+    /// Of all exposures merged: electrons a second, and their standard deviation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) hdr: Option<[String; 2]>,
 }
 
 impl<'a> Sidecar<'a> {
@@ -282,12 +330,40 @@ impl<'a> Sidecar<'a> {
             system_gain_dn_per_electron: sensor.system_gain(),
             channels: sensor.channels().collect(),
             white_balance: sensor.white_balance(),
+            defects: DefectivePixel::all(sensor),
             bands: sensor.bands().names(),
             seed,
             noise_seed,
             invalid: InvalidValues::default(),
             notes: Vec::new(),
             shots: Vec::new(),
+            hdr: None,
+        }
+    }
+}
+
+/// A pixel with which something is wrong.
+#[derive(Debug, Serialize)]
+struct DefectivePixel {
+    column: u32,
+    row: u32,
+    /// The channel of the image, where it has several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    channel: Option<usize>,
+    kind: Defect,
+}
+
+impl DefectivePixel {
+    /// Those of a sensor. Without noise it has none, as it has no other pattern.
+    fn all(sensor: &Sensor) -> Vec<Self> {
+        let has_channels = sensor.depth() > 1;
+        let pixel = |([column, row], channel, kind): ([u32; 2], usize, Defect)| {
+            let channel = has_channels.then_some(channel);
+            Self { column, row, channel, kind }
+        };
+        match sensor.noise() {
+            NoiseModel::None => Vec::new(),
+            NoiseModel::Poisson | NoiseModel::Normal => sensor.defects().map(pixel).collect(),
         }
     }
 }

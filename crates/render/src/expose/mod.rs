@@ -8,6 +8,7 @@
 //! | `raw.dng` | the same for raw converters, with pattern and levels (`raw` sensors of r, g, b or none) |
 //! | `raw.preview.png` | demosaiced, white balanced, sRGB; not data |
 //! | `raw_mean.npy`, `raw_variance.npy` | the expected value and variance of every pixel, once an exposure time, when asked for |
+//! | `raw_hdr.npy`, `raw_hdr_sigma.npy` | electrons a second of all exposures merged, when asked for |
 //! | `sensor.json` | what the numbers mean, and which file is which exposure |
 //!
 //! Several exposures or frames are numbered: `raw_000.png`, `raw_001.png`, …
@@ -232,6 +233,9 @@ pub fn write(
         }
         sidecar.shots.push(writer.shot(*shot)?);
     }
+    if sensor.spec().hdr == Some(true) {
+        sidecar.hdr = Some(writer.merged(&shots)?);
+    }
     sidecar.invalid = writer.invalid;
     writer.exposed.notes.extend(in_words(sidecar.invalid));
     sidecar.notes.clone_from(&writer.exposed.notes);
@@ -269,7 +273,10 @@ pub fn files_of(sensor: &Sensor) -> Vec<String> {
         .zip(shots.iter().filter(|_| has_moments))
         .flat_map(|(number, _)| files::moment_names(sensor, digits, number))
         .collect();
-    shots.iter().flat_map(shot).chain(moments).chain(["sensor.json".to_owned()]).collect()
+    let merged = files::HDR_NAMES.iter().filter(|_| sensor.spec().hdr == Some(true));
+    let merged = merged.map(|(name, _)| (*name).to_owned());
+    let sidecar = ["sensor.json".to_owned()];
+    shots.iter().flat_map(shot).chain(moments).chain(merged).chain(sidecar).collect()
 }
 
 /// Digits of a shot's number in names; 0 for none.

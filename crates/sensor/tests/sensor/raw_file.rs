@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::process::Command;
 
-use etendue_sensor::dng::DngError;
+use etendue_sensor::dng::{DngDetails, DngError};
 use etendue_sensor::{ChannelSet, Channels, Exposure, Film, RawImage, Sensor, SensorSpec};
 use serde_json::{Value, json};
 
@@ -23,7 +23,9 @@ fn taken(spec: Value) -> (Sensor, RawImage) {
 
 fn written(sensor: &Sensor, image: &RawImage) -> Result<Vec<u8>, DngError> {
     let mut bytes = Cursor::new(Vec::new());
-    sensor.write_dng(image, ("imx183", &sensor.white_response()), &mut bytes)?;
+    let white = sensor.white_response();
+    let details = DngDetails { model: "imx183", white: &white, exposure: 0.01 };
+    sensor.write_dng(image, details, &mut bytes)?;
     Ok(bytes.into_inner())
 }
 
@@ -99,6 +101,38 @@ fn numbers_pattern_and_levels_come_back() {
         // Entries have four decimals.
         assert!((seen - neutral).abs() < 3e-4, "{seen} {neutral}");
     }
+}
+
+/// The variance that `NoiseProfile` tells of a signal is that of frames at it, as shares of the range from black to
+/// white; exposure time and ISO stand beside it.
+#[test]
+fn the_noise_profile_is_the_noise() {
+    let spec = json!({
+        "type": "raw", "resolution": [300, 300], "bit_depth": 12, "black_level": 64, "noise": "poisson",
+        "iso_settings": [{ "iso": 400, "system_gain": 0.8, "read_noise": 3.0 }], "iso": 400,
+    });
+    let spec: SensorSpec = serde_json::from_value(spec).unwrap();
+    let sensor = Sensor::new(&spec).unwrap();
+    let shot = Exposure { exposure: 0.01, frame: 0 };
+    let frame = |light: f32| sensor.expose(Film { values: &vec![light; 90_000] }, shot, 1).unwrap();
+    let tags = directory(&written(&sensor, &frame(0.5)).unwrap());
+    let profile: Vec<f64> =
+        tags[&51_041].as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
+    let range = 4095.0 - 64.0;
+    for light in [0.0, 0.1, 0.5] {
+        let image = frame(light);
+        let signal = |&y: &u16| (f64::from(y) - 64.0) / range;
+        let mean = image.values.iter().map(signal).sum::<f64>() / 9e4;
+        let squares: f64 = image.values.iter().map(|y| (signal(y) - mean).powi(2)).sum();
+        let told = profile[0] * f64::from(light) + profile[1];
+        // Of 90 000 pixels a variance is known to √(2/n), times five.
+        let tolerance = 5.0 * (2.0_f64 / 9e4).sqrt();
+        assert!((squares / 9e4 / told - 1.0).abs() < tolerance, "{light}: {told}");
+    }
+    assert_eq!(longs(&tags[&33_434]), [10_000_000, 1_000_000_000]);
+    assert_eq!(shorts(&tags[&34_855])[0], 400);
+    let (unknown, image) = taken(json!({ "type": "raw", "resolution": [8, 8] }));
+    assert!(!directory(&written(&unknown, &image).unwrap()).contains_key(&51_041));
 }
 
 #[test]

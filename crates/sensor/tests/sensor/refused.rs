@@ -12,6 +12,24 @@ fn refused(spec: Value) -> SensorError {
     }
 }
 
+/// Settings of the amplifier that there are not, or twice; the first message says which there are.
+#[test]
+fn iso_settings() {
+    let settings = |settings: Value, iso: Value| {
+        refused(json!({ "type": "raw", "iso_settings": settings, "iso": iso })).to_string()
+    };
+    let two = json!([{ "iso": 100, "system_gain": 0.3 }, { "iso": 400, "system_gain": 1.2 }]);
+    assert_eq!(
+        settings(two, 200.into()),
+        "sensor.iso: there is no setting 200: sensor.iso_settings has 100, 400"
+    );
+    let twice = json!([{ "iso": 100, "system_gain": 0.3 }, { "iso": 100, "system_gain": 1.2 }]);
+    assert!(settings(twice, 100.into()).contains("settings of different numbers, found 100"));
+    assert!(settings(json!([]), 100.into()).contains("one setting at least"));
+    let none = json!([{ "iso": 100, "system_gain": 0 }]);
+    assert!(settings(none, 100.into()).contains("sensor.system_gain: expected DN per electron"));
+}
+
 #[test]
 fn numbers_out_of_range() {
     for (keys, word) in [
@@ -42,6 +60,19 @@ fn numbers_out_of_range() {
         (json!({ "prnu": 1.5 }), "a fraction"),
         (json!({ "dsnu": -1 }), "sensor.dsnu: expected "),
         (json!({ "row_noise": -1 }), "sensor.row_noise: expected "),
+        (json!({ "row_pattern": -1 }), "sensor.row_pattern: expected "),
+        (json!({ "column_pattern": 1e10 }), "sensor.column_pattern: expected "),
+        (json!({ "dcnu": 1.5 }), "sensor.dcnu: expected a fraction"),
+        (json!({ "dead_pixels": -0.1 }), "sensor.dead_pixels: expected a fraction"),
+        (json!({ "dead_pixels": 0.6, "stuck_pixels": 0.6 }), "all of them at most together"),
+        (json!({ "crosstalk": 0.3 }), "four neighbours"),
+        (json!({ "analog_gain": 0 }), "sensor.analog_gain: expected a factor"),
+        (json!({ "converter_noise": -1 }), "sensor.converter_noise: expected DN"),
+        (json!({ "iso": 100 }), "sensor.iso_settings: is missing"),
+        (
+            json!({ "iso_settings": [{ "iso": 100, "system_gain": 1 }] }),
+            "sensor.system_gain: is of no use",
+        ),
         (
             json!({ "hot_pixels": { "share": 2, "dark_current": 1 } }),
             "hot_pixels.share: expected a fraction in 0..=1, found 2",

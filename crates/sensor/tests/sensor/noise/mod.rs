@@ -4,6 +4,8 @@
 #![expect(clippy::cast_possible_truncation, reason = "films hold f32")]
 
 mod distribution;
+mod gain;
+mod hdr;
 mod moments;
 mod patterns;
 mod reference;
