@@ -43,8 +43,14 @@ if cargo deny --version >/dev/null 2>&1; then
     fi
 fi
 
+# What does not trace, or traces by `bvh` in the tests of the workspace, too, is not run twice.
 step "tests without Embree"
-EMBREE_DIR=/nonexistent run_tests -p etendue-accel -p etendue -p etendue-cli --no-default-features
+elsewhere='/^(files|gallery|inputs|lamps|lens|lens_pictures|lens_reference|light_fields|many_renders|memory|models|openings_and_glasses|shards|stopping|waves)(::|_)/'
+without_embree=(-p etendue-accel -p etendue -p etendue-cli --no-default-features)
+if cargo nextest --version >/dev/null 2>&1; then
+    without_embree+=(-E "not test($elsewhere)")
+fi
+EMBREE_DIR=/nonexistent run_tests "${without_embree[@]}"
 
 step "tests against Embree 4"
 scripts/test-embree4.sh
