@@ -11,6 +11,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Geometry, HitBatch, MISS, RayBatch};
 
 use crate::Material;
+use crate::transport::{LANES, Row};
 
 /// Emissive surfaces are kept apart when they are at most this share of the scene's triangles.
 const MOST: f64 = 0.125;
@@ -70,6 +71,11 @@ impl Emitters {
             && way.length_squared() - foot * foot <= squared * (1.0 + 1e-9)
     }
 
+    /// Sets to 0 the `values` of rays, from `starts` (m) along unit directions, that meet none of them for sure.
+    pub(crate) fn keep_those_that_may_meet(&self, rays: [&[Row; 3]; 2], values: &mut Row) {
+        keep_those_that_may_meet(self, rays, values);
+    }
+
     /// The closest emissive surface along each ray, by the scene's numbers.
     pub(crate) fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
         match &self.accel {
@@ -79,6 +85,30 @@ impl Emitters {
         for number in hits.placement.iter_mut().filter(|number| **number != MISS) {
             *number = self.numbers[*number as usize];
         }
+    }
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn keep_those_that_may_meet(
+    emitters: &Emitters,
+    [starts, along]: [&[Row; 3]; 2],
+    values: &mut Row,
+) {
+    let (mut foot, mut squared) = ([0.0; LANES], [0.0; LANES]);
+    let centre = emitters.centre.to_array();
+    for axis in 0..3 {
+        for i in 0..LANES {
+            let way = centre[axis] - starts[axis][i];
+            foot[i] += way * along[axis][i];
+            squared[i] += way * way;
+        }
+    }
+    let radius = emitters.radius;
+    let (within, beside) = (radius * radius, radius * radius * (1.0 + 1e-9));
+    for i in 0..LANES {
+        let is_ahead = (foot[i] >= 0.0) | (squared[i] <= within);
+        let may_meet = (radius >= 0.0) & is_ahead & (squared[i] - foot[i] * foot[i] <= beside);
+        values[i] = if may_meet { values[i] } else { 0.0 };
     }
 }
 

@@ -1,6 +1,6 @@
 //! Lights that are asked: for each hit of a patch one, a place on it, and a ray to that.
 
-use super::patch::{LANES, Patch, SheetColors, at};
+use super::patch::{Compressed, LANES, Patch, SheetColors, at};
 use super::paths::{Draw, Step, Workspace};
 use super::rays::Rays;
 use super::{LightingContext, Tracing, kernels};
@@ -107,14 +107,12 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let Workspace { now, shadows, picked, .. } = workspace;
         let count = self.count();
         let LightingContext { lights, scene, traits, .. } = self.ctx;
-        for (&lane, &(i, _)) in picked.iter().zip(patch.path.iter()) {
+        // Any comparison with NaN is false.
+        let lit = Compressed::of(picked.len(), |n| patch.away.value[picked[n]] > 0.0);
+        for n in lit.numbers() {
             let Patch { away, targets, radiance, crossings, .. } = &*patch;
+            let (lane, (i, _)) = (picked[n], patch.path[n]);
             let value = away.value[lane];
-            // Any comparison with NaN is false.
-            let counts = value > 0.0;
-            if !counts {
-                continue;
-            }
             let along = at(&away.along, lane);
             let ends = || [now.rays.triangle(i), targets.id[lane]];
             shadows.rays.push([at(&away.start, lane), along], away.reach[lane], ends);
@@ -138,9 +136,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             match kind {
                 SurfaceKind::Black | SurfaceKind::Smooth => {}
                 SurfaceKind::Matte => {
-                    let start = all.len();
-                    all.extend(bands.map(|(l, t)| l * t * value));
-                    self.tinted(&patch.colors[lane], &mut all[start..]);
+                    let color = &patch.colors[lane];
+                    let share = |k| self.band(color, k);
+                    all.extend(bands.enumerate().map(|(k, (l, t))| l * t * value * share(k)));
                 }
                 SurfaceKind::Sheet => {
                     let weights = patch.sheets.weights(lane);

@@ -290,6 +290,32 @@ impl Targets {
     }
 }
 
+/// Those of a patch's picked lanes that are worked on further, by their numbers. Put side by side without a branch,
+/// as nothing tells beforehand which they are.
+pub(super) struct Compressed {
+    numbers: [u8; LANES],
+    count: usize,
+}
+
+impl Compressed {
+    /// Those of so many picked lanes, at most as many as a patch has, that are `wanted`.
+    #[inline(always)]
+    pub(super) fn of(picked: usize, wanted: impl Fn(usize) -> bool) -> Self {
+        let (mut numbers, mut count) = ([0; LANES], 0);
+        for (n, number) in (0..picked.min(LANES)).zip(0_u8..) {
+            numbers[count] = number;
+            count += usize::from(wanted(n));
+        }
+        Self { numbers, count }
+    }
+
+    /// Their numbers, in order.
+    #[inline(always)]
+    pub(super) fn numbers(&self) -> impl Iterator<Item = usize> {
+        self.numbers[..self.count].iter().map(|&number| usize::from(number))
+    }
+}
+
 #[inline]
 pub(super) fn at(axes: &[Row; 3], lane: usize) -> DVec3 {
     DVec3::new(axes[0][lane], axes[1][lane], axes[2][lane])

@@ -3,10 +3,10 @@
 use etendue_geometry::glam::DVec3;
 
 use super::media::{Coincident, Media};
-use super::patch::{LANES, Patch, at};
+use super::patch::{Away, Compressed, LANES, Patch, at};
 use super::paths::{Draw, Passage, Step, Way, Workspace};
 use super::rays::Rays;
-use super::{Tracing, kernels};
+use super::{LightingContext, Tracing, kernels};
 use crate::bsdf::Weights;
 use crate::footprint::Cone;
 use crate::placed::SurfaceKind;
@@ -69,8 +69,14 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             }
             SurfaceKind::Other => return self.scatter_one_by_one(step, workspace, patch),
         }
+        // Where emitters are asked no surface lets paths pass: all have been scattered as often.
+        if step.asks_emitters && !is_specular && self.is_end_unless_specular(step.number) {
+            self.look_for_emitters(patch);
+        }
         let count = self.count();
-        for n in 0..workspace.picked.len() {
+        let picked = &workspace.picked;
+        let going = Compressed::of(picked.len(), |n| patch.away.value[picked[n]] > 0.0);
+        for n in going.numbers() {
             let (lane, (i, k)) = (workspace.picked[n], patch.path[n]);
             let pdf = patch.away.value[lane];
             let bounces = workspace.now.bounces(step.number, i);
@@ -78,8 +84,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 true => self.is_end(bounces),
                 false => self.is_end_unless_specular(bounces),
             };
-            let goes_on = pdf > 0.0 && (is_specular || hittable || !is_last);
-            if !goes_on {
+            if is_last && !is_specular && !hittable {
                 continue;
             }
             let throughput = &mut workspace.now.carried.throughput[i * count..(i + 1) * count];
@@ -108,6 +113,14 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let ray = [at(&patch.away.start, lane), at(&patch.away.along, lane)];
             self.follow(step, workspace, (i, k), Departure { ray, way, cone, media: None });
         }
+    }
+
+    /// Leaves out last directions that meet nothing that shines.
+    fn look_for_emitters(&self, patch: &mut Patch) {
+        let LightingContext { emitters, lights, .. } = self.ctx;
+        let Some(emitters) = emitters.filter(|_| !lights.has_environment()) else { return };
+        let Away { start, along, value, .. } = &mut patch.away;
+        emitters.keep_those_that_may_meet([start, along], value);
     }
 
     /// The same of surfaces that are worked out one by one.
@@ -149,6 +162,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let (pdf, normal) = (scattered.pdf, bsdf.receiving_normal().as_vec3().into());
             let way = Way { pdf, is_specular, is_last, normal };
             let ray = [patch.leave(lane, direction), direction];
+            if is_last && !is_specular && step.asks_emitters && !self.may_shine(ray) {
+                continue;
+            }
             self.follow(step, workspace, (i, k), Departure { ray, way, cone, media });
         }
     }
@@ -168,10 +184,11 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let Workspace { now, onward, coincident, .. } = workspace;
         let bounces = now.bounces(step.number, i) + 1;
         let throughput = &mut now.carried.throughput[i * count..(i + 1) * count];
-        let most = throughput.iter().copied().fold(0.0, f64::max);
+        let larger = |a: f64, &b: &f64| if b > a { b } else { a };
+        let most = throughput.iter().fold(0.0, larger);
         let Departure { ray, way, cone, media } = departure;
         let asks = way.is_last && !way.is_specular && step.asks_emitters;
-        if most <= 0.0 || (asks && !self.may_shine(ray)) {
+        if most <= 0.0 {
             return;
         }
         if self.rules.roulette.is_some_and(|after| bounces >= after) && !way.is_last {

@@ -179,11 +179,11 @@ pub(crate) fn show_scene(app: &mut App, ctx: &Context) {
 /// What is reached for most: noise on and off.
 fn shortcuts(ui: &mut Ui, scene: &Value, edits: &mut Vec<Edit>) {
     let sensor = &scene["camera"]["sensor"];
-    let is_real = ["type", "model", "system_gain"].iter().any(|key| !sensor[*key].is_null());
-    if !is_real {
+    let has_any = |keys: &[&str]| keys.iter().any(|key| !sensor[*key].is_null());
+    let has_gain = has_any(&["model", "system_gain", "iso_settings"]);
+    if !has_gain && !has_any(&["type"]) {
         return;
     }
-    let has_gain = !sensor["model"].is_null() || !sensor["system_gain"].is_null();
     let mut is_noisy = has_gain && sensor["noise"] != "none";
     let switch = ui.add_enabled(has_gain, egui::Checkbox::new(&mut is_noisy, "noise"));
     let switch =
