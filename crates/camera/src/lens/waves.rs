@@ -6,7 +6,7 @@ use etendue_optics::analysis::{AnalysisError, ObjectPoint};
 use etendue_optics::element::Part;
 use etendue_optics::train::{MonochromaticTrain, OpticalTrain};
 use etendue_spectrum::Bands;
-use glam::DVec3;
+use glam::{DMat3, DVec2, DVec3};
 
 use super::focused::View;
 use super::lens_camera::{LensCamera, SpreadBy, uniform_filters};
@@ -195,6 +195,17 @@ impl<'a> WaveLens<'a> {
     #[must_use]
     pub fn is_ideal(&self) -> bool {
         is_ideal(&self.train)
+    }
+
+    /// Whether what arrives in a picture of so many columns and rows is the same to both sides of its middle, but for
+    /// being seen in a mirror.
+    #[must_use]
+    pub fn is_mirrored(&self, resolution: [u32; 2]) -> bool {
+        let film = self.camera.focused().film();
+        let is_centred = film.frame.vertex.truncate() == DVec2::ZERO
+            && film.frame.rotation == DMat3::IDENTITY
+            && film.centre * 2.0 == DVec2::from(resolution.map(f64::from));
+        self.train.is_rotationally_symmetric() && is_centred
     }
 
     /// −1 where the picture is turned on the sensor; else 1.

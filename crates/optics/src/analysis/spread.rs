@@ -52,6 +52,20 @@ pub(super) fn shares(weights: &[f64], wavelengths: usize) -> Result<Vec<f64>, An
     Ok(weights.iter().map(|weight| weight / sum).collect())
 }
 
+/// The least length from `least` on that a transform is quick for: of no prime factors but 2, 3 and 5.
+#[must_use]
+pub fn quick_length(least: usize) -> usize {
+    let is_quick = |mut length: usize| {
+        for factor in [2, 3, 5] {
+            while length.is_multiple_of(factor) {
+                length /= factor;
+            }
+        }
+        length == 1
+    };
+    (least.max(1)..).find(|&length| is_quick(length)).unwrap_or(least)
+}
+
 /// sin πx / πx.
 pub(super) fn sinc(x: f64) -> f64 {
     let angle = std::f64::consts::PI * x;

@@ -25,7 +25,10 @@ const INWARDS: f64 = 0.88;
 pub(crate) struct Spreads {
     /// Nodes a side.
     pub(crate) side: usize,
+    /// Those of the nodes that others are seen in a mirror from, and of those that stand for themselves.
     fields: Vec<Option<FieldsBetween>>,
+    /// Whose fields each node has, and whether in a mirror along x and y.
+    own: Vec<(usize, [bool; 2])>,
     /// The wavelengths (nm) of each band.
     bands: Vec<Vec<f64>>,
     /// Of each layer (1/mm).
@@ -102,7 +105,8 @@ impl Spreads {
                 }
             }
         };
-        let fields = (0..side * side).into_par_iter().map(fields).collect::<Result<_, _>>()?;
+        let (traced, own) = sources(side, lens.is_mirrored(resolution));
+        let fields = traced.into_par_iter().map(fields).collect::<Result<_, _>>()?;
         let most = resolution.map(|side| f64::from(side) * cells).into_iter().fold(1.0, f64::max);
         #[expect(
             clippy::cast_possible_truncation,
@@ -113,19 +117,57 @@ impl Spreads {
         Ok(Self {
             side,
             fields,
+            own,
             bands: lens.wavelengths().iter().map(|all| few(all)).collect(),
             nearness: layers.nearness.iter().map(|near| 1e-3 * near).collect(),
             grid,
         })
     }
 
-    /// The spread of a node's light of a layer in a band.
-    pub(crate) fn spread(&self, node: usize, layer: usize, band: usize) -> CellSpread {
-        let Some(fields) = &self.fields[node] else { return CellSpread::point() };
+    /// The spreads of light of a layer in a band, of the fields that the nodes asked for have.
+    pub(crate) fn of_layer(
+        &self,
+        is_asked: impl Fn(usize) -> bool,
+        layer: usize,
+        band: usize,
+    ) -> Vec<Option<CellSpread>> {
+        let mut wanted = vec![false; self.fields.len()];
+        for (node, &(own, _)) in self.own.iter().enumerate() {
+            wanted[own] |= is_asked(node);
+        }
         let near = self.nearness[layer];
-        let fields: Vec<_> = self.bands[band].iter().map(|&nm| fields.at(nm, near)).collect();
-        CellSpread::of(&fields, &self.grid)
+        let spread = |(fields, wanted): (&Option<FieldsBetween>, bool)| {
+            wanted.then(|| {
+                let Some(fields) = fields else { return CellSpread::point() };
+                let of_band = self.bands[band].par_iter().map(|&nm| fields.at(nm, near));
+                CellSpread::of(&of_band.collect::<Vec<_>>(), &self.grid)
+            })
+        };
+        self.fields.par_iter().zip(wanted).map(spread).collect()
     }
+
+    /// A node's own among them, and whether it is seen in a mirror along x and y.
+    pub(crate) fn of_node<'a>(
+        &self,
+        spreads: &'a [Option<CellSpread>],
+        node: usize,
+    ) -> Option<(&'a CellSpread, [bool; 2])> {
+        let (own, mirrored) = self.own[node];
+        spreads[own].as_ref().map(|spread| (spread, mirrored))
+    }
+}
+
+/// The nodes that are traced, and which of them each node has its fields from, and in which mirrors.
+fn sources(side: usize, is_mirrored: bool) -> (Vec<usize>, Vec<(usize, [bool; 2])>) {
+    let traced = if is_mirrored { side.div_ceil(2) } else { side };
+    let own = |k: usize| if k < traced { k } else { side - 1 - k };
+    let nodes = (0..traced * traced).map(|k| k / traced * side + k % traced).collect();
+    let source = |node: usize| {
+        let place = [node % side, node / side];
+        let [x, y] = place.map(own);
+        (y * traced + x, place.map(|k| k >= traced))
+    };
+    (nodes, (0..side * side).map(source).collect())
 }
 
 /// Wavelengths that stand for as many, each for a run of them.
