@@ -88,6 +88,17 @@ impl LensCamera {
         (is_ideal(train), if train.is_dispersive() && !self.one_wavelength { NODES } else { 1 })
     }
 
+    /// Whether what arrives in a picture of so many columns and rows is the same on both sides of its middle,
+    /// but for being seen in a mirror: the lens is round, and the picture's middle is on its axis.
+    #[must_use]
+    pub fn is_mirrored(&self, resolution: [u32; 2]) -> bool {
+        let film = self.focused.film();
+        let is_centred = film.frame.vertex.truncate() == DVec2::ZERO
+            && film.frame.rotation == DMat3::IDENTITY
+            && film.centre * 2.0 == DVec2::from(resolution.map(f64::from));
+        self.focused.train().is_rotationally_symmetric() && is_centred
+    }
+
     /// Waves of defocus (at the rim, at a wavelength in nm) of something whose nearness differs from
     /// the one in focus by 1/m.
     #[must_use]
@@ -197,15 +208,10 @@ impl<'a> WaveLens<'a> {
         is_ideal(&self.train)
     }
 
-    /// Whether what arrives in a picture of so many columns and rows is the same to both sides of its middle, but for
-    /// being seen in a mirror.
+    /// As [`LensCamera::is_mirrored`].
     #[must_use]
     pub fn is_mirrored(&self, resolution: [u32; 2]) -> bool {
-        let film = self.camera.focused().film();
-        let is_centred = film.frame.vertex.truncate() == DVec2::ZERO
-            && film.frame.rotation == DMat3::IDENTITY
-            && film.centre * 2.0 == DVec2::from(resolution.map(f64::from));
-        self.train.is_rotationally_symmetric() && is_centred
+        self.camera.is_mirrored(resolution)
     }
 
     /// −1 where the picture is turned on the sensor; else 1.

@@ -18,7 +18,7 @@ use rustfft::num_complex::Complex64;
 
 use super::between::{FARTHEST_WAVES, airy_unit, landing_reach};
 use super::pupil::PupilField;
-use super::spread::{averaged, norm, quick_length, sinc};
+use super::spread::{amplitudes, norm, quick_length, sinc};
 
 /// How far beyond the rays' landings light is added up as waves (wavelengths times the f-number).
 const REACH: f64 = 40.0;
@@ -181,7 +181,13 @@ enum CellLight {
 /// where ν are whole numbers of a cell of the pupil over the wavelength; the mean of each over a square is known.
 /// R of −ν is the conjugate of R of ν, so half of them will do, and sums of x are those of −x with the
 /// sines' sign changed.
-fn add_waves(field: &PupilField, grid: &CellGrid, half: usize, light: CellLight, cells: &mut [f64]) {
+fn add_waves(
+    field: &PupilField,
+    grid: &CellGrid,
+    half: usize,
+    light: CellLight,
+    cells: &mut [f64],
+) {
     let side = 2 * half + 1;
     let n = field.cells;
     let cycles = field.step / (field.wavelength * 1e-6) * grid.pitch;
@@ -303,9 +309,8 @@ fn autocorrelation(field: &PupilField) -> Autocorrelation {
     let mut planner = FftPlanner::new();
     let (forward, inverse) = (planner.plan_fft_forward(size), planner.plan_fft_inverse(size));
     let mut rows = vec![Complex64::ZERO; n * size];
-    for i in field.lit() {
-        let angle = std::f64::consts::TAU * field.mean_waves(i);
-        rows[i / n * size + i % n] = Complex64::from_polar(averaged(field, i), angle);
+    for (row, values) in amplitudes(field).chunks(n).enumerate() {
+        rows[row * size..][..n].copy_from_slice(values);
     }
     forward.process(&mut rows);
     // Columns, as rows that are longer than the pupil.

@@ -192,6 +192,11 @@ impl<'a> Beam<'a> {
         Some(self.at.run_with_path(clip, self.launch.ray(place)?, &self.phases))
     }
 
+    /// Where the ray crosses an element, in its own frame and whether rims stop it or not (mm).
+    pub(crate) fn crossing(&self, element: usize, place: DVec2) -> Option<DVec2> {
+        self.at.crossing(Side::Object, element, self.launch.ray(place)?).map(DVec2::from)
+    }
+
     /// The ray as it leaves, whether rims stop it or not; `None` when it does not leave.
     pub(crate) fn run_on(&self, place: DVec2) -> Option<PathEnd> {
         self.run(Clip::Off, place).filter(|end| end.status == RayStatus::Exited)

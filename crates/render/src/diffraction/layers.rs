@@ -6,7 +6,7 @@
 use etendue_camera::LensCamera;
 
 /// Waves of defocus from one layer to the next, near focus.
-const STEP: f64 = 0.35;
+pub(super) const STEP: f64 = 0.35;
 
 /// From so many waves on, layers are a tenth of the defocus deep.
 const LINEAR: f64 = 3.5;

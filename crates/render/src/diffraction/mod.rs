@@ -71,7 +71,13 @@ pub(crate) fn bytes(scene: &Scene, plan: &Plan) -> u64 {
     let longest = (0..bands).map(|band| plan.bands.wavelength(band)).fold(0.0, f64::max);
     let unit = lens.airy_unit(longest) * f64::from(cells) / pitch;
     // Beside light, what a layer covers and what is known.
-    columns * rows * each as u64 + spreads::bytes(lens, resolution, (cells, unit), lit + 2)
+    let is_flat = words::depths(scene).is_some_and(|[near, far]| {
+        lens.waves_of_defocus(f64::midpoint(shortest, longest)) * (1.0 / near - 1.0 / far)
+            <= layers::STEP
+    });
+    let planes = if is_flat { lit + 1 } else { lit + 2 };
+    columns * rows * each as u64
+        + spreads::bytes(lens, resolution, (cells, unit), (planes, is_flat))
 }
 
 /// Refuses what light that is spread over the picture cannot be.
@@ -154,7 +160,8 @@ pub(crate) fn spread_light(
     // Light along chief rays, and depths.
     let (picture, lit, mut film) = cell_picture(scene, plan, prepared, cells, watch)?;
     let [columns, rows] = scene.camera.resolution();
-    let illumination = illumination(opened, plan, [columns, rows], waves.is_mirrored([columns, rows]));
+    let illumination =
+        illumination(opened, plan, [columns, rows], waves.is_mirrored([columns, rows]));
     let mean = all().sum::<f64>() / all().count().max(1) as f64;
     let layers = DepthLayers::of(&picture.depths, picture.size[0], lens, mean);
     let spreads = Spreads::new(&waves, &layers, [columns, rows], f64::from(cells), pitch)

@@ -41,19 +41,21 @@ const DEPTHS: usize = 3;
 
 /// Bytes of the fields of all nodes, and of what is made of them on the way to so many `planes` of pixels: for each
 /// thread the transforms of a node's cells, and the pixels that all nodes light. `cells` a pixel, of which λN has
-/// `unit`, of a lens that draws sharply.
+/// `unit`, of a lens that draws sharply, and of things that lie within one depth or not.
 pub(crate) fn bytes(
     lens: &LensCamera,
     resolution: [u32; 2],
     (cells, unit): (u32, f64),
-    planes: usize,
+    (planes, is_flat): (usize, bool),
 ) -> u64 {
     /// The spread, a plane, its transform and the scratch of that.
     const TRANSFORMS: usize = 4;
     let (is_ideal, wavelengths) = lens.waves_to_trace();
     let side = if is_ideal { IDEAL_NODES } else { NODES };
+    let traced = if lens.is_mirrored(resolution) { side.div_ceil(2) } else { side };
+    let depths = if is_flat { 1 } else { DEPTHS };
     let fields =
-        (side * side * wavelengths * DEPTHS + 2 * WAVELENGTHS) * FieldsBetween::FIELD_BYTES;
+        (traced * traced * wavelengths * depths + 2 * WAVELENGTHS) * FieldsBetween::FIELD_BYTES;
     let size = resolution.map(|pixels| pixels as usize * cells as usize);
     let half = CellSpread::half_of_sharp(unit, size[0].max(size[1]));
     let window = |size: usize| size.min(2 * size / (side - 1)) + 2 * half;
@@ -176,4 +178,27 @@ fn few(all: &[f64]) -> Vec<f64> {
     let run = |k: usize| &all[k * all.len() / count..(k + 1) * all.len() / count];
     let mean = |run: &[f64]| run.iter().sum::<f64>() / run.len().max(1) as f64;
     (0..count).map(|k| mean(run(k))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each node has the fields of the traced one that is as far from the middle in both directions.
+    #[test]
+    fn nodes_are_seen_in_mirrors() {
+        for (side, is_mirrored) in [(5, true), (3, true), (5, false)] {
+            let (traced, own) = sources(side, is_mirrored);
+            assert_eq!(
+                traced.len(),
+                if is_mirrored { side.div_ceil(2).pow(2) } else { side * side }
+            );
+            for (node, (source, mirrored)) in own.into_iter().enumerate() {
+                let flipped = |k: usize, is_flipped| if is_flipped { side - 1 - k } else { k };
+                let from = [traced[source] % side, traced[source] / side];
+                let seen = [flipped(from[0], mirrored[0]), flipped(from[1], mirrored[1])];
+                assert_eq!(seen, [node % side, node / side], "{side} {is_mirrored}");
+            }
+        }
+    }
 }
