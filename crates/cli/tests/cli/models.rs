@@ -98,14 +98,12 @@ fn plan_names_the_cheapest_model_within_a_tolerance() {
     let words = bench.run(&["plan", "scene.json", "--models", "--tolerance", "0.5 px,2 %"]);
     let words = text(&words.stdout);
     // Every model tells the keys that take it.
-    for key in
-        [
-            r#"{"plan":{"dispersion":false}} takes it"#,
-            r#""falloff":{"#,
-            r#""type":"thin_lens""#,
-            r#"{"camera":{"diffraction":true}} takes it"#,
-        ]
-    {
+    for key in [
+        r#"{"plan":{"dispersion":false}} takes it"#,
+        r#""falloff":{"#,
+        r#""type":"thin_lens""#,
+        r#"{"camera":{"diffraction":true}} takes it"#,
+    ] {
         assert!(words.contains(key), "{key}: {words}");
     }
     assert!(words.contains("cheapest within 0.5 px and 2 % of light: "), "{words}");

@@ -257,6 +257,7 @@ fn huygens_sum_is_written_as_the_transform_is() {
     let bench = Bench::new();
     bench.write("lens.json", IDEAL.as_bytes());
     let written = |folder: &str, more: &[&str]| {
+        let out = format!("out/{folder}");
         let size = [
             "--fields",
             "0.5",
@@ -268,7 +269,7 @@ fn huygens_sum_is_written_as_the_transform_is() {
             "31",
         ];
         let arguments =
-            [&["lens", "lens.json", "--psf", "-q", "-o", folder], &size[..], more].concat();
+            [&["lens", "lens.json", "--psf", "-q", "-o", &out], &size[..], more].concat();
         let output = bench.run(&arguments);
         assert!(output.status.success(), "{}", text(&output.stderr));
         bench.array(&format!("{folder}/psf"))

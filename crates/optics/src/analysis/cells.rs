@@ -75,6 +75,23 @@ impl CellSpread {
         self.shares[y * (last + 1) + x]
     }
 
+    /// How much of the light another one has elsewhere, twice: Σ |difference|, which no difference of their
+    /// transfer functions exceeds.
+    #[must_use]
+    pub fn difference(&self, other: &Self) -> f64 {
+        let half = self.half.max(other.half);
+        let side = 2 * half + 1;
+        let share = |spread: &Self, i: usize| {
+            let own = 2 * spread.half + 1;
+            let from = |k: usize| (k + spread.half).checked_sub(half).filter(|&k| k < own);
+            match (from(i / side), from(i % side)) {
+                (Some(row), Some(column)) => spread.shares[row * own + column],
+                _ => 0.0,
+            }
+        };
+        (0..side * side).map(|i| (share(self, i) - share(other, i)).abs()).sum()
+    }
+
     /// The spread of fields about one centre, which count alike.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts of cells")]

@@ -232,7 +232,9 @@ pub fn modulation_at(fields: &WeightedFields, frequency: f64) -> [f64; 2] {
 
 /// Σ A(p + s) A*(p) over cells, for a shift of so many to the right and up.
 fn autocorrelation(amplitudes: &[Complex64], cells: usize, [right, up]: [i64; 2]) -> Complex64 {
-    let (right, up) = if up < 0 { (-right, -up) } else { (right, up) };
+    if up < 0 {
+        return autocorrelation(amplitudes, cells, [-right, -up]).conj();
+    }
     let far = |shift: i64| usize::try_from(shift.unsigned_abs()).unwrap_or(cells).min(cells);
     let (shift, width) = (far(right), cells - far(right));
     let rows = amplitudes.chunks(cells).zip(amplitudes.chunks(cells).skip(far(up)));

@@ -89,7 +89,7 @@ fn spread_layer(
     let count = pixels[0] * pixels[1];
     let nodes = spreads.side * spreads.side;
     let windows: Vec<Window> =
-        (0..nodes).map(|node| Window::of(node, spreads.side, picture.size)).collect();
+        (0..nodes).map(|node| Window::of(node, spreads, picture.size)).collect();
     // The layer's cells, and how far their light gets.
     let around = |margin: usize| {
         let [low, high] = layers.boxes[layer];
@@ -162,8 +162,13 @@ struct Window {
 
 impl Window {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside a picture")]
-    fn of(node: usize, side: usize, size: [usize; 2]) -> Self {
+    fn of(node: usize, spreads: &Spreads, size: [usize; 2]) -> Self {
+        let side = spreads.side;
         let along = |node: usize, size: usize| {
+            if spreads.is_uniform {
+                let [first, last] = [node, node + 1].map(|node| node * size / side);
+                return (first, vec![1.0; last - first]);
+            }
             let step = size as f64 / (side - 1) as f64;
             let place = node as f64 * step;
             let first = (place - step).max(0.0).floor() as usize;

@@ -21,10 +21,21 @@ const ONE_DEPTH: f64 = 0.02;
 /// How far towards the middle a dark node looks each time.
 const INWARDS: f64 = 0.88;
 
+/// Spreads that differ by less than this share of the light are one: their modulation differs by less.
+const ALIKE: f64 = 5e-3;
+
+/// Cells a side of the tiles of a picture of one spread.
+const TILE: usize = 512;
+
+/// The most tiles a side.
+const TILES: usize = 16;
+
 /// Nodes over a picture with the fields of each.
 pub(crate) struct Spreads {
     /// Nodes a side.
     pub(crate) side: usize,
+    /// Whether all of them have one spread: they are tiles then, which share no light.
+    pub(crate) is_uniform: bool,
     /// Those of the nodes that others are seen in a mirror from, and of those that stand for themselves.
     fields: Vec<Option<FieldsBetween>>,
     /// Whose fields each node has, and whether in a mirror along x and y.
@@ -108,7 +119,12 @@ impl Spreads {
             }
         };
         let (traced, own) = sources(side, lens.is_mirrored(resolution));
-        let fields = traced.into_par_iter().map(fields).collect::<Result<_, _>>()?;
+        let trace = |spreads: &mut Self, nodes: &[usize]| -> Result<(), AnalysisError> {
+            let found =
+                nodes.par_iter().map(|&k| fields(traced[k])).collect::<Result<Vec<_>, _>>()?;
+            nodes.iter().zip(found).for_each(|(&k, found)| spreads.fields[k] = found);
+            Ok(())
+        };
         let most = resolution.map(|side| f64::from(side) * cells).into_iter().fold(1.0, f64::max);
         #[expect(
             clippy::cast_possible_truncation,
@@ -116,14 +132,66 @@ impl Spreads {
             reason = "a picture's size"
         )]
         let grid = CellGrid { pitch: pitch / cells, turn: lens.turn(), most: most as usize };
-        Ok(Self {
+        let mut spreads = Self {
             side,
-            fields,
+            is_uniform: false,
+            fields: vec![None; traced.len()],
             own,
             bands: lens.wavelengths().iter().map(|all| few(all)).collect(),
             nearness: layers.nearness.iter().map(|near| 1e-3 * near).collect(),
             grid,
+        };
+        let mut first: Vec<usize> = spreads.ends().into_iter().map(|k| spreads.own[k].0).collect();
+        first.sort_unstable();
+        first.dedup();
+        trace(&mut spreads, &first)?;
+        if spreads.are_alike() {
+            return Ok(spreads.joined());
+        }
+        let rest: Vec<usize> = (0..traced.len()).filter(|k| !first.contains(k)).collect();
+        trace(&mut spreads, &rest)?;
+        Ok(spreads)
+    }
+
+    /// The nodes in the middle and in the corners.
+    fn ends(&self) -> [usize; 5] {
+        let last = self.side - 1;
+        [self.side / 2 * (self.side + 1), 0, last, last * self.side, last * (self.side + 1)]
+    }
+
+    /// Whether the spreads in the corners are hardly others than that in the middle: in the first, the middle and the
+    /// last band, of the rearmost and the foremost layer.
+    fn are_alike(&self) -> bool {
+        let [middle, corners @ ..] = self.ends();
+        let bands = self.bands.len();
+        let mut ends = vec![0, bands / 2, bands.saturating_sub(1)];
+        ends.dedup();
+        let mut layers = vec![0, self.nearness.len().saturating_sub(1)];
+        layers.dedup();
+        if bands == 0 || self.nearness.is_empty() {
+            return false;
+        }
+        ends.iter().all(|&band| {
+            layers.iter().all(|&layer| {
+                let is_asked = |node| node == middle || corners.contains(&node);
+                let spreads = self.of_layer(is_asked, layer, band);
+                let Some((own, _)) = self.of_node(&spreads, middle) else { return false };
+                corners.iter().all(|&corner| {
+                    let other = self.of_node(&spreads, corner);
+                    other.is_some_and(|(other, _)| own.difference(other) <= ALIKE)
+                })
+            })
         })
+    }
+
+    /// The same with the middle's spread for all of the picture.
+    fn joined(mut self) -> Self {
+        let fields = self.fields.swap_remove(self.own[self.ends()[0]].0);
+        self.fields = vec![fields];
+        self.side = (self.grid.most / TILE).clamp(1, TILES);
+        self.own = vec![(0, [false; 2]); self.side * self.side];
+        self.is_uniform = true;
+        self
     }
 
     /// The spreads of light of a layer in a band, of the fields that the nodes asked for have.

@@ -376,8 +376,14 @@ impl Bench<'_> {
             return Ok(fields);
         }
         let cells = Cells::Given((cells / 2).max(USUAL_CELLS));
-        let waves = wavefronts(self.train, &self.lenses, object, self.planes.image_z, cells)?;
-        WeightedFields::new(waves.into_iter().map(|wave| wave.pupil).collect(), &self.weights)
+        match wavefronts(self.train, &self.lenses, object, self.planes.image_z, cells) {
+            Ok(waves) => WeightedFields::new(
+                waves.into_iter().map(|wave| wave.pupil).collect(),
+                &self.weights,
+            ),
+            Err(AnalysisError::Coarse { .. }) => Ok(fields),
+            Err(error) => Err(error),
+        }
     }
 
     fn foci(&self, widest: f64) -> Result<Vec<FieldFoci>, AnalysisError> {
