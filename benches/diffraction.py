@@ -43,10 +43,13 @@ def main():
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--command", type=Path, default=COMMAND)
     parser.add_argument("--page", type=Path, default=ROOT / "docs" / "cameras.md")
+    parser.add_argument("--only", help="a part of the names of the scenes that are rendered")
     options = parser.parse_args()
     rows, missed = [], False
     with tempfile.TemporaryDirectory() as folder:
         for name, samples, what in PICTURES:
+            if options.only and options.only not in name:
+                continue
             pairs = []
             for _ in range(options.rounds):
                 pair = []
@@ -69,7 +72,8 @@ def main():
     verdict = "met" if statistics.median(wall) <= REPORT else "**missed**"
     text = [
         f"`make bench-diffraction` writes this section: processor time (s), medians of {options.rounds} with the least and",
-        f"the greatest; the ratio is the median of the pairs'. At most {GOAL} is the goal. {section.machine()}.",
+        f"the greatest; the ratio is the median of the pairs'. At most {GOAL} is the goal. {options.command.parent.name.capitalize()} build.",
+        f"{section.machine()}.",
         "",
         "| scene | with waves | with rays | ratio | |",
         "|---|---|---|---|---|",
