@@ -103,18 +103,8 @@ pub(crate) fn write(
         }
     };
     asked.map(check).transpose()?;
-    let mut points = Vec::new();
-    for &depth in &depths {
-        for &field in &fields {
-            for &nm in &wavelengths {
-                let point = point(lens, report, sensor_z, (depth, field, nm)).map_err(|error| {
-                    let at = depth.map_or("infinity".to_owned(), |mm| format!("{mm} mm"));
-                    refused(format!("field {field}, {nm} nm, {at}: {error}"))
-                })?;
-                points.push(point);
-            }
-        }
-    }
+    let points =
+        points(lens, report, sensor_z, [&fields, &wavelengths], &depths).map_err(refused)?;
     let finest = points.iter().map(|point| airy_unit(&point.pupil)).fold(f64::INFINITY, f64::min);
     let pitch = arguments.psf_pitch.map_or(finest / FINE, |pitch| 1e-3 * pitch);
     // The sensor is looked at as a picture of it would be, x to the right and y upwards.
@@ -179,6 +169,29 @@ fn depths(report: &LensReport, arguments: &LensArguments) -> Result<Vec<Option<f
         _ => Err("--depths: expected distances above 0, such as \"infinity,2 m\"".to_owned()),
     };
     asked.iter().map(depth).collect()
+}
+
+/// All points, in the order of the array; why one has no light, or too rough a wavefront.
+fn points(
+    lens: &ReadLens,
+    report: &LensReport,
+    sensor_z: f64,
+    [fields, wavelengths]: [&[f64]; 2],
+    depths: &[Option<f64>],
+) -> Result<Vec<Point>, String> {
+    let mut points = Vec::new();
+    for &depth in depths {
+        for &field in fields {
+            for &nm in wavelengths {
+                let point = point(lens, report, sensor_z, (depth, field, nm)).map_err(|error| {
+                    let at = depth.map_or("infinity".to_owned(), |mm| format!("{mm} mm"));
+                    format!("field {field}, {nm} nm, {at}: {error}")
+                })?;
+                points.push(point);
+            }
+        }
+    }
+    Ok(points)
 }
 
 fn point(

@@ -218,10 +218,7 @@ fn add_waves(
         (0..n).flat_map(|k| (0..=half).map(move |j| mean(k) * wave(turn(k, j)))).collect()
     };
     let (cosines, sines) = (table(f64::cos), table(f64::sin));
-    let waves = |table: &[f64], k: usize| -> std::ops::Range<usize> {
-        debug_assert!(table.len() > k * (half + 1));
-        k * (half + 1)..(k + 1) * (half + 1)
-    };
+    let of = |k: usize| k * (half + 1)..(k + 1) * (half + 1);
     let correlation = autocorrelation(field);
     let scale = norm(field) * grid.pitch * grid.pitch;
     let length = field.wavelength * 1e-6;
@@ -245,7 +242,7 @@ fn add_waves(
             if sum == Complex64::ZERO && difference == Complex64::ZERO {
                 continue;
             }
-            let (cos, sin) = (&cosines[waves(&cosines, k)], &sines[waves(&sines, k)]);
+            let (cos, sin) = (&cosines[of(k)], &sines[of(k)]);
             add_scaled(&mut even[0], sum.re, cos);
             add_scaled(&mut even[1], sum.im, cos);
             add_scaled(&mut odd[0], difference.re, sin);

@@ -109,7 +109,7 @@ impl ZernikeTerm {
         let (n, m) = (self.n, self.m.unsigned_abs());
         let factorial = |k: u32| (1..=k).map(f64::from).product::<f64>();
         let coefficient = |s: u32| {
-            let sign = if s % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = if s.is_multiple_of(2) { 1.0 } else { -1.0 };
             let below = factorial(s) * factorial((n + m) / 2 - s) * factorial((n - m) / 2 - s);
             sign * factorial(n - s) / below
         };
