@@ -6,7 +6,7 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens lens-waves bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-aspheres bench-bands bench-time bench-gaps bench-decisions bench-window docs-figures docs-charts \
+.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens lens-waves bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-diffraction bench-aspheres bench-bands bench-time bench-gaps bench-decisions bench-window docs-figures docs-charts \
 	docs-stability docs-time generated gallery spectra light-fields fingerprints fuzz fuzz-smoke fuzz-seeds sanitize clean
 
 help:
@@ -33,6 +33,7 @@ help:
 	@echo "make bench-forecast  render the example scenes, and hold the forecast of time against it"
 	@echo "make bench-memory   the same for the forecast of memory, and for copies, large shapes and frames"
 	@echo "make bench-masks   what a ray through a mask of small openings costs; writes a part of docs/cameras.md"
+	@echo "make bench-diffraction  what waves in the picture cost beside rays; writes a part of docs/cameras.md"
 	@echo "make bench-aspheres  what setting a camera up behind steep aspheres takes; writes a part of docs/limits.md"
 	@echo "make bench-bands   what bands cost beside RGB, and a lens that disperses; writes parts of docs/spectra.md, cameras.md"
 	@echo "make bench-time    what shutters, moving cameras, copies and shapes cost; writes a part of docs/time.md"
@@ -153,6 +154,10 @@ bench-memory: setup
 bench-masks: setup
 	cargo build --release -p etendue-cli
 	python3 benches/masks.py $(ARGS)
+
+bench-diffraction: setup
+	cargo build --release -p etendue-cli
+	python3 benches/diffraction.py $(ARGS)
 
 bench-aspheres: setup
 	cargo build --release -p etendue-cli

@@ -7,7 +7,8 @@ use etendue_geometry::glam::DVec3;
 use etendue_optics::analysis::between::airy_unit;
 use etendue_optics::analysis::wavefront::Cells;
 use etendue_optics::analysis::{
-    AnalysisError, CellGrid, CellSpread, ObjectPoint, PupilField, Wavefront,
+    AnalysisError, CellGrid, CellSpread, ObjectPoint, PointSpread, PupilField, ReferenceSphere,
+    Wavefront,
 };
 use etendue_optics::train::{Focus, LensReport};
 use etendue_render::output::{Channel, Layer, Look, Picture, Values, exr, npy, sidecar};
@@ -30,6 +31,9 @@ const MOST_HALF: usize = 2047;
 
 /// The most bytes of all of them.
 const MOST_BYTES: usize = 1 << 30;
+
+/// The most waves that Huygens' sums add up: some minutes.
+const MOST_TERMS: f64 = 2e10;
 
 /// What the arrays are.
 #[derive(Debug, Serialize)]
@@ -58,7 +62,7 @@ struct Meaning {
 /// One point's light.
 struct Point {
     pupil: PupilField,
-    middle: [f64; 2],
+    sphere: ReferenceSphere,
 }
 
 /// Writes the point spread functions into the folder.
@@ -99,18 +103,8 @@ pub(crate) fn write(
         }
     };
     asked.map(check).transpose()?;
-    let mut points = Vec::new();
-    for &depth in &depths {
-        for &field in &fields {
-            for &nm in &wavelengths {
-                let point = point(lens, report, sensor_z, (depth, field, nm)).map_err(|error| {
-                    let at = depth.map_or("infinity".to_owned(), |mm| format!("{mm} mm"));
-                    refused(format!("field {field}, {nm} nm, {at}: {error}"))
-                })?;
-                points.push(point);
-            }
-        }
-    }
+    let points =
+        points(lens, report, sensor_z, [&fields, &wavelengths], &depths).map_err(refused)?;
     let finest = points.iter().map(|point| airy_unit(&point.pupil)).fold(f64::INFINITY, f64::min);
     let pitch = arguments.psf_pitch.map_or(finest / FINE, |pitch| 1e-3 * pitch);
     // The sensor is looked at as a picture of it would be, x to the right and y upwards.
@@ -121,19 +115,32 @@ pub(crate) fn write(
         .collect();
     let half = asked.or_else(|| spreads.iter().map(|spread| spread.half).max()).unwrap_or(0);
     let side = check(half)?;
-    let cropped: Vec<Vec<f32>> = spreads.iter().map(|spread| cropped(spread, half)).collect();
+    let cropped: Vec<Vec<f32>> = match arguments.huygens {
+        false => spreads.iter().map(|spread| cropped(spread, half)).collect(),
+        true => by_huygens(&points, side, (pitch, finest)).map_err(refused)?,
+    };
     let held = cropped.iter().map(|plane| plane.iter().map(|&v| f64::from(v)).sum()).collect();
     let meaning = Meaning {
         version: 1,
         axes: ["depth", "field", "wavelength", "row", "column"],
         shape: [depths.len(), fields.len(), wavelengths.len(), side, side],
-        definition: "share of a point's light on each cell, by diffraction; rows go down, against y",
+        definition: match arguments.huygens {
+            false => {
+                "share of a point's light on each cell, by diffraction; rows go down, against y"
+            }
+            true => {
+                "share of a point's light on each cell, by Huygens' sum; rows go down, against y"
+            }
+        },
         pitch: 1e3 * pitch,
         depths,
         fields,
         wavelengths,
         sensor_z,
-        middles: points.iter().map(|point| point.middle).collect(),
+        middles: points
+            .iter()
+            .map(|point| [point.sphere.centre[0], point.sphere.centre[1]])
+            .collect(),
         held,
     };
     files(to, folder, &meaning, cropped)?;
@@ -164,6 +171,29 @@ fn depths(report: &LensReport, arguments: &LensArguments) -> Result<Vec<Option<f
     asked.iter().map(depth).collect()
 }
 
+/// All points, in the order of the array; why one has no light, or too rough a wavefront.
+fn points(
+    lens: &ReadLens,
+    report: &LensReport,
+    sensor_z: f64,
+    [fields, wavelengths]: [&[f64]; 2],
+    depths: &[Option<f64>],
+) -> Result<Vec<Point>, String> {
+    let mut points = Vec::new();
+    for &depth in depths {
+        for &field in fields {
+            for &nm in wavelengths {
+                let point = point(lens, report, sensor_z, (depth, field, nm)).map_err(|error| {
+                    let at = depth.map_or("infinity".to_owned(), |mm| format!("{mm} mm"));
+                    format!("field {field}, {nm} nm, {at}: {error}")
+                })?;
+                points.push(point);
+            }
+        }
+    }
+    Ok(points)
+}
+
 fn point(
     lens: &ReadLens,
     report: &LensReport,
@@ -181,8 +211,38 @@ fn point(
         }
     };
     let front = Wavefront::new(&lens.train, &at, object, sensor_z, Cells::Needed)?;
-    let [x, y, _] = front.sphere.centre;
-    Ok(Point { pupil: front.pupil, middle: [x, y] })
+    Ok(Point { pupil: front.pupil, sphere: front.sphere })
+}
+
+/// Huygens' sums in the middles of cells, times their area.
+#[expect(clippy::cast_possible_truncation, reason = "shares below 1")]
+fn by_huygens(
+    points: &[Point],
+    side: usize,
+    (pitch, finest): (f64, f64),
+) -> Result<Vec<Vec<f32>>, String> {
+    if pitch > finest / 3.0 * (1.0 + 1e-9) {
+        return Err(format!(
+            "--huygens takes the light in the middle of each cell, and cells of {} um are wider than a \
+             third of the finest detail; give --psf-pitch \"{:.3} um\" or less",
+            1e3 * pitch,
+            1e3 * finest / 3.0
+        ));
+    }
+    let terms: f64 =
+        points.iter().map(|p| p.pupil.lit().count() as f64).sum::<f64>() * (side * side) as f64;
+    if terms > MOST_TERMS {
+        return Err(format!(
+            "--huygens would add up {terms:.1e} waves, and {MOST_TERMS:.0e} are the most; give a smaller \
+             --psf-size, or fewer fields"
+        ));
+    }
+    let plane = |point: &Point| {
+        let spread = PointSpread::by_huygens(&[(&point.pupil, &point.sphere, 1.0)], side, pitch);
+        let rows = spread.values.chunks(side).rev();
+        rows.flatten().map(|value| (value * pitch * pitch) as f32).collect()
+    };
+    Ok(points.iter().map(plane).collect())
 }
 
 /// The cells up to `half` from the middle.

@@ -4,10 +4,11 @@ use std::io::Write;
 
 use etendue::places;
 use etendue_files::Transaction;
+use etendue_optics::analysis::AnalysisError;
 use etendue_optics::analysis::conjugate::{Conjugate, with_numerical_aperture};
 use etendue_optics::analysis::report::{Taken, WaveInquiry, WaveReport, figures, page};
 use etendue_optics::analysis::wavefront::Cells;
-use etendue_optics::train::{Focus, LensReport, OpticalTrain, drawing};
+use etendue_optics::train::{Focus, FocusError, LensReport, OpticalTrain, drawing};
 use etendue_scene::escape::one_line;
 use etendue_scene::file::ReadLens;
 use serde::Serialize;
@@ -37,6 +38,9 @@ pub(crate) const FILES: [&str; 14] = [
 /// Shares of the image circle's radius at which a near object is looked at.
 const SHARES: [f64; 4] = [0.0, 0.35, 0.6, 0.8];
 
+/// The focal length of the ideal lens behind an afocal one (mm): a millimetre is a thousandth of a radian.
+const EYEPIECE: f64 = 1000.0;
+
 /// A report with what the lens does in waves.
 #[derive(Debug, Serialize)]
 pub(crate) struct With<'a> {
@@ -57,6 +61,7 @@ fn premise(arguments: &LensArguments) -> Option<&'static str> {
         ("--frequencies", arguments.frequencies.is_some()),
         ("--cells", arguments.cells.is_some()),
         ("--best-focus", arguments.best_focus),
+        ("--afocal", arguments.afocal),
         ("--object-distance", arguments.object_distance.is_some()),
         ("--magnification", arguments.magnification.is_some()),
         ("--numerical-aperture", arguments.numerical_aperture.is_some()),
@@ -90,7 +95,20 @@ pub(crate) fn analyse(
         (_, None) => Focus::AsWritten,
     };
     let mut train = lens.train.clone();
-    let planes = conjugate.planes(&train, focus).map_err(|error| refused(&error))?;
+    if arguments.afocal {
+        if let Some(efl) = report.paraxial.efl {
+            let why = format!("--afocal: the lens has a focal length of {efl} mm; leave it out");
+            return Err(refused(&why));
+        }
+        train = train.with_eyepiece(EYEPIECE);
+    }
+    let planes = conjugate.planes(&train, focus).map_err(|error| match error {
+        AnalysisError::Focus(FocusError::Afocal) => refused(
+            &"the lens is afocal: it images infinity to infinity, and has no focus; give --afocal to \
+              analyse it by angles",
+        ),
+        error => refused(&error),
+    })?;
     if let Some(aperture) = arguments.numerical_aperture {
         train =
             with_numerical_aperture(train, &planes, aperture).map_err(|error| refused(&error))?;
@@ -119,6 +137,7 @@ pub(crate) fn analyse(
         conjugate,
         focus,
         best_focus: arguments.best_focus,
+        is_afocal: arguments.afocal,
         cells: arguments.cells.map_or(Cells::Needed, Cells::Given),
         frequencies: frequencies(arguments)?,
         taken: Taken {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use etendue_files::Reach;
 use etendue_optics::train::drawing::Section;
-use etendue_optics::train::{Focus, Inquiry, LensReport};
+use etendue_optics::train::{Focus, Inquiry, LensReport, OpticalTrain};
 use etendue_scene::file::read_lens;
 use serde_json::{Value, json};
 
@@ -23,6 +23,20 @@ pub struct LensView {
     pub report: LensReport,
     /// The lens cut along its axis.
     pub section: Section,
+    /// What its curves in waves are of.
+    pub(crate) in_focus: InFocus,
+}
+
+/// A lens with its planes.
+#[derive(Debug, Clone)]
+pub(crate) struct InFocus {
+    pub(crate) train: OpticalTrain,
+    /// z of the point that depths are counted from (mm).
+    pub(crate) origin: f64,
+    /// From there to the plane in focus (m).
+    pub(crate) distance: f64,
+    /// z of the sensor (mm).
+    pub(crate) image_z: f64,
 }
 
 impl Inspector {
@@ -41,7 +55,13 @@ impl Inspector {
         let report = LensReport::new(train, &Inquiry { focus, ..Inquiry::default() })
             .map_err(|error| refused(error.to_string()))?;
         let section = Section::new(train, &report).map_err(|error| refused(error.to_string()))?;
-        Ok(Some(LensView { report, section }))
+        let in_focus = InFocus {
+            train: train.clone(),
+            origin: focused.origin(),
+            distance: focused.object_distance(),
+            image_z: focused.sensor_z(),
+        };
+        Ok(Some(LensView { report, section, in_focus }))
     }
 
     /// Rays of a place of the picture (pixels) through the lens, as lines of points (z, height over the axis)

@@ -14,6 +14,7 @@ use crate::document::{Document, Edit, View};
 use crate::form::Form;
 use crate::panels;
 use crate::panels::asking::Listing;
+use crate::panels::lens_curves::LensCurves;
 use crate::panels::light_field::{LightFieldPanel, Shows};
 use crate::worker::{Kind, News, Shown, Task, Wake, Wish, Worker};
 
@@ -75,6 +76,8 @@ pub(crate) struct App {
     /// The camera's lens, while its panel is open.
     pub(crate) lens: Option<Result<LensView, String>>,
     pub(crate) shows_lens: bool,
+    /// Its curves in waves.
+    pub(crate) lens_curves: LensCurves,
     /// The lens as the scene or its file has it, and whether that is a file's.
     pub(crate) written_lens: Option<(Value, bool)>,
     pub(crate) light_field: LightFieldPanel,
@@ -131,6 +134,7 @@ impl App {
             asked: None,
             lens: None,
             shows_lens: false,
+            lens_curves: LensCurves::default(),
             written_lens: None,
             light_field: LightFieldPanel::default(),
             frames: None,

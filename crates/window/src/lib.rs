@@ -24,6 +24,7 @@ mod panels {
     pub(crate) mod bar;
     pub(crate) mod inspect;
     pub(crate) mod lens;
+    pub(crate) mod lens_curves;
     pub(crate) mod light_field;
 }
 mod worker;

@@ -5,6 +5,7 @@
 //! itself has there.
 
 mod seconds;
+mod waves;
 mod words;
 
 use etendue_accel::Accel;
@@ -18,6 +19,7 @@ use serde_json::Value;
 use etendue_render::tolerance::{Field, FullView, has_mask};
 pub use etendue_render::tolerance::{Finding, Place, Tolerance, Worst};
 
+pub use self::waves::WaveFinding;
 use crate::pictures::Studio;
 use crate::{BenchError, Progress};
 
@@ -39,6 +41,8 @@ pub struct Comparison {
     pub cheapest: &'static str,
     /// How many times as fast as the full train that is, measured; `null` without a picture to time.
     pub saving: Option<f64>,
+    /// The full train by rays, and by waves as `camera.diffraction` has them.
+    pub waves: Vec<WaveFinding>,
     /// What a user should know, in sentences.
     pub notes: Vec<String>,
 }
@@ -83,6 +87,8 @@ pub fn compare(
     findings.push(view.itself(tolerance));
     models.push(opened(&plan, &scene.camera)?);
     scenes.push(Value::Null);
+    let (waves, missing) = waves::findings(&scene.camera, &plan.bands, &view.places);
+    notes.extend(missing);
     // What each costs, where there is a picture to time.
     match Studio::with_sensor(scene, accel) {
         Ok(mut studio) => {
@@ -108,6 +114,7 @@ pub fn compare(
         scenes,
         cheapest,
         saving,
+        waves,
         notes,
     })
 }

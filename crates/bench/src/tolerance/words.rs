@@ -4,7 +4,7 @@ use std::fmt;
 
 use etendue_report::{Cell, Table};
 
-use super::{Comparison, Finding, Worst};
+use super::{Comparison, Finding, WaveFinding, Worst};
 
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -20,6 +20,20 @@ impl fmt::Display for Comparison {
             if finding.model != "full" {
                 writeln!(f, "\n{}: {}; {scene} takes it", finding.model, where_it_misses(finding))?;
             }
+        }
+        if let Some(first) = self.waves.first() {
+            writeln!(
+                f,
+                "\nThe full train by rays, and by waves as `camera.diffraction` spreads light: the modulation of a \
+                 quarter of a cycle a pixel at {} nm, along y and along x.\n",
+                first.wavelength
+            )?;
+            write!(f, "{}", Table::of_rows(self.waves.iter().map(of_waves).collect()))?;
+            let most = self.waves.iter().map(WaveFinding::difference).fold(0.0, f64::max);
+            writeln!(
+                f,
+                "\nconvolved: at most {most:.3} of the modulation; {{\"camera\":{{\"diffraction\":true}}}} takes it"
+            )?;
         }
         writeln!(f)?;
         for note in &self.notes {
@@ -74,6 +88,20 @@ fn cells(finding: &Finding) -> Vec<(&'static str, Cell)> {
         ("ns a sample", number(finding.seconds_a_sample.map(|seconds| 1e9 * seconds), 0)),
         ("times as fast", number(finding.speed, 2)),
         ("", Cell::word(if finding.is_within { "within" } else { "" })),
+    ]
+}
+
+fn of_waves(finding: &WaveFinding) -> Vec<(&'static str, Cell)> {
+    let shown = |value: f64| Cell::number(value, format!("{value:.3}"));
+    let ([rays_y, rays_x], [waves_y, waves_x]) = (finding.rays, finding.waves);
+    vec![
+        ("column (px)", Cell::number(finding.at[0], format!("{:.0}", finding.at[0]))),
+        ("row (px)", Cell::number(finding.at[1], format!("{:.0}", finding.at[1]))),
+        ("depth (m)", finding.depth.map_or_else(|| Cell::word("infinity"), shown)),
+        ("rays, y", shown(rays_y)),
+        ("waves, y", shown(waves_y)),
+        ("rays, x", shown(rays_x)),
+        ("waves, x", shown(waves_x)),
     ]
 }
 

@@ -6,7 +6,7 @@ use etendue_optics::analysis::{AnalysisError, ObjectPoint};
 use etendue_optics::element::Part;
 use etendue_optics::train::{MonochromaticTrain, OpticalTrain};
 use etendue_spectrum::Bands;
-use glam::DVec3;
+use glam::{DMat3, DVec2, DVec3};
 
 use super::focused::View;
 use super::lens_camera::{LensCamera, SpreadBy, uniform_filters};
@@ -86,6 +86,17 @@ impl LensCamera {
     pub fn waves_to_trace(&self) -> (bool, usize) {
         let train = self.focused.train();
         (is_ideal(train), if train.is_dispersive() && !self.one_wavelength { NODES } else { 1 })
+    }
+
+    /// Whether what arrives in a picture of so many columns and rows is the same on both sides of its middle,
+    /// but for being seen in a mirror: the lens is round, and the picture's middle is on its axis.
+    #[must_use]
+    pub fn is_mirrored(&self, resolution: [u32; 2]) -> bool {
+        let film = self.focused.film();
+        let is_centred = film.frame.vertex.truncate() == DVec2::ZERO
+            && film.frame.rotation == DMat3::IDENTITY
+            && film.centre * 2.0 == DVec2::from(resolution.map(f64::from));
+        self.focused.train().is_rotationally_symmetric() && is_centred
     }
 
     /// Waves of defocus (at the rim, at a wavelength in nm) of something whose nearness differs from
@@ -195,6 +206,12 @@ impl<'a> WaveLens<'a> {
     #[must_use]
     pub fn is_ideal(&self) -> bool {
         is_ideal(&self.train)
+    }
+
+    /// As [`LensCamera::is_mirrored`].
+    #[must_use]
+    pub fn is_mirrored(&self, resolution: [u32; 2]) -> bool {
+        self.camera.is_mirrored(resolution)
     }
 
     /// −1 where the picture is turned on the sensor; else 1.

@@ -84,6 +84,10 @@ pub(crate) struct LensArguments {
     /// For waves, set the stop by the numerical aperture of a near object's light
     #[arg(long, value_name = "NA", conflicts_with = "f_number")]
     pub(crate) numerical_aperture: Option<f64>,
+    /// For waves, analyse an afocal lens by the angles of its light: what is mm on an image is mrad then
+    #[arg(long, conflicts_with_all = ["object_distance", "magnification", "numerical_aperture", "focus",
+          "psf", "best_focus"])]
+    pub(crate) afocal: bool,
     /// Write point spread functions by depth, field and wavelength into the folder of -o, as psf.npy,
     /// psf.exr and psf.json: shares of a point's light by cell
     #[arg(long, requires = "output", conflicts_with_all = ["rays", "fit_opencv", "object_distance",
@@ -99,6 +103,9 @@ pub(crate) struct LensArguments {
     /// Cells a side, an odd number; as many as hold all of the light when absent
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4095), requires = "psf")]
     pub(crate) psf_size: Option<u32>,
+    /// Take them by Huygens' sum, with the true distance from every cell of the pupil to every cell
+    #[arg(long, requires = "psf")]
+    pub(crate) huygens: bool,
     /// Field angles in degrees; the file's own or shares of the field of view when absent
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) fields: Option<Vec<f64>>,

@@ -173,7 +173,7 @@ fn forecasts_are_within_half_as_much_again_of_the_peak() {
         "--set=camera.sensor.resolution=[80,64]",
         "--set=render.samples=9",
     ];
-    let cases: [(&str, &[&str]); 10] = [
+    let cases: [(&str, &[&str]); 11] = [
         ("cube.json", &[]),
         ("first-light.json", &[]),
         ("instances.json", &[]),
@@ -185,6 +185,8 @@ fn forecasts_are_within_half_as_much_again_of_the_peak() {
         // Copies whose boxes meet.
         ("forest.json", &fewer),
         ("gallery/coded-aperture-stopped.json", &waves),
+        // All at one depth.
+        ("slanted-edge.json", &waves),
     ];
     let bench = Bench::new();
     for (name, more) in cases {

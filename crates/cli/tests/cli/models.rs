@@ -83,12 +83,27 @@ fn plan_names_the_cheapest_model_within_a_tolerance() {
     // A pixel is an eighth of that of the example: nothing that the train does shows but distortion and blur.
     assert_eq!(all["cheapest"], "opencv", "{all}");
     assert!(all["saving"].as_f64().is_some_and(f64::is_finite), "{all}");
+    // By waves there is less modulation than by rays, and nowhere more than there can be.
+    let waves = all["waves"].as_array().unwrap();
+    assert!(waves.len() >= 3, "{waves:?}");
+    for finding in waves {
+        for axis in [0, 1] {
+            let [rays, waves] = ["rays", "waves"].map(|key| finding[key][axis].as_f64().unwrap());
+            // A hundredth of what is left of waves that are not in focus may come back.
+            assert!((0.0..1.0 + 1e-6).contains(&waves) && waves < rays + 0.01, "{finding}");
+        }
+    }
+    let middle = &waves[0];
+    assert!(middle["waves"][0].as_f64() < middle["rays"][0].as_f64(), "{middle}");
     let words = bench.run(&["plan", "scene.json", "--models", "--tolerance", "0.5 px,2 %"]);
     let words = text(&words.stdout);
     // Every model tells the keys that take it.
-    for key in
-        [r#"{"plan":{"dispersion":false}} takes it"#, r#""falloff":{"#, r#""type":"thin_lens""#]
-    {
+    for key in [
+        r#"{"plan":{"dispersion":false}} takes it"#,
+        r#""falloff":{"#,
+        r#""type":"thin_lens""#,
+        r#"{"camera":{"diffraction":true}} takes it"#,
+    ] {
         assert!(words.contains(key), "{key}: {words}");
     }
     assert!(words.contains("cheapest within 0.5 px and 2 % of light: "), "{words}");

@@ -186,7 +186,9 @@ fn what_cannot_be_analysed_is_refused_by_name() {
     refused(&["lens.json", "--object-distance", "20 mm"], &["no real image"]);
     refused(&["lens.json", "--numerical-aperture", "0.1"], &["numerical-aperture", "infinity"]);
     refused(&["lens.json", "--frequencies", "nan"], &["--frequencies", "NaN"]);
-    refused(&["afocal.json", "--waves"], &["afocal"]);
+    refused(&["afocal.json", "--waves"], &["afocal.json", "no focus", "--afocal"]);
+    refused(&["lens.json", "--afocal"], &["--afocal", "focal length", "leave it out"]);
+    refused(&["afocal.json", "--afocal", "--focus", "2 m"], &["--afocal", "--focus"]);
     refused(&["afocal.json", "--magnification", "-1"], &["afocal"]);
     refused(&["lens.json", "--cells", "64", "--fit-opencv"], &["--cells", "--fit-opencv"]);
     refused(&["lens.json", "--report", "lens.json"], &["lens.json"]);
@@ -249,6 +251,75 @@ fn point_spread_functions_are_written_by_depth_field_and_wavelength() {
     assert!((number(&middles[2][1]) - 50.0 * 1.0_f64.to_radians().tan()).abs() < 1e-6);
 }
 
+/// Huygens' sum over true distances has the pattern of the transform, where the sphere is large.
+#[test]
+fn huygens_sum_is_written_as_the_transform_is() {
+    let bench = Bench::new();
+    bench.write("lens.json", IDEAL.as_bytes());
+    let written = |folder: &str, more: &[&str]| {
+        let out = format!("out/{folder}");
+        let size = [
+            "--fields",
+            "0.5",
+            "--wavelengths",
+            "500",
+            "--psf-pitch",
+            "0.625 um",
+            "--psf-size",
+            "31",
+        ];
+        let arguments =
+            [&["lens", "lens.json", "--psf", "-q", "-o", &out], &size[..], more].concat();
+        let output = bench.run(&arguments);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        bench.array(&format!("{folder}/psf"))
+    };
+    let (fft, sum) = (written("fft", &[]), written("sum", &["--huygens"]));
+    assert_eq!(fft.len(), sum.len());
+    let peak = fft.iter().copied().fold(0.0, f64::max);
+    for (k, (a, b)) in fft.iter().zip(&sum).enumerate() {
+        // The transform divides all by what it finds on its cells and in the ring beyond: a few thousandths.
+        assert!((a - b).abs() < 5e-3 * peak, "{k}: {a} {b}");
+    }
+}
+
+/// Kepler's telescope of ideal lenses, twice: angles leave twice as large and upside down, and waves are those of its
+/// exit pupil of 9 mm, by cycles a milliradian.
+#[test]
+fn an_afocal_lens_is_analysed_by_angles() {
+    let bench = Bench::new();
+    bench.write(
+        "afocal.json",
+        br#"{"wavelength": 500, "elements": [
+        {"type": "thin_lens", "focal_length": 100, "thickness": 150, "semi_diameter": 9, "stop": true},
+        {"type": "thin_lens", "focal_length": 50}]}"#,
+    );
+    let arguments = [
+        "afocal.json",
+        "--afocal",
+        "--wavelengths",
+        "500",
+        "--fields",
+        "0,1",
+        "--frequencies",
+        "9",
+    ];
+    let waves = json(&bench, &arguments)["waves"].clone();
+    assert_eq!(waves["image_unit"], "mrad");
+    let [on_axis, field] = [0, 1].map(|k| &waves["fields"][k]);
+    let expected = 2000.0 * 1.0_f64.to_radians().tan();
+    let angle = number(&field["sphere"]["centre"][1]);
+    assert!((angle.abs() - expected).abs() < 1e-6, "{angle} {expected}");
+    assert!((number(&on_axis["strehl"]) - 1.0).abs() < 1e-6);
+    // 9 mm over 500 nm: 18 cycles a milliradian are the limit, and 9 half of it.
+    let modulation = number(&on_axis["mtf"][0]["tangential"]);
+    let half = std::f64::consts::FRAC_2_PI * (0.5_f64.acos() - 0.5 * 0.75_f64.sqrt());
+    assert!((modulation - half).abs() < 1e-3, "{modulation} {half}");
+    let output = bench.run(&[&["lens"], &arguments[..]].concat());
+    let table = text(&output.stdout);
+    assert!(table.contains("mrad") && table.contains("cycles/mrad"), "{table}");
+}
+
 #[test]
 fn point_spread_functions_that_cannot_be_are_refused() {
     let bench = Bench::new();
@@ -261,6 +332,9 @@ fn point_spread_functions_that_cannot_be_are_refused() {
             "1024 are the most",
         ),
         (vec!["--depths", "2 m"], "--psf"),
+        (vec!["--huygens"], "--psf"),
+        (vec!["--psf", "--huygens", "-o", "out", "--psf-pitch", "2 um"], "--psf-pitch"),
+        (vec!["--psf", "--huygens", "-o", "out", "--psf-size", "2001"], "--psf-size"),
     ] {
         let output = bench.run(&[&["lens", "lens.json"], &arguments[..]].concat());
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");

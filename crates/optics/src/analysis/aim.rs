@@ -43,6 +43,21 @@ pub(crate) struct Outline {
     pub(crate) half: f64,
     /// From places about the middle, in shares of `half`, to coordinates of the beam.
     coefficients: [Vec<f64>; 2],
+    /// What it was found by.
+    pub(super) rays: Vec<FirstRay>,
+}
+
+/// A ray of the grid that an outline is found by.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FirstRay {
+    /// Coordinates of the beam.
+    pub(super) place: DVec2,
+    /// On the sphere, from the chief ray (optical direction cosines).
+    pub(super) from_middle: DVec2,
+    /// The path of the chief ray less its own (mm).
+    pub(super) ahead: f64,
+    /// Whether light passes.
+    pub(super) is_lit: bool,
 }
 
 /// A grid over the pupil.
@@ -89,8 +104,13 @@ fn basis(at: DVec2) -> [[f64; TERMS]; 3] {
 }
 
 impl Outline {
+    /// What `line` makes of the polynomial of one coordinate of the beam, by powers of shares, and its degree.
+    pub(super) fn along<T>(&self, axis: usize, line: impl Fn(&[f64], usize) -> T) -> T {
+        line(&self.coefficients[axis], DEGREE)
+    }
+
     /// Coordinates of the beam for a place in shares, and their derivatives by the shares.
-    fn guess(&self, share: DVec2) -> (DVec2, DMat2) {
+    pub(super) fn guess(&self, share: DVec2) -> (DVec2, DMat2) {
         let terms = basis(share);
         let sum = |values: &[f64; TERMS], axis: usize| -> f64 {
             values.iter().zip(&self.coefficients[axis]).map(|(t, c)| t * c).sum()
@@ -110,41 +130,35 @@ pub(crate) fn outline(beam: &Beam<'_>, sphere: &ReferenceSphere) -> Result<Outli
     // All that leave, for the polynomial; those that are lit, for the half.
     let mut rays = Vec::new();
     let mut half = 0.0_f64;
-    for row in 0..SAMPLES {
-        for column in 0..SAMPLES {
-            let cell = DVec2::new(f64::from(column) + 0.5, f64::from(row) + 0.5);
-            let place = low + cell * size;
-            let Some((cosines, _)) = beam.run_on(place).and_then(|end| sphere.meet(&end)) else {
-                continue;
-            };
-            let is_lit = beam.throughput(place) > 0.0;
-            if is_lit {
-                half = half.max((cosines - middle).abs().max_element());
-            }
-            rays.push((place, cosines, is_lit));
+    let cell = |k: u32| DVec2::new(f64::from(k % SAMPLES) + 0.5, f64::from(k / SAMPLES) + 0.5);
+    let places: Vec<DVec2> = (0..SAMPLES * SAMPLES).map(|k| low + cell(k) * size).collect();
+    for (&place, passed) in places.iter().zip(beam.throughputs(&places)) {
+        let Some(end) = beam.run_on(place) else { continue };
+        let Some((cosines, rest)) = sphere.meet(&end) else { continue };
+        let (is_lit, from_middle) = (passed > 0.0, cosines - middle);
+        if is_lit {
+            half = half.max(from_middle.abs().max_element());
         }
+        rays.push(FirstRay { place, from_middle, ahead: path - (end.length + rest), is_lit });
     }
     if half == 0.0 {
         return Err(AnalysisError::Dark { field: beam.object.name() });
     }
     // The middles of cells lie up to one cell inside.
-    let spread = rays.iter().filter(|ray| ray.2);
-    let lit = spread.count();
+    let lit = rays.iter().filter(|ray| ray.is_lit).count();
     half *= 1.0 + 1.5 / (lit as f64).sqrt().max(4.0);
     let mut fits = [LeastSquares::new(TERMS), LeastSquares::new(TERMS)];
-    for (place, cosines, _) in rays {
-        let share = (cosines - middle) / half;
-        // Far outside, rays run in ways that no polynomial follows.
-        if share.abs().max_element() < 1.2 {
-            let row = basis(share)[0];
-            fits[0].add(&row, place.x, 1.0);
-            fits[1].add(&row, place.y, 1.0);
-        }
+    // Far outside, rays run in ways that no polynomial follows.
+    rays.retain(|ray| (ray.from_middle / half).abs().max_element() < 1.2);
+    for ray in &rays {
+        let row = basis(ray.from_middle / half)[0];
+        fits[0].add(&row, ray.place.x, 1.0);
+        fits[1].add(&row, ray.place.y, 1.0);
     }
     let singular = AnalysisError::Singular { terms: TERMS, rays: lit };
     let [x, y] = fits.map(LeastSquares::solve);
     let coefficients = [x.ok_or(singular.clone())?, y.ok_or(singular)?];
-    let mut outline = Outline { middle, path, half, coefficients };
+    let mut outline = Outline { middle, path, half, coefficients, rays };
     outline.half = trimmed(beam, &outline);
     Ok(rescaled(outline, half))
 }
@@ -154,18 +168,18 @@ fn trimmed(beam: &Beam<'_>, outline: &Outline) -> f64 {
     const LINES: u32 = 200;
     const ACROSS: u32 = 200;
     let share = |i: u32, n: u32| 2.0 * (f64::from(i) + 0.5) / f64::from(n) - 1.0;
-    let is_lit = |line: f64, along: f64| {
-        let places = [
-            DVec2::new(line, along),
-            DVec2::new(-line, along),
-            DVec2::new(along, line),
-            DVec2::new(along, -line),
-        ];
-        places.iter().any(|&place| beam.throughput(outline.guess(place).0) > 0.0)
+    let is_lit = |line: f64| {
+        let places = (0..ACROSS).flat_map(|k| {
+            let along = share(k, ACROSS);
+            let (a, b) = (DVec2::new(line, along), DVec2::new(along, line));
+            [a, DVec2::new(-line, along), b, DVec2::new(along, -line)]
+        });
+        let places: Vec<DVec2> = places.map(|place| outline.guess(place).0).collect();
+        beam.throughputs(&places).iter().any(|passed| *passed > 0.0)
     };
     // From outside inwards: the first line of places with light.
     let lines = (0..LINES).map(|i| 1.0 - f64::from(i) / f64::from(LINES));
-    let first = lines.into_iter().find(|&line| (0..ACROSS).any(|k| is_lit(line, share(k, ACROSS))));
+    let first = lines.into_iter().find(|&line| is_lit(line));
     first.map_or(1.0, |line| (line + 1.0 / f64::from(LINES)).min(1.0)) * outline.half
 }
 
@@ -258,7 +272,7 @@ pub(crate) fn field(
 }
 
 /// A mean power of 1 where all is clear.
-fn normalise(pupil: &mut PupilField) {
+pub(super) fn normalise(pupil: &mut PupilField) {
     let clear: f64 = pupil.clear.iter().sum();
     let mean = pupil.total_power() / clear;
     if mean > 0.0 && mean.is_finite() {
@@ -275,12 +289,12 @@ fn neighbours(i: usize, cells: usize) -> Vec<usize> {
 }
 
 /// What passes of a cell, the mean of its root, and the middle of that from the cell's own (in cells).
-fn cell(beam: &Beam<'_>, middle: DVec2, turn: DMat2) -> ([f64; 2], DVec2) {
+pub(super) fn cell(beam: &Beam<'_>, middle: DVec2, turn: DMat2) -> ([f64; 2], DVec2) {
     let offset = |k: u32| (f64::from(k) + 0.5) / f64::from(FINE) - 0.5;
+    let at = |k: u32| DVec2::new(offset(k % FINE), offset(k / FINE));
+    let places: Vec<DVec2> = (0..FINE * FINE).map(|k| middle + turn * at(k)).collect();
     let (mut sum, mut roots, mut lean) = (0.0, 0.0, DVec2::ZERO);
-    for k in 0..FINE * FINE {
-        let at = DVec2::new(offset(k % FINE), offset(k / FINE));
-        let passes = beam.throughput(middle + turn * at);
+    for (at, passes) in (0..).map(at).zip(beam.throughputs(&places)) {
         sum += passes;
         roots += passes.sqrt();
         lean += at * passes.sqrt();

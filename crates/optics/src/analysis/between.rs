@@ -6,11 +6,12 @@
 //! and the grid over it are those of the place where the light lands, whatever sends it.
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 use super::aim::{self, Sampling};
 use super::object::Beam;
 use super::pupil::PupilField;
-use super::{AnalysisError, MOST_CELLS, ObjectPoint, ReferenceSphere};
+use super::{AnalysisError, MOST_CELLS, ObjectPoint, ReferenceSphere, smooth};
 use crate::train::{MonochromaticTrain, OpticalTrain};
 
 /// Cells a side that a grid has in the least.
@@ -22,6 +23,10 @@ pub const FARTHEST_WAVES: f64 = 60.0;
 
 /// Wavelengths times the f-number of the image that a grid has to hold beside where rays land.
 const BESIDE: f64 = 42.0;
+
+/// How far a wavefront may be from the polynomial that stands for it (waves): a picture's irradiance changes by a
+/// few thousandths of its peak per hundredth of a wave.
+const SMOOTH: f64 = 2e-3;
 
 /// Fields at all of some wavelengths and nearnesses.
 #[derive(Debug, Clone)]
@@ -45,7 +50,7 @@ pub struct FieldSource<'a> {
     /// Nearnesses (1/mm), ascending.
     pub nearness: &'a [f64],
     /// The point of a nearness.
-    pub object: &'a dyn Fn(f64) -> ObjectPoint,
+    pub object: &'a (dyn Fn(f64) -> ObjectPoint + Sync),
     /// The point of the image (mm) that the fields are about.
     pub image: DVec3,
 }
@@ -62,15 +67,15 @@ impl FieldsBetween {
     /// cells.
     pub fn new(source: &FieldSource<'_>) -> Result<Self, AnalysisError> {
         let FieldSource { train, lenses, nearness, object, image } = *source;
-        let mut parts = Vec::new();
-        for lens in lenses {
-            for &near in nearness {
-                let beam = Beam::new(train, lens, object(near))?;
-                let sphere = ReferenceSphere::about(train, lens, image)?;
-                let outline = aim::outline(&beam, &sphere)?;
-                parts.push((beam, sphere, outline));
-            }
-        }
+        let all: Vec<_> =
+            lenses.iter().flat_map(|lens| nearness.iter().map(move |&near| (lens, near))).collect();
+        let part = |(lens, near)| {
+            let beam = Beam::new(train, lens, object(near))?;
+            let sphere = ReferenceSphere::about(train, lens, image)?;
+            let outline = aim::outline(&beam, &sphere)?;
+            Ok((beam, sphere, outline))
+        };
+        let parts = all.into_par_iter().map(part).collect::<Result<Vec<_>, AnalysisError>>()?;
         // One grid over all of them.
         let middle = parts.get(parts.len() / 2).map_or(DVec2::ZERO, |part| part.2.middle);
         let reach =
@@ -80,9 +85,10 @@ impl FieldsBetween {
             let step = half / (0.5 * cells as f64 - super::pupil::RIM);
             let sampling = Sampling { cells, step, middle };
             let field = |(beam, sphere, outline): &(Beam<'_>, ReferenceSphere, aim::Outline)| {
-                aim::field(beam, sphere, outline, sampling)
+                smooth::field(beam, sphere, outline, sampling, SMOOTH)
+                    .map_or_else(|| aim::field(beam, sphere, outline, sampling), Ok)
             };
-            parts.iter().map(field).collect()
+            parts.par_iter().map(field).collect()
         };
         let mut fields = traced(USUAL)?;
         // Where rays land, in wavelengths times the f-number.
@@ -109,28 +115,32 @@ impl FieldsBetween {
     pub fn at(&self, wavelength: f64, nearness: f64) -> PupilField {
         let by_wavelength = lagrange(&self.wavelengths, wavelength);
         let by_nearness = lagrange(&self.nearness, nearness);
-        let weight = |k: usize| {
-            let depths = self.nearness.len();
-            by_wavelength[k / depths] * by_nearness[k % depths]
-        };
+        let depths = self.nearness.len();
+        let weight = |k: usize| by_wavelength[k / depths] * by_nearness[k % depths];
+        let weighted: Vec<(f64, f64, &PupilField)> = self
+            .fields
+            .iter()
+            .enumerate()
+            // As a path, which is nearly the same for all wavelengths.
+            .map(|(k, own)| (weight(k), weight(k) * own.wavelength / wavelength, own))
+            .collect();
         // The openings are those of the field next to it.
         let (nearest, depth) =
             (closest(&self.wavelengths, wavelength), closest(&self.nearness, nearness));
-        let mut field = self.fields[nearest * self.nearness.len() + depth].clone();
+        let mut field = self.fields[nearest * depths + depth].clone();
         for i in 0..field.clear.len() {
             if field.clear[i] <= 0.0 {
                 continue;
             }
             let mut waves = 0.0;
             let mut landing = DVec2::ZERO;
-            for (k, own) in self.fields.iter().enumerate() {
+            for &(by_landing, by_waves, own) in &weighted {
                 // No ray of that depth or wavelength crosses the cell.
                 if own.clear[i] <= 0.0 && own.slopes[i] == DVec2::ZERO {
                     field.clear[i] = 0.0;
                 }
-                // As a path, which is nearly the same for all wavelengths.
-                waves += weight(k) * own.waves[i] * own.wavelength / wavelength;
-                landing += weight(k) * own.landing[i];
+                waves += by_waves * own.waves[i];
+                landing += by_landing * own.landing[i];
             }
             if field.clear[i] <= 0.0 {
                 (field.amplitude[i], field.power[i]) = (0.0, 0.0);

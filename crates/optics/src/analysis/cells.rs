@@ -4,7 +4,7 @@
 //!
 //! The irradiance of a pupil has no finer detail than λN, its wavelength times its f-number. Cells of
 //! at most λN/3 take the irradiance in their middles: sums over them are then those of all of it
-//! (the sampling theorem). Larger cells take the mean over points in them, sharpened by a 24th of its
+//! (the sampling theorem). Larger cells take the mean over them, sharpened by a 24th of its
 //! second differences, so that a picture of such cells, each the mean over itself, is not blurred
 //! twice: what is left of a cell's own transform is 1 − O(u⁴) at u cycles a cell.
 //!
@@ -13,11 +13,12 @@
 //! distance as behind a round pupil: no light is lost.
 
 use glam::DVec2;
+use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
 
 use super::between::{FARTHEST_WAVES, airy_unit, landing_reach};
 use super::pupil::PupilField;
-use super::spread::{averaged, norm, sinc};
+use super::spread::{amplitudes, norm, quick_length, sinc};
 
 /// How far beyond the rays' landings light is added up as waves (wavelengths times the f-number).
 const REACH: f64 = 40.0;
@@ -27,9 +28,6 @@ const RING: f64 = 1.5;
 
 /// Cells of this share of λN or less take the irradiance in their middle.
 const FINE: f64 = 1.0 / 3.0;
-
-/// Points in larger cells are this share of λN apart, at most.
-const FINER: f64 = 1.0 / 6.0;
 
 /// On cells of more λN, all light lands where rays do.
 const COARSE: f64 = 4.0;
@@ -68,6 +66,32 @@ impl CellSpread {
         ((REACH * RING * unit).ceil().max(1.0) as usize).min(most.max(1))
     }
 
+    /// The share of the cell in a column and row, of what is seen in a mirror along x or y.
+    #[must_use]
+    pub fn share(&self, [column, row]: [usize; 2], mirrored: [bool; 2]) -> f64 {
+        let last = 2 * self.half;
+        let [x, y] = [(column, mirrored[0]), (row, mirrored[1])]
+            .map(|(k, mirrored)| if mirrored { last - k } else { k });
+        self.shares[y * (last + 1) + x]
+    }
+
+    /// How much of the light another one has elsewhere, twice: Σ |difference|, which no difference of their
+    /// transfer functions exceeds.
+    #[must_use]
+    pub fn difference(&self, other: &Self) -> f64 {
+        let half = self.half.max(other.half);
+        let side = 2 * half + 1;
+        let share = |spread: &Self, i: usize| {
+            let own = 2 * spread.half + 1;
+            let from = |k: usize| (k + spread.half).checked_sub(half).filter(|&k| k < own);
+            match (from(i / side), from(i % side)) {
+                (Some(row), Some(column)) => spread.shares[row * own + column],
+                _ => 0.0,
+            }
+        };
+        (0..side * side).map(|i| (share(self, i) - share(other, i)).abs()).sum()
+    }
+
     /// The spread of fields about one centre, which count alike.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts of cells")]
@@ -93,16 +117,16 @@ impl CellSpread {
             }
             return Self { half, shares }.normalised();
         }
-        let points = match grid.pitch <= FINE * least {
-            true => 1,
-            false => (grid.pitch / (FINER * least)).ceil() as usize,
+        let light = match grid.pitch <= FINE * least {
+            true => CellLight::Middle,
+            false => CellLight::Mean,
         };
         // One more on each side to take differences by.
-        let margin = usize::from(points > 1);
+        let margin = usize::from(light == CellLight::Mean);
         let wide = 2 * (core + margin) + 1;
         let mut means = vec![0.0; wide * wide];
         for field in fields {
-            add_waves(field, grid, core + margin, points, &mut means);
+            add_waves(field, grid, core + margin, light, &mut means);
         }
         let count = fields.len() as f64;
         for row in 0..2 * core + 1 {
@@ -159,55 +183,169 @@ impl CellSpread {
     }
 }
 
-/// Adds a field's light, as waves, to cells up to `half` from the middle: the mean over `points`
-/// squared points of each.
-fn add_waves(field: &PupilField, grid: &CellGrid, half: usize, points: usize, cells: &mut [f64]) {
+/// What of its irradiance a cell gets, times its area.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum CellLight {
+    /// That in its middle.
+    Middle,
+    /// The mean.
+    Mean,
+}
+
+/// Adds a field's light, as waves, to cells up to `half` from the middle.
+///
+/// The irradiance is a sum of waves whose amplitudes are the pupil's autocorrelation R: Σ R exp(−2πi ν·x),
+/// where ν are whole numbers of a cell of the pupil over the wavelength; the mean of each over a square is known.
+/// R of −ν is the conjugate of R of ν, so half of them will do, and sums of x are those of −x with the
+/// sines' sign changed.
+fn add_waves(
+    field: &PupilField,
+    grid: &CellGrid,
+    half: usize,
+    light: CellLight,
+    cells: &mut [f64],
+) {
     let side = 2 * half + 1;
-    let count = side * points;
     let n = field.cells;
-    let length = field.wavelength * 1e-6;
-    let fine = grid.pitch / points as f64;
-    // From the middle to a point, in the picture (mm).
-    let place = |k: usize| ((k as f64 + 0.5) / points as f64 - 0.5 - half as f64) * grid.pitch;
-    let pupil = |k: usize| (k as f64 - (n / 2) as f64) * field.step;
-    let wave = |cosine: f64, at: f64| {
-        Complex64::from_polar(1.0, -std::f64::consts::TAU * cosine * at / length)
+    let cycles = field.step / (field.wavelength * 1e-6) * grid.pitch;
+    let mean = |k: usize| match light {
+        CellLight::Middle => 1.0,
+        CellLight::Mean => sinc(k as f64 * cycles),
     };
-    // The sum over columns of cells first, for all columns of points, and then that over rows.
-    let (right, down) = (grid.turn, -grid.turn);
-    let by_column: Vec<Complex64> =
-        (0..n).flat_map(|i| (0..count).map(move |c| wave(pupil(i), right * place(c)))).collect();
-    let mut rows: Vec<(usize, Vec<Complex64>)> = Vec::new();
-    for j in 0..n {
-        let lit: Vec<usize> = (0..n).filter(|i| field.amplitude[j * n + i] > 0.0).collect();
-        if lit.is_empty() {
-            continue;
+    // Of every frequency, at every distance from the middle.
+    let table = |wave: fn(f64) -> f64| -> Vec<f64> {
+        let turn = |k: usize, j: usize| std::f64::consts::TAU * (k * j) as f64 * cycles;
+        (0..n).flat_map(|k| (0..=half).map(move |j| mean(k) * wave(turn(k, j)))).collect()
+    };
+    let (cosines, sines) = (table(f64::cos), table(f64::sin));
+    let of = |k: usize| k * (half + 1)..(k + 1) * (half + 1);
+    let correlation = autocorrelation(field);
+    let scale = norm(field) * grid.pitch * grid.pitch;
+    let length = field.wavelength * 1e-6;
+    // What the sum over the pupil's cells takes away at a distance: the transform of one.
+    let through: Vec<f64> = (0..=half)
+        .map(|j| sinc(j as f64 * grid.pitch * field.step / length).powi(2).max(1e-3))
+        .collect();
+    // Sums over the frequencies along x at places x, real and imaginary: even and odd parts.
+    let mut even = [vec![0.0; half + 1], vec![0.0; half + 1]];
+    let mut odd = even.clone();
+    // For each frequency along y, both parts at all places x.
+    let mut lines: Vec<[Vec<f64>; 2]> = Vec::with_capacity(n);
+    for along_y in 0..n {
+        even.iter_mut().chain(&mut odd).for_each(|sums| sums.fill(0.0));
+        for k in 0..n {
+            let [ahead, behind] = [correlation.at(k, along_y), correlation.at_minus(k, along_y)];
+            let (sum, difference) = match k {
+                0 => (ahead, Complex64::ZERO),
+                _ => (ahead + behind, ahead - behind),
+            };
+            if sum == Complex64::ZERO && difference == Complex64::ZERO {
+                continue;
+            }
+            let (cos, sin) = (&cosines[of(k)], &sines[of(k)]);
+            add_scaled(&mut even[0], sum.re, cos);
+            add_scaled(&mut even[1], sum.im, cos);
+            add_scaled(&mut odd[0], difference.re, sin);
+            add_scaled(&mut odd[1], difference.im, sin);
         }
-        let mut sums = vec![Complex64::ZERO; count];
-        for i in lit {
-            let angle = std::f64::consts::TAU * field.mean_waves(j * n + i);
-            let amplitude = Complex64::from_polar(averaged(field, j * n + i), angle);
-            let waves = &by_column[i * count..(i + 1) * count];
-            sums.iter_mut().zip(waves).for_each(|(sum, wave)| *sum += amplitude * wave);
+        // exp(−iφ): even − i odd.
+        let mut line = [vec![0.0; side], vec![0.0; side]];
+        let double = if along_y == 0 { scale } else { 2.0 * scale };
+        for j in 0..=half {
+            let [right, left] = match grid.turn > 0.0 {
+                true => [half + j, half - j],
+                false => [half - j, half + j],
+            };
+            let scale = double / through[j];
+            line[0][right] = scale * (even[0][j] + odd[1][j]);
+            line[1][right] = scale * (even[1][j] - odd[0][j]);
+            line[0][left] = scale * (even[0][j] - odd[1][j]);
+            line[1][left] = scale * (even[1][j] + odd[0][j]);
         }
-        rows.push((j, sums));
+        lines.push(line);
     }
-    let scale = norm(field) * fine * fine;
-    let mut sums = vec![Complex64::ZERO; count];
-    // What the sum over cells takes away at a distance: the transform of one cell.
-    let through: Vec<f64> =
-        (0..count).map(|k| sinc(place(k) * field.step / length).powi(2).max(1e-3)).collect();
-    for r in 0..count {
-        sums.fill(Complex64::ZERO);
-        for (j, own) in &rows {
-            let turn = wave(pupil(*j), down * place(r));
-            sums.iter_mut().zip(own).for_each(|(sum, own)| *sum += turn * own);
+    let (mut even, mut odd) = (vec![0.0; side], vec![0.0; side]);
+    for j in 0..=half {
+        even.fill(0.0);
+        odd.fill(0.0);
+        for (k, [re, im]) in lines.iter().enumerate() {
+            add_scaled(&mut even, cosines[k * (half + 1) + j], re);
+            add_scaled(&mut odd, sines[k * (half + 1) + j], im);
         }
-        let line = &mut cells[r / points * side..(r / points + 1) * side];
-        for (c, sum) in sums.iter().enumerate() {
-            line[c / points] += scale * sum.norm_sqr() / (through[r] * through[c]);
+        // Rows go down, against y.
+        let [up, down] = match grid.turn > 0.0 {
+            true => [half - j, half + j],
+            false => [half + j, half - j],
+        };
+        let over = 1.0 / through[j];
+        let mut add = |row: usize, sign: f64| {
+            let cells = &mut cells[row * side..(row + 1) * side];
+            for (cell, (even, odd)) in cells.iter_mut().zip(even.iter().zip(&odd)) {
+                *cell += over * (even + sign * odd);
+            }
+        };
+        add(up, 1.0);
+        if j > 0 {
+            add(down, -1.0);
         }
     }
+}
+
+/// Adds values times a number.
+fn add_scaled(sums: &mut [f64], by: f64, values: &[f64]) {
+    sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += by * value);
+}
+
+/// A pupil's autocorrelation, of shifts up in y and both ways in x.
+struct Autocorrelation {
+    /// Shifts in y, and points of the transform in x.
+    size: [usize; 2],
+    /// Row by row of a shift in y each; shifts to the left come last.
+    values: Vec<Complex64>,
+}
+
+impl Autocorrelation {
+    /// That of a shift by so many cells to the right and up.
+    fn at(&self, right: usize, up: usize) -> Complex64 {
+        self.values[up * self.size[1] + right]
+    }
+
+    /// That of a shift to the left and up.
+    fn at_minus(&self, left: usize, up: usize) -> Complex64 {
+        self.values[up * self.size[1] + (self.size[1] - left) % self.size[1]]
+    }
+}
+
+/// Σ A(p + s) A*(p) over cells, by its transform |FFT A|² on a grid on which shifts do not come round.
+fn autocorrelation(field: &PupilField) -> Autocorrelation {
+    let n = field.cells;
+    let size = quick_length(2 * n - 1);
+    let mut planner = FftPlanner::new();
+    let (forward, inverse) = (planner.plan_fft_forward(size), planner.plan_fft_inverse(size));
+    let mut rows = vec![Complex64::ZERO; n * size];
+    for (row, values) in amplitudes(field).chunks(n).enumerate() {
+        rows[row * size..][..n].copy_from_slice(values);
+    }
+    forward.process(&mut rows);
+    // Columns, as rows that are longer than the pupil.
+    let mut columns = vec![Complex64::ZERO; size * size];
+    for (y, row) in rows.chunks(size).enumerate() {
+        for (x, value) in row.iter().enumerate() {
+            columns[x * size + y] = *value;
+        }
+    }
+    forward.process(&mut columns);
+    columns.iter_mut().for_each(|value| *value = Complex64::from(value.norm_sqr()));
+    inverse.process(&mut columns);
+    let scale = 1.0 / (size * size) as f64;
+    let mut values = vec![Complex64::ZERO; n * size];
+    for (up, row) in values.chunks_mut(size).enumerate() {
+        for (x, value) in row.iter_mut().enumerate() {
+            *value = columns[x * size + up] * scale;
+        }
+    }
+    inverse.process(&mut values);
+    Autocorrelation { size: [n, size], values }
 }
 
 /// Adds where a field's rays land to cells up to `half` from the middle: each cell of the pupil lights

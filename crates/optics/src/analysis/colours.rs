@@ -1,16 +1,21 @@
 //! One object point at several wavelengths, on grids that have one pitch in the image.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::aim::{self, Sampling};
 use super::object::{Beam, ObjectPoint};
 use super::pupil::RIM;
+use super::spread::quick_length;
 use super::wavefront::{COMFORTABLE, Cells, ReferenceSphere, USUAL_CELLS, Wavefront, chief_point};
-use super::{AnalysisError, LEAST_CELLS, MOST_CELLS};
+use super::{AnalysisError, LEAST_CELLS, MOST_CELLS, smooth};
 use crate::train::{MonochromaticTrain, OpticalTrain};
 
 /// Cells a side of the grid that says how many are needed.
 const COARSE: usize = 64;
+
+/// How far a wavefront may be from the polynomial that stands for it (waves): less than what tables show.
+const SMOOTH: f64 = 2e-5;
 
 /// The wavefronts of a point at each of the wavelengths of `lenses`, all about the place where the
 /// chief ray of the first meets the plane at `image_z` (mm): lateral colour is in them. As many cells a
@@ -33,22 +38,28 @@ pub fn wavefronts(
     let Some(first) = beams.first() else { return Ok(Vec::new()) };
     let centre: DVec3 = chief_point(first, image_z);
     // What each lights, and how rough it is.
-    let mut parts = Vec::with_capacity(beams.len());
-    let mut counts = Vec::with_capacity(beams.len());
-    for beam in &beams {
+    let field = |(beam, sphere, outline): (&Beam<'_>, &ReferenceSphere, &aim::Outline),
+                 sampling| {
+        smooth::field(beam, sphere, outline, sampling, SMOOTH)
+            .map_or_else(|| aim::field(beam, sphere, outline, sampling), Ok)
+    };
+    let part = |i: usize| {
+        let beam = &beams[i];
         let sphere = ReferenceSphere::about(train, beam.at, centre)?;
         let outline = aim::outline(beam, &sphere)?;
+        let mut count = 0;
         if cells == Cells::Needed {
-            let coarse = aim::field(beam, &sphere, &outline, Sampling::cells(COARSE, &outline))?;
-            let count = coarse.needed_cells(COMFORTABLE);
+            let coarse = field((beam, &sphere, &outline), Sampling::cells(COARSE, &outline))?;
+            count = coarse.needed_cells(COMFORTABLE);
             if count > MOST_CELLS {
                 let waves = coarse.statistics().peak_to_valley;
                 return Err(AnalysisError::TooRough { needed: count, waves });
             }
-            counts.push(count);
         }
-        parts.push((beam, sphere, outline));
-    }
+        Ok(((beam, sphere, outline), count))
+    };
+    let parts = (0..beams.len()).into_par_iter().map(part).collect::<Result<Vec<_>, _>>()?;
+    let (parts, counts): (Vec<_>, Vec<usize>) = parts.into_iter().unzip();
     let over = |(beam, _, outline): &(&Beam<'_>, ReferenceSphere, aim::Outline)| {
         outline.half / beam.at.wavelength()
     };
@@ -59,7 +70,7 @@ pub fn wavefronts(
     let count = match cells {
         Cells::Needed if needed > MOST_CELLS as f64 => MOST_CELLS,
         #[expect(clippy::cast_possible_truncation, reason = "at most 1024")]
-        Cells::Needed => (needed.ceil() as usize).next_multiple_of(32),
+        Cells::Needed => (2 * quick_length((0.5 * needed).ceil() as usize)).min(MOST_CELLS),
         Cells::Given(count) if !(LEAST_CELLS..=MOST_CELLS).contains(&count) => {
             return Err(AnalysisError::Cells(count));
         }
@@ -69,7 +80,8 @@ pub fn wavefronts(
     let wavefront = |(beam, sphere, outline): (&Beam<'_>, ReferenceSphere, aim::Outline)| {
         let step = widest * beam.at.wavelength();
         let sampling = Sampling { cells: count, step, middle: outline.middle };
-        Wavefront::sampled(beam, sphere, &outline, sampling)
+        let pupil = field((beam, &sphere, &outline), sampling)?;
+        Wavefront::told(beam.object, sphere, pupil)
     };
-    parts.into_iter().map(wavefront).collect()
+    parts.into_par_iter().map(wavefront).collect()
 }

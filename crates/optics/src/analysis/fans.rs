@@ -21,6 +21,9 @@ pub struct FanRay {
     pub y: f64,
     /// How far its wave is ahead of the chief ray's on the reference sphere (waves).
     pub waves: f64,
+    /// How much farther along the fan it crosses the stop than a paraxial ray of the same place of the
+    /// entrance pupil (percent of the stop's paraxial radius); `null` where that is none.
+    pub pupil_aberration: Option<f64>,
 }
 
 /// Both fans of an object point at a wavelength.
@@ -38,6 +41,9 @@ pub struct Fans {
     /// Half the paraxial entrance pupil, by which `pupil` is counted: mm on that plane, or a direction
     /// cosine at a near object.
     pub half_pupil: f64,
+    /// Where the chief ray crosses the plane of the paraxial entrance pupil, from its middle in x and in y
+    /// (mm): it would be 0 without aberrations of the pupil. `null` where the pupil is at infinity.
+    pub pupil_shift: Option<[f64; 2]>,
     /// Along y in the pupil: those rays that pass.
     pub tangential: Vec<FanRay>,
     /// Along x.
@@ -71,6 +77,8 @@ pub fn fans(
     let (_, rest) = sphere.meet(&beam.chief_end).ok_or(none)?;
     let path = beam.chief_end.length + rest;
     let length = at.wavelength() * 1e-6;
+    let pupil = train.paraxial(at.wavelength())?.entrance_pupil;
+    let stop_radius = stop_radius(train, at, pupil.diameter)?;
     let fan = |along: DVec2| -> Vec<FanRay> {
         let ray = |k: i32| {
             let pupil = BEYOND * f64::from(k) / f64::from(HALF);
@@ -84,7 +92,12 @@ pub fn fans(
             let slope = (image_z - ray.position[2]) / ray.direction[2];
             let [x, y] = [0, 1].map(|axis| ray.position[axis] + ray.direction[axis] * slope);
             let waves = (path - end.length - rest) / length;
-            Some(FanRay { pupil, x: x - centre.x, y: y - centre.y, waves })
+            let stop = beam.crossing(train.stop(), place).map(|stop| stop.dot(along));
+            let pupil_aberration = stop.zip(stop_radius).map(|(stop, radius)| {
+                // Upside down where the stop is imaged so.
+                100.0 * (stop - pupil * radius) / radius.abs()
+            });
+            Some(FanRay { pupil, x: x - centre.x, y: y - centre.y, waves, pupil_aberration })
         };
         (-HALF..=HALF).filter_map(ray).collect()
     };
@@ -95,9 +108,27 @@ pub fn fans(
         origin: start.position,
         direction: start.direction,
         half_pupil: beam.reach(),
+        pupil_shift: pupil.z.map(|z| {
+            let way = (z - start.position[2]) / start.direction[2];
+            [0, 1].map(|axis| start.position[axis] + way * start.direction[axis])
+        }),
         tangential: fan(DVec2::Y),
         sagittal: fan(DVec2::X),
     })
+}
+
+/// Where a paraxial ray at the rim of the entrance pupil crosses the stop (mm, negative on the other side of
+/// the axis); `None` where the pupil has no size.
+fn stop_radius(
+    train: &OpticalTrain,
+    at: &MonochromaticTrain,
+    diameter: Option<f64>,
+) -> Result<Option<f64>, AnalysisError> {
+    let indices = train.indices(at.wavelength())?;
+    let stop = train.stop();
+    let to_stop = train.matrix(&indices, 0, stop).then(train.gap_before(&indices, stop));
+    // All slopes from a point of the pupil meet in its image at the stop.
+    Ok(diameter.map(|diameter| 0.5 * diameter * to_stop.a).filter(|radius| *radius != 0.0))
 }
 
 /// A point of a distortion grid (mm).

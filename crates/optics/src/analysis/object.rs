@@ -8,7 +8,7 @@
 use glam::{DVec2, DVec3};
 
 use super::AnalysisError;
-use crate::element::{Clip, Ray, RayStatus};
+use crate::element::{Clip, LensRays, Ray, RayStatus};
 use crate::train::aim::{follow, solve};
 use crate::train::optical_path::{PathEnd, ThinLensPhases};
 use crate::train::{MonochromaticTrain, OpticalTrain, Side};
@@ -192,6 +192,11 @@ impl<'a> Beam<'a> {
         Some(self.at.run_with_path(clip, self.launch.ray(place)?, &self.phases))
     }
 
+    /// Where the ray crosses an element, in its own frame and whether rims stop it or not (mm).
+    pub(crate) fn crossing(&self, element: usize, place: DVec2) -> Option<DVec2> {
+        self.at.crossing(Side::Object, element, self.launch.ray(place)?).map(DVec2::from)
+    }
+
     /// The ray as it leaves, whether rims stop it or not; `None` when it does not leave.
     pub(crate) fn run_on(&self, place: DVec2) -> Option<PathEnd> {
         self.run(Clip::Off, place).filter(|end| end.status == RayStatus::Exited)
@@ -203,6 +208,24 @@ impl<'a> Beam<'a> {
             Some(end) if end.status == RayStatus::Exited => end.throughput,
             _ => 0.0,
         }
+    }
+
+    /// What the lens passes of each ray: as [`Self::throughput`], in batches.
+    pub(crate) fn throughputs(&self, places: &[DVec2]) -> Vec<f64> {
+        /// Rays of a batch, which stay in the second-level cache.
+        const BATCH: usize = 1024;
+        let mut rays = LensRays::with_capacity(BATCH.min(places.len()));
+        let mut passed = Vec::with_capacity(places.len());
+        for batch in places.chunks(BATCH) {
+            rays.clear();
+            batch.iter().for_each(|&place| rays.push_ray(self.launch.ray(place), 1.0));
+            self.at.trace(Side::Object, Clip::On, &mut rays);
+            passed.extend((0..batch.len()).map(|i| match rays.status(i) {
+                RayStatus::Exited => rays.throughput(i),
+                _ => 0.0,
+            }));
+        }
+        passed
     }
 
     /// The chief ray as it is begun.
@@ -248,15 +271,15 @@ impl<'a> Beam<'a> {
     /// own rectangle where lit cells touch its edge.
     fn lit(&self, [low, high]: [DVec2; 2], cells: u32) -> Option<[DVec2; 2]> {
         let size = (high - low) / f64::from(cells);
+        let cell = |k: u32| DVec2::new(f64::from(k % cells) + 0.5, f64::from(k / cells) + 0.5);
+        let places: Vec<DVec2> = (0..cells * cells).map(|k| low + cell(k) * size).collect();
         let mut found: Option<[[u32; 2]; 2]> = None;
-        for row in 0..cells {
-            for column in 0..cells {
-                let cell = DVec2::new(f64::from(column) + 0.5, f64::from(row) + 0.5);
-                if self.throughput(low + cell * size) > 0.0 {
-                    let [least, most] = found.get_or_insert([[column, row]; 2]);
-                    *least = [least[0].min(column), least[1].min(row)];
-                    *most = [most[0].max(column), most[1].max(row)];
-                }
+        for (k, passed) in (0..).zip(self.throughputs(&places)) {
+            if passed > 0.0 {
+                let (column, row) = (k % cells, k / cells);
+                let [least, most] = found.get_or_insert([[column, row]; 2]);
+                *least = [least[0].min(column), least[1].min(row)];
+                *most = [most[0].max(column), most[1].max(row)];
             }
         }
         let [least, most] = found?;

@@ -63,6 +63,27 @@ pub struct SeidelTable {
     pub surfaces: Vec<SeidelSums>,
     /// All together.
     pub total: SeidelSums,
+    /// Where the stop would have to be for a sum to be nothing.
+    pub stop_shifts: Vec<StopShift>,
+}
+
+/// A place of the stop at which a sum is nothing, with the same marginal ray.
+///
+/// With the chief ray moved by Q times the marginal one, `S_II` becomes `S_II` + Q `S_I`, and `C_II` becomes
+/// `C_II` + Q `C_I` (W. T. Welford, *Aberrations of Optical Systems*, 1986, ch. 8.5: stop shift).
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct StopShift {
+    /// Without `coma` or without `lateral_colour`.
+    pub without: &'static str,
+    /// How much of the marginal ray the chief ray is moved by.
+    pub eccentricity: f64,
+    /// z of the entrance pupil then (mm); `null` at infinity.
+    pub entrance_pupil_z: Option<f64>,
+    /// z at which the chief ray crosses the axis then, and where a stop can stand (mm); `null` where it
+    /// crosses it in no gap, before or behind the lens.
+    pub stop_z: Option<f64>,
+    /// All sums then (mm).
+    pub total: SeidelSums,
 }
 
 /// A paraxial ray.
@@ -83,9 +104,42 @@ pub fn seidel(
     object: &ObjectPoint,
     colours: [f64; 2],
 ) -> Result<SeidelTable, AnalysisError> {
+    let (marginal, chief) = rays(train, object)?;
+    let mut table = sums(train, object, colours, (marginal, chief))?.0;
+    let of = |without, across: f64, along: f64| -> Result<Option<StopShift>, AnalysisError> {
+        let eccentricity = -across / along;
+        if !eccentricity.is_finite() || across == 0.0 {
+            return Ok(None);
+        }
+        let chief = Paraxial {
+            height: chief.height + eccentricity * marginal.height,
+            slope: chief.slope + eccentricity * marginal.slope,
+        };
+        let pupil = -chief.height / chief.slope;
+        let (table, stop_z) = sums(train, object, colours, (marginal, chief))?;
+        let entrance_pupil_z = Some(pupil).filter(|z| z.is_finite());
+        let total = table.total;
+        Ok(Some(StopShift { without, eccentricity, entrance_pupil_z, stop_z, total }))
+    };
+    let total = table.total;
+    let shifts = [
+        of("coma", total.coma, total.spherical)?,
+        of("lateral_colour", total.lateral_colour, total.longitudinal_colour)?,
+    ];
+    table.stop_shifts = shifts.into_iter().flatten().collect();
+    Ok(table)
+}
+
+/// The sums of two rays at the first vertex, and z where the chief ray crosses the axis for real: before the
+/// lens, in a gap, or behind it.
+fn sums(
+    train: &OpticalTrain,
+    object: &ObjectPoint,
+    colours: [f64; 2],
+    (mut marginal, mut chief): (Paraxial, Paraxial),
+) -> Result<(SeidelTable, Option<f64>), AnalysisError> {
     let indices = train.indices(train.wavelength())?;
     let [short, long] = [train.indices(colours[0])?, train.indices(colours[1])?];
-    let (mut marginal, mut chief) = rays(train, object)?;
     let n0 = indices[0];
     let invariant = n0 * (marginal.slope * chief.height - chief.slope * marginal.height);
     let mut table = SeidelTable {
@@ -95,10 +149,18 @@ pub fn seidel(
         colours,
         surfaces: Vec::new(),
         total: SeidelSums::default(),
+        stop_shifts: Vec::new(),
     };
+    let first = train.elements().first().map_or(0.0, |element| element.frame.vertex.z);
+    // From a vertex to where the chief ray crosses the axis.
+    let crossing = |chief: Paraxial| Some(-chief.height / chief.slope).filter(|z| z.is_finite());
+    let mut crossed = crossing(chief).filter(|z| *z <= 0.0).map(|z| first + z);
     for (i, element) in train.elements().iter().enumerate() {
         if i > 0 {
-            let gap = element.frame.vertex.z - train.elements()[i - 1].frame.vertex.z;
+            let before = train.elements()[i - 1].frame.vertex.z;
+            let gap = element.frame.vertex.z - before;
+            let inside = crossing(chief).filter(|z| (0.0..=gap).contains(z));
+            crossed = crossed.or(inside.map(|z| before + z));
             marginal.height += gap * marginal.slope;
             chief.height += gap * chief.slope;
         }
@@ -131,7 +193,8 @@ pub fn seidel(
         (marginal, chief) = (bent(marginal), bent(chief));
     }
     table.image_slope = marginal.slope;
-    Ok(table)
+    let behind = crossing(chief).filter(|z| *z >= 0.0).map(|z| train.last_vertex() + z);
+    Ok((table, crossed.or(behind)))
 }
 
 /// The marginal and the chief ray at the first vertex.

@@ -52,6 +52,20 @@ pub(super) fn shares(weights: &[f64], wavelengths: usize) -> Result<Vec<f64>, An
     Ok(weights.iter().map(|weight| weight / sum).collect())
 }
 
+/// The least length from `least` on that a transform is quick for: of no prime factors but 2, 3 and 5.
+#[must_use]
+pub fn quick_length(least: usize) -> usize {
+    let is_quick = |mut length: usize| {
+        for factor in [2, 3, 5] {
+            while length.is_multiple_of(factor) {
+                length /= factor;
+            }
+        }
+        length == 1
+    };
+    (least.max(1)..).find(|&length| is_quick(length)).unwrap_or(least)
+}
+
 /// sin πx / πx.
 pub(super) fn sinc(x: f64) -> f64 {
     let angle = std::f64::consts::PI * x;
@@ -112,22 +126,38 @@ impl WeightedFields {
         self.0.iter().map(of_one).sum()
     }
 
-    /// The irradiance (1/mm²) at a place of the image plane from the sphere's centre (mm), by the sum
-    /// over cells.
-    #[must_use]
-    pub fn irradiance(&self, place: DVec2) -> f64 {
-        let of_one = |(field, weight): &(PupilField, f64)| {
-            let length = field.wavelength * 1e-6;
-            let mut sum = Complex64::ZERO;
-            for i in field.lit() {
-                let waves = field.mean_waves(i) - field.place(i).dot(place) / length;
-                sum += Complex64::from_polar(averaged(field, i), std::f64::consts::TAU * waves);
-            }
-            let cycles = place * (field.step / length);
-            weight * (sum / (sinc(cycles.x) * sinc(cycles.y))).norm_sqr() * norm(field)
-        };
-        self.0.iter().map(of_one).sum()
+    /// The irradiance (1/mm²) at places of the image plane from the sphere's centre (mm), by sums over
+    /// cells.
+    fn irradiance(&self) -> impl Fn(DVec2) -> f64 + '_ {
+        let all: Vec<Vec<Complex64>> = self.0.iter().map(|(field, _)| amplitudes(field)).collect();
+        move |place| {
+            let of_one = |((field, weight), amplitudes): (&(PupilField, f64), &Vec<Complex64>)| {
+                let n = field.cells;
+                let cycles = place * (field.step / (field.wavelength * 1e-6));
+                let wave = |cycles: f64, k: usize| {
+                    Complex64::from_polar(1.0, -std::f64::consts::TAU * cycles * k as f64)
+                };
+                let across: Vec<Complex64> = (0..n).map(|k| wave(cycles.x, k)).collect();
+                let row = |(k, row): (usize, &[Complex64])| -> Complex64 {
+                    let sum: Complex64 = row.iter().zip(&across).map(|(a, wave)| a * wave).sum();
+                    sum * wave(cycles.y, k)
+                };
+                let sum: Complex64 = amplitudes.chunks(n).enumerate().map(row).sum();
+                weight * (sum / (sinc(cycles.x) * sinc(cycles.y))).norm_sqr() * norm(field)
+            };
+            self.0.iter().zip(&all).map(of_one).sum()
+        }
     }
+}
+
+/// A exp(2πi W) of every cell.
+pub(super) fn amplitudes(field: &PupilField) -> Vec<Complex64> {
+    let mut amplitudes = vec![Complex64::ZERO; field.cells * field.cells];
+    for i in field.lit() {
+        let angle = std::f64::consts::TAU * field.mean_waves(i);
+        amplitudes[i] = Complex64::from_polar(averaged(field, i), angle);
+    }
+    amplitudes
 }
 
 /// What makes |Σ a|² an irradiance of a power of 1 (1/mm²).
@@ -254,22 +284,27 @@ impl PointSpread {
 /// same pupil would have without aberrations: Strehl's ratio.
 #[must_use]
 pub fn strehl(fields: &WeightedFields) -> (DVec2, f64) {
+    strehl_of(fields, &PointSpread::by_fft(fields, 1))
+}
+
+/// The same where the point spread function is there already.
+pub(super) fn strehl_of(fields: &WeightedFields, spread: &PointSpread) -> (DVec2, f64) {
     /// The search ends this small a share of a point's distance from the last place.
     const HALVINGS: u32 = 10;
-    let spread = PointSpread::by_fft(fields, 1);
+    let irradiance = fields.irradiance();
     let (mut place, _) = spread.brightest();
-    let mut best = fields.irradiance(place);
+    let mut best = irradiance(place);
     let mut step = 0.5 * spread.pitch;
     for _ in 0..HALVINGS {
         let places = [DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y].map(|d| place + d * step);
-        let values = places.map(|place| fields.irradiance(place));
+        let values = places.map(&irradiance);
         // The top of the parabola through three points, in x and in y.
         let top = |low: f64, high: f64| {
             let bend = low + high - 2.0 * best;
             if bend < 0.0 { (0.5 * (low - high) / bend).clamp(-1.0, 1.0) } else { 0.0 }
         };
         let next = place + DVec2::new(top(values[1], values[0]), top(values[3], values[2])) * step;
-        let there = fields.irradiance(next);
+        let there = irradiance(next);
         if there > best {
             let gain = there - best;
             (place, best) = (next, there);
@@ -286,10 +321,8 @@ pub fn strehl(fields: &WeightedFields) -> (DVec2, f64) {
 fn spectrum(field: &PupilField, size: usize) -> Vec<Complex64> {
     let mut grid = vec![Complex64::ZERO; size * size];
     let offset = size / 2 - field.cells / 2;
-    for i in field.lit() {
-        let (row, column) = (i / field.cells + offset, i % field.cells + offset);
-        let angle = std::f64::consts::TAU * field.mean_waves(i);
-        grid[row * size + column] = Complex64::from_polar(averaged(field, i), angle);
+    for (row, values) in amplitudes(field).chunks(field.cells).enumerate() {
+        grid[(row + offset) * size + offset..][..field.cells].copy_from_slice(values);
     }
     transform(&mut grid, size);
     grid
@@ -311,10 +344,17 @@ pub(super) fn transform(grid: &mut Vec<Complex64>, size: usize) {
 }
 
 fn transposed(grid: &[Complex64], size: usize) -> Vec<Complex64> {
+    /// Squares of so many values a side stay in the nearest cache.
+    const SQUARE: usize = 16;
     let mut turned = vec![Complex64::ZERO; grid.len()];
-    turned.par_chunks_mut(size).enumerate().for_each(|(row, values)| {
-        for (column, value) in values.iter_mut().enumerate() {
-            *value = grid[column * size + row];
+    turned.par_chunks_mut(SQUARE * size).enumerate().for_each(|(block, rows)| {
+        for left in (0..size).step_by(SQUARE) {
+            for (row, values) in rows.chunks_mut(size).enumerate() {
+                let from = block * SQUARE + row;
+                for column in left..(left + SQUARE).min(size) {
+                    values[column] = grid[column * size + from];
+                }
+            }
         }
     });
     turned

@@ -8,7 +8,7 @@
 use glam::DVec2;
 use rustfft::num_complex::Complex64;
 
-use super::spread::{PointSpread, WeightedFields, sinc, transform};
+use super::spread::{PointSpread, WeightedFields, amplitudes, sinc, transform};
 
 /// A transfer function on a grid of frequencies.
 #[derive(Debug, Clone)]
@@ -198,6 +198,76 @@ fn sharpened_cone(x: i64, y: i64) -> f64 {
         + smoothed_cone(x, y + 1)
         + smoothed_cone(x, y - 1);
     own - (neighbours - 4.0 * own) / 12.0
+}
+
+/// Modulation by diffraction at one frequency (cycles/mm) alone, of waves along y and along x: the few values of the
+/// pupil's autocorrelation that [`Transfer::modulation`] takes there, without the transform that has all. Not for the
+/// lowest frequencies, whose peak is sharpened there.
+#[must_use]
+pub fn modulation_at(fields: &WeightedFields, frequency: f64) -> [f64; 2] {
+    let all: Vec<_> = fields.fields().iter().map(|(field, _)| amplitudes(field)).collect();
+    [[0, 1], [1, 0]].map(|[x, y]: [i64; 2]| {
+        let mut sum = Complex64::ZERO;
+        for ((field, weight), amplitudes) in fields.fields().iter().zip(&all) {
+            let step = field.step / (field.wavelength * 1e-6);
+            let nodes = nodes(frequency / step);
+            if nodes[0].0 + NODES as i64 >= field.cells as i64 {
+                continue;
+            }
+            let scale = weight / field.total_power();
+            // Along the line, and on both sides of it.
+            let at = |along: i64, beside: i64| {
+                let shift = [along * x + beside * y, along * y + beside * x];
+                autocorrelation(amplitudes, field.cells, shift)
+            };
+            let line: Vec<Complex64> = (-1..=NODES as i64).map(|k| at(nodes[0].0 + k, 0)).collect();
+            for (k, (node, by)) in nodes.into_iter().enumerate() {
+                let neighbours = line[k] + line[k + 2] + at(node, 1) + at(node, -1);
+                sum += (line[k + 1] * (4.0 / 3.0) - neighbours / 12.0) * (scale * by);
+            }
+        }
+        sum.norm()
+    })
+}
+
+/// Σ A(p + s) A*(p) over cells, for a shift of so many to the right and up.
+fn autocorrelation(amplitudes: &[Complex64], cells: usize, [right, up]: [i64; 2]) -> Complex64 {
+    if up < 0 {
+        return autocorrelation(amplitudes, cells, [-right, -up]).conj();
+    }
+    let far = |shift: i64| usize::try_from(shift.unsigned_abs()).unwrap_or(cells).min(cells);
+    let (shift, width) = (far(right), cells - far(right));
+    let rows = amplitudes.chunks(cells).zip(amplitudes.chunks(cells).skip(far(up)));
+    rows.map(|(low, high)| {
+        let (low, high) = match right < 0 {
+            true => (&low[shift..], &high[..width]),
+            false => (&low[..width], &high[shift..]),
+        };
+        high.iter().zip(low).map(|(high, low)| high * low.conj()).sum::<Complex64>()
+    })
+    .sum()
+}
+
+/// Modulation by rays alone, of waves along y and along x, at even frequencies from 0 on.
+#[must_use]
+pub fn geometric_modulations(fields: &WeightedFields, step: f64, count: usize) -> Vec<[f64; 2]> {
+    let mut sums = vec![[Complex64::ZERO; 2]; count];
+    for (field, weight) in fields.fields() {
+        let total = field.total_power();
+        for i in field.lit() {
+            let share = weight * field.power[i] / total;
+            let turns = [field.landing[i].y, field.landing[i].x]
+                .map(|at| Complex64::from_polar(1.0, -std::f64::consts::TAU * step * at));
+            let mut waves = [Complex64::from(share); 2];
+            for sums in &mut sums {
+                for axis in 0..2 {
+                    sums[axis] += waves[axis];
+                    waves[axis] *= turns[axis];
+                }
+            }
+        }
+    }
+    sums.into_iter().map(|sums| sums.map(Complex64::norm)).collect()
 }
 
 /// Modulation by rays alone, of waves along y and along x.

@@ -12,6 +12,7 @@ use super::aim::{self, Sampling};
 use super::least_squares::LeastSquares;
 use super::object::{Beam, ObjectPoint};
 use super::pupil::PupilField;
+use super::spread::quick_length;
 use super::{AnalysisError, MOST_CELLS};
 use crate::train::optical_path::PathEnd;
 use crate::train::{MonochromaticTrain, OpticalTrain};
@@ -26,7 +27,7 @@ const LEAST_RADIUS: f64 = 1e-3;
 pub const NYQUIST: f64 = 0.5;
 
 /// The change from cell to cell that grids are chosen for (waves).
-pub(super) const COMFORTABLE: f64 = 0.1;
+pub(super) const COMFORTABLE: f64 = 0.2;
 
 /// Cells a side of a grid that is chosen, in the least.
 pub const USUAL_CELLS: usize = 192;
@@ -152,8 +153,7 @@ impl Wavefront {
             Cells::Needed => {
                 let coarse = aim::field(beam, &sphere, &outline, Sampling::cells(64, &outline))?;
                 let needed = coarse.needed_cells(COMFORTABLE).max(USUAL_CELLS);
-                // A transform of lengths without large factors is quick.
-                let needed = needed.next_multiple_of(32);
+                let needed = 2 * quick_length(needed.div_ceil(2));
                 if needed > MOST_CELLS {
                     let waves = coarse.statistics().peak_to_valley;
                     return Err(AnalysisError::TooRough { needed, waves });
@@ -165,19 +165,28 @@ impl Wavefront {
     }
 
     /// The wavefront on a grid that is given.
-    pub(crate) fn sampled(
+    fn sampled(
         beam: &Beam<'_>,
         sphere: ReferenceSphere,
         outline: &aim::Outline,
         sampling: Sampling,
     ) -> Result<Self, AnalysisError> {
         let pupil = aim::field(beam, &sphere, outline, sampling)?;
+        Self::told(beam.object, sphere, pupil)
+    }
+
+    /// A field whose phase is told by its cells.
+    pub(super) fn told(
+        object: ObjectPoint,
+        sphere: ReferenceSphere,
+        pupil: PupilField,
+    ) -> Result<Self, AnalysisError> {
         let steepest = pupil.steepest();
         if steepest > NYQUIST {
             let needed = pupil.needed_cells(COMFORTABLE);
-            return Err(AnalysisError::Coarse { cells: sampling.cells, steepest, needed });
+            return Err(AnalysisError::Coarse { cells: pupil.cells, steepest, needed });
         }
-        Ok(Self { object: beam.object, sphere, pupil })
+        Ok(Self { object, sphere, pupil })
     }
 
     /// The same about the point of least root mean square.

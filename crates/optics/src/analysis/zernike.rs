@@ -100,24 +100,20 @@ impl ZernikeTerm {
     /// Its value at a place of the unit circle, greatest 1.
     #[must_use]
     pub fn value(self, place: DVec2) -> f64 {
-        let (rho, theta) = (place.length(), place.y.atan2(place.x));
-        let order = self.m.unsigned_abs();
-        let angle = f64::from(order) * theta;
-        self.radial(rho) * if self.m < 0 { angle.sin() } else { angle.cos() }
+        Basis::new(&[self], ZernikeOrder::Fringe).at(place)[0]
     }
 
-    /// R(ρ), by the sum; exact to a few roundings up to n = 12, which is the most of the Fringe set.
-    fn radial(self, rho: f64) -> f64 {
+    /// R(ρ) over ρ to the azimuthal order, as coefficients of powers of ρ², the highest first; sums of them are exact
+    /// to a few roundings up to n = 12, which is the most of the Fringe set.
+    fn radial(self) -> Vec<f64> {
         let (n, m) = (self.n, self.m.unsigned_abs());
         let factorial = |k: u32| (1..=k).map(f64::from).product::<f64>();
-        let mut sum = 0.0;
-        for s in 0..=(n - m) / 2 {
-            let sign = if s % 2 == 0 { 1.0 } else { -1.0 };
+        let coefficient = |s: u32| {
+            let sign = if s.is_multiple_of(2) { 1.0 } else { -1.0 };
             let below = factorial(s) * factorial((n + m) / 2 - s) * factorial((n - m) / 2 - s);
-            sum +=
-                sign * factorial(n - s) / below * rho.powi(i32::try_from(n - 2 * s).unwrap_or(0));
-        }
-        sum
+            sign * factorial(n - s) / below
+        };
+        (0..=(n - m) / 2).map(coefficient).collect()
     }
 
     /// The term's name.
@@ -147,6 +143,36 @@ impl ZernikeTerm {
             Some(word) => format!("{word}{kind}"),
             None => format!("{kind} of degree {}", self.n),
         }
+    }
+}
+
+/// Terms that are evaluated together at many places.
+struct Basis {
+    /// Of each: azimuthal order, whether it is a sine, scale, and what [`ZernikeTerm::radial`] has.
+    terms: Vec<(usize, bool, f64, Vec<f64>)>,
+}
+
+impl Basis {
+    fn new(terms: &[ZernikeTerm], order: ZernikeOrder) -> Self {
+        let of = |term: &ZernikeTerm| {
+            (term.m.unsigned_abs() as usize, term.m < 0, order.scale(*term), term.radial())
+        };
+        Self { terms: terms.iter().map(of).collect() }
+    }
+
+    /// The terms at a place of the unit circle: ρᵐ cos mθ and ρᵐ sin mθ are the parts of (x + iy)ᵐ.
+    fn at(&self, place: DVec2) -> Vec<f64> {
+        let square = place.length_squared();
+        let most = self.terms.iter().map(|term| term.0).max().unwrap_or(0);
+        let mut powers = vec![DVec2::X; most + 1];
+        for m in 1..=most {
+            powers[m] = powers[m - 1].rotate(place);
+        }
+        let value = |(m, is_sine, scale, radial): &(usize, bool, f64, Vec<f64>)| {
+            let along = radial.iter().fold(0.0, |sum, coefficient| sum * square + coefficient);
+            scale * along * if *is_sine { powers[*m].y } else { powers[*m].x }
+        };
+        self.terms.iter().map(value).collect()
     }
 }
 
@@ -193,9 +219,8 @@ impl ZernikeFit {
     ) -> Result<Self, AnalysisError> {
         let terms = order.terms(count);
         let (centre, radius) = pupil.circle();
-        let basis = |place: DVec2| -> Vec<f64> {
-            terms.iter().map(|t| order.scale(*t) * t.value((place - centre) / radius)).collect()
-        };
+        let all = Basis::new(&terms, order);
+        let basis = |place: DVec2| all.at((place - centre) / radius);
         let mut fit = LeastSquares::new(terms.len());
         let lit: Vec<usize> = pupil.lit().collect();
         for &i in &lit {

@@ -31,7 +31,7 @@ pub mod trace;
 pub mod zemax;
 
 use crate::element::aperture::SMALLEST_RADIUS;
-use crate::element::{Frame, LossesSpec, Symbol};
+use crate::element::{Frame, LossesSpec, Symbol, ThinLens};
 use crate::glass::{Glass, GlassError};
 
 /// The most elements that a lens may have: the largest that were built have a hundred.
@@ -196,6 +196,19 @@ impl OpticalTrain {
     pub fn is_ideal(&self) -> bool {
         let is_ideal = |e: &Element| e.frame.is_axial() && e.part.is_ideal();
         self.sensor.tilt == SensorMount::default().tilt && self.elements.iter().all(is_ideal)
+    }
+
+    /// The same with an ideal lens behind it, at whose focal length (mm) the sensor stands: angles become
+    /// lengths, and images at infinity are near.
+    #[must_use]
+    pub fn with_eyepiece(mut self, focal_length: f64) -> Self {
+        let z = self.last_vertex();
+        let part =
+            Part::ThinLens(ThinLens { power: 1.0 / focal_length, semi_diameter: f64::INFINITY });
+        self.elements.push(Element { part, frame: Frame::on_axis(z) });
+        self.media.extend(self.media.last().cloned());
+        self.end = z + focal_length;
+        self
     }
 
     /// What its glass takes from light.

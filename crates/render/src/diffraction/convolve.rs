@@ -13,6 +13,7 @@ use super::Illumination;
 use super::layers::DepthLayers;
 use super::spreads::Spreads;
 use etendue_optics::analysis::CellSpread;
+use etendue_optics::analysis::spread::quick_length;
 
 /// Where less than this share of a spread is known, nothing is.
 const KNOWN: f64 = 1e-6;
@@ -32,9 +33,13 @@ pub(crate) struct CellPicture {
 /// What is spread of one layer: its light, where it is, and where it could be seen.
 struct Planes {
     light: Vec<Vec<f64>>,
-    covers: Vec<f64>,
+    /// Of the rearmost, which nothing shines through, it is not asked.
+    covers: Option<Vec<f64>>,
     known: Vec<f64>,
 }
+
+/// Others' spreads reach at most so many times as far as those of a layer's own nodes.
+const FARTHER: usize = 3;
 
 /// The light of a band on pixels, for each layer of light, spread and multiplied by what arrives.
 pub(crate) fn composed(
@@ -56,12 +61,13 @@ pub(crate) fn composed(
     let first = shines.iter().position(|shines| *shines).unwrap_or(shines.len());
     for layer in first..layers.nearness.len() {
         let Planes { light, covers, known } =
-            spread_layer(picture, (layers, spreads), (layer, band), arrives);
+            spread_layer(picture, (layers, spreads), (layer, band), (arrives, layer > first));
         for i in 0..count {
             if known[i] <= KNOWN {
                 continue;
             }
-            let behind = 1.0 - (covers[i] / known[i]).clamp(0.0, 1.0);
+            let behind =
+                covers.as_ref().map_or(0.0, |covers| 1.0 - (covers[i] / known[i]).clamp(0.0, 1.0));
             for (out, light) in out.iter_mut().zip(&light) {
                 out[i] = light[i] / known[i] + behind * out[i];
             }
@@ -72,28 +78,54 @@ pub(crate) fn composed(
     out.into_iter().map(single).collect()
 }
 
-/// A layer's light, cover and knowledge, spread over the pixels.
+/// A layer's light, cover where it is wanted, and knowledge, spread over the pixels.
 fn spread_layer(
     picture: &CellPicture,
     (layers, spreads): (&DepthLayers, &Spreads),
     (layer, band): (usize, usize),
-    arrives: &Illumination,
+    (arrives, covers): (&Illumination, bool),
 ) -> Planes {
     let pixels = picture.size.map(|side| side / picture.cells);
     let count = pixels[0] * pixels[1];
-    let blocks: Vec<Vec<Block>> = (0..spreads.side * spreads.side)
+    let nodes = spreads.side * spreads.side;
+    let windows: Vec<Window> =
+        (0..nodes).map(|node| Window::of(node, spreads, picture.size)).collect();
+    // The layer's cells, and how far their light gets.
+    let around = |margin: usize| {
+        let [low, high] = layers.boxes[layer];
+        [low.map(|at| at.saturating_sub(margin)), high.map(|at| at + margin)]
+    };
+    let meets = |node: usize, margin: usize| windows[node].within(around(margin)).is_some();
+    let farthest = |spreads: &[Option<CellSpread>]| {
+        spreads.iter().flatten().map(|spread| spread.half).max().unwrap_or(0)
+    };
+    let of_layer = spreads.of_layer(|node| meets(node, 0), layer, band);
+    let reach = farthest(&of_layer);
+    // What is known is asked wherever that light gets.
+    let margin = reach.saturating_mul(FARTHER + 1);
+    let rest = spreads.of_layer(
+        |node| meets(node, margin) && spreads.of_node(&of_layer, node).is_none(),
+        layer,
+        band,
+    );
+    let of_layer: Vec<_> = of_layer.into_iter().zip(rest).map(|(own, rest)| own.or(rest)).collect();
+    let blocks: Vec<Vec<Block>> = (0..nodes)
         .into_par_iter()
         .map(|node| {
-            let window = Window::of(node, spreads.side, picture.size);
-            let filled = window.filled(picture, layers, (layer, band), arrives);
+            let Some((spread, mirrored)) = spreads.of_node(&of_layer, node) else {
+                return Vec::new();
+            };
+            let Some(window) = windows[node].within(around(reach + spread.half)) else {
+                return Vec::new();
+            };
+            let filled = window.filled(picture, layers, (layer, band), (arrives, covers));
             if filled.iter().all(|plane| plane.iter().all(|value| *value == 0.0)) {
                 return Vec::new();
             }
-            let spread = spreads.spread(node, layer, band);
-            window.spread(filled, &spread, picture)
+            window.spread(filled, (spread, mirrored), picture)
         })
         .collect();
-    let planes = picture.light.len() + 2;
+    let planes = picture.light.len() + usize::from(covers) + 1;
     let mut sums = vec![vec![0.0; count]; planes];
     for node in blocks {
         for (sum, block) in sums.iter_mut().zip(node) {
@@ -101,7 +133,7 @@ fn spread_layer(
         }
     }
     let known = sums.pop().unwrap_or_default();
-    let covers = sums.pop().unwrap_or_default();
+    let covers = if covers { sums.pop() } else { None };
     Planes { light: sums, covers, known }
 }
 
@@ -130,8 +162,13 @@ struct Window {
 
 impl Window {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside a picture")]
-    fn of(node: usize, side: usize, size: [usize; 2]) -> Self {
+    fn of(node: usize, spreads: &Spreads, size: [usize; 2]) -> Self {
+        let side = spreads.side;
         let along = |node: usize, size: usize| {
+            if spreads.is_uniform {
+                let [first, last] = [node, node + 1].map(|node| node * size / side);
+                return (first, vec![1.0; last - first]);
+            }
             let step = size as f64 / (side - 1) as f64;
             let place = node as f64 * step;
             let first = (place - step).max(0.0).floor() as usize;
@@ -148,17 +185,30 @@ impl Window {
         [self.shares[0].len(), self.shares[1].len()]
     }
 
-    /// Light of each layer of light, cover, and what is known, by cell.
+    /// The part of it that lies in a rectangle of cells; `None` where there is none.
+    fn within(&self, [low, high]: [[usize; 2]; 2]) -> Option<Self> {
+        let along = |axis: usize| {
+            let (start, shares) = (self.start[axis], &self.shares[axis]);
+            let first = low[axis].max(start) - start;
+            let last = high[axis].min(start + shares.len()).saturating_sub(start);
+            (first < last).then(|| (start + first, shares[first..last].to_vec()))
+        };
+        let ((left, columns), (top, rows)) = (along(0)?, along(1)?);
+        Some(Self { start: [left, top], shares: [columns, rows] })
+    }
+
+    /// Light of each layer of light, cover where it is wanted, and what is known, by cell.
     fn filled(
         &self,
         picture: &CellPicture,
         layers: &DepthLayers,
         (layer, band): (usize, usize),
-        arrives: &Illumination,
+        (arrives, covers): (&Illumination, bool),
     ) -> Vec<Vec<f64>> {
         let [width, height] = self.size();
         let kinds = picture.light.len();
-        let mut planes = vec![vec![0.0; width * height]; kinds + 2];
+        let known = kinds + usize::from(covers);
+        let mut planes = vec![vec![0.0; width * height]; known + 1];
         let fine = picture.cells as f64;
         for row in 0..height {
             let y = self.start[1] + row;
@@ -172,9 +222,11 @@ impl Window {
                 }
                 let share = self.shares[0][column] * self.shares[1][row];
                 let to = row * width + column;
-                planes[kinds + 1][to] = share;
+                planes[known][to] = share;
                 if own == layer {
-                    planes[kinds][to] = share;
+                    if covers {
+                        planes[kinds][to] = share;
+                    }
                     let place = [x, y].map(|cell| (cell as f64 + 0.5) / fine);
                     let share = share * arrives.at(place);
                     for (plane, light) in planes.iter_mut().zip(&picture.light) {
@@ -190,17 +242,20 @@ impl Window {
     fn spread(
         &self,
         planes: Vec<Vec<f64>>,
-        spread: &CellSpread,
+        (spread, mirrored): (&CellSpread, [bool; 2]),
         picture: &CellPicture,
     ) -> Vec<Block> {
         let [width, height] = self.size();
         let half = spread.half;
-        let size = [width, height].map(|side| quick(side + 2 * half));
+        let size = [width, height].map(|side| quick_length(side + 2 * half));
         let transform = Transform::new(size);
         let side = 2 * half + 1;
         let mut kernel = vec![Complex64::ZERO; size[0] * size[1]];
-        for (i, share) in spread.shares.iter().enumerate() {
-            kernel[i / side * size[0] + i % side] = Complex64::from(*share);
+        for row in 0..side {
+            for column in 0..side {
+                let share = spread.share([column, row], mirrored);
+                kernel[row * size[0] + column] = Complex64::from(share);
+            }
         }
         let kernel = transform.forward(kernel);
         let mut spread = Vec::with_capacity(planes.len());
@@ -255,19 +310,6 @@ impl Window {
         }
         Block { left, top, width, values }
     }
-}
-
-/// The least length from `least` on that a transform is quick for.
-fn quick(least: usize) -> usize {
-    let is_quick = |mut length: usize| {
-        for factor in [2, 3, 5] {
-            while length.is_multiple_of(factor) {
-                length /= factor;
-            }
-        }
-        length == 1
-    };
-    (least.max(1)..).find(|&length| is_quick(length)).unwrap_or(least)
 }
 
 /// Two-dimensional transforms of one size.

@@ -6,7 +6,7 @@
 use etendue_camera::LensCamera;
 
 /// Waves of defocus from one layer to the next, near focus.
-const STEP: f64 = 0.35;
+pub(super) const STEP: f64 = 0.35;
 
 /// From so many waves on, layers are a tenth of the defocus deep.
 const LINEAR: f64 = 3.5;
@@ -21,13 +21,16 @@ pub(crate) struct DepthLayers {
     pub(crate) of_cell: Vec<u8>,
     /// The mean nearness (1/m) of each.
     pub(crate) nearness: Vec<f64>,
+    /// Columns and rows that hold all cells of each: the first, and the one after the last.
+    pub(crate) boxes: Vec<[[usize; 2]; 2]>,
     /// Waves of defocus for each 1/m.
     pub(crate) waves: f64,
 }
 
 impl DepthLayers {
-    /// Sorts cells by their depths (m, infinite where there is nothing), for a lens at a wavelength (nm).
-    pub(crate) fn of(depths: &[f32], lens: &LensCamera, wavelength: f64) -> Self {
+    /// Sorts cells, rows of so many `columns`, by their depths (m, infinite where there is nothing), for a
+    /// lens at a wavelength (nm).
+    pub(crate) fn of(depths: &[f32], columns: usize, lens: &LensCamera, wavelength: f64) -> Self {
         let waves = lens.waves_of_defocus(wavelength);
         let focus = lens.focused().object_distance();
         let focus = if focus.is_finite() && focus != 0.0 { 1.0 / focus } else { 0.0 };
@@ -50,8 +53,16 @@ impl DepthLayers {
                 nearness.push(sum / *count as f64);
             }
         }
-        let of_cell = depths.iter().map(|&depth| own[number(depth)]).collect();
-        Self { of_cell, nearness, waves }
+        let of_cell: Vec<u8> = depths.iter().map(|&depth| own[number(depth)]).collect();
+        let mut boxes = vec![[[usize::MAX; 2], [0; 2]]; nearness.len()];
+        for (i, &layer) in of_cell.iter().enumerate() {
+            let [low, high] = &mut boxes[usize::from(layer)];
+            for (axis, at) in [i % columns, i / columns].into_iter().enumerate() {
+                low[axis] = low[axis].min(at);
+                high[axis] = high[axis].max(at + 1);
+            }
+        }
+        Self { of_cell, nearness, boxes, waves }
     }
 
     /// The least and the greatest nearness of a layer (1/m).

@@ -71,7 +71,13 @@ pub(crate) fn bytes(scene: &Scene, plan: &Plan) -> u64 {
     let longest = (0..bands).map(|band| plan.bands.wavelength(band)).fold(0.0, f64::max);
     let unit = lens.airy_unit(longest) * f64::from(cells) / pitch;
     // Beside light, what a layer covers and what is known.
-    columns * rows * each as u64 + spreads::bytes(lens, resolution, (cells, unit), lit + 2)
+    let is_flat = words::depths(scene).is_some_and(|[near, far]| {
+        lens.waves_of_defocus(f64::midpoint(shortest, longest)) * (1.0 / near - 1.0 / far)
+            <= layers::STEP
+    });
+    let planes = if is_flat { lit + 1 } else { lit + 2 };
+    columns * rows * each as u64
+        + spreads::bytes(lens, resolution, (cells, unit), (planes, is_flat))
 }
 
 /// Refuses what light that is spread over the picture cannot be.
@@ -154,9 +160,10 @@ pub(crate) fn spread_light(
     // Light along chief rays, and depths.
     let (picture, lit, mut film) = cell_picture(scene, plan, prepared, cells, watch)?;
     let [columns, rows] = scene.camera.resolution();
-    let illumination = illumination(opened, plan, [columns, rows]);
+    let illumination =
+        illumination(opened, plan, [columns, rows], waves.is_mirrored([columns, rows]));
     let mean = all().sum::<f64>() / all().count().max(1) as f64;
-    let layers = DepthLayers::of(&picture.depths, lens, mean);
+    let layers = DepthLayers::of(&picture.depths, picture.size[0], lens, mean);
     let spreads = Spreads::new(&waves, &layers, [columns, rows], f64::from(cells), pitch)
         .map_err(|error| fault(error.to_string()))?;
     let bands = plan.bands.count();
@@ -242,16 +249,25 @@ impl Illumination {
     }
 }
 
-/// What arrives of each band.
-fn illumination(opened: &Camera, plan: &Plan, resolution: [u32; 2]) -> Vec<Illumination> {
+/// What arrives of each band; where halves of the picture are alike, of one quarter.
+fn illumination(
+    opened: &Camera,
+    plan: &Plan,
+    resolution: [u32; 2],
+    is_mirrored: bool,
+) -> Vec<Illumination> {
     let size = resolution.map(f64::from);
     let share = |k: u32| f64::from(k) / f64::from(PLACES - 1);
-    let places: Vec<[f64; 2]> = (0..PLACES * PLACES)
-        .map(|k| [share(k % PLACES) * size[0], share(k / PLACES) * size[1]])
+    let traced = if is_mirrored { PLACES.div_ceil(2) } else { PLACES };
+    let places: Vec<[f64; 2]> = (0..traced * traced)
+        .map(|k| [share(k % traced) * size[0], share(k / traced) * size[1]])
         .collect();
+    let own = |k: u32| if k < traced { k } else { PLACES - 1 - k };
     let mut by_band = Vec::new();
     for (number, group) in opened.band_groups(&plan.bands).into_iter().enumerate() {
-        let values = opened.illumination(&places, number);
+        let quarter = opened.illumination(&places, number);
+        let value = |k: u32| quarter[(own(k / PLACES) * traced + own(k % PLACES)) as usize];
+        let values: Vec<f64> = (0..PLACES * PLACES).map(value).collect();
         by_band.extend(group.bands.map(|_| Illumination { values: values.clone(), size }));
     }
     by_band

@@ -21,11 +21,25 @@ const ONE_DEPTH: f64 = 0.02;
 /// How far towards the middle a dark node looks each time.
 const INWARDS: f64 = 0.88;
 
+/// Spreads that differ by less than this share of the light are one: their modulation differs by less.
+const ALIKE: f64 = 5e-3;
+
+/// Cells a side of the tiles of a picture of one spread.
+const TILE: usize = 512;
+
+/// The most tiles a side.
+const TILES: usize = 16;
+
 /// Nodes over a picture with the fields of each.
 pub(crate) struct Spreads {
     /// Nodes a side.
     pub(crate) side: usize,
+    /// Whether all of them have one spread: they are tiles then, which share no light.
+    pub(crate) is_uniform: bool,
+    /// Those of the nodes that others are seen in a mirror from, and of those that stand for themselves.
     fields: Vec<Option<FieldsBetween>>,
+    /// Whose fields each node has, and whether in a mirror along x and y.
+    own: Vec<(usize, [bool; 2])>,
     /// The wavelengths (nm) of each band.
     bands: Vec<Vec<f64>>,
     /// Of each layer (1/mm).
@@ -38,19 +52,21 @@ const DEPTHS: usize = 3;
 
 /// Bytes of the fields of all nodes, and of what is made of them on the way to so many `planes` of pixels: for each
 /// thread the transforms of a node's cells, and the pixels that all nodes light. `cells` a pixel, of which λN has
-/// `unit`, of a lens that draws sharply.
+/// `unit`, of a lens that draws sharply, and of things that lie within one depth or not.
 pub(crate) fn bytes(
     lens: &LensCamera,
     resolution: [u32; 2],
     (cells, unit): (u32, f64),
-    planes: usize,
+    (planes, is_flat): (usize, bool),
 ) -> u64 {
     /// The spread, a plane, its transform and the scratch of that.
     const TRANSFORMS: usize = 4;
     let (is_ideal, wavelengths) = lens.waves_to_trace();
     let side = if is_ideal { IDEAL_NODES } else { NODES };
+    let traced = if lens.is_mirrored(resolution) { side.div_ceil(2) } else { side };
+    let depths = if is_flat { 1 } else { DEPTHS };
     let fields =
-        (side * side * wavelengths * DEPTHS + 2 * WAVELENGTHS) * FieldsBetween::FIELD_BYTES;
+        (traced * traced * wavelengths * depths + 2 * WAVELENGTHS) * FieldsBetween::FIELD_BYTES;
     let size = resolution.map(|pixels| pixels as usize * cells as usize);
     let half = CellSpread::half_of_sharp(unit, size[0].max(size[1]));
     let window = |size: usize| size.min(2 * size / (side - 1)) + 2 * half;
@@ -102,7 +118,13 @@ impl Spreads {
                 }
             }
         };
-        let fields = (0..side * side).into_par_iter().map(fields).collect::<Result<_, _>>()?;
+        let (traced, own) = sources(side, lens.is_mirrored(resolution));
+        let trace = |spreads: &mut Self, nodes: &[usize]| -> Result<(), AnalysisError> {
+            let found =
+                nodes.par_iter().map(|&k| fields(traced[k])).collect::<Result<Vec<_>, _>>()?;
+            nodes.iter().zip(found).for_each(|(&k, found)| spreads.fields[k] = found);
+            Ok(())
+        };
         let most = resolution.map(|side| f64::from(side) * cells).into_iter().fold(1.0, f64::max);
         #[expect(
             clippy::cast_possible_truncation,
@@ -110,22 +132,112 @@ impl Spreads {
             reason = "a picture's size"
         )]
         let grid = CellGrid { pitch: pitch / cells, turn: lens.turn(), most: most as usize };
-        Ok(Self {
+        let mut spreads = Self {
             side,
-            fields,
+            is_uniform: false,
+            fields: vec![None; traced.len()],
+            own,
             bands: lens.wavelengths().iter().map(|all| few(all)).collect(),
             nearness: layers.nearness.iter().map(|near| 1e-3 * near).collect(),
             grid,
+        };
+        let mut first: Vec<usize> = spreads.ends().into_iter().map(|k| spreads.own[k].0).collect();
+        first.sort_unstable();
+        first.dedup();
+        trace(&mut spreads, &first)?;
+        if spreads.are_alike() {
+            return Ok(spreads.joined());
+        }
+        let rest: Vec<usize> = (0..traced.len()).filter(|k| !first.contains(k)).collect();
+        trace(&mut spreads, &rest)?;
+        Ok(spreads)
+    }
+
+    /// The nodes in the middle and in the corners.
+    fn ends(&self) -> [usize; 5] {
+        let last = self.side - 1;
+        [self.side / 2 * (self.side + 1), 0, last, last * self.side, last * (self.side + 1)]
+    }
+
+    /// Whether the spreads in the corners are hardly others than that in the middle: in the first, the middle and the
+    /// last band, of the rearmost and the foremost layer.
+    fn are_alike(&self) -> bool {
+        let [middle, corners @ ..] = self.ends();
+        let bands = self.bands.len();
+        let mut ends = vec![0, bands / 2, bands.saturating_sub(1)];
+        ends.dedup();
+        let mut layers = vec![0, self.nearness.len().saturating_sub(1)];
+        layers.dedup();
+        if bands == 0 || self.nearness.is_empty() {
+            return false;
+        }
+        ends.iter().all(|&band| {
+            layers.iter().all(|&layer| {
+                let is_asked = |node| node == middle || corners.contains(&node);
+                let spreads = self.of_layer(is_asked, layer, band);
+                let Some((own, _)) = self.of_node(&spreads, middle) else { return false };
+                corners.iter().all(|&corner| {
+                    let other = self.of_node(&spreads, corner);
+                    other.is_some_and(|(other, _)| own.difference(other) <= ALIKE)
+                })
+            })
         })
     }
 
-    /// The spread of a node's light of a layer in a band.
-    pub(crate) fn spread(&self, node: usize, layer: usize, band: usize) -> CellSpread {
-        let Some(fields) = &self.fields[node] else { return CellSpread::point() };
-        let near = self.nearness[layer];
-        let fields: Vec<_> = self.bands[band].iter().map(|&nm| fields.at(nm, near)).collect();
-        CellSpread::of(&fields, &self.grid)
+    /// The same with the middle's spread for all of the picture.
+    fn joined(mut self) -> Self {
+        let fields = self.fields.swap_remove(self.own[self.ends()[0]].0);
+        self.fields = vec![fields];
+        self.side = (self.grid.most / TILE).clamp(1, TILES);
+        self.own = vec![(0, [false; 2]); self.side * self.side];
+        self.is_uniform = true;
+        self
     }
+
+    /// The spreads of light of a layer in a band, of the fields that the nodes asked for have.
+    pub(crate) fn of_layer(
+        &self,
+        is_asked: impl Fn(usize) -> bool,
+        layer: usize,
+        band: usize,
+    ) -> Vec<Option<CellSpread>> {
+        let mut wanted = vec![false; self.fields.len()];
+        for (node, &(own, _)) in self.own.iter().enumerate() {
+            wanted[own] |= is_asked(node);
+        }
+        let near = self.nearness[layer];
+        let spread = |(fields, wanted): (&Option<FieldsBetween>, bool)| {
+            wanted.then(|| {
+                let Some(fields) = fields else { return CellSpread::point() };
+                let of_band = self.bands[band].par_iter().map(|&nm| fields.at(nm, near));
+                CellSpread::of(&of_band.collect::<Vec<_>>(), &self.grid)
+            })
+        };
+        self.fields.par_iter().zip(wanted).map(spread).collect()
+    }
+
+    /// A node's own among them, and whether it is seen in a mirror along x and y.
+    pub(crate) fn of_node<'a>(
+        &self,
+        spreads: &'a [Option<CellSpread>],
+        node: usize,
+    ) -> Option<(&'a CellSpread, [bool; 2])> {
+        let (own, mirrored) = self.own[node];
+        spreads[own].as_ref().map(|spread| (spread, mirrored))
+    }
+}
+
+/// The nodes that are traced, and which of them each node has its fields from, and in which mirrors.
+fn sources(side: usize, is_mirrored: bool) -> (Vec<usize>, Vec<(usize, [bool; 2])>) {
+    let traced = if is_mirrored { side.div_ceil(2) } else { side };
+    let own = |k: usize| if k < traced { k } else { side - 1 - k };
+    let nodes = (0..traced * traced).map(|k| k / traced * side + k % traced).collect();
+    let source = |node: usize| {
+        let place = [node % side, node / side];
+        let [x, y] = place.map(own);
+        (y * traced + x, place.map(|k| k >= traced))
+    };
+    (nodes, (0..side * side).map(source).collect())
 }
 
 /// Wavelengths that stand for as many, each for a run of them.
@@ -134,4 +246,27 @@ fn few(all: &[f64]) -> Vec<f64> {
     let run = |k: usize| &all[k * all.len() / count..(k + 1) * all.len() / count];
     let mean = |run: &[f64]| run.iter().sum::<f64>() / run.len().max(1) as f64;
     (0..count).map(|k| mean(run(k))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each node has the fields of the traced one that is as far from the middle in both directions.
+    #[test]
+    fn nodes_are_seen_in_mirrors() {
+        for (side, is_mirrored) in [(5, true), (3, true), (5, false)] {
+            let (traced, own) = sources(side, is_mirrored);
+            assert_eq!(
+                traced.len(),
+                if is_mirrored { side.div_ceil(2).pow(2) } else { side * side }
+            );
+            for (node, (source, mirrored)) in own.into_iter().enumerate() {
+                let flipped = |k: usize, is_flipped| if is_flipped { side - 1 - k } else { k };
+                let from = [traced[source] % side, traced[source] / side];
+                let seen = [flipped(from[0], mirrored[0]), flipped(from[1], mirrored[1])];
+                assert_eq!(seen, [node % side, node / side], "{side} {is_mirrored}");
+            }
+        }
+    }
 }

@@ -56,8 +56,8 @@ fn because(scene: &Scene, lens: &LensCamera) -> String {
     format!("{verdict}; {size}{against}")
 }
 
-/// The least and the greatest diameter (pixels) of blur between the nearest and the farthest thing.
-fn blur(scene: &Scene, lens: &LensCamera) -> Option<[f64; 2]> {
+/// The nearest and the farthest depth (m) of things before the camera.
+pub(super) fn depths(scene: &Scene) -> Option<[f64; 2]> {
     let bounds = scene.geometry.loose_bounds();
     if bounds.is_empty() {
         return None;
@@ -72,6 +72,12 @@ fn blur(scene: &Scene, lens: &LensCamera) -> Option<[f64; 2]> {
     }
     // Things behind the camera, or in it, are not seen.
     let near = depths.iter().copied().fold(f64::INFINITY, f64::min).max(0.05 * far);
+    Some([near, far])
+}
+
+/// The least and the greatest diameter (pixels) of blur between the nearest and the farthest thing.
+fn blur(scene: &Scene, lens: &LensCamera) -> Option<[f64; 2]> {
+    let [near, far] = depths(scene)?;
     let focus = 1.0 / lens.focused().object_distance();
     let waves = |depth: f64| lens.waves_of_defocus(GREEN) * (1.0 / depth - focus);
     let [near, far] = [near, far].map(waves);

@@ -1,9 +1,10 @@
 //! Light spread as waves are: known patterns, no light lost, and what is refused.
 
+use etendue_camera::WaveLens;
 use etendue_geometry::glam::DVec3;
 use etendue_optics::analysis::spread::WeightedFields;
 use etendue_optics::analysis::wavefront::Cells;
-use etendue_optics::analysis::{ObjectPoint, Transfer, Wavefront};
+use etendue_optics::analysis::{CellGrid, CellSpread, ObjectPoint, Transfer, Wavefront};
 use etendue_render::output::Outputs;
 use etendue_render::{Course, Plan, Prepared, RenderError, Shard};
 use etendue_scene::Scene;
@@ -189,6 +190,48 @@ fn even_light_falls_off_as_by_rays() {
     // At most 0.5 a sample, of nine pixels of 1024: 0.005, four times.
     assert!(worst < 0.02, "{worst}: {waves:?} {rays:?}");
     assert!(waves[0] < 0.9 * waves[9]);
+}
+
+/// The four places that are as far from the middle have spreads that are seen in mirrors of each other, though each
+/// is not its own: coma points outwards.
+#[test]
+fn a_round_lens_spreads_light_as_in_a_mirror_beyond_its_axis() {
+    let text = r#"{"etendue": 1, "tracer": {"type": "path", "max_bounces": 1}, "lights": [],
+        "camera": {"type": "lens", "diffraction": true, "focus_distance": 1,
+            "lens": {"elements": [
+                {"type": "surface", "radius": 20, "thickness": 2, "glass": "N-BK7", "semi_diameter": 2, "stop": true},
+                {"type": "surface", "radius": -20, "semi_diameter": 3}]},
+            "pose": {"from": [0, 0, 1], "look_at": [0, 0, 0]},
+            "sensor": {"resolution": [400, 300], "pixel_pitch": 3}},
+        "objects": [{"shape": "rectangle", "width": 1, "height": 1, "material": "lamp"}],
+        "materials": {"lamp": {"type": "emissive", "radiance": [1, 1, 1]}}, "render": {"samples": 1}}"#;
+    let scene = load(text);
+    let bands = Bands::Spectral(Grid::equal(GREEN - 0.05, GREEN + 0.05, 1).unwrap());
+    let waves = WaveLens::new(scene.camera.lens().unwrap(), &bands).unwrap();
+    assert!(waves.is_mirrored([400, 300]) && !waves.is_mirrored([400, 301]));
+    let grid = CellGrid { pitch: 3e-3, turn: waves.turn(), most: 200 };
+    let spread = |place: [f64; 2]| {
+        CellSpread::of(&[waves.fields(place, &[1.0]).unwrap().at(GREEN, 1e-3)], &grid)
+    };
+    let own = spread([40.0, 30.0]);
+    let peak = own.shares.iter().copied().fold(0.0, f64::max);
+    let worst = |other: &CellSpread, mirrored: [bool; 2]| {
+        assert_eq!(other.half, own.half);
+        let side = 2 * own.half + 1;
+        let share = |i: usize| own.share([i % side, i / side], mirrored);
+        let differences = other.shares.iter().enumerate().map(|(i, v)| (v - share(i)).abs());
+        differences.fold(0.0, f64::max) / peak
+    };
+    for mirrored in [[true, false], [false, true], [true, true]] {
+        let at = [0, 1].map(|axis| match mirrored[axis] {
+            true => [400.0, 300.0][axis] - [40.0, 30.0][axis],
+            false => [40.0, 30.0][axis],
+        });
+        let other = spread(at);
+        // The polynomial of the wavefront is within 2e-3 waves, on each side by itself.
+        assert!(worst(&other, mirrored) < 0.01, "{mirrored:?}: {}", worst(&other, mirrored));
+        assert!(worst(&other, [false, false]) > 0.05, "{mirrored:?}");
+    }
 }
 
 /// What waves cannot be spread over is refused by name.

@@ -81,6 +81,7 @@ impl App {
         let inspector = self.inspector.as_ref().filter(|_| self.shows_lens);
         let lens = inspector.and_then(|inspector| inspector.lens().transpose());
         self.lens = lens.map(|lens| lens.map_err(|error| error.to_string()));
+        self.lens_curves.forget();
         let document = self.document.as_ref().filter(|_| self.lens.is_some());
         self.written_lens = document.and_then(|document| {
             panels::lens::written(document.at("/camera/lens"), &document.path)

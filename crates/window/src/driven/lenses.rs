@@ -1,6 +1,7 @@
 //! Lenses: opened by themselves, and changed by dragging their surfaces.
 
 use super::*;
+use crate::panels::lens_curves::LensPlot;
 
 /// A copy of an example lens, in a folder of its own.
 fn lens_file(folder: &Path) -> PathBuf {
@@ -54,6 +55,40 @@ fn surfaces_are_dragged_and_the_lens_file_stays() {
     assert_eq!(fs::read(&path).unwrap(), before, "the lens' own file is as it was");
     window.press(Key::Z, Modifiers::COMMAND);
     assert_eq!(window.value("/camera/lens/elements/0/thickness").as_f64(), Some(4.0));
+}
+
+/// Curves in waves come when they are chosen, and go with the lens that they are of.
+#[test]
+fn fans_and_modulation_are_looked_at_beside_the_lens() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut window = Driver::open(&lens_file(folder.path()));
+    window.until("the lens", |app| app.lens.is_some() && app.written_lens.is_some());
+    window.step(Vec::new());
+    assert!(window.app.lens_curves.found.is_none(), "nothing is traced before it is asked for");
+    for (name, plot) in [
+        ("lens MTF", LensPlot::Modulation),
+        ("lens OPD", LensPlot::WaveFans),
+        ("lens ray fans", LensPlot::RayFans),
+    ] {
+        window.click(name);
+        window.until("curves", |app| app.lens_curves.found.is_some());
+        assert_eq!(window.app.lens_curves.plot, plot);
+    }
+    let waves = window.app.lens_curves.found.clone().unwrap().unwrap();
+    let first = &waves.fields[0];
+    assert!((first.modulation[0][1] - 1.0).abs() < 1e-3, "{:?}", first.modulation[0]);
+    assert!(first.modulation.last().unwrap()[1] < 0.01);
+    assert!(first.fans.tangential.len() > 20);
+    // A bent surface is another lens.
+    let from = window.place_of("element 0");
+    window.drag(from, Vec2::new(0.0, 30.0));
+    window.time += 1.0;
+    window.until("the changed lens", |app| !app.is_behind());
+    window.until("its curves", |app| app.lens_curves.found.is_some());
+    let bent = window.app.lens_curves.found.clone().unwrap().unwrap();
+    assert_ne!(bent.fields[0].fans, waves.fields[0].fans);
+    window.click("lens spots");
+    assert_eq!(window.app.lens_curves.plot, LensPlot::Spots);
 }
 
 #[test]

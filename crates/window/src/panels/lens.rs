@@ -1,4 +1,4 @@
-//! The lens: cut along its axis with the rays of the pixel that was asked, and its spots. Surfaces and gaps
+//! The lens: cut along its axis with the rays of the pixel that was asked, and its spots or curves. Surfaces and gaps
 //! can be dragged.
 
 use std::path::Path;
@@ -16,7 +16,7 @@ use crate::form::mark;
 const RAYS: u32 = 7;
 
 /// Colours of fields, on dark and on light.
-const COLORS: [[Color32; 2]; 3] = [
+pub(super) const COLORS: [[Color32; 2]; 3] = [
     [Color32::from_rgb(121, 192, 255), Color32::from_rgb(5, 80, 174)],
     [Color32::from_rgb(86, 211, 100), Color32::from_rgb(26, 127, 55)],
     [Color32::from_rgb(255, 123, 114), Color32::from_rgb(207, 34, 46)],
@@ -58,6 +58,7 @@ pub(crate) fn show(app: &mut App, ctx: &Context) {
     }
     let panel = egui::TopBottomPanel::bottom("lens").resizable(true).default_height(230.0);
     let mut edits = Vec::new();
+    let mut curves = std::mem::take(&mut app.lens_curves);
     panel.show(ctx, |ui| match &app.lens {
         None => {
             ui.weak("This camera has no lens.");
@@ -70,10 +71,14 @@ pub(crate) fn show(app: &mut App, ctx: &Context) {
             let room = ui.available_rect_before_wrap();
             let (left, right) = room.split_left_right_at_fraction(0.68);
             layout(app, ui, view, left, &mut edits);
-            spots(ui, view, right);
+            if !curves.show(ui, view, right) {
+                let below = Rect::from_min_max(right.min + Vec2::new(0.0, 26.0), right.max);
+                spots(ui, view, below);
+            }
             ui.allocate_rect(room, Sense::hover());
         }
     });
+    app.lens_curves = curves;
     if !edits.is_empty() {
         app.edit(ctx, &edits);
     }

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use etendue_chart::{Axis, Chart, Series, Stroke, Theme, short, side_by_side};
 
+use super::text::units_of;
 use super::{FieldWaves, WaveReport};
 
 /// A figure: the name of its file, and its SVG.
@@ -48,9 +49,15 @@ fn chart(title: &str, note: &str, axes: [&str; 2], series: Vec<Series>) -> Chart
     }
 }
 
+/// The unit of small lengths on the image.
+fn small(report: &WaveReport) -> &'static str {
+    if report.image_unit == "mrad" { "\u{b5}rad" } else { "\u{b5}m" }
+}
+
 const LINES: &str = "through: tangential; dashed: sagittal";
 
 fn mtf(report: &WaveReport) -> String {
+    let frequency = format!("frequency ({})", units_of(report)[0]);
     let by = |title: &str, values: [fn(&super::Modulation) -> f64; 2]| {
         let of = |(i, field): (usize, &FieldWaves)| {
             let strokes = [Stroke::Solid, Stroke::Dashed];
@@ -62,7 +69,7 @@ fn mtf(report: &WaveReport) -> String {
             .collect::<Vec<_>>()
         };
         let series = report.fields.iter().enumerate().flat_map(of).collect();
-        chart(title, LINES, ["frequency (cycles/mm)", "modulation"], series)
+        chart(title, LINES, [&frequency, "modulation"], series)
     };
     let charts = [
         by("MTF by diffraction", [|m| m.tangential, |m| m.sagittal]),
@@ -77,7 +84,8 @@ fn through_focus(report: &WaveReport) -> String {
             let planes = field.through_focus.planes.iter();
             planes.filter_map(move |(defocus, m)| m.map(|m| [*defocus, m[axis]]))
         };
-        let name = format!("{}, {} cycles/mm", field.name, short(field.through_focus.frequency));
+        let frequency = short(field.through_focus.frequency);
+        let name = format!("{}, {frequency} {}", field.name, units_of(report)[0]);
         [curve(name, i, Stroke::Solid, axis(0)), curve("", i, Stroke::Dashed, axis(1))]
     };
     let series = report.fields.iter().enumerate().flat_map(of).collect();
@@ -90,7 +98,8 @@ fn encircled(report: &WaveReport) -> String {
         curve(field.name.clone(), i, Stroke::Solid, points)
     };
     let series = report.fields.iter().enumerate().map(of).collect();
-    let axes = ["radius about the brightest point (\u{b5}m)", "share of light (%)"];
+    let radius = format!("radius about the brightest point ({})", small(report));
+    let axes = [&*radius, "share of light (%)"];
     chart("Encircled energy", "", axes, series).svg(Theme::Reader)
 }
 
@@ -103,7 +112,9 @@ fn lines(report: &WaveReport) -> String {
         ]
     };
     let series = report.fields.iter().enumerate().flat_map(of).collect();
-    let axes = ["from the chief ray (\u{b5}m)", "irradiance of a line of power 1 (1/mm)"];
+    let from = format!("from the chief ray ({})", small(report));
+    let irradiance = format!("irradiance of a line of power 1 (1/{})", units_of(report)[1]);
+    let axes = [&*from, &*irradiance];
     chart("Line spread", LINES, axes, series).svg(Theme::Reader)
 }
 
@@ -135,7 +146,8 @@ fn fan_charts(
 fn ray_fans(report: &WaveReport) -> String {
     let value =
         |ray: &super::super::fans::FanRay, axis: usize| 1e3 * if axis == 0 { ray.y } else { ray.x };
-    fan_charts(report, "Ray fan", "from the chief ray (\u{b5}m)", value)
+    let from = format!("from the chief ray ({})", small(report));
+    fan_charts(report, "Ray fan", &from, value)
 }
 
 fn wave_fans(report: &WaveReport) -> String {
@@ -152,7 +164,8 @@ fn field_curvature(report: &WaveReport) -> String {
         curve_of("tangential", 0, Stroke::Solid, |foci: &FieldFoci| foci.tangential),
         curve_of("sagittal", 1, Stroke::Dashed, |foci: &FieldFoci| foci.sagittal),
     ];
-    let axes = ["from the image plane to the focus (mm)", "height on the image (mm)"];
+    let height = format!("height on the image ({})", units_of(report)[1]);
+    let axes = ["from the image plane to the focus (mm)", &height];
     chart("Field curvature and astigmatism", "", axes, series).svg(Theme::Reader)
 }
 
@@ -166,9 +179,11 @@ fn distortion(report: &WaveReport) -> String {
         series("without distortion", 7, Mark::Ring, |p| p.ideal),
         series("chief rays", 0, Mark::Dot, |p| p.real),
     ];
+    let unit = units_of(report)[1];
     let most = report.distortion_grid.iter().map(|p| p.percent).fold(0.0, f64::max);
     let note = format!("at most {} %", short((most * 1e4).round() / 1e4));
-    chart("Distortion", &note, ["x (mm)", "y (mm)"], all).svg(Theme::Reader)
+    chart("Distortion", &note, [&*format!("x ({unit})"), &*format!("y ({unit})")], all)
+        .svg(Theme::Reader)
 }
 
 /// Colours of page and letters in the reader's light and dark theme, as those of the charts.

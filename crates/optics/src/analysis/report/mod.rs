@@ -4,6 +4,7 @@ pub mod figures;
 mod text;
 
 use glam::DVec2;
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -14,9 +15,9 @@ use super::conjugate::{Conjugate, Planes};
 use super::fans::{Fans, GridPoint, distortion_grid, fans};
 use super::object::ObjectPoint;
 use super::seidel::{SeidelTable, seidel};
-use super::spread::{PointSpread, WeightedFields, shares, strehl};
-use super::transfer::{Transfer, geometric_modulation};
-use super::wavefront::{Cells, ReferenceSphere, Wavefront};
+use super::spread::{PointSpread, WeightedFields, shares, strehl_of};
+use super::transfer::{Transfer, geometric_modulation, geometric_modulations, modulation_at};
+use super::wavefront::{Cells, ReferenceSphere, USUAL_CELLS, Wavefront};
 use super::zernike::{FRINGE_TERMS, ZernikeFit, ZernikeOrder};
 use crate::train::{Focus, MonochromaticTrain, OpticalTrain};
 
@@ -54,6 +55,9 @@ pub struct WaveInquiry {
     pub focus: Focus,
     /// Whether the image plane is moved to where the wavefront on the axis is flattest.
     pub best_focus: bool,
+    /// Whether the train ends with an [eyepiece](OpticalTrain::with_eyepiece) of 1000 mm behind an afocal
+    /// lens, so that lengths on the image are thousandths of a radian.
+    pub is_afocal: bool,
     /// Cells over the pupil.
     pub cells: Cells,
     /// Frequencies (cycles/mm); shares of the limit on the axis when empty.
@@ -80,6 +84,8 @@ pub struct Taken {
 pub struct WaveReport {
     /// Where the premises come from.
     pub taken: Taken,
+    /// What lengths on the image are in: `mm`; `mrad` of an afocal lens.
+    pub image_unit: &'static str,
     /// Object and image.
     pub planes: Planes,
     /// From the sensor's plane to `planes.image_z` (mm): other than 0 with the best focus.
@@ -249,6 +255,7 @@ impl WaveReport {
         let distortion_grid = bench.grid(widest)?;
         Ok(Self {
             taken: inquiry.taken.clone(),
+            image_unit: if inquiry.is_afocal { "mrad" } else { "mm" },
             planes,
             refocused,
             wavelengths: inquiry.wavelengths.clone(),
@@ -302,10 +309,11 @@ impl Bench<'_> {
         let fields = WeightedFields::new(pupils, &self.weights)?;
         let statistics = main.pupil.statistics();
         let fit = |order| ZernikeFit::new(&main.pupil, order, FRINGE_TERMS);
-        let (fringe, noll) = (fit(ZernikeOrder::Fringe)?, fit(ZernikeOrder::Noll)?);
+        let (fringe, noll) = rayon::join(|| fit(ZernikeOrder::Fringe), || fit(ZernikeOrder::Noll));
+        let (fringe, noll) = (fringe?, noll?);
         let spread = PointSpread::by_fft(&fields, 1);
         let transfer = Transfer::of(&spread);
-        let (brightest, ratio) = strehl(&fields);
+        let (brightest, ratio) = strehl_of(&fields, &spread);
         let widths = widths(&main);
         let working_f_number = widths.map(|width| 1.0 / width);
         let mean = 2.0 / (widths[0] + widths[1]);
@@ -348,12 +356,34 @@ impl Bench<'_> {
             working_f_number,
             airy_radius,
             relative_pupil,
-            mtf: self.frequencies.iter().map(|&f| modulation(&transfer, &fields, f)).collect(),
+            mtf: modulation(&transfer, &fields, &self.frequencies),
             encircled: encircled.collect(),
             line_spread: [near(along_y), near(along_x)],
-            through_focus: through_focus(&fields, frequency, depth),
+            through_focus: through_focus(&self.coarser(object, fields)?, frequency, depth),
             fans,
         })
+    }
+
+    /// Fields on half as many cells a side, where there are more than the usual number of them: one frequency at many
+    /// planes needs no more, and what grows with defocus is small beside what made the cells many.
+    fn coarser(
+        &self,
+        object: ObjectPoint,
+        fields: WeightedFields,
+    ) -> Result<WeightedFields, AnalysisError> {
+        let cells = fields.fields().first().map_or(0, |(field, _)| field.cells);
+        if self.cells != Cells::Needed || cells <= USUAL_CELLS {
+            return Ok(fields);
+        }
+        let cells = Cells::Given((cells / 2).max(USUAL_CELLS));
+        match wavefronts(self.train, &self.lenses, object, self.planes.image_z, cells) {
+            Ok(waves) => WeightedFields::new(
+                waves.into_iter().map(|wave| wave.pupil).collect(),
+                &self.weights,
+            ),
+            Err(AnalysisError::Coarse { .. }) => Ok(fields),
+            Err(error) => Err(error),
+        }
     }
 
     fn foci(&self, widest: f64) -> Result<Vec<FieldFoci>, AnalysisError> {
@@ -381,19 +411,31 @@ impl Bench<'_> {
     }
 }
 
-fn modulation(transfer: &Transfer, fields: &WeightedFields, frequency: f64) -> Modulation {
-    let [tangential, sagittal] = transfer.modulation(frequency);
-    let [geometric_tangential, geometric_sagittal] = geometric_modulation(fields, frequency);
-    Modulation { frequency, tangential, sagittal, geometric_tangential, geometric_sagittal }
+fn modulation(
+    transfer: &Transfer,
+    fields: &WeightedFields,
+    frequencies: &[f64],
+) -> Vec<Modulation> {
+    let step = frequencies.get(1).copied().unwrap_or(0.0);
+    let is_even = |(k, f): (usize, &f64)| (f - k as f64 * step).abs() <= 1e-9 * step;
+    let geometric = match step > 0.0 && frequencies.iter().enumerate().all(is_even) {
+        true => geometric_modulations(fields, step, frequencies.len()),
+        false => frequencies.par_iter().map(|&f| geometric_modulation(fields, f)).collect(),
+    };
+    let at = |(&frequency, [geometric_tangential, geometric_sagittal]): (&f64, [f64; 2])| {
+        let [tangential, sagittal] = transfer.modulation(frequency);
+        Modulation { frequency, tangential, sagittal, geometric_tangential, geometric_sagittal }
+    };
+    frequencies.iter().zip(geometric).map(at).collect()
 }
 
 fn through_focus(fields: &WeightedFields, frequency: f64, depth: f64) -> ThroughFocus {
     let plane = |k: i32| {
         let defocus = 2.0 * depth * f64::from(k) / f64::from(PLANES);
         let there = fields.at_focus(defocus).ok();
-        (defocus, there.map(|fields| Transfer::diffraction(&fields).modulation(frequency)))
+        (defocus, there.map(|fields| modulation_at(&fields, frequency)))
     };
-    ThroughFocus { frequency, planes: (-PLANES..=PLANES).map(plane).collect() }
+    ThroughFocus { frequency, planes: (-PLANES..=PLANES).into_par_iter().map(plane).collect() }
 }
 
 /// Widths of the lit pupil in y and in x (direction cosines).

@@ -15,9 +15,18 @@ fn some(value: Option<f64>) -> Cell {
     value.map_or_else(Cell::none, number)
 }
 
+/// Of frequencies, lengths and small lengths on the image.
+pub(super) fn units_of(report: &WaveReport) -> [&'static str; 3] {
+    match report.image_unit {
+        "mrad" => ["cycles/mrad", "mrad", "urad"],
+        _ => ["cycles/mm", "mm", "um"],
+    }
+}
+
 fn of_mtf(report: &WaveReport, values: [fn(&super::Modulation) -> f64; 2]) -> Table {
     let mut titles = vec!["frequency".to_owned()];
-    let mut units = vec!["cycles/mm"];
+    let [frequency, ..] = units_of(report);
+    let mut units = vec![frequency];
     for field in &report.fields {
         titles.extend([format!("{} tangential", field.name), format!("{} sagittal", field.name)]);
         units.extend(["", ""]);
@@ -37,10 +46,27 @@ fn of_mtf(report: &WaveReport, values: [fn(&super::Modulation) -> f64; 2]) -> Ta
     table
 }
 
+fn stop_shifts(shifts: &[super::super::seidel::StopShift]) -> Table {
+    let mut table = Table::new(&["without", "stop z", "entrance pupil z", "S_II", "S_III", "C_II"])
+        .with_units(&["", "mm", "mm", "", "", ""])
+        .indented(2);
+    for shift in shifts {
+        let sums = [shift.total.coma, shift.total.astigmatism, shift.total.lateral_colour];
+        // No minus before zeros.
+        let shown = |value: f64| format!("{:.6}", (value * 1e6).round() / 1e6 + 0.0);
+        let without = Cell::word(shift.without.replace('_', " "));
+        let places = [some(shift.stop_z), some(shift.entrance_pupil_z)];
+        let sums = sums.map(|value| Cell::number(value, shown(value)));
+        table.push([without].into_iter().chain(places).chain(sums));
+    }
+    table
+}
+
 impl WaveReport {
     /// Fields in waves.
     fn fields_table(&self) -> Table {
         let unit = if self.planes.object_z.is_none() { "deg" } else { "mm" };
+        let [_, image, small] = units_of(self);
         let mut table = Table::new(&[
             "field",
             "image y",
@@ -55,7 +81,9 @@ impl WaveReport {
             "illumination",
             "cells",
         ])
-        .with_units(&[unit, "mm", "waves", "waves", "waves", "mm", "", "", "", "um", "%", "a side"])
+        .with_units(&[
+            unit, image, "waves", "waves", "waves", "mm", "", "", "", small, "%", "a side",
+        ])
         .indented(2);
         for field in &self.fields {
             let refocus = field.best_fit.centre[2] - field.sphere.centre[2];
@@ -119,7 +147,7 @@ impl WaveReport {
     fn foci_table(&self) -> Table {
         let mut table =
             Table::new(&["field", "image y", "tangential focus", "sagittal focus", "chief ray"])
-                .with_units(&["", "mm", "mm", "mm", "deg"])
+                .with_units(&["", units_of(self)[1], "mm", "mm", "deg"])
                 .indented(2);
         for foci in &self.foci {
             table.push([
@@ -170,6 +198,12 @@ impl WaveReport {
                 seidel.field
             );
             all.push((what, table));
+            if !seidel.stop_shifts.is_empty() {
+                all.push((
+                    "Stop shift: where the stop would have to be (same marginal ray)".to_owned(),
+                    stop_shifts(&seidel.stop_shifts),
+                ));
+            }
         }
         if !self.foci.is_empty() {
             all.push((
@@ -193,10 +227,13 @@ impl WaveReport {
             }
             _ => "object at infinity".to_owned(),
         };
+        let place = match self.image_unit {
+            "mrad" => "by angles, behind an ideal lens of 1000 mm".to_owned(),
+            _ => format!("on the plane z = {} mm", significant(self.planes.image_z)),
+        };
         format!(
-            "In waves on the plane z = {} mm ({}); {}. Taken: fields ({}), wavelengths ({}), weights \
+            "In waves {place} ({}); {}. Taken: fields ({}), wavelengths ({}), weights \
              ({}), object ({})",
-            significant(self.planes.image_z),
             object,
             colours.join(", "),
             self.taken.fields,

@@ -228,6 +228,11 @@ fn legend(canvas: &mut Canvas, report: &LensReport, boxes: &[SpotBox], scale: f6
         canvas.dot([x, y - 4.0], 4.0, &format!("f{}", i % COLOURS));
         canvas.text([x + 9.0, y], TextAnchor::Start, "small", &format!("{wavelength} nm"));
     }
+    if let Some(radius) = airy_radius(report) {
+        let words =
+            format!("dashed where it shows: Airy disk, radius {} \u{b5}m", short(1e3 * radius));
+        canvas.text([16.0, y + 17.0], TextAnchor::Start, "small", &words);
+    }
     let length = round_length(90.0 / scale);
     let right = width - GAP;
     let left = right - length * scale;

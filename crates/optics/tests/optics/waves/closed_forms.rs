@@ -6,9 +6,13 @@
 use std::f64::consts::{FRAC_2_PI, PI, TAU};
 
 use etendue_optics::analysis::spread::{WeightedFields, strehl};
-use etendue_optics::analysis::transfer::geometric_modulation;
+use etendue_optics::analysis::transfer::{
+    geometric_modulation, geometric_modulations, modulation_at,
+};
 use etendue_optics::analysis::zernike::{ZernikeFit, ZernikeOrder};
-use etendue_optics::analysis::{AnalysisError, PointSpread, PupilField, ReferenceSphere, Transfer};
+use etendue_optics::analysis::{
+    AnalysisError, CellGrid, CellSpread, PointSpread, PupilField, ReferenceSphere, Transfer,
+};
 use glam::DVec2;
 
 /// Wavelength (mm and nm) and numerical aperture.
@@ -245,5 +249,58 @@ fn wavelengths_add_by_their_weights_and_weights_of_nothing_are_refused() {
     for weights in [&[0.0][..], &[-1.0], &[f64::NAN], &[1.0, 1.0]] {
         let refused = WeightedFields::new(vec![green.clone()], weights);
         assert!(matches!(refused, Err(AnalysisError::Weights(_))), "{weights:?}");
+    }
+}
+
+/// Wide cells have the mean of Airy's pattern over themselves, less a 24th of its second differences.
+#[test]
+fn wide_cells_have_the_mean_of_airys_pattern() {
+    let (aperture, wavelength) = (0.1, 500.0);
+    let pupil = PupilField::from_fn(128, aperture, wavelength, |p| p.length() <= 1.0, |_| 0.0);
+    // λN, of a diameter of 2 NA.
+    let unit = wavelength * 1e-6 / (2.0 * aperture);
+    let cell = 0.8;
+    let spread = CellSpread::of(&[pupil], &CellGrid { pitch: cell * unit, turn: 1.0, most: 999 });
+    let mean = |x: f64, y: f64| {
+        const FINE: usize = 24;
+        let offset = |k: usize| ((k as f64 + 0.5) / FINE as f64 - 0.5) * cell;
+        let at = |k: usize| {
+            let v = std::f64::consts::PI * (x + offset(k % FINE)).hypot(y + offset(k / FINE));
+            jinc(v).powi(2) * std::f64::consts::FRAC_PI_4
+        };
+        (0..FINE * FINE).map(at).sum::<f64>() / (FINE * FINE) as f64 * cell * cell
+    };
+    let side = 2 * spread.half + 1;
+    let peak = mean(0.0, 0.0);
+    for (row, column) in [(0, 0), (0, 1), (1, 1), (2, 0), (0, 3), (3, 2)] {
+        let [x, y] = [column, row].map(|k| k as f64 * cell);
+        let own = mean(x, y);
+        let around = mean(x + cell, y) + mean(x - cell, y) + mean(x, y + cell) + mean(x, y - cell);
+        let expected = (own - (around - 4.0 * own) / 24.0).max(0.0);
+        let share = spread.shares[(spread.half + row) * side + spread.half + column];
+        // The rim on cells of the pupil, and what the ring beyond 40 λN takes for good.
+        assert!((share - expected).abs() < 1e-3 * peak, "{row} {column}: {share} {expected}");
+    }
+    assert!((spread.shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+}
+
+/// One frequency by itself is the same as out of the transform of all, and so are even ones by rays.
+#[test]
+fn single_frequencies_are_those_of_all_of_them() {
+    let waves = |p: DVec2| 0.8 * p.length_squared() + 0.4 * p.y * p.length_squared();
+    let fields = pupil(96, 0.0, waves);
+    let transfer = Transfer::diffraction(&fields);
+    for share in [0.1, 0.25, 0.4] {
+        let frequency = share * transfer.limit;
+        let [own, all] = [modulation_at(&fields, frequency), transfer.modulation(frequency)];
+        for axis in 0..2 {
+            // The same sums, in another order.
+            assert!((own[axis] - all[axis]).abs() < 1e-10, "{share}: {own:?} {all:?}");
+        }
+    }
+    let step = 0.05 * transfer.limit;
+    for (k, own) in geometric_modulations(&fields, step, 12).into_iter().enumerate() {
+        let all = geometric_modulation(&fields, step * k as f64);
+        assert!((own[0] - all[0]).abs().max((own[1] - all[1]).abs()) < 1e-10, "{k}");
     }
 }
