@@ -6,6 +6,8 @@
 //! mesh that changes its shape, [one of its own](crate::deforming). A ray asks it when it meets the box that the body sweeps while the shutter is open. All backends agree, and
 //! hits are as exact as those of a body that stands at the place where it is at the ray's time.
 
+mod blocks;
+
 use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
@@ -20,8 +22,9 @@ use etendue_geometry::{
 use crate::deforming::Deforming;
 use crate::exact::Boxes;
 use crate::parts::{LocalRay, outward};
+use crate::single::F32Frame;
 use crate::tree::{LeafSize, MAX_DEPTH, Ref, Tree};
-use crate::{Accel, BuildError, BuildOptions, BuildReport, BuildWatch, Counts};
+use crate::{Accel, BlockAccel, BuildError, BuildOptions, BuildReport, BuildWatch, Counts};
 
 /// Builds a structure of one backend.
 pub type Build<'a> = &'a dyn Fn(Arc<Geometry>, &BuildOptions) -> Result<Box<dyn Accel>, BuildError>;
@@ -55,8 +58,11 @@ struct Moving {
     /// Of each placement, whether it moves.
     moves: Vec<bool>,
     exposure: [f64; 2],
-    /// The largest coordinate of a box (m).
+    /// The largest coordinate of a box (m), and the box around all of them (m, world).
     size: f64,
+    swept: Bounds,
+    /// The frame of rays in blocks.
+    frame: Option<F32Frame>,
     report: BuildReport,
 }
 
@@ -85,6 +91,10 @@ struct Carried {
 /// Distances that differ by no more than this, of the largest coordinate of the ray's origin and of the
 /// distance, are one: as in the rule of surfaces in one plane.
 const ONE_PLACE: f64 = 64.0 * f64::EPSILON;
+
+/// [`ONE_PLACE`], or a wider one.
+#[derive(Clone, Copy)]
+struct OnePlace(f64);
 
 impl Moving {
     fn build(
@@ -132,6 +142,7 @@ impl Moving {
             bodies.push(Body { placement, shape, motion, swept, deforms });
         }
         let tree = over(&bodies, options)?;
+        let standing = still.loose_bounds();
         let still = build(Arc::new(still), options)?;
         let mut report = still.report();
         for shape in &shapes {
@@ -145,7 +156,9 @@ impl Moving {
         let far = |body: &Body| body.swept.min.abs().max(body.swept.max.abs()).max_element();
         let size = bodies.iter().map(far).fold(0.0, f64::max);
         let exposure = options.exposure;
-        Ok(Self { still, shapes, bodies, tree, moves, exposure, size, report })
+        let swept = bodies.iter().fold(Bounds::EMPTY, |all, body| all.union(body.swept));
+        let frame = Self::frame_of_blocks(&*still, standing, swept);
+        Ok(Self { still, shapes, bodies, tree, moves, exposure, size, swept, frame, report })
     }
 
     /// The rays with those triangles at their ends that stand still.
@@ -282,16 +295,16 @@ fn meets(bounds: Bounds, origin: DVec3, direction: DVec3, [t_min, t_max]: [f64; 
     near <= far + ONE_PLACE * (size + far.abs())
 }
 
-impl Accel for Moving {
-    fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
-        self.still.closest(&self.with_still_ends(rays), hits);
-        hits.set_times(rays.times());
+impl Moving {
+    /// Puts bodies into hits that are nearer than what those have.
+    fn closest_of_bodies(&self, rays: &RayBatch, hits: &mut HitBatch, one_place: OnePlace) {
+        let OnePlace(one_place) = one_place;
         let mut carried = Carried::default();
         carried.hits.detail = hits.detail;
         let reach = |hits: &HitBatch, i: usize| {
             let t = hits.t[i].min(rays.t_max()[i]);
             // As far as what is in the same place.
-            let t = t + ONE_PLACE * t.abs().max(rays.origin(i).abs().max_element());
+            let t = t + one_place * t.abs().max(rays.origin(i).abs().max_element());
             Some(if t.is_nan() { f64::INFINITY } else { t.min(rays.t_max()[i]) })
         };
         let near = self.near(rays, |i| reach(hits, i));
@@ -309,10 +322,17 @@ impl Accel for Moving {
                 }
                 let t = found.t[k] / stretch;
                 let size = t.abs().max(rays.origin(i).abs().max_element());
+                // What is carried is exact in itself.
+                let known = hits.placement[i];
+                let same = if self.moves.get(known as usize) == Some(&true) {
+                    ONE_PLACE
+                } else {
+                    one_place
+                };
                 let is_nearer = match hits.is_hit(i) {
                     false => true,
-                    true if body.placement > hits.placement[i] => t <= hits.t[i] + ONE_PLACE * size,
-                    true => t < hits.t[i] - ONE_PLACE * size,
+                    true if body.placement > known => t <= hits.t[i] + same * size,
+                    true => t < hits.t[i] - same * size,
                 };
                 if !is_nearer {
                     continue;
@@ -331,8 +351,8 @@ impl Accel for Moving {
         }
     }
 
-    fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>) {
-        self.still.occluded(&self.with_still_ends(rays), blocked);
+    /// Says of rays that nothing blocked yet whether bodies do.
+    fn occluded_by_bodies(&self, rays: &RayBatch, blocked: &mut [bool]) {
         let mut carried = Carried::default();
         let reach = |blocked: &[bool], i: usize| (!blocked[i]).then(|| rays.t_max()[i]);
         let near = self.near(rays, |i| reach(blocked, i));
@@ -347,6 +367,23 @@ impl Accel for Moving {
                 blocked[i] |= is_blocked;
             }
         }
+    }
+}
+
+impl Accel for Moving {
+    fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
+        self.still.closest(&self.with_still_ends(rays), hits);
+        hits.set_times(rays.times());
+        self.closest_of_bodies(rays, hits, OnePlace(ONE_PLACE));
+    }
+
+    fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>) {
+        self.still.occluded(&self.with_still_ends(rays), blocked);
+        self.occluded_by_bodies(rays, blocked);
+    }
+
+    fn blocks(&self) -> Option<&dyn BlockAccel> {
+        self.frame.is_some().then_some(self)
     }
 
     fn report(&self) -> BuildReport {

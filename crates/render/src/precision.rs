@@ -2,7 +2,7 @@
 //! under its smallest things, in f64 where it is not.
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{HitPrecision, RayBatch};
+use etendue_geometry::{Bounds, HitPrecision, RayBatch};
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, LightPrecision};
 use etendue_tracer::spawn::roundings;
@@ -30,12 +30,20 @@ pub(crate) fn light_precision(scene: &Scene, samples: u32) -> (HitPrecision, Str
         return (HitPrecision::Double, "the accelerator works in f64".to_owned());
     }
     // By how much f32 misplaces rays, against the smallest triangle and what noise hides.
-    let offset = offset(scene);
+    let bounds = scene.geometry.loose_bounds_within(scene.camera.exposure_span());
+    let camera = camera_reach(scene);
+    let offset = offset(bounds, camera);
     let noise = scene.accuracy.path_noise / f64::from(samples).sqrt();
     let Some((least, edge)) = smallest(scene) else {
         return (HitPrecision::Single, "there is nothing to hit".to_owned());
     };
-    let words = |than: &str| format!("f32 misplaces rays by up to {offset:.1e} m, {than}");
+    let far = match reach(bounds).max(camera) {
+        most if most > 2.0 * reach(scene.geometry.loose_bounds()).max(still_camera(scene)) => {
+            format!(" while things move as far as {most:.1e} m away")
+        }
+        _ => String::new(),
+    };
+    let words = |than: &str| format!("f32 misplaces rays by up to {offset:.1e} m{far}, {than}");
     if offset > scene.accuracy.path_offset_of_edge * edge {
         let why = words(&format!("too much for triangles with edges of {edge:.1e} m"));
         return (HitPrecision::Double, why);
@@ -46,7 +54,7 @@ pub(crate) fn light_precision(scene: &Scene, samples: u32) -> (HitPrecision, Str
         return (HitPrecision::Double, words(&than));
     }
     // Against what a pixel sees.
-    let farthest = farthest(scene);
+    let farthest = reach(bounds).max(camera);
     let pixel = pixel_width(scene, farthest);
     let rounding = f64::from(f32::EPSILON) * farthest;
     if pixel.is_some_and(|pixel| pixel < ROUNDINGS_A_PIXEL * rounding) {
@@ -102,23 +110,31 @@ fn too_thin(scene: &Scene, crossed: &CrossedSurfaces) -> Option<String> {
 }
 
 /// How far (m) rays start off surfaces in f32, at most: what tracing reckons for a hit at the edge of the
-/// scene, seen from the camera.
-fn offset(scene: &Scene) -> f64 {
-    let bounds = scene.geometry.loose_bounds();
+/// scene's `bounds` (m), seen from a camera so far from the world's origin (m).
+fn offset(bounds: Bounds, camera: f64) -> f64 {
     if bounds.is_empty() {
         return 0.0;
     }
-    let farthest = bounds.min.abs().max(bounds.max.abs()).length();
-    let camera = scene.camera.pose().position.length();
+    let farthest = reach(bounds);
     // The hit, the placement's own numbers, and where the ray came from.
     roundings(HitPrecision::Single) * (2.0 * farthest + farthest.max(camera))
 }
 
-/// The farthest from the world's origin that rays come from (m).
-fn farthest(scene: &Scene) -> f64 {
-    let bounds = scene.geometry.loose_bounds();
-    let farthest = bounds.min.abs().max(bounds.max.abs()).length();
-    farthest.max(scene.camera.pose().position.length())
+/// The farthest from the world's origin that anything of a box is (m).
+fn reach(bounds: Bounds) -> f64 {
+    if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).length() }
+}
+
+/// How far from the world's origin the camera is at the frame's time (m).
+fn still_camera(scene: &Scene) -> f64 {
+    scene.camera.pose().position.length()
+}
+
+/// The same of its places when its shutter opens and closes, too: of what moves along a line, the farthest.
+fn camera_reach(scene: &Scene) -> f64 {
+    let ends =
+        scene.camera.exposure_span().map(|time| scene.camera.pose_at(time).position.length());
+    ends.into_iter().fold(still_camera(scene), f64::max)
 }
 
 /// How far apart (m) the chief rays of two pixels in the middle of the picture are at `distance` (m) from the
@@ -188,6 +204,33 @@ mod tests {
         let layers = file.spec.all_layers();
         let scene = file.load(wanted(&layers), &LoadOptions::default()).unwrap();
         light_precision(&scene, samples).0
+    }
+
+    /// What flies so far while the shutter is open that f32 cannot tell its triangles apart is hit in f64, and the plan
+    /// says why; at a hundredth of the speed f32 does.
+    #[test]
+    #[cfg(feature = "embree")]
+    fn speeds_that_outrun_single_precision_take_double() {
+        let planned = |object: bool, speed: f64| {
+            let velocity = json!({ "type": "velocity", "velocity": [speed, 0, 0] });
+            let mut camera = json!({ "type": "pinhole", "shutter": { "exposure": 1 },
+                                     "pose": { "from": [0, 0, 4], "look_at": [0, 0, 0] } });
+            let mut ball = json!({ "shape": "sphere", "triangles": 2000 });
+            let moving = if object { &mut ball } else { &mut camera };
+            moving["motion"] = velocity;
+            let scene = json!({ "tracer": { "type": "path" }, "camera": camera, "objects": [ball],
+                                "render": { "accel": "embree" } });
+            let opener = &LoadOptions::default().opener;
+            let file = SceneFile::from_json(opener, std::path::Path::new("."), scene).unwrap();
+            let layers = file.spec.all_layers();
+            light_precision(&file.load(wanted(&layers), &LoadOptions::default()).unwrap(), 64)
+        };
+        for object in [true, false] {
+            let (precision, why) = planned(object, 1e6);
+            assert_eq!(precision, HitPrecision::Double, "{why}");
+            assert!(why.contains("while things move as far as 1.0e6 m away"), "{why}");
+            assert_eq!(planned(object, 1.0).0, HitPrecision::Single);
+        }
     }
 
     #[test]

@@ -78,6 +78,7 @@ impl SceneFile {
         parts.settle_backs(self.spec.cull_backfaces);
         parts.files = instance_files;
         parts.files.extend(own.files);
+        let slot_count = slots.len();
         parts.files.extend(slots.into_iter().flat_map(|slot| slot.files));
         for (index, object) in objects.iter().enumerate() {
             self.check_overrides(&parts, object, index)?;
@@ -95,7 +96,7 @@ impl SceneFile {
         }
         let scene = self.finish(parts, &folder, options, (&budget, kept), since)?;
         kept.sweep();
-        Ok(scene)
+        Ok(Scene { slots: slot_count, ..scene })
     }
 
     /// The folder that the scene's paths start at.
@@ -304,7 +305,7 @@ impl SceneFile {
             camera_origin,
             cameras: parts.cameras,
             picture: self.spec.picture(),
-            slots: self.spec.serial.len(),
+            slots: 0,
             layers: self.spec.all_layers(),
             render: self.spec.render.clone(),
             plan: self.spec.plan,

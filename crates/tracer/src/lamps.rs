@@ -108,9 +108,7 @@ pub(crate) fn cluster(
     let sides = if two_sided { 2.0 } else { 1.0 };
     let (cone, bounds) = match way {
         None => (if two_sided { PI } else { 0.0 }, bounds),
-        Some(way) => {
-            (if two_sided || way.turns { PI } else { 0.0 }, way.around(id[1] as usize))
-        }
+        Some(way) => (if two_sided || way.turns { PI } else { 0.0 }, way.around(id[1] as usize)),
     };
     let intensity = power / (sides * PI);
     Some(Cluster { bounds, axis: shape.normal, cone, reach: FRAC_PI_2, intensity })

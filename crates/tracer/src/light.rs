@@ -3,8 +3,8 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
-use etendue_geometry::{Bounds, Motion, Transform};
 use etendue_geometry::glam::{DMat3, DVec3};
+use etendue_geometry::{Bounds, Motion, Transform};
 use etendue_spectrum::Curve;
 
 use crate::goniometric::Goniometric;

@@ -226,12 +226,7 @@ impl Lights {
     }
 
     /// The emissive triangle of a number at a time (s from the frame's time); `None` without area.
-    fn lamp(
-        &self,
-        around: &SceneView<'_>,
-        number: usize,
-        time: f64,
-    ) -> Option<Cow<'_, AreaLight>> {
+    fn lamp(&self, around: &SceneView<'_>, number: usize, time: f64) -> Option<Cow<'_, AreaLight>> {
         match self.lamps.get(number) {
             Some(Some(lamp)) => Some(Cow::Borrowed(lamp)),
             _ => AreaLight::at(around, self.triangles[number], time).map(Cow::Owned),
@@ -348,7 +343,9 @@ impl Lights {
         radiance.copy_from_slice(self.bands_of(index, radiance.len()));
         let stand = light.stand(time);
         match &light.kind {
-            LightKind::Point(at) => Target::bare(TargetKind::Point, stand.point(*at), chance).into(),
+            LightKind::Point(at) => {
+                Target::bare(TargetKind::Point, stand.point(*at), chance).into()
+            }
             &LightKind::Spot { at, axis, cos_outer, cos_inner } => {
                 let (at, axis) = (stand.point(at), stand.direction(axis));
                 let cosine = (receiver.point - at).try_normalize().map_or(-1.0, |d| d.dot(axis));
@@ -372,7 +369,8 @@ impl Lights {
                 (intensity > 0.0).then_some(place).into()
             }
             &LightKind::Directional { along, cos_radius } => {
-                let toward = Frame::around(-stand.direction(along)).world(cone_direction(square, cos_radius));
+                let toward = Frame::around(-stand.direction(along))
+                    .world(cone_direction(square, cos_radius));
                 Target::bare(TargetKind::Parallel, toward, chance).into()
             }
             LightKind::Environment { image: EnvironmentImage::Constant, .. } => {

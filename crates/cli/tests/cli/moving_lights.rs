@@ -76,12 +76,14 @@ fn passing() -> f64 {
 #[test]
 fn lights_of_nodes_that_move_light_from_where_they_are() {
     let point = json!({ "type": "point", "intensity": 40 });
-    let along = share(&point, "translation", |model| model.floats(&[[0.0_f32; 3], [2.0, 0.0, 0.0]]));
+    let along =
+        share(&point, "translation", |model| model.floats(&[[0.0_f32; 3], [2.0, 0.0, 0.0]]));
     assert!((along / passing() - 1.0).abs() < NOISE, "{along}, not {}", passing());
     // A quarter turn about +Y in equal times.
     #[expect(clippy::cast_possible_truncation, reason = "as files have it")]
     let half = FRAC_1_SQRT_2 as f32;
-    let turn = |model: &mut Model| model.floats(&[[0.0_f32, 0.0, 0.0, 1.0], [0.0, half, 0.0, half]]);
+    let turn =
+        |model: &mut Model| model.floats(&[[0.0_f32, 0.0, 0.0, 1.0], [0.0, half, 0.0, half]]);
     let sun = json!({ "type": "directional", "intensity": 3 });
     let sinking = share(&sun, "rotation", turn);
     assert!((sinking / (2.0 / PI) - 1.0).abs() < NOISE, "{sinking}, not {}", 2.0 / PI);
@@ -145,7 +147,8 @@ fn motions_of_lights_that_are_none_are_refused_by_place_and_remedy() {
         (json!({ "type": "orbit" }), ["lights[0].motion", "orbit"]),
     ];
     for (motion, words) in cases {
-        let light = json!({ "type": "point", "at": [0, 0, 1], "intensity": [1, 1, 1], "motion": motion });
+        let light =
+            json!({ "type": "point", "at": [0, 0, 1], "intensity": [1, 1, 1], "motion": motion });
         let scene = json!({ "etendue": 1, "lights": [light], "objects": [{ "shape": "box" }] });
         let bench = Bench::with_scene(&scene.to_string());
         let output = bench.run(&["check", "scene.json"]);

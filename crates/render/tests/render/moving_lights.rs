@@ -18,9 +18,8 @@ const PIXELS: usize = 256;
 
 /// A dot in the middle of a floor in z = 0, for one second.
 fn scene(lights: Value, objects: Value, more: &Value) -> Scene {
-    let mut all = vec![
-        json!({ "shape": "rectangle", "width": 60, "height": 60, "material": "floor" }),
-    ];
+    let mut all =
+        vec![json!({ "shape": "rectangle", "width": 60, "height": 60, "material": "floor" })];
     all.extend(objects.as_array().unwrap().iter().cloned());
     let mut scene = json!({
         "etendue": 1, "tracer": { "type": "direct" }, "lights": lights, "objects": all,
@@ -98,7 +97,8 @@ fn points_that_move_send_the_mean_of_their_closed_form() {
 fn cones_and_images_that_turn_are_seen_while_they_are_aimed() {
     // They turn by 120° from straight down, of which the first 30° meet the dot.
     let (h, turn) = (2.0_f64, json!({ "type": "velocity", "angular_velocity": [0, 120, 0] }));
-    let common = json!({ "at": [0, 0, h], "look_at": [0, 0, 0], "intensity": [8, 8, 8], "motion": turn });
+    let common =
+        json!({ "at": [0, 0, h], "look_at": [0, 0, 0], "intensity": [8, 8, 8], "motion": turn });
     let with = |more: Value| {
         let mut light = common.clone();
         light.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
@@ -271,9 +271,7 @@ fn asked_and_met_light_of_moving_lamps_make_one_whole() {
         degrees: 40.0,
     };
     let count = 24;
-    let more = |samples: usize| {
-        json!({ "/objects/0/material": "metal", "/render": { "samples": samples, "seed": samples } })
-    };
+    let more = |samples: usize| json!({ "/objects/0/material": "metal", "/render": { "samples": samples, "seed": samples } });
     let (mut due, mut squares) = (0.0, 0.0);
     for k in 0..count {
         let time = (f64::from(k) + 0.5) / f64::from(count);

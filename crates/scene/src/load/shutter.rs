@@ -11,7 +11,9 @@ use etendue_camera::{Camera, CameraMotionSpec, CameraSpec, ShutterKind};
 use etendue_geometry::Geometry;
 use etendue_geometry::units::Seconds;
 use etendue_sensor::Sensor;
-use etendue_tracer::{Clock, Light, LightMotionSpec, LightSpec, Material, MaterialSpec, Modulation, ModulationSpec};
+use etendue_tracer::{
+    Clock, Light, LightMotionSpec, LightSpec, Material, MaterialSpec, Modulation, ModulationSpec,
+};
 
 impl SceneFile {
     /// The camera as the file has it, with its exposure from the sensor and its motion in the frame's clock.

@@ -64,9 +64,8 @@ impl LightMotionSpec {
                     let why = "do not move; give two or more, or no `motion`";
                     return Err(Fault::new("offsets", why));
                 }
-                let place = |offset: &[f64; 3]| {
-                    Transform::new(DMat3::IDENTITY, DVec3::from(*offset))
-                };
+                let place =
+                    |offset: &[f64; 3]| Transform::new(DMat3::IDENTITY, DVec3::from(*offset));
                 if let Some(i) = offsets.iter().position(|it| !place(it).is_finite()) {
                     return Err(Fault::new(format!("offsets[{i}]"), "is not finite"));
                 }

@@ -201,8 +201,10 @@ fn lamps(scale: Scale) -> Result<Outcome> {
     const ALBEDO: f64 = 0.8;
     let mut outcome = Outcome::default();
     let samples = scale.pick(64, 4096);
-    let cases: &[(f64, f64)] = scale
-        .pick(&[(1.0, 90.0)], &[(1.0, 0.0), (1.0, 180.0), (1.0, 3600.0), (0.2, 90.0), (0.01, 90.0)]);
+    let cases: &[(f64, f64)] = scale.pick(
+        &[(1.0, 90.0)],
+        &[(1.0, 0.0), (1.0, 180.0), (1.0, 3600.0), (0.2, 90.0), (0.01, 90.0)],
+    );
     for &(side, degrees) in cases {
         let from = DVec3::new(0.6, 0.6, -0.5);
         let due = |k: u32| {

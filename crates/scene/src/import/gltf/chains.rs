@@ -5,8 +5,8 @@ use etendue_geometry::{Link, Transform};
 use super::Reader;
 use super::hierarchy::Scene;
 use super::pose::local;
-use crate::import::error::{Note, NoteKind, push};
 use crate::import::Import;
+use crate::import::error::{Note, NoteKind, push};
 
 /// What each node hangs on.
 pub(super) struct Chains<'a> {
