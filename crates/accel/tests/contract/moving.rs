@@ -406,3 +406,21 @@ fn rays_in_blocks_meet_bodies_at_their_times() {
     // Where two meet, and at outlines, single precision may take the other.
     assert!(met * 200 <= count, "{met} of {count} rays differ");
 }
+
+/// What one more copy that moves takes, of the structure and of the scene: some hundred bytes, whatever its mesh has.
+#[test]
+fn a_copy_that_moves_takes_some_hundred_bytes() {
+    let copies = |count: u32| {
+        let place =
+            |k: u32| Transform::from_trs(DVec3::X * f64::from(k), DQuat::IDENTITY, DVec3::ONE);
+        let steady = Motion::steady(spin(1.0, DVec3::Y, DVec3::ZERO)).expect("sound");
+        let copies = (0..count).map(|k| moved(0, steady.then_inner(&place(k))));
+        at(vec![blob(40)], copies.collect())
+    };
+    let [few, many] = [100, 300].map(copies);
+    for ((name, few), (_, many)) in each_moving(&few).iter().zip(&each_moving(&many)) {
+        let each = (many.report().bytes - few.report().bytes) / 200;
+        let whole = each as usize + size_of::<Motion>() + size_of::<Placement>();
+        assert!(whole < 900, "{name}: {each} of the structure, {whole} in all");
+    }
+}
