@@ -4,17 +4,20 @@
 //! the camera, directions from where those hit, and rays from there to a lamp. For each kind of rays a line is printed:
 //! its name, the ratios of each round of ours, and those of Embree.
 
+use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use etendue_accel::limit::{BareScene, Mode, Packet, Single};
-use etendue_accel::{Accel, BuildOptions, Embree, build_moving};
-use etendue_benches::contest::{Contestant, LimitPackets, LimitSingles, Ours, Query, time};
+use etendue_accel::{Accel, BlockAccel, BuildOptions, Embree, build_moving};
+use etendue_benches::contest::{
+    Contestant, LimitPackets, LimitSingles, Query, Worker, thread_time, time,
+};
 use etendue_benches::meshes::Random;
 use etendue_benches::rays::{BATCH, View};
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Detail, Geometry, HitBatch, HitPrecision, RayBatch};
+use etendue_geometry::{Detail, Geometry, HitBatch, RayBatch, RayBlocks};
 use etendue_scene::{LoadOptions, Scene, SceneFile, Wanted};
 
 /// Of how many batches of the camera's rays one is traced.
@@ -46,10 +49,60 @@ fn load(path: &str) -> Result<Scene> {
     Ok(file.load(Wanted::NOTHING, &LoadOptions::default())?)
 }
 
-fn light(mut rays: RayBatch, from_surface: bool) -> RayBatch {
-    rays.precision = HitPrecision::Single;
-    rays.from_surface = from_surface;
-    rays
+/// Ours, as light is traced: in blocks.
+struct InBlocks<'a> {
+    blocks: &'a dyn BlockAccel,
+    /// Of each batch.
+    rays: Vec<RayBlocks>,
+    times: Vec<Vec<f64>>,
+    query: Query,
+    is_coherent: bool,
+}
+
+impl<'a> InBlocks<'a> {
+    fn of(accel: &'a dyn Accel, batches: &[RayBatch], query: Query) -> Result<Self> {
+        let blocks = accel.blocks().context("the scene is not traced in blocks")?;
+        let convert = |rays: &RayBatch| {
+            let mut converted = RayBlocks::default();
+            blocks.convert(rays, &mut converted);
+            converted
+        };
+        let times = batches.iter().map(|rays| rays.times().to_vec()).collect();
+        let is_coherent = batches[0].coherent;
+        let rays = batches.iter().map(convert).collect();
+        Ok(Self { blocks, rays, times, query, is_coherent })
+    }
+}
+
+impl Contestant for InBlocks<'_> {
+    fn rays(&self) -> usize {
+        self.rays.len() * BATCH
+    }
+
+    fn worker(&self) -> Worker<'_> {
+        /// As many as other contestants trace between two looks at the clock.
+        const CHUNK: usize = 16;
+        let mut records: Vec<RayBlocks> = Vec::new();
+        Box::new(move |chunk| {
+            let own = chunk * CHUNK..self.rays.len().min((chunk + 1) * CHUNK);
+            records.clear();
+            records.extend_from_slice(&self.rays[own.clone()]);
+            let start = thread_time();
+            for (rays, times) in records.iter_mut().zip(&self.times[own]) {
+                let rays = rays.blocks_mut();
+                match self.query {
+                    Query::Closest => {
+                        self.blocks.closest_of_blocks(rays, times, self.is_coherent);
+                    }
+                    Query::Occluded => {
+                        self.blocks.occluded_of_blocks(rays, times, self.is_coherent);
+                    }
+                }
+            }
+            black_box(&records);
+            thread_time() - start
+        })
+    }
 }
 
 /// Directions from where rays hit, and rays from there to a lamp.
@@ -70,7 +123,7 @@ fn onward(accel: &dyn Accel, from: &[RayBatch]) -> [Vec<RayBatch>; 2] {
             both[1].push_between(start, way / length, 0.0, length);
             if both[0].len() == BATCH {
                 for (done, open) in batches.iter_mut().zip(&mut both) {
-                    done.push(light(std::mem::take(open), true));
+                    done.push(std::mem::take(open));
                 }
             }
         }
@@ -101,7 +154,7 @@ fn main() -> Result<()> {
     let rooms = [Room::of(&still.geometry, [0.0; 2])?, Room::of(&moving.geometry, exposure)?];
     let view = View { from: DVec3::new(0.0, 1.0, 4.9), look_at: DVec3::Y, fov: 36.0 };
     let camera = view.samples().into_iter().step_by(THINNED);
-    let camera: Vec<RayBatch> = camera.map(|rays| light(rays, false)).collect();
+    let camera: Vec<RayBatch> = camera.collect();
     let [bounces, shadows] = onward(&*rooms[0].accel, &camera);
     let kinds = [
         ("samples of the camera", camera, Query::Closest),
@@ -113,16 +166,17 @@ fn main() -> Result<()> {
         let packets = sets.each_ref().map(|batches| Packet::of(batches));
         let singles = sets.each_ref().map(|batches| Single::of(batches));
         let is_coherent = batches[0].coherent;
+        let of = |k: usize| InBlocks::of(&*rooms[k].accel, &sets[k], query);
+        let ours = [of(0)?, of(1)?];
         let mut ratios = [Vec::new(), Vec::new()];
         for _ in 0..rounds {
             let mut seconds = [[0.0; 2]; 2];
             for k in 0..2 {
-                let (room, scene) = (&rooms[k], &rooms[k].bare);
-                let ours = Ours { accel: &*room.accel, batches: &sets[k], query };
+                let scene = &rooms[k].bare;
                 let in_packets = LimitPackets { scene, packets: &packets[k], query };
                 let one_by_one = LimitSingles { scene, singles: &singles[k], query };
                 let limit: &dyn Contestant = if is_coherent { &in_packets } else { &one_by_one };
-                seconds[k] = [time(&ours, 1, 1), time(limit, 1, 1)];
+                seconds[k] = [time(&ours[k], 1, 1), time(limit, 1, 1)];
             }
             for (who, ratios) in ratios.iter_mut().enumerate() {
                 ratios.push(seconds[1][who] / seconds[0][who]);

@@ -206,33 +206,6 @@ mod tests {
         light_precision(&scene, samples).0
     }
 
-    /// What flies so far while the shutter is open that f32 cannot tell its triangles apart is hit in f64, and the plan
-    /// says why; at a hundredth of the speed f32 does.
-    #[test]
-    #[cfg(feature = "embree")]
-    fn speeds_that_outrun_single_precision_take_double() {
-        let planned = |object: bool, speed: f64| {
-            let velocity = json!({ "type": "velocity", "velocity": [speed, 0, 0] });
-            let mut camera = json!({ "type": "pinhole", "shutter": { "exposure": 1 },
-                                     "pose": { "from": [0, 0, 4], "look_at": [0, 0, 0] } });
-            let mut ball = json!({ "shape": "sphere", "triangles": 2000 });
-            let moving = if object { &mut ball } else { &mut camera };
-            moving["motion"] = velocity;
-            let scene = json!({ "tracer": { "type": "path" }, "camera": camera, "objects": [ball],
-                                "render": { "accel": "embree" } });
-            let opener = &LoadOptions::default().opener;
-            let file = SceneFile::from_json(opener, std::path::Path::new("."), scene).unwrap();
-            let layers = file.spec.all_layers();
-            light_precision(&file.load(wanted(&layers), &LoadOptions::default()).unwrap(), 64)
-        };
-        for object in [true, false] {
-            let (precision, why) = planned(object, 1e6);
-            assert_eq!(precision, HitPrecision::Double, "{why}");
-            assert!(why.contains("while things move as far as 1.0e6 m away"), "{why}");
-            assert_eq!(planned(object, 1.0).0, HitPrecision::Single);
-        }
-    }
-
     #[test]
     #[cfg(feature = "embree")]
     fn single_precision_is_chosen_where_its_error_is_lost() {
