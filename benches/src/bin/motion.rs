@@ -12,12 +12,12 @@ use anyhow::{Context, Result};
 use etendue_accel::limit::{BareScene, Mode, Packet, Single};
 use etendue_accel::{Accel, BlockAccel, BuildOptions, Embree, build_moving};
 use etendue_benches::contest::{
-    Contestant, LimitPackets, LimitSingles, Query, Worker, thread_time, time,
+    Contestant, LimitPackets, LimitSingles, Ours, Query, Worker, thread_time, time,
 };
 use etendue_benches::meshes::Random;
 use etendue_benches::rays::{BATCH, View};
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Detail, Geometry, HitBatch, RayBatch, RayBlocks};
+use etendue_geometry::{Detail, Geometry, HitBatch, HitPrecision, RayBatch, RayBlocks};
 use etendue_scene::{LoadOptions, Scene, SceneFile, Wanted};
 
 /// Of how many batches of the camera's rays one is traced.
@@ -49,7 +49,7 @@ fn load(path: &str) -> Result<Scene> {
     Ok(file.load(Wanted::NOTHING, &LoadOptions::default())?)
 }
 
-/// Ours, as light is traced: in blocks.
+/// Ours in blocks, as light is traced where it can be.
 struct InBlocks<'a> {
     blocks: &'a dyn BlockAccel,
     /// Of each batch.
@@ -60,8 +60,7 @@ struct InBlocks<'a> {
 }
 
 impl<'a> InBlocks<'a> {
-    fn of(accel: &'a dyn Accel, batches: &[RayBatch], query: Query) -> Result<Self> {
-        let blocks = accel.blocks().context("the scene is not traced in blocks")?;
+    fn of(blocks: &'a dyn BlockAccel, batches: &[RayBatch], query: Query) -> Self {
         let convert = |rays: &RayBatch| {
             let mut converted = RayBlocks::default();
             blocks.convert(rays, &mut converted);
@@ -70,8 +69,27 @@ impl<'a> InBlocks<'a> {
         let times = batches.iter().map(|rays| rays.times().to_vec()).collect();
         let is_coherent = batches[0].coherent;
         let rays = batches.iter().map(convert).collect();
-        Ok(Self { blocks, rays, times, query, is_coherent })
+        Self { blocks, rays, times, query, is_coherent }
     }
+}
+
+/// Ours as light is traced: in blocks, or in batches where there are instances of Embree's.
+fn ours<'a>(
+    accel: &'a dyn Accel,
+    batches: &'a [RayBatch],
+    query: Query,
+) -> Box<dyn Contestant + 'a> {
+    match accel.blocks() {
+        Some(blocks) => Box::new(InBlocks::of(blocks, batches, query)),
+        None => Box::new(Ours { accel, batches, query }),
+    }
+}
+
+/// Of the precision of light.
+fn light(mut rays: RayBatch, from_surface: bool) -> RayBatch {
+    rays.precision = HitPrecision::Single;
+    rays.from_surface = from_surface;
+    rays
 }
 
 impl Contestant for InBlocks<'_> {
@@ -123,7 +141,7 @@ fn onward(accel: &dyn Accel, from: &[RayBatch]) -> [Vec<RayBatch>; 2] {
             both[1].push_between(start, way / length, 0.0, length);
             if both[0].len() == BATCH {
                 for (done, open) in batches.iter_mut().zip(&mut both) {
-                    done.push(std::mem::take(open));
+                    done.push(light(std::mem::take(open), true));
                 }
             }
         }
@@ -154,7 +172,7 @@ fn main() -> Result<()> {
     let rooms = [Room::of(&still.geometry, [0.0; 2])?, Room::of(&moving.geometry, exposure)?];
     let view = View { from: DVec3::new(0.0, 1.0, 4.9), look_at: DVec3::Y, fov: 36.0 };
     let camera = view.samples().into_iter().step_by(THINNED);
-    let camera: Vec<RayBatch> = camera.collect();
+    let camera: Vec<RayBatch> = camera.map(|rays| light(rays, false)).collect();
     let [bounces, shadows] = onward(&*rooms[0].accel, &camera);
     let kinds = [
         ("samples of the camera", camera, Query::Closest),
@@ -166,8 +184,7 @@ fn main() -> Result<()> {
         let packets = sets.each_ref().map(|batches| Packet::of(batches));
         let singles = sets.each_ref().map(|batches| Single::of(batches));
         let is_coherent = batches[0].coherent;
-        let of = |k: usize| InBlocks::of(&*rooms[k].accel, &sets[k], query);
-        let ours = [of(0)?, of(1)?];
+        let ours = [0, 1].map(|k| ours(&*rooms[k].accel, &sets[k], query));
         let mut ratios = [Vec::new(), Vec::new()];
         for _ in 0..rounds {
             let mut seconds = [[0.0; 2]; 2];
@@ -176,7 +193,7 @@ fn main() -> Result<()> {
                 let in_packets = LimitPackets { scene, packets: &packets[k], query };
                 let one_by_one = LimitSingles { scene, singles: &singles[k], query };
                 let limit: &dyn Contestant = if is_coherent { &in_packets } else { &one_by_one };
-                seconds[k] = [time(&ours[k], 1, 1), time(limit, 1, 1)];
+                seconds[k] = [time(&*ours[k], 1, 1), time(limit, 1, 1)];
             }
             for (who, ratios) in ratios.iter_mut().enumerate() {
                 ratios.push(seconds[1][who] / seconds[0][who]);

@@ -31,14 +31,14 @@ pub(crate) fn light_precision(scene: &Scene, samples: u32) -> (HitPrecision, Str
     }
     // By how much f32 misplaces rays, against the smallest triangle and what noise hides.
     let bounds = scene.geometry.loose_bounds_within(scene.camera.exposure_span());
-    let camera = camera_reach(scene);
+    let [nearest, camera] = camera_reach(scene);
     let offset = offset(bounds, camera);
     let noise = scene.accuracy.path_noise / f64::from(samples).sqrt();
     let Some((least, edge)) = smallest(scene) else {
         return (HitPrecision::Single, "there is nothing to hit".to_owned());
     };
     let far = match reach(bounds).max(camera) {
-        most if most > 2.0 * reach(scene.geometry.loose_bounds()).max(still_camera(scene)) => {
+        most if most > 2.0 * reach(scene.geometry.loose_bounds()).max(nearest) => {
             format!(" while things move as far as {most:.1e} m away")
         }
         _ => String::new(),
@@ -125,16 +125,13 @@ fn reach(bounds: Bounds) -> f64 {
     if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).length() }
 }
 
-/// How far from the world's origin the camera is at the frame's time (m).
-fn still_camera(scene: &Scene) -> f64 {
-    scene.camera.pose().position.length()
-}
-
-/// The same of its places when its shutter opens and closes, too: of what moves along a line, the farthest.
-fn camera_reach(scene: &Scene) -> f64 {
-    let ends =
-        scene.camera.exposure_span().map(|time| scene.camera.pose_at(time).position.length());
-    ends.into_iter().fold(still_camera(scene), f64::max)
+/// How far from the world's origin the camera is (m), the least and the most of when its shutter opens and closes: of what
+/// moves along a line, the most of all.
+fn camera_reach(scene: &Scene) -> [f64; 2] {
+    let [open, close] = scene.camera.exposure_span();
+    let away = |time: f64| scene.camera.pose_at(time).position.length();
+    let (first, last) = (away(open), away(close));
+    [first.min(last), first.max(last)]
 }
 
 /// How far apart (m) the chief rays of two pixels in the middle of the picture are at `distance` (m) from the
