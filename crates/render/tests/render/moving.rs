@@ -272,9 +272,9 @@ fn speeds_that_outrun_single_precision_take_double() {
                                  "pose": { "from": [0, 0, 4], "look_at": [0, 0, 0] } });
         let mut ball = json!({ "shape": "sphere", "triangles": 2000 });
         if object {
-            ball["motion"] = velocity
+            ball["motion"] = velocity;
         } else {
-            camera["motion"] = velocity
+            camera["motion"] = velocity;
         }
         let scene = json!({ "etendue": 1, "tracer": { "type": "path" }, "camera": camera, "objects": [ball],
                             "render": { "accel": "embree" } });
