@@ -168,7 +168,7 @@ bench-bands: setup
 	python3 benches/bands.py $(ARGS)
 
 bench-time: setup
-	cargo build --release -p etendue-cli
+	cargo build --release -p etendue-cli -p etendue-benches
 	python3 benches/motion.py $(ARGS)
 
 bench-gaps: setup

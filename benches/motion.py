@@ -2,8 +2,9 @@
 how many times as long a sample takes as in the same room standing still.
 
 All are rendered in turn, and the median of the ratios of all rounds counts. The time is the processor time of a render of many
-samples less that of one of few, so that start, models and structures do not count. The table goes into docs/time.md.
-`--command` names another build than the release one.
+samples less that of one of few, so that start, models and structures do not count. A second table has what motion costs
+the caster of rays alone, beside Embree's own motion blur of the same things on the same rays (`benches/src/bin/motion.rs`). Both
+go into docs/time.md. `--command` names another build than the release one; the program `motion` is looked for beside it.
 """
 
 import argparse
@@ -95,6 +96,31 @@ def scenes(side):
             "a morph of 7200 triangles plays": scene(camera | shutter, [playing])}
 
 
+# What is compared with Embree's own motion blur: how many times as long as Embree's ratio ours may be.
+NEAR = 1.1
+
+
+def caster(command, all_scenes, rounds, folder):
+    """Rows of what motion costs the caster of rays, and Embree's own motion blur."""
+    lines = ["| moves | rays | ours | Embree's own | ours over Embree's | goal |", "|---|---|---|---|---|---|"]
+    for name, beside, _ in COMPARED[2:]:
+        paths = [folder / "still.json", folder / "moving.json"]
+        for path, key in zip(paths, [beside, name]):
+            path.write_text(json.dumps(all_scenes[key]))
+        words = [command.parent / "motion", rounds, *paths]
+        done = subprocess.run(list(map(str, words)), capture_output=True, text=True)
+        if done.returncode != 0:
+            raise SystemExit(done.stderr.strip())
+        for line in done.stdout.splitlines():
+            rays, ours, theirs = json.loads(line)
+            ratios = [a / b for a, b in zip(ours, theirs)]
+            verdict = f"{NEAR}, {'met' if statistics.median(ratios) <= NEAR else '**missed**'}"
+            lines.append(f"| {name} | {rays} | {section.spread(ours, 2)} | {section.spread(theirs, 2)} | "
+                         f"{section.spread(ratios, 2)} | {verdict} |")
+            print(lines[-1], flush=True)
+    return lines
+
+
 def seconds(command, spec, samples, folder):
     """Processor time of a render."""
     path = folder / "scene.json"
@@ -133,6 +159,12 @@ def main():
         verdict = "" if goal is None else f"{goal}, {'met' if statistics.median(ratios) <= goal else '**missed**'}"
         lines.append(f"| {name} | {beside} | {section.spread(ratios, 2)} | {verdict} |")
         print(lines[-1], flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        folder = Path(folder)
+        model(folder)
+        lines += ["", "What motion costs the caster of rays alone, and Embree's own motion blur of the same things on the same rays, each beside "
+                  "its own time where all stands still:", ""]
+        lines += caster(arguments.command, all_scenes, arguments.rounds, folder)
     section.put(ROOT / "docs" / "time.md", "motion", "\n".join(lines))
 
 

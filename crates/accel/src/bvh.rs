@@ -251,13 +251,13 @@ impl BlockAccel for Bvh {
         }
     }
 
-    fn closest_of_blocks(&self, blocks: &mut [RayBlock], _coherent: bool) {
+    fn closest_of_blocks(&self, blocks: &mut [RayBlock], _times: &[f64], _coherent: bool) {
         let Some(few) = &self.few else { return };
         few.closest_of_blocks(blocks);
         settle_blocks(&self.coplanar, &self.geometry, few.origin(), blocks);
     }
 
-    fn occluded_of_blocks(&self, blocks: &mut [RayBlock], _coherent: bool) {
+    fn occluded_of_blocks(&self, blocks: &mut [RayBlock], _times: &[f64], _coherent: bool) {
         if let Some(few) = &self.few {
             few.occluded_of_blocks(blocks);
         }

@@ -499,7 +499,7 @@ impl BlockAccel for Embree {
         });
     }
 
-    fn closest_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool) {
+    fn closest_of_blocks(&self, blocks: &mut [RayBlock], _times: &[f64], coherent: bool) {
         match &self.few {
             Some(few) => few.closest_of_blocks(blocks),
             None => {
@@ -510,7 +510,7 @@ impl BlockAccel for Embree {
         settle_blocks(&self.coplanar, self.scene.geometry(), self.frame.origin, blocks);
     }
 
-    fn occluded_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool) {
+    fn occluded_of_blocks(&self, blocks: &mut [RayBlock], _times: &[f64], coherent: bool) {
         match &self.few {
             Some(few) => few.occluded_of_blocks(blocks),
             None => self.scene.occluded_of_blocks(blocks, coherent),

@@ -102,10 +102,16 @@ pub trait BlockAccel: Send + Sync + fmt::Debug {
 
     /// The closest hit of each ray: its distance goes to `t_max`, with placement, triangle, weights and normal.
     /// Rays of one block that run close together are faster as `coherent`.
-    fn closest_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool);
+    /// `times` (s from the frame's time) are those of the rays, block by block; all are at 0 where there are none.
+    fn closest_of_blocks(&self, blocks: &mut [RayBlock], times: &[f64], coherent: bool);
 
     /// Whether anything is between the ends of each ray ([`RayBlock::is_blocked`]).
-    fn occluded_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool);
+    fn occluded_of_blocks(&self, blocks: &mut [RayBlock], times: &[f64], coherent: bool);
+
+    /// Whether what rays hit depends on their times.
+    fn has_times(&self) -> bool {
+        false
+    }
 }
 
 /// How a structure was built.

@@ -6,6 +6,8 @@
 //! mesh that changes its shape, [one of its own](crate::deforming). A ray asks it when it meets the box that the body sweeps while the shutter is open. All backends agree, and
 //! hits are as exact as those of a body that stands at the place where it is at the ray's time.
 
+mod blocks;
+
 use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
@@ -20,8 +22,9 @@ use etendue_geometry::{
 use crate::deforming::Deforming;
 use crate::exact::Boxes;
 use crate::parts::{LocalRay, outward};
+use crate::single::F32Frame;
 use crate::tree::{LeafSize, MAX_DEPTH, Ref, Tree};
-use crate::{Accel, BuildError, BuildOptions, BuildReport, BuildWatch, Counts};
+use crate::{Accel, BlockAccel, BuildError, BuildOptions, BuildReport, BuildWatch, Counts};
 
 /// Builds a structure of one backend.
 pub type Build<'a> = &'a dyn Fn(Arc<Geometry>, &BuildOptions) -> Result<Box<dyn Accel>, BuildError>;
@@ -55,8 +58,11 @@ struct Moving {
     /// Of each placement, whether it moves.
     moves: Vec<bool>,
     exposure: [f64; 2],
-    /// The largest coordinate of a box (m).
+    /// The largest coordinate of a box (m), and the box around all of them (m, world).
     size: f64,
+    swept: Bounds,
+    /// The frame of rays in blocks.
+    frame: Option<F32Frame>,
     report: BuildReport,
 }
 
@@ -68,6 +74,8 @@ struct Body {
     motion: Arc<Motion>,
     /// Where it is while the shutter is open (m, world).
     swept: Bounds,
+    /// The box of its mesh, in its frame (m).
+    local: Bounds,
     /// Its mesh changes its shape, so that its structure wants times.
     deforms: bool,
 }
@@ -78,7 +86,7 @@ struct Carried {
     rays: RayBatch,
     hits: HitBatch,
     blocked: Vec<bool>,
-    /// Of each, which of the batch it is, how long its unit is in the body's frame, and what carries normals back.
+    /// Of each, which of the batch it is, how long its unit is in the body's frame, and what turns and stretches that.
     from: Vec<(usize, f64, DMat3)>,
 }
 
@@ -129,9 +137,10 @@ impl Moving {
             let swept = motion.swept(bounds, options.exposure);
             let placement = u32::try_from(i).unwrap_or(MISS);
             let motion = Arc::clone(motion);
-            bodies.push(Body { placement, shape, motion, swept, deforms });
+            bodies.push(Body { placement, shape, motion, swept, local: bounds, deforms });
         }
         let tree = over(&bodies, options)?;
+        let standing = still.loose_bounds();
         let still = build(Arc::new(still), options)?;
         let mut report = still.report();
         for shape in &shapes {
@@ -145,7 +154,9 @@ impl Moving {
         let far = |body: &Body| body.swept.min.abs().max(body.swept.max.abs()).max_element();
         let size = bodies.iter().map(far).fold(0.0, f64::max);
         let exposure = options.exposure;
-        Ok(Self { still, shapes, bodies, tree, moves, exposure, size, report })
+        let swept = bodies.iter().fold(Bounds::EMPTY, |all, body| all.union(body.swept));
+        let frame = Self::frame_of_blocks(&*still, standing, swept);
+        Ok(Self { still, shapes, bodies, tree, moves, exposure, size, swept, frame, report })
     }
 
     /// The rays with those triangles at their ends that stand still.
@@ -224,6 +235,9 @@ impl Moving {
             }
             let start = inverse * -place.offset_from(origin);
             let limits = limits.map(|t| t * stretch);
+            if !meets(body.local, start, turned / stretch, limits) {
+                continue;
+            }
             match rays.endpoint_triangles() {
                 None => {
                     carried.rays.push_between(start, turned / stretch, limits[0], limits[1]);
@@ -237,13 +251,18 @@ impl Moving {
                     carried.rays.push_between_triangles(start, turned / stretch, limits, ends);
                 }
             }
-            carried.from.push((i, stretch, place.normal_matrix()));
+            carried.from.push((i, stretch, place.linear));
         }
         if body.deforms {
             let times = carried.from.iter().map(|(i, ..)| rays.time(*i));
             carried.rays.set_times(times);
         }
     }
+}
+
+/// A normal of a body's frame in the world (unit), by what turns and stretches the frame.
+fn turned_normal(linear: DMat3, normal: DVec3) -> DVec3 {
+    (Transform::new(linear, DVec3::ZERO).normal_matrix() * normal).normalize_or_zero()
 }
 
 /// A body's number.
@@ -263,7 +282,17 @@ fn over(bodies: &[Body], options: &BuildOptions) -> Result<Boxes, BuildError> {
 }
 
 /// Whether a ray meets a box at distances (m) within `limits`, rounding in favour of yes.
-fn meets(bounds: Bounds, origin: DVec3, direction: DVec3, [t_min, t_max]: [f64; 2]) -> bool {
+fn meets(bounds: Bounds, origin: DVec3, direction: DVec3, limits: [f64; 2]) -> bool {
+    span(bounds, origin, direction, limits).is_some()
+}
+
+/// From where to where a ray is in a box within `limits` (m), rounding in favour of longer.
+fn span(
+    bounds: Bounds,
+    origin: DVec3,
+    direction: DVec3,
+    [t_min, t_max]: [f64; 2],
+) -> Option<[f64; 2]> {
     let size = origin.abs().max(bounds.min.abs()).max(bounds.max.abs()).max_element();
     let pad = DVec3::splat(8.0 * f64::EPSILON * size);
     let (low, high) = (bounds.min - pad - origin, bounds.max + pad - origin);
@@ -271,7 +300,7 @@ fn meets(bounds: Bounds, origin: DVec3, direction: DVec3, [t_min, t_max]: [f64; 
     for axis in 0..3 {
         if direction[axis] == 0.0 {
             if low[axis] > 0.0 || high[axis] < 0.0 {
-                return false;
+                return None;
             }
             continue;
         }
@@ -279,74 +308,142 @@ fn meets(bounds: Bounds, origin: DVec3, direction: DVec3, [t_min, t_max]: [f64; 
         near = near.max(a.min(b));
         far = far.min(a.max(b));
     }
-    near <= far + ONE_PLACE * (size + far.abs())
+    (near <= far + ONE_PLACE * (size + far.abs())).then_some([near, far])
+}
+
+/// What a ray hit of a body, in the world.
+struct BodyHit {
+    t: f64,
+    triangle: u32,
+    weights: [f64; 2],
+    /// Unit, on the front.
+    normal: DVec3,
+}
+
+/// How far ray `i` looks, which hit what `hits` say: as far as what is in the same place.
+fn reach(rays: &RayBatch, hits: &HitBatch, i: usize, one_place: f64) -> f64 {
+    let t = hits.t[i].min(rays.t_max()[i]);
+    let t = t + one_place * t.abs().max(rays.origin(i).abs().max_element());
+    if t.is_nan() { f64::INFINITY } else { t.min(rays.t_max()[i]) }
+}
+
+impl Moving {
+    /// Puts bodies into hits that are nearer than what those have.
+    fn closest_of_bodies(&self, rays: &RayBatch, hits: &mut HitBatch) {
+        let mut carried = Carried::default();
+        carried.hits.detail = hits.detail;
+        let near = self.near(rays, |i| Some(reach(rays, hits, i, ONE_PLACE)));
+        for near in near.chunk_by(|a, b| a[0] == b[0]) {
+            let body = &self.bodies[near[0][0] as usize];
+            self.closest_of_body((body, near), rays, hits, (ONE_PLACE, &mut carried));
+        }
+    }
+
+    /// The same of one body, for the rays `near` it.
+    fn closest_of_body(
+        &self,
+        (body, near): (&Body, &[[u32; 2]]),
+        rays: &RayBatch,
+        hits: &mut HitBatch,
+        (one_place, carried): (f64, &mut Carried),
+    ) {
+        self.carry((body, near), rays, |i| Some(reach(rays, hits, i, one_place)), carried);
+        if carried.from.is_empty() {
+            return;
+        }
+        self.shapes[body.shape].closest(&carried.rays, &mut carried.hits);
+        let found = &carried.hits;
+        for (k, &(i, stretch, linear)) in carried.from.iter().enumerate() {
+            if !found.is_hit(k) {
+                continue;
+            }
+            let has_surface = hits.detail == Detail::Surface;
+            let hit = || BodyHit {
+                t: found.t[k] / stretch,
+                triangle: found.triangle[k],
+                weights: if has_surface { [found.u[k], found.v[k]] } else { [0.0; 2] },
+                normal: match has_surface {
+                    true => turned_normal(linear, found.normal(k)),
+                    false => DVec3::ZERO,
+                },
+            };
+            self.offer(body, rays, hits, (i, found.t[k] / stretch, one_place), hit);
+        }
+    }
+
+    /// Takes a hit on a body at a distance if it is nearer than what ray `i` has, or later in the same place.
+    fn offer(
+        &self,
+        body: &Body,
+        rays: &RayBatch,
+        hits: &mut HitBatch,
+        (i, t, one_place): (usize, f64, f64),
+        hit: impl FnOnce() -> BodyHit,
+    ) {
+        let size = t.abs().max(rays.origin(i).abs().max_element());
+        let known = hits.placement[i];
+        let is_nearer = match hits.is_hit(i) {
+            false => true,
+            true if body.placement > known => t <= hits.t[i] + one_place * size,
+            true => t < hits.t[i] - one_place * size,
+        };
+        if !is_nearer {
+            return;
+        }
+        let BodyHit { t, triangle, weights, normal } = hit();
+        (hits.t[i], hits.placement[i], hits.triangle[i]) = (t, body.placement, triangle);
+        if hits.detail == Detail::Surface {
+            [hits.u[i], hits.v[i]] = weights;
+            for axis in 0..3 {
+                hits.normal[axis][i] = normal[axis];
+            }
+        }
+    }
+
+    /// Says of rays that nothing blocked yet whether bodies do.
+    fn occluded_by_bodies(&self, rays: &RayBatch, blocked: &mut [bool]) {
+        let mut carried = Carried::default();
+        let near = self.near(rays, |i| (!blocked[i]).then(|| rays.t_max()[i]));
+        for near in near.chunk_by(|a, b| a[0] == b[0]) {
+            let body = &self.bodies[near[0][0] as usize];
+            self.occluded_by_body((body, near), rays, blocked, &mut carried);
+        }
+    }
+
+    /// The same of one body, for the rays `near` it.
+    fn occluded_by_body(
+        &self,
+        (body, near): (&Body, &[[u32; 2]]),
+        rays: &RayBatch,
+        blocked: &mut [bool],
+        carried: &mut Carried,
+    ) {
+        let reach = |i: usize| (!blocked[i]).then(|| rays.t_max()[i]);
+        self.carry((body, near), rays, reach, carried);
+        if carried.from.is_empty() {
+            return;
+        }
+        self.shapes[body.shape].occluded(&carried.rays, &mut carried.blocked);
+        for (&(i, ..), &is_blocked) in carried.from.iter().zip(&carried.blocked) {
+            blocked[i] |= is_blocked;
+        }
+    }
 }
 
 impl Accel for Moving {
     fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
         self.still.closest(&self.with_still_ends(rays), hits);
         hits.set_times(rays.times());
-        let mut carried = Carried::default();
-        carried.hits.detail = hits.detail;
-        let reach = |hits: &HitBatch, i: usize| {
-            let t = hits.t[i].min(rays.t_max()[i]);
-            // As far as what is in the same place.
-            let t = t + ONE_PLACE * t.abs().max(rays.origin(i).abs().max_element());
-            Some(if t.is_nan() { f64::INFINITY } else { t.min(rays.t_max()[i]) })
-        };
-        let near = self.near(rays, |i| reach(hits, i));
-        for near in near.chunk_by(|a, b| a[0] == b[0]) {
-            let body = &self.bodies[near[0][0] as usize];
-            self.carry((body, near), rays, |i| reach(hits, i), &mut carried);
-            if carried.from.is_empty() {
-                continue;
-            }
-            self.shapes[body.shape].closest(&carried.rays, &mut carried.hits);
-            for (k, &(i, stretch, turn)) in carried.from.iter().enumerate() {
-                let found = &carried.hits;
-                if !found.is_hit(k) {
-                    continue;
-                }
-                let t = found.t[k] / stretch;
-                let size = t.abs().max(rays.origin(i).abs().max_element());
-                let is_nearer = match hits.is_hit(i) {
-                    false => true,
-                    true if body.placement > hits.placement[i] => t <= hits.t[i] + ONE_PLACE * size,
-                    true => t < hits.t[i] - ONE_PLACE * size,
-                };
-                if !is_nearer {
-                    continue;
-                }
-                hits.t[i] = t;
-                hits.placement[i] = body.placement;
-                hits.triangle[i] = found.triangle[k];
-                if hits.detail == Detail::Surface {
-                    (hits.u[i], hits.v[i]) = (found.u[k], found.v[k]);
-                    let normal = (turn * found.normal(k)).normalize_or_zero();
-                    for axis in 0..3 {
-                        hits.normal[axis][i] = normal[axis];
-                    }
-                }
-            }
-        }
+        self.closest_of_bodies(rays, hits);
     }
 
     fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>) {
         self.still.occluded(&self.with_still_ends(rays), blocked);
-        let mut carried = Carried::default();
-        let reach = |blocked: &[bool], i: usize| (!blocked[i]).then(|| rays.t_max()[i]);
-        let near = self.near(rays, |i| reach(blocked, i));
-        for near in near.chunk_by(|a, b| a[0] == b[0]) {
-            let body = &self.bodies[near[0][0] as usize];
-            self.carry((body, near), rays, |i| reach(blocked, i), &mut carried);
-            if carried.from.is_empty() {
-                continue;
-            }
-            self.shapes[body.shape].occluded(&carried.rays, &mut carried.blocked);
-            for (&(i, ..), &is_blocked) in carried.from.iter().zip(&carried.blocked) {
-                blocked[i] |= is_blocked;
-            }
-        }
+        self.occluded_by_bodies(rays, blocked);
+    }
+
+    fn blocks(&self) -> Option<&dyn BlockAccel> {
+        self.frame.is_some().then_some(self)
     }
 
     fn report(&self) -> BuildReport {

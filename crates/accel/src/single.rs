@@ -62,6 +62,19 @@ impl F32Frame {
         let radius = (bounds.diagonal() * 0.5).max(f64::from(f32::MIN_POSITIVE));
         let centre = bounds.centre();
         let origin = if centre.length() > NEAR * radius { centre } else { DVec3::ZERO };
+        Self::relative(bounds, origin)
+    }
+
+    /// The frame of a box with this origin (m, world); `None` where that is too far away.
+    pub(crate) fn around(bounds: Bounds, origin: DVec3) -> Option<Self> {
+        let radius = 0.5 * bounds.diagonal();
+        let is_near = (bounds.centre() - origin).length() <= NEAR * radius;
+        (radius > 0.0 && is_near).then(|| Self::relative(bounds, origin))
+    }
+
+    fn relative(bounds: Bounds, origin: DVec3) -> Self {
+        let radius = (bounds.diagonal() * 0.5).max(f64::from(f32::MIN_POSITIVE));
+        let centre = bounds.centre();
         let half = if bounds.is_empty() {
             DVec3::NEG_INFINITY
         } else {

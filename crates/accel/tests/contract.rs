@@ -408,7 +408,7 @@ fn surfaces_in_one_plane_follow_the_rule_in_blocks() {
             compared += 1;
             let mut rays = RayBlocks::default();
             blocks.convert(&batch, &mut rays);
-            blocks.closest_of_blocks(rays.blocks_mut(), false);
+            blocks.closest_of_blocks(rays.blocks_mut(), &[], false);
             for i in 0..batch.len() {
                 let (block, lane) = (&rays.blocks()[i / LANES], i % LANES);
                 let own = [block.placement[lane], block.triangle[lane]];

@@ -22,7 +22,7 @@ pub struct RayBlock {
     pub t_min: Floats,
     /// Unit directions, one array an axis.
     pub direction: [Floats; 3],
-    /// Embree's time of each ray: 0.
+    /// Embree's time of each ray: 0, for its structures stand still.
     pub time: Floats,
     /// Farthest distances that count (m): nothing is traced where this is not above 0. A closest hit puts its
     /// distance here, occlusion puts −∞.

@@ -265,6 +265,16 @@ impl Link {
         }
     }
 
+    /// Whether directions in it change between some times (s).
+    pub(crate) fn turns_within(&self, times: [f64; 2]) -> bool {
+        match self {
+            Self::Fixed(_) => false,
+            Self::Joint(joint) => {
+                joint.rotation.moves_within(times) || joint.scale.moves_within(times)
+            }
+        }
+    }
+
     /// A bound of the factor by which any length is stretched.
     pub(crate) fn stretch(&self) -> f64 {
         match self {

@@ -44,7 +44,7 @@ pub use coplanar::Coplanar;
 pub use hermite::Interpolation;
 pub use joint::{Between, Joint, Link, Track};
 pub use mesh::{Buffer, Mesh, Positions, Vertices};
-pub use motion::{Motion, MotionError, Steady};
+pub use motion::{Motion, MotionError, Steady, Sweep};
 pub use steps::{Moment, Steps, StepsError};
 pub use transform::Transform;
 pub use world::{AreaTest, Bounds, Geometry, Placement, is_degenerate};

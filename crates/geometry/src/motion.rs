@@ -237,13 +237,31 @@ impl Motion {
         inner * links * self.keys.iter().map(Key::stretch).reduce(f64::max).unwrap_or(1.0)
     }
 
+    /// Whether directions of the body change between two times of `exposure` (s, first and last): whether it turns or is
+    /// stretched, and does not go alone.
+    #[must_use]
+    pub fn turns_within(&self, [open, close]: [f64; 2]) -> bool {
+        let overlaps = |a: &Key, b: &Key| a.time < close && b.time > open;
+        let differ = |a: &Key, b: &Key| a.rotation != b.rotation || a.scale != b.scale;
+        open < close
+            && (self.steady.is_some_and(|steady| steady.rate != 0.0)
+                || self.keys.windows(2).any(|k| overlaps(&k[0], &k[1]) && differ(&k[0], &k[1]))
+                || self.links.iter().any(|link| link.turns_within([open, close])))
+    }
+
     /// A box (m) around all places of the box `local` between the times of `exposure` (s, first and last).
     #[must_use]
-    pub fn swept(&self, local: Bounds, [open, close]: [f64; 2]) -> Bounds {
-        let mut swept = Bounds::EMPTY;
+    pub fn swept(&self, local: Bounds, exposure: [f64; 2]) -> Bounds {
         if local.is_empty() {
-            return swept;
+            return Bounds::EMPTY;
         }
+        self.sweep(local, exposure).around(&local.corners())
+    }
+
+    /// The places between the times of `exposure` (s, first and last) of what is in the box `local`.
+    #[must_use]
+    pub fn sweep(&self, local: Bounds, [open, close]: [f64; 2]) -> Sweep {
+        let mut sweep = Sweep { places: Vec::new() };
         let mut times = vec![open];
         let keys = self.keys.iter().map(|key| key.time);
         let keys = keys.chain(self.links.iter().flat_map(Link::times));
@@ -255,17 +273,11 @@ impl Motion {
         for span in times.windows(2) {
             let step = (span[1] - span[0]) / f64::from(STEPS);
             // Each point is within half a step of one of the places looked at.
-            let pad = DVec3::splat(self.speed(reach, [span[0], span[1]]) * step * 0.5);
-            for i in 0..=STEPS {
-                let place = self.at(span[0] + step * f64::from(i));
-                for corner in local.corners().map(|p| place.point(p)) {
-                    let size = corner.abs() * (4.0 * f64::EPSILON);
-                    swept.include(corner - pad - size);
-                    swept.include(corner + pad + size);
-                }
-            }
+            let pad = self.speed(reach, [span[0], span[1]]) * step * 0.5;
+            let places = (0..=STEPS).map(|i| (self.at(span[0] + step * f64::from(i)), pad));
+            sweep.places.extend(places);
         }
-        swept
+        sweep
     }
 
     /// At most how fast (m/s) any point moves that `inner` brings within `reach` (m) of its frame's origin.
@@ -321,6 +333,29 @@ impl Motion {
             rotation: turned(a.rotation, b.rotation, s),
             scale: a.scale.lerp(b.scale, s),
         }
+    }
+}
+
+/// Where a body is while it moves, step by step.
+#[derive(Debug, Clone)]
+pub struct Sweep {
+    /// Places, and how far any point is from there at most until half of the way to the next one (m).
+    places: Vec<(Transform, f64)>,
+}
+
+impl Sweep {
+    /// A box (m) around all places of what is between some points of the body (m, in its frame).
+    #[must_use]
+    pub fn around(&self, points: &[DVec3]) -> Bounds {
+        let mut swept = Bounds::EMPTY;
+        for (place, pad) in &self.places {
+            for point in points.iter().map(|&p| place.point(p)) {
+                let size = point.abs() * (4.0 * f64::EPSILON);
+                swept.include(point - *pad - size);
+                swept.include(point + *pad + size);
+            }
+        }
+        swept
     }
 }
 

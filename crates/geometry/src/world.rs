@@ -138,6 +138,16 @@ impl Geometry {
         boxes.fold(Bounds::EMPTY, Bounds::union)
     }
 
+    /// The same box with all places of what moves between the times of `exposure` (s from the frame's time, first and
+    /// last).
+    #[must_use]
+    pub fn loose_bounds_within(&self, exposure: [f64; 2]) -> Bounds {
+        let swept = |(i, motion): (usize, &Arc<Motion>)| {
+            motion.swept(self.mesh_of(&self.placements[i]).bounds_at_all_times(), exposure)
+        };
+        self.moving_within(exposure).map(swept).fold(self.loose_bounds(), Bounds::union)
+    }
+
     /// The same box around one placement (m); empty where nothing has an area.
     #[must_use]
     pub fn loose_bounds_of(&self, placement: &Placement) -> Bounds {

@@ -2,7 +2,7 @@
 //! under its smallest things, in f64 where it is not.
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{HitPrecision, RayBatch};
+use etendue_geometry::{Bounds, HitPrecision, RayBatch};
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, LightPrecision};
 use etendue_tracer::spawn::roundings;
@@ -30,12 +30,20 @@ pub(crate) fn light_precision(scene: &Scene, samples: u32) -> (HitPrecision, Str
         return (HitPrecision::Double, "the accelerator works in f64".to_owned());
     }
     // By how much f32 misplaces rays, against the smallest triangle and what noise hides.
-    let offset = offset(scene);
+    let bounds = scene.geometry.loose_bounds_within(scene.camera.exposure_span());
+    let [nearest, camera] = camera_reach(scene);
+    let offset = offset(bounds, camera);
     let noise = scene.accuracy.path_noise / f64::from(samples).sqrt();
     let Some((least, edge)) = smallest(scene) else {
         return (HitPrecision::Single, "there is nothing to hit".to_owned());
     };
-    let words = |than: &str| format!("f32 misplaces rays by up to {offset:.1e} m, {than}");
+    let far = match reach(bounds).max(camera) {
+        most if most > 2.0 * reach(scene.geometry.loose_bounds()).max(nearest) => {
+            format!(" while things move as far as {most:.1e} m away")
+        }
+        _ => String::new(),
+    };
+    let words = |than: &str| format!("f32 misplaces rays by up to {offset:.1e} m{far}, {than}");
     if offset > scene.accuracy.path_offset_of_edge * edge {
         let why = words(&format!("too much for triangles with edges of {edge:.1e} m"));
         return (HitPrecision::Double, why);
@@ -46,7 +54,7 @@ pub(crate) fn light_precision(scene: &Scene, samples: u32) -> (HitPrecision, Str
         return (HitPrecision::Double, words(&than));
     }
     // Against what a pixel sees.
-    let farthest = farthest(scene);
+    let farthest = reach(bounds).max(camera);
     let pixel = pixel_width(scene, farthest);
     let rounding = f64::from(f32::EPSILON) * farthest;
     if pixel.is_some_and(|pixel| pixel < ROUNDINGS_A_PIXEL * rounding) {
@@ -102,23 +110,28 @@ fn too_thin(scene: &Scene, crossed: &CrossedSurfaces) -> Option<String> {
 }
 
 /// How far (m) rays start off surfaces in f32, at most: what tracing reckons for a hit at the edge of the
-/// scene, seen from the camera.
-fn offset(scene: &Scene) -> f64 {
-    let bounds = scene.geometry.loose_bounds();
+/// scene's `bounds` (m), seen from a camera so far from the world's origin (m).
+fn offset(bounds: Bounds, camera: f64) -> f64 {
     if bounds.is_empty() {
         return 0.0;
     }
-    let farthest = bounds.min.abs().max(bounds.max.abs()).length();
-    let camera = scene.camera.pose().position.length();
+    let farthest = reach(bounds);
     // The hit, the placement's own numbers, and where the ray came from.
     roundings(HitPrecision::Single) * (2.0 * farthest + farthest.max(camera))
 }
 
-/// The farthest from the world's origin that rays come from (m).
-fn farthest(scene: &Scene) -> f64 {
-    let bounds = scene.geometry.loose_bounds();
-    let farthest = bounds.min.abs().max(bounds.max.abs()).length();
-    farthest.max(scene.camera.pose().position.length())
+/// The farthest from the world's origin that anything of a box is (m).
+fn reach(bounds: Bounds) -> f64 {
+    if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).length() }
+}
+
+/// How far from the world's origin the camera is (m), the least and the most of when its shutter opens and closes: of what
+/// moves along a line, the most of all.
+fn camera_reach(scene: &Scene) -> [f64; 2] {
+    let [open, close] = scene.camera.exposure_span();
+    let away = |time: f64| scene.camera.pose_at(time).position.length();
+    let (first, last) = (away(open), away(close));
+    [first.min(last), first.max(last)]
 }
 
 /// How far apart (m) the chief rays of two pixels in the middle of the picture are at `distance` (m) from the

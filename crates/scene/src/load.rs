@@ -78,6 +78,7 @@ impl SceneFile {
         parts.settle_backs(self.spec.cull_backfaces);
         parts.files = instance_files;
         parts.files.extend(own.files);
+        let slot_count = slots.len();
         parts.files.extend(slots.into_iter().flat_map(|slot| slot.files));
         for (index, object) in objects.iter().enumerate() {
             self.check_overrides(&parts, object, index)?;
@@ -95,7 +96,7 @@ impl SceneFile {
         }
         let scene = self.finish(parts, &folder, options, (&budget, kept), since)?;
         kept.sweep();
-        Ok(scene)
+        Ok(Scene { slots: slot_count, ..scene })
     }
 
     /// The folder that the scene's paths start at.
@@ -252,7 +253,9 @@ impl SceneFile {
         let built = self.kept_camera(parts.geometry, &parts.cameras, (folder, options), kept)?;
         let KeptCamera { geometry, camera, origin: camera_origin, files: camera_files, .. } = built;
         let geometry = self.deformed(geometry, &parts.deformers, &camera, budget)?;
-        let things_move = geometry.moving_within(camera.exposure_span()).next().is_some();
+        let span = camera.exposure_span();
+        let things_move = geometry.moving_within(span).next().is_some()
+            || parts.lights.iter().any(|light| light.moves_within(span));
         let camera = camera.among_moving_things(things_move);
         let mut emission = parts.materials.iter().filter_map(|material| material.emission.as_ref());
         let lights_change = parts.lights.iter().any(|light| light.modulation.is_some())
@@ -284,7 +287,7 @@ impl SceneFile {
         notes.extend(self.lens_notes(&camera, options.strictness)?);
         let is_whole = self.spec.serial.is_empty();
         notes.extend(shutter::notes(&camera).into_iter().filter(|_| is_whole));
-        notes.extend(shutter::held(&camera, &geometry, &parts.deformers));
+        notes.extend(shutter::held(&camera, &geometry, &parts.deformers, &parts.lights));
         notes.extend(shutter::dark_lights(&camera, &parts.lights, &parts.materials));
         Ok(Scene {
             path: self.path().to_owned(),
@@ -302,7 +305,7 @@ impl SceneFile {
             camera_origin,
             cameras: parts.cameras,
             picture: self.spec.picture(),
-            slots: self.spec.serial.len(),
+            slots: 0,
             layers: self.spec.all_layers(),
             render: self.spec.render.clone(),
             plan: self.spec.plan,

@@ -74,7 +74,13 @@ impl SceneFile {
             let fault = |Fault { key, why }| self.fault(&below(&at, &key), why);
             let time = self.spec.render.time();
             let mut built = spec.build(&mut supply).map_err(fault)?;
-            built.iter_mut().for_each(|light| start_at(&mut light.modulation, time));
+            let motion = spec.motion().map(|(motion, place)| motion.build(place, time));
+            let below = |Fault { key, why }| self.fault(&format!("{at}.motion.{key}"), why);
+            let motion = motion.transpose().map_err(below)?.map(Arc::new);
+            for light in &mut built {
+                start_at(&mut light.modulation, time);
+                light.motion.clone_from(&motion);
+            }
             let is_sky = |l: &Light| matches!(l.kind, LightKind::Environment { .. });
             if built.iter().any(is_sky) && lights.iter().any(is_sky) {
                 return Err(self.fault(&at, "a second environment; a scene has one at most"));

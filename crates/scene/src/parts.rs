@@ -163,8 +163,9 @@ impl Parts {
             let placed = cameras.filter_map(|camera| SceneCamera::new(camera, first_object, first));
             self.cameras.extend(placed);
         }
-        for copy in &object.world_from_object {
-            self.lights.extend(home.lights.iter().filter_map(|light| light.placed(copy)));
+        for (k, copy) in object.world_from_object.iter().enumerate() {
+            let placed = home.lights.iter().filter_map(|it| it.placed(copy, object.motions.get(k)));
+            self.lights.extend(placed);
         }
         Ok(())
     }

@@ -11,7 +11,8 @@ use serde_json::{Value, json};
 
 use crate::SceneError;
 use crate::error::not_found;
-use crate::file::{PixelsSpec, SceneFile, SlotSpec, join_index, texts_of};
+use crate::file::{CameraPath, FramesSpec, PixelsSpec, SceneFile, SlotSpec, join_index, texts_of};
+use crate::frames::listed;
 use etendue_camera::{Shutter, ShutterKind};
 
 /// The most slots of an exposure.
@@ -33,6 +34,8 @@ pub struct Slot {
     pub file: SceneFile,
     /// What each pixel takes of its light.
     pub pixels: Option<PixelShares>,
+    /// Which of the scene's `serial` it is of.
+    number: usize,
     /// The files that are named for it.
     pub(crate) files: Vec<PathBuf>,
 }
@@ -68,10 +71,59 @@ impl SceneFile {
         let folder = self.open_folder(opener)?;
         let shutter = self.serial_shutter()?;
         let spans = self.spans(&shutter)?;
-        let slot = |(number, (slot, span)): (usize, (&SlotSpec, &[f64; 2]))| {
-            self.slot(&folder, (number, slot), *span, &shutter)
+        let mut all = Vec::with_capacity(slots.len());
+        for (number, (slot, [start, end])) in slots.iter().zip(spans).enumerate() {
+            let frames = self.frames_of(opener, number, slot)?;
+            let each = (end - start) / frames.len() as f64;
+            for (k, settings) in frames.iter().enumerate() {
+                if all.len() == MOST_SLOTS {
+                    let why = format!("more than {MOST_SLOTS} slots with the frames along them");
+                    return Err(self.fault("serial", why));
+                }
+                let from = start + each * k as f64;
+                let to = if k + 1 == frames.len() { end } else { from + each };
+                let seed = self.spec.render.seed.wrapping_add(all.len() as u64);
+                let own = (number, slot, seed);
+                all.push(self.slot(&folder, own, ([from, to], settings), &shutter)?);
+            }
+        }
+        Ok(all)
+    }
+
+    /// What is set for each of the frames that a slot is divided among: nothing for one in one piece.
+    fn frames_of(
+        &self,
+        opener: &Opener,
+        number: usize,
+        slot: &SlotSpec,
+    ) -> Result<Vec<Vec<(String, Value)>>, SceneError> {
+        let Some(along) = &slot.along else { return Ok(vec![Vec::new()]) };
+        let at = format!("{}.along", join_index("serial", number));
+        let frames = match along {
+            FramesSpec::List(list) => listed(list),
+            FramesSpec::Path(path @ (CameraPath::Poses { .. } | CameraPath::Trajectory { .. })) => {
+                // What a user should know of the file is told of `frames`; here it is read for its poses alone.
+                let start = || Err(self.fault(&at, "starts from nothing"));
+                self.along(&at, path, (opener, &mut Vec::new()), start)?
+            }
+            FramesSpec::Path(_) => {
+                let why = "goes by the scene as it is loaded, which a slot does not know; give `poses`, a `trajectory`, \
+                           or a list of settings";
+                return Err(self.fault(&at, why));
+            }
         };
-        slots.iter().zip(&spans).enumerate().map(slot).collect()
+        if frames.is_empty() {
+            return Err(self.fault(&at, "there is no frame; leave `along` out for one slot"));
+        }
+        for frame in &frames {
+            for (path, _) in &frame.settings {
+                if let Some(why) = not_of_a_slot(path) {
+                    let at = join_index(&at, frame.number);
+                    return Err(self.fault(&at, format!("`{path}` {why}")));
+                }
+            }
+        }
+        Ok(frames.into_iter().map(|frame| frame.settings).collect())
     }
 
     /// Refuses slots by what they say alone.
@@ -166,8 +218,8 @@ impl SceneFile {
     fn slot(
         &self,
         folder: &InputFolder,
-        (number, slot): (usize, &SlotSpec),
-        [start, end]: [f64; 2],
+        (number, slot, seed): (usize, &SlotSpec, u64),
+        ([start, end], frame): ([f64; 2], &[(String, Value)]),
         shutter: &Shutter,
     ) -> Result<Slot, SceneError> {
         let at = join_index("serial", number);
@@ -183,7 +235,6 @@ impl SceneFile {
             let why = "the shutter is closed all the time that it lasts, by `camera.shutter`";
             return Err(self.fault(&at, why));
         }
-        let seed = self.spec.render.seed.wrapping_add(number as u64);
         let own = [
             ("serial", json!([])),
             ("render.seed", json!(seed)),
@@ -193,7 +244,10 @@ impl SceneFile {
             ("camera.shutter.chip", Value::Null),
         ];
         let own = own.into_iter().map(|(path, value)| (path.to_owned(), value.to_string()));
-        let set = slot.set.iter().map(|(path, value)| (path.clone(), value.to_string()));
+        let frame = frame.iter().map(|(path, value)| (path, value));
+        let set = slot.set.iter().chain(frame);
+        let words: Vec<&str> = set.clone().flat_map(|(_, value)| texts_of(value)).collect();
+        let set = set.map(|(path, value)| (path.clone(), value.to_string()));
         let settings: Vec<(String, String)> = own.chain(set).collect();
         let file = self.with(&settings).map_err(|error| {
             let why = match error {
@@ -203,7 +257,11 @@ impl SceneFile {
             self.fault(&at, why)
         })?;
         // Any word that it sets may be a file's name; those that are none are not found.
-        let words = slot.set.values().flat_map(texts_of);
+        let trajectory = match &slot.along {
+            Some(FramesSpec::Path(CameraPath::Trajectory { file, .. })) => Some(file.as_str()),
+            _ => None,
+        };
+        let words = words.into_iter().chain(trajectory);
         let mut files: Vec<PathBuf> =
             words.filter_map(|word| Some(folder.find(word).ok()?.path)).collect();
         let pixels = match &slot.pixels {
@@ -221,7 +279,7 @@ impl SceneFile {
                 Some(PixelShares { size, values })
             }
         };
-        Ok(Slot { file, pixels, files })
+        Ok(Slot { file, pixels, number, files })
     }
 
     /// Refuses numbers of pixels that are not those of a picture of `resolution`.
@@ -230,8 +288,10 @@ impl SceneFile {
         slots: &[Slot],
         resolution: [u32; 2],
     ) -> Result<(), SceneError> {
-        for (number, (slot, spec)) in slots.iter().zip(&self.spec.serial).enumerate() {
-            let (Some(pixels), Some(PixelsSpec::File(written))) = (&slot.pixels, &spec.pixels)
+        for slot in slots {
+            let (number, spec) = (slot.number, self.spec.serial.get(slot.number));
+            let (Some(pixels), Some(PixelsSpec::File(written))) =
+                (&slot.pixels, spec.and_then(|spec| spec.pixels.as_ref()))
             else {
                 continue;
             };

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Bounds, Placement};
+use etendue_geometry::{Bounds, Geometry, Mesh, Placement, Sweep};
 
 use crate::light::mean;
 use crate::light_tree::Cluster;
@@ -27,10 +27,10 @@ pub(crate) struct Shape {
 }
 
 impl Shape {
-    /// The triangle of a spot; `None` without area.
+    /// The triangle of a spot at its time; `None` without area.
     fn of(spot: &SurfacePoint<'_>) -> Option<Self> {
-        let place = &spot.placement.world_from_mesh;
-        let [a, b, c] = spot.mesh.corners(spot.triangle);
+        let place = &spot.placement.world_from_mesh_at(spot.time);
+        let [a, b, c] = spot.mesh.corners_at(spot.triangle, spot.time);
         let edges = [place.linear * (b - a), place.linear * (c - a)];
         let cross = edges[0].cross(edges[1]);
         let length = cross.length();
@@ -55,14 +55,15 @@ pub(crate) struct AreaLight {
 }
 
 impl AreaLight {
-    /// Triangle `id`; `None` when it does not shine or has no area.
-    pub(crate) fn new(around: &SceneView<'_>, id: [u32; 2]) -> Option<Self> {
+    /// Triangle `id` at a time (s from the frame's time); `None` when it does not shine or has no area.
+    pub(crate) fn at(around: &SceneView<'_>, id: [u32; 2], time: f64) -> Option<Self> {
         let placement = around.geometry.placements.get(id[0] as usize)?;
-        let spot = SurfacePoint::corner(around.geometry, placement, id[1] as usize);
+        let corner = SurfacePoint::corner(around.geometry, placement, id[1] as usize);
+        let spot = SurfacePoint { time, ..corner };
         let material = around.material(&spot)?;
         let emission = material.emission.as_ref()?;
-        let place = &placement.world_from_mesh;
-        let [corner, ..] = spot.mesh.corners(spot.triangle);
+        let place = &placement.world_from_mesh_at(time);
+        let [corner, ..] = spot.mesh.corners_at(spot.triangle, time);
         let (turned, far) = (place.linear * corner, place.translation);
         // Knuth's sum of two numbers without loss.
         let sum = turned + far;
@@ -91,27 +92,85 @@ impl AreaLight {
     }
 }
 
-/// Where an emissive triangle of some power (W) is and shines; `None` without area.
-pub(crate) fn cluster(around: &SceneView<'_>, id: [u32; 2], power: f64) -> Option<Cluster> {
-    let AreaLight { corner, shape, two_sided, .. } = AreaLight::new(around, id)?;
+/// Where an emissive triangle of some power (W) is and shines, at a time (s from the frame's time) or, of a placement
+/// that moves, while it does; `None` without area.
+pub(crate) fn cluster(
+    around: &SceneView<'_>,
+    (id, time): ([u32; 2], f64),
+    power: f64,
+    way: Option<&LampWay<'_>>,
+) -> Option<Cluster> {
+    let AreaLight { corner, shape, two_sided, .. } = AreaLight::at(around, id, time)?;
     let mut bounds = Bounds::default();
     for offset in [DVec3::ZERO, shape.edges[0], shape.edges[1]] {
         bounds.include(corner[0] + offset);
     }
-    let (cone, sides) = if two_sided { (PI, 2.0) } else { (0.0, 1.0) };
+    let sides = if two_sided { 2.0 } else { 1.0 };
+    let (cone, bounds) = match way {
+        None => (if two_sided { PI } else { 0.0 }, bounds),
+        Some(way) => (if two_sided || way.turns { PI } else { 0.0 }, way.around(id[1] as usize)),
+    };
     let intensity = power / (sides * PI);
     Some(Cluster { bounds, axis: shape.normal, cone, reach: FRAC_PI_2, intensity })
 }
 
-/// Power of an emissive triangle (W), by the paint at its middle and corners.
+/// Corners of triangles at steps of a mesh that changes its shape, beyond which all are taken to be anywhere in its box.
+const MOST_CORNERS: usize = 1 << 16;
+
+/// The way of a placement that shines and moves.
+pub(crate) struct LampWay<'a> {
+    mesh: &'a Mesh,
+    sweep: Sweep,
+    /// Its triangles do not shine the same way all the time.
+    turns: bool,
+    /// The box around all of them (m, world), where that is taken for the box of each.
+    whole: Option<Bounds>,
+}
+
+impl<'a> LampWay<'a> {
+    /// That of a placement between two times (s from the frame's time); `None` of one without a motion.
+    pub(crate) fn of(
+        geometry: &'a Geometry,
+        placement: &Placement,
+        span: [f64; 2],
+    ) -> Option<Self> {
+        let motion = placement.motion.as_ref()?;
+        let mesh = geometry.mesh_of(placement);
+        let local = mesh.bounds_at_all_times();
+        if local.is_empty() {
+            return None;
+        }
+        let sweep = motion.sweep(local, span);
+        let turns = motion.turns_within(span) || mesh.steps.is_some();
+        let steps = mesh.steps.as_ref().map_or(1, |steps| steps.times().len());
+        let are_many = steps > 1 && steps * mesh.triangles.len() > MOST_CORNERS;
+        let whole = are_many.then(|| sweep.around(&local.corners()));
+        Some(Self { mesh, sweep, turns, whole })
+    }
+
+    /// A box (m, world) around all places of a triangle.
+    fn around(&self, triangle: usize) -> Bounds {
+        let places = |at: f64| self.mesh.corners_at(triangle, at);
+        self.whole.unwrap_or_else(|| match &self.mesh.steps {
+            None => self.sweep.around(&places(0.0)),
+            Some(steps) => {
+                let corners: Vec<DVec3> = steps.times().iter().flat_map(|&at| places(at)).collect();
+                self.sweep.around(&corners)
+            }
+        })
+    }
+}
+
+/// Power of an emissive triangle (W) at a time (s from the frame's time), by the paint at its middle and corners.
 pub(crate) fn triangle_power(
     around: &SceneView<'_>,
-    placement: &Placement,
-    triangle: usize,
+    (placement, triangle): (&Placement, usize),
     material: &Material,
+    time: f64,
 ) -> f64 {
     let Some(emission) = &material.emission else { return 0.0 };
-    let spot = SurfacePoint::corner(around.geometry, placement, triangle);
+    let corner = SurfacePoint::corner(around.geometry, placement, triangle);
+    let spot = SurfacePoint { time, ..corner };
     let Some(Shape { area, .. }) = Shape::of(&spot) else { return 0.0 };
     let third = 1.0 / 3.0;
     let weights = [[third, third, third], [0.8, 0.1, 0.1], [0.1, 0.8, 0.1], [0.1, 0.1, 0.8]];

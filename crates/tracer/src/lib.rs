@@ -73,7 +73,7 @@ pub use placed::PlacedSurfaces;
 pub use projector::Projector;
 pub use reference::{Needs, SceneView, SurfacePoint, Traced, View};
 pub use scattering::{Absorption, Glass, Ior, Scattering};
-pub use spec::{LightSpec, MaterialSpec};
+pub use spec::{LightMotionSpec, LightSpec, MaterialSpec};
 pub use spectral::Spectral;
 pub use texture::{Image, ImageSource, Texture, TextureUse};
 pub use tint::{Conductor, ConductorId, SceneCurve, Tint, TintSpectrum};

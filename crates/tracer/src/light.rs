@@ -3,8 +3,8 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
-use etendue_geometry::Bounds;
 use etendue_geometry::glam::{DMat3, DVec3};
+use etendue_geometry::{Bounds, Motion, Transform};
 use etendue_spectrum::Curve;
 
 use crate::goniometric::Goniometric;
@@ -17,8 +17,10 @@ use crate::{ClearSky, Color, Cube, LightGroup, Modulation, TextureUse};
 /// A light of the scene, beside its emissive surfaces.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Light {
-    /// Where the light goes.
+    /// Where the light goes, in the frame of [`Self::motion`] where it has one.
     pub kind: LightKind,
+    /// How it moves, from that frame to the world, in the frame's clock; `None` when it stands still.
+    pub motion: Option<Arc<Motion>>,
     /// Radiant intensity, irradiance or radiance, by the kind: linear RGB.
     pub color: Color,
     /// The spectrum that the colour multiplies; equal energy when absent.
@@ -39,6 +41,7 @@ impl Light {
             turn: DMat3::IDENTITY,
             visible: true,
         },
+        motion: None,
         color: [1.0; 3],
         illuminant: None,
         spectrum: None,
@@ -49,7 +52,36 @@ impl Light {
     /// A light of equal energy that is of no group, and as strong all the time.
     #[must_use]
     pub fn steady(kind: LightKind, color: Color) -> Self {
-        Self { kind, color, illuminant: None, spectrum: None, group: None, modulation: None }
+        let (illuminant, spectrum, group) = (None, None, None);
+        Self { kind, motion: None, color, illuminant, spectrum, group, modulation: None }
+    }
+
+    /// Where it stands at a time (s from the frame's time).
+    #[inline(always)]
+    pub(crate) fn stand(&self, time: f64) -> Stand {
+        Stand(self.motion.as_ref().map(|motion| motion.at(time)))
+    }
+
+    /// Whether it moves between two times (s from the frame's time).
+    #[must_use]
+    pub fn moves_within(&self, span: [f64; 2]) -> bool {
+        self.motion.as_ref().is_some_and(|motion| motion.moves_within(span))
+    }
+
+    /// Where it is and shines within `span` (s from the frame's time), with an intensity (W/sr); `None` of what is far
+    /// away.
+    pub(crate) fn cluster(
+        &self,
+        intensity: f64,
+        (around, span): (&SceneView<'_>, [f64; 2]),
+    ) -> Option<Cluster> {
+        let own = self.kind.cluster(intensity, around)?;
+        let Some(motion) = &self.motion else { return Some(own) };
+        let bounds = motion.swept(own.bounds, span);
+        if motion.turns_within(span) {
+            return Some(Cluster { bounds, cone: PI, reach: FRAC_PI_2, ..own });
+        }
+        Some(Cluster { bounds, axis: self.stand(span[0]).direction(own.axis), ..own })
     }
 
     /// Its intensity in the middle, or of what is measured the mean, over the three colours (W/sr).
@@ -90,6 +122,31 @@ impl Light {
             | LightKind::Projector(_)
             | LightKind::Environment { .. } => None,
         }
+    }
+}
+
+/// Where a light stands at some time, which may move.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stand(Option<Transform>);
+
+impl Stand {
+    /// A point of its frame (m), in the world.
+    #[inline(always)]
+    pub(crate) fn point(&self, own: DVec3) -> DVec3 {
+        self.0.map_or(own, |place| place.point(own))
+    }
+
+    /// A direction of its frame, in the world (unit).
+    #[inline(always)]
+    pub(crate) fn direction(&self, own: DVec3) -> DVec3 {
+        let turned = |place: Transform| (place.linear * own).try_normalize();
+        self.0.map_or(own, |place| turned(place).unwrap_or(own))
+    }
+
+    /// A point of the world (m), in its frame.
+    #[inline(always)]
+    pub(crate) fn seen(&self, from: DVec3) -> DVec3 {
+        self.0.map_or(from, |place| place.linear.inverse() * -place.offset_from(from))
     }
 }
 

@@ -9,7 +9,7 @@ use etendue_spectrum::{NoOverlap, Outside};
 
 use crate::environment::EnvironmentMap;
 use crate::group::Groups;
-use crate::lamps::{self, AreaLight, triangle_power};
+use crate::lamps::{self, AreaLight, LampWay, triangle_power};
 use crate::light::{EnvironmentImage, Light, LightKind, irradiance, power, spot_falloff};
 use crate::light_sampler::{Candidate, Choices, LightSampler, Receiver};
 use crate::material::Alpha;
@@ -31,13 +31,11 @@ pub struct Lights {
     tints: Vec<EmissionBands>,
     /// For each placement, where its triangles start among the choices.
     first: Vec<Option<u32>>,
-    /// Some emissive surface moves: no place on it is chosen, and paths come upon it by themselves.
-    has_moving: bool,
-    /// Placement and triangle of each emissive triangle that stands still, behind the lights.
+    /// Placement and triangle of each emissive triangle, behind the lights.
     triangles: Vec<[u32; 2]>,
     sampler: LightSampler,
-    /// The emissive triangles where they are at most [`lamps::MOST`] (`None` without area), and what those
-    /// that shine alike all over give off in all bands.
+    /// The emissive triangles where they are at most [`lamps::MOST`] (`None` of one without area, and of one that moves),
+    /// and what those that shine alike all over give off in all bands.
     lamps: Vec<Option<AreaLight>>,
     lamp_bands: Vec<f64>,
     groups: Groups,
@@ -77,7 +75,7 @@ impl EmissionBands {
 impl Lights {
     /// The lights of a scene whose emissive surfaces are those of `around`; `map` is the decoded
     /// image of the environment, if it has one. Those that change with time are chosen by their mean over `span`, in
-    /// which the camera sees light (s from the frame's time).
+    /// which the camera sees light (s from the frame's time), and those that move by where they are within it.
     ///
     /// # Errors
     ///
@@ -106,7 +104,7 @@ impl Lights {
         let sky = Sky::of(lights, map, spectral)?;
         let candidate = |light: &Light| {
             let mean = mean(&light.modulation);
-            match light.kind.cluster(mean * light.intensity(), around) {
+            match light.cluster(mean * light.intensity(), (around, span)) {
                 Some(cluster) => Candidate::near(mean * power(light, around), cluster),
                 None => Candidate::Far { irradiance: mean * irradiance(light, sky.as_ref()) },
             }
@@ -114,20 +112,20 @@ impl Lights {
         let mut candidates: Vec<Candidate> = lights.iter().map(candidate).collect();
         let mut first = Vec::with_capacity(around.geometry.placements.len());
         let mut triangles = Vec::new();
-        let mut has_moving = false;
         for (number, placement) in (0_u32..).zip(&around.geometry.placements) {
             let material = around.materials.get(placement.material as usize);
             let emits = material.is_some_and(|m| m.emission.is_some());
-            has_moving |= emits && placement.motion.is_some();
-            let emits = emits && placement.motion.is_none();
             first.push(if emits { u32::try_from(candidates.len()).ok() } else { None });
             let Some(material) = material.filter(|_| emits) else { continue };
             let mesh = around.geometry.mesh_of(placement);
             let mean = material.emission.as_ref().map_or(1.0, |e| mean(&e.modulation));
+            // What moves shines as much as in the middle of that time.
+            let way = LampWay::of(around.geometry, placement, span);
+            let time = if way.is_some() { 0.5 * (span[0] + span[1]) } else { 0.0 };
             for triangle in 0..mesh.triangles.len() {
                 let id = [number, u32::try_from(triangle).unwrap_or(u32::MAX)];
-                let power = mean * triangle_power(around, placement, triangle, material);
-                candidates.push(match lamps::cluster(around, id, power) {
+                let power = mean * triangle_power(around, (placement, triangle), material, time);
+                candidates.push(match lamps::cluster(around, (id, time), power, way.as_ref()) {
                     Some(cluster) => Candidate::near(power, cluster),
                     None => Candidate::Dark,
                 });
@@ -156,7 +154,6 @@ impl Lights {
             sky,
             tints,
             first,
-            has_moving,
             triangles,
             sampler,
             lamps,
@@ -222,15 +219,17 @@ impl Lights {
             let spot = SurfacePoint::corner(around.geometry, placement, id[1] as usize);
             self.emitted(around, spectral, &spot, true, bands);
         }
-        self.lamps = self.triangles.iter().map(|&id| AreaLight::new(around, id)).collect();
+        let stands = |id: [u32; 2]| around.geometry.placements[id[0] as usize].motion.is_none();
+        let still = |&id: &[u32; 2]| AreaLight::at(around, id, 0.0).filter(|_| stands(id));
+        self.lamps = self.triangles.iter().map(still).collect();
         self.lamp_bands = bands;
     }
 
-    /// The emissive triangle of a number; `None` without area.
-    fn lamp(&self, around: &SceneView<'_>, number: usize) -> Option<Cow<'_, AreaLight>> {
+    /// The emissive triangle of a number at a time (s from the frame's time); `None` without area.
+    fn lamp(&self, around: &SceneView<'_>, number: usize, time: f64) -> Option<Cow<'_, AreaLight>> {
         match self.lamps.get(number) {
-            Some(lamp) => lamp.as_ref().map(Cow::Borrowed),
-            None => AreaLight::new(around, self.triangles[number]).map(Cow::Owned),
+            Some(Some(lamp)) => Some(Cow::Borrowed(lamp)),
+            _ => AreaLight::at(around, self.triangles[number], time).map(Cow::Owned),
         }
     }
 
@@ -243,7 +242,7 @@ impl Lights {
     /// Whether a ray that nobody aimed may come upon a light: not upon points and parallel light.
     #[must_use]
     pub fn is_hittable(&self) -> bool {
-        self.sky.is_some() || !self.triangles.is_empty() || self.has_moving
+        self.sky.is_some() || !self.triangles.is_empty()
     }
 
     /// Whether a place on one of them is chosen: not on points and parallel light.
@@ -307,14 +306,14 @@ impl Lights {
         &self.bands[light * count..(light + 1) * count]
     }
 
-    /// A place on a light that was [picked](Self::pick) with a chance, by a square; its radiance (of a point its
-    /// intensity) goes to `radiance`.
+    /// A place on a light that was [picked](Self::pick) with a chance, by a square, at a time (s from the frame's time);
+    /// its radiance (of a point its intensity) goes to `radiance`.
     #[inline(always)]
     pub(crate) fn place(
         &self,
         around: &SceneView<'_>,
         spectral: &Spectral,
-        receiver: &Receiver,
+        receiver: (&Receiver, f64),
         (one, square): ((usize, f64), [f64; 2]),
         radiance: &mut [f64],
     ) -> Chosen {
@@ -331,41 +330,47 @@ impl Lights {
         &self,
         around: &SceneView<'_>,
         spectral: &Spectral,
-        receiver: &Receiver,
+        (receiver, time): (&Receiver, f64),
         (index, chance): (usize, f64),
         square: [f64; 2],
         radiance: &mut [f64],
     ) -> Chosen {
         let Some(light) = self.lights.get(index) else {
             let number = index - self.lights.len();
-            return self.place_on_lamp(around, spectral, number, square, chance, radiance).into();
+            let lamp = (number, time);
+            return self.place_on_lamp(around, spectral, lamp, square, chance, radiance).into();
         };
         radiance.copy_from_slice(self.bands_of(index, radiance.len()));
+        let stand = light.stand(time);
         match &light.kind {
-            LightKind::Point(at) => Target::bare(TargetKind::Point, *at, chance).into(),
+            LightKind::Point(at) => {
+                Target::bare(TargetKind::Point, stand.point(*at), chance).into()
+            }
             &LightKind::Spot { at, axis, cos_outer, cos_inner } => {
+                let (at, axis) = (stand.point(at), stand.direction(axis));
                 let cosine = (receiver.point - at).try_normalize().map_or(-1.0, |d| d.dot(axis));
                 let factor = spot_falloff(cosine, cos_outer, cos_inner);
                 radiance.iter_mut().for_each(|band| *band *= factor);
                 (factor > 0.0).then(|| Target::bare(TargetKind::Point, at, chance)).into()
             }
             LightKind::Projector(projector) => {
-                let Some(color) = projector.toward(around, receiver.point) else {
+                let Some(color) = projector.toward(around, stand.seen(receiver.point)) else {
                     return Chosen::Dark;
                 };
                 for (k, band) in radiance.iter_mut().enumerate() {
                     *band *= spectral.band(&color, k);
                 }
-                Target::bare(TargetKind::Point, projector.at, chance).into()
+                Target::bare(TargetKind::Point, stand.point(projector.at), chance).into()
             }
             LightKind::Goniometric(measured) => {
-                let intensity = measured.toward(receiver.point);
+                let intensity = measured.toward(stand.seen(receiver.point));
                 radiance.iter_mut().for_each(|band| *band *= intensity);
-                let place = Target::bare(TargetKind::Point, measured.at, chance);
+                let place = Target::bare(TargetKind::Point, stand.point(measured.at), chance);
                 (intensity > 0.0).then_some(place).into()
             }
             &LightKind::Directional { along, cos_radius } => {
-                let toward = Frame::around(-along).world(cone_direction(square, cos_radius));
+                let toward = Frame::around(-stand.direction(along))
+                    .world(cone_direction(square, cos_radius));
                 Target::bare(TargetKind::Parallel, toward, chance).into()
             }
             LightKind::Environment { image: EnvironmentImage::Constant, .. } => {
@@ -382,12 +387,12 @@ impl Lights {
         &self,
         around: &SceneView<'_>,
         spectral: &Spectral,
-        number: usize,
+        (number, time): (usize, f64),
         square: [f64; 2],
         chance: f64,
         radiance: &mut [f64],
     ) -> Option<Target> {
-        let lamp = self.lamp(around, number)?;
+        let lamp = self.lamp(around, number, time)?;
         let [u, v] = triangle_point(square);
         let count = radiance.len();
         match self.lamp_bands.get(number * count..(number + 1) * count) {
@@ -395,7 +400,7 @@ impl Lights {
             _ => {
                 let placement = &around.geometry.placements[lamp.id[0] as usize];
                 let spot = SurfacePoint::corner(around.geometry, placement, lamp.id[1] as usize);
-                let spot = SurfacePoint { weights: [1.0 - u - v, u, v], ..spot };
+                let spot = SurfacePoint { weights: [1.0 - u - v, u, v], time, ..spot };
                 if !self.emitted(around, spectral, &spot, true, radiance) {
                     return None;
                 }
@@ -476,7 +481,8 @@ impl Lights {
             return 0.0;
         }
         let index = *first as usize + spot.triangle;
-        let Some(lamp) = self.lamp(around, index - self.lights.len()) else { return 0.0 };
+        let number = index - self.lights.len();
+        let Some(lamp) = self.lamp(around, number, spot.time) else { return 0.0 };
         let [_, u, v] = spot.weights;
         let squared = lamp.offset(receiver.point, [u, v]).length_squared();
         let cosine = direction.dot(lamp.shape.normal).abs();

@@ -97,13 +97,13 @@ impl BlockAccel for Timed {
         self.of_blocks().convert(rays, blocks);
     }
 
-    fn closest_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool) {
+    fn closest_of_blocks(&self, blocks: &mut [RayBlock], times: &[f64], coherent: bool) {
         let lanes = blocks.len() * etendue_geometry::block::LANES;
-        self.time(lanes, || self.of_blocks().closest_of_blocks(blocks, coherent));
+        self.time(lanes, || self.of_blocks().closest_of_blocks(blocks, times, coherent));
     }
 
-    fn occluded_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool) {
+    fn occluded_of_blocks(&self, blocks: &mut [RayBlock], times: &[f64], coherent: bool) {
         let lanes = blocks.len() * etendue_geometry::block::LANES;
-        self.time(lanes, || self.of_blocks().occluded_of_blocks(blocks, coherent));
+        self.time(lanes, || self.of_blocks().occluded_of_blocks(blocks, times, coherent));
     }
 }

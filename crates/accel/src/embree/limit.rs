@@ -1,6 +1,8 @@
 //! The limit: Embree's own speed. A loop that hands prepared records to Embree and does nothing else;
 //! robust mode, as `etendue` has it by default, and the same geometry, shared in the same way.
 
+mod motion;
+
 use std::ffi::{CString, c_void};
 use std::fmt;
 use std::ptr;
@@ -24,6 +26,9 @@ pub enum LimitError {
     /// The vertices are not as Embree reads them.
     #[error("mesh \"{0}\" has no padded f32 vertices, so its buffers cannot be shared")]
     Layout(String),
+    /// Something moves as Embree's own motion blur does not have it.
+    #[error("{0}, which Embree's own motion blur does not have")]
+    Motion(String),
 }
 
 /// What Embree holds by its own count.
@@ -39,8 +44,8 @@ pub struct BareScene {
     parts: Vec<sys::RTCScene>,
     device: sys::RTCDevice,
     bytes: Box<Bytes>,
-    /// Owns the buffers that Embree reads.
-    _geometry: Arc<Geometry>,
+    /// Owns the buffers that Embree reads, where those are shared.
+    _geometry: Option<Arc<Geometry>>,
 }
 
 // SAFETY: after `build` the scene is only read, and Embree's queries may be made from any thread;
@@ -91,8 +96,8 @@ impl BareScene {
             let counter: *mut c_void = ptr::from_ref(&*bytes).cast_mut().cast();
             sys::rtcSetDeviceMemoryMonitorFunction(device, Some(count_bytes), counter);
             let scene = new_scene(device, mode);
-            let mut bare =
-                Self { scene, parts: Vec::new(), device, bytes, _geometry: Arc::clone(&geometry) };
+            let owner = Some(Arc::clone(&geometry));
+            let mut bare = Self { scene, parts: Vec::new(), device, bytes, _geometry: owner };
             for (mesh, uses) in geometry.meshes.iter().zip(geometry.uses()) {
                 let part = if uses > 1 { new_scene(device, mode) } else { scene };
                 let shape = new_mesh(device, mesh, mode)?;
@@ -314,6 +319,7 @@ impl Packet {
                 (single.dir_x, single.dir_y, single.dir_z);
             (ray.tnear[lane], ray.tfar[lane], ray.mask[lane]) =
                 (single.tnear, single.tfar, single.mask);
+            ray.time[lane] = single.time;
         }
         packet.hit.geomID = [sys::RTC_INVALID_GEOMETRY_ID; WIDTH];
         packet.hit.instID[0] = [sys::RTC_INVALID_GEOMETRY_ID; WIDTH];
@@ -347,12 +353,13 @@ impl Single {
     fn at(rays: &RayBatch, i: usize) -> Self {
         let (origin, direction) = (rays.origin(i).as_vec3(), rays.direction(i).as_vec3());
         #[expect(clippy::cast_possible_truncation, reason = "Embree's rays are single precision")]
-        let (tnear, tfar) = (rays.t_min()[i] as f32, rays.t_max()[i] as f32);
+        let [tnear, tfar, time] =
+            [rays.t_min()[i], rays.t_max()[i], rays.time(i)].map(|x| x as f32);
         let mut query = sys::RTCRayHit::default();
         let ray = &mut query.ray;
         [ray.org_x, ray.org_y, ray.org_z] = origin.to_array();
         [ray.dir_x, ray.dir_y, ray.dir_z] = direction.to_array();
-        (ray.tnear, ray.tfar, ray.mask) = (tnear, tfar, u32::MAX);
+        (ray.tnear, ray.tfar, ray.mask, ray.time) = (tnear, tfar, u32::MAX, time);
         query.hit.geomID = sys::RTC_INVALID_GEOMETRY_ID;
         query.hit.instID[0] = sys::RTC_INVALID_GEOMETRY_ID;
         Self(query)

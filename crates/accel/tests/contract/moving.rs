@@ -4,9 +4,11 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use etendue_accel::{Accel, BuildOptions, build_moving};
+use etendue_geometry::block::LANES;
 use etendue_geometry::glam::{DMat3, DQuat, DVec3};
 use etendue_geometry::{
-    Geometry, HitBatch, Interpolation, MISS, Motion, Placement, RayBatch, Steady, Transform,
+    Geometry, HitBatch, Interpolation, MISS, Motion, Placement, RayBatch, RayBlock, RayBlocks,
+    Steady, Transform,
 };
 
 use super::meshes::{Random, at, blob, mesh, placed, rays, scene, soup};
@@ -341,5 +343,84 @@ fn many_bodies_that_move_are_each_where_they_are() {
         }
         // Rays through edges go to either side by the last digit, and Embree's f32 loses some at outlines.
         assert!(differ <= 6 && hit > 600, "{name}: {differ} differ, {hit} hit");
+    }
+}
+
+/// Rays in blocks, of which each has a time of its own, meet what batches meet: among bodies and things that stand, from
+/// near and from far away, also where what stands is a small part of the whole.
+#[test]
+fn rays_in_blocks_meet_bodies_at_their_times() {
+    let mut few = (*bodies()).clone();
+    few.placements.retain(|placement| placement.motion.is_some());
+    few.placements.push(Placement::of(
+        2,
+        Transform::from_trs(DVec3::new(0.2, 0.1, 0.0), DQuat::IDENTITY, DVec3::splat(0.05)),
+    ));
+    let (mut compared, mut met, mut count) = (0, 0, 0);
+    for (geometry, away) in [(bodies(), 1.0), (bodies(), 60.0), (Arc::new(few), 20.0)] {
+        for (name, accel) in each_moving(&geometry) {
+            let Some(blocks) = accel.blocks() else { continue };
+            assert!(blocks.has_times());
+            compared += 1;
+            let mut random = Random(31);
+            let mut batch = RayBatch::default();
+            for _ in 0..2000 {
+                let [from, to] = [random.cube(), random.cube()];
+                let from = from.normalize() * (1.5 * away);
+                batch.push(from, (0.8 * to - from).normalize());
+            }
+            let times: Vec<f64> = (0..batch.len()).map(|_| 0.4 + 0.5 * random.cube().x).collect();
+            batch.set_times(times.iter().copied());
+            let due = closest(&*accel, &batch);
+            let mut rays = RayBlocks::default();
+            blocks.convert(&batch, &mut rays);
+            let start = |block: &RayBlock, lane: usize| {
+                blocks.origin() + DVec3::from(block.origin.map(|axis| f64::from(axis[lane])))
+            };
+            let mut shadows = rays.clone();
+            blocks.closest_of_blocks(rays.blocks_mut(), &times, false);
+            blocks.occluded_of_blocks(shadows.blocks_mut(), &times, false);
+            for i in 0..batch.len() {
+                let (block, lane) = (&rays.blocks()[i / LANES], i % LANES);
+                let own = [block.placement[lane], block.triangle[lane]];
+                count += 1;
+                if own != [due.placement[i], due.triangle[i]] {
+                    met += 1;
+                    continue;
+                }
+                let is_blocked = shadows.blocks()[i / LANES].is_blocked(lane);
+                assert_eq!(is_blocked, due.is_hit(i), "{name} {away}: ray {i}");
+                if !due.is_hit(i) {
+                    continue;
+                }
+                // f32 at some metres from the scene, where blocks start, over the cosine of the most grazing ray.
+                let t =
+                    (start(block, lane) - batch.origin(i)).length() + f64::from(block.t_max[lane]);
+                assert!((t - due.t[i]).abs() < 5e-4, "{name} {away}: {t}, not {}", due.t[i]);
+                let normal = DVec3::from(block.normal.map(|axis| f64::from(axis[lane])));
+                assert!(normal.normalize().distance(due.normal(i)) < 1e-5, "{name} {away}: {i}");
+            }
+        }
+    }
+    assert!(compared >= 3, "{compared}");
+    // Where two meet, and at outlines, single precision may take the other.
+    assert!(met * 200 <= count, "{met} of {count} rays differ");
+}
+
+/// What one more copy that moves takes, of the structure and of the scene: some hundred bytes, whatever its mesh has.
+#[test]
+fn a_copy_that_moves_takes_some_hundred_bytes() {
+    let copies = |count: u32| {
+        let place =
+            |k: u32| Transform::from_trs(DVec3::X * f64::from(k), DQuat::IDENTITY, DVec3::ONE);
+        let steady = Motion::steady(spin(1.0, DVec3::Y, DVec3::ZERO)).expect("sound");
+        let copies = (0..count).map(|k| moved(0, steady.then_inner(&place(k))));
+        at(vec![blob(40)], copies.collect())
+    };
+    let [few, many] = [100, 300].map(copies);
+    for ((name, few), (_, many)) in each_moving(&few).iter().zip(&each_moving(&many)) {
+        let each = (many.report().bytes - few.report().bytes) / 200;
+        let whole = each as usize + size_of::<Motion>() + size_of::<Placement>();
+        assert!(whole < 900, "{name}: {each} of the structure, {whole} in all");
     }
 }

@@ -9,7 +9,7 @@ const LENGTH: f64 = 0.01;
 
 /// A model put together: its numbers are in a file beside it.
 #[derive(Default)]
-struct Model {
+pub(crate) struct Model {
     bytes: Vec<u8>,
     views: Vec<Value>,
     accessors: Vec<Value>,
@@ -28,7 +28,7 @@ impl Model {
         self.accessors.len() - 1
     }
 
-    fn floats<const N: usize>(&mut self, values: &[[f32; N]]) -> usize {
+    pub(crate) fn floats<const N: usize>(&mut self, values: &[[f32; N]]) -> usize {
         let bytes: Vec<u8> = values.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
         self.accessor(5126, ["", "SCALAR", "VEC2", "VEC3", "VEC4"][N], values.len(), &bytes)
     }
@@ -38,7 +38,7 @@ impl Model {
         self.accessor(5125, "SCALAR", values.len(), &bytes)
     }
 
-    fn write(self, bench: &Bench, mut document: Value) {
+    pub(crate) fn write(self, bench: &Bench, mut document: Value) {
         document["asset"] = json!({ "version": "2.0" });
         document["accessors"] = json!(self.accessors);
         document["bufferViews"] = json!(self.views);

@@ -36,6 +36,7 @@ mod memory; // refused before it is taken
 mod messages; // what is wrong, in plain words
 mod models; // simpler models of a lens, and OpenCV's fitted to it
 mod motion; // what moves while the shutter is open, crossed with all else
+mod moving_lights; // lights that move while the shutter is open
 mod moving_sets; // rolling shutters in data sets of frames, readings of an inertial unit
 mod openings_and_glasses; // f-numbers that a lens lacks, glasses of earlier catalogues and of one's own
 mod orbit; // a data set of a real model

@@ -171,6 +171,33 @@ fn noise_is_drawn_once() {
     assert!((mean - whole).abs() < 6.0 * (due / n).sqrt(), "{mean} {whole}");
 }
 
+/// Frames that are spread over a slot are slots that are written one by one.
+#[test]
+fn frames_along_a_slot_are_slots_of_their_own() {
+    let poses = [0.0, 0.2, -0.3].map(|x| json!({ "from": [x, 0.5 * x, 3], "look_at": [0, 0, 0] }));
+    let by_hand = |serial: Value| {
+        let mut scene = scene();
+        scene["serial"] = serial;
+        rendered(&scene, &[]).array("picture")
+    };
+    let along = by_hand(json!([
+        { "duration": "6 ms", "pixels": [[1, 0.5]], "along": { "type": "poses", "poses": poses } },
+        { "along": [{ "camera.fov": 40 }, { "camera.fov": 60, "lights[1].radiance": [1, 0, 0] }] }
+    ]));
+    let mut each: Vec<Value> = poses
+        .iter()
+        .map(|pose| json!({ "duration": "2 ms", "pixels": [[1, 0.5]], "set": { "camera.pose": pose } }))
+        .collect();
+    each.push(json!({ "set": { "camera.fov": 40 } }));
+    each.push(json!({ "set": { "camera.fov": 60, "lights[1].radiance": [1, 0, 0] } }));
+    let each = by_hand(json!(each));
+    assert!(along.iter().any(|value| *value > 0.0));
+    for (along, each) in along.iter().zip(&each) {
+        // Starts of slots are rounded in f64 by another sum.
+        assert!((along - each).abs() <= 1e-6 * each, "{along}, not {each}");
+    }
+}
+
 #[test]
 fn what_is_no_slot_is_refused_by_its_place() {
     let with = |slots: Value| {
@@ -199,6 +226,22 @@ fn what_is_no_slot_is_refused_by_its_place() {
         (with(json!([{ "set": { "camera": {} } }])), "serial[0].set", "whole exposure"),
         (with(json!([{ "set": { "render.seed": 1 } }])), "serial[0].set", "whole exposure"),
         (with(json!([{ "set": { "camera.f_stop": 1 } }])), "serial[0]", "f_stop"),
+        (
+            with(json!([{}, { "along": { "type": "orbit", "count": 4 } }])),
+            "serial[1].along",
+            "`poses`",
+        ),
+        (with(json!([{ "along": [] }])), "serial[0].along", "no frame"),
+        (
+            with(json!([{ "along": [{}, { "camera.sensor.exposure": 1 }] }])),
+            "serial[0].along[1]",
+            "whole exposure",
+        ),
+        (
+            with(json!([{ "along": { "type": "trajectory", "file": "none.txt" } }])),
+            "serial[0].along.file",
+            "none.txt",
+        ),
         (with(json!([{ "pixels": [[1], [1, 0]] }])), "serial[0].pixels", "tile"),
         (with(json!([{ "pixels": [[2]] }])), "serial[0].pixels", "0 to 1"),
         (with(json!([{ "pixels": "none.png" }])), "serial[0].pixels", "none.png"),

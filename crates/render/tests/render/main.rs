@@ -15,6 +15,7 @@ mod light_sampling;
 mod many_lights;
 mod modulation;
 mod moving;
+mod moving_lights;
 mod overruled;
 mod overruled_camera;
 mod passes;

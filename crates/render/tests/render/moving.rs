@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Motion, Steady};
+use etendue_geometry::{HitPrecision, Motion, Steady};
 use etendue_render::Plan;
 use etendue_render::output::Outputs;
 use etendue_report::DecisionKind;
@@ -260,4 +260,35 @@ fn objects_that_stand_still_change_no_bit() {
         placed.motion = None;
     }
     assert_eq!(layer(&picture(&still), ""), layer(&picture(&without), ""));
+}
+
+/// What flies so far while the shutter is open that f32 cannot tell its triangles apart is hit in f64, and the plan says
+/// why; so is what a camera sees that flies so far. At a millionth of the speed f32 does.
+#[test]
+fn speeds_that_outrun_single_precision_take_double() {
+    let planned = |object: bool, speed: f64| {
+        let velocity = json!({ "type": "velocity", "velocity": [speed, 0, 0] });
+        let mut camera = json!({ "type": "pinhole", "shutter": { "exposure": 1 },
+                                 "pose": { "from": [0, 0, 4], "look_at": [0, 0, 0] } });
+        let mut ball = json!({ "shape": "sphere", "triangles": 2000 });
+        if object {
+            ball["motion"] = velocity;
+        } else {
+            camera["motion"] = velocity;
+        }
+        let scene = json!({ "etendue": 1, "tracer": { "type": "path" }, "camera": camera, "objects": [ball],
+                            "render": { "accel": "embree" } });
+        let plan = Plan::new(
+            &load_json(std::path::Path::new("."), scene),
+            Outputs::from_list("exr").unwrap(),
+        );
+        let row = plan.decisions.iter().find(|row| row.kind == DecisionKind::LightPaths);
+        (plan.light_precision, row.unwrap().reason.clone())
+    };
+    for object in [true, false] {
+        let (precision, why) = planned(object, 1e6);
+        assert_eq!(precision, HitPrecision::Double, "{why}");
+        assert!(why.contains("while things move as far as 1.0e6 m away"), "{why}");
+        assert_eq!(planned(object, 1.0).0, HitPrecision::Single);
+    }
 }

@@ -175,6 +175,10 @@ pub struct SlotSpec {
     /// What is set for it: paths of `camera`, `lights`, `objects` or `materials` and their values, as
     /// `{"camera.pose": …}`. The sensor and the shutter are those of the exposure.
     pub set: BTreeMap<String, Value>,
+    /// Frames that are spread over it, each for an equal share: a list of settings, `poses` or a `trajectory`, as `frames`
+    /// has them. Times of poses do not count.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub along: Option<FramesSpec>,
 }
 
 /// What each pixel takes of a slot's light.

@@ -194,7 +194,8 @@ impl SceneFile {
         self.without_frames()?.of_frame(frame.number).with(&settings).map_err(in_frame)
     }
 
-    fn along(
+    /// The frames along a path of the camera, which is written at `place`.
+    pub(crate) fn along(
         &self,
         place: &str,
         path: &CameraPath,
@@ -282,7 +283,7 @@ impl SceneFile {
 }
 
 /// A frame for each entry of a list.
-fn listed(list: &[BTreeMap<String, Value>]) -> Vec<Frame> {
+pub(crate) fn listed(list: &[BTreeMap<String, Value>]) -> Vec<Frame> {
     let frame = |(number, settings): (usize, &BTreeMap<String, Value>)| Frame {
         number,
         time: None,

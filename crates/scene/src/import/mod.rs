@@ -31,7 +31,7 @@ use rayon::prelude::*;
 use crate::memory::Budget;
 use crate::sniff::what_it_is;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Bounds, Link, Mesh, Positions, Transform, Vertices};
+use etendue_geometry::{Bounds, Link, Mesh, Motion, Positions, Transform, Vertices};
 use etendue_tracer::{Light, LightKind, Material, Texture};
 use files::Files;
 
@@ -181,12 +181,28 @@ pub struct ImportedLight {
     pub light: Light,
     /// From the node's frame to the model's (m).
     pub model_from_light: Transform,
+    /// How it moves, from the node's frame to the model's, the outermost frame first, in s from the moment that is shown;
+    /// empty where it stands still.
+    pub links: Vec<Link>,
 }
 
 impl ImportedLight {
-    /// The light in the world of a model placed by `world_from_model`; `None` where that leaves it
-    /// no direction.
-    pub(crate) fn placed(&self, world_from_model: &Transform) -> Option<Light> {
+    /// The light in the world of a model placed by `world_from_model`, or that moves as `motion` says; `None` where that
+    /// leaves it no direction.
+    pub(crate) fn placed(
+        &self,
+        world_from_model: &Transform,
+        motion: Option<&Motion>,
+    ) -> Option<Light> {
+        if motion.is_some() || !self.links.is_empty() {
+            let still = Motion::default().then_inner(world_from_model);
+            let motion = motion.unwrap_or(&still);
+            let motion = match self.links.is_empty() {
+                true => motion.then_inner(&self.model_from_light),
+                false => motion.then_links(&self.links),
+            };
+            return Some(Light { motion: Some(Arc::new(motion)), ..self.light.clone() });
+        }
         let world = world_from_model.then_inner(&self.model_from_light);
         let at = world.translation + world.translation_low;
         let along = || (-world.linear.z_axis).try_normalize();

@@ -11,7 +11,9 @@ use etendue_camera::{Camera, CameraMotionSpec, CameraSpec, ShutterKind};
 use etendue_geometry::Geometry;
 use etendue_geometry::units::Seconds;
 use etendue_sensor::Sensor;
-use etendue_tracer::{Clock, Light, LightSpec, Material, MaterialSpec, Modulation, ModulationSpec};
+use etendue_tracer::{
+    Clock, Light, LightMotionSpec, LightSpec, Material, MaterialSpec, Modulation, ModulationSpec,
+};
 
 impl SceneFile {
     /// The camera as the file has it, with its exposure from the sensor and its motion in the frame's clock.
@@ -105,16 +107,23 @@ impl SceneFile {
         self.spec.objects.iter().any(|object| object.motion.is_some() || plays(object))
     }
 
+    /// How lights of the scene move.
+    fn light_motions(&self) -> impl Iterator<Item = &LightMotionSpec> {
+        let motions = self.spec.lights.iter().flatten().filter_map(LightSpec::motion);
+        motions.map(|(motion, _)| motion)
+    }
+
     /// What says how lights change with time, and from when on.
     fn modulations(&self) -> impl Iterator<Item = &ModulationSpec> {
         let lights = self.spec.lights.iter().flatten().filter_map(LightSpec::modulation);
         lights.chain(self.spec.materials.values().filter_map(MaterialSpec::modulation))
     }
 
-    /// Whether some object has a motion, some light a modulation, or the exposure several slots.
+    /// Whether some object or light has a motion, some light a modulation, or the exposure several slots.
     fn changes(&self) -> bool {
         let has_slots = !self.spec.serial.is_empty();
-        has_slots || self.objects_move() || self.modulations().next().is_some()
+        let lights_move = self.light_motions().next().is_some();
+        has_slots || self.objects_move() || lights_move || self.modulations().next().is_some()
     }
 
     /// Refuses frames without times of what moves through poses or transforms, which have them.
@@ -128,6 +137,7 @@ impl SceneFile {
         };
         let needs = matches!(motion, Some(CameraMotionSpec::Poses { .. }))
             || self.spec.objects.iter().any(through)
+            || self.light_motions().any(LightMotionSpec::has_times)
             || self.modulations().any(|modulation| modulation.clock() == Clock::Scene);
         let is_timed = self.spec.render.rate.is_some() || frames.iter().all(has_time);
         if !needs || is_timed {
@@ -175,9 +185,11 @@ pub(crate) fn held(
     camera: &Camera,
     geometry: &Geometry,
     deformers: &BTreeMap<u32, Arc<Deformer>>,
+    lights: &[Light],
 ) -> Option<Note> {
     let [open, close] = camera.exposure_span();
     let motions = geometry.placements.iter().filter_map(|placement| placement.motion.as_ref());
+    let motions = motions.chain(lights.iter().filter_map(|light| light.motion.as_ref()));
     let deformers = deformers.values().filter_map(|deformer| deformer.played_span());
     let [first, last] = motions
         .filter_map(|motion| motion.played_span())

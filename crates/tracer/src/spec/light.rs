@@ -7,6 +7,7 @@ use etendue_spectrum::{Curve, Grid, Illuminant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::light_motion::LightMotionSpec;
 use super::{
     Bound, ColorSpec, CubeSpec, Emitted, Fault, PaintSpec, Supply, emitted, in_bounds, luminous,
     one, radiant_paint, share_of, unit_scale, white,
@@ -41,6 +42,9 @@ pub enum LightSpec {
         /// How its strength changes with time; not at all when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         modulation: Option<ModulationSpec>,
+        /// How it moves while the shutter is open; it stands still when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        motion: Option<LightMotionSpec>,
     },
     /// A point that shines into a cone.
     Spot {
@@ -71,6 +75,9 @@ pub enum LightSpec {
         /// How its strength changes with time; not at all when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         modulation: Option<ModulationSpec>,
+        /// How it moves while the shutter is open; it stands still when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        motion: Option<LightMotionSpec>,
     },
     /// Parallel light, as from the sun.
     Directional {
@@ -122,6 +129,9 @@ pub enum LightSpec {
         /// How its strength changes with time; not at all when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         modulation: Option<ModulationSpec>,
+        /// How it moves while the shutter is open; it stands still when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        motion: Option<LightMotionSpec>,
     },
     /// A point that throws an image, as for structured light.
     Projector {
@@ -154,6 +164,9 @@ pub enum LightSpec {
         /// How its strength changes with time; not at all when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         modulation: Option<ModulationSpec>,
+        /// How it moves while the shutter is open; it stands still when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        motion: Option<LightMotionSpec>,
     },
     /// Light from all around.
     Environment {
@@ -357,6 +370,18 @@ impl LightSpec {
             | Self::Projector { modulation, .. }
             | Self::Environment { modulation, .. }
             | Self::Sky { modulation, .. } => modulation.as_ref(),
+        }
+    }
+
+    /// How it moves, and where it is written to be (m), if it does.
+    #[must_use]
+    pub fn motion(&self) -> Option<(&LightMotionSpec, DVec3)> {
+        match self {
+            Self::Point { motion, at, .. }
+            | Self::Spot { motion, at, .. }
+            | Self::Goniometric { motion, at, .. }
+            | Self::Projector { motion, at, .. } => Some((motion.as_ref()?, DVec3::from(*at))),
+            Self::Directional { .. } | Self::Environment { .. } | Self::Sky { .. } => None,
         }
     }
 

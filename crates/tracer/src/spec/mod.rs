@@ -2,6 +2,7 @@
 //! they are: one file for each, and here what both have.
 
 mod light;
+mod light_motion;
 mod material;
 
 use std::path::PathBuf;
@@ -17,6 +18,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use self::light::{LightSpec, SkyCubeSpec, SkyImageSpec, SunSpec};
+pub use self::light_motion::LightMotionSpec;
 pub use self::material::{AbbeSpec, AbsorptionSpec, IorSpec, MaterialSpec};
 use crate::texture::{Filter, Wrap};
 use crate::{Color, Cube, CubeKind, Ior, Paint, SceneCube, SceneCurve};

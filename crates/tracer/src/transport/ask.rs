@@ -54,8 +54,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             }
             return;
         }
-        let Patch { picks, seen, bsdfs, targets, radiance, .. } = patch;
-        for &lane in &workspace.picked {
+        let Patch { picks, seen, bsdfs, targets, radiance, path, .. } = patch;
+        for (&lane, &(i, _)) in workspace.picked.iter().zip(&*path) {
             let (index, chance) = (picks.index[lane] as usize, picks.chance[lane]);
             let radiance = &mut radiance[lane * count..(lane + 1) * count];
             if chance == 0.0 {
@@ -70,7 +70,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             }
             let one = ((index, chance), [squares[0][lane], squares[1][lane]]);
             let receiver = seen.receiver(lane, bsdfs.get(lane));
-            match lights.place(scene, spectral, &receiver, one, radiance) {
+            let ray = workspace.now.carried.ray[i] as usize;
+            let time = self.times.get(ray).copied().unwrap_or(0.0);
+            match lights.place(scene, spectral, (&receiver, time), one, radiance) {
                 Chosen::Dark => targets.set(lane, None),
                 Chosen::Place(target) => targets.set(lane, Some(&target)),
                 Chosen::Sky { square, chance } => workspace.asked.push(lane, square, chance),

@@ -97,6 +97,9 @@ pub(super) struct Blocks {
     rays: RayBlocks,
     /// What coordinates are relative to (m).
     origin: DVec3,
+    /// When each ray is (s from the frame's time), where that counts.
+    times: Vec<f64>,
+    has_times: bool,
 }
 
 impl Blocks {
@@ -109,7 +112,10 @@ impl Blocks {
 impl Rays for Blocks {
     fn restart(&mut self, ctx: &LightingContext<'_>) {
         self.rays.clear();
-        self.origin = ctx.accel.blocks().map_or(DVec3::ZERO, |blocks| blocks.origin());
+        self.times.clear();
+        let blocks = ctx.accel.blocks();
+        self.origin = blocks.map_or(DVec3::ZERO, |blocks| blocks.origin());
+        self.has_times = blocks.is_some_and(|blocks| blocks.has_times());
     }
 
     fn take(&mut self, ctx: &LightingContext<'_>, rays: &RayBatch) {
@@ -130,18 +136,20 @@ impl Rays for Blocks {
         self.rays.push(round(start - self.origin), round(along), single(reach));
     }
 
-    /// Nothing moves in scenes that are traced in blocks.
-    fn set_times(&mut self, _times: impl Iterator<Item = f64>) {}
+    fn set_times(&mut self, times: impl Iterator<Item = f64>) {
+        self.times.clear();
+        self.times.extend(times.filter(|_| self.has_times));
+    }
 
     fn closest(&mut self, ctx: &LightingContext<'_>, coherent: bool) {
         if let Some(blocks) = ctx.accel.blocks() {
-            blocks.closest_of_blocks(self.rays.blocks_mut(), coherent);
+            blocks.closest_of_blocks(self.rays.blocks_mut(), &self.times, coherent);
         }
     }
 
     fn occlude(&mut self, ctx: &LightingContext<'_>, coherent: bool) {
         if let Some(blocks) = ctx.accel.blocks() {
-            blocks.occluded_of_blocks(self.rays.blocks_mut(), coherent);
+            blocks.occluded_of_blocks(self.rays.blocks_mut(), &self.times, coherent);
         }
     }
 
@@ -206,7 +214,7 @@ impl Rays for Blocks {
             weights: [block.u[lane], block.v[lane]].map(f64::from),
             t: f64::from(block.t_max[lane]),
             normal: normal / normal.length(),
-            time: 0.0,
+            time: self.times.get(i).copied().unwrap_or(0.0),
         }
     }
 

@@ -5,8 +5,8 @@ use etendue_geometry::{Link, Transform};
 use super::Reader;
 use super::hierarchy::Scene;
 use super::pose::local;
+use crate::import::Import;
 use crate::import::error::{Note, NoteKind, push};
-use crate::import::{Import, ImportError};
 
 /// What each node hangs on.
 pub(super) struct Chains<'a> {
@@ -67,31 +67,16 @@ impl<'a> Chains<'a> {
         links
     }
 
-    /// Refuses what shines while it moves; a camera stands still, with a note.
-    ///
-    /// # Errors
-    ///
-    /// When a light hangs on a node that moves; the message names the node.
-    pub(super) fn check(&self, scene: &Scene, import: &mut Import) -> Result<(), ImportError> {
+    /// Notes that cameras of nodes that move stand still.
+    pub(super) fn note(&self, scene: &Scene, import: &mut Import) {
         let document = self.reader.document;
-        let refused = |node: usize, why: &str| {
-            let reason = format!(
-                "{why} while its animation plays, which is not rendered within an exposure; leave `plays` out, so that \
-                 all stands still in the moment that is shown"
-            );
-            Err(self.reader.damaged(format!("nodes[{node}]"), reason))
-        };
         for &node in scene.pose.shown.iter().filter(|node| self.moves(**node)) {
             let shown = &document.nodes[node];
-            if self.reader.wanted.light && shown.extensions.contains_key("KHR_lights_punctual") {
-                return refused(node, "its light moves");
-            }
             if shown.camera.is_some() {
                 let message = "its camera stands still within an exposure, as it is in the moment that is shown";
                 let note = Note::new(NoteKind::Unsupported, format!("nodes[{node}]"), message);
                 push(&mut import.notes, note);
             }
         }
-        Ok(())
     }
 }

@@ -25,7 +25,8 @@ pub(super) struct Scene {
     pub pose: Pose,
     pub meshes: Vec<PlacedMesh>,
     pub cameras: Vec<ImportedCamera>,
-    pub lights: Vec<ImportedLight>,
+    /// With the nodes that they are of.
+    pub lights: Vec<(usize, ImportedLight)>,
 }
 
 /// A node with a mesh.
@@ -96,7 +97,9 @@ pub(super) fn walk(
             scene.cameras.push(placed_camera(path, document, index, camera, model_from_node)?);
         }
         if !hidden && let Some(light) = super::lights::placed(path, document, node, index, notes)? {
-            scene.lights.push(ImportedLight { light, model_from_light: model_from_node });
+            let links = Vec::new();
+            let light = ImportedLight { light, model_from_light: model_from_node, links };
+            scene.lights.push((index, light));
         }
     }
     scene.pose = pose;

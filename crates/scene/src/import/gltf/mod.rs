@@ -28,7 +28,7 @@ mod primitive;
 use std::path::Path;
 
 use super::files::Files;
-use super::{Import, ImportError, Options, Wanted, error};
+use super::{Import, ImportError, ImportedLight, Options, Wanted, error};
 use crate::memory::of_json;
 use animation::Playing;
 use buffers::Buffers;
@@ -129,11 +129,12 @@ pub(super) fn import(
     let chains = Chains::new(&reader);
     let shapes = primitive::load(&reader, (&scene, &chains), &mut import)?;
     material::load(&reader, &mut import)?;
-    chains.check(&scene, &mut import)?;
+    chains.note(&scene, &mut import);
     hierarchy::place(&reader, (&scene, &chains), &shapes, &mut import)?;
     import.cameras = scene.cameras;
     if wanted.light {
-        import.lights = scene.lights;
+        let moves = |(node, light)| ImportedLight { links: chains.of(node), ..light };
+        import.lights = scene.lights.into_iter().map(moves).collect();
     }
     if options.animation.is_none() && !document.animations.is_empty() {
         error::push(
