@@ -4,6 +4,7 @@
 //! Nothing is approximated unless a scene has the key `tolerance`: [`choose`] then says what is taken of it,
 //! [`crate::Plan::taking`] plans with that, and [`verify`] renders a small part with everything.
 
+mod detail;
 pub mod lens_models;
 mod light;
 mod pixel_views;
@@ -22,6 +23,7 @@ use self::lens_models::{LensModel, LensModels, NoModels};
 use self::pixel_views::{Line, PlaceView, chief_rays, places, seen};
 use crate::{Images, Plan, RenderError, Watch};
 
+pub use self::detail::{TakenDetail, coarser, with_meshes};
 pub use self::verify::{Verified, verify};
 
 /// What a model may be off by.
@@ -357,6 +359,8 @@ pub struct Taken {
     pub camera: Option<TakenCamera>,
     /// How far light is followed, less than the scene's tracer does.
     pub bounces: Option<TakenBounces>,
+    /// What is left out of its meshes.
+    pub detail: Option<TakenDetail>,
     /// Why not more is, in sentences.
     pub notes: Vec<String>,
 }
@@ -383,8 +387,9 @@ pub struct TakenBounces {
 /// some 10⁵.
 const WORTH: u64 = 200_000;
 
-/// What of the tolerance of `scene` is taken: the simplest camera model within it, and of the light that this leaves
-/// the fewest surfaces. Says nothing of a scene without a tolerance.
+/// What of the tolerance of `scene` is taken: beside what was left out of its meshes ([`coarser`]), which are those of
+/// `scene` now, the simplest camera model within what this leaves, and of the light that is left then the fewest
+/// surfaces. Says nothing of a scene without a tolerance.
 ///
 /// # Errors
 ///
@@ -392,12 +397,12 @@ const WORTH: u64 = 200_000;
 pub fn choose(
     scene: &Scene,
     plan: &Plan,
-    accel: &dyn Accel,
-    images: &Images,
+    (accel, images): (&dyn Accel, &Images),
+    detail: Option<TakenDetail>,
     watch: &dyn Watch,
 ) -> Result<Option<Taken>, RenderError> {
     let Some(tolerance) = scene.tolerance else { return Ok(None) };
-    let mut taken = Taken { tolerance, camera: None, bounces: None, notes: Vec::new() };
+    let mut taken = Taken { tolerance, camera: None, bounces: None, detail, notes: Vec::new() };
     if !plan.layers.contains(&LayerSpec::Radiance) {
         taken.notes.push("no light is rendered: data layers are exact".to_owned());
         return Ok(Some(taken));
@@ -410,10 +415,13 @@ pub fn choose(
         taken.notes.push(why);
         return Ok(Some(taken));
     }
-    taken.camera = simplest(scene, plan, accel, tolerance, &mut taken.notes)?;
-    let left = taken.camera.as_ref().map_or(0.0, |camera| camera.finding.light.value);
-    let left = (tolerance.light.0 - left).max(0.0);
-    let looked = (left, samples);
+    let mut left = Tolerance::from(tolerance);
+    let [pixels, light] = detail.map_or([0.0; 2], |detail| [detail.displacement, detail.light]);
+    left.pixels -= pixels;
+    left.light = Some((tolerance.light.0 - light).max(0.0));
+    taken.camera = simplest(scene, plan, accel, left, &mut taken.notes)?;
+    let of_lens = taken.camera.as_ref().map_or(0.0, |camera| camera.finding.light.value);
+    let looked = ((tolerance.light.0 - light - of_lens).max(0.0), samples);
     taken.bounces = light::fewest(scene, (accel, images), looked, &mut taken.notes, watch)?;
     Ok(Some(taken))
 }
@@ -423,7 +431,7 @@ fn simplest(
     scene: &Scene,
     plan: &Plan,
     accel: &dyn Accel,
-    spec: ToleranceSpec,
+    tolerance: Tolerance,
     notes: &mut Vec<String>,
 ) -> Result<Option<TakenCamera>, RenderError> {
     let Some(lens) = scene.camera.lens() else { return Ok(None) };
@@ -435,7 +443,6 @@ fn simplest(
         notes.push("light is spread by the waves of this very lens".to_owned());
         return Ok(None);
     }
-    let tolerance = Tolerance::from(spec);
     let view = FullView::new(scene, accel, &plan.bands, Field::QUICK)?;
     let models = match view.models_in_reach(tolerance) {
         Ok(found) => found.models,
