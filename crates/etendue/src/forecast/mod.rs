@@ -163,9 +163,11 @@ impl TimeForecast {
 
 /// The time of the build (s).
 fn build_time(scene: &Scene, plan: &Plan, machine: &Calibration) -> f64 {
-    let unseen = plan.unseen.as_ref().map_or(0, |unseen| unseen.triangles());
-    let triangles = scene.geometry.triangles_unique().saturating_sub(unseen);
-    triangles as f64 * machine.build_of(plan.quality) + scene.placed_copies() as f64 * machine.copy
+    let unseen = plan.unseen.as_ref();
+    let unseen = unseen.map_or([0; 2], |unseen| [unseen.triangles(), unseen.placements() as u64]);
+    let triangles = scene.geometry.triangles_unique().saturating_sub(unseen[0]);
+    let copies = scene.placed_copies().saturating_sub(unseen[1]);
+    triangles as f64 * machine.build_of(plan.quality) + copies as f64 * machine.placed_copy
 }
 
 fn pixels(scene: &Scene) -> f64 {

@@ -166,10 +166,10 @@ fn nothing_is_taken_without_a_tolerance_or_where_looking_does_not_pay() {
     assert!(few.bounces.is_none() && few.notes[0].contains("too few"), "{few:?}");
 }
 
-/// A ball of many triangles, 15 pixels wide, lit by the sun from one side.
+/// A ball of many triangles, 17 pixels wide, lit by the sun from one side.
 fn fine_ball(tolerance: &Value, changes: &[(&str, Value)]) -> Scene {
     let mut scene = json!({
-        "camera": { "type": "pinhole", "fov": 40, "sensor": { "resolution": [96, 64] },
+        "camera": { "type": "pinhole", "fov": 40, "sensor": { "resolution": [72, 48] },
             "pose": { "from": [0, 0, 2.4], "look_at": [0, 0, 0] } },
         "tracer": { "type": "path", "max_bounces": 3 }, "tolerance": tolerance,
         "lights": [{ "type": "directional", "direction": [-1, -1, -1], "irradiance": [3, 3, 3] },
@@ -204,7 +204,7 @@ fn meshes_have_the_detail_that_the_nearest_view_tells() {
     assert!(found < 0.02, "{found}");
     // Cells of several pixels change the area by more than half of 2 %, and where that is allowed the same comparison
     // tells it.
-    let wide = |light: &str| coarser(&fine_ball(&allowed("10 px", light), &[]));
+    let wide = |light: &str| coarser(&fine_ball(&allowed("6 px", light), &[]));
     assert!(wide("2 %").is_none());
     let (geometry, detail) = wide("60 %").expect("a coarser ball");
     assert!(detail.light > 0.01, "{detail:?}");
