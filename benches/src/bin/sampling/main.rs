@@ -10,6 +10,7 @@
     reason = "programs of measurements and tests write their own files"
 )]
 
+mod oracle;
 mod study;
 
 use std::fmt::Write as _;
@@ -40,6 +41,9 @@ const COUNTS: [u32; 15] = [8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 51
 
 /// The variance that samples may have, as a share of the sensor's.
 const FRACTION: f64 = 0.1;
+
+/// The fewest samples that the oracle gives.
+const FEWEST: f64 = 4.0;
 
 /// The relative error of the other table.
 const ERROR: f64 = 0.1;
@@ -160,13 +164,16 @@ fn noise_table(
          with the same variance in the mean over the picture (so the same root mean square error of the sensor's \
          image), over those taken. `as good`: of a number with which as many as nine tenths of all blocks of 8 × 8 \
          pixels have what nine tenths have here; `as good everywhere`: the same of 99 in 100. What lies beyond the numbers of samples measured ({} to {}) is extrapolated along \
-         the nearest two, and marked.\n\n| scene | exposure | samples a pixel | variance, of the sensor's | as even | as good | as good everywhere |\n\
-         |---|---|---|---|---|---|---|\n",
+         the nearest two, and marked. `oracle`: what could be saved there at best, by somebody who knows how the variance of \
+         every block falls and gives each the fewest samples, {FEWEST} at least, with which 99 in 100 are as good; `of the \
+         oracle`: the samples taken over those.\n\n| scene | exposure | samples a pixel | variance, of the sensor's | as even | as good | as good everywhere | oracle | of the oracle |\n\
+         |---|---|---|---|---|---|---|---|---|\n",
         effort.counts[0],
         effort.counts[effort.counts.len() - 1]
     );
     let mut saved = Vec::new();
     let mut factors = Vec::new();
+    let mut beside: Vec<f64> = Vec::new();
     for ((name, study), uniform) in names.iter().zip(studies).zip(uniform) {
         let mut line = Vec::new();
         for &exposure in effort.charted {
@@ -183,16 +190,24 @@ fn noise_table(
             let (most, most_mark) = rays_for(&curve(&|s| s.most), own.most);
             line.push([exposure, good / taken.rays]);
             if SHOWN.contains(&exposure) {
+                let of_blocks = uniform.iter().map(|shot| study.noise_shares(&shot.pair, exposure));
+                let of_blocks: Vec<Vec<f64>> = of_blocks.collect();
+                let oracle = oracle::samples(effort.counts, &of_blocks, own.most, FEWEST);
+                // Rays are as many as samples for all.
+                let at_best = oracle * uniform[0].rays / f64::from(effort.counts[0]);
+                let of_oracle = taken.mean_samples / oracle;
                 factors.push([even, good, most].map(|rays| rays / taken.rays));
+                beside.push(of_oracle);
                 let _ = writeln!(
                     text,
-                    "| `{name}` | {} ms | {:.0} | {:.3} | {:.1}{even_mark} | {:.1}{good_mark} | {:.1}{most_mark} |",
+                    "| `{name}` | {} ms | {:.0} | {:.3} | {:.1}{even_mark} | {:.1}{good_mark} | {:.1}{most_mark} | {:.1}{most_mark} | {of_oracle:.2} |",
                     exposure * 1e3,
                     taken.mean_samples,
                     own.mean,
                     even / taken.rays,
                     good / taken.rays,
-                    most / taken.rays
+                    most / taken.rays,
+                    most / at_best
                 );
             }
         }
@@ -207,6 +222,9 @@ fn noise_table(
             "\nMedian, {words}: one number for all takes **{middle:.1} times the rays** (goal: 4).\n"
         );
     }
+    beside.sort_by(f64::total_cmp);
+    let middle = 0.5 * (beside[(beside.len() - 1) / 2] + beside[beside.len() / 2]);
+    let _ = write!(text, "\nMedian, of the oracle: **{middle:.2} times its samples** (goal: 1.5).\n");
     NoiseTable { text, saved }
 }
 

@@ -20,7 +20,7 @@ const SHARES: [f64; 2] = [0.4, 0.8];
 
 /// The soonest is rendered again while its error is outside of these shares of the target, at most so often.
 const NEAR_ENOUGH: [f64; 2] = [0.85, 1.0];
-const MOST_TRIES: usize = 4;
+const MOST_TRIES: usize = 6;
 
 /// The most samples that are foretold.
 const MOST_SAMPLES: f64 = 1e6;
@@ -66,10 +66,17 @@ fn forecast(points: &[Point], target: f64) -> Option<Forecast> {
     if samples > MOST_SAMPLES {
         return None;
     }
-    let slope = ((two.seconds - one.seconds) / (m - n)).max(0.0);
-    let seconds = (two.seconds + slope * (samples - m)).max(0.0);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to a million")]
-    Some(Forecast { samples: samples.ceil() as u32, seconds })
+    let samples = samples.ceil() as u32;
+    Some(Forecast { samples, seconds: seconds_of(points, samples) })
+}
+
+/// The time (s) of so many samples by the last two renders: as a + c n.
+fn seconds_of(points: &[Point], samples: u32) -> f64 {
+    let [.., one, two] = points else { return f64::INFINITY };
+    let [n, m] = [one, two].map(|point| f64::from(point.samples));
+    let slope = ((two.seconds - one.seconds) / (m - n)).max(0.0);
+    (two.seconds + slope * (f64::from(samples) - m)).max(0.0)
 }
 
 /// Renders the scene and its changes until it is known which reach the target soonest. `axes` are lists of changes of
@@ -248,6 +255,8 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
         let (point, render) = self.judged(contender.name.clone(), samples, &run);
         self.renders.push(render);
         let entry = &mut self.entries[who];
+        // Two of one number would tell no slope.
+        entry.points.retain(|known| known.samples != samples);
         entry.points.push(point);
         entry.points.sort_by_key(|point| point.samples);
         entry.renders += 1;
@@ -310,13 +319,21 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
         forecasts.any(|forecast| forecast.samples > samples)
     }
 
-    /// Renders the soonest with what it needs, and again while that is not near the target.
+    /// Renders the soonest with what it needs, and again while that is not near the target. Of those within it, the
+    /// soonest; or else the one that comes nearest.
     fn verify(&mut self) -> Result<Option<Verified>, E> {
-        let mut best = None;
+        let mut best: Option<Verified> = None;
+        // More than any that was not enough.
+        let mut too_few: Vec<(usize, u32)> = Vec::new();
         for _ in 0..MOST_TRIES {
             // Another may be sooner by what was learnt meanwhile.
             let all = (0..self.entries.len()).filter(|&i| !self.entries[i].is_out);
-            let all = all.filter_map(|i| Some((i, self.forecast_of(&self.entries[i])?)));
+            let all = all.filter_map(|i| {
+                let forecast = self.forecast_of(&self.entries[i])?;
+                let short = too_few.iter().filter(|(who, _)| *who == i).map(|(_, n)| *n).max();
+                let samples = forecast.samples.max(short.map_or(1, |n| n + n.div_ceil(8)));
+                Some((i, Forecast { samples, seconds: seconds_of(&self.entries[i].points, samples) }))
+            });
             let Some((who, forecast)) = all.min_by(|a, b| a.1.seconds.total_cmp(&b.1.seconds)) else {
                 self.notes.push("nothing reaches the target, with any number of samples".to_owned());
                 return Ok(None);
@@ -326,20 +343,31 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
                     "the soonest would take {:.0} s, for which no time was left; more --seconds have it",
                     forecast.seconds
                 ));
-                return Ok(best);
+                break;
+            }
+            let name = self.entries[who].contender.name.clone();
+            let is_known = |known: &&Verified| known.name == name && known.samples == forecast.samples;
+            // The same again would tell nothing.
+            if best.as_ref().filter(is_known).is_some() {
+                break;
             }
             let Some(point) = self.render(who, forecast.samples)? else { continue };
             let error = point.square.sqrt();
-            let name = self.entries[who].contender.name.clone();
             let (samples, seconds, foretold) = (point.samples, point.seconds, forecast.seconds);
-            best = Some(Verified { name, samples, foretold, seconds, error });
+            let found = Verified { name, samples, foretold, seconds, error };
             let share = error / self.effort.target;
-            let is_near = (NEAR_ENOUGH[0]..=NEAR_ENOUGH[1]).contains(&share);
-            if is_near || (samples == 1 && share <= 1.0) {
-                break;
+            if share > 1.0 {
+                too_few.push((who, samples));
             }
-            // The same number twice would tell nothing.
-            if self.forecast_of(&self.entries[who]).is_some_and(|next| next.samples == samples) {
+            let is_better = best.as_ref().is_none_or(|known| {
+                match [known.error, error].map(|error| error <= self.effort.target) {
+                    [true, true] => seconds < known.seconds,
+                    [false, false] => error < known.error,
+                    [_, is_within] => is_within,
+                }
+            });
+            best = if is_better { Some(found) } else { best };
+            if (NEAR_ENOUGH[0]..=NEAR_ENOUGH[1]).contains(&share) || (samples == 1 && share <= 1.0) {
                 break;
             }
         }

@@ -201,27 +201,30 @@ fn clustered(mesh: &Mesh, side: f64) -> Option<Mesh> {
             clusters.add(cells.of(mesh.positions.get(i)), mesh.positions.get(i), normal)
         })
         .collect();
-    // Those that keep three corners apart, each once, from its least corner on.
-    let mut triangles: Vec<[u32; 3]> = mesh
+    // Those that keep three cells apart, each once, from its least cell on.
+    let mut triangles: Vec<[[u32; 3]; 2]> = mesh
         .triangles
         .iter()
-        .map(|triangle| triangle.map(|corner| of_corner[corner as usize]))
-        .filter(|&[a, b, c]| {
-            let [a, b, c] = [a, b, c].map(|corner| clusters.cell_of(corner));
-            a != b && b != c && c != a
-        })
-        .map(|[a, b, c]| match a.min(b).min(c) {
-            least if least == a => [a, b, c],
-            least if least == b => [b, c, a],
-            _ => [c, a, b],
+        .filter_map(|triangle| {
+            let corners = triangle.map(|corner| of_corner[corner as usize]);
+            let cells @ [a, b, c] = corners.map(|corner| clusters.cell_of(corner));
+            let first = match a.min(b).min(c) {
+                least if least == a => 0,
+                least if least == b => 1,
+                _ => 2,
+            };
+            let turned = |of: [u32; 3]| [0, 1, 2].map(|k| of[(first + k) % 3]);
+            (a != b && b != c && c != a).then(|| [turned(cells), turned(corners)])
         })
         .collect();
     triangles.sort_unstable();
-    triangles.dedup();
+    triangles.dedup_by_key(|[cells, _]| *cells);
     if triangles.len() >= mesh.triangles.len() / 4 {
         return None;
     }
-    let mut less = Mesh::new(mesh.name.clone(), clusters.positions(&mesh.positions), triangles.into());
+    let triangles: Vec<[u32; 3]> = triangles.into_iter().map(|[_, corners]| corners).collect();
+    let positions = clusters.positions(&mesh.positions);
+    let mut less = Mesh::new(mesh.name.clone(), positions, triangles.into());
     less.normals = mesh.normals.as_ref().map(|_| clusters.normals());
     Some(less)
 }
