@@ -33,11 +33,10 @@ pub(crate) struct Wanted {
     pub(crate) exposure: f64,
 }
 
-/// A picture's light, and what it cost.
+/// A picture's light, and its samples a pixel.
 pub(crate) struct Picture {
     /// `[channel][pixel]`, in the film's bands as red, green and blue.
     light: Vec<Vec<f64>>,
-    pub(crate) rays: f64,
     pub(crate) samples: f64,
 }
 
@@ -130,7 +129,7 @@ impl Study {
         eprintln!("  {} at {} s: {samples:.0} samples", wanted.samples, wanted.exposure);
         let layer = done.picture.layer("").expect("the picture");
         let light = layer.channels.iter().map(|channel| numbers(&channel.values)).collect();
-        Picture { light, rays: done.rays as f64, samples }
+        Picture { light, samples }
     }
 
     /// The photo-electrons of a picture in the mean over its pixels and channels.

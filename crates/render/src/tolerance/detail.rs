@@ -194,7 +194,7 @@ fn clustered(mesh: &Mesh, side: f64) -> Option<Mesh> {
         return None;
     }
     let cells = Cells::over(&mesh.bounds, side);
-    let mut clusters = Clusters::default();
+    let mut clusters = Clusters::new(&cells, mesh.positions.len());
     let of_corner: Vec<u32> = (0..mesh.positions.len())
         .map(|i| {
             let normal = mesh.normals.as_ref().map(|normals| DVec3::from(normals.get(i).map(f64::from)));
@@ -233,34 +233,51 @@ fn clustered(mesh: &Mesh, side: f64) -> Option<Mesh> {
 struct Cells {
     origin: DVec3,
     side: f64,
+    /// Columns, rows and layers.
+    counts: [u64; 3],
 }
 
 impl Cells {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 2²⁰")]
     fn over(bounds: &Bounds, side: f64) -> Self {
-        Self { origin: bounds.min, side }
+        let extent = (bounds.max - bounds.min) / side;
+        let counts = extent.to_array().map(|cells| (cells.floor() as u64 + 1).min(1 << 20));
+        Self { origin: bounds.min, side, counts }
     }
 
-    /// The cell of a point, by its column, row and layer. Points outside of the box, which no triangle with an area has,
-    /// are in cells of its faces.
-    #[expect(clippy::cast_possible_truncation, reason = "fewer cells than triangles along each side; it saturates")]
-    fn of(&self, point: DVec3) -> [i32; 3] {
+    /// All of them, and one for what is no point.
+    fn len(&self) -> u64 {
+        self.counts.iter().product::<u64>() + 1
+    }
+
+    /// The number of a point's cell. Those outside of the box, which no triangle with an area has, are in its outermost
+    /// cells.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it saturates")]
+    fn of(&self, point: DVec3) -> u64 {
         if !point.is_finite() {
-            // No triangle has it.
-            return [i32::MIN; 3];
+            return self.len() - 1;
         }
-        ((point - self.origin) / self.side).to_array().map(|cell| cell.floor() as i32)
+        let cell = ((point - self.origin) / self.side).to_array();
+        let [x, y, z] = [0, 1, 2].map(|k| (cell[k].max(0.0) as u64).min(self.counts[k] - 1));
+        (z * self.counts[1] + y) * self.counts[0] + x
     }
 }
 
+/// By cell, the number of what is in it.
+enum NumberOfCell {
+    /// Of all cells, where they are not many more than what is put into them.
+    Dense(Vec<u32>),
+    Sparse(HashMap<u64, u32>),
+}
+
+/// None yet.
+const NONE: u32 = u32::MAX;
+
 /// Corners that were put together.
-#[derive(Default)]
 struct Clusters {
-    /// By cell: its number.
-    cells: HashMap<[i32; 3], u32>,
-    /// By cell and the way that the normals there point: the number of the corner.
-    corners: HashMap<(u32, u8), u32>,
-    /// The last corner's cell, its number and its corner: those of a file often lie beside each other.
-    last: Option<([i32; 3], u32)>,
+    number: NumberOfCell,
+    /// Of each cell the corner for each way that normals point ([`facing`]); without normals the first alone.
+    corners: Vec<[u32; 6]>,
     /// Sums of the places in each cell, and how many.
     places: Vec<(DVec3, f64)>,
     /// The cell of each corner, and the sum of its normals.
@@ -268,37 +285,38 @@ struct Clusters {
 }
 
 impl Clusters {
-    /// Adds a corner: where it went. Normals of both sides of a sheet are kept apart.
-    fn add(&mut self, cell: [i32; 3], place: DVec3, normal: Option<DVec3>) -> u32 {
-        let number = match self.last {
-            Some((last, number)) if last == cell => number,
-            _ => {
-                let next = u32::try_from(self.places.len()).unwrap_or(u32::MAX);
-                let number = *self.cells.entry(cell).or_insert(next);
-                if number == next {
-                    self.places.push((DVec3::ZERO, 0.0));
-                }
-                self.last = Some((cell, number));
-                number
-            }
+    /// For so many corners in the cells of a grid.
+    fn new(cells: &Cells, corners: usize) -> Self {
+        let number = match usize::try_from(cells.len()) {
+            Ok(count) if count <= 4 * corners => NumberOfCell::Dense(vec![NONE; count]),
+            _ => NumberOfCell::Sparse(HashMap::new()),
         };
+        Self { number, corners: Vec::new(), places: Vec::new(), of_corner: Vec::new() }
+    }
+
+    /// Adds a corner: where it went. Normals of both sides of a sheet are kept apart.
+    #[expect(clippy::cast_possible_truncation, reason = "a mesh has fewer than 2³² corners")]
+    fn add(&mut self, cell: u64, place: DVec3, normal: Option<DVec3>) -> u32 {
+        let known = match &mut self.number {
+            NumberOfCell::Dense(numbers) => &mut numbers[cell as usize],
+            NumberOfCell::Sparse(numbers) => numbers.entry(cell).or_insert(NONE),
+        };
+        if *known == NONE {
+            *known = self.places.len() as u32;
+            self.places.push((DVec3::ZERO, 0.0));
+            self.corners.push([NONE; 6]);
+        }
+        let number = *known;
         let (sum, count) = &mut self.places[number as usize];
         *sum += place;
         *count += 1.0;
-        let Some(normal) = normal else {
-            // Corners are cells then.
-            if self.of_corner.len() == number as usize {
-                self.of_corner.push((number, DVec3::ZERO));
-            }
-            return number;
-        };
-        let next = u32::try_from(self.of_corner.len()).unwrap_or(u32::MAX);
-        let corner = *self.corners.entry((number, facing(normal))).or_insert(next);
-        if corner == next {
+        let corner = &mut self.corners[number as usize][normal.map_or(0, facing)];
+        if *corner == NONE {
+            *corner = self.of_corner.len() as u32;
             self.of_corner.push((number, DVec3::ZERO));
         }
-        self.of_corner[corner as usize].1 += normal;
-        corner
+        self.of_corner[*corner as usize].1 += normal.unwrap_or_default();
+        *corner
     }
 
     fn cell_of(&self, corner: u32) -> u32 {
@@ -328,15 +346,15 @@ impl Clusters {
     }
 }
 
-/// Along which axis a normal points most, and to which side of it.
-fn facing(normal: DVec3) -> u8 {
+/// Along which axis a normal points most, and to which side of it: a number below 6.
+fn facing(normal: DVec3) -> usize {
     let size = normal.abs();
     let axis = match size.max_element() {
         most if most == size.x => 0,
         most if most == size.y => 1,
         _ => 2,
     };
-    2 * axis + u8::from(normal[usize::from(axis)] < 0.0)
+    2 * axis + usize::from(normal[axis] < 0.0)
 }
 
 /// The area of all triangles of a mesh (m², of its own frame).

@@ -125,6 +125,19 @@ fn a_lens_wide_open_is_taken_as_it_is_but_for_its_colours() {
 }
 
 #[test]
+fn what_choosing_measured_of_a_lens_is_what_rendering_would() {
+    let scene = lens_scene(2.8, &allowed("0.1 px", "3 %"));
+    let mut taken = taken(&scene);
+    taken.bounces = None;
+    let own = blocks(&scene, Some(taken));
+    // To the bit the picture of a lens without dispersion that was never looked at.
+    let mut fresh = lens_scene(2.8, &allowed("0.1 px", "3 %"));
+    (fresh.tolerance, fresh.plan.dispersion) = (None, Some(false));
+    fresh.camera = fresh.camera.without_dispersion();
+    assert_eq!(own, blocks(&fresh, None));
+}
+
+#[test]
 fn light_is_followed_to_as_few_surfaces_as_the_tolerance_allows() {
     for (albedo, percent) in [(0.3, 2.0), (0.6, 5.0)] {
         let scene = room(albedo, &allowed("0.5 px", &format!("{percent} %")));
