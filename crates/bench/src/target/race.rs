@@ -16,7 +16,7 @@ const STEP: u32 = 4;
 const OWN_SHARE: f64 = 0.25;
 
 /// The shares of the time that the converged picture, and that with the rounds, may take.
-const SHARES: [f64; 2] = [0.4, 0.8];
+const SHARES: [f64; 2] = [0.3, 0.8];
 
 /// The soonest is rendered again while its error is outside of these shares of the target, at most so often.
 const NEAR_ENOUGH: [f64; 2] = [0.85, 1.0];
@@ -100,9 +100,7 @@ pub fn measure<E: From<BenchError>>(
     let singles = singles.flat_map(|(axis, changes)| (0..changes.len()).map(move |k| (axis, k)));
     let singles: Vec<Contender> = singles.map(|change| Contender::of(axes, &[change])).collect();
     race.add(singles);
-    for samples in FIRST {
-        race.render_all(samples)?;
-    }
+    race.render_first()?;
     // Changes that are sooner each for itself, together: the best of each axis, and each two of the best.
     let better = race.better();
     let mut joint: Vec<Vec<(usize, usize)>> = vec![better.clone()];
@@ -113,9 +111,7 @@ pub fn measure<E: From<BenchError>>(
     // Of two changes all together are one of the pairs.
     joint.dedup();
     race.add(joint.iter().map(|changes| Contender::of(axes, changes)).collect());
-    for samples in FIRST {
-        race.render_all(samples)?;
-    }
+    race.render_first()?;
     let mut samples = FIRST[1];
     while race.halve() && race.is_undecided(samples) {
         samples = samples.saturating_mul(STEP);
@@ -216,24 +212,43 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
     /// Renders all that are not out, and not yet, with so many samples; whether there was time for all.
     fn render_all(&mut self, samples: u32) -> Result<bool, E> {
         for who in 0..self.entries.len() {
-            let entry = &self.entries[who];
-            if entry.is_out || entry.points.iter().any(|point| point.samples >= samples) {
-                continue;
-            }
-            // As many samples more take as much time more, at most.
-            let last = entry.points.last();
-            let expected = last.map_or(0.0, |last| {
-                last.seconds * f64::from(samples) / f64::from(last.samples)
-            });
-            if expected > self.left(SHARES[1]) {
-                self.notes.push(format!(
-                    "no time was left for renders with {samples} samples; more --seconds have it"
-                ));
-                self.notes.dedup();
+            if !self.render_in_time(who, samples)? {
                 return Ok(false);
             }
-            self.render(who, samples)?;
         }
+        Ok(true)
+    }
+
+    /// The first two renders of everybody, one after another: what there was time for can be told of.
+    fn render_first(&mut self) -> Result<(), E> {
+        for who in 0..self.entries.len() {
+            for samples in FIRST {
+                if !self.render_in_time(who, samples)? {
+                    return Ok(());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Renders one that is not out, and not yet, with so many samples, unless there is no time for it.
+    fn render_in_time(&mut self, who: usize, samples: u32) -> Result<bool, E> {
+        let entry = &self.entries[who];
+        if entry.is_out || entry.points.iter().any(|point| point.samples >= samples) {
+            return Ok(true);
+        }
+        // As many samples more take as much time more, at most; the first of all tell of the others.
+        let known = entry.points.last().or_else(|| self.entries[0].points.first());
+        let expected = known.map_or(0.0, |known| {
+            known.seconds * (f64::from(samples) / f64::from(known.samples)).max(1.0)
+        });
+        if expected > self.left(SHARES[1]) {
+            self.notes.push(format!(
+                "no time was left for renders with {samples} samples; more --seconds have it"
+            ));
+            return Ok(false);
+        }
+        self.render(who, samples)?;
         Ok(true)
     }
 
@@ -394,6 +409,8 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
         let mut contenders: Vec<Foretold> = self.entries.iter().map(foretold).collect();
         let time = |foretold: &Foretold| foretold.seconds.unwrap_or(f64::INFINITY);
         contenders.sort_by(|a, b| time(a).total_cmp(&time(b)));
+        let mut notes = self.notes;
+        notes.dedup();
         Target {
             target: self.effort.target,
             converged: self.samples,
@@ -401,7 +418,7 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
             renders: self.renders,
             contenders,
             verified,
-            notes: self.notes,
+            notes,
         }
     }
 }

@@ -34,12 +34,11 @@ pub(super) fn race(
     let folder = tempfile::tempdir().map_err(|error| {
         Fault::refused(format!("no folder for temporary files, to write pictures into: {error}"))
     })?;
-    let mut program = |run: Run<'_>| {
-        match whole_run(arguments, run, folder.path()) {
-            Ok(done) => Ok(Outcome::Done(done)),
-            Err(error) if error.is_refused() => Ok(Outcome::Refused(error.to_string())),
-            Err(error) => Err(Fault::from(error)),
-        }
+    let layers = without_sampling(scene);
+    let mut program = |run: Run<'_>| match whole_run(arguments, &layers, run, folder.path()) {
+        Ok(done) => Ok(Outcome::Done(done)),
+        Err(error) if error.is_refused() => Ok(Outcome::Refused(error.to_string())),
+        Err(error) => Err(Fault::from(error)),
     };
     let progress = phases.begin("target");
     // The picture that all are compared with has everything.
@@ -48,9 +47,21 @@ pub(super) fn race(
     measure((&axes(scene), &in_full), effort, &mut program, &|share| progress(share))
 }
 
-/// The program from the scene's text to its files.
+/// What makes a scene have no layers of sampling, which there are of samples that stop by themselves alone; nothing
+/// where it has none.
+fn without_sampling(scene: &Scene) -> Vec<(String, String)> {
+    let is_own = |layer: &&LayerSpec| Some(**layer) != scene.picture;
+    let own: Vec<&LayerSpec> = scene.layers.iter().filter(is_own).collect();
+    let names = own.iter().filter(|layer| !layer.is_of_sampling());
+    let names: Vec<String> = names.map(|layer| format!("\"{}\"", layer.row().name)).collect();
+    let has_some = names.len() < own.len();
+    has_some.then(|| ("layers".to_owned(), format!("[{}]", names.join(",")))).into_iter().collect()
+}
+
+/// The program from the scene's text to its files, with these `layers` where they are set.
 fn whole_run(
     arguments: &BenchArguments,
+    layers: &[(String, String)],
     run: Run<'_>,
     folder: &std::path::Path,
 ) -> Result<WholeRun, etendue::Error> {
@@ -62,6 +73,7 @@ fn whole_run(
     settings.retain(|(path, _)| path != DENOISE);
     options.outputs =
         Outputs { denoised: settings.len() < run.contender.settings.len(), ..Outputs::ALL };
+    options.settings.extend(layers.iter().cloned());
     options.settings.extend(settings);
     options.settings.extend(
         [("render.samples", run.samples.to_string()), ("render.seed", run.seed.to_string())].map(set),

@@ -175,7 +175,8 @@ fn counts_that_make_no_sense_are_refused() {
 }
 
 /// A lit scene before a raw sensor.
-const LIT: &str = r#"{"etendue": 1, "tracer": {"type": "path"}, "render": {"accel": "bvh"},
+const LIT: &str = r#"{"etendue": 1, "tracer": {"type": "path"}, "layers": ["sample_count", "depth"],
+    "render": {"accel": "bvh", "samples": {"relative_error": 0.05}},
     "camera": {"type": "pinhole", "pose": {"from": [0, 1, 3], "look_at": [0, 0, 0]},
         "sensor": {"type": "raw", "resolution": [32, 24], "system_gain": 0.5, "bit_depth": 12, "full_well": 8000,
             "quantum_efficiency": 0.6, "read_noise": 3}},

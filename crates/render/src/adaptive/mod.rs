@@ -352,12 +352,7 @@ impl<'a> Adaptive<'a> {
                     block.slope[half]
                 };
                 let share = convergence::share_of_independent(samples, slope);
-                let own = share * block.apart[half];
-                // What half as many samples told, by as much less as there are more.
-                let before = block.error[half] / slope.exp2();
-                let is_doubled = samples.is_power_of_two() && before > 0.0;
-                block.error[half] = if is_doubled { 0.5 * (own + before) } else { own };
-                block.slope[half] = slope;
+                (block.slope[half], block.error[half]) = (slope, share * block.apart[half]);
             }
         }
     }
