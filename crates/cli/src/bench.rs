@@ -254,7 +254,8 @@ fn file_names() -> impl Iterator<Item = String> {
     ];
     let charts =
         charts.into_iter().flat_map(|stem| ["svg", "png"].map(|end| format!("{stem}.{end}")));
-    let tables = ["accelerators", "samplers", "cameras", "target"].map(|stem| format!("{stem}.csv"));
+    let tables =
+        ["accelerators", "samplers", "cameras", "target"].map(|stem| format!("{stem}.csv"));
     tables.into_iter().chain(charts).chain(["bench.json", MANIFEST].map(str::to_owned))
 }
 

@@ -171,7 +171,10 @@ fn means<const C: usize, T: Copy>(
             for k in 0..C {
                 let upper = value(upper[k], k) + value(upper[C + k], k);
                 let sum = upper + value(lower[k], k) + value(lower[C + k], k);
-                #[expect(clippy::cast_possible_truncation, reason = "means are kept in f32 or less")]
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    reason = "means are kept in f32 or less"
+                )]
                 means.push((0.25 * sum) as f32);
             }
         }
@@ -271,7 +274,8 @@ mod tests {
         let linear: [f64; 256] = std::array::from_fn(|i| i as f64 / 255.0);
         for channels in 1..=4 {
             let size = [12, 8];
-            let bytes: Vec<u8> = (0..96 * channels).map(|i| (i * 89 % 256) as u8).collect();
+            let byte = |i: usize| u8::try_from(i * 89 % 256).unwrap();
+            let bytes: Vec<u8> = (0..96 * channels).map(byte).collect();
             // As a texel of so many channels spreads over red, green, blue and alpha.
             let texel = |x: usize, y: usize| {
                 let at = |k: usize| usize::from(bytes[(y * 12 + x) * channels + k]);

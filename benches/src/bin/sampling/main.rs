@@ -220,7 +220,8 @@ fn noise_table(
     }
     beside.sort_by(f64::total_cmp);
     let middle = 0.5 * (beside[(beside.len() - 1) / 2] + beside[beside.len() / 2]);
-    let _ = write!(text, "\nMedian, of the oracle: **{middle:.2} times its samples** (goal: 1.5).\n");
+    let _ =
+        write!(text, "\nMedian, of the oracle: **{middle:.2} times its samples** (goal: 1.5).\n");
     NoiseTable { text, saved }
 }
 
@@ -239,7 +240,8 @@ fn relative_table(
         let samples = json!({ "relative_error": ERROR, "max": effort.most });
         let taken = PicturePair::of(study, samples);
         let spread = |shot: &PicturePair| study.relative_variance(&shot.pair).ninth;
-        let curve: Vec<[f64; 2]> = uniform.iter().map(|shot| [shot.mean_samples, spread(shot)]).collect();
+        let curve: Vec<[f64; 2]> =
+            uniform.iter().map(|shot| [shot.mean_samples, spread(shot)]).collect();
         let (samples, mark) = samples_for(&curve, spread(&taken));
         let _ = writeln!(
             text,

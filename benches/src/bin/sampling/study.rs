@@ -201,7 +201,9 @@ impl Study {
     fn means(&self, of: &dyn Fn(usize) -> f64) -> Vec<f64> {
         let height = self.file.value()["camera"]["sensor"]["resolution"][1].as_u64().unwrap_or(1);
         let blocks = self.blocks(self.width * usize::try_from(height).unwrap_or(1));
-        blocks.map(|pixels| pixels.iter().map(|&p| of(p)).sum::<f64>() / pixels.len() as f64).collect()
+        blocks
+            .map(|pixels| pixels.iter().map(|&p| of(p)).sum::<f64>() / pixels.len() as f64)
+            .collect()
     }
 
     /// The pixels of each block.

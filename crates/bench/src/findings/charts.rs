@@ -178,8 +178,7 @@ pub(super) fn target(found: &Target) -> Chart {
     let mut series: Vec<Series> = Vec::new();
     for own in &found.contenders {
         let renders = found.renders.iter().filter(|render| render.name == own.name);
-        let mut at: Vec<[f64; 2]> =
-            renders.map(|render| [render.seconds, render.error]).collect();
+        let mut at: Vec<[f64; 2]> = renders.map(|render| [render.seconds, render.error]).collect();
         at.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let place = shown.iter().position(|name| *name == own.name);
         let is_named = place.is_some() || own.name == AS_IT_IS;
@@ -207,13 +206,16 @@ pub(super) fn target(found: &Target) -> Chart {
         });
     }
     Chart {
-        title: "Settings: error of what the sensor records against the time of the whole program".to_owned(),
+        title: "Settings: error of what the sensor records against the time of the whole program"
+            .to_owned(),
         notes: vec![
-            "dots: other settings; shaded: the Pareto front, which nothing else beats in both".to_owned(),
+            "dots: other settings; shaded: the Pareto front, which nothing else beats in both"
+                .to_owned(),
         ],
         axes: [
             Axis::new("load, build, trace and write (s)"),
-            Axis::new("root mean square error over the mean").with_zero("the converged picture's own"),
+            Axis::new("root mean square error over the mean")
+                .with_zero("the converged picture's own"),
         ],
         series,
         front: true,

@@ -2,7 +2,9 @@
 
 use std::time::Instant;
 
-use super::{Change, Contender, Effort, Foretold, Outcome, Render, Run, Target, Verified, WholeRun};
+use super::{
+    Change, Contender, Effort, Foretold, Outcome, Render, Run, Target, Verified, WholeRun,
+};
 use crate::pictures::{mean, mean_square};
 use crate::{BenchError, Progress};
 
@@ -185,7 +187,8 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
                 100.0 * own
             ));
         }
-        let entries = vec![Entry { contender: plain, points: Vec::new(), renders: 0, is_out: false }];
+        let entries =
+            vec![Entry { contender: plain, points: Vec::new(), renders: 0, is_out: false }];
         Ok(Self {
             effort,
             program,
@@ -307,7 +310,9 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
         let plain = self.time_of(&self.entries[0]);
         let mut better: Vec<((usize, usize), f64)> = Vec::new();
         for entry in self.entries.iter().filter(|entry| !entry.is_out) {
-            let (&[change], time) = (&*entry.contender.changes, self.time_of(entry)) else { continue };
+            let (&[change], time) = (&*entry.contender.changes, self.time_of(entry)) else {
+                continue;
+            };
             match better.iter_mut().find(|((axis, _), _)| *axis == change.0) {
                 _ if time >= plain => {}
                 Some(known) if known.1 <= time => {}
@@ -320,7 +325,8 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
 
     /// Leaves out the later half, but not the scene as it is; whether more than it and another are left.
     fn halve(&mut self) -> bool {
-        let mut left: Vec<usize> = (0..self.entries.len()).filter(|&i| !self.entries[i].is_out).collect();
+        let mut left: Vec<usize> =
+            (0..self.entries.len()).filter(|&i| !self.entries[i].is_out).collect();
         left.sort_by(|&a, &b| {
             self.time_of(&self.entries[a]).total_cmp(&self.time_of(&self.entries[b]))
         });
@@ -350,10 +356,15 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
                 let forecast = self.forecast_of(&self.entries[i])?;
                 let short = too_few.iter().filter(|(who, _)| *who == i).map(|(_, n)| *n).max();
                 let samples = forecast.samples.max(short.map_or(1, |n| n + n.div_ceil(8)));
-                Some((i, Forecast { samples, seconds: seconds_of(&self.entries[i].points, samples) }))
+                Some((
+                    i,
+                    Forecast { samples, seconds: seconds_of(&self.entries[i].points, samples) },
+                ))
             });
-            let Some((who, forecast)) = all.min_by(|a, b| a.1.seconds.total_cmp(&b.1.seconds)) else {
-                self.notes.push("nothing reaches the target, with any number of samples".to_owned());
+            let Some((who, forecast)) = all.min_by(|a, b| a.1.seconds.total_cmp(&b.1.seconds))
+            else {
+                self.notes
+                    .push("nothing reaches the target, with any number of samples".to_owned());
                 return Ok(None);
             };
             if forecast.seconds > self.left(1.0) {
@@ -364,7 +375,8 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
                 break;
             }
             let name = self.entries[who].contender.name.clone();
-            let is_known = |known: &&Verified| known.name == name && known.samples == forecast.samples;
+            let is_known =
+                |known: &&Verified| known.name == name && known.samples == forecast.samples;
             // The same again would tell nothing.
             if best.as_ref().filter(is_known).is_some() {
                 break;
@@ -378,14 +390,17 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
                 too_few.push((who, samples));
             }
             let is_better = best.as_ref().is_none_or(|known| {
-                match [known.error, error].map(|error| error <= NEAR_ENOUGH[1] * self.effort.target) {
+                match [known.error, error].map(|error| error <= NEAR_ENOUGH[1] * self.effort.target)
+                {
                     [true, true] => seconds < known.seconds,
                     [false, false] => error < known.error,
                     [_, is_within] => is_within,
                 }
             });
             best = if is_better { Some(found) } else { best };
-            if (NEAR_ENOUGH[0]..=NEAR_ENOUGH[1]).contains(&share) || (samples == 1 && share <= NEAR_ENOUGH[1]) {
+            if (NEAR_ENOUGH[0]..=NEAR_ENOUGH[1]).contains(&share)
+                || (samples == 1 && share <= NEAR_ENOUGH[1])
+            {
                 break;
             }
         }
@@ -437,11 +452,14 @@ mod tests {
 
     /// A picture of mean 1 with just this squared error.
     fn picture(square: f64) -> Vec<f64> {
-        (0..64).map(|i| if i % 2 == 0 { 1.0 + square.sqrt() } else { 1.0 - square.sqrt() }).collect()
+        (0..64)
+            .map(|i| if i % 2 == 0 { 1.0 + square.sqrt() } else { 1.0 - square.sqrt() })
+            .collect()
     }
 
     fn raced(axes: &[Vec<(&str, Law)>], plain: Law, target: f64) -> Target {
-        let of = |(name, _): &(&str, Law)| Change { name: (*name).to_owned(), settings: Vec::new() };
+        let of =
+            |(name, _): &(&str, Law)| Change { name: (*name).to_owned(), settings: Vec::new() };
         let changes: Vec<Vec<Change>> =
             axes.iter().map(|axis| axis.iter().map(of).collect()).collect();
         let mut program = |run: Run<'_>| {
@@ -451,7 +469,12 @@ mod tests {
             // Of joint changes the savings multiply, and what is missed adds up.
             let laws = run.contender.changes.iter().map(|&(axis, number)| axes[axis][number].1);
             let [start, sample, variance, rest] = laws.fold(plain, |a, b| {
-                [a[0] * b[0] / plain[0], a[1] * b[1] / plain[1], a[2] * b[2] / plain[2], a[3] + b[3]]
+                [
+                    a[0] * b[0] / plain[0],
+                    a[1] * b[1] / plain[1],
+                    a[2] * b[2] / plain[2],
+                    a[3] + b[3],
+                ]
             });
             if sample < 0.0 {
                 return Ok(Outcome::Refused("not with this".to_owned()));

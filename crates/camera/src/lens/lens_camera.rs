@@ -290,7 +290,11 @@ impl LensCamera {
     }
 
     /// The exit pupil of a train with clear filters at these wavelengths (nm).
-    fn measured(&self, clear: &OpticalTrain, wavelengths: &[f64]) -> Result<ExitPupil, CameraError> {
+    fn measured(
+        &self,
+        clear: &OpticalTrain,
+        wavelengths: &[f64],
+    ) -> Result<ExitPupil, CameraError> {
         let half_size = self.focused.film().half_size().to_array();
         ExitPupil::new(clear, wavelengths, self.focused.sensor_z(), half_size)
             .map_err(|error| CameraError::new("", error.to_string()))

@@ -52,10 +52,16 @@ pub(super) fn race(
 fn without_sampling(scene: &Scene) -> Vec<(String, String)> {
     let is_own = |layer: &&LayerSpec| Some(**layer) != scene.picture;
     let own: Vec<&LayerSpec> = scene.layers.iter().filter(is_own).collect();
-    let names = own.iter().filter(|layer| !layer.is_of_sampling());
-    let names: Vec<String> = names.map(|layer| format!("\"{}\"", layer.row().name)).collect();
-    let has_some = names.len() < own.len();
-    has_some.then(|| ("layers".to_owned(), format!("[{}]", names.join(",")))).into_iter().collect()
+    if !own.iter().any(|layer| layer.is_of_sampling()) {
+        return Vec::new();
+    }
+    let kept = own.iter().filter(|layer| !layer.is_of_sampling());
+    let written = |layer: &LayerSpec| {
+        LayerSpec::NAMES.into_iter().find(|name| LayerSpec::from_name(name) == Some(*layer))
+    };
+    let names: Vec<String> =
+        kept.filter_map(|layer| Some(format!("\"{}\"", written(layer)?))).collect();
+    vec![("layers".to_owned(), format!("[{}]", names.join(",")))]
 }
 
 /// The program from the scene's text to its files, with these `layers` where they are set.
@@ -76,12 +82,12 @@ fn whole_run(
     options.settings.extend(layers.iter().cloned());
     options.settings.extend(settings);
     options.settings.extend(
-        [("render.samples", run.samples.to_string()), ("render.seed", run.seed.to_string())].map(set),
+        [("render.samples", run.samples.to_string()), ("render.seed", run.seed.to_string())]
+            .map(set),
     );
     let progress = Progress::new(|_, _| !stop::asked());
     let outputs = options.outputs;
-    let rendering =
-        Session::open_with(&arguments.scene.scene, options)?.render(&progress)?;
+    let rendering = Session::open_with(&arguments.scene.scene, options)?.render(&progress)?;
     let written = rendering.write_with(folder, outputs, &progress)?;
     let seconds = rendering.report().seconds;
     let before = seconds.load + seconds.decode;
@@ -102,7 +108,8 @@ fn recorded(rendering: &Rendering) -> Result<Vec<f64>, etendue::Error> {
     }
     let name = if rendering.layer(denoise::DENOISED).is_some() { denoise::DENOISED } else { "" };
     let planes = rendering.layer(name).into_iter().flat_map(|layer| &layer.channels);
-    let values = |values: &Values| (0..values.len()).map(|i| values.at(i).min(1.0)).collect::<Vec<_>>();
+    let values =
+        |values: &Values| (0..values.len()).map(|i| values.at(i).min(1.0)).collect::<Vec<_>>();
     Ok(planes.flat_map(|channel| values(&channel.values)).collect())
 }
 

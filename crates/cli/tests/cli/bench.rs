@@ -188,7 +188,8 @@ const LIT: &str = r#"{"etendue": 1, "tracer": {"type": "path"}, "layers": ["samp
 #[test]
 fn the_settings_that_reach_an_error_soonest_are_found_and_verified() {
     let bench = Bench::with_scene(LIT);
-    let words = ["bench", "scene.json", "-o", "out", "--quick", "--target", "5%", "--seconds", "20"];
+    let words =
+        ["bench", "scene.json", "-o", "out", "--quick", "--target", "5%", "--seconds", "20"];
     let output = bench.run(&words);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let table = text(&output.stdout);
@@ -198,8 +199,12 @@ fn the_settings_that_reach_an_error_soonest_are_found_and_verified() {
     // It was rendered for itself, and is within the target; how long it took, no test asserts.
     assert!(verified["error"].as_f64().unwrap() <= 0.05, "{verified}");
     assert!(verified["samples"].as_u64().unwrap() >= 1);
-    let names: Vec<&str> =
-        found["contenders"].as_array().unwrap().iter().map(|c| c["name"].as_str().unwrap()).collect();
+    let names: Vec<&str> = found["contenders"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|c| c["name"].as_str().unwrap())
+        .collect();
     for name in ["as the plan takes it", "independent samples", "2 surfaces", "a high build"] {
         assert!(names.contains(&name), "{names:?}");
     }
@@ -220,11 +225,21 @@ fn the_settings_that_reach_an_error_soonest_are_found_and_verified() {
 fn a_target_that_is_none_is_refused() {
     let bench = Bench::with_scene(LIT);
     for target in ["0", "150%", "-1%", "much"] {
-        let output = bench.run(&["bench", "scene.json", "-o", "out", &format!("--target={target}")]);
+        let output =
+            bench.run(&["bench", "scene.json", "-o", "out", &format!("--target={target}")]);
         assert_eq!(output.status.code(), Some(2), "{target}");
         assert!(text(&output.stderr).contains("such as 1% or 0.01"), "{}", text(&output.stderr));
     }
-    let flat = bench.run(&["bench", "scene.json", "-o", "out", "--target", "1%", "--set", "tracer={\"type\": \"facing\"}"]);
+    let flat = bench.run(&[
+        "bench",
+        "scene.json",
+        "-o",
+        "out",
+        "--target",
+        "1%",
+        "--set",
+        "tracer={\"type\": \"facing\"}",
+    ]);
     assert_eq!(flat.status.code(), Some(2));
     assert!(text(&flat.stderr).contains("--target") && text(&flat.stderr).contains("tracer"));
 }

@@ -156,8 +156,11 @@ fn detail_is_left_out_of_the_picture_alone_told_and_verified() {
     // The render has fewer triangles; data beside the picture have all of them again.
     let triangles = |more: &[&str]| {
         let output = bench.run(
-            &[&["render", "scene.json", "-o", "out", "--outputs", "npy", "--report", "r.json"], more]
-                .concat(),
+            &[
+                &["render", "scene.json", "-o", "out", "--outputs", "npy", "--report", "r.json"],
+                more,
+            ]
+            .concat(),
         );
         assert!(output.status.success(), "{}", text(&output.stderr));
         bench.json("r.json")["triangles_unique"].as_u64().unwrap()

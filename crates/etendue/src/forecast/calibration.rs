@@ -92,8 +92,9 @@ impl Calibration {
             *time = done.report().seconds.build / f64::from(TRIANGLES);
         }
         // Apart, since what touches is looked at for coplanar triangles; and built whether or not they are seen.
-        let places: Vec<Value> =
-            (0..COPIES).map(|i| json!({ "translate": [3 * (i % 100), 3 * (i / 100), 0] })).collect();
+        let places: Vec<Value> = (0..COPIES)
+            .map(|i| json!({ "translate": [3 * (i % 100), 3 * (i / 100), 0] }))
+            .collect();
         let copies = json!([{ "shape": "box", "instances": places }]);
         let all = json!({ "unseen": true });
         let done = rendered(&json!({ "objects": copies, "layers": ["depth"], "plan": all }))?;
@@ -124,7 +125,18 @@ impl Calibration {
         let [raw, rgb] = [exposed("raw", "none")?, exposed("rgb", "none")?];
         let noise = [exposed("raw", "poisson")?, exposed("raw", "normal")?];
         let noise = noise.map(|time| (time - raw).max(0.0));
-        Ok(Self { build, placed_copy, ray, exr, npy, png, together: together.min(1.0), raw, rgb, noise })
+        Ok(Self {
+            build,
+            placed_copy,
+            ray,
+            exr,
+            npy,
+            png,
+            together: together.min(1.0),
+            raw,
+            rgb,
+            noise,
+        })
     }
 }
 

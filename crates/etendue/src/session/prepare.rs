@@ -72,7 +72,8 @@ impl Session {
         let scene = Arc::new(scene);
         let (accel, coarse) = (None, None);
         let is_decoded = false;
-        self.loaded = Some(LoadedScene { scene, plan, notes, accel, neighbours, is_decoded, coarse });
+        self.loaded =
+            Some(LoadedScene { scene, plan, notes, accel, neighbours, is_decoded, coarse });
         self.seconds.load += start.elapsed().as_secs_f64();
         Ok(())
     }

@@ -98,9 +98,8 @@ fn is_plain(scene: &Scene) -> bool {
     let is_picture = scene.layers.contains(&LayerSpec::Radiance)
         && scene.layers.iter().all(is_light)
         && !scene.render.alpha;
-    let is_still = scene.slots == 0
-        && scene.camera.motion().is_none()
-        && scene.camera.light_field().is_none();
+    let is_still =
+        scene.slots == 0 && scene.camera.motion().is_none() && scene.camera.light_field().is_none();
     let mut placed = vec![false; scene.materials.len()];
     for placement in &scene.geometry.placements {
         placed.get_mut(placement.material as usize).into_iter().for_each(|placed| *placed = true);
@@ -109,7 +108,8 @@ fn is_plain(scene: &Scene) -> bool {
     is_picture
         && is_still
         && scene.lights.iter().all(|light| is_far(&light.kind))
-        && materials.all(|(material, _)| shows_nothing_else(material) && material.emission.is_none())
+        && materials
+            .all(|(material, _)| shows_nothing_else(material) && material.emission.is_none())
 }
 
 /// Whether no other surface is seen in a material, mirrored or through it.
@@ -151,7 +151,8 @@ fn pixel_extent(scene: &Scene, distance: f64) -> Option<f64> {
     let point = |i: usize| rays.origin(i) + distance * rays.direction(i);
     let is_seen = |i: usize| rays.t_max()[i] >= 0.0;
     let extents = (0..rays.len()).step_by(3).filter(|&i| (i..i + 3).all(is_seen));
-    let extents = extents.map(|i| point(i).distance(point(i + 1)).min(point(i).distance(point(i + 2))));
+    let extents =
+        extents.map(|i| point(i).distance(point(i + 1)).min(point(i).distance(point(i + 2))));
     extents.reduce(f64::min).filter(|extent| *extent > 0.0 && extent.is_finite())
 }
 
@@ -197,7 +198,8 @@ fn clustered(mesh: &Mesh, side: f64) -> Option<Mesh> {
     let mut clusters = Clusters::new(&cells, mesh.positions.len());
     let of_corner: Vec<u32> = (0..mesh.positions.len())
         .map(|i| {
-            let normal = mesh.normals.as_ref().map(|normals| DVec3::from(normals.get(i).map(f64::from)));
+            let normal =
+                mesh.normals.as_ref().map(|normals| DVec3::from(normals.get(i).map(f64::from)));
             clusters.add(cells.of(mesh.positions.get(i)), mesh.positions.get(i), normal)
         })
         .collect();
@@ -341,7 +343,8 @@ impl Clusters {
     }
 
     fn normals(&self) -> Vertices<3> {
-        let normals = self.of_corner.iter().map(|(_, sum)| sum.normalize_or_zero().as_vec3().to_array());
+        let normals =
+            self.of_corner.iter().map(|(_, sum)| sum.normalize_or_zero().as_vec3().to_array());
         Vertices::from_arrays(&normals.collect::<Vec<_>>())
     }
 }

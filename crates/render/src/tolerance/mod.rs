@@ -228,8 +228,9 @@ impl FullView {
     fn blur(&self) -> f64 {
         let of_place = |(seen, place): (&PlaceView, &Place)| {
             let depths = place.depths.iter();
-            let of_depth =
-                |depth: &f64| seen.bands.iter().map(|band| band.blur(1.0 / depth)).fold(0.0, f64::max);
+            let of_depth = |depth: &f64| {
+                seen.bands.iter().map(|band| band.blur(1.0 / depth)).fold(0.0, f64::max)
+            };
             depths.map(of_depth).fold(0.0, f64::max)
         };
         self.scale * self.seen.iter().zip(&self.places).map(of_place).fold(0.0, f64::max)

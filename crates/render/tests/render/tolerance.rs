@@ -217,7 +217,7 @@ fn meshes_have_the_detail_that_the_nearest_view_tells() {
     assert!(found < 0.02, "{found}");
     // Cells of several pixels change the area by more than half of 2 %, and where that is allowed the same comparison
     // tells it.
-    let wide = |light: &str| coarser(&fine_ball(&allowed("6 px", light), &[]));
+    let wide = |light: &str| coarser(&fine_ball(&allowed("8 px", light), &[]));
     assert!(wide("2 %").is_none());
     let (geometry, detail) = wide("60 %").expect("a coarser ball");
     assert!(detail.light > 0.01, "{detail:?}");
@@ -232,7 +232,8 @@ fn meshes_stay_as_they_are_where_something_could_show_more_of_them() {
     assert!(coarser(&fine_ball(&tolerance, &[])).is_some());
     let mirror = json!({ "type": "mirror" });
     let ball = |more: Value| {
-        let mut ball = json!({ "shape": "sphere", "radius": 0.2, "transform": { "translate": [0.6, 0, -1] } });
+        let mut ball =
+            json!({ "shape": "sphere", "radius": 0.2, "transform": { "translate": [0.6, 0, -1] } });
         ball.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
         ball
     };
@@ -241,17 +242,32 @@ fn meshes_stay_as_they_are_where_something_could_show_more_of_them() {
         ("depth", vec![("/layers", json!(["depth"]))]),
         ("alpha", vec![("/render/alpha", json!(true))]),
         // A mirror may enlarge, and a lamp nearby throws large shadows.
-        ("mirror", vec![
-            ("/materials/mirror", mirror),
-            ("/objects/1", ball(json!({ "material": "mirror" }))),
-        ]),
-        ("point", vec![("/lights/2", json!({ "type": "point", "at": [0, 1, 0], "intensity": [1, 1, 1] }))]),
-        ("emissive", vec![
-            ("/materials/lamp", json!({ "type": "emissive", "radiance": [1, 1, 1] })),
-            ("/objects/1", ball(json!({ "material": "lamp" }))),
-        ]),
+        (
+            "mirror",
+            vec![
+                ("/materials/mirror", mirror),
+                ("/objects/1", ball(json!({ "material": "mirror" }))),
+            ],
+        ),
+        (
+            "point",
+            vec![(
+                "/lights/2",
+                json!({ "type": "point", "at": [0, 1, 0], "intensity": [1, 1, 1] }),
+            )],
+        ),
+        (
+            "emissive",
+            vec![
+                ("/materials/lamp", json!({ "type": "emissive", "radiance": [1, 1, 1] })),
+                ("/objects/1", ball(json!({ "material": "lamp" }))),
+            ],
+        ),
         // The camera stands within the box of a thing.
-        ("within", vec![("/objects/1", json!({ "shape": "box", "size": [9, 9, 9], "material": "white" }))]),
+        (
+            "within",
+            vec![("/objects/1", json!({ "shape": "box", "size": [9, 9, 9], "material": "white" }))],
+        ),
         // The ball is patterned, or moves.
         ("checker", vec![("/materials/white", json!({ "type": "checker", "squares": 4 }))]),
     ];
