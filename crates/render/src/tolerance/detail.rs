@@ -163,18 +163,19 @@ fn stretch_of(scene: &Scene, number: usize) -> Option<f64> {
     if mesh.triangles.len() < WORTH || mesh.steps.is_some() || mesh.colors.is_some() {
         return None;
     }
-    let placed = geometry.placements.iter().filter(|placement| placement.mesh as usize == number);
-    placed.fold(Some(0.0), |most: Option<f64>, placement| {
+    let mut placed =
+        geometry.placements.iter().filter(|placement| placement.mesh as usize == number);
+    placed.try_fold(0.0, |most: f64, placement| {
         let material = scene.materials.get(placement.material as usize)?;
         let is_simple = placement.motion.is_none()
             && !material.is_patterned()
             && material.alpha == Alpha::Opaque;
         let stretch = stretch(&placement.world_from_mesh);
-        is_simple.then_some(most?.max(stretch))
+        is_simple.then_some(most.max(stretch))
     })
 }
 
-/// The greatest stretch of a transform, or a little more: its square is the greatest eigenvalue of AᵀA, which is no
+/// The greatest stretch of a transform, or a little more: its square is the greatest eigenvalue of `AᵀA`, which is no
 /// more than the greatest sum of absolute values of a row (S. Gerschgorin, 1931), and just that of what is turned and
 /// scaled alike.
 fn stretch(transform: &Transform) -> f64 {
