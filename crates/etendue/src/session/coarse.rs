@@ -23,6 +23,9 @@ pub(super) struct CoarseScene {
     is_in_place: bool,
 }
 
+/// A scene with all its detail, and the structure over it once that is built.
+pub(super) type FullScene = (Arc<Scene>, Option<Arc<dyn Accel>>);
+
 impl Session {
     /// Puts the coarser scene in the place of the loaded one, where there is one.
     pub(super) fn show_coarse(&mut self) {
@@ -60,7 +63,7 @@ impl Session {
     }
 
     /// The scene with all its detail, and the structure over it, for what is rendered to be compared with.
-    pub(super) fn in_full(&self) -> Result<(Arc<Scene>, Option<Arc<dyn Accel>>), Error> {
+    pub(super) fn in_full(&self) -> Result<FullScene, Error> {
         let loaded = self.loaded()?;
         Ok(match loaded.coarse.as_ref().filter(|coarse| coarse.is_in_place) {
             Some(coarse) => (Arc::clone(&coarse.scene), coarse.accel.clone()),
