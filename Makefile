@@ -29,7 +29,7 @@ help:
 	@echo "make bench-cycles  light against Blender's Cycles, from PyPI; writes docs/benchmarks-cycles.md"
 	@echo "make bench-sensor  time one exposure against numpy, prysm and emva1288, from PyPI"
 	@echo "make bench-limits  scenes and pictures as large as most machines take; writes docs/limits.md"
-	@echo "make bench-sampling  what samples that stop save; writes the measured part of docs/sampling.md"
+	@echo "make bench-sampling  what samples that stop save, and what an oracle would; writes the measured part of docs/sampling.md"
 	@echo "make bench-forecast  render the example scenes, and hold the forecast of time against it"
 	@echo "make bench-memory   the same for the forecast of memory, and for copies, large shapes and frames"
 	@echo "make bench-masks   what a ray through a mask of small openings costs; writes a part of docs/cameras.md"

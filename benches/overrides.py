@@ -105,7 +105,8 @@ def cases(folder, scenes):
     room = scene({"type": "pinhole", "pose": {"from": [1.2, 0.1, 1.1], "look_at": [-1, -0.3, -1]}}, [192, 128], ROOM,
                  tracer={"type": "path"}, lights=[], **some)
     room["materials"] = {"grey": {"type": "matte", "color": [0.3] * 3}, "lamp": {"type": "emissive", "radiance": [5] * 3}}
-    yield "32 bounces where 4 are seen", False, room, {"tracer": {"type": "path", "max_bounces": 4}}, None
+    # Four leave out 2.2 % of the light in 99 % of blocks, five 0.7 %.
+    yield "32 bounces where 5 are within the tolerance", False, room, {"tracer": {"type": "path", "max_bounces": 5}}, None
 
 
 def undispersed(gauss):

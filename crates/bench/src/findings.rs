@@ -10,6 +10,7 @@ use serde::Serialize;
 use crate::accelerators;
 use crate::cameras::Cameras;
 use crate::samplers::{Converged, Samplers};
+use crate::target::Target;
 
 /// What was measured, and on what.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -26,6 +27,8 @@ pub struct Findings {
     pub samplers: Option<Samplers>,
     /// Each model of the lens × number of samples, where the camera has one.
     pub cameras: Option<Cameras>,
+    /// Which settings reach a given error soonest, where that was asked for.
+    pub target: Option<Target>,
     /// What was left out or stands in for something, and why.
     pub notes: Vec<String>,
 }
@@ -42,6 +45,7 @@ impl Findings {
         for (title, table) in self.tables() {
             text.push_str(&format!("\n{title}\n{}", table.text()));
         }
+        text.extend(self.target.iter().map(|found| format!("\n{}\n", found.verdict())));
         text
     }
 
@@ -58,6 +62,9 @@ impl Findings {
         if let Some(cameras) = &self.cameras {
             files.push(("cameras.csv", table::cameras(cameras).csv()));
         }
+        if let Some(target) = &self.target {
+            files.push(("target.csv", table::renders(target).csv()));
+        }
         files
     }
 
@@ -73,6 +80,9 @@ impl Findings {
         }
         if let Some(cameras) = &self.cameras {
             charts.extend(charts::cameras(cameras));
+        }
+        if let Some(target) = &self.target {
+            charts.push(("target-time", charts::target(target)));
         }
         charts
     }
@@ -103,6 +113,16 @@ impl Findings {
             let of = "the full train's";
             let title = pictures("Camera models", found.resolution, &found.converged, of);
             tables.push((title, table::cameras(found)));
+        }
+        if let Some(found) = &self.target {
+            let title = format!(
+                "Settings by when the whole program reaches an error of {} % of the picture's mean, against one of {} \
+                 samples, whose own error is {:.2} %.",
+                100.0 * found.target,
+                found.converged,
+                100.0 * found.own_error
+            );
+            tables.push((title, table::contenders(found)));
         }
         tables
     }

@@ -12,6 +12,7 @@
 //! | [`samplers`] | each sampler × number of samples |
 //! | [`cameras`] | each model of the same lens × number of samples |
 //! | [`tolerance`] | the cheapest model of a lens within a tolerance, by what pixels see |
+//! | [`target`] | which settings reach an error of the sensor's picture soonest, by the time of the whole program |
 //! | [`findings`] | all that was measured on a scene: as text, CSV and charts |
 //! | [`drawing`] | charts as files, SVG and PNG |
 
@@ -22,6 +23,7 @@ pub mod findings;
 pub mod hits;
 pub mod pictures;
 pub mod samplers;
+pub mod target;
 pub mod timing;
 pub mod tolerance;
 
@@ -61,6 +63,9 @@ pub enum BenchError {
     /// A chart could not be turned into pixels; a fault of this program.
     #[error("a chart cannot be drawn as PNG: {0}")]
     Drawing(String),
+    /// The scene itself cannot be rendered.
+    #[error("{0}")]
+    Refused(String),
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,

@@ -63,6 +63,7 @@ fn on_chart(findings: &[Finding], chart: &str, method: Method) -> f64 {
         accelerators: findings.to_vec(),
         samplers: None,
         cameras: None,
+        target: None,
         notes: Vec::new(),
     };
     let charts = findings.charts();

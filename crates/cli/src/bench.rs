@@ -1,5 +1,7 @@
 //! `etendue bench`: speed against accuracy on the user's own scene and machine.
 
+mod target;
+
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -48,7 +50,7 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
     let phases = Phases::new(arguments.quiet);
     places::folder(&arguments.output)?;
     // The scene, with a picture where parts need one.
-    let has = |part| arguments.only.is_empty() || arguments.only.contains(&part);
+    let has = |part| wants(arguments, part);
     let has_pictures = has(PartArgument::Samplers) || has(PartArgument::Cameras);
     let mut notes = Vec::new();
     let scene_arguments = match has_pictures {
@@ -70,6 +72,7 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
         accelerators: Vec::new(),
         samplers: None,
         cameras: None,
+        target: None,
         notes,
     };
     // The parts that were asked for, and their files.
@@ -80,6 +83,11 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
         let (scene, accel) = session.scene_and_accel(&progress)?;
         pictures(arguments, (scene, accel), phases, &mut findings)?;
     }
+    if let Some(target) = arguments.target {
+        let found = target::race(arguments, target, (session.scene(&progress)?, phases))?;
+        findings.notes.extend(found.notes.iter().cloned());
+        findings.target = Some(found);
+    }
     let ledger = Ledger::open(&arguments.output, "bench");
     let files = places::recorded(ledger, &session.inputs(), |to| write(to, arguments, &findings))?;
     print_text(&findings.text())?;
@@ -89,6 +97,12 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
         lines.chain(files).for_each(|line| say(&line));
     }
     Ok(())
+}
+
+/// Whether a part is measured: those that are named, or all where no target is.
+fn wants(arguments: &BenchArguments, part: PartArgument) -> bool {
+    let all = arguments.only.is_empty() && arguments.target.is_none();
+    all || arguments.only.contains(&part)
 }
 
 /// What is traced.
@@ -180,7 +194,7 @@ fn pictures(
         rounds: findings.rounds,
         seconds: arguments.seconds.unwrap_or(SECONDS[quick]),
     };
-    let has = |part| arguments.only.is_empty() || arguments.only.contains(&part);
+    let has = |part| wants(arguments, part);
     if has(PartArgument::Samplers) && scene.picture.is_some_and(is_sampled) {
         let progress = phases.begin("sample");
         let mut studio = Studio::new(scene, accel)?;
@@ -236,10 +250,12 @@ fn file_names() -> impl Iterator<Item = String> {
         "samplers-time",
         "samplers-samples",
         "cameras-time",
+        "target-time",
     ];
     let charts =
         charts.into_iter().flat_map(|stem| ["svg", "png"].map(|end| format!("{stem}.{end}")));
-    let tables = ["accelerators", "samplers", "cameras"].map(|stem| format!("{stem}.csv"));
+    let tables =
+        ["accelerators", "samplers", "cameras", "target"].map(|stem| format!("{stem}.csv"));
     tables.into_iter().chain(charts).chain(["bench.json", MANIFEST].map(str::to_owned))
 }
 

@@ -1,5 +1,6 @@
 //! A scene that is opened once and rendered often.
 
+mod coarse;
 mod opening;
 mod prepare;
 mod render;
@@ -24,6 +25,7 @@ use serde_json::Value;
 
 pub use opening::read_glasses;
 
+use self::coarse::CoarseScene;
 use crate::changes;
 use crate::neighbours::{self, Neighbour};
 use crate::rendering::{certain_files, file_names};
@@ -70,7 +72,7 @@ pub struct Session {
 /// A scene, the structure over it, and its images.
 pub(crate) type Ready = (Arc<Scene>, Arc<dyn Accel>, Arc<Images>);
 
-/// The scene as it is now.
+/// The scene as it is now: while its picture is rendered, the one in its place.
 struct LoadedScene {
     scene: Arc<Scene>,
     plan: Plan,
@@ -81,6 +83,8 @@ struct LoadedScene {
     neighbours: Vec<Neighbour>,
     /// Images are those of this scene.
     is_decoded: bool,
+    /// What is rendered in its place, once that was looked for.
+    coarse: Option<CoarseScene>,
 }
 
 impl fmt::Debug for Session {
@@ -288,7 +292,7 @@ impl Session {
     ///
     /// As [`Self::scene`].
     pub fn prospect(&mut self, progress: &Progress) -> Result<Prospect<'_>, Error> {
-        self.load(progress)?;
+        self.load_as_rendered(progress)?;
         let LoadedScene { scene, plan, .. } = self.loaded()?;
         let (outputs, load) = (self.options.outputs, self.seconds.load);
         Ok(Prospect { scene, plan, outputs, load })
@@ -314,7 +318,8 @@ impl Session {
     pub fn plan(&mut self, progress: &Progress) -> Result<&Plan, Error> {
         self.load(progress)?;
         if self.loaded()?.scene.tolerance.is_some() {
-            self.prepare(progress)?;
+            self.build_for_picture(progress)?;
+            self.decode(progress)?;
             self.take(progress)?;
         }
         Ok(&self.loaded()?.plan)

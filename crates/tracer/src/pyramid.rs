@@ -21,28 +21,49 @@ struct Level {
 }
 
 impl Pyramid {
-    /// Over `image`, whose linear texel in a column and row is `texel`.
+    /// Over `image`, whose linear texel of a number is `texel`; `bytes` has that of each byte of a colour, where the
+    /// image has bytes.
     ///
     /// # Errors
     ///
     /// When there is no memory for it.
     pub(crate) fn new(
         image: &Raster,
-        texel: impl Fn(usize, usize) -> [f64; 4],
+        texel: impl Fn(usize) -> [f64; 4],
+        bytes: impl Fn() -> [f64; 256],
     ) -> Result<Self, DecodeError> {
         let mut levels = Vec::new();
         if image.len() <= 1 {
             return Ok(Self { levels });
         }
-        let mut next = halved(image.size(), image.channels(), texel)?;
+        let evenly = match image.samples() {
+            Samples::U8(values) if is_even(image.size()) => {
+                let colour = bytes();
+                // Alpha is linear.
+                let alpha = std::array::from_fn(|i| i as f64 / 255.0);
+                Some(halved_evenly(image.size(), image.channels(), values, [&colour, &alpha])?)
+            }
+            Samples::U8(_) | Samples::U16(_) | Samples::F16(_) | Samples::F32(_) => None,
+        };
+        let width = image.size()[0];
+        let mut next = match evenly {
+            Some(next) => next,
+            None => halved(image.size(), image.channels(), |x, y| texel(y * width + x))?,
+        };
         loop {
             levels.push(Level::new(&next, image.is_float())?);
             if next.len() == 1 {
                 return Ok(Self { levels });
             }
-            let width = next.size()[0];
-            let texel = |x: usize, y: usize| next.texel(y * width + x);
-            next = halved(next.size(), next.channels(), texel)?;
+            next = match next.samples() {
+                Samples::F32(values) if is_even(next.size()) => {
+                    halved_singles(next.size(), next.channels(), values)?
+                }
+                Samples::U8(_) | Samples::U16(_) | Samples::F16(_) | Samples::F32(_) => {
+                    let width = next.size()[0];
+                    halved(next.size(), next.channels(), |x, y| next.texel(y * width + x))?
+                }
+            };
         }
     }
 
@@ -94,6 +115,71 @@ impl Level {
         let row = wrap[1].apply(y, height);
         self.raster.texel(row * width + column)
     }
+}
+
+/// Whether each texel of half as many columns and rows is the mean of four.
+fn is_even(size: [usize; 2]) -> bool {
+    size.iter().all(|side| side.is_multiple_of(2))
+}
+
+/// [`halved`] of bytes with even sides, to the bit: what each stands for in a colour, and in alpha, is looked up.
+fn halved_evenly(
+    size: [usize; 2],
+    channels: usize,
+    values: &[u8],
+    [colour, alpha]: [&[f64; 256]; 2],
+) -> Result<Raster, DecodeError> {
+    let value = |byte: u8, k: usize| match channels.is_multiple_of(2) && k + 1 == channels {
+        true => alpha[usize::from(byte)],
+        false => colour[usize::from(byte)],
+    };
+    match channels {
+        1 => means::<1, u8>(size, values, value),
+        2 => means::<2, u8>(size, values, value),
+        3 => means::<3, u8>(size, values, value),
+        _ => means::<4, u8>(size, values, value),
+    }
+}
+
+/// The same of single precision.
+fn halved_singles(
+    size: [usize; 2],
+    channels: usize,
+    values: &[f32],
+) -> Result<Raster, DecodeError> {
+    let value = |value: f32, _: usize| f64::from(value);
+    match channels {
+        1 => means::<1, f32>(size, values, value),
+        2 => means::<2, f32>(size, values, value),
+        3 => means::<3, f32>(size, values, value),
+        _ => means::<4, f32>(size, values, value),
+    }
+}
+
+/// Of each two columns and rows the means of `C` channels, added up as [`halved`] does: a quarter is a power of two,
+/// by which the sum may be multiplied in the place of what is summed.
+fn means<const C: usize, T: Copy>(
+    [width, height]: [usize; 2],
+    values: &[T],
+    value: impl Fn(T, usize) -> f64,
+) -> Result<Raster, DecodeError> {
+    let size = [width / 2, height / 2];
+    let mut means = room(size[0] * size[1] * C)?;
+    for rows in values.chunks_exact(2 * width * C) {
+        let (upper, lower) = rows.split_at(width * C);
+        for (upper, lower) in upper.chunks_exact(2 * C).zip(lower.chunks_exact(2 * C)) {
+            for k in 0..C {
+                let upper = value(upper[k], k) + value(upper[C + k], k);
+                let sum = upper + value(lower[k], k) + value(lower[C + k], k);
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    reason = "means are kept in f32 or less"
+                )]
+                means.push((0.25 * sum) as f32);
+            }
+        }
+    }
+    Ok(Raster::new(size, C, Samples::F32(means)))
 }
 
 /// Half as many columns and rows, rounded down; where that leaves a rest, texels are split among
@@ -163,8 +249,9 @@ mod tests {
         for (width, height) in [(8, 8), (7, 5), (1, 9), (13, 1), (6, 3)] {
             #[expect(clippy::cast_precision_loss, reason = "small numbers")]
             let value = |x: usize, y: usize| ((x * 37 + y * 101) % 16) as f64 / 15.0;
-            let image = Raster::new([width, height], 4, Samples::U8(vec![0; 4 * width * height]));
-            let pyramid = Pyramid::new(&image, |x, y| [value(x, y), 0.0, 1.0, 0.5]).unwrap();
+            let image = Raster::new([width, height], 4, Samples::U16(vec![0; 4 * width * height]));
+            let at = |k: usize| [value(k % width, k / width), 0.0, 1.0, 0.5];
+            let pyramid = Pyramid::new(&image, at, || unreachable!()).unwrap();
             let count = f64::from(u32::try_from(width * height).unwrap());
             let all = (0..width * height).map(|k| value(k % width, k / width));
             let mean: f64 = all.sum::<f64>() / count;
@@ -178,6 +265,37 @@ mod tests {
             let top = pyramid.levels.last().unwrap();
             assert_eq!(top.raster.size(), [1, 1]);
             assert_eq!(top.raster.texel(0)[1..3], [0.0, 1.0]);
+        }
+    }
+
+    #[test]
+    fn even_sides_are_halved_as_any_are_to_the_bit() {
+        let curve: [f64; 256] = std::array::from_fn(|i| (i as f64 / 255.0).powf(2.2));
+        let linear: [f64; 256] = std::array::from_fn(|i| i as f64 / 255.0);
+        for channels in 1..=4 {
+            let size = [12, 8];
+            let byte = |i: usize| u8::try_from(i * 89 % 256).unwrap();
+            let bytes: Vec<u8> = (0..96 * channels).map(byte).collect();
+            // As a texel of so many channels spreads over red, green, blue and alpha.
+            let texel = |x: usize, y: usize| {
+                let at = |k: usize| usize::from(bytes[(y * 12 + x) * channels + k]);
+                match channels {
+                    1 => [curve[at(0)], curve[at(0)], curve[at(0)], 1.0],
+                    2 => [curve[at(0)], curve[at(0)], curve[at(0)], linear[at(1)]],
+                    3 => [curve[at(0)], curve[at(1)], curve[at(2)], 1.0],
+                    _ => [curve[at(0)], curve[at(1)], curve[at(2)], linear[at(3)]],
+                }
+            };
+            let bits = |raster: &Raster| match raster.samples() {
+                Samples::F32(values) => values.iter().map(|v| v.to_bits()).collect::<Vec<u32>>(),
+                _ => panic!("means are single"),
+            };
+            let any = halved(size, channels, texel).unwrap();
+            let even = halved_evenly(size, channels, &bytes, [&curve, &linear]).unwrap();
+            assert_eq!(bits(&any), bits(&even), "{channels} channels");
+            let Samples::F32(values) = any.samples() else { panic!("means are single") };
+            let again = halved(any.size(), channels, |x, y| any.texel(y * 6 + x)).unwrap();
+            assert_eq!(bits(&again), bits(&halved_singles(any.size(), channels, values).unwrap()));
         }
     }
 }

@@ -253,10 +253,14 @@ impl Image {
         if self.pyramids[encoding as usize].is_some() || self.raster.is_empty() {
             return Ok(());
         }
-        let [width, _] = self.size();
-        let pyramid =
-            Pyramid::new(&self.raster, |x, y| decoded(&self.raster, y * width + x, encoding))
-                .map_err(|source| ImageError::Decode { name: name.to_owned(), source })?;
+        // What every byte stands for, where the image has bytes: that of an image of all of them.
+        let bytes = || {
+            let all = Raster::new([256, 1], 1, Samples::U8((0..=255).collect()));
+            std::array::from_fn(|i| decoded(&all, i, encoding)[0])
+        };
+        let texel = |i: usize| decoded(&self.raster, i, encoding);
+        let pyramid = Pyramid::new(&self.raster, texel, bytes)
+            .map_err(|source| ImageError::Decode { name: name.to_owned(), source })?;
         self.pyramids[encoding as usize] = Some(pyramid);
         Ok(())
     }

@@ -82,6 +82,7 @@ fn nothing() -> Findings {
         accelerators: Vec::new(),
         samplers: None,
         cameras: None,
+        target: None,
         notes: Vec::new(),
     }
 }

@@ -141,6 +141,7 @@ fn chart(findings: &[Finding], stem: &str) -> anyhow::Result<Chart> {
         accelerators: findings.to_vec(),
         samplers: None,
         cameras: None,
+        target: None,
         notes: Vec::new(),
     };
     let chart = findings.charts().into_iter().find(|(name, _)| *name == stem);

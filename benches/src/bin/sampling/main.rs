@@ -10,6 +10,7 @@
     reason = "programs of measurements and tests write their own files"
 )]
 
+mod oracle;
 mod study;
 
 use std::fmt::Write as _;
@@ -40,6 +41,9 @@ const COUNTS: [u32; 15] = [8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 51
 
 /// The variance that samples may have, as a share of the sensor's.
 const FRACTION: f64 = 0.1;
+
+/// The fewest samples that the oracle gives.
+const FEWEST: f64 = 4.0;
 
 /// The relative error of the other table.
 const ERROR: f64 = 0.1;
@@ -110,7 +114,7 @@ fn main() -> anyhow::Result<()> {
     let noise = noise_table(&effort, &names, &studies, &uniform);
     text += &noise.text;
     draw(&arguments.docs, &names, &noise.saved)?;
-    text += "\n![Rays saved against exposure time](images/sampling/saved.svg)\n";
+    text += "\n![Samples saved against exposure time](images/sampling/saved.svg)\n";
     text += &relative_table(&effort, &names, &studies, &uniform);
     text += &map(&arguments.docs, &studies[0])?;
     text += &planner(&studies[0]);
@@ -122,10 +126,9 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Two pictures of other seeds, and the rays of one.
+/// Two pictures of other seeds, and the samples of one.
 struct PicturePair {
     pair: [study::Picture; 2],
-    rays: f64,
     mean_samples: f64,
 }
 
@@ -137,15 +140,14 @@ impl PicturePair {
 
     fn with(study: &Study, wanted: &Wanted) -> Self {
         let pair = [1, 2].map(|seed| study.picture(wanted, seed));
-        let mean = |of: &dyn Fn(&study::Picture) -> f64| 0.5 * (of(&pair[0]) + of(&pair[1]));
-        let (rays, mean_samples) = (mean(&|p| p.rays), mean(&|p| p.samples));
-        Self { rays, mean_samples, pair }
+        let mean_samples = 0.5 * (pair[0].samples + pair[1].samples);
+        Self { mean_samples, pair }
     }
 }
 
 struct NoiseTable {
     text: String,
-    /// Of each scene: exposure time, and rays of the same number for each pixel over those taken.
+    /// Of each scene: exposure time, and the same number for each pixel over the samples taken.
     saved: Vec<Vec<[f64; 2]>>,
 }
 
@@ -156,17 +158,20 @@ fn noise_table(
     uniform: &[Vec<PicturePair>],
 ) -> NoiseTable {
     let mut text = format!(
-        "\nUntil the variance of the samples is {FRACTION} of the sensor's. `as even`: rays of a number for every pixel \
+        "\nUntil the variance of the samples is {FRACTION} of the sensor's. `as even`: a number for every pixel \
          with the same variance in the mean over the picture (so the same root mean square error of the sensor's \
-         image), over those taken. `as good`: of a number with which as many as nine tenths of all blocks of 8 × 8 \
+         image), over the samples taken. `as good`: a number with which as many as nine tenths of all blocks of 8 × 8 \
          pixels have what nine tenths have here; `as good everywhere`: the same of 99 in 100. What lies beyond the numbers of samples measured ({} to {}) is extrapolated along \
-         the nearest two, and marked.\n\n| scene | exposure | samples a pixel | variance, of the sensor's | as even | as good | as good everywhere |\n\
-         |---|---|---|---|---|---|---|\n",
+         the nearest two, and marked. `oracle`: what could be saved there at best, by somebody who knows how the variance of \
+         every block falls and gives each the fewest samples, {FEWEST} at least, with which 99 in 100 are as good; `of the \
+         oracle`: the samples taken over those.\n\n| scene | exposure | samples a pixel | variance, of the sensor's | as even | as good | as good everywhere | oracle | of the oracle |\n\
+         |---|---|---|---|---|---|---|---|---|\n",
         effort.counts[0],
         effort.counts[effort.counts.len() - 1]
     );
     let mut saved = Vec::new();
     let mut factors = Vec::new();
+    let mut beside: Vec<f64> = Vec::new();
     for ((name, study), uniform) in names.iter().zip(studies).zip(uniform) {
         let mut line = Vec::new();
         for &exposure in effort.charted {
@@ -176,23 +181,29 @@ fn noise_table(
             let spread = |shot: &PicturePair| study.noise_share(&shot.pair, exposure);
             let own = spread(&taken);
             let curve = |of: &dyn Fn(Spread) -> f64| -> Vec<[f64; 2]> {
-                uniform.iter().map(|shot| [shot.rays, of(spread(shot))]).collect()
+                uniform.iter().map(|shot| [shot.mean_samples, of(spread(shot))]).collect()
             };
-            let (even, even_mark) = rays_for(&curve(&|s| s.mean), own.mean);
-            let (good, good_mark) = rays_for(&curve(&|s| s.ninth), own.ninth);
-            let (most, most_mark) = rays_for(&curve(&|s| s.most), own.most);
-            line.push([exposure, good / taken.rays]);
+            let (even, even_mark) = samples_for(&curve(&|s| s.mean), own.mean);
+            let (good, good_mark) = samples_for(&curve(&|s| s.ninth), own.ninth);
+            let (most, most_mark) = samples_for(&curve(&|s| s.most), own.most);
+            line.push([exposure, good / taken.mean_samples]);
             if SHOWN.contains(&exposure) {
-                factors.push([even, good, most].map(|rays| rays / taken.rays));
+                let of_blocks = uniform.iter().map(|shot| study.noise_shares(&shot.pair, exposure));
+                let of_blocks: Vec<Vec<f64>> = of_blocks.collect();
+                let oracle = oracle::samples(effort.counts, &of_blocks, own.most, FEWEST);
+                let of_oracle = taken.mean_samples / oracle;
+                factors.push([even, good, most].map(|samples| samples / taken.mean_samples));
+                beside.push(of_oracle);
                 let _ = writeln!(
                     text,
-                    "| `{name}` | {} ms | {:.0} | {:.3} | {:.1}{even_mark} | {:.1}{good_mark} | {:.1}{most_mark} |",
+                    "| `{name}` | {} ms | {:.0} | {:.3} | {:.1}{even_mark} | {:.1}{good_mark} | {:.1}{most_mark} | {:.1}{most_mark} | {of_oracle:.2} |",
                     exposure * 1e3,
                     taken.mean_samples,
                     own.mean,
-                    even / taken.rays,
-                    good / taken.rays,
-                    most / taken.rays
+                    even / taken.mean_samples,
+                    good / taken.mean_samples,
+                    most / taken.mean_samples,
+                    most / oracle
                 );
             }
         }
@@ -204,9 +215,13 @@ fn noise_table(
         let middle = 0.5 * (all[(all.len() - 1) / 2] + all[all.len() / 2]);
         let _ = write!(
             text,
-            "\nMedian, {words}: one number for all takes **{middle:.1} times the rays** (goal: 4).\n"
+            "\nMedian, {words}: one number for all takes **{middle:.1} times the samples** (goal: 4).\n"
         );
     }
+    beside.sort_by(f64::total_cmp);
+    let middle = 0.5 * (beside[(beside.len() - 1) / 2] + beside[beside.len() / 2]);
+    let _ =
+        write!(text, "\nMedian, of the oracle: **{middle:.2} times its samples** (goal: 1.5).\n");
     NoiseTable { text, saved }
 }
 
@@ -218,29 +233,30 @@ fn relative_table(
 ) -> String {
     let mut text = format!(
         "\nUntil a relative error of {ERROR}, against a number for every pixel with the same error in the worst tenth of \
-         all blocks (goal: 2):\n\n| scene | samples a pixel | error of the worst tenth | rays of one number for all over those taken |\n\
+         all blocks (goal: 2):\n\n| scene | samples a pixel | error of the worst tenth | one number for all over the samples taken |\n\
          |---|---|---|---|\n"
     );
     for ((name, study), uniform) in names.iter().zip(studies).zip(uniform) {
         let samples = json!({ "relative_error": ERROR, "max": effort.most });
         let taken = PicturePair::of(study, samples);
         let spread = |shot: &PicturePair| study.relative_variance(&shot.pair).ninth;
-        let curve: Vec<[f64; 2]> = uniform.iter().map(|shot| [shot.rays, spread(shot)]).collect();
-        let (rays, mark) = rays_for(&curve, spread(&taken));
+        let curve: Vec<[f64; 2]> =
+            uniform.iter().map(|shot| [shot.mean_samples, spread(shot)]).collect();
+        let (samples, mark) = samples_for(&curve, spread(&taken));
         let _ = writeln!(
             text,
             "| `{name}` | {:.0} | {:.3} | {:.1}{mark} |",
             taken.mean_samples,
             spread(&taken).sqrt(),
-            rays / taken.rays
+            samples / taken.mean_samples
         );
     }
     text
 }
 
-/// The rays at which a curve of rays and variances, which falls, is `variance`; and a mark when that is
+/// The samples at which a curve of samples and variances, which falls, is `variance`; and a mark when that is
 /// beyond it.
-fn rays_for(curve: &[[f64; 2]], variance: f64) -> (f64, &'static str) {
+fn samples_for(curve: &[[f64; 2]], variance: f64) -> (f64, &'static str) {
     let logs: Vec<[f64; 2]> = curve.iter().map(|point| point.map(f64::ln)).collect();
     let wanted = variance.max(1e-300).ln();
     let within = logs.windows(2).find(|pair| pair[1][1] <= wanted);
@@ -255,10 +271,10 @@ fn draw(docs: &Path, names: &[&str], saved: &[Vec<[f64; 2]>]) -> anyhow::Result<
     std::fs::create_dir_all(&folder)?;
     let series = names.iter().zip(saved).enumerate();
     let chart = Chart {
-        title: "Rays saved against exposure time".to_owned(),
+        title: "Samples saved against exposure time".to_owned(),
         axes: [
             Axis::new("exposure time (s)"),
-            Axis::new("rays of one number for all over rays taken"),
+            Axis::new("one number for all over the samples taken"),
         ],
         series: series
             .map(|(k, (name, line))| Series { colour: k, ..Series::line(*name, line.clone()) })

@@ -33,11 +33,10 @@ pub(crate) struct Wanted {
     pub(crate) exposure: f64,
 }
 
-/// A picture's light, and what it cost.
+/// A picture's light, and its samples a pixel.
 pub(crate) struct Picture {
     /// `[channel][pixel]`, in the film's bands as red, green and blue.
     light: Vec<Vec<f64>>,
-    pub(crate) rays: f64,
     pub(crate) samples: f64,
 }
 
@@ -130,7 +129,7 @@ impl Study {
         eprintln!("  {} at {} s: {samples:.0} samples", wanted.samples, wanted.exposure);
         let layer = done.picture.layer("").expect("the picture");
         let light = layer.channels.iter().map(|channel| numbers(&channel.values)).collect();
-        Picture { light, rays: done.rays as f64, samples }
+        Picture { light, samples }
     }
 
     /// The photo-electrons of a picture in the mean over its pixels and channels.
@@ -156,6 +155,11 @@ impl Study {
 
     /// The variance of a pair of pictures in digital numbers, as a share of the sensor's own.
     pub(crate) fn noise_share(&self, pair: &[Picture; 2], exposure: f64) -> Spread {
+        spread_of(&mut self.noise_shares(pair, exposure))
+    }
+
+    /// The same of each block.
+    pub(crate) fn noise_shares(&self, pair: &[Picture; 2], exposure: f64) -> Vec<f64> {
         let (sensor, units) = self.sensor(exposure);
         let floor = sensor.noise_floor(exposure).expect("a sensor with noise");
         let share = |pixel: usize| {
@@ -166,7 +170,7 @@ impl Study {
             };
             (0..3).map(of).sum::<f64>() / 3.0
         };
-        self.spread(&share)
+        self.means(&share)
     }
 
     /// The variance of a pair of pictures, as a share of the square of a block's mean.
@@ -193,13 +197,13 @@ impl Study {
         spread_of(&mut blocks)
     }
 
-    fn spread(&self, of: &dyn Fn(usize) -> f64) -> Spread {
+    /// The mean of a value of pixels over each block.
+    fn means(&self, of: &dyn Fn(usize) -> f64) -> Vec<f64> {
         let height = self.file.value()["camera"]["sensor"]["resolution"][1].as_u64().unwrap_or(1);
-        let mut blocks: Vec<f64> = self
-            .blocks(self.width * usize::try_from(height).unwrap_or(1))
+        let blocks = self.blocks(self.width * usize::try_from(height).unwrap_or(1));
+        blocks
             .map(|pixels| pixels.iter().map(|&p| of(p)).sum::<f64>() / pixels.len() as f64)
-            .collect();
-        spread_of(&mut blocks)
+            .collect()
     }
 
     /// The pixels of each block.

@@ -3,6 +3,7 @@
 use crate::accelerators::{Finding, RENDER_WIDTH};
 use crate::cameras::Cameras;
 use crate::samplers::{Converged, Samplers};
+use crate::target::{AS_IT_IS, Target};
 use etendue_chart::{Axis, Chart, GREY, Mark, Point, Series, Stroke};
 
 /// What stands on a chart's axes for one finding.
@@ -166,6 +167,59 @@ pub(super) fn cameras(found: &Cameras) -> Vec<(&'static str, Chart)> {
         of: "the full train's converged picture",
     };
     vec![("cameras-time", about.against_time("Models of the lens: error against time"))]
+}
+
+/// Contenders that have a colour of their own: the soonest, and the scene as it is.
+const COLOURS: usize = 6;
+
+/// Every render by the time of the whole program and its error.
+pub(super) fn target(found: &Target) -> Chart {
+    let shown: Vec<&str> = found.contenders.iter().map(|own| &*own.name).take(COLOURS).collect();
+    let mut series: Vec<Series> = Vec::new();
+    for own in &found.contenders {
+        let renders = found.renders.iter().filter(|render| render.name == own.name);
+        let mut at: Vec<[f64; 2]> = renders.map(|render| [render.seconds, render.error]).collect();
+        at.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let place = shown.iter().position(|name| *name == own.name);
+        let is_named = place.is_some() || own.name == AS_IT_IS;
+        let mark = if is_named { Mark::Disk } else { Mark::Dot };
+        series.push(Series {
+            name: if is_named { own.name.clone() } else { String::new() },
+            points: at.into_iter().map(|at| Point { at, mark }).collect(),
+            joined: is_named,
+            colour: place.unwrap_or(GREY),
+            contends: true,
+            ..Series::default()
+        });
+    }
+    // The target, from the first to the last.
+    let times = || found.renders.iter().map(|render| render.seconds);
+    if let (Some(low), Some(high)) = (times().reduce(f64::min), times().reduce(f64::max)) {
+        let end = |x| Point { at: [x, found.target], mark: Mark::None };
+        series.push(Series {
+            name: format!("target: {} %", 100.0 * found.target),
+            points: vec![end(low), end(high)],
+            joined: true,
+            stroke: Stroke::Dashed,
+            colour: GREY,
+            contends: false,
+        });
+    }
+    Chart {
+        title: "Settings: error of what the sensor records against the time of the whole program"
+            .to_owned(),
+        notes: vec![
+            "dots: other settings; shaded: the Pareto front, which nothing else beats in both"
+                .to_owned(),
+        ],
+        axes: [
+            Axis::new("load, build, trace and write (s)"),
+            Axis::new("root mean square error over the mean")
+                .with_zero("the converged picture's own"),
+        ],
+        series,
+        front: true,
+    }
 }
 
 /// Pictures against a converged one.

@@ -6,6 +6,7 @@ use crate::accelerators;
 use crate::cameras::Cameras;
 use crate::hits::Quantiles;
 use crate::samplers::Samplers;
+use crate::target::Target;
 use crate::timing::TimeSpread;
 
 pub(super) fn accelerators(findings: &[accelerators::Finding]) -> Table {
@@ -69,6 +70,40 @@ pub(super) fn cameras(found: &Cameras) -> Table {
         picture(name, finding.samples, finding.seconds, [finding.rmse, finding.relative_rmse])
     };
     Table::of_rows(found.findings.iter().map(row).collect())
+}
+
+/// When each contender reaches the target.
+pub(super) fn contenders(found: &Target) -> Table {
+    let row = |own: &crate::target::Foretold| {
+        let samples = own.samples.map_or_else(Cell::none, |samples| Cell::count(samples.into()));
+        let seconds = |value: f64| Cell::number(value, format!("{value:.2}"));
+        vec![
+            ("settings", Cell::word(&own.name)),
+            ("samples", samples),
+            ("after_s", own.seconds.map_or_else(Cell::none, seconds)),
+            ("renders", Cell::count(own.renders as u64)),
+        ]
+    };
+    Table::of_rows(found.contenders.iter().map(row).collect())
+}
+
+/// Every render of them.
+pub(super) fn renders(found: &Target) -> Table {
+    let row = |own: &crate::target::Render| {
+        let [load, build, trace, write] = own.stages.map(Cell::hidden);
+        vec![
+            ("settings", Cell::word(&own.name)),
+            ("samples", Cell::count(own.samples.into())),
+            ("seconds", Cell::hidden(own.seconds)),
+            ("load_s", load),
+            ("build_s", build),
+            ("trace_s", trace),
+            ("write_s", write),
+            ("error", Cell::hidden(own.error)),
+            ("relative_mse", Cell::hidden(own.relative_mse)),
+        ]
+    };
+    Table::of_rows(found.renders.iter().map(row).collect())
 }
 
 fn picture(

@@ -55,6 +55,8 @@ pub struct LensCamera {
     /// Projected solid angle of the unvignetted pupil seen from the axis (sr).
     pub(super) solid_angle: f64,
     pub(super) opened: Option<Arc<Opened>>,
+    /// The pupil at the design wavelength alone, once it was measured: that of a lens without dispersion, too.
+    design_pupil: Option<Arc<DesignPupil>>,
     /// Rays of all bands run as at the design wavelength.
     pub(super) one_wavelength: bool,
     /// How light is spread on the sensor.
@@ -71,6 +73,14 @@ pub(super) enum SpreadBy {
     Waves,
     /// Not at all: each place sees along its chief ray.
     Nothing,
+}
+
+/// An exit pupil measured at the design wavelength, with filters clear.
+#[derive(Debug)]
+struct DesignPupil {
+    /// Half the sensor's width and height (mm).
+    half_size: [f64; 2],
+    pupil: ExitPupil,
 }
 
 /// The exit pupil measured at the wavelengths that are wanted.
@@ -141,7 +151,7 @@ impl LensCamera {
         let solid_angle = unvignetted(focused.train(), &design, &focused);
         let straight = unbent.at(unbent.wavelength()).unwrap_or_else(|_| design.clone());
         let chief = ChiefTable::new(&unbent, &frame, half, &straight);
-        let (opened, one_wavelength, spread) = Default::default();
+        let (opened, design_pupil, one_wavelength, spread) = Default::default();
         Ok(Self {
             focused,
             design,
@@ -150,6 +160,7 @@ impl LensCamera {
             lit,
             solid_angle,
             opened,
+            design_pupil,
             one_wavelength,
             spread,
         })
@@ -265,8 +276,28 @@ impl LensCamera {
     /// what other wavelengths pass beside it is left out.
     pub(crate) fn opened_roughly(&self, bands: &Bands) -> Result<Self, CameraError> {
         let train = self.focused.train();
-        let opened = self.open_at(bands, train, Some(train.wavelength()))?;
-        Ok(Self { opened: Some(Arc::new(opened)), ..self.clone() })
+        let half_size = self.focused.film().half_size().to_array();
+        let known = match &self.design_pupil {
+            Some(known) if known.half_size == half_size => Arc::clone(known),
+            _ => {
+                let pupil = self.measured(&without_filters(train), &[train.wavelength()])?;
+                Arc::new(DesignPupil { half_size, pupil })
+            }
+        };
+        let known = Self { design_pupil: Some(known), ..self.clone() };
+        let opened = known.open_at(bands, train, Some(train.wavelength()))?;
+        Ok(Self { opened: Some(Arc::new(opened)), ..known })
+    }
+
+    /// The exit pupil of a train with clear filters at these wavelengths (nm).
+    fn measured(
+        &self,
+        clear: &OpticalTrain,
+        wavelengths: &[f64],
+    ) -> Result<ExitPupil, CameraError> {
+        let half_size = self.focused.film().half_size().to_array();
+        ExitPupil::new(clear, wavelengths, self.focused.sensor_z(), half_size)
+            .map_err(|error| CameraError::new("", error.to_string()))
     }
 
     /// The same with filters clear.
@@ -311,10 +342,14 @@ impl LensCamera {
             measured = vec![nm];
         }
         let half_size = self.focused.film().half_size().to_array();
-        let z = self.focused.sensor_z();
         let clear = without_filters(train);
-        let pupil = ExitPupil::new(&clear, &measured, z, half_size)
-            .map_err(|error| fault(error.to_string()))?;
+        let known = self.design_pupil.as_ref().filter(|known| {
+            known.half_size == half_size && measured == [self.focused.train().wavelength()]
+        });
+        let pupil = match known {
+            Some(known) => known.pupil.clone(),
+            None => self.measured(&clear, &measured)?,
+        };
         let all: Vec<f64> =
             groups.iter().flat_map(|g| &g.lenses).map(MonochromaticTrain::wavelength).collect();
         let pupil =

@@ -19,6 +19,17 @@ pub(super) fn setting(text: &str) -> Result<(String, String), String> {
     }
 }
 
+/// A share from a number of hundredths, such as 1%.
+pub(super) fn share(text: &str) -> Result<f64, String> {
+    let percent = text.trim().strip_suffix('%').map(str::trim);
+    let share = percent
+        .map_or_else(|| text.trim().parse(), |number| number.parse().map(|p: f64| p / 100.0));
+    match share {
+        Ok(share) if share > 0.0 && share < 1.0 => Ok(share),
+        _ => Err("expected a share above 0 and below 1, such as 1% or 0.01".to_owned()),
+    }
+}
+
 pub(super) fn wavelength(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(nanometres) if nanometres > 0.0 && f64::is_finite(nanometres) => Ok(nanometres),

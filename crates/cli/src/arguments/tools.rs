@@ -335,10 +335,14 @@ pub(crate) struct BenchArguments {
     /// Samples a pixel to compare [default: 1,4,16,64,256, quick 1,4,16,64]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::samples)]
     pub(crate) sample_counts: Option<Vec<u32>>,
-    /// About how long samplers and cameras may take, each; pixels are made larger until they do
-    /// [default: 60, quick 10]
+    /// About how long samplers and cameras may take, each; pixels are made larger until they do. How long all renders
+    /// of --target may take, of pixels as they are [default: 60, quick 10; --target 600, quick 50]
     #[arg(long, value_name = "S", value_parser = parse::seconds)]
     pub(crate) seconds: Option<f64>,
+    /// Find which settings reach this error of what the sensor records soonest, e.g. 1%, by the time of the whole
+    /// program; the parts of --only are measured where they are named, too
+    #[arg(long, value_name = "SHARE", value_parser = parse::share)]
+    pub(crate) target: Option<f64>,
     /// Stop when a structure would need more than this, e.g. 800M or 4G (bytes, 1024-based)
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     pub(crate) memory_limit: Option<u64>,

@@ -173,3 +173,73 @@ fn counts_that_make_no_sense_are_refused() {
     assert!(text(&missing.stderr).contains("none.json"));
     assert_eq!(bench.run(&["bench", "scene.json"]).status.code(), Some(2), "-o is needed");
 }
+
+/// A lit scene before a raw sensor.
+const LIT: &str = r#"{"etendue": 1, "tracer": {"type": "path"}, "layers": ["sample_count", "depth"],
+    "render": {"accel": "bvh", "samples": {"relative_error": 0.05}},
+    "camera": {"type": "pinhole", "pose": {"from": [0, 1, 3], "look_at": [0, 0, 0]},
+        "sensor": {"type": "raw", "resolution": [32, 24], "system_gain": 0.5, "bit_depth": 12, "full_well": 8000,
+            "quantum_efficiency": 0.6, "read_noise": 3}},
+    "lights": [{"type": "environment", "radiance": [0.3, 0.3, 0.3]}],
+    "objects": [{"shape": "sphere", "radius": 0.5},
+        {"shape": "rectangle", "width": 6, "height": 6,
+         "transform": {"translate": [0, -0.5, 0], "rotate": [1, 0, 0, -90]}}]}"#;
+
+#[test]
+fn the_settings_that_reach_an_error_soonest_are_found_and_verified() {
+    let bench = Bench::with_scene(LIT);
+    let words =
+        ["bench", "scene.json", "-o", "out", "--quick", "--target", "5%", "--seconds", "20"];
+    let output = bench.run(&words);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let table = text(&output.stdout);
+    assert!(table.contains("Soonest: ") && table.contains("--samples "), "{table}");
+    let found = &bench.json("out/bench.json")["target"];
+    let verified = &found["verified"];
+    // It was rendered for itself, and is within the target; how long it took, no test asserts.
+    assert!(verified["error"].as_f64().unwrap() <= 0.05, "{verified}");
+    assert!(verified["samples"].as_u64().unwrap() >= 1);
+    let names: Vec<&str> = found["contenders"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|c| c["name"].as_str().unwrap())
+        .collect();
+    for name in ["as the plan takes it", "independent samples", "2 surfaces", "a high build"] {
+        assert!(names.contains(&name), "{names:?}");
+    }
+    // Independent samples are noisier than Sobol's points.
+    let renders = found["renders"].as_array().unwrap();
+    let error = |name: &str| {
+        let of = |render: &&serde_json::Value| render["name"] == name && render["samples"] == 16;
+        renders.iter().find(of).unwrap()["error"].as_f64().unwrap()
+    };
+    assert!(error("independent samples") > error("as the plan takes it"));
+    for file in ["target.csv", "target-time.svg", "target-time.png"] {
+        assert!(bench.path("out").join(file).is_file(), "{file}");
+    }
+    assert!(!bench.path("out/samplers.csv").exists(), "only what was asked for");
+}
+
+#[test]
+fn a_target_that_is_none_is_refused() {
+    let bench = Bench::with_scene(LIT);
+    for target in ["0", "150%", "-1%", "much"] {
+        let output =
+            bench.run(&["bench", "scene.json", "-o", "out", &format!("--target={target}")]);
+        assert_eq!(output.status.code(), Some(2), "{target}");
+        assert!(text(&output.stderr).contains("such as 1% or 0.01"), "{}", text(&output.stderr));
+    }
+    let flat = bench.run(&[
+        "bench",
+        "scene.json",
+        "-o",
+        "out",
+        "--target",
+        "1%",
+        "--set",
+        "tracer={\"type\": \"facing\"}",
+    ]);
+    assert_eq!(flat.status.code(), Some(2));
+    assert!(text(&flat.stderr).contains("--target") && text(&flat.stderr).contains("tracer"));
+}

@@ -131,3 +131,42 @@ fn a_pinhole_with_a_falloff_gets_darker_from_the_axis() {
         assert!((found - wanted).abs() < 2e-3, "pixel {pixel}: {found} for {wanted}");
     }
 }
+
+#[test]
+fn detail_is_left_out_of_the_picture_alone_told_and_verified() {
+    let scene = json!({
+        "etendue": 1,
+        "camera": { "type": "pinhole", "fov": 40, "sensor": { "resolution": [72, 48] },
+            "pose": { "from": [0, 0, 2.4], "look_at": [0, 0, 0] } },
+        "tracer": { "type": "direct" },
+        "lights": [{ "type": "directional", "direction": [-1, -1, -1], "irradiance": [3, 3, 3] }],
+        "materials": { "grey": { "type": "matte", "color": [0.5, 0.5, 0.5] } },
+        "objects": [{ "shape": "sphere", "radius": 0.3, "triangles": 400_000, "material": "grey" }],
+        "render": { "samples": 16, "accel": "bvh" }, "tolerance": { "displacement": "0.5 px", "light": "2 %" },
+    });
+    let bench = Bench::with_scene(&scene.to_string());
+    let output = bench.run(&["plan", "scene.json", "--json", "--verify"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let rows: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let row = rows.as_array().unwrap().iter().find(|row| row["what"] == "tolerance").unwrap();
+    let because = row["because"].as_str().unwrap();
+    assert!(because.contains("triangles, of which places are displaced by 0.500 px"), "{because}");
+    let told = text(&output.stderr);
+    assert!(told.contains("verified: within the tolerance"), "{told}");
+    // The render has fewer triangles; data beside the picture have all of them again.
+    let triangles = |more: &[&str]| {
+        let output = bench.run(
+            &[
+                &["render", "scene.json", "-o", "out", "--outputs", "npy", "--report", "r.json"],
+                more,
+            ]
+            .concat(),
+        );
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        bench.json("r.json")["triangles_unique"].as_u64().unwrap()
+    };
+    let all = triangles(&["--layers", "depth"]);
+    assert!(all >= 400_000 && triangles(&[]) < all / 4, "{all}");
+    // Nor is anything left out without a tolerance.
+    assert_eq!(triangles(&["--set", "tolerance=null"]), all);
+}

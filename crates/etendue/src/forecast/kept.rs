@@ -107,7 +107,7 @@ mod tests {
 
     const RATES: Calibration = Calibration {
         build: [1e-7, 2e-7, 3e-7],
-        copy: 1e-7,
+        placed_copy: 1e-7,
         ray: 1e-7,
         exr: 1e-8,
         npy: 1e-8,

@@ -163,9 +163,11 @@ impl TimeForecast {
 
 /// The time of the build (s).
 fn build_time(scene: &Scene, plan: &Plan, machine: &Calibration) -> f64 {
-    let unseen = plan.unseen.as_ref().map_or(0, |unseen| unseen.triangles());
-    let triangles = scene.geometry.triangles_unique().saturating_sub(unseen);
-    triangles as f64 * machine.build_of(plan.quality) + scene.placed_copies() as f64 * machine.copy
+    let unseen = plan.unseen.as_ref();
+    let unseen = unseen.map_or([0; 2], |unseen| [unseen.triangles(), unseen.placements() as u64]);
+    let triangles = scene.geometry.triangles_unique().saturating_sub(unseen[0]);
+    let copies = scene.placed_copies().saturating_sub(unseen[1]);
+    triangles as f64 * machine.build_of(plan.quality) + copies as f64 * machine.placed_copy
 }
 
 fn pixels(scene: &Scene) -> f64 {
@@ -208,4 +210,48 @@ fn output(prospect: &Prospect<'_>, machine: &Calibration) -> f64 {
         * (each(outputs.exr, machine.exr, values)
             + each(outputs.npy, machine.npy, values)
             + each(outputs.png, machine.png, plan.layers.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+    use crate::{Progress, Session};
+
+    const RATES: Calibration = Calibration {
+        build: [1e-7, 2e-7, 4e-7],
+        placed_copy: 5e-6,
+        ray: 1e-7,
+        exr: 0.0,
+        npy: 0.0,
+        png: 0.0,
+        together: 1.0,
+        raw: 0.0,
+        rgb: 0.0,
+        noise: [0.0; 2],
+    };
+
+    #[test]
+    fn copies_are_built_as_often_as_they_are_seen() {
+        // Ninety copies of a box in a row before the camera, and ten behind it, which depth alone does not build.
+        let places: Vec<_> = (0..100).map(|i| json!({ "translate": [0, 0, 30 - 3 * i] })).collect();
+        let scene = json!({
+            "etendue": 1, "layers": ["depth"], "plan": { "build_quality": "medium" },
+            "camera": { "type": "pinhole", "sensor": { "resolution": [32, 24] },
+                        "pose": { "from": [0, 0, 1.5], "look_at": [0, 0, 0] } },
+            "objects": [{ "shape": "box", "instances": places }],
+        });
+        let build = |more: Option<bool>| {
+            let mut scene = scene.clone();
+            scene["plan"]["unseen"] = json!(more);
+            let mut session = Session::from_json(".", scene).unwrap();
+            let prospect = session.prospect(&Progress::none()).unwrap();
+            TimeForecast::counted(&prospect, &RATES).build
+        };
+        // Twelve triangles of the box, and as many copies.
+        let all = 12.0 * 2e-7 + 100.0 * 5e-6;
+        assert!((build(Some(true)) - all).abs() < 1e-12);
+        assert!((build(None) - (all - 10.0 * 5e-6)).abs() < 1e-12);
+    }
 }

@@ -40,8 +40,15 @@ impl Session {
         self.loaded()?.accel.as_deref().ok_or_else(not_built)
     }
 
-    /// Loads the scene, if it is not, and the frames that it is compared with.
+    /// Loads the scene, if it is not, and the frames that it is compared with. It has all its detail then.
     pub(super) fn load(&mut self, progress: &Progress) -> Result<(), Error> {
+        self.load_as_rendered(progress)?;
+        self.show_all();
+        Ok(())
+    }
+
+    /// The same, but that a scene of which a coarser one is rendered stays so.
+    pub(super) fn load_as_rendered(&mut self, progress: &Progress) -> Result<(), Error> {
         if self.loaded.is_some() {
             return Ok(());
         }
@@ -63,8 +70,10 @@ impl Session {
         notes.iter().for_each(|note| progress.note(note));
         let plan = Plan::new(&scene, self.options.outputs);
         let scene = Arc::new(scene);
+        let (accel, coarse) = (None, None);
+        let is_decoded = false;
         self.loaded =
-            Some(LoadedScene { scene, plan, notes, accel: None, neighbours, is_decoded: false });
+            Some(LoadedScene { scene, plan, notes, accel, neighbours, is_decoded, coarse });
         self.seconds.load += start.elapsed().as_secs_f64();
         Ok(())
     }
@@ -124,8 +133,8 @@ impl Session {
         self.build_for(false, progress)
     }
 
-    /// The same for the rays of the picture alone: what they cannot meet may be left out. Of several frames each
-    /// sees something else, and all have one structure.
+    /// The same for the rays of the picture alone: what they cannot meet may be left out, and what is finer than the
+    /// scene's tolerance. Of several frames each sees something else, and all have one structure.
     pub(super) fn build_for_picture(&mut self, progress: &Progress) -> Result<(), Error> {
         let is_single = self.file.spec.frames.is_none();
         self.build_for(is_single, progress)
@@ -134,6 +143,9 @@ impl Session {
     fn build_for(&mut self, picture: bool, progress: &Progress) -> Result<(), Error> {
         self.load(progress)?;
         let start = Instant::now();
+        if picture {
+            self.show_coarse();
+        }
         let options = BuildOptions {
             threads: rayon::current_num_threads(),
             memory_limit: self.options.memory_limit,
@@ -198,13 +210,15 @@ impl Session {
 impl Session {
     /// Takes what is cheapest within the scene's tolerance, unless it was.
     pub(super) fn take(&mut self, progress: &Progress) -> Result<(), Error> {
-        let LoadedScene { scene, plan, .. } = self.loaded()?;
+        let loaded = self.loaded()?;
+        let LoadedScene { scene, plan, .. } = loaded;
         if scene.tolerance.is_none() || plan.taken.is_some() {
             return Ok(());
         }
         let start = Instant::now();
         let watch = |share: f64| progress.goes_on(Phase::Build, share);
-        let taken = tolerance::choose(scene, plan, self.built()?, &self.images, &watch)?;
+        let prepared = (self.built()?, &*self.images);
+        let taken = tolerance::choose(scene, plan, prepared, loaded.detail(), &watch)?;
         let plan = Plan::taking(scene, self.options.outputs, taken);
         if let Some(loaded) = &mut self.loaded {
             loaded.plan = plan;
@@ -220,12 +234,26 @@ impl Session {
     ///
     /// As [`Self::prepare`].
     pub fn verify(&mut self, progress: &Progress) -> Result<Option<Verified>, Error> {
-        self.prepare(progress)?;
+        self.build_for_picture(progress)?;
+        self.decode(progress)?;
         self.take(progress)?;
+        // Where meshes are coarser, the scene with its own is built, too.
+        let (full, accel) = self.in_full()?;
+        let accel = match accel {
+            Some(accel) => accel,
+            None => {
+                self.build(progress)?;
+                let (_, accel) = self.in_full()?;
+                self.build_for_picture(progress)?;
+                accel.ok_or_else(not_built)?
+            }
+        };
         let LoadedScene { scene, plan, .. } = self.loaded()?;
         let Some(taken) = &plan.taken else { return Ok(None) };
         let watch = |share: f64| progress.goes_on(Phase::Render, share);
-        Ok(Some(tolerance::verify(scene, taken, self.built()?, &self.images, &watch)?))
+        let rendered = (&**scene, self.built()?);
+        let found = tolerance::verify((&full, &*accel), rendered, taken, &self.images, &watch)?;
+        Ok(Some(found))
     }
 }
 

@@ -66,7 +66,8 @@ impl Session {
     pub fn merge(&mut self, shares: &Shares, progress: &Progress) -> Result<Rendering, Error> {
         let clock = self.clock();
         self.open_denoiser(progress)?;
-        self.prepare(progress)?;
+        self.build_for_picture(progress)?;
+        self.decode(progress)?;
         let film = if shares.are_of_samples() {
             self.trace(None, &shares.files, progress)?
         } else {

@@ -100,6 +100,7 @@ impl Session {
                 accel: None,
                 neighbours: Vec::new(),
                 is_decoded: false,
+                coarse: None,
             });
             self.build(progress)?;
             self.decode(progress)?;

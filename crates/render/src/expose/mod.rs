@@ -29,7 +29,7 @@ use etendue_files::{Transaction, WriteError};
 use etendue_report::{Decision, DecisionKind, DecisionValue};
 use etendue_scene::Scene;
 use etendue_sensor::{
-    Exposure, Film, InvalidValues, NoiseModel, RawImage, Sensor, SensorError, SensorKind,
+    Exposure, Film, InvalidValues, Moments, NoiseModel, RawImage, Sensor, SensorError, SensorKind,
 };
 use etendue_spectrum::Bands;
 
@@ -191,6 +191,15 @@ impl SensorLight {
     /// When the film is not the sensor's; a fault of this program.
     pub fn expose(&self, exposure: Exposure) -> Result<RawImage, SensorError> {
         self.sensor.expose(self.film(), exposure, self.seeds[1])
+    }
+
+    /// What the sensor records in the mean over frames, and its variance, in one exposure.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::expose`].
+    pub fn moments(&self, exposure: Exposure) -> Result<Moments, SensorError> {
+        self.sensor.moments(self.film(), exposure)
     }
 
     fn film(&self) -> Film<'_> {

@@ -16,7 +16,7 @@ use super::{
     MOST_BYTES_OF_SUMS, Passes, Plan, RAYS_A_SAMPLE_OF_LIGHT, RAYS_PER_TRIANGLE, quality_for,
 };
 use crate::film::Precision;
-use crate::tolerance::{TakenBounces, TakenCamera};
+use crate::tolerance::{TakenBounces, TakenCamera, TakenDetail};
 use crate::{diffraction, expose, samples};
 
 /// What decisions are made by, beside the plan.
@@ -384,7 +384,14 @@ impl Plan {
                 100.0 * share
             )
         });
-        let all: Vec<String> = camera.into_iter().chain(bounces).collect();
+        let detail = taken.detail.map(|TakenDetail { triangles: [all, left], displacement, light, .. }| {
+            format!(
+                "{left} of {all} triangles, of which places are displaced by {displacement:.3} px at most and areas \
+                 differ by {:.2} %",
+                100.0 * light
+            )
+        });
+        let all: Vec<String> = camera.into_iter().chain(bounces).chain(detail).collect();
         let what = if all.is_empty() { "nothing".to_owned() } else { all.join("; ") };
         let notes: String = taken.notes.iter().map(|note| format!("; {note}")).collect();
         let because = format!("the cheapest within it are taken: {what}{notes}");

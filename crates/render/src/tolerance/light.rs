@@ -18,8 +18,12 @@ pub(super) const BLOCK: u32 = 8;
 /// The longer side of the small pictures, at most.
 const SIDE: u32 = 28;
 
-/// Samples of their pixels.
-const SAMPLES: u32 = 32;
+/// Samples of their pixels, at least and at most.
+const SAMPLES: [u64; 2] = [8, 32];
+
+/// A small picture has so many times fewer samples than the picture itself, so that looking takes a few hundredths of
+/// its time: some five of them are rendered.
+const FEWER: u64 = 128;
 
 /// The numbers of surfaces among which the fewest are looked for.
 const STEPS: [u32; 11] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24];
@@ -30,12 +34,12 @@ const SAFETY: f64 = 2.0;
 /// The share of blocks that are to be within the tolerance.
 pub(super) const MOST_BLOCKS: f64 = 0.99;
 
-/// The fewest surfaces whose longer paths bring at most the share `light` in 99 % of blocks; `None` where the scene
-/// follows light no farther than that.
+/// The fewest surfaces whose longer paths bring at most the share `light` in 99 % of blocks, of a picture with so many
+/// samples in all; `None` where the scene follows light no farther than that.
 pub(super) fn fewest(
     scene: &Scene,
     prepared: (&dyn Accel, &Images),
-    light: f64,
+    (light, samples): (f64, u64),
     notes: &mut Vec<String>,
     watch: &dyn Watch,
 ) -> Result<Option<TakenBounces>, RenderError> {
@@ -52,10 +56,14 @@ pub(super) fn fewest(
     };
     let [width, height] = camera.resolution();
     let camera = camera.coarser(width.max(height).div_ceil(SIDE).max(BLOCK));
+    let pixels: u64 = camera.resolution().map(u64::from).iter().product();
+    let [least, most] = SAMPLES;
+    #[expect(clippy::cast_possible_truncation, reason = "at most 32")]
+    let samples = (samples / (FEWER * pixels)).clamp(least, most) as u32;
     let small = |bounces: u32| {
         let mut scene = scene.clone();
         scene.tracer = Some(TracerSpec::Path { max_bounces: bounces });
-        values(&scene, &camera, prepared, (SAMPLES, None), watch)
+        values(&scene, &camera, prepared, (samples, None), watch)
     };
     let width = camera.resolution()[0] as usize;
     let all = pooled(&small(max_bounces)?, width);

@@ -4,6 +4,7 @@
 //! Nothing is approximated unless a scene has the key `tolerance`: [`choose`] then says what is taken of it,
 //! [`crate::Plan::taking`] plans with that, and [`verify`] renders a small part with everything.
 
+mod detail;
 pub mod lens_models;
 mod light;
 mod pixel_views;
@@ -19,9 +20,10 @@ use etendue_tracer::LayerSpec;
 use serde::Serialize;
 
 use self::lens_models::{LensModel, LensModels, NoModels};
-use self::pixel_views::{PlaceView, places, seen};
+use self::pixel_views::{Line, PlaceView, chief_rays, places, seen};
 use crate::{Images, Plan, RenderError, Watch};
 
+pub use self::detail::{TakenDetail, coarser, with_meshes};
 pub use self::verify::{Verified, verify};
 
 /// What a model may be off by.
@@ -50,7 +52,7 @@ impl Field {
     /// What a user who compares models gets.
     pub const FINE: Self = Self { size: [9, 7], rays: 1024, bands: usize::MAX, rough: false };
     /// What a render does before it begins.
-    pub const QUICK: Self = Self { size: [9, 7], rays: 512, bands: 3, rough: true };
+    pub const QUICK: Self = Self { size: [9, 7], rays: 256, bands: 3, rough: true };
     /// What a choice is verified by: places in between, and more bands.
     pub const BETWEEN: Self = Self { size: [16, 12], rays: 256, bands: 5, rough: false };
 }
@@ -182,18 +184,33 @@ impl FullView {
     ///
     /// [`NoModels`] as [`lens_models::near_axis`].
     pub fn models(&self, tolerance: Tolerance) -> Result<LensModels, NoModels> {
+        self.models_of(Sought::All, tolerance)
+    }
+
+    /// Those that can be within the tolerance as far as this view tells by itself: where the lens blurs by more, no
+    /// model without a pupil, which has no blur at all.
+    fn models_in_reach(&self, tolerance: Tolerance) -> Result<LensModels, NoModels> {
+        let sought = if self.blur() > tolerance.pixels { Sought::WithPupil } else { Sought::All };
+        self.models_of(sought, tolerance)
+    }
+
+    fn models_of(&self, sought: Sought, tolerance: Tolerance) -> Result<LensModels, NoModels> {
         let full = &self.camera;
         let LensModels { models: mut near, mut notes } = lens_models::near_axis(full)?;
         let after = near.iter().take_while(|model| model.name == "pinhole").count();
         let mut models: Vec<LensModel> = near.drain(..after).collect();
-        match lens_models::opencv(full, tolerance.pixels) {
-            Ok((model, spec)) => {
-                let falloff = self.falloff(&model.camera);
-                models.push(model);
-                let with = falloff.and_then(|falloff| with_falloff(full, spec, falloff));
-                models.extend(with);
+        if sought == Sought::WithPupil {
+            models.clear();
+        } else {
+            match lens_models::opencv(full, tolerance.pixels) {
+                Ok((model, spec)) => {
+                    let falloff = self.falloff(&model.camera);
+                    models.push(model);
+                    let with = falloff.and_then(|falloff| with_falloff(full, spec, falloff));
+                    models.extend(with);
+                }
+                Err(error) => notes.push(format!("no `opencv` model of this lens: {error}")),
             }
-            Err(error) => notes.push(format!("no `opencv` model of this lens: {error}")),
         }
         models.extend(near);
         let undispersed = lens_models::undispersed(full);
@@ -205,6 +222,31 @@ impl FullView {
             models.push(undispersed);
         }
         Ok(LensModels { models, notes })
+    }
+
+    /// The greatest blur of a pixel's light in a band, at any of the depths (pixels).
+    fn blur(&self) -> f64 {
+        let of_place = |(seen, place): (&PlaceView, &Place)| {
+            let depths = place.depths.iter();
+            let of_depth = |depth: &f64| {
+                seen.bands.iter().map(|band| band.blur(1.0 / depth)).fold(0.0, f64::max)
+            };
+            depths.map(of_depth).fold(0.0, f64::max)
+        };
+        self.scale * self.seen.iter().zip(&self.places).map(of_place).fold(0.0, f64::max)
+    }
+
+    /// How far the chief rays of `camera` are from its own, at most (pixels): what is cheap to find of a model, of
+    /// which no more needs to be known when this is too far.
+    fn chief_displacement(&self, camera: &Camera) -> f64 {
+        let own = chief_rays(camera, &self.places);
+        let places = own.iter().zip(&self.seen).zip(&self.places);
+        let of_place = |((own, full), place): ((&Option<Line>, &PlaceView), &Place)| {
+            let (Some(own), Some(full)) = (own, &full.chief) else { return 0.0 };
+            let depths = place.depths.iter().map(|depth| 1.0 / depth);
+            depths.map(|near| (own.at(near) - full.at(near)).length()).fold(0.0, f64::max)
+        };
+        self.scale * places.map(of_place).fold(0.0, f64::max)
     }
 
     /// What `camera` misses of it.
@@ -274,6 +316,14 @@ impl FullView {
     }
 }
 
+/// Which models are made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Sought {
+    All,
+    /// Those whose pixels see through an aperture.
+    WithPupil,
+}
+
 /// OpenCV's camera with a falloff.
 fn with_falloff(full: &Camera, spec: CameraSpec, falloff: FalloffSpec) -> Option<LensModel> {
     let CameraSpec::Pinhole(mut spec) = spec else { return None };
@@ -310,6 +360,8 @@ pub struct Taken {
     pub camera: Option<TakenCamera>,
     /// How far light is followed, less than the scene's tracer does.
     pub bounces: Option<TakenBounces>,
+    /// What is left out of its meshes.
+    pub detail: Option<TakenDetail>,
     /// Why not more is, in sentences.
     pub notes: Vec<String>,
 }
@@ -336,8 +388,9 @@ pub struct TakenBounces {
 /// some 10⁵.
 const WORTH: u64 = 200_000;
 
-/// What of the tolerance of `scene` is taken: the simplest camera model within it, and of the light that this leaves
-/// the fewest surfaces. Says nothing of a scene without a tolerance.
+/// What of the tolerance of `scene` is taken: beside what was left out of its meshes ([`coarser`]), which are those of
+/// `scene` now, the simplest camera model within what this leaves, and of the light that is left then the fewest
+/// surfaces. Says nothing of a scene without a tolerance.
 ///
 /// # Errors
 ///
@@ -345,12 +398,12 @@ const WORTH: u64 = 200_000;
 pub fn choose(
     scene: &Scene,
     plan: &Plan,
-    accel: &dyn Accel,
-    images: &Images,
+    (accel, images): (&dyn Accel, &Images),
+    detail: Option<TakenDetail>,
     watch: &dyn Watch,
 ) -> Result<Option<Taken>, RenderError> {
     let Some(tolerance) = scene.tolerance else { return Ok(None) };
-    let mut taken = Taken { tolerance, camera: None, bounces: None, notes: Vec::new() };
+    let mut taken = Taken { tolerance, camera: None, bounces: None, detail, notes: Vec::new() };
     if !plan.layers.contains(&LayerSpec::Radiance) {
         taken.notes.push("no light is rendered: data layers are exact".to_owned());
         return Ok(Some(taken));
@@ -363,10 +416,14 @@ pub fn choose(
         taken.notes.push(why);
         return Ok(Some(taken));
     }
-    taken.camera = simplest(scene, plan, accel, tolerance, &mut taken.notes)?;
-    let left = taken.camera.as_ref().map_or(0.0, |camera| camera.finding.light.value);
-    let left = (tolerance.light.0 - left).max(0.0);
-    taken.bounces = light::fewest(scene, (accel, images), left, &mut taken.notes, watch)?;
+    let mut left = Tolerance::from(tolerance);
+    let [pixels, light] = detail.map_or([0.0; 2], |detail| [detail.displacement, detail.light]);
+    left.pixels -= pixels;
+    left.light = Some((tolerance.light.0 - light).max(0.0));
+    taken.camera = simplest(scene, plan, accel, left, &mut taken.notes)?;
+    let of_lens = taken.camera.as_ref().map_or(0.0, |camera| camera.finding.light.value);
+    let looked = ((tolerance.light.0 - light - of_lens).max(0.0), samples);
+    taken.bounces = light::fewest(scene, (accel, images), looked, &mut taken.notes, watch)?;
     Ok(Some(taken))
 }
 
@@ -375,7 +432,7 @@ fn simplest(
     scene: &Scene,
     plan: &Plan,
     accel: &dyn Accel,
-    spec: ToleranceSpec,
+    tolerance: Tolerance,
     notes: &mut Vec<String>,
 ) -> Result<Option<TakenCamera>, RenderError> {
     let Some(lens) = scene.camera.lens() else { return Ok(None) };
@@ -387,9 +444,8 @@ fn simplest(
         notes.push("light is spread by the waves of this very lens".to_owned());
         return Ok(None);
     }
-    let tolerance = Tolerance::from(spec);
     let view = FullView::new(scene, accel, &plan.bands, Field::QUICK)?;
-    let models = match view.models(tolerance) {
+    let models = match view.models_in_reach(tolerance) {
         Ok(found) => found.models,
         Err(error) => {
             notes.push(error.to_string());
@@ -400,6 +456,9 @@ fn simplest(
     for LensModel { name, camera, .. } in models {
         // The root mean square of a blur says nothing of the pattern in it.
         if is_masked && ["thin", "thick"].contains(&name) {
+            continue;
+        }
+        if view.chief_displacement(&camera) > tolerance.pixels {
             continue;
         }
         let Ok(finding) = view.finding(name, &camera, tolerance) else { continue };

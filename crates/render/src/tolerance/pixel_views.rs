@@ -105,26 +105,35 @@ impl PlaceView {
     }
 }
 
+/// The chief rays of `camera` from `places`; `None` where it sees nothing.
+pub(super) fn chief_rays(camera: &Camera, places: &[Place]) -> Vec<Option<Line>> {
+    let (columns, rows): (Vec<f64>, Vec<f64>) =
+        places.iter().map(|place| (place.column, place.row)).unzip();
+    let mut rays = RayBatch::default();
+    camera.rays_through(&columns, &rows, &mut rays);
+    let line = |i: usize| {
+        let line = || Line::of(camera.pose(), rays.origin(i), rays.direction(i));
+        (rays.t_max()[i] >= 0.0).then(line).flatten()
+    };
+    (0..places.len()).map(line).collect()
+}
+
 /// What `camera`, opened for `bands`, sees from each of `places` in the bands that are `chosen`, by `rays` of each
-/// band or group of bands.
+/// band or group of bands; by one where it has no pupil.
 pub(super) fn seen(
     (camera, bands): (&Camera, &Bands),
     chosen: &[usize],
     places: &[Place],
     rays: u32,
 ) -> Vec<PlaceView> {
-    let (columns, rows): (Vec<f64>, Vec<f64>) =
-        places.iter().map(|place| (place.column, place.row)).unzip();
-    let mut chief = RayBatch::default();
-    camera.rays_through(&columns, &rows, &mut chief);
+    // Without a pupil all rays of a place are one.
+    let rays = if camera.has_pupil() { rays } else { 1 };
     let groups = camera.band_groups(bands);
     let mut samples = FilmSamples::default();
     let mut out = CameraRays::default();
     let mut all = Vec::with_capacity(places.len());
-    for (i, place) in places.iter().enumerate() {
-        let sees = chief.t_max()[i] >= 0.0;
-        let line = Line::of(camera.pose(), chief.origin(i), chief.direction(i));
-        let mut seen = PlaceView { chief: line.filter(|_| sees), bands: Vec::new() };
+    for (place, chief) in places.iter().zip(chief_rays(camera, places)) {
+        let mut seen = PlaceView { chief, bands: Vec::new() };
         // The same places of the pupil for every camera, and everywhere.
         let points = Sampler::Sobol.pixel(0, 0, 0, rays);
         for (number, group) in groups.iter().enumerate() {

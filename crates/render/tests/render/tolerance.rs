@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use etendue_render::output::Outputs;
-use etendue_render::tolerance::{Taken, TakenBounces, choose, lens_models};
+use etendue_render::tolerance::{Taken, TakenBounces, choose, coarser, lens_models, with_meshes};
 use etendue_render::{BandPaths, Plan};
 use etendue_report::DecisionKind;
 use etendue_scene::Scene;
@@ -60,7 +60,7 @@ fn allowed(pixels: &str, light: &str) -> Value {
 fn taken(scene: &Scene) -> Taken {
     let plan = Plan::new(scene, Outputs::ALL);
     let (accel, images) = prepare(scene, &plan);
-    choose(scene, &plan, &*accel, &images, &|_: f64| true).unwrap().unwrap()
+    choose(scene, &plan, (&*accel, &images), None, &|_: f64| true).unwrap().unwrap()
 }
 
 /// The light of blocks of 8 × 8 pixels with what is `taken`.
@@ -125,6 +125,19 @@ fn a_lens_wide_open_is_taken_as_it_is_but_for_its_colours() {
 }
 
 #[test]
+fn what_choosing_measured_of_a_lens_is_what_rendering_would() {
+    let scene = lens_scene(2.8, &allowed("0.1 px", "3 %"));
+    let mut taken = taken(&scene);
+    taken.bounces = None;
+    let own = blocks(&scene, Some(taken));
+    // To the bit the picture of a lens without dispersion that was never looked at.
+    let mut fresh = lens_scene(2.8, &allowed("0.1 px", "3 %"));
+    (fresh.tolerance, fresh.plan.dispersion) = (None, Some(false));
+    fresh.camera = fresh.camera.without_dispersion();
+    assert_eq!(own, blocks(&fresh, None));
+}
+
+#[test]
 fn light_is_followed_to_as_few_surfaces_as_the_tolerance_allows() {
     for (albedo, percent) in [(0.3, 2.0), (0.6, 5.0)] {
         let scene = room(albedo, &allowed("0.5 px", &format!("{percent} %")));
@@ -156,7 +169,7 @@ fn nothing_is_taken_without_a_tolerance_or_where_looking_does_not_pay() {
     assert!(scene.tolerance.is_none());
     let plan = Plan::new(&scene, Outputs::ALL);
     let (accel, images) = prepare(&scene, &plan);
-    let found = choose(&scene, &plan, &*accel, &images, &|_: f64| true).unwrap();
+    let found = choose(&scene, &plan, (&*accel, &images), None, &|_: f64| true).unwrap();
     assert!(found.is_none() && plan.taken.is_none());
     // Numbers are pixels and shares; a picture of few samples is rendered sooner than looked at.
     scene = room(0.5, &json!({ "displacement": 1, "light": 0.02 }));
@@ -164,4 +177,102 @@ fn nothing_is_taken_without_a_tolerance_or_where_looking_does_not_pay() {
     scene.render.samples = SamplesSpec::Count(1);
     let few = taken(&scene);
     assert!(few.bounces.is_none() && few.notes[0].contains("too few"), "{few:?}");
+}
+
+/// A ball of many triangles, 17 pixels wide, lit by the sun from one side.
+fn fine_ball(tolerance: &Value, changes: &[(&str, Value)]) -> Scene {
+    let mut scene = json!({
+        "camera": { "type": "pinhole", "fov": 40, "sensor": { "resolution": [72, 48] },
+            "pose": { "from": [0, 0, 2.4], "look_at": [0, 0, 0] } },
+        "tracer": { "type": "path", "max_bounces": 3 }, "tolerance": tolerance,
+        "lights": [{ "type": "directional", "direction": [-1, -1, -1], "irradiance": [3, 3, 3] },
+            { "type": "environment", "radiance": [0.3, 0.3, 0.3] }],
+        "materials": { "white": { "type": "matte", "color": [0.7, 0.7, 0.7] } },
+        "objects": [{ "shape": "sphere", "radius": 0.3, "triangles": 400_000, "material": "white" }],
+        "render": { "samples": 16 },
+    });
+    for (pointer, value) in changes {
+        let (parent, key) = pointer.rsplit_once('/').unwrap();
+        match scene.pointer_mut(parent).unwrap() {
+            Value::Array(list) => list.push(value.clone()),
+            parent => parent[key] = value.clone(),
+        }
+    }
+    load_json(tempfile::tempdir().unwrap().path(), scene)
+}
+
+#[test]
+fn meshes_have_the_detail_that_the_nearest_view_tells() {
+    let scene = fine_ball(&allowed("0.5 px", "2 %"), &[]);
+    let (geometry, detail) = coarser(&scene).expect("a coarser ball");
+    assert!(detail.triangles[1] < detail.triangles[0] / 4, "{detail:?}");
+    assert!(detail.displacement <= 0.5 && detail.light <= 0.01, "{detail:?}");
+    let full = blocks(&scene, None);
+    let lit = |own: Vec<f64>| -> (Vec<f64>, Vec<f64>) {
+        own.into_iter().zip(full.iter().copied()).filter(|(_, full)| *full > 0.0).unzip()
+    };
+    let (own, all) = lit(blocks(&with_meshes(&scene, geometry), None));
+    // The samples are the same; edges move by less than half a pixel.
+    let found = difference(&own, &all);
+    assert!(found < 0.02, "{found}");
+    // Cells of several pixels change the area by more than half of 2 %, and where that is allowed the same comparison
+    // tells it.
+    let wide = |light: &str| coarser(&fine_ball(&allowed("8 px", light), &[]));
+    assert!(wide("2 %").is_none());
+    let (geometry, detail) = wide("60 %").expect("a coarser ball");
+    assert!(detail.light > 0.01, "{detail:?}");
+    let (own, all) = lit(blocks(&with_meshes(&scene, geometry), None));
+    let found = difference(&own, &all);
+    assert!(found > 0.02, "{found}");
+}
+
+#[test]
+fn meshes_stay_as_they_are_where_something_could_show_more_of_them() {
+    let tolerance = allowed("0.5 px", "2 %");
+    assert!(coarser(&fine_ball(&tolerance, &[])).is_some());
+    let mirror = json!({ "type": "mirror" });
+    let ball = |more: Value| {
+        let mut ball =
+            json!({ "shape": "sphere", "radius": 0.2, "transform": { "translate": [0.6, 0, -1] } });
+        ball.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        ball
+    };
+    let cases = [
+        // Data are exact.
+        ("depth", vec![("/layers", json!(["depth"]))]),
+        ("alpha", vec![("/render/alpha", json!(true))]),
+        // A mirror may enlarge, and a lamp nearby throws large shadows.
+        (
+            "mirror",
+            vec![
+                ("/materials/mirror", mirror),
+                ("/objects/1", ball(json!({ "material": "mirror" }))),
+            ],
+        ),
+        (
+            "point",
+            vec![(
+                "/lights/2",
+                json!({ "type": "point", "at": [0, 1, 0], "intensity": [1, 1, 1] }),
+            )],
+        ),
+        (
+            "emissive",
+            vec![
+                ("/materials/lamp", json!({ "type": "emissive", "radiance": [1, 1, 1] })),
+                ("/objects/1", ball(json!({ "material": "lamp" }))),
+            ],
+        ),
+        // The camera stands within the box of a thing.
+        (
+            "within",
+            vec![("/objects/1", json!({ "shape": "box", "size": [9, 9, 9], "material": "white" }))],
+        ),
+        // The ball is patterned, or moves.
+        ("checker", vec![("/materials/white", json!({ "type": "checker", "squares": 4 }))]),
+    ];
+    for (what, changes) in cases {
+        assert!(coarser(&fine_ball(&tolerance, &changes)).is_none(), "{what}");
+    }
+    assert!(coarser(&room(0.5, &Value::Null)).is_none());
 }

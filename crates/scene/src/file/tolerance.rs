@@ -8,8 +8,8 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::PlanSpec;
 
-/// What a picture may be off by: what is cheapest within it is taken of the camera's lens, and of the surfaces that
-/// light is followed to. Without it nothing is approximated.
+/// What a picture may be off by: what is cheapest within it is taken of the camera's lens, of the detail of meshes, and
+/// of the surfaces that light is followed to. Without it nothing is approximated.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ToleranceSpec {

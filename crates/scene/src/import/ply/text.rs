@@ -310,6 +310,19 @@ impl Table for Rows<'_> {
     }
 }
 
+/// Reads a triangle from each of the `rows`; whether all have one.
+fn filled<'a>(
+    triangles: &mut [[u32; 3]],
+    rows: impl IndexedParallelIterator<Item = &'a [u8]>,
+    read: impl Fn(&[u8]) -> Option<[u32; 3]> + Sync,
+) -> bool {
+    triangles.par_iter_mut().zip(rows).all(|(to, row)| {
+        let read = read(row);
+        *to = read.unwrap_or_default();
+        read.is_some()
+    })
+}
+
 /// Rows with lists.
 struct Walk<'a> {
     element: &'a Element,
@@ -334,17 +347,29 @@ impl Walk<'_> {
         let first = before + length.size();
         let row = first + 3 * item.size() + behind;
         let total = row.checked_mul(self.element.count)?;
-        let triangles: Option<Vec<[u32; 3]>> = self
-            .bytes
-            .get(..total)?
-            .par_chunks_exact(row)
-            .map(|bytes| {
-                let corner = |k: usize| index(item, self.order, &bytes[first + k * item.size()..]);
-                (index(length, self.order, &bytes[before..]) == 3)
-                    .then(|| [corner(0), corner(1), corner(2)])
-            })
-            .collect();
-        Some((triangles?, total))
+        let bytes = self.bytes.get(..total)?;
+        let mut triangles = vec![[0; 3]; self.element.count];
+        // As nearly all files have them: a length of a byte, and corners of four, whose bits are the numbers.
+        let corners_of_four = |row: &[u8]| {
+            let word = |k: usize| row[first + 4 * k..].first_chunk().copied().unwrap_or_default();
+            let [a, b, c] = [word(0), word(1), word(2)];
+            let corners = match self.order {
+                Order::Little => [a, b, c].map(u32::from_le_bytes),
+                Order::Big => [a, b, c].map(u32::from_be_bytes),
+            };
+            (row[before] == 3).then_some(corners)
+        };
+        let corners_of_any = |row: &[u8]| {
+            let corner = |k: usize| index(item, self.order, &row[first + k * item.size()..]);
+            (index(length, self.order, &row[before..]) == 3)
+                .then(|| [corner(0), corner(1), corner(2)])
+        };
+        let is_plain = matches!((length, item), (Type::U8, Type::U32 | Type::I32));
+        let are_triangles = match is_plain {
+            true => filled(&mut triangles, bytes.par_chunks_exact(row), corners_of_four),
+            false => filled(&mut triangles, bytes.par_chunks_exact(row), corners_of_any),
+        };
+        are_triangles.then_some((triangles, total))
     }
 
     /// Adds all lists to `faces`; the size of the rows, `None` where the file ends too soon.

@@ -1,0 +1,199 @@
+//! Which settings reach a given error of the sensor's picture soonest, by the time of the whole program.
+//!
+//! The scene as it is contends with itself under changes: one on every axis (accelerator, precision, sampler, …), and
+//! several together. All are rendered with few samples; of each is foretold when it will reach the target, the later
+//! half is left out, and the others are rendered with four times as many: successive halving (K. Jamieson & A.
+//! Talwalkar, "Non-stochastic best arm identification and hyperparameter optimization", 2016). The soonest is rendered
+//! once more, with as many samples as it is foretold to need.
+//!
+//! The squared error falls with the number of samples n as b² + v/n, where b is what a change misses that no sample
+//! mends, and the time rises as a + c n: two renders tell all four. Where the error falls faster, as that of Sobol's
+//! points does, what is foretold is late, and the renders that follow mend it.
+
+mod race;
+
+use serde::Serialize;
+
+pub use self::race::measure;
+
+/// A change of the scene.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Change {
+    /// What it is called.
+    pub name: String,
+    /// What is set, as pairs of a path of the scene and JSON.
+    pub settings: Vec<(String, String)>,
+}
+
+/// Settings that contend: the scene under some changes, each of another axis.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Contender {
+    /// Its changes by axis and number; none of the scene as it is.
+    pub changes: Vec<(usize, usize)>,
+    /// What it is called.
+    pub name: String,
+    /// All that is set.
+    pub settings: Vec<(String, String)>,
+}
+
+impl Contender {
+    /// The scene under changes of `axes`.
+    #[must_use]
+    pub fn of(axes: &[Vec<Change>], changes: &[(usize, usize)]) -> Self {
+        let chosen: Vec<&Change> =
+            changes.iter().map(|&(axis, number)| &axes[axis][number]).collect();
+        let names: Vec<&str> = chosen.iter().map(|change| &*change.name).collect();
+        let name = if names.is_empty() { AS_IT_IS.to_owned() } else { names.join(" + ") };
+        let settings = chosen.iter().flat_map(|change| change.settings.iter().cloned()).collect();
+        Self { changes: changes.to_vec(), name, settings }
+    }
+}
+
+/// What the scene without changes is called.
+pub const AS_IT_IS: &str = "as the plan takes it";
+
+/// A render of the whole program that is wanted.
+#[derive(Debug, Clone, Copy)]
+pub struct Run<'a> {
+    /// The settings.
+    pub contender: &'a Contender,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Other seeds give other samples.
+    pub seed: u64,
+}
+
+/// What became of it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// It was rendered.
+    Done(WholeRun),
+    /// The scene is not to be had with these settings, and why.
+    Refused(String),
+}
+
+/// A render of the whole program.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WholeRun {
+    /// Loading, building, tracing and writing, in turn (s).
+    pub stages: [f64; 4],
+    /// What the sensor records in the mean, above its black level.
+    pub values: Vec<f64>,
+}
+
+impl WholeRun {
+    /// All of it (s).
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.stages.iter().sum()
+    }
+}
+
+/// What is sought, and how long that may take.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effort {
+    /// The error: the root of the mean squared difference to the converged picture, over its mean.
+    pub target: f64,
+    /// What all renders together may take (s): about, since a render is not broken off.
+    pub seconds: f64,
+}
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Target {
+    /// The error that is sought, as a share of the picture's mean.
+    pub target: f64,
+    /// Samples of the converged picture, which is the mean of two.
+    pub converged: u32,
+    /// Its own error, in the same terms.
+    pub own_error: f64,
+    /// All that was rendered, in turn.
+    pub renders: Vec<Render>,
+    /// Every contender and when it reaches the target, the soonest first.
+    pub contenders: Vec<Foretold>,
+    /// The soonest, rendered with as many samples as it needs.
+    pub verified: Option<Verified>,
+    /// What a user should know.
+    pub notes: Vec<String>,
+}
+
+/// A render, and how far it is from the converged picture.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Render {
+    /// The contender's name.
+    pub name: String,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Loading, building, tracing and writing, in turn (s).
+    pub stages: [f64; 4],
+    /// The whole program (s).
+    pub seconds: f64,
+    /// The root of the mean squared difference to the converged picture, over its mean.
+    pub error: f64,
+    /// The mean of squared differences over squared values, to which a hundredth of the squared mean is added (F.
+    /// Rousselle et al., "Adaptive sampling and reconstruction using greedy error minimization", 2011).
+    pub relative_mse: f64,
+}
+
+/// When a contender reaches the target.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Foretold {
+    /// Its name.
+    pub name: String,
+    /// Samples a pixel; `null` where no number is enough.
+    pub samples: Option<u32>,
+    /// The time of the whole program (s).
+    pub seconds: Option<f64>,
+    /// How often it was rendered.
+    pub renders: usize,
+    /// What is set, as pairs of a path of the scene and JSON.
+    pub settings: Vec<(String, String)>,
+}
+
+/// The soonest contender, rendered for itself.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Verified {
+    /// Its name.
+    pub name: String,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// The time that was foretold of so many (s).
+    pub foretold: f64,
+    /// The time that it took (s).
+    pub seconds: f64,
+    /// Its error.
+    pub error: f64,
+}
+
+impl Verified {
+    /// By which factor what was foretold is off, above 1.
+    #[must_use]
+    pub fn factor(&self) -> f64 {
+        (self.foretold / self.seconds).max(self.seconds / self.foretold)
+    }
+}
+
+impl Target {
+    /// What was found, in a sentence or two.
+    #[must_use]
+    pub fn verdict(&self) -> String {
+        let Some(found) = &self.verified else {
+            return format!("No settings were seen to reach {} %.", 100.0 * self.target);
+        };
+        let settings = self.contenders.iter().find(|own| own.name == found.name);
+        let settings = settings.map_or(&[][..], |own| &own.settings);
+        let set: String =
+            settings.iter().map(|(path, value)| format!(" --set '{path}={value}'")).collect();
+        format!(
+            "Soonest: {} with {} samples: {:.2} s foretold, {:.2} s taken (a factor of {:.2}), an error of {:.2} %.\n\
+             It is rendered with --samples {}{set}",
+            found.name,
+            found.samples,
+            found.foretold,
+            found.seconds,
+            found.factor(),
+            100.0 * found.error,
+            found.samples
+        )
+    }
+}

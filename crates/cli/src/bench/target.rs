@@ -1,0 +1,169 @@
+//! `etendue bench --target`: which settings reach a given error of what the sensor records soonest.
+
+use etendue::{Denoiser, Options, Outputs, Progress, Rendering, Session};
+use etendue_bench::target::{Change, Effort, Outcome, Run, Target, WholeRun, measure};
+use etendue_render::output::Values;
+use etendue_render::{accelerators, denoise};
+use etendue_scene::Scene;
+use etendue_scene::file::{AccelName, TracerSpec};
+use etendue_tracer::LayerSpec;
+
+use crate::arguments::BenchArguments;
+use crate::fault::Fault;
+use crate::progress::Phases;
+use crate::{render, stop};
+
+/// How long all renders may take (s), and in a quick run.
+const SECONDS: [f64; 2] = [600.0, 50.0];
+
+/// Surfaces to which light is followed, where the scene follows it farther.
+const BOUNCES: [u32; 3] = [8, 4, 2];
+
+/// Finds the settings. `scene` is the scene as it is.
+pub(super) fn race(
+    arguments: &BenchArguments,
+    target: f64,
+    (scene, phases): (&Scene, Phases),
+) -> Result<Target, Fault> {
+    if scene.picture != Some(LayerSpec::Radiance) {
+        return Err(Fault::refused(
+            "--target: the scene has no picture of light, whose error samples could mend; name a `tracer` such as path",
+        ));
+    }
+    let seconds = arguments.seconds.unwrap_or(SECONDS[usize::from(arguments.quick)]);
+    let folder = tempfile::tempdir().map_err(|error| {
+        Fault::refused(format!("no folder for temporary files, to write pictures into: {error}"))
+    })?;
+    let layers = without_sampling(scene);
+    let mut program = |run: Run<'_>| match whole_run(arguments, &layers, run, folder.path()) {
+        Ok(done) => Ok(Outcome::Done(done)),
+        Err(error) if error.is_refused() => Ok(Outcome::Refused(error.to_string())),
+        Err(error) => Err(Fault::from(error)),
+    };
+    let progress = phases.begin("target");
+    // The picture that all are compared with has everything.
+    let in_full = [("tolerance".to_owned(), "null".to_owned())];
+    let effort = Effort { target, seconds };
+    measure((&axes(scene), &in_full), effort, &mut program, &|share| progress(share))
+}
+
+/// What makes a scene have no layers of sampling, which there are of samples that stop by themselves alone; nothing
+/// where it has none.
+fn without_sampling(scene: &Scene) -> Vec<(String, String)> {
+    let is_own = |layer: &&LayerSpec| Some(**layer) != scene.picture;
+    let own: Vec<&LayerSpec> = scene.layers.iter().filter(is_own).collect();
+    if !own.iter().any(|layer| layer.is_of_sampling()) {
+        return Vec::new();
+    }
+    let kept = own.iter().filter(|layer| !layer.is_of_sampling());
+    let written = |layer: &LayerSpec| {
+        LayerSpec::NAMES.into_iter().find(|name| LayerSpec::from_name(name) == Some(*layer))
+    };
+    let names: Vec<String> =
+        kept.filter_map(|layer| Some(format!("\"{}\"", written(layer)?))).collect();
+    vec![("layers".to_owned(), format!("[{}]", names.join(",")))]
+}
+
+/// The program from the scene's text to its files, with these `layers` where they are set.
+fn whole_run(
+    arguments: &BenchArguments,
+    layers: &[(String, String)],
+    run: Run<'_>,
+    folder: &std::path::Path,
+) -> Result<WholeRun, etendue::Error> {
+    let mut options =
+        Options { memory_limit: arguments.memory_limit, ..render::options(&arguments.scene) };
+    let set = |(path, value): (&str, String)| (path.to_owned(), value);
+    let mut settings = run.contender.settings.clone();
+    // What is no key of a scene is an output.
+    settings.retain(|(path, _)| path != DENOISE);
+    options.outputs =
+        Outputs { denoised: settings.len() < run.contender.settings.len(), ..Outputs::ALL };
+    options.settings.extend(layers.iter().cloned());
+    options.settings.extend(settings);
+    options.settings.extend(
+        [("render.samples", run.samples.to_string()), ("render.seed", run.seed.to_string())]
+            .map(set),
+    );
+    let progress = Progress::new(|_, _| !stop::asked());
+    let outputs = options.outputs;
+    let rendering = Session::open_with(&arguments.scene.scene, options)?.render(&progress)?;
+    let written = rendering.write_with(folder, outputs, &progress)?;
+    let seconds = rendering.report().seconds;
+    let before = seconds.load + seconds.decode;
+    let trace = (seconds.total - before - seconds.build).max(0.0);
+    let stages = [before, seconds.build, trace, written.time.as_secs_f64()];
+    Ok(WholeRun { stages, values: recorded(&rendering)? })
+}
+
+/// What the sensor records in the mean in its first exposure, above its black level (DN); of a scene without a sensor
+/// the light, clipped at full scale.
+fn recorded(rendering: &Rendering) -> Result<Vec<f64>, etendue::Error> {
+    if let Some(light) = rendering.sensor_light()
+        && let Some(shot) = light.sensor().shots().next()
+    {
+        let black = light.sensor().black_level();
+        let moments = light.moments(shot).map_err(etendue_render::expose::ExposeError::from)?;
+        return Ok(moments.mean.iter().map(|&mean| f64::from(mean) - black).collect());
+    }
+    let name = if rendering.layer(denoise::DENOISED).is_some() { denoise::DENOISED } else { "" };
+    let planes = rendering.layer(name).into_iter().flat_map(|layer| &layer.channels);
+    let values =
+        |values: &Values| (0..values.len()).map(|i| values.at(i).min(1.0)).collect::<Vec<_>>();
+    Ok(planes.flat_map(|channel| values(&channel.values)).collect())
+}
+
+/// What stands for the output `--denoise` among settings.
+const DENOISE: &str = "--denoise";
+
+/// What can be changed of a scene: lists of which each change excludes the others.
+fn axes(scene: &Scene) -> Vec<Vec<Change>> {
+    let change = |name: &str, path: &str, value: &str| Change {
+        name: name.to_owned(),
+        settings: vec![(path.to_owned(), value.to_owned())],
+    };
+    let is_embree = scene.render.accel.unwrap_or(accelerators()[0]) == AccelName::Embree;
+    let mut axes = vec![
+        vec![
+            change("independent samples", "render.sampler", "\"independent\""),
+            change("blue noise", "render.sampler", "\"blue_noise\""),
+        ],
+        vec![
+            change("a low build", "plan.build_quality", "\"low\""),
+            change("a high build", "plan.build_quality", "\"high\""),
+        ],
+    ];
+    if is_embree {
+        axes.push(vec![change("the tree in Rust", "render.accel", "\"bvh\"")]);
+        axes.push(vec![
+            change("light in f32", "plan.light_precision", "\"single\""),
+            change("light in f64", "plan.light_precision", "\"double\""),
+        ]);
+    }
+    if let Some(TracerSpec::Path { max_bounces }) = scene.tracer {
+        let fewer = BOUNCES.into_iter().filter(|&bounces| bounces < max_bounces);
+        let fewer = fewer.map(|bounces| {
+            change(&format!("{bounces} surfaces"), "tracer.max_bounces", &bounces.to_string())
+        });
+        axes.push(fewer.collect());
+    }
+    if scene.tolerance.is_none() {
+        let tolerance = r#"{"displacement": "0.5 px", "light": "2 %"}"#;
+        let mut models = vec![change("a tolerance of 0.5 px, 2 %", "tolerance", tolerance)];
+        if scene.camera.lens().is_some() {
+            models.push(change("no dispersion", "plan.dispersion", "false"));
+        }
+        axes.push(models);
+    }
+    if !scene.textures.is_empty() {
+        axes.push(vec![
+            change("images at points", "plan.texture_filter", "false"),
+            change("no images", "plan.textures", "false"),
+        ]);
+    }
+    if scene.sensor.is_none() && Denoiser::open(1).is_ok() {
+        axes.push(vec![change("denoised", DENOISE, "")]);
+    }
+    axes.retain(|axis| !axis.is_empty());
+    axes
+}

@@ -1,0 +1,93 @@
+//! What is rendered in the place of a scene with a tolerance: the same with coarser meshes, where these are within it.
+//! All else that a session is asked of its scene is answered by the scene's own meshes.
+
+use std::sync::Arc;
+
+use etendue_accel::Accel;
+use etendue_render::Plan;
+use etendue_render::tolerance::{TakenDetail, coarser, with_meshes};
+use etendue_scene::Scene;
+
+use super::{LoadedScene, Session};
+use crate::Error;
+
+/// A scene with coarser meshes; while it is rendered, the scene with its own.
+pub(super) struct CoarseScene {
+    /// The other one of the two, its plan and the structure over it.
+    scene: Arc<Scene>,
+    plan: Plan,
+    accel: Option<Arc<dyn Accel>>,
+    /// What was left out; nothing where the scene has to be rendered as it is.
+    detail: Option<TakenDetail>,
+    /// Whether the coarser one is the session's now.
+    is_in_place: bool,
+}
+
+/// A scene with all its detail, and the structure over it once that is built.
+pub(super) type FullScene = (Arc<Scene>, Option<Arc<dyn Accel>>);
+
+impl Session {
+    /// Puts the coarser scene in the place of the loaded one, where there is one.
+    pub(super) fn show_coarse(&mut self) {
+        let outputs = self.options.outputs;
+        let Some(loaded) = &mut self.loaded else { return };
+        if loaded.coarse.is_none() && loaded.scene.tolerance.is_some() {
+            let found = coarser(&loaded.scene);
+            let (scene, detail) = match found {
+                Some((geometry, detail)) => {
+                    (Arc::new(with_meshes(&loaded.scene, geometry)), Some(detail))
+                }
+                None => (Arc::clone(&loaded.scene), None),
+            };
+            let plan = match detail {
+                Some(_) => Plan::new(&scene, outputs),
+                None => loaded.plan.clone(),
+            };
+            loaded.coarse =
+                Some(CoarseScene { scene, plan, accel: None, detail, is_in_place: false });
+        }
+        loaded.exchange(true);
+    }
+
+    /// Puts the scene with its own meshes back. What was taken of its tolerance stays known.
+    pub(super) fn show_all(&mut self) {
+        let outputs = self.options.outputs;
+        let Some(loaded) = &mut self.loaded else { return };
+        if !loaded.exchange(false) {
+            return;
+        }
+        let taken = loaded.coarse.as_ref().and_then(|coarse| coarse.plan.taken.clone());
+        if loaded.plan.taken.is_none() && taken.is_some() {
+            loaded.plan = Plan::taking(&loaded.scene, outputs, taken);
+        }
+    }
+
+    /// The scene with all its detail, and the structure over it, for what is rendered to be compared with.
+    pub(super) fn in_full(&self) -> Result<FullScene, Error> {
+        let loaded = self.loaded()?;
+        Ok(match loaded.coarse.as_ref().filter(|coarse| coarse.is_in_place) {
+            Some(coarse) => (Arc::clone(&coarse.scene), coarse.accel.clone()),
+            None => (Arc::clone(&loaded.scene), loaded.accel.clone()),
+        })
+    }
+}
+
+impl LoadedScene {
+    /// What is left out of its meshes.
+    pub(super) fn detail(&self) -> Option<TakenDetail> {
+        self.coarse.as_ref().filter(|coarse| coarse.is_in_place)?.detail
+    }
+
+    /// Exchanges the two scenes where the other one is wanted; whether it did.
+    fn exchange(&mut self, coarse_wanted: bool) -> bool {
+        let Some(coarse) = &mut self.coarse else { return false };
+        if coarse.detail.is_none() || coarse.is_in_place == coarse_wanted {
+            return false;
+        }
+        std::mem::swap(&mut self.scene, &mut coarse.scene);
+        std::mem::swap(&mut self.plan, &mut coarse.plan);
+        std::mem::swap(&mut self.accel, &mut coarse.accel);
+        coarse.is_in_place = coarse_wanted;
+        true
+    }
+}
