@@ -54,10 +54,18 @@ struct Forecast {
     seconds: f64,
 }
 
+/// The render with most samples, and one before it with half as many at most, where there is one: what two of nearly
+/// one number differ by is noise, and that a number is a power of two.
+fn apart(points: &[Point]) -> Option<(&Point, &Point)> {
+    let (two, before) = points.split_last()?;
+    let half = before.iter().rev().find(|one| 2 * one.samples <= two.samples);
+    Some((half.or(before.first())?, two))
+}
+
 /// The last two renders carried on to a squared error: as b² + v/n, and a + c n. `None` where no number of samples
 /// is enough, or nothing is known.
 fn forecast(points: &[Point], target: f64) -> Option<Forecast> {
-    let [.., one, two] = points else { return None };
+    let (one, two) = apart(points)?;
     let [n, m] = [one, two].map(|point| f64::from(point.samples));
     let fallen = (one.square - two.square) / (1.0 / n - 1.0 / m);
     // Faster than 1/n leaves nothing that samples do not mend; no fall at all is noise or such a rest.
@@ -78,7 +86,7 @@ fn forecast(points: &[Point], target: f64) -> Option<Forecast> {
 
 /// The time (s) of so many samples by the last two renders: as a + c n.
 fn seconds_of(points: &[Point], samples: u32) -> f64 {
-    let [.., one, two] = points else { return f64::INFINITY };
+    let Some((one, two)) = apart(points) else { return f64::INFINITY };
     let [n, m] = [one, two].map(|point| f64::from(point.samples));
     let slope = ((two.seconds - one.seconds) / (m - n)).max(0.0);
     (two.seconds + slope * (f64::from(samples) - m)).max(0.0)
