@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::{Camera, CameraRays, FilmSamples, Kinematics, Pose, Shutter, Trajectory};
+use crate::{Camera, CameraRays, FilmSamples, Kinematics, Pose, Shutter, Trajectory, TruthAt};
 use etendue_geometry::{RayBatch, RaysMut};
 
 /// Steps in which the row of a point is found that a moving camera sees; each is nearer by the ratio of the picture's
@@ -63,6 +63,16 @@ impl Camera {
     pub fn under_changing_lights(mut self, lights_change: bool) -> Self {
         if let Some(time) = &mut self.time {
             Arc::make_mut(time).lights_change = lights_change;
+        }
+        self
+    }
+
+    /// The same camera, in the same pose of the frame, of which data layers see another moment of each row's exposure.
+    #[must_use]
+    pub fn with_truth_at(mut self, truth_at: TruthAt) -> Self {
+        if let Some(time) = &mut self.time {
+            let time = Arc::make_mut(time);
+            time.shutter = time.shutter.with_truth_at(truth_at);
         }
         self
     }

@@ -281,6 +281,11 @@ impl Shutter {
         self.truth_at
     }
 
+    /// The same, of which data layers see another moment.
+    pub(crate) fn with_truth_at(&self, truth_at: TruthAt) -> Self {
+        Self { truth_at, ..self.clone() }
+    }
+
     /// The same for rows of the picture `factor` times as high.
     pub(crate) fn coarser(&self, factor: f64) -> Self {
         Self { coarse: self.coarse * factor, ..self.clone() }

@@ -4,10 +4,11 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use etendue_accel::Accel;
+use etendue_camera::TruthAt;
 use etendue_render::FollowedFrame;
 use etendue_scene::{Frame, Scene};
 use etendue_tracer::LayerSpec;
-use etendue_tracer::layer::{Along, FrameStep};
+use etendue_tracer::layer::{Along, FrameStep, RowMoment};
 
 use crate::Error;
 
@@ -25,6 +26,20 @@ pub(crate) fn steps(layers: &[LayerSpec]) -> BTreeSet<FrameStep> {
     layers.iter().filter_map(|layer| layer.step()).collect()
 }
 
+/// The frame itself at the moments of its exposure that its layers compare it with.
+pub(crate) fn moments(scene: &Scene) -> Vec<Neighbour> {
+    let moment = |step: FrameStep| {
+        let truth_at = match step.moment()? {
+            RowMoment::Open => TruthAt::Open,
+            RowMoment::Close => TruthAt::Close,
+        };
+        let mut then = scene.clone();
+        then.camera = then.camera.with_truth_at(truth_at);
+        Some(Neighbour { step, scene: Arc::new(then), accel: None })
+    };
+    steps(&scene.layers).into_iter().filter_map(moment).collect()
+}
+
 /// The frames that are these steps away from frame `number`, as far as there are such.
 pub(crate) fn around<'f>(
     frames: &'f [Frame],
@@ -33,7 +48,7 @@ pub(crate) fn around<'f>(
 ) -> Vec<(FrameStep, &'f Frame)> {
     let Some(shown) = frames.get(number) else { return Vec::new() };
     let frame = |&step: &FrameStep| Some((step, frames.get(target(shown, step)?)?));
-    steps.iter().filter_map(frame).collect()
+    steps.iter().filter(|step| step.moment().is_none()).filter_map(frame).collect()
 }
 
 /// The number of the frame that is a step away from `frame`, if the rig has such a camera.
@@ -42,6 +57,7 @@ fn target(frame: &Frame, step: FrameStep) -> Option<usize> {
     let (moment, camera) = match step.along() {
         Along::Frames => (step.from(rig.moment)?, rig.camera),
         Along::Cameras => (rig.moment, step.from(rig.camera).filter(|camera| *camera < rig.count)?),
+        Along::Exposure => return None,
     };
     moment.checked_mul(rig.count)?.checked_add(camera)
 }
@@ -52,9 +68,11 @@ pub(crate) fn refuse_far(scene: &Scene, frames: &[Frame]) -> Result<(), Error> {
     let extent = |step: &FrameStep| match (rig, step.along()) {
         (None, _) => (frames.len(), "the scene's frames"),
         (Some(rig), Along::Frames) => (frames.len() / rig.count, "the rig's moments"),
-        (Some(rig), Along::Cameras) => (rig.count, "the rig's cameras"),
+        (Some(rig), Along::Cameras | Along::Exposure) => (rig.count, "the rig's cameras"),
     };
-    let is_far = |step: &FrameStep| step.count().unsigned_abs() as usize >= extent(step).0;
+    let is_far = |step: &FrameStep| {
+        step.moment().is_none() && step.count().unsigned_abs() as usize >= extent(step).0
+    };
     match steps(&scene.layers).into_iter().find(is_far) {
         Some(step) => {
             let (count, what) = extent(&step);
@@ -101,14 +119,23 @@ impl Neighbour {
         let along = match self.step.along() {
             Along::Frames => "",
             Along::Cameras => "camera_",
+            Along::Exposure => "exposure_",
         };
         let key = format!("scene_hash_{along}{}_{way}", self.step.count().unsigned_abs());
         Ok((key, self.scene.hash()?.to_string()))
     }
 }
 
-/// A camera that has no one place for a point.
+/// A camera that has no one place for a point, and moments of an exposure that has several cameras.
 pub(crate) fn refuse_views(scene: &Scene) -> Result<(), Error> {
+    if scene.slots > 0
+        && scene.layers.iter().any(|layer| layer.step().is_some_and(|to| to.moment().is_some()))
+    {
+        return Err(Error::Refused(format!(
+            "{}: layers: `to`: \"open\" and \"close\" are moments of one camera's exposure; leave them out, or `serial`",
+            scene.path.display()
+        )));
+    }
     let is_views = scene.camera.opencv().projection == etendue_camera::ProjectionName::Views;
     match scene.layers.iter().any(|layer| layer.step().is_some()) && is_views {
         true => Err(Error::Refused(format!(

@@ -321,3 +321,79 @@ fn lenslets_and_lenses_see_what_moves() {
         assert!(off < 0.1, "{kind}: {off}");
     }
 }
+
+/// Motion vectors within one exposure: from where a point is seen to where it is when its row's shutter opens and
+/// closes, of an object and of a camera that moves, in closed form; without frames, and the same for any threads.
+#[test]
+fn points_are_followed_to_the_ends_of_their_exposure() {
+    let (exposure, line) = (0.01, 50e-6);
+    let layers = json!(["depth", { "type": "flow", "to": "open" }, { "type": "flow", "to": "close" },
+        { "type": "occlusion", "to": "close" }]);
+    let scene = |wall: [f64; 3], camera: [f64; 3]| {
+        Bench::with_scene(
+            &json!({
+                "etendue": 1, "layers": layers,
+                "camera": {
+                    "type": "orthographic", "height": 1, "pose": { "from": [0, 0, 2], "look_at": [0, 0, 0] },
+                    "shutter": { "type": "rolling", "line_time": line },
+                    "motion": { "type": "velocity", "velocity": camera },
+                    "sensor": { "resolution": [20, 20], "exposure": exposure }
+                },
+                "objects": [
+                    { "shape": "rectangle", "width": 9, "height": 9, "motion": { "type": "velocity", "velocity": wall } }
+                ]
+            })
+            .to_string(),
+        )
+    };
+    // Pixels a second to the right and down, of a wall, of a camera that goes the other way, and of both.
+    let (across, down) = (3.0 * 20.0, 2.0 * 20.0);
+    for (wall, camera) in [
+        ([3.0, -2.0, 0.0], [0.0; 3]),
+        ([0.0; 3], [-3.0, 2.0, 0.0]),
+        ([1.0, -2.0, 0.0], [-2.0, 0.0, 0.0]),
+    ] {
+        let bench = scene(wall, camera);
+        bench.render(&[]);
+        for (name, half) in [("flow_open", -0.5 * exposure), ("flow_close", 0.5 * exposure)] {
+            // The row of arrival opens and closes later by as many lines as it lies lower.
+            let rows = down * half / (1.0 - down * line);
+            let columns = across * (half + rows * line);
+            for flow in bench.array(name).chunks(2) {
+                let off = (flow[0] - columns).abs().max((flow[1] - rows).abs());
+                assert!(
+                    off < 1e-9,
+                    "{name} of {wall:?} {camera:?}: {flow:?}, not {columns} {rows}"
+                );
+            }
+        }
+        let header = text(
+            &bench.run(&["render", "scene.json", "-o", "one", "--threads", "1", "--quiet"]).stderr,
+        );
+        assert_eq!(
+            bytes(&bench, "one", "flow_close.npy"),
+            bytes(&bench, "out", "flow_close.npy"),
+            "{header}"
+        );
+        // What leaves the picture meanwhile is outside at its edge.
+        assert!(bench.array("occlusion_close_outside").contains(&1.0));
+        assert!(!bench.array("occlusion_close_hidden").contains(&1.0));
+    }
+    // Nothing moves: nor do points.
+    let bench = scene([0.0; 3], [0.0; 3]);
+    bench.render(&[]);
+    assert!(bench.array("flow_close").iter().all(|flow| *flow == 0.0));
+    // Slots have exposures of their own.
+    let mut written: Value =
+        serde_json::from_slice(&std::fs::read(bench.path("scene.json")).unwrap()).unwrap();
+    written["serial"] = json!([{}, {}]);
+    written["tracer"] = json!({ "type": "direct" });
+    std::fs::write(bench.path("scene.json"), written.to_string()).unwrap();
+    let output = bench.run(&["render", "scene.json", "-o", "slots"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        text(&output.stderr).contains("moments of one camera's exposure"),
+        "{}",
+        text(&output.stderr)
+    );
+}

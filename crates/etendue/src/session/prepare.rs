@@ -53,9 +53,10 @@ impl Session {
             return Ok(());
         }
         let start = Instant::now();
-        let neighbours = self.load_neighbours(progress)?;
+        let mut neighbours = self.load_neighbours(progress)?;
         let mut scene = self.load_file(self.file(), progress)?;
         neighbours::refuse_views(&scene)?;
+        neighbours.extend(neighbours::moments(&scene));
         if let Some(frames) = &self.frames {
             neighbours::refuse_far(&scene, frames)?;
         }
@@ -100,7 +101,8 @@ impl Session {
     }
 
     pub(super) fn load_neighbours(&self, progress: &Progress) -> Result<Vec<Neighbour>, Error> {
-        let steps = neighbours::steps(&self.file().spec.all_layers());
+        let mut steps = neighbours::steps(&self.file().spec.all_layers());
+        steps.retain(|step| step.moment().is_none());
         if steps.is_empty() {
             return Ok(Vec::new());
         }

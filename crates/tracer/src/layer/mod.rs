@@ -16,7 +16,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
 pub use self::look::Look;
-pub use self::pair::{Along, FrameStep, OtherFrame, Sight, WrittenStep};
+pub use self::pair::{Along, FrameStep, OtherFrame, RowMoment, Sight, WrittenStep};
 pub use self::table::LayerSpec;
 use crate::{LightingContext, Needs, SceneView, Traced};
 
@@ -246,6 +246,13 @@ mod tests {
                 [LayerSpec::Flow { to }, LayerSpec::Disparity { to }, LayerSpec::Occlusion { to }];
             layers.extend(pair);
             let to = to.across();
+            let pair =
+                [LayerSpec::Flow { to }, LayerSpec::Disparity { to }, LayerSpec::Occlusion { to }];
+            layers.extend(pair);
+        }
+        for moment in [RowMoment::Open, RowMoment::Close] {
+            let to = FrameStep::try_from(WrittenStep::Moment(moment)).unwrap();
+            assert_eq!((to.moment(), to.across()), (Some(moment), to));
             let pair =
                 [LayerSpec::Flow { to }, LayerSpec::Disparity { to }, LayerSpec::Occlusion { to }];
             layers.extend(pair);

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{Columns, Seen};
 
-/// The way from a frame to the other one: 1 for the next, −1 for the one before.
+/// The way from a frame to the other one: 1 for the next, −1 for the one before; or to the end or the beginning of its
+/// own exposure.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
@@ -25,14 +26,28 @@ pub enum Along {
     Frames,
     /// The cameras of a rig at one moment; frames where there is no rig.
     Cameras,
+    /// The exposure of each row of the frame itself: its opening (−1) and its closing (1).
+    Exposure,
 }
 
-/// A step as files write it: a number, or `{"cameras": 1}`.
+/// A moment of the exposure of each row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RowMoment {
+    /// When its shutter opens.
+    Open,
+    /// When its shutter closes.
+    Close,
+}
+
+/// A step as files write it: a number, `"open"` or `"close"`, or `{"cameras": 1}`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum WrittenStep {
     /// So many frames on; of `disparity` so many cameras on, where there is a rig.
     Frames(i32),
+    /// The same frame, when the shutter of the row opens or closes.
+    Moment(RowMoment),
     /// So many cameras of the rig on.
     Cameras {
         /// 1 for the next camera, −1 for the one before.
@@ -53,10 +68,22 @@ impl FrameStep {
         self.along
     }
 
-    /// As many steps along the cameras of a rig.
+    /// As many steps along the cameras of a rig; the same within an exposure.
     #[must_use]
     pub fn across(self) -> Self {
-        Self { along: Along::Cameras, ..self }
+        match self.along {
+            Along::Exposure => self,
+            Along::Frames | Along::Cameras => Self { along: Along::Cameras, ..self },
+        }
+    }
+
+    /// The moment of the frame's own exposure, where it is one.
+    #[must_use]
+    pub fn moment(self) -> Option<RowMoment> {
+        (self.along == Along::Exposure).then_some(match self.count {
+            ..0 => RowMoment::Open,
+            _ => RowMoment::Close,
+        })
     }
 
     /// The number that is this many steps on from `number`; `None` below 0.
@@ -68,6 +95,8 @@ impl FrameStep {
     /// Which frame it is, as headers say it.
     pub(super) fn meaning(self) -> (&'static str, &'static str) {
         let which = match (self.along, self.count) {
+            (Along::Exposure, ..0) => "this one, when the shutter of the row opens",
+            (Along::Exposure, _) => "this one, when the shutter of the row closes",
             (Along::Frames, 1) => "the next one",
             (Along::Frames, -1) => "the one before",
             (Along::Frames, 1..) => "as many on as the layer's name says",
@@ -85,11 +114,14 @@ impl FrameStep {
         ("other frame", which)
     }
 
-    /// `name` with the step: `Flow`, `FlowBack`, `Flow2`, `FlowBack2`; `FlowCamera` and so on along cameras.
+    /// `name` with the step: `Flow`, `FlowBack`, `Flow2`, `FlowBack2`; `FlowCamera` and so on along cameras; `FlowOpen`
+    /// and `FlowClose`.
     pub(super) fn name(self, name: &'static str) -> Cow<'static, str> {
         let along = match self.along {
             Along::Frames => "",
             Along::Cameras => "Camera",
+            Along::Exposure if self.count < 0 => return format!("{name}Open").into(),
+            Along::Exposure => return format!("{name}Close").into(),
         };
         match self.count {
             1 if along.is_empty() => name.into(),
@@ -112,6 +144,8 @@ impl From<FrameStep> for WrittenStep {
         match step.along {
             Along::Frames => Self::Frames(step.count),
             Along::Cameras => Self::Cameras { cameras: step.count },
+            Along::Exposure if step.count < 0 => Self::Moment(RowMoment::Open),
+            Along::Exposure => Self::Moment(RowMoment::Close),
         }
     }
 }
@@ -123,6 +157,8 @@ impl TryFrom<WrittenStep> for FrameStep {
         let (count, along) = match written {
             WrittenStep::Frames(count) => (count, Along::Frames),
             WrittenStep::Cameras { cameras } => (cameras, Along::Cameras),
+            WrittenStep::Moment(RowMoment::Open) => (-1, Along::Exposure),
+            WrittenStep::Moment(RowMoment::Close) => (1, Along::Exposure),
         };
         match count {
             0 => Err("`to` is 0: a frame does not move against itself; 1 is the next frame"),
