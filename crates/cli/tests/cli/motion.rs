@@ -347,11 +347,11 @@ fn points_are_followed_to_the_ends_of_their_exposure() {
         )
     };
     // Pixels a second to the right and down, of a wall, of a camera that goes the other way, and of both.
-    let (across, down) = (3.0 * 20.0, 2.0 * 20.0);
+    let (across, down) = (30.0 * 20.0, 20.0 * 20.0);
     for (wall, camera) in [
-        ([3.0, -2.0, 0.0], [0.0; 3]),
-        ([0.0; 3], [-3.0, 2.0, 0.0]),
-        ([1.0, -2.0, 0.0], [-2.0, 0.0, 0.0]),
+        ([30.0, -20.0, 0.0], [0.0; 3]),
+        ([0.0; 3], [-30.0, 20.0, 0.0]),
+        ([10.0, -20.0, 0.0], [-20.0, 0.0, 0.0]),
     ] {
         let bench = scene(wall, camera);
         bench.render(&[]);

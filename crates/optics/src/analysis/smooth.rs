@@ -275,7 +275,8 @@ mod tests {
             assert!((aimed.landing[i] - smooth.landing[i]).length() < 1e-4, "{i}");
             assert!((aimed.power[i] / smooth.power[i] - 1.0).abs() < 1e-3, "{i}");
         }
-        assert!(compared > 2000, "{compared}");
+        // Of 64 × 64 cells those of a pupil with room around it.
+        assert!(compared > 1500, "{compared}");
         // The rim lies a thousandth of the width elsewhere at most: 0.03 of a cell on a side.
         for i in 0..aimed.clear.len() {
             assert!((aimed.clear[i] - smooth.clear[i]).abs() < 0.06, "{i}");
