@@ -255,10 +255,10 @@ fn pattern(chain: &Chain, place: BlockPlace, mean: &mut BlockValues, offset: &mu
 /// `μ = μₑ + μ_I·T·(1 + DCNU·z)`; a dark current cannot be negative.
 #[inline(always)]
 fn uneven_dark_signal(chain: &Chain, place: BlockPlace, mean: &mut BlockValues) {
-    for i in 0..BLOCK {
+    for (i, mean) in mean.iter_mut().enumerate() {
         let [a, b, c, _] = chain.pattern.words(place.fixed(i, Stage::DarkCurrent));
         let [z, _] = pair([a, b, c]);
-        mean[i] += chain.dark * (1.0 + chain.dcnu * z).max(0.0);
+        *mean += chain.dark * (1.0 + chain.dcnu * z).max(0.0);
     }
 }
 

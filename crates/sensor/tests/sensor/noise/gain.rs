@@ -55,7 +55,7 @@ fn each_iso_setting_is_found_again() {
     }
 }
 
-/// Analog gain multiplies K, and what the converter adds is divided by it: σ² = σ_read² + (σ_c/K)².
+/// Analog gain multiplies K, and what the converter adds is divided by it, where variances add up.
 #[test]
 fn analog_gain_hides_the_noise_of_the_converter() {
     for factor in [0.5, 1.0, 4.0, 16.0] {
