@@ -5,7 +5,7 @@
 //! | [`object`] | points of the object, their chief rays, and rays over the pupil |
 //! | [`pupil`] | the field in the exit pupil on a grid of cells: amplitude, power and waves |
 //! | [`aim`](mod@aim) | rays to the middles of those cells, and how much of each cell is clear |
-//! | [`smooth`] | the same of smooth wavefronts, by a polynomial through few rays |
+//! | `smooth` | the same of smooth wavefronts, by a polynomial through few rays |
 //! | [`wavefront`] | optical path differences against a reference sphere, and their statistics |
 //! | [`colours`] | one point at several wavelengths |
 //! | [`zernike`] | Zernike polynomials, Fringe and Noll, and their fit to a wavefront |
