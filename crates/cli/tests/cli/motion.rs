@@ -379,10 +379,10 @@ fn points_are_followed_to_the_ends_of_their_exposure() {
         assert!(bench.array("occlusion_close_outside").contains(&1.0));
         assert!(!bench.array("occlusion_close_hidden").contains(&1.0));
     }
-    // Nothing moves: nor do points.
+    // Nothing moves: nor do points, but for the rounding of their places.
     let bench = scene([0.0; 3], [0.0; 3]);
     bench.render(&[]);
-    assert!(bench.array("flow_close").iter().all(|flow| *flow == 0.0));
+    assert!(bench.array("flow_close").iter().all(|flow| flow.abs() < 1e-12));
     // Slots have exposures of their own.
     let mut written: Value =
         serde_json::from_slice(&std::fs::read(bench.path("scene.json")).unwrap()).unwrap();
