@@ -20,14 +20,15 @@ const OWN_SHARE: f64 = 0.25;
 /// The shares of the time that the converged picture, and that with the rounds, may take.
 const SHARES: [f64; 2] = [0.3, 0.8];
 
-/// The soonest is rendered again while its error is outside of these shares of the target, at most so often.
+/// The soonest is rendered again while its error is outside of these shares of the target: as long as there is time
+/// while none is within it, then no more than so often in all.
 const NEAR_ENOUGH: [f64; 2] = [0.85, 1.0 + ROUNDING];
 const MOST_TRIES: usize = 6;
 
 /// By how much rounding may take an error over the target.
 const ROUNDING: f64 = 1e-9;
 
-/// The most samples that are foretold.
+/// The most samples that are foretold, and rendered.
 const MOST_SAMPLES: f64 = 1e6;
 
 /// What is known of a contender.
@@ -357,7 +358,11 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
         let mut best: Option<Verified> = None;
         // More than any that was not enough.
         let mut too_few: Vec<(usize, u32)> = Vec::new();
-        for _ in 0..MOST_TRIES {
+        let most = NEAR_ENOUGH[1] * self.effort.target;
+        for tries in 0.. {
+            if tries >= MOST_TRIES && best.as_ref().is_some_and(|known| known.error <= most) {
+                break;
+            }
             // Another may be sooner by what was learnt meanwhile.
             let all = (0..self.entries.len()).filter(|&i| !self.entries[i].is_out);
             let all = all.filter_map(|i| {
@@ -369,11 +374,12 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
                     Forecast { samples, seconds: seconds_of(&self.entries[i].points, samples) },
                 ))
             });
+            let all = all.filter(|(_, forecast)| f64::from(forecast.samples) <= MOST_SAMPLES);
             let Some((who, forecast)) = all.min_by(|a, b| a.1.seconds.total_cmp(&b.1.seconds))
             else {
                 self.notes
                     .push("nothing reaches the target, with any number of samples".to_owned());
-                return Ok(None);
+                break;
             };
             if forecast.seconds > self.left(1.0) {
                 self.notes.push(format!(
@@ -398,8 +404,7 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
                 too_few.push((who, samples));
             }
             let is_better = best.as_ref().is_none_or(|known| {
-                match [known.error, error].map(|error| error <= NEAR_ENOUGH[1] * self.effort.target)
-                {
+                match [known.error, error].map(|error| error <= most) {
                     [true, true] => seconds < known.seconds,
                     [false, false] => error < known.error,
                     [_, is_within] => is_within,
@@ -412,7 +417,6 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
                 break;
             }
         }
-        let most = NEAR_ENOUGH[1] * self.effort.target;
         if let Some(found) = best.as_ref().filter(|found| found.error > most) {
             self.notes.push(format!(
                 "the last render of the soonest has an error of {:.2} %, more than the target",

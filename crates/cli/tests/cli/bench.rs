@@ -196,12 +196,8 @@ fn the_settings_that_reach_an_error_soonest_are_found_and_verified() {
     assert!(table.contains("Soonest: ") && table.contains("--samples "), "{table}");
     let found = &bench.json("out/bench.json")["target"];
     let verified = &found["verified"];
-    // It was rendered for itself, and is within the target, or the last of its tries is near and said not to be: which
-    // is soonest goes by the machine's time, of which no test asserts anything.
-    let error = verified["error"].as_f64().unwrap();
-    let told = [table.clone(), text(&output.stderr), found.to_string()].concat();
-    let is_told = error < 0.06 && told.contains("more than the target");
-    assert!(error <= 0.05 || is_told, "{verified}: {told}");
+    // It was rendered for itself, and is within the target; how long it took, no test asserts.
+    assert!(verified["error"].as_f64().unwrap() <= 0.05, "{verified}");
     assert!(verified["samples"].as_u64().unwrap() >= 1);
     let names: Vec<&str> = found["contenders"]
         .as_array()
@@ -214,11 +210,11 @@ fn the_settings_that_reach_an_error_soonest_are_found_and_verified() {
     }
     // Independent samples are noisier than Sobol's points.
     let renders = found["renders"].as_array().unwrap();
-    let of_one = |name: &str| {
+    let error = |name: &str| {
         let of = |render: &&serde_json::Value| render["name"] == name && render["samples"] == 16;
         renders.iter().find(of).unwrap()["error"].as_f64().unwrap()
     };
-    assert!(of_one("independent samples") > of_one("as the plan takes it"));
+    assert!(error("independent samples") > error("as the plan takes it"));
     for file in ["target.csv", "target-time.svg", "target-time.png"] {
         assert!(bench.path("out").join(file).is_file(), "{file}");
     }
