@@ -47,6 +47,28 @@ pub struct Steady {
     pub about: DVec3,
 }
 
+impl Steady {
+    /// Of a velocity (m/s), an angular velocity (degrees/s; its direction is the axis, right-handed) and a point on the
+    /// axis (m), along the world's axes.
+    ///
+    /// # Errors
+    ///
+    /// The name of the first that is too large or not finite, and why.
+    pub fn of_velocities(
+        velocity: [f64; 3],
+        angular_velocity: [f64; 3],
+        about: DVec3,
+    ) -> Result<Self, (&'static str, &'static str)> {
+        let [velocity, axis] = [velocity, angular_velocity].map(DVec3::from);
+        let given = [("velocity", velocity), ("angular_velocity", axis), ("about", about)];
+        // A length that is finite has numbers that are.
+        match given.iter().find(|(_, vector)| !vector.length().is_finite()) {
+            Some((name, _)) => Err((*name, "a number is too large or not finite")),
+            None => Ok(Self { velocity, axis, rate: axis.length().to_radians(), about }),
+        }
+    }
+}
+
 /// Why keys or a steady motion make no motion.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MotionError {
@@ -255,7 +277,7 @@ impl Motion {
         if local.is_empty() {
             return Bounds::EMPTY;
         }
-        self.sweep(local, exposure).around(&local.corners())
+        self.sweep(local, exposure).bounds_of(&local.corners())
     }
 
     /// The places between the times of `exposure` (s, first and last) of what is in the box `local`.
@@ -346,7 +368,7 @@ pub struct Sweep {
 impl Sweep {
     /// A box (m) around all places of what is between some points of the body (m, in its frame).
     #[must_use]
-    pub fn around(&self, points: &[DVec3]) -> Bounds {
+    pub fn bounds_of(&self, points: &[DVec3]) -> Bounds {
         let mut swept = Bounds::EMPTY;
         for (place, pad) in &self.places {
             for point in points.iter().map(|&p| place.point(p)) {

@@ -540,8 +540,8 @@ impl<'a> Exposing<'a> {
         let [above, below] = [row.saturating_sub(1), (row + 1).min(height - 1)].map(of_row);
         let share = self.sensor.settings.crosstalk;
         let mixed = (0..width).map(|x| {
-            let beside = own[x.saturating_sub(1)] + own[(x + 1).min(width - 1)];
-            own[x] * (1.0 - 4.0 * share) + share * (beside + above[x] + below[x])
+            let neighbours = own[x.saturating_sub(1)] + own[(x + 1).min(width - 1)];
+            own[x] * (1.0 - 4.0 * share) + share * (neighbours + above[x] + below[x])
         });
         mixed.collect()
     }

@@ -108,7 +108,7 @@ pub(crate) fn cluster(
     let sides = if two_sided { 2.0 } else { 1.0 };
     let (cone, bounds) = match way {
         None => (if two_sided { PI } else { 0.0 }, bounds),
-        Some(way) => (if two_sided || way.turns { PI } else { 0.0 }, way.around(id[1] as usize)),
+        Some(way) => (if two_sided || way.turns { PI } else { 0.0 }, way.bounds_of(id[1] as usize)),
     };
     let intensity = power / (sides * PI);
     Some(Cluster { bounds, axis: shape.normal, cone, reach: FRAC_PI_2, intensity })
@@ -144,18 +144,18 @@ impl<'a> LampWay<'a> {
         let turns = motion.turns_within(span) || mesh.steps.is_some();
         let steps = mesh.steps.as_ref().map_or(1, |steps| steps.times().len());
         let are_many = steps > 1 && steps * mesh.triangles.len() > MOST_CORNERS;
-        let whole = are_many.then(|| sweep.around(&local.corners()));
+        let whole = are_many.then(|| sweep.bounds_of(&local.corners()));
         Some(Self { mesh, sweep, turns, whole })
     }
 
     /// A box (m, world) around all places of a triangle.
-    fn around(&self, triangle: usize) -> Bounds {
+    fn bounds_of(&self, triangle: usize) -> Bounds {
         let places = |at: f64| self.mesh.corners_at(triangle, at);
         self.whole.unwrap_or_else(|| match &self.mesh.steps {
-            None => self.sweep.around(&places(0.0)),
+            None => self.sweep.bounds_of(&places(0.0)),
             Some(steps) => {
                 let corners: Vec<DVec3> = steps.times().iter().flat_map(|&at| places(at)).collect();
-                self.sweep.around(&corners)
+                self.sweep.bounds_of(&corners)
             }
         })
     }

@@ -81,7 +81,7 @@ pub fn wavefronts(
         let step = widest * beam.at.wavelength();
         let sampling = Sampling { cells: count, step, middle: outline.middle };
         let pupil = field((beam, &sphere, &outline), sampling)?;
-        Wavefront::told(beam.object, sphere, pupil)
+        Wavefront::resolved(beam.object, sphere, pupil)
     };
     parts.into_par_iter().map(wavefront).collect()
 }

@@ -172,11 +172,11 @@ impl Wavefront {
         sampling: Sampling,
     ) -> Result<Self, AnalysisError> {
         let pupil = aim::field(beam, &sphere, outline, sampling)?;
-        Self::told(beam.object, sphere, pupil)
+        Self::resolved(beam.object, sphere, pupil)
     }
 
-    /// A field whose phase is told by its cells.
-    pub(super) fn told(
+    /// Of a field whose cells resolve its phase.
+    pub(super) fn resolved(
         object: ObjectPoint,
         sphere: ReferenceSphere,
         pupil: PupilField,

@@ -79,18 +79,10 @@ impl ObjectMotionSpec {
         match self {
             Self::Velocity { velocity, angular_velocity, about } => {
                 let stands = transform.build().map_err(|(key, why)| (key.to_owned(), why))?;
-                let [velocity, angular] = [*velocity, *angular_velocity].map(DVec3::from);
                 let about = about.map_or(stands.translation, DVec3::from);
-                let given =
-                    [("velocity", velocity), ("angular_velocity", angular), ("about", about)];
-                // A length that is finite has numbers that are.
-                if let Some((key, _)) = given.iter().find(|(_, v)| !v.length().is_finite()) {
-                    let why = "a number is too large or not finite".to_owned();
-                    return Err(((*key).to_owned(), why));
-                }
-                let rate = angular.length().to_radians();
-                let motion =
-                    Motion::default().with_steady(Steady { velocity, axis: angular, rate, about });
+                let steady = Steady::of_velocities(*velocity, *angular_velocity, about)
+                    .map_err(|(key, why)| (key.to_owned(), why.to_owned()))?;
+                let motion = Motion::default().with_steady(steady);
                 let fault = |error: MotionError| ("angular_velocity".to_owned(), error.to_string());
                 Ok(motion.map_err(fault)?.then_inner(&stands))
             }

@@ -46,16 +46,9 @@ impl LightMotionSpec {
     pub fn build(&self, at: DVec3, time: f64) -> Result<Motion, Fault> {
         match self {
             Self::Velocity { velocity, angular_velocity, about } => {
-                let [velocity, angular] = [*velocity, *angular_velocity].map(DVec3::from);
                 let about = about.map_or(at, DVec3::from);
-                let given =
-                    [("velocity", velocity), ("angular_velocity", angular), ("about", about)];
-                // A length that is finite has numbers that are.
-                if let Some((key, _)) = given.iter().find(|(_, v)| !v.length().is_finite()) {
-                    return Err(Fault::new(*key, "a number is too large or not finite"));
-                }
-                let rate = angular.length().to_radians();
-                let steady = Steady { velocity, axis: angular, rate, about };
+                let steady = Steady::of_velocities(*velocity, *angular_velocity, about)
+                    .map_err(|(key, why)| Fault::new(key, why))?;
                 let fault = |error: MotionError| Fault::new("angular_velocity", error.to_string());
                 Motion::steady(steady).map_err(fault)
             }
