@@ -36,6 +36,7 @@ pub mod demosaic;
 pub mod dng;
 pub mod emva;
 mod error;
+mod exposing;
 pub mod film;
 mod hdr;
 mod inertial;
