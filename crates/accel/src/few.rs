@@ -2,14 +2,15 @@
 //! triangles that takes less time than going down a tree. Runs of triangles whose box no ray of a block meets are
 //! left out.
 //!
-//! Rays are those of single precision, and what they meet is worked out in double precision.
-//!
 //! A ray passes an edge on the side that the sign of their Plücker product tells. Triangles that share an edge
 //! share its sign, whatever rounding did to it, so no ray slips between them along the edge (R. Jones, "Intersecting
 //! a ray and a triangle with Plücker coordinates", Ray Tracing News 13.1, 2000; K. Shoemake, "Plücker coordinate
-//! tutorial", Ray Tracing News 11.1, 1998).
+//! tutorial", Ray Tracing News 11.1, 1998). Where several edges meet, signs may contradict each other.
+//!
+//! Rays are those of single precision, and so is what they meet, as in Embree. Where a ray passes an edge so near
+//! that single precision cannot tell the side, its block is worked out again in double precision.
 
-use std::ops::Range;
+use std::ops::{Add, Mul, Range, Sub};
 
 use etendue_geometry::block::{Floats, LANES};
 use etendue_geometry::glam::DVec3;
@@ -20,23 +21,96 @@ use crate::single::{F32Frame, Rays32, round};
 /// Scenes of more triangles are traced by trees.
 const MOST_TRIANGLES: usize = 64;
 
-/// An edge, by its Plücker coordinates in the frame.
+/// A number of either precision.
+trait Number:
+    Copy + Default + PartialOrd + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
+    /// The largest finite one.
+    const LARGEST: Self;
+    /// A number of single precision.
+    fn of(x: f32) -> Self;
+    /// Its absolute value.
+    fn size(self) -> Self;
+    /// 1 over it.
+    fn inverse(self) -> Self;
+    /// The number, rounded to single precision.
+    fn single(self) -> f32;
+}
+
+impl Number for f32 {
+    const LARGEST: Self = Self::MAX;
+    #[inline(always)]
+    fn of(x: f32) -> Self {
+        x
+    }
+    #[inline(always)]
+    fn size(self) -> Self {
+        self.abs()
+    }
+    #[inline(always)]
+    fn inverse(self) -> Self {
+        1.0 / self
+    }
+    #[inline(always)]
+    fn single(self) -> f32 {
+        self
+    }
+}
+
+impl Number for f64 {
+    const LARGEST: Self = Self::MAX;
+    #[inline(always)]
+    fn of(x: f32) -> Self {
+        Self::from(x)
+    }
+    #[inline(always)]
+    fn size(self) -> Self {
+        self.abs()
+    }
+    #[inline(always)]
+    fn inverse(self) -> Self {
+        1.0 / self
+    }
+    #[inline(always)]
+    fn single(self) -> f32 {
+        round(self)
+    }
+}
+
+/// One number of each ray of a block.
+type Row<F> = [F; LANES];
+
+/// An edge, by its Plücker coordinates in the frame, the direction a unit vector.
 #[derive(Debug, Clone, Copy)]
-struct PluckerEdge {
-    along: [f64; 3],
-    moment: [f64; 3],
+struct PluckerEdge<F> {
+    along: [F; 3],
+    moment: [F; 3],
 }
 
 /// A triangle in the frame.
 #[derive(Debug, Clone, Copy)]
-struct FewTriangle {
-    /// Numbers of the edges opposite to its corners, and the sign with which each is one of its own.
-    edges: [(usize, f64); 3],
+struct FewTriangle<F> {
+    /// Numbers of the edges opposite to its corners.
+    edges: [usize; 3],
+    /// Their lengths, with the sign with which each is one of its own.
+    lengths: [F; 3],
     /// Normal on the front where the corners run counter-clockwise, as long as twice the area.
-    normal: [f64; 3],
-    /// The normal times any corner.
-    offset: f64,
-    /// The normal as hits tell it: of the placement's front.
+    normal: [F; 3],
+    /// A corner.
+    corner: [F; 3],
+}
+
+/// Edges and triangles in one precision.
+#[derive(Debug, Default)]
+struct Shapes<F> {
+    edges: Vec<PluckerEdge<F>>,
+    triangles: Vec<FewTriangle<F>>,
+}
+
+/// Which triangle of the scene one is.
+#[derive(Debug, Clone, Copy)]
+struct Named {
+    /// Its normal as hits tell it: of the placement's front.
     front: [f32; 3],
     placement: u32,
     triangle: u32,
@@ -60,9 +134,12 @@ struct Run {
 #[derive(Debug)]
 pub(crate) struct FewTriangles {
     frame: F32Frame,
-    edges: Vec<PluckerEdge>,
-    triangles: Vec<FewTriangle>,
+    single: Shapes<f32>,
+    double: Shapes<f64>,
+    named: Vec<Named>,
     runs: Vec<Run>,
+    /// The largest distance of a corner from the frame's origin (m).
+    radius: f32,
 }
 
 impl FewTriangles {
@@ -71,8 +148,14 @@ impl FewTriangles {
         if geometry.triangles() > MOST_TRIANGLES as u64 {
             return None;
         }
-        let frame = F32Frame::of(geometry.loose_bounds());
-        let mut few = Self { frame, edges: Vec::new(), triangles: Vec::new(), runs: Vec::new() };
+        let mut few = Self {
+            frame: F32Frame::of(geometry.loose_bounds()),
+            single: Shapes::default(),
+            double: Shapes::default(),
+            named: Vec::new(),
+            runs: Vec::new(),
+            radius: 0.0,
+        };
         let mut ends: Vec<[[f64; 3]; 2]> = Vec::new();
         let mut bounds = Bounds::EMPTY;
         for (number, placement) in (0_u32..).zip(&geometry.placements) {
@@ -81,8 +164,7 @@ impl FewTriangles {
             // Of hits in one place the last one wins: of a placement the lowest triangle.
             for triangle in (0..mesh.triangles.len()).rev() {
                 let own = mesh.corners(triangle);
-                let wide = own.map(|corner| place.point_from(corner, frame.origin));
-                let corners = wide.map(|corner| corner.to_array());
+                let wide = own.map(|corner| place.point_from(corner, few.frame.origin));
                 let normal = (wide[1] - wide[0]).cross(wide[2] - wide[0]);
                 if is_degenerate(wide) || normal.length_squared() == 0.0 {
                     continue;
@@ -91,21 +173,15 @@ impl FewTriangles {
                     Some(run) if run.triangles.len() < RUN => run.edges.start,
                     _ => few.begin_run(&mut bounds),
                 };
-                let mut edge = |k: usize| {
-                    let [a, b] = [corners[(k + 1) % 3], corners[(k + 2) % 3]];
-                    let is_own = |ends: &[[f64; 3]; 2]| *ends == [a, b] || *ends == [b, a];
-                    let found = ends[first..].iter().position(is_own).map(|k| first + k);
-                    let at = found.unwrap_or_else(|| {
-                        ends.push([a, b]);
-                        few.edges.push(PluckerEdge::between(a, b));
-                        ends.len() - 1
-                    });
-                    (at, if ends[at] == [a, b] { 1.0 } else { -1.0 })
-                };
-                few.triangles.push(FewTriangle {
-                    edges: [edge(0), edge(1), edge(2)],
+                let edges = [0, 1, 2]
+                    .map(|k| few.edge([wide[(k + 1) % 3], wide[(k + 2) % 3]], &mut ends, first));
+                few.double.triangles.push(FewTriangle {
+                    edges: edges.map(|(edge, _)| edge),
+                    lengths: edges.map(|(_, length)| length),
                     normal: normal.to_array(),
-                    offset: normal.dot(wide[0]),
+                    corner: wide[0].to_array(),
+                });
+                few.named.push(Named {
                     front: (normal * place.handedness()).to_array().map(round),
                     placement: number,
                     triangle: u32::try_from(triangle).unwrap_or(MISS),
@@ -114,12 +190,34 @@ impl FewTriangles {
                 few.end_run(bounds);
             }
         }
+        few.single = few.double.rounded();
         Some(few)
+    }
+
+    /// The number of the edge between two corners, found among those from `first` on or appended, and its length,
+    /// negative where it runs the other way.
+    fn edge(
+        &mut self,
+        [from, to]: [DVec3; 2],
+        ends: &mut Vec<[[f64; 3]; 2]>,
+        first: usize,
+    ) -> (usize, f64) {
+        let [a, b] = [from.to_array(), to.to_array()];
+        let is_own = |ends: &[[f64; 3]; 2]| *ends == [a, b] || *ends == [b, a];
+        let found = ends[first..].iter().position(is_own).map(|k| first + k);
+        let at = found.unwrap_or_else(|| {
+            ends.push([a, b]);
+            self.double.edges.push(PluckerEdge::between(from, to));
+            ends.len() - 1
+        });
+        self.radius = self.radius.max(round(from.length()));
+        let length = from.distance(to);
+        (at, if ends[at] == [a, b] { length } else { -length })
     }
 
     /// Begins a run behind all others; the number of its first edge.
     fn begin_run(&mut self, bounds: &mut Bounds) -> usize {
-        let (edge, triangle) = (self.edges.len(), self.triangles.len());
+        let (edge, triangle) = (self.double.edges.len(), self.double.triangles.len());
         *bounds = Bounds::EMPTY;
         self.runs.push(Run {
             edges: edge..edge,
@@ -133,7 +231,8 @@ impl FewTriangles {
     /// Sets the last run to what has been added since it began, within these bounds.
     fn end_run(&mut self, bounds: Bounds) {
         let Some(run) = self.runs.last_mut() else { return };
-        (run.edges.end, run.triangles.end) = (self.edges.len(), self.triangles.len());
+        let Shapes { edges, triangles } = &self.double;
+        (run.edges.end, run.triangles.end) = (edges.len(), triangles.len());
         // Some roundings of the largest coordinate.
         let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
         let beyond = DVec3::splat(largest * 4.0 * f64::from(f32::EPSILON));
@@ -153,33 +252,43 @@ impl FewTriangles {
 
     /// The closest hits of blocks, as [`BlockAccel`](crate::BlockAccel) has them; of triangles in one place the last.
     pub(crate) fn closest_of_blocks(&self, blocks: &mut [RayBlock]) {
-        let mut of_edges = vec![[0.0; LANES]; self.edges.len()];
+        let mut sides = Sides::of(self);
         for block in blocks {
-            let mut best = Best {
-                t: block.t_max.map(f64::from),
-                u: [0.0; LANES],
-                v: [0.0; LANES],
-                number: [MISS; LANES],
-            };
-            closest(self, block, &mut of_edges, &mut best);
-            block.clear_hits();
-            [block.t_max, block.u, block.v] = [best.t, best.u, best.v].map(|row| row.map(round));
-            for (lane, &number) in best.number.iter().enumerate() {
-                let Some(hit) = self.triangles.get(number as usize) else { continue };
-                (block.placement[lane], block.triangle[lane]) = (hit.placement, hit.triangle);
-                for axis in 0..3 {
-                    block.normal[axis][lane] = hit.front[axis];
-                }
+            let mut nearest = Nearest::of(block);
+            if closest_in_single(self, block, &mut sides.single, &mut nearest) {
+                let mut exact = Nearest::of(block);
+                closest_in_double(self, block, &mut sides.double, &mut exact);
+                self.note(block, &exact);
+            } else {
+                self.note(block, &nearest);
+            }
+        }
+    }
+
+    /// Tells a block what its rays hit.
+    #[inline(always)]
+    fn note<F: Number>(&self, block: &mut RayBlock, nearest: &Nearest<F>) {
+        block.clear_hits();
+        [block.t_max, block.u, block.v] =
+            [&nearest.t, &nearest.u, &nearest.v].map(|row| row.map(F::single));
+        for (lane, &number) in nearest.number.iter().enumerate() {
+            let Some(hit) = self.named.get(number as usize) else { continue };
+            (block.placement[lane], block.triangle[lane]) = (hit.placement, hit.triangle);
+            for axis in 0..3 {
+                block.normal[axis][lane] = hit.front[axis];
             }
         }
     }
 
     /// Whether anything is between the ends of rays of blocks.
     pub(crate) fn occluded_of_blocks(&self, blocks: &mut [RayBlock]) {
-        let mut of_edges = vec![[0.0; LANES]; self.edges.len()];
+        let mut sides = Sides::of(self);
         for block in blocks {
             let mut blocked = [0; LANES];
-            occluded(self, block, &mut of_edges, &mut blocked);
+            if occluded_in_single(self, block, &mut sides.single, &mut blocked) {
+                blocked = [0; LANES];
+                occluded_in_double(self, block, &mut sides.double, &mut blocked);
+            }
             for (t_max, &blocked) in block.t_max.iter_mut().zip(&blocked) {
                 *t_max = if blocked != 0 { f32::NEG_INFINITY } else { *t_max };
             }
@@ -187,42 +296,81 @@ impl FewTriangles {
     }
 }
 
-impl PluckerEdge {
-    fn between(a: [f64; 3], b: [f64; 3]) -> Self {
-        let [from, to] = [a, b].map(DVec3::from);
-        Self { along: (to - from).to_array(), moment: from.cross(to).to_array() }
+impl PluckerEdge<f64> {
+    fn between(from: DVec3, to: DVec3) -> Self {
+        let along = (to - from).normalize();
+        Self { along: along.to_array(), moment: from.cross(along).to_array() }
     }
 }
 
-/// One number of each ray of a block.
-type Doubles = [f64; LANES];
+impl Shapes<f64> {
+    /// The same in single precision.
+    fn rounded(&self) -> Shapes<f32> {
+        let edge = |own: &PluckerEdge<f64>| PluckerEdge {
+            along: own.along.map(round),
+            moment: own.moment.map(round),
+        };
+        let triangle = |own: &FewTriangle<f64>| FewTriangle {
+            edges: own.edges,
+            lengths: own.lengths.map(round),
+            normal: own.normal.map(round),
+            corner: own.corner.map(round),
+        };
+        Shapes {
+            edges: self.edges.iter().map(edge).collect(),
+            triangles: self.triangles.iter().map(triangle).collect(),
+        }
+    }
+}
+
+/// Room for the sides on which a block's rays pass all edges, in both precisions.
+struct Sides {
+    single: Vec<Row<f32>>,
+    double: Vec<Row<f64>>,
+}
+
+impl Sides {
+    fn of(few: &FewTriangles) -> Self {
+        let count = few.double.edges.len();
+        Self { single: vec![[0.0; LANES]; count], double: vec![[0.0; LANES]; count] }
+    }
+}
 
 /// What of a block's rays is nearest so far.
-struct Best {
-    t: Doubles,
-    u: Doubles,
-    v: Doubles,
+struct Nearest<F> {
+    t: Row<F>,
+    u: Row<F>,
+    v: Row<F>,
     /// Number of the triangle in the list, or [`MISS`].
     number: [u32; LANES],
 }
 
+impl<F: Number> Nearest<F> {
+    #[inline(always)]
+    fn of(block: &RayBlock) -> Self {
+        let zero = [F::default(); LANES];
+        Self { t: block.t_max.map(F::of), u: zero, v: zero, number: [MISS; LANES] }
+    }
+}
+
 /// The rays of a block.
-struct BlockLines {
-    origin: [Doubles; 3],
+struct BlockLines<F> {
+    origin: [Row<F>; 3],
     /// Plücker coordinates.
-    direction: [Doubles; 3],
-    moment: [Doubles; 3],
+    direction: [Row<F>; 3],
+    moment: [Row<F>; 3],
     /// Of the directions.
     inverse: [Floats; 3],
 }
 
-impl BlockLines {
+impl<F: Number> BlockLines<F> {
     #[inline(always)]
     fn of(block: &RayBlock) -> Self {
-        let origin = block.origin.map(|axis| axis.map(f64::from));
-        let direction = block.direction.map(|axis| axis.map(f64::from));
+        let origin = block.origin.map(|axis| axis.map(F::of));
+        let direction = block.direction.map(|axis| axis.map(F::of));
         let ([ox, oy, oz], [dx, dy, dz]) = (&origin, &direction);
-        let (mut mx, mut my, mut mz) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let zero = [F::default(); LANES];
+        let (mut mx, mut my, mut mz) = (zero, zero, zero);
         for i in 0..LANES {
             mx[i] = oy[i] * dz[i] - oz[i] * dy[i];
             my[i] = oz[i] * dx[i] - ox[i] * dz[i];
@@ -239,10 +387,10 @@ const SLACK: f32 = 1e-6;
 /// Whether any ray of a block meets a box. Where a ray runs in the plane of a side, what is not a number parts
 /// nothing: the box is a little larger than what is in it.
 #[inline(always)]
-fn reaches([from, to]: [[f32; 3]; 2], block: &RayBlock, lines: &BlockLines) -> bool {
+fn reaches([from, to]: [[f32; 3]; 2], block: &RayBlock, inverse: &[Floats; 3]) -> bool {
     let (mut enter, mut exit) = (block.t_min, block.t_max);
     for axis in 0..3 {
-        let (origin, inverse) = (&block.origin[axis], &lines.inverse[axis]);
+        let (origin, inverse) = (&block.origin[axis], &inverse[axis]);
         for i in 0..LANES {
             let a = (from[axis] - origin[i]) * inverse[i];
             let b = (to[axis] - origin[i]) * inverse[i];
@@ -258,116 +406,202 @@ fn reaches([from, to]: [[f32; 3]; 2], block: &RayBlock, lines: &BlockLines) -> b
     any != 0
 }
 
-/// On which side each ray passes each edge: the sign of what is found here.
+/// On which side each ray passes each edge: the sign of what is found here, the distance of the lines times the sine
+/// of their angle (m). `least` is brought down to the least of all.
 #[inline(always)]
-fn sides(edges: &[PluckerEdge], lines: &BlockLines, sides: &mut [Doubles]) {
+fn pass<F: Number>(
+    edges: &[PluckerEdge<F>],
+    lines: &BlockLines<F>,
+    sides: &mut [Row<F>],
+    least: &mut Row<F>,
+) {
     let ([dx, dy, dz], [mx, my, mz]) = (&lines.direction, &lines.moment);
     for (PluckerEdge { along, moment }, side) in edges.iter().zip(sides) {
         for i in 0..LANES {
             let of_moment = dx[i] * moment[0] + dy[i] * moment[1] + dz[i] * moment[2];
             side[i] = of_moment + (mx[i] * along[0] + my[i] * along[1] + mz[i] * along[2]);
+            least[i] = lower(least[i], side[i].size());
         }
     }
 }
 
-#[inline(always)]
-fn least(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
+/// Roundings of single precision that may be in the side of an edge, of the distances from the frame's origin of the
+/// ray's start and of the edge: one of each of its six terms and of their sums, and three of the ray's moment.
+const SIDE_ROUNDINGS: f32 = 12.0 * f32::EPSILON;
 
+/// Whether any ray that is traced passes an edge as near as roundings may be, of which the `least` distance is known.
 #[inline(always)]
-fn most(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
-}
-
-/// Whether any ray passes all three edges on one side.
-#[inline(always)]
-fn is_inside(lowest: &Doubles, highest: &Doubles) -> bool {
+fn is_doubtful(few: &FewTriangles, block: &RayBlock, least: &Row<f32>) -> bool {
+    let [x, y, z] = &block.origin;
     let mut any = 0_u32;
     for i in 0..LANES {
-        any |= u32::from((lowest[i] >= 0.0) | (highest[i] <= 0.0));
+        let size = x[i].abs() + y[i].abs() + z[i].abs() + few.radius;
+        any |= u32::from((block.t_max[i] > 0.0) & (least[i] < SIDE_ROUNDINGS * size));
     }
     any != 0
 }
 
-#[multiversion::multiversion(targets = "simd")]
-fn closest(few: &FewTriangles, block: &RayBlock, of_edges: &mut [Doubles], best: &mut Best) {
-    let lines = BlockLines::of(block);
-    let t_min = block.t_min.map(f64::from);
-    let [x, y, z] = &lines.origin;
-    for run in &few.runs {
-        if !reaches(run.bounds, block, &lines) {
-            continue;
+#[inline(always)]
+fn lower<F: Number>(a: F, b: F) -> F {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn higher<F: Number>(a: F, b: F) -> F {
+    if a > b { a } else { b }
+}
+
+/// How rays of a block pass a triangle's edges.
+struct Passing<F> {
+    /// Barycentric weights, times [`total`](Self::total).
+    weights: [Row<F>; 3],
+    total: Row<F>,
+    /// All edges are passed on one side.
+    is_inside: [bool; LANES],
+}
+
+impl<F: Number> FewTriangle<F> {
+    /// `None` where no ray passes all edges on one side.
+    #[inline(always)]
+    fn passed(&self, sides: &[Row<F>]) -> Option<Passing<F>> {
+        let [first, second, third] = self.edges.map(|edge| &sides[edge]);
+        let [la, lb, lc] = self.lengths;
+        let zero = F::default();
+        let mut weights = [[zero; LANES]; 3];
+        let (mut total, mut is_inside, mut any) = ([zero; LANES], [false; LANES], 0_u32);
+        for i in 0..LANES {
+            let (a, b, c) = (first[i] * la, second[i] * lb, third[i] * lc);
+            let (lowest, highest) = (lower(lower(a, b), c), higher(higher(a, b), c));
+            is_inside[i] = (lowest >= zero) | (highest <= zero);
+            any |= u32::from(is_inside[i]);
+            (weights[0][i], weights[1][i], weights[2][i]) = (a, b, c);
+            total[i] = a + b + c;
         }
-        sides(&few.edges[run.edges.clone()], &lines, &mut of_edges[run.edges.clone()]);
-        for (number, triangle) in (run.first..).zip(&few.triangles[run.triangles.clone()]) {
-            let [first, second, third] = triangle.edges.map(|(edge, _)| &of_edges[edge]);
-            let [sa, sb, sc] = triangle.edges.map(|(_, sign)| sign);
-            let (mut lowest, mut highest) = ([0.0; LANES], [0.0; LANES]);
-            for i in 0..LANES {
-                let (a, b, c) = (first[i] * sa, second[i] * sb, third[i] * sc);
-                lowest[i] = least(least(a, b), c);
-                highest[i] = most(most(a, b), c);
-            }
-            if !is_inside(&lowest, &highest) {
-                continue;
-            }
-            let [nx, ny, nz] = triangle.normal;
-            for i in 0..LANES {
-                let (a, b, c) = (first[i] * sa, second[i] * sb, third[i] * sc);
-                let sum = a + b + c;
-                let over = 1.0 / sum;
-                let height = triangle.offset - (x[i] * nx + y[i] * ny + z[i] * nz);
-                let t = height * over;
-                let is_inside = (lowest[i] >= 0.0) | (highest[i] <= 0.0);
-                let counts = is_inside & (sum != 0.0) & (t > t_min[i]) & (t <= best.t[i]);
-                best.t[i] = if counts { t } else { best.t[i] };
-                best.u[i] = if counts { b * over } else { best.u[i] };
-                best.v[i] = if counts { c * over } else { best.v[i] };
-                best.number[i] = if counts { number } else { best.number[i] };
-            }
+        (any != 0).then_some(Passing { weights, total, is_inside })
+    }
+
+    /// The distances along the rays of a block to the triangle's plane (m).
+    #[inline(always)]
+    fn distances(&self, lines: &BlockLines<F>) -> Row<F> {
+        let ([x, y, z], [dx, dy, dz]) = (&lines.origin, &lines.direction);
+        let ([nx, ny, nz], [cx, cy, cz]) = (self.normal, self.corner);
+        let mut t = [F::default(); LANES];
+        for i in 0..LANES {
+            let height = (cx - x[i]) * nx + (cy - y[i]) * ny + (cz - z[i]) * nz;
+            t[i] = height * (dx[i] * nx + dy[i] * ny + dz[i] * nz).inverse();
         }
+        t
     }
 }
 
-#[multiversion::multiversion(targets = "simd")]
-fn occluded(
-    few: &FewTriangles,
+/// The closest hits of a block; the least distance (m) at which each ray passes an edge.
+#[inline(always)]
+fn closest<F: Number>(
+    (few, shapes): (&FewTriangles, &Shapes<F>),
     block: &RayBlock,
-    of_edges: &mut [Doubles],
-    blocked: &mut [u32; LANES],
-) {
+    sides: &mut [Row<F>],
+    nearest: &mut Nearest<F>,
+) -> Row<F> {
     let lines = BlockLines::of(block);
-    let [t_min, t_max] = [block.t_min, block.t_max].map(|limits| limits.map(f64::from));
-    let [x, y, z] = &lines.origin;
+    let t_min = block.t_min.map(F::of);
+    let mut least = [F::LARGEST; LANES];
     for run in &few.runs {
-        if !reaches(run.bounds, block, &lines) {
+        if !reaches(run.bounds, block, &lines.inverse) {
             continue;
         }
-        sides(&few.edges[run.edges.clone()], &lines, &mut of_edges[run.edges.clone()]);
-        for triangle in &few.triangles[run.triangles.clone()] {
-            let [first, second, third] = triangle.edges.map(|(edge, _)| &of_edges[edge]);
-            let [sa, sb, sc] = triangle.edges.map(|(_, sign)| sign);
-            let (mut lowest, mut highest, mut sums) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let edges = run.edges.clone();
+        pass(&shapes.edges[edges.clone()], &lines, &mut sides[edges], &mut least);
+        for (number, triangle) in (run.first..).zip(&shapes.triangles[run.triangles.clone()]) {
+            let Some(passing) = triangle.passed(sides) else { continue };
+            let t = triangle.distances(&lines);
             for i in 0..LANES {
-                let (a, b, c) = (first[i] * sa, second[i] * sb, third[i] * sc);
-                lowest[i] = least(least(a, b), c);
-                highest[i] = most(most(a, b), c);
-                sums[i] = a + b + c;
+                let over = passing.total[i].inverse();
+                let is_between = (t[i] > t_min[i]) & (t[i] <= nearest.t[i]);
+                // A ray in the triangle's plane meets it nowhere.
+                let counts = passing.is_inside[i] & is_between & (t[i] <= F::LARGEST);
+                nearest.t[i] = if counts { t[i] } else { nearest.t[i] };
+                nearest.u[i] = if counts { passing.weights[1][i] * over } else { nearest.u[i] };
+                nearest.v[i] = if counts { passing.weights[2][i] * over } else { nearest.v[i] };
+                nearest.number[i] = if counts { number } else { nearest.number[i] };
             }
-            if !is_inside(&lowest, &highest) {
-                continue;
-            }
-            let [nx, ny, nz] = triangle.normal;
+        }
+    }
+    least
+}
+
+/// Marks the rays of a block that have anything between their ends; the least distance (m) at which each passes an
+/// edge.
+#[inline(always)]
+fn occluded<F: Number>(
+    (few, shapes): (&FewTriangles, &Shapes<F>),
+    block: &RayBlock,
+    sides: &mut [Row<F>],
+    blocked: &mut [u32; LANES],
+) -> Row<F> {
+    let lines = BlockLines::of(block);
+    let [t_min, t_max] = [block.t_min, block.t_max].map(|limits| limits.map(F::of));
+    let mut least = [F::LARGEST; LANES];
+    for run in &few.runs {
+        if !reaches(run.bounds, block, &lines.inverse) {
+            continue;
+        }
+        let edges = run.edges.clone();
+        pass(&shapes.edges[edges.clone()], &lines, &mut sides[edges], &mut least);
+        for triangle in &shapes.triangles[run.triangles.clone()] {
+            let Some(passing) = triangle.passed(sides) else { continue };
+            let t = triangle.distances(&lines);
             for i in 0..LANES {
-                let height = triangle.offset - (x[i] * nx + y[i] * ny + z[i] * nz);
-                let t = height / sums[i];
-                let is_inside = (lowest[i] >= 0.0) | (highest[i] <= 0.0);
-                let counts = is_inside & (sums[i] != 0.0) & (t > t_min[i]) & (t <= t_max[i]);
+                let is_between = (t[i] > t_min[i]) & (t[i] <= t_max[i]);
+                let counts = passing.is_inside[i] & is_between & (t[i] <= F::LARGEST);
                 blocked[i] |= u32::from(counts);
             }
         }
     }
+    least
+}
+
+/// The closest hits of a block; whether single precision left any in doubt.
+#[multiversion::multiversion(targets = "simd")]
+fn closest_in_single(
+    few: &FewTriangles,
+    block: &RayBlock,
+    sides: &mut [Row<f32>],
+    nearest: &mut Nearest<f32>,
+) -> bool {
+    let least = closest((few, &few.single), block, sides, nearest);
+    is_doubtful(few, block, &least)
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn closest_in_double(
+    few: &FewTriangles,
+    block: &RayBlock,
+    sides: &mut [Row<f64>],
+    nearest: &mut Nearest<f64>,
+) {
+    closest((few, &few.double), block, sides, nearest);
+}
+
+/// Marks rays with anything between their ends; whether single precision left any in doubt.
+#[multiversion::multiversion(targets = "simd")]
+fn occluded_in_single(
+    few: &FewTriangles,
+    block: &RayBlock,
+    sides: &mut [Row<f32>],
+    blocked: &mut [u32; LANES],
+) -> bool {
+    let least = occluded((few, &few.single), block, sides, blocked);
+    is_doubtful(few, block, &least)
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn occluded_in_double(
+    few: &FewTriangles,
+    block: &RayBlock,
+    sides: &mut [Row<f64>],
+    blocked: &mut [u32; LANES],
+) {
+    occluded((few, &few.double), block, sides, blocked);
 }
 
 #[cfg(test)]
@@ -451,7 +685,7 @@ mod tests {
         for far in [0.0, 1e4] {
             let geometry = scene(far);
             let few = FewTriangles::of(&geometry).unwrap();
-            assert!(few.edges.len() < 3 * few.triangles.len(), "edges are shared");
+            assert!(few.double.edges.len() < 3 * few.named.len(), "edges are shared");
             let exact = Exact::build(Arc::clone(&geometry), &BuildOptions::default()).unwrap();
             let mut rays = RayBatch::default();
             for k in 0..4096 {
