@@ -12,8 +12,6 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use signal_hook::low_level::exit;
 
-use crate::progress::say;
-
 /// The signals that came.
 static REQUESTS: AtomicU32 = AtomicU32::new(0);
 
@@ -32,9 +30,9 @@ const PATIENCE: Duration = Duration::from_millis(200);
 /// What is said of work that left nothing.
 pub(crate) const STOPPED: &str = "stopped; no unfinished file was left";
 
-/// Takes over Ctrl-C and the termination signals for the rest of the process. A signal that it was
-/// started to ignore, as by `nohup`, stays ignored.
-pub(crate) fn listen() {
+/// Takes over Ctrl-C and the termination signals for the rest of the process, whose end is said by `say`. A
+/// signal that it was started to ignore, as by `nohup`, stays ignored.
+pub(crate) fn listen(say: fn(&str)) {
     let ignored = ignored();
     let wanted = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|n| ignored >> (n - 1) & 1 == 0);
     // Without a handler the signal ends the process as ever; open parts then stay behind.
@@ -42,12 +40,12 @@ pub(crate) fn listen() {
     let _ = std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
         for _ in signals.forever() {
             if REQUESTS.fetch_add(1, Ordering::Relaxed) > 0 {
-                end();
+                end(say);
             }
-            let _ = std::thread::Builder::new().spawn(|| {
+            let _ = std::thread::Builder::new().spawn(move || {
                 std::thread::sleep(PATIENCE);
                 if !HEEDED.load(Ordering::Relaxed) && !SAVES.load(Ordering::Relaxed) {
-                    end();
+                    end(say);
                 }
             });
         }
@@ -62,7 +60,7 @@ fn ignored() -> u64 {
 }
 
 /// Ends the process now.
-fn end() -> ! {
+fn end(say: fn(&str)) -> ! {
     remove_open_parts();
     if let Some(folder) = NEW_FOLDER.lock().unwrap_or_else(PoisonError::into_inner).take() {
         // Goes only when nothing was written into it.

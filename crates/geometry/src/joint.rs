@@ -7,7 +7,7 @@
 use glam::{DQuat, DVec3, DVec4};
 
 use crate::Transform;
-use crate::motion::turned;
+use crate::hermite::turned;
 
 /// Steps in which the length of a rotation's cubic is looked at between two keys.
 const STEPS: u32 = 64;

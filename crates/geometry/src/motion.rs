@@ -6,7 +6,7 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use crate::hermite::{self, Interpolation, Points, Way};
+use crate::hermite::{self, Interpolation, Points, Way, turned};
 use crate::joint::Link;
 use crate::{Bounds, Transform};
 
@@ -446,20 +446,6 @@ impl Steady {
         let turn = DMat3::from_axis_angle(self.axis, self.rate * time);
         Transform::new(turn, self.about - turn * self.about + moved)
     }
-}
-
-/// The rotation a share `s` of the way from `a` to `b`, which are in one half of the sphere: as `a` and a
-/// turn about one axis, which is exact for the least angles, too.
-pub(crate) fn turned(a: DQuat, b: DQuat, s: f64) -> DQuat {
-    let way = a.conjugate() * b;
-    let sine = way.xyz().length();
-    if sine == 0.0 {
-        return a;
-    }
-    let half = sine.atan2(way.w) * s;
-    let axis = way.xyz() / sine;
-    let turn = DQuat::from_vec4((axis * half.sin()).extend(half.cos()));
-    (a * turn).normalize()
 }
 
 #[cfg(test)]

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use etendue_files::FindError;
 
 use crate::ImportError;
-use crate::file::{Origin, OverrideError, Place, nearest};
+use crate::file::{Origin, OverrideError, Place};
 use crate::memory::TooMuch;
+use crate::words::nearest;
 
 /// Why a scene cannot be read or loaded. The message names the file, the place in it, and a remedy.
 #[derive(Debug, thiserror::Error)]

@@ -1,11 +1,11 @@
-//! What serde says of a value, in plain words.
+//! The words of messages about values: what serde says of one, and what was probably meant.
 //!
 //! serde speaks of Rust's types (`expected usize`, `invalid type: map`); who wrote the file knows
 //! JSON's.
 
 use std::fmt::Display;
 
-use crate::file::suggest;
+use serde_json::Value;
 
 /// The longest value that a message repeats (characters).
 const LONGEST: usize = 40;
@@ -32,6 +32,51 @@ pub(crate) fn plain(error: &impl Display) -> String {
         .or_else(|| key(text, "missing field ", "is missing"))
         .or_else(|| key(text, "duplicate field ", "stands here twice"))
         .unwrap_or_else(|| syntax(text))
+}
+
+/// What a value is, as a sentence says it.
+pub(crate) fn kind_of(value: &Value) -> &'static str {
+    match value {
+        Value::Null => "null",
+        Value::Bool(_) => "true or false",
+        Value::Number(_) => "a number",
+        Value::String(_) => "a string",
+        Value::Array(_) => "an array",
+        Value::Object(_) => "an object",
+    }
+}
+
+/// `; did you mean …? known: …`, with the nearest of `known` when one is near.
+pub(crate) fn suggest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let mut known: Vec<&str> = known.into_iter().collect();
+    known.sort_unstable();
+    known.dedup();
+    let listed: Vec<String> = known.iter().take(40).map(|k| format!("`{k}`")).collect();
+    let all = match listed.len() {
+        0 => return String::new(),
+        n if n < known.len() => format!("known: {}, …", listed.join(", ")),
+        _ => format!("known: {}", listed.join(", ")),
+    };
+    match nearest(wrong, known) {
+        Some(near) => format!("; did you mean `{near}`? {all}"),
+        None => format!("; {all}"),
+    }
+}
+
+/// The word that was probably meant.
+pub(crate) fn nearest<'a>(
+    wrong: &str,
+    known: impl IntoIterator<Item = &'a str>,
+) -> Option<&'a str> {
+    // Nobody mistypes a word of that length, and comparing takes its time.
+    if wrong.len() > 200 {
+        return None;
+    }
+    let wrong = wrong.to_lowercase();
+    let distance = |word: &str| strsim::damerau_levenshtein(&wrong, &word.to_lowercase());
+    let best = known.into_iter().min_by_key(|word| distance(word))?;
+    // A third of the letters may be wrong: `colour`, `resoluton`, `focus_distnace`.
+    (distance(best) * 3 <= wrong.chars().count().max(best.chars().count()).max(3)).then_some(best)
 }
 
 /// What was found.

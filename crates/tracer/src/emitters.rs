@@ -11,7 +11,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Geometry, HitBatch, MISS, RayBatch};
 
 use crate::Material;
-use crate::transport::{LANES, Row};
+use crate::{LANES, Row};
 
 /// Emissive surfaces are kept apart when they are at most this share of the scene's triangles.
 const MOST: f64 = 0.125;

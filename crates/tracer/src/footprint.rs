@@ -97,36 +97,3 @@ impl SurfacePoint<'_> {
         extent.iter().flatten().all(|x| x.is_finite()).then_some(extent)
     }
 }
-
-/// The mean of a wave that is 1 in even intervals of length 1 and −1 in odd ones, over `width` around
-/// `x`.
-pub(crate) fn mean_of_squares(x: f64, width: f64) -> f64 {
-    let (a, b) = (x - 0.5 * width, x + 0.5 * width);
-    let (low, high) = (a.floor(), b.floor());
-    if low == high || b - a <= 0.0 {
-        return if x.floor().rem_euclid(2.0) < 1.0 { 1.0 } else { -1.0 };
-    }
-    // The wave's integral from 0.
-    let integral = |x: f64| {
-        let m = x.rem_euclid(2.0);
-        if m < 1.0 { m } else { 2.0 - m }
-    };
-    ((integral(b) - integral(a)) / (b - a)).clamp(-1.0, 1.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn squares_have_their_mean() {
-        assert_eq!(mean_of_squares(0.5, 0.4), 1.0);
-        assert_eq!(mean_of_squares(-0.5, 0.4), -1.0);
-        assert_eq!(mean_of_squares(1.5, 0.0), -1.0);
-        // Two whole periods, half of each sort, and three quarters of one square.
-        assert!(mean_of_squares(0.3, 4.0).abs() < 1e-15);
-        assert!(mean_of_squares(1.0, 1.0).abs() < 1e-15);
-        assert!((mean_of_squares(0.75, 1.0) - 0.5).abs() < 1e-15);
-        assert!(mean_of_squares(0.1, 1e6).abs() < 1e-6);
-    }
-}

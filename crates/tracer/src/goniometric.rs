@@ -136,18 +136,18 @@ impl Photometry {
     pub fn intensity(&self, vertical: f64, horizontal: f64) -> f64 {
         let Some((row, down)) = between(&self.vertical, vertical) else { return 0.0 };
         let last = self.horizontal[self.horizontal.len() - 1];
-        let around = horizontal.rem_euclid(TAU);
+        let azimuth = horizontal.rem_euclid(TAU);
         // Rounded to more than three quarters of a right angle, or to none.
-        let around = match last {
+        let azimuth = match last {
             0.0 => 0.0,
-            last if last > 1.5 * PI => around,
-            last if last > 0.75 * PI => around.min(TAU - around),
+            last if last > 1.5 * PI => azimuth,
+            last if last > 0.75 * PI => azimuth.min(TAU - azimuth),
             _ => {
-                let half = around.rem_euclid(PI);
+                let half = azimuth.rem_euclid(PI);
                 half.min(PI - half)
             }
         };
-        let (column, aside) = between(&self.horizontal, around.min(last)).unwrap_or_default();
+        let (column, aside) = between(&self.horizontal, azimuth.min(last)).unwrap_or_default();
         let rows = self.vertical.len();
         let at = |column: usize, row: usize| {
             let column = column.min(self.horizontal.len() - 1);

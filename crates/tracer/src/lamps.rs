@@ -28,9 +28,9 @@ pub(crate) struct Shape {
 
 impl Shape {
     /// The triangle of a spot at its time; `None` without area.
-    fn of(spot: &SurfacePoint<'_>) -> Option<Self> {
-        let place = &spot.placement.world_from_mesh_at(spot.time);
-        let [a, b, c] = spot.mesh.corners_at(spot.triangle, spot.time);
+    fn of(point: &SurfacePoint<'_>) -> Option<Self> {
+        let place = &point.placement.world_from_mesh_at(point.time);
+        let [a, b, c] = point.mesh.corners_at(point.triangle, point.time);
         let edges = [place.linear * (b - a), place.linear * (c - a)];
         let cross = edges[0].cross(edges[1]);
         let length = cross.length();
@@ -56,14 +56,14 @@ pub(crate) struct AreaLight {
 
 impl AreaLight {
     /// Triangle `id` at a time (s from the frame's time); `None` when it does not shine or has no area.
-    pub(crate) fn at(around: &SceneView<'_>, id: [u32; 2], time: f64) -> Option<Self> {
-        let placement = around.geometry.placements.get(id[0] as usize)?;
-        let corner = SurfacePoint::corner(around.geometry, placement, id[1] as usize);
-        let spot = SurfacePoint { time, ..corner };
-        let material = around.material(&spot)?;
+    pub(crate) fn at(scene: &SceneView<'_>, id: [u32; 2], time: f64) -> Option<Self> {
+        let placement = scene.geometry.placements.get(id[0] as usize)?;
+        let corner = SurfacePoint::corner(scene.geometry, placement, id[1] as usize);
+        let point = SurfacePoint { time, ..corner };
+        let material = scene.material(&point)?;
         let emission = material.emission.as_ref()?;
         let place = &placement.world_from_mesh_at(time);
-        let [corner, ..] = spot.mesh.corners_at(spot.triangle, time);
+        let [corner, ..] = point.mesh.corners_at(point.triangle, time);
         let (turned, far) = (place.linear * corner, place.translation);
         // Knuth's sum of two numbers without loss.
         let sum = turned + far;
@@ -72,11 +72,11 @@ impl AreaLight {
         Some(Self {
             id,
             corner: [sum, lost + place.translation_low],
-            shape: Shape::of(&spot)?,
+            shape: Shape::of(&point)?,
             two_sided: emission.two_sided,
             is_plain: matches!(emission.radiance, Paint::Plain(_) | Paint::Curve { .. })
                 && material.alpha == Alpha::Opaque,
-            magnitudes: magnitudes(placement, spot.mesh),
+            magnitudes: magnitudes(placement, point.mesh),
         })
     }
 
@@ -95,12 +95,12 @@ impl AreaLight {
 /// Where an emissive triangle of some power (W) is and shines, at a time (s from the frame's time) or, of a placement
 /// that moves, while it does; `None` without area.
 pub(crate) fn cluster(
-    around: &SceneView<'_>,
+    scene: &SceneView<'_>,
     (id, time): ([u32; 2], f64),
     power: f64,
     way: Option<&LampWay<'_>>,
 ) -> Option<Cluster> {
-    let AreaLight { corner, shape, two_sided, .. } = AreaLight::at(around, id, time)?;
+    let AreaLight { corner, shape, two_sided, .. } = AreaLight::at(scene, id, time)?;
     let mut bounds = Bounds::default();
     for offset in [DVec3::ZERO, shape.edges[0], shape.edges[1]] {
         bounds.include(corner[0] + offset);
@@ -163,20 +163,20 @@ impl<'a> LampWay<'a> {
 
 /// Power of an emissive triangle (W) at a time (s from the frame's time), by the paint at its middle and corners.
 pub(crate) fn triangle_power(
-    around: &SceneView<'_>,
+    scene: &SceneView<'_>,
     (placement, triangle): (&Placement, usize),
     material: &Material,
     time: f64,
 ) -> f64 {
     let Some(emission) = &material.emission else { return 0.0 };
-    let corner = SurfacePoint::corner(around.geometry, placement, triangle);
-    let spot = SurfacePoint { time, ..corner };
-    let Some(Shape { area, .. }) = Shape::of(&spot) else { return 0.0 };
+    let corner = SurfacePoint::corner(scene.geometry, placement, triangle);
+    let point = SurfacePoint { time, ..corner };
+    let Some(Shape { area, .. }) = Shape::of(&point) else { return 0.0 };
     let third = 1.0 / 3.0;
     let weights = [[third, third, third], [0.8, 0.1, 0.1], [0.1, 0.8, 0.1], [0.1, 0.1, 0.8]];
     let radiance: f64 = weights
         .map(|weights| {
-            let [r, g, b, _] = around.paint(&emission.radiance, &SurfacePoint { weights, ..spot });
+            let [r, g, b, _] = scene.paint(&emission.radiance, &SurfacePoint { weights, ..point });
             mean(&[r, g, b])
         })
         .iter()

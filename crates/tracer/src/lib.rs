@@ -46,6 +46,7 @@ mod pyramid;
 pub mod reference;
 pub mod sampling;
 pub mod scattering;
+mod shading;
 mod sky;
 pub mod spawn;
 pub mod spec;
@@ -78,3 +79,9 @@ pub use spectral::Spectral;
 pub use texture::{Image, ImageSource, Texture, TextureUse};
 pub use tint::{Conductor, ConductorId, SceneCurve, Tint, TintSpectrum};
 pub use transport::{LightingContext, RayStats, Rules, Samples, Scratch, Traits};
+
+/// Hits that are worked on side by side.
+pub(crate) const LANES: usize = 64;
+
+/// One number of each of them.
+pub(crate) type Row = [f64; LANES];

@@ -73,9 +73,9 @@ impl Light {
     pub(crate) fn cluster(
         &self,
         intensity: f64,
-        (around, span): (&SceneView<'_>, [f64; 2]),
+        (scene, span): (&SceneView<'_>, [f64; 2]),
     ) -> Option<Cluster> {
-        let own = self.kind.cluster(intensity, around)?;
+        let own = self.kind.cluster(intensity, scene)?;
         let Some(motion) = &self.motion else { return Some(own) };
         let bounds = motion.swept(own.bounds, span);
         if motion.turns_within(span) {
@@ -204,7 +204,7 @@ impl LightKind {
     }
 
     /// Where it is and shines, with an intensity (W/sr); `None` of what is far away.
-    pub(crate) fn cluster(&self, intensity: f64, around: &SceneView<'_>) -> Option<Cluster> {
+    pub(crate) fn cluster(&self, intensity: f64, scene: &SceneView<'_>) -> Option<Cluster> {
         let (at, axis, cone, reach) = match self {
             Self::Point(at) => (*at, DVec3::Y, PI, FRAC_PI_2),
             Self::Spot { at, axis, cos_outer, cos_inner } => {
@@ -212,7 +212,7 @@ impl LightKind {
                 (*at, *axis, inner, outer - inner)
             }
             Self::Projector(projector) => {
-                (projector.at, projector.axis(), projector.cone(around), 0.0)
+                (projector.at, projector.axis(), projector.cone(scene), 0.0)
             }
             Self::Goniometric(measured) => {
                 (measured.at, measured.axis(), measured.photometry.reach(), 0.0)
@@ -281,7 +281,7 @@ pub(crate) fn irradiance(light: &Light, sky: Option<&Sky>) -> f64 {
 }
 
 /// Power of a light near by (W); 0 of one far away.
-pub(crate) fn power(light: &Light, around: &SceneView<'_>) -> f64 {
+pub(crate) fn power(light: &Light, scene: &SceneView<'_>) -> f64 {
     let own = mean(&light.color);
     match &light.kind {
         LightKind::Point(_) => 4.0 * PI * own,
@@ -289,7 +289,7 @@ pub(crate) fn power(light: &Light, around: &SceneView<'_>) -> f64 {
         LightKind::Spot { cos_outer, cos_inner, .. } => {
             2.0 * PI * (1.0 - 0.5 * (cos_outer + cos_inner)) * own
         }
-        LightKind::Projector(projector) => projector.solid_angle(around) * own,
+        LightKind::Projector(projector) => projector.solid_angle(scene) * own,
         LightKind::Goniometric(_) => 4.0 * PI * light.intensity(),
         LightKind::Directional { .. } | LightKind::Environment { .. } => 0.0,
     }

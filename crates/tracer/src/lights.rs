@@ -83,7 +83,7 @@ impl Lights {
     pub fn new(
         lights: &[Light],
         map: Option<Arc<EnvironmentMap>>,
-        (around, span): (&SceneView<'_>, [f64; 2]),
+        (scene, span): (&SceneView<'_>, [f64; 2]),
         spectral: &Spectral,
     ) -> Result<Self, NoOverlap> {
         let mean = |modulation: &Option<Arc<Modulation>>| {
@@ -104,28 +104,28 @@ impl Lights {
         let sky = Sky::of(lights, map, spectral)?;
         let candidate = |light: &Light| {
             let mean = mean(&light.modulation);
-            match light.cluster(mean * light.intensity(), (around, span)) {
-                Some(cluster) => Candidate::near(mean * power(light, around), cluster),
+            match light.cluster(mean * light.intensity(), (scene, span)) {
+                Some(cluster) => Candidate::near(mean * power(light, scene), cluster),
                 None => Candidate::Far { irradiance: mean * irradiance(light, sky.as_ref()) },
             }
         };
         let mut candidates: Vec<Candidate> = lights.iter().map(candidate).collect();
-        let mut first = Vec::with_capacity(around.geometry.placements.len());
+        let mut first = Vec::with_capacity(scene.geometry.placements.len());
         let mut triangles = Vec::new();
-        for (number, placement) in (0_u32..).zip(&around.geometry.placements) {
-            let material = around.materials.get(placement.material as usize);
+        for (number, placement) in (0_u32..).zip(&scene.geometry.placements) {
+            let material = scene.materials.get(placement.material as usize);
             let emits = material.is_some_and(|m| m.emission.is_some());
             first.push(if emits { u32::try_from(candidates.len()).ok() } else { None });
             let Some(material) = material.filter(|_| emits) else { continue };
-            let mesh = around.geometry.mesh_of(placement);
+            let mesh = scene.geometry.mesh_of(placement);
             let mean = material.emission.as_ref().map_or(1.0, |e| mean(&e.modulation));
             // What moves shines as much as in the middle of that time.
-            let way = LampWay::of(around.geometry, placement, span);
+            let way = LampWay::of(scene.geometry, placement, span);
             let time = if way.is_some() { 0.5 * (span[0] + span[1]) } else { 0.0 };
             for triangle in 0..mesh.triangles.len() {
                 let id = [number, u32::try_from(triangle).unwrap_or(u32::MAX)];
-                let power = mean * triangle_power(around, (placement, triangle), material, time);
-                candidates.push(match lamps::cluster(around, (id, time), power, way.as_ref()) {
+                let power = mean * triangle_power(scene, (placement, triangle), material, time);
+                candidates.push(match lamps::cluster(scene, (id, time), power, way.as_ref()) {
                     Some(cluster) => Candidate::near(power, cluster),
                     None => Candidate::Dark,
                 });
@@ -133,8 +133,8 @@ impl Lights {
             }
         }
         let tint = |material: &Material| EmissionBands::of(material, spectral);
-        let tints = around.materials.iter().map(tint).collect::<Result<_, _>>()?;
-        let sampler = LightSampler::new(&candidates, around.geometry.loose_bounds());
+        let tints = scene.materials.iter().map(tint).collect::<Result<_, _>>()?;
+        let sampler = LightSampler::new(&candidates, scene.geometry.loose_bounds());
         let part = |group: Option<LightGroup>, modulation: &Option<Arc<Modulation>>| {
             (group.unwrap_or(LightGroup::OTHER), modulation.clone())
         };
@@ -144,7 +144,7 @@ impl Lights {
         };
         let groups = Groups::of(
             lights.iter().map(|light| part(light.group, &light.modulation)),
-            around.materials.iter().map(of_material),
+            scene.materials.iter().map(of_material),
         );
         let lights = lights.to_vec();
         let (lamps, lamp_bands) = Default::default();
@@ -160,7 +160,7 @@ impl Lights {
             lamp_bands,
             groups,
         };
-        all.light_lamps(around, spectral);
+        all.light_lamps(scene, spectral);
         Ok(all)
     }
 
@@ -208,28 +208,28 @@ impl Lights {
     }
 
     /// Keeps emissive triangles ready.
-    fn light_lamps(&mut self, around: &SceneView<'_>, spectral: &Spectral) {
+    fn light_lamps(&mut self, scene: &SceneView<'_>, spectral: &Spectral) {
         if self.is_dark() || self.triangles.len() > lamps::MOST {
             return;
         }
         let count = spectral.count();
         let mut bands = vec![0.0; self.triangles.len() * count];
         for (id, bands) in self.triangles.iter().zip(bands.chunks_mut(count)) {
-            let placement = &around.geometry.placements[id[0] as usize];
-            let spot = SurfacePoint::corner(around.geometry, placement, id[1] as usize);
-            self.emitted(around, spectral, &spot, true, bands);
+            let placement = &scene.geometry.placements[id[0] as usize];
+            let point = SurfacePoint::corner(scene.geometry, placement, id[1] as usize);
+            self.emitted(scene, spectral, &point, true, bands);
         }
-        let stands = |id: [u32; 2]| around.geometry.placements[id[0] as usize].motion.is_none();
-        let still = |&id: &[u32; 2]| AreaLight::at(around, id, 0.0).filter(|_| stands(id));
+        let stands = |id: [u32; 2]| scene.geometry.placements[id[0] as usize].motion.is_none();
+        let still = |&id: &[u32; 2]| AreaLight::at(scene, id, 0.0).filter(|_| stands(id));
         self.lamps = self.triangles.iter().map(still).collect();
         self.lamp_bands = bands;
     }
 
     /// The emissive triangle of a number at a time (s from the frame's time); `None` without area.
-    fn lamp(&self, around: &SceneView<'_>, number: usize, time: f64) -> Option<Cow<'_, AreaLight>> {
+    fn lamp(&self, scene: &SceneView<'_>, number: usize, time: f64) -> Option<Cow<'_, AreaLight>> {
         match self.lamps.get(number) {
             Some(Some(lamp)) => Some(Cow::Borrowed(lamp)),
-            _ => AreaLight::at(around, self.triangles[number], time).map(Cow::Owned),
+            _ => AreaLight::at(scene, self.triangles[number], time).map(Cow::Owned),
         }
     }
 
@@ -289,16 +289,16 @@ impl Lights {
     }
 
     /// The group of a surface that shines.
-    pub(crate) fn group_of_placement(&self, around: &SceneView<'_>, placement: u32) -> u32 {
-        let placement = around.geometry.placements.get(placement as usize);
+    pub(crate) fn group_of_placement(&self, scene: &SceneView<'_>, placement: u32) -> u32 {
+        let placement = scene.geometry.placements.get(placement as usize);
         placement.map_or(0, |placement| self.groups.of_material(placement.material))
     }
 
     /// The group of what was aimed at.
-    pub(crate) fn group_of(&self, around: &SceneView<'_>, [placement, light]: [u32; 2]) -> u32 {
+    pub(crate) fn group_of(&self, scene: &SceneView<'_>, [placement, light]: [u32; 2]) -> u32 {
         match placement {
             MISS => self.groups.of_light(light as usize),
-            placement => self.group_of_placement(around, placement),
+            placement => self.group_of_placement(scene, placement),
         }
     }
 
@@ -311,13 +311,13 @@ impl Lights {
     #[inline(always)]
     pub(crate) fn place(
         &self,
-        around: &SceneView<'_>,
+        scene: &SceneView<'_>,
         spectral: &Spectral,
         receiver: (&Receiver, f64),
         (one, square): ((usize, f64), [f64; 2]),
         radiance: &mut [f64],
     ) -> Chosen {
-        let mut chosen = self.place_on(around, spectral, receiver, one, square, radiance);
+        let mut chosen = self.place_on(scene, spectral, receiver, one, square, radiance);
         if let Chosen::Place(target) = &mut chosen {
             target.light = u32::try_from(one.0).unwrap_or(MISS);
         }
@@ -328,7 +328,7 @@ impl Lights {
     #[inline(always)]
     fn place_on(
         &self,
-        around: &SceneView<'_>,
+        scene: &SceneView<'_>,
         spectral: &Spectral,
         (receiver, time): (&Receiver, f64),
         (index, chance): (usize, f64),
@@ -338,7 +338,7 @@ impl Lights {
         let Some(light) = self.lights.get(index) else {
             let number = index - self.lights.len();
             let lamp = (number, time);
-            return self.place_on_lamp(around, spectral, lamp, square, chance, radiance).into();
+            return self.place_on_lamp(scene, spectral, lamp, square, chance, radiance).into();
         };
         radiance.copy_from_slice(self.bands_of(index, radiance.len()));
         let stand = light.stand(time);
@@ -354,7 +354,7 @@ impl Lights {
                 (factor > 0.0).then(|| Target::bare(TargetKind::Point, at, chance)).into()
             }
             LightKind::Projector(projector) => {
-                let Some(color) = projector.toward(around, stand.seen(receiver.point)) else {
+                let Some(color) = projector.toward(scene, stand.seen(receiver.point)) else {
                     return Chosen::Dark;
                 };
                 for (k, band) in radiance.iter_mut().enumerate() {
@@ -385,23 +385,23 @@ impl Lights {
     #[inline]
     fn place_on_lamp(
         &self,
-        around: &SceneView<'_>,
+        scene: &SceneView<'_>,
         spectral: &Spectral,
         (number, time): (usize, f64),
         square: [f64; 2],
         chance: f64,
         radiance: &mut [f64],
     ) -> Option<Target> {
-        let lamp = self.lamp(around, number, time)?;
+        let lamp = self.lamp(scene, number, time)?;
         let [u, v] = triangle_point(square);
         let count = radiance.len();
         match self.lamp_bands.get(number * count..(number + 1) * count) {
             Some(bands) if lamp.is_plain => radiance.copy_from_slice(bands),
             _ => {
-                let placement = &around.geometry.placements[lamp.id[0] as usize];
-                let spot = SurfacePoint::corner(around.geometry, placement, lamp.id[1] as usize);
-                let spot = SurfacePoint { weights: [1.0 - u - v, u, v], time, ..spot };
-                if !self.emitted(around, spectral, &spot, true, radiance) {
+                let placement = &scene.geometry.placements[lamp.id[0] as usize];
+                let point = SurfacePoint::corner(scene.geometry, placement, lamp.id[1] as usize);
+                let point = SurfacePoint { weights: [1.0 - u - v, u, v], time, ..point };
+                if !self.emitted(scene, spectral, &point, true, radiance) {
                     return None;
                 }
             }
@@ -420,14 +420,14 @@ impl Lights {
     /// Radiance that a surface gives off to its front or back, as much as of it is there; `false` when it is dark.
     pub fn emitted(
         &self,
-        around: &SceneView<'_>,
+        scene: &SceneView<'_>,
         spectral: &Spectral,
-        spot: &SurfacePoint<'_>,
+        point: &SurfacePoint<'_>,
         front: bool,
         radiance: &mut [f64],
     ) -> bool {
-        let number = spot.placement.material as usize;
-        let material = around.materials.get(number);
+        let number = point.placement.material as usize;
+        let material = scene.materials.get(number);
         let Some((material, emission)) = material.and_then(|m| Some((m, m.emission.as_ref()?)))
         else {
             return false;
@@ -437,12 +437,12 @@ impl Lights {
         }
         let there = match material.alpha {
             Alpha::Opaque => 1.0,
-            alpha => alpha.opacity(around.base_tint(spectral, material, spot).1),
+            alpha => alpha.opacity(scene.base_tint(spectral, material, point).1),
         };
         if let Paint::Cube { cube, repeat } = &emission.radiance
             && !spectral.is_rgb()
         {
-            let [u, v] = spot.uv(0);
+            let [u, v] = point.uv(0);
             let at = [u * repeat[0], v * repeat[1]];
             for (i, band) in radiance.iter_mut().enumerate() {
                 *band = there * emission.strength * spectral.texel(cube.number, at, i);
@@ -452,13 +452,13 @@ impl Lights {
         if let (EmissionBands::Squares([a, b]), Paint::Checker { squares, .. }) =
             (&self.tints[number], &emission.radiance)
         {
-            let [first, second] = squares_at(spot, *squares).shares();
+            let [first, second] = squares_at(point, *squares).shares();
             for ((band, a), b) in radiance.iter_mut().zip(a).zip(b) {
                 *band = there * emission.strength * (first * a + second * b);
             }
             return true;
         }
-        let [r, g, b, _] = around.paint(&emission.radiance, spot);
+        let [r, g, b, _] = scene.paint(&emission.radiance, point);
         spectral.spread(&[r, g, b].map(|c| c * emission.strength * there), radiance);
         if let EmissionBands::Times(tint) = &self.tints[number] {
             radiance.iter_mut().zip(tint).for_each(|(band, tint)| *band *= tint);
@@ -470,9 +470,9 @@ impl Lights {
     /// which was met by a ray along `direction` from the point.
     pub(crate) fn pdf_of_surface(
         &self,
-        around: &SceneView<'_>,
+        scene: &SceneView<'_>,
         placement: u32,
-        spot: &SurfacePoint<'_>,
+        point: &SurfacePoint<'_>,
         receiver: &Receiver,
         direction: DVec3,
     ) -> f64 {
@@ -480,10 +480,10 @@ impl Lights {
         if self.is_dark() {
             return 0.0;
         }
-        let index = *first as usize + spot.triangle;
+        let index = *first as usize + point.triangle;
         let number = index - self.lights.len();
-        let Some(lamp) = self.lamp(around, number, spot.time) else { return 0.0 };
-        let [_, u, v] = spot.weights;
+        let Some(lamp) = self.lamp(scene, number, point.time) else { return 0.0 };
+        let [_, u, v] = point.weights;
         let squared = lamp.offset(receiver.point, [u, v]).length_squared();
         let cosine = direction.dot(lamp.shape.normal).abs();
         let pdf = self.chance(receiver, index) * squared / (cosine * lamp.shape.area);

@@ -24,9 +24,9 @@ pub struct Projector {
 
 impl Projector {
     /// Tangents of half the angles across and down.
-    fn tangents(&self, around: &SceneView<'_>) -> [f64; 2] {
+    fn tangents(&self, scene: &SceneView<'_>) -> [f64; 2] {
         let of_image = || {
-            let [width, height] = decoded(self.image.image()?, around)?.size();
+            let [width, height] = decoded(self.image.image()?, scene)?.size();
             (width > 0 && height > 0).then_some(width as f64 / height as f64)
         };
         let aspect = self.aspect.or_else(of_image).unwrap_or(1.0);
@@ -35,10 +35,10 @@ impl Projector {
 
     /// What its axial intensity is multiplied by towards the point `to` (m), by colour; `None` outside of its
     /// image.
-    pub(crate) fn toward(&self, around: &SceneView<'_>, to: DVec3) -> Option<Color> {
+    pub(crate) fn toward(&self, scene: &SceneView<'_>, to: DVec3) -> Option<Color> {
         let local = self.axes.transpose() * (to - self.at);
         let ahead = -local.z;
-        let [across, down] = self.tangents(around);
+        let [across, down] = self.tangents(scene);
         let (x, y) = (local.x / (ahead * across), local.y / (ahead * down));
         if ahead <= 0.0 || x.abs().max(y.abs()) > 1.0 {
             return None;
@@ -53,7 +53,7 @@ impl Projector {
             Paint::Image { factor, image, .. } => {
                 let [u, v] = [0.5 * (1.0 + x), 0.5 * (1.0 - y)];
                 let uv = image.transform.map(|[a, b, c]| a * u + b * v + c);
-                let thrown = decoded(image, around).map(|file| file.sample(uv, image.encoding));
+                let thrown = decoded(image, scene).map(|file| file.sample(uv, image.encoding));
                 std::array::from_fn(|k| factor[k] * thrown.map_or(1.0, |thrown| thrown[k]))
             }
         };
@@ -62,8 +62,8 @@ impl Projector {
     }
 
     /// Its power (W) over its axial intensity (W/sr), of a white image: ∫ cos⁻³ θ dΩ.
-    pub(crate) fn solid_angle(&self, around: &SceneView<'_>) -> f64 {
-        let [across, down] = self.tangents(around);
+    pub(crate) fn solid_angle(&self, scene: &SceneView<'_>) -> f64 {
+        let [across, down] = self.tangents(scene);
         4.0 * across * down
     }
 
@@ -73,12 +73,12 @@ impl Projector {
     }
 
     /// The angle from the axis to the image's corner (rad).
-    pub(crate) fn cone(&self, around: &SceneView<'_>) -> f64 {
-        let [across, down] = self.tangents(around);
+    pub(crate) fn cone(&self, scene: &SceneView<'_>) -> f64 {
+        let [across, down] = self.tangents(scene);
         across.hypot(down).atan()
     }
 }
 
-fn decoded<'a>(image: &TextureUse, around: &SceneView<'a>) -> Option<&'a crate::Image> {
-    around.images.get(image.texture as usize)?.as_deref()
+fn decoded<'a>(image: &TextureUse, scene: &SceneView<'a>) -> Option<&'a crate::Image> {
+    scene.images.get(image.texture as usize)?.as_deref()
 }

@@ -6,8 +6,21 @@
 //! the memory of its image, or a third where that has 16 bits or f32.
 
 use etendue_image::{DecodeError, Raster, Samples, room};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use crate::texture::{Wrap, bilinear};
+/// What happens to texture coordinates outside 0..=1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Wrap {
+    /// The image repeats.
+    #[default]
+    Repeat,
+    /// Every other copy is mirrored.
+    MirroredRepeat,
+    /// The border goes on.
+    ClampToEdge,
+}
 
 /// The levels above the image itself.
 #[derive(Debug, Clone)]
@@ -240,6 +253,57 @@ fn shares(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
         .collect()
 }
 
+/// What lies between the four texels around a place, whose centres are at whole numbers.
+pub(crate) fn bilinear([x, y]: [f64; 2], at: impl Fn(f64, f64) -> [f64; 4]) -> [f64; 4] {
+    let (x0, y0) = (x.floor(), y.floor());
+    let (fx, fy) = (x - x0, y - y0);
+    let (a, b) = (at(x0, y0), at(x0 + 1.0, y0));
+    let (c, d) = (at(x0, y0 + 1.0), at(x0 + 1.0, y0 + 1.0));
+    std::array::from_fn(|k| {
+        let top = a[k] + (b[k] - a[k]) * fx;
+        let bottom = c[k] + (d[k] - c[k]) * fx;
+        top + (bottom - top) * fy
+    })
+}
+
+impl Wrap {
+    /// Column or row `x` (a whole number) of `size` after wrapping.
+    pub(crate) fn apply(self, x: f64, size: usize) -> usize {
+        let n = size as f64;
+        let wrapped = match self {
+            Self::Repeat => x.rem_euclid(n),
+            Self::MirroredRepeat => {
+                let m = x.rem_euclid(2.0 * n);
+                if m < n { m } else { 2.0 * n - 1.0 - m }
+            }
+            Self::ClampToEdge => x,
+        };
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "clamped to the image; the cast saturates"
+        )]
+        let index = wrapped.clamp(0.0, n - 1.0) as usize;
+        index.min(size - 1)
+    }
+}
+
+/// The mean of a wave that is 1 in even intervals of length 1 and −1 in odd ones, over `width` around
+/// `x`.
+pub(crate) fn mean_of_squares(x: f64, width: f64) -> f64 {
+    let (a, b) = (x - 0.5 * width, x + 0.5 * width);
+    let (low, high) = (a.floor(), b.floor());
+    if low == high || b - a <= 0.0 {
+        return if x.floor().rem_euclid(2.0) < 1.0 { 1.0 } else { -1.0 };
+    }
+    // The wave's integral from 0.
+    let integral = |x: f64| {
+        let m = x.rem_euclid(2.0);
+        if m < 1.0 { m } else { 2.0 - m }
+    };
+    ((integral(b) - integral(a)) / (b - a)).clamp(-1.0, 1.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -297,5 +361,17 @@ mod tests {
             let again = halved(any.size(), channels, |x, y| any.texel(y * 6 + x)).unwrap();
             assert_eq!(bits(&again), bits(&halved_singles(any.size(), channels, values).unwrap()));
         }
+    }
+
+    #[test]
+    fn squares_have_their_mean() {
+        assert_eq!(mean_of_squares(0.5, 0.4), 1.0);
+        assert_eq!(mean_of_squares(-0.5, 0.4), -1.0);
+        assert_eq!(mean_of_squares(1.5, 0.0), -1.0);
+        // Two whole periods, half of each sort, and three quarters of one square.
+        assert!(mean_of_squares(0.3, 4.0).abs() < 1e-15);
+        assert!(mean_of_squares(1.0, 1.0).abs() < 1e-15);
+        assert!((mean_of_squares(0.75, 1.0) - 0.5).abs() < 1e-15);
+        assert!(mean_of_squares(0.1, 1e6).abs() < 1e-6);
     }
 }

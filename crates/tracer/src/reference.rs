@@ -6,8 +6,8 @@ use std::sync::Arc;
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Geometry, HitBatch, MISS, Mesh, Placement, RayBatch, Vertices};
 
-use crate::footprint::mean_of_squares;
 use crate::material::Alpha;
+use crate::pyramid::mean_of_squares;
 use crate::{
     Color, Footprint, Image, Ior, Material, NormalKind, Paint, Pixel, Scattering, SceneCurve,
     Space, Spectral, TextureUse, Tint, TintSpectrum,
@@ -112,14 +112,14 @@ impl SceneView<'_> {
         let placement = self.placement(hits, i)?;
         let (u, v) = (hits.u[i], hits.v[i]);
         let weights = [1.0 - u - v, u, v];
-        let spot = SurfacePoint::corner(self.geometry, placement, hits.triangle[i] as usize);
-        Some(SurfacePoint { weights, time: hits.time(i), ..spot })
+        let point = SurfacePoint::corner(self.geometry, placement, hits.triangle[i] as usize);
+        Some(SurfacePoint { weights, time: hits.time(i), ..point })
     }
 
     /// The material of a spot.
     #[must_use]
-    pub fn material(&self, spot: &SurfacePoint<'_>) -> Option<&Material> {
-        self.materials.get(spot.placement.material as usize)
+    pub fn material(&self, point: &SurfacePoint<'_>) -> Option<&Material> {
+        self.materials.get(point.placement.material as usize)
     }
 
     /// The index of the glass of a placement; `None` of all else.
@@ -165,18 +165,18 @@ impl SceneView<'_> {
     /// black for a miss.
     #[must_use]
     pub fn flat(&self, traced: Traced<'_>, i: usize) -> Color {
-        let Some(spot) = self.seen(traced, i) else { return [0.0; 3] };
-        let Some(material) = self.material(&spot) else { return [0.0; 3] };
-        let [r, g, b, _] = self.base_color(material, &spot);
+        let Some(point) = self.seen(traced, i) else { return [0.0; 3] };
+        let Some(material) = self.material(&point) else { return [0.0; 3] };
+        let [r, g, b, _] = self.base_color(material, &point);
         [r, g, b]
     }
 
     /// Base colour at the very point of hit `i`, black for a miss.
     #[must_use]
     pub fn albedo(&self, hits: &HitBatch, i: usize) -> Color {
-        let Some(spot) = self.spot(hits, i) else { return [0.0; 3] };
-        let Some(material) = self.material(&spot) else { return [0.0; 3] };
-        let [r, g, b, _] = self.base_color(material, &spot);
+        let Some(point) = self.spot(hits, i) else { return [0.0; 3] };
+        let Some(material) = self.material(&point) else { return [0.0; 3] };
+        let [r, g, b, _] = self.base_color(material, &point);
         [r, g, b]
     }
 
@@ -189,7 +189,7 @@ impl SceneView<'_> {
     /// Texture coordinates of the first set at hit `i`; (0, 0) without any.
     #[must_use]
     pub fn first_uv(&self, hits: &HitBatch, i: usize) -> [f64; 2] {
-        self.spot(hits, i).map_or([0.0; 2], |spot| spot.uv(0))
+        self.spot(hits, i).map_or([0.0; 2], |point| point.uv(0))
     }
 
     /// Base colour and alpha, vertex colours included.
@@ -197,14 +197,14 @@ impl SceneView<'_> {
     /// Where alpha cuts holes there is no mean over a footprint: the mean of alpha against a cut-off
     /// is not the share that is cut.
     #[must_use]
-    pub fn base_color(&self, material: &Material, spot: &SurfacePoint<'_>) -> [f64; 4] {
+    pub fn base_color(&self, material: &Material, point: &SurfacePoint<'_>) -> [f64; 4] {
         let mut color = if material.alpha != Alpha::Opaque {
-            self.paint(&material.base_color, &SurfacePoint { footprint: None, ..*spot })
+            self.paint(&material.base_color, &SurfacePoint { footprint: None, ..*point })
         } else {
-            self.paint(&material.base_color, spot)
+            self.paint(&material.base_color, point)
         };
         if material.vertex_colors
-            && let Some(vertex) = spot.vertex_color()
+            && let Some(vertex) = point.vertex_color()
         {
             color = std::array::from_fn(|k| color[k] * vertex[k]);
         }
@@ -216,15 +216,15 @@ impl SceneView<'_> {
         &self,
         spectral: &Spectral,
         material: &Material,
-        spot: &SurfacePoint<'_>,
+        point: &SurfacePoint<'_>,
     ) -> (Tint, f64) {
-        let [r, g, b, alpha] = self.base_color(material, spot);
+        let [r, g, b, alpha] = self.base_color(material, point);
         if spectral.is_rgb() || !material.base_color.has_spectrum() {
             return (Tint::from([r, g, b]), alpha);
         }
         let seen = match material.alpha {
-            Alpha::Opaque => *spot,
-            Alpha::Mask { .. } | Alpha::Blend { .. } => SurfacePoint { footprint: None, ..*spot },
+            Alpha::Opaque => *point,
+            Alpha::Mask { .. } | Alpha::Blend { .. } => SurfacePoint { footprint: None, ..*point },
         };
         let mut tint = match &material.base_color {
             Paint::Plain(color) => Tint::from(*color),
@@ -256,7 +256,7 @@ impl SceneView<'_> {
             }
         };
         if material.vertex_colors
-            && let Some(vertex) = spot.vertex_color()
+            && let Some(vertex) = point.vertex_color()
         {
             tint.color = std::array::from_fn(|k| tint.color[k] * vertex[k]);
         }
@@ -265,11 +265,11 @@ impl SceneView<'_> {
 
     /// A paint's colour and alpha.
     #[must_use]
-    pub fn paint(&self, paint: &Paint, spot: &SurfacePoint<'_>) -> [f64; 4] {
+    pub fn paint(&self, paint: &Paint, point: &SurfacePoint<'_>) -> [f64; 4] {
         match paint {
             Paint::Plain([r, g, b]) | Paint::Curve { look: [r, g, b], .. } => [*r, *g, *b, 1.0],
             Paint::Checker { colors, squares, .. } => {
-                let [r, g, b] = match squares_at(spot, *squares) {
+                let [r, g, b] = match squares_at(point, *squares) {
                     Squares::Mean(wave) => std::array::from_fn(|k| {
                         colors[0][k] * (0.5 + wave) + colors[1][k] * (0.5 - wave)
                     }),
@@ -278,12 +278,12 @@ impl SceneView<'_> {
                 [r, g, b, 1.0]
             }
             Paint::Cube { cube, repeat } => {
-                let [u, v] = spot.uv(0);
+                let [u, v] = point.uv(0);
                 let [r, g, b] = cube.cube.look([u * repeat[0], v * repeat[1]]);
                 [r, g, b, 1.0]
             }
             Paint::Image { factor, image, .. } => {
-                let [r, g, b, a] = self.tint(image, spot);
+                let [r, g, b, a] = self.tint(image, point);
                 [factor[0] * r, factor[1] * g, factor[2] * b, a]
             }
         }
@@ -292,22 +292,22 @@ impl SceneView<'_> {
     /// The colour that a use of an image has at a spot, whatever its encoding: the magenta checker
     /// where the image cannot be had, white where nobody asked for it.
     #[must_use]
-    pub fn tint(&self, image: &TextureUse, spot: &SurfacePoint<'_>) -> [f64; 4] {
-        self.decoded(image).map_or([1.0; 4], |pixels| Self::over(pixels, image, spot))
+    pub fn tint(&self, image: &TextureUse, point: &SurfacePoint<'_>) -> [f64; 4] {
+        self.decoded(image).map_or([1.0; 4], |pixels| Self::over(pixels, image, point))
     }
 
     /// What an image of data (a roughness, a share) says at a spot; 1 without the image.
     #[must_use]
-    pub fn texel(&self, image: &TextureUse, spot: &SurfacePoint<'_>) -> [f64; 4] {
-        self.lookup(image, spot).unwrap_or([1.0; 4])
+    pub fn texel(&self, image: &TextureUse, point: &SurfacePoint<'_>) -> [f64; 4] {
+        self.lookup(image, point).unwrap_or([1.0; 4])
     }
 
     /// What an image of data says at a spot; `None` without the image.
     #[must_use]
-    pub fn lookup(&self, image: &TextureUse, spot: &SurfacePoint<'_>) -> Option<[f64; 4]> {
+    pub fn lookup(&self, image: &TextureUse, point: &SurfacePoint<'_>) -> Option<[f64; 4]> {
         // Magenta is for looking at, not a roughness or a tilt.
         let pixels = self.decoded(image).filter(|pixels| !pixels.stands_in())?;
-        Some(Self::over(pixels, image, spot))
+        Some(Self::over(pixels, image, point))
     }
 
     fn decoded(&self, image: &TextureUse) -> Option<&Image> {
@@ -315,11 +315,11 @@ impl SceneView<'_> {
     }
 
     /// The pixels of a use of an image, averaged over the spot's footprint.
-    fn over(pixels: &Image, image: &TextureUse, spot: &SurfacePoint<'_>) -> [f64; 4] {
+    fn over(pixels: &Image, image: &TextureUse, point: &SurfacePoint<'_>) -> [f64; 4] {
         let set = image.uv_set as usize;
-        let [u, v] = spot.uv(set);
+        let [u, v] = point.uv(set);
         let at = image.transform.map(|[a, b, c]| a * u + b * v + c);
-        match spot.extent(set) {
+        match point.extent(set) {
             None => pixels.sample(at, image.encoding),
             Some(axes) => {
                 let axes = axes.map(|[u, v]| image.transform.map(|[a, b, _]| a * u + b * v));
@@ -330,10 +330,10 @@ impl SceneView<'_> {
 
     /// Share of ambient light that reaches hit `i`.
     pub(crate) fn unoccluded(&self, traced: Traced<'_>, i: usize) -> f64 {
-        let Some(spot) = self.seen(traced, i) else { return 1.0 };
-        let occlusion = self.material(&spot).and_then(|material| material.occlusion.as_ref());
+        let Some(point) = self.seen(traced, i) else { return 1.0 };
+        let occlusion = self.material(&point).and_then(|material| material.occlusion.as_ref());
         let Some(occlusion) = occlusion else { return 1.0 };
-        let [arrives, ..] = self.texel(&occlusion.image, &spot);
+        let [arrives, ..] = self.texel(&occlusion.image, &point);
         1.0 + occlusion.strength.clamp(0.0, 1.0) * (arrives - 1.0)
     }
 }
@@ -358,9 +358,9 @@ impl Squares {
 }
 
 /// The squares of a checker, of so many along one unit of the texture coordinates, that a place sees.
-pub(crate) fn squares_at(spot: &SurfacePoint<'_>, squares: f64) -> Squares {
-    let [u, v] = spot.uv(0);
-    if let Some([a, b]) = spot.extent(0) {
+pub(crate) fn squares_at(point: &SurfacePoint<'_>, squares: f64) -> Squares {
+    let [u, v] = point.uv(0);
+    if let Some([a, b]) = point.extent(0) {
         let mean =
             |x: f64, k: usize| mean_of_squares(x * squares, (a[k].abs() + b[k].abs()) * squares);
         return Squares::Mean(0.5 * mean(u, 0) * mean(v, 1));

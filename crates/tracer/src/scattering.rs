@@ -1,16 +1,8 @@
 //! How materials scatter light, and by which model of a surface.
 
-use etendue_geometry::glam::DVec3;
 use etendue_spectrum::Curve;
 
-use crate::bsdf::{Bsdf, Coat, Layered, Model, Sheen, fresnel};
-use crate::reference::{SceneView, SurfacePoint};
-use crate::sampling::Frame;
-use crate::surface::SurfaceInteraction;
 use crate::{Color, Conductor, SceneCurve, Spectral, TextureUse, Tint, TintSpectrum};
-
-/// The least α across a grain.
-const SMOOTHEST_GRAIN: f64 = 1e-3;
 
 /// How a surface scatters light.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,31 +80,6 @@ impl Scattering {
             ]
         });
         textures.into_iter().flatten().flatten()
-    }
-
-    /// The model of it where it was met, for light of a wavelength (nm).
-    pub(crate) fn bsdf(
-        &self,
-        met: &SurfaceInteraction<'_>,
-        around: &SceneView<'_>,
-        (spectral, wavelength): (&Spectral, f64),
-    ) -> Bsdf {
-        let model = match self {
-            Self::Black | Self::Unlit => Model::Black,
-            Self::Matte => Model::Matte,
-            Self::Mirror => Model::Mirror,
-            Self::Metal { roughness, named } => Model::Metal {
-                alpha: roughness * roughness,
-                named: named.as_ref().map(Conductor::id),
-            },
-            Self::Dielectric(glass) => Model::Dielectric {
-                alpha: glass.roughness * glass.roughness,
-                eta: met.eta(around, wavelength),
-            },
-            Self::Gltf(surface) => return surface.bsdf(met, around, spectral),
-        };
-        let (geometric, shading) = met.normals(around);
-        Bsdf::new(model, [geometric, shading], met.wo, [met.color(), Tint::WHITE])
     }
 
     /// The glTF surface, of one.
@@ -245,22 +212,12 @@ pub struct GltfSurface {
     pub anisotropy_texture: Option<TextureUse>,
 }
 
-/// A sheet of facets over a matte or metallic base, at one point.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct SheetSurface {
-    /// Share of metal, 0..=1.
-    pub(crate) metallic: f64,
-    /// The square of the roughness, 0..=1.
-    pub(crate) alpha: f64,
-    /// The dielectric's reflectance face on, before the highlights' colour, and at grazing incidence.
-    pub(crate) f0: f64,
-    pub(crate) f90: f64,
-    /// The colour of its highlights.
-    pub(crate) highlight: Tint,
-}
-
 /// The factor of a part's image, and its spectrum: the look alone where light is traced as red, green and blue.
-fn part(spectral: &Spectral, look: Color, curve: Option<&SceneCurve>) -> (Color, TintSpectrum) {
+pub(crate) fn part(
+    spectral: &Spectral,
+    look: Color,
+    curve: Option<&SceneCurve>,
+) -> (Color, TintSpectrum) {
     match curve.filter(|_| !spectral.is_rgb()) {
         Some(curve) => ([1.0; 3], curve.spectrum()),
         None => (look, TintSpectrum::White),
@@ -305,122 +262,5 @@ impl GltfSurface {
         let is_rough = self.roughness > 0.0 || self.glossiness_texture.is_some();
         let is_covered = self.clearcoat > 0.0 || self.sheen_color != [0.0; 3];
         is_rough && !is_covered && self.anisotropy == 0.0 && self.transmission == 0.0
-    }
-
-    /// Its sheet of facets at a point.
-    pub(crate) fn sheet(
-        &self,
-        spot: &SurfacePoint<'_>,
-        around: &SceneView<'_>,
-        spectral: &Spectral,
-    ) -> SheetSurface {
-        let texel = |image: &Option<_>| match image {
-            Some(image) => around.texel(image, spot),
-            None => [1.0; 4],
-        };
-        let rough = texel(&self.metallic_roughness);
-        let roughness = match &self.glossiness_texture {
-            Some(_) => 1.0 - (1.0 - self.roughness) * texel(&self.glossiness_texture)[3],
-            None => self.roughness * rough[1],
-        };
-        let roughness = roughness.clamp(0.0, 1.0);
-        let specular = (self.specular * texel(&self.specular_texture)[3]).clamp(0.0, 1.0);
-        let face_on = fresnel::normal_reflectance(self.ior);
-        let tint = self.specular_color_texture.as_ref();
-        let tint = tint.map_or([1.0; 4], |image| around.tint(image, spot));
-        // The extension caps the reflectance face on at 1.
-        let most = if face_on > 0.0 { 1.0 / face_on } else { f64::INFINITY };
-        SheetSurface {
-            metallic: (self.metallic * rough[2]).clamp(0.0, 1.0),
-            alpha: roughness * roughness,
-            f0: face_on * specular,
-            f90: specular,
-            highlight: {
-                let (color, spectrum) =
-                    part(spectral, self.specular_color, self.specular_curve.as_ref());
-                Tint { color: std::array::from_fn(|k| (color[k] * tint[k]).min(most)), spectrum }
-            },
-        }
-    }
-
-    /// Its layers where it was met.
-    fn bsdf(
-        &self,
-        met: &SurfaceInteraction<'_>,
-        around: &SceneView<'_>,
-        spectral: &Spectral,
-    ) -> Bsdf {
-        let texel = |image: &Option<_>| match image {
-            Some(image) => around.texel(image, &met.spot),
-            None => [1.0; 4],
-        };
-        let SheetSurface { metallic, alpha, f0, f90, highlight } =
-            self.sheet(&met.spot, around, spectral);
-        let (geometric, shading) = met.normals(around);
-        let grain = self.grain(met, around, shading);
-        let strength = grain.map_or(0.0, |(_, strength)| strength);
-        let model = Model::Layered(Layered {
-            metallic,
-            // A grain has no single directions, however smooth it is across.
-            alpha: if strength > 0.0 { alpha.max(SMOOTHEST_GRAIN) } else { alpha },
-            along: alpha + (1.0 - alpha) * strength * strength,
-            f0,
-            f90,
-            ior: self.ior,
-            transmission: (self.transmission * texel(&self.transmission_texture)[0])
-                .clamp(0.0, 1.0),
-            sheen: match self.sheen_color {
-                [0.0, 0.0, 0.0] => Sheen::default(),
-                look => {
-                    let (color, spectrum) = part(spectral, look, self.sheen_curve.as_ref());
-                    let tint = self.sheen_color_texture.as_ref();
-                    let tint = tint.map_or([1.0; 4], |image| around.tint(image, &met.spot));
-                    Sheen {
-                        color: Tint {
-                            color: std::array::from_fn(|k| (color[k] * tint[k]).clamp(0.0, 1.0)),
-                            spectrum,
-                        },
-                        roughness: self.sheen_roughness * texel(&self.sheen_roughness_texture)[3],
-                    }
-                }
-            },
-            coat: match self.clearcoat {
-                0.0 => Coat::default(),
-                share => Coat {
-                    share: (share * texel(&self.clearcoat_texture)[0]).clamp(0.0, 1.0),
-                    alpha: (self.clearcoat_roughness * texel(&self.clearcoat_roughness_texture)[1])
-                        .clamp(0.0, 1.0)
-                        .powi(2),
-                },
-            },
-        });
-        let frame = match grain {
-            Some((along, _)) => Frame::along(shading, along),
-            None => Frame::around(shading),
-        };
-        Bsdf::turned(model, (geometric, frame), met.wo, [met.color(), highlight])
-    }
-
-    /// Where the grain goes, and how strong it is; `None` where there is none, or where no texture coordinates
-    /// tell where.
-    fn grain(
-        &self,
-        met: &SurfaceInteraction<'_>,
-        around: &SceneView<'_>,
-        normal: DVec3,
-    ) -> Option<(DVec3, f64)> {
-        if self.anisotropy == 0.0 {
-            return None;
-        }
-        let image = self.anisotropy_texture.as_ref();
-        let [x, y, share, _] = match image.and_then(|image| around.lookup(image, &met.spot)) {
-            Some([x, y, share, _]) => [2.0 * x - 1.0, 2.0 * y - 1.0, share, 1.0],
-            None => [1.0, 0.0, 1.0, 1.0],
-        };
-        let (sin, cos) = self.anisotropy_rotation.sin_cos();
-        let [tangent, bitangent] =
-            met.spot.tangents(image.map_or(0, |i| i.uv_set as usize), normal)?;
-        let along = tangent * (cos * x - sin * y) + bitangent * (sin * x + cos * y);
-        Some((along, (self.anisotropy * share).clamp(0.0, 1.0)))
     }
 }

@@ -3,17 +3,16 @@
 use etendue_geometry::MISS;
 use etendue_geometry::glam::{DMat3, DVec3};
 
-use crate::bsdf::Bsdf;
 use crate::material::NormalMap;
 use crate::placed::PlacedSurface;
 use crate::reference::{SceneView, SurfacePoint};
 use crate::spawn::Anchor;
-use crate::{Ior, LightingContext, Material, Spectral, Tint};
+use crate::{Ior, LightingContext, Material, Tint};
 
 /// A hit seen from its ray.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SurfaceInteraction<'a> {
-    pub(crate) spot: SurfacePoint<'a>,
+    pub(crate) point: SurfacePoint<'a>,
     placed: &'a PlacedSurface,
     pub(crate) material: &'a Material,
     pub(crate) anchor: Anchor,
@@ -32,18 +31,18 @@ impl<'a> SurfaceInteraction<'a> {
     /// this unit normal on its front.
     pub(crate) fn at(
         ctx: &'a LightingContext<'a>,
-        (own, spot): (u32, SurfacePoint<'a>),
+        (own, point): (u32, SurfacePoint<'a>),
         (origin, direction): (DVec3, DVec3),
         (t, normal): (f64, DVec3),
     ) -> Option<Self> {
         let scene = &ctx.scene;
         let placed = ctx.placed.get(own)?;
-        let material = scene.material(&spot)?;
+        let material = scene.material(&point)?;
         let anchor = ctx.anchor(origin + direction * t, normal, origin, placed);
         let front = normal.dot(direction) <= 0.0;
-        let (base, alpha) = scene.base_tint(ctx.spectral, material, &spot);
+        let (base, alpha) = scene.base_tint(ctx.spectral, material, &point);
         let media = if front { [MISS, own] } else { [own, MISS] };
-        Some(Self { spot, placed, material, anchor, front, base, alpha, wo: -direction, media })
+        Some(Self { point, placed, material, anchor, front, base, alpha, wo: -direction, media })
     }
 
     /// Share of the surface that is there.
@@ -52,11 +51,6 @@ impl<'a> SurfaceInteraction<'a> {
             return 0.0;
         }
         self.material.alpha.opacity(self.alpha)
-    }
-
-    /// How it scatters light of the wavelength (nm).
-    pub(crate) fn bsdf(&self, scene: &SceneView<'_>, spectral: &Spectral, wavelength: f64) -> Bsdf {
-        self.material.scattering.bsdf(self, scene, (spectral, wavelength))
     }
 
     /// The base colour alone, the share of light that a surface can reflect.
@@ -85,7 +79,7 @@ impl<'a> SurfaceInteraction<'a> {
         if !self.placed.is_tilted {
             return (geometric, geometric);
         }
-        let normal = self.spot.tilted_normal(scene, self.material, turn, front);
+        let normal = self.point.tilted_normal(scene, self.material, turn, front);
         (geometric, facing(if self.front { normal } else { -normal }, geometric, self.wo))
     }
 }

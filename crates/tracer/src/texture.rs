@@ -8,7 +8,9 @@ use etendue_image::{DecodeError, Limits, Raster, Samples};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::pyramid::Pyramid;
+use crate::pyramid::{Pyramid, bilinear};
+
+pub use crate::pyramid::Wrap;
 
 /// Where an image's bytes are, still encoded (PNG, JPEG, Radiance or EXR).
 #[derive(Debug, Clone)]
@@ -19,19 +21,6 @@ pub enum ImageSource {
     Bytes(Buffer<u8>),
     /// Nowhere: the file that the model names is not there.
     Missing,
-}
-
-/// What happens to texture coordinates outside 0..=1.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Wrap {
-    /// The image repeats.
-    #[default]
-    Repeat,
-    /// Every other copy is mirrored.
-    MirroredRepeat,
-    /// The border goes on.
-    ClampToEdge,
 }
 
 /// How a lookup reads texels.
@@ -204,19 +193,6 @@ pub(crate) fn read_image(name: &str, bytes: &[u8], limits: Limits) -> Result<Ras
         .map_err(|source| ImageError::Decode { name: name.to_owned(), source })
 }
 
-/// What lies between the four texels around a place, whose centres are at whole numbers.
-pub(crate) fn bilinear([x, y]: [f64; 2], at: impl Fn(f64, f64) -> [f64; 4]) -> [f64; 4] {
-    let (x0, y0) = (x.floor(), y.floor());
-    let (fx, fy) = (x - x0, y - y0);
-    let (a, b) = (at(x0, y0), at(x0 + 1.0, y0));
-    let (c, d) = (at(x0, y0 + 1.0), at(x0 + 1.0, y0 + 1.0));
-    std::array::from_fn(|k| {
-        let top = a[k] + (b[k] - a[k]) * fx;
-        let bottom = c[k] + (d[k] - c[k]) * fx;
-        top + (bottom - top) * fy
-    })
-}
-
 impl Image {
     /// The magenta and black checker that stands in for an image that cannot be had.
     #[must_use]
@@ -360,27 +336,5 @@ fn decoded(raster: &Raster, index: usize, encoding: Encoding) -> [f64; 4] {
     match encoding {
         Encoding::Srgb => raster.linear(index),
         Encoding::Linear => raster.texel(index),
-    }
-}
-
-impl Wrap {
-    /// Column or row `x` (a whole number) of `size` after wrapping.
-    pub(crate) fn apply(self, x: f64, size: usize) -> usize {
-        let n = size as f64;
-        let wrapped = match self {
-            Self::Repeat => x.rem_euclid(n),
-            Self::MirroredRepeat => {
-                let m = x.rem_euclid(2.0 * n);
-                if m < n { m } else { 2.0 * n - 1.0 - m }
-            }
-            Self::ClampToEdge => x,
-        };
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "clamped to the image; the cast saturates"
-        )]
-        let index = wrapped.clamp(0.0, n - 1.0) as usize;
-        index.min(size - 1)
     }
 }

@@ -10,10 +10,10 @@ use serde_json::{Value, json};
 
 use super::document::Document;
 use super::lens::SCENE_KEYS;
-use super::{WrittenPlaces, check, join, kind_of, read_document, spec};
+use super::{WrittenPlaces, check, join, read_document, spec};
 use crate::SceneError;
 use crate::error::not_found;
-use crate::words::plain;
+use crate::words::{kind_of, plain};
 use etendue_camera::CameraSpec;
 use etendue_camera::curve_files::{self, LONGEST_TABLE};
 use etendue_files::{InputFolder, Opener};

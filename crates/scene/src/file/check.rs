@@ -12,6 +12,7 @@ mod choice;
 use serde_json::{Map, Value};
 
 use super::document::{join, join_index};
+use crate::words::{kind_of, nearest, suggest};
 use etendue_geometry::units::Dimension;
 use etendue_optics::train::NOTES;
 
@@ -28,51 +29,6 @@ pub(crate) struct Problem {
 pub(crate) fn check(schema: &Value, value: &Value) -> Result<(), Problem> {
     let definitions = schema.get("$defs").and_then(Value::as_object);
     Checker { definitions }.visit(schema, value, "")
-}
-
-/// What a value is, as a sentence says it.
-pub(crate) fn kind_of(value: &Value) -> &'static str {
-    match value {
-        Value::Null => "null",
-        Value::Bool(_) => "true or false",
-        Value::Number(_) => "a number",
-        Value::String(_) => "a string",
-        Value::Array(_) => "an array",
-        Value::Object(_) => "an object",
-    }
-}
-
-/// `; did you mean …? known: …`, with the nearest of `known` when one is near.
-pub(crate) fn suggest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> String {
-    let mut known: Vec<&str> = known.into_iter().collect();
-    known.sort_unstable();
-    known.dedup();
-    let listed: Vec<String> = known.iter().take(40).map(|k| format!("`{k}`")).collect();
-    let all = match listed.len() {
-        0 => return String::new(),
-        n if n < known.len() => format!("known: {}, …", listed.join(", ")),
-        _ => format!("known: {}", listed.join(", ")),
-    };
-    match nearest(wrong, known) {
-        Some(near) => format!("; did you mean `{near}`? {all}"),
-        None => format!("; {all}"),
-    }
-}
-
-/// The word that was probably meant.
-pub(crate) fn nearest<'a>(
-    wrong: &str,
-    known: impl IntoIterator<Item = &'a str>,
-) -> Option<&'a str> {
-    // Nobody mistypes a word of that length, and comparing takes its time.
-    if wrong.len() > 200 {
-        return None;
-    }
-    let wrong = wrong.to_lowercase();
-    let distance = |word: &str| strsim::damerau_levenshtein(&wrong, &word.to_lowercase());
-    let best = known.into_iter().min_by_key(|word| distance(word))?;
-    // A third of the letters may be wrong: `colour`, `resoluton`, `focus_distnace`.
-    (distance(best) * 3 <= wrong.chars().count().max(best.chars().count()).max(3)).then_some(best)
 }
 
 struct Checker<'a> {

@@ -6,7 +6,7 @@ use std::collections::HashSet;
 
 use serde_json::{Map, Value};
 
-use crate::words::plain;
+use crate::words::{kind_of, plain};
 
 /// A place in a text, both counted from 1; the column in characters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -319,7 +319,7 @@ pub(crate) fn apply(root: &mut Value, path: &str, text: &str) -> Result<String, 
                 &mut elements[index]
             }
             leaf => {
-                let found = super::check::kind_of(leaf);
+                let found = kind_of(leaf);
                 return Err(OverrideError::Leaf { parent, found, step: step.clone() });
             }
         };

@@ -44,7 +44,6 @@ pub use settings::{
 pub use spec::{FormatVersion, SceneSpec, scene_schema};
 pub use tolerance::{DisplacementSpec, ShareSpec, ToleranceSpec};
 
-pub(crate) use check::{kind_of, nearest, suggest};
 pub(crate) use document::{join, join_index};
 
 use crate::SceneError;

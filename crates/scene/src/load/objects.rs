@@ -8,9 +8,7 @@ use std::path::PathBuf;
 
 use crate::doctor::memory;
 use crate::error::not_found;
-use crate::file::{
-    AnimationSpec, FileKind, ObjectSpec, SceneFile, Source, Up, join, join_index, suggest,
-};
+use crate::file::{AnimationSpec, FileKind, ObjectSpec, SceneFile, Source, Up, join, join_index};
 use crate::import::{Import, Note, NoteKind, Play};
 use crate::memory::Budget;
 use crate::parts::{Instances, Object, Parts};

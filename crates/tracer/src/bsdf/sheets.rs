@@ -11,7 +11,7 @@ use etendue_geometry::disk;
 use super::albedo::{AlbedoTable, OBLIQUITIES, ROUGHNESSES, TABLE, lacking, obliquity};
 use super::metal::{mean_reflectance, multiple};
 use super::{Weights, fresnel};
-use crate::transport::{LANES, Row};
+use crate::{LANES, Row};
 
 const ZERO: Row = [0.0; LANES];
 

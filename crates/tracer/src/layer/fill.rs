@@ -200,8 +200,8 @@ impl SceneView<'_> {
         for i in run {
             let (geometric, direction) = (traced.hits.normal(i), traced.rays.direction(i));
             let side = if geometric.dot(direction) > 0.0 { 1.0 } else { -1.0 };
-            let spot = self.spot(traced.hits, i);
-            let normal = spot.and_then(|spot| spot.turned_normal(turn.as_ref(), geometric));
+            let point = self.spot(traced.hits, i);
+            let normal = point.and_then(|point| point.turned_normal(turn.as_ref(), geometric));
             out[i] = (normal.unwrap_or(geometric).dot(direction) * side).max(0.0);
         }
     }

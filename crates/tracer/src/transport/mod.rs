@@ -14,6 +14,7 @@
 //!   one of them where a smooth boundary parts them; here all go on, each its way.
 
 mod ask;
+mod boundaries;
 mod dispersion;
 mod kernels;
 mod media;
@@ -34,7 +35,6 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Geometry, HitPrecision, RayBatch};
 
 use self::patch::Patch;
-pub(crate) use self::patch::{LANES, Row};
 use self::paths::Workspace;
 use self::rays::{Batch, Blocks};
 pub use self::rules::{Follow, Rules};

@@ -10,17 +10,12 @@ use crate::lamps::AreaLight;
 use crate::light_sampler::{Choices, Receiver};
 use crate::spawn::Anchor;
 use crate::target::{Target, TargetKind};
-use crate::{Color, ConductorId, Tint};
-
-/// Hits worked on side by side.
-pub(crate) const LANES: usize = 64;
+use crate::{Color, ConductorId, LANES, Row, Tint};
 
 /// Hits of f32 are beside an edge of their triangle where their least barycentric weight is below this: only
 /// triangles that are less than some hundred of the bounds of [`spawn`](crate::spawn) high have others as near
 /// to one, and a mesh of those has no sharp corners that it can resolve.
 pub(super) const BESIDE: f64 = 1.0 / 256.0;
-
-pub(crate) type Row = [f64; LANES];
 
 /// Hits and what leaves them.
 #[derive(Debug, Default)]

@@ -12,7 +12,6 @@ use bytemuck::AnyBitPattern;
 use gltf::json;
 
 use super::document::Document;
-use super::draco::Decoded;
 use super::meshopt::MeshoptView;
 use super::{Reader, damaged};
 use crate::import::files::Files;
@@ -68,8 +67,6 @@ pub(super) struct Buffers {
     buffers: Vec<Result<Bytes, Unread>>,
     /// The bytes of compressed views, once somebody needs them.
     decoded: Vec<OnceLock<Bytes>>,
-    /// The meshes of views that Draco compressed, once somebody needs them.
-    pub(super) draco: Vec<OnceLock<Decoded>>,
 }
 
 /// A buffer without bytes of its own: another extension's placeholder.
@@ -102,9 +99,7 @@ impl Buffers {
         }
         let mut decoded = Vec::new();
         decoded.resize_with(document.root.buffer_views.len(), OnceLock::new);
-        let mut draco = Vec::new();
-        draco.resize_with(document.root.buffer_views.len(), OnceLock::new);
-        Ok(Self { buffers, decoded, draco })
+        Ok(Self { buffers, decoded })
     }
 }
 

@@ -3,8 +3,7 @@
 use etendue_geometry::{Link, Transform};
 
 use super::Reader;
-use super::hierarchy::Scene;
-use super::pose::local;
+use super::pose::{Pose, local};
 use crate::import::Import;
 use crate::import::error::{Note, NoteKind, push};
 
@@ -68,9 +67,9 @@ impl<'a> Chains<'a> {
     }
 
     /// Notes that cameras of nodes that move stand still.
-    pub(super) fn note(&self, scene: &Scene, import: &mut Import) {
+    pub(super) fn note(&self, pose: &Pose, import: &mut Import) {
         let document = self.reader.document;
-        for &node in scene.pose.shown.iter().filter(|node| self.moves(**node)) {
+        for &node in pose.shown.iter().filter(|node| self.moves(**node)) {
             let shown = &document.nodes[node];
             if shown.camera.is_some() {
                 let message = "its camera stands still within an exposure, as it is in the moment that is shown";

@@ -5,6 +5,7 @@
 //! out is checked here.
 
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 use draco_core::{
     DataType, DecodeLimits, DecoderBuffer, ErrorKind, Mesh, MeshDecoder, PointAttribute, PointIndex,
@@ -18,6 +19,7 @@ use serde::Deserialize;
 use super::Reader;
 use super::accessor::Accessor;
 use super::buffers::{Bytes, View};
+use super::document::Document;
 use crate::import::ImportError;
 use crate::words::plain;
 
@@ -61,6 +63,11 @@ impl Compressed {
     }
 }
 
+/// A place for the mesh of each view of a document.
+pub(super) fn undecoded(document: &Document) -> Vec<OnceLock<Decoded>> {
+    document.root.buffer_views.iter().map(|_| OnceLock::new()).collect()
+}
+
 impl Reader<'_> {
     /// The mesh of `primitive` when it is there in compressed form alone.
     pub(super) fn draco(
@@ -88,7 +95,7 @@ impl Reader<'_> {
     fn decoded(&self, index: usize, place: &str) -> Result<&Decoded, ImportError> {
         let View { bytes, start, len, .. } = self.view(index, place)?;
         // There is such a view.
-        let known = &self.buffers.draco[index];
+        let known = &self.meshes_of_views[index];
         if let Some(decoded) = known.get() {
             return Ok(decoded);
         }

@@ -14,10 +14,9 @@ use serde_json::Value;
 
 use super::damaged;
 use super::document::{Document, Node};
-use crate::file::kind_of;
 use crate::import::ImportError;
 use crate::import::error::{self, Note, NoteKind};
-use crate::words::plain;
+use crate::words::{kind_of, plain};
 
 const NAME: &str = "KHR_lights_punctual";
 

@@ -13,11 +13,15 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::images::Images;
-use super::material::{Judge, MIRROR};
+use super::judge::Judge;
 use crate::import::{Import, ImportError};
 use etendue_tracer::scattering::{Absorption, Glass, GltfSurface};
 use etendue_tracer::texture::Encoding;
 use etendue_tracer::{Ior, Scattering, TextureUse};
+
+/// The refractive index of what reflects all that its colour lets it. An index of 0 stands for it in
+/// `KHR_materials_ior`; glass of 10¹⁵ reflects as much.
+pub(super) const MIRROR: f64 = 1e15;
 
 const SHEEN: &str = "KHR_materials_sheen";
 const ANISOTROPY: &str = "KHR_materials_anisotropy";

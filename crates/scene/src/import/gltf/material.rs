@@ -16,7 +16,8 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::images::Images;
-use super::lobes::Glossiness;
+use super::judge::Judge;
+use super::lobes::{Glossiness, MIRROR};
 use super::{Reader, lobes};
 use crate::import::error::{self, Note, NoteKind};
 use crate::import::{Import, ImportError, Strictness};
@@ -46,74 +47,6 @@ pub(super) fn load(reader: &Reader<'_>, import: &mut Import) -> Result<(), Impor
     }
     import.materials.push(Material { one_sided: reader.wanted.light, ..Material::unnamed() });
     Ok(())
-}
-
-/// What becomes of numbers that no surface can have.
-pub(super) struct Judge<'a> {
-    reader: &'a Reader<'a>,
-    /// What the material is called in messages.
-    subject: String,
-}
-
-impl Judge<'_> {
-    /// Says that the material's `what` is wrong and what is done about it; refused when strict.
-    pub(super) fn say(
-        &self,
-        what: &str,
-        remedy: &str,
-        import: &mut Import,
-    ) -> Result<(), ImportError> {
-        if self.reader.options.strictness == Strictness::Strict {
-            let place = format!("material \"{}\"", self.subject);
-            return Err(self.reader.damaged(place, format!("its {what}; export it again")));
-        }
-        let message = format!("its {what}; {remedy}");
-        error::push(&mut import.notes, Note::new(NoteKind::Irregular, &self.subject, message));
-        Ok(())
-    }
-
-    /// What messages call a key of the material.
-    pub(super) fn place(&self, key: &str) -> String {
-        format!("material \"{}\".{key}", self.subject)
-    }
-
-    /// A factor brought to `low..=high`.
-    pub(super) fn factor(
-        &self,
-        key: &str,
-        value: f64,
-        [low, high]: [f64; 2],
-        import: &mut Import,
-    ) -> Result<f64, ImportError> {
-        if !(low..=high).contains(&value) {
-            let what = match high {
-                f64::INFINITY => format!("{key} {value} is below {low}"),
-                _ => format!("{key} {value} is outside {low} to {high}"),
-            };
-            self.say(&what, "it is brought there", import)?;
-        }
-        Ok(if value.is_nan() { low } else { value.clamp(low, high) })
-    }
-
-    /// The number that an extension of the material gives; `None` without one.
-    pub(super) fn number(
-        &self,
-        material: &json::Material,
-        name: &str,
-        key: &str,
-        import: &mut Import,
-    ) -> Result<Option<f64>, ImportError> {
-        let extension = material.extensions.as_ref().and_then(|e| e.others.get(name));
-        let Some(extension) = extension else { return Ok(None) };
-        let value = match (extension.is_object(), extension.get(key)) {
-            (true, None) => return Ok(None),
-            (_, value) => value.and_then(Value::as_f64),
-        };
-        if value.is_none() {
-            self.say(&format!("{name}.{key} is not a number"), "it is left out", import)?;
-        }
-        Ok(value)
-    }
 }
 
 fn read(
@@ -227,10 +160,6 @@ fn is_unlit(material: &json::Material) -> bool {
     let extensions = material.extensions.as_ref();
     extensions.is_some_and(|extensions| extensions.others.contains_key("KHR_materials_unlit"))
 }
-
-/// The refractive index of what reflects all that its colour lets it. An index of 0 stands for it in
-/// `KHR_materials_ior`; glass of 10¹⁵ reflects as much.
-pub(super) const MIRROR: f64 = 1e15;
 
 /// The metallic-roughness surface and the extensions that change it.
 fn scattering(

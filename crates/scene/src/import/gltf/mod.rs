@@ -18,14 +18,18 @@ mod draco;
 mod extensions;
 mod hierarchy;
 mod images;
+mod instances;
+mod judge;
 mod lights;
 mod lobes;
 mod material;
 mod meshopt;
+mod part;
 mod pose;
 mod primitive;
 
 use std::path::Path;
+use std::sync::OnceLock;
 
 use super::files::Files;
 use super::{Import, ImportError, ImportedLight, Options, Wanted, error};
@@ -34,6 +38,7 @@ use animation::Playing;
 use buffers::Buffers;
 use chains::Chains;
 use document::Document;
+use draco::Decoded;
 
 /// What the parts of the reader share.
 pub(super) struct Reader<'a> {
@@ -42,6 +47,8 @@ pub(super) struct Reader<'a> {
     files: &'a Files,
     document: &'a Document,
     buffers: &'a Buffers,
+    /// The meshes of views that Draco compressed, once somebody needs them.
+    meshes_of_views: Vec<OnceLock<Decoded>>,
     wanted: Wanted,
     options: &'a Options,
     /// What goes on from the moment that is shown.
@@ -107,7 +114,17 @@ pub(super) fn import(
         let buffers = Buffers::open(path, files, &document, container.binary.clone())?;
         let moved = {
             let (document, buffers, playing) = (&document, &buffers, &playing);
-            let reader = Reader { file: path, files, document, buffers, wanted, options, playing };
+            let meshes_of_views = draco::undecoded(document);
+            let reader = Reader {
+                file: path,
+                files,
+                document,
+                buffers,
+                meshes_of_views,
+                wanted,
+                options,
+                playing,
+            };
             animation::moved(&reader, play, &mut import)?
         };
         animation::apply(path, &moved, &mut document.nodes)?;
@@ -122,6 +139,7 @@ pub(super) fn import(
         files,
         document: &document,
         buffers: &buffers,
+        meshes_of_views: draco::undecoded(&document),
         wanted,
         options,
         playing: &playing,
@@ -129,8 +147,8 @@ pub(super) fn import(
     let chains = Chains::new(&reader);
     let shapes = primitive::load(&reader, (&scene, &chains), &mut import)?;
     material::load(&reader, &mut import)?;
-    chains.note(&scene, &mut import);
-    hierarchy::place(&reader, (&scene, &chains), &shapes, &mut import)?;
+    chains.note(&scene.pose, &mut import);
+    instances::place(&reader, (&scene, &chains), &shapes, &mut import)?;
     import.cameras = scene.cameras;
     if wanted.light {
         let moves = |(node, light)| ImportedLight { links: chains.of(node), ..light };

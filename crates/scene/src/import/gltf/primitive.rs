@@ -4,22 +4,21 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::sync::Arc;
 
-use etendue_geometry::{Buffer, Positions, Vertices};
+use etendue_geometry::{Buffer, Mesh, Positions, Vertices};
 use gltf::json;
 use json::mesh::{Mode, Primitive, Semantic};
 use json::validation::Checked;
 use rayon::prelude::*;
 
 use super::Reader;
-use super::accessor::Accessor;
 use super::chains::Chains;
 use super::deform::{Corners, Skin};
-use super::draco::{Compressed, Decoded};
 use super::hierarchy::{Scene, Shape};
+use super::part::Part;
 use crate::import::admit::{Admitted, Candidate, admit, cost};
 use crate::import::deformer::Deformer;
 use crate::import::error::{self, Note, NoteKind};
-use crate::import::{Import, ImportError, Strictness};
+use crate::import::{Import, ImportError};
 
 /// A primitive that became a mesh.
 pub(super) struct Loaded {
@@ -64,6 +63,16 @@ struct Read {
     copied: u64,
     mapped: u64,
     notes: Vec<Note>,
+}
+
+impl Read {
+    /// A mesh of nothing, of which there are `notes`.
+    fn empty(name: String, notes: Vec<Note>) -> Self {
+        let positions = Positions::F32(Vertices::from_arrays(&[]));
+        let mesh = Mesh::new(name, positions, Vec::new().into());
+        let admitted = Admitted { mesh, dropped: 0, notes: Vec::new() };
+        Self { skinned: false, admitted, deformer: None, copied: 0, mapped: 0, notes }
+    }
 }
 
 /// Loads the meshes that `scene` shows. Materials are numbered as in the document.
@@ -185,10 +194,10 @@ fn read(
         return Ok(None);
     }
     let draco = reader.draco(primitive, &place)?;
-    let mut part = Part { reader, primitive, draco, place, notes: Vec::new() };
+    let mut part = Part::new(reader, primitive, draco, place);
     let Some(positions) = part.attribute::<3>(&Semantic::Positions, 0.0)? else {
         part.note(NoteKind::Irregular, "a primitive without positions is left out");
-        return Ok(Some(part.empty(name)));
+        return Ok(Some(Read::empty(name, part.notes)));
     };
     let triangles = part.triangles(mode, positions.len())?;
     let wanted = reader.wanted;
@@ -218,175 +227,8 @@ fn read(
     Ok(Some(Read { skinned, admitted, deformer, copied, mapped, notes: part.notes }))
 }
 
-/// A primitive being read.
-pub(super) struct Part<'a> {
-    pub reader: &'a Reader<'a>,
-    pub primitive: &'a Primitive,
-    /// Where its vertices and triangles are, when they are compressed.
-    draco: Option<(Compressed, &'a Decoded)>,
-    pub place: String,
-    notes: Vec<Note>,
-}
-
-impl<'a> Part<'a> {
-    /// The floats of an attribute; `None` when the primitive has none.
-    pub(super) fn attribute<const N: usize>(
-        &self,
-        semantic: &Semantic,
-        fill: f32,
-    ) -> Result<Option<Vertices<N>>, ImportError> {
-        let Some((accessor, place)) = self.accessor(semantic)? else { return Ok(None) };
-        match accessor.floats(fill) {
-            Some(floats) => Ok(Some(floats)),
-            None => Err(self.reader.damaged(
-                place,
-                format!(
-                    "it has {} components, not {N}; export the file again",
-                    accessor.components
-                ),
-            )),
-        }
-    }
-
-    /// As [`Self::attribute`], one for each position; an attribute of another length is left out
-    /// with a note, or refused under strict rules.
-    fn vertex_data<const N: usize>(
-        &mut self,
-        semantic: &Semantic,
-        fill: f32,
-        positions: &Vertices<3>,
-    ) -> Result<Option<Vertices<N>>, ImportError> {
-        let Some(values) = self.attribute(semantic, fill)? else { return Ok(None) };
-        if values.len() == positions.len() {
-            return Ok(Some(values));
-        }
-        let reason = format!(
-            "{} has {} values for {} positions",
-            semantic.to_string(),
-            values.len(),
-            positions.len()
-        );
-        self.irregular(&reason, "left out")?;
-        Ok(None)
-    }
-
-    fn uvs(&mut self, positions: &Vertices<3>) -> Result<Vec<Vertices<2>>, ImportError> {
-        let mut sets = Vec::new();
-        // glTF numbers sets without gaps.
-        while let Ok(set) = u32::try_from(sets.len()) {
-            match self.vertex_data(&Semantic::TexCoords(set), 0.0, positions)? {
-                Some(uvs) => sets.push(uvs),
-                None => break,
-            }
-        }
-        Ok(sets)
-    }
-
-    fn accessor(&self, semantic: &Semantic) -> Result<Option<(Accessor<'a>, String)>, ImportError> {
-        let wanted = semantic.to_string();
-        let found = self.primitive.attributes.iter().find(|(known, _)| match known {
-            Checked::Valid(known) => known.to_string() == wanted,
-            Checked::Invalid => false,
-        });
-        let place = format!("{}, {wanted}", self.place);
-        if let Some((compressed, decoded)) = &self.draco {
-            let accessors = &self.reader.document.root.accessors;
-            let own = found.and_then(|(_, index)| accessors.get(index.value()));
-            let normalized = own.is_some_and(|accessor| accessor.normalized);
-            if let Some(accessor) = decoded.accessor(compressed, &wanted, normalized) {
-                let accessor = accessor.map_err(|why| self.reader.damaged(&*place, why))?;
-                return Ok(Some((accessor, place)));
-            }
-        }
-        let Some((_, index)) = found else { return Ok(None) };
-        let accessor = self.reader.accessor(index.value(), &place)?;
-        Ok(Some((accessor, place)))
-    }
-
-    fn triangles(&mut self, mode: Mode, vertices: usize) -> Result<Buffer<[u32; 3]>, ImportError> {
-        if let Some((_, decoded)) = &self.draco {
-            return Ok(decoded.triangles.clone().into());
-        }
-        let Some(index) = self.primitive.indices else {
-            let count = u32::try_from(vertices).unwrap_or(u32::MAX);
-            self.whole_triangles(mode, vertices)?;
-            return Ok(assemble(mode, vertices, |i| u32::try_from(i).unwrap_or(count)).into());
-        };
-        let place = format!("{}, indices", self.place);
-        let accessor = self.reader.accessor(index.value(), &place)?;
-        self.reader.files.take(12 * accessor.count as u64 / 3, || place.clone())?;
-        if !accessor.is_index() {
-            return Err(self.reader.damaged(
-                place,
-                "they are not scalars of componentType 5121, 5123 or 5125; export the file again",
-            ));
-        }
-        self.whole_triangles(mode, accessor.count)?;
-        if mode == Mode::Triangles
-            && let Some(mapped) = accessor.mapped_triangles()
-        {
-            return Ok(mapped);
-        }
-        let corners = accessor.integers();
-        let corners: &[u32] = &corners;
-        Ok(assemble(mode, corners.len(), |i| corners[i]).into())
-    }
-
-    fn whole_triangles(&mut self, mode: Mode, corners: usize) -> Result<(), ImportError> {
-        match corners % 3 {
-            left @ 1.. if mode == Mode::Triangles => self.irregular(
-                &format!("{left} of {corners} corners make no whole triangle"),
-                "left out",
-            ),
-            _ => Ok(()),
-        }
-    }
-
-    pub(super) fn irregular(&mut self, reason: &str, done: &str) -> Result<(), ImportError> {
-        if self.reader.options.strictness == Strictness::Strict {
-            return Err(self.reader.damaged(
-                self.place.clone(),
-                format!("{reason}; without --strict they are {done}"),
-            ));
-        }
-        self.note(NoteKind::Irregular, &format!("{reason}; they are {done}"));
-        Ok(())
-    }
-
-    fn note(&mut self, kind: NoteKind, message: &str) {
-        self.note_counted(kind, message, 1);
-    }
-
-    pub(super) fn note_counted(&mut self, kind: NoteKind, message: &str, count: u64) {
-        self.notes.push(Note::new(kind, self.place.clone(), message).counted(count));
-    }
-
-    /// A mesh of nothing.
-    fn empty(self, name: String) -> Read {
-        let positions = Positions::F32(Vertices::from_arrays(&[]));
-        let mesh = etendue_geometry::Mesh::new(name, positions, Vec::new().into());
-        let admitted = Admitted { mesh, dropped: 0, notes: Vec::new() };
-        Read { skinned: false, admitted, deformer: None, copied: 0, mapped: 0, notes: self.notes }
-    }
-}
-
 /// `triangles` with their backs in front.
 fn turned_over(triangles: &[[u32; 3]]) -> Buffer<[u32; 3]> {
     let turned: Vec<[u32; 3]> = triangles.par_iter().map(|&[a, b, c]| [a, c, b]).collect();
     turned.into()
-}
-
-/// Triangles from `len` corners (glTF 2.0, section 3.7.2.1): in strips, every other triangle is
-/// turned round so that all fronts are on one side.
-fn assemble(mode: Mode, len: usize, corner: impl Fn(usize) -> u32 + Sync) -> Vec<[u32; 3]> {
-    let count = match mode {
-        Mode::Triangles => len / 3,
-        _ => len.saturating_sub(2),
-    };
-    let triangle = |i: usize| match mode {
-        Mode::Triangles => [3 * i, 3 * i + 1, 3 * i + 2],
-        Mode::TriangleStrip => [i, i + 1 + i % 2, i + 2 - i % 2],
-        _ => [i + 1, i + 2, 0],
-    };
-    (0..count).into_par_iter().map(|i| triangle(i).map(&corner)).collect()
 }
