@@ -36,7 +36,7 @@ const SECONDS: [f64; 2] = [60.0, 10.0];
 const CONVERGED: u32 = 16;
 
 pub(crate) fn run(arguments: &BenchArguments) -> Result<(), Fault> {
-    stop::listen();
+    stop::listen(say);
     let folder_is_new = !arguments.output.exists();
     let done = bench(arguments);
     if done.is_err() && folder_is_new {

@@ -39,7 +39,7 @@ pub(crate) fn run(arguments: &PlanArguments) -> Result<(), Fault> {
 
 /// `--models`: what simpler models of the lens miss, and what they cost.
 fn compare_models(arguments: &PlanArguments) -> Result<(), Fault> {
-    stop::listen();
+    stop::listen(say);
     let phases = Phases::new(arguments.json);
     // The tolerance is what models are judged by here, not what is taken of the scene's.
     let own = SceneArguments { tolerance: None, ..arguments.scene.clone() };

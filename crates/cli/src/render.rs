@@ -27,7 +27,7 @@ pub(crate) fn carry_out(
     arguments: &RenderArguments,
     render: impl FnOnce(Outputs) -> Result<(), Fault> + Send,
 ) -> Result<(), Fault> {
-    stop::listen();
+    stop::listen(say);
     let outputs = Outputs::from_list(&arguments.outputs)
         .map_err(|message| Fault::refused(format!("--outputs: {message}")))?;
     let outputs = Outputs { denoised: arguments.denoise, ..outputs };

@@ -21,7 +21,7 @@ use crate::progress::{Phases, say};
 use crate::stop;
 
 pub(crate) fn run(arguments: &SensorArguments) -> Result<(), Fault> {
-    stop::listen();
+    stop::listen(say);
     let Some(name) = &arguments.sensor else {
         return list(arguments.json);
     };

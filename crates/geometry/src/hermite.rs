@@ -4,7 +4,7 @@
 //! parabola (Catmull & Rom, *A class of local interpolating splines*, 1974, for uneven times): points on a parabola give that
 //! parabola. Of two points the curve is the line.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

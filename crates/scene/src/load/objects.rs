@@ -13,6 +13,7 @@ use crate::import::{Import, Note, NoteKind, Play};
 use crate::memory::Budget;
 use crate::parts::{Instances, Object, Parts};
 use crate::shape::ShapeSpec;
+use crate::words::suggest;
 use crate::{Cache, SceneError, cache};
 use etendue_files::{FoundFile, InputFolder};
 use etendue_geometry::{Bounds, Geometry, Mesh, Placement};

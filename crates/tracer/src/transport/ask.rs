@@ -1,9 +1,10 @@
 //! Lights that are asked: for each hit of a patch one, a place on it, and a ray to that.
 
-use super::patch::{Compressed, LANES, Patch, SheetColors, at};
+use super::patch::{Compressed, Patch, SheetColors, at};
 use super::paths::{Draw, Step, Workspace};
 use super::rays::Rays;
 use super::{LightingContext, Tracing, kernels};
+use crate::LANES;
 use crate::bsdf::Weights;
 use crate::placed::SurfaceKind;
 use crate::sampling::power_heuristic;

@@ -8,7 +8,8 @@ use etendue_geometry::block::LANES as BLOCK;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{RayBlock, disk};
 
-use super::patch::{BESIDE, LANES, Patch, Picks};
+use super::patch::{BESIDE, Patch, Picks};
+use crate::LANES;
 use crate::bsdf::fresnel::schlick_weight;
 use crate::lamps::AreaLight;
 use crate::sampling::ONE_BELOW;

@@ -21,7 +21,7 @@ impl Media {
     /// In the open.
     pub(super) const NONE: Self = Self { bodies: [MISS; DEPTH], sheet: MISS };
 
-    fn with(mut self, body: u32) -> Self {
+    pub(super) fn with(mut self, body: u32) -> Self {
         if !self.bodies.contains(&body)
             && let Some(place) = self.bodies.iter_mut().find(|place| **place == MISS)
         {
@@ -56,7 +56,7 @@ pub(super) struct Coincident {
     pub(super) placement: u32,
     pub(super) triangle: u32,
     /// The ray came from its front.
-    front: bool,
+    pub(super) front: bool,
 }
 
 impl Coincident {
@@ -72,15 +72,20 @@ impl Coincident {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Crossing {
     /// Before the front of its triangles.
-    outside: Media,
+    pub(super) outside: Media,
     /// Behind it.
-    inside: Media,
+    pub(super) inside: Media,
 }
 
 impl Crossing {
     /// Those that a path which was in `media` finds at a boundary. That it met the front of a body says that it was not
     /// in it, and the back that it was, whatever it crossed before.
-    fn of(media: Media, hit: (u32, Coincident), front: bool, placed: &PlacedSurfaces) -> Self {
+    pub(super) fn of(
+        media: Media,
+        hit: (u32, Coincident),
+        front: bool,
+        placed: &PlacedSurfaces,
+    ) -> Self {
         let open = Media { sheet: MISS, ..media };
         let (placement, second) = hit;
         if second.placement != MISS {

@@ -10,8 +10,9 @@ use etendue_geometry::{
     Detail, HitBatch, HitPrecision, PlacedTriangle, RayBatch, RayBlock, RayBlocks,
 };
 
-use super::patch::{BESIDE, LANES, Patch, put};
+use super::patch::{BESIDE, Patch, put};
 use super::{LightingContext, kernels};
+use crate::LANES;
 
 /// What a ray hit.
 #[derive(Debug, Clone, Copy)]

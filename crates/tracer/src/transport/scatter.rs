@@ -3,10 +3,11 @@
 use etendue_geometry::glam::DVec3;
 
 use super::media::{Coincident, Media};
-use super::patch::{Away, Compressed, LANES, Patch, at};
+use super::patch::{Away, Compressed, Patch, at};
 use super::paths::{Draw, Passage, Step, Way, Workspace};
 use super::rays::Rays;
 use super::{LightingContext, Tracing, kernels};
+use crate::LANES;
 use crate::bsdf::Weights;
 use crate::footprint::Cone;
 use crate::placed::SurfaceKind;

@@ -3,15 +3,15 @@
 use super::Tracing;
 use super::dispersion::Boundary;
 use super::media::Coincident;
-use super::patch::{LANES, Patch, SheetColors, at, put};
+use super::patch::{Patch, SheetColors, at, put};
 use super::paths::{Draw, Paths, Step, Workspace};
 use super::rays::Rays;
 use crate::bsdf::{Bsdf, Model};
 use crate::placed::PlacedSurface;
 use crate::reference::SurfacePoint;
-use crate::scattering::SheetSurface;
+use crate::shading::SheetSurface;
 use crate::surface::SurfaceInteraction;
-use crate::{Conductor, Scattering, Tint};
+use crate::{Conductor, LANES, Scattering, Tint};
 
 impl<const RGB: bool> Tracing<'_, RGB> {
     /// Where a hit is on its mesh, as path `i` sees it.

@@ -9,7 +9,7 @@ use etendue_geometry::PlacedTriangle;
 use etendue_geometry::glam::DVec3;
 
 use super::media::Media;
-use super::patch::{LANES, Patch};
+use super::patch::Patch;
 use super::paths::{Carried, DRAWS, Draw, KINDS, Passage, Paths, Step, Way, Workspace};
 use super::rays::{RayHit, Rays};
 use super::{Follow, LightingContext, RaySamples, Tracing, kernels, metal};
@@ -18,7 +18,7 @@ use crate::footprint::{Cone, Footprint};
 use crate::light_sampler::Receiver;
 use crate::placed::{PlacedSurface, SurfaceKind};
 use crate::reference::SurfacePoint;
-use crate::{Scattering, Tint};
+use crate::{LANES, Scattering, Tint};
 
 /// The most surfaces that a path meets: those that let it pass count, and may be many.
 const MOST_STEPS: u32 = 4096;

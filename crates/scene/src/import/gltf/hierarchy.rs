@@ -2,19 +2,13 @@
 
 use std::path::Path;
 
-use serde_json::Value;
-
 use super::animation::Playing;
-use super::chains::Chains;
-use super::document::{Document, Node};
-use super::pose::{Pose, trs};
-use super::{Reader, absent, damaged};
+use super::document::Document;
+use super::pose::Pose;
+use super::{absent, damaged};
 use crate::import::error::Note;
-use crate::import::{
-    Import, ImportError, ImportedCamera, ImportedLight, ImportedPlacement, Projection,
-};
-use etendue_geometry::glam::{DQuat, DVec3};
-use etendue_geometry::{Link, Placement, Transform, Vertices};
+use crate::import::{ImportError, ImportedCamera, ImportedLight, Projection};
+use etendue_geometry::Transform;
 
 /// What stands in the scene.
 #[derive(Default)]

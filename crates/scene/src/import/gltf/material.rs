@@ -19,8 +19,7 @@ use super::images::Images;
 use super::judge::Judge;
 use super::lobes::{Glossiness, MIRROR};
 use super::{Reader, lobes};
-use crate::import::error::{self, Note, NoteKind};
-use crate::import::{Import, ImportError, Strictness};
+use crate::import::{Import, ImportError};
 
 /// The number of the material of `primitive`, which messages call `place`.
 pub(super) fn number(
