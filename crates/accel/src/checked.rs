@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use etendue_geometry::block::LANES;
+use etendue_geometry::block::{LANES, vector};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{
     Coplanar, Detail, Geometry, HitBatch, HitPrecision, MISS, RayBatch, RayBlock, RayBlocks,
@@ -111,7 +111,7 @@ impl Embree {
         let Some(turns) = self.scene.turns() else { return };
         for block in blocks {
             for lane in (0..LANES).filter(|&lane| block.placement[lane] != MISS) {
-                let own = DVec3::from(block.normal.map(|axis| f64::from(axis[lane])));
+                let own = vector(&block.normal, lane);
                 let turned = turns[block.placement[lane] as usize] * own;
                 for axis in 0..3 {
                     block.normal[axis][lane] = round(turned[axis]);

@@ -4,7 +4,7 @@
 
 use crate::single::round;
 use crate::watertight;
-use etendue_geometry::block::{Floats, LANES};
+use etendue_geometry::block::{LANES, vector};
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{
     Coplanar, Detail, Geometry, HitBatch, MISS, PlacedTriangle, Placement, RayBatch, RayBlock,
@@ -297,10 +297,9 @@ pub(crate) fn settle_blocks(
             if !coplanar.has_others(block.placement[lane]) {
                 continue;
             }
-            let vector = |axes: &[Floats; 3]| DVec3::from(axes.map(|a| f64::from(a[lane])));
             let query = Query {
-                origin: origin + vector(&block.origin),
-                direction: vector(&block.direction),
+                origin: origin + vector(&block.origin, lane),
+                direction: vector(&block.direction, lane),
                 t_min: f64::from(block.t_min[lane]),
                 t_max: f64::INFINITY,
             };

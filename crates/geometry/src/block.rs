@@ -1,5 +1,7 @@
 //! Rays in blocks of sixteen in single precision, as Embree's packets have them: light is traced in these.
 
+use glam::DVec3;
+
 use crate::batch::MISS;
 
 /// Rays of a block.
@@ -47,6 +49,14 @@ pub struct RayBlock {
     pub instance: Indices,
     /// Embree's numbers of primitives of instances, which not every version has.
     pub instance_primitive: Indices,
+}
+
+/// The vector of a lane of three arrays, one an axis.
+#[must_use]
+#[inline(always)]
+pub fn vector(axes: &[Floats; 3], lane: usize) -> DVec3 {
+    let [x, y, z] = axes;
+    DVec3::new(f64::from(x[lane]), f64::from(y[lane]), f64::from(z[lane]))
 }
 
 impl RayBlock {

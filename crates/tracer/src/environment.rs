@@ -89,13 +89,13 @@ impl EnvironmentMap {
     #[must_use]
     pub fn studio() -> Self {
         let (width, height) = (256, 128);
-        let lamp = DVec3::new(-0.6, 0.7, 0.55).normalize();
+        let area_light = DVec3::new(-0.6, 0.7, 0.55).normalize();
         let texels = (0..width * height)
             .map(|k| {
                 let at = |i: usize, n: usize| (i as f64 + 0.5) / n as f64;
                 let d = direction([at(k % width, width), at(k / width, height)]);
                 let sky = 0.3 + 0.2 * d.y;
-                let glow = (6.0 * (d.dot(lamp) - 0.82)).clamp(0.0, 1.0);
+                let glow = (6.0 * (d.dot(area_light) - 0.82)).clamp(0.0, 1.0);
                 #[expect(clippy::cast_possible_truncation, reason = "radiance is kept as f32")]
                 let value = (sky + 4.0 * glow * glow * (3.0 - 2.0 * glow)) as f32;
                 [value, value, value]

@@ -23,6 +23,7 @@
 //! | [`spectral`], [`sampling`] | colours to bands, numbers to directions |
 
 mod angles;
+mod area_light;
 mod bodies;
 pub mod bsdf;
 pub mod clear_sky;
@@ -32,7 +33,6 @@ pub mod environment;
 pub mod footprint;
 pub mod goniometric;
 pub mod group;
-mod lamps;
 pub mod layer;
 pub mod light;
 mod light_sampler;

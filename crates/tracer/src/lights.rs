@@ -7,9 +7,9 @@ use etendue_geometry::MISS;
 use etendue_geometry::glam::DVec3;
 use etendue_spectrum::{NoOverlap, Outside};
 
+use crate::area_light::{self, AreaLight, AreaLightMotion, triangle_power};
 use crate::environment::EnvironmentMap;
 use crate::group::Groups;
-use crate::lamps::{self, AreaLight, LampWay, triangle_power};
 use crate::light::{EnvironmentImage, Light, LightKind, irradiance, power, spot_falloff};
 use crate::light_sampler::{Candidate, Choices, LightSampler, Receiver};
 use crate::material::Alpha;
@@ -34,10 +34,10 @@ pub struct Lights {
     /// Placement and triangle of each emissive triangle, behind the lights.
     triangles: Vec<[u32; 2]>,
     sampler: LightSampler,
-    /// The emissive triangles where they are at most [`lamps::MOST`] (`None` of one without area, and of one that moves),
+    /// The emissive triangles where they are at most [`area_light::MOST`] (`None` of one without area, and of one that moves),
     /// and what those that shine alike all over give off in all bands.
-    lamps: Vec<Option<AreaLight>>,
-    lamp_bands: Vec<f64>,
+    area_lights: Vec<Option<AreaLight>>,
+    area_light_bands: Vec<f64>,
     groups: Groups,
 }
 
@@ -120,15 +120,17 @@ impl Lights {
             let mesh = scene.geometry.mesh_of(placement);
             let mean = material.emission.as_ref().map_or(1.0, |e| mean(&e.modulation));
             // What moves shines as much as in the middle of that time.
-            let way = LampWay::of(scene.geometry, placement, span);
+            let way = AreaLightMotion::of(scene.geometry, placement, span);
             let time = if way.is_some() { 0.5 * (span[0] + span[1]) } else { 0.0 };
             for triangle in 0..mesh.triangles.len() {
                 let id = [number, u32::try_from(triangle).unwrap_or(u32::MAX)];
                 let power = mean * triangle_power(scene, (placement, triangle), material, time);
-                candidates.push(match lamps::cluster(scene, (id, time), power, way.as_ref()) {
-                    Some(cluster) => Candidate::near(power, cluster),
-                    None => Candidate::Dark,
-                });
+                candidates.push(
+                    match area_light::cluster(scene, (id, time), power, way.as_ref()) {
+                        Some(cluster) => Candidate::near(power, cluster),
+                        None => Candidate::Dark,
+                    },
+                );
                 triangles.push(id);
             }
         }
@@ -147,7 +149,7 @@ impl Lights {
             scene.materials.iter().map(of_material),
         );
         let lights = lights.to_vec();
-        let (lamps, lamp_bands) = Default::default();
+        let (area_lights, area_light_bands) = Default::default();
         let mut all = Self {
             lights,
             bands,
@@ -156,11 +158,11 @@ impl Lights {
             first,
             triangles,
             sampler,
-            lamps,
-            lamp_bands,
+            area_lights,
+            area_light_bands,
             groups,
         };
-        all.light_lamps(scene, spectral);
+        all.prepare_area_lights(scene, spectral);
         Ok(all)
     }
 
@@ -183,16 +185,18 @@ impl Lights {
         count: usize,
     ) -> Option<(&AreaLight, &[f64])> {
         let number = index.checked_sub(self.lights.len())?;
-        let lamp = self.lamps.get(number)?.as_ref().filter(|lamp| lamp.is_plain)?;
-        Some((lamp, &self.lamp_bands[number * count..(number + 1) * count]))
+        let area_light = self.area_lights.get(number)?.as_ref().filter(|own| own.is_plain)?;
+        Some((area_light, &self.area_light_bands[number * count..(number + 1) * count]))
     }
 
     /// All lights and their bands, if they are few triangles that are kept ready and shine alike all over.
     pub(crate) fn few_triangles(&self) -> Option<(&[Option<AreaLight>], &[f64])> {
-        let is_plain = |lamp: &Option<AreaLight>| lamp.as_ref().is_some_and(|lamp| lamp.is_plain);
+        let is_plain =
+            |area_light: &Option<AreaLight>| area_light.as_ref().is_some_and(|own| own.is_plain);
         let are_few = self.lights.is_empty() && self.few().is_some();
-        let are_plain = are_few && !self.lamps.is_empty() && self.lamps.iter().all(is_plain);
-        are_plain.then_some((&self.lamps, &self.lamp_bands))
+        let are_plain =
+            are_few && !self.area_lights.is_empty() && self.area_lights.iter().all(is_plain);
+        are_plain.then_some((&self.area_lights, &self.area_light_bands))
     }
 
     /// The number among all lights of a triangle that shines.
@@ -208,8 +212,8 @@ impl Lights {
     }
 
     /// Keeps emissive triangles ready.
-    fn light_lamps(&mut self, scene: &SceneView<'_>, spectral: &Spectral) {
-        if self.is_dark() || self.triangles.len() > lamps::MOST {
+    fn prepare_area_lights(&mut self, scene: &SceneView<'_>, spectral: &Spectral) {
+        if self.is_dark() || self.triangles.len() > area_light::MOST {
             return;
         }
         let count = spectral.count();
@@ -221,14 +225,19 @@ impl Lights {
         }
         let stands = |id: [u32; 2]| scene.geometry.placements[id[0] as usize].motion.is_none();
         let still = |&id: &[u32; 2]| AreaLight::at(scene, id, 0.0).filter(|_| stands(id));
-        self.lamps = self.triangles.iter().map(still).collect();
-        self.lamp_bands = bands;
+        self.area_lights = self.triangles.iter().map(still).collect();
+        self.area_light_bands = bands;
     }
 
     /// The emissive triangle of a number at a time (s from the frame's time); `None` without area.
-    fn lamp(&self, scene: &SceneView<'_>, number: usize, time: f64) -> Option<Cow<'_, AreaLight>> {
-        match self.lamps.get(number) {
-            Some(Some(lamp)) => Some(Cow::Borrowed(lamp)),
+    fn area_light(
+        &self,
+        scene: &SceneView<'_>,
+        number: usize,
+        time: f64,
+    ) -> Option<Cow<'_, AreaLight>> {
+        match self.area_lights.get(number) {
+            Some(Some(area_light)) => Some(Cow::Borrowed(area_light)),
             _ => AreaLight::at(scene, self.triangles[number], time).map(Cow::Owned),
         }
     }
@@ -337,8 +346,10 @@ impl Lights {
     ) -> Chosen {
         let Some(light) = self.lights.get(index) else {
             let number = index - self.lights.len();
-            let lamp = (number, time);
-            return self.place_on_lamp(scene, spectral, lamp, square, chance, radiance).into();
+            let area_light = (number, time);
+            return self
+                .place_on_area_light(scene, spectral, area_light, square, chance, radiance)
+                .into();
         };
         radiance.copy_from_slice(self.bands_of(index, radiance.len()));
         let stand = light.stand(time);
@@ -383,7 +394,7 @@ impl Lights {
 
     /// A place on an emissive triangle.
     #[inline]
-    fn place_on_lamp(
+    fn place_on_area_light(
         &self,
         scene: &SceneView<'_>,
         spectral: &Spectral,
@@ -392,14 +403,15 @@ impl Lights {
         chance: f64,
         radiance: &mut [f64],
     ) -> Option<Target> {
-        let lamp = self.lamp(scene, number, time)?;
+        let area_light = self.area_light(scene, number, time)?;
         let [u, v] = triangle_point(square);
         let count = radiance.len();
-        match self.lamp_bands.get(number * count..(number + 1) * count) {
-            Some(bands) if lamp.is_plain => radiance.copy_from_slice(bands),
+        match self.area_light_bands.get(number * count..(number + 1) * count) {
+            Some(bands) if area_light.is_plain => radiance.copy_from_slice(bands),
             _ => {
-                let placement = &scene.geometry.placements[lamp.id[0] as usize];
-                let point = SurfacePoint::corner(scene.geometry, placement, lamp.id[1] as usize);
+                let placement = &scene.geometry.placements[area_light.id[0] as usize];
+                let point =
+                    SurfacePoint::corner(scene.geometry, placement, area_light.id[1] as usize);
                 let point = SurfacePoint { weights: [1.0 - u - v, u, v], time, ..point };
                 if !self.emitted(scene, spectral, &point, true, radiance) {
                     return None;
@@ -407,12 +419,12 @@ impl Lights {
             }
         }
         Some(Target {
-            kind: TargetKind::Triangle { two_sided: lamp.two_sided },
-            place: [lamp.corner[0], lamp.corner[1], lamp.across([u, v])],
-            normal: lamp.shape.normal,
-            magnitudes: lamp.magnitudes,
-            density: chance / lamp.shape.area,
-            id: lamp.id,
+            kind: TargetKind::Triangle { two_sided: area_light.two_sided },
+            place: [area_light.corner[0], area_light.corner[1], area_light.across([u, v])],
+            normal: area_light.shape.normal,
+            magnitudes: area_light.magnitudes,
+            density: chance / area_light.shape.area,
+            id: area_light.id,
             light: MISS,
         })
     }
@@ -482,11 +494,11 @@ impl Lights {
         }
         let index = *first as usize + point.triangle;
         let number = index - self.lights.len();
-        let Some(lamp) = self.lamp(scene, number, point.time) else { return 0.0 };
+        let Some(area_light) = self.area_light(scene, number, point.time) else { return 0.0 };
         let [_, u, v] = point.weights;
-        let squared = lamp.offset(receiver.point, [u, v]).length_squared();
-        let cosine = direction.dot(lamp.shape.normal).abs();
-        let pdf = self.chance(receiver, index) * squared / (cosine * lamp.shape.area);
+        let squared = area_light.offset(receiver.point, [u, v]).length_squared();
+        let cosine = direction.dot(area_light.shape.normal).abs();
+        let pdf = self.chance(receiver, index) * squared / (cosine * area_light.shape.area);
         if pdf.is_finite() { pdf } else { 0.0 }
     }
 }

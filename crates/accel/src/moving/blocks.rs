@@ -1,7 +1,7 @@
 //! Bodies that move, for rays in blocks: what stands still is asked as ever, and of the rest only rays that meet the
 //! boxes that bodies sweep are carried, in f64, and asked in blocks of the body's frame again.
 
-use etendue_geometry::block::LANES;
+use etendue_geometry::block::{LANES, vector};
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Bounds, Detail, HitBatch, MISS, RayBatch, RayBlock, RayBlocks};
 
@@ -41,8 +41,8 @@ impl Moving {
                 if limits[1] <= 0.0 {
                     continue;
                 }
-                let [start, along] = [&block.origin, &block.direction]
-                    .map(|axes| DVec3::from(axes.map(|axis| f64::from(axis[lane]))));
+                let [start, along] =
+                    [&block.origin, &block.direction].map(|axes| vector(axes, lane));
                 let size = limits[1].abs().max((origin + start).abs().max_element());
                 let slack = if ends(block, lane) { ONE_PLACE * size } else { 0.0 };
                 let reach = limits[1] + slack;
@@ -110,7 +110,7 @@ impl BlockAccel for Moving {
                         continue;
                     }
                     let t = (ahead + f64::from(block.t_max[lane])) / stretch;
-                    let normal = DVec3::from(block.normal.map(|axis| f64::from(axis[lane])));
+                    let normal = vector(&block.normal, lane);
                     let hit = || BodyHit {
                         t,
                         triangle: block.triangle[lane],

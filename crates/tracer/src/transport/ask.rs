@@ -46,8 +46,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let squares = picks.square;
         kernels::spread_over_triangles(picks);
         // A place on it.
-        if let Some((lamps, bands)) = lights.few_triangles() {
-            kernels::place_on_triangles(patch, lamps);
+        if let Some((area_lights, bands)) = lights.few_triangles() {
+            kernels::place_on_triangles(patch, area_lights);
             for &lane in &workspace.picked {
                 let own = patch.picks.index[lane] as usize * count;
                 let radiance = &mut patch.radiance[lane * count..(lane + 1) * count];
@@ -63,10 +63,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 targets.set(lane, None);
                 continue;
             }
-            if let Some((lamp, bands)) = lights.plain_triangle(index, count) {
+            if let Some((area_light, bands)) = lights.plain_triangle(index, count) {
                 radiance.copy_from_slice(bands);
                 let weights = [picks.square[0][lane], picks.square[1][lane]];
-                targets.set_triangle(lane, lamp, weights, chance);
+                targets.set_triangle(lane, area_light, weights, chance);
                 continue;
             }
             let one = ((index, chance), [squares[0][lane], squares[1][lane]]);

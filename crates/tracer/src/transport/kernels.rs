@@ -10,8 +10,8 @@ use etendue_geometry::{RayBlock, disk};
 
 use super::patch::{BESIDE, Patch, Picks};
 use crate::LANES;
+use crate::area_light::AreaLight;
 use crate::bsdf::fresnel::schlick_weight;
-use crate::lamps::AreaLight;
 use crate::sampling::ONE_BELOW;
 use crate::surface::facing;
 
@@ -166,13 +166,13 @@ pub(super) fn spread_over_triangles(picks: &mut Picks) {
 
 /// Places on the triangles that were picked, which are few, as [`super::patch::Targets::set_triangle`] has them.
 #[multiversion::multiversion(targets = "simd")]
-pub(super) fn place_on_triangles(patch: &mut Patch, lamps: &[Option<AreaLight>]) {
+pub(super) fn place_on_triangles(patch: &mut Patch, area_lights: &[Option<AreaLight>]) {
     let Patch { picks, targets, .. } = patch;
     let [second, third] = &picks.square;
-    for (number, lamp) in (0_u32..).zip(lamps) {
-        let Some(lamp) = lamp else { continue };
-        let [corner, rest] = lamp.corner;
-        let edges = lamp.shape.edges;
+    for (number, area_light) in (0_u32..).zip(area_lights) {
+        let Some(area_light) = area_light else { continue };
+        let [corner, rest] = area_light.corner;
+        let edges = area_light.shape.edges;
         for axis in 0..3 {
             let [of_corner, of_rest, of_across] = &mut targets.place;
             for i in 0..LANES {
@@ -183,14 +183,15 @@ pub(super) fn place_on_triangles(patch: &mut Patch, lamps: &[Option<AreaLight>])
                 of_across[axis][i] = if is_own { across } else { of_across[axis][i] };
             }
             let (of_normal, of_magnitudes) = (&mut targets.normal, &mut targets.magnitudes);
-            let (normal, magnitudes) = (lamp.shape.normal[axis], lamp.magnitudes[axis]);
+            let (normal, magnitudes) = (area_light.shape.normal[axis], area_light.magnitudes[axis]);
             for i in 0..LANES {
                 let is_own = picks.index[i] == number;
                 of_normal[axis][i] = if is_own { normal } else { of_normal[axis][i] };
                 of_magnitudes[axis][i] = if is_own { magnitudes } else { of_magnitudes[axis][i] };
             }
         }
-        let (area, two_sided) = (lamp.shape.area, if lamp.two_sided { 1.0 } else { 0.0 });
+        let (area, two_sided) =
+            (area_light.shape.area, if area_light.two_sided { 1.0 } else { 0.0 });
         for i in 0..LANES {
             let is_own = picks.index[i] == number;
             let density =
@@ -200,7 +201,7 @@ pub(super) fn place_on_triangles(patch: &mut Patch, lamps: &[Option<AreaLight>])
         }
         for i in 0..LANES {
             if picks.index[i] == number {
-                targets.id[i] = lamp.id;
+                targets.id[i] = area_light.id;
             }
         }
     }

@@ -292,7 +292,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     #[inline(always)]
     fn tinted(&self, tint: &Tint, light: &mut [f64]) {
         match RGB {
-            true => light.iter_mut().zip(tint.color).for_each(|(band, part)| *band *= part),
+            true => light.iter_mut().zip(&tint.color).for_each(|(band, part)| *band *= part),
             false => self.ctx.spectral.times(tint, light),
         }
     }

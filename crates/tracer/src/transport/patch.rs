@@ -4,9 +4,9 @@ use etendue_geometry::MISS;
 use etendue_geometry::glam::DVec3;
 
 use super::media::Crossing;
+use crate::area_light::AreaLight;
 use crate::bsdf::sheets::Sheets;
 use crate::bsdf::{Bsdf, Weights};
-use crate::lamps::AreaLight;
 use crate::light_sampler::{Choices, Receiver};
 use crate::spawn::Anchor;
 use crate::target::{Target, TargetKind};

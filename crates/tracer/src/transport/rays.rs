@@ -4,7 +4,7 @@
 use std::fmt::Debug;
 use std::ops::Range;
 
-use etendue_geometry::block::LANES as BLOCK;
+use etendue_geometry::block::{LANES as BLOCK, vector};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{
     Detail, HitBatch, HitPrecision, PlacedTriangle, RayBatch, RayBlock, RayBlocks,
@@ -168,13 +168,13 @@ impl Rays for Blocks {
     #[inline(always)]
     fn origin(&self, i: usize) -> DVec3 {
         let (block, lane) = self.at(i);
-        self.origin + DVec3::from(block.origin.map(|axis| f64::from(axis[lane])))
+        self.origin + vector(&block.origin, lane)
     }
 
     #[inline(always)]
     fn direction(&self, i: usize) -> DVec3 {
         let (block, lane) = self.at(i);
-        DVec3::from(block.direction.map(|axis| f64::from(axis[lane])))
+        vector(&block.direction, lane)
     }
 
     #[inline(always)]
@@ -209,7 +209,7 @@ impl Rays for Blocks {
     #[inline(always)]
     fn hit(&self, i: usize) -> RayHit {
         let (block, lane) = self.at(i);
-        let normal = DVec3::from(block.normal.map(|axis| f64::from(axis[lane])));
+        let normal = vector(&block.normal, lane);
         RayHit {
             id: [block.placement[lane], block.triangle[lane]],
             weights: [block.u[lane], block.v[lane]].map(f64::from),

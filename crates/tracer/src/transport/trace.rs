@@ -235,18 +235,18 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let is_front = encounter.is_front();
         let weight = |pdf: f64| way.weight_against(if pdf.is_finite() { pdf } else { 0.0 });
         if let Some(index) = lights.index_of(hit.id)
-            && let Some((lamp, bands)) = lights.plain_triangle(index, self.count())
+            && let Some((area_light, bands)) = lights.plain_triangle(index, self.count())
         {
-            if !is_front && !lamp.two_sided {
+            if !is_front && !area_light.two_sided {
                 return None;
             }
             radiance.copy_from_slice(bands);
             if way.is_specular {
                 return Some(1.0);
             }
-            let cosine = direction.dot(lamp.shape.normal).abs();
+            let cosine = direction.dot(area_light.shape.normal).abs();
             let distance = hit.t + (*origin - receiver.point).length();
-            let density = distance * distance / (cosine * lamp.shape.area);
+            let density = distance * distance / (cosine * area_light.shape.area);
             return Some(weight(lights.chance(receiver, index) * density));
         }
         let placement = scene.geometry.placements.get(hit.id[0] as usize)?;

@@ -98,7 +98,7 @@ pub(crate) fn cluster(
     scene: &SceneView<'_>,
     (id, time): ([u32; 2], f64),
     power: f64,
-    way: Option<&LampWay<'_>>,
+    way: Option<&AreaLightMotion<'_>>,
 ) -> Option<Cluster> {
     let AreaLight { corner, shape, two_sided, .. } = AreaLight::at(scene, id, time)?;
     let mut bounds = Bounds::default();
@@ -118,7 +118,7 @@ pub(crate) fn cluster(
 const MOST_CORNERS: usize = 1 << 16;
 
 /// The way of a placement that shines and moves.
-pub(crate) struct LampWay<'a> {
+pub(crate) struct AreaLightMotion<'a> {
     mesh: &'a Mesh,
     sweep: Sweep,
     /// Its triangles do not shine the same way all the time.
@@ -127,7 +127,7 @@ pub(crate) struct LampWay<'a> {
     whole: Option<Bounds>,
 }
 
-impl<'a> LampWay<'a> {
+impl<'a> AreaLightMotion<'a> {
     /// That of a placement between two times (s from the frame's time); `None` of one without a motion.
     pub(crate) fn of(
         geometry: &'a Geometry,
