@@ -4,18 +4,21 @@
 //! +Z, its top to +Y, and +X is right of the middle.
 #![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
-use std::f64::consts::PI;
+mod sampler;
+
 use std::path::Path;
 
 use etendue_geometry::glam::DVec3;
 use etendue_image::Limits;
 
 use crate::angles;
-use crate::sampling::{GridCell, GridDistribution, ONE_BELOW, linear_place};
 use crate::spec::BRIGHTEST;
 use crate::spectral_sky::{self, Spectrum};
 use crate::texture::{ImageError, read_file, read_image};
 use crate::{Color, Cube};
+
+pub use sampler::MapSampler;
+pub(crate) use sampler::OnMap;
 
 /// The most cells of the grid that directions are chosen on, across and down.
 const CELLS: [usize; 2] = [2048, 1024];
@@ -248,270 +251,10 @@ fn direction([u, v]: [f64; 2]) -> DVec3 {
     DVec3::new(x, y, z)
 }
 
-/// What cells get of their neighbours, along each axis 1/8 of both. Columns go around, rows end.
-fn blurred(bright: &[f64], [columns, rows]: [usize; 2]) -> Vec<f64> {
-    let along = |row: usize, x: usize| {
-        let row = &bright[row * columns..(row + 1) * columns];
-        0.75 * row[x] + 0.125 * (row[(x + columns - 1) % columns] + row[(x + 1) % columns])
-    };
-    let down = |x: usize, y: usize| {
-        let above_and_below = along(y.saturating_sub(1), x) + along((y + 1).min(rows - 1), x);
-        0.75 * along(y, x) + 0.125 * above_and_below
-    };
-    (0..columns * rows).map(|k| down(k % columns, k / columns)).collect()
-}
-
-/// How bright a map is, in cells: texels, or the means of some.
-#[derive(Debug, Clone)]
-struct Cells {
-    /// Columns and rows.
-    size: [usize; 2],
-    /// The mean over the colours or bands of each.
-    bright: Vec<f32>,
-}
-
-impl Cells {
-    /// The brightness at the corners of a patch between the middles of cells: left and right above, and below.
-    #[inline]
-    fn corners(&self, [x, y]: [usize; 2]) -> [[f64; 2]; 2] {
-        let [columns, rows] = self.size;
-        let next = if x + 1 == columns { 0 } else { x + 1 };
-        [y.saturating_sub(1), y.min(rows - 1)].map(|row| {
-            let row = &self.bright[row * columns..(row + 1) * columns];
-            [f64::from(row[x]), f64::from(row[next])]
-        })
-    }
-
-    /// Where a row of patches begins and ends, in rows of cells.
-    #[inline]
-    fn ends(&self, row: usize) -> [f64; 2] {
-        [row as f64 - 0.5, row as f64 + 0.5].map(|v| v.clamp(0.0, self.size[1] as f64))
-    }
-}
-
-/// Directions by the brightness of a map, as it is interpolated: first a patch between the middles of four
-/// cells, then a place in it by a density that is linear along both axes (Pharr, Jakob and Humphreys,
-/// *Physically Based Rendering*, 4th edition, sections 12.5 and A.5.2). What the sphere narrows towards the
-/// poles is taken to be as at the middle of each row of patches.
-#[derive(Debug, Clone)]
-pub struct MapSampler {
-    cells: Cells,
-    /// One row more than there are cells, of which the first and the last are half as high.
-    patches: GridDistribution,
-    /// By row of patches, the density over the unit square where the brightness is 1.
-    scale: Vec<f64>,
-    /// Mean radiance over all directions, the mean over colours or bands.
-    pub mean: f64,
-}
-
-impl MapSampler {
-    /// For `map`, by the mean of its three colours.
-    #[must_use]
-    pub fn new(map: &EnvironmentMap) -> Self {
-        let bright = map.texels.iter().map(|texel| f64::from(texel[0] + texel[1] + texel[2]) / 3.0);
-        Self::by_brightness(map.size(), bright)
-    }
-
-    /// For a map of so many columns and rows by how bright each of its texels is, row by row from the top.
-    pub(crate) fn by_brightness(
-        [width, height]: [usize; 2],
-        texels: impl Iterator<Item = f64>,
-    ) -> Self {
-        let size = [width.clamp(1, CELLS[0]), height.clamp(1, CELLS[1])];
-        let [columns, rows] = size;
-        let mut bright = vec![0.0; columns * rows];
-        for (k, texel) in texels.enumerate() {
-            let (x, y) = (k % width * columns / width, k / width * rows / height);
-            bright[y * columns + x] += texel;
-        }
-        let texels_a_cell = (width * height) as f64 / bright.len() as f64;
-        bright.iter_mut().for_each(|bright| *bright /= texels_a_cell);
-        let sine = |v: f64| (PI * v / rows as f64).sin();
-        let bands = bright.chunks(columns).enumerate();
-        let sums = bands.map(|(y, band)| band.iter().sum::<f64>() * sine(y as f64 + 0.5));
-        // The mean of sin θ over rows is 2/π.
-        let mean = sums.sum::<f64>() / (columns * rows) as f64 * PI / 2.0;
-        if texels_a_cell > 1.0 {
-            // Where a texel shines beyond its own cell there is some chance, too.
-            bright = blurred(&bright, size);
-        }
-        #[expect(clippy::cast_possible_truncation, reason = "brightness is kept as f32")]
-        let cells = Cells { size, bright: bright.iter().map(|&b| b as f32).collect() };
-        let sines: Vec<f64> =
-            (0..=rows).map(|row| sine(0.5 * cells.ends(row).iter().sum::<f64>())).collect();
-        let mut weights = Vec::with_capacity(columns * (rows + 1));
-        for (y, sine) in sines.iter().enumerate() {
-            let [start, end] = cells.ends(y);
-            for x in 0..columns {
-                let sum: f64 = cells.corners([x, y]).as_flattened().iter().sum();
-                weights.push(0.25 * sum * sine * (end - start));
-            }
-        }
-        let whole: f64 = weights.iter().sum();
-        let of_one = if whole > 0.0 { (columns * rows) as f64 / whole } else { 0.0 };
-        let scale = sines.iter().map(|sine| sine * of_one).collect();
-        Self { cells, patches: GridDistribution::new(columns, &weights), scale, mean }
-    }
-
-    /// A direction, its [`place`], and its density (1/sr) for each of `squares`, and the radiance of `map` there.
-    pub(crate) fn sample(&self, map: &EnvironmentMap, squares: &[[f64; 2]], out: &mut OnMap) {
-        out.directions.clear();
-        self.patches.cells(squares.iter().copied(), &mut out.cells);
-        out.resize(squares.len());
-        if !map.texels.is_empty() {
-            chosen(self, map, out);
-        }
-    }
-
-    /// The [`place`]s of the unit directions in `asked`, their densities (1/sr), and the radiance of `map` there.
-    pub(crate) fn look_up(&self, map: &EnvironmentMap, asked: &mut OnMap) {
-        asked.resize(asked.directions.len());
-        if !map.texels.is_empty() {
-            looked_up(self, map, asked);
-        }
-    }
-
-    /// Places in the patches that were chosen, and their density over the unit square.
-    #[inline(always)]
-    fn places_in(&self, patches: &[GridCell; LANES]) -> ([Row; 2], Row) {
-        let [columns, rows] = self.cells.size.map(|cells| cells as f64);
-        // What there is in memory of each.
-        let (mut corners, mut scale) = ([[0.0; LANES]; 4], [0.0; LANES]);
-        let [mut start, mut end, mut x] = [[0.0; LANES]; 3];
-        for (i, patch) in patches.iter().enumerate() {
-            let [[a, b], [c, d]] = self.cells.corners(patch.at);
-            (corners[0][i], corners[1][i], corners[2][i], corners[3][i]) = (a, b, c, d);
-            scale[i] = self.scale[patch.at[1]];
-            [start[i], end[i]] = self.cells.ends(patch.at[1]);
-            x[i] = patch.at[0] as f64;
-        }
-        let (mut places, mut density) = ([[0.0; LANES]; 2], [0.0; LANES]);
-        for i in 0..LANES {
-            let [a, b, c, d] = [0, 1, 2, 3].map(|corner: usize| corners[corner][i]);
-            let [across, down] = patches[i].rest;
-            let down = linear_place(down, [a + b, c + d]);
-            let [left, right] = [a + (c - a) * down, b + (d - b) * down];
-            let across = linear_place(across, [left, right]);
-            density[i] = (left + (right - left) * across) * scale[i];
-            let u = (x[i] + 0.5 + across) / columns;
-            places[0][i] = if u < 1.0 { u } else { u - 1.0 };
-            places[1][i] = ((start[i] + down * (end[i] - start[i])) / rows).min(ONE_BELOW);
-        }
-        (places, density)
-    }
-
-    /// The density (1/sr) of a unit direction.
-    #[must_use]
-    pub fn pdf(&self, d: DVec3) -> f64 {
-        let [u, v] = place(d);
-        let about = Corners::of([[u], [v]], self.cells.size);
-        let [pdf] = self.pdf_about(&about, [(d.x * d.x + d.z * d.z).sqrt()]);
-        pdf
-    }
-
-    /// Densities (1/sr) of places about which the cells are known, with the sines of their polar angles.
-    #[inline(always)]
-    fn pdf_about<const N: usize>(&self, about: &Corners<N>, sines: [f64; N]) -> [f64; N] {
-        let (mut corners, mut scale) = ([[0.0_f32; N]; 4], [0.0; N]);
-        for i in 0..N {
-            for corner in 0..4 {
-                corners[corner][i] = self.cells.bright[about.numbers[corner][i] as usize];
-            }
-            scale[i] = self.scale[about.row[i] as usize];
-        }
-        let mut pdf = [0.0; N];
-        for i in 0..N {
-            let corners = [0, 1, 2, 3].map(|corner: usize| f64::from(corners[corner][i]));
-            let bright = between(corners, [about.across[i], about.down[i]]);
-            pdf[i] = over_the_sphere(bright * scale[i], sines[i]);
-        }
-        pdf
-    }
-}
-
-type Row = [f64; LANES];
-
-/// Directions, and what a map has there; kept for the next.
-#[derive(Debug, Default)]
-pub(crate) struct OnMap {
-    cells: Vec<GridCell>,
-    /// Unit.
-    pub(crate) directions: Vec<DVec3>,
-    pub(crate) places: Vec<[f64; 2]>,
-    /// 1/sr.
-    pub(crate) densities: Vec<f64>,
-    pub(crate) colors: Vec<Color>,
-}
-
-impl OnMap {
-    /// Makes room for so many, which have nothing yet.
-    fn resize(&mut self, count: usize) {
-        self.directions.resize(count, DVec3::Y);
-        self.places.clear();
-        self.places.resize(count, [0.0; 2]);
-        self.densities.clear();
-        self.densities.resize(count, 0.0);
-        self.colors.clear();
-        self.colors.resize(count, [0.0; 3]);
-    }
-}
-
-#[multiversion::multiversion(targets = "simd")]
-fn chosen(sampler: &MapSampler, map: &EnvironmentMap, out: &mut OnMap) {
-    for start in (0..out.directions.len()).step_by(LANES) {
-        let count = LANES.min(out.directions.len() - start);
-        let mut patches = [GridCell::default(); LANES];
-        patches[..count].copy_from_slice(&out.cells[start..start + count]);
-        let (places, over_square) = sampler.places_in(&patches);
-        let ([x, y, z], sines) = angles::directions(&places);
-        let colors = map.radiance_of_lanes(&Corners::of(places, map.size()));
-        for i in 0..count {
-            out.directions[start + i] = DVec3::new(x[i], y[i], z[i]);
-            out.places[start + i] = [places[0][i], places[1][i]];
-            out.densities[start + i] = over_the_sphere(over_square[i], sines[i]);
-        }
-        out.colors[start..start + count].copy_from_slice(&colors[..count]);
-    }
-}
-
-#[multiversion::multiversion(targets = "simd")]
-fn looked_up(sampler: &MapSampler, map: &EnvironmentMap, asked: &mut OnMap) {
-    for start in (0..asked.directions.len()).step_by(LANES) {
-        let count = LANES.min(asked.directions.len() - start);
-        let mut directions = [[0.0; LANES]; 3];
-        for i in 0..count {
-            let d = asked.directions[start + i];
-            (directions[0][i], directions[1][i], directions[2][i]) = (d.x, d.y, d.z);
-        }
-        let mut sines = [0.0; LANES];
-        for i in 0..LANES {
-            let (x, z) = (directions[0][i], directions[2][i]);
-            sines[i] = (x * x + z * z).sqrt();
-        }
-        let places = angles::places(&directions);
-        let about = Corners::of(places, map.size());
-        let colors = map.radiance_of_lanes(&about);
-        let pdf = match map.size() == sampler.cells.size {
-            true => sampler.pdf_about(&about, sines),
-            false => sampler.pdf_about(&Corners::of(places, sampler.cells.size), sines),
-        };
-        for i in 0..count {
-            asked.places[start + i] = [places[0][i], places[1][i]];
-        }
-        asked.densities[start..start + count].copy_from_slice(&pdf[..count]);
-        asked.colors[start..start + count].copy_from_slice(&colors[..count]);
-    }
-}
-
-/// A density over the map's places as one over solid angles (1/sr), by the sine of the polar angle.
-#[inline(always)]
-fn over_the_sphere(density: f64, sin_theta: f64) -> f64 {
-    let over = density / (2.0 * PI * PI * sin_theta);
-    if sin_theta > 0.0 { over } else { 0.0 }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     #[test]

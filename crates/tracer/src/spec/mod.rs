@@ -4,6 +4,7 @@
 mod light;
 mod light_motion;
 mod material;
+mod paint;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -20,6 +21,7 @@ use serde::{Deserialize, Serialize};
 pub use self::light::{LightSpec, SkyCubeSpec, SkyImageSpec, SunSpec};
 pub use self::light_motion::LightMotionSpec;
 pub use self::material::{AbbeSpec, AbsorptionSpec, IorSpec, MaterialSpec};
+use self::paint::{paint, radiant_paint};
 use crate::texture::{Filter, Wrap};
 use crate::{Color, Cube, CubeKind, Ior, Paint, SceneCube, SceneCurve};
 
@@ -297,126 +299,6 @@ fn curve(key: &str, spec: &CurveSpec, supply: &mut dyn Supply) -> Result<Curve, 
     })
 }
 
-/// The colours of a surface.
-fn paint(key: &str, spec: &PaintSpec, supply: &mut dyn Supply) -> Result<Paint, Fault> {
-    match spec {
-        PaintSpec::Color(color) => {
-            in_bounds(key, color, Bound::One)?;
-            Ok(Paint::Plain(*color))
-        }
-        PaintSpec::Curve(spec) => {
-            let spec = ColorSpec::Curve(spec.clone());
-            let Reflectance { look, curve } = reflectance(key, &spec, supply)?;
-            Ok(match curve {
-                Some(curve) => Paint::Curve { look, curve },
-                None => Paint::Plain(look),
-            })
-        }
-        PaintSpec::Cube(cube) => cube_paint((key, cube), CubeKind::Reflectance, supply),
-        PaintSpec::Checker(CheckerSpec { checker, squares }) => {
-            let below = |fault: Fault| Fault::new(format!("{key}.{}", fault.key), fault.why);
-            self::checker("checker", (checker, *squares), supply).map_err(below)
-        }
-        PaintSpec::Image(image) => {
-            let Reflectance { look, curve } =
-                reflectance(&format!("{key}.factor"), &image.factor, supply)?;
-            image_paint(key, image, (look, curve), supply)
-        }
-    }
-}
-
-/// A cube over a surface.
-fn cube_paint(
-    (key, spec): (&str, &CubeSpec),
-    kind: CubeKind,
-    supply: &mut dyn Supply,
-) -> Result<Paint, Fault> {
-    let below = |fault: Fault| Fault::new(format!("{key}.{}", fault.key), fault.why);
-    let number = supply.curve_number();
-    let cube = Arc::new(supply.cube(spec, kind).map_err(below)?);
-    Ok(Paint::Cube { cube: SceneCube { number, cube }, repeat: spec.repeat })
-}
-
-/// An image times a factor, and times a curve of which that is the look.
-fn image_paint(
-    key: &str,
-    image: &ImageSpec,
-    (own, own_curve): (Color, Option<SceneCurve>),
-    supply: &mut dyn Supply,
-) -> Result<Paint, Fault> {
-    let below = |fault: Fault| Fault::new(format!("{key}.{}", fault.key), fault.why);
-    Ok(match (supply.image(image).map_err(below)?, own_curve) {
-        (Paint::Image { image, .. }, curve) => Paint::Image { factor: own, curve, image },
-        (_, Some(curve)) => Paint::Curve { look: own, curve },
-        (_, None) => Paint::Plain(own),
-    })
-}
-
-/// Squares of two colours.
-fn checker(
-    key: &str,
-    (colors, squares): (&[ColorSpec; 2], f64),
-    supply: &mut dyn Supply,
-) -> Result<Paint, Fault> {
-    let [a, b] = [reflectance(key, &colors[0], supply)?, reflectance(key, &colors[1], supply)?];
-    if squares.is_nan() || squares <= 0.0 {
-        return Err(Fault::new("squares", format!("{squares} is not above zero")));
-    }
-    let looks = [a.look, b.look];
-    let curves = match [a, b] {
-        [Reflectance { curve: None, .. }, Reflectance { curve: None, .. }] => None,
-        // A colour beside a curve is the curve that colours become.
-        both => Some(Box::new(both.map(|one| match one.curve {
-            Some(curve) => curve,
-            None => SceneCurve {
-                number: supply.curve_number(),
-                curve: Arc::new(rgb::spectrum(one.look)),
-            },
-        }))),
-    };
-    Ok(Paint::Checker { colors: looks, curves, squares })
-}
-
-/// What a surface gives off: a paint, and the curve that multiplies it.
-fn radiant_paint(
-    (key, spec): (&str, &PaintSpec),
-    illuminant: Option<Illuminant>,
-    supply: &mut dyn Supply,
-) -> Result<(Paint, Option<Arc<Curve>>), Fault> {
-    Ok(match spec {
-        PaintSpec::Color(color) => {
-            let Emitted { color, curve } =
-                emitted((key, &ColorSpec::Rgb(*color)), illuminant, supply)?;
-            (Paint::Plain(color), curve)
-        }
-        PaintSpec::Curve(spec) => {
-            let spec = ColorSpec::Curve(spec.clone());
-            let Emitted { color, curve } = emitted((key, &spec), illuminant, supply)?;
-            (Paint::Plain(color), curve)
-        }
-        PaintSpec::Cube(cube) => {
-            if illuminant.is_some() {
-                let why =
-                    format!("is given beside a cube of `{key}`, which has spectra of its own");
-                return Err(Fault::new("illuminant", format!("{why}: leave one of them out")));
-            }
-            (cube_paint((key, cube), CubeKind::Light, supply)?, None)
-        }
-        PaintSpec::Checker(CheckerSpec { checker, squares }) => {
-            if squares.is_nan() || *squares <= 0.0 {
-                let why = format!("{squares} is not above zero");
-                return Err(Fault::new(format!("{key}.squares"), why));
-            }
-            radiant_checker(key, (checker, *squares), illuminant, supply)?
-        }
-        PaintSpec::Image(image) => {
-            let factor = format!("{key}.factor");
-            let Emitted { color, curve } = emitted((&factor, &image.factor), illuminant, supply)?;
-            (image_paint(key, image, (color, None), supply)?, curve)
-        }
-    })
-}
-
 /// Luminous quantity of a colour times a curve (lm for W/nm, and so on): 683.002 lm/W times ∫ S V dλ, of which V is
 /// the CIE 1931 observer's ȳ (CIE 018:2019, equation 1).
 fn luminous(color: &Color, curve: Option<&Curve>) -> f64 {
@@ -445,47 +327,6 @@ fn share_of(key: &str, wanted: f64, own: f64) -> Result<f64, Fault> {
     }
     let why = "is wanted of light that the eye does not see: give its spectrum visible light, or its power itself";
     Err(Fault::new(key, why))
-}
-
-/// Squares of two lights, and the curve that multiplies both, where neither is one.
-fn radiant_checker(
-    key: &str,
-    (specs, squares): (&[ColorSpec; 2], f64),
-    illuminant: Option<Illuminant>,
-    supply: &mut dyn Supply,
-) -> Result<(Paint, Option<Arc<Curve>>), Fault> {
-    let (mut colors, mut curves) = ([[0.0; 3]; 2], [None, None]);
-    for (k, spec) in specs.iter().enumerate() {
-        let key = format!("{key}.checker[{k}]");
-        match spec {
-            ColorSpec::Rgb(given) => {
-                in_bounds(&key, given, Bound::None)?;
-                colors[k] = *given;
-            }
-            ColorSpec::Curve(spec) => {
-                let curve = curve(&key, spec, supply)?;
-                brightest(&key, &curve)?;
-                let color = Bands::Rgb.from_curve(&curve, Outside::Zero).unwrap_or_default();
-                colors[k] = std::array::from_fn(|i| color.get(i).copied().unwrap_or(0.0));
-                curves[k] = Some(curve);
-            }
-        }
-    }
-    if curves.iter().all(Option::is_none) {
-        return Ok((Paint::Checker { colors, curves: None, squares }, checked(illuminant)?));
-    }
-    if illuminant.is_some() {
-        let why = format!("is given beside a curve of `{key}`, which has its own spectrum");
-        return Err(Fault::new("illuminant", format!("{why}: leave one of them out")));
-    }
-    let [first, second] = curves;
-    // A colour beside a curve is the curve that colours become.
-    let mut of = |given: Option<Curve>, color: Color| SceneCurve {
-        number: supply.curve_number(),
-        curve: Arc::new(given.unwrap_or_else(|| rgb::spectrum(color))),
-    };
-    let curves = Some(Box::new([of(first, colors[0]), of(second, colors[1])]));
-    Ok((Paint::Checker { colors, curves, squares }, None))
 }
 
 fn in_bounds(key: &str, color: &Color, bound: Bound) -> Result<(), Fault> {
