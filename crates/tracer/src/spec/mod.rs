@@ -21,9 +21,9 @@ use serde::{Deserialize, Serialize};
 pub use self::light::{LightSpec, SkyCubeSpec, SkyImageSpec, SunSpec};
 pub use self::light_motion::LightMotionSpec;
 pub use self::material::{AbbeSpec, AbsorptionSpec, IorSpec, MaterialSpec};
-use self::paint::{paint, radiant_paint};
+use self::paint::{checker, paint, radiant_paint};
 use crate::texture::{Filter, Wrap};
-use crate::{Color, Cube, CubeKind, Ior, Paint, SceneCube, SceneCurve};
+use crate::{Color, Cube, CubeKind, Ior, Paint, SceneCurve};
 
 /// The brightest that a light or a surface may be, in whichever unit: pictures hold no number above
 /// 3·10³⁸, and the powers of all lights are added up.

@@ -6,9 +6,9 @@ use etendue_spectrum::{Bands, Curve, Illuminant, Outside, rgb};
 
 use super::{
     Bound, CheckerSpec, ColorSpec, CubeSpec, Emitted, Fault, ImageSpec, PaintSpec, Reflectance,
-    Supply, brightest, checked, curve, emitted, in_bounds, look, reflectance,
+    Supply, brightest, checked, curve, emitted, in_bounds, reflectance,
 };
-use crate::{Color, Cube, CubeKind, Paint, SceneCube, SceneCurve};
+use crate::{Color, CubeKind, Paint, SceneCube, SceneCurve};
 
 /// The colours of a surface.
 pub(super) fn paint(key: &str, spec: &PaintSpec, supply: &mut dyn Supply) -> Result<Paint, Fault> {
@@ -66,7 +66,7 @@ fn image_paint(
 }
 
 /// Squares of two colours.
-fn checker(
+pub(super) fn checker(
     key: &str,
     (colors, squares): (&[ColorSpec; 2], f64),
     supply: &mut dyn Supply,
