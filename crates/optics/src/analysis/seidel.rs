@@ -184,6 +184,11 @@ fn sums(
                     invariant,
                 )
             }
+            // Reflection is refraction into the index −n; the sums are the same in the unfolded space.
+            Part::Mirror(mirror) => {
+                let shape = (mirror.surface.paraxial_curvature(), quartic(&mirror.surface));
+                at_surface([n, -n], shape, 0.0, [marginal, chief], invariant)
+            }
             Part::ThinLens(_) | Part::Aperture(_) | Part::Filter(_) | Part::MicrolensArray(_) => {
                 SeidelSums::default()
             }

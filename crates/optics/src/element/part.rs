@@ -9,6 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::crossings::Slopes;
+use super::mirror::{Mirror, MirrorMount, MirrorSpec};
 use super::lenslets::Lenslets;
 use super::refract::Media;
 use super::step::Action;
@@ -35,6 +36,8 @@ pub enum PartSpec {
     Filter(FilterSpec),
     /// An array of lenslets.
     MicrolensArray(MicrolensArraySpec),
+    /// A mirror.
+    Mirror(MirrorSpec),
 }
 
 /// What an element is, ready to be traced.
@@ -52,6 +55,8 @@ pub enum Part {
     Filter(Arc<Filter>),
     /// An array of lenslets.
     MicrolensArray(Arc<MicrolensArray>),
+    /// A mirror.
+    Mirror(Mirror),
 }
 
 /// How drawings show a part.
@@ -99,7 +104,7 @@ impl PartSpec {
             Self::Surface(surface) => Some(surface.glass.as_ref()),
             Self::Biconic(surface) => Some(surface.glass.as_ref()),
             Self::MicrolensArray(array) => array.has_faces().then_some(array.glass.as_ref()),
-            Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) => None,
+            Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) | Self::Mirror(_) => None,
         }
     }
 
@@ -116,6 +121,7 @@ impl PartSpec {
             Self::Aperture(aperture) => Part::Aperture(aperture.build(resolve)?.into()),
             Self::Filter(filter) => Part::Filter(filter.build(resolve)?.into()),
             Self::MicrolensArray(array) => Part::MicrolensArray(array.build()?.into()),
+            Self::Mirror(mirror) => Part::Mirror(mirror.build()?),
         })
     }
 }
@@ -131,6 +137,7 @@ impl Part {
             Self::Aperture(_) => "aperture",
             Self::Filter(_) => "filter",
             Self::MicrolensArray(_) => "microlens_array",
+            Self::Mirror(_) => "mirror",
         }
     }
 
@@ -144,6 +151,7 @@ impl Part {
             Self::Aperture(opening) => opening.radius(),
             Self::Filter(filter) => filter.radius(),
             Self::MicrolensArray(array) => array.radius(),
+            Self::Mirror(mirror) => mirror.surface.semi_diameter,
         }
     }
 
@@ -163,6 +171,7 @@ impl Part {
                 *opening = opening.with_radius(radius).ok_or("it is a mask")?;
             }
             Self::MicrolensArray(_) => return Err("it is a microlens array"),
+            Self::Mirror(mirror) => mirror.surface.semi_diameter = radius,
         }
         Ok(())
     }
@@ -171,7 +180,7 @@ impl Part {
     #[must_use]
     pub fn is_ideal(&self) -> bool {
         match self {
-            Self::Surface(_) | Self::Biconic(_) | Self::MicrolensArray(_) => false,
+            Self::Surface(_) | Self::Biconic(_) | Self::MicrolensArray(_) | Self::Mirror(_) => false,
             Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) => true,
         }
     }
@@ -183,7 +192,7 @@ impl Part {
             Self::Surface(surface) => surface.is_plane(),
             Self::Biconic(surface) => surface.curvature == [0.0; 2],
             Self::Aperture(_) | Self::Filter(_) => true,
-            Self::ThinLens(_) | Self::MicrolensArray(_) => false,
+            Self::ThinLens(_) | Self::MicrolensArray(_) | Self::Mirror(_) => false,
         }
     }
 
@@ -196,7 +205,8 @@ impl Part {
             | Self::Biconic(_)
             | Self::ThinLens(_)
             | Self::Filter(_)
-            | Self::MicrolensArray(_) => None,
+            | Self::MicrolensArray(_)
+            | Self::Mirror(_) => None,
         }
     }
 
@@ -206,6 +216,7 @@ impl Part {
         match self {
             Self::Surface(surface) => surface.domain(),
             Self::Biconic(surface) => surface.domain(),
+            Self::Mirror(mirror) => mirror.surface.domain(),
             Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => {
                 f64::INFINITY
             }
@@ -218,6 +229,7 @@ impl Part {
         match self {
             Self::Surface(surface) => surface.sag(x.hypot(y)),
             Self::Biconic(surface) => surface.sag([x, y]),
+            Self::Mirror(mirror) => mirror.surface.sag(x.hypot(y)),
             Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => {
                 Some(0.0)
             }
@@ -231,6 +243,7 @@ impl Part {
         match self {
             Self::Surface(surface) => 1.0 / surface.curvature,
             Self::Biconic(surface) => 1.0 / surface.curvature[1],
+            Self::Mirror(mirror) => 1.0 / mirror.surface.curvature,
             Self::ThinLens(lens) => 1.0 / lens.power,
             Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => f64::INFINITY,
         }
@@ -242,6 +255,11 @@ impl Part {
         match self {
             Self::Surface(surface) => surface.shape(),
             Self::Biconic(surface) => surface.shape(),
+            Self::Mirror(mirror) => {
+                let hole = (mirror.mount.hole > 0.0)
+                    .then(|| format!("hole of radius {} mm", mirror.mount.hole));
+                mirror.surface.shape().into_iter().chain(hole).collect()
+            }
             Self::Aperture(opening) => opening.shape().into_iter().collect(),
             Self::MicrolensArray(array) => {
                 let [width, height] = array.half_size.map(|half| 2.0 * half);
@@ -257,7 +275,7 @@ impl Part {
     #[must_use]
     pub fn symbol(&self) -> Symbol {
         match self {
-            Self::Surface(_) | Self::Biconic(_) => Symbol::Surface,
+            Self::Surface(_) | Self::Biconic(_) | Self::Mirror(_) => Symbol::Surface,
             Self::ThinLens(lens) => Symbol::ThinLens { converging: lens.power.signum() },
             Self::Aperture(_) => Symbol::Opening,
             Self::Filter(_) | Self::MicrolensArray(_) => Symbol::Sheet,
@@ -268,7 +286,7 @@ impl Part {
     #[must_use]
     pub fn is_round(&self) -> bool {
         match self {
-            Self::Surface(_) | Self::ThinLens(_) => true,
+            Self::Surface(_) | Self::ThinLens(_) | Self::Mirror(_) => true,
             Self::Biconic(surface) => surface.is_round(),
             Self::Aperture(opening) => opening.is_round(),
             Self::Filter(filter) => filter.is_uniform(),
@@ -282,6 +300,7 @@ impl Part {
         match self {
             Self::Filter(filter) => &filter.curves,
             Self::MicrolensArray(array) => &array.curves,
+            Self::Mirror(mirror) => mirror.mount.reflectance.as_slice(),
             Self::Surface(_) | Self::Biconic(_) | Self::ThinLens(_) | Self::Aperture(_) => &[],
         }
     }
@@ -295,6 +314,7 @@ impl Part {
                 [one] => Some(one),
                 _ => None,
             },
+            Self::Mirror(mirror) => mirror.mount.reflectance.as_ref(),
             Self::Surface(_)
             | Self::Biconic(_)
             | Self::ThinLens(_)
@@ -312,7 +332,36 @@ impl Part {
             // As drawings and tables, it sees the section along y.
             Self::Biconic(surface) => (behind - before) * surface.curvature[1],
             Self::ThinLens(lens) => before * lens.power,
+            Self::Mirror(mirror) => -(before + behind) * mirror.surface.paraxial_curvature(),
             Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => 0.0,
+        }
+    }
+
+    /// The mirror's own, where it is one.
+    #[must_use]
+    pub fn mirror(&self) -> Option<&MirrorMount> {
+        match self {
+            Self::Mirror(mirror) => Some(&mirror.mount),
+            Self::Surface(_)
+            | Self::Biconic(_)
+            | Self::ThinLens(_)
+            | Self::Aperture(_)
+            | Self::Filter(_)
+            | Self::MicrolensArray(_) => None,
+        }
+    }
+
+    /// The same as light that runs against the axis meets it: behind an odd number of mirrors.
+    #[must_use]
+    pub fn flipped(self) -> Self {
+        match self {
+            Self::Surface(surface) => Self::Surface(surface.flipped()),
+            Self::Biconic(surface) => Self::Biconic(surface.flipped()),
+            Self::Mirror(mirror) => {
+                Self::Mirror(Mirror { surface: mirror.surface.flipped(), ..mirror })
+            }
+            Self::MicrolensArray(array) => Self::MicrolensArray(array.flipped().into()),
+            Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) => self,
         }
     }
 
@@ -338,6 +387,10 @@ impl Part {
                     Action::Biconic { surface, media, slopes }
                 })
             }
+            Self::Mirror(mirror) => [
+                Action::refract(Refraction::mirror(mirror.surface.clone())),
+                Action::refract(Refraction::mirror(mirror.surface.flipped())),
+            ],
             Self::ThinLens(lens) => [lens.power, -lens.power]
                 .map(|power| Action::ThinLens { power, semi_diameter: lens.semi_diameter }),
             Self::Aperture(opening) => both(Action::Opening(Arc::clone(opening))),

@@ -84,6 +84,9 @@ impl Media {
         Self { ratio, rest: (1.0 - ratio) * (1.0 + ratio) }
     }
 
+    /// Of a mirror: the kernels then give minus the direction that is reflected.
+    pub(crate) const MIRROR: Self = Self { ratio: -1.0, rest: 0.0 };
+
     /// Refracts at `ray`'s position, where the normal is `m` with |m|² = `length2`, d·m has the
     /// sign of `sign`, and (d·m)² = `along2` with the root `along`.
     #[inline(always)]
@@ -111,6 +114,11 @@ impl Refraction {
     pub(crate) fn new(surface: Surface, before: f64, behind: f64) -> Self {
         let slopes = Slopes::of_surface(&surface);
         Self { surface, media: Media::new(before, behind), slopes }
+    }
+
+    /// At a mirror.
+    pub(crate) fn mirror(surface: Surface) -> Self {
+        Self { media: Media::MIRROR, ..Self::new(surface, 1.0, 1.0) }
     }
 
     /// A ray in the surface's frame at a plane.
