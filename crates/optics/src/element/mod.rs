@@ -9,6 +9,7 @@
 pub(crate) mod aperture;
 mod biconic;
 mod crossings;
+mod freeform;
 mod lattice;
 mod lenslets;
 mod losses;
@@ -38,6 +39,9 @@ pub use aperture::{
     ApertureSpec, CircularSpec, MaskSpec, Opening, Picture, PolygonSpec, grey_picture,
 };
 pub use biconic::{Biconic, BiconicSpec};
+pub use freeform::{
+    Freeform, FreeformSpec, HeightMapSpec, PatternSpec, PhaseSpec, SagSpec,
+};
 pub use lattice::{Grid, Lattice, LatticeCell};
 pub(crate) use losses::Loss;
 pub use losses::{Coating, Filter, FilterSpec, LossesSpec, Plain, Reflection};

@@ -9,6 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::crossings::Slopes;
+use super::freeform::{Freeform, FreeformSpec, FreeformSurface};
 use super::mirror::{Mirror, MirrorMount, MirrorSpec};
 use super::lenslets::Lenslets;
 use super::refract::Media;
@@ -38,6 +39,8 @@ pub enum PartSpec {
     MicrolensArray(MicrolensArraySpec),
     /// A mirror.
     Mirror(MirrorSpec),
+    /// A surface of any shape.
+    Freeform(FreeformSpec),
 }
 
 /// What an element is, ready to be traced.
@@ -57,6 +60,8 @@ pub enum Part {
     MicrolensArray(Arc<MicrolensArray>),
     /// A mirror.
     Mirror(Mirror),
+    /// A surface of any shape.
+    Freeform(Arc<Freeform>),
 }
 
 /// How drawings show a part.
@@ -103,6 +108,7 @@ impl PartSpec {
         match self {
             Self::Surface(surface) => Some(surface.glass.as_ref()),
             Self::Biconic(surface) => Some(surface.glass.as_ref()),
+            Self::Freeform(surface) => (!surface.mirror).then_some(surface.glass.as_ref()),
             Self::MicrolensArray(array) => array.has_faces().then_some(array.glass.as_ref()),
             Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) | Self::Mirror(_) => None,
         }
@@ -122,6 +128,7 @@ impl PartSpec {
             Self::Filter(filter) => Part::Filter(filter.build(resolve)?.into()),
             Self::MicrolensArray(array) => Part::MicrolensArray(array.build()?.into()),
             Self::Mirror(mirror) => Part::Mirror(mirror.build()?),
+            Self::Freeform(surface) => Part::Freeform(surface.build(resolve)?.into()),
         })
     }
 }
@@ -138,6 +145,7 @@ impl Part {
             Self::Filter(_) => "filter",
             Self::MicrolensArray(_) => "microlens_array",
             Self::Mirror(_) => "mirror",
+            Self::Freeform(_) => "freeform",
         }
     }
 
@@ -152,6 +160,7 @@ impl Part {
             Self::Filter(filter) => filter.radius(),
             Self::MicrolensArray(array) => array.radius(),
             Self::Mirror(mirror) => mirror.surface.semi_diameter,
+            Self::Freeform(surface) => surface.semi_diameter,
         }
     }
 
@@ -172,6 +181,7 @@ impl Part {
             }
             Self::MicrolensArray(_) => return Err("it is a microlens array"),
             Self::Mirror(mirror) => mirror.surface.semi_diameter = radius,
+            Self::Freeform(surface) => Arc::make_mut(surface).semi_diameter = radius,
         }
         Ok(())
     }
@@ -180,7 +190,11 @@ impl Part {
     #[must_use]
     pub fn is_ideal(&self) -> bool {
         match self {
-            Self::Surface(_) | Self::Biconic(_) | Self::MicrolensArray(_) | Self::Mirror(_) => false,
+            Self::Surface(_)
+            | Self::Biconic(_)
+            | Self::MicrolensArray(_)
+            | Self::Mirror(_)
+            | Self::Freeform(_) => false,
             Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) => true,
         }
     }
@@ -192,7 +206,10 @@ impl Part {
             Self::Surface(surface) => surface.is_plane(),
             Self::Biconic(surface) => surface.curvature == [0.0; 2],
             Self::Aperture(_) | Self::Filter(_) => true,
-            Self::ThinLens(_) | Self::MicrolensArray(_) | Self::Mirror(_) => false,
+            Self::ThinLens(_)
+            | Self::MicrolensArray(_)
+            | Self::Mirror(_)
+            | Self::Freeform(_) => false,
         }
     }
 
@@ -206,7 +223,8 @@ impl Part {
             | Self::ThinLens(_)
             | Self::Filter(_)
             | Self::MicrolensArray(_)
-            | Self::Mirror(_) => None,
+            | Self::Mirror(_)
+            | Self::Freeform(_) => None,
         }
     }
 
@@ -217,6 +235,7 @@ impl Part {
             Self::Surface(surface) => surface.domain(),
             Self::Biconic(surface) => surface.domain(),
             Self::Mirror(mirror) => mirror.surface.domain(),
+            Self::Freeform(surface) => surface.domain(),
             Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => {
                 f64::INFINITY
             }
@@ -230,6 +249,7 @@ impl Part {
             Self::Surface(surface) => surface.sag(x.hypot(y)),
             Self::Biconic(surface) => surface.sag([x, y]),
             Self::Mirror(mirror) => mirror.surface.sag(x.hypot(y)),
+            Self::Freeform(surface) => surface.sag([x, y]),
             Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => {
                 Some(0.0)
             }
@@ -244,6 +264,7 @@ impl Part {
             Self::Surface(surface) => 1.0 / surface.curvature,
             Self::Biconic(surface) => 1.0 / surface.curvature[1],
             Self::Mirror(mirror) => 1.0 / mirror.surface.curvature,
+            Self::Freeform(surface) => 1.0 / surface.base_curvature(),
             Self::ThinLens(lens) => 1.0 / lens.power,
             Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => f64::INFINITY,
         }
@@ -255,6 +276,7 @@ impl Part {
         match self {
             Self::Surface(surface) => surface.shape(),
             Self::Biconic(surface) => surface.shape(),
+            Self::Freeform(surface) => surface.shape(),
             Self::Mirror(mirror) => {
                 let hole = (mirror.mount.hole > 0.0)
                     .then(|| format!("hole of radius {} mm", mirror.mount.hole));
@@ -275,7 +297,9 @@ impl Part {
     #[must_use]
     pub fn symbol(&self) -> Symbol {
         match self {
-            Self::Surface(_) | Self::Biconic(_) | Self::Mirror(_) => Symbol::Surface,
+            Self::Surface(_) | Self::Biconic(_) | Self::Mirror(_) | Self::Freeform(_) => {
+                Symbol::Surface
+            }
             Self::ThinLens(lens) => Symbol::ThinLens { converging: lens.power.signum() },
             Self::Aperture(_) => Symbol::Opening,
             Self::Filter(_) | Self::MicrolensArray(_) => Symbol::Sheet,
@@ -287,6 +311,7 @@ impl Part {
     pub fn is_round(&self) -> bool {
         match self {
             Self::Surface(_) | Self::ThinLens(_) | Self::Mirror(_) => true,
+            Self::Freeform(surface) => surface.is_round(),
             Self::Biconic(surface) => surface.is_round(),
             Self::Aperture(opening) => opening.is_round(),
             Self::Filter(filter) => filter.is_uniform(),
@@ -300,7 +325,9 @@ impl Part {
         match self {
             Self::Filter(filter) => &filter.curves,
             Self::MicrolensArray(array) => &array.curves,
-            Self::Mirror(mirror) => mirror.mount.reflectance.as_slice(),
+            Self::Mirror(_) | Self::Freeform(_) => {
+                self.mirror().map_or(&[], |mirror| mirror.reflectance.as_slice())
+            }
             Self::Surface(_) | Self::Biconic(_) | Self::ThinLens(_) | Self::Aperture(_) => &[],
         }
     }
@@ -314,7 +341,9 @@ impl Part {
                 [one] => Some(one),
                 _ => None,
             },
-            Self::Mirror(mirror) => mirror.mount.reflectance.as_ref(),
+            Self::Mirror(_) | Self::Freeform(_) => {
+                self.mirror().and_then(|mirror| mirror.reflectance.as_ref())
+            }
             Self::Surface(_)
             | Self::Biconic(_)
             | Self::ThinLens(_)
@@ -324,15 +353,22 @@ impl Part {
         }
     }
 
-    /// The paraxial power (1/mm) between media of index `before` and `behind`. An array of lenslets has
+    /// The paraxial power (1/mm) between media of index `before` and `behind` at a wavelength (nm). An array of lenslets has
     /// none: what is paraxial is the picture that the lens before it makes, which its lenslets sample.
-    pub(crate) fn power(&self, before: f64, behind: f64) -> f64 {
+    pub(crate) fn power(&self, before: f64, behind: f64, wavelength: f64) -> f64 {
         match self {
             Self::Surface(surface) => (behind - before) * surface.paraxial_curvature(),
             // As drawings and tables, it sees the section along y.
             Self::Biconic(surface) => (behind - before) * surface.curvature[1],
             Self::ThinLens(lens) => before * lens.power,
             Self::Mirror(mirror) => -(before + behind) * mirror.surface.paraxial_curvature(),
+            Self::Freeform(surface) => {
+                let change = match surface.mirror {
+                    Some(_) => -(before + behind),
+                    None => behind - before,
+                };
+                change * surface.paraxial_curvature() + surface.phase_power(wavelength)
+            }
             Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => 0.0,
         }
     }
@@ -342,6 +378,7 @@ impl Part {
     pub fn mirror(&self) -> Option<&MirrorMount> {
         match self {
             Self::Mirror(mirror) => Some(&mirror.mount),
+            Self::Freeform(surface) => surface.mirror.as_ref(),
             Self::Surface(_)
             | Self::Biconic(_)
             | Self::ThinLens(_)
@@ -361,16 +398,18 @@ impl Part {
                 Self::Mirror(Mirror { surface: mirror.surface.flipped(), ..mirror })
             }
             Self::MicrolensArray(array) => Self::MicrolensArray(array.flipped().into()),
+            Self::Freeform(surface) => Self::Freeform(surface.flipped().into()),
             Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) => self,
         }
     }
 
-    /// What it does to light from the object, and to light traced from the sensor. `transmission` is
-    /// what passes of a filter's curve.
+    /// What it does to light of a wavelength (nm) from the object, and to light traced from the sensor. `transmission`
+    /// is what passes of a filter's curve.
     pub(crate) fn actions(
         &self,
         before: f64,
         behind: f64,
+        wavelength: f64,
         transmission: &dyn Fn(&Curve) -> f64,
     ) -> [Action; 2] {
         let both = |action: Action| [action.clone(), action];
@@ -391,6 +430,19 @@ impl Part {
                 Action::refract(Refraction::mirror(mirror.surface.clone())),
                 Action::refract(Refraction::mirror(mirror.surface.flipped())),
             ],
+            Self::Freeform(surface) => {
+                let is_mirror = surface.mirror.is_some();
+                let action = |shape: Arc<Freeform>, before, behind| Action::Freeform {
+                    efficiency: shape.efficiency(wavelength),
+                    surface: FreeformSurface::new(shape, behind, wavelength),
+                    media: if is_mirror { Media::MIRROR } else { Media::new(before, behind) },
+                };
+                let from_behind = match is_mirror {
+                    true => Arc::new(surface.flipped()),
+                    false => Arc::clone(surface),
+                };
+                [action(Arc::clone(surface), before, behind), action(from_behind, behind, before)]
+            }
             Self::ThinLens(lens) => [lens.power, -lens.power]
                 .map(|power| Action::ThinLens { power, semi_diameter: lens.semi_diameter }),
             Self::Aperture(opening) => both(Action::Opening(Arc::clone(opening))),

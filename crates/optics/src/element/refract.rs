@@ -109,6 +109,29 @@ impl Media {
     }
 }
 
+impl Media {
+    /// As [`Self::refract`] at a surface whose phase adds `kick` to the direction in its tangent plane. What is
+    /// evanescent does not go on.
+    pub(crate) fn diffract(
+        &self,
+        ray: Ray,
+        m: [f64; 3],
+        length2: f64,
+        along: f64,
+        kick: [f64; 3],
+    ) -> (Ray, bool) {
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let (across, of_kick) = (along / length2, dot(kick, m) / length2);
+        let tangent: [f64; 3] = std::array::from_fn(|i| {
+            self.ratio * (ray.direction[i] - across * m[i]) + kick[i] - of_kick * m[i]
+        });
+        let behind2 = 1.0 - dot(tangent, tangent);
+        let rise = (behind2 / length2).sqrt().copysign(along);
+        let direction = std::array::from_fn(|i| tangent[i] + rise * m[i]);
+        (Ray { direction, ..ray }, (0.0..f64::INFINITY).contains(&behind2))
+    }
+}
+
 impl Refraction {
     /// From a medium of index `before` into one of index `behind`.
     pub(crate) fn new(surface: Surface, before: f64, behind: f64) -> Self {

@@ -217,7 +217,6 @@ impl Shape {
 #[cfg(test)]
 mod tests {
     use super::super::ApertureSpec;
-    use super::*;
 
     fn shape(json: &str) -> Result<super::super::Opening, String> {
         let spec: ApertureSpec = serde_json::from_str(json).map_err(|e| e.to_string())?;

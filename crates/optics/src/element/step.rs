@@ -6,11 +6,14 @@
 
 use std::sync::Arc;
 
+use glam::DVec3;
+
 use super::Frame;
 use super::aperture::{Opening, in_circle, in_polygon};
 use super::biconic::Biconic;
 use super::crossings::{Slopes, cross_first, cross_first_after};
 use super::lenslets::Lenslets;
+use super::freeform::FreeformSurface;
 use super::losses::{Filter, Loss};
 use super::mirror::{Fold, Shadow};
 use super::newton::{Profile, cross_block};
@@ -53,6 +56,8 @@ pub(crate) enum Action {
     Opening(Arc<Opening>),
     Filter { filter: Arc<Filter>, transmissions: Vec<f64> },
     Lenslets(Lenslets),
+    /// A surface of any shape, and the share of light in its order.
+    Freeform { surface: FreeformSurface, media: Media, efficiency: f64 },
     /// A mirror in the way to another element.
     Shadow(Shadow),
 }
@@ -202,6 +207,12 @@ impl Step {
             }
             Action::Lenslets(_) => {
                 self.run_placed(block, clip);
+                false
+            }
+            Action::Freeform { surface, media, efficiency } => {
+                let clip2 = limit(surface.shape.semi_diameter, clip);
+                self.cross_block(surface, (*media, &Slopes::default()), block, z, clip2);
+                block.throughput.iter_mut().for_each(|share| *share *= efficiency);
                 false
             }
             Action::Shadow(shadow) => {
@@ -360,6 +371,13 @@ impl Step {
         }
     }
 
+    /// The path (mm) that a phase of the element adds at a place (mm) of the lens.
+    pub(crate) fn added_path(&self, place: DVec3) -> f64 {
+        let Action::Freeform { surface, .. } = &self.action else { return 0.0 };
+        let local = self.frame.rotation.transpose() * (place - self.frame.vertex);
+        surface.added_path([local.x, local.y])
+    }
+
     /// Whether it stands for a mirror on the way to another element.
     pub(crate) fn is_shadow(&self) -> bool {
         matches!(self.action, Action::Shadow(_))
@@ -418,6 +436,11 @@ impl Step {
                 let (crossing, kind) = lenslets.exactly(ray, clip);
                 let passes = kind.and_then(|kind| lenslets.transmissions.get(kind).copied());
                 Traversal { transmission: passes.unwrap_or(1.0), ..self.crossed(crossing) }
+            }
+            Action::Freeform { surface, media, efficiency } => {
+                let clip2 = limit(surface.shape.semi_diameter, clip);
+                let crossing = cross_first(surface, (*media, &Slopes::default()), ray, clip2);
+                Traversal { transmission: *efficiency, ..self.crossed(crossing) }
             }
             Action::Shadow(shadow) => {
                 let stopped = clip == Clip::On && shadow.stops(ray);

@@ -223,7 +223,9 @@ impl OpticalTrain {
     /// Whether rays of different wavelengths run differently.
     #[must_use]
     pub fn is_dispersive(&self) -> bool {
-        self.media.iter().any(Glass::is_dispersive)
+        let diffracts =
+            |element: &Element| matches!(&element.part, Part::Freeform(f) if f.is_dispersive());
+        self.media.iter().any(Glass::is_dispersive) || self.elements.iter().any(diffracts)
     }
 
     /// Sentences on glasses and filters that are not known at some of `wavelengths` (nm), one for

@@ -129,7 +129,7 @@ impl MonochromaticTrain {
                 if matches!(step.action, Action::ThinLens { .. }) {
                     length += phases.at(step.element, traversal.ray.position.into());
                 }
-                end.length += index * length;
+                end.length += index * length + step.added_path(point.into());
             }
             end.ray = traversal.ray;
         }

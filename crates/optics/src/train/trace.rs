@@ -28,7 +28,7 @@ pub enum Side {
 #[derive(Debug, Clone)]
 pub struct MonochromaticTrain {
     wavelength: f64,
-    indices: Vec<f64>,
+    indices: Indices,
     forward: Vec<Step>,
     backward: Vec<Step>,
     /// Whether rays take long to be traced through it.
@@ -77,7 +77,7 @@ impl OpticalTrain {
             shade(&obstructions[element], [&mut forward, &mut backward]);
             let [before, behind] = [indices[element], indices[element + 1]];
             let [towards_sensor, towards_object] =
-                placed.part.actions(before, behind, transmission);
+                placed.part.actions(before, behind, wavelength, transmission);
             let absorption = |medium: usize| self.media[medium].absorption(wavelength);
             let loss =
                 |indices, medium| Loss::new(&self.losses, indices, absorption(medium), wavelength);
@@ -104,8 +104,26 @@ impl OpticalTrain {
     }
 
     /// The index of each medium at `wavelength` (nm), from the object's to the sensor's.
-    pub(crate) fn indices(&self, wavelength: f64) -> Result<Vec<f64>, GlassError> {
-        self.media.iter().map(|glass| glass.index(wavelength)).collect()
+    pub(crate) fn indices(&self, wavelength: f64) -> Result<Indices, GlassError> {
+        let of = self.media.iter().map(|glass| glass.index(wavelength)).collect::<Result<_, _>>()?;
+        Ok(Indices { wavelength, of })
+    }
+}
+
+/// The index of each medium of a train at a wavelength.
+#[derive(Debug, Clone)]
+pub(crate) struct Indices {
+    /// In nm.
+    pub(crate) wavelength: f64,
+    /// From the object's medium to the sensor's.
+    pub(crate) of: Vec<f64>,
+}
+
+impl std::ops::Deref for Indices {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        &self.of
     }
 }
 

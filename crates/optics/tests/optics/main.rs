@@ -1,10 +1,12 @@
 //! Lenses and what they are made of, against closed forms, references and each other.
 
 mod asphere_crossings;
+mod components;
 mod exit_pupil;
 mod lens_limits;
 mod lens_properties;
 mod microlens_array;
+mod mirrors;
 mod openings;
 mod optics_reference;
 mod reports;

@@ -2,7 +2,7 @@
 //!
 //! Along the surface the wave vector gains the gradient of the phase: n' d' = n d + (m λ/2π) ∇φ in its tangent plane
 //! (W. T. Welford, "A vector raytracing equation for hologram lenses of arbitrary shape", *Opt. Commun.* 14, 322
-//! (1975)); on a flat grating of lines λ-independent in number that is n' sin θ' = n sin θ + m λ/d. Orders that do not exist at a
+//! (1975)); on a flat grating of period d that is n' sin θ' = n sin θ + m λ/d. Orders that do not exist at a
 //! wavelength are evanescent: their light goes nowhere and is counted as totally reflected.
 //!
 //! A kinoform that is blazed for λ₀ gives order m the share sinc²(λ₀/λ − m) of the light (G. J. Swanson, *Binary Optics
@@ -23,7 +23,6 @@ use crate::element::aperture::Picture;
 #[serde(deny_unknown_fields)]
 pub struct PhaseSpec {
     /// What it is of.
-    #[serde(flatten)]
     pub pattern: PatternSpec,
     /// The order of diffraction; 1 when absent. Not that of a mask with a `design_wavelength`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -40,7 +39,7 @@ pub struct PhaseSpec {
 
 /// The pattern of a phase.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "pattern", rename_all = "snake_case")]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum PatternSpec {
     /// Straight lines: φ = 2π y/period, turned.
     Grating {
@@ -71,7 +70,7 @@ pub enum PatternSpec {
         /// The picture's width (mm).
         width: Millimetres,
         /// The picture's height (mm); by square pixels when absent.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         height: Option<Millimetres>,
         /// The phase of white, where black is 0 (rad).
         depth: f64,
@@ -80,7 +79,7 @@ pub enum PatternSpec {
 
 /// A phase, ready to be asked.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Phase {
+pub(super) struct Phase {
     pattern: Pattern,
     order: f64,
     blaze: Option<f64>,

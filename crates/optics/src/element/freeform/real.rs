@@ -3,7 +3,7 @@
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// What sags and phases are worked out in.
-pub trait Real:
+pub(super) trait Real:
     Copy
     + Add<Output = Self>
     + Sub<Output = Self>
@@ -51,16 +51,16 @@ impl Real for f64 {
 /// A number with its derivatives by x and y (W. K. Clifford's dual numbers, two of them). Of dual numbers it has the
 /// second derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Dual<T> {
+pub(super) struct Dual<T> {
     /// The value.
-    pub v: T,
+    pub(super) v: T,
     /// The derivatives.
-    pub d: [T; 2],
+    pub(super) d: [T; 2],
 }
 
 impl<T: Real> Dual<T> {
     /// The coordinates themselves.
-    pub fn place([x, y]: [T; 2]) -> [Self; 2] {
+    pub(super) fn place([x, y]: [T; 2]) -> [Self; 2] {
         let (zero, one) = (T::constant(0.0), T::constant(1.0));
         [Self { v: x, d: [one, zero] }, Self { v: y, d: [zero, one] }]
     }
@@ -135,7 +135,7 @@ impl<T: Real> Real for Dual<T> {
 }
 
 /// `number` to a whole power.
-pub fn power<T: Real>(number: T, exponent: u32) -> T {
+pub(super) fn power<T: Real>(number: T, exponent: u32) -> T {
     let (mut product, mut square, mut rest) = (T::constant(1.0), number, exponent);
     while rest > 0 {
         if rest % 2 == 1 {
