@@ -29,6 +29,14 @@ impl Isometry {
     /// What changes nothing.
     pub const ONE: Self = Self { turn: DMat3::IDENTITY, shift: DVec3::ZERO };
 
+    /// The reflection in the plane through `point` (mm) with the unit normal `normal`.
+    #[must_use]
+    pub(crate) fn reflection(point: DVec3, normal: DVec3) -> Self {
+        let column = |axis: DVec3| axis - 2.0 * normal.dot(axis) * normal;
+        let turn = DMat3::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z));
+        Self { turn, shift: point - turn * point }
+    }
+
     /// Where it takes a place (mm).
     #[must_use]
     pub fn place(&self, place: DVec3) -> DVec3 {

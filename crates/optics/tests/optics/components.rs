@@ -11,7 +11,7 @@ const SURFACES: [&str; 9] = [
     r#"{"radius": 40, "aspheric": {"3": 2e-5, "4": 1e-6}}"#,
     r#"{"radius": 40, "conic": -0.5, "rotation_radius": 55}"#,
     r#"{"radius": 40, "sag": [{"type": "zernike", "radius": 9, "coefficients": {"5": 0.02, "7": -0.01, "11": 0.01}}]}"#,
-    r#"{"radius": 40, "sag": [{"type": "chebyshev", "half_size": [9, 9], "coefficients": [[2, 1, 0.02], [4, 0, 0.01]]}]}"#,
+    r#"{"radius": 40, "sag": [{"type": "chebyshev", "half_size": [9, 9], "coefficients": [[2, 2, 0.02], [4, 0, 0.01]]}]}"#,
     r#"{"radius": 40, "sag": [{"type": "polynomial", "radius": 10, "coefficients": [[3, 0, 0.02], [1, 2, 0.03]]}]}"#,
     r#"{"radius": 40, "sag": [{"type": "q_bfs", "radius": 9, "coefficients": [0.05, -0.02, 0.01]}]}"#,
     r#"{"radius": 40, "conic": -1, "sag": [{"type": "q_con", "radius": 9, "coefficients": [0.05, -0.02, 0.01]}]}"#,

@@ -157,12 +157,12 @@ fn preset_parabola() -> OpticalTrain {
 
 #[test]
 fn the_coma_of_a_paraboloid_is_that_of_the_formula() {
-    // S_II of a paraboloid with the stop at the mirror: A² terms cancel, what is left is −h³ ū /f² … by W. T. Welford,
-    // *Aberrations of Optical Systems*, 1986, 9.4: S_II = h⁴·0 + h³ ū/f² in absolute value.
+    // The tangential coma of a paraboloid with the stop at the mirror is 3 f ū/(16 N²) (W. T. Welford, *Aberrations of Optical
+    // Systems*, 1986, 9.4), and 3 S_II/(2 u'): with u' = h/f and N = f/2h, S_II = h³ ū/(2 f²).
     let f: f64 = 57_600.0;
     let field = ObjectPoint::Infinity { angles: [0.0, 0.1] };
     let table = seidel(&preset_parabola(), &field, [500.0, 600.0]).unwrap();
-    let expected = 1200.0_f64.powi(3) * 0.1_f64.to_radians().tan() / (f * f);
+    let expected = 1200.0_f64.powi(3) * 0.1_f64.to_radians().tan() / (2.0 * f * f);
     assert!(table.total.spherical.abs() < 1e-12 * expected);
     assert!((table.total.coma.abs() / expected - 1.0).abs() < 1e-10, "{table:?} {expected}");
 }
