@@ -212,8 +212,8 @@ impl Fold {
     fn unfolded(&self, ray: Ray) -> Ray {
         let Ray { position: [x, y, z], direction: [u, v, w] } = ray;
         let n = self.normal;
-        let twice =
-            2.0 * ((x - self.vertex.x) * n.x + (y - self.vertex.y) * n.y + (z - self.vertex.z) * n.z);
+        let twice = 2.0
+            * ((x - self.vertex.x) * n.x + (y - self.vertex.y) * n.y + (z - self.vertex.z) * n.z);
         let along = 2.0 * (u * n.x + v * n.y + w * n.z);
         Ray {
             position: [x - twice * n.x, y - twice * n.y, z - twice * n.z],

@@ -39,17 +39,15 @@ pub use aperture::{
     ApertureSpec, CircularSpec, MaskSpec, Opening, Picture, PolygonSpec, grey_picture,
 };
 pub use biconic::{Biconic, BiconicSpec};
-pub use freeform::{
-    Freeform, FreeformSpec, HeightMapSpec, PatternSpec, PhaseSpec, SagSpec,
-};
+pub use freeform::{Freeform, FreeformSpec, HeightMapSpec, PatternSpec, PhaseSpec, SagSpec};
 pub use lattice::{Grid, Lattice, LatticeCell};
 pub(crate) use losses::Loss;
 pub use losses::{Coating, Filter, FilterSpec, LossesSpec, Plain, Reflection};
 pub use microlens_array::{
     Gaps, Lenslet, LensletShape, LensletSpec, MicrolensArray, MicrolensArraySpec, clipped,
 };
-pub use mirror::{Mirror, MirrorMount, MirrorSpec};
 pub(crate) use mirror::{Fold, Shadow};
+pub use mirror::{Mirror, MirrorMount, MirrorSpec};
 pub use part::{Part, PartSpec, Symbol};
 pub use rays::{Block, LANES, LensRays, Ray, RayStatus, StatusCounts};
 pub(crate) use refract::Refraction;

@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use super::crossings::Slopes;
 use super::freeform::{Freeform, FreeformSpec, FreeformSurface};
-use super::mirror::{Mirror, MirrorMount, MirrorSpec};
 use super::lenslets::Lenslets;
+use super::mirror::{Mirror, MirrorMount, MirrorSpec};
 use super::refract::Media;
 use super::step::Action;
 use super::{
@@ -206,10 +206,9 @@ impl Part {
             Self::Surface(surface) => surface.is_plane(),
             Self::Biconic(surface) => surface.curvature == [0.0; 2],
             Self::Aperture(_) | Self::Filter(_) => true,
-            Self::ThinLens(_)
-            | Self::MicrolensArray(_)
-            | Self::Mirror(_)
-            | Self::Freeform(_) => false,
+            Self::ThinLens(_) | Self::MicrolensArray(_) | Self::Mirror(_) | Self::Freeform(_) => {
+                false
+            }
         }
     }
 

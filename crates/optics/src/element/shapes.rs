@@ -148,9 +148,8 @@ impl Shape {
             ShapeKind::Ellipse([a, b]) => (x / a).powi(2) + (y / b).powi(2) <= 1.0,
             ShapeKind::Ring { inner, outer, arms, half_width } => {
                 let square = x * x + y * y;
-                let is_on = |[u, v]: &[f64; 2]| {
-                    x * u + y * v > 0.0 && (y * u - x * v).abs() < *half_width
-                };
+                let is_on =
+                    |[u, v]: &[f64; 2]| x * u + y * v > 0.0 && (y * u - x * v).abs() < *half_width;
                 square >= inner * inner && square <= outer * outer && !arms.iter().any(is_on)
             }
         }
@@ -174,8 +173,7 @@ impl Shape {
             ShapeKind::Rectangle(half) => ShapeKind::Rectangle(half.map(|half| half * scale)),
             ShapeKind::Ellipse(half) => ShapeKind::Ellipse(half.map(|half| half * scale)),
             ShapeKind::Ring { inner, outer, arms, half_width } => {
-                let scale =
-                    if outer.is_finite() && radius.is_finite() { scale } else { 1.0 };
+                let scale = if outer.is_finite() && radius.is_finite() { scale } else { 1.0 };
                 ShapeKind::Ring {
                     inner: inner * scale,
                     outer: radius,
@@ -251,21 +249,30 @@ mod tests {
 
     #[test]
     fn turned_shapes_turn_from_x_towards_y() {
-        let opening = shape(r#"{"shape": "rectangular", "width": 4, "height": 0.2, "rotation": 30}"#);
+        let opening =
+            shape(r#"{"shape": "rectangular", "width": 4, "height": 0.2, "rotation": 30}"#);
         let opening = opening.unwrap();
         let along = [30.0_f64.to_radians().cos(), 30.0_f64.to_radians().sin()];
         assert_eq!(opening.transmission(1.9 * along[0], 1.9 * along[1]), 1.0);
         assert_eq!(opening.transmission(1.9 * along[0], -1.9 * along[1]), 0.0);
-        let spider = shape(r#"{"shape": "spider", "arms": 1, "width": 0.2, "rotation": 90}"#).unwrap();
+        let spider =
+            shape(r#"{"shape": "spider", "arms": 1, "width": 0.2, "rotation": 90}"#).unwrap();
         assert_eq!((spider.transmission(0.0, 5.0), spider.transmission(0.0, -5.0)), (0.0, 1.0));
     }
 
     #[test]
     fn what_is_no_opening_is_refused_in_words() {
         let error = |json: &str| shape(json).unwrap_err();
-        assert!(error(r#"{"shape": "rectangular", "width": 0, "height": 1}"#).contains("width is 0"));
-        assert!(error(r#"{"shape": "annular", "radius": 1, "inner_radius": 1}"#).contains("nothing is open"));
+        assert!(
+            error(r#"{"shape": "rectangular", "width": 0, "height": 1}"#).contains("width is 0")
+        );
+        assert!(
+            error(r#"{"shape": "annular", "radius": 1, "inner_radius": 1}"#)
+                .contains("nothing is open")
+        );
         assert!(error(r#"{"shape": "spider", "arms": 0, "width": 1}"#).contains("arms is 0"));
-        assert!(error(r#"{"shape": "annular", "inner_radius": -1}"#).contains("inner_radius is -1"));
+        assert!(
+            error(r#"{"shape": "annular", "inner_radius": -1}"#).contains("inner_radius is -1")
+        );
     }
 }

@@ -12,8 +12,8 @@ use super::Frame;
 use super::aperture::{Opening, in_circle, in_polygon};
 use super::biconic::Biconic;
 use super::crossings::{Slopes, cross_first, cross_first_after};
-use super::lenslets::Lenslets;
 use super::freeform::FreeformSurface;
+use super::lenslets::Lenslets;
 use super::losses::{Filter, Loss};
 use super::mirror::{Fold, Shadow};
 use super::newton::{Profile, cross_block};
@@ -51,13 +51,27 @@ pub(crate) enum Action {
     Sphere(Refraction),
     Conic(Refraction),
     Asphere(Refraction),
-    Biconic { surface: Biconic, media: Media, slopes: Slopes },
-    ThinLens { power: f64, semi_diameter: f64 },
+    Biconic {
+        surface: Biconic,
+        media: Media,
+        slopes: Slopes,
+    },
+    ThinLens {
+        power: f64,
+        semi_diameter: f64,
+    },
     Opening(Arc<Opening>),
-    Filter { filter: Arc<Filter>, transmissions: Vec<f64> },
+    Filter {
+        filter: Arc<Filter>,
+        transmissions: Vec<f64>,
+    },
     Lenslets(Lenslets),
     /// A surface of any shape, and the share of light in its order.
-    Freeform { surface: FreeformSurface, media: Media, efficiency: f64 },
+    Freeform {
+        surface: FreeformSurface,
+        media: Media,
+        efficiency: f64,
+    },
     /// A mirror in the way to another element.
     Shadow(Shadow),
 }

@@ -127,7 +127,8 @@ impl OpticalTrain {
         let spaces = self.built();
         let end = self.end_of_light();
         // The elements at which a leg begins and ends, but for sheets, which only look at rays.
-        let bends = |i: &usize| !matches!(self.elements[*i].part, Part::Aperture(_) | Part::Filter(_));
+        let bends =
+            |i: &usize| !matches!(self.elements[*i].part, Part::Aperture(_) | Part::Filter(_));
         for (leg, obstructions) in legs.iter_mut().enumerate() {
             let (before, behind) = ((0..leg).rev().find(bends), (leg..count).find(bends));
             let z = |i: usize| self.elements[i].frame.vertex.z;
@@ -142,7 +143,10 @@ impl OpticalTrain {
             };
             let to = if leg < count { z(leg) + slack(behind) } else { end };
             for (element, mirror) in self.elements.iter().enumerate() {
-                if mirror.part.mirror().is_none() || before == Some(element) || behind == Some(element) {
+                if mirror.part.mirror().is_none()
+                    || before == Some(element)
+                    || behind == Some(element)
+                {
                     continue;
                 }
                 let Some(shadow) = mirror.shadow() else { continue };

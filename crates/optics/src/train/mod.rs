@@ -270,7 +270,9 @@ impl OpticalTrain {
                 part => {
                     for curve in part.curves() {
                         let known = match part {
-                            Part::Mirror(_) => format!("what the mirror elements[{i}] reflects is known"),
+                            Part::Mirror(_) => {
+                                format!("what the mirror elements[{i}] reflects is known")
+                            }
                             _ => format!("a filter of the lenslets elements[{i}] is known"),
                         };
                         tell(known, curve.range());
@@ -449,9 +451,8 @@ impl OpticalTrain {
         let pair = self.elements.get(i..i + 2)?;
         let [a, b] = [&pair[0].part, &pair[1].part];
         let reach = a.clear_radius().min(b.clear_radius());
-        let of_glass = [a, b]
-            .iter()
-            .all(|part| part.symbol() == Symbol::Surface && part.mirror().is_none());
+        let of_glass =
+            [a, b].iter().all(|part| part.symbol() == Symbol::Surface && part.mirror().is_none());
         if !of_glass || !reach.is_finite() || !pair.iter().all(|e| e.frame.is_axial()) {
             return None;
         }

@@ -121,7 +121,8 @@ impl OpticalTrain {
             Some(_) => return None,
         };
         // The first step that ends, and then by halves of it.
-        let Some(first) = (begin + 1..=RAYS).map(|i| step * f64::from(i)).find(|&i| ended(i).is_some())
+        let Some(first) =
+            (begin + 1..=RAYS).map(|i| step * f64::from(i)).find(|&i| ended(i).is_some())
         else {
             return Some(RimEdge::Open);
         };

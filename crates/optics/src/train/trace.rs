@@ -85,7 +85,11 @@ impl OpticalTrain {
                 let reflectance = mirror.reflectance.as_ref().map_or(1.0, transmission);
                 Fold::new(mirror, &placed.frame, reflectance)
             });
-            let add = |steps: &mut Vec<Step>, action: Action, loss: Option<Loss>, fold, frame: Frame| {
+            let add = |steps: &mut Vec<Step>,
+                       action: Action,
+                       loss: Option<Loss>,
+                       fold,
+                       frame: Frame| {
                 // Sheets do not move rays: what absorbs before one is counted at the next surface.
                 let loss = loss.filter(|_| action.moves());
                 steps.push(Step { element, frame, axial: frame.is_axial(), action, loss, fold });
@@ -105,7 +109,8 @@ impl OpticalTrain {
 
     /// The index of each medium at `wavelength` (nm), from the object's to the sensor's.
     pub(crate) fn indices(&self, wavelength: f64) -> Result<Indices, GlassError> {
-        let of = self.media.iter().map(|glass| glass.index(wavelength)).collect::<Result<_, _>>()?;
+        let of =
+            self.media.iter().map(|glass| glass.index(wavelength)).collect::<Result<_, _>>()?;
         Ok(Indices { wavelength, of })
     }
 }

@@ -11,7 +11,7 @@ const SURFACES: [&str; 9] = [
     r#"{"radius": 40, "aspheric": {"3": 2e-5, "4": 1e-6}}"#,
     r#"{"radius": 40, "conic": -0.5, "rotation_radius": 55}"#,
     r#"{"radius": 40, "sag": [{"type": "zernike", "radius": 9, "coefficients": {"5": 0.02, "7": -0.01, "11": 0.01}}]}"#,
-    r#"{"radius": 40, "sag": [{"type": "chebyshev", "half_size": [9, 9], "coefficients": [[2, 2, 0.02], [4, 0, 0.01]]}]}"#,
+    r#"{"radius": 40, "sag": [{"type": "chebyshev", "half_size": [9, 9], "coefficients": [[2, 2, 0.02], [4, 0, 0.01], [0, 0, -0.03]]}]}"#,
     r#"{"radius": 40, "sag": [{"type": "polynomial", "radius": 10, "coefficients": [[3, 0, 0.02], [1, 2, 0.03]]}]}"#,
     r#"{"radius": 40, "sag": [{"type": "q_bfs", "radius": 9, "coefficients": [0.05, -0.02, 0.01]}]}"#,
     r#"{"radius": 40, "conic": -1, "sag": [{"type": "q_con", "radius": 9, "coefficients": [0.05, -0.02, 0.01]}]}"#,
@@ -82,7 +82,8 @@ fn focal_lengths_are_those_of_rays_near_the_axis() {
             at.run(Side::Object, Clip::On, ray).ray
         };
         let [up, down] = [ray(1e-4), ray(-1e-4)];
-        let slope = (up.direction[1] / up.direction[2] - down.direction[1] / down.direction[2]) / 2e-4;
+        let slope =
+            (up.direction[1] / up.direction[2] - down.direction[1] / down.direction[2]) / 2e-4;
         let efl = train.paraxial(550.0).unwrap().efl.unwrap();
         assert!((-1.0 / slope / efl - 1.0).abs() < 1e-6, "{surface}: {} {efl}", -1.0 / slope);
     }
@@ -105,7 +106,11 @@ fn a_kinoform_has_the_focal_length_of_its_order_at_each_wavelength() {
             assert!((efl / expected - 1.0).abs() < 1e-14, "{order} {wavelength}");
             // sin θ = m λ/2π dφ/dr = r/f exactly, and the light of the order alone.
             let at = train.at(wavelength).unwrap();
-            let end = at.run(Side::Object, Clip::On, Ray::new(DVec3::new(0.0, 4.0, -1.0), DVec3::Z).unwrap());
+            let end = at.run(
+                Side::Object,
+                Clip::On,
+                Ray::new(DVec3::new(0.0, 4.0, -1.0), DVec3::Z).unwrap(),
+            );
             assert!((end.ray.direction[1] + 4.0 / expected).abs() < 1e-15);
             let off = std::f64::consts::PI * (design / wavelength - f64::from(order));
             let share = if off.abs() < 1e-9 { 1.0 } else { (off.sin() / off).powi(2) };
@@ -140,7 +145,8 @@ fn with_picture(columns: u32, values: &[u8], element: &str) -> Result<OpticalTra
         .unwrap()
         .save(folder.path().join("map.png"))
         .unwrap();
-    let file = LensFile::from_json(&format!(r#"{{"elements": [{element}]}}"#)).map_err(|e| e.to_string())?;
+    let file = LensFile::from_json(&format!(r#"{{"elements": [{element}]}}"#))
+        .map_err(|e| e.to_string())?;
     file.build(&|name: &str| Ok(folder.path().join(name))).map_err(|e| e.to_string())
 }
 
@@ -152,14 +158,16 @@ fn a_height_map_of_a_ramp_is_a_wedge_and_pictures_that_are_none_are_refused() {
     let train = with_picture(21, &ramp, element).unwrap();
     let at = train.at(550.0).unwrap();
     for (x, y) in [(0.0, 0.0), (3.3, -4.2), (-7.7, 5.0)] {
-        let end = at.run(Side::Object, Clip::On, Ray::new(DVec3::new(x, y, -3.0), DVec3::Z).unwrap());
+        let end =
+            at.run(Side::Object, Clip::On, Ray::new(DVec3::new(x, y, -3.0), DVec3::Z).unwrap());
         let tilt = 0.01_f64.atan();
         let bent = tilt - (tilt.sin() / 1.5).asin();
         assert!((end.ray.direction[0] + bent.sin()).abs() < 1e-13, "{x} {y}: {:?}", end.ray);
         assert!((end.ray.position[2] - 0.01 * (x + 10.0)).abs() < 1e-13);
     }
     // Beyond the picture there is no surface.
-    let end = at.run(Side::Object, Clip::On, Ray::new(DVec3::new(10.6, 0.0, -3.0), DVec3::Z).unwrap());
+    let end =
+        at.run(Side::Object, Clip::On, Ray::new(DVec3::new(10.6, 0.0, -3.0), DVec3::Z).unwrap());
     assert_eq!(end.status, RayStatus::Missed { element: 0 });
     let mask = |depth: f64| {
         format!(

@@ -13,6 +13,7 @@ mod reports;
 mod small_openings;
 mod waves;
 mod zemax_commands;
+mod zemax_components;
 
 use etendue_optics::train::{LensFile, OpticalTrain};
 

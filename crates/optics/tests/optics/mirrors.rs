@@ -218,7 +218,10 @@ fn a_flat_fold_mirror_leaves_the_picture_as_it_is_and_turns_the_built_axis() {
     let expected = (2.0_f64).to_radians().sin();
     assert!((end.ray.direction[1].abs() - expected).abs() < 1e-15);
     let built = tilted.built()[1].direction(end.ray.direction.into());
-    assert!((built - DVec3::new(0.0, expected, -(1.0 - expected * expected).sqrt())).length() < 1e-14, "{built}");
+    assert!(
+        (built - DVec3::new(0.0, expected, -(1.0 - expected * expected).sqrt())).length() < 1e-14,
+        "{built}"
+    );
 }
 
 #[test]
@@ -247,7 +250,10 @@ fn light_goes_back_the_way_it_came_and_batches_keep_every_bit() {
             assert!(apart < 1e-12, "{name} {i}: {apart:e}");
             let way = DVec3::from(back.ray.position) - DVec3::from(ray.position);
             let direction = DVec3::from(ray.direction);
-            assert!((way - direction * way.dot(direction)).length() < 1e-12 * (1.0 + way.length()) * 100.0);
+            assert!(
+                (way - direction * way.dot(direction)).length()
+                    < 1e-12 * (1.0 + way.length()) * 100.0
+            );
             returned += 1;
         }
         assert!(returned > 100, "{name}: {returned}");
@@ -291,7 +297,10 @@ fn the_secondary_stops_what_its_area_is_of_the_light() {
         r#"{"elements": [{"type": "mirror", "radius": -1000, "conic": -1, "thickness": -500, "semi_diameter": 100, "hole": 20}]}"#,
     );
     let ray = Ray::new(DVec3::new(0.0, 19.9, -900.0), DVec3::Z).unwrap();
-    assert_eq!(holed.at(550.0).unwrap().run(Side::Object, Clip::On, ray).status, RayStatus::Vignetted { element: 0 });
+    assert_eq!(
+        holed.at(550.0).unwrap().run(Side::Object, Clip::On, ray).status,
+        RayStatus::Vignetted { element: 0 }
+    );
     // What meets the primary beside its hole on the way back is stopped there.
     let narrow = build(
         r#"{"elements": [
@@ -317,8 +326,10 @@ fn of_the_rays_sampled_behind_a_secondary_90_percent_leave_without_bias() {
     for r in [0.0, 8.0, 15.0, 20.0] {
         let film = DVec2::from_angle(0.7) * r;
         let count = 60_000_u32;
-        let square =
-            |i: u32| [0.754_877_666_246_693, 0.569_840_290_998_053].map(|a: f64| (0.5 + a * f64::from(i)).fract());
+        let square = |i: u32| {
+            [0.754_877_666_246_693, 0.569_840_290_998_053]
+                .map(|a: f64| (0.5 + a * f64::from(i)).fract())
+        };
         let u: Vec<[f64; 2]> = (0..count).map(square).collect();
         let mut rays = LensRays::with_capacity(count as usize);
         pupil.push_rays(&vec![film; count as usize], &u, train.wavelength(), &mut rays);
@@ -348,14 +359,23 @@ fn of_the_rays_sampled_behind_a_secondary_90_percent_leave_without_bias() {
 
 #[test]
 fn what_no_light_runs_along_is_refused_with_its_remedy() {
-    let wrong = try_build(r#"{"elements": [{"type": "mirror", "radius": -100, "thickness": 50}]}"#).unwrap_err();
+    let wrong = try_build(r#"{"elements": [{"type": "mirror", "radius": -100, "thickness": 50}]}"#)
+        .unwrap_err();
     assert!(wrong.contains("elements[0]") && wrong.contains("write -50"), "{wrong}");
-    let hole = try_build(r#"{"elements": [{"type": "mirror", "hole": 5, "semi_diameter": 4}]}"#).unwrap_err();
+    let hole = try_build(r#"{"elements": [{"type": "mirror", "hole": 5, "semi_diameter": 4}]}"#)
+        .unwrap_err();
     assert!(hole.contains("nothing of the mirror is left"), "{hole}");
-    let two = r#"{"elements": [{"type": "mirror", "stop": true}, {"type": "mirror", "stop": true}]}"#;
-    assert!(try_build(two).unwrap_err().contains("elements[1].stop: elements[0] is the stop already"));
+    let two =
+        r#"{"elements": [{"type": "mirror", "stop": true}, {"type": "mirror", "stop": true}]}"#;
+    assert!(
+        try_build(two).unwrap_err().contains("elements[1].stop: elements[0] is the stop already")
+    );
     let back = build(
         r#"{"elements": [{"type": "mirror", "radius": -100, "thickness": -50, "semi_diameter": 20}]}"#,
     );
-    assert!(back.notes().iter().any(|note| note.contains("the sensor stands in the light")), "{:?}", back.notes());
+    assert!(
+        back.notes().iter().any(|note| note.contains("the sensor stands in the light")),
+        "{:?}",
+        back.notes()
+    );
 }

@@ -76,7 +76,7 @@ pub struct FreeformSpec {
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub aspheric: BTreeMap<String, f64>,
     /// Makes a toroid: the radius of the circle (mm) on which the section along y goes along x, positive when its
-    /// centre lies at greater z.
+    /// centre lies at greater z; 0 for a cylinder, that goes straight.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotation_radius: Option<Millimetres>,
     /// What is added to the base.
@@ -141,6 +141,7 @@ impl FreeformSpec {
         let curvature = vertex_curvature(self.radius, self.curvature)?;
         let rotation = match self.rotation_radius {
             None => None,
+            Some(Millimetres(0.0)) => Some(0.0),
             Some(radius) => Some(
                 vertex_curvature(Some(radius), None)
                     .map_err(|why| format!("rotation_radius: {why}"))?,
@@ -165,14 +166,12 @@ impl FreeformSpec {
     fn mirror_mount(&self, semi_diameter: f64) -> Result<Option<MirrorMount>, String> {
         if self.mirror {
             if self.glass.is_some() {
-                return Err("a mirror has no glass behind it: leave out glass, or mirror".to_owned());
+                return Err(
+                    "a mirror has no glass behind it: leave out glass, or mirror".to_owned()
+                );
             }
-            let mount = MirrorMount::build(
-                self.hole,
-                self.fold,
-                self.reflectance.as_ref(),
-                semi_diameter,
-            )?;
+            let mount =
+                MirrorMount::build(self.hole, self.fold, self.reflectance.as_ref(), semi_diameter)?;
             return Ok(Some(mount));
         }
         let given = [
@@ -181,7 +180,9 @@ impl FreeformSpec {
             (self.reflectance.is_some(), "reflectance"),
         ];
         match given.iter().find(|given| given.0) {
-            Some((_, key)) => Err(format!("{key} is for mirrors: write \"mirror\": true, or leave it out")),
+            Some((_, key)) => {
+                Err(format!("{key} is for mirrors: write \"mirror\": true, or leave it out"))
+            }
             None => Ok(None),
         }
     }
@@ -282,12 +283,23 @@ impl Freeform {
     /// Words on how it differs from a sphere.
     pub(super) fn shape(&self) -> Vec<String> {
         let conic = (self.base.conic != 0.0).then(|| format!("conic {}", self.base.conic));
-        let powers = (!self.powers.is_empty()).then(|| format!("aspheric to r^{}", self.powers.len()));
-        let toroid = self.rotation.map(|c| format!("toroid about {} mm", 1.0 / c));
+        let powers =
+            (!self.powers.is_empty()).then(|| format!("aspheric to r^{}", self.powers.len()));
+        let toroid = self.rotation.map(|c| match c {
+            0.0 => "cylinder along x".to_owned(),
+            c => format!("toroid about {} mm", 1.0 / c),
+        });
         let fresnel = self.is_fresnel.then(|| "Fresnel".to_owned());
         let terms = self.terms.iter().map(|term| term.word().to_owned());
         let phase = self.phase.iter().map(Phase::word);
-        conic.into_iter().chain(powers).chain(toroid).chain(fresnel).chain(terms).chain(phase).collect()
+        conic
+            .into_iter()
+            .chain(powers)
+            .chain(toroid)
+            .chain(fresnel)
+            .chain(terms)
+            .chain(phase)
+            .collect()
     }
 
     /// The sag (mm), in any number; beyond the domain of the base as at its edge.
@@ -365,8 +377,7 @@ pub(crate) struct FreeformSurface {
 impl FreeformSurface {
     /// At a wavelength (nm), with the index behind it.
     pub(crate) fn new(shape: Arc<Freeform>, behind: f64, wavelength: f64) -> Self {
-        let path =
-            shape.phase.as_ref().map_or(0.0, |phase| phase.path_per_radian(wavelength));
+        let path = shape.phase.as_ref().map_or(0.0, |phase| phase.path_per_radian(wavelength));
         let sign = if shape.mirror.is_some() { -1.0 } else { 1.0 };
         Self { shape, kick: sign * path / behind, path }
     }
@@ -386,7 +397,10 @@ impl Profile for FreeformSurface {
             let travel = -ray.position[2] / ray.direction[2];
             (ray.advanced(travel), travel)
         };
-        if self.shape.is_fresnel || self.shape.rotation.is_some() || self.shape.base.curvature == 0.0 {
+        if self.shape.is_fresnel
+            || self.shape.rotation.is_some()
+            || self.shape.base.curvature == 0.0
+        {
             return on_plane();
         }
         let base = match self.shape.sense < 0.0 {
@@ -454,7 +468,8 @@ impl Profile for FreeformSurface {
         /// Places a side at which the sag is looked at; waves between are within the slack of a tenth that is added.
         const PLACES: i32 = 12;
         let at = |i: i32| reach * f64::from(i) / f64::from(PLACES);
-        let places = (-PLACES..=PLACES).flat_map(|i| (-PLACES..=PLACES).map(move |j| [at(i), at(j)]));
+        let places =
+            (-PLACES..=PLACES).flat_map(|i| (-PLACES..=PLACES).map(move |j| [at(i), at(j)]));
         let sags = places.map(|[x, y]| {
             let ray = Ray { position: [x, y, 0.0], direction: [0.0, 0.0, 1.0] };
             self.sag_and_slope(ray).0

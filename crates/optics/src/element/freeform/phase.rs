@@ -90,8 +90,14 @@ pub(super) struct Phase {
 enum Pattern {
     /// The gradient (rad/mm).
     Grating([f64; 2]),
-    Radial { scale: f64, coefficients: Vec<f64> },
-    Polynomial { scale: f64, terms: Vec<(u32, u32, f64)> },
+    Radial {
+        scale: f64,
+        coefficients: Vec<f64>,
+    },
+    Polynomial {
+        scale: f64,
+        terms: Vec<(u32, u32, f64)>,
+    },
     Image(Grid),
 }
 
@@ -117,7 +123,10 @@ impl PhaseSpec {
         let design = wavelength("design_wavelength", self.design_wavelength)?;
         let blaze = wavelength("blaze_wavelength", self.blaze_wavelength)?;
         if design.is_some() && (self.order.is_some() || blaze.is_some()) {
-            return Err("a phase has a design_wavelength, or an order with its blaze_wavelength, not both".to_owned());
+            return Err(
+                "a phase has a design_wavelength, or an order with its blaze_wavelength, not both"
+                    .to_owned(),
+            );
         }
         if self.order.is_some_and(|order| order.abs() > 1000) {
             return Err("phase.order must be within -1000 to 1000".to_owned());

@@ -78,12 +78,28 @@ fn one() -> Millimetres {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Term {
     /// Azimuthal order (sines below 0), and the radial polynomial over ρ to it in powers of ρ², the highest first.
-    Zernike { scale: f64, terms: Vec<(i32, Vec<f64>)> },
+    Zernike {
+        scale: f64,
+        terms: Vec<(i32, Vec<f64>)>,
+    },
     /// Rows of coefficients by i, in them by j.
-    Chebyshev { scale: [f64; 2], rows: Vec<Vec<f64>> },
-    Polynomial { scale: f64, terms: Vec<(u32, u32, f64)> },
-    QBfs { scale: f64, curvature: f64, coefficients: Vec<f64> },
-    QCon { scale: f64, coefficients: Vec<f64> },
+    Chebyshev {
+        scale: [f64; 2],
+        rows: Vec<Vec<f64>>,
+    },
+    Polynomial {
+        scale: f64,
+        terms: Vec<(u32, u32, f64)>,
+    },
+    QBfs {
+        scale: f64,
+        curvature: f64,
+        coefficients: Vec<f64>,
+    },
+    QCon {
+        scale: f64,
+        coefficients: Vec<f64>,
+    },
     Grid(Grid),
 }
 
@@ -178,7 +194,9 @@ fn zernike(
         .map(|(key, &value)| {
             let number = key.parse::<usize>().ok().filter(|number| (1..=most).contains(number));
             let Some(number) = number else {
-                return Err(format!("coefficients has the number \"{key}\"; terms count from 1 to {most}"));
+                return Err(format!(
+                    "coefficients has the number \"{key}\"; terms count from 1 to {most}"
+                ));
             };
             let term = table[number - 1];
             let factor = value * order.scale(term);
@@ -225,8 +243,7 @@ impl Term {
                 let (x, y) = (x.times(*scale), y.times(*scale));
                 let square = x * x + y * y;
                 terms.iter().fold(zero, |sum, (m, radial)| {
-                    let radial =
-                        radial.iter().fold(zero, |value, &c| (value * square).plus(c));
+                    let radial = radial.iter().fold(zero, |value, &c| (value * square).plus(c));
                     // (x + iy)ᵐ.
                     let (mut cosine, mut sine) = (T::constant(1.0), zero);
                     for _ in 0..m.unsigned_abs() {
@@ -244,7 +261,9 @@ impl Term {
                     sum + tx * inner.fold(zero, |sum, (&c, &ty)| sum + ty.times(c))
                 })
             }
-            Self::Polynomial { scale, terms } => polynomial([x.times(*scale), y.times(*scale)], terms),
+            Self::Polynomial { scale, terms } => {
+                polynomial([x.times(*scale), y.times(*scale)], terms)
+            }
             Self::QBfs { scale, curvature, coefficients } => {
                 let square = (x * x + y * y).times(scale * scale);
                 let bend = curvature / scale;
@@ -262,9 +281,9 @@ impl Term {
 
 /// Σ c xⁱ yʲ.
 pub(super) fn polynomial<T: Real>([x, y]: [T; 2], terms: &[(u32, u32, f64)]) -> T {
-    terms.iter().fold(T::constant(0.0), |sum, &(i, j, c)| {
-        sum + (power(x, i) * power(y, j)).times(c)
-    })
+    terms
+        .iter()
+        .fold(T::constant(0.0), |sum, &(i, j, c)| sum + (power(x, i) * power(y, j)).times(c))
 }
 
 /// T₀ to T of `count` − 1: Tₙ₊₁ = 2x Tₙ − Tₙ₋₁.

@@ -22,7 +22,8 @@ fn check(json: &str, definition: impl Fn(f64, f64) -> f64) {
         assert!((sag - expected).abs() < close, "{json} {x} {y}: {sag} {expected}");
         // A difference of fourth order over 1e-3 mm: its error is some 1e-12 of the fifth derivative, rounding 1e-12.
         let h = 1e-3;
-        let by = |f: &dyn Fn(f64) -> f64| (8.0 * (f(h) - f(-h)) - f(2.0 * h) + f(-2.0 * h)) / (12.0 * h);
+        let by =
+            |f: &dyn Fn(f64) -> f64| (8.0 * (f(h) - f(-h)) - f(2.0 * h) + f(-2.0 * h)) / (12.0 * h);
         let differences = [by(&|h| definition(x + h, y)), by(&|h| definition(x, y + h))];
         for axis in 0..2 {
             let error = (slopes[axis] - differences[axis]).abs();
@@ -45,11 +46,14 @@ fn odd_aspheres_and_toroids_are_their_formulas() {
             conic(1.0 / 40.0, -0.4, r * r) + 1e-3 * r * r + 2e-5 * r.powi(3) - 1e-7 * r.powi(5)
         },
     );
-    check(r#"{"radius": 30, "conic": 0.2, "aspheric": {"4": 1e-6}, "rotation_radius": -25}"#, |x, y| {
-        let f = conic(1.0 / 30.0, 0.2, y * y) + 1e-6 * y.powi(4);
-        // z = R − sign(R) √((R − f)² − x²).
-        -25.0 + ((-25.0 - f).powi(2) - x * x).sqrt()
-    });
+    check(
+        r#"{"radius": 30, "conic": 0.2, "aspheric": {"4": 1e-6}, "rotation_radius": -25}"#,
+        |x, y| {
+            let f = conic(1.0 / 30.0, 0.2, y * y) + 1e-6 * y.powi(4);
+            // z = R − sign(R) √((R − f)² − x²).
+            -25.0 + ((-25.0 - f).powi(2) - x * x).sqrt()
+        },
+    );
 }
 
 #[test]
@@ -72,7 +76,9 @@ fn zernike_and_chebyshev_terms_are_their_formulas() {
         r#"{"radius": 50, "sag": [{"type": "chebyshev", "half_size": [8, 7], "coefficients": [[3, 2, 0.01], [0, 1, 0.02]]}]}"#,
         |x, y| {
             let t = |n: f64, u: f64| (n * u.acos()).cos();
-            conic(0.02, 0.0, x * x + y * y) + 0.01 * t(3.0, x / 8.0) * t(2.0, y / 7.0) + 0.02 * y / 7.0
+            conic(0.02, 0.0, x * x + y * y)
+                + 0.01 * t(3.0, x / 8.0) * t(2.0, y / 7.0)
+                + 0.02 * y / 7.0
         },
     );
     check(
@@ -177,8 +183,11 @@ fn a_kinoform_has_its_focal_length_and_share_by_order() {
         let surface = read(&json(order)).unwrap();
         for wavelength in [450.0, 550.0, 650.0] {
             // Φ = −m λ a₁/(π R²).
-            let expected = f64::from(order) * wavelength * 1e-6 * 628.0 / (std::f64::consts::PI * 100.0);
-            assert!((surface.phase_power(wavelength) - expected).abs() < 1e-15 + 1e-14 * expected.abs());
+            let expected =
+                f64::from(order) * wavelength * 1e-6 * 628.0 / (std::f64::consts::PI * 100.0);
+            assert!(
+                (surface.phase_power(wavelength) - expected).abs() < 1e-15 + 1e-14 * expected.abs()
+            );
             let off = std::f64::consts::PI * (550.0 / wavelength - f64::from(order));
             let share = if off.abs() < 1e-12 { 1.0 } else { (off.sin() / off).powi(2) };
             assert!((surface.efficiency(wavelength) - share).abs() < 1e-12);
@@ -192,10 +201,22 @@ fn what_is_no_surface_is_refused_in_words() {
     assert!(error(r#"{"aspheric": {"31": 1}}"#).contains("from 1 to 30"));
     assert!(error(r#"{"hole": 3}"#).contains("\"mirror\": true"));
     assert!(error(r#"{"mirror": true, "glass": "N-BK7"}"#).contains("no glass behind"));
-    assert!(error(r#"{"sag": [{"type": "zernike", "radius": 1, "coefficients": {"38": 1}}]}"#).contains("sag[0]"));
-    assert!(error(r#"{"sag": [{"type": "q_bfs", "radius": 30, "coefficients": [1]}], "radius": 20}"#).contains("beyond which"));
-    assert!(error(r#"{"sag": [{"type": "zernike", "radius": 1, "coefficents": {}}]}"#).contains("unknown field"));
+    assert!(
+        error(r#"{"sag": [{"type": "zernike", "radius": 1, "coefficients": {"38": 1}}]}"#)
+            .contains("sag[0]")
+    );
+    assert!(
+        error(r#"{"sag": [{"type": "q_bfs", "radius": 30, "coefficients": [1]}], "radius": 20}"#)
+            .contains("beyond which")
+    );
+    assert!(
+        error(r#"{"sag": [{"type": "zernike", "radius": 1, "coefficents": {}}]}"#)
+            .contains("unknown field")
+    );
     let both = r#"{"phase": {"pattern": {"type": "grating", "period": 1}, "order": 2, "design_wavelength": 500}}"#;
     assert!(error(both).contains("not both"));
-    assert!(error(r#"{"phase": {"pattern": {"type": "grating", "period": 0}}}"#).contains("phase.period"));
+    assert!(
+        error(r#"{"phase": {"pattern": {"type": "grating", "period": 0}}}"#)
+            .contains("phase.period")
+    );
 }

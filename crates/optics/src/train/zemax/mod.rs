@@ -296,7 +296,13 @@ impl Importer<'_> {
     }
 
     /// An aperture at the vertex of a row, moved across its axis.
-    fn place_sheet(&mut self, opening: ApertureSpec, decentre: [f64; 2], here: &Axes, way: &mut Way) {
+    fn place_sheet(
+        &mut self,
+        opening: ApertureSpec,
+        decentre: [f64; 2],
+        here: &Axes,
+        way: &mut Way,
+    ) {
         let moved = here.shifted(decentre).placed();
         self.close_gap(moved.z, way);
         let mut element = ElementSpec::new(PartSpec::Aperture(opening), 0.0);

@@ -411,7 +411,9 @@ impl SheetRow {
                 self.inner = line.number(0)?;
                 self.clear = Some(line.number(1)?).filter(|length| *length > 0.0);
                 if self.inner < 0.0 || self.clear.is_some_and(|clear| self.inner >= clear) {
-                    return Err(line.error("the inner radius must be from 0 on and below the outer one"));
+                    return Err(
+                        line.error("the inner radius must be from 0 on and below the outer one")
+                    );
                 }
             }
             "OBDC" => self.aperture_decentre = [line.number(0)?, line.number_or(1, 0.0)?],
