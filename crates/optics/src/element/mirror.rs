@@ -15,6 +15,7 @@
 //! [`Fold`] turns that round on its way into the unfolded space.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use etendue_geometry::units::Millimetres;
 use etendue_spectrum::Curve;
@@ -23,6 +24,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Frame;
+use super::coating::{MirrorCoating, MirrorCoatingSpec};
 use super::rays::{Block, LANES, Ray, RayStatus};
 use super::step::{Clip, Traversal};
 use super::surface::{Surface, SurfaceSpec};
@@ -59,6 +61,9 @@ pub struct MirrorSpec {
     /// absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reflectance: Option<Curve>,
+    /// Instead of `reflectance`: a metal or glass with films on it, that reflects by the angle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coating: Option<MirrorCoatingSpec>,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
@@ -89,6 +94,8 @@ pub struct MirrorMount {
     pub folds_axis: bool,
     /// The share of light that it reflects; all of it when there is none.
     pub reflectance: Option<Curve>,
+    /// Films that reflect by the angle.
+    pub coating: Option<Arc<MirrorCoating>>,
 }
 
 impl MirrorMount {
@@ -115,7 +122,7 @@ impl MirrorMount {
         }
         let reflectance =
             reflectance.map(|curve| curve.clone().within(0.0, 1.0).map_err(|e| e.to_string()));
-        Ok(Self { hole, folds_axis: fold, reflectance: reflectance.transpose()? })
+        Ok(Self { hole, folds_axis: fold, reflectance: reflectance.transpose()?, coating: None })
     }
 }
 
@@ -141,7 +148,15 @@ impl MirrorSpec {
             self.reflectance.as_ref(),
             surface.semi_diameter,
         )?;
-        Ok(Mirror { surface, mount })
+        let mut mirror = Mirror { surface, mount };
+        if let Some(coating) = &self.coating {
+            if self.reflectance.is_some() {
+                return Err("give either reflectance or coating".to_owned());
+            }
+            let coating = coating.build().map_err(|why| format!("coating: {why}"))?;
+            mirror.mount.coating = Some(coating.into());
+        }
+        Ok(mirror)
     }
 }
 

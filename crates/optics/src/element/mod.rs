@@ -8,6 +8,7 @@
 
 pub(crate) mod aperture;
 mod biconic;
+mod coating;
 mod crossings;
 mod freeform;
 mod lattice;
@@ -39,6 +40,7 @@ pub use aperture::{
     ApertureSpec, CircularSpec, MaskSpec, Opening, Picture, PolygonSpec, grey_picture,
 };
 pub use biconic::{Biconic, BiconicSpec};
+pub use coating::{LayerSpec, MirrorCoating, MirrorCoatingSpec, Stack, StackSpec};
 pub use freeform::{Freeform, FreeformSpec, HeightMapSpec, PatternSpec, PhaseSpec, SagSpec};
 pub use lattice::{Grid, Lattice, LatticeCell};
 pub(crate) use losses::Loss;

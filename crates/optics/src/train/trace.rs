@@ -79,8 +79,14 @@ impl OpticalTrain {
             let [towards_sensor, towards_object] =
                 placed.part.actions(before, behind, wavelength, transmission);
             let absorption = |medium: usize| self.media[medium].absorption(wavelength);
-            let loss =
-                |indices, medium| Loss::new(&self.losses, indices, absorption(medium), wavelength);
+            let coating = placed.part.mirror().and_then(|mirror| mirror.coating.as_ref());
+            let loss = |indices: [f64; 2], medium| {
+                let loss = Loss::new(&self.losses, indices, absorption(medium), wavelength);
+                match coating {
+                    Some(coating) => Some(Loss::of_mirror(loss, coating, indices[0], wavelength)),
+                    None => loss,
+                }
+            };
             let fold = placed.part.mirror().map(|mirror| {
                 let reflectance = mirror.reflectance.as_ref().map_or(1.0, transmission);
                 Fold::new(mirror, &placed.frame, reflectance)

@@ -1,6 +1,7 @@
 //! Lenses and what they are made of, against closed forms, references and each other.
 
 mod asphere_crossings;
+mod code_v;
 mod components;
 mod exit_pupil;
 mod lens_limits;

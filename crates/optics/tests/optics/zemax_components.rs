@@ -184,3 +184,76 @@ fn what_has_no_counterpart_is_refused_with_its_line() {
     let backwards = error(&["TYPE STANDARD; STOP; CURV -0.02; DISZ 40; GLAS MIRROR; DIAM 3"]);
     assert!(backwards.contains("write -40"), "{backwards}");
 }
+
+/// Every lens that a Zemax file can hold, through one and back: the same surfaces to the last bit where nothing is tilted, and
+/// rays that leave alike.
+#[test]
+fn lenses_come_back_from_zemax_files_as_they_went() {
+    use etendue_optics::element::{Clip, Ray};
+    use etendue_optics::train::Side;
+    let mut files = Vec::new();
+    let folder = format!("{}/../../scenes/lenses", env!("CARGO_MANIFEST_DIR"));
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let text = std::fs::read_to_string(entry.unwrap().path()).unwrap();
+        files.push(LensFile::from_json(&text).unwrap());
+    }
+    let more = [
+        r#"{"type": "freeform", "radius": 40, "aspheric": {"3": 2e-5, "4": 1e-6}, "thickness": 3, "glass": {"n": 1.6}, "semi_diameter": 8, "stop": true}"#,
+        r#"{"type": "freeform", "radius": 40, "rotation_radius": -55, "aspheric": {"4": 1e-6}, "thickness": 3, "glass": {"nd": 1.6, "vd": 50}, "semi_diameter": 8, "stop": true}"#,
+        r#"{"type": "freeform", "radius": 40, "sag": [{"type": "zernike", "radius": 9, "coefficients": {"5": 0.02}}], "thickness": 3, "glass": "N-BK7", "semi_diameter": 8, "stop": true}"#,
+        r#"{"type": "freeform", "radius": 40, "fresnel": true, "thickness": 3, "glass": "N-BK7", "semi_diameter": 8, "stop": true}"#,
+        r#"{"type": "freeform", "phase": {"pattern": {"type": "grating", "period": 0.0078125}, "order": -1}, "thickness": 3, "glass": "N-BK7", "semi_diameter": 8, "stop": true}"#,
+        r#"{"type": "freeform", "phase": {"pattern": {"type": "radial", "radius": 8, "coefficients": [-90, 1]}, "order": 2}, "thickness": 3, "glass": "N-BK7", "semi_diameter": 8, "stop": true}"#,
+        r#"{"type": "biconic", "radius": 40, "radius_x": 55, "conic_x": 0.5, "thickness": 3, "glass": "N-BK7", "semi_diameter": 8, "stop": true}"#,
+        r#"{"type": "surface", "radius": 40, "tilt": [2, -1], "decentre": [0.3, 0.1], "thickness": 3, "glass": "N-BK7", "semi_diameter": 8, "stop": true}"#,
+    ];
+    for element in more {
+        let text = format!(r#"{{"elements": [{element}, {{"type": "surface", "radius": -90, "thickness": 40, "semi_diameter": 9}}]}}"#);
+        files.push(LensFile::from_json(&text).unwrap());
+    }
+    let tilted = r#"{"sensor": {"tilt": [3, 0], "decentre": [0, 1]}, "elements": [{"type": "mirror", "radius": -200, "tilt": [5, 3], "fold": true, "thickness": -100, "semi_diameter": 8, "stop": true}]}"#;
+    files.push(LensFile::from_json(tilted).unwrap());
+    let mut compared = 0;
+    for file in &files {
+        let Ok(before) = file.build(&|name: &str| Err(name.to_owned())) else { continue };
+        let text = file.to_zemax().unwrap_or_else(|why| panic!("{}: {why}", file.name));
+        let back = ZemaxLens::read(text.as_bytes(), &[]).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        let after = build(&back.file);
+        assert_eq!((before.elements().len(), before.stop()), (after.elements().len(), after.stop()), "{text}");
+        for (a, b) in before.elements().iter().zip(after.elements()) {
+            assert_eq!(a.part, b.part, "{text}");
+            // Sums of thicknesses, and sines of angles there and back.
+            let size = 1.0 + a.frame.vertex.length();
+            assert!((a.frame.vertex - b.frame.vertex).length() < 1e-14 * size, "{text}");
+            assert!((a.frame.rotation.z_axis - b.frame.rotation.z_axis).length() < 1e-14, "{text}");
+        }
+        let wavelength = before.wavelength();
+        let lenses = [&before, &after].map(|train| train.at(wavelength).unwrap());
+        let reach = 0.4 * before.paraxial(wavelength).unwrap().entrance_pupil.diameter.unwrap_or(4.0);
+        for i in 0..50_u32 {
+            let place = DVec3::new(reach * (f64::from(i)).sin(), reach * (1.7 * f64::from(i)).cos(), -30.0);
+            let ray = Ray::new(place, DVec3::new(0.01, 0.0, 1.0)).unwrap();
+            let [a, b] = lenses.each_ref().map(|at| at.run(Side::Object, Clip::On, ray));
+            assert_eq!(a.status, b.status, "{text}");
+            let apart = DVec3::from(a.ray.direction) - DVec3::from(b.ray.direction);
+            assert!(apart.length() < 1e-12, "{text}: {apart}");
+            compared += 1;
+        }
+    }
+    assert!(compared >= 50 * 15, "{compared}");
+}
+
+#[test]
+fn what_zemax_files_have_no_counterpart_for_is_refused_by_its_element() {
+    for (element, word) in [
+        (r#"{"type": "filter", "transmission": 0.5}"#, "a filter"),
+        (r#"{"type": "aperture", "shape": "polygon", "radius": 1, "blades": 5}"#, "not circular"),
+        (r#"{"type": "surface", "glass": {"cauchy": [1.5]}}"#, "AGF"),
+        (r#"{"type": "mirror", "reflectance": 0.9}"#, "reflects"),
+        (r#"{"type": "freeform", "sag": [{"type": "q_con", "radius": 1, "coefficients": [1]}]}"#, "added"),
+    ] {
+        let file = LensFile::from_json(&format!(r#"{{"elements": [{{"type": "surface"}}, {element}]}}"#)).unwrap();
+        let why = file.to_zemax().unwrap_err();
+        assert!(why.starts_with("elements[1]: ") && why.contains(word), "{why}");
+    }
+}

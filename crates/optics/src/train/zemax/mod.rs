@@ -5,6 +5,8 @@
 //! | `sheet` | lines to the rows of the lens data sheet |
 //! | `parts` | a row to what it is |
 //! | `configuration` | the values of one position of a zoom lens; field points to field angles; coordinate breaks to tilts and decentrings; bytes to lines: UTF-8 and UTF-16 |
+//! | `code_v` | lines of CODE V's files to the same rows |
+//! | `write` | a lens file to lines |
 //! | here | rows to the elements of a lens file |
 //!
 //! What has no counterpart here and would change the light's way is an error that names its line;
@@ -15,9 +17,11 @@
 //! The format has no public specification. What the lines mean is taken from files in the wild and
 //! from OpticStudio's knowledge base ("Rotation Matrix and Tilt About X/Y/Z in OpticStudio", 2021).
 
+mod code_v;
 mod configuration;
 mod parts;
 mod sheet;
+mod write;
 
 use std::path::Path;
 
@@ -71,6 +75,22 @@ impl ZemaxLens {
         path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("zmx"))
     }
 
+    /// Whether a file's name says that it is one of CODE V's.
+    #[must_use]
+    pub fn is_named_code_v(path: &Path) -> bool {
+        path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("seq"))
+    }
+
+    /// Reads the bytes of one of CODE V's `.seq` files.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::read`].
+    pub fn read_code_v(bytes: &[u8], glasses: &[AgfCatalogue]) -> Result<Self, ZemaxError> {
+        let text = configuration::decode(bytes)?;
+        Self::of_sheet(&ZemaxSheet::read_code_v(&text)?, "a CODE V file", glasses)
+    }
+
     /// Reads the bytes of a `.zmx` file.
     ///
     /// # Errors
@@ -97,8 +117,17 @@ impl ZemaxLens {
         if let Some(configuration) = configuration {
             sheet.choose(configuration)?;
         }
+        Self::of_sheet(&sheet, "a Zemax file", glasses)
+    }
+
+    /// The lens of a data sheet.
+    fn of_sheet(
+        sheet: &ZemaxSheet,
+        source: &str,
+        glasses: &[AgfCatalogue],
+    ) -> Result<Self, ZemaxError> {
         let mut importer = Importer {
-            sheet: &sheet,
+            sheet,
             glasses,
             elements: Vec::new(),
             notes: Vec::new(),
@@ -114,13 +143,13 @@ impl ZemaxLens {
         }
         // The lens that a lens file would hold.
         let mut file = LensFile { name: sheet.name.clone(), elements, ..LensFile::default() };
-        "a Zemax file".clone_into(&mut file.source);
+        source.clone_into(&mut file.source);
         file.sensor = (sensor != SensorMount::default()).then_some(sensor);
         let wavelengths = sheet.wavelengths_nm();
         file.wavelength = wavelengths.first().copied().map(Nanometres);
         // What only the built train tells: the stop, field angles, and whether the focal length is
         // as stated.
-        let train = open_stop(&mut file, (&sheet, glasses), object_z, &mut notes)?;
+        let train = open_stop(&mut file, (sheet, glasses), object_z, &mut notes)?;
         let (fields, left_out) = sheet.fields.angles(sheet.unit, &train, object_z);
         notes.extend(left_out);
         let mut lens = Self {

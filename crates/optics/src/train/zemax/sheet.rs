@@ -203,7 +203,7 @@ impl ZemaxSheet {
                 },
             };
             if !known {
-                sheet.ignore(&line);
+                sheet.leave_out(line.command, line.number);
             }
         }
         if sheet.rows.is_empty() {
@@ -290,6 +290,25 @@ impl ZemaxSheet {
         Ok(())
     }
 
+    /// All wavelengths (µm), in their order.
+    pub(super) fn set_wavelengths(&mut self, micrometres: Vec<f64>) {
+        // As many as there are: none is a slot that is not in use.
+        self.fields.wavelengths = Some(micrometres.len());
+        self.wavelengths = micrometres;
+    }
+
+    /// The primary one, from 1.
+    pub(super) fn set_primary(&mut self, number: usize) {
+        self.primary = number;
+    }
+
+    /// Counts a command that is left out.
+    pub(super) fn leave_out(&mut self, command: &str, line: usize) {
+        let ignored =
+            self.ignored.entry(command.to_owned()).or_insert(Ignored { first: line, times: 0 });
+        ignored.times += 1;
+    }
+
     fn set_wavelength(&mut self, number: usize, micrometres: f64) {
         // Numbered from 1.
         let slot = number.clamp(1, MOST_WAVELENGTHS) - 1;
@@ -309,14 +328,6 @@ impl ZemaxSheet {
         };
         self.stated_efl = stated.filter(|efl| *efl != 0.0).or(self.stated_efl);
         Ok(())
-    }
-
-    fn ignore(&mut self, line: &SheetLine<'_>) {
-        let ignored = self
-            .ignored
-            .entry(line.command.to_owned())
-            .or_insert(Ignored { first: line.number, times: 0 });
-        ignored.times += 1;
     }
 
     /// Wavelengths (nm) in use, the primary one first.
@@ -466,6 +477,16 @@ impl SheetRow {
             None if is_beside || self.has_corners() => None,
             None => self.semi_diameter,
         }
+    }
+
+    /// Sets the radius of its clear aperture, in the file's unit.
+    pub(super) fn set_clear(&mut self, radius: f64) {
+        self.clear = Some(radius).filter(|radius| *radius > 0.0);
+    }
+
+    /// Sets that of its edge.
+    pub(super) fn set_semi_diameter(&mut self, radius: f64) {
+        self.semi_diameter = Some(radius).filter(|radius| *radius > 0.0);
     }
 
     /// The radius of its own clear aperture.
