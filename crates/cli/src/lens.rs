@@ -5,7 +5,7 @@ use std::path::Path;
 
 use etendue::{places, read_glasses};
 use etendue_files::{Reach, Transaction};
-use etendue_optics::train::{Inquiry, LensReport, OpticalTrain, drawing};
+use etendue_optics::train::{Inquiry, LensReport, OpticalTrain, ZemaxLens, drawing};
 use etendue_render::output::sidecar;
 use etendue_scene::escape::one_line;
 use etendue_scene::file::{ReadLens, read_lens_at, trace_rays};
@@ -39,7 +39,14 @@ pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
         let file = lens.file.as_ref().ok_or_else(|| {
             Fault::refused("--save: the lens of a scene cannot be saved; give its own file")
         })?;
-        sidecar::write_json(&to, path, file)?;
+        match ZemaxLens::is_named(path) {
+            true => {
+                let refused = |why: String| Fault::refused(format!("--save {}: {why}", path.display()));
+                let text = file.to_zemax().map_err(refused)?;
+                to.write(path, |part| part.write_all(text.as_bytes()))?;
+            }
+            false => sidecar::write_json(&to, path, file)?,
+        }
     }
     lens.train = adjusted(lens.train, arguments)?;
     match &arguments.rays {

@@ -43,7 +43,7 @@ pub enum SceneError {
     },
     /// A file that holds no lens.
     #[error(
-        "{}: {reason}; give a lens file (.json), a Zemax file (.zmx), or a scene whose camera is a \
+        "{}: {reason}; give a lens file (.json), a Zemax file (.zmx), a CODE V file (.seq), or a scene whose camera is a \
          lens",
         file.display()
     )]

@@ -20,7 +20,7 @@ pub(crate) fn alone(
         sensor_height: None,
         sensor_tilt: Default::default(),
         sensor_decentre: Default::default(),
-        losses: *train.losses(),
+        losses: train.losses().clone(),
         diffraction: false,
         pose: None,
         sensor,

@@ -44,10 +44,14 @@ impl LensSource {
                 let path = resolve.path(written).map_err(error)?;
                 let bytes = etendue_files::read(&path, LONGEST)
                     .map_err(|why| error(format!("{written}: cannot be read: {why}")))?;
-                if ZemaxLens::is_named(&path) {
+                let is_code_v = ZemaxLens::is_named_code_v(&path);
+                if is_code_v || ZemaxLens::is_named(&path) {
                     let fault = |why: String| error(format!("{written}, {why}"));
-                    let lens = ZemaxLens::read(&bytes, resolve.glasses())
-                        .map_err(|e| fault(e.to_string()))?;
+                    let lens = match is_code_v {
+                        true => ZemaxLens::read_code_v(&bytes, resolve.glasses()),
+                        false => ZemaxLens::read(&bytes, resolve.glasses()),
+                    };
+                    let lens = lens.map_err(|e| fault(e.to_string()))?;
                     return lens.file.build(resolve).map_err(|e| fault(e.to_string()));
                 }
                 let text = String::from_utf8(bytes)
@@ -195,7 +199,7 @@ impl JsonSchema for FocusDistance {
 }
 
 /// What the cameras with a lens have in common.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Setup<'a> {
     pub(crate) f_number: Option<f64>,
     pub(crate) focus: Option<Focus>,

@@ -96,7 +96,7 @@ macro_rules! camera_with_a_lens {
                     sensor_height: self.sensor_height.map(|height| height.0),
                     sensor_tilt: self.sensor_tilt,
                     sensor_decentre: self.sensor_decentre,
-                    losses: self.losses,
+                    losses: self.losses.clone(),
                     diffraction: self.diffraction,
                     pose: self.pose.as_ref(),
                     sensor: &self.sensor,

@@ -111,7 +111,11 @@ impl LensCamera {
 fn is_ideal(train: &OpticalTrain) -> bool {
     train.elements().iter().all(|element| match &element.part {
         Part::ThinLens(_) | Part::Aperture(_) | Part::Filter(_) => true,
-        Part::Surface(_) | Part::Biconic(_) | Part::MicrolensArray(_) => false,
+        Part::Surface(_)
+        | Part::Biconic(_)
+        | Part::MicrolensArray(_)
+        | Part::Mirror(_)
+        | Part::Freeform(_) => false,
     })
 }
 

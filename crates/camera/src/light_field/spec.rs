@@ -182,7 +182,7 @@ impl LightFieldSpec {
             sensor_height: self.sensor_height.map(|height| height.0),
             sensor_tilt: [Degrees(0.0); 2],
             sensor_decentre: [Millimetres(0.0); 2],
-            losses: self.losses,
+            losses: self.losses.clone(),
             diffraction: false,
             pose: self.pose.as_ref(),
             sensor: &self.sensor,

@@ -56,8 +56,8 @@ pub fn foci(
         let bends = match &element.part {
             Part::Aperture(_) | Part::Filter(_) => continue,
             _ if !element.frame.is_axial() => return Ok(None),
-            Part::Surface(_) | Part::ThinLens(_) => true,
-            Part::Biconic(_) | Part::MicrolensArray(_) => false,
+            Part::Surface(_) | Part::ThinLens(_) | Part::Mirror(_) => true,
+            Part::Biconic(_) | Part::MicrolensArray(_) | Part::Freeform(_) => false,
         };
         let Some(point) = traversal.point.filter(|_| bends) else { return Ok(None) };
         let way = DVec3::from(point) - DVec3::from(ray.position);
@@ -80,8 +80,15 @@ pub fn foci(
             part => {
                 let local = DVec3::from(point) - element.frame.vertex;
                 let Some((normal, [across, along])) = shape(part, local) else { return Ok(None) };
-                let [cos, cos1] = [before, behind].map(|d| d.dot(normal).abs());
-                let power = n1 * cos1 - n * cos;
+                let cos = before.dot(normal).abs();
+                // Light is reflected as by the index −n, and unfolded.
+                let (cos1, power) = match element.part.mirror() {
+                    Some(_) => (cos, -2.0 * n * cos),
+                    None => {
+                        let cos1 = behind.dot(normal).abs();
+                        (cos1, n1 * cos1 - n * cos)
+                    }
+                };
                 vergence = [
                     (n * vergence[0] + across * power) / n1,
                     (n * cos * cos * vergence[1] + along * power) / (n1 * cos1 * cos1),
@@ -110,7 +117,11 @@ pub fn foci(
 /// The unit normal of a round surface at a place on it, and its curvatures across and along the
 /// section through the axis, positive as the vertex' (1/mm).
 fn shape(part: &Part, at: DVec3) -> Option<(DVec3, [f64; 2])> {
-    let Part::Surface(surface) = part else { return None };
+    let surface = match part {
+        Part::Surface(surface) => surface,
+        Part::Mirror(mirror) => &mirror.surface,
+        _ => return None,
+    };
     let r = at.truncate().length();
     // (∂z/∂r)/r, and by its change the second derivative.
     let slope = |r: f64| surface.profile(r * r).1;

@@ -184,6 +184,18 @@ fn sums(
                     invariant,
                 )
             }
+            // Reflection is refraction into the index −n; the sums are the same in the unfolded space.
+            Part::Mirror(mirror) => {
+                let shape = (mirror.surface.paraxial_curvature(), quartic(&mirror.surface));
+                at_surface([n, -n], shape, 0.0, [marginal, chief], invariant)
+            }
+            // Its section along y near the axis, without what it adds farther out.
+            Part::Freeform(surface) => {
+                let dispersion = (short[i + 1] - long[i + 1]) / n1 - (short[i] - long[i]) / n;
+                let behind = if surface.mirror.is_some() { -n } else { n1 };
+                let shape = (surface.paraxial_curvature(), 0.0);
+                at_surface([n, behind], shape, dispersion, [marginal, chief], invariant)
+            }
             Part::ThinLens(_) | Part::Aperture(_) | Part::Filter(_) | Part::MicrolensArray(_) => {
                 SeidelSums::default()
             }

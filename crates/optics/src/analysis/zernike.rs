@@ -11,14 +11,14 @@
 
 use glam::DVec2;
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::AnalysisError;
 use super::least_squares::LeastSquares;
 use super::pupil::PupilField;
 
 /// The numbering and norm of Zernike terms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ZernikeOrder {
     /// 37 terms of greatest value 1.
@@ -105,7 +105,7 @@ impl ZernikeTerm {
 
     /// R(ρ) over ρ to the azimuthal order, as coefficients of powers of ρ², the highest first; sums of them are exact
     /// to a few roundings up to n = 12, which is the most of the Fringe set.
-    fn radial(self) -> Vec<f64> {
+    pub(crate) fn radial(self) -> Vec<f64> {
         let (n, m) = (self.n, self.m.unsigned_abs());
         let factorial = |k: u32| (1..=k).map(f64::from).product::<f64>();
         let coefficient = |s: u32| {

@@ -13,6 +13,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Resolve;
+use super::shapes::{AnnularSpec, BoxSpec, Shape, SpiderSpec};
 use etendue_geometry::units::{Degrees, Millimetres};
 use etendue_image::{Limits, Samples};
 
@@ -26,6 +27,14 @@ pub enum ApertureSpec {
     Polygon(PolygonSpec),
     /// A mask: white passes light, black stops it, grey dims it.
     Image(MaskSpec),
+    /// A rectangle.
+    Rectangular(BoxSpec),
+    /// An ellipse.
+    Elliptical(BoxSpec),
+    /// A ring around a disk that is in the way.
+    Annular(AnnularSpec),
+    /// A ring crossed by arms.
+    Spider(SpiderSpec),
 }
 
 /// A round hole.
@@ -88,6 +97,8 @@ pub enum Opening {
     },
     /// A mask.
     Image(Picture),
+    /// Another shape.
+    Shaped(Shape),
 }
 
 impl ApertureSpec {
@@ -114,6 +125,10 @@ impl ApertureSpec {
                 let height = spec.height.map(|h| h.0);
                 Picture::read(&spec.file, spec.width.0, height, resolve).map(Opening::Image)
             }
+            Self::Rectangular(spec) => spec.rectangle().map(Opening::Shaped),
+            Self::Elliptical(spec) => spec.ellipse().map(Opening::Shaped),
+            Self::Annular(spec) => spec.build().map(Opening::Shaped),
+            Self::Spider(spec) => spec.build().map(Opening::Shaped),
         }
     }
 }
@@ -147,6 +162,7 @@ impl Opening {
                 Some(Self::Polygon { normals, radius, apothem: radius * shape })
             }
             Self::Image(_) => None,
+            Self::Shaped(shape) => Some(Self::Shaped(shape.with_radius(radius))),
         }
     }
 
@@ -157,6 +173,7 @@ impl Opening {
             Self::Circle { radius } => in_circle(*radius, x, y),
             Self::Polygon { normals, apothem, .. } => in_polygon(normals, *apothem, x, y),
             Self::Image(picture) => return picture.value(x, y),
+            Self::Shaped(shape) => shape.is_open(x, y),
         };
         f64::from(u8::from(open))
     }
@@ -167,6 +184,7 @@ impl Opening {
         match self {
             Self::Circle { radius } | Self::Polygon { radius, .. } => *radius,
             Self::Image(picture) => picture.radius(),
+            Self::Shaped(shape) => shape.radius(),
         }
     }
 
@@ -178,13 +196,24 @@ impl Opening {
             Self::Image(Picture { pixels: [width, height], .. }) => {
                 Some(format!("mask of {width} x {height} pixels"))
             }
+            Self::Shaped(shape) => Some(shape.words()),
         }
     }
 
     /// Whether a turn about the axis changes nothing.
     #[must_use]
     pub fn is_round(&self) -> bool {
-        matches!(self, Self::Circle { .. })
+        match self {
+            Self::Circle { .. } => true,
+            Self::Shaped(shape) => shape.is_round(),
+            Self::Polygon { .. } | Self::Image(_) => false,
+        }
+    }
+
+    /// Whether its middle is closed by a disk.
+    #[must_use]
+    pub fn is_obscured(&self) -> bool {
+        matches!(self, Self::Shaped(shape) if shape.is_obscured())
     }
 }
 

@@ -97,6 +97,12 @@ impl Biconic {
         limit.sqrt().recip()
     }
 
+    /// The same as light that runs against the axis meets it.
+    #[must_use]
+    pub fn flipped(&self) -> Self {
+        Self { curvature: self.curvature.map(|c| -c), ..*self }
+    }
+
     /// Whether a turn about its axis changes nothing.
     #[must_use]
     pub fn is_round(&self) -> bool {

@@ -11,19 +11,22 @@
 //! glass is two flat surfaces around one.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
+use rustfft::num_complex::Complex64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Resolve;
 use super::aperture::Picture;
+use super::coating::{MirrorCoating, Stack, StackSpec};
 use super::rays::{Block, LANES, Ray};
 use super::surface::checked_semi_diameter;
 use etendue_geometry::units::{Millimetres, Nanometres};
 use etendue_spectrum::Curve;
 
 /// Losses as a camera writes them. Nothing is lost unless it is asked for.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LossesSpec {
     /// What the surfaces between glass and air reflect: `uncoated`, or a coating. Cemented surfaces
@@ -41,13 +44,15 @@ fn is_false(value: &bool) -> bool {
 }
 
 /// How surfaces between glass and air reflect.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Reflection {
     /// By Fresnel's equations.
     Plain(Plain),
     /// Through one layer.
     Coated(Coating),
+    /// Through several.
+    Stack(StackSpec),
 }
 
 /// The word for surfaces without a coating.
@@ -81,6 +86,9 @@ impl LossesSpec {
     ///
     /// The key and a sentence.
     pub fn check(&self) -> Result<(), (&'static str, String)> {
+        if let Some(Reflection::Stack(stack)) = &self.reflection {
+            return stack.build().map(|_| ()).map_err(|why| ("reflection", why));
+        }
         let Some(Reflection::Coated(Coating { index, thickness })) = self.reflection else {
             return Ok(());
         };
@@ -96,7 +104,7 @@ impl LossesSpec {
 }
 
 /// What one element takes from light that arrives on one side of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Loss {
     /// Indices before and behind the surface, as the light goes.
     indices: [f64; 2],
@@ -105,6 +113,17 @@ pub(crate) struct Loss {
     layer: Option<[f64; 2]>,
     /// α of the medium that the light comes through (1/mm).
     absorption: f64,
+    /// Several layers, as the light meets them, or what is a mirror; and the wavelength (nm).
+    films: Option<(Films, f64)>,
+}
+
+/// Films that a ray meets.
+#[derive(Debug, Clone, PartialEq)]
+enum Films {
+    /// On glass.
+    Glass(Arc<Stack>),
+    /// On a mirror.
+    Mirror(Arc<MirrorCoating>),
 }
 
 impl Loss {
@@ -123,8 +142,29 @@ impl Loss {
             }
             _ => None,
         };
+        // Layers are told from the air on; a spec that is none has been refused.
+        let films = match &spec.reflection {
+            Some(Reflection::Stack(stack)) if in_air && reflects => stack.build().ok().map(|stack| {
+                let met = if indices[0] == 1.0 { stack } else { stack.reversed() };
+                (Films::Glass(met.into()), wavelength)
+            }),
+            _ => None,
+        };
         let absorption = absorption.filter(|_| spec.absorption).unwrap_or(0.0);
-        (reflects || absorption > 0.0).then_some(Self { indices, reflects, layer, absorption })
+        (reflects || absorption > 0.0)
+            .then_some(Self { indices, reflects, layer, absorption, films })
+    }
+
+    /// Of a mirror with films, in a medium of this index, and what else is lost on the way to it.
+    pub(crate) fn of_mirror(
+        loss: Option<Self>,
+        coating: &Arc<MirrorCoating>,
+        index: f64,
+        wavelength: f64,
+    ) -> Self {
+        let absorption = loss.map_or(0.0, |loss| loss.absorption);
+        let films = Some((Films::Mirror(Arc::clone(coating)), wavelength));
+        Self { indices: [index; 2], reflects: true, layer: None, absorption, films }
     }
 
     /// The share of light that is left of a ray that came as `before` and goes on as `after`.
@@ -135,21 +175,32 @@ impl Loss {
             share = (-self.absorption * way(0).hypot(way(1)).hypot(way(2))).exp();
         }
         if self.reflects {
-            share *= 1.0 - self.reflectance(before.direction, after.direction);
+            share *= 1.0 - self.lost(before.direction, after.direction);
         }
         share
     }
 
-    /// From the directions alone: n' d' − n d is along the normal.
-    fn reflectance(&self, before: [f64; 3], after: [f64; 3]) -> f64 {
+    /// What is not let through, or of a mirror what is not reflected, from the directions alone: n' d' − n d is along the
+    /// normal.
+    fn lost(&self, before: [f64; 3], after: [f64; 3]) -> f64 {
         let [n, m] = self.indices;
-        let normal: [f64; 3] = std::array::from_fn(|k| m * after[k] - n * before[k]);
         let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        if let Some((Films::Mirror(coating), wavelength)) = &self.films {
+            // A mirror's kernel leaves minus the reflected direction, which is 2 cos i of the normal with the arriving one.
+            let normal: [f64; 3] = std::array::from_fn(|k| before[k] + after[k]);
+            let cosine = 0.5 * dot(normal, normal).sqrt();
+            return 1.0 - coating.reflectance(n, cosine.min(1.0), *wavelength);
+        }
+        let normal: [f64; 3] = std::array::from_fn(|k| m * after[k] - n * before[k]);
         let length = dot(normal, normal).sqrt();
         if length == 0.0 {
             return 0.0;
         }
         let cosines = [before, after].map(|d| (dot(d, normal) / length).abs().min(1.0));
+        if let Some((Films::Glass(stack), wavelength)) = &self.films {
+            let indices = [n, m].map(|n| Complex64::new(n, 0.0));
+            return 1.0 - stack.shares(indices, cosines[0], *wavelength)[1];
+        }
         let Some([film, phase]) = self.layer else {
             let [s, p] = amplitudes([n, m], cosines);
             return 0.5 * (s * s + p * p);

@@ -423,6 +423,16 @@ impl MicrolensArray {
             .collect()
     }
 
+    /// The same as light that runs against the axis meets it.
+    #[must_use]
+    pub fn flipped(&self) -> Self {
+        let types = self.types.iter().map(|lenslet| match lenslet {
+            Lenslet::Thin(power) => Lenslet::Thin(*power),
+            Lenslet::Face(surface) => Lenslet::Face(surface.flipped()),
+        });
+        Self { types: types.collect(), ..self.clone() }
+    }
+
     /// The same array with nothing dimmed.
     #[must_use]
     pub fn without_filters(self: &Arc<Self>) -> Arc<Self> {

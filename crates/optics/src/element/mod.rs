@@ -8,15 +8,19 @@
 
 pub(crate) mod aperture;
 mod biconic;
+mod coating;
 mod crossings;
+mod freeform;
 mod lattice;
 mod lenslets;
 mod losses;
 mod microlens_array;
+mod mirror;
 mod newton;
 mod part;
 mod rays;
 mod refract;
+mod shapes;
 mod step;
 mod surface;
 
@@ -36,16 +40,21 @@ pub use aperture::{
     ApertureSpec, CircularSpec, MaskSpec, Opening, Picture, PolygonSpec, grey_picture,
 };
 pub use biconic::{Biconic, BiconicSpec};
+pub use coating::{LayerSpec, MirrorCoating, MirrorCoatingSpec, Stack, StackSpec};
+pub use freeform::{Freeform, FreeformSpec, HeightMapSpec, PatternSpec, PhaseSpec, SagSpec};
 pub use lattice::{Grid, Lattice, LatticeCell};
 pub(crate) use losses::Loss;
 pub use losses::{Coating, Filter, FilterSpec, LossesSpec, Plain, Reflection};
 pub use microlens_array::{
     Gaps, Lenslet, LensletShape, LensletSpec, MicrolensArray, MicrolensArraySpec, clipped,
 };
+pub(crate) use mirror::{Fold, Shadow};
+pub use mirror::{Mirror, MirrorMount, MirrorSpec};
 pub use part::{Part, PartSpec, Symbol};
 pub use rays::{Block, LANES, LensRays, Ray, RayStatus, StatusCounts};
 pub(crate) use refract::Refraction;
 pub use refract::{ThinLens, ThinLensSpec};
+pub use shapes::{AnnularSpec, BoxSpec, Shape, SpiderSpec};
 pub use step::Clip;
 pub(crate) use step::{Action, Step};
 pub use surface::{Surface, SurfaceSpec};
@@ -323,7 +332,7 @@ mod tests {
         let schema = schemars::schema_for!(ElementSpec).to_value();
         let mut kinds = Vec::new();
         leaves(&schema, &mut kinds);
-        assert_eq!(kinds.len(), 8, "three shapes of apertures");
+        assert_eq!(kinds.len(), 14, "seven shapes of apertures");
         for kind in kinds {
             assert_eq!(kind["additionalProperties"], false, "{kind}");
             let keys = kind["properties"].as_object().unwrap();
@@ -336,7 +345,7 @@ mod tests {
     fn unknown_keys_and_types_are_refused_by_name() {
         let error = |json| read(json).unwrap_err();
         assert!(error(r#"{"type": "surface", "radios": 3}"#).contains("unknown field `radios`"));
-        assert!(error(r#"{"type": "mirror"}"#).contains("unknown variant `mirror`"));
+        assert!(error(r#"{"type": "prism"}"#).contains("unknown variant `prism`"));
         assert!(error(r#"{"radius": 3}"#).contains("missing field `type`"));
         let stop = r#"{"type": "surface", "stop": "yes"}"#;
         assert!(error(stop).contains("invalid type: string \"yes\""), "{}", error(stop));

@@ -9,7 +9,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::crossings::Slopes;
+use super::freeform::{Freeform, FreeformSpec, FreeformSurface};
 use super::lenslets::Lenslets;
+use super::mirror::{Mirror, MirrorMount, MirrorSpec};
 use super::refract::Media;
 use super::step::Action;
 use super::{
@@ -35,6 +37,10 @@ pub enum PartSpec {
     Filter(FilterSpec),
     /// An array of lenslets.
     MicrolensArray(MicrolensArraySpec),
+    /// A mirror.
+    Mirror(MirrorSpec),
+    /// A surface of any shape.
+    Freeform(FreeformSpec),
 }
 
 /// What an element is, ready to be traced.
@@ -52,6 +58,10 @@ pub enum Part {
     Filter(Arc<Filter>),
     /// An array of lenslets.
     MicrolensArray(Arc<MicrolensArray>),
+    /// A mirror.
+    Mirror(Mirror),
+    /// A surface of any shape.
+    Freeform(Arc<Freeform>),
 }
 
 /// How drawings show a part.
@@ -98,8 +108,9 @@ impl PartSpec {
         match self {
             Self::Surface(surface) => Some(surface.glass.as_ref()),
             Self::Biconic(surface) => Some(surface.glass.as_ref()),
+            Self::Freeform(surface) => (!surface.mirror).then_some(surface.glass.as_ref()),
             Self::MicrolensArray(array) => array.has_faces().then_some(array.glass.as_ref()),
-            Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) => None,
+            Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) | Self::Mirror(_) => None,
         }
     }
 
@@ -116,6 +127,8 @@ impl PartSpec {
             Self::Aperture(aperture) => Part::Aperture(aperture.build(resolve)?.into()),
             Self::Filter(filter) => Part::Filter(filter.build(resolve)?.into()),
             Self::MicrolensArray(array) => Part::MicrolensArray(array.build()?.into()),
+            Self::Mirror(mirror) => Part::Mirror(mirror.build()?),
+            Self::Freeform(surface) => Part::Freeform(surface.build(resolve)?.into()),
         })
     }
 }
@@ -131,6 +144,8 @@ impl Part {
             Self::Aperture(_) => "aperture",
             Self::Filter(_) => "filter",
             Self::MicrolensArray(_) => "microlens_array",
+            Self::Mirror(_) => "mirror",
+            Self::Freeform(_) => "freeform",
         }
     }
 
@@ -144,6 +159,8 @@ impl Part {
             Self::Aperture(opening) => opening.radius(),
             Self::Filter(filter) => filter.radius(),
             Self::MicrolensArray(array) => array.radius(),
+            Self::Mirror(mirror) => mirror.surface.semi_diameter,
+            Self::Freeform(surface) => surface.semi_diameter,
         }
     }
 
@@ -163,6 +180,8 @@ impl Part {
                 *opening = opening.with_radius(radius).ok_or("it is a mask")?;
             }
             Self::MicrolensArray(_) => return Err("it is a microlens array"),
+            Self::Mirror(mirror) => mirror.surface.semi_diameter = radius,
+            Self::Freeform(surface) => Arc::make_mut(surface).semi_diameter = radius,
         }
         Ok(())
     }
@@ -171,7 +190,11 @@ impl Part {
     #[must_use]
     pub fn is_ideal(&self) -> bool {
         match self {
-            Self::Surface(_) | Self::Biconic(_) | Self::MicrolensArray(_) => false,
+            Self::Surface(_)
+            | Self::Biconic(_)
+            | Self::MicrolensArray(_)
+            | Self::Mirror(_)
+            | Self::Freeform(_) => false,
             Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) => true,
         }
     }
@@ -183,7 +206,9 @@ impl Part {
             Self::Surface(surface) => surface.is_plane(),
             Self::Biconic(surface) => surface.curvature == [0.0; 2],
             Self::Aperture(_) | Self::Filter(_) => true,
-            Self::ThinLens(_) | Self::MicrolensArray(_) => false,
+            Self::ThinLens(_) | Self::MicrolensArray(_) | Self::Mirror(_) | Self::Freeform(_) => {
+                false
+            }
         }
     }
 
@@ -196,7 +221,9 @@ impl Part {
             | Self::Biconic(_)
             | Self::ThinLens(_)
             | Self::Filter(_)
-            | Self::MicrolensArray(_) => None,
+            | Self::MicrolensArray(_)
+            | Self::Mirror(_)
+            | Self::Freeform(_) => None,
         }
     }
 
@@ -206,6 +233,8 @@ impl Part {
         match self {
             Self::Surface(surface) => surface.domain(),
             Self::Biconic(surface) => surface.domain(),
+            Self::Mirror(mirror) => mirror.surface.domain(),
+            Self::Freeform(surface) => surface.domain(),
             Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => {
                 f64::INFINITY
             }
@@ -218,6 +247,8 @@ impl Part {
         match self {
             Self::Surface(surface) => surface.sag(x.hypot(y)),
             Self::Biconic(surface) => surface.sag([x, y]),
+            Self::Mirror(mirror) => mirror.surface.sag(x.hypot(y)),
+            Self::Freeform(surface) => surface.sag([x, y]),
             Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => {
                 Some(0.0)
             }
@@ -231,6 +262,8 @@ impl Part {
         match self {
             Self::Surface(surface) => 1.0 / surface.curvature,
             Self::Biconic(surface) => 1.0 / surface.curvature[1],
+            Self::Mirror(mirror) => 1.0 / mirror.surface.curvature,
+            Self::Freeform(surface) => 1.0 / surface.base_curvature(),
             Self::ThinLens(lens) => 1.0 / lens.power,
             Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => f64::INFINITY,
         }
@@ -242,6 +275,12 @@ impl Part {
         match self {
             Self::Surface(surface) => surface.shape(),
             Self::Biconic(surface) => surface.shape(),
+            Self::Freeform(surface) => surface.shape(),
+            Self::Mirror(mirror) => {
+                let hole = (mirror.mount.hole > 0.0)
+                    .then(|| format!("hole of radius {} mm", mirror.mount.hole));
+                mirror.surface.shape().into_iter().chain(hole).collect()
+            }
             Self::Aperture(opening) => opening.shape().into_iter().collect(),
             Self::MicrolensArray(array) => {
                 let [width, height] = array.half_size.map(|half| 2.0 * half);
@@ -257,7 +296,9 @@ impl Part {
     #[must_use]
     pub fn symbol(&self) -> Symbol {
         match self {
-            Self::Surface(_) | Self::Biconic(_) => Symbol::Surface,
+            Self::Surface(_) | Self::Biconic(_) | Self::Mirror(_) | Self::Freeform(_) => {
+                Symbol::Surface
+            }
             Self::ThinLens(lens) => Symbol::ThinLens { converging: lens.power.signum() },
             Self::Aperture(_) => Symbol::Opening,
             Self::Filter(_) | Self::MicrolensArray(_) => Symbol::Sheet,
@@ -268,7 +309,8 @@ impl Part {
     #[must_use]
     pub fn is_round(&self) -> bool {
         match self {
-            Self::Surface(_) | Self::ThinLens(_) => true,
+            Self::Surface(_) | Self::ThinLens(_) | Self::Mirror(_) => true,
+            Self::Freeform(surface) => surface.is_round(),
             Self::Biconic(surface) => surface.is_round(),
             Self::Aperture(opening) => opening.is_round(),
             Self::Filter(filter) => filter.is_uniform(),
@@ -282,6 +324,9 @@ impl Part {
         match self {
             Self::Filter(filter) => &filter.curves,
             Self::MicrolensArray(array) => &array.curves,
+            Self::Mirror(_) | Self::Freeform(_) => {
+                self.mirror().map_or(&[], |mirror| mirror.reflectance.as_slice())
+            }
             Self::Surface(_) | Self::Biconic(_) | Self::ThinLens(_) | Self::Aperture(_) => &[],
         }
     }
@@ -295,6 +340,9 @@ impl Part {
                 [one] => Some(one),
                 _ => None,
             },
+            Self::Mirror(_) | Self::Freeform(_) => {
+                self.mirror().and_then(|mirror| mirror.reflectance.as_ref())
+            }
             Self::Surface(_)
             | Self::Biconic(_)
             | Self::ThinLens(_)
@@ -304,24 +352,63 @@ impl Part {
         }
     }
 
-    /// The paraxial power (1/mm) between media of index `before` and `behind`. An array of lenslets has
+    /// The paraxial power (1/mm) between media of index `before` and `behind` at a wavelength (nm). An array of lenslets has
     /// none: what is paraxial is the picture that the lens before it makes, which its lenslets sample.
-    pub(crate) fn power(&self, before: f64, behind: f64) -> f64 {
+    pub(crate) fn power(&self, before: f64, behind: f64, wavelength: f64) -> f64 {
         match self {
             Self::Surface(surface) => (behind - before) * surface.paraxial_curvature(),
             // As drawings and tables, it sees the section along y.
             Self::Biconic(surface) => (behind - before) * surface.curvature[1],
             Self::ThinLens(lens) => before * lens.power,
+            Self::Mirror(mirror) => -(before + behind) * mirror.surface.paraxial_curvature(),
+            Self::Freeform(surface) => {
+                let change = match surface.mirror {
+                    Some(_) => -(before + behind),
+                    None => behind - before,
+                };
+                change * surface.paraxial_curvature() + surface.phase_power(wavelength)
+            }
             Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => 0.0,
         }
     }
 
-    /// What it does to light from the object, and to light traced from the sensor. `transmission` is
-    /// what passes of a filter's curve.
+    /// The mirror's own, where it is one.
+    #[must_use]
+    pub fn mirror(&self) -> Option<&MirrorMount> {
+        match self {
+            Self::Mirror(mirror) => Some(&mirror.mount),
+            Self::Freeform(surface) => surface.mirror.as_ref(),
+            Self::Surface(_)
+            | Self::Biconic(_)
+            | Self::ThinLens(_)
+            | Self::Aperture(_)
+            | Self::Filter(_)
+            | Self::MicrolensArray(_) => None,
+        }
+    }
+
+    /// The same as light that runs against the axis meets it: behind an odd number of mirrors.
+    #[must_use]
+    pub fn flipped(self) -> Self {
+        match self {
+            Self::Surface(surface) => Self::Surface(surface.flipped()),
+            Self::Biconic(surface) => Self::Biconic(surface.flipped()),
+            Self::Mirror(mirror) => {
+                Self::Mirror(Mirror { surface: mirror.surface.flipped(), ..mirror })
+            }
+            Self::MicrolensArray(array) => Self::MicrolensArray(array.flipped().into()),
+            Self::Freeform(surface) => Self::Freeform(surface.flipped().into()),
+            Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) => self,
+        }
+    }
+
+    /// What it does to light of a wavelength (nm) from the object, and to light traced from the sensor. `transmission`
+    /// is what passes of a filter's curve.
     pub(crate) fn actions(
         &self,
         before: f64,
         behind: f64,
+        wavelength: f64,
         transmission: &dyn Fn(&Curve) -> f64,
     ) -> [Action; 2] {
         let both = |action: Action| [action.clone(), action];
@@ -337,6 +424,23 @@ impl Part {
                     let slopes = Slopes::of_biconic(&surface);
                     Action::Biconic { surface, media, slopes }
                 })
+            }
+            Self::Mirror(mirror) => [
+                Action::refract(Refraction::mirror(mirror.surface.clone())),
+                Action::refract(Refraction::mirror(mirror.surface.flipped())),
+            ],
+            Self::Freeform(surface) => {
+                let is_mirror = surface.mirror.is_some();
+                let action = |shape: Arc<Freeform>, before, behind| Action::Freeform {
+                    efficiency: shape.efficiency(wavelength),
+                    surface: FreeformSurface::new(shape, behind, wavelength),
+                    media: if is_mirror { Media::MIRROR } else { Media::new(before, behind) },
+                };
+                let from_behind = match is_mirror {
+                    true => Arc::new(surface.flipped()),
+                    false => Arc::clone(surface),
+                };
+                [action(Arc::clone(surface), before, behind), action(from_behind, behind, before)]
             }
             Self::ThinLens(lens) => [lens.power, -lens.power]
                 .map(|power| Action::ThinLens { power, semi_diameter: lens.semi_diameter }),

@@ -84,6 +84,9 @@ impl Media {
         Self { ratio, rest: (1.0 - ratio) * (1.0 + ratio) }
     }
 
+    /// Of a mirror: the kernels then give minus the direction that is reflected.
+    pub(crate) const MIRROR: Self = Self { ratio: -1.0, rest: 0.0 };
+
     /// Refracts at `ray`'s position, where the normal is `m` with |m|² = `length2`, d·m has the
     /// sign of `sign`, and (d·m)² = `along2` with the root `along`.
     #[inline(always)]
@@ -106,11 +109,39 @@ impl Media {
     }
 }
 
+impl Media {
+    /// As [`Self::refract`] at a surface whose phase adds `kick` to the direction in its tangent plane. What is
+    /// evanescent does not go on.
+    pub(crate) fn diffract(
+        &self,
+        ray: Ray,
+        m: [f64; 3],
+        length2: f64,
+        along: f64,
+        kick: [f64; 3],
+    ) -> (Ray, bool) {
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let (across, of_kick) = (along / length2, dot(kick, m) / length2);
+        let tangent: [f64; 3] = std::array::from_fn(|i| {
+            self.ratio * (ray.direction[i] - across * m[i]) + kick[i] - of_kick * m[i]
+        });
+        let behind2 = 1.0 - dot(tangent, tangent);
+        let rise = (behind2 / length2).sqrt().copysign(along);
+        let direction = std::array::from_fn(|i| tangent[i] + rise * m[i]);
+        (Ray { direction, ..ray }, (0.0..f64::INFINITY).contains(&behind2))
+    }
+}
+
 impl Refraction {
     /// From a medium of index `before` into one of index `behind`.
     pub(crate) fn new(surface: Surface, before: f64, behind: f64) -> Self {
         let slopes = Slopes::of_surface(&surface);
         Self { surface, media: Media::new(before, behind), slopes }
+    }
+
+    /// At a mirror.
+    pub(crate) fn mirror(surface: Surface) -> Self {
+        Self { media: Media::MIRROR, ..Self::new(surface, 1.0, 1.0) }
     }
 
     /// A ray in the surface's frame at a plane.

@@ -6,12 +6,16 @@
 
 use std::sync::Arc;
 
+use glam::DVec3;
+
 use super::Frame;
 use super::aperture::{Opening, in_circle, in_polygon};
 use super::biconic::Biconic;
 use super::crossings::{Slopes, cross_first, cross_first_after};
+use super::freeform::FreeformSurface;
 use super::lenslets::Lenslets;
 use super::losses::{Filter, Loss};
+use super::mirror::{Fold, Shadow};
 use super::newton::{Profile, cross_block};
 use super::rays::{Block, LANES, PENDING, Ray, RayStatus};
 use super::refract::{Media, Refracted, Refraction, at_thin_lens, each_lane};
@@ -36,6 +40,8 @@ pub(crate) struct Step {
     pub(crate) action: Action,
     /// What is lost here, when losses are asked for.
     pub(crate) loss: Option<Loss>,
+    /// How light goes on behind a mirror.
+    pub(crate) fold: Option<Fold>,
 }
 
 /// What an element does.
@@ -45,17 +51,35 @@ pub(crate) enum Action {
     Sphere(Refraction),
     Conic(Refraction),
     Asphere(Refraction),
-    Biconic { surface: Biconic, media: Media, slopes: Slopes },
-    ThinLens { power: f64, semi_diameter: f64 },
+    Biconic {
+        surface: Biconic,
+        media: Media,
+        slopes: Slopes,
+    },
+    ThinLens {
+        power: f64,
+        semi_diameter: f64,
+    },
     Opening(Arc<Opening>),
-    Filter { filter: Arc<Filter>, transmissions: Vec<f64> },
+    Filter {
+        filter: Arc<Filter>,
+        transmissions: Vec<f64>,
+    },
     Lenslets(Lenslets),
+    /// A surface of any shape, and the share of light in its order.
+    Freeform {
+        surface: FreeformSurface,
+        media: Media,
+        efficiency: f64,
+    },
+    /// A mirror in the way to another element.
+    Shadow(Shadow),
 }
 
 impl Action {
     /// Whether it moves rays to itself; sheets only look at them.
     pub(crate) fn moves(&self) -> bool {
-        !matches!(self, Self::Opening(_) | Self::Filter { .. })
+        !matches!(self, Self::Opening(_) | Self::Filter { .. } | Self::Shadow(_))
     }
 
     /// The kernel that a surface needs.
@@ -109,6 +133,14 @@ impl Step {
     /// Takes a block of rays through the element.
     #[inline(always)]
     pub(crate) fn run(&self, block: &mut Block, clip: Clip) {
+        let Some(fold) = &self.fold else { return self.meet(block, clip) };
+        let before = block.outcome;
+        self.meet(block, clip);
+        fold.unfold(block, &before, clip, RayStatus::Vignetted { element: self.element }.code());
+    }
+
+    #[inline(always)]
+    fn meet(&self, block: &mut Block, clip: Clip) {
         match &self.loss {
             None => self.pass(block, clip),
             Some(loss) => {
@@ -191,6 +223,16 @@ impl Step {
                 self.run_placed(block, clip);
                 false
             }
+            Action::Freeform { surface, media, efficiency } => {
+                let clip2 = limit(surface.shape.semi_diameter, clip);
+                self.cross_block(surface, (*media, &Slopes::default()), block, z, clip2);
+                block.throughput.iter_mut().for_each(|share| *share *= efficiency);
+                false
+            }
+            Action::Shadow(shadow) => {
+                self.shade(block, shadow, clip, z);
+                false
+            }
         };
         // Rays that are left go one by one.
         if pending {
@@ -252,7 +294,20 @@ impl Step {
             Opening::Polygon { normals, apothem, .. } => {
                 self.sheet(block, z, |x, y| in_polygon(normals, *apothem, x, y));
             }
+            Opening::Shaped(shape) => self.sheet(block, z, |x, y| shape.is_open(x, y)),
             Opening::Image(_) => self.run_placed(block, clip),
+        }
+    }
+
+    /// A mirror in the way, on the axis.
+    #[inline(always)]
+    fn shade(&self, block: &mut Block, shadow: &Shadow, clip: Clip, z: f64) {
+        let vignetted = RayStatus::Vignetted { element: self.element }.code();
+        for lane in 0..LANES {
+            let mut ray = block.ray(lane);
+            ray.position[2] -= z;
+            let stopped = (clip == Clip::On) & (block.outcome[lane] == 0) & shadow.stops(ray);
+            block.outcome[lane] = if stopped { vignetted } else { block.outcome[lane] };
         }
     }
 
@@ -324,7 +379,22 @@ impl Step {
         if let (Some(loss), RayStatus::Exited) = (&self.loss, traversal.status) {
             traversal.transmission *= loss.share(ray, traversal.ray);
         }
-        traversal
+        match &self.fold {
+            Some(fold) => fold.unfold_one(ray, traversal, clip, self.element),
+            None => traversal,
+        }
+    }
+
+    /// The path (mm) that a phase of the element adds at a place (mm) of the lens.
+    pub(crate) fn added_path(&self, place: DVec3) -> f64 {
+        let Action::Freeform { surface, .. } = &self.action else { return 0.0 };
+        let local = self.frame.rotation.transpose() * (place - self.frame.vertex);
+        surface.added_path([local.x, local.y])
+    }
+
+    /// Whether it stands for a mirror on the way to another element.
+    pub(crate) fn is_shadow(&self) -> bool {
+        matches!(self.action, Action::Shadow(_))
     }
 
     #[inline]
@@ -380,6 +450,21 @@ impl Step {
                 let (crossing, kind) = lenslets.exactly(ray, clip);
                 let passes = kind.and_then(|kind| lenslets.transmissions.get(kind).copied());
                 Traversal { transmission: passes.unwrap_or(1.0), ..self.crossed(crossing) }
+            }
+            Action::Freeform { surface, media, efficiency } => {
+                let clip2 = limit(surface.shape.semi_diameter, clip);
+                let crossing = cross_first(surface, (*media, &Slopes::default()), ray, clip2);
+                Traversal { transmission: *efficiency, ..self.crossed(crossing) }
+            }
+            Action::Shadow(shadow) => {
+                let stopped = clip == Clip::On && shadow.stops(ray);
+                let status = match stopped {
+                    true => RayStatus::Vignetted { element: self.element },
+                    false => RayStatus::Exited,
+                };
+                let t = (shadow.rim[0] - ray.position[2]) / ray.direction[2];
+                let point = stopped.then(|| ray.advanced(t).position);
+                Traversal { status, ray, point, transmission: 1.0 }
             }
         }
     }

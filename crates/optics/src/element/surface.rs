@@ -155,6 +155,16 @@ impl Surface {
         Self { curvature, conic: 0.0, aspheric: Vec::new(), semi_diameter: f64::INFINITY }
     }
 
+    /// The same as light that runs against the axis meets it.
+    #[must_use]
+    pub fn flipped(&self) -> Self {
+        Self {
+            curvature: -self.curvature,
+            aspheric: self.aspheric.iter().map(|a| -a).collect(),
+            ..*self
+        }
+    }
+
     /// Whether the surface is flat.
     #[must_use]
     pub fn is_plane(&self) -> bool {

@@ -104,13 +104,22 @@ impl LensFile {
         };
         let mut media = vec![Glass::air()];
         let mut elements = Vec::with_capacity(self.elements.len());
-        let mut z = 0.0;
+        // Files count along the axis as it is built, trains along the way of light.
+        let (mut z, mut sense) = (0.0, 1.0);
         for (index, spec) in self.elements.iter().enumerate() {
             let error = |why| LensError::Element { index, why };
-            elements.push(place(spec, z, resolve).map_err(error)?);
+            let element = place(spec, (z, sense), resolve).map_err(error)?;
+            if element.part.mirror().is_some() {
+                sense = -sense;
+                check_gap(spec.mount.thickness.0, sense).map_err(error)?;
+            }
+            elements.push(element);
             media.push(behind(spec, index, &media, &catalogues)?);
-            z += spec.mount.thickness.0;
+            z += sense * spec.mount.thickness.0;
         }
+        let sensor = self.sensor.unwrap_or_default();
+        let sensor =
+            SensorMount { tilt: sensor.tilt.map(|angle| Degrees(along(sense, angle.0))), ..sensor };
         let train = OpticalTrain {
             name: self.name.clone(),
             source: self.source.clone(),
@@ -119,7 +128,7 @@ impl LensFile {
             stop: 0,
             wavelength,
             end: z,
-            sensor: self.sensor.unwrap_or_default(),
+            sensor,
             losses: LossesSpec::default(),
             notes: Vec::new(),
         };
@@ -153,9 +162,32 @@ impl LensFile {
     }
 }
 
-fn place(spec: &ElementSpec, z: f64, resolve: Resolve<'_>) -> Result<Element, String> {
+/// A number that changes its sign where light runs against the axis; 0 keeps its own.
+fn along(sense: f64, value: f64) -> f64 {
+    if value == 0.0 { value } else { sense * value }
+}
+
+/// Refuses a gap behind a mirror that light does not run along.
+fn check_gap(thickness: f64, sense: f64) -> Result<(), String> {
+    if thickness * sense >= 0.0 {
+        return Ok(());
+    }
+    let way = if sense < 0.0 { "towards smaller z" } else { "towards greater z" };
+    Err(format!(
+        "thickness is {thickness} mm, and behind this mirror light runs {way}: write {}",
+        -thickness
+    ))
+}
+
+/// An element where `sense` is −1 if light runs against the axis there.
+fn place(
+    spec: &ElementSpec,
+    (z, sense): (f64, f64),
+    resolve: Resolve<'_>,
+) -> Result<Element, String> {
     let part = spec.part.build(resolve)?;
-    let tilt = spec.mount.tilt.map(|angle| angle.0);
+    let part = if sense < 0.0 { part.flipped() } else { part };
+    let tilt = spec.mount.tilt.map(|angle| along(sense, angle.0));
     let decentre = spec.mount.decentre.map(|length| length.0);
     let numbers = [spec.mount.thickness.0, tilt[0], tilt[1], decentre[0], decentre[1]];
     if numbers.iter().any(|number| !number.is_finite()) {

@@ -7,6 +7,7 @@
 //! | [`lenslets`] | arrays of lenslets: the lens without them, and the lens as each lenslet sees it |
 //! | [`paraxial`] | focal lengths, principal planes and pupils |
 //! | [`focus`] | where the sensor goes |
+//! | [`folds`] | mirrors: the built lens, and what is in the way of its light |
 //! | [`opening`] | the widest beam that the rims let through |
 //! | [`aim`] | chief rays: aimed at the stop's centre |
 //! | [`analysis`] | spots, distortion, relative illumination, colour |
@@ -21,6 +22,7 @@ pub mod analysis;
 pub mod drawing;
 pub mod file;
 pub mod focus;
+pub mod folds;
 pub mod lenslets;
 pub mod opening;
 pub mod optical_path;
@@ -41,6 +43,7 @@ pub use crate::element::Part;
 pub use aim::ChiefRay;
 pub use file::{GivenRay, LensFile, RayError, RaysFile, SensorMount, TracedRays};
 pub use focus::{Focus, FocusError};
+pub use folds::Isometry;
 pub use lenslets::BehindLenslets;
 pub use opening::WidestOpening;
 pub use paraxial::{Paraxial, Pupil};
@@ -220,7 +223,9 @@ impl OpticalTrain {
     /// Whether rays of different wavelengths run differently.
     #[must_use]
     pub fn is_dispersive(&self) -> bool {
-        self.media.iter().any(Glass::is_dispersive)
+        let diffracts =
+            |element: &Element| matches!(&element.part, Part::Freeform(f) if f.is_dispersive());
+        self.media.iter().any(Glass::is_dispersive) || self.elements.iter().any(diffracts)
     }
 
     /// Sentences on glasses and filters that are not known at some of `wavelengths` (nm), one for
@@ -264,7 +269,12 @@ impl OpticalTrain {
                 }
                 part => {
                     for curve in part.curves() {
-                        let known = format!("a filter of the lenslets elements[{i}] is known");
+                        let known = match part {
+                            Part::Mirror(_) => {
+                                format!("what the mirror elements[{i}] reflects is known")
+                            }
+                            _ => format!("a filter of the lenslets elements[{i}] is known"),
+                        };
                         tell(known, curve.range());
                     }
                 }
@@ -400,6 +410,13 @@ impl OpticalTrain {
         // Elements that run into one another, and a stop that is not filled.
         notes.extend(self.crossings());
         notes.extend(self.unfilled_stop());
+        notes.extend(self.sensor_in_the_light());
+        if self.is_folded() {
+            notes.push(
+                "the lens has mirrors: places and directions are unfolded, z counts along the way of light"
+                    .to_owned(),
+            );
+        }
         if !self.elements.iter().all(|e| e.frame.is_axial()) {
             notes.push(
                 "the paraxial analysis leaves tilts and decentrings out; rays do not".to_owned(),
@@ -434,7 +451,8 @@ impl OpticalTrain {
         let pair = self.elements.get(i..i + 2)?;
         let [a, b] = [&pair[0].part, &pair[1].part];
         let reach = a.clear_radius().min(b.clear_radius());
-        let of_glass = [a, b].iter().all(|part| part.symbol() == Symbol::Surface);
+        let of_glass =
+            [a, b].iter().all(|part| part.symbol() == Symbol::Surface && part.mirror().is_none());
         if !of_glass || !reach.is_finite() || !pair.iter().all(|e| e.frame.is_axial()) {
             return None;
         }

@@ -111,12 +111,18 @@ impl OpticalTrain {
                 | RayStatus::Vignetted { element } => Some(element),
             }
         };
-        if ended(0.0).is_some() {
-            return None;
-        }
-        // The first step that ends, and then by halves of it.
+        // What stands in the middle leaves the beam around it.
         let step = limit / f64::from(RAYS);
-        let Some(first) = (1..=RAYS).map(|i| step * f64::from(i)).find(|&i| ended(i).is_some())
+        let begin = match ended(0.0) {
+            None => 0,
+            Some(_) if self.is_obscured() => {
+                (1..=RAYS).find(|&i| ended(step * f64::from(i)).is_none())?
+            }
+            Some(_) => return None,
+        };
+        // The first step that ends, and then by halves of it.
+        let Some(first) =
+            (begin + 1..=RAYS).map(|i| step * f64::from(i)).find(|&i| ended(i).is_some())
         else {
             return Some(RimEdge::Open);
         };

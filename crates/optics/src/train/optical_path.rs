@@ -122,14 +122,14 @@ impl MonochromaticTrain {
             if traversal.status != RayStatus::Exited {
                 break;
             }
-            if step.moves() {
-                let way = DVec3::from(traversal.ray.position) - DVec3::from(end.ray.position);
+            if let (true, Some(point)) = (step.moves(), traversal.point) {
+                let way = DVec3::from(point) - DVec3::from(end.ray.position);
                 let index = self.index_before(step.element);
                 let mut length = way.dot(DVec3::from(end.ray.direction));
                 if matches!(step.action, Action::ThinLens { .. }) {
                     length += phases.at(step.element, traversal.ray.position.into());
                 }
-                end.length += index * length;
+                end.length += index * length + step.added_path(point.into());
             }
             end.ray = traversal.ray;
         }

@@ -10,6 +10,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::OpticalTrain;
+use super::trace::Indices;
 use crate::glass::GlassError;
 
 /// A power this small a share of the powers it is made of is rounding: the lens is afocal.
@@ -145,7 +146,7 @@ impl OpticalTrain {
     }
 
     /// z of the entrance pupil and the stop's radius over its radius.
-    fn entrance_pupil(&self, indices: &[f64]) -> (Option<f64>, Option<f64>) {
+    fn entrance_pupil(&self, indices: &Indices) -> (Option<f64>, Option<f64>) {
         let to_stop = self.matrix(indices, 0, self.stop).then(self.gap_before(indices, self.stop));
         if to_stop.a.abs() < 1e-12 {
             return (None, None);
@@ -153,7 +154,7 @@ impl OpticalTrain {
         (Some(indices[0] * to_stop.b / to_stop.a), Some(to_stop.a))
     }
 
-    fn exit_pupil(&self, indices: &[f64]) -> Pupil {
+    fn exit_pupil(&self, indices: &Indices) -> Pupil {
         let from_stop = self.matrix(indices, self.stop, self.elements.len());
         if from_stop.d.abs() < 1e-12 {
             return Pupil::default();
@@ -174,7 +175,8 @@ impl OpticalTrain {
         let index = |(i, glass): (usize, &crate::glass::Glass)| {
             glass.index(wavelength).map_err(|e| (i.saturating_sub(1), e))
         };
-        let indices = self.media.iter().enumerate().map(index).collect::<Result<Vec<_>, _>>()?;
+        let of = self.media.iter().enumerate().map(index).collect::<Result<Vec<_>, _>>()?;
+        let indices = Indices { wavelength, of };
         let heights = (0..self.elements.len())
             .map(|i| self.matrix(&indices, 0, i).then(self.gap_before(&indices, i)).a);
         Ok(heights.collect())
@@ -193,7 +195,7 @@ impl OpticalTrain {
     }
 
     /// From before element `from` to behind the one before `to`: the gaps between, none outside.
-    pub(crate) fn matrix(&self, indices: &[f64], from: usize, to: usize) -> Abcd {
+    pub(crate) fn matrix(&self, indices: &Indices, from: usize, to: usize) -> Abcd {
         let mut all = Abcd::ONE;
         for i in from..to {
             if i > from {
@@ -204,7 +206,7 @@ impl OpticalTrain {
         all
     }
 
-    pub(crate) fn gap_before(&self, indices: &[f64], i: usize) -> Abcd {
+    pub(crate) fn gap_before(&self, indices: &Indices, i: usize) -> Abcd {
         match i.checked_sub(1) {
             Some(previous) => {
                 let gap = self.elements[i].frame.vertex.z - self.elements[previous].frame.vertex.z;
@@ -214,7 +216,7 @@ impl OpticalTrain {
         }
     }
 
-    pub(crate) fn power(&self, indices: &[f64], i: usize) -> f64 {
-        self.elements[i].part.power(indices[i], indices[i + 1])
+    pub(crate) fn power(&self, indices: &Indices, i: usize) -> f64 {
+        self.elements[i].part.power(indices[i], indices[i + 1], indices.wavelength)
     }
 }

@@ -7,7 +7,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::OpticalTrain;
-use crate::element::{Action, Block, Clip, LensRays, Loss, Ray, RayStatus, Step};
+use super::folds::Obstruction;
+use crate::element::{Action, Block, Clip, Fold, Frame, LensRays, Loss, Ray, RayStatus, Step};
 use crate::glass::GlassError;
 
 /// More elements than these make a train long: the largest zoom lenses have some fifty surfaces.
@@ -27,7 +28,7 @@ pub enum Side {
 #[derive(Debug, Clone)]
 pub struct MonochromaticTrain {
     wavelength: f64,
-    indices: Vec<f64>,
+    indices: Indices,
     forward: Vec<Step>,
     backward: Vec<Step>,
     /// Whether rays take long to be traced through it.
@@ -71,30 +72,83 @@ impl OpticalTrain {
     ) -> Result<MonochromaticTrain, GlassError> {
         let indices = self.indices(wavelength)?;
         let (mut forward, mut backward) = (Vec::new(), Vec::new());
+        let obstructions = self.obstructions();
         for (element, placed) in self.elements.iter().enumerate() {
+            shade(&obstructions[element], [&mut forward, &mut backward]);
             let [before, behind] = [indices[element], indices[element + 1]];
             let [towards_sensor, towards_object] =
-                placed.part.actions(before, behind, transmission);
+                placed.part.actions(before, behind, wavelength, transmission);
             let absorption = |medium: usize| self.media[medium].absorption(wavelength);
-            let loss =
-                |indices, medium| Loss::new(&self.losses, indices, absorption(medium), wavelength);
-            let (frame, axial) = (placed.frame, placed.frame.is_axial());
-            let add = |steps: &mut Vec<Step>, action: Action, loss: Option<Loss>| {
+            let coating = placed.part.mirror().and_then(|mirror| mirror.coating.as_ref());
+            let loss = |indices: [f64; 2], medium| {
+                let loss = Loss::new(&self.losses, indices, absorption(medium), wavelength);
+                match coating {
+                    Some(coating) => Some(Loss::of_mirror(loss, coating, indices[0], wavelength)),
+                    None => loss,
+                }
+            };
+            let fold = placed.part.mirror().map(|mirror| {
+                let reflectance = mirror.reflectance.as_ref().map_or(1.0, transmission);
+                Fold::new(mirror, &placed.frame, reflectance)
+            });
+            let add = |steps: &mut Vec<Step>,
+                       action: Action,
+                       loss: Option<Loss>,
+                       fold,
+                       frame: Frame| {
                 // Sheets do not move rays: what absorbs before one is counted at the next surface.
                 let loss = loss.filter(|_| action.moves());
-                steps.push(Step { element, frame, axial, action, loss });
+                steps.push(Step { element, frame, axial: frame.is_axial(), action, loss, fold });
             };
-            add(&mut forward, towards_sensor, loss([before, behind], element));
-            add(&mut backward, towards_object, loss([behind, before], element + 1));
+            add(&mut forward, towards_sensor, loss([before, behind], element), fold, placed.frame);
+            let (frame, fold) = match fold.map(|fold| fold.from_behind(&placed.frame)) {
+                Some((frame, fold)) => (frame, Some(fold)),
+                None => (placed.frame, None),
+            };
+            add(&mut backward, towards_object, loss([behind, before], element + 1), fold, frame);
         }
+        shade(&obstructions[self.elements.len()], [&mut forward, &mut backward]);
         backward.reverse();
         let is_costly = forward.len() > LONG || forward.iter().any(Step::has_wall);
         Ok(MonochromaticTrain { wavelength, indices, forward, backward, is_costly })
     }
 
     /// The index of each medium at `wavelength` (nm), from the object's to the sensor's.
-    pub(crate) fn indices(&self, wavelength: f64) -> Result<Vec<f64>, GlassError> {
-        self.media.iter().map(|glass| glass.index(wavelength)).collect()
+    pub(crate) fn indices(&self, wavelength: f64) -> Result<Indices, GlassError> {
+        let of =
+            self.media.iter().map(|glass| glass.index(wavelength)).collect::<Result<_, _>>()?;
+        Ok(Indices { wavelength, of })
+    }
+}
+
+/// The index of each medium of a train at a wavelength.
+#[derive(Debug, Clone)]
+pub(crate) struct Indices {
+    /// In nm.
+    pub(crate) wavelength: f64,
+    /// From the object's medium to the sensor's.
+    pub(crate) of: Vec<f64>,
+}
+
+impl std::ops::Deref for Indices {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        &self.of
+    }
+}
+
+/// Adds the mirrors in the way of a leg.
+fn shade(obstructions: &[Obstruction], steps: [&mut Vec<Step>; 2]) {
+    for steps in steps {
+        steps.extend(obstructions.iter().map(|obstruction| Step {
+            element: obstruction.element,
+            frame: obstruction.frame,
+            axial: obstruction.frame.is_axial(),
+            action: Action::Shadow(obstruction.shadow),
+            loss: None,
+            fold: None,
+        }));
     }
 }
 
@@ -227,7 +281,7 @@ impl MonochromaticTrain {
     pub(crate) fn crossing(&self, from: Side, element: usize, mut ray: Ray) -> Option<[f64; 2]> {
         for step in self.steps(from) {
             let traversal = step.run_one(ray, Clip::Off);
-            if step.element == element {
+            if step.element == element && !step.is_shadow() {
                 let local = step.frame.rotation.transpose()
                     * (DVec3::from(traversal.point?) - step.frame.vertex);
                 return Some([local.x, local.y]);

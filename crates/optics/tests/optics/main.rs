@@ -1,16 +1,20 @@
 //! Lenses and what they are made of, against closed forms, references and each other.
 
 mod asphere_crossings;
+mod code_v;
+mod components;
 mod exit_pupil;
 mod lens_limits;
 mod lens_properties;
 mod microlens_array;
+mod mirrors;
 mod openings;
 mod optics_reference;
 mod reports;
 mod small_openings;
 mod waves;
 mod zemax_commands;
+mod zemax_components;
 
 use etendue_optics::train::{LensFile, OpticalTrain};
 

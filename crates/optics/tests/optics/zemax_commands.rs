@@ -27,16 +27,22 @@ fn says(text: &str, words: &[&str]) {
 }
 
 #[test]
-fn disks_in_the_way_are_refused_with_a_remedy() {
-    says(&file("", "  OBSC 0 1.5 0\n", GLASS), &["line 16", "OBSC", "take the line out", "--save"]);
+fn what_stands_in_the_way_and_is_no_disk_is_refused_with_a_remedy() {
+    for line in ["OBSC 0.5 1.5 0", "SQOB 1 1 0", "ELOB 1 1 0"] {
+        let command = line.split(' ').next().unwrap();
+        says(
+            &file("", &format!("  {line}\n"), GLASS),
+            &["line 16", command, "take the line out", "--save"],
+        );
+    }
     // One without a radius covers nothing.
     let open = read(&file("", "  OBSC 0 0 0\n", GLASS)).unwrap();
     assert_eq!(open.file, read(&file("", "", GLASS)).unwrap().file);
 }
 
 #[test]
-fn rectangular_apertures_are_refused_with_a_remedy() {
-    says(&file("", "  SQAP 3 2 0\n", GLASS), &["line 16", "SQAP", "CLAP 0", "take the line out"]);
+fn apertures_by_points_are_refused_with_a_remedy() {
+    says(&file("", "  UDAP 3 2 0\n", GLASS), &["line 16", "UDAP", "CLAP 0", "take the line out"]);
 }
 
 #[test]

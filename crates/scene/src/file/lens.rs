@@ -99,6 +99,9 @@ pub fn read_lens_at(
     if ZemaxLens::is_named(path) {
         return read_zemax(path, configuration, glasses);
     }
+    if ZemaxLens::is_named_code_v(path) && configuration.is_none() {
+        return read_zemax(path, None, glasses);
+    }
     if configuration.is_some() {
         let reason = "has no configurations, which Zemax files (.zmx) have".to_owned();
         return Err(SceneError::NotALens { file: path.to_owned(), reason });
@@ -139,7 +142,8 @@ pub fn is_lens(path: &Path) -> bool {
         let Ok((_, value)) = read(path) else { return false };
         value.get("elements").is_some() && !SCENE_KEYS.iter().any(|key| value.get(key).is_some())
     };
-    ZemaxLens::is_named(path) || (is_json && has_elements())
+    let is_of_designers = ZemaxLens::is_named(path) || ZemaxLens::is_named_code_v(path);
+    is_of_designers || (is_json && has_elements())
 }
 
 /// Reads rays and traces them through a lens.
@@ -215,8 +219,11 @@ fn read_zemax(
 ) -> Result<ReadLens, SceneError> {
     let bytes = super::read_bytes(path).map_err(not_a_lens)?;
     let zemax = |source| SceneError::Zemax { file: path.to_owned(), source };
-    let ZemaxLens { file, fields, wavelengths, notes, .. } =
-        ZemaxLens::read_configuration(&bytes, configuration, glasses).map_err(zemax)?;
+    let lens = match ZemaxLens::is_named_code_v(path) {
+        true => ZemaxLens::read_code_v(&bytes, glasses),
+        false => ZemaxLens::read_configuration(&bytes, configuration, glasses),
+    };
+    let ZemaxLens { file, fields, wavelengths, notes, .. } = lens.map_err(zemax)?;
     let train = file
         .build(&GlassesAlone(glasses))
         .map_err(|error| zemax(ZemaxError { line: 1, why: error.to_string() }))?;

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::{COLOURS, title};
 use crate::element::{Clip, RayStatus, Symbol};
-use crate::train::{Element, LensReport, MonochromaticTrain, OpticalTrain, Side};
+use crate::train::{Element, Isometry, LensReport, MonochromaticTrain, OpticalTrain, Side};
 
 /// The picture's width and the most of its height (pixels).
 const WIDTH: f64 = 960.0;
@@ -36,9 +36,14 @@ pub fn layout(
     let at = train.at(train.wavelength())?;
     let end = end_of(train, report);
     let fields = drawn_fields(report);
-    let fans: Vec<Fan> = fields.iter().map(|&field| fan(train, &at, report, field, end)).collect();
+    // Mirrors are drawn as they are built.
+    let spaces = train.built();
+    let fans: Vec<Fan> =
+        fields.iter().map(|&field| fan(train, &at, report, field, (end, &spaces))).collect();
     let heights = heights(train, &fans);
-    let view = DrawingView::around(train, &heights, &fans, report, end);
+    let train = &as_built(train, &spaces);
+    let behind = spaces.last().copied().unwrap_or(Isometry::ONE);
+    let view = DrawingView::around(train, &heights, &fans, report, (end, &behind));
     // Glass first, then rays, then the elements' lines over both.
     let mut canvas = Canvas::new(WIDTH, view.height, &title(report));
     glasses(&mut canvas, &view, &bodies(train, &at, &heights));
@@ -56,12 +61,24 @@ pub fn layout(
     }
     if let Some(z) = report.sensor_z {
         let half = view.sensor;
-        canvas.path(&[view.pixel([z, -half]), view.pixel([z, half])], "ink", 2.5);
+        let ends = [-half, half].map(|y| behind.place(DVec3::new(0.0, y, z)));
+        canvas.path(&ends.map(|end| view.pixel([end.z, end.y])), "ink", 2.5);
     }
     let drawn = fields.iter().zip(&fans).enumerate().filter(|(_, (_, fan))| !fan.rays.is_empty());
     let drawn: Vec<(usize, f64)> = drawn.map(|(i, (&field, _))| (i, field)).collect();
     legend(&mut canvas, &view, &drawn);
     Ok(canvas.svg(Theme::Reader))
+}
+
+/// The elements where they stand in the built lens, for drawing alone.
+fn as_built(train: &OpticalTrain, spaces: &[Isometry]) -> OpticalTrain {
+    let mut built = train.clone();
+    if train.is_folded() {
+        for (element, space) in built.elements.iter_mut().zip(spaces) {
+            element.frame = space.frame(&element.frame);
+        }
+    }
+    built
 }
 
 /// Where rays end (mm): at the sensor, or a little behind the lens.
@@ -90,7 +107,7 @@ pub(super) fn fan(
     at: &MonochromaticTrain,
     report: &LensReport,
     field: f64,
-    end: f64,
+    (end, spaces): (f64, &[Isometry]),
 ) -> Fan {
     let none = Fan { rays: Vec::new() };
     let Some(chief) = train.chief_ray(at, field) else { return none };
@@ -99,7 +116,10 @@ pub(super) fn fan(
         report.paraxial.entrance_pupil.diameter.map_or(0.2 * train.lateral_scale(), |d| 0.5 * d);
     let across = DVec3::new(0.0, chief.direction.z, -chief.direction.y);
     let lit =
-        |offset: f64| trace(train, at, chief.position + across * offset, chief.direction, end);
+        |offset: f64| {
+            let position = chief.position + across * offset;
+            trace(train, at, (position, chief.direction), (end, spaces))
+        };
     // Where the beam ends on both sides of its chief ray, to a percent of the pupil.
     let edge = |side: f64| {
         let mut steps = (0..=200).rev().map(|i| side * radius * 0.01 * f64::from(i));
@@ -120,7 +140,7 @@ pub(super) fn fan_of(
     report: &LensReport,
     field: f64,
 ) -> Vec<Vec<[f64; 2]>> {
-    fan(train, at, report, field, report.sensor_z.unwrap_or_default()).rays
+    fan(train, at, report, field, (report.sensor_z.unwrap_or_default(), &[])).rays
 }
 
 /// Moves the beginnings of parallel rays to a plane square to them, that of the one that begins first.
@@ -137,9 +157,8 @@ fn start_together(rays: &mut [Vec<[f64; 2]>], direction: [f64; 2]) {
 fn trace(
     train: &OpticalTrain,
     at: &MonochromaticTrain,
-    position: DVec3,
-    direction: DVec3,
-    end: f64,
+    (position, direction): (DVec3, DVec3),
+    (end, spaces): (f64, &[Isometry]),
 ) -> Option<Vec<[f64; 2]>> {
     let path = at.path(Side::Object, Clip::On, position, direction);
     let (RayStatus::Exited, Some(out)) = (path.status, path.direction) else { return None };
@@ -147,7 +166,21 @@ fn trace(
     let lead = 0.25 * (end.abs() + train.lateral_scale());
     let start = first - direction * lead;
     let stop = last + out * ((end - last.z) / out.z);
-    let points = std::iter::once(start).chain(path.points.iter().copied()).chain([stop]);
+    // Each point as the space before its element stands in the built lens; without spaces as they are.
+    let place = |i: usize, point: DVec3| spaces.get(i).map_or(point, |space| space.place(point));
+    let met = path.points.iter().enumerate().map(|(i, &point)| place(i, point));
+    let stop = match train.elements().last().and_then(|last| last.part.mirror()) {
+        // The last point is before the fold: where it is behind it follows from the way back.
+        Some(_) if !spaces.is_empty() => {
+            let direction = spaces.last()?.direction(out);
+            let from = place(path.points.len() - 1, last);
+            let plane = spaces.last()?.place(DVec3::new(0.0, 0.0, end));
+            let normal = spaces.last()?.direction(DVec3::Z);
+            from + direction * ((plane - from).dot(normal) / direction.dot(normal))
+        }
+        _ => place(path.points.len(), stop),
+    };
+    let points = std::iter::once(start).chain(met).chain([stop]);
     let points: Vec<[f64; 2]> = points.map(|point| [point.z, point.y]).collect();
     points.iter().flatten().all(|number| number.is_finite()).then_some(points)
 }
@@ -184,9 +217,11 @@ impl DrawingView {
         heights: &[f64],
         fans: &[Fan],
         report: &LensReport,
-        end: f64,
+        (end, behind): (f64, &Isometry),
     ) -> Self {
-        let (mut left, mut right, mut top) = (0.0_f64, end, 0.0_f64);
+        let sensor = behind.place(DVec3::new(0.0, 0.0, end));
+        let (mut left, mut right) = (sensor.z.min(0.0), sensor.z);
+        let mut top = sensor.y.abs();
         for (element, &height) in train.elements().iter().zip(heights) {
             top = top.max(height + element.frame.vertex.truncate().length());
             for [z, _] in section(element, height) {
@@ -331,7 +366,19 @@ pub(super) fn strokes(element: &Element, height: f64, pixel: f64) -> Vec<(Vec<[f
     };
     let at = |y: f64, z: f64| DVec3::new(0.0, y, z);
     match element.part.symbol() {
-        Symbol::Surface => vec![(section(element, height), 1.2)],
+        Symbol::Surface => match element.part.mirror().map(|mirror| mirror.hole) {
+            Some(hole) if hole > 0.0 && hole < height => {
+                let half = |side: f64| {
+                    let points = (0..=SECTION).filter_map(|i| {
+                        let y = side * (hole + (height - hole) * f64::from(i) / f64::from(SECTION));
+                        Some(at(y, element.part.sag([0.0, y])?))
+                    });
+                    line(&points.collect::<Vec<_>>(), 1.2)
+                };
+                vec![half(-1.0), half(1.0)]
+            }
+            _ => vec![(section(element, height), 1.2)],
+        },
         Symbol::ThinLens { converging } => {
             let tip = 0.05 * height * converging;
             let arrow = |side: f64| {

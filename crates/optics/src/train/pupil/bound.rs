@@ -26,6 +26,15 @@ impl PupilBound<'_> {
         })
     }
 
+    /// The radius within which nothing passes.
+    fn inner(&self, turn: f64) -> f64 {
+        self.place.as_ref().map_or(0.0, |place| {
+            let inner =
+                |&(node, weight): &(usize, f64)| between(&self.nodes[node].inner, turn) * weight;
+            place.nodes.iter().map(inner).sum()
+        })
+    }
+
     fn turned(&self, slopes: DVec2) -> DVec2 {
         self.place.as_ref().map_or(slopes, |place| place.turned(slopes))
     }
@@ -46,6 +55,14 @@ impl PupilBound<'_> {
         let reach = self.reach(turn);
         let [centre, half] = self.frame;
         let angle = DVec2::from_angle(turn * std::f64::consts::TAU);
+        let inner = self.inner(turn);
+        if inner > 0.0 && inner < reach {
+            let squares = [inner * inner, reach * reach];
+            let rest = squares[1] - squares[0];
+            let radius = (squares[0] + rest * disc_radius * disc_radius).sqrt();
+            let area = std::f64::consts::PI * half.x * half.y * rest;
+            return Some((self.turned(centre + angle * half * radius), area));
+        }
         let area = std::f64::consts::PI * half.x * half.y * reach * reach;
         (reach > 0.0).then(|| (self.turned(centre + angle * half * (reach * disc_radius)), area))
     }

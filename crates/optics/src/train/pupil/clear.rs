@@ -22,7 +22,9 @@ impl OpticalTrain {
     pub fn closed_mask(&self) -> Option<usize> {
         self.elements.iter().position(|element| match element.part.opening() {
             Some(Opening::Image(mask)) => mask.values.iter().all(|value| *value <= 0.0),
-            Some(Opening::Circle { .. } | Opening::Polygon { .. }) | None => false,
+            Some(Opening::Circle { .. } | Opening::Polygon { .. } | Opening::Shaped(_)) | None => {
+                false
+            }
         })
     }
 }

@@ -30,7 +30,10 @@ const TOTAL: f64 = (1_u64 << 50) as f64;
 pub(super) fn first_mask(train: &OpticalTrain) -> Option<(usize, &Picture)> {
     train.elements.iter().enumerate().find_map(|(i, element)| match element.part.opening()? {
         Opening::Image(mask) if mask.values.iter().any(|v| *v < 1.0) => Some((i, mask)),
-        Opening::Image(_) | Opening::Circle { .. } | Opening::Polygon { .. } => None,
+        Opening::Image(_)
+        | Opening::Circle { .. }
+        | Opening::Polygon { .. }
+        | Opening::Shaped(_) => None,
     })
 }
 

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::place::between;
+use super::place::{NodePlace, between};
 use super::search::Window;
 use super::{ANGLES, ExitPupil, NodeLayout, Outline, PLANAR_INTERVALS, RADIAL_INTERVALS, turn_of};
 use crate::element::{Clip, LensRays, RayStatus};
@@ -67,7 +67,8 @@ impl ExitPupil {
         // The outline between nodes, twice as fine in place and angle.
         let margins = self.margins();
         self.continue_frames();
-        let fine = self.measure_fine(lenses);
+        let fine = self.measure_fine(lenses, 0.0, widen);
+        let inner = train.is_obscured().then(|| self.measure_fine(lenses, f64::INFINITY, narrow));
         // Each node's reach is the widest around it, so that no light between nodes is lost.
         let [fine_columns, fine_rows] = [2 * columns + 1, 2 * rows + 1];
         for row in 0..=rows {
@@ -91,6 +92,21 @@ impl ExitPupil {
                         }
                     }
                     *reach = widest * (1.0 + margin);
+                }
+                // The innermost around it; where nothing passes nearby, nothing is known to be obscured.
+                let Some(fine) = &inner else { continue };
+                for (i, inner) in node.inner.iter_mut().enumerate() {
+                    let mut least = f64::INFINITY;
+                    for r in near(row, fine_rows) {
+                        for c in near(column, fine_columns) {
+                            let radii = &fine[r * fine_columns + c];
+                            for step in [2 * ANGLES - 1, 0, 1] {
+                                least = least.min(radii[(2 * i + step) % (2 * ANGLES)]);
+                            }
+                        }
+                    }
+                    let is_known = least.is_finite();
+                    *inner = if is_known { (least * (1.0 - margin)).max(0.0) } else { 0.0 };
                 }
             }
         }
@@ -163,16 +179,21 @@ impl ExitPupil {
     }
 
     /// Radii at all nodes of the fine grid, each in the frame that the bound has there.
-    fn measure_fine(&self, lenses: &[MonochromaticTrain]) -> Vec<[f64; 2 * ANGLES]> {
+    fn measure_fine(
+        &self,
+        lenses: &[MonochromaticTrain],
+        initial: f64,
+        measure: fn(&mut [f64; 2 * ANGLES], &MonochromaticTrain, DVec3, [DVec2; 2]),
+    ) -> Vec<[f64; 2 * ANGLES]> {
         let [columns, rows] = self.intervals();
         let columns = 2 * columns + 1;
         let radii = |place: usize| {
             let film = self.fine_film(place % columns, place / columns);
-            let mut radii = [0.0; 2 * ANGLES];
+            let mut radii = [initial; 2 * ANGLES];
             if let Some(frame) = self.frame(film) {
                 let at = self.film_point(film);
                 for lens in lenses {
-                    widen(&mut radii, lens, at, frame);
+                    measure(&mut radii, lens, at, frame);
                 }
             }
             radii
@@ -206,8 +227,52 @@ impl ExitPupil {
         }
     }
 
+    /// Looks for rays that pass just inside of the obscured middle, and lets them through until there are none.
+    pub(super) fn narrow_until_tight(&mut self, lenses: &[MonochromaticTrain]) {
+        for round in 4..8 {
+            let found: Vec<Stray> =
+                lenses.iter().flat_map(|lens| self.inner_strays(lens, round * CHECKS)).collect();
+            for stray in &found {
+                let low = turn_index(stray.turn);
+                for (node, _) in stray.nodes.into_iter().filter(|&(_, weight)| weight > 0.0) {
+                    let inner = &mut self.nodes[node].inner;
+                    for entry in [low, low + 1] {
+                        inner[entry] = inner[entry].min(stray.radius * (1.0 - MARGIN));
+                    }
+                    let ends = inner[0].min(inner[ANGLES]);
+                    (inner[0], inner[ANGLES]) = (ends, ends);
+                }
+            }
+            if found.is_empty() {
+                return;
+            }
+        }
+    }
+
+    /// Random rays within the obscured middle that pass.
+    pub(super) fn inner_strays(&self, lens: &MonochromaticTrain, first: u32) -> Vec<Stray> {
+        self.random_strays(lens, first, |place, u| {
+            let nodes = place.nodes.iter();
+            let inner: f64 = nodes.map(|&(n, w)| between(&self.nodes[n].inner, u[1]) * w).sum();
+            inner * (1.0 - CHECKED * u[2])
+        })
+    }
+
     /// Random rays outside of the bound that pass.
     pub(super) fn strays(&self, lens: &MonochromaticTrain, first: u32) -> Vec<Stray> {
+        self.random_strays(lens, first, |place, u| {
+            let nodes = place.nodes.iter();
+            let bound: f64 = nodes.map(|&(n, w)| between(&self.nodes[n].reach, u[1]) * w).sum();
+            bound * (1.0 + CHECKED * u[2])
+        })
+    }
+
+    fn random_strays(
+        &self,
+        lens: &MonochromaticTrain,
+        first: u32,
+        radius_at: impl Fn(&NodePlace, [f64; 4]) -> f64,
+    ) -> Vec<Stray> {
         let checks = if lens.is_costly() { CHECKS / 4 } else { CHECKS };
         let mut rays = LensRays::with_capacity(checks as usize);
         let mut strays = Vec::with_capacity(checks as usize);
@@ -219,9 +284,7 @@ impl ExitPupil {
             };
             let Some(place) = self.place(film) else { continue };
             let Some([centre, half]) = self.frame(film) else { continue };
-            let bound: f64 =
-                place.nodes.iter().map(|&(n, w)| between(&self.nodes[n].reach, u[1]) * w).sum();
-            let radius = bound * (1.0 + CHECKED * u[2]);
+            let radius = radius_at(&place, u);
             let angle = DVec2::from_angle(u[1] * std::f64::consts::TAU);
             rays.push(self.film_point(film), towards_lens(centre + angle * half * radius));
             strays.push(Stray { nodes: place.nodes, turn: u[1], radius });
@@ -233,13 +296,7 @@ impl ExitPupil {
 
     /// Raises the table's entries around a ray to the ray's radius.
     fn widen_around(&mut self, stray: &Stray) {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            clippy::cast_precision_loss,
-            reason = "a turn is in 0..1"
-        )]
-        let low = ((stray.turn * ANGLES as f64) as usize).min(ANGLES - 1);
+        let low = turn_index(stray.turn);
         for (node, _) in stray.nodes.into_iter().filter(|&(_, weight)| weight > 0.0) {
             let reach = &mut self.nodes[node].reach;
             for entry in [low, low + 1] {
@@ -249,6 +306,18 @@ impl ExitPupil {
             (reach[0], reach[ANGLES]) = (ends, ends);
         }
     }
+}
+
+/// The entry of the table at or before a share of a turn.
+fn turn_index(turn: f64) -> usize {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "a turn is in 0..1"
+    )]
+    let low = (turn * ANGLES as f64) as usize;
+    low.min(ANGLES - 1)
 }
 
 /// Steps of the additive recurrence of the plastic number's kin in four dimensions (M. Roberts,
@@ -361,5 +430,56 @@ fn widen(
     }
     for (i, low) in brackets {
         radii[i] = radii[i].max(low + width);
+    }
+}
+
+/// Lowers `radii` to the innermost passing ray of each angle from `film` in the frame; to 0 where none passes.
+fn narrow(
+    radii: &mut [f64; 2 * ANGLES],
+    lens: &MonochromaticTrain,
+    film: DVec3,
+    [centre, half]: [DVec2; 2],
+) {
+    let (scanned, halvings) = if lens.is_costly() { (16, 5) } else { (32, 12) };
+    const OUTERMOST: f64 = 1.6;
+    let angle = |i: usize| DVec2::from_angle(0.5 * turn_of(i) * std::f64::consts::TAU) * half;
+    let directions: Vec<DVec2> = (0..2 * ANGLES).map(angle).collect();
+    let passes = |places: &[(usize, f64)]| -> Vec<bool> {
+        let mut rays = LensRays::with_capacity(places.len());
+        for &(i, radius) in places {
+            rays.push(film, towards_lens(centre + directions[i] * radius));
+        }
+        lens.trace(Side::Sensor, Clip::On, &mut rays);
+        (0..rays.len()).map(|i| rays.status(i) == RayStatus::Exited).collect()
+    };
+    let step = OUTERMOST / f64::from(scanned);
+    let scan: Vec<(usize, f64)> =
+        (0..2 * ANGLES).flat_map(|i| (0..scanned).map(move |s| (i, step * f64::from(s)))).collect();
+    let mut innermost = [None; 2 * ANGLES];
+    for (&(i, radius), passed) in scan.iter().zip(passes(&scan)) {
+        if passed && innermost[i].is_none() {
+            innermost[i] = Some(radius);
+        }
+    }
+    let mut brackets: Vec<(usize, f64)> =
+        (0..2 * ANGLES).filter_map(|i| innermost[i].map(|radius| (i, radius))).collect();
+    let mut width = step;
+    for _ in 0..halvings {
+        width *= 0.5;
+        let middles: Vec<(usize, f64)> =
+            brackets.iter().map(|&(i, high)| (i, (high - width).max(0.0))).collect();
+        for (bracket, passed) in brackets.iter_mut().zip(passes(&middles)) {
+            if passed {
+                bracket.1 = (bracket.1 - width).max(0.0);
+            }
+        }
+    }
+    // Where nothing passes at an angle, nothing is known.
+    let mut found = [0.0; 2 * ANGLES];
+    for (i, high) in brackets {
+        found[i] = (high - width).max(0.0);
+    }
+    for (radius, found) in radii.iter_mut().zip(found) {
+        *radius = radius.min(found);
     }
 }

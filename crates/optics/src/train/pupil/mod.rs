@@ -16,6 +16,12 @@
 //! outside the bound when it is built, and the bound is widened until none of them passes. Radii are
 //! those of the outermost passing ray, so an outline needs not be convex.
 //!
+//! # Obscuration
+//!
+//! Where something may stand in the middle of the light, the innermost passing rays are measured in the same way as
+//! the outermost, the least of those nearby less a margin is kept, and random rays just inside of it are let through
+//! until none passes: samples are drawn between the two.
+//!
 //! # Weights
 //!
 //! For the irradiance of Eq. (1) of Nürnberg et al. (2019), E = ∫ L cos θ dΩ: a sample stands for
@@ -149,7 +155,9 @@ struct Outline {
     half: DVec2,
     /// Radii in the frame by angle; the first again at the end.
     reach: [f64; ANGLES + 1],
-    /// The greatest of them.
+    /// Radii within which nothing passes, by angle; the first again at the end. 0 where nothing obscures.
+    inner: [f64; ANGLES + 1],
+    /// The greatest of the outer ones.
     widest: f64,
     /// The slopes of the chief ray.
     chief: Option<DVec2>,
@@ -160,6 +168,7 @@ impl Outline {
         centre: DVec2::ZERO,
         half: DVec2::ZERO,
         reach: [0.0; ANGLES + 1],
+        inner: [0.0; ANGLES + 1],
         widest: 0.0,
         chief: None,
     };
@@ -235,6 +244,9 @@ impl ExitPupil {
             return Err(blocked(train, first, pupil.sensor.vertex));
         }
         pupil.widen_until_tight(&lenses);
+        if train.is_obscured() {
+            pupil.narrow_until_tight(&lenses);
+        }
         for node in &mut pupil.nodes {
             node.widest = node.reach.into_iter().fold(0.0, f64::max);
         }

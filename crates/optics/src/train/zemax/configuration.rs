@@ -19,7 +19,7 @@ use glam::{DMat3, DVec3};
 use super::ZemaxError;
 use super::sheet::{Aperture, SheetLine, ZemaxSheet};
 use crate::train::analysis::chief_height;
-use crate::train::{Focus, OpticalTrain};
+use crate::train::{Focus, Isometry, OpticalTrain};
 
 /// Thicknesses from here on are infinite, as OpticStudio has it.
 const INFINITE: f64 = 1e10;
@@ -300,6 +300,38 @@ impl Axes {
 
     pub(super) fn advanced(self, thickness: f64) -> Self {
         Self { origin: self.origin + self.rotation.z_axis * thickness, ..self }
+    }
+
+    /// The same as it stands in an unfolded space, in which light that runs against the file's axis runs along +z.
+    pub(super) fn unfolded(&self, space: &Isometry, sense: f64) -> Self {
+        if *space == Isometry::ONE {
+            return *self;
+        }
+        let flip = DMat3::from_diagonal(DVec3::new(1.0, 1.0, sense));
+        let columns = [self.rotation.x_axis, self.rotation.y_axis, self.rotation.z_axis];
+        let [x, y, z] = columns.map(|column| space.direction(column));
+        Self { origin: space.place(self.origin), rotation: DMat3::from_cols(x, y, z) * flip }
+    }
+
+    /// The same moved across its axis (mm).
+    pub(super) fn shifted(&self, [x, y]: [f64; 2]) -> Self {
+        Self { origin: self.origin + self.rotation * DVec3::new(x, y, 0.0), ..*self }
+    }
+
+    /// The axis.
+    pub(super) fn axis(&self) -> DVec3 {
+        self.rotation.z_axis
+    }
+
+    pub(super) fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// Whether it is turned about its own axis, which two tilts do not say.
+    pub(super) fn is_turned(&self) -> bool {
+        let [about_x, about_y] = self.placed().tilt.map(f64::to_radians);
+        let two = DMat3::from_rotation_x(about_x) * DMat3::from_rotation_y(about_y);
+        (two.x_axis - self.rotation.x_axis).length() > 1e-9
     }
 
     pub(super) fn placed(&self) -> SheetPlace {

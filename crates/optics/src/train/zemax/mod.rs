@@ -3,7 +3,10 @@
 //! | module | idea |
 //! |---|---|
 //! | `sheet` | lines to the rows of the lens data sheet |
+//! | `parts` | a row to what it is |
 //! | `configuration` | the values of one position of a zoom lens; field points to field angles; coordinate breaks to tilts and decentrings; bytes to lines: UTF-8 and UTF-16 |
+//! | `code_v` | lines of CODE V's files to the same rows |
+//! | `write` | a lens file to lines |
 //! | here | rows to the elements of a lens file |
 //!
 //! What has no counterpart here and would change the light's way is an error that names its line;
@@ -14,18 +17,22 @@
 //! The format has no public specification. What the lines mean is taken from files in the wild and
 //! from OpticStudio's knowledge base ("Rotation Matrix and Tilt About X/Y/Z in OpticStudio", 2021).
 
+mod code_v;
 mod configuration;
+mod parts;
 mod sheet;
+mod write;
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::{LensError, LensFile, OpticalTrain, SensorMount};
-use crate::element::{ElementSpec, GlassesAlone, PartSpec, SurfaceSpec, ThinLensSpec};
+use glam::DVec3;
+
+use super::{Isometry, LensError, LensFile, OpticalTrain, SensorMount};
+use crate::element::{ApertureSpec, ElementSpec, GlassesAlone, PartSpec};
 use crate::glass::{AgfCatalogue, GlassSpec, Makers};
 use configuration::{Axes, SheetPlace};
 use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
-use sheet::{Aperture, Parameter, SheetRow, SurfaceShape, ZemaxSheet};
+use sheet::{Aperture, SheetRow, SurfaceShape, ZemaxSheet};
 
 /// A difference of focal lengths that is more than rounding (share).
 const SAME_FOCAL_LENGTH: f64 = 1e-3;
@@ -68,6 +75,22 @@ impl ZemaxLens {
         path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("zmx"))
     }
 
+    /// Whether a file's name says that it is one of CODE V's.
+    #[must_use]
+    pub fn is_named_code_v(path: &Path) -> bool {
+        path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("seq"))
+    }
+
+    /// Reads the bytes of one of CODE V's `.seq` files.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::read`].
+    pub fn read_code_v(bytes: &[u8], glasses: &[AgfCatalogue]) -> Result<Self, ZemaxError> {
+        let text = configuration::decode(bytes)?;
+        Self::of_sheet(&ZemaxSheet::read_code_v(&text)?, "a CODE V file", glasses)
+    }
+
     /// Reads the bytes of a `.zmx` file.
     ///
     /// # Errors
@@ -94,8 +117,17 @@ impl ZemaxLens {
         if let Some(configuration) = configuration {
             sheet.choose(configuration)?;
         }
+        Self::of_sheet(&sheet, "a Zemax file", glasses)
+    }
+
+    /// The lens of a data sheet.
+    fn of_sheet(
+        sheet: &ZemaxSheet,
+        source: &str,
+        glasses: &[AgfCatalogue],
+    ) -> Result<Self, ZemaxError> {
         let mut importer = Importer {
-            sheet: &sheet,
+            sheet,
             glasses,
             elements: Vec::new(),
             notes: Vec::new(),
@@ -111,13 +143,13 @@ impl ZemaxLens {
         }
         // The lens that a lens file would hold.
         let mut file = LensFile { name: sheet.name.clone(), elements, ..LensFile::default() };
-        "a Zemax file".clone_into(&mut file.source);
+        source.clone_into(&mut file.source);
         file.sensor = (sensor != SensorMount::default()).then_some(sensor);
         let wavelengths = sheet.wavelengths_nm();
         file.wavelength = wavelengths.first().copied().map(Nanometres);
         // What only the built train tells: the stop, field angles, and whether the focal length is
         // as stated.
-        let train = open_stop(&mut file, (&sheet, glasses), object_z, &mut notes)?;
+        let train = open_stop(&mut file, (sheet, glasses), object_z, &mut notes)?;
         let (fields, left_out) = sheet.fields.angles(sheet.unit, &train, object_z);
         notes.extend(left_out);
         let mut lens = Self {
@@ -176,18 +208,32 @@ impl Importer<'_> {
         self.look_at_ends(object, image)?;
         let mut axes = Axes::default();
         let mut medium_is_air = true;
-        let (mut first_z, mut last_z) = (None, None);
-        for row in inner {
+        let mut first_z = None;
+        let mut way = Way { space: Isometry::ONE, sense: 1.0, last_z: None };
+        for (i, row) in inner.iter().enumerate() {
             if row.shape == SurfaceShape::CoordinateBreak {
                 axes = axes.broken(&row.coordinate_break(unit));
             } else {
-                let flat_in_air = row.is_flat() && medium_is_air && row.glass.is_none();
-                if let Some(part) = self.part(row, flat_in_air)? {
-                    let placed = axes.placed();
-                    first_z = first_z.or(Some(placed.z));
-                    self.place(part, row, &placed, &mut last_z);
+                let flat_in_air =
+                    row.is_flat() && medium_is_air && row.glass.is_none() && !row.mirror;
+                let here = axes.unfolded(&way.space, way.sense);
+                for (opening, decentre) in row.sheets(unit) {
+                    check_turn(row, &here)?;
+                    self.place_sheet(opening, decentre, &here, &mut way);
+                    first_z = first_z.or(Some(here.placed().z));
                 }
-                medium_is_air = row.glass.is_none();
+                if let Some(part) = self.part(row, flat_in_air)? {
+                    if !row.is_round() {
+                        check_turn(row, &here)?;
+                    }
+                    first_z = first_z.or(Some(here.placed().z));
+                    self.place(part, row, &here.placed(), &mut way);
+                    if row.mirror {
+                        let turned = after_breaks(axes, &rows[i + 2..], unit);
+                        self.fold(&here, &turned, &mut way);
+                    }
+                }
+                medium_is_air = if row.mirror { medium_is_air } else { row.glass.is_none() };
             }
             if !row.thickness.is_finite() {
                 let why = "DISZ is infinite inside the lens";
@@ -195,14 +241,35 @@ impl Importer<'_> {
             }
             axes = axes.advanced(row.thickness * unit);
         }
-        let image = axes.placed();
-        if let (Some(last), Some(z)) = (self.elements.last_mut(), last_z) {
-            last.mount.thickness = Millimetres(image.z - z);
+        let image = axes.unfolded(&way.space, way.sense).placed();
+        if let (Some(last), Some(z)) = (self.elements.last_mut(), way.last_z) {
+            last.mount.thickness = Millimetres(signed(way.sense, image.z - z));
         }
         // Lens coordinates begin at the first element, which need not be the first row.
         self.object_z = (object.thickness.is_finite())
             .then(|| -object.thickness * unit - first_z.unwrap_or_default());
-        Ok(SensorMount { tilt: image.tilt.map(Degrees), decentre: image.decentre.map(Millimetres) })
+        let tilt = image.tilt.map(|angle| Degrees(signed(way.sense, angle)));
+        Ok(SensorMount { tilt, decentre: image.decentre.map(Millimetres) })
+    }
+
+    /// Goes on behind a mirror that stands as `here` in the unfolded space before it, where the file's axes go on
+    /// as `turned`: the axis is folded where that is what the mirror's vertex does to it.
+    fn fold(&mut self, here: &Axes, turned: &Axes, way: &mut Way) {
+        way.sense = -way.sense;
+        let normal = here.axis();
+        let leaves = way.space.direction(turned.axis()) * way.sense;
+        let reflected = DVec3::Z - 2.0 * normal.z * normal;
+        let is_tilted = normal.truncate().length() > SAME_AXIS;
+        let folds = is_tilted && (reflected - leaves).length() < SAME_AXIS;
+        if let (true, Some(element)) = (folds, self.elements.last_mut()) {
+            match &mut element.part {
+                PartSpec::Mirror(mirror) => mirror.fold = true,
+                PartSpec::Freeform(surface) => surface.fold = true,
+                _ => {}
+            }
+        }
+        let plane = if folds { normal } else { DVec3::Z };
+        way.space = Isometry::reflection(here.origin(), plane).after(&way.space);
     }
 
     fn look_at_ends(&mut self, object: &SheetRow, image: &SheetRow) -> Result<(), ZemaxError> {
@@ -222,43 +289,6 @@ impl Importer<'_> {
             self.notes.push(format!("line {}: the curved image surface is taken flat", image.line));
         }
         Ok(())
-    }
-
-    /// What a row is; `None` for a plane between air and air that does nothing.
-    fn part(&mut self, row: &SheetRow, flat_in_air: bool) -> Result<Option<PartSpec>, ZemaxError> {
-        let unit = self.sheet.unit;
-        let semi_diameter = row.semi_diameter().map(|length| length * unit);
-        if row.shape == SurfaceShape::Paraxial {
-            let focal_length = row.parameters.get(&1).map_or(100.0, |p| p.value) * unit;
-            if focal_length == 0.0 {
-                return Err(ZemaxError::new(row.line, "a paraxial lens of focal length 0"));
-            }
-            return Ok(Some(PartSpec::ThinLens(ThinLensSpec {
-                focal_length: Millimetres(focal_length),
-                semi_diameter: semi_diameter.map(Millimetres),
-            })));
-        }
-        if flat_in_air {
-            if !row.stop && !row.has_fixed_rim() {
-                self.notes.push(format!(
-                    "line {}: a plane in air that does nothing is left out",
-                    row.line
-                ));
-                return Ok(None);
-            }
-            // Nothing limits a stop of unknown size yet; the system's aperture may.
-            let radius = semi_diameter.unwrap_or(0.0);
-            return Ok(Some(PartSpec::circular(radius)));
-        }
-        let glass = row.glass.as_ref().map(|glass| self.glass(glass)).transpose()?;
-        Ok(Some(PartSpec::Surface(SurfaceSpec {
-            curvature: (row.curvature != 0.0).then_some(row.curvature / unit),
-            glass,
-            semi_diameter: semi_diameter.map(Millimetres),
-            conic: if row.curvature == 0.0 { 0.0 } else { row.conic },
-            aspheric: row.aspheric(unit)?,
-            radius: None,
-        })))
     }
 
     fn glass(&self, glass: &sheet::SheetGlass) -> Result<GlassSpec, ZemaxError> {
@@ -285,23 +315,71 @@ impl Importer<'_> {
         })
     }
 
-    fn place(
-        &mut self,
-        part: PartSpec,
-        row: &SheetRow,
-        placed: &SheetPlace,
-        last_z: &mut Option<f64>,
-    ) {
-        if let (Some(last), Some(z)) = (self.elements.last_mut(), *last_z) {
-            last.mount.thickness = Millimetres(placed.z - z);
-        }
-        *last_z = Some(placed.z);
+    fn place(&mut self, part: PartSpec, row: &SheetRow, placed: &SheetPlace, way: &mut Way) {
+        self.close_gap(placed.z, way);
         let mut element = ElementSpec::new(part, 0.0);
         element.mount.stop = row.stop;
-        element.mount.tilt = placed.tilt.map(Degrees);
+        element.mount.tilt = placed.tilt.map(|angle| Degrees(signed(way.sense, angle)));
         element.mount.decentre = placed.decentre.map(Millimetres);
         self.elements.push(element);
     }
+
+    /// An aperture at the vertex of a row, moved across its axis.
+    fn place_sheet(
+        &mut self,
+        opening: ApertureSpec,
+        decentre: [f64; 2],
+        here: &Axes,
+        way: &mut Way,
+    ) {
+        let moved = here.shifted(decentre).placed();
+        self.close_gap(moved.z, way);
+        let mut element = ElementSpec::new(PartSpec::Aperture(opening), 0.0);
+        element.mount.tilt = moved.tilt.map(|angle| Degrees(signed(way.sense, angle)));
+        element.mount.decentre = moved.decentre.map(Millimetres);
+        self.elements.push(element);
+    }
+
+    /// Ends the gap behind the last element at `z` (mm).
+    fn close_gap(&mut self, z: f64, way: &mut Way) {
+        if let (Some(last), Some(before)) = (self.elements.last_mut(), way.last_z) {
+            last.mount.thickness = Millimetres(signed(way.sense, z - before));
+        }
+        way.last_z = Some(z);
+    }
+}
+
+/// The way of light so far.
+struct Way {
+    /// From the file's space to the unfolded one.
+    space: Isometry,
+    /// −1 where light runs against the file's axis.
+    sense: f64,
+    /// z of the last element (mm).
+    last_z: Option<f64>,
+}
+
+/// Axes (their sines) that count as one.
+const SAME_AXIS: f64 = 1e-9;
+
+/// A number that changes its sign where light runs against the axis; 0 keeps its own.
+fn signed(sense: f64, value: f64) -> f64 {
+    if value == 0.0 { value } else { sense * value }
+}
+
+/// The axes behind the coordinate breaks that come next.
+fn after_breaks(axes: Axes, rows: &[SheetRow], unit: f64) -> Axes {
+    let breaks = rows.iter().take_while(|row| row.shape == SurfaceShape::CoordinateBreak);
+    breaks.fold(axes, |axes, row| axes.broken(&row.coordinate_break(unit)))
+}
+
+fn check_turn(row: &SheetRow, here: &Axes) -> Result<(), ZemaxError> {
+    if here.is_turned() {
+        let why = "a surface or an aperture that is not round is turned about its own axis by a coordinate break; turn \
+                   the rows before and behind it instead, or write it round";
+        return Err(ZemaxError::new(row.line, why));
+    }
+    Ok(())
 }
 
 /// The stop's radius (mm) that makes the entrance pupil as wide as `radius` says, from its z (mm).
@@ -368,6 +446,8 @@ fn open_stop(
         PartSpec::Surface(surface) => surface.semi_diameter = Some(Millimetres(radius)),
         PartSpec::ThinLens(lens) => lens.semi_diameter = Some(Millimetres(radius)),
         PartSpec::Biconic(surface) => surface.semi_diameter = Some(Millimetres(radius)),
+        PartSpec::Mirror(mirror) => mirror.semi_diameter = Some(Millimetres(radius)),
+        PartSpec::Freeform(surface) => surface.semi_diameter = Some(Millimetres(radius)),
         part => *part = PartSpec::circular(radius),
     }
     build(file)
@@ -403,63 +483,6 @@ fn float_stop(
     ));
     file.elements[index].part = PartSpec::circular(widest.stop_radius);
     build(file)
-}
-
-impl SheetRow {
-    fn is_flat(&self) -> bool {
-        let bends = |(number, parameter): (&usize, &Parameter)| {
-            parameter.value != 0.0 && (self.shape == SurfaceShape::EvenAsphere || *number > 2)
-        };
-        let terms = match self.shape {
-            SurfaceShape::EvenAsphere => &self.parameters,
-            SurfaceShape::ExtendedAsphere => &self.extra,
-            SurfaceShape::Standard => return self.curvature == 0.0,
-            SurfaceShape::Paraxial | SurfaceShape::CoordinateBreak => return false,
-        };
-        self.curvature == 0.0 && !terms.iter().any(bends)
-    }
-
-    /// Coefficients by power, in millimetres.
-    fn aspheric(&self, unit: f64) -> Result<BTreeMap<String, f64>, ZemaxError> {
-        let mut terms = BTreeMap::new();
-        let mut add = |power: usize, value: f64| {
-            let scale = unit.powi(1 - i32::try_from(power).unwrap_or(0));
-            if value != 0.0 {
-                terms.insert(power.to_string(), value * scale);
-            }
-        };
-        match self.shape {
-            // PARM 1 to 8 are the coefficients of r² to r¹⁶.
-            SurfaceShape::EvenAsphere => {
-                for (&number, parameter) in self.parameters.iter().filter(|p| (1..=8).contains(p.0))
-                {
-                    add(2 * number, parameter.value);
-                }
-            }
-            // XDAT 1 is the number of terms, 2 the radius that r is divided by, and the
-            // coefficients follow.
-            SurfaceShape::ExtendedAsphere => {
-                let terms = self.extra.get(&1).map_or(0.0, |p| p.value);
-                let radius = self.extra.get(&2).map_or(1.0, |p| p.value);
-                let last = self.extra.range(3..).rfind(|(_, p)| p.value != 0.0);
-                if let Some((_, parameter)) = last.filter(|(number, _)| **number > 17) {
-                    let why = "XDAT: powers beyond r^30 have no counterpart here";
-                    return Err(ZemaxError::new(parameter.line, why));
-                }
-                for (&number, parameter) in self.extra.range(3..18) {
-                    let power = 2 * (number - 2);
-                    #[expect(clippy::cast_precision_loss, reason = "at most 15")]
-                    let counts = (number - 2) as f64 <= terms;
-                    if counts {
-                        let power_of_radius = radius.powi(i32::try_from(power).unwrap_or(0));
-                        add(power, parameter.value / power_of_radius);
-                    }
-                }
-            }
-            SurfaceShape::Standard | SurfaceShape::Paraxial | SurfaceShape::CoordinateBreak => {}
-        }
-        Ok(terms)
-    }
 }
 
 #[cfg(test)]

@@ -57,6 +57,14 @@ pub(super) struct SheetRow {
     pub(super) conic: f64,
     pub(super) thickness: f64,
     pub(super) glass: Option<SheetGlass>,
+    /// Whether its glass is MIRROR.
+    pub(super) mirror: bool,
+    /// What it stops of light beside its rim, in the file's unit.
+    pub(super) openings: Vec<SheetOpening>,
+    /// Where those stand across its axis.
+    pub(super) aperture_decentre: [f64; 2],
+    /// Its own inner radius.
+    pub(super) inner: f64,
     pub(super) stop: bool,
     pub(super) parameters: BTreeMap<usize, Parameter>,
     pub(super) extra: BTreeMap<usize, Parameter>,
@@ -74,6 +82,29 @@ pub(super) enum SurfaceShape {
     ExtendedAsphere,
     Paraxial,
     CoordinateBreak,
+    OddAsphere,
+    Toroidal,
+    Biconic,
+    Grating,
+    Binary2,
+    ZernikeStandard,
+    ZernikeFringe,
+    Fresnel,
+}
+
+/// An aperture of a surface that is no rim.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum SheetOpening {
+    /// A disk of this radius in the way.
+    Disk(f64),
+    /// By half its sides.
+    Rectangle([f64; 2]),
+    /// By half its axes.
+    Ellipse([f64; 2]),
+    /// Width and number of arms.
+    Spider(f64, u32),
+    /// A circle that stands beside the axis, by its radius.
+    Circle(f64),
 }
 
 #[derive(Debug)]
@@ -172,7 +203,7 @@ impl ZemaxSheet {
                 },
             };
             if !known {
-                sheet.ignore(&line);
+                sheet.leave_out(line.command, line.number);
             }
         }
         if sheet.rows.is_empty() {
@@ -259,6 +290,25 @@ impl ZemaxSheet {
         Ok(())
     }
 
+    /// All wavelengths (µm), in their order.
+    pub(super) fn set_wavelengths(&mut self, micrometres: Vec<f64>) {
+        // As many as there are: none is a slot that is not in use.
+        self.fields.wavelengths = Some(micrometres.len());
+        self.wavelengths = micrometres;
+    }
+
+    /// The primary one, from 1.
+    pub(super) fn set_primary(&mut self, number: usize) {
+        self.primary = number;
+    }
+
+    /// Counts a command that is left out.
+    pub(super) fn leave_out(&mut self, command: &str, line: usize) {
+        let ignored =
+            self.ignored.entry(command.to_owned()).or_insert(Ignored { first: line, times: 0 });
+        ignored.times += 1;
+    }
+
     fn set_wavelength(&mut self, number: usize, micrometres: f64) {
         // Numbered from 1.
         let slot = number.clamp(1, MOST_WAVELENGTHS) - 1;
@@ -278,14 +328,6 @@ impl ZemaxSheet {
         };
         self.stated_efl = stated.filter(|efl| *efl != 0.0).or(self.stated_efl);
         Ok(())
-    }
-
-    fn ignore(&mut self, line: &SheetLine<'_>) {
-        let ignored = self
-            .ignored
-            .entry(line.command.to_owned())
-            .or_insert(Ignored { first: line.number, times: 0 });
-        ignored.times += 1;
     }
 
     /// Wavelengths (nm) in use, the primary one first.
@@ -356,6 +398,7 @@ impl SheetRow {
             "CONI" => self.conic = line.number(0)?,
             "DISZ" if line.rest.starts_with("INF") => self.thickness = f64::INFINITY,
             "DISZ" => self.thickness = line.number(0)?,
+            "GLAS" if line.word(0) == Some("MIRROR") => self.mirror = true,
             "GLAS" => self.glass = glass(line)?,
             "PARM" => {
                 let parameter = Parameter { line: line.number, value: line.number(1)? };
@@ -376,25 +419,46 @@ impl SheetRow {
                 self.fixed = line.number_or(1, 0.0)? == 1.0;
             }
             "CLAP" | "FLAP" => {
-                if line.number(0)? > 0.0 {
-                    let why = "an aperture with a central obscuration has no counterpart here";
-                    return Err(line.error(why));
-                }
+                self.inner = line.number(0)?;
                 self.clear = Some(line.number(1)?).filter(|length| *length > 0.0);
+                if self.inner < 0.0 || self.clear.is_some_and(|clear| self.inner >= clear) {
+                    return Err(
+                        line.error("the inner radius must be from 0 on and below the outer one")
+                    );
+                }
             }
+            "OBDC" => self.aperture_decentre = [line.number(0)?, line.number_or(1, 0.0)?],
             // One that covers nothing.
             "OBSC" if line.number_or(1, 0.0)? == 0.0 => {}
+            "OBSC" if line.number(0)? == 0.0 && line.number(1)? > 0.0 => {
+                self.openings.push(SheetOpening::Disk(line.number(1)?));
+            }
+            "SQAP" | "ELAP" => {
+                let half = [line.number(0)?, line.number(1)?];
+                if half.iter().any(|half| *half <= 0.0) {
+                    return Err(line.error("both half widths must be positive"));
+                }
+                self.openings.push(match line.command {
+                    "SQAP" => SheetOpening::Rectangle(half),
+                    _ => SheetOpening::Ellipse(half),
+                });
+            }
+            "SPID" => {
+                let arms = u32::try_from(line.index(1)?).unwrap_or(u32::MAX);
+                self.openings.push(SheetOpening::Spider(line.number(0)?, arms));
+            }
             "OBSC" | "SQOB" | "ELOB" => {
                 return Err(line.error(
-                    "a disk in the way of the light has no counterpart here; take the line out for the \
-                     lens without it, and add its shadow to the lens file that --save writes, as an \
-                     `aperture` with a mask (\"shape\": \"image\")",
+                    "of what stands in the way of the light only round disks (OBSC 0 and a radius) and spiders (SPID) \
+                     can be imported; take the line out for the lens without it, and add its shadow to the lens file \
+                     that --save writes, as an `aperture` with a mask (\"shape\": \"image\")",
                 ));
             }
-            "SQAP" | "ELAP" | "UDAP" => {
+            "UDAP" => {
                 return Err(line.error(
-                    "only round clear apertures can be imported; write CLAP 0 and the radius that the \
-                     light is to go by, or take the line out to go by the semi-diameter",
+                    "an aperture by points of the user's cannot be imported; write CLAP 0 and the radius that the \
+                     light is to go by, SQAP or ELAP with half widths, or take the line out to go by the \
+                     semi-diameter",
                 ));
             }
             // The substrate of a mirror, of which every surface has one; a mirror is GLAS MIRROR.
@@ -405,7 +469,36 @@ impl SheetRow {
 
     /// How far from the axis light passes, in the file's unit.
     pub(super) fn semi_diameter(&self) -> Option<f64> {
-        self.clear.or(self.semi_diameter)
+        // One that stands beside the axis is a sheet of its own, and rims of rectangles are corners.
+        let is_beside = self.aperture_decentre != [0.0; 2];
+        match self.clear {
+            Some(_) if is_beside => None,
+            Some(clear) => Some(clear),
+            None if is_beside || self.has_corners() => None,
+            None => self.semi_diameter,
+        }
+    }
+
+    /// Sets the radius of its clear aperture, in the file's unit.
+    pub(super) fn set_clear(&mut self, radius: f64) {
+        self.clear = Some(radius).filter(|radius| *radius > 0.0);
+    }
+
+    /// Sets that of its edge.
+    pub(super) fn set_semi_diameter(&mut self, radius: f64) {
+        self.semi_diameter = Some(radius).filter(|radius| *radius > 0.0);
+    }
+
+    /// The radius of its own clear aperture.
+    pub(super) fn clear_radius(&self) -> Option<f64> {
+        self.clear
+    }
+
+    fn has_corners(&self) -> bool {
+        let is_shape = |opening: &SheetOpening| {
+            matches!(opening, SheetOpening::Rectangle(_) | SheetOpening::Ellipse(_))
+        };
+        self.openings.iter().any(is_shape)
     }
 
     /// Whether someone wants this surface to stop light.
@@ -448,9 +541,17 @@ fn shape(line: &SheetLine<'_>) -> Result<SurfaceShape, ZemaxError> {
         Some("XASPHERE") => Ok(SurfaceShape::ExtendedAsphere),
         Some("PARAXIAL") => Ok(SurfaceShape::Paraxial),
         Some("COORDBRK") => Ok(SurfaceShape::CoordinateBreak),
+        Some("ODDASPHE") => Ok(SurfaceShape::OddAsphere),
+        Some("TOROIDAL") => Ok(SurfaceShape::Toroidal),
+        Some("BICONICX") => Ok(SurfaceShape::Biconic),
+        Some("DGRATING") => Ok(SurfaceShape::Grating),
+        Some("BINARY_2") => Ok(SurfaceShape::Binary2),
+        Some("SZERNSAG") => Ok(SurfaceShape::ZernikeStandard),
+        Some("FZERNSAG") => Ok(SurfaceShape::ZernikeFringe),
+        Some("FRESNELS") => Ok(SurfaceShape::Fresnel),
         other => Err(line.error(format!(
-            "the surface type {} has no counterpart here; known: STANDARD, EVENASPH, XASPHERE, \
-             PARAXIAL, COORDBRK",
+            "the surface type {} has no counterpart here; known: STANDARD, EVENASPH, XASPHERE, ODDASPHE, \
+             TOROIDAL, BICONICX, SZERNSAG, FZERNSAG, FRESNELS, DGRATING, BINARY_2, PARAXIAL, COORDBRK",
             other.unwrap_or_default()
         ))),
     }
@@ -458,9 +559,6 @@ fn shape(line: &SheetLine<'_>) -> Result<SurfaceShape, ZemaxError> {
 
 fn glass(line: &SheetLine<'_>) -> Result<Option<SheetGlass>, ZemaxError> {
     let name = line.word(0).ok_or_else(|| line.error("a name is missing"))?;
-    if name == "MIRROR" {
-        return Err(line.error("mirrors cannot be imported; lenses here only refract"));
-    }
     // Old files name the air.
     if name == "AIR" {
         return Ok(None);

@@ -437,14 +437,14 @@ fn what_has_no_counterpart_is_refused_by_name_and_line() {
         }
     };
     says(changed("GLAS", "GLAS UNOBTAINIUM 0 0 1.5 40"), &["line 14", "UNOBTAINIUM", "___BLANK"]);
-    says(changed("GLAS", "GLAS MIRROR 0 0 1.5 40"), &["line 14", "mirror"]);
     says(changed("GLAS", "GLAS ___BLANK 1 0 -2 40"), &["line 14", "nd must exceed 1"]);
-    says(changed("TYPE", "TYPE BINARY_2"), &["line 10", "BINARY_2", "EVENASPH"]);
+    says(changed("TYPE", "TYPE BIREFRIN"), &["line 10", "BIREFRIN", "EVENASPH", "BINARY_2"]);
     says(changed("CURV", "CURV nan"), &["line 11", "CURV", "`nan`"]);
     says(changed("CURV", "CURV"), &["line 11", "missing"]);
     says(changed("DISZ", "DISZ INFINITY"), &["line 8", "infinite"]);
-    says(changed("DIAM", "SQAP 3 4"), &["line 15", "SQAP", "CLAP"]);
-    says(changed("DIAM", "CLAP 3 10"), &["line 15", "obscuration"]);
+    says(changed("DIAM", "SQAP 3 0"), &["line 15", "SQAP", "positive"]);
+    says(changed("DIAM", "UDAP 3 4"), &["line 15", "UDAP", "CLAP"]);
+    says(changed("DIAM", "CLAP 10 3"), &["line 15", "below the outer"]);
     says(refused(""), &["line 1", "empty"]);
     says(refused("hello\n"), &["SURF"]);
     says(refused("\0\0\0"), &["no text"]);

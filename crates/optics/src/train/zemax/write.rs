@@ -1,0 +1,373 @@
+//! A lens file as a Zemax file, which OpticStudio and [`super::ZemaxLens`] read.
+
+use std::fmt::Write;
+
+use crate::analysis::ZernikeOrder;
+use crate::element::{
+    ApertureSpec, ElementSpec, FreeformSpec, PartSpec, PatternSpec, PhaseSpec, SagSpec,
+};
+use crate::glass::{FRAUNHOFER_D, GlassSpec};
+use crate::train::LensFile;
+
+/// The lines of one surface.
+#[derive(Default)]
+struct Row {
+    lines: Vec<String>,
+    thickness: f64,
+}
+
+impl Row {
+    fn new(kind: &str) -> Self {
+        Self { lines: vec![format!("TYPE {kind}")], thickness: 0.0 }
+    }
+
+    fn push(&mut self, line: String) {
+        self.lines.push(line);
+    }
+
+    fn parameter(&mut self, number: usize, value: f64) {
+        self.push(format!("PARM {number} {value:e}"));
+    }
+
+    fn curved(&mut self, curvature: f64, conic: f64) {
+        self.push(format!("CURV {curvature:e} 0 0 0 0 \"\""));
+        if conic != 0.0 {
+            self.push(format!("CONI {conic:e}"));
+        }
+    }
+
+    /// XDAT 1 and 2, and the values from 3 on.
+    fn data(&mut self, radius: f64, values: &[f64]) {
+        self.push(format!("XDAT 1 {}", values.len()));
+        self.push(format!("XDAT 2 {radius:e}"));
+        for (i, value) in values.iter().enumerate().filter(|(_, value)| **value != 0.0) {
+            self.push(format!("XDAT {} {value:e}", i + 3));
+        }
+    }
+}
+
+impl LensFile {
+    /// The lens as the text of a `.zmx` file, in millimetres.
+    ///
+    /// # Errors
+    ///
+    /// A sentence that names the element that such files have no counterpart for.
+    pub fn to_zemax(&self) -> Result<String, String> {
+        let mut rows = Vec::new();
+        let mut medium: Option<GlassSpec> = None;
+        for (i, element) in self.elements.iter().enumerate() {
+            let error = |why: String| format!("elements[{i}]: {why}");
+            let mut row = surface(element, medium.as_ref()).map_err(error)?;
+            if let Some(behind) = element.part.medium_behind() {
+                medium = behind.cloned();
+            }
+            if element.mount.stop {
+                row.lines.insert(0, "STOP".to_owned());
+            }
+            placed(element, row, &mut rows);
+        }
+        let wavelength = self.wavelength.map_or(FRAUNHOFER_D, |nm| nm.0);
+        let mut text = "VERS 140730 201 26155\nMODE SEQ\n".to_owned();
+        // A title of one line.
+        let name = self.name.replace(['\r', '\n'], " ");
+        let _ = write!(
+            text,
+            "NAME {name}\nUNIT MM X W X CM MR CPMM\nFLOA\nWAVM 1 {:e} 1\nPWAV 1\n",
+            wavelength * 1e-3
+        );
+        let object =
+            Row { lines: vec!["TYPE STANDARD".to_owned()], thickness: f64::INFINITY };
+        let mut image = vec![Row::new("STANDARD")];
+        if let Some(sensor) = self.sensor {
+            let mount = crate::element::Mount {
+                tilt: sensor.tilt,
+                decentre: sensor.decentre,
+                ..crate::element::Mount::default()
+            };
+            image.insert(0, coordinate_break(&mount, 1.0));
+        }
+        for (number, row) in std::iter::once(object).chain(rows).chain(image).enumerate() {
+            let _ = writeln!(text, "SURF {number}");
+            for line in &row.lines {
+                let _ = writeln!(text, "  {line}");
+            }
+            match row.thickness.is_infinite() {
+                true => text.push_str("  DISZ INFINITY\n"),
+                false => {
+                    let _ = writeln!(text, "  DISZ {:e}", row.thickness);
+                }
+            }
+        }
+        Ok(text)
+    }
+}
+
+/// A break to where an element stands, or, with −1, back.
+fn coordinate_break(mount: &crate::element::Mount, sense: f64) -> Row {
+    let mut row = Row::new("COORDBRK");
+    let values = [mount.decentre[0].0, mount.decentre[1].0, mount.tilt[0].0, mount.tilt[1].0];
+    for (i, value) in values.into_iter().enumerate().filter(|(_, value)| *value != 0.0) {
+        row.parameter(i + 1, sense * value);
+    }
+    if sense < 0.0 {
+        // Turned first, about the axes in the other order.
+        row.parameter(6, 1.0);
+    }
+    row
+}
+
+/// Adds the row of an element with the breaks that it takes.
+fn placed(element: &ElementSpec, mut row: Row, rows: &mut Vec<Row>) {
+    let mount = &element.mount;
+    let is_moved = mount.tilt.iter().any(|angle| angle.0 != 0.0)
+        || mount.decentre.iter().any(|length| length.0 != 0.0);
+    if !is_moved {
+        row.thickness = mount.thickness.0;
+        return rows.push(row);
+    }
+    let folds = match &element.part {
+        PartSpec::Mirror(mirror) => mirror.fold,
+        PartSpec::Freeform(surface) => surface.mirror && surface.fold,
+        _ => false,
+    };
+    rows.extend([coordinate_break(mount, 1.0), row]);
+    if folds {
+        // About y first and then about x, as the reflection of the way there; and back across.
+        let turn = |axis: usize| {
+            let mut row = Row::new("COORDBRK");
+            row.parameter(axis + 3, mount.tilt[axis].0);
+            row
+        };
+        rows.extend([turn(1), turn(0)]);
+        let mut back = Row::new("COORDBRK");
+        back.parameter(1, -mount.decentre[0].0);
+        back.parameter(2, -mount.decentre[1].0);
+        back.thickness = mount.thickness.0;
+        rows.push(back);
+    } else {
+        let mut back = coordinate_break(mount, -1.0);
+        back.thickness = mount.thickness.0;
+        rows.push(back);
+    }
+}
+
+/// The row of an element between media.
+fn surface(element: &ElementSpec, before: Option<&GlassSpec>) -> Result<Row, String> {
+    let none = |what: &str| Err(format!("Zemax files have no counterpart for {what}; leave it out"));
+    let rim = |row: &mut Row, radius: Option<f64>| {
+        if let Some(radius) = radius {
+            row.push(format!("DIAM {radius:e} 1 0 0 1 \"\""));
+        }
+    };
+    let length = |length: Option<etendue_geometry::units::Millimetres>| length.map(|l| l.0);
+    let bend = |radius: Option<etendue_geometry::units::Millimetres>, curvature: Option<f64>| {
+        radius.map_or(curvature.unwrap_or(0.0), |radius| 1.0 / radius.0)
+    };
+    let mut row = match &element.part {
+        PartSpec::Surface(spec) => {
+            let mut row = even(&spec.aspheric)?;
+            row.curved(bend(spec.radius, spec.curvature), spec.conic);
+            rim(&mut row, length(spec.semi_diameter));
+            row
+        }
+        PartSpec::Mirror(spec) if spec.reflectance.is_none() && spec.coating.is_none() => {
+            let mut row = even(&spec.aspheric)?;
+            row.curved(bend(spec.radius, spec.curvature), spec.conic);
+            match (spec.hole.0, length(spec.semi_diameter)) {
+                (0.0, radius) => rim(&mut row, radius),
+                (hole, Some(radius)) => row.push(format!("CLAP {hole:e} {radius:e} 0")),
+                (_, None) => return none("a mirror with a hole and no semi_diameter"),
+            }
+            row
+        }
+        PartSpec::Mirror(_) => return none("what a mirror reflects"),
+        PartSpec::Biconic(spec) => {
+            let mut row = Row::new("BICONICX");
+            row.curved(bend(spec.radius, None), spec.conic);
+            row.parameter(1, spec.radius_x.map_or(0.0, |radius| radius.0));
+            row.parameter(2, spec.conic_x);
+            rim(&mut row, length(spec.semi_diameter));
+            row
+        }
+        PartSpec::ThinLens(spec) => {
+            let mut row = Row::new("PARAXIAL");
+            row.parameter(1, spec.focal_length.0);
+            rim(&mut row, length(spec.semi_diameter));
+            row
+        }
+        PartSpec::Aperture(ApertureSpec::Circular(spec)) => {
+            let mut row = Row::new("STANDARD");
+            row.curved(0.0, 0.0);
+            rim(&mut row, Some(spec.radius.0));
+            row
+        }
+        PartSpec::Freeform(spec) => {
+            let mut row = freeform(spec)?;
+            row.curved(bend(spec.radius, spec.curvature), spec.conic);
+            rim(&mut row, length(spec.semi_diameter));
+            row
+        }
+        PartSpec::Aperture(_) => return none("an aperture that is not circular"),
+        PartSpec::Filter(_) => return none("a filter"),
+        PartSpec::MicrolensArray(_) => return none("an array of lenslets"),
+    };
+    let is_mirror = match &element.part {
+        PartSpec::Mirror(_) => true,
+        PartSpec::Freeform(spec) => spec.mirror,
+        _ => false,
+    };
+    // Sheets stand in the medium before them.
+    let behind = match element.part.medium_behind() {
+        Some(behind) => behind,
+        None => before,
+    };
+    match (is_mirror, behind) {
+        (true, _) => row.push("GLAS MIRROR 0 0 1.5 40 0 0 0 0 0 0".to_owned()),
+        (false, None) => {}
+        (false, Some(glass)) => row.push(format!("GLAS {}", named(glass)?)),
+    }
+    Ok(row)
+}
+
+/// `NAME 0 0 …`, or a model glass.
+fn named(glass: &GlassSpec) -> Result<String, String> {
+    match glass {
+        GlassSpec::Named(name) => {
+            let name = name.split_once(':').map_or(name.as_str(), |(_, name)| name);
+            Ok(format!("{name} 0 0 1.5 40 0 0 0 0 0 0"))
+        }
+        GlassSpec::Constant(n) => Ok(format!("___BLANK 1 0 {n:e} 0 0 0 0 0 0 0")),
+        GlassSpec::Abbe { nd, vd } => Ok(format!("___BLANK 1 0 {nd:e} {vd:e} 0 0 0 0 0 0")),
+        GlassSpec::Sellmeier { .. } | GlassSpec::Power(_) | GlassSpec::Cauchy(_) => {
+            Err("a glass by a formula has no counterpart in Zemax files; put it into an AGF catalogue and name it".to_owned())
+        }
+    }
+}
+
+/// Powers of r by the type that has them.
+fn even(terms: &std::collections::BTreeMap<String, f64>) -> Result<Row, String> {
+    let powers = powers(terms)?;
+    let highest = powers.iter().map(|(power, _)| *power).max().unwrap_or(0);
+    if highest > 16 {
+        let mut row = Row::new("XASPHERE");
+        let mut values = vec![0.0; highest / 2];
+        for (power, value) in powers {
+            values[power / 2 - 1] = value;
+        }
+        row.data(1.0, &values);
+        return Ok(row);
+    }
+    let mut row = Row::new(if powers.is_empty() { "STANDARD" } else { "EVENASPH" });
+    for (power, value) in powers {
+        row.parameter(power / 2, value);
+    }
+    Ok(row)
+}
+
+fn powers(terms: &std::collections::BTreeMap<String, f64>) -> Result<Vec<(usize, f64)>, String> {
+    let terms = terms.iter().map(|(key, value)| {
+        let power = key.parse::<usize>().map_err(|_| format!("aspheric has the power \"{key}\""));
+        Ok((power?, *value))
+    });
+    terms.collect()
+}
+
+fn freeform(spec: &FreeformSpec) -> Result<Row, String> {
+    let none = |what: &str| Err(format!("Zemax files have no counterpart for {what}; leave it out"));
+    if spec.reflectance.is_some() || spec.hole.0 != 0.0 {
+        return none("the hole or reflectance of a freeform mirror");
+    }
+    let powers = powers(&spec.aspheric)?;
+    let evens = |row: &mut Row| {
+        for (power, value) in &powers {
+            if power % 2 == 1 || *power > 16 {
+                return Err(format!("the power {power} of r with what else this surface has has no counterpart in Zemax files"));
+            }
+            row.parameter(power / 2, *value);
+        }
+        Ok(())
+    };
+    let plain = spec.phase.is_none() && !spec.fresnel && spec.rotation_radius.is_none();
+    let mut row = match (&spec.sag[..], &spec.phase) {
+        ([], None) if spec.fresnel && spec.rotation_radius.is_none() => {
+            let mut row = Row::new("FRESNELS");
+            evens(&mut row)?;
+            row
+        }
+        ([], None) if plain => {
+            let mut row = Row::new("ODDASPHE");
+            for (power, value) in &powers {
+                if *power > 8 {
+                    return none("powers of r beyond 8 with odd ones among them");
+                }
+                row.parameter(*power, *value);
+            }
+            row
+        }
+        ([], None) if !spec.fresnel => {
+            let mut row = Row::new("TOROIDAL");
+            row.parameter(1, spec.rotation_radius.map_or(0.0, |radius| radius.0));
+            for (power, value) in &powers {
+                if power % 2 == 1 || *power > 14 {
+                    return none("powers of y of a toroid that are odd or beyond 14");
+                }
+                row.parameter(power / 2 + 1, *value);
+            }
+            row
+        }
+        ([SagSpec::Zernike { radius, order, coefficients }], None) if plain => {
+            let mut row = Row::new(match order {
+                ZernikeOrder::Fringe => "FZERNSAG",
+                ZernikeOrder::Noll => "SZERNSAG",
+            });
+            evens(&mut row)?;
+            let mut values = Vec::new();
+            for (key, value) in coefficients {
+                let number = key.parse::<usize>().ok().filter(|n| (1..=400).contains(n));
+                let number = number.ok_or_else(|| format!("sag[0]: no term has the number \"{key}\""))?;
+                values.resize(values.len().max(number), 0.0);
+                values[number - 1] = *value;
+            }
+            row.data(radius.0, &values);
+            row
+        }
+        ([], Some(phase)) if !spec.fresnel && spec.rotation_radius.is_none() => {
+            let mut row = diffracting(phase)?;
+            if matches!(phase.pattern, PatternSpec::Grating { .. }) && !powers.is_empty() {
+                return none("an aspheric grating");
+            }
+            evens(&mut row)?;
+            row
+        }
+        _ => return none("what is added to this surface, or these together"),
+    };
+    if row.lines.is_empty() {
+        row = Row::new("STANDARD");
+    }
+    Ok(row)
+}
+
+fn diffracting(phase: &PhaseSpec) -> Result<Row, String> {
+    let none = |what: &str| Err(format!("Zemax files have no counterpart for {what}; leave it out"));
+    if phase.blaze_wavelength.is_some() || phase.design_wavelength.is_some() {
+        return none("a phase with a blaze_wavelength or design_wavelength");
+    }
+    let order = f64::from(phase.order.unwrap_or(1));
+    match &phase.pattern {
+        PatternSpec::Grating { period, rotation: 0.0 } => {
+            let mut row = Row::new("DGRATING");
+            row.parameter(1, 1e-3 / period.0);
+            row.parameter(2, order);
+            Ok(row)
+        }
+        PatternSpec::Radial { radius, coefficients } => {
+            let mut row = Row::new("BINARY_2");
+            row.parameter(0, order);
+            row.data(radius.0, coefficients);
+            Ok(row)
+        }
+        PatternSpec::Grating { .. } | PatternSpec::Polynomial { .. } | PatternSpec::Image { .. } => {
+            none("this pattern of phase")
+        }
+    }
+}

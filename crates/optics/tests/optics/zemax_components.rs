@@ -1,0 +1,259 @@
+//! Zemax files with mirrors, folds, freeforms, gratings and apertures: what each command becomes.
+
+use etendue_optics::element::PartSpec;
+use etendue_optics::train::{LensFile, OpticalTrain, ZemaxLens};
+use glam::DVec3;
+use serde_json::{Value, json};
+
+use crate::preset;
+
+/// A file of these surfaces between an object at infinity and an image.
+fn file(surfaces: &[&str]) -> String {
+    let mut text = "MODE SEQ\nUNIT MM\nENPD 10\nFTYP 0 0 1 1\nYFLN 0\nWAVL 0.55\nSURF 0\n  TYPE STANDARD\n  DISZ INFINITY\n".to_owned();
+    for (i, lines) in surfaces.iter().enumerate() {
+        text += &format!("SURF {}\n", i + 1);
+        for line in lines.split(';') {
+            text += &format!("  {}\n", line.trim());
+        }
+    }
+    text + &format!("SURF {}\n  TYPE STANDARD\n  DISZ 0\n", surfaces.len() + 1)
+}
+
+fn try_read(surfaces: &[&str]) -> Result<ZemaxLens, String> {
+    ZemaxLens::read(file(surfaces).as_bytes(), &[]).map_err(|error| error.to_string())
+}
+
+fn read(surfaces: &[&str]) -> ZemaxLens {
+    try_read(surfaces).unwrap_or_else(|error| panic!("{error}\n{}", file(surfaces)))
+}
+
+fn build(file: &LensFile) -> OpticalTrain {
+    file.build(&|name: &str| Err(name.to_owned())).unwrap()
+}
+
+/// The elements as a lens file has them.
+fn elements(lens: &ZemaxLens) -> Vec<Value> {
+    let text = serde_json::to_value(&lens.file).unwrap();
+    // What is saved is read again, and is the same.
+    let back: LensFile = serde_json::from_value(text.clone()).unwrap();
+    assert_eq!(back, lens.file);
+    text["elements"].as_array().unwrap().clone()
+}
+
+#[test]
+fn a_newtonian_with_coordinate_breaks_is_the_one_of_the_lens_file() {
+    let lens = read(&[
+        "TYPE STANDARD; STOP; CURV -6.25E-4; CONI -1; DISZ -650; GLAS MIRROR 0 0 1.5 40; DIAM 75",
+        "TYPE COORDBRK; PARM 3 45; DISZ 0",
+        "TYPE STANDARD; GLAS MIRROR 0 0 1.5 40; DISZ 0; DIAM 24",
+        "TYPE COORDBRK; PARM 3 45; DISZ 150",
+    ]);
+    let mut file = lens.file.clone();
+    if let PartSpec::Mirror(mirror) = &mut file.elements[0].part {
+        mirror.semi_diameter = Some(etendue_geometry::units::Millimetres(75.0));
+    }
+    let (ours, theirs) = (build(&file), preset("newtonian"));
+    assert_eq!(ours.elements().len(), 2);
+    for (a, b) in ours.elements().iter().zip(theirs.elements()) {
+        assert_eq!(a.part, b.part);
+        assert!((a.frame.vertex - b.frame.vertex).length() < 1e-12, "{a:?}");
+        for (x, y) in [(a.frame.rotation, b.frame.rotation)] {
+            assert!((x.z_axis - y.z_axis).length() < 1e-14);
+        }
+    }
+    let sensors = [&ours, &theirs].map(|train| {
+        let z = train.sensor_z(etendue_optics::train::Focus::AsWritten).unwrap();
+        train.built().last().unwrap().place(DVec3::new(0.0, 0.0, z))
+    });
+    assert!((sensors[0] - sensors[1]).length() < 1e-12, "{sensors:?}");
+    assert!(
+        (sensors[0] - DVec3::new(0.0, -150.0, -650.0)).length() < 1e-9 || sensors[0].y > 149.0,
+        "{sensors:?}"
+    );
+}
+
+#[test]
+fn a_mirror_between_breaks_that_undo_one_another_is_tilted_alone() {
+    let lens = read(&[
+        "TYPE COORDBRK; PARM 1 1.5; PARM 3 2; DISZ 0",
+        "TYPE STANDARD; STOP; CURV -1E-3; DISZ 0; GLAS MIRROR; DIAM 30",
+        "TYPE COORDBRK; PARM 1 -1.5; PARM 3 -2; PARM 6 1; DISZ -500",
+    ]);
+    let element = &elements(&lens)[0];
+    assert_eq!(element["type"], "mirror");
+    assert_eq!(element.get("fold"), None);
+    assert!((element["tilt"][0].as_f64().unwrap() - 2.0).abs() < 1e-12);
+    assert_eq!(element["decentre"], json!([1.5, 0.0]));
+    assert!((element["thickness"].as_f64().unwrap() + 500.0).abs() < 1e-12);
+    // The sensor stands square to the axis, on it.
+    assert_eq!(lens.file.sensor, None);
+    // And one that folds the axis of a curved mirror.
+    let lens = read(&[
+        "TYPE COORDBRK; PARM 3 10; DISZ 0",
+        "TYPE STANDARD; STOP; CURV -1E-3; DISZ 0; GLAS MIRROR; DIAM 30",
+        "TYPE COORDBRK; PARM 3 10; DISZ -500",
+    ]);
+    assert_eq!(elements(&lens)[0]["fold"], true);
+    assert_eq!(lens.file.sensor, None);
+}
+
+#[test]
+fn apertures_become_sheets_at_the_vertex() {
+    let glass = "TYPE STANDARD; STOP; CURV 0.02; DISZ 4; GLAS N-BK7 0 0 1.5168 64.17; DIAM 8";
+    let back = "TYPE STANDARD; CURV -0.02; DISZ 48; DIAM 8";
+    for (line, expected) in [
+        ("OBSC 0 1.5 0", json!({"shape": "annular", "inner_radius": 1.5})),
+        ("CLAP 2 7 0", json!({"shape": "annular", "inner_radius": 2.0})),
+        ("SQAP 3 2 0", json!({"shape": "rectangular", "width": 6.0, "height": 4.0})),
+        ("ELAP 3 2 0", json!({"shape": "elliptical", "width": 6.0, "height": 4.0})),
+        ("SPID 0.5 4 0", json!({"shape": "spider", "arms": 4, "width": 0.5})),
+        (
+            "SQAP 3 2 0; OBDC 1 -0.5",
+            json!({"shape": "rectangular", "width": 6.0, "height": 4.0, "decentre": [1.0, -0.5]}),
+        ),
+        (
+            "CLAP 0 3 0; OBDC 1 0",
+            json!({"shape": "circular", "radius": 3.0, "decentre": [1.0, 0.0]}),
+        ),
+    ] {
+        let mut expected = expected;
+        expected["type"] = json!("aperture");
+        let elements = elements(&read(&[&format!("{glass}; {line}"), back]));
+        assert_eq!(elements[0], expected, "{line}");
+        assert_eq!((elements.len(), &elements[1]["stop"]), (3, &json!(true)), "{line}");
+    }
+    // The hole of a mirror is its own.
+    let mirror = "TYPE STANDARD; STOP; CURV -0.001; DISZ -400; GLAS MIRROR; CLAP 2 90 0";
+    assert_eq!(elements(&read(&[mirror]))[0]["hole"], 2.0);
+}
+
+#[test]
+fn surfaces_of_other_shapes_are_their_parts() {
+    let back = "TYPE STANDARD; CURV -0.02; DISZ 48; DIAM 8";
+    let glass = "STOP; CURV 0.025; CONI -0.5; DISZ 4; GLAS N-BK7 0 0 1.5168 64.17; DIAM 8";
+    for (lines, key, expected) in [
+        ("TYPE ODDASPHE; PARM 3 2E-5; PARM 4 1E-6", "aspheric", json!({"3": 2e-5, "4": 1e-6})),
+        ("TYPE TOROIDAL; PARM 1 -60; PARM 3 1E-6", "rotation_radius", json!(-60.0)),
+        ("TYPE TOROIDAL; PARM 1 -60; PARM 3 1E-6", "aspheric", json!({"4": 1e-6})),
+        ("TYPE TOROIDAL", "rotation_radius", json!(0.0)),
+        ("TYPE BICONICX; PARM 1 55; PARM 2 0.3", "radius_x", json!(55.0)),
+        (
+            "TYPE SZERNSAG; PARM 2 1E-6; XDAT 1 6; XDAT 2 9; XDAT 7 0.02; XDAT 8 -0.01",
+            "sag",
+            json!([{"type": "zernike", "radius": 9.0, "order": "noll", "coefficients": {"5": 0.02, "6": -0.01}}]),
+        ),
+        (
+            "TYPE FZERNSAG; XDAT 1 9; XDAT 2 9; XDAT 11 0.02",
+            "sag",
+            json!([{"type": "zernike", "radius": 9.0, "order": "fringe", "coefficients": {"9": 0.02}}]),
+        ),
+        ("TYPE FRESNELS; PARM 2 1E-6", "fresnel", json!(true)),
+        (
+            "TYPE DGRATING; PARM 1 0.2; PARM 2 -1",
+            "phase",
+            json!({"pattern": {"type": "grating", "period": 0.005, "rotation": 0.0}, "order": -1}),
+        ),
+        (
+            "TYPE BINARY_2; PARM 0 2; XDAT 1 2; XDAT 2 10; XDAT 3 -300; XDAT 4 5",
+            "phase",
+            json!({"pattern": {"type": "radial", "radius": 10.0, "coefficients": [-300.0, 5.0]}, "order": 2}),
+        ),
+    ] {
+        let lens = read(&[&format!("{lines}; {glass}"), back]);
+        assert_eq!(elements(&lens)[0][key], expected, "{lines}");
+    }
+}
+
+#[test]
+fn what_has_no_counterpart_is_refused_with_its_line() {
+    let back = "TYPE STANDARD; CURV -0.02; DISZ 48; DIAM 8";
+    let error = |surfaces: &[&str]| try_read(surfaces).unwrap_err();
+    let turned = error(&[
+        "TYPE COORDBRK; PARM 5 30; DISZ 0",
+        "TYPE TOROIDAL; STOP; PARM 1 9; CURV 0.02; DISZ 4; DIAM 3",
+        back,
+    ]);
+    assert!(
+        turned.starts_with("line 14") && turned.contains("turned about its own axis"),
+        "{turned}"
+    );
+    let order = error(&["TYPE DGRATING; STOP; PARM 1 1; PARM 2 0.5; DISZ 9; DIAM 3", back]);
+    assert!(order.contains("order of diffraction is 0.5"), "{order}");
+    let radius = error(&["TYPE BINARY_2; STOP; XDAT 1 1; XDAT 3 5; DISZ 9; DIAM 3", back]);
+    assert!(radius.contains("must be positive"), "{radius}");
+    let backwards = error(&["TYPE STANDARD; STOP; CURV -0.02; DISZ 40; GLAS MIRROR; DIAM 3"]);
+    assert!(backwards.contains("write -40"), "{backwards}");
+}
+
+/// Every lens that a Zemax file can hold, through one and back: the same surfaces to the last bit where nothing is tilted, and
+/// rays that leave alike.
+#[test]
+fn lenses_come_back_from_zemax_files_as_they_went() {
+    use etendue_optics::element::{Clip, Ray};
+    use etendue_optics::train::Side;
+    let mut files = Vec::new();
+    let folder = format!("{}/../../scenes/lenses", env!("CARGO_MANIFEST_DIR"));
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let text = std::fs::read_to_string(entry.unwrap().path()).unwrap();
+        files.push(LensFile::from_json(&text).unwrap());
+    }
+    let more = [
+        r#"{"type": "freeform", "radius": 40, "aspheric": {"3": 2e-5, "4": 1e-6}, "thickness": 3, "glass": {"n": 1.6}, "semi_diameter": 8, "stop": true}"#,
+        r#"{"type": "freeform", "radius": 40, "rotation_radius": -55, "aspheric": {"4": 1e-6}, "thickness": 3, "glass": {"nd": 1.6, "vd": 50}, "semi_diameter": 8, "stop": true}"#,
+        r#"{"type": "freeform", "radius": 40, "sag": [{"type": "zernike", "radius": 9, "coefficients": {"5": 0.02}}], "thickness": 3, "glass": "N-BK7", "semi_diameter": 8, "stop": true}"#,
+        r#"{"type": "freeform", "radius": 40, "fresnel": true, "thickness": 3, "glass": "N-BK7", "semi_diameter": 8, "stop": true}"#,
+        r#"{"type": "freeform", "phase": {"pattern": {"type": "grating", "period": 0.0078125}, "order": -1}, "thickness": 3, "glass": "N-BK7", "semi_diameter": 8, "stop": true}"#,
+        r#"{"type": "freeform", "phase": {"pattern": {"type": "radial", "radius": 8, "coefficients": [-90, 1]}, "order": 2}, "thickness": 3, "glass": "N-BK7", "semi_diameter": 8, "stop": true}"#,
+        r#"{"type": "biconic", "radius": 40, "radius_x": 55, "conic_x": 0.5, "thickness": 3, "glass": "N-BK7", "semi_diameter": 8, "stop": true}"#,
+        r#"{"type": "surface", "radius": 40, "tilt": [2, -1], "decentre": [0.3, 0.1], "thickness": 3, "glass": "N-BK7", "semi_diameter": 8, "stop": true}"#,
+    ];
+    for element in more {
+        let text = format!(r#"{{"elements": [{element}, {{"type": "surface", "radius": -90, "thickness": 40, "semi_diameter": 9}}]}}"#);
+        files.push(LensFile::from_json(&text).unwrap());
+    }
+    let tilted = r#"{"sensor": {"tilt": [3, 0], "decentre": [0, 1]}, "elements": [{"type": "mirror", "radius": -200, "tilt": [5, 3], "fold": true, "thickness": -100, "semi_diameter": 8, "stop": true}]}"#;
+    files.push(LensFile::from_json(tilted).unwrap());
+    let mut compared = 0;
+    for file in &files {
+        let Ok(before) = file.build(&|name: &str| Err(name.to_owned())) else { continue };
+        let text = file.to_zemax().unwrap_or_else(|why| panic!("{}: {why}", file.name));
+        let back = ZemaxLens::read(text.as_bytes(), &[]).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        let after = build(&back.file);
+        assert_eq!((before.elements().len(), before.stop()), (after.elements().len(), after.stop()), "{text}");
+        for (a, b) in before.elements().iter().zip(after.elements()) {
+            assert_eq!(a.part, b.part, "{text}");
+            // Sums of thicknesses, and sines of angles there and back.
+            let size = 1.0 + a.frame.vertex.length();
+            assert!((a.frame.vertex - b.frame.vertex).length() < 1e-14 * size, "{text}");
+            assert!((a.frame.rotation.z_axis - b.frame.rotation.z_axis).length() < 1e-14, "{text}");
+        }
+        let wavelength = before.wavelength();
+        let lenses = [&before, &after].map(|train| train.at(wavelength).unwrap());
+        let reach = 0.4 * before.paraxial(wavelength).unwrap().entrance_pupil.diameter.unwrap_or(4.0);
+        for i in 0..50_u32 {
+            let place = DVec3::new(reach * (f64::from(i)).sin(), reach * (1.7 * f64::from(i)).cos(), -30.0);
+            let ray = Ray::new(place, DVec3::new(0.01, 0.0, 1.0)).unwrap();
+            let [a, b] = lenses.each_ref().map(|at| at.run(Side::Object, Clip::On, ray));
+            assert_eq!(a.status, b.status, "{text}");
+            let apart = DVec3::from(a.ray.direction) - DVec3::from(b.ray.direction);
+            assert!(apart.length() < 1e-12, "{text}: {apart}");
+            compared += 1;
+        }
+    }
+    assert!(compared >= 50 * 15, "{compared}");
+}
+
+#[test]
+fn what_zemax_files_have_no_counterpart_for_is_refused_by_its_element() {
+    for (element, word) in [
+        (r#"{"type": "filter", "transmission": 0.5}"#, "a filter"),
+        (r#"{"type": "aperture", "shape": "polygon", "radius": 1, "blades": 5}"#, "not circular"),
+        (r#"{"type": "surface", "glass": {"cauchy": [1.5]}}"#, "AGF"),
+        (r#"{"type": "mirror", "reflectance": 0.9}"#, "reflects"),
+        (r#"{"type": "freeform", "sag": [{"type": "q_con", "radius": 1, "coefficients": [1]}]}"#, "added"),
+    ] {
+        let file = LensFile::from_json(&format!(r#"{{"elements": [{{"type": "surface"}}, {element}]}}"#)).unwrap();
+        let why = file.to_zemax().unwrap_err();
+        assert!(why.starts_with("elements[1]: ") && why.contains(word), "{why}");
+    }
+}
