@@ -526,7 +526,7 @@ fn frame_seed(seed: u64, frame: u32) -> u64 {
 /// The film of a cube.
 fn film(axis: &cube::BandAxis, values: Vec<f32>) -> Result<BandFilm, String> {
     let grid = Grid::from_edges(axis.edges().to_vec()).map_err(|error| error.to_string())?;
-    Ok(BandFilm { bands: Bands::Spectral(grid), values })
+    Ok(BandFilm { bands: Bands::Spectral(grid), values, parts: Vec::new() })
 }
 
 /// The sensor of `file` with the radiometry that light in `unit` has, and with pixels of `pitch` (µm) where it says

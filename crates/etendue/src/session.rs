@@ -67,6 +67,8 @@ pub struct Session {
     checkpoint: Option<Checkpoint>,
     /// What takes the noise out of pictures, once it was asked for.
     denoiser: Option<Denoiser>,
+    /// The exposure that was metered on the first frame (s), which all frames have.
+    metered: Option<f64>,
 }
 
 /// A scene, the structure over it, and its images.

@@ -6,7 +6,7 @@
 //! | [`photo_response`] | `μₑ ← μₑ·(1 + PRNU·z)` |
 //! | [`dark_signal`] | `μ = μₑ + μ_I·T`, of each pixel its own with DCNU |
 //! | [`shot_noise`] | `n ~ Poisson(μ)`, or its approximation |
-//! | [`full_well`] | `n ← min(n, capacity)` |
+//! | [`full_well`] | `n ← min(n, capacity)`, and what of that is read near saturation |
 //! | [`read_out`] | `n + σ_read·z + DSNU·z′ + row + column` |
 //! | [`convert`] | `y = clip(round(K·n + black), 0, 2ᵇ − 1)` |
 //!
@@ -22,11 +22,15 @@
 //!
 //! Mean photo-electrons of a run of pixels: each pixel's bands times what they are worth there.
 
+use std::sync::Arc;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::effects::Effects;
 use crate::film::InvalidValues;
 use crate::moments::PixelLaw;
 use crate::normal::{ln, pair};
-use serde::Serialize;
-
 use crate::philox::{PhiloxKey, Site, Stage, unit32, unit52};
 use crate::poisson::{FINISHED_TOGETHER, OpenPixel, PD_FROM, finish, first_try, small_means};
 use crate::spec::NoiseModel;
@@ -71,8 +75,12 @@ pub(crate) struct Chain {
     /// Shares of pixels that collect nothing, and that are always saturated.
     pub(crate) dead: f64,
     pub(crate) stuck: f64,
+    /// Listed defects, and what is read near saturation.
+    pub(crate) effects: Arc<Effects>,
     /// The seed of temporal noise.
     pub(crate) temporal: PhiloxKey,
+    /// The seed of what a second read-out of the same electrons adds; `None` of the first.
+    pub(crate) second: Option<PhiloxKey>,
     /// The serial number.
     pub(crate) pattern: PhiloxKey,
 }
@@ -100,7 +108,7 @@ impl BlockPlace {
 }
 
 /// What is wrong with a pixel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Defect {
     /// It has much more dark current than others.
@@ -124,6 +132,7 @@ pub(crate) fn expose(
     if chain.noise == NoiseModel::None {
         dark_signal(chain.dark, mean);
         full_well(chain.full_well, mean);
+        read_near_saturation(chain, mean);
         return convert(chain, mean, out);
     }
     match chain.has_pattern() {
@@ -133,11 +142,15 @@ pub(crate) fn expose(
     let mut normals = [[0.0; BLOCK]; 2];
     let mut units = [0.0; BLOCK];
     deviates(&chain.temporal, place, &mut normals, &mut units);
+    if let Some(key) = &chain.second {
+        second_deviates(key, place, &mut normals[1]);
+    }
     match chain.noise {
         NoiseModel::Poisson => shot_noise(chain, place, mean, &normals[0], &units),
         NoiseModel::Normal | NoiseModel::None => normal_shot_noise(mean, &normals[0]),
     }
     full_well(chain.full_well, mean);
+    read_near_saturation(chain, mean);
     read_out(chain.read_noise, &normals[1], offset, mean);
     convert(chain, mean, out);
 }
@@ -162,6 +175,7 @@ pub(crate) fn moments(
             noise: chain.noise,
             mean: mean[i],
             full_well: chain.full_well,
+            curve: chain.effects.nonlinearity.as_ref(),
             offset: offset[i],
             read_noise,
             gain: chain.gain,
@@ -194,7 +208,12 @@ impl Chain {
 
     fn has_pattern(&self) -> bool {
         let all = [self.prnu, self.dsnu, self.dcnu * self.dark, self.hot[0], self.dead, self.stuck];
-        all.iter().any(|&part| part > 0.0)
+        all.iter().any(|&part| part > 0.0) || !self.effects.listed.is_empty()
+    }
+
+    /// The seed of what the read-out adds.
+    pub(crate) fn of_read_out(&self) -> &PhiloxKey {
+        self.second.as_ref().unwrap_or(&self.temporal)
     }
 }
 
@@ -211,6 +230,15 @@ fn deviates(
         let [a, b, c, d] = key.words(counter);
         [normals[0][i], normals[1][i]] = pair([a, b, c]);
         units[i] = unit32(d);
+    }
+}
+
+/// Normal deviates of a second read-out.
+#[inline(always)]
+fn second_deviates(key: &PhiloxKey, place: BlockPlace, normals: &mut BlockValues) {
+    for (i, normal) in normals.iter_mut().enumerate() {
+        let [a, b, c, _] = key.words(place.site.counter(place.at(i), Stage::Temporal, 0));
+        [_, *normal] = pair([a, b, c]);
     }
 }
 
@@ -247,6 +275,32 @@ fn pattern(chain: &Chain, place: BlockPlace, mean: &mut BlockValues, offset: &mu
                 Some(Defect::Dead) => mean[i] = 0.0,
                 Some(Defect::Stuck) => offset[i] = STUCK,
                 Some(Defect::Hot) | None => {}
+            }
+        }
+    }
+    if !chain.effects.listed.is_empty() {
+        listed_defects(chain, place, mean, offset);
+    }
+}
+
+/// The defects of a map, as those by chance.
+fn listed_defects(
+    chain: &Chain,
+    place: BlockPlace,
+    mean: &mut BlockValues,
+    offset: &mut BlockValues,
+) {
+    let Site { row, channel, .. } = place.site;
+    #[expect(clippy::cast_possible_truncation, reason = "a block is short")]
+    let columns = place.column..place.column.saturating_add(BLOCK as u32);
+    for listed in chain.effects.listed_in(row, columns, channel) {
+        let i = (listed.column - place.column) as usize;
+        match listed.kind {
+            Defect::Dead => mean[i] = 0.0,
+            Defect::Stuck => offset[i] = STUCK,
+            Defect::Hot => {
+                let words = chain.pattern.words(place.fixed(i, Stage::HotPixel));
+                mean[i] -= chain.hot[1] * ln(unit52(words[0], words[1]));
             }
         }
     }
@@ -341,6 +395,16 @@ fn normal_shot_noise(mean: &mut BlockValues, normals: &BlockValues) {
 fn full_well(capacity: f64, electrons: &mut BlockValues) {
     for electrons in electrons {
         *electrons = electrons.min(capacity);
+    }
+}
+
+/// `n ← C·f(n/C)` where a sensor has such a curve.
+#[inline(always)]
+fn read_near_saturation(chain: &Chain, electrons: &mut BlockValues) {
+    if let Some(curve) = &chain.effects.nonlinearity {
+        for electrons in electrons {
+            *electrons = chain.full_well * curve.read(*electrons / chain.full_well);
+        }
     }
 }
 

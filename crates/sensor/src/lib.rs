@@ -16,6 +16,7 @@
 //! | module | idea |
 //! |---|---|
 //! | [`spec`] | the sensor as a scene file writes it |
+//! | [`effects`] | parts of real chips: defects, blooming, second read-outs, angles |
 //! | [`preset`] | sensors of the trade |
 //! | [`cfa`] | colour filter arrays |
 //! | [`bands`] | the fewest spectral bands that count electrons right |
@@ -34,6 +35,7 @@ pub mod cfa;
 mod chain;
 pub mod demosaic;
 pub mod dng;
+pub mod effects;
 pub mod emva;
 mod error;
 mod exposing;
@@ -49,13 +51,18 @@ pub mod preset;
 mod presets;
 mod response;
 pub mod sensor;
+mod second;
 mod settings;
 pub mod slanted_edge;
 pub mod spec;
+mod whole_frame;
 
 pub use bands::{BandChoice, Factor, Illumination, Times};
 pub use cfa::CfaSpec;
 pub use chain::Defect;
+pub use effects::{
+    AngularResponse, AutoExposure, DefectMap, ListedDefect, Photodiodes, SecondReadout,
+};
 pub use error::SensorError;
 pub use film::{Exposure, Film, InvalidValues, Moments, NoiseFloor, RawImage};
 pub use hdr::HdrImage;

@@ -31,6 +31,8 @@ pub(super) fn name(digits: usize, stem: &str, number: u32, ending: &str) -> Stri
 /// Writes one exposure after the other.
 pub(super) struct ExposureWriter<'a> {
     pub(super) sensor: &'a Sensor,
+    /// What its second read-out is, where it has one.
+    pub(super) second: Option<Sensor>,
     pub(super) light: &'a SensorLight,
     pub(super) files: &'a Transaction,
     pub(super) folder: &'a Path,
@@ -93,6 +95,15 @@ impl ExposureWriter<'_> {
             npy::write(self.files, &self.place(&name), &raw, "Raw")?;
             files.npy = Some(name);
         }
+        if let Some(second) = self.second.clone() {
+            let image = self.light.expose_on(&second, shot)?;
+            files.second = self.numbers(image, SECOND, shot)?;
+        }
+        let parts: Vec<&'static str> = self.light.parts().collect();
+        for (part, stem) in parts.into_iter().enumerate() {
+            let image = self.light.expose_part(part, shot)?;
+            files.photodiodes.extend(self.numbers(image, stem, shot)?);
+        }
         if self.sensor.spec().moments == Some(true) {
             let known = self.moments.iter().find(|(exposure, _)| *exposure == shot.exposure);
             let found = match known {
@@ -106,6 +117,29 @@ impl ExposureWriter<'_> {
             [files.mean, files.variance] = found.map(Some);
         }
         Ok(files)
+    }
+
+    /// Writes further numbers of the pixels, as the first ones.
+    fn numbers(
+        &mut self,
+        image: RawImage,
+        stem: &str,
+        shot: Exposure,
+    ) -> Result<Option<String>, ExposeError> {
+        let is_picture = matches!(image.depth, 1 | 3);
+        let raw = self.raw(image, shot)?;
+        let mut named = None;
+        if self.outputs.png && is_picture {
+            let name = self.name(stem, shot.frame, "png");
+            png::write(self.files, &self.place(&name), &raw, "Raw", png::Bits::Sixteen)?;
+            named = Some(name);
+        }
+        if self.outputs.npy || !is_picture {
+            let name = self.name(stem, shot.frame, "npy");
+            npy::write(self.files, &self.place(&name), &raw, "Raw")?;
+            named = Some(name);
+        }
+        Ok(named)
     }
 
     /// The numbers as a picture of one layer.
@@ -212,7 +246,7 @@ impl ExposureWriter<'_> {
     /// Merges all exposures, and writes electrons a second with their standard deviation.
     pub(super) fn merged(&mut self, shots: &[Exposure]) -> Result<[String; 2], ExposeError> {
         let light = self.light;
-        let image = self.sensor.merged(shots, |shot| light.expose(shot))?;
+        let image = self.sensor.merged(shots, |sensor, shot| light.expose_on(sensor, shot))?;
         if image.saturated > 0 {
             let of = image.rate.len();
             self.exposed.notes.push(format!(
@@ -278,6 +312,9 @@ pub(super) const HDR_NAMES: [(&str, &str); 2] = [
     ("raw_hdr_sigma.npy", "their standard deviation"),
 ];
 
+/// What the files of a second read-out are called.
+pub(super) const SECOND: &str = "raw_second";
+
 /// Names of the files of expected value and variance.
 pub(super) type MomentFiles = [String; 2];
 
@@ -301,6 +338,9 @@ pub(super) struct Sidecar<'a> {
     white_level_dn: f64,
     saturation_level_dn: f64,
     system_gain_dn_per_electron: f64,
+    /// The exposure that `auto_exposure` found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) metered_exposure_s: Option<f64>,
     channels: Vec<&'a str>,
     white_balance: Vec<f64>,
     /// Pixels with which something is wrong, row by row.
@@ -328,6 +368,7 @@ impl<'a> Sidecar<'a> {
             white_level_dn: sensor.white_level(),
             saturation_level_dn: sensor.saturation_level(),
             system_gain_dn_per_electron: sensor.system_gain(),
+            metered_exposure_s: None,
             channels: sensor.channels().collect(),
             white_balance: sensor.white_balance(),
             defects: DefectivePixel::all(sensor),
@@ -381,6 +422,12 @@ pub(super) struct ShotFiles {
     dng: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     preview: Option<String>,
+    /// Of the second read-out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    second: Option<String>,
+    /// Of the photodiodes of dual and quad pixels.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    photodiodes: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     mean: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -396,6 +443,8 @@ impl ShotFiles {
             npy: None,
             dng: None,
             preview: None,
+            second: None,
+            photodiodes: Vec::new(),
             mean: None,
             variance: None,
         }

@@ -7,12 +7,15 @@
 //! | `raw.npy` | the same, `[h, w]` or `[h, w, channels]`, `u2` |
 //! | `raw.dng` | the same for raw converters, with pattern and levels (`raw` sensors of r, g, b or none) |
 //! | `raw.preview.png` | demosaiced, white balanced, sRGB; not data |
+//! | `raw_left.png`, `.npy`, `raw_right…`, `raw_top_left…`, … | the numbers of the photodiodes of dual and quad pixels |
+//! | `raw_second.png`, `raw_second.npy` | the second number of each pixel, of sensors that have two |
 //! | `raw_mean.npy`, `raw_variance.npy` | the expected value and variance of every pixel, once an exposure time, when asked for |
 //! | `raw_hdr.npy`, `raw_hdr_sigma.npy` | electrons a second of all exposures merged, when asked for |
 //! | `sensor.json` | what the numbers mean, and which file is which exposure |
 //!
 //! Several exposures or frames are numbered: `raw_000.png`, `raw_001.png`, …
 
+mod angles;
 mod bands;
 mod elsewhere;
 mod files;
@@ -29,9 +32,11 @@ use etendue_files::{Transaction, WriteError};
 use etendue_report::{Decision, DecisionKind, DecisionValue};
 use etendue_scene::Scene;
 use etendue_sensor::{
-    Exposure, Film, InvalidValues, Moments, NoiseModel, RawImage, Sensor, SensorError, SensorKind,
+    Exposure, Film, InvalidValues, Moments, NoiseModel, Photodiodes, RawImage, Sensor, SensorError,
+    SensorKind,
 };
 use etendue_spectrum::Bands;
+use etendue_tracer::LayerSpec;
 
 pub(crate) use bands::{bands, explain_bands};
 pub use elsewhere::{PictureLight, PixelLight};
@@ -130,6 +135,8 @@ pub struct SensorLight {
     pub(super) white: Vec<f64>,
     header: Vec<(String, String)>,
     notes: Vec<String>,
+    /// The exposure that `auto_exposure` found (s).
+    metered: Option<f64>,
 }
 
 impl SensorLight {
@@ -166,10 +173,48 @@ impl SensorLight {
                 (sensor, film)
             }
         };
+        let film = match film.parts.is_empty() {
+            true => film.with_parts_of(&sensor, picture)?,
+            false => film,
+        };
         let film = film.on_sensor(scene, &sensor);
+        let film = angles::seen(film, scene, &sensor).summed();
         let seeds = [scene.render.seed, noise_seed(scene)];
         let white = sensor.white_under(&illumination::light(scene, sensor.bands()));
-        Ok(Ok(Self { sensor, film, seeds, white, header: picture.header().to_vec(), notes }))
+        let header = picture.header().to_vec();
+        let light = Self { sensor, film, seeds, white, header, notes, metered: None };
+        Ok(Ok(light.metered_by_itself()))
+    }
+
+    /// The same at the exposure that its own light asks for, where that is metered.
+    pub(super) fn metered_by_itself(mut self) -> Self {
+        if self.sensor.spec().auto_exposure.is_none() {
+            return self;
+        }
+        match self.sensor.metered(self.film()) {
+            Some(time) => self.at_exposure(time),
+            None => {
+                self.notes.push(
+                    "sensor.auto_exposure: no light falls on the sensor, so the exposure is 0.01 s"
+                        .to_owned(),
+                );
+                self
+            }
+        }
+    }
+
+    /// The same at an exposure that was metered elsewhere (s), such as on the first frame of a sequence.
+    #[must_use]
+    pub fn at_exposure(mut self, time: f64) -> Self {
+        self.sensor = self.sensor.at_exposure(time);
+        self.metered = Some(time);
+        self
+    }
+
+    /// The exposure that was metered (s), where `auto_exposure` asks for it and there is light.
+    #[must_use]
+    pub fn metered(&self) -> Option<f64> {
+        self.metered
     }
 
     /// The sensor, in the bands of the light.
@@ -190,7 +235,16 @@ impl SensorLight {
     ///
     /// When the film is not the sensor's; a fault of this program.
     pub fn expose(&self, exposure: Exposure) -> Result<RawImage, SensorError> {
-        self.sensor.expose(self.film(), exposure, self.seeds[1])
+        self.expose_on(&self.sensor, exposure)
+    }
+
+    /// One exposure of a sensor that has the same film: the sensor's own, or its second read-out.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::expose`].
+    pub fn expose_on(&self, sensor: &Sensor, exposure: Exposure) -> Result<RawImage, SensorError> {
+        sensor.expose(self.film(), exposure, self.seeds[1])
     }
 
     /// What the sensor records in the mean over frames, and its variance, in one exposure.
@@ -204,6 +258,24 @@ impl SensorLight {
 
     fn film(&self) -> Film<'_> {
         Film { values: &self.film.values }
+    }
+
+    /// The parts of the pupil whose light is told apart, each by the name of its files.
+    pub fn parts(&self) -> impl ExactSizeIterator<Item = &'static str> + '_ {
+        self.film.parts.iter().map(|(layer, _)| part_name(*layer))
+    }
+
+    /// One exposure of the photodiodes that see a part of the pupil, by the number of the part: their electrons, and noise
+    /// of their own.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::expose`].
+    pub fn expose_part(&self, part: usize, exposure: Exposure) -> Result<RawImage, SensorError> {
+        let none = (LayerSpec::Radiance, Vec::new());
+        let (layer, values) = self.film.parts.get(part).unwrap_or(&none);
+        let seed = etendue_sensor::mixed_seed(self.seeds[1], part_name(*layer).as_bytes());
+        self.sensor.expose(Film { values }, exposure, seed)
     }
 }
 
@@ -224,6 +296,7 @@ pub fn write(
     let digits = digits(shots.len());
     let mut writer = ExposureWriter {
         sensor,
+        second: sensor.second(),
         light,
         files,
         folder,
@@ -235,6 +308,7 @@ pub fn write(
         exposed: Exposed { files: Vec::new(), notes: light.notes.clone() },
     };
     let mut sidecar = Sidecar::new(sensor, light.seeds);
+    sidecar.metered_exposure_s = light.metered;
     // One shot after the other, each with its entry in the sidecar.
     for (done, shot) in shots.iter().enumerate() {
         if !progress(done as f64 / shots.len() as f64) {
@@ -251,6 +325,29 @@ pub fn write(
     let path = writer.place("sensor.json");
     sidecar::write_json(files, &path, &sidecar)?;
     Ok(writer.exposed)
+}
+
+/// What the files of a part of the pupil are called.
+fn part_name(layer: LayerSpec) -> &'static str {
+    match layer {
+        LayerSpec::LeftPupil => "raw_left",
+        LayerSpec::RightPupil => "raw_right",
+        LayerSpec::TopLeftPupil => "raw_top_left",
+        LayerSpec::TopRightPupil => "raw_top_right",
+        LayerSpec::BottomLeftPupil => "raw_bottom_left",
+        _ => "raw_bottom_right",
+    }
+}
+
+/// The names of files of the photodiodes of a sensor.
+fn part_names(sensor: &Sensor) -> &'static [&'static str] {
+    match sensor.spec().photodiodes {
+        None => &[],
+        Some(Photodiodes::Dual) => &["raw_left", "raw_right"],
+        Some(Photodiodes::Quad) => {
+            &["raw_top_left", "raw_top_right", "raw_bottom_left", "raw_bottom_right"]
+        }
+    }
 }
 
 /// The seed of temporal noise: two frames or cameras of a scene, and two places of one camera, draw noise
@@ -285,7 +382,18 @@ pub fn files_of(sensor: &Sensor) -> Vec<String> {
     let merged = files::HDR_NAMES.iter().filter(|_| sensor.spec().hdr == Some(true));
     let merged = merged.map(|(name, _)| (*name).to_owned());
     let sidecar = ["sensor.json".to_owned()];
-    shots.iter().flat_map(shot).chain(moments).chain(merged).chain(sidecar).collect()
+    let second = shots.iter().filter(|_| sensor.spec().second_readout.is_some());
+    let of_second = |shot: &Exposure| {
+        ["png", "npy"].map(|ending| files::name(digits, files::SECOND, shot.frame, ending))
+    };
+    let second = second.flat_map(of_second);
+    let parts = part_names(sensor).iter().flat_map(|name| {
+        let of_part = |shot: &Exposure| {
+            ["png", "npy"].map(|ending| files::name(digits, name, shot.frame, ending))
+        };
+        shots.iter().flat_map(of_part).collect::<Vec<_>>()
+    });
+    shots.iter().flat_map(shot).chain(second).chain(parts).chain(moments).chain(merged).chain(sidecar).collect()
 }
 
 /// Digits of a shot's number in names; 0 for none.
