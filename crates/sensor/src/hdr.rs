@@ -17,9 +17,10 @@
 //! Where a sensor is not linear near saturation, `(y − b)/K` is taken through the inverse of its curve first, and `σ` is
 //! divided by its slope.
 //!
-//! Whether a number may be saturated is judged by the one before, which is less exposed: to leave out what came out
-//! saturated would keep those of the others that noise made too dark. Where that judgement goes by chance it favours
-//! the bright among the less exposed ones, by 0.4 of their standard deviation at most.
+//! A number counts when it lies four standard deviations of the read-out below saturation and all less exposed ones count.
+//! Near saturation, where that goes by chance, it favours those that noise made darker: by 0.4 of its own standard deviation at
+//! most, the peak of the normal density. To judge it by a less exposed number instead would go by chance over a range
+//! that is as many times wider as that number has more noise.
 
 use rayon::prelude::*;
 
@@ -91,10 +92,9 @@ impl Sensor {
             .collect();
         for (number, reading) in readings.iter().enumerate().skip(1) {
             let image = expose(reading.sensor, reading.shot)?;
-            let before = &readings[number - 1];
+            let limit = reading.limit();
             pilots.par_iter_mut().zip(&image.values).for_each(|(pilot, &y)| {
-                let may_saturate = !reading.stays_below(pilot.rate, before);
-                if pilot.count == number && !may_saturate {
+                if pilot.count == number && f64::from(y) < limit {
                     *pilot = Pilot { count: number + 1, rate: reading.rate(y) };
                 }
             });
@@ -199,12 +199,5 @@ impl Reading<'_> {
         let [own, other] = [self, twin].map(|reading| 1.0 / reading.of_read_out(electrons));
         let together = (electrons + 1.0 / (own + other)) / self.exposed().powi(2);
         own / (own + other) / together
-    }
-
-    /// Whether a pixel, of which so many electrons a second were found by `before`, is not saturated in this.
-    fn stays_below(&self, rate: f64, before: &Reading<'_>) -> bool {
-        let found = before.variance_of_rate(rate) + self.variance_of_rate(rate);
-        let most = self.electrons(rate) + MARGIN * found.sqrt() * self.exposed();
-        most < self.sensor.saturation()
     }
 }

@@ -24,6 +24,7 @@
 //! | [`sensor`] | a sensor ready to expose, and pictures of what it saw |
 //! | [`demosaic`] | missing colours |
 //! | [`dng`] | raw files |
+//! | [`packed`] | raw numbers of 10 and 12 bits as MIPI packs them |
 //! | [`emva`] | the image series of a characterisation |
 //! | [`slanted_edge`] | the modulation transfer of a camera from a picture of an edge |
 //! | [`photon_transfer`] | photon-transfer and SNR curves |
@@ -44,6 +45,7 @@ mod hdr;
 mod inertial;
 mod moments;
 mod normal;
+pub mod packed;
 mod philox;
 pub mod photon_transfer;
 mod poisson;
@@ -56,6 +58,7 @@ mod settings;
 pub mod slanted_edge;
 pub mod spec;
 mod whole_frame;
+mod window;
 
 pub use bands::{BandChoice, Factor, Illumination, Times};
 pub use cfa::CfaSpec;
@@ -67,9 +70,11 @@ pub use error::SensorError;
 pub use film::{Exposure, Film, InvalidValues, Moments, NoiseFloor, RawImage};
 pub use hdr::HdrImage;
 pub use inertial::{InertialError, InertialNoise, InertialNoiseSpec};
+pub use packed::Packing;
 pub use philox::mixed_seed;
 pub use preset::{Model, Preset};
 pub use sensor::Sensor;
+pub use window::Window;
 pub use spec::{
     ChannelSet, ChannelSpec, Channels, IsoSetting, NoiseModel, Radiometry, SensorKind, SensorSpec,
 };

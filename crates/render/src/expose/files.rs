@@ -214,7 +214,8 @@ impl ExposureWriter<'_> {
         let written = self.files.write(&path, |part| {
             let mut out = BufWriter::new(part);
             let white = &self.light.white;
-            let details = DngDetails { model, white, exposure: shot.exposure };
+            let (exposure, f_number) = (shot.exposure, self.light.f_number);
+            let details = DngDetails { model, white, exposure, f_number, shading: None };
             match self.sensor.write_dng(image, details, &mut out) {
                 Ok(()) => out.flush(),
                 Err(DngError::NotRaw(why)) => {

@@ -137,6 +137,8 @@ pub struct SensorLight {
     notes: Vec<String>,
     /// The exposure that `auto_exposure` found (s).
     metered: Option<f64>,
+    /// Of the lens.
+    f_number: Option<f64>,
 }
 
 impl SensorLight {
@@ -182,7 +184,9 @@ impl SensorLight {
         let seeds = [scene.render.seed, noise_seed(scene)];
         let white = sensor.white_under(&illumination::light(scene, sensor.bands()));
         let header = picture.header().to_vec();
-        let light = Self { sensor, film, seeds, white, header, notes, metered: None };
+        let lens = scene.camera.lens().map(etendue_camera::LensCamera::focused);
+        let f_number = lens.and_then(|lens| lens.paraxial().f_number);
+        let light = Self { sensor, film, seeds, white, header, notes, metered: None, f_number };
         Ok(Ok(light.metered_by_itself()))
     }
 
@@ -209,6 +213,47 @@ impl SensorLight {
         self.sensor = self.sensor.at_exposure(time);
         self.metered = Some(time);
         self
+    }
+
+    /// The same light times a factor; 0 of a sensor in the dark.
+    #[must_use]
+    pub fn scaled(mut self, factor: f64) -> Self {
+        self.film = self.film.times(factor).summed();
+        self
+    }
+
+    /// The light of one pixel on all of them.
+    #[must_use]
+    pub fn even(mut self, [column, row]: [usize; 2]) -> Self {
+        let [columns, _] = self.sensor.resolution().map(|side| side as usize);
+        let bands = self.film.bands.count();
+        let place = row * columns + column;
+        let everywhere = |values: &mut Vec<f32>| {
+            let Some(own) = values.chunks_exact(bands).nth(place).map(<[f32]>::to_vec) else { return };
+            values.chunks_exact_mut(bands).for_each(|pixel| pixel.copy_from_slice(&own));
+        };
+        everywhere(&mut self.film.values);
+        self.film.parts.iter_mut().for_each(|(_, values)| everywhere(values));
+        self
+    }
+
+    /// Mean photo-electrons that all but the brightest thousandth of the pixels have at most, in an exposure of so long
+    /// (s).
+    #[must_use]
+    pub fn brightest(&self, exposure: f64) -> f64 {
+        self.sensor.electrons_of_brightest(self.film(), exposure, 1e-3)
+    }
+
+    /// What each channel makes of a white surface in the scene's light, the most being 1.
+    #[must_use]
+    pub fn white(&self) -> &[f64] {
+        &self.white
+    }
+
+    /// The f-number of the lens, where there is one.
+    #[must_use]
+    pub fn f_number(&self) -> Option<f64> {
+        self.f_number
     }
 
     /// The exposure that was metered (s), where `auto_exposure` asks for it and there is light.

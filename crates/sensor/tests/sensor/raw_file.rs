@@ -24,7 +24,13 @@ fn taken(spec: Value) -> (Sensor, RawImage) {
 fn written(sensor: &Sensor, image: &RawImage) -> Result<Vec<u8>, DngError> {
     let mut bytes = Cursor::new(Vec::new());
     let white = sensor.white_response();
-    let details = DngDetails { model: "imx183", white: &white, exposure: 0.01 };
+    let details = DngDetails {
+        model: "imx183",
+        white: &white,
+        exposure: 0.01,
+        f_number: Some(2.8),
+        shading: None,
+    };
     sensor.write_dng(image, details, &mut bytes)?;
     Ok(bytes.into_inner())
 }

@@ -75,8 +75,8 @@ fn order_does_not_count_and_saturation_is_told() {
     assert!(sensor.merged(&[], expose).is_err());
 }
 
-/// Near a saturation the mean is bent by no more than the choice by a shorter exposure may: 0.4 (the peak of the normal
-/// density) of its standard deviation.
+/// Near a saturation the mean is bent by no more than the choice among numbers of one exposure may: 0.4 (the peak of the
+/// normal density) of its standard deviation.
 #[test]
 fn near_a_saturation_the_mean_holds() {
     let sensor = bracket();
@@ -86,9 +86,9 @@ fn near_a_saturation_the_mean_holds() {
         let expose = |sensor: &Sensor, shot| sensor.expose(Film { values: &film }, shot, 9);
         let image = sensor.merged(&shots, expose).unwrap();
         let [mean, spread] = moments(image.rate.iter().map(|&r| f64::from(r)));
-        let shorter = ((rate * 1e-3 + 10.0) / 1e-6).sqrt();
+        let own = ((rate * 1e-2 + 10.0) / 1e-4).sqrt();
         let error = spread.sqrt() / 256.0;
         let off = (mean - rate).abs();
-        assert!(off < 0.4 * shorter + 4.0 * error, "{share}: {mean} for {rate}, ±{shorter}");
+        assert!(off < 0.4 * own + 4.0 * error, "{share}: {mean} for {rate}, ±{own}");
     }
 }

@@ -76,9 +76,9 @@ fn what_is_merged_has_the_ratio_of_the_closed_form() {
         let mut range = 0.0;
         for k in 0..10 {
             let (film, rate) = film(&sensor, 0.5 * most / 10.0_f64.powf(0.4 * f64::from(k)));
-            // Where the first is near saturation the second judges by chance.
+            // Near saturation of the first it counts by chance.
             let share = rate * 0.01 / sensor.saturation();
-            if (0.7..1.3).contains(&share) {
+            if (0.85..1.15).contains(&share) {
                 continue;
             }
             range = 8.0 * f64::from(k);
