@@ -13,6 +13,7 @@
 //! | [`Frame`], [`Dataset`] | the pictures of a scene that has `frames`, and what others read of them |
 //! | [`Shard`], [`Shares`], [`Checkpoint`] | renders that are divided over machines, or interrupted |
 //! | [`TimeForecast`], [`Calibration`] | how long a render will take, by what this machine takes for a ray |
+//! | [`calibrate`] | the pictures by which a camera is calibrated |
 //! | [`Denoiser`] | Open Image Denoise, where its library is there |
 //! | [`Progress`] | how far work is, and how it is stopped |
 //! | [`Error`] | why something could not be done, in a sentence |
@@ -22,6 +23,7 @@
 //! `etendue-sensor` a sensor after EMVA 1288, `etendue-accel` an exact ray caster.
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests set their stage by hand"))]
 
+mod calibration_set;
 mod changes;
 mod dataset;
 mod error;
@@ -47,6 +49,7 @@ mod viewed;
 mod viewpoint;
 mod words;
 
+pub use calibration_set::{CalibrationOptions, calibrate};
 pub use dataset::Dataset;
 pub use error::Error;
 pub use etendue_files::Reach;

@@ -181,6 +181,11 @@ impl Session {
         self.shown.as_ref().map_or(&self.file, |(_, shown)| shown)
     }
 
+    /// Where files that the scene names may be.
+    pub(crate) fn reach(&self) -> etendue_files::Reach {
+        self.options.reach
+    }
+
     /// The scene file as it is now, whichever frame is shown.
     pub(crate) fn whole(&self) -> &SceneFile {
         &self.file
