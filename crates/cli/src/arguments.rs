@@ -15,7 +15,7 @@ use etendue_scene::import::Strictness;
 use etendue_tracer::LayerSpec;
 
 pub(crate) use tools::{
-    BenchArguments, CalibrateArguments, EdgeArguments, ExposeArguments, LensArguments, PackedArgument, PartArgument,
+    BenchArguments, CalibrateArguments, EdgeArguments, ExposeArguments, LensArguments, MatchArguments, PackedArgument, PartArgument,
     SpectrumArguments,
 };
 
@@ -61,6 +61,9 @@ pub(crate) enum Command {
     /// Take the pictures by which the camera of a scene is calibrated: darks, flats, white images, a chessboard
     #[command(after_help = tools::CALIBRATE_HELP)]
     Calibrate(CalibrateArguments),
+    /// Fit the sensor and the light of a scene to a raw photograph of it
+    #[command(after_help = tools::MATCH_HELP)]
+    Match(MatchArguments),
     /// Print what a curve over wavelengths is: XYZ, colour temperature, luminous efficacy, photons
     #[command(after_help = tools::SPECTRUM_HELP)]
     Spectrum(SpectrumArguments),

@@ -9,6 +9,7 @@ mod edge;
 mod expose;
 mod fault;
 mod lens;
+mod matching;
 mod merge;
 mod opencv;
 mod plan;
@@ -58,6 +59,7 @@ fn main() -> ExitCode {
         Some(Command::Sensor(arguments)) => sensor::run(&arguments),
         Some(Command::Expose(arguments)) => expose::run(&arguments),
         Some(Command::Calibrate(arguments)) => calibrate::run(&arguments),
+        Some(Command::Match(arguments)) => matching::run(&arguments),
         Some(Command::Spectrum(arguments)) => spectrum::run(&arguments),
         Some(Command::Edge(arguments)) => edge::run(&arguments),
         Some(Command::View(arguments)) => view(&arguments),

@@ -24,6 +24,7 @@
 //! | [`sensor`] | a sensor ready to expose, and pictures of what it saw |
 //! | [`demosaic`] | missing colours |
 //! | [`dng`] | raw files |
+//! | [`matching`] | the numbers of a sensor by which a simulation matches a photograph |
 //! | [`packed`] | raw numbers of 10 and 12 bits as MIPI packs them |
 //! | [`emva`] | the image series of a characterisation |
 //! | [`slanted_edge`] | the modulation transfer of a camera from a picture of an edge |
@@ -43,6 +44,7 @@ mod exposing;
 pub mod film;
 mod hdr;
 mod inertial;
+pub mod matching;
 mod moments;
 mod normal;
 pub mod packed;

@@ -229,7 +229,7 @@ impl Sensor {
     }
 
     /// Photo-electrons of the pixels, row by row; `of_pixel` makes one number of its channels.
-    fn rows_of_electrons<'a>(
+    pub(crate) fn rows_of_electrons<'a>(
         &'a self,
         film: Film<'a>,
         exposure: f64,

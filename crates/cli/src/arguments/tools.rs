@@ -281,6 +281,48 @@ pub(crate) enum PackedArgument {
     Raw12,
 }
 
+pub(super) const MATCH_HELP: &str = "\
+The paper's three steps: what is known of the sensor stands in the scene, the photograph is raw, and the
+scene is rendered and fitted to it: gain, read noise and black of the sensor, and the level of light in
+each channel, each with its standard deviation. The photograph is a DNG or TIFF without compression, or
+a grey PNG of 16 bits, of the scene's own view and size. With -o: match.json, residuals.png, where grey is
+no difference and black and white are 4 standard deviations, residuals.npy, and residuals.svg.
+
+Examples:
+  etendue match photo.dng chart.json
+  etendue match raw.png chart.json --set camera.sensor.prnu=0.005 -o out/match
+  etendue match photo.dng chart.json --json";
+
+#[derive(Debug, Args)]
+pub(crate) struct MatchArguments {
+    /// A raw photograph (.dng, .tif, .png)
+    #[arg(value_name = "PHOTO")]
+    pub(crate) photo: PathBuf,
+    /// The scene that it shows, with a raw sensor
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+    // Not a comment of documentation, whose brackets would be a link.
+    #[arg(
+        long = "set",
+        value_name = "PATH=VALUE",
+        value_parser = parse::setting,
+        help = "Set any value of the scene, e.g. camera.sensor.exposure=0.02"
+    )]
+    pub(crate) settings: Vec<(String, String)>,
+    /// Draw residuals and write what was found into this folder, made when it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Print JSON for machines
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Let the scene name files outside its own folder
+    #[arg(long)]
+    pub(crate) allow_outside: bool,
+    /// Show no progress and no notes
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
 pub(super) const SPECTRUM_HELP: &str = "\
 X, Y and Z are integrals of the curve times the CIE 1931 observer, not normalised; the curve is taken for
 light and is 0 beyond its ends. With --under it is a reflectance, and what it leaves of a lamp's light is

@@ -22,7 +22,7 @@ fn wall(sensor: &Value, more: &Value) -> Bench {
         },
         "tracer": { "type": "flat" },
         "objects": [{ "shape": "rectangle", "width": 99, "height": 99, "material": "paint" }],
-        "materials": { "paint": { "type": "matte", "color": [0.001, 0.001, 0.001] } },
+        "materials": { "paint": { "type": "matte", "color": [2e-5, 2e-5, 2e-5] } },
     });
     for (key, value) in more.as_object().unwrap() {
         scene[key] = value.clone();
@@ -41,7 +41,7 @@ fn refused(bench: &Bench, more: &[&str]) -> String {
 #[test]
 fn all_frames_have_the_exposure_of_the_first() {
     let frames = json!([
-        {}, { "materials.paint.color": [0.002, 0.002, 0.002] }, { "materials.paint.color": [0.0005, 0.0005, 0.0005] }
+        {}, { "materials.paint.color": [4e-5, 4e-5, 4e-5] }, { "materials.paint.color": [1e-5, 1e-5, 1e-5] }
     ]);
     let metering = |each: bool| {
         json!({ "auto_exposure": { "percentile": 90, "target": 0.4, "each_frame": each } })
@@ -201,7 +201,7 @@ fn lamp(sensor: &Value) -> Bench {
         },
         "tracer": { "type": "direct" }, "render": { "samples": 1024 },
         "objects": [{ "shape": "disk", "radius": 2e-4, "material": "lamp" }],
-        "materials": { "lamp": { "type": "emissive", "radiance": [1000, 1000, 1000] } },
+        "materials": { "lamp": { "type": "emissive", "radiance": [100, 100, 100] } },
         "lights": [],
     });
     Bench::with_scene(&scene.to_string())
@@ -247,8 +247,10 @@ fn halves_of_a_defocused_point_are_apart_and_make_the_whole() {
 #[test]
 fn what_a_camera_has_not_is_refused() {
     let dual = json!({ "photodiodes": "dual" });
-    let why = refused(&wall(&dual, &json!({})), &[]);
+    let why = refused(&wall(&dual, &json!({ "tracer": { "type": "direct" } })), &[]);
     assert!(why.contains("camera.sensor.photodiodes") && why.contains("one lens"), "{why}");
+    let why = refused(&lamp(&dual), &["--set", "tracer={\"type\": \"flat\"}"]);
+    assert!(why.contains("camera.sensor.photodiodes") && why.contains("`tracer` of light"), "{why}");
     let parts = json!({ "layers": ["left_pupil"], "tracer": { "type": "direct" } });
     let why = refused(&wall(&json!({}), &parts), &[]);
     assert!(why.contains("layers[0]") && why.contains("one lens"), "{why}");

@@ -31,6 +31,7 @@ use std::path::{Path, PathBuf};
 use etendue_files::{Transaction, WriteError};
 use etendue_report::{Decision, DecisionKind, DecisionValue};
 use etendue_scene::Scene;
+use etendue_sensor::matching::{MatchError, Matched, Photograph};
 use etendue_sensor::{
     Exposure, Film, InvalidValues, Moments, NoiseModel, Photodiodes, RawImage, Sensor, SensorError,
     SensorKind,
@@ -235,6 +236,15 @@ impl SensorLight {
         everywhere(&mut self.film.values);
         self.film.parts.iter_mut().for_each(|(_, values)| everywhere(values));
         self
+    }
+
+    /// Fits the sensor's numbers and the level of this light to a photograph of it.
+    ///
+    /// # Errors
+    ///
+    /// As [`Sensor::matched`].
+    pub fn matched(&self, exposure: f64, photo: Photograph<'_>) -> Result<Matched, MatchError> {
+        self.sensor.matched(self.film(), exposure, photo)
     }
 
     /// Mean photo-electrons that all but the brightest thousandth of the pixels have at most, in an exposure of so long

@@ -199,13 +199,6 @@ impl SceneFile {
         written.read_defects(&mut value, "camera.sensor")?;
         let mut file = Self { written, kind, value, spec: SceneSpec::default(), sensor: None };
         (file.spec, file.sensor) = file.check()?;
-        // Parts of pixels see parts of the light.
-        let photodiodes = file.sensor.as_ref().and_then(|sensor| sensor.spec().photodiodes);
-        for layer in photodiodes.map_or(&[][..], layers_of) {
-            if !file.spec.layers.contains(layer) {
-                file.spec.layers.push(*layer);
-            }
-        }
         let spec = &file.spec;
         let fault = samples::fault(&spec.render, &spec.sampling_layers(), &file.value)
             .or_else(|| spec.layer_fault())
@@ -229,7 +222,14 @@ impl SceneFile {
             None => {
                 file.check_times()?;
                 file.check_serial()?;
-                Ok(file)
+                // Parts of pixels see parts of the light.
+        let photodiodes = file.sensor.as_ref().and_then(|sensor| sensor.spec().photodiodes);
+        for layer in photodiodes.map_or(&[][..], layers_of) {
+            if !file.spec.layers.contains(layer) {
+                file.spec.layers.push(*layer);
+            }
+        }
+        Ok(file)
             }
         }
     }

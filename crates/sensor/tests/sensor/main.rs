@@ -5,6 +5,7 @@ mod bands;
 mod emva;
 mod environment;
 mod light;
+mod matching;
 mod noise;
 mod raw_file;
 mod refused;
