@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use etendue_sensor::dng::{DngDetails, DngError};
 use etendue_sensor::{
-    Defect, Exposure, Film, InvalidValues, NoiseModel, RawImage, Sensor, SensorKind, SensorSpec,
+    Defect, Exposure, Film, InvalidValues, Moments, NoiseModel, RawImage, Sensor, SensorKind, SensorSpec,
 };
 use rayon::prelude::*;
 use serde::Serialize;
@@ -276,6 +276,31 @@ impl ExposureWriter<'_> {
         Ok(HDR_NAMES.map(|(name, _)| name.to_owned()))
     }
 
+    /// Draws the ratio of signal above black to noise of every number, 20·log₁₀ of it from 0 dB (black) to 50 dB (white).
+    fn ratios(&mut self, moments: &Moments, name: &str, shot: Exposure) -> Result<(), ExposeError> {
+        let black = self.sensor.black_level() + self.sensor.system_gain() * self.sensor.dark_current() * shot.exposure;
+        let grey = |(mean, variance): (&f32, &f32)| {
+            let ratio = (f64::from(*mean) - black).max(0.0) / f64::from(*variance).max(1e-12).sqrt();
+            #[expect(clippy::cast_possible_truncation, reason = "a picture to look at")]
+            let grey = (20.0 * ratio.max(1e-9).log10() / WHITE_DECIBELS).clamp(0.0, 1.0) as f32;
+            grey
+        };
+        let all: Vec<f32> = moments.mean.iter().zip(&moments.variance).map(grey).collect();
+        let depth = moments.depth;
+        let plane = |k: usize| Values::F32(all.iter().skip(k).step_by(depth).copied().collect());
+        let definition = "signal to noise, 20 log10 of it, as a share of 50 dB";
+        let layer = Layer {
+            name: "Snr".to_owned(),
+            look: Look::Share,
+            channels: self.named((0..depth).map(plane).collect()),
+            meaning: self.meaning(definition, "50 dB", shot),
+        };
+        let header = self.light.header.clone();
+        let picture = Picture::new(moments.width, moments.height, vec![layer], header)?;
+        png::write(self.files, &self.place(name), &picture, "Snr", png::Bits::Eight)?;
+        Ok(())
+    }
+
     /// Writes expected value and variance of an exposure time, numbered as the exposure is.
     fn moments(&mut self, shot: Exposure) -> Result<MomentFiles, ExposeError> {
         #[expect(clippy::cast_possible_truncation, reason = "fewer than shots")]
@@ -284,6 +309,9 @@ impl ExposureWriter<'_> {
         // Mean and variance, a file each.
         let moments = self.sensor.moments(self.film(), shot)?;
         let depth = moments.depth;
+        if self.outputs.png && matches!(depth, 1 | 3) {
+            self.ratios(&moments, &snr_name(self.sensor, self.digits, number), shot)?;
+        }
         for ((stem, definition, unit, values), name) in [
             ("mean", "expected digital number", "DN", moments.mean),
             ("variance", "variance over frames, quantisation included", "DN^2", moments.variance),
@@ -305,6 +333,15 @@ impl ExposureWriter<'_> {
         }
         Ok(names)
     }
+}
+
+/// Decibels that are white in a map of ratios.
+const WHITE_DECIBELS: f64 = 50.0;
+
+/// The name of the map of ratios of signal to noise of the exposure time `number`.
+pub(super) fn snr_name(sensor: &Sensor, digits: usize, number: u32) -> String {
+    let [mean, _] = moment_names(sensor, digits, number);
+    mean.replace("raw_mean", "raw_snr").replace(".npy", ".preview.png")
 }
 
 /// The files of all exposures merged, and what is in them.
@@ -339,6 +376,9 @@ pub(super) struct Sidecar<'a> {
     white_level_dn: f64,
     saturation_level_dn: f64,
     system_gain_dn_per_electron: f64,
+    /// The light in lux, cd/m² and EV, where it has units.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) photometry: Option<super::Photometry>,
     /// The exposure that `auto_exposure` found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) metered_exposure_s: Option<f64>,
@@ -369,6 +409,7 @@ impl<'a> Sidecar<'a> {
             white_level_dn: sensor.white_level(),
             saturation_level_dn: sensor.saturation_level(),
             system_gain_dn_per_electron: sensor.system_gain(),
+            photometry: None,
             metered_exposure_s: None,
             channels: sensor.channels().collect(),
             white_balance: sensor.white_balance(),

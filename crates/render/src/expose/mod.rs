@@ -10,6 +10,7 @@
 //! | `raw_left.png`, `.npy`, `raw_right…`, `raw_top_left…`, … | the numbers of the photodiodes of dual and quad pixels |
 //! | `raw_second.png`, `raw_second.npy` | the second number of each pixel, of sensors that have two |
 //! | `raw_mean.npy`, `raw_variance.npy` | the expected value and variance of every pixel, once an exposure time, when asked for |
+//! | `raw_snr.preview.png` | beside those, the ratio of signal to noise from 0 to 50 dB; not data |
 //! | `raw_hdr.npy`, `raw_hdr_sigma.npy` | electrons a second of all exposures merged, when asked for |
 //! | `sensor.json` | what the numbers mean, and which file is which exposure |
 //!
@@ -22,6 +23,7 @@ mod files;
 mod film;
 mod illumination;
 mod noise;
+mod photometry;
 mod remarks;
 mod unit;
 
@@ -45,6 +47,7 @@ pub use film::BandFilm;
 pub use film::SPECTRUM;
 pub(crate) use film::{has_spectrum, spectrum, three_planes};
 pub(crate) use noise::NoiseOfPixels;
+pub use photometry::Photometry;
 pub use unit::{KNOWN_UNITS, LightUnit, pupil_solid_angle};
 
 use crate::film::NoMemory;
@@ -140,6 +143,8 @@ pub struct SensorLight {
     metered: Option<f64>,
     /// Of the lens.
     f_number: Option<f64>,
+    /// Of the pupil (sr).
+    solid_angle: Option<f64>,
 }
 
 impl SensorLight {
@@ -185,9 +190,10 @@ impl SensorLight {
         let seeds = [scene.render.seed, noise_seed(scene)];
         let white = sensor.white_under(&illumination::light(scene, sensor.bands()));
         let header = picture.header().to_vec();
+        let solid_angle = scene.camera.pupil_solid_angle();
         let lens = scene.camera.lens().map(etendue_camera::LensCamera::focused);
         let f_number = lens.and_then(|lens| lens.paraxial().f_number);
-        let light = Self { sensor, film, seeds, white, header, notes, metered: None, f_number };
+        let light = Self { sensor, film, seeds, white, header, notes, metered: None, f_number, solid_angle };
         Ok(Ok(light.metered_by_itself()))
     }
 
@@ -364,6 +370,7 @@ pub fn write(
     };
     let mut sidecar = Sidecar::new(sensor, light.seeds);
     sidecar.metered_exposure_s = light.metered;
+    sidecar.photometry = light.photometry();
     // One shot after the other, each with its entry in the sidecar.
     for (done, shot) in shots.iter().enumerate() {
         if !progress(done as f64 / shots.len() as f64) {
@@ -432,7 +439,10 @@ pub fn files_of(sensor: &Sensor) -> Vec<String> {
     // Fewer exposure times than shots, numbered alike.
     let moments: BTreeSet<String> = (0..)
         .zip(shots.iter().filter(|_| has_moments))
-        .flat_map(|(number, _)| files::moment_names(sensor, digits, number))
+        .flat_map(|(number, _)| {
+            let [mean, variance] = files::moment_names(sensor, digits, number);
+            [mean, variance, files::snr_name(sensor, digits, number)]
+        })
         .collect();
     let merged = files::HDR_NAMES.iter().filter(|_| sensor.spec().hdr == Some(true));
     let merged = merged.map(|(name, _)| (*name).to_owned());

@@ -8,5 +8,6 @@ mod light;
 mod matching;
 mod noise;
 mod raw_file;
+mod readout;
 mod refused;
 mod slanted_edge;
