@@ -15,8 +15,8 @@ use etendue_scene::import::Strictness;
 use etendue_tracer::LayerSpec;
 
 pub(crate) use tools::{
-    BenchArguments, CalibrateArguments, EdgeArguments, ExposeArguments, LensArguments, MatchArguments, PackedArgument, PartArgument,
-    SpectrumArguments,
+    BenchArguments, CalibrateArguments, EdgeArguments, ExposeArguments, LensArguments,
+    MatchArguments, PackedArgument, PartArgument, SpectrumArguments,
 };
 
 /// Simulates computational cameras: what a sensor records of a scene, with exact ground truth beside

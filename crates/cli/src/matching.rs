@@ -5,7 +5,8 @@ use std::io::Write as _;
 use std::path::Path;
 
 use etendue::{
-    Channel, Layer, Look, Options, Outputs, PhotoMatch, Picture, RawPhoto, Session, Values, match_photo, places,
+    Channel, Layer, Look, Options, Outputs, PhotoMatch, Picture, RawPhoto, Session, Values,
+    match_photo, places,
 };
 use etendue_chart::{Axis, Chart, Series, Theme};
 use etendue_files::{Reach, Transaction};
@@ -154,13 +155,18 @@ fn histogram(residuals: &[f32]) -> String {
     for &residual in residuals.iter().filter(|r| r.is_finite()) {
         all += 1.0;
         let place = (f64::from(residual) + f64::from(SHOWN)) / width;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked before")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "checked before"
+        )]
         if (0.0..BINS as f64).contains(&place) {
             counts[place as usize] += 1.0;
         }
     }
     let middle = |k: usize| (k as f64 + 0.5) * width - f64::from(SHOWN);
-    let found: Vec<[f64; 2]> = (0..BINS).map(|k| [middle(k), counts[k] / f64::max(all, 1.0) / width]).collect();
+    let found: Vec<[f64; 2]> =
+        (0..BINS).map(|k| [middle(k), counts[k] / f64::max(all, 1.0) / width]).collect();
     let normal = |x: f64| (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
     let normal: Vec<[f64; 2]> = (0..BINS).map(|k| [middle(k), normal(middle(k))]).collect();
     let series = vec![

@@ -33,7 +33,8 @@ impl RawPhoto {
     /// When it cannot be read, or holds a developed picture; the message names the file and what to do.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let refuse = |why: String| Error::Refused(format!("{}: {why}", path.display()));
-        let bytes = etendue_files::read(path, LONGEST).map_err(|error| refuse(error.to_string()))?;
+        let bytes =
+            etendue_files::read(path, LONGEST).map_err(|error| refuse(error.to_string()))?;
         if dng::is_tiff(&bytes) {
             let read = dng::read(&bytes, Limits::default()).map_err(refuse)?;
             let dng::RawDng { size, numbers, white, exposure, .. } = read;
@@ -43,7 +44,9 @@ impl RawPhoto {
             .map_err(|error| refuse(format!("{error}; give a DNG, or a PNG of raw numbers")))?;
         let developed = "is a developed picture, gamma-encoded: give the camera's raw numbers, as a DNG or a grey PNG of 16 bits";
         match (raster.size(), raster.channels(), raster.into_samples()) {
-            (size, 1, Samples::U16(numbers)) => Ok(Self { size, numbers, white: None, exposure: None }),
+            (size, 1, Samples::U16(numbers)) => {
+                Ok(Self { size, numbers, white: None, exposure: None })
+            }
             _ => Err(refuse(developed.to_owned())),
         }
     }
@@ -98,7 +101,8 @@ pub fn match_photo(
     let rendering = session.render(progress)?;
     let light = rendering.sensor_light().ok_or_else(idle)?;
     let sensor = light.sensor();
-    let Exposure { exposure, .. } = sensor.shots().next().unwrap_or(Exposure { exposure: 0.01, frame: 0 });
+    let Exposure { exposure, .. } =
+        sensor.shots().next().unwrap_or(Exposure { exposure: 0.01, frame: 0 });
     let photograph = Photograph { size: photo.size, numbers: &photo.numbers, white: photo.white };
     let matched = light.matched(exposure, photograph).map_err(|error| match error {
         MatchError::Sensor(error) => ExposeError::from(error).into(),

@@ -132,7 +132,8 @@ fn length_of(kind: usize) -> usize {
 impl Directory<'_> {
     /// All values of a tag; none where it is not there.
     fn all(&self, tag: u16) -> Result<Vec<f64>, String> {
-        let Some(&(_, kind, count, place)) = self.entries.iter().find(|entry| entry.0 == tag) else {
+        let Some(&(_, kind, count, place)) = self.entries.iter().find(|entry| entry.0 == tag)
+        else {
             return Ok(Vec::new());
         };
         if count > MOST_VALUES {
@@ -147,7 +148,11 @@ impl Directory<'_> {
             let whole = |from: usize, length| self.file.number(at.checked_add(from)?, length);
             Some(match kind {
                 5 => whole(0, 4)? as f64 / whole(4, 4)? as f64,
-                #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "four bytes")]
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_possible_wrap,
+                    reason = "four bytes"
+                )]
                 10 => f64::from(whole(0, 4)? as u32 as i32) / f64::from(whole(4, 4)? as u32 as i32),
                 11 => f64::from(f32::from_bits(u32::try_from(whole(0, 4)?).ok()?)),
                 12 => f64::from_bits(whole(0, 8)? as u64),
@@ -199,9 +204,15 @@ impl Directory<'_> {
         numbers.resize(pixels, 0);
         let is_tiled = !self.all(324)?.is_empty();
         let (places, lengths, wide, tall) = match is_tiled {
-            true => (self.all(324)?, self.all(325)?, self.whole(322, "tile width")?, self.whole(323, "tile height")?),
+            true => (
+                self.all(324)?,
+                self.all(325)?,
+                self.whole(322, "tile width")?,
+                self.whole(323, "tile height")?,
+            ),
             false => {
-                let rows = self.first(278)?.map_or(Ok(height), |_| self.whole(278, "rows a strip"))?;
+                let rows =
+                    self.first(278)?.map_or(Ok(height), |_| self.whole(278, "rows a strip"))?;
                 (self.all(273)?, self.all(279)?, width, rows.min(height))
             }
         };
@@ -216,9 +227,13 @@ impl Directory<'_> {
             let [left, top] = [k % across * wide, k / across * tall];
             // Strips end with the picture, tiles go on.
             let rows = if is_tiled { tall } else { tall.min(height - top) };
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked below")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "checked below"
+            )]
             let start = *place as usize;
-            let length = (wide * bits).div_ceil(8) * rows;
+            let length = (wide * bits).div_ceil(8).saturating_mul(rows);
             let told = lengths.get(k).copied().unwrap_or(f64::INFINITY);
             let block = start
                 .checked_add(length)
@@ -244,7 +259,8 @@ impl Directory<'_> {
                 _ => {
                     let Range { start, end } = k * bits..(k + 1) * bits;
                     let byte = |at: usize| u32::from(bytes.get(at).copied().unwrap_or(0));
-                    let three = byte(start / 8) << 16 | byte(start / 8 + 1) << 8 | byte(start / 8 + 2);
+                    let three =
+                        byte(start / 8) << 16 | byte(start / 8 + 1) << 8 | byte(start / 8 + 2);
                     let shifted = three >> (24 - (end - start / 8 * 8));
                     #[expect(clippy::cast_possible_truncation, reason = "at most 15 bits")]
                     let number = (shifted & ((1 << bits) - 1)) as u16;
@@ -308,7 +324,10 @@ mod tests {
             let data: Vec<u8> = numbers.iter().flat_map(|&n| word(n)).collect();
             let found = read(&file(&tags(16, 16), &data, is_big), Limits::default()).unwrap();
             assert_eq!((found.size, &found.numbers[..]), ([4, 2], &numbers[..]));
-            assert_eq!((found.black, found.white, found.exposure), (Some(64.0), Some(1023.0), None));
+            assert_eq!(
+                (found.black, found.white, found.exposure),
+                (Some(64.0), Some(1023.0), None)
+            );
         }
         // Ten bits after ten bits, each row from a byte on.
         let data: Vec<u8> = numbers

@@ -64,7 +64,11 @@ impl GainMap {
         // A half of the way to the next point, all around.
         let span = |k: usize, count: usize, length: usize| {
             let [way, middle] = [length as f64 / (count - 1) as f64, k as f64];
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place in it")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a place in it"
+            )]
             let place = |at: f64| (at * way).round().clamp(0.0, length as f64) as usize;
             let from = place(middle - 0.25).min(length.saturating_sub(1));
             from..place(middle + 0.25).max(from + 1)

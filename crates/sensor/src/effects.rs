@@ -226,7 +226,12 @@ impl AngularResponse {
         }
         let shift = self.lens_shift.unwrap_or(0.0);
         let demand = "degrees, 0 or more, below 90";
-        SensorError::unless((0.0..90.0).contains(&shift), "angular_response.lens_shift", shift, demand)
+        SensorError::unless(
+            (0.0..90.0).contains(&shift),
+            "angular_response.lens_shift",
+            shift,
+            demand,
+        )
     }
 }
 
@@ -265,7 +270,10 @@ impl Nonlinearity {
         let value = |value, demand| SensorError::Value { key, value, demand };
         let last = points.last().map_or(0.0, |point| point[0]);
         if last != 1.0 {
-            return Err(value(last, "points [collected, read] as shares of the full well, up to 1 collected"));
+            return Err(value(
+                last,
+                "points [collected, read] as shares of the full well, up to 1 collected",
+            ));
         }
         let mut all = vec![[0.0; 2]];
         for &[collected, read] in points.iter().filter(|point| **point != [0.0; 2]) {
@@ -274,7 +282,10 @@ impl Nonlinearity {
                 return Err(value(collected, "shares collected that ascend from 0 to 1"));
             }
             if !(read > below && read <= 2.0) {
-                return Err(value(read, "shares read that ascend: two signals of one number cannot be told apart"));
+                return Err(value(
+                    read,
+                    "shares read that ascend: two signals of one number cannot be told apart",
+                ));
             }
             all.push([collected, read]);
         }
@@ -334,7 +345,8 @@ impl Effects {
             let inside = (0.0..=1.0).contains(&value);
             SensorError::unless(inside, key, value, "a fraction in 0..=1").map(|()| value)
         };
-        let of_a_well = spec.nonlinearity.is_some() || spec.blooming.is_some_and(|share| share > 0.0);
+        let of_a_well =
+            spec.nonlinearity.is_some() || spec.blooming.is_some_and(|share| share > 0.0);
         if of_a_well && full_well.is_infinite() {
             let why = "nonlinearity and blooming count from the electrons that a pixel holds";
             return Err(SensorError::Missing { key: "full_well", why });
@@ -342,7 +354,12 @@ impl Effects {
         let nonlinearity = spec.nonlinearity.as_deref().map(Nonlinearity::new).transpose()?;
         let diffusion = spec.carrier_diffusion.map_or(0.0, |length| length.0);
         let demand = "micrometres, 0 or more, up to 1000";
-        SensorError::unless((0.0..=1000.0).contains(&diffusion), "carrier_diffusion", diffusion, demand)?;
+        SensorError::unless(
+            (0.0..=1000.0).contains(&diffusion),
+            "carrier_diffusion",
+            diffusion,
+            demand,
+        )?;
         if let Some(metering) = spec.auto_exposure {
             metering.check()?;
         }
@@ -366,7 +383,12 @@ impl Effects {
         for at in &listed {
             let demand = "columns of the sensor";
             SensorError::unless(at.column < columns, "defect_map", f64::from(at.column), demand)?;
-            SensorError::unless(at.row < rows, "defect_map", f64::from(at.row), "rows of the sensor")?;
+            SensorError::unless(
+                at.row < rows,
+                "defect_map",
+                f64::from(at.row),
+                "rows of the sensor",
+            )?;
             if at.kind == Defect::Hot && spec.hot_pixels.is_none() {
                 let why = "the map has hot pixels, and nobody says how hot they are: give { \"share\": 0, \
                            \"dark_current\": 50 } (e⁻/s)";
@@ -418,7 +440,10 @@ mod tests {
 
     #[test]
     fn shifted_lenses_move_the_curve() {
-        let response = AngularResponse { curve: vec![[0.0, 1.0], [10.0, 0.9], [30.0, 0.5]], lens_shift: Some(20.0) };
+        let response = AngularResponse {
+            curve: vec![[0.0, 1.0], [10.0, 0.9], [30.0, 0.5]],
+            lens_shift: Some(20.0),
+        };
         assert_eq!(response.at(0.0, 0.0), 1.0);
         assert_eq!(response.at(20.0, 1.0), 1.0);
         // Ten degrees from the design, on either side.

@@ -5,11 +5,12 @@ use std::borrow::Cow;
 use rayon::prelude::*;
 
 use crate::Sensor;
-use crate::chain::{self, BLOCK, BlockPlace, BlockValues, Chain, Responsivity};
+use crate::chain::{self, BLOCK, BlockPlace, BlockValues, Chain};
 use crate::effects::Effects;
 use crate::film::{Exposure, Film, InvalidValues};
 use crate::normal::pair;
 use crate::philox::{PhiloxKey, Site, Stage};
+use crate::responsivity::Responsivity;
 use crate::spec::{NoiseModel, Radiometry};
 use crate::whole_frame::WholeFrame;
 

@@ -132,9 +132,7 @@ fn readings<'a>(readouts: [Option<&'a Sensor>; 2], shots: &[Exposure]) -> Vec<Re
         .flat_map(|sensor| shots.iter().map(move |&shot| Reading { sensor, shot, twin: None }))
         .collect();
     // By the light that each can tell, the most first.
-    readings.sort_by(|a, b| {
-        b.most().total_cmp(&a.most()).then(a.shot.frame.cmp(&b.shot.frame))
-    });
+    readings.sort_by(|a, b| b.most().total_cmp(&a.most()).then(a.shot.frame.cmp(&b.shot.frame)));
     for number in 0..readings.len() {
         let own = &readings[number];
         let has_twin = |(other, reading): (usize, &Reading<'_>)| {

@@ -44,6 +44,7 @@ mod exposing;
 pub mod film;
 mod hdr;
 mod inertial;
+mod least_squares;
 pub mod matching;
 mod moments;
 mod normal;
@@ -54,8 +55,9 @@ mod poisson;
 pub mod preset;
 mod presets;
 mod response;
-pub mod sensor;
+mod responsivity;
 mod second;
+pub mod sensor;
 mod settings;
 pub mod slanted_edge;
 pub mod spec;
@@ -76,7 +78,7 @@ pub use packed::Packing;
 pub use philox::mixed_seed;
 pub use preset::{Model, Preset};
 pub use sensor::Sensor;
-pub use window::Window;
 pub use spec::{
     ChannelSet, ChannelSpec, Channels, IsoSetting, NoiseModel, Radiometry, SensorKind, SensorSpec,
 };
+pub use window::Window;

@@ -23,6 +23,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::film::Film;
+use crate::least_squares::NormalEquations;
 use crate::{Sensor, SensorError};
 
 /// Fits are repeated so often; the last change a parameter by less than a thousandth of its σ.
@@ -45,7 +46,9 @@ const CERTAIN: f64 = 8.0;
 #[non_exhaustive]
 pub enum MatchError {
     /// A sensor of several numbers a pixel.
-    #[error("the scene's sensor has {0} numbers a pixel, and a raw photograph one: set camera.sensor.type to `raw`, with the photograph's `cfa`")]
+    #[error(
+        "the scene's sensor has {0} numbers a pixel, and a raw photograph one: set camera.sensor.type to `raw`, with the photograph's `cfa`"
+    )]
     NotRaw(usize),
     /// A photograph of other columns and rows.
     #[error("has {} x {} pixels, and the scene's sensor {} x {}: set camera.sensor.resolution to the photograph's", .photo[0], .photo[1], .sensor[0], .sensor[1])]
@@ -56,7 +59,9 @@ pub enum MatchError {
         sensor: [usize; 2],
     },
     /// Too many pixels at an end of the scale.
-    #[error("is clipped: {share:.1} % of its pixels are at {level}, the {end} of its scale; {remedy}")]
+    #[error(
+        "is clipped: {share:.1} % of its pixels are at {level}, the {end} of its scale; {remedy}"
+    )]
     Clipped {
         /// Percent.
         share: f64,
@@ -68,10 +73,14 @@ pub enum MatchError {
         remedy: &'static str,
     },
     /// Numbers that do not go with the light.
-    #[error("is not linear in the scene's light: its numbers bend by {0:.0} % of the brightest; it is gamma-encoded or developed, or shows another scene; give the raw numbers, linearised")]
+    #[error(
+        "is not linear in the scene's light: its numbers bend by {0:.0} % of the brightest; it is gamma-encoded or developed, or shows another scene; give the raw numbers, linearised"
+    )]
     NotLinear(f64),
     /// One level of light, or none.
-    #[error("shows too few levels of light to tell gain from noise and light from black: photograph a step chart, or a scene with dark and bright parts")]
+    #[error(
+        "shows too few levels of light to tell gain from noise and light from black: photograph a step chart, or a scene with dark and bright parts"
+    )]
     OneLevel,
     /// A film that is not the sensor's.
     #[error(transparent)]
@@ -179,7 +188,12 @@ impl Sensor {
         let white = photo.white.unwrap_or_else(|| self.saturation_level());
         not_clipped(photo.numbers, white)?;
         let electrons = self.electrons_of_pixels(film, exposure)?;
-        let pixels = Pixels { sensor: self, electrons: &electrons, numbers: photo.numbers, columns: size[0] };
+        let pixels = Pixels {
+            sensor: self,
+            electrons: &electrons,
+            numbers: photo.numbers,
+            columns: size[0],
+        };
         let mut fit = self.first_fit(exposure);
         let limit = |fit: &Fit| NEARLY_SATURATED * (white - fit.line[0]) + fit.line[0];
         // The first line is of what is dark enough by itself.
@@ -187,12 +201,14 @@ impl Sensor {
         pixels.fit_line(&mut fit, &by_number)?;
         for _ in 0..ROUNDS {
             let [line, most] = [fit.line.clone(), vec![limit(&fit)]];
-            let is_used = move |channel: usize, x: f64, _: f64| line[0] + line[1 + channel] * x < most[0];
+            let is_used =
+                move |channel: usize, x: f64, _: f64| line[0] + line[1 + channel] * x < most[0];
             pixels.fit_noise(&mut fit, &is_used)?;
             pixels.fit_line(&mut fit, &is_used)?;
         }
         let [line, most] = [fit.line.clone(), vec![limit(&fit)]];
-        let is_used = move |channel: usize, x: f64, _: f64| line[0] + line[1 + channel] * x < most[0];
+        let is_used =
+            move |channel: usize, x: f64, _: f64| line[0] + line[1 + channel] * x < most[0];
         pixels.not_bent(&fit, &is_used)?;
         Ok(self.told(&fit, &pixels, &is_used, exposure))
     }
@@ -268,7 +284,8 @@ impl Sensor {
             .collect();
         let brightest = pixels.brightest_channel();
         let reference = levels.get(brightest).map_or(gain, |channel| channel.level);
-        let exposure = Estimate { value: exposure * reference.value, sigma: exposure * reference.sigma };
+        let exposure =
+            Estimate { value: exposure * reference.value, sigma: exposure * reference.sigma };
         let residuals = pixels.residuals(fit, is_used);
         let used = residuals.par_iter().filter(|r| r.is_finite()).count() as u64;
         let structure = structure(&residuals, pixels.columns);
@@ -299,7 +316,8 @@ impl Pixels<'_> {
     fn row(&self, row: usize) -> impl Iterator<Item = (usize, f64, f64)> + '_ {
         let range = row * self.columns..(row + 1) * self.columns;
         let both = self.electrons[range.clone()].iter().zip(&self.numbers[range]);
-        both.enumerate().map(move |(column, (&x, &y))| (self.sensor.channel_at(row, column), x, f64::from(y)))
+        both.enumerate()
+            .map(move |(column, (&x, &y))| (self.sensor.channel_at(row, column), x, f64::from(y)))
     }
 
     fn rows(&self) -> usize {
@@ -404,7 +422,11 @@ impl Pixels<'_> {
         }
     }
 
-    fn residuals(&self, fit: &Fit, is_used: &(impl Fn(usize, f64, f64) -> bool + Sync)) -> Vec<f32> {
+    fn residuals(
+        &self,
+        fit: &Fit,
+        is_used: &(impl Fn(usize, f64, f64) -> bool + Sync),
+    ) -> Vec<f32> {
         let rows = (0..self.rows()).into_par_iter();
         rows.flat_map_iter(|row| {
             let residual = |(channel, x, y): (usize, f64, f64)| {
@@ -440,12 +462,22 @@ fn not_clipped(numbers: &[u16], white: f64) -> Result<(), MatchError> {
     let bright = share(&|y| f64::from(**y) >= white);
     if bright > MOST_CLIPPED {
         let remedy = "photograph it with a shorter exposure or less light";
-        return Err(MatchError::Clipped { share: 100.0 * bright, level: white, end: "upper end", remedy });
+        return Err(MatchError::Clipped {
+            share: 100.0 * bright,
+            level: white,
+            end: "upper end",
+            remedy,
+        });
     }
     let dark = share(&|y| **y == 0);
     if dark > MOST_CLIPPED {
         let remedy = "leave the black level in the raw numbers";
-        return Err(MatchError::Clipped { share: 100.0 * dark, level: 0.0, end: "lower end", remedy });
+        return Err(MatchError::Clipped {
+            share: 100.0 * dark,
+            level: 0.0,
+            end: "lower end",
+            remedy,
+        });
     }
     Ok(())
 }
@@ -468,73 +500,4 @@ fn structure(residuals: &[f32], columns: usize) -> f64 {
         }
     }
     (sum / f64::max(blocks, 1.0)).sqrt()
-}
-
-/// Sums of weighted least squares.
-#[derive(Debug, Clone)]
-struct NormalEquations {
-    matrix: Vec<Vec<f64>>,
-    right: Vec<f64>,
-}
-
-impl NormalEquations {
-    fn new(count: usize) -> Self {
-        Self { matrix: vec![vec![0.0; count]; count], right: vec![0.0; count] }
-    }
-
-    fn add(&mut self, terms: &[f64], value: f64, weight: f64) {
-        for (i, &term) in terms.iter().enumerate().filter(|(_, term)| **term != 0.0) {
-            self.right[i] += weight * term * value;
-            for (sum, other) in self.matrix[i].iter_mut().zip(terms) {
-                *sum += weight * term * other;
-            }
-        }
-    }
-
-    fn add_all(&mut self, other: &Self) {
-        for (own, row) in self.matrix.iter_mut().zip(&other.matrix) {
-            own.iter_mut().zip(row).for_each(|(own, other)| *own += other);
-        }
-        self.right.iter_mut().zip(&other.right).for_each(|(own, other)| *own += other);
-    }
-
-    /// The solution and the inverse, by Gauss and Jordan on a matrix whose diagonal is 1; `None` where it is singular.
-    fn solved(&self) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
-        let count = self.right.len();
-        let scale: Vec<f64> = (0..count).map(|i| self.matrix[i][i].sqrt()).collect();
-        if scale.iter().any(|scale| !(*scale > 0.0 && scale.is_finite())) {
-            return None;
-        }
-        let mut own: Vec<Vec<f64>> = (0..count)
-            .map(|i| (0..count).map(|k| self.matrix[i][k] / (scale[i] * scale[k])).collect())
-            .collect();
-        let mut inverse: Vec<Vec<f64>> =
-            (0..count).map(|i| (0..count).map(|k| f64::from(u8::from(i == k))).collect()).collect();
-        for i in 0..count {
-            let pivot = (i..count).max_by(|&a, &b| own[a][i].abs().total_cmp(&own[b][i].abs()))?;
-            own.swap(i, pivot);
-            inverse.swap(i, pivot);
-            let divisor = own[i][i];
-            // Terms that are nearly one another's multiples.
-            if divisor.abs() < 1e-9 {
-                return None;
-            }
-            own[i].iter_mut().chain(&mut inverse[i]).for_each(|value| *value /= divisor);
-            for k in (0..count).filter(|&k| k != i) {
-                let factor = own[k][i];
-                for column in 0..count {
-                    own[k][column] -= factor * own[i][column];
-                    inverse[k][column] -= factor * inverse[i][column];
-                }
-            }
-        }
-        let inverse: Vec<Vec<f64>> = (0..count)
-            .map(|i| (0..count).map(|k| inverse[i][k] / (scale[i] * scale[k])).collect())
-            .collect();
-        let solution = inverse
-            .iter()
-            .map(|row| row.iter().zip(&self.right).map(|(a, b)| a * b).sum())
-            .collect();
-        Some((solution, inverse))
-    }
 }

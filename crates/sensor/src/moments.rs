@@ -75,7 +75,8 @@ impl PixelLaw<'_> {
         let unclipped = low > 0.5 && high < self.white - 0.5 && mean + reach < self.full_well;
         if unclipped
             && self.curve.is_none()
-            && let Some(moments) = self.unclipped() {
+            && let Some(moments) = self.unclipped()
+        {
             return moments;
         }
         let pivot = quantised(self.level(mean.min(self.full_well)), self.white);

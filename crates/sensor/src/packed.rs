@@ -50,8 +50,12 @@ impl Packing {
         let columns = image.width * image.depth;
         let divides = image.depth == 1 && columns.is_multiple_of(count);
         let demand = match self {
-            Self::Raw10 => "a width of one number a pixel that four divide, as RAW10 packs four of them together",
-            Self::Raw12 => "an even width of one number a pixel, as RAW12 packs two of them together",
+            Self::Raw10 => {
+                "a width of one number a pixel that four divide, as RAW10 packs four of them together"
+            }
+            Self::Raw12 => {
+                "an even width of one number a pixel, as RAW12 packs two of them together"
+            }
         };
         SensorError::unless(divides, "packed", columns as f64, demand)?;
         let most = image.values.iter().copied().max().unwrap_or(0);
@@ -65,7 +69,8 @@ impl Packing {
         for group in image.values.chunks_exact(count) {
             #[expect(clippy::cast_possible_truncation, reason = "eight bits of ten or twelve")]
             packed.extend(group.iter().map(|value| (value >> low) as u8));
-            let rests = group.iter().zip(0..).map(|(value, k)| (value & ((1 << low) - 1)) << (k * low));
+            let rests =
+                group.iter().zip(0..).map(|(value, k)| (value & ((1 << low) - 1)) << (k * low));
             #[expect(clippy::cast_possible_truncation, reason = "eight bits in all")]
             packed.push(rests.sum::<u16>() as u8);
         }

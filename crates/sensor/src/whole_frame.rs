@@ -66,7 +66,8 @@ mod tests {
             let mut frame = WholeFrame { width, values };
             frame.bloom(share, (well, dark));
             let column: Vec<f64> = frame.values.iter().skip(1).step_by(width).copied().collect();
-            let gained: f64 = column.iter().enumerate().filter(|(r, _)| *r != 20).map(|(_, v)| v).sum();
+            let gained: f64 =
+                column.iter().enumerate().filter(|(r, _)| *r != 20).map(|(_, v)| v).sum();
             // Sums of at most ten numbers of 10³.
             assert!((gained - share * wells * (well - dark)).abs() < 1e-9, "{share}: {gained}");
             let full = column.iter().filter(|v| (**v - (well - dark)).abs() < 1e-9).count();

@@ -42,9 +42,19 @@ impl Sensor {
         refuse(y.is_multiple_of(tall), "region", y as f64, demand)?;
         refuse((1..=64).contains(&binning), "binning", binning as f64, "1 to 64 pixels a side")?;
         let demand = "a width that divides into bins of whole tiles of filters";
-        refuse(width.is_multiple_of(wide * binning) || binning == 1, "binning", width as f64, demand)?;
+        refuse(
+            width.is_multiple_of(wide * binning) || binning == 1,
+            "binning",
+            width as f64,
+            demand,
+        )?;
         let demand = "a height that divides into bins of whole tiles of filters";
-        refuse(height.is_multiple_of(tall * binning) || binning == 1, "binning", height as f64, demand)?;
+        refuse(
+            height.is_multiple_of(tall * binning) || binning == 1,
+            "binning",
+            height as f64,
+            demand,
+        )?;
         let depth = image.depth;
         let mut values = Vec::with_capacity(width * height * depth / (binning * binning));
         let share = 1.0 / (binning * binning) as f64;

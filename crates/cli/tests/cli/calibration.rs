@@ -26,7 +26,7 @@ fn chart(sensor: &Value) -> Value {
         .collect();
     let materials: serde_json::Map<String, Value> = (0..12)
         .map(|k| {
-            let level = 0.9 * 10.0_f64.powf(-f64::from(k) * 0.15);
+            let level = 3e-4 * 10.0_f64.powf(-f64::from(k) * 0.15);
             (format!("step{k}"), json!({ "type": "matte", "color": [level, level, level] }))
         })
         .collect();
@@ -36,8 +36,7 @@ fn chart(sensor: &Value) -> Value {
             "type": "thin_lens", "focal_length": "1 mm", "f_number": 4, "focus_distance": "1 m",
             "pose": { "from": [0, 0, 1], "look_at": [0, 0, 0] }, "sensor": own,
         },
-        "tracer": { "type": "direct" }, "render": { "samples": 16 },
-        "lights": [{ "type": "environment", "radiance": [0.01, 0.01, 0.01] }],
+        "tracer": { "type": "flat" }, "render": { "samples": 16 },
         "objects": patches, "materials": materials,
     })
 }
@@ -64,7 +63,17 @@ fn moments(values: &[f64]) -> [f64; 2] {
 fn a_set_is_of_the_scenes_own_camera() {
     let bench = bench(&json!({ "prnu": 0 }));
     let output = bench.run(&[
-        "calibrate", "scene.json", "-o", "out", "--quiet", "--frames", "4", "--boards", "3", "--squares", "6,4",
+        "calibrate",
+        "scene.json",
+        "-o",
+        "out",
+        "--quiet",
+        "--frames",
+        "4",
+        "--boards",
+        "3",
+        "--squares",
+        "6,4",
     ]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let (dark, flat) = (bench.array("dark_000"), bench.array("flat_000"));
@@ -73,7 +82,10 @@ fn a_set_is_of_the_scenes_own_camera() {
     let errors = 5.0 / 6144.0_f64.sqrt();
     assert!((black - 64.0).abs() < errors * of_dark.sqrt(), "{black}");
     let saturation = (4095.0 - 64.0_f64).min(0.4 * 20_000.0);
-    assert!((bright - 64.0 - 0.5 * saturation).abs() < errors * of_flat.sqrt() + 2e-3 * saturation, "{bright}");
+    assert!(
+        (bright - 64.0 - 0.5 * saturation).abs() < errors * of_flat.sqrt() + 2e-3 * saturation,
+        "{bright}"
+    );
     let gain = (of_flat - of_dark) / (bright - black);
     assert!((gain / 0.4 - 1.0).abs() < errors * 2.0_f64.sqrt() * 1.2, "{gain}");
     let frames: Vec<Vec<f64>> = (0..4).map(|k| bench.array(&format!("flat_00{k}"))).collect();
@@ -107,7 +119,10 @@ fn a_set_is_of_the_scenes_own_camera() {
             let four = [at(-2.0, -2.0), at(2.0, -2.0), at(2.0, 2.0), at(-2.0, 2.0)];
             let [a, b] = [four[0] + four[2], four[1] + four[3]];
             assert!(a.max(b) > 4.0 * a.min(b), "board {number} at {x} {y}: {four:?}");
-            assert!((four[0] / four[2]).ln().abs() < 0.5 && (four[1] / four[3]).ln().abs() < 0.5, "{four:?}");
+            assert!(
+                (four[0] / four[2]).ln().abs() < 0.5 && (four[1] / four[3]).ln().abs() < 0.5,
+                "{four:?}"
+            );
             seen += 1;
         }
     }
@@ -119,13 +134,15 @@ fn a_set_is_of_the_scenes_own_camera() {
 fn regions_bins_and_packed_numbers_fit_or_are_refused() {
     let bench = bench(&json!({ "cfa": "rggb" }));
     let of = |folder: &str, more: &[&str]| {
-        let base = ["calibrate", "scene.json", "-o", folder, "--quiet", "--frames", "1", "--boards", "0"];
+        let base =
+            ["calibrate", "scene.json", "-o", folder, "--quiet", "--frames", "1", "--boards", "0"];
         let output = bench.run(&[&base[..], more].concat());
         assert!(output.status.success(), "{}", text(&output.stderr));
     };
     of("whole", &[]);
     of("part", &["--region", "8,4,32,16", "--binning", "2", "--packed", "raw12"]);
-    let (whole, part) = (read_npy(&bench.path("whole/flat_000.npy")), read_npy(&bench.path("part/flat_000.npy")));
+    let (whole, part) =
+        (read_npy(&bench.path("whole/flat_000.npy")), read_npy(&bench.path("part/flat_000.npy")));
     assert_eq!(part.len(), 16 * 8);
     let four: f64 = [[8, 4], [10, 4], [8, 6], [10, 6]].iter().map(|[x, y]| whole[y * 96 + x]).sum();
     assert_eq!(part[0], (four / 4.0).round_ties_even());
@@ -134,11 +151,17 @@ fn regions_bins_and_packed_numbers_fit_or_are_refused() {
     let first = u16::from(packed[0]) << 4 | u16::from(packed[2] & 15);
     assert_eq!(f64::from(first), part[0]);
     for (more, word) in [
-        (&["--region", "80,0,32,16"][..], "--region: expected columns of the chip, one at least, found 112"),
+        (
+            &["--region", "80,0,32,16"][..],
+            "--region: expected columns of the chip, one at least, found 112",
+        ),
         (&["--region", "1,0,32,16"][..], "where a tile of filters begins"),
         (&["--binning", "5"][..], "--binning: expected a width that divides into bins"),
         (&["--packed", "raw10"][..], "12 bits, the format 10"),
-        (&["--region", "0,0,6,4", "--packed", "raw10", "--set", "camera.sensor.bit_depth=10"][..], "that four divide"),
+        (
+            &["--region", "0,0,6,4", "--packed", "raw10", "--set", "camera.sensor.bit_depth=10"][..],
+            "that four divide",
+        ),
         (&["--frames", "0"][..], "--frames 0: expected 1 to 1000"),
         (&["--level", "1.5"][..], "--level 1.5: expected a share"),
         (&["--boards", "1", "--squares", "2x6"][..], "--squares 2,6: expected 3 to 64"),
@@ -153,7 +176,9 @@ fn regions_bins_and_packed_numbers_fit_or_are_refused() {
         assert!(why.contains(word), "{more:?}: {why}");
         assert!(!bench.path("none").exists(), "{more:?}");
     }
-    let grid = Bench::with_scene(r#"{"etendue": 1, "camera": {"type": "pinhole"}, "objects": [{"shape": "sphere"}]}"#);
+    let grid = Bench::with_scene(
+        r#"{"etendue": 1, "camera": {"type": "pinhole"}, "objects": [{"shape": "sphere"}]}"#,
+    );
     let why = refused(&grid, &["calibrate", "scene.json", "-o", "out"]);
     assert!(why.contains("camera.sensor") && why.contains("ideal grid"), "{why}");
 }
@@ -172,18 +197,30 @@ fn a_photograph_with_hidden_numbers_is_matched() {
     std::fs::copy(hidden.path("out/raw.preview.png"), bench.path("developed.png")).unwrap();
     for photo in ["photo.dng", "photo.png"] {
         let output = bench.run(&[
-            "match", photo, "scene.json", "--json", "--quiet", "-o", "out", "--set", "render.samples=256",
+            "match",
+            photo,
+            "scene.json",
+            "--json",
+            "--quiet",
+            "-o",
+            "out",
+            "--set",
+            "render.samples=256",
         ]);
         assert!(output.status.success(), "{}", text(&output.stderr));
         let told: Value = serde_json::from_slice(&output.stdout).unwrap();
-        for (key, truth) in [
-            ("system_gain", 0.31),
-            ("read_noise", 5.0),
-            ("black_level", 101.5),
-            ("exposure", 0.013),
+        // Of 6144 pixels the noise of the dark ones tells the read-out's to a quarter.
+        for (key, truth, least) in [
+            ("system_gain", 0.31, 0.1),
+            ("read_noise", 5.0, 0.3),
+            ("black_level", 101.5, 0.02),
+            ("exposure", 0.013, 0.1),
         ] {
             let [value, sigma] = ["value", "sigma"].map(|part| told[key][part].as_f64().unwrap());
-            assert!((value - truth).abs() < 3.0 * sigma && sigma < 0.2 * truth, "{key}: {value} ± {sigma}");
+            assert!(
+                (value - truth).abs() < 3.0 * sigma && sigma < least * truth,
+                "{key}: {value} ± {sigma}"
+            );
         }
         let structure = told["structure"].as_f64().unwrap();
         assert!((structure - 1.0).abs() < 0.4, "{structure}");
@@ -191,7 +228,8 @@ fn a_photograph_with_hidden_numbers_is_matched() {
     let told = bench.json("out/match.json");
     assert_eq!(told["settings"][3][0], "camera.sensor.exposure");
     let residuals = bench.array("residuals");
-    let [mean, variance] = moments(&residuals.iter().copied().filter(|r| r.is_finite()).collect::<Vec<_>>());
+    let [mean, variance] =
+        moments(&residuals.iter().copied().filter(|r| r.is_finite()).collect::<Vec<_>>());
     assert!(mean.abs() < 0.05 && (variance - 1.0).abs() < 0.1, "{mean} {variance}");
     assert!(bench.path("out/residuals.svg").exists() && bench.path("out/residuals.png").exists());
     // Each of what cannot be matched, by its name.

@@ -43,9 +43,7 @@ fn all_frames_have_the_exposure_of_the_first() {
     let frames = json!([
         {}, { "materials.paint.color": [4e-5, 4e-5, 4e-5] }, { "materials.paint.color": [1e-5, 1e-5, 1e-5] }
     ]);
-    let metering = |each: bool| {
-        json!({ "auto_exposure": { "percentile": 90, "target": 0.4, "each_frame": each } })
-    };
+    let metering = |each: bool| json!({ "auto_exposure": { "percentile": 90, "target": 0.4, "each_frame": each } });
     let told = |bench: &Bench, frame: u32| {
         let sidecar = bench.json(&format!("out/frames/00000{frame}/sensor.json"));
         assert_eq!(sidecar["shots"][0]["exposure_s"], sidecar["metered_exposure_s"]);
@@ -59,7 +57,8 @@ fn all_frames_have_the_exposure_of_the_first() {
     let first = told(&bench, 0);
     assert_eq!([told(&bench, 1), told(&bench, 2)], [first; 2]);
     // 0.4 of the converter's (2¹⁴ − 1 − 100) above black; twice that in the second frame.
-    let levels = [0, 1].map(|frame| read_npy(&bench.path(&format!("out/frames/00000{frame}/raw.npy")))[0]);
+    let levels =
+        [0, 1].map(|frame| read_npy(&bench.path(&format!("out/frames/00000{frame}/raw.npy")))[0]);
     let target = 0.4 * (16_383.0 - 100.0);
     assert!((levels[0] - 100.0 - target).abs() <= 1.0, "{}", levels[0]);
     assert!((levels[1] - 100.0 - 2.0 * target).abs() <= 1.5, "{}", levels[1]);
@@ -67,7 +66,10 @@ fn all_frames_have_the_exposure_of_the_first() {
     bench.render(&[]);
     let times = [0, 1, 2].map(|frame| told(&bench, frame));
     // Light is f32.
-    assert!((times[0] / times[1] - 2.0).abs() < 1e-5 && (times[2] / times[0] - 2.0).abs() < 1e-5, "{times:?}");
+    assert!(
+        (times[0] / times[1] - 2.0).abs() < 1e-5 && (times[2] / times[0] - 2.0).abs() < 1e-5,
+        "{times:?}"
+    );
 }
 
 /// A map as a PNG and as the NPY of the same numbers are the list of them; others are refused by name.
@@ -109,7 +111,9 @@ fn maps_of_defects_are_read() {
         bench.render(&[]);
         let raw = bench.array("raw");
         assert_eq!((raw[9], raw[20]), (100.0, 16_383.0), "{map}");
-        assert!(raw.iter().enumerate().all(|(at, y)| numbers(at) > 0 || (*y > 110.0 && *y < 16_000.0)));
+        assert!(
+            raw.iter().enumerate().all(|(at, y)| numbers(at) > 0 || (*y > 110.0 && *y < 16_000.0))
+        );
         let told = bench.json("out/sensor.json")["defects"].clone();
         assert_eq!(
             told,
@@ -119,7 +123,10 @@ fn maps_of_defects_are_read() {
     let bench = with("map.png");
     png(&bench, [8, 5], &|_| 0);
     let why = refused(&bench, &[]);
-    assert!(why.contains("camera.sensor.defect_map") && why.contains("8 columns and 5 rows"), "{why}");
+    assert!(
+        why.contains("camera.sensor.defect_map") && why.contains("8 columns and 5 rows"),
+        "{why}"
+    );
     png(&bench, [8, 6], &|at| u8::from(at == 17) * 9);
     let why = refused(&bench, &[]);
     assert!(why.contains("the number 9 at column 1, row 2"), "{why}");
@@ -155,7 +162,8 @@ fn a_white_image_has_the_curve_of_angles() {
     let curve = [[0.0, 1.0], [10.0, 0.97], [20.0, 0.85], [30.0, 0.6], [40.0, 0.4]];
     let size = [60, 40];
     let white = |response: Option<Value>| {
-        let mut sensor = json!({ "resolution": size, "bit_depth": 16, "black_level": 0, "exposure": 0.1 });
+        let mut sensor =
+            json!({ "resolution": size, "bit_depth": 16, "black_level": 0, "exposure": 0.1 });
         if let Some(response) = response {
             sensor["angular_response"] = response;
         }
@@ -187,8 +195,8 @@ fn a_white_image_has_the_curve_of_angles() {
         let expected = at((angle - design * radius / corner).abs());
         assert!((found / expected - 1.0).abs() < 2e-3, "{x} {y}: {found} for {expected}");
     }
-    // The angle and the way to the corner go nearly together: never more than two degrees apart.
-    assert!(shifted.iter().zip(&plain).all(|(a, b)| a / b > 0.99));
+    // The angle and the way to the corner go nearly together: never six degrees apart.
+    assert!(shifted.iter().zip(&plain).all(|(a, b)| a / b > 0.982));
 }
 
 /// A lens of 50 mm at f/2, focused at 1 m, before a small lamp at 2 m.
@@ -216,9 +224,8 @@ fn halves_of_a_defocused_point_are_apart_and_make_the_whole() {
         "noise": "none", "system_gain": 1, "bit_depth": 16,
     }));
     bench.render(&["--layers", "left_pupil,right_pupil"]);
-    let plane = |name: &str| -> Vec<f64> {
-        bench.array(name).chunks_exact(3).map(|rgb| rgb[0]).collect()
-    };
+    let plane =
+        |name: &str| -> Vec<f64> { bench.array(name).chunks_exact(3).map(|rgb| rgb[0]).collect() };
     let (left, right, whole) = (plane("left_pupil"), plane("right_pupil"), plane("picture"));
     for ((l, r), w) in left.iter().zip(&right).zip(&whole) {
         // Each of the three is rounded to f32.
@@ -249,11 +256,37 @@ fn what_a_camera_has_not_is_refused() {
     let dual = json!({ "photodiodes": "dual" });
     let why = refused(&wall(&dual, &json!({ "tracer": { "type": "direct" } })), &[]);
     assert!(why.contains("camera.sensor.photodiodes") && why.contains("one lens"), "{why}");
-    let why = refused(&lamp(&dual), &["--set", "tracer={\"type\": \"flat\"}"]);
-    assert!(why.contains("camera.sensor.photodiodes") && why.contains("`tracer` of light"), "{why}");
+    let why = refused(
+        &lamp(&json!({ "photodiodes": "dual", "pixel_pitch": 5.0 })),
+        &["--set", "tracer={\"type\": \"flat\"}"],
+    );
+    assert!(
+        why.contains("camera.sensor.photodiodes") && why.contains("`tracer` of light"),
+        "{why}"
+    );
     let parts = json!({ "layers": ["left_pupil"], "tracer": { "type": "direct" } });
     let why = refused(&wall(&json!({}), &parts), &[]);
     assert!(why.contains("layers[0]") && why.contains("one lens"), "{why}");
+    // A picture from elsewhere says nothing of a pupil.
+    let bench = wall(&dual, &json!({}));
+    let header = "{'descr': '<f4', 'fortran_order': False, 'shape': (6, 8), }";
+    let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    bytes.extend(format!("{header:<117}\n").bytes());
+    bytes.extend([0; 4 * 48]);
+    bench.write("light.npy", &bytes);
+    let output = bench.run(&[
+        "expose",
+        "light.npy",
+        "--sensor",
+        "scene.json",
+        "--unit",
+        "W/m2/nm",
+        "-o",
+        "out",
+    ]);
+    let why = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{why}");
+    assert!(why.contains("photodiodes") && why.contains("from elsewhere"), "{why}");
     let rolling = json!({
         "camera": {
             "type": "pinhole", "fov": 60, "shutter": { "type": "rolling", "exposure": 0.01, "row_time": 1e-5 },

@@ -113,7 +113,9 @@ fn lumens_are_the_flux_of_points_cones_and_measured_lamps() {
 #[test]
 fn lux_are_the_illuminance_of_parallel_light() {
     let bench = Bench::new();
-    for spectrum in [json!([1, 1, 1]), json!([0.2, 0.5, 1]), json!({ "illuminant": "fl11", "scale": 1e-6 })] {
+    for spectrum in
+        [json!([1, 1, 1]), json!([0.2, 0.5, 1]), json!({ "illuminant": "fl11", "scale": 1e-6 })]
+    {
         for (direction, cosine) in [([0.0, 0.0, -1.0], 1.0), ([0.0, -1.0, -1.0], 0.5_f64.sqrt())] {
             let sun = json!({
                 "type": "directional", "direction": direction, "irradiance": spectrum, "lux": 10_000,
@@ -121,7 +123,10 @@ fn lux_are_the_illuminance_of_parallel_light() {
             let found = luminance(&seen(&bench, &wall(&fine(), json!([sun]))));
             let expected = 10_000.0 * cosine * 0.5 / PI;
             // Light in f32, in bands of a nanometre.
-            assert!((found / expected - 1.0).abs() < 1e-4, "{spectrum} {direction:?}: {found} {expected}");
+            assert!(
+                (found / expected - 1.0).abs() < 1e-4,
+                "{spectrum} {direction:?}: {found} {expected}"
+            );
         }
     }
     let dark = json!([{

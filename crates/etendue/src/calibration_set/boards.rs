@@ -158,7 +158,8 @@ impl Board {
         let centre = self.camera_rotation * (rotation * at + DVec3::from(pose.translation));
         let centre = centre + self.camera_position;
         // Its x as the board's, its y upwards, its z towards the viewer.
-        let turned = self.camera_rotation * rotation * DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
+        let turned =
+            self.camera_rotation * rotation * DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
         let rows = by_rows(turned);
         let row = |k: usize| [rows[k][0], rows[k][1], rows[k][2], centre[k]];
         [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
@@ -176,14 +177,20 @@ fn focus_of(camera: &Camera) -> Result<f64, String> {
     let distance = lens.focused().object_distance();
     match distance.is_finite() && distance > 0.0 {
         true => Ok(distance),
-        false => Err("--distance: the lens is focused at infinity, where no board can be; say how far it is".to_owned()),
+        false => Err(
+            "--distance: the lens is focused at infinity, where no board can be; say how far it is"
+                .to_owned(),
+        ),
     }
 }
 
 /// A half of the width and of the height that the camera sees at a distance (m).
 fn half_extent(camera: &Camera, distance: f64) -> Result<[f64; 2], String> {
     if let Projection::Views(_) = camera.projection() {
-        return Err("camera: many views are no camera to calibrate; take one with a lens or a pinhole".to_owned());
+        return Err(
+            "camera: many views are no camera to calibrate; take one with a lens or a pinhole"
+                .to_owned(),
+        );
     }
     let [columns, rows] = camera.resolution().map(f64::from);
     let middle = [0.5 * columns, 0.5 * rows];

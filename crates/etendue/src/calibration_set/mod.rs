@@ -1,6 +1,7 @@
 //! The pictures by which a camera is calibrated, as its own simulation takes them: darks, flats, white images and a board.
 
 mod boards;
+mod stage;
 
 use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
@@ -10,13 +11,16 @@ use etendue_files::{Ledger, MANIFEST, SOFTWARE, Transaction};
 use etendue_render::expose::{ExposeError, SensorLight};
 use etendue_render::output::{Look, Outputs, npy, png, sidecar};
 use etendue_sensor::dng::{DngDetails, DngError, GainMap};
-use etendue_sensor::{Exposure, Packing, RawImage, Sensor, SensorError, SensorKind, Window};
+use etendue_sensor::{
+    Exposure, InvalidValues, Packing, RawImage, Sensor, SensorError, SensorKind, Window,
+};
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::progress::Phase;
-use crate::{Channel, Error, Layer, Options, Picture, Progress, Session, Values, Written, places};
+use crate::{Channel, Error, Layer, Picture, Progress, Session, Values, Written, places};
 use boards::{Board, BoardPose};
+use stage::Stage;
 
 /// Points of the gain map of a DNG, along columns and rows.
 const SHADING: [u32; 2] = [17, 13];
@@ -112,148 +116,53 @@ pub fn calibrate(
 ) -> Result<Written, Error> {
     let start = Instant::now();
     check(options)?;
-    let (camera, inputs, is_idle) = {
-        let scene = session.scene(progress)?;
-        (scene.camera.clone(), scene.inputs.clone(), scene.sensor.is_none())
-    };
-    let values = session.values().clone();
-    let refuse = |why: &str| Error::Refused(format!("{}: {why}", session.file().path().display()));
-    if values.get("camera").is_none_or(Value::is_null) {
-        return Err(refuse("camera: a calibration is of the scene's own camera, and it names none"));
-    }
-    if is_idle {
-        return Err(refuse(
-            "camera.sensor: an ideal grid of pixels has nothing to calibrate; give it a sensor, such as \
-             { \"type\": \"raw\", \"model\": \"imx183\" }",
-        ));
-    }
-    let parent = session.file().path().parent().map_or_else(PathBuf::new, Path::to_path_buf);
-    let take = |objects: Vec<Value>| -> Result<SensorLight, Error> {
-        let own = json!({
-            "etendue": 1,
-            "camera": values["camera"],
-            "tracer": { "type": "direct" },
-            "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
-            "materials": {
-                "white": { "type": "matte", "color": [0.9, 0.9, 0.9] },
-                "black": { "type": "matte", "color": [0.04, 0.04, 0.04] },
-            },
-            "objects": objects,
-            "render": render_settings(&values),
-        });
-        let reach = session.reach();
-        let options = Options { reach, ..Options::default() };
-        let mut session = Session::from_json_with(&parent, own, options)?;
-        let rendering = session.render(progress)?;
-        let light = rendering.sensor_light().cloned();
-        light.ok_or_else(|| refuse("camera.sensor: exposes nothing"))
-    };
+    let stage = Stage::of(session, progress)?;
     // One picture of white, of which darks and flats are made, too.
-    let white = take(Vec::new())?;
+    let white = stage.take(Vec::new(), progress)?;
     let sensor = white.sensor().clone();
-    let shot = Exposure { frame: 0, ..sensor.shots().next().unwrap_or(Exposure { exposure: 0.01, frame: 0 }) };
-    let brightest = white.brightest(shot.exposure);
-    let dark = sensor.dark_current() * shot.exposure;
-    let wanted = options.level * sensor.saturation() - dark;
-    if brightest <= 0.0 || wanted <= 0.0 {
-        return Err(refuse(&format!(
-            "camera.sensor: no light brings it to {} of saturation at {} s: the dark signal alone is {dark:.0} e⁻ of {:.0}; \
-             set sensor.exposure lower",
-            options.level,
-            shot.exposure,
-            sensor.saturation()
-        )));
-    }
-    let factor = wanted / brightest;
+    let first = Exposure { exposure: 0.01, frame: 0 };
+    let shot = Exposure { frame: 0, ..sensor.shots().next().unwrap_or(first) };
+    let factor = stage.factor(&white, (shot, options.level))?;
     let board = match options.boards {
         0 => None,
-        count => Some(Board::before(&camera, options, count).map_err(|why| refuse(&why))?),
+        count => {
+            let board = Board::before(&stage.camera, options, count);
+            Some(board.map_err(|why| stage.refused(&why))?)
+        }
     };
-    let f_number = white.f_number().or(options.f_number);
     let mut set = CalibrationSet {
         sensor: &sensor,
         options,
         shot,
         shading: None,
-        f_number,
+        f_number: white.f_number().or(options.f_number),
         files: Vec::new(),
         notes: Vec::new(),
     };
     // What does not fit is told before anything is written.
-    let blank = RawImage {
-        width: sensor.resolution()[0] as usize,
-        height: sensor.resolution()[1] as usize,
-        depth: sensor.depth(),
-        values: vec![0; (sensor.resolution()[0] * sensor.resolution()[1]) as usize * sensor.depth()],
-        invalid: etendue_sensor::InvalidValues::default(),
-    };
-    let seen = sensor.window(&blank, options.window).map_err(in_words)?;
-    if let Some(packing) = options.packed {
-        packing.pack(&seen).map_err(in_words)?;
-        if sensor.bit_depth() > packing.bits() {
-            return Err(Error::Refused(format!(
-                "--packed: the sensor has {} bits, the format {}; set camera.sensor.bit_depth",
-                sensor.bit_depth(),
-                packing.bits()
-            )));
-        }
-    }
-    let middle = sensor.resolution().map(|side| side as usize / 2);
-    let white = white.scaled(factor);
-    let flat = white.clone().even(middle);
+    let resolution = set.fitting()?;
     places::folder(folder)?;
     let names = [MANIFEST.to_owned(), "calibration.json".to_owned()];
-    places::keep_apart(&inputs, &names.map(|name| folder.join(name)))?;
+    places::keep_apart(&stage.inputs, &names.map(|name| folder.join(name)))?;
+    let white = white.scaled(factor);
     let count = 3.0 + f64::from(options.boards);
-    places::recorded(Ledger::open(folder, "calibrate"), &inputs, |to| {
+    places::recorded(Ledger::open(folder, "calibrate"), &stage.inputs, |to| {
         let goes_on = |done: f64| match progress.goes_on(Phase::Expose, done / count) {
             true => Ok(()),
             false => Err(Error::from(ExposeError::Stopped)),
         };
-        let mut sets = Vec::new();
         goes_on(0.0)?;
-        set.shading = set.shading_of(&white)?;
-        let dark = flat.clone().scaled(0.0);
-        let kinds = [
-            ("dark", "no light at all", &dark),
-            ("flat", "the same light on every pixel, as without a lens", &flat),
-            ("white", "an even white surrounding through the camera's own lens", &white),
-        ];
-        for ((kind, what, light), done) in kinds.into_iter().zip([0.0, 1.0, 2.0]) {
-            goes_on(done)?;
-            sets.push(set.frames((to, folder), (kind, what), light)?);
-        }
+        let mut sets = set.of_light((to, folder), &white, &goes_on)?;
         for (number, pose) in board.iter().flat_map(|board| &board.poses).enumerate() {
             goes_on(3.0 + number as f64)?;
             let objects = board.iter().flat_map(|board| board.objects(pose)).collect();
-            let light = take(objects)?.scaled(factor);
+            let light = stage.take(objects, progress)?.scaled(factor);
             let kind = format!("board_{number:03}");
             let mut told = set.frames((to, folder), (&kind, "a chessboard"), &light)?;
             told.pose = Some(pose.clone());
             sets.push(told);
         }
-        let told = Told {
-            software: SOFTWARE,
-            version: 1,
-            sensor: json!(sensor.spec()),
-            resolution: [seen.width, seen.height],
-            region: options.window.region,
-            binning: options.window.binning,
-            exposure_s: shot.exposure,
-            level: options.level,
-            black_level_dn: sensor.black_level(),
-            saturation_level_dn: sensor.saturation_level(),
-            sets,
-            board: board.clone().map(|mut board| {
-                // Each stands with its own pictures.
-                board.poses.clear();
-                board
-            }),
-        };
-        let path = folder.join("calibration.json");
-        sidecar::write_json(to, &path, &told)?;
-        set.files.push(path);
-        Ok::<_, Error>(())
+        set.tell((to, folder), (sets, board.clone()), resolution)
     })?;
     let CalibrationSet { files, mut notes, .. } = set;
     notes.dedup();
@@ -285,17 +194,6 @@ fn check(options: &CalibrationOptions) -> Result<(), Error> {
     Ok(())
 }
 
-/// The scene's settings of sampling, without what belongs to its own picture.
-fn render_settings(values: &Value) -> Value {
-    let mut kept = json!({});
-    for key in ["samples", "sampler", "seed", "accel", "frozen_noise"] {
-        if let Some(value) = values.pointer(&format!("/render/{key}")) {
-            kept[key] = value.clone();
-        }
-    }
-    kept
-}
-
 fn in_words(error: SensorError) -> Error {
     match error.at() {
         "region" | "binning" | "packed" => {
@@ -317,6 +215,80 @@ struct CalibrationSet<'a> {
 }
 
 impl CalibrationSet<'_> {
+    /// Columns and rows of what is read out.
+    fn fitting(&self) -> Result<[usize; 2], Error> {
+        let [width, height] = self.sensor.resolution().map(|side| side as usize);
+        let depth = self.sensor.depth();
+        let values = vec![0; width * height * depth];
+        let blank = RawImage { width, height, depth, values, invalid: InvalidValues::default() };
+        let seen = self.sensor.window(&blank, self.options.window).map_err(in_words)?;
+        if let Some(packing) = self.options.packed {
+            packing.pack(&seen).map_err(in_words)?;
+            let [own, most] = [self.sensor.bit_depth(), packing.bits()];
+            if own > most {
+                return Err(Error::Refused(format!(
+                    "--packed: the sensor has {own} bits, the format {most}; set camera.sensor.bit_depth"
+                )));
+            }
+        }
+        Ok([seen.width, seen.height])
+    }
+
+    /// Darks, flats and white images of white light.
+    fn of_light(
+        &mut self,
+        to: (&Transaction, &Path),
+        white: &SensorLight,
+        goes_on: &dyn Fn(f64) -> Result<(), Error>,
+    ) -> Result<Vec<ToldSet>, Error> {
+        self.shading = self.shading_of(white)?;
+        let flat = white.clone().even(self.sensor.resolution().map(|side| side as usize / 2));
+        let dark = flat.clone().scaled(0.0);
+        let kinds = [
+            ("dark", "no light at all", &dark),
+            ("flat", "the same light on every pixel, as without a lens", &flat),
+            ("white", "an even white surrounding through the camera's own lens", white),
+        ];
+        let mut sets = Vec::new();
+        for ((kind, what, light), done) in kinds.into_iter().zip([0.0, 1.0, 2.0]) {
+            goes_on(done)?;
+            sets.push(self.frames(to, (kind, what), light)?);
+        }
+        Ok(sets)
+    }
+
+    /// Writes `calibration.json`.
+    fn tell(
+        &mut self,
+        (to, folder): (&Transaction, &Path),
+        (sets, board): (Vec<ToldSet>, Option<Board>),
+        resolution: [usize; 2],
+    ) -> Result<(), Error> {
+        let (sensor, options) = (self.sensor, self.options);
+        let told = Told {
+            software: SOFTWARE,
+            version: 1,
+            sensor: json!(sensor.spec()),
+            resolution,
+            region: options.window.region,
+            binning: options.window.binning,
+            exposure_s: self.shot.exposure,
+            level: options.level,
+            black_level_dn: sensor.black_level(),
+            saturation_level_dn: sensor.saturation_level(),
+            sets,
+            board: board.map(|mut board| {
+                // Each stands with its own pictures.
+                board.poses.clear();
+                board
+            }),
+        };
+        let path = folder.join("calibration.json");
+        sidecar::write_json(to, &path, &told)?;
+        self.files.push(path);
+        Ok(())
+    }
+
     /// The gain map of the lens, by the expected numbers of the white image; `None` of sensors whose numbers DNG has not.
     fn shading_of(&self, white: &SensorLight) -> Result<Option<GainMap>, Error> {
         if self.sensor.depth() != 1 || !self.options.outputs.dng {
@@ -326,7 +298,8 @@ impl CalibrationSet<'_> {
         let image = white.expose_on(&silent, self.shot).map_err(ExposeError::from)?;
         let image = self.sensor.window(&image, self.options.window).map_err(in_words)?;
         let black = self.sensor.black_level();
-        let above: Vec<f64> = image.values.iter().map(|&y| (f64::from(y) - black).max(0.0)).collect();
+        let above: Vec<f64> =
+            image.values.iter().map(|&y| (f64::from(y) - black).max(0.0)).collect();
         // Colours of a mosaic differ by more than the lens does: each is taken by its own mean.
         let even = self.by_own_means(&above, image.width);
         Ok(Some(GainMap::of_white(&even, image.width, SHADING)))
@@ -369,9 +342,11 @@ impl CalibrationSet<'_> {
         #[expect(clippy::cast_possible_truncation, reason = "a mean of numbers of 16 bits")]
         let means: Vec<f32> = sums.iter().map(|sum| (sum / count) as f32).collect();
         let [width, height, depth] = size;
-        let planes = (0..depth).map(|k| Values::F32(means.iter().skip(k).step_by(depth).copied().collect()));
+        let planes =
+            (0..depth).map(|k| Values::F32(means.iter().skip(k).step_by(depth).copied().collect()));
         let layer = self.layer(planes.collect(), Look::Cube, "mean of the frames' numbers");
-        let picture = Picture::new(width, height, vec![layer], Vec::new()).map_err(ExposeError::from)?;
+        let picture =
+            Picture::new(width, height, vec![layer], Vec::new()).map_err(ExposeError::from)?;
         let mean = format!("{kind}_mean.npy");
         let path = to.1.join(&mean);
         npy::write(to.0, &path, &picture, "Raw")?;
@@ -420,7 +395,8 @@ impl CalibrationSet<'_> {
             _ => Look::Cube,
         };
         let layer = self.layer((0..depth).map(plane).collect(), look, "digital numbers");
-        let picture = Picture::new(width, height, vec![layer], Vec::new()).map_err(ExposeError::from)?;
+        let picture =
+            Picture::new(width, height, vec![layer], Vec::new()).map_err(ExposeError::from)?;
         if outputs.png && matches!(depth, 1 | 3) {
             let name = format!("{stem}.png");
             png::write(to, &folder.join(&name), &picture, "Raw", png::Bits::Sixteen)?;

@@ -84,7 +84,17 @@ impl SensorLight {
         };
         let film = film.times(factor);
         let white = sensor.white_under(&vec![1.0; sensor.bands().count()]);
-        let light = Self { sensor, film, seeds, white, header, notes, metered: None, f_number: None, solid_angle: None };
+        let light = Self {
+            sensor,
+            film,
+            seeds,
+            white,
+            header,
+            notes,
+            metered: None,
+            f_number: None,
+            solid_angle: None,
+        };
         Ok(light.metered_by_itself())
     }
 }

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use etendue_sensor::dng::{DngDetails, DngError};
 use etendue_sensor::{
-    Defect, Exposure, Film, InvalidValues, Moments, NoiseModel, RawImage, Sensor, SensorKind, SensorSpec,
+    Defect, Exposure, Film, InvalidValues, Moments, NoiseModel, RawImage, Sensor, SensorKind,
+    SensorSpec,
 };
 use rayon::prelude::*;
 use serde::Serialize;
@@ -278,9 +279,11 @@ impl ExposureWriter<'_> {
 
     /// Draws the ratio of signal above black to noise of every number, 20·log₁₀ of it from 0 dB (black) to 50 dB (white).
     fn ratios(&mut self, moments: &Moments, name: &str, shot: Exposure) -> Result<(), ExposeError> {
-        let black = self.sensor.black_level() + self.sensor.system_gain() * self.sensor.dark_current() * shot.exposure;
+        let black = self.sensor.black_level()
+            + self.sensor.system_gain() * self.sensor.dark_current() * shot.exposure;
         let grey = |(mean, variance): (&f32, &f32)| {
-            let ratio = (f64::from(*mean) - black).max(0.0) / f64::from(*variance).max(1e-12).sqrt();
+            let ratio =
+                (f64::from(*mean) - black).max(0.0) / f64::from(*variance).max(1e-12).sqrt();
             #[expect(clippy::cast_possible_truncation, reason = "a picture to look at")]
             let grey = (20.0 * ratio.max(1e-9).log10() / WHITE_DECIBELS).clamp(0.0, 1.0) as f32;
             grey

@@ -89,7 +89,9 @@ impl BandFilm {
         if factor != 1.0 {
             #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
             let factor = factor as f32;
-            for values in std::iter::once(&mut self.values).chain(self.parts.iter_mut().map(|p| &mut p.1)) {
+            for values in
+                std::iter::once(&mut self.values).chain(self.parts.iter_mut().map(|p| &mut p.1))
+            {
                 values.par_iter_mut().for_each(|value| *value *= factor);
             }
         }
@@ -104,7 +106,9 @@ impl BandFilm {
         factor: impl Fn([usize; 2]) -> f32 + Sync,
     ) -> Self {
         let bands = self.bands.count();
-        for values in std::iter::once(&mut self.values).chain(self.parts.iter_mut().map(|p| &mut p.1)) {
+        for values in
+            std::iter::once(&mut self.values).chain(self.parts.iter_mut().map(|p| &mut p.1))
+        {
             values.par_chunks_mut(columns * bands).enumerate().for_each(|(row, values)| {
                 for (column, pixel) in values.chunks_exact_mut(bands).enumerate() {
                     let factor = factor([column, row]);

@@ -193,7 +193,17 @@ impl SensorLight {
         let solid_angle = scene.camera.pupil_solid_angle();
         let lens = scene.camera.lens().map(etendue_camera::LensCamera::focused);
         let f_number = lens.and_then(|lens| lens.paraxial().f_number);
-        let light = Self { sensor, film, seeds, white, header, notes, metered: None, f_number, solid_angle };
+        let light = Self {
+            sensor,
+            film,
+            seeds,
+            white,
+            header,
+            notes,
+            metered: None,
+            f_number,
+            solid_angle,
+        };
         Ok(Ok(light.metered_by_itself()))
     }
 
@@ -236,7 +246,9 @@ impl SensorLight {
         let bands = self.film.bands.count();
         let place = row * columns + column;
         let everywhere = |values: &mut Vec<f32>| {
-            let Some(own) = values.chunks_exact(bands).nth(place).map(<[f32]>::to_vec) else { return };
+            let Some(own) = values.chunks_exact(bands).nth(place).map(<[f32]>::to_vec) else {
+                return;
+            };
             values.chunks_exact_mut(bands).for_each(|pixel| pixel.copy_from_slice(&own));
         };
         everywhere(&mut self.film.values);
@@ -458,7 +470,15 @@ pub fn files_of(sensor: &Sensor) -> Vec<String> {
         };
         shots.iter().flat_map(of_part).collect::<Vec<_>>()
     });
-    shots.iter().flat_map(shot).chain(second).chain(parts).chain(moments).chain(merged).chain(sidecar).collect()
+    shots
+        .iter()
+        .flat_map(shot)
+        .chain(second)
+        .chain(parts)
+        .chain(moments)
+        .chain(merged)
+        .chain(sidecar)
+        .collect()
 }
 
 /// Digits of a shot's number in names; 0 for none.

@@ -17,8 +17,8 @@ use crate::words::plain;
 use etendue_camera::CameraSpec;
 use etendue_camera::curve_files::{self, LONGEST_TABLE};
 use etendue_files::{InputFolder, Opener};
-use etendue_optics::train::remove_notes;
 use etendue_image::Samples;
+use etendue_optics::train::remove_notes;
 use etendue_sensor::{DefectMap, ListedDefect, Model, Sensor, SensorError, SensorSpec};
 use etendue_spectrum::CurveFault;
 

@@ -223,13 +223,13 @@ impl SceneFile {
                 file.check_times()?;
                 file.check_serial()?;
                 // Parts of pixels see parts of the light.
-        let photodiodes = file.sensor.as_ref().and_then(|sensor| sensor.spec().photodiodes);
-        for layer in photodiodes.map_or(&[][..], layers_of) {
-            if !file.spec.layers.contains(layer) {
-                file.spec.layers.push(*layer);
-            }
-        }
-        Ok(file)
+                let photodiodes = file.sensor.as_ref().and_then(|sensor| sensor.spec().photodiodes);
+                for layer in photodiodes.map_or(&[][..], layers_of) {
+                    if !file.spec.layers.contains(layer) {
+                        file.spec.layers.push(*layer);
+                    }
+                }
+                Ok(file)
             }
         }
     }

@@ -181,7 +181,10 @@ impl SceneFile {
         let refused = |key: &str, why: &str| Err(self.fault(&format!("camera.sensor.{key}"), why));
         let has_lenslets = camera.light_field().is_some();
         if sensor.angular_response.is_some() && has_lenslets {
-            return refused("angular_response", "behind lenslets a pixel has no chief ray of its own");
+            return refused(
+                "angular_response",
+                "behind lenslets a pixel has no chief ray of its own",
+            );
         }
         if sensor.carrier_diffusion.is_some_and(|way| way.0 > 0.0) {
             if camera.diffracts() {

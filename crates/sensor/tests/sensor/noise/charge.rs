@@ -26,7 +26,11 @@ fn what_is_read_follows_the_curve() {
     for k in 0..=26 {
         let (image, electrons) = even_frame(&silent, well * f64::from(k) / 20.0, 0, 0);
         let level = gain * well * curve(electrons / well) + 50.0;
-        assert!((f64::from(image.values[0]) - level).abs() <= 0.5, "{k}: {} {level}", image.values[0]);
+        assert!(
+            (f64::from(image.values[0]) - level).abs() <= 0.5,
+            "{k}: {} {level}",
+            image.values[0]
+        );
     }
     assert_eq!(silent.saturation_level(), (gain * 0.9 * well + 50.0).round());
     assert!((silent.saturation() - well).abs() < 1e-9);
@@ -39,8 +43,14 @@ fn what_is_read_follows_the_curve() {
             let told = one.moments(Film { values: &[light] }, SHOT).unwrap();
             let [m, v] = [told.mean[0], told.variance[0]].map(f64::from);
             // 65 536 pixels: five errors of a mean, and of a variance.
-            assert!((mean - m).abs() < 5.0 * v.sqrt() / 256.0 + 1e-3, "{noise} {share}: {mean} {m}");
-            assert!((variance / v - 1.0).abs() < 5.0 * (2.0_f64 / 65_536.0).sqrt(), "{noise} {share}: {variance} {v}");
+            assert!(
+                (mean - m).abs() < 5.0 * v.sqrt() / 256.0 + 1e-3,
+                "{noise} {share}: {mean} {m}"
+            );
+            assert!(
+                (variance / v - 1.0).abs() < 5.0 * (2.0_f64 / 65_536.0).sqrt(),
+                "{noise} {share}: {variance} {v}"
+            );
         }
     }
 }

@@ -20,11 +20,15 @@ fn sensor(second: Value) -> Sensor {
 }
 
 fn dual_gain() -> Sensor {
-    sensor(json!({ "type": "dual_gain", "system_gain": 0.2, "read_noise": 6.0, "full_well": 15_000.0 }))
+    sensor(
+        json!({ "type": "dual_gain", "system_gain": 0.2, "read_noise": 6.0, "full_well": 15_000.0 }),
+    )
 }
 
 fn split_pixel() -> Sensor {
-    sensor(json!({ "type": "split_pixel", "ratio": 0.02, "system_gain": 0.25, "read_noise": 4.0, "full_well": 12_000.0 }))
+    sensor(
+        json!({ "type": "split_pixel", "ratio": 0.02, "system_gain": 0.25, "read_noise": 4.0, "full_well": 12_000.0 }),
+    )
 }
 
 /// A film of which so many electrons a second are freed in each pixel, and how many they are after rounding.
@@ -61,7 +65,10 @@ fn two_gains_read_the_same_electrons_and_two_photodiodes_do_not() {
         let shot = if shares { 0.0 } else { rate * 0.01 * (1.0 + ratio) + 0.03 * (1.0 + ratio) };
         let expected = of_read[0] + of_read[1] + shot;
         // A variance of 65 536 pixels is known to √(2/n), times five.
-        assert!((variance / expected - 1.0).abs() < 5.0 * (2.0 / PIXELS).sqrt(), "{variance} for {expected}");
+        assert!(
+            (variance / expected - 1.0).abs() < 5.0 * (2.0 / PIXELS).sqrt(),
+            "{variance} for {expected}"
+        );
     }
 }
 
@@ -85,9 +92,11 @@ fn what_is_merged_has_the_ratio_of_the_closed_form() {
             let expose = |sensor: &Sensor, shot| sensor.expose(Film { values: &film }, shot, 5);
             let image = sensor.merged(&shots, expose).unwrap();
             assert_eq!(image.saturated, 0);
-            let readouts = [(&sensor, 1.0, share < 1.0), (&second, if is_dual { 1.0 } else { 0.02 }, true)];
+            let readouts =
+                [(&sensor, 1.0, share < 1.0), (&second, if is_dual { 1.0 } else { 0.02 }, true)];
             let counting = readouts.iter().filter(|(.., counts)| *counts);
-            let of_read = |s: &Sensor| s.read_noise().powi(2) + 1.0 / 12.0 / s.system_gain().powi(2);
+            let of_read =
+                |s: &Sensor| s.read_noise().powi(2) + 1.0 / 12.0 / s.system_gain().powi(2);
             let variance = match is_dual {
                 true => {
                     let read: f64 = counting.map(|(s, ..)| 1.0 / of_read(s)).sum();
@@ -95,13 +104,17 @@ fn what_is_merged_has_the_ratio_of_the_closed_form() {
                 }
                 false => {
                     let of = |s: &Sensor, q: f64| {
-                        (q * rate * 0.01 + s.dark_current() * 0.01 + of_read(s)) / (q * 0.01).powi(2)
+                        (q * rate * 0.01 + s.dark_current() * 0.01 + of_read(s))
+                            / (q * 0.01).powi(2)
                     };
                     1.0 / counting.map(|(s, q, _)| 1.0 / of(s, *q)).sum::<f64>()
                 }
             };
             let [mean, spread] = moments(image.rate.iter().map(|&r| f64::from(r)));
-            assert!((mean - rate).abs() < 4.0 * variance.sqrt() / 256.0 + 1e-4 * rate, "{rate}: {mean}");
+            assert!(
+                (mean - rate).abs() < 4.0 * variance.sqrt() / 256.0 + 1e-4 * rate,
+                "{rate}: {mean}"
+            );
             let off = 10.0 * (spread / variance).log10();
             assert!(off.abs() < 0.1, "{is_dual} {rate}: {off} dB");
         }
