@@ -15,7 +15,8 @@ use etendue_scene::import::Strictness;
 use etendue_tracer::LayerSpec;
 
 pub(crate) use tools::{
-    BenchArguments, EdgeArguments, ExposeArguments, LensArguments, PartArgument, SpectrumArguments,
+    BenchArguments, CalibrateArguments, EdgeArguments, ExposeArguments, LensArguments,
+    MatchArguments, PackedArgument, PartArgument, SpectrumArguments,
 };
 
 /// Simulates computational cameras: what a sensor records of a scene, with exact ground truth beside
@@ -57,6 +58,12 @@ pub(crate) enum Command {
     /// Expose a sensor to a picture from elsewhere: EXR (RGB or spectral), NPY, ENVI, or a folder of them
     #[command(after_help = tools::EXPOSE_HELP)]
     Expose(ExposeArguments),
+    /// Take the pictures by which the camera of a scene is calibrated: darks, flats, white images, a chessboard
+    #[command(after_help = tools::CALIBRATE_HELP)]
+    Calibrate(CalibrateArguments),
+    /// Fit the sensor and the light of a scene to a raw photograph of it
+    #[command(after_help = tools::MATCH_HELP)]
+    Match(MatchArguments),
     /// Print what a curve over wavelengths is: XYZ, colour temperature, luminous efficacy, photons
     #[command(after_help = tools::SPECTRUM_HELP)]
     Spectrum(SpectrumArguments),

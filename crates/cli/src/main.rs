@@ -3,11 +3,13 @@
 
 mod arguments;
 mod bench;
+mod calibrate;
 mod check;
 mod edge;
 mod expose;
 mod fault;
 mod lens;
+mod matching;
 mod merge;
 mod opencv;
 mod plan;
@@ -56,6 +58,8 @@ fn main() -> ExitCode {
         Some(Command::Bench(arguments)) => bench::run(&arguments),
         Some(Command::Sensor(arguments)) => sensor::run(&arguments),
         Some(Command::Expose(arguments)) => expose::run(&arguments),
+        Some(Command::Calibrate(arguments)) => calibrate::run(&arguments),
+        Some(Command::Match(arguments)) => matching::run(&arguments),
         Some(Command::Spectrum(arguments)) => spectrum::run(&arguments),
         Some(Command::Edge(arguments)) => edge::run(&arguments),
         Some(Command::View(arguments)) => view(&arguments),

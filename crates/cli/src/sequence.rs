@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::PathBuf;
 
-use etendue::{Dataset, Frame, Progress, Session, places};
+use etendue::{Dataset, Frame, FramePattern, Progress, Session, places};
 use etendue_files::{Ledger, Transaction};
 use etendue_render::output::{Outputs, sidecar};
 
@@ -36,6 +36,7 @@ pub(crate) fn render(
     keep_report_apart(arguments, session, &[])?;
     let mut ledger = Ledger::open(out, "render");
     ledger.list_below(frames.iter().map(|frame| pattern.list_of(frame.number)));
+    keep_exposure(arguments, session, (frames, wanted), &pattern, progress)?;
     let mut dataset = Dataset::default();
     let mut files = Vec::new();
     let mut reports = Vec::new();
@@ -101,6 +102,48 @@ pub(crate) fn render(
     }
     let lines: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     print_text(&lines.join("\n"))
+}
+
+/// Takes the exposure that was metered on the first frame from the files of that, where this run does not render it.
+fn keep_exposure(
+    arguments: &RenderArguments,
+    session: &mut Session,
+    (frames, wanted): (&[Frame], &[Frame]),
+    pattern: &FramePattern,
+    progress: &Progress,
+) -> Result<(), Fault> {
+    let (Some(first), Some(start)) = (frames.first(), wanted.first()) else { return Ok(()) };
+    session.show(first)?;
+    let sensor = session.scene(progress)?.sensor.as_ref();
+    let metering = sensor.and_then(|sensor| sensor.spec().auto_exposure);
+    if metering.is_none_or(|metering| metering.each_frame) {
+        return Ok(());
+    }
+    let out = &arguments.output;
+    let is_there = session.is_complete((out, pattern), first.number, progress)?;
+    if start.number == first.number && !(arguments.resume && is_there) {
+        return Ok(());
+    }
+    let told = out.join(pattern.place(first.number, "sensor.json"));
+    let read = || -> Option<f64> {
+        let text = std::fs::read(&told).ok()?;
+        let sidecar: serde_json::Value = serde_json::from_slice(&text).ok()?;
+        sidecar["metered_exposure_s"].as_f64().filter(|time| *time > 0.0)
+    };
+    match is_there.then(read).flatten() {
+        Some(time) => session.set_metered_exposure(time),
+        None => {
+            let why = format!(
+                "camera.sensor.auto_exposure: all frames have the exposure that is metered on frame {}, which is \
+                 neither rendered by this run nor in {}; render it first, give sensor.exposure, or set \
+                 camera.sensor.auto_exposure.each_frame=true",
+                first.number,
+                out.display()
+            );
+            return Err(Fault::refused(why));
+        }
+    }
+    Ok(())
 }
 
 /// Tells what of the folder's frames was left, and what has gone.

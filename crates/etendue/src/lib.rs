@@ -13,6 +13,8 @@
 //! | [`Frame`], [`Dataset`] | the pictures of a scene that has `frames`, and what others read of them |
 //! | [`Shard`], [`Shares`], [`Checkpoint`] | renders that are divided over machines, or interrupted |
 //! | [`TimeForecast`], [`Calibration`] | how long a render will take, by what this machine takes for a ray |
+//! | [`calibrate`] | the pictures by which a camera is calibrated |
+//! | [`match_photo`] | what makes a simulation match a photograph |
 //! | [`Denoiser`] | Open Image Denoise, where its library is there |
 //! | [`Progress`] | how far work is, and how it is stopped |
 //! | [`Error`] | why something could not be done, in a sentence |
@@ -22,6 +24,7 @@
 //! `etendue-sensor` a sensor after EMVA 1288, `etendue-accel` an exact ray caster.
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests set their stage by hand"))]
 
+mod calibration_set;
 mod changes;
 mod dataset;
 mod error;
@@ -34,6 +37,7 @@ mod lens_waves;
 mod light_image;
 mod neighbours;
 mod options;
+mod photo_match;
 pub mod places;
 mod preview;
 mod progress;
@@ -47,6 +51,7 @@ mod viewed;
 mod viewpoint;
 mod words;
 
+pub use calibration_set::{CalibrationOptions, calibrate};
 pub use dataset::Dataset;
 pub use error::Error;
 pub use etendue_files::Reach;
@@ -70,6 +75,7 @@ pub use lens_view::{LensView, lens_values};
 pub use lens_waves::{FieldCurves, LensWaves};
 pub use light_image::{ExposeOptions, LightImage};
 pub use options::Options;
+pub use photo_match::{PhotoMatch, RawPhoto, match_photo};
 pub use preview::{Preview, Roughness};
 pub use progress::{Phase, Progress};
 pub use rendering::{Rendering, Written};

@@ -15,7 +15,7 @@ use etendue_render::expose::{
 use etendue_render::output::LayerFile;
 use etendue_scene::file::{RenderSpec, SensorFile};
 use etendue_scene::memory::Budget;
-use etendue_sensor::{Radiometry, Sensor, SensorSpec};
+use etendue_sensor::{Radiometry, Sensor, SensorError, SensorSpec};
 use etendue_spectrum::{Bands, Grid};
 use serde_json::Value;
 
@@ -408,6 +408,7 @@ impl LightImage {
         let unit = self.resolved_unit(options)?;
         let factor = self.factor(unit, options)?;
         let mut notes: Vec<String> = self.notes.clone();
+        refuse_what_a_camera_knows(sensor)?;
         let sensor = for_light(sensor, (unit, self.pixel_pitch), &path)?;
         notes.extend(self.judge_size(&sensor)?);
         let [columns, rows] = self.picture.size;
@@ -526,7 +527,7 @@ fn frame_seed(seed: u64, frame: u32) -> u64 {
 /// The film of a cube.
 fn film(axis: &cube::BandAxis, values: Vec<f32>) -> Result<BandFilm, String> {
     let grid = Grid::from_edges(axis.edges().to_vec()).map_err(|error| error.to_string())?;
-    Ok(BandFilm { bands: Bands::Spectral(grid), values })
+    Ok(BandFilm { bands: Bands::Spectral(grid), values, parts: Vec::new() })
 }
 
 /// The sensor of `file` with the radiometry that light in `unit` has, and with pixels of `pitch` (µm) where it says
@@ -581,4 +582,26 @@ fn fits(memory: Option<u64>, bytes: u64, [columns, rows, depth]: [usize; 3]) -> 
 
 fn refused(path: &Path, why: impl std::fmt::Display) -> Error {
     Error::Refused(format!("{}: {why}", path.display()))
+}
+
+/// Refuses parts of a sensor that ask a camera which a picture from elsewhere has not.
+fn refuse_what_a_camera_knows(sensor: &SensorFile) -> Result<(), Error> {
+    let spec = &sensor.spec;
+    let diffuses = spec.carrier_diffusion.is_some_and(|way| way.0 > 0.0);
+    let (key, why) = if spec.photodiodes.is_some() {
+        (
+            "photodiodes",
+            "a picture from elsewhere does not say through which part of the pupil its light came",
+        )
+    } else if spec.angular_response.is_some() {
+        ("angular_response", "a picture from elsewhere does not say at which angle its light came")
+    } else if diffuses {
+        (
+            "carrier_diffusion",
+            "a picture from elsewhere does not say what light fell between the middles of its pixels",
+        )
+    } else {
+        return Ok(());
+    };
+    Err(sensor.fault(&SensorError::Misplaced { key, why }).into())
 }

@@ -67,6 +67,8 @@ pub struct Session {
     checkpoint: Option<Checkpoint>,
     /// What takes the noise out of pictures, once it was asked for.
     denoiser: Option<Denoiser>,
+    /// The exposure that was metered on the first frame (s), which all frames have.
+    metered: Option<f64>,
 }
 
 /// A scene, the structure over it, and its images.
@@ -177,6 +179,11 @@ impl Session {
     #[must_use]
     pub fn file(&self) -> &SceneFile {
         self.shown.as_ref().map_or(&self.file, |(_, shown)| shown)
+    }
+
+    /// Where files that the scene names may be.
+    pub(crate) fn reach(&self) -> etendue_files::Reach {
+        self.options.reach
     }
 
     /// The scene file as it is now, whichever frame is shown.

@@ -113,7 +113,8 @@ impl Still {
     fn of_cube(cube: Cube) -> Result<Self, Error> {
         let [width, height] = cube.size;
         let grid = Grid::from_edges(cube.axis.edges().to_vec()).map_err(in_words)?;
-        let film = BandFilm { bands: Bands::Spectral(grid), values: cube.values };
+        let film =
+            BandFilm { bands: Bands::Spectral(grid), values: cube.values, parts: Vec::new() };
         let (count, mut missing) = (cube.axis.len(), 0);
         let channel = |(k, nm): (usize, &f64)| {
             let mut plane =
@@ -127,7 +128,9 @@ impl Still {
         let bands = Layer { name: SPECTRUM.to_owned(), look: Look::Cube, channels, meaning };
         let finite = |value: &f32| if value.is_finite() { *value } else { 0.0 };
         let values = film.values.iter().map(finite).collect();
-        let colors = BandFilm { bands: film.bands.clone(), values }.colors().map_err(in_words)?;
+        let colors = BandFilm { bands: film.bands.clone(), values, parts: Vec::new() }
+            .colors()
+            .map_err(in_words)?;
         let channels = ["R", "G", "B"].into_iter().zip(colors);
         let channels = channels
             .map(|(name, plane)| Channel { name: name.to_owned(), values: Values::F32(plane) })

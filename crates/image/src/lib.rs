@@ -2,6 +2,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod cube;
+pub mod dng;
 pub mod envi;
 pub mod npy;
 

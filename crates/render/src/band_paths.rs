@@ -57,6 +57,10 @@ impl BandPaths {
             let why = "rows are seen at different times, and light lands on other rows than it starts from";
             return Self::Apart(why.to_owned());
         }
+        if scene.sensor.as_ref().is_some_and(|sensor| sensor.carrier_diffusion() > 0.0) {
+            let why = "carriers diffuse in the sensor, beside the pixel that a ray starts from";
+            return Self::Apart(why.to_owned());
+        }
         let [width, height] = scene.camera.resolution().map(u64::from);
         let lit = scene.layers.iter().filter(|layer| layer.is_light()).count();
         let values = (width * height).saturating_mul((lit * bands.count()) as u64);

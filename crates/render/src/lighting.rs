@@ -138,6 +138,7 @@ fn dark_share(
             seed: scene.render.frame_seed(),
             shard: Shard::ALL,
             sets: 1,
+            diffusion: 0.0,
         },
         rule: None,
         time: None,

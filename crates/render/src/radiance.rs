@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use etendue_camera::{BandGroup, Camera, CameraRays, FilmSamples, PixelSamples, squares_of_pair};
+use etendue_geometry::RayBatch;
 use etendue_tracer::transport::{Parts, RaySamples};
 use etendue_tracer::{LayerSpec, LightGroup, LightingContext, Modulation, Rules, Samples};
 
@@ -89,15 +90,32 @@ impl LightPass<'_> {
         }
     }
 
+    /// Where a ray crosses the entrance pupil's plane, to the right of its middle and above it (m).
+    fn place_in_pupil(&self, rays: &RayBatch, ray: usize) -> [f64; 2] {
+        let pose = self.camera.pose();
+        let from = rays.origin(ray) - pose.position;
+        let direction = rays.direction(ray);
+        let way = -from.dot(pose.forward()) / direction.dot(pose.forward());
+        let at = from + way * direction;
+        [at.dot(pose.right()), at.dot(pose.up())]
+    }
+
     /// Adds up the parts of each ray's light, `[ray][part][band]`, that each layer counts.
-    fn gather(&self, parts: &[f64], values: &mut Vec<f64>) {
+    fn gather(&self, rays: &RayBatch, parts: &[f64], values: &mut Vec<f64>) {
         let count = self.stage.spectral.count();
         let groups = self.stage.lights.parts();
         values.clear();
-        for ray in parts.chunks_exact((1 + 2 * groups.len()) * count) {
+        for (number, ray) in parts.chunks_exact((1 + 2 * groups.len()) * count).enumerate() {
             for &layer in &self.layers {
-                if layer == LayerSpec::Radiance {
+                let is_seen = layer
+                    .pupil_part()
+                    .is_none_or(|part| part.contains(self.place_in_pupil(rays, number)));
+                if layer == LayerSpec::Radiance || (layer.pupil_part().is_some() && is_seen) {
                     values.extend_from_slice(&ray[..count]);
+                    continue;
+                }
+                if !is_seen {
+                    values.resize(values.len() + count, 0.0);
                     continue;
                 }
                 let start = values.len();
@@ -190,7 +208,7 @@ impl Averaged for LightPass<'_> {
             self.modulate(rays, film, light_in_parts);
         }
         if parts != Parts::Whole {
-            self.gather(light_in_parts, values);
+            self.gather(&rays.rays, light_in_parts, values);
         }
         if is_one_for_all {
             repeat_each(values, self.count);

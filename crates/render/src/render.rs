@@ -8,6 +8,7 @@ use etendue_camera::{Camera, LensCamera, PixelExtent};
 use etendue_optics::element::StatusCounts;
 use etendue_scene::Scene;
 use etendue_scene::file::{LightRow, SETS};
+use etendue_sensor::Sensor;
 use etendue_spectrum::Bands;
 use etendue_tracer::layer::OtherFrame;
 use etendue_tracer::{
@@ -266,6 +267,7 @@ pub fn trace(
             seed: scene.render.frame_seed(),
             shard,
             sets: if rule.is_some() { SETS } else { 1 },
+            diffusion: scene.sensor.as_ref().map_or(0.0, Sensor::carrier_diffusion),
         },
         rule,
         time: plan.stopping.time(),
@@ -391,10 +393,18 @@ fn finished(
 ) -> Result<(Picture, Option<expose::BandFilm>), PictureError> {
     let [width, height] = scene.camera.resolution().map(|side| side as usize);
     let mut band_film = None;
+    let mut parts = Vec::new();
     for layer in &mut film {
         let bands = layer.take_bands(&plan.bands)?;
-        // Of the picture: parts of its light are to look at.
-        band_film = band_film.or(bands.filter(|_| layer.spec == LayerSpec::Radiance));
+        // Of the picture and of parts of the pupil: other parts of its light are to look at.
+        match (layer.spec, bands) {
+            (LayerSpec::Radiance, bands) => band_film = bands,
+            (spec, Some(bands)) if spec.pupil_part().is_some() => parts.push((spec, bands.values)),
+            _ => {}
+        }
+    }
+    if let Some(film) = &mut band_film {
+        film.parts = parts;
     }
     let mut layers: Vec<Layer> = film
         .into_iter()

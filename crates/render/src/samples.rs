@@ -45,6 +45,9 @@ pub(crate) const CAMERA_PAIRS: u32 = 3;
 /// The pair of random numbers whose first is a sample's time: the last that there is, which light never gets to.
 const TIME_PAIR: u32 = u32::MAX;
 
+/// The pair of random numbers by which carriers diffuse.
+const DIFFUSION_PAIR: u32 = u32::MAX - 1;
+
 /// Bytes that sums take a value of the film when there are several passes.
 pub(crate) const BYTES_OF_SUM: u64 = size_of::<Sum>() as u64;
 
@@ -85,6 +88,8 @@ pub(crate) struct Sampling {
     /// Sets that the samples of a pixel are of: two of which the first has those before the last power of
     /// two ([`of_first_set`]), or one.
     pub(crate) sets: u32,
+    /// Standard deviation of the way that carriers diffuse in the sensor (pixels).
+    pub(crate) diffusion: f64,
 }
 
 impl Sampling {
@@ -542,6 +547,18 @@ impl Adding<'_> {
             let corner = [tile.left + x, tile.top + y].map(f64::from);
             film.columns.extend(places.iter().map(|place| corner[0] + place[0]));
             film.rows.extend(places.iter().map(|place| corner[1] + place[1]));
+        }
+        // Carriers that a pixel collects were freed beside where they are collected: the pixel sees its own square,
+        // spread by a normal distribution.
+        if self.sampling.diffusion > 0.0 {
+            draw(DIFFUSION_PAIR, &mut places);
+            let moved = film.columns.iter_mut().zip(&mut film.rows).zip(&places);
+            for ((column, row), &[u, v]) in moved {
+                let radius = self.sampling.diffusion * (-2.0 * (1.0 - u).ln()).sqrt();
+                let (sine, cosine) = (std::f64::consts::TAU * v).sin_cos();
+                *column += radius * cosine;
+                *row += radius * sine;
+            }
         }
         let lens = self.what.camera().lens();
         match self.what.camera().has_pupil() {

@@ -6,7 +6,7 @@
 //! | [`photo_response`] | `μₑ ← μₑ·(1 + PRNU·z)` |
 //! | [`dark_signal`] | `μ = μₑ + μ_I·T`, of each pixel its own with DCNU |
 //! | [`shot_noise`] | `n ~ Poisson(μ)`, or its approximation |
-//! | [`full_well`] | `n ← min(n, capacity)` |
+//! | [`full_well`] | `n ← min(n, capacity)`, and what of that is read near saturation |
 //! | [`read_out`] | `n + σ_read·z + DSNU·z′ + row + column` |
 //! | [`convert`] | `y = clip(round(K·n + black), 0, 2ᵇ − 1)` |
 //!
@@ -19,14 +19,15 @@
 //! plus `N(μ_I·T, μ_I·T + σ_read²)` (its Eq. 6). Eq. (5) prints the variance as K²·g; that is DN² only
 //! if g counts electrons. With g as a grey value in DN, μₑ = g/K and the variance is K·g, which is what
 //! happens here: the draw is in electrons and K comes after.
-//!
-//! Mean photo-electrons of a run of pixels: each pixel's bands times what they are worth there.
 
-use crate::film::InvalidValues;
+use std::sync::Arc;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::effects::Effects;
 use crate::moments::PixelLaw;
 use crate::normal::{ln, pair};
-use serde::Serialize;
-
 use crate::philox::{PhiloxKey, Site, Stage, unit32, unit52};
 use crate::poisson::{FINISHED_TOGETHER, OpenPixel, PD_FROM, finish, first_try, small_means};
 use crate::spec::NoiseModel;
@@ -71,8 +72,12 @@ pub(crate) struct Chain {
     /// Shares of pixels that collect nothing, and that are always saturated.
     pub(crate) dead: f64,
     pub(crate) stuck: f64,
+    /// Listed defects, and what is read near saturation.
+    pub(crate) effects: Arc<Effects>,
     /// The seed of temporal noise.
     pub(crate) temporal: PhiloxKey,
+    /// The seed of what a second read-out of the same electrons adds; `None` of the first.
+    pub(crate) second: Option<PhiloxKey>,
     /// The serial number.
     pub(crate) pattern: PhiloxKey,
 }
@@ -100,7 +105,7 @@ impl BlockPlace {
 }
 
 /// What is wrong with a pixel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Defect {
     /// It has much more dark current than others.
@@ -124,6 +129,7 @@ pub(crate) fn expose(
     if chain.noise == NoiseModel::None {
         dark_signal(chain.dark, mean);
         full_well(chain.full_well, mean);
+        read_near_saturation(chain, mean);
         return convert(chain, mean, out);
     }
     match chain.has_pattern() {
@@ -133,11 +139,15 @@ pub(crate) fn expose(
     let mut normals = [[0.0; BLOCK]; 2];
     let mut units = [0.0; BLOCK];
     deviates(&chain.temporal, place, &mut normals, &mut units);
+    if let Some(key) = &chain.second {
+        second_deviates(key, place, &mut normals[1]);
+    }
     match chain.noise {
         NoiseModel::Poisson => shot_noise(chain, place, mean, &normals[0], &units),
         NoiseModel::Normal | NoiseModel::None => normal_shot_noise(mean, &normals[0]),
     }
     full_well(chain.full_well, mean);
+    read_near_saturation(chain, mean);
     read_out(chain.read_noise, &normals[1], offset, mean);
     convert(chain, mean, out);
 }
@@ -162,6 +172,7 @@ pub(crate) fn moments(
             noise: chain.noise,
             mean: mean[i],
             full_well: chain.full_well,
+            curve: chain.effects.nonlinearity.as_ref(),
             offset: offset[i],
             read_noise,
             gain: chain.gain,
@@ -194,7 +205,12 @@ impl Chain {
 
     fn has_pattern(&self) -> bool {
         let all = [self.prnu, self.dsnu, self.dcnu * self.dark, self.hot[0], self.dead, self.stuck];
-        all.iter().any(|&part| part > 0.0)
+        all.iter().any(|&part| part > 0.0) || !self.effects.listed.is_empty()
+    }
+
+    /// The seed of what the read-out adds.
+    pub(crate) fn of_read_out(&self) -> &PhiloxKey {
+        self.second.as_ref().unwrap_or(&self.temporal)
     }
 }
 
@@ -211,6 +227,15 @@ fn deviates(
         let [a, b, c, d] = key.words(counter);
         [normals[0][i], normals[1][i]] = pair([a, b, c]);
         units[i] = unit32(d);
+    }
+}
+
+/// Normal deviates of a second read-out.
+#[inline(always)]
+fn second_deviates(key: &PhiloxKey, place: BlockPlace, normals: &mut BlockValues) {
+    for (i, normal) in normals.iter_mut().enumerate() {
+        let [a, b, c, _] = key.words(place.site.counter(place.at(i), Stage::Temporal, 0));
+        [_, *normal] = pair([a, b, c]);
     }
 }
 
@@ -247,6 +272,32 @@ fn pattern(chain: &Chain, place: BlockPlace, mean: &mut BlockValues, offset: &mu
                 Some(Defect::Dead) => mean[i] = 0.0,
                 Some(Defect::Stuck) => offset[i] = STUCK,
                 Some(Defect::Hot) | None => {}
+            }
+        }
+    }
+    if !chain.effects.listed.is_empty() {
+        listed_defects(chain, place, mean, offset);
+    }
+}
+
+/// The defects of a map, as those by chance.
+fn listed_defects(
+    chain: &Chain,
+    place: BlockPlace,
+    mean: &mut BlockValues,
+    offset: &mut BlockValues,
+) {
+    let Site { row, channel, .. } = place.site;
+    #[expect(clippy::cast_possible_truncation, reason = "a block is short")]
+    let columns = place.column..place.column.saturating_add(BLOCK as u32);
+    for listed in chain.effects.listed_in(row, columns, channel) {
+        let i = (listed.column - place.column) as usize;
+        match listed.kind {
+            Defect::Dead => mean[i] = 0.0,
+            Defect::Stuck => offset[i] = STUCK,
+            Defect::Hot => {
+                let words = chain.pattern.words(place.fixed(i, Stage::HotPixel));
+                mean[i] -= chain.hot[1] * ln(unit52(words[0], words[1]));
             }
         }
     }
@@ -344,6 +395,16 @@ fn full_well(capacity: f64, electrons: &mut BlockValues) {
     }
 }
 
+/// `n ← C·f(n/C)` where a sensor has such a curve.
+#[inline(always)]
+fn read_near_saturation(chain: &Chain, electrons: &mut BlockValues) {
+    if let Some(curve) = &chain.effects.nonlinearity {
+        for electrons in electrons {
+            *electrons = chain.full_well * curve.read(*electrons / chain.full_well);
+        }
+    }
+}
+
 /// `n + σ_read·z` + offsets (e⁻).
 #[inline(always)]
 fn read_out(sigma: f64, normals: &BlockValues, offset: &BlockValues, electrons: &mut BlockValues) {
@@ -359,114 +420,5 @@ fn convert(chain: &Chain, electrons: &BlockValues, out: &mut [u16; BLOCK]) {
     for i in 0..BLOCK {
         let level = (chain.gain * electrons[i] + chain.black).clamp(0.0, chain.white);
         out[i] = (level + TO_INTEGER).to_bits() as u16;
-    }
-}
-
-/// What bands are worth along a row: `[phase][band]`, the phases taking turns from column to column.
-#[derive(Debug, Clone)]
-pub(crate) struct Responsivity {
-    pub(crate) bands: usize,
-    /// Electrons a unit of light, `[phase][band]`.
-    pub(crate) electrons: Vec<f64>,
-}
-
-impl Responsivity {
-    /// Fills `mean` with the photo-electrons of the pixels in `values` (`[column][band]`), the first
-    /// of which is in column `start`. Light that is none counts as 0 and as a flaw.
-    pub(crate) fn gather(&self, values: &[f32], start: usize, mean: &mut [f64]) -> InvalidValues {
-        let clean = match (self.bands, self.electrons.as_slice()) {
-            (1, &[worth]) => one_band(values, worth, mean),
-            (3, &[..]) => bands_of::<3>(values, &self.electrons, start, mean),
-            (1, &[..]) => bands_of::<1>(values, &self.electrons, start, mean),
-            _ => self.many_bands(values, start, mean),
-        };
-        if clean { InvalidValues::default() } else { InvalidValues::of(values) }
-    }
-
-    fn many_bands(&self, values: &[f32], start: usize, mean: &mut [f64]) -> bool {
-        let mut clean = true;
-        let phases = self.electrons.chunks_exact(self.bands);
-        let skipped = start % phases.len();
-        let pixels = values.chunks_exact(self.bands);
-        for ((pixel, worth), mean) in pixels.zip(phases.cycle().skip(skipped)).zip(mean) {
-            let mut sum = 0.0;
-            for (&value, worth) in pixel.iter().zip(worth) {
-                clean &= is_light(value);
-                sum += light(value) * worth;
-            }
-            *mean = sum;
-        }
-        clean
-    }
-}
-
-#[multiversion::multiversion(targets = "simd")]
-fn one_band(values: &[f32], worth: f64, mean: &mut [f64]) -> bool {
-    let mut clean = true;
-    for (&value, mean) in values.iter().zip(mean) {
-        clean &= is_light(value);
-        *mean = light(value) * worth;
-    }
-    clean
-}
-
-fn bands_of<const N: usize>(
-    values: &[f32],
-    electrons: &[f64],
-    start: usize,
-    mean: &mut [f64],
-) -> bool {
-    let mut clean = true;
-    let phases = electrons.as_chunks::<N>().0;
-    let mut phase = start % phases.len();
-    for (pixel, mean) in values.as_chunks::<N>().0.iter().zip(mean) {
-        let mut sum = 0.0;
-        for (&value, worth) in pixel.iter().zip(&phases[phase]) {
-            clean &= is_light(value);
-            sum += light(value) * worth;
-        }
-        *mean = sum;
-        phase = if phase + 1 == phases.len() { 0 } else { phase + 1 };
-    }
-    clean
-}
-
-#[inline(always)]
-fn is_light(value: f32) -> bool {
-    (0.0..f32::INFINITY).contains(&value)
-}
-
-#[inline(always)]
-fn light(value: f32) -> f64 {
-    f64::from(if is_light(value) { value } else { 0.0 })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn all_ways_of_adding_agree() {
-        for bands in [1u16, 2, 3, 5] {
-            for phases in [1u16, 2, 3] {
-                let electrons: Vec<f64> = (0..bands * phases).map(|i| 1.0 + f64::from(i)).collect();
-                let responsivity =
-                    Responsivity { bands: bands.into(), electrons: electrons.clone() };
-                let values: Vec<f32> = (0..bands * 7).map(|i| f32::from(i) - 2.0).collect();
-                let mut mean = [0.0; 7];
-                let invalid = responsivity.gather(&values, 4, &mut mean);
-                assert_eq!(invalid, InvalidValues { negative: 2, not_finite: 0 });
-                for (x, mean) in mean.iter().enumerate() {
-                    let phase = (4 + x) % usize::from(phases);
-                    let expected: f64 = (0..usize::from(bands))
-                        .map(|band| {
-                            let value = f64::from(values[x * usize::from(bands) + band]).max(0.0);
-                            value * electrons[phase * usize::from(bands) + band]
-                        })
-                        .sum();
-                    assert_eq!(*mean, expected, "{bands} bands, {phases} phases, pixel {x}");
-                }
-            }
-        }
     }
 }

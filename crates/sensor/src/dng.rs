@@ -5,13 +5,14 @@
 //!
 //! "Digital Negative (DNG) Specification", version 1.4.0.0, Adobe 2012; tag numbers are its.
 
+use std::borrow::Cow;
 use std::io::{Seek, Write};
 
 use etendue_spectrum::colorchecker::PATCHES;
 use etendue_spectrum::colour::{FINE_OBSERVER, Matrix3, SRGB_FROM_XYZ, inverse};
 use etendue_spectrum::{Curve, Illuminant, integral};
-use tiff::encoder::{Rational, SRational, TiffEncoder};
-use tiff::tags::Tag;
+use tiff::encoder::{Rational, SRational, TiffEncoder, TiffValue};
+use tiff::tags::{Tag, Type};
 
 use crate::response::{Filter, filters};
 use crate::{RawImage, Sensor};
@@ -38,6 +39,79 @@ pub struct DngDetails<'a> {
     pub white: &'a [f64],
     /// s
     pub exposure: f64,
+    /// Of the lens, if anybody knows.
+    pub f_number: Option<f64>,
+    /// What brings the lens' shading back to even, if it is known.
+    pub shading: Option<&'a GainMap>,
+}
+
+/// Factors over a picture, from its top left corner to its bottom right one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GainMap {
+    /// Columns and rows of points.
+    pub points: [u32; 2],
+    /// `[row][column]`, by which numbers above black are multiplied.
+    pub gains: Vec<f32>,
+}
+
+impl GainMap {
+    /// The map that makes a white image even: `white` has `[row][column]` numbers above black, of `columns` columns, and
+    /// the map's gains are 1 at the greatest of their means around its `points`.
+    #[must_use]
+    pub fn of_white(white: &[f64], columns: usize, points: [u32; 2]) -> Self {
+        let rows = white.len() / columns.max(1);
+        let [across, down] = points.map(|count| count.max(2) as usize);
+        // A half of the way to the next point, all around.
+        let span = |k: usize, count: usize, length: usize| {
+            let [way, middle] = [length as f64 / (count - 1) as f64, k as f64];
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a place in it"
+            )]
+            let place = |at: f64| (at * way).round().clamp(0.0, length as f64) as usize;
+            let from = place(middle - 0.25).min(length.saturating_sub(1));
+            from..place(middle + 0.25).max(from + 1)
+        };
+        let mut means = Vec::with_capacity(across * down);
+        for row in 0..down {
+            for column in 0..across {
+                let (mut sum, mut count) = (0.0, 0.0);
+                for y in span(row, down, rows) {
+                    for x in span(column, across, columns) {
+                        sum += white[y * columns + x];
+                        count += 1.0;
+                    }
+                }
+                means.push(sum / f64::max(count, 1.0));
+            }
+        }
+        let most = means.iter().copied().fold(0.0, f64::max);
+        #[expect(clippy::cast_possible_truncation, reason = "the format has f32")]
+        let gains = means.iter().map(|mean| (most / mean.max(1e-3 * most)) as f32).collect();
+        #[expect(clippy::cast_possible_truncation, reason = "as they came")]
+        Self { points: [across as u32, down as u32], gains }
+    }
+
+    /// As the only one of an `OpcodeList2`: opcode 9 of DNG 1.3, in big-endian order.
+    fn opcodes(&self, [width, height]: [u32; 2]) -> Vec<u8> {
+        let [across, down] = self.points;
+        let mut data = Vec::new();
+        let words = [0, 0, height, width, 0, 1, 1, 1, down, across];
+        words.iter().for_each(|word: &u32| data.extend(word.to_be_bytes()));
+        let step = |count: u32| 1.0 / f64::from(count.max(2) - 1);
+        let places = [step(down), step(across), 0.0, 0.0];
+        places.iter().for_each(|place| data.extend(place.to_be_bytes()));
+        data.extend(1u32.to_be_bytes());
+        self.gains.iter().for_each(|gain| data.extend(gain.to_be_bytes()));
+        // One opcode: its number, the version that knows it, no flags, its length.
+        let mut list = Vec::new();
+        #[expect(clippy::cast_possible_truncation, reason = "a map of a few hundred points")]
+        let head = [1, 9, 0x0103_0000, 0, data.len() as u32];
+        head.iter().for_each(|word: &u32| list.extend(word.to_be_bytes()));
+        list.extend(data);
+        list
+    }
 }
 
 /// Colour filter array, of the photometric interpretations.
@@ -57,7 +131,7 @@ impl Sensor {
     pub fn write_dng(
         &self,
         image: &RawImage,
-        DngDetails { model, white, exposure }: DngDetails<'_>,
+        DngDetails { model, white, exposure, f_number, shading }: DngDetails<'_>,
         out: impl Write + Seek,
     ) -> Result<(), DngError> {
         if image.depth != 1 {
@@ -103,6 +177,12 @@ impl Sensor {
         }
         // Of TIFF/EP, on which DNG stands.
         directory.write_tag(unknown(33_434), duration(exposure))?;
+        if let Some(f_number) = f_number.filter(|number| number.is_finite() && *number > 0.0) {
+            directory.write_tag(unknown(33_437), rational(f_number))?;
+        }
+        if let Some(map) = shading {
+            directory.write_tag(unknown(51_009), TiffUndefined(&map.opcodes([width, height])))?;
+        }
         if let Some(iso) = self.spec().iso.filter(|iso| (1.0..=65_535.0).contains(iso)) {
             #[expect(
                 clippy::cast_possible_truncation,
@@ -119,6 +199,9 @@ impl Sensor {
             directory.write_tag(unknown(50_711), 1u16)?;
             let matrix = self.colour_matrix();
             directory.write_tag(unknown(50_721), matrix.as_slice())?;
+            if let Some(forward) = forward_matrix(&matrix) {
+                directory.write_tag(unknown(50_964), forward.as_slice())?;
+            }
             let neutral = self.neutral(white);
             directory.write_tag(unknown(50_728), neutral.as_slice())?;
             directory.write_tag(unknown(50_778), D65)?;
@@ -234,6 +317,47 @@ impl Sensor {
             let found = names.iter().position(|other| other.eq_ignore_ascii_case(name));
             found.map_or_else(T::default, &of)
         })
+    }
+}
+
+/// `ForwardMatrix1`: from channels that are balanced for D65 to XYZ under D50, of a `ColorMatrix1` for D65. White, 1 in
+/// each of them, becomes D50's (DNG specification, chapter 6, "Camera to XYZ (D50) Transform"), adapted by Bradford's
+/// matrices (Lam 1985).
+fn forward_matrix(of_colours: &[SRational]) -> Option<Vec<SRational>> {
+    let number = |k: usize| f64::from(of_colours[k].n) / f64::from(of_colours[k].d);
+    let matrix: Matrix3 = std::array::from_fn(|row| std::array::from_fn(|k| number(3 * row + k)));
+    let times = |m: &Matrix3, x: [f64; 3]| -> [f64; 3] {
+        m.map(|row| row.iter().zip(x).map(|(m, x)| m * x).sum())
+    };
+    let bradford: Matrix3 =
+        [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]];
+    let (d65, d50) = ([0.950_47, 1.0, 1.088_83], [0.964_22, 1.0, 0.825_21]);
+    let [from, to] = [d65, d50].map(|white| times(&bradford, white));
+    let (back, of_channels) = (inverse(&bradford)?, inverse(&matrix)?);
+    let balanced = times(&matrix, d65);
+    let column = |k: usize| -> [f64; 3] {
+        let mut channel = [0.0; 3];
+        channel[k] = balanced[k];
+        let cones = times(&bradford, times(&of_channels, channel));
+        times(&back, std::array::from_fn(|i| cones[i] * to[i] / from[i]))
+    };
+    let columns: [[f64; 3]; 3] = std::array::from_fn(column);
+    Some((0..9).map(|at| signed(columns[at % 3][at / 3])).collect())
+}
+
+/// Bytes of TIFF's type `UNDEFINED`, which no list of bytes has by itself.
+struct TiffUndefined<'a>(&'a [u8]);
+
+impl TiffValue for TiffUndefined<'_> {
+    const BYTE_LEN: u8 = 1;
+    const FIELD_TYPE: Type = Type::UNDEFINED;
+
+    fn count(&self) -> usize {
+        self.0.len()
+    }
+
+    fn data(&self) -> Cow<'_, [u8]> {
+        Cow::Borrowed(self.0)
     }
 }
 

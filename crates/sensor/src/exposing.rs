@@ -1,11 +1,18 @@
 //! A film in the course of an exposure: what light, neighbours, rows and columns bring to each block of pixels.
 
+use std::borrow::Cow;
+
+use rayon::prelude::*;
+
 use crate::Sensor;
-use crate::chain::{self, BLOCK, BlockPlace, BlockValues, Chain, Responsivity};
+use crate::chain::{self, BLOCK, BlockPlace, BlockValues, Chain};
+use crate::effects::Effects;
 use crate::film::{Exposure, Film, InvalidValues};
 use crate::normal::pair;
 use crate::philox::{PhiloxKey, Site, Stage};
+use crate::responsivity::Responsivity;
 use crate::spec::{NoiseModel, Radiometry};
+use crate::whole_frame::WholeFrame;
 
 /// A film in the course of an exposure.
 pub(crate) struct Exposing<'a> {
@@ -18,6 +25,9 @@ pub(crate) struct Exposing<'a> {
     /// What each column adds (e⁻), in this frame and in all; empty when nothing.
     columns: Vec<f64>,
     fixed_columns: Vec<f64>,
+    /// Mean photo-electrons of all pixels, `[channel][row][column]`, where those of a column are not each for itself;
+    /// else empty.
+    whole: Vec<WholeFrame>,
 }
 
 impl<'a> Exposing<'a> {
@@ -34,6 +44,7 @@ impl<'a> Exposing<'a> {
             factor,
             columns: Vec::new(),
             fixed_columns: Vec::new(),
+            whole: Vec::new(),
             chain,
         };
         exposing.fixed_columns = exposing.offsets_of_columns(Lasting::Always);
@@ -43,7 +54,30 @@ impl<'a> Exposing<'a> {
             true => exposing.columns = fixed.copied().collect(),
             false => exposing.columns.iter_mut().zip(fixed).for_each(|(own, fixed)| *own += fixed),
         }
+        exposing.whole = exposing.whole_frame();
         exposing
+    }
+
+    /// Mean photo-electrons with smear and blooming; nothing of sensors without.
+    fn whole_frame(&self) -> Vec<WholeFrame> {
+        let Effects { blooming, smear, .. } = *self.chain.effects;
+        if blooming + smear <= 0.0 {
+            return Vec::new();
+        }
+        let [width, height] = self.sensor.settings.resolution.map(|side| side as usize);
+        let of_channel = |channel: usize| {
+            let rows = (0..height).into_par_iter();
+            let values = rows.flat_map_iter(|row| self.with_crosstalk(row, channel)).collect();
+            let mut frame = WholeFrame { width, values };
+            if smear > 0.0 {
+                frame.smear(smear);
+            }
+            if blooming > 0.0 {
+                frame.bloom(blooming, (self.chain.full_well, self.chain.dark));
+            }
+            frame
+        };
+        (0..self.sensor.depth()).map(of_channel).collect()
     }
 
     /// What each column adds (e⁻); empty when nothing.
@@ -66,7 +100,7 @@ impl<'a> Exposing<'a> {
     fn key_and_site(&self, row: usize, lasting: Lasting) -> (&PhiloxKey, Site) {
         let site = self.site(row, 0);
         match lasting {
-            Lasting::OneFrame => (&self.chain.temporal, site),
+            Lasting::OneFrame => (self.chain.of_read_out(), site),
             Lasting::Always => (&self.chain.pattern, Site { frame: 0, ..site }),
         }
     }
@@ -123,7 +157,10 @@ impl<'a> Exposing<'a> {
         let mut invalid = InvalidValues::default();
         let mut mean = [0.0; BLOCK];
         for (channel, responsivity) in responsivities.iter().enumerate() {
-            let mixed = (share > 0.0).then(|| self.with_crosstalk(row, channel));
+            let mixed = match self.whole.get(channel) {
+                Some(frame) => Some(Cow::Borrowed(&frame.values[row * width..][..width])),
+                None => (share > 0.0).then(|| Cow::Owned(self.with_crosstalk(row, channel))),
+            };
             for start in (0..width).step_by(BLOCK) {
                 let count = BLOCK.min(width - start);
                 let values = &film[start * bands..][..count * bands];
@@ -157,6 +194,9 @@ impl<'a> Exposing<'a> {
             mean
         };
         let own = of_row(row);
+        if self.sensor.settings.crosstalk <= 0.0 {
+            return own;
+        }
         let [above, below] = [row.saturating_sub(1), (row + 1).min(height - 1)].map(of_row);
         let share = self.sensor.settings.crosstalk;
         let mixed = (0..width).map(|x| {

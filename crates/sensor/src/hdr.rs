@@ -1,19 +1,26 @@
-//! Exposures of different times merged to one picture of high dynamic range.
+//! Exposures of different times, and both numbers of pixels that have two, merged to one picture of high dynamic range.
 //!
-//! A pixel's number `y` of an exposure of `T` seconds says that light freed `r = ((y − b)/K − μ_I·T)/T` electrons a
-//! second, with the variance
+//! A pixel's number `y` of an exposure of `T` seconds by a photodiode of the sensitivity `q` says that light freed
+//! `r = ((y − b)/K − μ_I·T)/(q·T)` electrons a second, with the variance
 //!
 //! ```text
-//! v = (r·T + μ_I·T + σ² + 1/(12·K²)) / T²
+//! v = (q·r·T + μ_I·T + σ² + 1/(12·K²)) / (q·T)²
 //! ```
 //!
 //! of shot noise, dark signal, read-out and rounding. What is merged is `Σ r/v / Σ 1/v`, whose own variance is
 //! `1 / Σ 1/v`: no other weights leave less noise (Granados et al., "Optimal HDR reconstruction with linear digital
 //! cameras", CVPR 2010). The `r` of the weights is that of the longest exposure which counts, the same for all.
 //!
-//! Whether an exposure may be saturated is judged by the one before, which is shorter: to leave out what came out
-//! saturated would keep those of the others that noise made too dark. Where that judgement goes by chance it favours
-//! the bright among the shorter ones, by 0.4 of their standard deviation at most.
+//! Two readings of the same electrons at two gains have their shot noise in common, which no weights take away: they count
+//! together as one number whose read-out has the variance `1 / Σ 1/(σ² + 1/(12·K²))`, each in proportion to its own.
+//!
+//! Where a sensor is not linear near saturation, `(y − b)/K` is taken through the inverse of its curve first, and `σ` is
+//! divided by its slope.
+//!
+//! A number counts when it lies four standard deviations of the read-out below saturation and all less exposed ones count.
+//! Near saturation, where that goes by chance, it favours those that noise made darker: by 0.4 of its own standard deviation at
+//! most, the peak of the normal density. To judge it by a less exposed number instead would go by chance over a range
+//! that is as many times wider as that number has more noise.
 
 use rayon::prelude::*;
 
@@ -32,8 +39,8 @@ pub struct HdrImage {
     pub height: usize,
     /// Numbers a pixel.
     pub depth: usize,
-    /// Photo-electrons a second, `[row][column][channel]`; of pixels that are saturated in the shortest exposure what
-    /// they have at least.
+    /// Photo-electrons a second (of the first photodiode), `[row][column][channel]`; of pixels that are saturated in the
+    /// least exposed number what they have at least.
     pub rate: Vec<f32>,
     /// Their standard deviations (e⁻/s); +inf of those pixels.
     pub sigma: Vec<f32>,
@@ -41,17 +48,26 @@ pub struct HdrImage {
     pub saturated: u64,
 }
 
-/// What is known of a pixel before exposures are weighed.
+/// What is known of a pixel before numbers are weighed.
 #[derive(Debug, Clone, Copy)]
 struct Pilot {
-    /// Exposures that count, the shortest first; 0 of a pixel that is saturated in that.
+    /// Numbers that count, the least exposed first; 0 of a pixel that is saturated in that.
     count: usize,
-    /// Electrons a second by the longest of them.
+    /// Electrons a second by the most exposed of them.
     rate: f64,
 }
 
+/// One number of each pixel: of a read-out in an exposure.
+struct Reading<'a> {
+    sensor: &'a Sensor,
+    shot: Exposure,
+    /// Which reading, by its place among all, has the same electrons.
+    twin: Option<usize>,
+}
+
 impl Sensor {
-    /// Merges what `expose` gives of each of `shots`, which may come in any order, each twice.
+    /// Merges what `expose` gives of each of `shots`, which may come in any order, each twice; of a sensor with a second
+    /// read-out both, of which `expose` is given the sensor of each.
     ///
     /// # Errors
     ///
@@ -59,46 +75,40 @@ impl Sensor {
     pub fn merged<E: From<SensorError>>(
         &self,
         shots: &[Exposure],
-        mut expose: impl FnMut(Exposure) -> Result<RawImage, E>,
+        mut expose: impl FnMut(&Self, Exposure) -> Result<RawImage, E>,
     ) -> Result<HdrImage, E> {
-        let mut shots = shots.to_vec();
-        shots.sort_by(|a, b| a.exposure.total_cmp(&b.exposure).then(a.frame.cmp(&b.frame)));
-        let Some(first) = shots.first() else {
+        let second = self.second();
+        let readings = readings([Some(self), second.as_ref()], shots);
+        let Some(first) = readings.first() else {
             let why = "nothing to merge: name several exposures";
             return Err(SensorError::Missing { key: "exposures", why }.into());
         };
-        // Which exposures count.
-        let RawImage { width, height, depth, values, .. } = expose(*first)?;
-        let mut before = first.exposure;
-        // Below a full well reads what the read-out takes from it.
-        let of_read_out = self.dark_noise(0.0).hypot(self.non_uniformity()[1]);
-        let limit = self.saturation_level() - MARGIN * self.system_gain() * of_read_out;
+        // Which numbers count.
+        let RawImage { width, height, depth, values, .. } = expose(first.sensor, first.shot)?;
+        let limit = first.limit();
         let mut pilots: Vec<Pilot> = values
             .par_iter()
-            .map(|&y| Pilot {
-                count: usize::from(f64::from(y) < limit),
-                rate: self.rate(y, first.exposure),
-            })
+            .map(|&y| Pilot { count: usize::from(f64::from(y) < limit), rate: first.rate(y) })
             .collect();
-        for (number, shot) in shots.iter().enumerate().skip(1) {
-            let image = expose(*shot)?;
+        for (number, reading) in readings.iter().enumerate().skip(1) {
+            let image = expose(reading.sensor, reading.shot)?;
+            let limit = reading.limit();
             pilots.par_iter_mut().zip(&image.values).for_each(|(pilot, &y)| {
-                let may_saturate = !self.stays_below(pilot.rate, before, shot.exposure);
-                if pilot.count == number && !may_saturate {
-                    *pilot = Pilot { count: number + 1, rate: self.rate(y, shot.exposure) };
+                if pilot.count == number && f64::from(y) < limit {
+                    *pilot = Pilot { count: number + 1, rate: reading.rate(y) };
                 }
             });
-            before = shot.exposure;
         }
         // Those together.
         let mut sums = vec![[0.0; 2]; pilots.len()];
-        for (number, shot) in shots.iter().enumerate() {
-            let image = expose(*shot)?;
+        for (number, reading) in readings.iter().enumerate() {
+            let image = expose(reading.sensor, reading.shot)?;
             let pixels = sums.par_iter_mut().zip(&pilots).zip(&image.values);
             pixels.for_each(|(([weighed, weight], pilot), &y)| {
                 if number < pilot.count {
-                    let own = 1.0 / self.variance_of_rate(pilot.rate, shot.exposure);
-                    *weighed += own * self.rate(y, shot.exposure);
+                    let twin = reading.twin.filter(|&twin| twin < pilot.count);
+                    let own = reading.weight(pilot.rate, twin.map(|twin| &readings[twin]));
+                    *weighed += own * reading.rate(y);
                     *weight += own;
                 }
             });
@@ -113,25 +123,79 @@ impl Sensor {
         let (rate, sigma) = both.map(|[rate, sigma]| (rate, sigma)).unzip();
         Ok(HdrImage { width, height, depth, rate, sigma, saturated })
     }
+}
+
+/// Every shot by every read-out, the least exposed first.
+fn readings<'a>(readouts: [Option<&'a Sensor>; 2], shots: &[Exposure]) -> Vec<Reading<'a>> {
+    let all = readouts.into_iter().flatten();
+    let mut readings: Vec<Reading<'a>> = all
+        .flat_map(|sensor| shots.iter().map(move |&shot| Reading { sensor, shot, twin: None }))
+        .collect();
+    // By the light that each can tell, the most first.
+    readings.sort_by(|a, b| b.most().total_cmp(&a.most()).then(a.shot.frame.cmp(&b.shot.frame)));
+    for number in 0..readings.len() {
+        let own = &readings[number];
+        let has_twin = |(other, reading): (usize, &Reading<'_>)| {
+            let is_shared = reading.sensor.settings.readout != own.sensor.settings.readout;
+            other != number && is_shared && reading.shot == own.shot
+        };
+        readings[number].twin = readings.iter().enumerate().position(has_twin);
+    }
+    readings
+}
+
+impl Reading<'_> {
+    /// Electrons a second of light that it can tell.
+    fn most(&self) -> f64 {
+        self.sensor.saturation() / self.exposed()
+    }
+
+    /// Seconds of exposure of a photodiode of sensitivity 1.
+    fn exposed(&self) -> f64 {
+        self.sensor.settings.sensitivity * self.shot.exposure
+    }
+
+    /// Numbers below this are of pixels that are not saturated (DN).
+    fn limit(&self) -> f64 {
+        // Below a full well reads what the read-out takes from it.
+        let sensor = self.sensor;
+        let of_read_out = sensor.dark_noise(0.0).hypot(sensor.non_uniformity()[1]);
+        sensor.saturation_level() - MARGIN * sensor.system_gain() * of_read_out
+    }
 
     /// Photo-electrons a second that a number stands for.
-    fn rate(&self, y: u16, exposure: f64) -> f64 {
-        let electrons = (f64::from(y) - self.black_level()) / self.system_gain();
-        electrons / exposure - self.dark_current()
+    fn rate(&self, y: u16) -> f64 {
+        let read = (f64::from(y) - self.sensor.black_level()) / self.sensor.system_gain();
+        let (electrons, _) = self.sensor.settings.collected_of(read);
+        (electrons - self.sensor.dark_current() * self.shot.exposure) / self.exposed()
+    }
+
+    /// Mean electrons where so many a second are freed, those of heat included.
+    fn electrons(&self, rate: f64) -> f64 {
+        rate.max(0.0) * self.exposed() + self.sensor.dark_current() * self.shot.exposure
+    }
+
+    /// The variance of read-out and rounding (e⁻²), of so many electrons.
+    fn of_read_out(&self, electrons: f64) -> f64 {
+        let sensor = self.sensor;
+        let read = sensor.settings.read_of(electrons.min(sensor.full_well()));
+        let (_, slope) = sensor.settings.collected_of(read);
+        let rounding = 1.0 / (12.0 * sensor.system_gain() * sensor.system_gain());
+        (sensor.dark_noise(0.0).powi(2) + rounding) / (slope * slope)
     }
 
     /// The variance of [`Self::rate`], where so many electrons a second are freed.
-    fn variance_of_rate(&self, rate: f64, exposure: f64) -> f64 {
-        let rounding = 1.0 / (12.0 * self.system_gain() * self.system_gain());
-        let electrons = rate.max(0.0) * exposure + self.dark_noise(exposure).powi(2) + rounding;
-        electrons / (exposure * exposure)
+    fn variance_of_rate(&self, rate: f64) -> f64 {
+        let electrons = self.electrons(rate);
+        (electrons + self.of_read_out(electrons)) / self.exposed().powi(2)
     }
 
-    /// Whether a pixel, of which so many electrons a second were found in the time `before`, is not saturated in
-    /// the time `exposure`.
-    fn stays_below(&self, rate: f64, before: f64, exposure: f64) -> bool {
-        let found = self.variance_of_rate(rate, before) + self.variance_of_rate(rate, exposure);
-        let most = (rate + self.dark_current() + MARGIN * found.sqrt()) * exposure;
-        most < self.saturation()
+    /// What it counts for, where so many electrons a second are freed, with a twin that counts, or alone.
+    fn weight(&self, rate: f64, twin: Option<&Reading<'_>>) -> f64 {
+        let Some(twin) = twin else { return 1.0 / self.variance_of_rate(rate) };
+        let electrons = self.electrons(rate);
+        let [own, other] = [self, twin].map(|reading| 1.0 / reading.of_read_out(electrons));
+        let together = (electrons + 1.0 / (own + other)) / self.exposed().powi(2);
+        own / (own + other) / together
     }
 }

@@ -16,6 +16,7 @@
 //! | module | idea |
 //! |---|---|
 //! | [`spec`] | the sensor as a scene file writes it |
+//! | [`effects`] | parts of real chips: defects, blooming, second read-outs, angles |
 //! | [`preset`] | sensors of the trade |
 //! | [`cfa`] | colour filter arrays |
 //! | [`bands`] | the fewest spectral bands that count electrons right |
@@ -23,6 +24,8 @@
 //! | [`sensor`] | a sensor ready to expose, and pictures of what it saw |
 //! | [`demosaic`] | missing colours |
 //! | [`dng`] | raw files |
+//! | [`matching`] | the numbers of a sensor by which a simulation matches a photograph |
+//! | [`packed`] | raw numbers of 10 and 12 bits as MIPI packs them |
 //! | [`emva`] | the image series of a characterisation |
 //! | [`slanted_edge`] | the modulation transfer of a camera from a picture of an edge |
 //! | [`photon_transfer`] | photon-transfer and SNR curves |
@@ -34,35 +37,48 @@ pub mod cfa;
 mod chain;
 pub mod demosaic;
 pub mod dng;
+pub mod effects;
 pub mod emva;
 mod error;
 mod exposing;
 pub mod film;
 mod hdr;
 mod inertial;
+mod least_squares;
+pub mod matching;
 mod moments;
 mod normal;
+pub mod packed;
 mod philox;
 pub mod photon_transfer;
 mod poisson;
 pub mod preset;
 mod presets;
 mod response;
+mod responsivity;
+mod second;
 pub mod sensor;
 mod settings;
 pub mod slanted_edge;
 pub mod spec;
+mod whole_frame;
+mod window;
 
 pub use bands::{BandChoice, Factor, Illumination, Times};
 pub use cfa::CfaSpec;
 pub use chain::Defect;
+pub use effects::{
+    AngularResponse, AutoExposure, DefectMap, ListedDefect, Photodiodes, SecondReadout,
+};
 pub use error::SensorError;
 pub use film::{Exposure, Film, InvalidValues, Moments, NoiseFloor, RawImage};
 pub use hdr::HdrImage;
 pub use inertial::{InertialError, InertialNoise, InertialNoiseSpec};
+pub use packed::Packing;
 pub use philox::mixed_seed;
 pub use preset::{Model, Preset};
 pub use sensor::Sensor;
 pub use spec::{
     ChannelSet, ChannelSpec, Channels, IsoSetting, NoiseModel, Radiometry, SensorKind, SensorSpec,
 };
+pub use window::Window;

@@ -12,6 +12,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use crate::effects::Nonlinearity;
 use crate::normal::{clipped, normal_cdf, normal_density};
 use crate::poisson::probability;
 use crate::spec::NoiseModel;
@@ -34,12 +35,14 @@ const WIDE: f64 = 2.0;
 
 /// All that the law of one pixel depends on.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct PixelLaw {
+pub(crate) struct PixelLaw<'a> {
     pub(crate) noise: NoiseModel,
     /// Mean electrons of light and heat (e⁻).
     pub(crate) mean: f64,
     /// C (e⁻), +inf for none.
     pub(crate) full_well: f64,
+    /// What is read near saturation, as shares of the well.
+    pub(crate) curve: Option<&'a Nonlinearity>,
     /// The pixel's own offset (e⁻).
     pub(crate) offset: f64,
     /// Standard deviation of what the read-out adds (e⁻).
@@ -52,11 +55,11 @@ pub(crate) struct PixelLaw {
     pub(crate) white: f64,
 }
 
-impl PixelLaw {
+impl PixelLaw<'_> {
     /// `[mean, variance]` (DN, DN²) over exposures.
     pub(crate) fn moments(&self) -> [f64; 2] {
         if self.noise == NoiseModel::None {
-            let level = self.gain * self.mean.min(self.full_well) + self.black;
+            let level = self.gain * self.read_of(self.mean.min(self.full_well)) + self.black;
             return [quantised(level, self.white), 0.0];
         }
         let mean = self.mean.max(0.0);
@@ -70,7 +73,10 @@ impl PixelLaw {
         };
         let high = self.level(mean + reach) + REACH * sigma;
         let unclipped = low > 0.5 && high < self.white - 0.5 && mean + reach < self.full_well;
-        if unclipped && let Some(moments) = self.unclipped() {
+        if unclipped
+            && self.curve.is_none()
+            && let Some(moments) = self.unclipped()
+        {
             return moments;
         }
         let pivot = quantised(self.level(mean.min(self.full_well)), self.white);
@@ -84,7 +90,12 @@ impl PixelLaw {
 
     /// X of so many electrons without read noise (DN).
     fn level(&self, electrons: f64) -> f64 {
-        self.gain * (electrons + self.offset) + self.black
+        self.gain * (self.read_of(electrons) + self.offset) + self.black
+    }
+
+    fn read_of(&self, electrons: f64) -> f64 {
+        let bent = |curve: &Nonlinearity| self.full_well * curve.read(electrons / self.full_well);
+        self.curve.map_or(electrons, bent)
     }
 
     /// Both moments where nothing is clipped; `None` where the series is longer than the sum.
@@ -170,15 +181,16 @@ impl PixelLaw {
     fn over_normal(&self, mean: f64, pivot: f64, sum: &mut Shifted) {
         let spread = mean.sqrt();
         let well = (self.full_well - mean) / spread;
-        if spread <= 0.0 || well > CHARGE_REACH {
+        let is_straight = self.curve.is_none();
+        if spread <= 0.0 || (well > CHARGE_REACH && is_straight) {
             return self.add(1.0, mean, mean, pivot, sum);
         }
-        if self.read_noise <= 0.0 {
+        if self.read_noise <= 0.0 && is_straight {
             // The well is an end of the converter's.
             let white = quantised(self.level(self.full_well), self.white);
             return sum.add(1.0, given(self.level(mean), self.gain * spread, white, pivot));
         }
-        let top = well.max(-CHARGE_REACH);
+        let top = well.clamp(-CHARGE_REACH, CHARGE_REACH);
         let cells =
             (2.0 * CHARGE_REACH / (0.5 * self.read_noise / spread).clamp(2e-3, 0.025)).ceil();
         let width = (top + CHARGE_REACH) / cells;
@@ -203,7 +215,8 @@ impl PixelLaw {
 
     /// Adds a count of electrons with a variance of its own (e⁻²) and the read noise.
     fn add(&self, weight: f64, electrons: f64, own: f64, pivot: f64, sum: &mut Shifted) {
-        let sigma = self.gain * (self.read_noise * self.read_noise + own).sqrt();
+        let slope = self.curve.map_or(1.0, |curve| curve.slope(electrons / self.full_well));
+        let sigma = self.gain * (self.read_noise * self.read_noise + slope * slope * own).sqrt();
         sum.add(weight, given(self.level(electrons), sigma, self.white, pivot));
     }
 }

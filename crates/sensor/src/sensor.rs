@@ -1,5 +1,7 @@
 //! A sensor ready to expose films.
 
+use std::sync::Arc;
+
 use etendue_geometry::units::Micrometres;
 use etendue_spectrum::{Bands, Curve};
 use rayon::prelude::*;
@@ -9,7 +11,7 @@ use crate::exposing::Exposing;
 use crate::film::{Exposure, Film, InvalidValues, Moments, RawImage};
 use crate::philox::{PhiloxKey, Site};
 use crate::response::Response;
-use crate::settings::SensorSettings;
+use crate::settings::{Readout, SensorSettings};
 use crate::spec::{HotPixels, NoiseModel, Radiometry, SensorSpec};
 use crate::{CfaSpec, SensorError};
 
@@ -31,7 +33,9 @@ impl Sensor {
     pub fn new(spec: &SensorSpec) -> Result<Self, SensorError> {
         let settings = SensorSettings::new(spec)?;
         let response = Response::new(spec, &settings, None)?;
-        Ok(Self { spec: spec.clone(), settings, response, cfa: spec.cfa.clone() })
+        let sensor = Self { spec: spec.clone(), settings, response, cfa: spec.cfa.clone() };
+        sensor.check_second()?;
+        Ok(sensor)
     }
 
     /// What it was made of.
@@ -163,6 +167,7 @@ impl Sensor {
     #[must_use]
     pub fn saturation(&self) -> f64 {
         let converter = (self.settings.white() - self.settings.black) / self.settings.gain;
+        let (converter, _) = self.settings.collected_of(converter);
         self.settings.full_well.min(converter)
     }
 
@@ -224,7 +229,7 @@ impl Sensor {
     }
 
     /// Photo-electrons of the pixels, row by row; `of_pixel` makes one number of its channels.
-    fn rows_of_electrons<'a>(
+    pub(crate) fn rows_of_electrons<'a>(
         &'a self,
         film: Film<'a>,
         exposure: f64,
@@ -262,6 +267,12 @@ impl Sensor {
         let s = &self.settings;
         let offsets = s.row_noise.powi(2) + s.column_noise.powi(2);
         (s.read_noise.powi(2) + offsets + s.dark_current * exposure).sqrt()
+    }
+
+    /// Standard deviation of the way that carriers diffuse sideways (pixels).
+    #[must_use]
+    pub fn carrier_diffusion(&self) -> f64 {
+        self.settings.effects.diffusion / self.settings.pixel_pitch
     }
 
     /// Bits of the converter.
@@ -342,16 +353,28 @@ impl Sensor {
     pub fn defects(&self) -> impl Iterator<Item = ([u32; 2], usize, Defect)> + '_ {
         let chain = self.chain(0.0, 0);
         let [width, height] = self.settings.resolution;
-        let any = self.settings.dead + self.settings.stuck + chain.hot[0] > 0.0;
-        let rows = if any { 0..height } else { 0..0 };
-        let pixels = rows.flat_map(move |row| (0..width).map(move |column| [column, row]));
-        pixels.flat_map(move |at @ [column, row]| {
-            let chain = chain.clone();
-            (0..self.depth()).filter_map(move |channel| {
+        let by_chance = self.settings.dead + self.settings.stuck + chain.hot[0] > 0.0;
+        let rows = if by_chance || !chain.effects.listed.is_empty() { 0..height } else { 0..0 };
+        rows.flat_map(move |row| {
+            let mut found = Vec::new();
+            for column in (0..width).filter(|_| by_chance) {
+                for channel in 0..self.depth() {
+                    #[expect(clippy::cast_possible_truncation, reason = "channels have 12 bits")]
+                    let site = Site { row, channel: channel as u16, frame: 0 };
+                    let kind = chain.defect_at(site, column);
+                    found.extend(kind.map(|kind| ([column, row], channel, kind)));
+                }
+            }
+            for channel in 0..self.depth() {
                 #[expect(clippy::cast_possible_truncation, reason = "channels have 12 bits")]
-                let site = Site { row, channel: channel as u16, frame: 0 };
-                Some((at, channel, chain.defect_at(site, column)?))
-            })
+                let listed = chain.effects.listed_in(row, 0..width, channel as u16);
+                found.extend(listed.map(|at| ([at.column, row], channel, at.kind)));
+            }
+            found.sort_by_key(|(at, channel, _)| (*at, *channel));
+            // What a map says of a pixel comes after what chance does, and holds.
+            found.reverse();
+            found.dedup_by_key(|(at, channel, _)| (*at, *channel));
+            found.into_iter().rev()
         })
     }
 
@@ -381,7 +404,12 @@ impl Sensor {
             hot: s.hot_pixels.map_or([0.0; 2], hot),
             dead: s.dead,
             stuck: s.stuck,
+            effects: Arc::clone(&s.effects),
             temporal: PhiloxKey::temporal(seed, s.serial),
+            second: match s.readout {
+                Readout::First => None,
+                Readout::Second => Some(PhiloxKey::temporal(!seed, s.serial)),
+            },
             pattern: PhiloxKey::new(s.serial),
         }
     }

@@ -1,9 +1,11 @@
 //! A spec with every gap filled, by the model or by an ideal sensor, and every number checked.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use etendue_spectrum::Curve;
 
+use crate::effects::Effects;
 use crate::spec::{Filters, HotPixels, NoiseModel, Radiometry, SensorKind, SensorSpec};
 use crate::{CfaSpec, Model, SensorError};
 
@@ -18,6 +20,13 @@ const MOST_ELECTRONS: f64 = 1e9;
 
 /// Dark currents beyond this are, too (e⁻/s).
 const MOST_CURRENT: f64 = 1e15;
+
+/// Which read-out of a pixel's electrons: the noise of each is its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Readout {
+    First,
+    Second,
+}
 
 /// A sensor's numbers, in the units of [`SensorSpec`].
 #[derive(Debug, Clone, PartialEq)]
@@ -57,6 +66,11 @@ pub(crate) struct SensorSettings {
     pub(crate) noise: NoiseModel,
     pub(crate) serial: u64,
     pub(crate) radiometry: Radiometry,
+    /// Sensitivity beside that of the first read-out's photodiode, which is 1.
+    pub(crate) sensitivity: f64,
+    /// Which read-out of the electrons it is.
+    pub(crate) readout: Readout,
+    pub(crate) effects: Arc<Effects>,
     /// What a user should know.
     pub(crate) notes: Vec<String>,
 }
@@ -69,7 +83,26 @@ impl SensorSettings {
 
     /// Where a pixel saturates (DN): its well, or the converter.
     pub(crate) fn saturation_level(&self) -> f64 {
-        (self.gain * self.full_well + self.black).round_ties_even().min(self.white())
+        (self.gain * self.read_of(self.full_well) + self.black).round_ties_even().min(self.white())
+    }
+
+    /// What is read of so many electrons (e⁻), which the well holds.
+    pub(crate) fn read_of(&self, electrons: f64) -> f64 {
+        match &self.effects.nonlinearity {
+            Some(curve) => self.full_well * curve.read(electrons / self.full_well),
+            None => electrons,
+        }
+    }
+
+    /// The electrons of which so many are read, and what one more of them adds to that.
+    pub(crate) fn collected_of(&self, read: f64) -> (f64, f64) {
+        match &self.effects.nonlinearity {
+            Some(curve) => {
+                let share = curve.collected(read / self.full_well);
+                (self.full_well * share, curve.slope(share))
+            }
+            None => (read, 1.0),
+        }
     }
 
     /// Fills and checks a spec.
@@ -120,6 +153,9 @@ impl SensorSettings {
             noise,
             serial: spec.serial.unwrap_or(0),
             radiometry: spec.radiometry.unwrap_or_default(),
+            sensitivity: 1.0,
+            readout: Readout::First,
+            effects: Arc::default(),
             notes: Vec::new(),
         };
         settings.amplify(spec)?;
@@ -130,6 +166,7 @@ impl SensorSettings {
         settings.check_converter(spec.full_well)?;
         settings.check_exposures(spec)?;
         settings.check_use(spec)?;
+        settings.effects = Arc::new(Effects::new(spec, settings.resolution, settings.full_well)?);
         settings.warm(spec)?;
         Ok(settings)
     }
@@ -234,8 +271,9 @@ impl SensorSettings {
         let frames = f64::from(self.frames);
         SensorError::unless((1..=100_000).contains(&self.frames), "frames", frames, "1 to 100000")?;
         if spec.hdr == Some(true) {
-            if self.exposures.len() as f64 * frames < 2.0 {
-                let why = "sensor.hdr merges several: name their times";
+            let readouts = if spec.second_readout.is_some() { 2.0 } else { 1.0 };
+            if self.exposures.len() as f64 * frames * readouts < 2.0 {
+                let why = "sensor.hdr merges several: name their times, or a second_readout";
                 return Err(SensorError::Missing { key: "exposures", why });
             }
             if self.radiometry == Radiometry::Digital {
@@ -247,6 +285,17 @@ impl SensorSettings {
         if spec.exposure.is_some() && spec.exposures.is_some() {
             let why = "sensor.exposures says it all";
             return Err(SensorError::Misplaced { key: "exposure", why });
+        }
+        if spec.auto_exposure.is_some() {
+            if spec.exposure.is_some() || spec.exposures.is_some() {
+                let why = "sensor.exposure or sensor.exposures gives the time that it would meter";
+                return Err(SensorError::Misplaced { key: "auto_exposure", why });
+            }
+            if self.radiometry == Radiometry::Digital {
+                let why =
+                    "with radiometry `digital` longer exposures have no more light; set `physical`";
+                return Err(SensorError::Misplaced { key: "auto_exposure", why });
+            }
         }
         Ok(())
     }
@@ -288,6 +337,8 @@ impl SensorSettings {
             spec.column_pattern,
             spec.converter_noise,
             spec.hot_pixels.map(|hot| hot.share),
+            spec.blooming,
+            spec.second_readout.map(|second| second.ratio()),
         ];
         let wants_electrons = self.noise != NoiseModel::None
             || self.radiometry == Radiometry::Physical
@@ -342,7 +393,7 @@ impl SensorSettings {
 }
 
 /// The spec with the numbers of the ISO setting that holds.
-fn at_its_iso(spec: &SensorSpec) -> Result<Cow<'_, SensorSpec>, SensorError> {
+pub(crate) fn at_its_iso(spec: &SensorSpec) -> Result<Cow<'_, SensorSpec>, SensorError> {
     let Some(all) = &spec.iso_settings else {
         if spec.iso.is_some() {
             let why = "sensor.iso names one of them";

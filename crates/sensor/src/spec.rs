@@ -12,6 +12,7 @@ use serde::de::{self, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::demosaic::Method;
+use crate::effects::{AngularResponse, AutoExposure, DefectMap, Photodiodes, SecondReadout};
 use crate::{CfaSpec, Model};
 
 /// A scene file's `sensor`. What is absent comes from the `model`, or is ideal.
@@ -108,6 +109,34 @@ pub struct SensorSpec {
     /// (0..=0.2; default 0).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub crosstalk: Option<f64>,
+    /// Pixels with which something is wrong, one by one: a picture of them, or a list.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub defect_map: Option<DefectMap>,
+    /// What is read of what a pixel collected, near saturation: points `[collected, read]` as shares of `full_well`,
+    /// ascending from 0 to 1 collected, that straight lines join (absent: all of it).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nonlinearity: Option<Vec<[f64; 2]>>,
+    /// The share of the charge above `full_well` that flows into the neighbours of its column (0..=1; default 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blooming: Option<f64>,
+    /// The signal of smear, as a share of that of an area a tenth of the picture high (0..=1; default 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub smear: Option<f64>,
+    /// Standard deviation of the way that carriers diffuse sideways, along columns as along rows (µm, ≥ 0; default 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub carrier_diffusion: Option<Micrometres>,
+    /// The sensitivity against the angle of the chief ray (absent: the same at all angles).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub angular_response: Option<AngularResponse>,
+    /// Parts of each pixel, that see parts of the pupil under one on-chip lens, each read for itself beside the whole.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub photodiodes: Option<Photodiodes>,
+    /// A second number of each pixel: of another gain, or of a second photodiode.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_readout: Option<SecondReadout>,
+    /// The exposure time is metered: instead of `exposure`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub auto_exposure: Option<AutoExposure>,
     /// Exposure time T (s, > 0; default 0.01).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exposure: Option<Seconds>,
@@ -117,7 +146,7 @@ pub struct SensorSpec {
     /// Frames of each exposure (≥ 1; default 1). They share the fixed pattern, not the noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frames: Option<u32>,
-    /// Also merge all exposures to one picture of electrons a second (default false).
+    /// Also merge all exposures and read-outs to one picture of electrons a second (default false).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hdr: Option<bool>,
     /// How electrons are drawn (default: `poisson` with a model or a gain, else `none`).

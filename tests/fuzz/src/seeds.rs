@@ -46,6 +46,7 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
         "environment_hdr" => vec![hdr()],
         "mask_exr" | "environment_exr" => vec![exr_file()],
         "envi" => envis(),
+        "dng" => dngs(),
         "doctor" => vec![GLTF.into(), glb(GLTF), MTL.into(), b"unused.png %20 \\ ".repeat(99)],
         _ => Vec::new(),
     };
@@ -205,6 +206,27 @@ fn envis() -> Vec<Vec<u8>> {
             "reflectance scale factor = 1\ndata ignore value = 0\nz plot titles = {a (nm), b (c)}\n",
         ),
     ]
+}
+
+/// A raw image of four by two numbers, in both orders of bytes.
+fn dngs() -> Vec<Vec<u8>> {
+    let file = |is_big: bool| {
+        let short = |n: u16| if is_big { n.to_be_bytes() } else { n.to_le_bytes() };
+        let long = |n: u32| if is_big { n.to_be_bytes() } else { n.to_le_bytes() };
+        let mut bytes = if is_big { b"MM\0*".to_vec() } else { b"II*\0".to_vec() };
+        bytes.extend(long(8));
+        let tags: [(u16, u32); 8] =
+            [(256, 4), (257, 2), (258, 16), (259, 1), (273, 110), (277, 1), (278, 2), (279, 16)];
+        bytes.extend(short(8));
+        for (tag, value) in tags {
+            [short(tag), short(4)].iter().for_each(|word| bytes.extend(word));
+            [long(1), long(value)].iter().for_each(|word| bytes.extend(word));
+        }
+        bytes.extend(long(0));
+        bytes.resize(126, 7);
+        bytes
+    };
+    vec![file(false), file(true)]
 }
 
 fn npys() -> Vec<Vec<u8>> {

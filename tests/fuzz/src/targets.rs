@@ -24,7 +24,7 @@ pub struct Target {
 }
 
 /// All readers.
-pub const TARGETS: [Target; 22] = [
+pub const TARGETS: [Target; 23] = [
     Target { name: "gltf", run: gltf },
     Target { name: "glb", run: glb },
     Target { name: "obj", run: obj },
@@ -46,6 +46,7 @@ pub const TARGETS: [Target; 22] = [
     Target { name: "environment_hdr", run: environment_hdr },
     Target { name: "environment_exr", run: environment_exr },
     Target { name: "envi", run: envi },
+    Target { name: "dng", run: dng },
     Target { name: "doctor", run: doctor },
 ];
 
@@ -234,6 +235,11 @@ fn envi(bytes: &[u8], _folder: &Path) {
     if let Ok(header) = envi::Header::parse(header) {
         let _ = header.decode(numbers, Limits::default());
     }
+}
+
+/// A raw photograph.
+fn dng(bytes: &[u8], _folder: &Path) {
+    let _ = etendue_image::dng::read(bytes, Limits::default());
 }
 
 /// The files beside a model, which are looked through for names.

@@ -157,6 +157,18 @@ pub(super) fn pitch(text: &str) -> Result<f64, String> {
     }
 }
 
+/// `25 mm`, or a plain number of metres.
+pub(super) fn length(text: &str) -> Result<f64, String> {
+    let metres = match text.trim().parse() {
+        Ok(number) => number,
+        Err(_) => Dimension::Length.parse(text, "m").map_err(|error| error.to_string())?,
+    };
+    match metres > 0.0 && f64::is_finite(metres) {
+        true => Ok(metres),
+        false => Err("expected a length above 0, such as \"25 mm\"".to_owned()),
+    }
+}
+
 /// `40,60,200,240`.
 pub(super) fn region(text: &str) -> Result<[usize; 4], String> {
     let numbers: Option<Vec<usize>> = text.split(',').map(|n| n.trim().parse().ok()).collect();

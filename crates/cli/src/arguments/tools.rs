@@ -202,6 +202,127 @@ pub(crate) struct ExposeArguments {
     pub(crate) quiet: bool,
 }
 
+pub(super) const CALIBRATE_HELP: &str = "\
+Takes the pictures of the scene's own camera, at its own settings:
+  dark_000 …         frames in the dark, and their mean dark_mean.npy
+  flat_000 …         the same light on every pixel, as without a lens
+  white_000 …        an even white surrounding through the lens
+  board_000_000 …    a chessboard in poses over the picture; calibration.json says where its corners are
+The DNGs say shading as a gain map (OpcodeList2), made of the white image.
+
+Examples:
+  etendue calibrate scenes/double-gauss.json -o out/calibration --set camera.sensor.model=imx250
+  etendue calibrate scene.json -o out/set --frames 64 --level 0.8 --boards 0
+  etendue calibrate scene.json -o out/set --region 0,0,640,480 --binning 2 --packed raw12";
+
+#[derive(Debug, Args)]
+pub(crate) struct CalibrateArguments {
+    /// A scene whose camera has a sensor
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+    /// The folder to write into; made when it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    // Not a comment of documentation, whose brackets would be a link.
+    #[arg(
+        long = "set",
+        value_name = "PATH=VALUE",
+        value_parser = parse::setting,
+        help = "Set any value of the scene, e.g. camera.sensor.exposure=0.02"
+    )]
+    pub(crate) settings: Vec<(String, String)>,
+    /// Frames of each kind, 1 to 1000
+    #[arg(long, value_name = "N", default_value_t = 16)]
+    pub(crate) frames: u32,
+    /// The share of saturation that flats and white images reach
+    #[arg(long, value_name = "SHARE", default_value_t = 0.5)]
+    pub(crate) level: f64,
+    /// Poses of the chessboard; 0 for none
+    #[arg(long, value_name = "N", default_value_t = 12)]
+    pub(crate) boards: u32,
+    /// Squares of the chessboard along columns and rows
+    #[arg(long, value_name = "COLUMNS,ROWS", value_parser = parse::resolution, default_value = "9,6")]
+    pub(crate) squares: [u32; 2],
+    /// A side of a square, such as "25 mm"; what fills half of the picture when absent
+    #[arg(long, value_name = "LENGTH", value_parser = parse::length)]
+    pub(crate) square: Option<f64>,
+    /// How far the chessboard is, such as "1.2 m"; where the lens is focused when absent
+    #[arg(long, value_name = "DISTANCE", value_parser = parse::length)]
+    pub(crate) distance: Option<f64>,
+    /// Read out a region alone: left column, top row, width and height (pixels)
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse::region)]
+    pub(crate) region: Option<[usize; 4]>,
+    /// Average the numbers of so many pixels a side, those behind the same filter
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) binning: usize,
+    /// Also write the numbers as MIPI packs them
+    #[arg(long, value_name = "FORMAT", value_enum)]
+    pub(crate) packed: Option<PackedArgument>,
+    /// The f-number that DNGs say of a camera without a lens of its own
+    #[arg(long, value_name = "N", value_parser = parse::f_number)]
+    pub(crate) f_number: Option<f64>,
+    /// Kinds of file to write
+    #[arg(long, value_name = "LIST", default_value = "png,npy,dng")]
+    pub(crate) outputs: String,
+    /// Let the scene name files outside its own folder
+    #[arg(long)]
+    pub(crate) allow_outside: bool,
+    /// Show no progress and no summary; the list of files and errors remain
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+/// A packed format.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PackedArgument {
+    /// Four pixels of 10 bits in five bytes
+    Raw10,
+    /// Two pixels of 12 bits in three bytes
+    Raw12,
+}
+
+pub(super) const MATCH_HELP: &str = "\
+The paper's three steps: what is known of the sensor stands in the scene, the photograph is raw, and the
+scene is rendered and fitted to it: gain, read noise and black of the sensor, and the level of light in
+each channel, each with its standard deviation. The photograph is a DNG or TIFF without compression, or
+a grey PNG of 16 bits, of the scene's own view and size. With -o: match.json, residuals.png, where grey is
+no difference and black and white are 4 standard deviations, residuals.npy, and residuals.svg.
+
+Examples:
+  etendue match photo.dng chart.json
+  etendue match raw.png chart.json --set camera.sensor.prnu=0.005 -o out/match
+  etendue match photo.dng chart.json --json";
+
+#[derive(Debug, Args)]
+pub(crate) struct MatchArguments {
+    /// A raw photograph (.dng, .tif, .png)
+    #[arg(value_name = "PHOTO")]
+    pub(crate) photo: PathBuf,
+    /// The scene that it shows, with a raw sensor
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+    // Not a comment of documentation, whose brackets would be a link.
+    #[arg(
+        long = "set",
+        value_name = "PATH=VALUE",
+        value_parser = parse::setting,
+        help = "Set any value of the scene, e.g. camera.sensor.exposure=0.02"
+    )]
+    pub(crate) settings: Vec<(String, String)>,
+    /// Draw residuals and write what was found into this folder, made when it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Print JSON for machines
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Let the scene name files outside its own folder
+    #[arg(long)]
+    pub(crate) allow_outside: bool,
+    /// Show no progress and no notes
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
 pub(super) const SPECTRUM_HELP: &str = "\
 X, Y and Z are integrals of the curve times the CIE 1931 observer, not normalised; the curve is taken for
 light and is 0 beyond its ends. With --under it is a reflectance, and what it leaves of a lamp's light is

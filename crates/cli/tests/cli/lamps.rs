@@ -109,6 +109,36 @@ fn lumens_are_the_flux_of_points_cones_and_measured_lamps() {
     refused(&sun, "lumens");
 }
 
+/// Under so many lux, a matte wall of reflectance ½ has the luminance E/(2π), whatever the spectrum and the angle.
+#[test]
+fn lux_are_the_illuminance_of_parallel_light() {
+    let bench = Bench::new();
+    for spectrum in
+        [json!([1, 1, 1]), json!([0.2, 0.5, 1]), json!({ "illuminant": "fl11", "scale": 1e-6 })]
+    {
+        for (direction, cosine) in [([0.0, 0.0, -1.0], 1.0), ([0.0, -1.0, -1.0], 0.5_f64.sqrt())] {
+            let sun = json!({
+                "type": "directional", "direction": direction, "irradiance": spectrum, "lux": 10_000,
+            });
+            let found = luminance(&seen(&bench, &wall(&fine(), json!([sun]))));
+            let expected = 10_000.0 * cosine * 0.5 / PI;
+            // Light in f32, in bands of a nanometre.
+            assert!(
+                (found / expected - 1.0).abs() < 1e-4,
+                "{spectrum} {direction:?}: {found} {expected}"
+            );
+        }
+    }
+    let dark = json!([{
+        "type": "directional", "direction": [0, 0, -1], "irradiance": { "line": 940 }, "lux": 5,
+    }]);
+    bench.write("scene.json", wall(&fine(), dark).to_string().as_bytes());
+    let output = bench.run(&["render", "scene.json", "-o", "none"]);
+    assert_eq!(output.status.code(), Some(2));
+    let why = text(&output.stderr);
+    assert!(why.contains("lux") && why.contains("the eye does not see"), "{why}");
+}
+
 #[test]
 fn a_luminance_is_that_of_a_surface() {
     let bench = Bench::new();

@@ -5,6 +5,8 @@ mod assets; // real models from outside the repository
 mod bad_input; // refused with exit code 2, one message, and nothing written
 mod bad_light; // materials, textures and lights that make no sense
 mod bench; // speed against accuracy on a tiny scene
+mod calibration;
+mod chips;
 mod cubes; // surfaces and lamps by wavelength, from files of every form
 mod cubes_around; // light by wavelength from all around
 mod deforming; // skins and morph targets while the shutter is open

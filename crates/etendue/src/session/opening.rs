@@ -100,6 +100,7 @@ impl Session {
             seconds: Seconds::default(),
             checkpoint: None,
             denoiser: None,
+            metered: None,
         })
     }
 

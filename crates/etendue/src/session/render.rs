@@ -7,6 +7,7 @@ use std::time::Instant;
 use etendue_accel::Accel;
 use etendue_files::{SOFTWARE, Transaction};
 use etendue_oidn::Denoiser;
+use etendue_render::expose::SensorLight;
 use etendue_render::output::{ImageHash, Layer};
 use etendue_render::report::memory;
 use etendue_render::{
@@ -198,8 +199,9 @@ impl Session {
         let traced = structure
             .filter(|_| scene.camera.light_field().is_some())
             .map(|accel| (accel, Arc::clone(&self.images)));
-        let rendering =
+        let mut rendering =
             Rendering::new(scene, (picture, band_film), traced, (report, fingerprints))?;
+        rendering.light = rendering.light.map(|light| self.at_common_exposure(light));
         match &self.denoiser {
             Some(denoiser) => {
                 let rendering = rendering.denoised(denoiser)?;
@@ -207,6 +209,27 @@ impl Session {
                 Ok(rendering)
             }
             None => Ok(rendering),
+        }
+    }
+
+    /// What the frames of a sequence have of the exposure that `auto_exposure` metered on the first of them (s), for one that
+    /// does not render that.
+    pub fn set_metered_exposure(&mut self, exposure: f64) {
+        self.metered = Some(exposure);
+    }
+
+    /// Of a sequence all frames have the exposure that was metered on the first, unless each has its own.
+    fn at_common_exposure(&mut self, light: SensorLight) -> SensorLight {
+        let metering = light.sensor().spec().auto_exposure;
+        if self.shown.is_none() || metering.is_none_or(|metering| metering.each_frame) {
+            return light;
+        }
+        match self.metered {
+            Some(time) => light.at_exposure(time),
+            None => {
+                self.metered = light.metered();
+                light
+            }
         }
     }
 

@@ -84,7 +84,18 @@ impl SensorLight {
         };
         let film = film.times(factor);
         let white = sensor.white_under(&vec![1.0; sensor.bands().count()]);
-        Ok(Self { sensor, film, seeds, white, header, notes })
+        let light = Self {
+            sensor,
+            film,
+            seeds,
+            white,
+            header,
+            notes,
+            metered: None,
+            f_number: None,
+            solid_angle: None,
+        };
+        Ok(light.metered_by_itself())
     }
 }
 
@@ -121,7 +132,7 @@ fn divided(film: BandFilm, sensor: &Sensor) -> Result<BandFilm, ExposeError> {
             *value = part.map_or(0.0, |band| light[band]);
         }
     });
-    Ok(BandFilm { bands: Bands::Spectral(finer), values })
+    Ok(BandFilm { bands: Bands::Spectral(finer), values, parts: Vec::new() })
 }
 
 /// A sentence on what of white light the sensor would see beyond `bands`.

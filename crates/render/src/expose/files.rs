@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use etendue_sensor::dng::{DngDetails, DngError};
 use etendue_sensor::{
-    Defect, Exposure, Film, InvalidValues, NoiseModel, RawImage, Sensor, SensorKind, SensorSpec,
+    Defect, Exposure, Film, InvalidValues, Moments, NoiseModel, RawImage, Sensor, SensorKind,
+    SensorSpec,
 };
 use rayon::prelude::*;
 use serde::Serialize;
@@ -31,6 +32,8 @@ pub(super) fn name(digits: usize, stem: &str, number: u32, ending: &str) -> Stri
 /// Writes one exposure after the other.
 pub(super) struct ExposureWriter<'a> {
     pub(super) sensor: &'a Sensor,
+    /// What its second read-out is, where it has one.
+    pub(super) second: Option<Sensor>,
     pub(super) light: &'a SensorLight,
     pub(super) files: &'a Transaction,
     pub(super) folder: &'a Path,
@@ -93,6 +96,15 @@ impl ExposureWriter<'_> {
             npy::write(self.files, &self.place(&name), &raw, "Raw")?;
             files.npy = Some(name);
         }
+        if let Some(second) = self.second.clone() {
+            let image = self.light.expose_on(&second, shot)?;
+            files.second = self.numbers(image, SECOND, shot)?;
+        }
+        let parts: Vec<&'static str> = self.light.parts().collect();
+        for (part, stem) in parts.into_iter().enumerate() {
+            let image = self.light.expose_part(part, shot)?;
+            files.photodiodes.extend(self.numbers(image, stem, shot)?);
+        }
         if self.sensor.spec().moments == Some(true) {
             let known = self.moments.iter().find(|(exposure, _)| *exposure == shot.exposure);
             let found = match known {
@@ -106,6 +118,29 @@ impl ExposureWriter<'_> {
             [files.mean, files.variance] = found.map(Some);
         }
         Ok(files)
+    }
+
+    /// Writes further numbers of the pixels, as the first ones.
+    fn numbers(
+        &mut self,
+        image: RawImage,
+        stem: &str,
+        shot: Exposure,
+    ) -> Result<Option<String>, ExposeError> {
+        let is_picture = matches!(image.depth, 1 | 3);
+        let raw = self.raw(image, shot)?;
+        let mut named = None;
+        if self.outputs.png && is_picture {
+            let name = self.name(stem, shot.frame, "png");
+            png::write(self.files, &self.place(&name), &raw, "Raw", png::Bits::Sixteen)?;
+            named = Some(name);
+        }
+        if self.outputs.npy || !is_picture {
+            let name = self.name(stem, shot.frame, "npy");
+            npy::write(self.files, &self.place(&name), &raw, "Raw")?;
+            named = Some(name);
+        }
+        Ok(named)
     }
 
     /// The numbers as a picture of one layer.
@@ -180,7 +215,8 @@ impl ExposureWriter<'_> {
         let written = self.files.write(&path, |part| {
             let mut out = BufWriter::new(part);
             let white = &self.light.white;
-            let details = DngDetails { model, white, exposure: shot.exposure };
+            let (exposure, f_number) = (shot.exposure, self.light.f_number);
+            let details = DngDetails { model, white, exposure, f_number, shading: None };
             match self.sensor.write_dng(image, details, &mut out) {
                 Ok(()) => out.flush(),
                 Err(DngError::NotRaw(why)) => {
@@ -212,7 +248,7 @@ impl ExposureWriter<'_> {
     /// Merges all exposures, and writes electrons a second with their standard deviation.
     pub(super) fn merged(&mut self, shots: &[Exposure]) -> Result<[String; 2], ExposeError> {
         let light = self.light;
-        let image = self.sensor.merged(shots, |shot| light.expose(shot))?;
+        let image = self.sensor.merged(shots, |sensor, shot| light.expose_on(sensor, shot))?;
         if image.saturated > 0 {
             let of = image.rate.len();
             self.exposed.notes.push(format!(
@@ -241,6 +277,33 @@ impl ExposureWriter<'_> {
         Ok(HDR_NAMES.map(|(name, _)| name.to_owned()))
     }
 
+    /// Draws the ratio of signal above black to noise of every number, 20·log₁₀ of it from 0 dB (black) to 50 dB (white).
+    fn ratios(&mut self, moments: &Moments, name: &str, shot: Exposure) -> Result<(), ExposeError> {
+        let black = self.sensor.black_level()
+            + self.sensor.system_gain() * self.sensor.dark_current() * shot.exposure;
+        let grey = |(mean, variance): (&f32, &f32)| {
+            let ratio =
+                (f64::from(*mean) - black).max(0.0) / f64::from(*variance).max(1e-12).sqrt();
+            #[expect(clippy::cast_possible_truncation, reason = "a picture to look at")]
+            let grey = (20.0 * ratio.max(1e-9).log10() / WHITE_DECIBELS).clamp(0.0, 1.0) as f32;
+            grey
+        };
+        let all: Vec<f32> = moments.mean.iter().zip(&moments.variance).map(grey).collect();
+        let depth = moments.depth;
+        let plane = |k: usize| Values::F32(all.iter().skip(k).step_by(depth).copied().collect());
+        let definition = "signal to noise, 20 log10 of it, as a share of 50 dB";
+        let layer = Layer {
+            name: "Snr".to_owned(),
+            look: Look::Share,
+            channels: self.named((0..depth).map(plane).collect()),
+            meaning: self.meaning(definition, "50 dB", shot),
+        };
+        let header = self.light.header.clone();
+        let picture = Picture::new(moments.width, moments.height, vec![layer], header)?;
+        png::write(self.files, &self.place(name), &picture, "Snr", png::Bits::Eight)?;
+        Ok(())
+    }
+
     /// Writes expected value and variance of an exposure time, numbered as the exposure is.
     fn moments(&mut self, shot: Exposure) -> Result<MomentFiles, ExposeError> {
         #[expect(clippy::cast_possible_truncation, reason = "fewer than shots")]
@@ -249,6 +312,9 @@ impl ExposureWriter<'_> {
         // Mean and variance, a file each.
         let moments = self.sensor.moments(self.film(), shot)?;
         let depth = moments.depth;
+        if self.outputs.png && matches!(depth, 1 | 3) {
+            self.ratios(&moments, &snr_name(self.sensor, self.digits, number), shot)?;
+        }
         for ((stem, definition, unit, values), name) in [
             ("mean", "expected digital number", "DN", moments.mean),
             ("variance", "variance over frames, quantisation included", "DN^2", moments.variance),
@@ -272,11 +338,23 @@ impl ExposureWriter<'_> {
     }
 }
 
+/// Decibels that are white in a map of ratios.
+const WHITE_DECIBELS: f64 = 50.0;
+
+/// The name of the map of ratios of signal to noise of the exposure time `number`.
+pub(super) fn snr_name(sensor: &Sensor, digits: usize, number: u32) -> String {
+    let [mean, _] = moment_names(sensor, digits, number);
+    mean.replace("raw_mean", "raw_snr").replace(".npy", ".preview.png")
+}
+
 /// The files of all exposures merged, and what is in them.
 pub(super) const HDR_NAMES: [(&str, &str); 2] = [
     ("raw_hdr.npy", "photo-electrons a second, of all exposures by the weights of least noise"),
     ("raw_hdr_sigma.npy", "their standard deviation"),
 ];
+
+/// What the files of a second read-out are called.
+pub(super) const SECOND: &str = "raw_second";
 
 /// Names of the files of expected value and variance.
 pub(super) type MomentFiles = [String; 2];
@@ -301,6 +379,12 @@ pub(super) struct Sidecar<'a> {
     white_level_dn: f64,
     saturation_level_dn: f64,
     system_gain_dn_per_electron: f64,
+    /// The light in lux, cd/m² and EV, where it has units.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) photometry: Option<super::Photometry>,
+    /// The exposure that `auto_exposure` found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) metered_exposure_s: Option<f64>,
     channels: Vec<&'a str>,
     white_balance: Vec<f64>,
     /// Pixels with which something is wrong, row by row.
@@ -328,6 +412,8 @@ impl<'a> Sidecar<'a> {
             white_level_dn: sensor.white_level(),
             saturation_level_dn: sensor.saturation_level(),
             system_gain_dn_per_electron: sensor.system_gain(),
+            photometry: None,
+            metered_exposure_s: None,
             channels: sensor.channels().collect(),
             white_balance: sensor.white_balance(),
             defects: DefectivePixel::all(sensor),
@@ -381,6 +467,12 @@ pub(super) struct ShotFiles {
     dng: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     preview: Option<String>,
+    /// Of the second read-out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    second: Option<String>,
+    /// Of the photodiodes of dual and quad pixels.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    photodiodes: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     mean: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -396,6 +488,8 @@ impl ShotFiles {
             npy: None,
             dng: None,
             preview: None,
+            second: None,
+            photodiodes: Vec::new(),
             mean: None,
             variance: None,
         }

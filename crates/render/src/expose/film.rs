@@ -1,14 +1,15 @@
 //! The light of a picture in the bands of a sensor.
 
 use etendue_scene::Scene;
-use etendue_sensor::{Radiometry, Sensor, SensorKind};
+use etendue_sensor::{Photodiodes, Radiometry, Sensor, SensorKind};
 use etendue_spectrum::{Bands, Grid};
+use etendue_tracer::LayerSpec;
 use rayon::prelude::*;
 
 use super::LightUnit;
 use super::files::plain;
 use crate::film::{NoMemory, filled};
-use crate::output::{Channel, Layer, Look, Values};
+use crate::output::{Channel, Layer, Look, Picture, Values};
 
 /// Light in spectral bands, as a sensor is given it.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +18,8 @@ pub struct BandFilm {
     pub bands: Bands,
     /// `[row][column][band]`.
     pub values: Vec<f32>,
+    /// The same of the light that came through parts of the pupil, where it is told apart.
+    pub parts: Vec<(LayerSpec, Vec<f32>)>,
 }
 
 impl BandFilm {
@@ -33,7 +36,7 @@ impl BandFilm {
                 *value = plane[i];
             }
         });
-        Ok(Self { bands, values })
+        Ok(Self { bands, values, parts: Vec::new() })
     }
 
     /// One plane a band of `grid`: the plain mean of the light over its wavelengths.
@@ -86,7 +89,73 @@ impl BandFilm {
         if factor != 1.0 {
             #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
             let factor = factor as f32;
-            self.values.par_iter_mut().for_each(|value| *value *= factor);
+            for values in
+                std::iter::once(&mut self.values).chain(self.parts.iter_mut().map(|p| &mut p.1))
+            {
+                values.par_iter_mut().for_each(|value| *value *= factor);
+            }
+        }
+        self
+    }
+
+    /// All values of each pixel times what `factor` says of its column and row.
+    #[must_use]
+    pub(super) fn times_by_pixel(
+        mut self,
+        columns: usize,
+        factor: impl Fn([usize; 2]) -> f32 + Sync,
+    ) -> Self {
+        let bands = self.bands.count();
+        for values in
+            std::iter::once(&mut self.values).chain(self.parts.iter_mut().map(|p| &mut p.1))
+        {
+            values.par_chunks_mut(columns * bands).enumerate().for_each(|(row, values)| {
+                for (column, pixel) in values.chunks_exact_mut(bands).enumerate() {
+                    let factor = factor([column, row]);
+                    pixel.iter_mut().for_each(|value| *value *= factor);
+                }
+            });
+        }
+        self
+    }
+
+    /// The same with the parts of the light of a picture in red, green and blue, where a sensor asks for them.
+    ///
+    /// # Errors
+    ///
+    /// When there is no memory for them.
+    pub(super) fn with_parts_of(
+        mut self,
+        sensor: &Sensor,
+        picture: &Picture,
+    ) -> Result<Self, NoMemory> {
+        let layers: &[LayerSpec] = match sensor.spec().photodiodes {
+            None => &[],
+            Some(Photodiodes::Dual) => &[LayerSpec::LeftPupil, LayerSpec::RightPupil],
+            Some(Photodiodes::Quad) => &[
+                LayerSpec::TopLeftPupil,
+                LayerSpec::TopRightPupil,
+                LayerSpec::BottomLeftPupil,
+                LayerSpec::BottomRightPupil,
+            ],
+        };
+        for layer in layers {
+            let name = layer.row().name;
+            let found = picture.layers().iter().find(|other| other.name == name);
+            let Some(planes) = found.and_then(three_planes) else { continue };
+            let film = Self::from_rgb(self.bands.clone(), &planes)?;
+            self.parts.push((*layer, film.values));
+        }
+        Ok(self)
+    }
+
+    /// The same whose light is the sum of its parts, to the bit, where it has some.
+    #[must_use]
+    pub(super) fn summed(mut self) -> Self {
+        let Some(((_, first), others)) = self.parts.split_first() else { return self };
+        self.values.clone_from(first);
+        for (_, other) in others {
+            self.values.par_iter_mut().zip(other).for_each(|(sum, part)| *sum += part);
         }
         self
     }
@@ -111,7 +180,7 @@ impl BandFilm {
                 *value = band;
             }
         });
-        Ok(Self { bands, values })
+        Ok(Self { bands, values, parts: Vec::new() })
     }
 }
 

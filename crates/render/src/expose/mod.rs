@@ -7,18 +7,23 @@
 //! | `raw.npy` | the same, `[h, w]` or `[h, w, channels]`, `u2` |
 //! | `raw.dng` | the same for raw converters, with pattern and levels (`raw` sensors of r, g, b or none) |
 //! | `raw.preview.png` | demosaiced, white balanced, sRGB; not data |
+//! | `raw_left.png`, `.npy`, `raw_right…`, `raw_top_left…`, … | the numbers of the photodiodes of dual and quad pixels |
+//! | `raw_second.png`, `raw_second.npy` | the second number of each pixel, of sensors that have two |
 //! | `raw_mean.npy`, `raw_variance.npy` | the expected value and variance of every pixel, once an exposure time, when asked for |
+//! | `raw_snr.preview.png` | beside those, the ratio of signal to noise from 0 to 50 dB; not data |
 //! | `raw_hdr.npy`, `raw_hdr_sigma.npy` | electrons a second of all exposures merged, when asked for |
 //! | `sensor.json` | what the numbers mean, and which file is which exposure |
 //!
 //! Several exposures or frames are numbered: `raw_000.png`, `raw_001.png`, …
 
+mod angles;
 mod bands;
 mod elsewhere;
 mod files;
 mod film;
 mod illumination;
 mod noise;
+mod photometry;
 mod remarks;
 mod unit;
 
@@ -28,10 +33,13 @@ use std::path::{Path, PathBuf};
 use etendue_files::{Transaction, WriteError};
 use etendue_report::{Decision, DecisionKind, DecisionValue};
 use etendue_scene::Scene;
+use etendue_sensor::matching::{MatchError, Matched, Photograph};
 use etendue_sensor::{
-    Exposure, Film, InvalidValues, Moments, NoiseModel, RawImage, Sensor, SensorError, SensorKind,
+    Exposure, Film, InvalidValues, Moments, NoiseModel, Photodiodes, RawImage, Sensor, SensorError,
+    SensorKind,
 };
 use etendue_spectrum::Bands;
+use etendue_tracer::LayerSpec;
 
 pub(crate) use bands::{bands, explain_bands};
 pub use elsewhere::{PictureLight, PixelLight};
@@ -39,6 +47,7 @@ pub use film::BandFilm;
 pub use film::SPECTRUM;
 pub(crate) use film::{has_spectrum, spectrum, three_planes};
 pub(crate) use noise::NoiseOfPixels;
+pub use photometry::Photometry;
 pub use unit::{KNOWN_UNITS, LightUnit, pupil_solid_angle};
 
 use crate::film::NoMemory;
@@ -130,6 +139,12 @@ pub struct SensorLight {
     pub(super) white: Vec<f64>,
     header: Vec<(String, String)>,
     notes: Vec<String>,
+    /// The exposure that `auto_exposure` found (s).
+    metered: Option<f64>,
+    /// Of the lens.
+    f_number: Option<f64>,
+    /// Of the pupil (sr).
+    solid_angle: Option<f64>,
 }
 
 impl SensorLight {
@@ -166,10 +181,113 @@ impl SensorLight {
                 (sensor, film)
             }
         };
+        let film = match film.parts.is_empty() {
+            true => film.with_parts_of(&sensor, picture)?,
+            false => film,
+        };
         let film = film.on_sensor(scene, &sensor);
+        let film = angles::seen(film, scene, &sensor).summed();
         let seeds = [scene.render.seed, noise_seed(scene)];
         let white = sensor.white_under(&illumination::light(scene, sensor.bands()));
-        Ok(Ok(Self { sensor, film, seeds, white, header: picture.header().to_vec(), notes }))
+        let header = picture.header().to_vec();
+        let solid_angle = scene.camera.pupil_solid_angle();
+        let lens = scene.camera.lens().map(etendue_camera::LensCamera::focused);
+        let f_number = lens.and_then(|lens| lens.paraxial().f_number);
+        let light = Self {
+            sensor,
+            film,
+            seeds,
+            white,
+            header,
+            notes,
+            metered: None,
+            f_number,
+            solid_angle,
+        };
+        Ok(Ok(light.metered_by_itself()))
+    }
+
+    /// The same at the exposure that its own light asks for, where that is metered.
+    pub(super) fn metered_by_itself(mut self) -> Self {
+        if self.sensor.spec().auto_exposure.is_none() {
+            return self;
+        }
+        match self.sensor.metered(self.film()) {
+            Some(time) => self.at_exposure(time),
+            None => {
+                self.notes.push(
+                    "sensor.auto_exposure: no light falls on the sensor, so the exposure is 0.01 s"
+                        .to_owned(),
+                );
+                self
+            }
+        }
+    }
+
+    /// The same at an exposure that was metered elsewhere (s), such as on the first frame of a sequence.
+    #[must_use]
+    pub fn at_exposure(mut self, time: f64) -> Self {
+        self.sensor = self.sensor.at_exposure(time);
+        self.metered = Some(time);
+        self
+    }
+
+    /// The same light times a factor; 0 of a sensor in the dark.
+    #[must_use]
+    pub fn scaled(mut self, factor: f64) -> Self {
+        self.film = self.film.times(factor).summed();
+        self
+    }
+
+    /// The light of one pixel on all of them.
+    #[must_use]
+    pub fn even(mut self, [column, row]: [usize; 2]) -> Self {
+        let [columns, _] = self.sensor.resolution().map(|side| side as usize);
+        let bands = self.film.bands.count();
+        let place = row * columns + column;
+        let everywhere = |values: &mut Vec<f32>| {
+            let Some(own) = values.chunks_exact(bands).nth(place).map(<[f32]>::to_vec) else {
+                return;
+            };
+            values.chunks_exact_mut(bands).for_each(|pixel| pixel.copy_from_slice(&own));
+        };
+        everywhere(&mut self.film.values);
+        self.film.parts.iter_mut().for_each(|(_, values)| everywhere(values));
+        self
+    }
+
+    /// Fits the sensor's numbers and the level of this light to a photograph of it.
+    ///
+    /// # Errors
+    ///
+    /// As [`Sensor::matched`].
+    pub fn matched(&self, exposure: f64, photo: Photograph<'_>) -> Result<Matched, MatchError> {
+        self.sensor.matched(self.film(), exposure, photo)
+    }
+
+    /// Mean photo-electrons that all but the brightest thousandth of the pixels have at most, in an exposure of so long
+    /// (s).
+    #[must_use]
+    pub fn brightest(&self, exposure: f64) -> f64 {
+        self.sensor.electrons_of_brightest(self.film(), exposure, 1e-3)
+    }
+
+    /// What each channel makes of a white surface in the scene's light, the most being 1.
+    #[must_use]
+    pub fn white(&self) -> &[f64] {
+        &self.white
+    }
+
+    /// The f-number of the lens, where there is one.
+    #[must_use]
+    pub fn f_number(&self) -> Option<f64> {
+        self.f_number
+    }
+
+    /// The exposure that was metered (s), where `auto_exposure` asks for it and there is light.
+    #[must_use]
+    pub fn metered(&self) -> Option<f64> {
+        self.metered
     }
 
     /// The sensor, in the bands of the light.
@@ -190,7 +308,16 @@ impl SensorLight {
     ///
     /// When the film is not the sensor's; a fault of this program.
     pub fn expose(&self, exposure: Exposure) -> Result<RawImage, SensorError> {
-        self.sensor.expose(self.film(), exposure, self.seeds[1])
+        self.expose_on(&self.sensor, exposure)
+    }
+
+    /// One exposure of a sensor that has the same film: the sensor's own, or its second read-out.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::expose`].
+    pub fn expose_on(&self, sensor: &Sensor, exposure: Exposure) -> Result<RawImage, SensorError> {
+        sensor.expose(self.film(), exposure, self.seeds[1])
     }
 
     /// What the sensor records in the mean over frames, and its variance, in one exposure.
@@ -204,6 +331,24 @@ impl SensorLight {
 
     fn film(&self) -> Film<'_> {
         Film { values: &self.film.values }
+    }
+
+    /// The parts of the pupil whose light is told apart, each by the name of its files.
+    pub fn parts(&self) -> impl ExactSizeIterator<Item = &'static str> + '_ {
+        self.film.parts.iter().map(|(layer, _)| part_name(*layer))
+    }
+
+    /// One exposure of the photodiodes that see a part of the pupil, by the number of the part: their electrons, and noise
+    /// of their own.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::expose`].
+    pub fn expose_part(&self, part: usize, exposure: Exposure) -> Result<RawImage, SensorError> {
+        let none = (LayerSpec::Radiance, Vec::new());
+        let (layer, values) = self.film.parts.get(part).unwrap_or(&none);
+        let seed = etendue_sensor::mixed_seed(self.seeds[1], part_name(*layer).as_bytes());
+        self.sensor.expose(Film { values }, exposure, seed)
     }
 }
 
@@ -224,6 +369,7 @@ pub fn write(
     let digits = digits(shots.len());
     let mut writer = ExposureWriter {
         sensor,
+        second: sensor.second(),
         light,
         files,
         folder,
@@ -235,6 +381,8 @@ pub fn write(
         exposed: Exposed { files: Vec::new(), notes: light.notes.clone() },
     };
     let mut sidecar = Sidecar::new(sensor, light.seeds);
+    sidecar.metered_exposure_s = light.metered;
+    sidecar.photometry = light.photometry();
     // One shot after the other, each with its entry in the sidecar.
     for (done, shot) in shots.iter().enumerate() {
         if !progress(done as f64 / shots.len() as f64) {
@@ -251,6 +399,29 @@ pub fn write(
     let path = writer.place("sensor.json");
     sidecar::write_json(files, &path, &sidecar)?;
     Ok(writer.exposed)
+}
+
+/// What the files of a part of the pupil are called.
+fn part_name(layer: LayerSpec) -> &'static str {
+    match layer {
+        LayerSpec::LeftPupil => "raw_left",
+        LayerSpec::RightPupil => "raw_right",
+        LayerSpec::TopLeftPupil => "raw_top_left",
+        LayerSpec::TopRightPupil => "raw_top_right",
+        LayerSpec::BottomLeftPupil => "raw_bottom_left",
+        _ => "raw_bottom_right",
+    }
+}
+
+/// The names of files of the photodiodes of a sensor.
+fn part_names(sensor: &Sensor) -> &'static [&'static str] {
+    match sensor.spec().photodiodes {
+        None => &[],
+        Some(Photodiodes::Dual) => &["raw_left", "raw_right"],
+        Some(Photodiodes::Quad) => {
+            &["raw_top_left", "raw_top_right", "raw_bottom_left", "raw_bottom_right"]
+        }
+    }
 }
 
 /// The seed of temporal noise: two frames or cameras of a scene, and two places of one camera, draw noise
@@ -280,12 +451,34 @@ pub fn files_of(sensor: &Sensor) -> Vec<String> {
     // Fewer exposure times than shots, numbered alike.
     let moments: BTreeSet<String> = (0..)
         .zip(shots.iter().filter(|_| has_moments))
-        .flat_map(|(number, _)| files::moment_names(sensor, digits, number))
+        .flat_map(|(number, _)| {
+            let [mean, variance] = files::moment_names(sensor, digits, number);
+            [mean, variance, files::snr_name(sensor, digits, number)]
+        })
         .collect();
     let merged = files::HDR_NAMES.iter().filter(|_| sensor.spec().hdr == Some(true));
     let merged = merged.map(|(name, _)| (*name).to_owned());
     let sidecar = ["sensor.json".to_owned()];
-    shots.iter().flat_map(shot).chain(moments).chain(merged).chain(sidecar).collect()
+    let second = shots.iter().filter(|_| sensor.spec().second_readout.is_some());
+    let of_second = |shot: &Exposure| {
+        ["png", "npy"].map(|ending| files::name(digits, files::SECOND, shot.frame, ending))
+    };
+    let second = second.flat_map(of_second);
+    let parts = part_names(sensor).iter().flat_map(|name| {
+        let of_part = |shot: &Exposure| {
+            ["png", "npy"].map(|ending| files::name(digits, name, shot.frame, ending))
+        };
+        shots.iter().flat_map(of_part).collect::<Vec<_>>()
+    });
+    shots
+        .iter()
+        .flat_map(shot)
+        .chain(second)
+        .chain(parts)
+        .chain(moments)
+        .chain(merged)
+        .chain(sidecar)
+        .collect()
 }
 
 /// Digits of a shot's number in names; 0 for none.

@@ -17,8 +17,9 @@ use crate::words::{kind_of, plain};
 use etendue_camera::CameraSpec;
 use etendue_camera::curve_files::{self, LONGEST_TABLE};
 use etendue_files::{InputFolder, Opener};
+use etendue_image::Samples;
 use etendue_optics::train::remove_notes;
-use etendue_sensor::{Model, Sensor, SensorError, SensorSpec};
+use etendue_sensor::{DefectMap, ListedDefect, Model, Sensor, SensorError, SensorSpec};
 use etendue_spectrum::CurveFault;
 
 /// The schema of a scene's `camera`: the object, or the file that holds it, in whose place its values stand
@@ -108,14 +109,76 @@ impl WrittenPlaces {
         read.map_err(|CurveFault { key, why }| self.fault(&join("camera", &key), why))?;
         Ok(())
     }
+
+    /// Puts the list of defects in the place of the picture of them that the sensor at `place` names.
+    pub(super) fn read_defects(&self, value: &mut Value, place: &str) -> Result<(), SceneError> {
+        let pointer = if place.is_empty() { String::new() } else { IN_SCENE_POINTER.to_owned() };
+        let Some(map) = value.pointer_mut(&format!("{pointer}/defect_map")) else { return Ok(()) };
+        let Value::String(written) = &*map else { return Ok(()) };
+        let (size, list) = self.defects_in(written).map_err(|why| {
+            self.fault(&inside(place, "defect_map"), format!("\"{written}\" {why}"))
+        })?;
+        *map = json!(list);
+        // A map of other columns and rows belongs to another sensor.
+        let sensor = value.pointer(&pointer).unwrap_or(&Value::Null);
+        let resolution = sensor.get("resolution").cloned().or_else(|| {
+            let model: Model = serde_json::from_value(sensor.get("model")?.clone()).ok()?;
+            Some(json!(model.preset().resolution.value))
+        });
+        let resolution = resolution.unwrap_or(json!([1024, 1024]));
+        if resolution.is_array() && resolution != json!(size) {
+            let why = format!(
+                "has {} columns and {} rows, the sensor {resolution}: give a map of the sensor's own",
+                size[0], size[1]
+            );
+            return Err(self.fault(&inside(place, "defect_map"), why));
+        }
+        Ok(())
+    }
+
+    /// Columns and rows of a picture of defects, and the list of them.
+    fn defects_in(&self, written: &str) -> Result<([usize; 2], Vec<ListedDefect>), String> {
+        let folder = self.opener.folder(self.folder()).map_err(|error| error.to_string())?;
+        let path = folder.find(written).map_err(not_found)?.path;
+        let bytes = etendue_files::read(&path, LONGEST_MAP).map_err(|error| error.to_string())?;
+        self.opener.record([path]);
+        if bytes.starts_with(b"\x93NUMPY") {
+            let is_plane = |shape: &[usize]| match shape {
+                [_, _] => Ok(()),
+                _ => Err(format!("has the shape {shape:?}, not [rows, columns]")),
+            };
+            let array = etendue_image::npy::read(&bytes, is_plane)?;
+            let [rows, columns] = [array.shape[0], array.shape[1]];
+            let list = DefectMap::of_numbers(array.numbers.into_iter(), columns)?;
+            return Ok(([columns, rows], list));
+        }
+        let raster = etendue_image::decode(&bytes, etendue_image::Limits::default())
+            .map_err(|error| format!("{error}; give a PNG or NPY"))?;
+        let size @ [columns, _] = raster.size();
+        if raster.channels() != 1 {
+            return Err(format!("has {} channels; give a grey picture", raster.channels()));
+        }
+        let list = match raster.samples() {
+            Samples::U8(all) => DefectMap::of_numbers(all.iter().map(|&n| f64::from(n)), columns),
+            Samples::U16(all) => DefectMap::of_numbers(all.iter().map(|&n| f64::from(n)), columns),
+            Samples::F16(_) | Samples::F32(_) => Err("has no integers; give a PNG or NPY".into()),
+        }?;
+        Ok((size, list))
+    }
 }
+
+/// The longest map of defects that is read (bytes).
+const LONGEST_MAP: u64 = 1 << 30;
+
+/// Where a scene keeps its sensor, as a JSON pointer.
+const IN_SCENE_POINTER: &str = "/camera/sensor";
 
 fn remedy() -> &'static str {
     "name a JSON file that holds what a scene's `camera` does, such as {\"type\": \"pinhole\", \"fov\": 40}"
 }
 
 /// The keys of a camera and of what it consists of that name files.
-const FILES: [&str; 4] = ["lens", "file", "image", "glass_catalogs"];
+const FILES: [&str; 5] = ["lens", "file", "image", "glass_catalogs", "defect_map"];
 
 /// Lets paths that start at the folder `own` start where that does.
 fn move_paths(value: &mut Value, own: &Path) {
@@ -227,6 +290,7 @@ impl SensorFile {
         let resolution = inside(place, "resolution");
         spec::read_resolution(&mut value, &resolution)
             .map_err(|why| written.fault(&resolution, why))?;
+        written.read_defects(&mut value, place)?;
         let object = if in_scene { value.pointer("/camera/sensor") } else { Some(&value) };
         let object = object.ok_or_else(|| {
             let why = "the scene has no sensor; give it one, such as { \"type\": \"raw\", \

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 
 use etendue_files::Opener;
 use etendue_optics::train::remove_notes;
-use etendue_sensor::{Sensor, SensorKind};
+use etendue_sensor::{Photodiodes, Sensor, SensorKind};
 use etendue_tracer::LayerSpec;
 use serde_json::{Value, json};
 
@@ -195,6 +195,7 @@ impl SceneFile {
         written.read_curves(&mut value)?;
         spec::read_resolution(&mut value, "camera.sensor.resolution")
             .map_err(|why| written.fault("camera.sensor.resolution", why))?;
+        written.read_defects(&mut value, "camera.sensor")?;
         let mut file = Self { written, kind, value, spec: SceneSpec::default(), sensor: None };
         (file.spec, file.sensor) = file.check()?;
         let spec = &file.spec;
@@ -220,6 +221,13 @@ impl SceneFile {
             None => {
                 file.check_times()?;
                 file.check_serial()?;
+                // Parts of pixels see parts of the light.
+                let photodiodes = file.sensor.as_ref().and_then(|sensor| sensor.spec().photodiodes);
+                for layer in photodiodes.map_or(&[][..], layers_of) {
+                    if !file.spec.layers.contains(layer) {
+                        file.spec.layers.push(*layer);
+                    }
+                }
                 Ok(file)
             }
         }
@@ -392,6 +400,19 @@ impl WrittenPlaces {
             (None, Some(place)) => Origin::Text(place),
             (None, None) => Origin::Nowhere,
         }
+    }
+}
+
+/// The layers of the light that a sensor's photodiodes see.
+fn layers_of(photodiodes: Photodiodes) -> &'static [LayerSpec] {
+    match photodiodes {
+        Photodiodes::Dual => &[LayerSpec::LeftPupil, LayerSpec::RightPupil],
+        Photodiodes::Quad => &[
+            LayerSpec::TopLeftPupil,
+            LayerSpec::TopRightPupil,
+            LayerSpec::BottomLeftPupil,
+            LayerSpec::BottomRightPupil,
+        ],
     }
 }
 

@@ -17,8 +17,9 @@ use etendue_files::InputFolder;
 use etendue_geometry::{Geometry, Transform};
 use etendue_optics::element::LensResources;
 use etendue_optics::glass::AgfCatalogue;
-use etendue_sensor::Sensor;
+use etendue_sensor::{Sensor, SensorSpec};
 use etendue_spectrum::Bands;
+use etendue_tracer::LayerSpec;
 
 impl SceneFile {
     pub(crate) fn camera_spec(&self) -> CameraSpec {
@@ -146,13 +147,69 @@ impl SceneFile {
     }
 
     /// The sensor with the pixels that the camera gives it.
+    /// Refuses parts of the pupil's light where the camera has none.
+    fn check_pupil_parts(&self, camera: &Camera) -> Result<(), SceneError> {
+        let has_lenslets = camera.light_field().is_some();
+        let photodiodes = self.sensor.as_ref().and_then(|sensor| sensor.spec().photodiodes);
+        let parts = self.spec.layers.iter().position(|layer| layer.pupil_part().is_some());
+        if let Some(number) = parts {
+            let key = match photodiodes {
+                Some(_) => "camera.sensor.photodiodes".to_owned(),
+                None => format!("layers[{number}]"),
+            };
+            let why = if !camera.has_pupil() || has_lenslets {
+                "parts of the pupil want a camera with one lens: thin_lens, real_lens or lens"
+            } else if camera.diffracts() {
+                "light that is spread as waves are came through all of the pupil; leave out `diffraction`"
+            } else if camera.motion().is_some() {
+                "the pupil moves with the camera; leave out its `motion`"
+            } else if self.spec.picture() != Some(LayerSpec::Radiance) {
+                "base colours come through no pupil; give the scene a `tracer` of light, such as \
+                 {\"type\": \"path\"}"
+            } else {
+                ""
+            };
+            if !why.is_empty() {
+                return Err(self.fault(&key, why));
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses angles and diffusion where the camera cannot have them.
+    fn check_sensor_behind(&self, sensor: &SensorSpec, camera: &Camera) -> Result<(), SceneError> {
+        let refused = |key: &str, why: &str| Err(self.fault(&format!("camera.sensor.{key}"), why));
+        let has_lenslets = camera.light_field().is_some();
+        if sensor.angular_response.is_some() && has_lenslets {
+            return refused(
+                "angular_response",
+                "behind lenslets a pixel has no chief ray of its own",
+            );
+        }
+        if sensor.carrier_diffusion.is_some_and(|way| way.0 > 0.0) {
+            if camera.diffracts() {
+                let why = "light that is spread as waves are is traced along chief rays; leave out `diffraction`, or \
+                           this";
+                return refused("carrier_diffusion", why);
+            }
+            if camera.shutter().is_some() {
+                let why = "a shutter looks at rows of the light, and carriers come from beside them; leave out \
+                           `shutter`, or this";
+                return refused("carrier_diffusion", why);
+            }
+        }
+        Ok(())
+    }
+
     pub(super) fn sensor_behind(&self, camera: &Camera) -> Result<Option<Sensor>, SceneError> {
+        self.check_pupil_parts(camera)?;
         let Some(sensor) = &self.sensor else { return Ok(None) };
         let sized = match camera.pixel_pitch() {
             Some(pitch) if pitch != sensor.pixel_pitch() => sensor.with_pixel_pitch(pitch),
             _ => Ok(sensor.clone()),
         };
         let sized = sized.map_err(|error| self.fault("camera.sensor", error.why()))?;
+        self.check_sensor_behind(sized.spec(), camera)?;
         Ok(Some(sized.with_resolution(camera.resolution())))
     }
 }

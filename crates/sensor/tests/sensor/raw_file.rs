@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::process::Command;
 
-use etendue_sensor::dng::{DngDetails, DngError};
+use etendue_sensor::dng::{DngDetails, DngError, GainMap};
 use etendue_sensor::{ChannelSet, Channels, Exposure, Film, RawImage, Sensor, SensorSpec};
 use serde_json::{Value, json};
 
@@ -24,7 +24,13 @@ fn taken(spec: Value) -> (Sensor, RawImage) {
 fn written(sensor: &Sensor, image: &RawImage) -> Result<Vec<u8>, DngError> {
     let mut bytes = Cursor::new(Vec::new());
     let white = sensor.white_response();
-    let details = DngDetails { model: "imx183", white: &white, exposure: 0.01 };
+    let details = DngDetails {
+        model: "imx183",
+        white: &white,
+        exposure: 0.01,
+        f_number: Some(2.8),
+        shading: None,
+    };
     sensor.write_dng(image, details, &mut bytes)?;
     Ok(bytes.into_inner())
 }
@@ -62,6 +68,62 @@ fn white_is_where_the_first_of_well_and_converter_ends() {
         let (sensor, image) = taken(spec);
         let tags = directory(&written(&sensor, &image).unwrap());
         assert_eq!(shorts(&tags[&50_717]), [white], "{model}");
+    }
+}
+
+/// F-number, forward matrix and gain map are there as the specification has them: white balanced for D65 becomes D50's
+/// XYZ, and the map evens a white image that falls off by a known law.
+#[test]
+fn lens_and_shading_are_told() {
+    let spec = json!({ "type": "raw", "model": "imx183", "resolution": [64, 48], "cfa": "rggb" });
+    let (sensor, image) = taken(spec);
+    let falloff = |x: f64, y: f64| {
+        let [x, y] = [(x - 32.0) / 40.0, (y - 24.0) / 40.0];
+        1.0 / (1.0 + x * x + y * y).powi(2)
+    };
+    let white: Vec<f64> = (0..64 * 48)
+        .map(|at| 900.0 * falloff((at % 64) as f64 + 0.5, (at / 64) as f64 + 0.5))
+        .collect();
+    let map = GainMap::of_white(&white, 64, [9, 7]);
+    let white = sensor.white_response();
+    let mut bytes = Cursor::new(Vec::new());
+    let details = DngDetails {
+        model: "imx183",
+        white: &white,
+        exposure: 0.01,
+        f_number: Some(2.8),
+        shading: Some(&map),
+    };
+    sensor.write_dng(&image, details, &mut bytes).unwrap();
+    let tags = directory(&bytes.into_inner());
+    assert_eq!(longs(&tags[&33_437]), [28_000, 10_000]);
+    let forward: Vec<f64> =
+        longs(&tags[&50_964]).chunks(2).map(|r| f64::from(r[0] as i32) / f64::from(r[1])).collect();
+    let balanced = [0, 1, 2].map(|row| forward[3 * row..3 * row + 3].iter().sum::<f64>());
+    for (found, d50) in balanced.iter().zip([0.964_22, 1.0, 0.825_21]) {
+        // Each of three numbers is rounded to four digits.
+        assert!((found - d50).abs() < 5e-4, "{balanced:?}");
+    }
+    let opcodes = &tags[&51_009];
+    let word = |at: usize| u32::from_be_bytes(opcodes[at..at + 4].try_into().unwrap());
+    let double = |at: usize| f64::from_be_bytes(opcodes[at..at + 8].try_into().unwrap());
+    // One opcode, GainMap of DNG 1.3, over the whole picture, of 7 rows and 9 columns.
+    assert_eq!([word(0), word(4), word(8), word(12)], [1, 9, 0x0103_0000, 0]);
+    assert_eq!(word(16) as usize, opcodes.len() - 20);
+    assert_eq!(
+        [20, 24, 28, 32, 36, 40, 44, 48, 52, 56].map(word),
+        [0, 0, 48, 64, 0, 1, 1, 1, 7, 9]
+    );
+    assert_eq!([60, 68, 76, 84].map(double), [1.0 / 6.0, 1.0 / 8.0, 0.0, 0.0]);
+    assert_eq!(word(92), 1);
+    for row in 0..7_u8 {
+        for column in 0..9_u8 {
+            let at = 96 + 4 * (9 * usize::from(row) + usize::from(column));
+            let gain = f64::from(f32::from_bits(word(at)));
+            let known = falloff(64.0 * f64::from(column) / 8.0, 48.0 * f64::from(row) / 6.0);
+            // Means about a point are off by the law over a quarter of the way to the next, most in the corners.
+            assert!((gain * known - 1.0).abs() < 0.1, "{row} {column}: {gain} {known}");
+        }
     }
 }
 

@@ -66,6 +66,68 @@ fn numbers_out_of_range() {
         (json!({ "dead_pixels": -0.1 }), "sensor.dead_pixels: expected a fraction"),
         (json!({ "dead_pixels": 0.6, "stuck_pixels": 0.6 }), "all of them at most together"),
         (json!({ "crosstalk": 0.3 }), "four neighbours"),
+        (
+            json!({ "blooming": 1.5, "system_gain": 1, "full_well": 9 }),
+            "sensor.blooming: expected a fraction",
+        ),
+        (
+            json!({ "blooming": 0.5, "system_gain": 1 }),
+            "sensor.full_well: is missing: nonlinearity and blooming",
+        ),
+        (json!({ "smear": -1 }), "sensor.smear: expected a fraction"),
+        (json!({ "nonlinearity": [[1, 0.9]] }), "sensor.full_well: is missing"),
+        (
+            json!({ "nonlinearity": [[0.9, 0.9]], "full_well": 9, "system_gain": 1 }),
+            "up to 1 collected, found 0.9",
+        ),
+        (
+            json!({ "nonlinearity": [[0.9, 0.9], [1, 0.8]], "full_well": 9, "system_gain": 1 }),
+            "shares read that ascend",
+        ),
+        (json!({ "carrier_diffusion": -1 }), "sensor.carrier_diffusion: expected micrometres"),
+        (json!({ "defect_map": "a.png" }), "sensor.defect_map: is of no use here"),
+        (
+            json!({ "defect_map": [{ "column": 1024, "row": 0, "kind": "dead" }] }),
+            "columns of the sensor, found 1024",
+        ),
+        (
+            json!({ "defect_map": [{ "column": 0, "row": 0, "kind": "hot" }] }),
+            "nobody says how hot",
+        ),
+        (
+            json!({ "angular_response": { "curve": [[0, 1], [10, 1.1]] } }),
+            "no light is seen twice, found 1.1",
+        ),
+        (json!({ "angular_response": { "curve": [[5, 1]] } }), "begin at 0 degrees"),
+        (json!({ "angular_response": { "curve": [[0, 1], [0, 0.5]] } }), "angles that ascend"),
+        (
+            json!({ "angular_response": { "curve": [[0, 1]], "lens_shift": 95 } }),
+            "lens_shift: expected degrees",
+        ),
+        (
+            json!({ "auto_exposure": { "percentile": 0, "target": 0.5 }, "radiometry": "physical", "system_gain": 1 }),
+            "sensor.auto_exposure.percentile: expected a percentile",
+        ),
+        (
+            json!({ "auto_exposure": { "percentile": 99, "target": 2 }, "radiometry": "physical", "system_gain": 1 }),
+            "sensor.auto_exposure.target: expected a share",
+        ),
+        (
+            json!({ "auto_exposure": { "percentile": 99, "target": 0.5 } }),
+            "longer exposures have no more light",
+        ),
+        (
+            json!({ "auto_exposure": { "percentile": 99, "target": 0.5 }, "exposure": 1 }),
+            "the time that it would meter",
+        ),
+        (
+            json!({ "system_gain": 1, "second_readout": { "type": "split_pixel", "ratio": 1 } }),
+            "sensor.second_readout.ratio: expected a share above 0 and below 1",
+        ),
+        (
+            json!({ "system_gain": 1, "second_readout": { "type": "dual_gain", "system_gain": 0 } }),
+            "sensor.second_readout: expected DN per electron",
+        ),
         (json!({ "analog_gain": 0 }), "sensor.analog_gain: expected a factor"),
         (json!({ "converter_noise": -1 }), "sensor.converter_noise: expected DN"),
         (json!({ "iso": 100 }), "sensor.iso_settings: is missing"),

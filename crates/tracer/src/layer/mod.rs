@@ -139,6 +139,24 @@ pub struct Seen<'a> {
 /// One number of each ray, as many times as a layer has channels.
 pub type Columns = [Vec<f64>; 4];
 
+/// A half or a quarter of the pupil, as the camera sees it from behind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PupilPart {
+    /// Left, else right.
+    pub left: bool,
+    /// Above, below, or both.
+    pub top: Option<bool>,
+}
+
+impl PupilPart {
+    /// Whether a place of the entrance pupil, to the right of its middle and above it, is in this part. The middle is
+    /// right and above.
+    #[must_use]
+    pub fn contains(self, [right, up]: [f64; 2]) -> bool {
+        self.left == (right < 0.0) && self.top.is_none_or(|top| top == (up >= 0.0))
+    }
+}
+
 impl LayerSpec {
     /// Whether the layer is a mean over the samples of a pixel; the others are taken along the chief
     /// ray of its centre.
@@ -151,6 +169,21 @@ impl LayerSpec {
     #[must_use]
     pub fn is_light(self) -> bool {
         self.row().taken == Taken::Light
+    }
+
+    /// Of which part of the pupil's light it is: whether that is left or right, and above or below where it is a
+    /// quarter. `None` of other layers.
+    #[must_use]
+    pub fn pupil_part(self) -> Option<PupilPart> {
+        Some(match self {
+            Self::LeftPupil => PupilPart { left: true, top: None },
+            Self::RightPupil => PupilPart { left: false, top: None },
+            Self::TopLeftPupil => PupilPart { left: true, top: Some(true) },
+            Self::TopRightPupil => PupilPart { left: false, top: Some(true) },
+            Self::BottomLeftPupil => PupilPart { left: true, top: Some(false) },
+            Self::BottomRightPupil => PupilPart { left: false, top: Some(false) },
+            _ => return None,
+        })
     }
 
     /// Whether the layer tells of the samples of the picture.

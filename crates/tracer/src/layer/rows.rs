@@ -1,5 +1,6 @@
 //! Rows of the [`super::table`] to begin with, and what they need.
 
+use super::meaning::LINEAR;
 use super::{Kept, Layer, Look, Taken};
 use crate::Needs;
 
@@ -32,6 +33,21 @@ pub(super) fn light(name: &'static str) -> Layer {
         taken: Taken::Light,
         needs: Needs { normals: true, light: true, ..BASE_COLOUR },
         ..colour(name)
+    }
+}
+
+/// A row of the light that came through a part of the pupil.
+pub(super) fn part_of_pupil(name: &'static str) -> Layer {
+    Layer {
+        meaning: vec![
+            (
+                "definition",
+                "the part of the picture's light that came through one part of the entrance pupil, halves or \
+                 quarters as the camera sees them; the picture is the sum of all parts",
+            ),
+            LINEAR,
+        ],
+        ..light(name)
     }
 }
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::layers::layers;
 use super::meaning::{CHIEF_RAY, LINEAR, definition_of_normals, frame, name_in, name_of_normals};
-use super::rows::{BASE_COLOUR, SURFACE, colour, light, measured};
+use super::rows::{BASE_COLOUR, SURFACE, colour, light, measured, part_of_pupil};
 use super::{Columns, FrameStep, Kept, Layer, Look, NormalKind, Seen, Space, Taken};
 use crate::{LightGroup, Needs};
 
@@ -332,6 +332,24 @@ layers! {
             ],
             ..light("Indirect")
         }, |_seen, _out| {};
+
+        /// `LeftPupil.R G B`: the part of the picture's light that came through the left half of the pupil.
+        LeftPupil = "left_pupil": part_of_pupil("LeftPupil"), |_seen, _out| {};
+
+        /// `RightPupil.R G B`: the part that came through the right half.
+        RightPupil = "right_pupil": part_of_pupil("RightPupil"), |_seen, _out| {};
+
+        /// `TopLeftPupil.R G B`: the part that came through the upper left quarter.
+        TopLeftPupil = "top_left_pupil": part_of_pupil("TopLeftPupil"), |_seen, _out| {};
+
+        /// `TopRightPupil.R G B`: the part that came through the upper right quarter.
+        TopRightPupil = "top_right_pupil": part_of_pupil("TopRightPupil"), |_seen, _out| {};
+
+        /// `BottomLeftPupil.R G B`: the part that came through the lower left quarter.
+        BottomLeftPupil = "bottom_left_pupil": part_of_pupil("BottomLeftPupil"), |_seen, _out| {};
+
+        /// `BottomRightPupil.R G B`: the part that came through the lower right quarter.
+        BottomRightPupil = "bottom_right_pupil": part_of_pupil("BottomRightPupil"), |_seen, _out| {};
 
         /// A layer `Light.NAME` for each group of lights: see [`Self::LightGroup`], which takes its place.
         LightGroups = "light_groups": light("Light"), |_seen, _out| {};

@@ -85,6 +85,10 @@ pub enum LightSpec {
         direction: [f64; 3],
         /// Irradiance on a surface that faces it, linear RGB.
         irradiance: ColorSpec,
+        /// Illuminance on a surface that faces it (lx): brings the irradiance to it, which then says the spectrum alone.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 0.0))]
+        lux: Option<f64>,
         /// Diameter of the disk that it comes from, as seen from the scene (degrees; the sun's is 0.53).
         /// Shadows have soft edges by it; no ray of the camera meets the disk.
         #[serde(default)]
@@ -385,17 +389,22 @@ impl LightSpec {
         }
     }
 
-    /// The colour of a light of this kind and curve with the luminous flux that it is to have.
+    /// The colour of a light of this kind and curve with the luminous flux or the illuminance that it is to have.
     fn brought_to_flux(
         &self,
         color: Color,
         (kind, curve): (&LightKind, Option<&Curve>),
     ) -> Result<Color, Fault> {
-        let Some(lumens) = self.lumens() else { return Ok(color) };
-        let own = luminous(&color, curve) * kind.spread().unwrap_or(0.0);
-        let scale = share_of("lumens", lumens, own)?;
+        // Of a flux the intensity is spread over directions; an illuminance is that of the irradiance itself.
+        let (key, wanted, spread) = match (self.lumens(), self) {
+            (Some(lumens), _) => ("lumens", lumens, kind.spread().unwrap_or(0.0)),
+            (None, Self::Directional { lux: Some(lux), .. }) => ("lux", *lux, 1.0),
+            (None, _) => return Ok(color),
+        };
+        let own = luminous(&color, curve) * spread;
+        let scale = share_of(key, wanted, own)?;
         let scaled = color.map(|part| part * scale);
-        in_bounds("lumens", &scaled, Bound::None)?;
+        in_bounds(key, &scaled, Bound::None)?;
         Ok(scaled)
     }
 

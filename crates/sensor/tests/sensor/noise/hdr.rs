@@ -36,7 +36,7 @@ fn merged_exposures_have_the_ratio_of_the_closed_form() {
     // The brightest is half of what the shortest holds; each is well off a saturation.
     for k in 0..13 {
         let (film, rate) = film(&sensor, 0.5 * well / 1e-4 / 10.0_f64.powf(0.5 * f64::from(k)));
-        let expose = |shot| sensor.expose(Film { values: &film }, shot, 5);
+        let expose = |sensor: &Sensor, shot| sensor.expose(Film { values: &film }, shot, 5);
         let image = sensor.merged(&shots, expose).unwrap();
         assert_eq!(image.saturated, 0);
         let variance = |time: f64| {
@@ -65,7 +65,7 @@ fn order_does_not_count_and_saturation_is_told() {
     let sensor = bracket();
     let mut shots: Vec<Exposure> = sensor.shots().collect();
     let (film, rate) = film(&sensor, 3e8);
-    let expose = |shot| sensor.expose(Film { values: &film }, shot, 5);
+    let expose = |sensor: &Sensor, shot| sensor.expose(Film { values: &film }, shot, 5);
     let image = sensor.merged(&shots, expose).unwrap();
     assert_eq!(image.saturated, u64::from(SIDE * SIDE));
     assert!(image.sigma.iter().all(|&sigma| sigma == f32::INFINITY));
@@ -75,20 +75,20 @@ fn order_does_not_count_and_saturation_is_told() {
     assert!(sensor.merged(&[], expose).is_err());
 }
 
-/// Near a saturation the mean is bent by no more than the choice by a shorter exposure may: 0.4 (the peak of the normal
-/// density) of its standard deviation.
+/// Near a saturation the mean is bent by no more than the choice among numbers of one exposure may: 0.4 (the peak of the
+/// normal density) of its standard deviation.
 #[test]
 fn near_a_saturation_the_mean_holds() {
     let sensor = bracket();
     let shots: Vec<Exposure> = sensor.shots().collect();
     for share in [0.7, 0.8, 0.82, 0.84, 0.86, 0.88, 0.9, 0.95, 1.0, 1.05] {
         let (film, rate) = film(&sensor, share * 15_000.0 / 1e-2);
-        let expose = |shot| sensor.expose(Film { values: &film }, shot, 9);
+        let expose = |sensor: &Sensor, shot| sensor.expose(Film { values: &film }, shot, 9);
         let image = sensor.merged(&shots, expose).unwrap();
         let [mean, spread] = moments(image.rate.iter().map(|&r| f64::from(r)));
-        let shorter = ((rate * 1e-3 + 10.0) / 1e-6).sqrt();
+        let own = ((rate * 1e-2 + 10.0) / 1e-4).sqrt();
         let error = spread.sqrt() / 256.0;
         let off = (mean - rate).abs();
-        assert!(off < 0.4 * shorter + 4.0 * error, "{share}: {mean} for {rate}, ±{shorter}");
+        assert!(off < 0.4 * own + 4.0 * error, "{share}: {mean} for {rate}, ±{own}");
     }
 }

@@ -3,6 +3,7 @@
 
 #![expect(clippy::cast_possible_truncation, reason = "films hold f32")]
 
+mod charge;
 mod distribution;
 mod gain;
 mod hdr;
@@ -10,6 +11,7 @@ mod moments;
 mod patterns;
 mod reference;
 mod repeatability;
+mod second;
 
 use etendue_sensor::{Exposure, Film, RawImage, Sensor, SensorSpec};
 use serde_json::{Value, json};

@@ -1,0 +1,106 @@
+//! A scene's camera before an even white surrounding.
+
+use std::path::{Path, PathBuf};
+
+use etendue_camera::Camera;
+use etendue_files::Reach;
+use etendue_render::expose::SensorLight;
+use etendue_sensor::Exposure;
+use serde_json::{Value, json};
+
+use crate::{Error, Options, Progress, Session};
+
+/// The scene's camera, and what stands before it.
+pub(super) struct Stage {
+    /// The scene's file.
+    path: PathBuf,
+    values: Value,
+    reach: Reach,
+    pub(super) camera: Camera,
+    pub(super) inputs: Vec<PathBuf>,
+}
+
+impl Stage {
+    /// Of a session's scene.
+    pub(super) fn of(session: &mut Session, progress: &Progress) -> Result<Self, Error> {
+        let (camera, inputs, is_idle) = {
+            let scene = session.scene(progress)?;
+            (scene.camera.clone(), scene.inputs.clone(), scene.sensor.is_none())
+        };
+        let path = session.file().path().to_owned();
+        let stage =
+            Self { path, values: session.values().clone(), reach: session.reach(), camera, inputs };
+        if stage.values.get("camera").is_none_or(Value::is_null) {
+            return Err(stage
+                .refused("camera: a calibration is of the scene's own camera, and it names none"));
+        }
+        if is_idle {
+            return Err(stage.refused(
+                "camera.sensor: an ideal grid of pixels has nothing to calibrate; give it a sensor, such as \
+                 { \"type\": \"raw\", \"model\": \"imx183\" }",
+            ));
+        }
+        Ok(stage)
+    }
+
+    pub(super) fn refused(&self, why: &str) -> Error {
+        Error::Refused(format!("{}: {why}", self.path.display()))
+    }
+
+    /// The light of these objects in an even white surrounding.
+    pub(super) fn take(
+        &self,
+        objects: Vec<Value>,
+        progress: &Progress,
+    ) -> Result<SensorLight, Error> {
+        let scene = json!({
+            "etendue": 1,
+            "camera": self.values["camera"],
+            "tracer": { "type": "direct" },
+            "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
+            "materials": {
+                "white": { "type": "matte", "color": [0.9, 0.9, 0.9] },
+                "black": { "type": "matte", "color": [0.04, 0.04, 0.04] },
+            },
+            "objects": objects,
+            "render": render_settings(&self.values),
+        });
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        let options = Options { reach: self.reach, ..Options::default() };
+        let mut session = Session::from_json_with(folder, scene, options)?;
+        let rendering = session.render(progress)?;
+        let light = rendering.sensor_light().cloned();
+        light.ok_or_else(|| self.refused("camera.sensor: exposes nothing"))
+    }
+
+    /// What `white` is multiplied by to reach a share of saturation.
+    pub(super) fn factor(
+        &self,
+        white: &SensorLight,
+        (shot, level): (Exposure, f64),
+    ) -> Result<f64, Error> {
+        let (sensor, brightest) = (white.sensor(), white.brightest(shot.exposure));
+        let dark = sensor.dark_current() * shot.exposure;
+        let wanted = level * sensor.saturation() - dark;
+        match brightest > 0.0 && wanted > 0.0 {
+            true => Ok(wanted / brightest),
+            false => Err(self.refused(&format!(
+                "camera.sensor: no light brings it to {level} of saturation at {} s: the dark signal alone is {dark:.0} e⁻ \
+                 of {:.0}; set sensor.exposure lower",
+                shot.exposure,
+                sensor.saturation()
+            ))),
+        }
+    }
+}
+
+/// The scene's settings of sampling, without what belongs to its own picture.
+fn render_settings(values: &Value) -> Value {
+    let mut kept = json!({});
+    for key in ["samples", "sampler", "seed", "accel", "frozen_noise"] {
+        if let Some(value) = values.pointer(&format!("/render/{key}")) {
+            kept[key] = value.clone();
+        }
+    }
+    kept
+}

@@ -1,0 +1,120 @@
+//! A photograph matched: the numbers of the scene's sensor and the level of its light that make the same picture.
+
+use std::path::Path;
+
+use etendue_image::{Limits, Samples, dng};
+use etendue_render::expose::ExposeError;
+use etendue_sensor::matching::{MatchError, Matched, Photograph};
+use etendue_sensor::{Exposure, Radiometry};
+
+use crate::{Error, Progress, Session};
+
+/// The longest photograph that is read (bytes).
+const LONGEST: u64 = 1 << 31;
+
+/// A raw photograph.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawPhoto {
+    /// Columns and rows.
+    pub size: [usize; 2],
+    /// DN, `[row][column]`.
+    pub numbers: Vec<u16>,
+    /// Where it saturates (DN), where its file says it.
+    pub white: Option<f64>,
+    /// Exposure time (s), where its file says it.
+    pub exposure: Option<f64>,
+}
+
+impl RawPhoto {
+    /// Reads a DNG or TIFF without compression, or a grey PNG of 16 bits whose numbers are those of the converter.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be read, or holds a developed picture; the message names the file and what to do.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let refuse = |why: String| Error::Refused(format!("{}: {why}", path.display()));
+        let bytes =
+            etendue_files::read(path, LONGEST).map_err(|error| refuse(error.to_string()))?;
+        if dng::is_tiff(&bytes) {
+            let read = dng::read(&bytes, Limits::default()).map_err(refuse)?;
+            let dng::RawDng { size, numbers, white, exposure, .. } = read;
+            return Ok(Self { size, numbers, white, exposure });
+        }
+        let raster = etendue_image::decode(&bytes, Limits::default())
+            .map_err(|error| refuse(format!("{error}; give a DNG, or a PNG of raw numbers")))?;
+        let developed = "is a developed picture, gamma-encoded: give the camera's raw numbers, as a DNG or a grey PNG of 16 bits";
+        match (raster.size(), raster.channels(), raster.into_samples()) {
+            (size, 1, Samples::U16(numbers)) => {
+                Ok(Self { size, numbers, white: None, exposure: None })
+            }
+            _ => Err(refuse(developed.to_owned())),
+        }
+    }
+}
+
+/// What a photograph says of a scene.
+#[derive(Debug, Clone)]
+pub struct PhotoMatch {
+    /// What was fitted.
+    pub matched: Matched,
+    /// Exposure of the simulation (s).
+    pub exposure: f64,
+    /// Exposure of the photograph (s), where its file says it.
+    pub photo_exposure: Option<f64>,
+    /// Columns and rows.
+    pub size: [usize; 2],
+    /// Values of the scene, by path, that make it match.
+    pub settings: Vec<(String, f64)>,
+}
+
+/// Renders the scene of a session and fits its sensor's numbers and the level of its light to a photograph of it.
+///
+/// # Errors
+///
+/// When the scene has no raw sensor, and as the fit: of another size, clipped, not linear, too few levels of light.
+pub fn match_photo(
+    session: &mut Session,
+    (path, photo): (&Path, &RawPhoto),
+    progress: &Progress,
+) -> Result<PhotoMatch, Error> {
+    let of_scene = format!("{}: ", session.file().path().display());
+    let idle = || {
+        Error::Refused(format!(
+            "{of_scene}camera.sensor: a photograph is matched by a sensor that counts electrons; give it one, such as \
+             {{ \"type\": \"raw\", \"system_gain\": 0.3, \"bit_depth\": 12 }}"
+        ))
+    };
+    {
+        // Before anything is rendered.
+        let scene = session.scene(progress)?;
+        let sensor = scene.sensor.as_ref().ok_or_else(idle)?;
+        let size = sensor.resolution().map(|side| side as usize);
+        if size != photo.size {
+            let why = MatchError::Size { photo: photo.size, sensor: size };
+            return Err(Error::Refused(format!("{}: {why}", path.display())));
+        }
+        if sensor.depth() != 1 {
+            let why = MatchError::NotRaw(sensor.depth());
+            return Err(Error::Refused(format!("{of_scene}{why}")));
+        }
+    }
+    let rendering = session.render(progress)?;
+    let light = rendering.sensor_light().ok_or_else(idle)?;
+    let sensor = light.sensor();
+    let Exposure { exposure, .. } =
+        sensor.shots().next().unwrap_or(Exposure { exposure: 0.01, frame: 0 });
+    let photograph = Photograph { size: photo.size, numbers: &photo.numbers, white: photo.white };
+    let matched = light.matched(exposure, photograph).map_err(|error| match error {
+        MatchError::Sensor(error) => ExposeError::from(error).into(),
+        error => Error::Refused(format!("{}: {error}", path.display())),
+    })?;
+    let mut settings = vec![
+        ("camera.sensor.system_gain".to_owned(), matched.system_gain.value),
+        ("camera.sensor.read_noise".to_owned(), matched.read_noise.value),
+        ("camera.sensor.black_level".to_owned(), matched.black_level.value.max(0.0)),
+    ];
+    if sensor.radiometry() == Radiometry::Physical {
+        settings.push(("camera.sensor.exposure".to_owned(), matched.exposure.value));
+    }
+    Ok(PhotoMatch { matched, exposure, photo_exposure: photo.exposure, size: photo.size, settings })
+}
