@@ -2,7 +2,7 @@
 //! measured part of `docs/sampling.md` with its chart and its map.
 //!
 //! The light of each scene is scaled so that a quarter of the sensor's full well is filled in 10 ms, in the
-//! mean over the picture. The variance of a picture is measured from two of other
+//! mean over the picture. The variance of a picture is measured from pairs of other
 //! seeds, never from a picture's own samples: per pixel and channel, the half of their squared difference,
 //! carried to digital numbers and divided by the sensor's own variance.
 #![allow(
@@ -107,9 +107,9 @@ fn main() -> anyhow::Result<()> {
     let names = ["paper/fig3.json", "double-gauss.json", "sensor-noise.json"];
     let open = |name: &&str| Study::open(&arguments.scenes.join(name), arguments.width);
     let studies: Vec<Study> = names.iter().map(open).collect::<Result<_, _>>()?;
-    let uniform: Vec<Vec<PicturePair>> = studies
+    let uniform: Vec<Vec<PicturePairs>> = studies
         .iter()
-        .map(|study| effort.counts.iter().map(|n| PicturePair::of(study, json!(n))).collect())
+        .map(|study| effort.counts.iter().map(|n| PicturePairs::of(study, json!(n))).collect())
         .collect();
     let noise = noise_table(&effort, &names, &studies, &uniform);
     text += &noise.text;
@@ -126,22 +126,28 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Two pictures of other seeds, and the samples of one.
-struct PicturePair {
-    pair: [study::Picture; 2],
+/// Pairs of pictures of other seeds: the variance of a block is told by 64 squares of each, and the worst hundredth of
+/// blocks is that of what is measured.
+const PAIRS: u64 = 4;
+
+/// Pairs of pictures of other seeds, and the samples of one.
+struct PicturePairs {
+    pairs: Vec<[study::Picture; 2]>,
     mean_samples: f64,
 }
 
-impl PicturePair {
+impl PicturePairs {
     fn of(study: &Study, samples: serde_json::Value) -> Self {
         let wanted = Wanted { samples, exposure: SHOWN[0] };
         Self::with(study, &wanted)
     }
 
     fn with(study: &Study, wanted: &Wanted) -> Self {
-        let pair = [1, 2].map(|seed| study.picture(wanted, seed));
-        let mean_samples = 0.5 * (pair[0].samples + pair[1].samples);
-        Self { mean_samples, pair }
+        let pair = |k: u64| [2 * k + 1, 2 * k + 2].map(|seed| study.picture(wanted, seed));
+        let pairs: Vec<_> = (0..PAIRS).map(pair).collect();
+        let samples = pairs.iter().flatten().map(|picture| picture.samples);
+        let mean_samples = samples.sum::<f64>() / (2 * PAIRS) as f64;
+        Self { pairs, mean_samples }
     }
 }
 
@@ -155,7 +161,7 @@ fn noise_table(
     effort: &Effort,
     names: &[&str],
     studies: &[Study],
-    uniform: &[Vec<PicturePair>],
+    uniform: &[Vec<PicturePairs>],
 ) -> NoiseTable {
     let mut text = format!(
         "\nUntil the variance of the samples is {FRACTION} of the sensor's. `as even`: a number for every pixel \
@@ -177,8 +183,8 @@ fn noise_table(
         for &exposure in effort.charted {
             let samples =
                 json!({ "until": "sensor-noise", "fraction": FRACTION, "max": effort.most });
-            let taken = PicturePair::with(study, &Wanted { samples, exposure });
-            let spread = |shot: &PicturePair| study.noise_share(&shot.pair, exposure);
+            let taken = PicturePairs::with(study, &Wanted { samples, exposure });
+            let spread = |shot: &PicturePairs| study.noise_share(&shot.pairs, exposure);
             let own = spread(&taken);
             let curve = |of: &dyn Fn(Spread) -> f64| -> Vec<[f64; 2]> {
                 uniform.iter().map(|shot| [shot.mean_samples, of(spread(shot))]).collect()
@@ -188,7 +194,7 @@ fn noise_table(
             let (most, most_mark) = samples_for(&curve(&|s| s.most), own.most);
             line.push([exposure, good / taken.mean_samples]);
             if SHOWN.contains(&exposure) {
-                let of_blocks = uniform.iter().map(|shot| study.noise_shares(&shot.pair, exposure));
+                let of_blocks = uniform.iter().map(|shot| study.noise_shares(&shot.pairs, exposure));
                 let of_blocks: Vec<Vec<f64>> = of_blocks.collect();
                 let oracle = oracle::samples(effort.counts, &of_blocks, own.most, FEWEST);
                 let of_oracle = taken.mean_samples / oracle;
@@ -229,7 +235,7 @@ fn relative_table(
     effort: &Effort,
     names: &[&str],
     studies: &[Study],
-    uniform: &[Vec<PicturePair>],
+    uniform: &[Vec<PicturePairs>],
 ) -> String {
     let mut text = format!(
         "\nUntil a relative error of {ERROR}, against a number for every pixel with the same error in the worst tenth of \
@@ -238,8 +244,8 @@ fn relative_table(
     );
     for ((name, study), uniform) in names.iter().zip(studies).zip(uniform) {
         let samples = json!({ "relative_error": ERROR, "max": effort.most });
-        let taken = PicturePair::of(study, samples);
-        let spread = |shot: &PicturePair| study.relative_variance(&shot.pair).ninth;
+        let taken = PicturePairs::of(study, samples);
+        let spread = |shot: &PicturePairs| study.relative_variance(&shot.pairs).ninth;
         let curve: Vec<[f64; 2]> =
             uniform.iter().map(|shot| [shot.mean_samples, spread(shot)]).collect();
         let (samples, mark) = samples_for(&curve, spread(&taken));

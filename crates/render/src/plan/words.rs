@@ -153,8 +153,8 @@ impl Plan {
     fn explain_passes(&self) -> Decision {
         let because = match &self.passes[..] {
             [first, ..] if self.stopping.is_adaptive() => format!(
-                "at most: the picture can be seen after {} samples a pixel, and is judged where they are \
-                 a power of two",
+                "the picture can be seen after {} samples a pixel, and then after every round of those that are \
+                 still wanted",
                 first.end
             ),
             [first, .., last] => format!(
