@@ -254,8 +254,8 @@ fn file_names() -> impl Iterator<Item = String> {
     ];
     let charts =
         charts.into_iter().flat_map(|stem| ["svg", "png"].map(|end| format!("{stem}.{end}")));
-    let tables =
-        ["accelerators", "samplers", "cameras", "target", "target-equal-time"].map(|stem| format!("{stem}.csv"));
+    let tables = ["accelerators", "samplers", "cameras", "target", "target-equal-time"]
+        .map(|stem| format!("{stem}.csv"));
     let others = ["target-equal-time.png", "bench.json", MANIFEST].map(str::to_owned);
     tables.into_iter().chain(charts).chain(others)
 }

@@ -483,8 +483,7 @@ impl Adding<'_> {
         for (pixels, slot) in pixels.chunks(pixels_at_once).zip((0_u32..).step_by(pixels_at_once)) {
             for first in pass.clone().step_by(at_once as usize) {
                 let range = first..pass.end.min(first + at_once);
-                let of_pixel =
-                    |(&pixel, slot)| Run { pixel, set: 0, range: range.clone(), slot };
+                let of_pixel = |(&pixel, slot)| Run { pixel, set: 0, range: range.clone(), slot };
                 runs.clear();
                 runs.extend(pixels.iter().zip(slot..).map(of_pixel));
                 self.add_runs(tile, &runs, memory)?;
@@ -563,8 +562,7 @@ impl Adding<'_> {
                 for first in pass.clone().step_by(at_once as usize) {
                     let range = first..pass.end.min(first + at_once);
                     let a_pixel = range.end - range.start;
-                    let of_pixel =
-                        |&pixel| Run { pixel, set: 0, range: range.clone(), slot: 0 };
+                    let of_pixel = |&pixel| Run { pixel, set: 0, range: range.clone(), slot: 0 };
                     let runs: Vec<Run> = pixels.iter().map(of_pixel).collect();
                     self.place(tile, &runs, memory);
                     let Memory { film, rays, landings, .. } = memory;

@@ -276,7 +276,8 @@ impl Job<'_> {
                     let distance = hits.t[i].max(f64::MIN_POSITIVE).ln();
                     let [colour, normal] = [&values[..3], &hits.normal[..]];
                     let numbers = colour.iter().chain(normal).map(|column| column[i]);
-                    for (met, number) in met[at as usize].iter_mut().zip(numbers.chain([distance])) {
+                    for (met, number) in met[at as usize].iter_mut().zip(numbers.chain([distance]))
+                    {
                         #[expect(clippy::cast_possible_truncation, reason = "how alike pixels are")]
                         let number = number as f32;
                         *met = number;

@@ -194,7 +194,8 @@ fn noise_table(
             let (most, most_mark) = samples_for(&curve(&|s| s.most), own.most);
             line.push([exposure, good / taken.mean_samples]);
             if SHOWN.contains(&exposure) {
-                let of_blocks = uniform.iter().map(|shot| study.noise_shares(&shot.pairs, exposure));
+                let of_blocks =
+                    uniform.iter().map(|shot| study.noise_shares(&shot.pairs, exposure));
                 let of_blocks: Vec<Vec<f64>> = of_blocks.collect();
                 let oracle = oracle::samples(effort.counts, &of_blocks, own.most, FEWEST);
                 let of_oracle = taken.mean_samples / oracle;

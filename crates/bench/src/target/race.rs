@@ -484,7 +484,11 @@ mod tests {
             axes.iter().map(|axis| axis.iter().map(of).collect()).collect();
         let mut program = |run: Run<'_>| {
             if run.seed >= u64::MAX - 1 {
-                return Ok(Outcome::Done(WholeRun { stages: [0.0; 4], values: picture(0.0), shape: [8, 8, 1] }));
+                return Ok(Outcome::Done(WholeRun {
+                    stages: [0.0; 4],
+                    values: picture(0.0),
+                    shape: [8, 8, 1],
+                }));
             }
             // Of joint changes the savings multiply, and what is missed adds up.
             let laws = run.contender.changes.iter().map(|&(axis, number)| axes[axis][number].1);

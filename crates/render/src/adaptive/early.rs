@@ -96,8 +96,7 @@ fn above(mean: f64, variance: f64) -> f64 {
 fn normal(x: f64) -> f64 {
     let t = 1.0 / (1.0 + 0.231_641_9 * x.abs());
     let series = [1.330_274_429, -1.821_255_978, 1.781_477_937, -0.356_563_782, 0.319_381_530];
-    let tail = series.iter().fold(0.0, |sum, c| (sum + c) * t)
-        * (-0.5 * x * x).exp()
+    let tail = series.iter().fold(0.0, |sum, c| (sum + c) * t) * (-0.5 * x * x).exp()
         / (2.0 * std::f64::consts::PI).sqrt();
     if x > 0.0 { 1.0 - tail } else { tail }
 }

@@ -10,12 +10,12 @@
 const SCALES: [f32; 3] = [0.1, 0.3, 0.2];
 
 /// Numbers of a guide.
-pub(super) const FEATURES: usize = 9;
+pub(super) const FEATURES: usize = 8;
 
 /// What a chief ray meets: base colour, geometric normal, and the logarithm of its distance; nothing for a miss.
 pub(crate) type Met = [f32; 7];
 
-/// What tells which pixels are alike: colour, normal, and the steps of colour, normal and distance to the pixels
+/// What tells which pixels are alike: colour, normal, and the steps of colour, and of normal or distance, to the pixels
 /// beside, each in units of what makes half a difference.
 pub(super) type Guide = [f32; FEATURES];
 
@@ -46,8 +46,7 @@ pub(super) fn guides(met: &[Met], width: usize) -> Vec<Guide> {
             3..6 => own[k] / normal,
             // Steps beyond a few scales are alike: an edge is an edge.
             6 => (steps[0] / colour).min(3.0),
-            7 => (steps[1] / normal).min(3.0),
-            _ => (steps[2] / distance).min(3.0),
+            _ => (steps[1] / normal).max(steps[2] / distance).min(3.0),
         })
     };
     (0..met.len()).map(guide).collect()

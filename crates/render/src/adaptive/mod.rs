@@ -1,7 +1,7 @@
 //! Samples until an error is reached: which parts of the picture want more.
 //!
 //! The samples of a pixel are of two sets, each a sequence of its own, so that a quarter of the squared difference of
-//! their means is the variance of the mean of both, without bias and for any number of samples (J. Rousselle, C. Knaus
+//! their means is the variance of the mean of both, without bias and for any number of samples (F. Rousselle, C. Knaus
 //! and M. Zwicker, "Adaptive rendering with non-local means filtering", 2012, section 4.1, on two buffers). One square is
 //! a poor witness: those of pixels around that are alike are pooled ([`guide`]), those of all numbers of samples that a
 //! pixel had on the way count, and what a block of 8 by 8 pixels is reckoned to have is the mean of that and two of its

@@ -47,6 +47,12 @@ impl Rule {
         Some(Self { least, sigmas, allowed })
     }
 
+    /// A relative error, with so many standard errors.
+    #[cfg(test)]
+    pub(super) fn of_relative_error(share: f64, sigmas: f64) -> Self {
+        Self { least: 4, sigmas, allowed: Allowed::RelativeError(share) }
+    }
+
     /// What the two sets of a pixel's samples tell, `a_set` being in each.
     pub(super) fn told(&self, Sampled { pixel, sets: [a, b] }: &Sampled<'_>, a_set: u32) -> Told {
         let a_set = f64::from(a_set.max(1));

@@ -11,6 +11,9 @@ const BLOCK: usize = 8;
 /// Pixels to each side that are asked how large the variance is.
 const REACH: usize = 5;
 
+/// How much a pixel that is unlike all others asks each of them.
+const LEAST: f32 = 1e-6;
+
 /// The colours of the chessboard.
 const HALVES: usize = 2;
 
@@ -69,6 +72,53 @@ pub(super) struct StripOfPixels<'a> {
     pub(super) guides: &'a [Guide],
 }
 
+/// The pixels that those of a block ask.
+#[derive(Debug, Clone, Copy)]
+struct Window {
+    /// Columns of the strip, and the first and the one behind the last of columns and rows.
+    width: usize,
+    columns: [usize; 2],
+    rows: [usize; 2],
+}
+
+impl Window {
+    /// Around a block of a strip of so many columns and rows.
+    fn around(block: [usize; 2], size: [usize; 2]) -> Self {
+        let [columns, rows] = [0, 1].map(|axis| {
+            let first = block[axis] * BLOCK;
+            [first.saturating_sub(REACH), (first + BLOCK + REACH).min(size[axis])]
+        });
+        Self { width: size[0], columns, rows }
+    }
+
+    fn len(&self) -> usize {
+        (self.columns[1] - self.columns[0]) * (self.rows[1] - self.rows[0])
+    }
+
+    /// The pixels of it, in rows.
+    fn pixels(self) -> impl Iterator<Item = usize> {
+        let rows = self.rows[0]..self.rows[1];
+        rows.flat_map(move |y| (self.columns[0]..self.columns[1]).map(move |x| y * self.width + x))
+    }
+
+    /// The pixels of the other colour around one of the block, and their numbers in the window.
+    fn others(self, index: usize) -> impl Iterator<Item = (usize, usize)> {
+        let (x, y) = (index % self.width, index / self.width);
+        let reach = |at: usize, [first, end]: [usize; 2]| {
+            [at.saturating_sub(REACH).max(first), (at + REACH + 1).min(end)]
+        };
+        let ([left, right], [top, bottom]) = (reach(x, self.columns), reach(y, self.rows));
+        let across = self.columns[1] - self.columns[0];
+        (top..bottom).flat_map(move |row| {
+            let first = left + (left + row + x + y + 1) % HALVES;
+            let (of_strip, of_window) = (row * self.width, (row - self.rows[0]) * across);
+            (first..right)
+                .step_by(HALVES)
+                .map(move |column| (of_strip + column, of_window + column - self.columns[0]))
+        })
+    }
+}
+
 /// What the pixels around tell of one half of a block.
 struct HalfOfBlock {
     /// Its pixels, and the variance of one sample of each.
@@ -103,76 +153,62 @@ impl StripOfPixels<'_> {
         (index % self.width + index / self.width) % HALVES
     }
 
-    /// The pixels of the other colour around one.
-    fn around(&self, index: usize) -> impl Iterator<Item = usize> + use<> {
-        let (width, height) = (self.width, self.height());
-        let (x, y) = (index % width, index / width);
-        let rows = y.saturating_sub(REACH)..(y + REACH + 1).min(height);
-        let (left, right) = (x.saturating_sub(REACH), (x + REACH + 1).min(width));
-        rows.flat_map(move |row| {
-            let first = left + (left + row + x + y + 1) % HALVES;
-            (first..right).step_by(HALVES).map(move |column| row * width + column)
-        })
-    }
-
     /// Says in `demands` how many samples the pixels are to have, where anything around them `changed`.
     pub(super) fn ask(&self, rule: &Rule, most: u32, changed: &[bool], demands: &mut [Demand]) {
         let [across, down] = self.blocks();
         let has_changed: Vec<bool> = (0..across * down)
             .map(|block| self.pixels([block % across, block / across]).any(|index| changed[index]))
             .collect();
+        let told: Vec<f64> = self.evidence.iter().map(Evidence::of_one).collect();
         for block in 0..across * down {
             let place @ [column, _] = [block % across, block / across];
             let beside = column.saturating_sub(1)..(column + 2).min(across);
             let is_new = |row: usize| beside.clone().any(|x| has_changed[row * across + x]);
             if (0..down).any(is_new) {
                 for half in 0..HALVES {
-                    self.ask_half(rule, most, &self.half(place, half), demands);
+                    self.ask_half(rule, most, &self.half(place, half, &told), demands);
                 }
             }
         }
     }
 
-    /// What the pixels of the other colour tell of those of one in a block.
-    fn half(&self, place: [usize; 2], half: usize) -> HalfOfBlock {
+    /// What the pixels of the other colour tell of those of one in a block: `told` is what each tells of one sample.
+    fn half(&self, place: [usize; 2], half: usize, told: &[f64]) -> HalfOfBlock {
         let pixels: Vec<usize> =
             self.pixels(place).filter(|&index| self.half_of(index) == half).collect();
-        let (mut weights, mut spans) = (Vec::new(), Vec::new());
+        let window = Window::around(place, [self.width, self.height()]);
         let mut of_one = Vec::with_capacity(pixels.len());
+        // How much each of those asked bears on each pixel.
+        let mut weights: Vec<(usize, f64)> = Vec::new();
+        let mut parts = Vec::with_capacity(pixels.len());
         let (mut light, mut lit) = (0.0, 0.0);
         for &index in &pixels {
             let start = weights.len();
             let (mut sum, mut total) = (0.0, 0.0);
-            for other in self.around(index) {
-                let evidence = &self.evidence[other];
-                if evidence.weight > 0.0 {
-                    let weight =
-                        f64::from(likeness(&self.guides[index], &self.guides[other])) + 1e-6;
-                    sum += weight * evidence.of_one();
-                    light += weight * evidence.light;
-                    total += weight;
-                    weights.push((other, weight));
-                }
+            for (other, at) in window.others(index) {
+                let weight = f64::from(likeness(&self.guides[index], &self.guides[other]) + LEAST);
+                sum += weight * told[other];
+                light += weight * self.evidence[other].light;
+                total += weight;
+                weights.push((at, weight));
             }
             lit += total;
             of_one.push(if total > 0.0 { sum / total } else { 0.0 });
-            spans.push((start..weights.len(), total));
+            parts.push((start..weights.len(), total));
         }
         let mean = of_one.iter().sum::<f64>() / of_one.len().max(1) as f64;
         for own in &mut of_one {
             *own = (1.0 - OF_BLOCK) * *own + OF_BLOCK * mean;
         }
-        // By how much each of those asked bears on the whole, where pixels get samples by the root of their variance.
-        let mut bears: Vec<(usize, f64)> = Vec::new();
-        for ((span, total), own) in spans.into_iter().zip(&of_one) {
+        // And on the whole, where pixels get samples by the root of their variance.
+        let mut bears = vec![0.0; window.len()];
+        for ((part, total), own) in parts.into_iter().zip(&of_one) {
             let scale = 1.0 / (total * own.sqrt()).max(f64::MIN_POSITIVE);
-            bears.extend(weights[span].iter().map(|&(other, weight)| (other, weight * scale)));
+            weights[part].iter().for_each(|&(at, weight)| bears[at] += weight * scale);
         }
-        bears.sort_unstable_by_key(|&(other, _)| other);
         let (mut sum, mut squares) = (0.0, 0.0);
-        for same in bears.chunk_by(|a, b| a.0 == b.0) {
-            let told = self.evidence[same[0].0].of_one();
-            let part = told * same.iter().map(|&(_, weight)| weight).sum::<f64>();
+        for (index, bears) in window.pixels().zip(bears) {
+            let part = told[index] * bears;
             sum += part;
             squares += part * part;
         }
@@ -203,7 +239,11 @@ impl StripOfPixels<'_> {
         }
         for (&own, &index) in of_one() {
             let have = self.have[index];
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturated")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "saturated"
+            )]
             let needs = number(scales[1], own, have).ceil() as u32;
             let next = match needs > have {
                 true => {
@@ -299,4 +339,65 @@ struct CountedBlock {
     own: f64,
     judged: Option<OwnVariance>,
     counts: Option<SampleCounts>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each pixel of a block asks those of the other colour alone, as far as the window and its own reach go, and their
+    /// numbers in the window are those of its pixels.
+    #[test]
+    fn a_pixel_asks_those_of_the_other_colour() {
+        let size @ [width, _] = [30, 16];
+        for block in [[0, 0], [1, 1], [3, 0]] {
+            let window = Window::around(block, size);
+            let all: Vec<usize> = window.pixels().collect();
+            assert_eq!(all.len(), window.len());
+            for index in
+                [block[1] * 8 * width + block[0] * 8, (block[1] * 8 + 5) * width + block[0] * 8 + 5]
+            {
+                let (x, y) = (index % width, index / width);
+                let asked: Vec<(usize, usize)> = window.others(index).collect();
+                let expected = all.iter().filter(|&&other| {
+                    let (a, b) = (other % width, other / width);
+                    (a + b + x + y) % 2 == 1 && a.abs_diff(x) <= REACH && b.abs_diff(y) <= REACH
+                });
+                assert_eq!(asked.len(), expected.count());
+                assert!(asked.iter().all(|&(other, at)| all[at] == other));
+            }
+        }
+    }
+
+    /// Half of a block of 64 pixels, a quarter of which has sixteen times the variance: samples go by its root, to the
+    /// mean that is allowed, and are the fewest that do.
+    #[test]
+    fn samples_go_by_the_root_of_the_variance() {
+        let told = |variance| Told { variance, light: 1.0 };
+        let mut evidence = vec![Evidence::default(); 64];
+        for (index, pixel) in evidence.iter_mut().enumerate() {
+            pixel.learn(4, told(if index % 8 < 2 { 16.0 } else { 1.0 }));
+        }
+        // Left columns are like each other alone.
+        let mut guides = vec![[0.0; super::super::guide::FEATURES]; 64];
+        (0..64).filter(|index| index % 8 < 2).for_each(|index| guides[index][0] = 1e3);
+        let strip =
+            StripOfPixels { width: 8, have: &[4; 64], evidence: &evidence, guides: &guides };
+        let rule = Rule::of_relative_error(0.5, 0.0);
+        let mut demands = vec![Demand::default(); 64];
+        strip.ask(&rule, 1 << 20, &[true; 64], &mut demands);
+        // Of one sample 64 and 4, of which each is reckoned to have a tenth of the mean: 19.
+        let [hard, easy] = [64.0, 4.0].map(|own| 0.9 * own + 0.1 * 19.0_f64);
+        let scale = (0.25 * hard.sqrt() + 0.75 * easy.sqrt()) / 0.25;
+        for (index, demand) in demands.iter().enumerate() {
+            let expected = scale * if index % 8 < 2 { hard.sqrt() } else { easy.sqrt() };
+            let found = f64::from(demand.needs);
+            assert!(
+                (found - expected).abs() <= 1.0 + 1e-3 * expected,
+                "{index}: {found} {expected}"
+            );
+            // Twice as many as it has, at most.
+            assert_eq!(demand.next, 8);
+        }
+    }
 }

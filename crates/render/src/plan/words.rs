@@ -167,7 +167,11 @@ impl Plan {
             }
             _ => "too few samples to look at some of them".to_owned(),
         };
-        Decision::new(Kind::Passes, DecisionValue::Count(self.passes.len() as u64), because)
+        let value = match self.stopping.is_adaptive() {
+            true => "in rounds".into(),
+            false => DecisionValue::Count(self.passes.len() as u64),
+        };
+        Decision::new(Kind::Passes, value, because)
     }
 
     fn explain_quality(&self, scene: &Scene, triangles: u64) -> Decision {

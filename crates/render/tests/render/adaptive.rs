@@ -117,7 +117,10 @@ fn what_stopped_too_early_is_counted_and_said() {
     // Of 32 pixels with 8 samples each, the variance is 0.27/0.3²/8, where a four hundredth is allowed.
     assert_eq!(counts.over, u64::from(side * side / 2), "{counts:?}");
     let note = counts.notes().concat();
-    assert!(note.contains("50.00 % of the pixels stopped with more than twice the variance"), "{note}");
+    assert!(
+        note.contains("50.00 % of the pixels stopped with more than twice the variance"),
+        "{note}"
+    );
     // An even picture says nothing; neither does one whose blocks have four pixels a half, where 16 samples make
     // the variance what is allowed: the mean of their eight squares is over twice that by chance in 4 of 100.
     for (resolution, error) in [([32, 32], 0.2), ([1024, 1], 0.25)] {
@@ -181,7 +184,9 @@ fn how_much_stopped_too_early_is_told_truly() {
             pixels += counts.pixels;
         }
         let [told, early] = [told, early].map(|count| 100.0 * count as f64 / pixels as f64);
-        println!("white {white:?} {share}: told {told:.2} %, are {early:.2} %, {unjudged} of 8 cannot be judged");
+        println!(
+            "white {white:?} {share}: told {told:.2} %, are {early:.2} %, {unjudged} of 8 cannot be judged"
+        );
         // One in a hundred is not worth a word.
         let is_true = (early - 1.0) / 1.5 <= told && told <= 1.5 * early + 1.0;
         assert!(is_true || unjudged > 6, "{share}: {told} {early} {unjudged}");

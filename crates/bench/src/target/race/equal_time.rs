@@ -87,8 +87,8 @@ fn strip(pictures: &[Vec<f64>], shape @ [width, height, depth]: [usize; 3]) -> O
         let pixels = (top..top + side[1]).flat_map(row);
         pixels.map(|at| (second[at] - converged[at]).powi(2)).sum()
     };
-    let places = starts(height, side[1])
-        .flat_map(|top| starts(width, side[0]).map(move |left| [left, top]));
+    let places =
+        starts(height, side[1]).flat_map(|top| starts(width, side[0]).map(move |left| [left, top]));
     let [left, top] = places.max_by(|a, b| difference(a).total_cmp(&difference(b)))?;
     // White is what a hundredth of the converged picture is brighter than.
     let mut sorted = converged.clone();
@@ -100,7 +100,11 @@ fn strip(pictures: &[Vec<f64>], shape @ [width, height, depth]: [usize; 3]) -> O
             let colour = |k: usize| values[first + if depth >= 3 { k } else { 0 }];
             [0, 1, 2].map(colour).map(|value| {
                 let grey = 255.0 * (value / white).clamp(0.0, 1.0).powf(1.0 / 2.2);
-                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "clamped"
+                )]
                 let grey = grey.round() as u8;
                 grey
             })
@@ -118,11 +122,8 @@ mod tests {
 
     #[test]
     fn as_many_samples_as_fit_are_told_by_two_renders() {
-        let point = |samples: u32| Point {
-            samples,
-            seconds: 0.5 + 0.01 * f64::from(samples),
-            square: 0.0,
-        };
+        let point =
+            |samples: u32| Point { samples, seconds: 0.5 + 0.01 * f64::from(samples), square: 0.0 };
         let found = within(&[point(4), point(16)], 2.5).unwrap();
         assert!((199..=200).contains(&found.samples), "{found:?}");
         assert_eq!(within(&[point(4), point(16)], 0.1).unwrap().samples, 1);
