@@ -7,6 +7,7 @@ use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree, fontdb};
 
 use crate::BenchError;
+use crate::target::Strip;
 
 /// Letters for machines without fonts; `data/DejaVuSans-LICENSE` tells where they come from.
 const FONT: &[u8] = include_bytes!("../data/DejaVuSans-Latin.ttf");
@@ -35,17 +36,42 @@ pub fn png(chart: &Chart) -> Result<Vec<u8>, BenchError> {
     encode(&pixels).map_err(|error| fault(error.to_string()))
 }
 
+/// Pictures side by side, with a white line between, as the bytes of a PNG.
+///
+/// # Errors
+///
+/// When they are larger than a PNG may be: a fault of this program.
+pub fn strip(strip: &Strip) -> Result<Vec<u8>, BenchError> {
+    const LINE: [u8; 6] = [255; 6];
+    let ([width, height], count) = (strip.side, strip.pictures.len());
+    let mut rgb = Vec::new();
+    for row in 0..height {
+        for (k, picture) in strip.pictures.iter().enumerate() {
+            rgb.extend(&LINE[..if k > 0 { LINE.len() } else { 0 }]);
+            rgb.extend(&picture[3 * row * width..3 * (row + 1) * width]);
+        }
+    }
+    let fault = |why: String| BenchError::Drawing(why);
+    let columns = (width + LINE.len() / 3) * count - LINE.len() / 3;
+    let side = |side: usize| u32::try_from(side).map_err(|error| fault(error.to_string()));
+    encode_rgb([side(columns)?, side(height)?], &rgb).map_err(|error| fault(error.to_string()))
+}
+
 /// Opaque pixels, as the paper covers all of a chart.
 fn encode(pixels: &Pixmap) -> Result<Vec<u8>, png::EncodingError> {
+    let rgb: Vec<u8> =
+        pixels.pixels().iter().flat_map(|p| [p.red(), p.green(), p.blue()]).collect();
+    encode_rgb([pixels.width(), pixels.height()], &rgb)
+}
+
+fn encode_rgb([width, height]: [u32; 2], rgb: &[u8]) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, pixels.width(), pixels.height());
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::High);
-    let rgb: Vec<u8> =
-        pixels.pixels().iter().flat_map(|p| [p.red(), p.green(), p.blue()]).collect();
     let mut writer = encoder.write_header()?;
-    writer.write_image_data(&rgb)?;
+    writer.write_image_data(rgb)?;
     writer.finish()?;
     Ok(bytes)
 }
@@ -54,6 +80,23 @@ fn encode(pixels: &Pixmap) -> Result<Vec<u8>, png::EncodingError> {
 mod tests {
     use super::*;
     use etendue_chart::{Axis, Series};
+
+    #[test]
+    fn a_strip_has_its_pictures_side_by_side() {
+        let strip = Strip {
+            side: [2, 1],
+            corner: [0, 0],
+            pictures: vec![vec![0, 0, 0, 9, 9, 9], vec![5, 6, 7, 1, 2, 3]],
+        };
+        let bytes = super::strip(&strip).unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        assert_eq!([info.width, info.height], [6, 1]);
+        assert_eq!(pixels[..6], [0, 0, 0, 9, 9, 9]);
+        assert_eq!(pixels[6..12], [255; 6]);
+        assert_eq!(pixels[12..], [5, 6, 7, 1, 2, 3]);
+    }
 
     #[test]
     fn a_png_has_lines_and_letters() {

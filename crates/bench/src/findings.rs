@@ -64,6 +64,9 @@ impl Findings {
         }
         if let Some(target) = &self.target {
             files.push(("target.csv", table::renders(target).csv()));
+            if !target.equal_time.is_empty() {
+                files.push(("target-equal-time.csv", table::equal_time(target).csv()));
+            }
         }
         files
     }
@@ -123,6 +126,11 @@ impl Findings {
                 100.0 * found.own_error
             );
             tables.push((title, table::contenders(found)));
+            if !found.equal_time.is_empty() {
+                let title = "In the time that the soonest takes: as `target-equal-time.png` shows them, from the left, \
+                             behind the converged picture.";
+                tables.push((title.to_owned(), table::equal_time(found)));
+            }
         }
         tables
     }

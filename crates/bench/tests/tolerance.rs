@@ -13,12 +13,23 @@ use serde_json::{Value, json};
 
 /// A wall 3 m before a camera.
 fn compared(camera: &Value, tolerance: Tolerance) -> Result<Comparison, BenchError> {
+    compared_with(camera, tolerance, None)
+}
+
+/// The same with a thing before it.
+fn compared_with(
+    camera: &Value,
+    tolerance: Tolerance,
+    thing: Option<Value>,
+) -> Result<Comparison, BenchError> {
     let mut camera = camera.clone();
     camera["pose"] = json!({ "from": [1, 2, 3], "look_at": [1, 2, 0] });
     let scene = json!({
         "camera": camera, "tracer": { "type": "facing" },
         "objects": [{ "shape": "rectangle", "width": 40, "height": 40 }],
     });
+    let mut scene = scene;
+    scene["objects"].as_array_mut().unwrap().extend(thing);
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     let file = SceneFile::from_json(&LoadOptions::default().opener, &scenes, scene).unwrap();
     let scene = file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default()).unwrap();
@@ -69,6 +80,21 @@ fn a_pinhole_lacks_the_blur_and_falloff_of_a_thin_lens_and_nothing_else() {
     }
     assert_eq!((all.cheapest, all.depths.len()), ("thin", 2));
     assert!(all.models.iter().all(|m| m.seconds_a_sample.is_some()));
+}
+
+/// A ball of three pixels 0.6 m before a camera that looks at a wall, wherever it stands: its parallax and blur count.
+#[test]
+fn small_near_things_are_seen() {
+    // A pixel of 0.24 mm behind 50 mm covers 2.8 mm there.
+    for place in [[0.011, 0.003], [-0.071, 0.042], [0.1234, -0.0871], [0.0327, 0.0611]] {
+        let ball = json!({ "shape": "sphere", "radius": 0.0043, "triangles": 320,
+            "transform": { "translate": [1.0 + place[0], 2.0 + place[1], 2.4] } });
+        let all = compared_with(&thin_lens(), Tolerance { pixels: 0.35, light: None }, Some(ball))
+            .unwrap();
+        assert!((all.depths[0] - 0.6).abs() < 0.005, "{place:?}: {:?}", all.depths);
+        // A pinhole is within it for the wall alone.
+        assert_eq!(all.cheapest, "thin", "{place:?}");
+    }
 }
 
 #[test]

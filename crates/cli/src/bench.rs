@@ -254,9 +254,10 @@ fn file_names() -> impl Iterator<Item = String> {
     ];
     let charts =
         charts.into_iter().flat_map(|stem| ["svg", "png"].map(|end| format!("{stem}.{end}")));
-    let tables =
-        ["accelerators", "samplers", "cameras", "target"].map(|stem| format!("{stem}.csv"));
-    tables.into_iter().chain(charts).chain(["bench.json", MANIFEST].map(str::to_owned))
+    let tables = ["accelerators", "samplers", "cameras", "target", "target-equal-time"]
+        .map(|stem| format!("{stem}.csv"));
+    let others = ["target-equal-time.png", "bench.json", MANIFEST].map(str::to_owned);
+    tables.into_iter().chain(charts).chain(others)
 }
 
 /// Writes all files; each appears when it is complete.
@@ -276,6 +277,9 @@ fn write(
     };
     for (name, csv) in findings.csv() {
         save(name.to_owned(), csv.as_bytes())?;
+    }
+    if let Some(strip) = findings.target.as_ref().and_then(|target| target.strip.as_ref()) {
+        save("target-equal-time.png".to_owned(), &drawing::strip(strip)?)?;
     }
     for (stem, chart) in findings.charts() {
         save(format!("{stem}.svg"), chart.svg(Theme::Reader).as_bytes())?;

@@ -4,11 +4,12 @@ use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use crate::adaptive::{Adaptive, SampleCounts};
-use crate::film::FilmLayer;
-use crate::samples::Averaging;
+use crate::adaptive::{Adaptive, Rule, SampleCounts};
+use crate::error::RenderError;
+use crate::film::{FilmLayer, NoMemory};
+use crate::samples::{Averaging, Sampling};
 use crate::tiles::{Job, RayCounts};
-use crate::watch::{SoFar, Stopped, Watcher};
+use crate::watch::{SoFar, Watcher};
 
 /// The share of what is left of a time that a pass may be reckoned to take.
 const SHARE_OF_TIME: f64 = 0.95;
@@ -39,10 +40,10 @@ impl Job<'_> {
         &self,
         mut samples: u32,
         parts: &mut [Averaging<'_>],
-        mut beside: Beside<'_, '_>,
+        beside: Beside<'_, '_>,
         watcher: &Watcher<'_>,
         traffic: &Mutex<RayCounts>,
-    ) -> Result<Passed, Stopped> {
+    ) -> Result<Passed, RenderError> {
         let Range { start: first, end: all } = self.sampling.range();
         if parts.is_empty() {
             return Ok(Passed { samples: all, is_complete: true, counts: None });
@@ -50,24 +51,23 @@ impl Job<'_> {
         if !self.shares.is_empty() || samples >= all {
             parts.iter_mut().for_each(|part| part.show(samples));
         }
-        let mut adaptive = self.adaptive(parts);
+        if let Some(rule) = &self.rule
+            && self.shares.is_empty()
+        {
+            let adaptive = self.adaptive(rule, parts)?;
+            return self.rounds(adaptive, parts, beside, watcher, traffic);
+        }
         let mut passed = Passed { samples, is_complete: samples >= all, counts: None };
         let start = Instant::now();
         while let (false, Some(end)) = (passed.is_complete, self.end_of_pass(samples, start)) {
-            let blocks = adaptive.as_ref().map(|adaptive| &adaptive.blocks);
             let pass = samples..end;
-            let mut add = |part: &mut Averaging<'_>| part.add(&pass, blocks, watcher, traffic);
+            let mut add = |part: &mut Averaging<'_>| part.add(&pass, watcher, traffic);
             if let Err(stopped) = parts.iter_mut().try_for_each(&mut add) {
-                return if samples > first { Ok(passed) } else { Err(stopped) };
+                return if samples > first { Ok(passed) } else { Err(stopped.into()) };
             }
             samples = end;
-            passed = match &mut adaptive {
-                Some(adaptive) => judged(adaptive, samples, parts, &mut beside, watcher),
-                None => {
-                    parts.iter_mut().for_each(|part| part.show(samples));
-                    Passed { samples, is_complete: samples >= all, counts: None }
-                }
-            };
+            parts.iter_mut().for_each(|part| part.show(samples));
+            passed = Passed { samples, is_complete: samples >= all, counts: None };
             self.expect(start, watcher);
             if !passed.is_complete {
                 self.look(samples, parts, watcher);
@@ -82,17 +82,50 @@ impl Job<'_> {
         Ok(Passed { is_complete: true, ..passed })
     }
 
-    /// Who judges the samples, where they are judged.
-    fn adaptive(&self, parts: &[Averaging<'_>]) -> Option<Adaptive<'_>> {
-        let rule = self.rule.as_ref()?;
+    /// Takes the samples that are wanted, round by round, until no pixel wants more.
+    fn rounds(
+        &self,
+        mut adaptive: Adaptive<'_>,
+        parts: &mut [Averaging<'_>],
+        beside: Beside<'_, '_>,
+        watcher: &Watcher<'_>,
+        traffic: &Mutex<RayCounts>,
+    ) -> Result<Passed, RenderError> {
+        let mut passed: Option<Passed> = None;
+        while adaptive.goes_on() {
+            let wanted = adaptive.wanted();
+            let mut add = |part: &mut Averaging<'_>| part.add_wanted(wanted, watcher, traffic);
+            if let Err(stopped) = parts.iter_mut().try_for_each(&mut add) {
+                return passed.ok_or(stopped.into());
+            }
+            adaptive.judge(parts);
+            adaptive.show(parts, beside.told);
+            watcher.expect(adaptive.to_come() * parts.len() as u64);
+            let counts = adaptive.counts();
+            let least = counts.map_or(self.sampling.samples, |counts| counts.least);
+            if adaptive.goes_on() {
+                self.look(least, parts, watcher);
+            }
+            passed = Some(Passed { samples: least, is_complete: !adaptive.goes_on(), counts });
+        }
+        // A share without rows wants nothing.
+        let all = Passed { samples: self.sampling.samples, is_complete: true, counts: None };
+        Ok(passed.unwrap_or(all))
+    }
+
+    /// Who judges the samples by a rule.
+    fn adaptive<'a>(
+        &self,
+        rule: &'a Rule,
+        parts: &[Averaging<'_>],
+    ) -> Result<Adaptive<'a>, NoMemory> {
         let place = |(k, part): (usize, &Averaging<'_>)| {
             let layer = part.layers().position(|layer| Some(layer.spec) == self.judged)?;
             Some((k, layer * part.what.shape()[1]))
         };
         let judged = parts.iter().enumerate().find_map(place).unwrap_or((0, 0));
-        let sampling = &self.sampling;
-        let limits = [rule.least, sampling.samples];
-        Some(Adaptive::new(rule, limits, self.camera.resolution(), sampling.shard, judged))
+        let Sampling { samples, shard, .. } = self.sampling;
+        Adaptive::new(rule, samples, self.camera.resolution(), shard, judged, &self.met()?)
     }
 
     /// The samples after the next pass; `None` when there is no time for one.
@@ -124,25 +157,4 @@ impl Job<'_> {
             picture: &picture,
         });
     }
-}
-
-/// Judges what there is after `samples` samples of each pixel that wanted them, where it is time, and shows it.
-fn judged(
-    adaptive: &mut Adaptive<'_>,
-    samples: u32,
-    parts: &mut [Averaging<'_>],
-    beside: &mut Beside<'_, '_>,
-    watcher: &Watcher<'_>,
-) -> Passed {
-    if adaptive.judges_at(samples) {
-        adaptive.judge(samples, parts);
-    }
-    parts.iter_mut().for_each(|part| part.show_settled(&adaptive.blocks, samples));
-    if !beside.told.is_empty() {
-        adaptive.tell(samples, parts, beside.told);
-    }
-    watcher.expect(adaptive.to_come(samples) * parts.len() as u64);
-    let counts = adaptive.counts(samples, parts);
-    let least = counts.map_or(samples, |counts| counts.least);
-    Passed { samples: least, is_complete: !adaptive.goes_on(samples), counts }
 }

@@ -358,7 +358,7 @@ pub fn finish(
     }
     notes.extend(sparkles.note_in_words());
     notes.extend(plan.not_as_asked.as_ref().map(|why| format!("samples: {why}")));
-    notes.extend(sample_counts.filter(|_| is_complete).and_then(|counts| counts.note()));
+    notes.extend(sample_counts.filter(|_| is_complete).iter().flat_map(SampleCounts::notes));
     let words = sample_counts.map_or_else(|| samples.to_string(), |counts| counts.words());
     let header = marked(header, words, [samples, samples_wanted]);
     // The film as a picture, and whether it is black or clipped.

@@ -19,7 +19,7 @@ use etendue_tracer::Scratch;
 use etendue_tracer::layer::{Columns, Taken};
 use rayon::prelude::*;
 
-use crate::adaptive::SampleBlocks;
+use crate::adaptive::Wanted;
 use crate::film::{FilmLayer, NoMemory, PlaneRows, Strip, filled, strips, take};
 use crate::radiance::SampleNumbers;
 use crate::shard::Shard;
@@ -85,18 +85,33 @@ pub(crate) struct Sampling {
     pub(crate) seed: u64,
     /// The share of the pixels, or of the samples, that is rendered.
     pub(crate) shard: Shard,
-    /// Sets that the samples of a pixel are of: two of which the first has those before the last power of
-    /// two ([`of_first_set`]), or one.
+    /// Sets that the samples of a pixel are of, each of which is a sequence of its own: two, of one size, where they
+    /// are judged, or one.
     pub(crate) sets: u32,
     /// Standard deviation of the way that carriers diffuse in the sensor (pixels).
     pub(crate) diffusion: f64,
 }
 
+/// What the seed of the second set's sequence differs by.
+const SECOND_SET: u64 = 0xD1B5_4A32_D192_ED03;
+
+/// Samples of a pixel, side by side.
+#[derive(Debug, Clone)]
+struct Run {
+    /// The pixel from its tile's corner, and which of its sequences they are of.
+    pixel: (u32, u32),
+    set: u32,
+    range: Range<u32>,
+    /// The sum that they are added to.
+    slot: u32,
+}
+
 impl Sampling {
-    /// Appends what each sample of a pixel in `range` is sampled by, and its index there.
-    fn extend(&self, pixel: [u32; 2], range: Range<u32>, numbers: &mut Vec<(PixelSamples, u32)>) {
-        let pixel = self.sampler.pixel(self.seed, pixel[0], pixel[1], self.samples);
-        numbers.extend(range.map(|index| (pixel, index)));
+    /// Appends what each sample of a run at a pixel is sampled by, and its index there.
+    fn extend(&self, pixel: [u32; 2], run: &Run, numbers: &mut Vec<(PixelSamples, u32)>) {
+        let seed = if run.set == 0 { self.seed } else { self.seed ^ SECOND_SET };
+        let pixel = self.sampler.pixel(seed, pixel[0], pixel[1], self.samples);
+        numbers.extend(run.range.clone().map(|index| (pixel, index)));
     }
 
     /// The samples that the share has.
@@ -144,29 +159,9 @@ pub(crate) struct Memory {
     pub(crate) film: FilmSamples,
     /// `[pixel of the tile][set][layer][band]`.
     sums: Vec<Sum>,
+    /// The sum that each sample of the batch is added to: its number among those of a pixel's set.
+    slots: Vec<u32>,
     order: Vec<u32>,
-}
-
-/// The sums that the samples of a batch are added to: a pixel's, or those of its sets.
-#[derive(Debug, Clone, Copy)]
-struct Slots {
-    /// Samples that each pixel has in the batch, and those of them that are of the first set.
-    a_pixel: u32,
-    of_first: u32,
-    sets: usize,
-}
-
-impl Slots {
-    /// Which sum a sample is added to, and the first sample behind it that is added to another.
-    #[inline]
-    fn of(self, sample: u32) -> (usize, u32) {
-        let pixel = sample / self.a_pixel;
-        let (slot, start) = (pixel as usize * self.sets, pixel * self.a_pixel);
-        match sample - start < self.of_first {
-            true => (slot, start + self.of_first.min(self.a_pixel)),
-            false => (slot + 1, start + self.a_pixel),
-        }
-    }
 }
 
 /// A sum and what rounding took from it.
@@ -233,18 +228,36 @@ impl<'a> Averaging<'a> {
         Ok(Self { what, sampling, layers, sums, spare: Mutex::default() })
     }
 
-    /// Adds the samples `pass` of every pixel, or of those of `blocks` that want more. Of several passes
-    /// the layers see nothing until [`Self::show`]; a single one fills them.
+    /// Adds the samples `pass` of every pixel. Of several passes the layers see nothing until [`Self::show`]; a single
+    /// one fills them.
     pub(crate) fn add(
         &mut self,
         pass: &Range<u32>,
-        blocks: Option<&SampleBlocks>,
         watcher: &Watcher<'_>,
         traffic: &Mutex<RayCounts>,
     ) -> Result<(), Stopped> {
-        if let Some(rows) = self.what.shared_rows() {
-            return self.add_shared(rows, pass, watcher, traffic);
+        match self.what.shared_rows() {
+            Some(rows) => self.add_shared(rows, pass, watcher, traffic),
+            None => self.add_to(Work::Pass(pass), watcher, traffic),
         }
+    }
+
+    /// Adds the samples that are `wanted` of each pixel.
+    pub(crate) fn add_wanted(
+        &mut self,
+        wanted: Wanted<'_>,
+        watcher: &Watcher<'_>,
+        traffic: &Mutex<RayCounts>,
+    ) -> Result<(), Stopped> {
+        self.add_to(Work::Wanted(wanted), watcher, traffic)
+    }
+
+    fn add_to(
+        &mut self,
+        work: Work<'_>,
+        watcher: &Watcher<'_>,
+        traffic: &Mutex<RayCounts>,
+    ) -> Result<(), Stopped> {
         let sets = self.sampling.sets as usize;
         let Self { what, sampling, layers, sums, spare } = self;
         let spare = &*spare;
@@ -255,7 +268,7 @@ impl<'a> Averaging<'a> {
             let Some(mut strip) = take(strip).filter(|_| sampling.shard.owns(k)) else {
                 return Ok(());
             };
-            let adding = Adding { what: *what, sampling: *sampling, pass, blocks, watcher };
+            let adding = Adding { what: *what, sampling: *sampling, work, watcher };
             let spare = || spare.lock().unwrap_or_else(PoisonError::into_inner);
             let mut memory = spare().pop().unwrap_or_default();
             let done = adding.fill(&mut strip, take(kept), &mut memory);
@@ -283,7 +296,7 @@ impl<'a> Averaging<'a> {
         let [width, height] = what.camera().resolution();
         let [count, bands] = what.shape();
         let a_row = width as usize * count * bands;
-        let adding = Adding { what: *what, sampling, pass, blocks: None, watcher };
+        let adding = Adding { what: *what, sampling, work: Work::Pass(pass), watcher };
         let sets = 1 + (2 * rows).div_ceil(TILE);
         for set in 0..sets {
             // The rows on which each strip of the set lands.
@@ -302,7 +315,7 @@ impl<'a> Averaging<'a> {
                 let Some((strip, mut window)) = take(strip) else { return Ok(()) };
                 let spare = || spare.lock().unwrap_or_else(PoisonError::into_inner);
                 let mut memory = spare().pop().unwrap_or_default();
-                let done = adding.fill_window(strip, &mut window, &mut memory);
+                let done = adding.fill_window((strip, pass), &mut window, &mut memory);
                 let statuses = std::mem::take(&mut memory.rays.statuses);
                 let own = std::mem::take(&mut memory.traffic);
                 // Rays from beside a share's rows are counted by the share that has those.
@@ -356,20 +369,6 @@ impl<'a> Averaging<'a> {
     }
 }
 
-/// Of the samples of a pixel, those of the first of two sets: as many as the largest power of two below them,
-/// so that of a power of two both sets have the half.
-pub(crate) fn of_first_set(samples: u32) -> u32 {
-    1 << samples.saturating_sub(1).max(1).ilog2()
-}
-
-/// Puts the sums of both sets of a pixel into the first.
-fn join_sets(sums: &mut [Sum]) {
-    let (first, second) = sums.split_at_mut(sums.len() / 2);
-    for (first, second) in first.iter_mut().zip(second) {
-        first.add_sum(std::mem::take(second));
-    }
-}
-
 type Shared<T> = Mutex<Option<T>>;
 
 /// The sums of each strip; of nothing when none are kept.
@@ -411,12 +410,20 @@ struct Window<'a> {
     sums: &'a mut [Sum],
 }
 
+/// Which samples are added.
+#[derive(Clone, Copy)]
+enum Work<'a> {
+    /// These of every pixel.
+    Pass(&'a Range<u32>),
+    /// What each pixel wants, half of it of each set.
+    Wanted(Wanted<'a>),
+}
+
 /// One pass of a strip.
 struct Adding<'a> {
     what: &'a dyn Averaged,
     sampling: Sampling,
-    pass: &'a Range<u32>,
-    blocks: Option<&'a SampleBlocks>,
+    work: Work<'a>,
     watcher: &'a Watcher<'a>,
 }
 
@@ -431,68 +438,114 @@ impl Adding<'_> {
         let [width, _] = self.what.camera().resolution();
         let [layers, bands] = self.what.shape();
         let count = layers * bands * self.sampling.sets as usize;
-        let Range { start, end } = *self.pass;
-        let starts_set = self.sampling.sets > 1 && start > 0 && of_first_set(end) == start;
         for tile in Tile::across(width, [strip.top, strip.height]) {
-            let wants = |&(x, y): &(u32, u32)| {
-                self.blocks.is_none_or(|blocks| blocks.wants([tile.left + x, tile.top + y], start))
+            let range = |x: u32, y: u32| match self.work {
+                Work::Pass(pass) => pass.clone(),
+                Work::Wanted(wanted) => {
+                    let above = strip.top as usize * width as usize;
+                    wanted.of(above + tile.index(x, y, width))
+                }
             };
             // Pixels that want more samples, with what they have so far.
-            let pixels: Vec<(u32, u32)> = tile.pixels().filter(wants).collect();
+            let pixels: Vec<(u32, u32)> =
+                tile.pixels().filter(|&(x, y)| !range(x, y).is_empty()).collect();
             let places = pixels.iter().map(|&(x, y)| tile.index(x, y, width));
             memory.sums.clear();
             match &kept {
                 Some(kept) => places.clone().for_each(|at| {
                     memory.sums.extend_from_slice(&kept[at * count..(at + 1) * count]);
-                    if starts_set {
-                        let start = memory.sums.len() - count;
-                        join_sets(&mut memory.sums[start..]);
-                    }
                 }),
                 None => memory.sums.resize(pixels.len() * count, Sum::default()),
             }
             // Samples for these, and back to where their sums are kept.
-            self.tile(tile, &pixels, memory)?;
+            match self.work {
+                Work::Pass(pass) => self.tile(tile, &pixels, pass, memory)?,
+                Work::Wanted(_) => self.tile_of_wanted(tile, &pixels, &range, memory)?,
+            }
             for (at, sums) in places.zip(memory.sums.chunks(count)) {
-                match &mut kept {
-                    Some(kept) => kept[at * count..(at + 1) * count].copy_from_slice(sums),
-                    None => put(strip, at, sums, bands, self.pass.end),
+                match (&mut kept, self.work) {
+                    (Some(kept), _) => kept[at * count..(at + 1) * count].copy_from_slice(sums),
+                    (None, Work::Pass(pass)) => put(strip, at, sums, bands, pass.end),
+                    // What pixels want is always kept.
+                    (None, Work::Wanted(_)) => {}
                 }
             }
         }
         Ok(())
     }
 
-    fn tile(&self, tile: Tile, pixels: &[(u32, u32)], memory: &mut Memory) -> Result<(), Stopped> {
-        let shape @ [layers, bands] = self.what.shape();
-        let sets = self.sampling.sets as usize;
-        let of_first = of_first_set(self.pass.end);
-        let at_once = (self.pass.end - self.pass.start).clamp(1, self.what.batch());
+    /// Adds the same samples of each of `pixels`.
+    fn tile(
+        &self,
+        tile: Tile,
+        pixels: &[(u32, u32)],
+        pass: &Range<u32>,
+        memory: &mut Memory,
+    ) -> Result<(), Stopped> {
+        let at_once = (pass.end - pass.start).clamp(1, self.what.batch());
         let pixels_at_once = (self.what.batch() / at_once) as usize;
-        for (k, pixels) in pixels.chunks(pixels_at_once).enumerate() {
-            let start = k * pixels_at_once * layers * bands * sets;
-            for first in self.pass.clone().step_by(at_once as usize) {
-                let range = first..self.pass.end.min(first + at_once);
-                let a_pixel = range.end - range.start;
-                let of_first = if sets > 1 { of_first.saturating_sub(first) } else { a_pixel };
-                let slots = Slots { a_pixel, sets, of_first };
-                self.place(tile, (pixels, range), memory);
-                for (number, group) in self.what.groups().iter().enumerate() {
-                    memory.film.group = number;
-                    self.what.camera().sample_rays(&memory.film, &mut memory.rays);
-                    self.what.trace(&group.bands, memory);
-                    memory.add(start, slots, shape, &group.bands);
-                }
-                self.watcher.did(pixels.len() as u64 * u64::from(a_pixel))?;
+        let mut runs = Vec::with_capacity(pixels_at_once);
+        for (pixels, slot) in pixels.chunks(pixels_at_once).zip((0_u32..).step_by(pixels_at_once)) {
+            for first in pass.clone().step_by(at_once as usize) {
+                let range = first..pass.end.min(first + at_once);
+                let of_pixel = |(&pixel, slot)| Run { pixel, set: 0, range: range.clone(), slot };
+                runs.clear();
+                runs.extend(pixels.iter().zip(slot..).map(of_pixel));
+                self.add_runs(tile, &runs, memory)?;
             }
         }
         Ok(())
+    }
+
+    /// Adds to each of `pixels` the samples `range` of both its sets together, which are even numbers.
+    fn tile_of_wanted(
+        &self,
+        tile: Tile,
+        pixels: &[(u32, u32)],
+        range: &dyn Fn(u32, u32) -> Range<u32>,
+        memory: &mut Memory,
+    ) -> Result<(), Stopped> {
+        let (batch, sets) = (self.what.batch(), self.sampling.sets);
+        let (mut runs, mut room) = (Vec::new(), batch);
+        for (&pixel, slot) in pixels.iter().zip((0..).step_by(sets as usize)) {
+            let Range { start, end } = range(pixel.0, pixel.1);
+            for set in 0..sets {
+                let (mut first, end) = (start / sets, end / sets);
+                while first < end {
+                    let last = end.min(first + room);
+                    runs.push(Run { pixel, set, range: first..last, slot: slot + set });
+                    (room, first) = (room - (last - first), last);
+                    if room == 0 {
+                        self.add_runs(tile, &runs, memory)?;
+                        runs.clear();
+                        room = batch;
+                    }
+                }
+            }
+        }
+        if runs.is_empty() { Ok(()) } else { self.add_runs(tile, &runs, memory) }
+    }
+
+    /// Adds the samples of a batch.
+    fn add_runs(&self, tile: Tile, runs: &[Run], memory: &mut Memory) -> Result<(), Stopped> {
+        self.place(tile, runs, memory);
+        memory.slots.clear();
+        for run in runs {
+            memory.slots.extend(run.range.clone().map(|_| run.slot));
+        }
+        for (number, group) in self.what.groups().iter().enumerate() {
+            memory.film.group = number;
+            self.what.camera().sample_rays(&memory.film, &mut memory.rays);
+            self.what.trace(&group.bands, memory);
+            memory.add(self.what.shape(), &group.bands);
+        }
+        self.watcher.did(memory.slots.len() as u64)
     }
 
     /// Adds the light of a strip's samples where it lands.
     fn fill_window(
         &self,
-        strip: [u32; 2],
+        (strip, pass): ([u32; 2], &Range<u32>),
         window: &mut Window<'_>,
         memory: &mut Memory,
     ) -> Result<(), Stopped> {
@@ -509,12 +562,14 @@ impl Adding<'_> {
         for tile in Tile::across(width, strip) {
             let pixels: Vec<(u32, u32)> =
                 tile.pixels().filter(|&(_, y)| lands(tile.top + y)).collect();
-            let at_once = (self.pass.end - self.pass.start).clamp(1, self.what.batch());
+            let at_once = (pass.end - pass.start).clamp(1, self.what.batch());
             for pixels in pixels.chunks((self.what.batch() / at_once) as usize) {
-                for first in self.pass.clone().step_by(at_once as usize) {
-                    let range = first..self.pass.end.min(first + at_once);
+                for first in pass.clone().step_by(at_once as usize) {
+                    let range = first..pass.end.min(first + at_once);
                     let a_pixel = range.end - range.start;
-                    self.place(tile, (pixels, range), memory);
+                    let of_pixel = |&pixel| Run { pixel, set: 0, range: range.clone(), slot: 0 };
+                    let runs: Vec<Run> = pixels.iter().map(of_pixel).collect();
+                    self.place(tile, &runs, memory);
                     let Memory { film, rays, landings, .. } = memory;
                     self.what.camera().sample_band_rays(film, rays, landings);
                     self.what.trace(&(0..bands), memory);
@@ -527,15 +582,15 @@ impl Adding<'_> {
         Ok(())
     }
 
-    /// Refills the batch with samples `range` of each of `pixels`, those of one pixel side by side.
-    /// A camera without a lens looks at places alone.
-    fn place(&self, tile: Tile, (pixels, range): (&[(u32, u32)], Range<u32>), memory: &mut Memory) {
+    /// Refills the batch with the samples of `runs`. A camera without a lens looks at places alone.
+    fn place(&self, tile: Tile, runs: &[Run], memory: &mut Memory) {
         let Memory { numbers, film, .. } = memory;
         let numbers: &mut Vec<(PixelSamples, u32)> = &mut numbers.samples;
         numbers.clear();
         // The numbers of all samples of these pixels.
-        for &(x, y) in pixels {
-            self.sampling.extend([tile.left + x, tile.top + y], range.clone(), numbers);
+        let pixel = |run: &Run| [tile.left + run.pixel.0, tile.top + run.pixel.1];
+        for run in runs {
+            self.sampling.extend(pixel(run), run, numbers);
         }
         let count = numbers.len();
         // Their places on the sensor, in the pupil, and in the spectrum.
@@ -543,10 +598,12 @@ impl Adding<'_> {
         film.clear();
         let mut places = Vec::new();
         draw(0, &mut places);
-        for (&(x, y), places) in pixels.iter().zip(places.chunks(range.len().max(1))) {
-            let corner = [tile.left + x, tile.top + y].map(f64::from);
-            film.columns.extend(places.iter().map(|place| corner[0] + place[0]));
-            film.rows.extend(places.iter().map(|place| corner[1] + place[1]));
+        let mut first = 0;
+        for run in runs {
+            let (corner, end) = (pixel(run).map(f64::from), first + run.range.len());
+            film.columns.extend(places[first..end].iter().map(|place| corner[0] + place[0]));
+            film.rows.extend(places[first..end].iter().map(|place| corner[1] + place[1]));
+            first = end;
         }
         // Carriers that a pixel collects were freed beside where they are collected: the pixel sees its own square,
         // spread by a normal distribution.
@@ -591,23 +648,18 @@ impl Adding<'_> {
 }
 
 impl Memory {
-    /// Adds the values of the batch's rays, sample by sample, to sums from `start` on.
-    fn add(
-        &mut self,
-        start: usize,
-        slots: Slots,
-        [layers, bands]: [usize; 2],
-        group: &Range<usize>,
-    ) {
-        let Self { rays: CameraRays { sample, weight, .. }, values, sums, order, .. } = self;
+    /// Adds the values of the batch's rays, sample by sample, to their sums.
+    fn add(&mut self, [layers, bands]: [usize; 2], group: &Range<usize>) {
+        let Self { rays: CameraRays { sample, weight, .. }, values, sums, slots, order, .. } = self;
         let count = layers * bands;
         if group.len() == count && sample.is_sorted() {
             // Samples of one sum lie side by side.
             let mut first = 0;
             while let Some(&of_first) = sample.get(first) {
-                let (slot, behind) = slots.of(of_first);
-                let of_sum = sample[first..].iter().take_while(|&&other| other < behind).count();
-                let (at, end) = (start + slot * count, first + of_sum);
+                let slot = slots[of_first as usize];
+                let is_of_sum = |other: &&u32| slots[**other as usize] == slot;
+                let of_sum = sample[first..].iter().take_while(is_of_sum).count();
+                let (at, end) = (slot as usize * count, first + of_sum);
                 let values = &values[first * count..end * count];
                 add_run(&mut sums[at..at + count], values, &weight[first..end]);
                 first = end;
@@ -615,7 +667,7 @@ impl Memory {
             return;
         }
         let mut add = |ray: usize| {
-            let (at, weight) = (start + slots.of(sample[ray]).0 * count, weight[ray]);
+            let (at, weight) = (slots[sample[ray] as usize] as usize * count, weight[ray]);
             let sums = sums[at..at + count].chunks_exact_mut(bands.max(1));
             let values = values[ray * count..(ray + 1) * count].chunks_exact(bands.max(1));
             for (sums, values) in sums.zip(values) {

@@ -1,6 +1,5 @@
 //! When the samples of a pixel are enough: what the scene asks for, as far as it can be had.
 
-use std::ops::Range;
 use std::time::Duration;
 
 use etendue_scene::Scene;
@@ -85,45 +84,5 @@ impl Stopping {
             }
         };
         (choice, because)
-    }
-}
-
-/// The passes of samples that are judged on the way. Sobol points are evenest where they are a power of two,
-/// so each pass but the last ends at one, or half-way to the next: there those end of which the former tells
-/// that it will do ([`crate::adaptive`]). The first two powers only show how fast the error falls.
-pub(crate) fn judged_passes(least: u32, most: u32) -> Vec<Range<u32>> {
-    let first = (least / 4).next_power_of_two().max(2).min(most);
-    let mut passes: Vec<Range<u32>> = std::iter::once(0..first).collect();
-    while let Some(end) = passes.last().map(|pass| pass.end).filter(|end| *end < most) {
-        let next = match end.is_power_of_two() && end >= least {
-            true => end.saturating_add(end / 2),
-            false => end.saturating_add(1).checked_next_power_of_two().unwrap_or(most),
-        };
-        passes.push(end..most.min(next));
-    }
-    passes
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn judged_passes_cover_all_samples_and_meet_powers_of_two() {
-        let ends = |least, most| -> Vec<u32> {
-            judged_passes(least, most).iter().map(|pass| pass.end).collect()
-        };
-        assert_eq!(ends(16, 100), [4, 8, 16, 24, 32, 48, 64, 96, 100]);
-        assert_eq!(ends(4, 4), [2, 4]);
-        assert_eq!(ends(12, 12), [4, 8, 12]);
-        for (least, most) in [(16, 16), (16, 4096), (64, 1 << 20), (8, 12), (4, u32::MAX)] {
-            let passes = judged_passes(least, most);
-            assert_eq!(passes[0].start, 0);
-            assert_eq!(passes.last().unwrap().end, most);
-            assert!(passes.windows(2).all(|pair| pair[0].end == pair[1].start));
-            assert!(passes.iter().any(|pass| pass.end == least));
-            let judged = passes.iter().filter(|pass| pass.end.is_power_of_two());
-            assert_eq!(judged.count(), (most.ilog2() + 1 - passes[0].end.ilog2()) as usize);
-        }
     }
 }

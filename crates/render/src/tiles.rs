@@ -12,10 +12,10 @@ use etendue_tracer::layer::{Columns, OtherFrame, Seen};
 use etendue_tracer::{LayerSpec, RayStats, SceneView, Traced};
 use rayon::prelude::*;
 
-use crate::adaptive::Rule;
+use crate::adaptive::{Met, Rule};
 use crate::checkpoint::Keeper;
 use crate::error::RenderError;
-use crate::film::{FilmLayer, Strip, strips, take};
+use crate::film::{FilmLayer, NoMemory, Strip, filled, strips, take};
 use crate::film_file::{FilmError, FilmFile};
 use crate::output::{Picture, PictureError};
 use crate::passes::{Beside, Passed};
@@ -256,6 +256,36 @@ impl Job<'_> {
             watcher.did(batch.rays.len() as u64)?;
         }
         Ok(())
+    }
+
+    /// What the chief ray of each pixel meets, in rows from the top: by which pixels are alike.
+    pub(crate) fn met(&self) -> Result<Vec<Met>, NoMemory> {
+        let [width, height] = self.camera.resolution();
+        let mut all = filled(Met::default(), width as usize * height as usize)?;
+        let strips = all.par_chunks_mut((width * TILE) as usize).enumerate();
+        strips.filter(|(k, _)| self.sampling.shard.owns(*k)).for_each(|(k, met)| {
+            let mut batch = RayBuffers::new(Detail::Surface);
+            #[expect(clippy::cast_possible_truncation, reason = "a row of a picture")]
+            let top = k as u32 * TILE;
+            for tile in Tile::across(width, [top, TILE.min(height - top)]) {
+                batch.aim_at_centres(self.camera, tile, top);
+                self.accel.closest(&batch.rays, &mut batch.hits);
+                let RayBuffers { rays, hits, places, values, .. } = &mut batch;
+                LayerSpec::Albedo.fill(&self.seen(Traced { rays, hits }), values);
+                for (i, &at) in places.iter().enumerate().filter(|(i, _)| hits.t[*i].is_finite()) {
+                    let distance = hits.t[i].max(f64::MIN_POSITIVE).ln();
+                    let [colour, normal] = [&values[..3], &hits.normal[..]];
+                    let numbers = colour.iter().chain(normal).map(|column| column[i]);
+                    for (met, number) in met[at as usize].iter_mut().zip(numbers.chain([distance]))
+                    {
+                        #[expect(clippy::cast_possible_truncation, reason = "how alike pixels are")]
+                        let number = number as f32;
+                        *met = number;
+                    }
+                }
+            }
+        });
+        Ok(all)
     }
 
     /// What layers are filled from.

@@ -2,7 +2,7 @@
 //! measured part of `docs/sampling.md` with its chart and its map.
 //!
 //! The light of each scene is scaled so that a quarter of the sensor's full well is filled in 10 ms, in the
-//! mean over the picture. The variance of a picture is measured from two of other
+//! mean over the picture. The variance of a picture is measured from pairs of other
 //! seeds, never from a picture's own samples: per pixel and channel, the half of their squared difference,
 //! carried to digital numbers and divided by the sensor's own variance.
 #![allow(
@@ -65,6 +65,12 @@ struct Arguments {
     /// Measure fewer numbers of samples and exposure times.
     #[arg(long)]
     quick: bool,
+    /// Measure these scenes alone, of those of the table.
+    #[arg(long, value_delimiter = ',')]
+    only: Vec<String>,
+    /// Pairs of pictures that a variance is measured by.
+    #[arg(long, default_value_t = PAIRS)]
+    pairs: u64,
     /// Measure only what planning costs, and print it.
     #[arg(long)]
     planning: bool,
@@ -72,52 +78,57 @@ struct Arguments {
 
 /// How much is measured.
 struct Effort {
+    pairs: u64,
     counts: &'static [u32],
     charted: &'static [f64],
     most: u32,
 }
 
 impl Effort {
-    fn of(quick: bool) -> Self {
+    fn of(quick: bool, pairs: u64) -> Self {
         match quick {
-            false => Self { counts: &COUNTS, charted: &CHARTED, most: MOST },
-            true => Self { counts: &COUNTS[..9], charted: &SHOWN, most: MOST / 4 },
+            false => Self { counts: &COUNTS, charted: &CHARTED, most: MOST, pairs },
+            true => Self { counts: &COUNTS[..9], charted: &SHOWN, most: MOST / 4, pairs },
         }
     }
 }
 
 fn main() -> anyhow::Result<()> {
     let arguments = Arguments::parse();
-    let effort = Effort::of(arguments.quick);
+    let effort = Effort::of(arguments.quick, arguments.pairs.max(1));
     if arguments.planning {
         let study = Study::open(&arguments.scenes.join("paper/fig3.json"), arguments.width)?;
-        print!("{}", planner(&study).trim_start());
+        print!("{}", planner(("paper/fig3.json", &study)).trim_start());
         return Ok(());
     }
     let mut text = String::new();
     let _ = write!(
         text,
-        "\n## Measured\n\n`make bench-sampling` measures this and writes it. Pictures of {} columns{}.\n\n",
+        "\n## Measured\n\n`make bench-sampling` measures this and writes it. Pictures of {} columns{}; variances by {} pairs \
+         of pictures.\n\n",
         arguments.width,
-        if arguments.quick { ", at the quick scale" } else { "" }
+        if arguments.quick { ", at the quick scale" } else { "" },
+        effort.pairs
     );
     for line in timing::describe().into_iter().chain([timing::checkout()]) {
         let _ = writeln!(text, "- {line}");
     }
-    let names = ["paper/fig3.json", "double-gauss.json", "sensor-noise.json"];
+    let mut names = vec!["paper/fig3.json", "double-gauss.json", "sensor-noise.json"];
+    names.retain(|name| arguments.only.is_empty() || arguments.only.iter().any(|own| own == name));
+    anyhow::ensure!(!names.is_empty(), "--only names none of the scenes of the table");
     let open = |name: &&str| Study::open(&arguments.scenes.join(name), arguments.width);
     let studies: Vec<Study> = names.iter().map(open).collect::<Result<_, _>>()?;
-    let uniform: Vec<Vec<PicturePair>> = studies
+    let uniform: Vec<Vec<PicturePairs>> = studies
         .iter()
-        .map(|study| effort.counts.iter().map(|n| PicturePair::of(study, json!(n))).collect())
+        .map(|study| effort.counts.iter().map(|n| PicturePairs::of(study, json!(n), effort.pairs)).collect())
         .collect();
     let noise = noise_table(&effort, &names, &studies, &uniform);
     text += &noise.text;
     draw(&arguments.docs, &names, &noise.saved)?;
     text += "\n![Samples saved against exposure time](images/sampling/saved.svg)\n";
     text += &relative_table(&effort, &names, &studies, &uniform);
-    text += &map(&arguments.docs, &studies[0])?;
-    text += &planner(&studies[0]);
+    text += &map(&arguments.docs, (names[0], &studies[0]))?;
+    text += &planner((names[0], &studies[0]));
     let path = arguments.docs.join("sampling.md");
     let page = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
     let written = page.split(MARK).next().unwrap_or_default().trim_end().to_owned();
@@ -126,22 +137,28 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Two pictures of other seeds, and the samples of one.
-struct PicturePair {
-    pair: [study::Picture; 2],
+/// Pairs of pictures of other seeds: the variance of a block is told by 64 squares of each, and the worst hundredth of
+/// blocks is that of what is measured.
+const PAIRS: u64 = 4;
+
+/// Pairs of pictures of other seeds, and the samples of one.
+struct PicturePairs {
+    pairs: Vec<[study::Picture; 2]>,
     mean_samples: f64,
 }
 
-impl PicturePair {
-    fn of(study: &Study, samples: serde_json::Value) -> Self {
+impl PicturePairs {
+    fn of(study: &Study, samples: serde_json::Value, pairs: u64) -> Self {
         let wanted = Wanted { samples, exposure: SHOWN[0] };
-        Self::with(study, &wanted)
+        Self::with(study, &wanted, pairs)
     }
 
-    fn with(study: &Study, wanted: &Wanted) -> Self {
-        let pair = [1, 2].map(|seed| study.picture(wanted, seed));
-        let mean_samples = 0.5 * (pair[0].samples + pair[1].samples);
-        Self { mean_samples, pair }
+    fn with(study: &Study, wanted: &Wanted, pairs: u64) -> Self {
+        let pair = |k: u64| [2 * k + 1, 2 * k + 2].map(|seed| study.picture(wanted, seed));
+        let pairs: Vec<_> = (0..pairs).map(pair).collect();
+        let samples = pairs.iter().flatten().map(|picture| picture.samples);
+        let mean_samples = samples.sum::<f64>() / (2 * pairs.len()) as f64;
+        Self { pairs, mean_samples }
     }
 }
 
@@ -155,7 +172,7 @@ fn noise_table(
     effort: &Effort,
     names: &[&str],
     studies: &[Study],
-    uniform: &[Vec<PicturePair>],
+    uniform: &[Vec<PicturePairs>],
 ) -> NoiseTable {
     let mut text = format!(
         "\nUntil the variance of the samples is {FRACTION} of the sensor's. `as even`: a number for every pixel \
@@ -177,8 +194,8 @@ fn noise_table(
         for &exposure in effort.charted {
             let samples =
                 json!({ "until": "sensor-noise", "fraction": FRACTION, "max": effort.most });
-            let taken = PicturePair::with(study, &Wanted { samples, exposure });
-            let spread = |shot: &PicturePair| study.noise_share(&shot.pair, exposure);
+            let taken = PicturePairs::with(study, &Wanted { samples, exposure }, effort.pairs);
+            let spread = |shot: &PicturePairs| study.noise_share(&shot.pairs, exposure);
             let own = spread(&taken);
             let curve = |of: &dyn Fn(Spread) -> f64| -> Vec<[f64; 2]> {
                 uniform.iter().map(|shot| [shot.mean_samples, of(spread(shot))]).collect()
@@ -188,7 +205,8 @@ fn noise_table(
             let (most, most_mark) = samples_for(&curve(&|s| s.most), own.most);
             line.push([exposure, good / taken.mean_samples]);
             if SHOWN.contains(&exposure) {
-                let of_blocks = uniform.iter().map(|shot| study.noise_shares(&shot.pair, exposure));
+                let of_blocks =
+                    uniform.iter().map(|shot| study.noise_shares(&shot.pairs, exposure));
                 let of_blocks: Vec<Vec<f64>> = of_blocks.collect();
                 let oracle = oracle::samples(effort.counts, &of_blocks, own.most, FEWEST);
                 let of_oracle = taken.mean_samples / oracle;
@@ -229,7 +247,7 @@ fn relative_table(
     effort: &Effort,
     names: &[&str],
     studies: &[Study],
-    uniform: &[Vec<PicturePair>],
+    uniform: &[Vec<PicturePairs>],
 ) -> String {
     let mut text = format!(
         "\nUntil a relative error of {ERROR}, against a number for every pixel with the same error in the worst tenth of \
@@ -238,8 +256,8 @@ fn relative_table(
     );
     for ((name, study), uniform) in names.iter().zip(studies).zip(uniform) {
         let samples = json!({ "relative_error": ERROR, "max": effort.most });
-        let taken = PicturePair::of(study, samples);
-        let spread = |shot: &PicturePair| study.relative_variance(&shot.pair).ninth;
+        let taken = PicturePairs::of(study, samples, effort.pairs);
+        let spread = |shot: &PicturePairs| study.relative_variance(&shot.pairs).ninth;
         let curve: Vec<[f64; 2]> =
             uniform.iter().map(|shot| [shot.mean_samples, spread(shot)]).collect();
         let (samples, mark) = samples_for(&curve, spread(&taken));
@@ -286,7 +304,7 @@ fn draw(docs: &Path, names: &[&str], saved: &[Vec<[f64; 2]>]) -> anyhow::Result<
 }
 
 /// The map of samples as a picture.
-fn map(docs: &Path, study: &Study) -> anyhow::Result<String> {
+fn map(docs: &Path, (name, study): (&str, &Study)) -> anyhow::Result<String> {
     let samples = json!({ "until": "sensor-noise", "fraction": FRACTION, "max": 512 });
     let rendered = study.rendered(&Wanted { samples, exposure: SHOWN[1] }, 1);
     let path = docs.join("images/sampling/map.png");
@@ -294,14 +312,14 @@ fn map(docs: &Path, study: &Study) -> anyhow::Result<String> {
     let counts = rendered.sample_counts.context("samples are counted")?;
     let [fewest, most] = [counts.least, counts.most];
     Ok(format!(
-        "\nWhere the samples of `paper/fig3.json` go at {} ms: {fewest} (dark) to {most} (bright) a pixel.\n\n\
+        "\nWhere the samples of `{name}` go at {} ms: {fewest} (dark) to {most} (bright) a pixel.\n\n\
          ![Samples of each pixel](images/sampling/map.png)\n",
         SHOWN[1] * 1e3
     ))
 }
 
 /// What planning costs beyond loading.
-fn planner(study: &Study) -> String {
+fn planner((name, study): (&str, &Study)) -> String {
     let wanted = Wanted { samples: json!(64), exposure: SHOWN[0] };
     let scene = study.scene(&wanted, 0);
     let mut times: Vec<f64> = (0..50)
@@ -313,7 +331,7 @@ fn planner(study: &Study) -> String {
         .collect();
     times.sort_by(f64::total_cmp);
     format!(
-        "\nPlanning `paper/fig3.json` takes {:.3} ms beyond loading (median of 50; goal: 1).\n",
+        "\nPlanning `{name}` takes {:.3} ms beyond loading (median of 50; goal: 1).\n",
         times[25]
     )
 }

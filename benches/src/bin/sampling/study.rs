@@ -153,13 +153,17 @@ impl Study {
         (sensor, units)
     }
 
-    /// The variance of a pair of pictures in digital numbers, as a share of the sensor's own.
-    pub(crate) fn noise_share(&self, pair: &[Picture; 2], exposure: f64) -> Spread {
-        spread_of(&mut self.noise_shares(pair, exposure))
+    /// The variance of pairs of pictures in digital numbers, as a share of the sensor's own.
+    pub(crate) fn noise_share(&self, pairs: &[[Picture; 2]], exposure: f64) -> Spread {
+        spread_of(&mut self.noise_shares(pairs, exposure))
     }
 
-    /// The same of each block.
-    pub(crate) fn noise_shares(&self, pair: &[Picture; 2], exposure: f64) -> Vec<f64> {
+    /// The same of each block, in the mean over the pairs.
+    pub(crate) fn noise_shares(&self, pairs: &[[Picture; 2]], exposure: f64) -> Vec<f64> {
+        mean_of(pairs.iter().map(|pair| self.noise_shares_of(pair, exposure)))
+    }
+
+    fn noise_shares_of(&self, pair: &[Picture; 2], exposure: f64) -> Vec<f64> {
         let (sensor, units) = self.sensor(exposure);
         let floor = sensor.noise_floor(exposure).expect("a sensor with noise");
         let share = |pixel: usize| {
@@ -173,8 +177,12 @@ impl Study {
         self.means(&share)
     }
 
-    /// The variance of a pair of pictures, as a share of the square of a block's mean.
-    pub(crate) fn relative_variance(&self, pair: &[Picture; 2]) -> Spread {
+    /// The variance of pairs of pictures, as a share of the square of a block's mean.
+    pub(crate) fn relative_variance(&self, pairs: &[[Picture; 2]]) -> Spread {
+        spread_of(&mut mean_of(pairs.iter().map(|pair| self.relative_variances(pair))))
+    }
+
+    fn relative_variances(&self, pair: &[Picture; 2]) -> Vec<f64> {
         let grey = |picture: &Picture, pixel: usize| {
             picture.light.iter().map(|plane| plane[pixel]).sum::<f64>() / 3.0
         };
@@ -183,8 +191,7 @@ impl Study {
                 (0..3).map(|k| 0.5 * (pair[0].light[k][pixel] - pair[1].light[k][pixel]).powi(2));
             squares.sum::<f64>() / 3.0
         };
-        let mut blocks: Vec<f64> = self
-            .blocks(pair[0].light[0].len())
+        self.blocks(pair[0].light[0].len())
             .map(|pixels| {
                 let count = pixels.len() as f64;
                 let mean = |of: &dyn Fn(usize) -> f64| {
@@ -193,8 +200,7 @@ impl Study {
                 let light = mean(&|pixel| 0.5 * (grey(&pair[0], pixel) + grey(&pair[1], pixel)));
                 mean(&variance) / (light * light).max(1e-300)
             })
-            .collect();
-        spread_of(&mut blocks)
+            .collect()
     }
 
     /// The mean of a value of pixels over each block.
@@ -215,6 +221,13 @@ impl Study {
             (y..height.min(y + BLOCK)).flat_map(inside).collect()
         })
     }
+}
+
+/// The mean of lists of one length.
+fn mean_of(lists: impl ExactSizeIterator<Item = Vec<f64>>) -> Vec<f64> {
+    let count = lists.len() as f64;
+    let sum = lists.reduce(|a, b| a.iter().zip(&b).map(|(a, b)| a + b).collect());
+    sum.unwrap_or_default().into_iter().map(|sum| sum / count).collect()
 }
 
 fn spread_of(blocks: &mut [f64]) -> Spread {

@@ -87,6 +87,21 @@ pub(super) fn contenders(found: &Target) -> Table {
     Table::of_rows(found.contenders.iter().map(row).collect())
 }
 
+/// What some of them give in one time.
+pub(super) fn equal_time(found: &Target) -> Table {
+    let row = |own: &crate::target::EqualTime| {
+        let shown = |value: f64, text: String| Cell::number(value, text);
+        vec![
+            ("settings", Cell::word(&own.name)),
+            ("samples", Cell::count(own.samples.into())),
+            ("seconds", shown(own.seconds, format!("{:.2}", own.seconds))),
+            ("error", shown(own.error, format!("{:.4}", own.error))),
+            ("relative_mse", shown(own.relative_mse, format!("{:.2e}", own.relative_mse))),
+        ]
+    };
+    Table::of_rows(found.equal_time.iter().map(row).collect())
+}
+
 /// Every render of them.
 pub(super) fn renders(found: &Target) -> Table {
     let row = |own: &crate::target::Render| {

@@ -77,8 +77,10 @@ pub enum Outcome {
 pub struct WholeRun {
     /// Loading, building, tracing and writing, in turn (s).
     pub stages: [f64; 4],
-    /// What the sensor records in the mean, above its black level.
+    /// What the sensor records in the mean, above its black level: `[row][column][channel]`.
     pub values: Vec<f64>,
+    /// Columns, rows and channels.
+    pub shape: [usize; 3],
 }
 
 impl WholeRun {
@@ -113,6 +115,11 @@ pub struct Target {
     pub contenders: Vec<Foretold>,
     /// The soonest, rendered with as many samples as it needs.
     pub verified: Option<Verified>,
+    /// The scene as it is, the soonest and those next to it, each with what fits into the time of the soonest.
+    pub equal_time: Vec<EqualTime>,
+    /// Their pictures, behind the converged one.
+    #[serde(skip)]
+    pub strip: Option<Strip>,
     /// What a user should know.
     pub notes: Vec<String>,
 }
@@ -163,6 +170,32 @@ pub struct Verified {
     pub seconds: f64,
     /// Its error.
     pub error: f64,
+}
+
+/// What settings give in the time that the soonest takes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EqualTime {
+    /// Their name.
+    pub name: String,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// The time that they took (s).
+    pub seconds: f64,
+    /// The root of the mean squared difference to the converged picture, over its mean.
+    pub error: f64,
+    /// As [`Render::relative_mse`].
+    pub relative_mse: f64,
+}
+
+/// One part of several pictures.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Strip {
+    /// Columns and rows of each.
+    pub side: [usize; 2],
+    /// The column and row of its first pixel.
+    pub corner: [usize; 2],
+    /// Red, green and blue of each pixel, in rows, of each picture.
+    pub pictures: Vec<Vec<u8>>,
 }
 
 impl Verified {

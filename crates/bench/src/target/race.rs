@@ -1,5 +1,7 @@
 //! The rounds in which contenders are rendered, and what is foretold of them.
 
+mod equal_time;
+
 use std::time::Instant;
 
 use super::{
@@ -134,7 +136,11 @@ pub fn measure<E: From<BenchError>>(
         }
     }
     let verified = race.verify()?;
-    Ok(race.conclude(verified))
+    let (rows, strip) = match &verified {
+        Some(found) => race.equal_time(found)?,
+        None => (Vec::new(), None),
+    };
+    Ok(Target { equal_time: rows, strip, ..race.conclude(verified) })
 }
 
 struct Race<'a, E> {
@@ -449,6 +455,8 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
             renders: self.renders,
             contenders,
             verified,
+            equal_time: Vec::new(),
+            strip: None,
             notes,
         }
     }
@@ -476,7 +484,11 @@ mod tests {
             axes.iter().map(|axis| axis.iter().map(of).collect()).collect();
         let mut program = |run: Run<'_>| {
             if run.seed >= u64::MAX - 1 {
-                return Ok(Outcome::Done(WholeRun { stages: [0.0; 4], values: picture(0.0) }));
+                return Ok(Outcome::Done(WholeRun {
+                    stages: [0.0; 4],
+                    values: picture(0.0),
+                    shape: [8, 8, 1],
+                }));
             }
             // Of joint changes the savings multiply, and what is missed adds up.
             let laws = run.contender.changes.iter().map(|&(axis, number)| axes[axis][number].1);
@@ -494,7 +506,7 @@ mod tests {
             let n = f64::from(run.samples);
             let stages = [start, 0.0, sample * n, 0.0];
             let values = picture(variance / n + rest);
-            Ok::<_, BenchError>(Outcome::Done(WholeRun { stages, values }))
+            Ok::<_, BenchError>(Outcome::Done(WholeRun { stages, values, shape: [8, 8, 1] }))
         };
         measure((&changes, &[]), Effort { target, seconds: 1e9 }, &mut program, &|_| true).unwrap()
     }
@@ -524,6 +536,13 @@ mod tests {
         assert_eq!(verified.samples, 200);
         assert!((verified.seconds - 1.5).abs() < 1e-9 && verified.factor() < 1.0 + 1e-9);
         assert!((verified.error - 0.01).abs() < 1e-9, "{verified:?}");
+        // In its 1.5 s the scene as it is has 100 samples, and twice the error.
+        let [own, soonest, ..] = &found.equal_time[..] else { panic!("{:?}", found.equal_time) };
+        assert_eq!((&*own.name, own.samples / 2), (AS_IT_IS, 50));
+        assert!((own.error - 0.02).abs() < 1e-4, "{own:?}");
+        assert_eq!(soonest.name, best.name);
+        assert!((soonest.error - 0.01).abs() < 1e-4 && soonest.relative_mse < own.relative_mse);
+        assert_eq!(found.strip.unwrap().pictures.len(), 1 + found.equal_time.len());
         let time = |name: &str| {
             let own = found.contenders.iter().find(|own| own.name == name).unwrap();
             own.seconds

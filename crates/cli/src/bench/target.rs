@@ -2,7 +2,6 @@
 
 use etendue::{Denoiser, Options, Outputs, Progress, Rendering, Session};
 use etendue_bench::target::{Change, Effort, Outcome, Run, Target, WholeRun, measure};
-use etendue_render::output::Values;
 use etendue_render::{accelerators, denoise};
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, TracerSpec};
@@ -93,24 +92,26 @@ fn whole_run(
     let before = seconds.load + seconds.decode;
     let trace = (seconds.total - before - seconds.build).max(0.0);
     let stages = [before, seconds.build, trace, written.time.as_secs_f64()];
-    Ok(WholeRun { stages, values: recorded(&rendering)? })
+    let (values, shape) = recorded(&rendering)?;
+    Ok(WholeRun { stages, values, shape })
 }
 
-/// What the sensor records in the mean in its first exposure, above its black level (DN); of a scene without a sensor
-/// the light, clipped at full scale.
-fn recorded(rendering: &Rendering) -> Result<Vec<f64>, etendue::Error> {
+/// What the sensor records in the mean in its first exposure, above its black level (DN), as `[row][column][channel]`;
+/// of a scene without a sensor the light, clipped at full scale.
+fn recorded(rendering: &Rendering) -> Result<(Vec<f64>, [usize; 3]), etendue::Error> {
     if let Some(light) = rendering.sensor_light()
         && let Some(shot) = light.sensor().shots().next()
     {
         let black = light.sensor().black_level();
         let moments = light.moments(shot).map_err(etendue_render::expose::ExposeError::from)?;
-        return Ok(moments.mean.iter().map(|&mean| f64::from(mean) - black).collect());
+        let values = moments.mean.iter().map(|&mean| f64::from(mean) - black).collect();
+        return Ok((values, [moments.width, moments.height, moments.depth]));
     }
     let name = if rendering.layer(denoise::DENOISED).is_some() { denoise::DENOISED } else { "" };
-    let planes = rendering.layer(name).into_iter().flat_map(|layer| &layer.channels);
-    let values =
-        |values: &Values| (0..values.len()).map(|i| values.at(i).min(1.0)).collect::<Vec<_>>();
-    Ok(planes.flat_map(|channel| values(&channel.values)).collect())
+    let channels = rendering.layer(name).map_or(&[][..], |layer| &layer.channels);
+    let [width, height] = rendering.resolution().map(|side| side as usize);
+    let of_pixel = |i: usize| channels.iter().map(move |channel| channel.values.at(i).min(1.0));
+    Ok(((0..width * height).flat_map(of_pixel).collect(), [width, height, channels.len()]))
 }
 
 /// What stands for the output `--denoise` among settings.

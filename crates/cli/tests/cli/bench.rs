@@ -215,7 +215,16 @@ fn the_settings_that_reach_an_error_soonest_are_found_and_verified() {
         renders.iter().find(of).unwrap()["error"].as_f64().unwrap()
     };
     assert!(error("independent samples") > error("as the plan takes it"));
-    for file in ["target.csv", "target-time.svg", "target-time.png"] {
+    let equal_time = found["equal_time"].as_array().unwrap();
+    assert_eq!(equal_time[0]["name"], "as the plan takes it", "{equal_time:?}");
+    assert!(table.contains("In the time that the soonest takes"), "{table}");
+    for file in [
+        "target.csv",
+        "target-time.svg",
+        "target-time.png",
+        "target-equal-time.csv",
+        "target-equal-time.png",
+    ] {
         assert!(bench.path("out").join(file).is_file(), "{file}");
     }
     assert!(!bench.path("out/samplers.csv").exists(), "only what was asked for");

@@ -1,26 +1,17 @@
 //! When the error of a block's samples is small enough.
 
-use super::halves::Sampled;
+use super::sampled::Sampled;
 use crate::Plan;
 use crate::expose::NoiseOfPixels;
-use crate::samples::of_first_set;
 use crate::stopping::Stopping;
 use etendue_scene::Scene;
-use etendue_scene::file::AccuracySpec;
-
-/// The normal deviate that one of a thousand exceeds.
-const ONE_IN_A_THOUSAND: f64 = 3.0902;
 
 /// When samples are enough.
 pub(crate) struct Rule {
     /// Not before there are so many of each pixel.
     pub(crate) least: u32,
-    /// The error of blocks around that a block does not wait for, as a share of what is allowed: they will
-    /// get about so many times its samples.
-    pub(super) wait: f64,
-    /// What the error may be for half as many samples again to do: they leave two thirds of a variance at most
-    /// ([`super::convergence`]).
-    pub(super) half_step: f64,
+    /// Standard errors of a block's variance that are added to it.
+    pub(super) sigmas: f64,
     allowed: Allowed,
 }
 
@@ -30,6 +21,15 @@ enum Allowed {
     SensorNoise(Box<NoiseOfPixels>, f64),
     /// The light itself, of which the standard deviation may be this share.
     RelativeError(f64),
+}
+
+/// What the samples of a pixel tell.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Told {
+    /// The variance of their mean: as a share of what the sensor's noise allows, or of light.
+    pub(super) variance: f64,
+    /// The mean of the light over its bands.
+    pub(super) light: f64,
 }
 
 impl Rule {
@@ -43,88 +43,45 @@ impl Rule {
                 Allowed::SensorNoise(Box::new(noise), share)
             }
         };
-        let AccuracySpec { sample_wait: wait, sample_half_step: half_step, .. } = scene.accuracy;
-        Some(Self { least: scene.render.samples.least(), wait, half_step, allowed })
+        let (least, sigmas) = (scene.render.samples.least(), scene.accuracy.sample_sigmas);
+        Some(Self { least, sigmas, allowed })
     }
 
-    /// The variance of the mean of two sets of some pixels' samples as a share of what is allowed, as if
-    /// each were for itself: in the mean over the pixels. `samples` is what each pixel has. `None` of no
-    /// pixels.
-    pub(super) fn error<'a>(
-        &self,
-        pixels: impl Iterator<Item = Sampled<'a>>,
-        samples: u32,
-    ) -> Option<f64> {
-        let of_set = sizes(samples);
-        let mut count = 0.0;
+    /// A relative error, with so many standard errors.
+    #[cfg(test)]
+    pub(super) fn of_relative_error(share: f64, sigmas: f64) -> Self {
+        Self { least: 4, sigmas, allowed: Allowed::RelativeError(share) }
+    }
+
+    /// What the two sets of a pixel's samples tell, `a_set` being in each.
+    pub(super) fn told(&self, Sampled { pixel, sets: [a, b] }: &Sampled<'_>, a_set: u32) -> Told {
+        let a_set = f64::from(a_set.max(1));
+        let of_set = |set: usize, band: usize| [a, b][set][band].total() / a_set;
+        let (mut variance, mut light) = (0.0, 0.0);
+        for band in 0..a.len() {
+            let [a, b] = [of_set(0, band), of_set(1, band)];
+            variance += variance_of_mean(a - b);
+            light += 0.5 * (a + b);
+        }
+        let bands = a.len().max(1) as f64;
+        let variance = match &self.allowed {
+            Allowed::SensorNoise(noise, share) => noise.share(*pixel, of_set) / share,
+            Allowed::RelativeError(_) => variance / bands,
+        };
+        Told { variance, light: light / bands }
+    }
+
+    /// The variance that is allowed where the light is `light` in the mean, in the unit of [`Told::variance`].
+    pub(super) fn allowed(&self, light: f64) -> f64 {
         match &self.allowed {
-            Allowed::SensorNoise(noise, share) => {
-                let mut sum = 0.0;
-                for Sampled { pixel, sets: [a, b] } in pixels {
-                    let light = |set: usize, band: usize| [a, b][set][band].total() / of_set[set];
-                    sum += noise.share(pixel, light);
-                    count += 1.0;
-                }
-                (count > 0.0).then(|| sum / count / share)
-            }
-            Allowed::RelativeError(share) => {
-                // Two sets differ by twice the variance of their mean.
-                let (mut variance, mut mean) = (0.0, 0.0);
-                for Sampled { sets: [a, b], .. } in pixels {
-                    for (a, b) in a.iter().zip(b) {
-                        let [a, b] = [a.total() / of_set[0], b.total() / of_set[1]];
-                        variance += variance_of_mean(a - b);
-                        mean += 0.5 * (a + b);
-                        count += 1.0;
-                    }
-                }
-                let error = || match variance > 0.0 {
-                    true => variance * count / (mean * mean) / (share * share),
-                    false => 0.0,
-                };
-                (count > 0.0).then(error)
-            }
+            Allowed::SensorNoise(..) => 1.0,
+            Allowed::RelativeError(share) => (share * light).powi(2),
         }
     }
-}
-
-/// Samples in each of the two sets that `samples` are of.
-pub(super) fn sizes(samples: u32) -> [f64; 2] {
-    let first = of_first_set(samples).min(samples);
-    [first, samples - first].map(|count| f64::from(count.max(1)))
 }
 
 /// The variance of the mean of two independent sets of one size, by the difference of their means: a quarter
 /// of its square.
 pub(crate) fn variance_of_mean(difference: f64) -> f64 {
     0.25 * difference * difference
-}
-
-/// The mean of so many squares of independent normal differences, over its expected value, that chance exceeds once
-/// in a thousand: of χ² of as many degrees of freedom, by E. B. Wilson and M. M. Hilferty, "The distribution of
-/// chi-square", 1931. It is 1.96 of half a block's 32 pixels, and more of the few in a block that the edge of the
-/// picture cuts.
-pub(super) fn by_chance(pixels: usize) -> f64 {
-    let spread = 2.0 / (9.0 * pixels.max(1) as f64);
-    (1.0 - spread + ONE_IN_A_THOUSAND * spread.sqrt()).powi(3)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Quantiles of χ² at 0.999 (M. Abramowitz and I. A. Stegun, *Handbook of Mathematical Functions*, table 26.8).
-    #[test]
-    fn chance_is_that_of_chi_square() {
-        for (degrees, quantile) in
-            [(1, 10.828), (4, 18.467), (8, 26.125), (16, 39.252), (32, 62.487)]
-        {
-            let found = by_chance(degrees) * degrees as f64;
-            // The cube root is nearly normal: to 3 % of one square, and far less of many.
-            assert!(
-                (found / quantile - 1.0).abs() < 0.04 / (degrees as f64).sqrt(),
-                "{degrees}: {found}"
-            );
-        }
-    }
 }

@@ -8,6 +8,12 @@ use etendue_tracer::LayerSpec;
 use super::film::light_factor;
 use crate::adaptive::variance_of_mean;
 
+/// Parts of the way between the light of two sets of samples in which it is looked at how much of it is clipped.
+const PARTS: u32 = 32;
+
+/// The share by which slopes may differ that are taken for one.
+const ALIKE: f64 = 1e-6;
+
 /// The sensor's noise at each pixel of a picture.
 pub(crate) struct NoiseOfPixels {
     sensor: Sensor,
@@ -87,7 +93,33 @@ impl ExposureResponse {
         let units = self.electrons[channel].iter().enumerate();
         let [a, b] = [0, 1]
             .map(|set| units.clone().map(|(band, unit)| unit * light(set, band)).sum::<f64>());
-        let (signal, slope) = (0.5 * (a + b), floor.slope(0.5 * (a + b)));
-        slope * slope * variance_of_mean(a - b) / floor.variance(signal)
+        let slope = secant(&|electrons| floor.slope(electrons), a, b);
+        slope * slope * variance_of_mean(a - b) / floor.variance(0.5 * (a + b))
+    }
+}
+
+/// The mean of a slope from `a` to `b`. Where one set of samples has met a lamp and the other has not, their mean may
+/// be clipped, which the pixel is not.
+fn secant(slope: &dyn Fn(f64) -> f64, a: f64, b: f64) -> f64 {
+    let ends = [a, b].map(slope);
+    if (ends[0] - ends[1]).abs() <= ALIKE * ends[0].max(ends[1]) {
+        return ends[0];
+    }
+    let at = |k: u32| a + (b - a) * (f64::from(k) + 0.5) / f64::from(PARTS);
+    (0..PARTS).map(|k| slope(at(k))).sum::<f64>() / f64::from(PARTS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_one_set_alone_clips_is_not_clipped() {
+        let clipped = |electrons: f64| if electrons < 100.0 { 2.0 } else { 0.0 };
+        assert_eq!(secant(&clipped, 0.0, 50.0), 2.0);
+        assert_eq!(secant(&clipped, 200.0, 300.0), 0.0);
+        // From 0 to 1000 a tenth is below the well, of 32 parts three.
+        let found = secant(&clipped, 0.0, 1000.0);
+        assert!((found - 2.0 * 3.0 / 32.0).abs() < 1e-12, "{found}");
     }
 }

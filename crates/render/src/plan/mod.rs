@@ -28,7 +28,7 @@ use crate::forecast::forecast;
 use crate::output::Outputs;
 use crate::precision::light_precision;
 use crate::samples::{self, BYTES_OF_SUM};
-use crate::stopping::{Stopping, judged_passes};
+use crate::stopping::Stopping;
 use crate::tolerance::Taken;
 
 /// What of the models has to be read for `layers`: decided before they are opened.
@@ -119,7 +119,11 @@ fn sample_passes(
 ) -> Vec<Range<u32>> {
     let samples = scene.render.samples.most();
     if stopping.is_adaptive() {
-        return judged_passes(scene.render.samples.least(), samples);
+        // How many rounds follow the first, and of how many samples, the picture says.
+        return [0..scene.render.samples.least(), scene.render.samples.least()..samples]
+            .into_iter()
+            .filter(|pass| !pass.is_empty())
+            .collect();
     }
     let [width, height] = scene.camera.resolution().map(u64::from);
     let colours = if passes.mean {

@@ -153,8 +153,8 @@ impl Plan {
     fn explain_passes(&self) -> Decision {
         let because = match &self.passes[..] {
             [first, ..] if self.stopping.is_adaptive() => format!(
-                "at most: the picture can be seen after {} samples a pixel, and is judged where they are \
-                 a power of two",
+                "the picture can be seen after {} samples a pixel, and then after every round of those that are \
+                 still wanted",
                 first.end
             ),
             [first, .., last] => format!(
@@ -167,7 +167,11 @@ impl Plan {
             }
             _ => "too few samples to look at some of them".to_owned(),
         };
-        Decision::new(Kind::Passes, DecisionValue::Count(self.passes.len() as u64), because)
+        let value = match self.stopping.is_adaptive() {
+            true => "in rounds".into(),
+            false => DecisionValue::Count(self.passes.len() as u64),
+        };
+        Decision::new(Kind::Passes, value, because)
     }
 
     fn explain_quality(&self, scene: &Scene, triangles: u64) -> Decision {

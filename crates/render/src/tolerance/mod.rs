@@ -46,15 +46,20 @@ pub struct Field {
     pub bands: usize,
     /// Whether the pupil is measured at one wavelength alone.
     pub rough: bool,
+    /// Chief rays across the neighbourhood of a place, at most, by which its depths are found: one every two pixels
+    /// where that is enough.
+    pub across: u32,
 }
 
 impl Field {
     /// What a user who compares models gets.
-    pub const FINE: Self = Self { size: [9, 7], rays: 1024, bands: usize::MAX, rough: false };
+    pub const FINE: Self =
+        Self { size: [9, 7], rays: 1024, bands: usize::MAX, rough: false, across: 256 };
     /// What a render does before it begins.
-    pub const QUICK: Self = Self { size: [9, 7], rays: 256, bands: 3, rough: true };
+    pub const QUICK: Self = Self { size: [9, 7], rays: 256, bands: 3, rough: true, across: 64 };
     /// What a choice is verified by: places in between, and more bands.
-    pub const BETWEEN: Self = Self { size: [16, 12], rays: 256, bands: 5, rough: false };
+    pub const BETWEEN: Self =
+        Self { size: [16, 12], rays: 256, bands: 5, rough: false, across: 64 };
 }
 
 /// A place of the picture.
@@ -149,7 +154,7 @@ impl FullView {
         bands: &Bands,
         field: Field,
     ) -> Result<Self, RenderError> {
-        let mut places = places(scene, accel, field.size);
+        let mut places = places(scene, accel, field.size, field.across);
         let mut notes = Vec::new();
         if places.iter().all(|place| place.depths.is_empty()) {
             let in_focus = scene.camera.lens().map(|lens| lens.focused().object_distance());

@@ -162,13 +162,21 @@ pub(super) fn seen(
     all
 }
 
-/// Chief rays across each cell of the field.
+/// Chief rays across each cell of the field, at least.
 const ACROSS: u32 = 8;
+
+/// Pixels between them, where there may be so many: what is three pixels large meets one.
+const STEP: f64 = 2.0;
 
 /// Places of the picture, each with the depths (m) that its neighbourhood shows: the nearest, the middle one
 /// and the farthest; infinity where an environment's image is seen. A place whose neighbourhood shows nothing
-/// has none.
-pub(super) fn places(scene: &Scene, accel: &dyn Accel, size: [u32; 2]) -> Vec<Place> {
+/// has none. `most_across` is how many chief rays are sent across a neighbourhood, at most.
+pub(super) fn places(
+    scene: &Scene,
+    accel: &dyn Accel,
+    size: [u32; 2],
+    most_across: u32,
+) -> Vec<Place> {
     let [width, height] = scene.camera.resolution().map(f64::from);
     let [columns, rows] = size;
     let share = |i: u32, count: u32| f64::from(i) / f64::from(count - 1);
@@ -179,7 +187,8 @@ pub(super) fn places(scene: &Scene, accel: &dyn Accel, size: [u32; 2]) -> Vec<Pl
         for column in 0..columns {
             let at = [share(column, columns) * width, share(row, rows) * height];
             let size = [width / f64::from(columns - 1), height / f64::from(rows - 1)];
-            let depths = depths_in_cell(&scene.camera, accel, (at, size), sees_infinity);
+            let depths =
+                depths_in_cell(&scene.camera, accel, (at, size, most_across), sees_infinity);
             places.push(Place { column: at[0], row: at[1], depths });
         }
     }
@@ -190,16 +199,19 @@ pub(super) fn places(scene: &Scene, accel: &dyn Accel, size: [u32; 2]) -> Vec<Pl
 fn depths_in_cell(
     camera: &Camera,
     accel: &dyn Accel,
-    (middle, size): ([f64; 2], [f64; 2]),
+    (middle, size, most_across): ([f64; 2], [f64; 2], u32),
     sees_infinity: bool,
 ) -> Vec<f64> {
     let picture = camera.resolution().map(f64::from);
     let (mut columns, mut rows) = (Vec::new(), Vec::new());
     // Chief rays through even places around the middle, as far as the picture goes.
-    for y in 0..ACROSS {
-        for x in 0..ACROSS {
-            let share = |i: u32| (f64::from(i) + 0.5) / f64::from(ACROSS) - 0.5;
-            let at = [middle[0] + share(x) * size[0], middle[1] + share(y) * size[1]];
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it saturates")]
+    let [across, down] =
+        size.map(|side| ((side / STEP).ceil() as u32).clamp(ACROSS, most_across.max(ACROSS)));
+    for y in 0..down {
+        for x in 0..across {
+            let share = |i: u32, count: u32| (f64::from(i) + 0.5) / f64::from(count) - 0.5;
+            let at = [middle[0] + share(x, across) * size[0], middle[1] + share(y, down) * size[1]];
             if (0..2).all(|axis| at[axis] > 0.0 && at[axis] < picture[axis]) {
                 columns.push(at[0]);
                 rows.push(at[1]);

@@ -120,12 +120,9 @@ accuracy_settings! {
     Samples roulette_after: u32 = Rules::ROULETTE_AFTER, 1 to 1024, "surfaces",
         "Surfaces of a path of the tracer `path` after which it may end by chance",
         "More follow dim paths farther, which takes time; fewer end paths sooner, which adds noise and no bias";
-    Samples sample_wait: f64 = 2.0, 1.0 to 1e6, "of the variance that is allowed",
-        "Error up to which blocks of pixels do not wait for a neighbour, where samples stop by themselves",
-        "Less keeps more blocks going beside a difficult one; more finds less of what is hard by its surroundings";
-    Samples sample_half_step: f64 = 1.5, 1.0 to 2.0, "of the variance that is allowed",
-        "Error up to which half as many samples again are taken to do, where samples stop by themselves",
-        "1 doubles samples always, which takes more of them; near 2 leaves blocks above what is allowed";
+    Samples sample_sigmas: f64 = 2.0, 0.0 to 10.0, "standard errors of a block's variance",
+        "Standard errors that are added to the variance of a block of pixels, where samples stop by themselves",
+        "Less stops sooner, and half of the blocks above what is allowed at 0; more takes more samples";
     Samples sample_error: f64 = 0.02, 1e-9 to 1.0, "relative error",
         "Error at which samples stop that are to stop at a sensor's noise, where there is none",
         "Less takes more samples, by its square";

@@ -39,8 +39,8 @@ pub struct SensorNoiseSpec {
     #[serde(default = "tenth")]
     #[schemars(range(min = 0, max = 1))]
     pub fraction: f64,
-    /// Samples that each pixel gets in any case; rounded up to a power of two, four at least.
-    #[serde(default = "sixteen")]
+    /// Samples that each pixel gets in any case; rounded up to an even number, four at least.
+    #[serde(default = "four")]
     #[schemars(range(min = 1, max = 1_048_576))]
     pub min: u32,
     /// Samples that no pixel gets more of; rounded up to a multiple of four.
@@ -64,8 +64,8 @@ pub struct RelativeErrorSpec {
     /// The standard deviation of the samples' mean, as a share of it (above 0, at most 1).
     #[schemars(range(min = 0, max = 1))]
     pub relative_error: f64,
-    /// Samples that each pixel gets in any case; rounded up to a power of two, four at least.
-    #[serde(default = "sixteen")]
+    /// Samples that each pixel gets in any case; rounded up to an even number, four at least.
+    #[serde(default = "four")]
     #[schemars(range(min = 1, max = 1_048_576))]
     pub min: u32,
     /// Samples that no pixel gets more of; rounded up to a multiple of four.
@@ -90,8 +90,8 @@ fn tenth() -> f64 {
     0.1
 }
 
-fn sixteen() -> u32 {
-    16
+fn four() -> u32 {
+    LEAST_SAMPLES
 }
 
 /// Errors under this are reached by no number of samples.
@@ -126,7 +126,7 @@ impl SamplesSpec {
             Self::Count(count) => count,
             Self::SensorNoise(SensorNoiseSpec { min, .. })
             | Self::RelativeError(RelativeErrorSpec { min, .. }) => {
-                min.next_power_of_two().max(LEAST_SAMPLES).min(self.most())
+                min.next_multiple_of(SETS).max(LEAST_SAMPLES).min(self.most())
             }
             Self::Time(_) => 1,
         }

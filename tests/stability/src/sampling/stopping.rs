@@ -83,8 +83,9 @@ fn behind_glass(scale: Scale) -> Result<Outcome> {
         let pairs = picture.values.iter().zip(&converged[0].values);
         found += pairs.map(|(value, exact)| (value - exact).powi(2)).sum::<f64>();
         told += picture.variances.iter().sum::<f64>();
-        over +=
-            u32::from(picture.notes.iter().any(|note| note.contains("stopped with more variance")));
+        over += u32::from(
+            picture.notes.iter().any(|note| note.contains("stopped with more than twice")),
+        );
         outcome.must(picture.are_sound(), || "a pixel is no number".to_owned());
     }
     outcome.measured(format!(
