@@ -5,6 +5,7 @@ use std::io;
 use etendue_accel::BuildError;
 use etendue_files::WriteError;
 use etendue_render::RenderError;
+use etendue_render::annotations::AnnotationError;
 use etendue_render::expose::ExposeError;
 use etendue_render::light_field::LightFieldError;
 use etendue_render::output::{OutputError, PictureError};
@@ -16,6 +17,16 @@ impl From<LightFieldError> for Error {
             LightFieldError::Render(error) => Self::Render(error),
             LightFieldError::Output(error) => Self::Output(error),
             other => Self::LightField(other),
+        }
+    }
+}
+
+impl From<AnnotationError> for Error {
+    fn from(error: AnnotationError) -> Self {
+        match error {
+            AnnotationError::Render(error) => Self::Render(error),
+            AnnotationError::Output(error) => Self::Output(error),
+            other => Self::Refused(other.to_string()),
         }
     }
 }

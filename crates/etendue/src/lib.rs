@@ -73,7 +73,7 @@ pub use options::Options;
 pub use preview::{Preview, Roughness};
 pub use progress::{Phase, Progress};
 pub use rendering::{Rendering, Written};
-pub use session::{Session, read_glasses};
+pub use session::{MeshAttributes, Session, read_glasses};
 pub use shares::Shares;
 pub use still::Still;
 pub use viewed::Viewed;
