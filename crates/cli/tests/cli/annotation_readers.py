@@ -132,7 +132,7 @@ def check_cryptomatte():
         share = np.asarray(found[name], dtype=np.float64).reshape(objects.shape)
         # Where all around sees one thing, it has the pixel; halves are at edges.
         alone = np.ones_like(share, dtype=bool)
-        for rows, columns in [(1, 0), (-1, 0), (0, 1), (0, -1)]:
+        for rows, columns in [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)]:
             alone &= np.roll(objects, (rows, columns), (0, 1)) == objects
         alone[[0, -1]], alone[:, [0, -1]] = False, False
         np.testing.assert_allclose(share[alone], (objects == number)[alone], atol=1e-6)
