@@ -40,7 +40,7 @@ help:
 	@echo "make bench-gaps    what finding the thinnest gap of a million triangles takes; writes a part of docs/light.md"
 	@echo "make bench-window  how soon and how often the window shows pictures; writes a part of docs/window.md"
 	@echo "make bench-decisions  what decisions of the plan save, each against the fuller model, and what overriding it by hand would"
-	@echo "make generated     schemas, tables of keys and the page of the command line, as the program writes them"
+	@echo "make generated     schemas, tables of keys, the pages of the command line and of the Python package, as these write them"
 	@echo "make gallery       render the pictures of docs/gallery.md, and write there what they took"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
 	@echo "make docs-time     render the pictures of docs/time.md anew"
@@ -216,6 +216,7 @@ docs-time:
 # docs/command-line.md.
 generated: setup
 	ETENDUE_GENERATE=1 cargo test -p etendue-cli --test cli generated::
+	python3 scripts/python_api.py
 
 # The commands of docs/gallery.md, their pictures and their times. ARGS="prism burst" takes some sections.
 gallery: setup
