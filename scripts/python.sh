@@ -18,6 +18,16 @@ fi
     colour-science==0.4.7 spectral==0.25 'OpenImageIO>=3' \
     nbmake==1.5.5 ipykernel matplotlib opencv-python-headless pycocotools==2.0.11
 
+# What is built in, and the libraries that a repaired wheel takes along.
+notices=(etendue-python crates/python/THIRD-PARTY-NOTICES.txt)
+[ "${FEATURES:-embree}" = embree ] || notices+=(--no-default-features)
+if [ "${AUDITWHEEL:-skip}" = repair ] && [ "${FEATURES:-embree}" = embree ]; then
+    for library in $(ldconfig -p | awk '/lib(embree[34]|tbb)\.so\.[0-9]+ / { print $NF }'); do
+        notices+=(--library "$library")
+    done
+fi
+python3 scripts/notices.py "${notices[@]}"
+
 rm -rf "$out/wheels"
 PATH="$venv/bin:$PATH" "$venv/bin/maturin" build --manifest-path crates/python/Cargo.toml --locked \
     --profile "$profile" --auditwheel "${AUDITWHEEL:-skip}" --out "$out/wheels"

@@ -19,6 +19,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+import warnings
 from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
@@ -27,6 +28,18 @@ from . import _core
 from ._copies import StoredRendering, TemporaryFolder
 
 __version__ = _core.version()
+
+has_embree: bool = _core.has_embree()
+"""Whether Embree is built in. Without it the same numbers come from the tree in pure Rust, more slowly."""
+
+if not has_embree:
+    warnings.warn(
+        "this wheel of etendue is for older systems: it has the renderer in pure Rust alone, which gives the same numbers "
+        "as Embree more slowly",
+        RuntimeWarning,
+        stacklevel=2,
+    )
+
 __all__ = [
     "load",
     "Scene",
@@ -797,7 +810,7 @@ class Hits(NamedTuple):
     """Unit geometric normal on the triangle's front; zero for a miss."""
 
 
-def _accel(vertices: Any, faces: Any, backend: str, threads: Optional[int]) -> "Accel":
+def _accel(vertices: Any, faces: Any, backend: Optional[str], threads: Optional[int]) -> "Accel":
     return Accel(vertices, faces, backend, threads=threads)
 
 
@@ -805,12 +818,14 @@ class Accel:
     """A ray caster over one mesh: Embree finds, double precision measures."""
 
     def __init__(
-        self, vertices: Any, faces: Any, backend: str = "embree", *, threads: Optional[int] = None
+        self, vertices: Any, faces: Any, backend: Optional[str] = None, *, threads: Optional[int] = None
     ) -> None:
-        """vertices: (n, 3) float. faces: (m, 3) int. backend: embree, bvh (pure Rust) or exact (slow).
+        """vertices: (n, 3) float. faces: (m, 3) int. backend: embree, bvh (pure Rust) or exact (slow); the first of
+        them that is built in when it is None.
         threads: how many threads work; None for all processors."""
         self.threads, self._backend = threads, backend
         vertices, faces = _rows("vertices", vertices, np.float64), _rows("faces", faces, np.uint32)
+        backend = backend or ("embree" if has_embree else "bvh")
         self._core = _core.Accel(vertices, faces, backend, _threads(threads))
 
     def __reduce__(self) -> Any:

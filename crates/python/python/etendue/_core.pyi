@@ -7,6 +7,7 @@ import numpy as np
 AtVertices = Tuple[Optional[np.ndarray], Optional[np.ndarray], Optional[np.ndarray]]
 
 def version() -> str: ...
+def has_embree() -> bool: ...
 
 class Session:
     @staticmethod
