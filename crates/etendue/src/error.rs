@@ -66,6 +66,22 @@ pub enum Error {
 }
 
 impl Error {
+    /// What the command line says of it: the sentence, and behind it those of its causes that it does not quote.
+    #[must_use]
+    pub fn message(&self) -> String {
+        let mut message = self.to_string();
+        let mut cause = std::error::Error::source(self);
+        while let Some(inner) = cause {
+            let words = inner.to_string();
+            if !message.contains(&words) {
+                message.push_str(": ");
+                message.push_str(&words);
+            }
+            cause = inner.source();
+        }
+        message
+    }
+
     /// Whether it is no fault: the caller asked to stop.
     #[must_use]
     pub fn is_stopped(&self) -> bool {

@@ -16,7 +16,7 @@ use pyo3::prelude::*;
 /// An error as Python has it: what the system refused is an `OSError`, such as `FileNotFoundError`, what
 /// else the caller can mend a `ValueError`.
 pub(crate) fn raised(error: Error) -> PyErr {
-    let message = in_python(&with_causes(&error));
+    let message = in_python(&error.message());
     match system_error(&error) {
         _ if error.is_stopped() => PyKeyboardInterrupt::new_err("stopped"),
         Some(io::ErrorKind::NotFound) => PyFileNotFoundError::new_err(message),
@@ -45,21 +45,6 @@ fn system_error(error: &Error) -> Option<io::ErrorKind> {
 /// A `ValueError` of what something says.
 pub(crate) fn refused(error: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(in_python(&error.to_string()))
-}
-
-fn with_causes(error: &dyn std::error::Error) -> String {
-    let mut message = error.to_string();
-    let mut cause = error.source();
-    while let Some(inner) = cause {
-        let inner_words = inner.to_string();
-        // Some errors already quote what caused them.
-        if !message.contains(&inner_words) {
-            message.push_str(": ");
-            message.push_str(&inner_words);
-        }
-        cause = inner.source();
-    }
-    message
 }
 
 /// Rows of three numbers, where they are if they lie in rows.

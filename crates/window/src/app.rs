@@ -16,6 +16,7 @@ use crate::panels;
 use crate::panels::asking::Listing;
 use crate::panels::lens_curves::LensCurves;
 use crate::panels::light_field::{LightFieldPanel, Shows};
+use crate::panels::start::FirstScene;
 use crate::worker::{Kind, News, Shown, Task, Wake, Wish, Worker};
 
 /// What a click on the picture does.
@@ -337,6 +338,12 @@ impl App {
 
     pub(crate) fn open(&mut self, path: &Path) {
         self.worker.ask(Task::Open(path.to_owned()));
+    }
+
+    /// Opens a scene that is built in: it stands in no file until it is saved.
+    pub(crate) fn begin(&mut self, first: &FirstScene) {
+        self.error = None;
+        self.worker.ask(Task::Begin(first.name, first.json));
     }
 
     pub(crate) fn save(&mut self) {
