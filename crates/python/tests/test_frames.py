@@ -76,7 +76,7 @@ def test_what_objects_say_of_themselves():
     assert repr(scene.frames()).startswith("<etendue.Frames: 1 of <etendue.Scene")
     assert repr(etendue.Lens(LENSES / "achromat.json")).endswith(": 100.1 mm, f/4.17>")
     assert repr(etendue.Sensor("imx183")).startswith("<etendue.Sensor imx183: 5")
-    exposed = etendue.Light(np.ones((4, 4))).expose("imx183")
+    exposed = etendue.Light(np.ones((4, 4)), unit="1").expose("imx183")
     assert repr(exposed) == "<etendue.Exposed: 1 of (4, 4)>"
 
 
@@ -88,7 +88,6 @@ def test_texture_coordinates_normals_and_colours_of_arrays():
     made = {"uvs": uvs, "normals": tilted, "colors": colors}
     scene = etendue.Scene(
         QUAD, FACES, **made, camera=quad()["camera"], layers=layers,
-        objects=[{"file": "mesh", "material": "white"}], materials={"white": {"type": "matte", "color": [1, 1, 1]}},
     )  # fmt: skip
     for scene in [scene, pickle.loads(pickle.dumps(scene))]:
         shot = scene.render()
@@ -96,11 +95,11 @@ def test_texture_coordinates_normals_and_colours_of_arrays():
         # The quad is 18 m wide and its v runs down; attributes are 32-bit floats.
         np.testing.assert_allclose(shot["uv"], np.stack([(x + 9) / 18, (9 - y) / 18], axis=-1), atol=1e-6)
         np.testing.assert_allclose(shot["normal_shading"], np.broadcast_to([0.6, 0, 0.8], x.shape + (3,)), atol=1e-7)
-        # On the triangle below the diagonal the third corner's blue has the weight (y + 9) / 18.
+        # On the triangle below the diagonal the third corner's blue has the weight (y + 9) / 18; the grey is 0.8.
         below = x > y
-        np.testing.assert_allclose(shot["albedo"][..., 2][below], ((y + 9) / 18)[below], atol=1e-6)
+        np.testing.assert_allclose(shot["albedo"][..., 2][below], 0.8 * ((y + 9) / 18)[below], atol=1e-6)
     checker = {"type": "checker", "colors": [[0, 0, 0], [1, 1, 1]], "squares": 2}
-    scene["materials.white"] = checker
+    scene["materials"], scene["objects[0].material"] = {"tiles": checker}, "tiles"
     scene.insert_mesh("mesh", QUAD, FACES, uvs=uvs)
     shot = scene.render()
     column, row = (2 * shot["uv"]).astype(int)[..., 0], (2 * shot["uv"]).astype(int)[..., 1]

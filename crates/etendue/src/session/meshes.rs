@@ -11,7 +11,8 @@ pub struct MeshAttributes<'a> {
     pub uvs: Option<&'a [[f32; 2]]>,
     /// Shading normals; they need no length of 1.
     pub normals: Option<&'a [[f32; 3]]>,
-    /// Linear colours, 0 to 1, that multiply the material's.
+    /// Linear colours, 0 to 1: they multiply the light grey of objects without a material, as vertex colours of
+    /// PLY files do.
     pub colors: Option<&'a [[f32; 4]]>,
 }
 

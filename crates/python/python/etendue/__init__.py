@@ -233,7 +233,8 @@ class Scene:
 
         vertices: (n, 3) float, metres. faces: (m, 3) int, counter-clockwise from the front. uvs: (n, 2), texture
         coordinates, v down; images that the object's material names are laid by them. normals: (n, 3), shading
-        normals. colors: (n, 3) or (n, 4), linear, 0 to 1: they multiply the material's colour.
+        normals. colors: (n, 3) or (n, 4), linear, 0 to 1: of objects without a `material`, whose light grey of 0.8 they
+        multiply.
         """
         if colors is not None:
             colors = np.asarray(colors, dtype=np.float32)

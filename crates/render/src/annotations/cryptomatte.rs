@@ -2,11 +2,11 @@
 //!
 //! Three mattes: `CryptoObject` (objects), `CryptoInstance` (copies of objects) and `CryptoMaterial` (materials). Each has
 //! six ranks, the greatest share first: pairs of a name's number and its share, two pairs a layer of four channels. The
-//! number is MurmurHash3_32 of the name, without a seed, as the bits of a float that is neither denormal, infinite nor no
+//! number is `MurmurHash3_32` of the name, without a seed, as the bits of a float that is neither denormal, infinite nor no
 //! number. The shares are those of the samples of a pixel, weighted as the camera weights them: through the lens, while the
 //! shutter is open, over the pixel's square.
 //!
-//! Sources: Psyop, *Cryptomatte Specification*, version 1.2.0, 2018; A. Appleby, MurmurHash3, 2011.
+//! Sources: Psyop, *Cryptomatte Specification*, version 1.2.0, 2018; A. Appleby, `MurmurHash3`, 2011.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -39,6 +39,9 @@ const MOST: u32 = 1024;
 
 /// The pair of random numbers whose first is a sample's time, as the picture has it.
 const TIME_PAIR: u32 = u32::MAX;
+
+/// Rows that are traced before a stop is heard.
+const ROWS: u32 = 16;
 
 /// Rays that are traced together.
 const BATCH: usize = 1024;
@@ -125,13 +128,11 @@ pub fn write(
     for _ in 0..mattes.len() * 2 * RANKS {
         planes.push(filled(0.0, pixels)?);
     }
-    // Some rows at a time, so that a stop is heard.
-    let rows_at_once = 16;
-    for top in (0..height).step_by(rows_at_once) {
+    for top in (0..height).step_by(ROWS as usize) {
         if !progress(f64::from(top) / f64::from(height)) {
             return Err(RenderError::Stopped.into());
         }
-        let rows: Vec<u32> = (top..height.min(top + rows_at_once as u32)).collect();
+        let rows: Vec<u32> = (top..height.min(top + ROWS)).collect();
         let ranked: Vec<_> = rows.par_iter().map(|&row| tracing.row(row)).collect();
         for (row, ranked) in rows.iter().zip(ranked) {
             for (x, pixel) in ranked.chunks(mattes.len() * 2 * RANKS).enumerate() {
@@ -190,9 +191,11 @@ impl Tracing<'_> {
             self.camera.sample_rays(&film, &mut rays);
             self.accel.closest(&rays.rays, &mut hits);
             let mut first = 0;
-            for k in 0..pixels.len() as u32 {
-                let end = (k + 1) * self.samples;
-                let count = rays.sample[first..].iter().take_while(|&&sample| sample < end).count();
+            for end in (1..=pixels.len()).map(|k| k * self.samples as usize) {
+                let count = rays.sample[first..]
+                    .iter()
+                    .take_while(|&&sample| (sample as usize) < end)
+                    .count();
                 self.rank(first..first + count, &rays, &hits, &mut out);
                 first += count;
             }
@@ -267,7 +270,7 @@ fn float_bits(hash: u32) -> u32 {
     if exponent == 0 || exponent == 255 { hash ^ 1 << 23 } else { hash }
 }
 
-/// MurmurHash3_32 without a seed.
+/// `MurmurHash3_32` without a seed.
 fn murmur3(bytes: &[u8]) -> u32 {
     let mix = |word: u32| word.wrapping_mul(0xcc9e_2d51).rotate_left(15).wrapping_mul(0x1b87_3593);
     let (words, rest) = bytes.as_chunks::<4>();
