@@ -298,6 +298,50 @@ fn mattes_have_names_by_their_shares_of_a_pixel() {
     assert!((shares[edge] + others[edge] - 1.0).abs() < 1e-6);
 }
 
+#[test]
+fn what_a_lens_blurs_has_shares_of_the_pixels_around_its_edge() {
+    let plate = |name: &str, width: f64, x: f64, z: f64| json!({ "name": name, "shape": "rectangle", "width": width, "height": 9, "transform": { "translate": [x, 0, z] } });
+    let bench = rendered(
+        &json!({
+            "etendue": 1,
+            "camera": {
+                "type": "thin_lens", "focal_length": "50 mm", "f_number": 1.4, "focus_distance": "4 m",
+                "sensor_height": "24 mm", "pose": { "from": [0, 0, 2], "look_at": [0, 0, 0] },
+                "sensor": { "resolution": [80, 20] }
+            },
+            "tracer": { "type": "facing" }, "render": { "samples": 1, "accel": "bvh" },
+            "objects": [plate("near", 8.0, 4.0, 1.0), plate("far", 40.0, 0.0, -2.0)]
+        }),
+        "cryptomatte",
+    );
+    let image =
+        exr::prelude::read_first_flat_layer_from_file(bench.path("out/cryptomatte.exr")).unwrap();
+    let list = &image.layer_data.channel_data.list;
+    let channel = |name: &str| -> Vec<f32> {
+        let channel = list.iter().find(|channel| channel.name.to_string() == name).expect(name);
+        channel.sample_data.values_as_f32().collect()
+    };
+    let near = f32::from_bits(0x8bb7_b66c);
+    let pairs =
+        [["r", "g"], ["b", "a"]].map(|pair| pair.map(|c| channel(&format!("CryptoObject00.{c}"))));
+    for row in 0..20 {
+        let share = |x: usize| -> f32 {
+            pairs
+                .iter()
+                .filter(|[id, _]| id[80 * row + x] == near)
+                .map(|[_, share]| share[80 * row + x])
+                .sum()
+        };
+        let mixed = (0..80).filter(|&x| (0.01..0.99).contains(&share(x))).count();
+        // The blur of an edge 1 m away is 50 mm / 1.4 · 3/4 · 4 · 50 / 3950 = 1.36 mm wide, pixels are 1.2 mm.
+        assert!((1..=4).contains(&mixed), "{mixed}");
+        // The edge is on the axis, and a round pupil takes from one side what it gives to the other. 64 samples are off
+        // by 2 of them in each of the mixed pixels.
+        let sum: f32 = (0..80).map(share).sum();
+        assert!((sum - 40.0).abs() < 0.15, "{sum}");
+    }
+}
+
 /// What pycocotools, cryptomatte-api and a reader of BOP's folder make of the sets.
 #[test]
 fn others_read_the_sets() {

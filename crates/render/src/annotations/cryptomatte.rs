@@ -190,14 +190,14 @@ impl Tracing<'_> {
             self.aim(pixels, row, &mut film);
             self.camera.sample_rays(&film, &mut rays);
             self.accel.closest(&rays.rays, &mut hits);
-            let mut first = 0;
+            // Lenses may give the rays in another order than the samples.
+            let mut order: Vec<usize> = (0..rays.len()).collect();
+            order.sort_by_key(|&ray| rays.sample[ray]);
+            let mut own = order.iter().copied().peekable();
             for end in (1..=pixels.len()).map(|k| k * self.samples as usize) {
-                let count = rays.sample[first..]
-                    .iter()
-                    .take_while(|&&sample| (sample as usize) < end)
-                    .count();
-                self.rank(first..first + count, &rays, &hits, &mut out);
-                first += count;
+                let is_own = |ray: &usize| (rays.sample[*ray] as usize) < end;
+                let of_pixel: Vec<usize> = std::iter::from_fn(|| own.next_if(is_own)).collect();
+                self.rank(&of_pixel, &rays, &hits, &mut out);
             }
         }
         out
@@ -234,17 +234,11 @@ impl Tracing<'_> {
     }
 
     /// Appends the pairs of a pixel, whose rays these are.
-    fn rank(
-        &self,
-        own: std::ops::Range<usize>,
-        rays: &CameraRays,
-        hits: &HitBatch,
-        out: &mut Vec<f32>,
-    ) {
-        let all: f64 = rays.weight[own.clone()].iter().sum();
+    fn rank(&self, own: &[usize], rays: &CameraRays, hits: &HitBatch, out: &mut Vec<f32>) {
+        let all: f64 = own.iter().map(|&ray| rays.weight[ray]).sum();
         for (k, matte) in self.mattes.iter().enumerate() {
             let mut shares: Vec<(u32, f64)> = Vec::new();
-            for i in own.clone().filter(|&i| hits.placement[i] != MISS) {
+            for i in own.iter().copied().filter(|&ray| hits.placement[ray] != MISS) {
                 let placement = &self.scene.geometry.placements[hits.placement[i] as usize];
                 let number = [placement.object, placement.instance, placement.material][k];
                 let Some(&id) = matte.ids.get(number as usize) else { continue };
