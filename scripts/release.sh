@@ -10,6 +10,20 @@ step() {
     printf '\n==> %s\n' "$1"
 }
 
+# Crates and wheels say the same of where the project lives.
+addresses() {
+    local crates wheels
+    crates=$(sed -n 's/^repository = "\(.*\)"/\1/p' Cargo.toml)
+    wheels=$(sed -n 's/^Repository = "\(.*\)"/\1/p' crates/python/pyproject.toml)
+    [ "$crates" = "$wheels" ] || {
+        echo "Cargo.toml's repository is $crates, crates/python/pyproject.toml's Repository $wheels: make them one" >&2
+        exit 1
+    }
+    case "$crates" in
+    *example.org*) echo "note: $crates is a placeholder; give both files the project's address before publishing" ;;
+    esac
+}
+
 # Packages in the order in which they would be published, and what crates.io would refuse of any.
 crates() {
     step "crates"
@@ -61,6 +75,7 @@ wheels() {
     done
 }
 
+addresses
 case "${1:-all}" in
 crates) crates ;;
 artefacts) scripts/dist.sh ;;
