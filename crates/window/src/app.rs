@@ -90,6 +90,8 @@ pub(crate) struct App {
     is_refusal: bool,
     pub(crate) said: Option<String>,
     pub(crate) busy: Option<(&'static str, f64)>,
+    /// The user has stopped what there was to do since the last wish.
+    pub(crate) is_stopped: bool,
     pub(crate) asking: Option<(Asking, String)>,
     /// What there is to choose from, while a path is asked for.
     pub(crate) listing: Listing,
@@ -144,6 +146,7 @@ impl App {
             is_refusal: false,
             said: None,
             busy: None,
+            is_stopped: false,
             asking: None,
             listing: Listing::default(),
             titled: String::new(),
@@ -370,6 +373,7 @@ impl App {
     }
 
     pub(crate) fn cancel(&mut self) {
+        self.is_stopped = true;
         self.worker.cancel();
     }
 
@@ -403,6 +407,7 @@ impl App {
     pub(crate) fn wish(&mut self) {
         let Some(document) = &self.document else { return };
         self.number += 1;
+        self.is_stopped = false;
         self.worker.wish(Wish {
             number: self.number,
             scene: Arc::clone(document.value()),

@@ -57,7 +57,7 @@ pub(crate) fn show(app: &mut App, ui: &mut Ui) {
                     app.cancel();
                 }
             }
-            (true, None) if app.is_behind() && app.error.is_none() => {
+            (true, None) if app.is_stopped => {
                 ui.label(RichText::new("stopped").size(17.0));
                 if button(ui, "go on", "Go on", "Read it after all") {
                     app.wish();
