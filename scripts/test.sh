@@ -43,6 +43,9 @@ if cargo deny --version >/dev/null 2>&1; then
     fi
 fi
 
+step "crates as crates.io would take them, not built once more"
+NO_VERIFY=1 scripts/release.sh crates
+
 # What does not trace, or traces by `bvh` in the tests of the workspace, too, is not run twice.
 step "tests without Embree"
 elsewhere='/^(files|gallery|inputs|lamps|lens|lens_pictures|lens_reference|light_fields|many_renders|memory|models|openings_and_glasses|shards|stopping|waves)(::|_)/'

@@ -282,7 +282,8 @@ pub(crate) struct RenderArguments {
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
     /// Kinds of file to write; tum and kitti (16-bit PNG of depth, disparity, flow), flo, indexed
-    /// (masks with a palette) and envi (light in bands as an ENVI cube) are there, too
+    /// (masks with a palette), envi (light in bands as an ENVI cube), coco and bop (objects with masks, boxes
+    /// and poses) and cryptomatte are there, too
     #[arg(long, value_name = "LIST", default_value = "exr,png,npy,dng")]
     pub(crate) outputs: String,
     /// Denoise the picture of a tracer of light by Intel's Open Image Denoise, which is to be

@@ -12,6 +12,7 @@ use etendue_camera::{
 };
 use etendue_files::{MANIFEST, SOFTWARE, Transaction};
 use etendue_geometry::glam::{DMat3, DQuat};
+use etendue_render::annotations::{self, BOP_DEPTH, COCO, INSTANCES, Models, Shot, Source};
 use etendue_render::denoise::DENOISED;
 use etendue_render::output::conventions::{KITTI_DEPTH, TUM_DEPTH};
 use etendue_render::output::{Outputs, sidecar};
@@ -35,6 +36,9 @@ const COLMAP: [&str; 3] = ["cameras.txt", "images.txt", "points3D.txt"];
 #[derive(Debug, Clone, Default)]
 pub struct Dataset {
     entries: Vec<Entry>,
+    outputs: Option<Outputs>,
+    /// Of BOP's set.
+    models: Models,
 }
 
 /// One frame.
@@ -55,6 +59,8 @@ struct Entry {
     scene_hash: String,
     seed: u64,
     samples: SamplesSpec,
+    /// What annotates it, and its depth as BOP has it.
+    annotations: [String; 2],
 }
 
 impl Dataset {
@@ -75,6 +81,10 @@ impl Dataset {
         let clock = scene.render.time.is_some() || scene.render.rate.is_some();
         let matrix = scene.camera.pose().world_from_camera(Convention::Opengl);
         let at = self.entries.partition_point(|entry| entry.number < frame.number);
+        self.outputs = Some(outputs);
+        if outputs.bop {
+            self.models.add(scene);
+        }
         self.entries.insert(
             at,
             Entry {
@@ -91,6 +101,7 @@ impl Dataset {
                 scene_hash: scene.hash()?.to_string(),
                 seed: scene.render.seed,
                 samples: scene.render.samples,
+                annotations: [INSTANCES, BOP_DEPTH].map(|name| pattern.place(frame.number, name)),
             },
         );
         Ok(())
@@ -99,7 +110,7 @@ impl Dataset {
     /// The names of the files that it may write, as seen from its folder.
     pub fn file_names() -> impl Iterator<Item = String> {
         let colmap = COLMAP.map(|name| format!("{COLMAP_FOLDER}/{name}"));
-        [INDEX, TRANSFORMS, MANIFEST].map(str::to_owned).into_iter().chain(colmap)
+        [INDEX, TRANSFORMS, COCO, MANIFEST].map(str::to_owned).into_iter().chain(colmap)
     }
 
     /// Writes `index.json`, and where every camera has a K, `transforms.json` and the folder `colmap`.
@@ -111,6 +122,7 @@ impl Dataset {
     pub fn write(&self, to: &Transaction, folder: &Path) -> Result<Vec<PathBuf>, Error> {
         let mut files = vec![folder.join(INDEX)];
         sidecar::write_json(to, &files[0], &self.index(folder))?;
+        files.extend(self.write_annotations(to, folder)?);
         if self.entries.is_empty() || !self.entries.iter().all(Entry::has_k) {
             return Ok(files);
         }
@@ -124,6 +136,26 @@ impl Dataset {
             files.push(path);
         }
         Ok(files)
+    }
+
+    /// The sets of annotated pictures that are wanted.
+    fn write_annotations(&self, to: &Transaction, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+        let Some(outputs) = self.outputs.filter(|outputs| outputs.annotates()) else {
+            return Ok(Vec::new());
+        };
+        let shot = |entry: &Entry| {
+            let [annotated, depth] = entry.annotations.each_ref().map(|name| folder.join(name));
+            let file_name = entry.picture.clone().unwrap_or_default();
+            Ok(Shot {
+                number: entry.number,
+                annotated: rendering::read_annotated(&annotated)?,
+                picture: Source::File(folder.join(&file_name)),
+                depth: Source::File(depth),
+                file_name,
+            })
+        };
+        let shots = self.entries.iter().map(shot).collect::<Result<Vec<_>, Error>>()?;
+        Ok(annotations::write_sets(&shots, &self.models, (to, folder), outputs)?)
     }
 
     /// What a user should know of what the formats of others have no place for.

@@ -5,6 +5,7 @@ use std::io;
 use etendue_accel::BuildError;
 use etendue_files::WriteError;
 use etendue_render::RenderError;
+use etendue_render::annotations::AnnotationError;
 use etendue_render::expose::ExposeError;
 use etendue_render::light_field::LightFieldError;
 use etendue_render::output::{OutputError, PictureError};
@@ -16,6 +17,16 @@ impl From<LightFieldError> for Error {
             LightFieldError::Render(error) => Self::Render(error),
             LightFieldError::Output(error) => Self::Output(error),
             other => Self::LightField(other),
+        }
+    }
+}
+
+impl From<AnnotationError> for Error {
+    fn from(error: AnnotationError) -> Self {
+        match error {
+            AnnotationError::Render(error) => Self::Render(error),
+            AnnotationError::Output(error) => Self::Output(error),
+            other => Self::Refused(other.to_string()),
         }
     }
 }
@@ -55,6 +66,22 @@ pub enum Error {
 }
 
 impl Error {
+    /// What the command line says of it: the sentence, and behind it those of its causes that it does not quote.
+    #[must_use]
+    pub fn message(&self) -> String {
+        let mut message = self.to_string();
+        let mut cause = std::error::Error::source(self);
+        while let Some(inner) = cause {
+            let words = inner.to_string();
+            if !message.contains(&words) {
+                message.push_str(": ");
+                message.push_str(&words);
+            }
+            cause = inner.source();
+        }
+        message
+    }
+
     /// Whether it is no fault: the caller asked to stop.
     #[must_use]
     pub fn is_stopped(&self) -> bool {

@@ -163,7 +163,7 @@ impl FramePattern {
     ) -> Result<Written, Error> {
         let folder = out.join(self.folder(number));
         places::folder(&folder)?;
-        let mut written = rendering.write_with(&folder, outputs, progress)?;
+        let mut written = rendering.write_frame(&folder, outputs, progress)?;
         if self.folder.is_none() {
             let record = record_of(out, number);
             let before = read_record(&record).unwrap_or_default();

@@ -79,7 +79,7 @@ pub use photo_match::{PhotoMatch, RawPhoto, match_photo};
 pub use preview::{Preview, Roughness};
 pub use progress::{Phase, Progress};
 pub use rendering::{Rendering, Written};
-pub use session::{Session, read_glasses};
+pub use session::{MeshAttributes, Session, read_glasses};
 pub use shares::Shares;
 pub use still::Still;
 pub use viewed::Viewed;

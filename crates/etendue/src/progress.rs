@@ -21,6 +21,8 @@ pub enum Phase {
     Expose,
     /// A light-field camera's views are rendered, decoded and written.
     LightField,
+    /// Copies of objects are told apart, and what annotates them is written.
+    Annotate,
 }
 
 impl Phase {
@@ -34,6 +36,7 @@ impl Phase {
             Self::Write => "write",
             Self::Expose => "expose",
             Self::LightField => "views",
+            Self::Annotate => "annotate",
         }
     }
 }

@@ -4,9 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use etendue_accel::Accel;
+use etendue_accel::{Accel, BuildOptions};
 use etendue_files::{Ledger, MANIFEST, Transaction};
 use etendue_oidn::Denoiser;
+use etendue_render::annotations::{
+    self, Annotated, BOP_DEPTH, COCO, CRYPTOMATTE, INSTANCES, Models, Shot, Source,
+};
 use etendue_render::denoise::{self, DENOISED};
 use etendue_render::expose::{self, BandFilm, SensorLight};
 use etendue_render::light_field::{self, LightFieldSet};
@@ -34,10 +37,20 @@ pub struct Rendering {
     /// Notes on a sensor that has nothing to expose.
     pub(crate) idle_notes: Vec<String>,
     pub(crate) report: Report,
-    /// The structure and the images of a light-field camera's scene.
+    /// The structure and the images of a scene that more is asked of when files are written: by light-field cameras,
+    /// and by annotations.
     traced: Option<(Arc<dyn Accel>, Arc<Images>)>,
     /// Entries of the header that tell what it shows.
     fingerprints: Vec<(String, String)>,
+}
+
+/// Whether a picture stands by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Part {
+    /// It does, and its sets are of it alone.
+    Whole,
+    /// It is one of a scene's frames.
+    Frame,
 }
 
 /// What was written.
@@ -209,6 +222,26 @@ impl Rendering {
         outputs: Outputs,
         progress: &Progress,
     ) -> Result<Written, Error> {
+        self.write_part(folder, outputs, Part::Whole, progress)
+    }
+
+    /// As [`Self::write_with`], of one frame among others: what annotates it is kept for the set of all.
+    pub(crate) fn write_frame(
+        &self,
+        folder: &Path,
+        outputs: Outputs,
+        progress: &Progress,
+    ) -> Result<Written, Error> {
+        self.write_part(folder, outputs, Part::Frame, progress)
+    }
+
+    fn write_part(
+        &self,
+        folder: &Path,
+        outputs: Outputs,
+        part: Part,
+        progress: &Progress,
+    ) -> Result<Written, Error> {
         let start = Instant::now();
         // Results must not be written over inputs.
         let names = self.picture.layers().iter().map(|layer| layer.name.clone());
@@ -229,6 +262,7 @@ impl Rendering {
                 let set = self.write_light_field((to, folder), outputs, progress)?;
                 files.extend(set.files);
                 notes.extend(set.notes);
+                files.extend(self.write_annotations((to, folder), outputs, part, progress)?);
                 Ok::<_, Error>(Written { files, notes, time: Duration::ZERO })
             })?;
         // A whole picture takes the place of a partial one.
@@ -262,6 +296,67 @@ impl Rendering {
         let rendering = light_field::Rendering { scene: &self.scene, accel: &**accel, images };
         let goes_on = |share| progress.goes_on(Phase::LightField, share);
         Ok(light_field::write(rendering, &self.picture, to, outputs, &goes_on)?)
+    }
+
+    /// What tells the scene's copies apart, and names by their shares of pixels.
+    fn write_annotations(
+        &self,
+        (to, folder): (&Transaction, &Path),
+        outputs: Outputs,
+        part: Part,
+        progress: &Progress,
+    ) -> Result<Vec<PathBuf>, Error> {
+        let mut files = Vec::new();
+        if !outputs.annotates() && !outputs.cryptomatte {
+            return Ok(files);
+        }
+        if let Some(why) = annotations::refusal(&self.scene, outputs) {
+            return Err(Error::Refused(why));
+        }
+        let accel = match &self.traced {
+            Some((accel, _)) => Arc::clone(accel),
+            None => {
+                let plan = Plan::new(&self.scene, outputs);
+                etendue_render::build(&self.scene, &plan, &BuildOptions::default())?.into()
+            }
+        };
+        let goes_on = |share| progress.goes_on(Phase::Annotate, share);
+        if outputs.cryptomatte {
+            let path = folder.join(CRYPTOMATTE);
+            annotations::write_cryptomatte(&self.scene, &*accel, (to, &path), &goes_on)?;
+            files.push(path);
+        }
+        if !outputs.annotates() {
+            return Ok(files);
+        }
+        let (annotated, depth) = annotations::survey(&self.scene, &*accel, outputs, &goes_on)?;
+        let path = folder.join(INSTANCES);
+        sidecar::write_json(to, &path, &annotated)?;
+        files.push(path);
+        match part {
+            Part::Frame if outputs.bop => {
+                let path = folder.join(BOP_DEPTH);
+                let size = self.scene.camera.resolution();
+                annotations::write_depth(to, &path, size, &depth)?;
+                files.push(path);
+            }
+            Part::Frame => {}
+            Part::Whole => {
+                let mut models = Models::default();
+                if outputs.bop {
+                    models.add(&self.scene);
+                }
+                let shot = Shot {
+                    number: 0,
+                    annotated,
+                    file_name: LayerFile::Preview.name(""),
+                    picture: Source::Picture(&self.picture),
+                    depth: Source::Numbers(&depth),
+                };
+                files.extend(annotations::write_sets(&[shot], &models, (to, folder), outputs)?);
+            }
+        }
+        Ok(files)
     }
 
     /// The files of layers, and what a user should know of them.
@@ -319,7 +414,29 @@ fn files_of(
     let layers = layers.into_iter().flat_map(move |layer| layer_files(&layer, outputs));
     let others = expose::file_names(scene).into_iter().chain(light_field::file_names(scene));
     let others = others.chain(scene.render.imu.as_ref().map(|_| IMU.to_owned()));
-    always.into_iter().chain(layers).chain(others)
+    always.into_iter().chain(layers).chain(others).chain(annotation_files(outputs))
+}
+
+/// The files of annotations that lie beside those of layers, whatever the scene holds.
+fn annotation_files(outputs: Outputs) -> impl Iterator<Item = String> {
+    let all = [
+        (outputs.annotates(), INSTANCES),
+        (outputs.bop, BOP_DEPTH),
+        (outputs.coco, COCO),
+        (outputs.cryptomatte, CRYPTOMATTE),
+    ];
+    all.into_iter().filter(|(wanted, _)| *wanted).map(|(_, name)| name.to_owned())
+}
+
+/// The annotations of a picture that was written.
+///
+/// # Errors
+///
+/// When they cannot be read.
+pub(crate) fn read_annotated(path: &Path) -> Result<Annotated, Error> {
+    let read = std::fs::read(path).map_err(|error| error.to_string());
+    read.and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string()))
+        .map_err(|why| Error::Refused(format!("{}: cannot be read: {why}", path.display())))
 }
 
 /// The files that a render leaves of these layers whatever they hold. A mask is not among them: its numbers
@@ -333,7 +450,8 @@ pub(crate) fn certain_files(
         certain.map(|file| file.name(&layer)).collect::<Vec<_>>()
     };
     let files = layers.into_iter().flat_map(of);
-    files.chain(outputs.exr.then(|| "layers.exr".to_owned())).collect()
+    let beside = annotation_files(outputs).filter(|name| name != COCO);
+    files.chain(outputs.exr.then(|| "layers.exr".to_owned())).chain(beside).collect()
 }
 
 /// The names in files of the layers that a scene asks for; the picture's is empty.

@@ -1,6 +1,7 @@
 //! A scene that is opened once and rendered often.
 
 mod coarse;
+mod meshes;
 mod opening;
 mod prepare;
 mod render;
@@ -12,9 +13,9 @@ use std::sync::Arc;
 
 use etendue_accel::Accel;
 use etendue_files::Opener;
-use etendue_geometry::Mesh;
 use etendue_oidn::Denoiser;
 use etendue_optics::glass::AgfCatalogue;
+use etendue_render::annotations;
 use etendue_render::expose::SPECTRUM;
 use etendue_render::output::{LayerFile, Outputs};
 use etendue_render::{Checkpoint, Images, Plan, Seconds, denoise};
@@ -23,6 +24,7 @@ use etendue_scene::{Cache, Frame, Frames, Scene, SceneError, Start};
 use etendue_tracer::LayerSpec;
 use serde_json::Value;
 
+pub use meshes::MeshAttributes;
 pub use opening::read_glasses;
 
 use self::coarse::CoarseScene;
@@ -96,25 +98,6 @@ impl fmt::Debug for Session {
 }
 
 impl Session {
-    /// Adds a mesh, or replaces it: objects whose `file` is `name` are made of it. Three coordinates a
-    /// vertex (m) and three vertices a triangle, counter-clockwise from its front.
-    ///
-    /// # Errors
-    ///
-    /// When a triangle names a vertex that is not there, or has a corner that is not finite.
-    pub fn insert_mesh(
-        &mut self,
-        name: &str,
-        vertices: &[[f64; 3]],
-        triangles: &[[u32; 3]],
-    ) -> Result<(), Error> {
-        let mesh = Mesh::from_arrays(name, vertices, triangles)
-            .map_err(|why| Error::Refused(format!("mesh \"{name}\": {why}")))?;
-        self.cache.insert_mesh(name, mesh);
-        self.loaded = None;
-        Ok(())
-    }
-
     /// Sets a value of the scene, at any path: `camera.f_number`, `objects[0].transform.translate`,
     /// `lights`. What is missing on the way is made. When it is refused, the session is as it was.
     ///
@@ -417,6 +400,9 @@ impl Session {
         // A frame may lack what others of its scene have: the last one has no flow.
         if self.shown.is_none() {
             refuse_idle(outputs, &self.file.spec.all_layers(), self.file.value())?;
+        }
+        if let Some(why) = annotations::refusal(&loaded.scene, outputs) {
+            return Err(Error::Refused(why));
         }
         let names = file_names(&loaded.scene, &loaded.plan, outputs);
         let names = names.into_iter().chain(also.iter().map(|&name| name.to_owned()));

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::io;
 
 use etendue::Error;
-use etendue_geometry::Mesh;
+use etendue_geometry::{Mesh, Vertices};
 use etendue_render::output::{Layer, Values};
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::{
@@ -16,7 +16,7 @@ use pyo3::prelude::*;
 /// An error as Python has it: what the system refused is an `OSError`, such as `FileNotFoundError`, what
 /// else the caller can mend a `ValueError`.
 pub(crate) fn raised(error: Error) -> PyErr {
-    let message = in_python(&with_causes(&error));
+    let message = in_python(&error.message());
     match system_error(&error) {
         _ if error.is_stopped() => PyKeyboardInterrupt::new_err("stopped"),
         Some(io::ErrorKind::NotFound) => PyFileNotFoundError::new_err(message),
@@ -47,21 +47,6 @@ pub(crate) fn refused(error: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(in_python(&error.to_string()))
 }
 
-fn with_causes(error: &dyn std::error::Error) -> String {
-    let mut message = error.to_string();
-    let mut cause = error.source();
-    while let Some(inner) = cause {
-        let inner_words = inner.to_string();
-        // Some errors already quote what caused them.
-        if !message.contains(&inner_words) {
-            message.push_str(": ");
-            message.push_str(&inner_words);
-        }
-        cause = inner.source();
-    }
-    message
-}
-
 /// Rows of three numbers, where they are if they lie in rows.
 pub(crate) fn triples<'a, T: numpy::Element + Copy>(
     name: &str,
@@ -76,6 +61,31 @@ pub(crate) fn triples<'a, T: numpy::Element + Copy>(
         }
         (other, _) => Err(refused(format!("{name} has the shape {other:?} instead of (n, 3)"))),
     }
+}
+
+/// Rows of `N` numbers, as meshes have what is known at their vertices.
+pub(crate) fn rows<const N: usize>(
+    name: &str,
+    array: Option<PyReadonlyArray2<'_, f32>>,
+) -> PyResult<Option<Vec<[f32; N]>>> {
+    let Some(array) = array else { return Ok(None) };
+    let array = array.as_array();
+    match array.shape() {
+        [_, columns] if *columns == N => {
+            Ok(Some(array.rows().into_iter().map(|row| std::array::from_fn(|k| row[k])).collect()))
+        }
+        other => Err(refused(format!("{name} has the shape {other:?} instead of (n, {N})"))),
+    }
+}
+
+/// What is known at the vertices of a mesh, as an array (n, N); nothing where it is not.
+pub(crate) fn of_vertices<'py, const N: usize>(
+    py: Python<'py>,
+    values: Option<&Vertices<N>>,
+) -> PyResult<Option<Bound<'py, PyAny>>> {
+    let Some(values) = values else { return Ok(None) };
+    let flat: Vec<f32> = (0..values.len()).flat_map(|i| values.get(i)).collect();
+    Ok(Some(flat.into_pyarray(py).reshape([values.len(), N])?.into_any()))
 }
 
 /// A layer as an array: `[h, w]` for one channel, else `[h, w, channels]`.

@@ -27,7 +27,13 @@ mod _core {
     #[pymodule_export]
     use super::sensor::Sensor;
     #[pymodule_export]
-    use super::version;
+    use super::{has_embree, version};
+}
+
+/// Whether Embree is built in.
+#[pyfunction]
+fn has_embree() -> bool {
+    cfg!(feature = "embree")
 }
 
 /// The version of the package.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use etendue::{Error, Options, Outputs, Progress, Reach, Strictness};
+use etendue::{Error, MeshAttributes, Options, Outputs, Progress, Reach, Strictness};
 use etendue_files::Transaction;
 use etendue_render::output::{png, sidecar};
 use numpy::{IntoPyArray, PyReadonlyArray2};
@@ -10,11 +10,24 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::Value;
 
-use crate::arrays::{in_python, of_layer, of_mesh, raised, refused, shaped, triples};
+use crate::arrays::{
+    in_python, of_layer, of_mesh, of_vertices, raised, refused, rows, shaped, triples,
+};
 use crate::work::{Stop, interruptible};
 
-/// Name, vertices and faces.
-type NamedMesh<'py> = (String, Bound<'py, PyAny>, Bound<'py, PyAny>);
+/// Name, vertices, faces, and what is known at the vertices: texture coordinates, normals and colours.
+type NamedMesh<'py> = (String, Bound<'py, PyAny>, Bound<'py, PyAny>, AtVertices<'py>);
+
+/// Texture coordinates, normals and colours.
+type AtVertices<'py> =
+    (Option<Bound<'py, PyAny>>, Option<Bound<'py, PyAny>>, Option<Bound<'py, PyAny>>);
+
+/// The same as arrays that are given.
+type GivenAtVertices<'py> = (
+    Option<PyReadonlyArray2<'py, f32>>,
+    Option<PyReadonlyArray2<'py, f32>>,
+    Option<PyReadonlyArray2<'py, f32>>,
+);
 
 /// A scene that is opened once, changed and rendered often.
 #[pyclass]
@@ -101,7 +114,10 @@ impl Session {
     fn meshes<'py>(&self, py: Python<'py>) -> PyResult<Vec<NamedMesh<'py>>> {
         let meshes = self.session.meshes().map(|(name, mesh)| {
             let (vertices, faces) = of_mesh(py, mesh)?;
-            Ok((name.to_owned(), vertices, faces))
+            let uvs = of_vertices(py, mesh.uvs.first())?;
+            let normals = of_vertices(py, mesh.normals.as_ref())?;
+            let colors = of_vertices(py, mesh.colors.as_ref())?;
+            Ok((name.to_owned(), vertices, faces, (uvs, normals, colors)))
         });
         meshes.collect()
     }
@@ -111,9 +127,24 @@ impl Session {
         name: &str,
         vertices: PyReadonlyArray2<'_, f64>,
         faces: PyReadonlyArray2<'_, u32>,
+        at_vertices: GivenAtVertices<'_>,
     ) -> PyResult<()> {
         let (vertices, faces) = (triples("vertices", &vertices)?, triples("faces", &faces)?);
-        self.session.insert_mesh(name, &vertices, &faces).map_err(raised)
+        let (uvs, normals, colors) = at_vertices;
+        let (uvs, normals, colors) =
+            (rows("uvs", uvs)?, rows("normals", normals)?, rows("colors", colors)?);
+        let attributes = MeshAttributes {
+            uvs: uvs.as_deref(),
+            normals: normals.as_deref(),
+            colors: colors.as_deref(),
+        };
+        self.session.insert_mesh_with(name, (&vertices, &faces), attributes).map_err(raised)
+    }
+
+    /// Makes the scene that which `json` says.
+    fn replace(&mut self, json: &str) -> PyResult<()> {
+        let values: Value = serde_json::from_str(json).map_err(refused)?;
+        self.session.replace(&values).map_err(raised)
     }
 
     fn set(&mut self, path: &str, json: &str) -> PyResult<()> {
@@ -150,7 +181,9 @@ impl Session {
         py: Python<'_>,
         callback: Option<Py<PyAny>>,
         threads: usize,
+        denoise: bool,
     ) -> PyResult<Rendering> {
+        self.session.set_denoised(denoise);
         let rendering = self.work(py, (threads, callback), etendue::Session::render)?;
         Ok(Rendering { rendering, threads })
     }

@@ -8,9 +8,14 @@ use etendue_sensor::Exposure;
 use numpy::{IntoPyArray, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use serde_json::Value;
 
 use crate::arrays::{raised, refused, shaped};
 use crate::work::{Stop, interruptible};
+
+fn text(letters: &[u8]) -> String {
+    String::from_utf8_lossy(letters).into_owned()
+}
 
 /// A sensor of the trade, or of a file.
 #[pyclass(frozen)]
@@ -42,6 +47,15 @@ impl Sensor {
         ] {
             facts.set_item(key, value)?;
         }
+        // Its letters row by row; nothing of a sensor without one.
+        let cfa = s.cfa().map(serde_json::to_value).transpose().map_err(refused)?;
+        let rows: Option<Vec<String>> = cfa.map(|cfa| match cfa {
+            Value::Array(rows) => {
+                rows.iter().filter_map(Value::as_str).map(str::to_owned).collect()
+            }
+            word => word.as_str().unwrap_or_default().as_bytes().chunks(2).map(text).collect(),
+        });
+        facts.set_item("cfa", rows)?;
         Ok(facts)
     }
 

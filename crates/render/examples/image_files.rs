@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         for (name, compression) in
             [("none", exr::Compression::None), ("zip", exr::Compression::Zip)]
         {
-            let options = exr::Options { compression, progress: None };
+            let options = exr::Options { compression, ..Default::default() };
             let path = at("a.exr");
             report(&format!("exr {name}"), &path, bytes, || {
                 exr::write(&Transaction::at_once(), &path, &picture, &options)

@@ -54,7 +54,7 @@ pub fn build_without(
     build_over(Arc::new(unseen.left_out_of(&scene.geometry)), scene, plan, options)
 }
 
-fn build_over(
+pub(crate) fn build_over(
     geometry: Arc<Geometry>,
     scene: &Scene,
     plan: &Plan,

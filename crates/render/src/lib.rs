@@ -17,6 +17,7 @@
 
 mod adaptive;
 mod alike;
+pub mod annotations;
 mod band_paths;
 mod build;
 mod checkpoint;

@@ -16,6 +16,7 @@ use crate::panels;
 use crate::panels::asking::Listing;
 use crate::panels::lens_curves::LensCurves;
 use crate::panels::light_field::{LightFieldPanel, Shows};
+use crate::panels::start::FirstScene;
 use crate::worker::{Kind, News, Shown, Task, Wake, Wish, Worker};
 
 /// What a click on the picture does.
@@ -89,6 +90,8 @@ pub(crate) struct App {
     is_refusal: bool,
     pub(crate) said: Option<String>,
     pub(crate) busy: Option<(&'static str, f64)>,
+    /// The user has stopped what there was to do since the last wish.
+    pub(crate) is_stopped: bool,
     pub(crate) asking: Option<(Asking, String)>,
     /// What there is to choose from, while a path is asked for.
     pub(crate) listing: Listing,
@@ -143,6 +146,7 @@ impl App {
             is_refusal: false,
             said: None,
             busy: None,
+            is_stopped: false,
             asking: None,
             listing: Listing::default(),
             titled: String::new(),
@@ -339,6 +343,12 @@ impl App {
         self.worker.ask(Task::Open(path.to_owned()));
     }
 
+    /// Opens a scene that is built in: it stands in no file until it is saved.
+    pub(crate) fn begin(&mut self, first: &FirstScene) {
+        self.error = None;
+        self.worker.ask(Task::Begin(first.name, first.json));
+    }
+
     pub(crate) fn save(&mut self) {
         let Some(document) = &self.document else { return };
         let own = document.own_file();
@@ -363,6 +373,7 @@ impl App {
     }
 
     pub(crate) fn cancel(&mut self) {
+        self.is_stopped = true;
         self.worker.cancel();
     }
 
@@ -396,6 +407,7 @@ impl App {
     pub(crate) fn wish(&mut self) {
         let Some(document) = &self.document else { return };
         self.number += 1;
+        self.is_stopped = false;
         self.worker.wish(Wish {
             number: self.number,
             scene: Arc::clone(document.value()),

@@ -6,6 +6,7 @@ use etendue::{DistanceScale, Viewpoint};
 use crate::app::{App, Tool};
 use crate::document::Edit;
 use crate::form::mark;
+use crate::panels;
 use crate::panels::light_field::Shows;
 
 /// A drag of this many points turns the camera by a radian.
@@ -54,13 +55,8 @@ pub(crate) fn show(app: &mut App, ui: &mut Ui) {
     mark(ui.ctx(), "canvas", canvas);
     ui.painter().rect_filled(canvas, 0.0, backdrop(ui));
     let Some(picture) = &app.picture else {
-        let words = match app.document {
-            Some(_) => "",
-            None => "Drop a scene, a model, a lens or an image here, or open one (Ctrl+O)",
-        };
-        let font = egui::FontId::proportional(17.0);
-        let color = ui.visuals().weak_text_color();
-        ui.painter().text(canvas.center(), egui::Align2::CENTER_CENTER, words, font, color);
+        let inside = egui::UiBuilder::new().max_rect(canvas);
+        ui.scope_builder(inside, |ui| panels::start::show(app, ui));
         return;
     };
     let size = resolution(app);

@@ -5,6 +5,7 @@ mod images;
 mod lenses;
 mod light_fields;
 mod measured;
+mod start;
 mod tasks;
 
 use std::fs;
@@ -32,7 +33,11 @@ struct Driver {
 
 impl Driver {
     fn open(path: &Path) -> Self {
-        let app = App::new(Some(path.to_owned()), Options::default(), Arc::new(|| {})).unwrap();
+        Self::start(Some(path.to_owned()))
+    }
+
+    fn start(path: Option<PathBuf>) -> Self {
+        let app = App::new(path, Options::default(), Arc::new(|| {})).unwrap();
         let mut driver = Self { app, ctx: egui::Context::default(), time: 0.0 };
         driver.step(Vec::new());
         driver

@@ -80,10 +80,16 @@ impl Form {
         let is_nested = field.value.is_object()
             || field.value.as_array().is_some_and(|list| list.iter().any(|v| !v.is_number()));
         if is_nested {
-            let heading = egui::CollapsingHeader::new(label).id_salt(field.pointer);
+            let heading = egui::CollapsingHeader::new(&label).id_salt(field.pointer);
             let shown = heading.default_open(key == "sensor").show(ui, |ui| {
                 self.inner(ui, field, edits);
-                if !field.is_required && ui.small_button("remove").clicked() {
+                if field.is_required {
+                    return;
+                }
+                // Below what it removes, often beside the one of what that is in.
+                let remove = ui.small_button(format!("remove {label}"));
+                mark(ui.ctx(), &format!("{}-", field.pointer), remove.rect);
+                if remove.clicked() {
                     edits.push(Edit::Remove(field.pointer.to_owned()));
                 }
             });
@@ -91,10 +97,12 @@ impl Form {
             return;
         }
         ui.horizontal(|ui| {
-            hint(ui.label(label), about);
+            hint(ui.label(&label), about);
             self.inner(ui, field, edits);
             if !field.is_required && !field.value.is_null() {
-                let default = ui.small_button("\u{d7}").on_hover_text("back to the default");
+                let default = ui
+                    .small_button("\u{d7}")
+                    .on_hover_text(format!("{label}: back to the default"));
                 if default.clicked() {
                     edits.push(Edit::Remove(field.pointer.to_owned()));
                 }

@@ -26,6 +26,7 @@ mod panels {
     pub(crate) mod lens;
     pub(crate) mod lens_curves;
     pub(crate) mod light_field;
+    pub(crate) mod start;
 }
 mod worker;
 

@@ -39,6 +39,8 @@ pub(crate) struct Wish {
 pub(crate) enum Task {
     /// Open a scene, a model, a lens or an image.
     Open(PathBuf),
+    /// Begin with a scene that is in no file: its name and its JSON.
+    Begin(&'static str, &'static str),
     /// Write the scene to a file.
     Save(PathBuf, Arc<Value>),
     /// Render the scene as the command line does, and write its files into a folder.
@@ -49,6 +51,8 @@ pub(crate) enum Task {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Scene,
+    /// A scene that is in no file yet.
+    First,
     Model,
     Lens,
 }
@@ -207,7 +211,7 @@ impl Teller {
 
     fn fault(&self, error: &Error) {
         if !error.is_stopped() {
-            self.tell(News::Fault(error.to_string()));
+            self.tell(News::Fault(error.message()));
         }
     }
 }

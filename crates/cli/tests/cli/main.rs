@@ -1,6 +1,7 @@
 //! The built command, as a user runs it.
 #![allow(clippy::disallowed_methods, reason = "tests set their stage by hand")]
 
+mod annotations; // copies of objects in data sets and mattes, by others' readers
 mod assets; // real models from outside the repository
 mod bad_input; // refused with exit code 2, one message, and nothing written
 mod bad_light; // materials, textures and lights that make no sense

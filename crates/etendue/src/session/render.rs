@@ -195,9 +195,11 @@ impl Session {
         report.notes = notes;
         self.seconds = Seconds::default();
         let Rendered { picture, band_film, .. } = rendered;
-        // The views of a light field are rendered when they are written.
+        // The views of a light field are rendered when they are written, and annotations are traced.
+        let outputs = self.options.outputs;
+        let asks = outputs.annotates() || outputs.cryptomatte;
         let traced = structure
-            .filter(|_| scene.camera.light_field().is_some())
+            .filter(|_| asks || scene.camera.light_field().is_some())
             .map(|accel| (accel, Arc::clone(&self.images)));
         let mut rendering =
             Rendering::new(scene, (picture, band_film), traced, (report, fingerprints))?;

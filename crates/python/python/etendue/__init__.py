@@ -19,6 +19,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+import warnings
 from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
@@ -27,9 +28,22 @@ from . import _core
 from ._copies import StoredRendering, TemporaryFolder
 
 __version__ = _core.version()
+
+has_embree: bool = _core.has_embree()
+"""Whether Embree is built in. Without it the same numbers come from the tree in pure Rust, more slowly."""
+
+if not has_embree:
+    warnings.warn(
+        "this wheel of etendue is for older systems: it has the renderer in pure Rust alone, which gives the same numbers "
+        "as Embree more slowly",
+        RuntimeWarning,
+        stacklevel=2,
+    )
+
 __all__ = [
     "load",
     "Scene",
+    "Frames",
     "Shot",
     "LightField",
     "Lens",
@@ -58,6 +72,19 @@ def _rows(name: str, values: Any, dtype: Any) -> np.ndarray:
         raise ValueError(f"{name}: {error}") from None
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"{name} has the shape {array.shape} instead of (n, 3)")
+    return array
+
+
+def _at_vertices(name: str, values: Any, columns: int) -> Optional[np.ndarray]:
+    """An array of shape (n, columns) of what is known at the vertices of a mesh."""
+    if values is None:
+        return None
+    try:
+        array = np.ascontiguousarray(values, dtype=np.float32)
+    except TypeError as error:
+        raise ValueError(f"{name}: {error}") from None
+    if array.ndim != 2 or array.shape[1] != columns:
+        raise ValueError(f"{name} has the shape {array.shape} instead of (n, {columns})")
     return array
 
 
@@ -130,6 +157,9 @@ class Scene:
         vertices: Any = None,
         faces: Any = None,
         *,
+        uvs: Any = None,
+        normals: Any = None,
+        colors: Any = None,
         folder: _Path = ".",
         strict: bool = False,
         allow_outside: bool = False,
@@ -141,7 +171,7 @@ class Scene:
 
         vertices: (n, 3) float, metres. faces: (m, 3) int, counter-clockwise from the front. They become the
         mesh "mesh", and an object of it when `objects` says nothing. A mesh of trimesh, or anything else with
-        `vertices` and `faces`, may stand for both.
+        `vertices` and `faces`, may stand for both. uvs, normals, colors: as of `insert_mesh`.
         folder: where files that the scene names lie.
         """
         if faces is None and hasattr(vertices, "vertices") and hasattr(vertices, "faces"):
@@ -154,7 +184,9 @@ class Scene:
         self.threads, self._options = threads, (strict, allow_outside, memory_limit)
         self._core = _core.Session.from_json(json.dumps(scene), os.fspath(folder), *self._options)
         if vertices is not None:
-            self.insert_mesh("mesh", vertices, faces)
+            self.insert_mesh("mesh", vertices, faces, uvs=uvs, normals=normals, colors=colors)
+        elif not (uvs is None and normals is None and colors is None):
+            raise ValueError("uvs, normals and colors belong to vertices, which are not given")
 
     @classmethod
     def _of(cls, core: Any, options: Any, threads: Optional[int], folder: Any) -> "Scene":
@@ -183,15 +215,38 @@ class Scene:
             with open(path, "wb") as file:
                 file.write(model)
         scene = cls._of(_core.Session.restore(path, values, inputs, *options), options, threads, folder)
-        for name, vertices, faces in meshes:
-            scene.insert_mesh(name, vertices, faces)
+        for name, vertices, faces, at_vertices in meshes:
+            scene._do("insert_mesh", name, vertices, faces, at_vertices)
         return scene
 
-    def insert_mesh(self, name: str, vertices: Any, faces: Any) -> None:
-        """Adds a mesh, or replaces it: objects whose `file` is `name` are made of it."""
-        self._do(
-            "insert_mesh", name, _rows("vertices", vertices, np.float64), _rows("faces", faces, np.uint32)
+    def insert_mesh(
+        self,
+        name: str,
+        vertices: Any,
+        faces: Any,
+        *,
+        uvs: Any = None,
+        normals: Any = None,
+        colors: Any = None,
+    ) -> None:
+        """Adds a mesh, or replaces it: objects whose `file` is `name` are made of it.
+
+        vertices: (n, 3) float, metres. faces: (m, 3) int, counter-clockwise from the front. uvs: (n, 2), texture
+        coordinates, v down; images that the object's material names are laid by them. normals: (n, 3), shading
+        normals. colors: (n, 3) or (n, 4), linear, 0 to 1: of objects without a `material`, whose light grey of 0.8 they
+        multiply.
+        """
+        if colors is not None:
+            colors = np.asarray(colors, dtype=np.float32)
+            if colors.ndim == 2 and colors.shape[1] == 3:
+                colors = np.concatenate([colors, np.ones((len(colors), 1), np.float32)], axis=1)
+        at_vertices = (
+            _at_vertices("uvs", uvs, 2),
+            _at_vertices("normals", normals, 3),
+            _at_vertices("colors", colors, 4),
         )
+        vertices, faces = _rows("vertices", vertices, np.float64), _rows("faces", faces, np.uint32)
+        self._do("insert_mesh", name, vertices, faces, at_vertices)
 
     def _do(self, what: str, *arguments: Any) -> Any:
         """Calls the core, which is one thread's at a time."""
@@ -220,6 +275,35 @@ class Scene:
                 raise KeyError(path) from None
         return value
 
+    def __delitem__(self, path: str) -> None:
+        """Removes a value of the scene: del scene["camera.f_number"]; KeyError where it says nothing."""
+        values = self.values
+        *steps, last = path.replace("[", ".").replace("]", "").split(".")
+        parent: Any = values
+        try:
+            for step in steps:
+                parent = parent[int(step)] if isinstance(parent, list) else parent[step]
+            del parent[int(last) if isinstance(parent, list) else last]
+        except (KeyError, IndexError, ValueError, TypeError):
+            raise KeyError(path) from None
+        self._do("replace", json.dumps(values))
+
+    def __contains__(self, path: object) -> bool:
+        """Whether the scene says something at a path."""
+        try:
+            self[str(path)]
+        except KeyError:
+            return False
+        return True
+
+    def __repr__(self) -> str:
+        values = self.values
+        camera = values.get("camera")
+        kind = camera.get("type") if isinstance(camera, dict) else camera
+        objects = len(values.get("objects", []))
+        name = os.path.basename(self._do("origin")[0])
+        return f"<etendue.Scene {name}: objects {objects}, camera {kind or 'of the model'}>"
+
     @property
     def values(self) -> Dict[str, Any]:
         """All values of the scene as they are now."""
@@ -229,32 +313,79 @@ class Scene:
         """What a render will do, and why."""
         return self._do("plan", _threads(self.threads))
 
-    def render(self, samples: Optional[int] = None, progress: Any = False) -> "Shot":
+    def render(
+        self, samples: Optional[int] = None, progress: Any = False, *, denoise: bool = False
+    ) -> "Shot":
         """Renders the scene as it is now, on its `threads` and without Python's lock.
 
         samples: samples a pixel from now on.
         progress: True prints, a function is called with the stage and the share of it that is done; what it
         raises stops the render and comes out of here.
+        denoise: takes the noise out of a picture of light, by Open Image Denoise, which is to be installed: the
+        layer "denoised" beside "picture", which keeps its own.
         """
         if samples is not None:
             self["render.samples"] = int(samples)
         told = _print_progress if progress is True else (progress or None)
-        shot = Shot(self._do("render", told, _threads(self.threads)))
+        shot = Shot(self._do("render", told, _threads(self.threads), bool(denoise)))
         if progress is True:
             print(flush=True)
         return shot
 
-    def frames(self, samples: Optional[int] = None) -> Iterator["Shot"]:
-        """Renders the frames that the scene's `frames` name, one after the other."""
+    def frames(self, samples: Optional[int] = None, *, denoise: bool = False) -> "Frames":
+        """The frames that the scene's `frames` name, each rendered when it is asked for; one of a scene without.
+
+        samples: samples a pixel from now on. denoise: as of `render`.
+        """
         if samples is not None:
             self["render.samples"] = int(samples)
-        threads = _threads(self.threads)
-        count = self._do("load_frames", threads)
-        if count == 0:
-            yield self.render()
-        for number in range(count):
-            self._do("show", number, threads)
-            yield Shot(self._do("render", None, threads))
+        return Frames(self, denoise)
+
+
+class Frames(Sequence["Shot"]):
+    """The frames of a scene: `len(frames)`, `frames[i]`, `for shot in frames`.
+
+    Each is rendered when it is asked for, and none is kept. Frames are pickled with their scene, so that workers of a
+    data loader take each their own; they follow changes of the scene that they are of.
+    """
+
+    scene: Scene
+    """The scene, which shows the frame that was asked for last until a value of it is set."""
+
+    def __init__(self, scene: Scene, denoise: bool = False) -> None:
+        self.scene, self._denoise = scene, bool(denoise)
+
+    def _count(self) -> int:
+        """How many the scene names; 0 of a scene without."""
+        return self.scene._do("load_frames", _threads(self.scene.threads))
+
+    def __len__(self) -> int:
+        return max(self._count(), 1)
+
+    def __getitem__(self, index: Any) -> Any:
+        """The shot of frame `index`; negative ones count from the end. Of a slice a list."""
+        count = self._count()
+        if isinstance(index, slice):
+            return [self._shot(number, count) for number in range(*index.indices(max(count, 1)))]
+        number = int(index)
+        if number < 0:
+            number += max(count, 1)
+        if not 0 <= number < max(count, 1):
+            raise IndexError(f"frame {int(index)}: the scene has the frames 0 to {max(count, 1) - 1}")
+        return self._shot(number, count)
+
+    def __iter__(self) -> Iterator["Shot"]:
+        count = self._count()
+        return (self._shot(number, count) for number in range(max(count, 1)))
+
+    def _shot(self, number: int, count: int) -> "Shot":
+        threads = _threads(self.scene.threads)
+        if count > 0:
+            self.scene._do("show", number, threads)
+        return Shot(self.scene._do("render", None, threads, self._denoise))
+
+    def __repr__(self) -> str:
+        return f"<etendue.Frames: {len(self)} of {self.scene!r}>"
 
 
 def _print_progress(stage: str, share: float) -> None:
@@ -370,7 +501,8 @@ class Shot(Mapping[str, np.ndarray]):
                 return file.read()
 
     def __repr__(self) -> str:
-        return f"<etendue.Shot of {', '.join(self._names)}>"
+        width, height = self._camera["resolution"]
+        return f"<etendue.Shot {width} x {height}: {', '.join(self._names)}>"
 
 
 class LightField(NamedTuple):
@@ -393,6 +525,12 @@ class LightField(NamedTuple):
     refocused: Optional[np.ndarray] = None
     """(h, w, channels): sharp at refocus_distance; of a camera without views by its lenslets' patches, unless
     geometry["no_patches"] says why not."""
+
+    def __repr__(self) -> str:
+        shapes = [
+            f"{name} {value.shape}" for name, value in self._asdict().items() if isinstance(value, np.ndarray)
+        ]
+        return f"<etendue.LightField: {', '.join(shapes)}>"
 
 
 class Traced(NamedTuple):
@@ -422,6 +560,12 @@ class Lens:
 
     def __reduce__(self) -> Any:
         return Lens, self._arguments
+
+    def __repr__(self) -> str:
+        length, number = self.effective_focal_length, self.f_number
+        facts = [] if length is None else [f"{length:.4g} mm"]
+        facts += [] if number is None else [f"f/{number:.3g}"]
+        return f"<etendue.Lens {self.name or os.path.basename(self._arguments[0])}: {', '.join(facts) or 'afocal'}>"
 
     @property
     def name(self) -> str:
@@ -491,20 +635,49 @@ class Sensor:
     def __reduce__(self) -> Any:
         return Sensor, self._arguments
 
+    def __repr__(self) -> str:
+        facts = self.facts
+        (width, height), bits = facts["resolution"], facts["bit_depth"]
+        return f"<etendue.Sensor {os.path.basename(self._arguments[0])}: {width} x {height}, {bits} bits>"
+
     @property
     def facts(self) -> Dict[str, Any]:
-        """Resolution, levels (DN), gain (DN/e-), noise (e-), pixel pitch (um)."""
+        """Resolution, levels (DN), gain (DN/e-), noise (e-), pixel pitch (um); cfa: rows of the colour filter
+        array's letters, None without one."""
         return self._core.facts()
 
     def expose(
         self, electrons: Any, seed: int = 0, exposure: float = 0.01, frame: int = 0
     ) -> np.ndarray:
-        """Digital numbers (uint16) of one exposure, of (h, w) mean photo-electrons a pixel. The exposure time
+        """Digital numbers (uint16) of one exposure, (h, w), of mean photo-electrons a pixel: (h, w), or (h, w, 3) of
+        red, green and blue, of which each pixel of a colour filter array has that of its filter. The exposure time
         (s) counts for the dark current; another frame has other temporal noise."""
-        array = np.ascontiguousarray(electrons, dtype=np.float64)
+        array = np.asarray(electrons, dtype=np.float64)
+        if array.ndim == 3 and array.shape[2] == 3 and array.size:
+            array = self._mosaic(array)
         if array.ndim != 2 or array.size == 0:
-            raise ValueError(f"electrons has the shape {array.shape} instead of (h, w)")
-        return self._core.expose(array, float(exposure), int(frame), int(seed))
+            raise ValueError(f"electrons has the shape {array.shape} instead of (h, w) or (h, w, 3)")
+        return self._core.expose(np.ascontiguousarray(array), float(exposure), int(frame), int(seed))
+
+    def _mosaic(self, colors: np.ndarray) -> np.ndarray:
+        """Of each pixel of (h, w, 3) the colour that its filter passes."""
+        cfa = self.facts["cfa"]
+        if cfa is None:
+            raise ValueError(
+                "electrons of three colours want a sensor with a colour filter array, and this has none: give (h, w), or "
+                'settings {"cfa": "rggb"}'
+            )
+        unknown = sorted(set("".join(cfa)) - set("rgb"))
+        if unknown:
+            raise ValueError(
+                f"the colour filter array has the filters {', '.join(unknown)} beside r, g and b, whose electrons three "
+                "colours do not tell: give (h, w)"
+            )
+        letters = np.array([["rgb".index(letter) for letter in row] for row in cfa])
+        height, width = colors.shape[:2]
+        repeats = (-(-height // letters.shape[0]), -(-width // letters.shape[1]))
+        channel = np.tile(letters, repeats)[:height, :width]
+        return np.take_along_axis(colors, channel[:, :, None], axis=2)[:, :, 0]
 
 
 class Light:
@@ -619,6 +792,9 @@ class Exposed:
         """Writes the files that the command writes; gives their names."""
         return self._core.write(os.fspath(folder), outputs)
 
+    def __repr__(self) -> str:
+        return f"<etendue.Exposed: {len(self.exposures)} of {self.raw.shape}>"
+
 
 class Hits(NamedTuple):
     """The closest hits of rays, (n,) each and (n, 3) for the normal."""
@@ -635,7 +811,7 @@ class Hits(NamedTuple):
     """Unit geometric normal on the triangle's front; zero for a miss."""
 
 
-def _accel(vertices: Any, faces: Any, backend: str, threads: Optional[int]) -> "Accel":
+def _accel(vertices: Any, faces: Any, backend: Optional[str], threads: Optional[int]) -> "Accel":
     return Accel(vertices, faces, backend, threads=threads)
 
 
@@ -643,12 +819,14 @@ class Accel:
     """A ray caster over one mesh: Embree finds, double precision measures."""
 
     def __init__(
-        self, vertices: Any, faces: Any, backend: str = "embree", *, threads: Optional[int] = None
+        self, vertices: Any, faces: Any, backend: Optional[str] = None, *, threads: Optional[int] = None
     ) -> None:
-        """vertices: (n, 3) float. faces: (m, 3) int. backend: embree, bvh (pure Rust) or exact (slow).
+        """vertices: (n, 3) float. faces: (m, 3) int. backend: embree, bvh (pure Rust) or exact (slow); the first of
+        them that is built in when it is None.
         threads: how many threads work; None for all processors."""
         self.threads, self._backend = threads, backend
         vertices, faces = _rows("vertices", vertices, np.float64), _rows("faces", faces, np.uint32)
+        backend = backend or ("embree" if has_embree else "bvh")
         self._core = _core.Accel(vertices, faces, backend, _threads(threads))
 
     def __reduce__(self) -> Any:

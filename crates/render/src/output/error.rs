@@ -147,12 +147,12 @@ pub enum OutputError {
 
 impl OutputError {
     /// The system's refusal of `path`, with what to do about it.
-    pub(super) fn io(path: &Path, source: io::Error) -> Self {
+    pub(crate) fn io(path: &Path, source: io::Error) -> Self {
         WriteError::io(path, source).into()
     }
 
     /// What `path`'s format cannot hold.
-    pub(super) fn format(path: &Path, message: impl ToString) -> Self {
+    pub(crate) fn format(path: &Path, message: impl ToString) -> Self {
         Self::Format { path: path.to_owned(), message: message.to_string() }
     }
 }

@@ -57,6 +57,8 @@ pub struct Options<'a> {
     pub compression: Compression,
     /// Told the share done (0..=1) now and then; answering `false` stops, and leaves no file.
     pub progress: Option<&'a dyn Fn(f64) -> bool>,
+    /// Texts of the header by their full names, as other programs look for them.
+    pub attributes: &'a [(String, String)],
 }
 
 impl fmt::Debug for Options<'_> {
@@ -79,7 +81,7 @@ pub fn write(
     options: &Options<'_>,
 ) -> Result<(), OutputError> {
     let blocks = Blocks::new(picture, options.compression);
-    let header = header(path, picture, &blocks)?;
+    let header = header(path, picture, &blocks, options.attributes)?;
     let head = head_bytes(&header).map_err(|error| OutputError::format(path, error))?;
     let mut part = files.create(path)?;
     let mut file = BufWriter::with_capacity(1 << 20, &mut part);
@@ -277,7 +279,12 @@ fn zip(raw: Vec<u8>) -> Vec<u8> {
     if packed.len() < raw.len() { packed } else { raw }
 }
 
-fn header(path: &Path, picture: &Picture, blocks: &Blocks<'_>) -> Result<Header, OutputError> {
+fn header(
+    path: &Path,
+    picture: &Picture,
+    blocks: &Blocks<'_>,
+    attributes: &[(String, String)],
+) -> Result<Header, OutputError> {
     // The format counts pixels in i32, and the crate panics beyond.
     if i32::try_from(blocks.width).is_err() || i32::try_from(blocks.height).is_err() {
         return Err(OutputError::format(path, "a side is longer than 2147483647 pixels"));
@@ -311,6 +318,9 @@ fn header(path: &Path, picture: &Picture, blocks: &Blocks<'_>) -> Result<Header,
     }
     for (key, value) in picture.header() {
         own.other.insert(attribute_name(key), AttributeValue::Text(text(value)));
+    }
+    for (key, value) in attributes {
+        own.other.insert(text(key), AttributeValue::Text(text(value)));
     }
     Ok(header)
 }
@@ -371,8 +381,13 @@ mod tests {
     fn bytes(picture: &Picture, compression: Compression) -> Vec<u8> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.exr");
-        write(&Transaction::at_once(), &path, picture, &Options { compression, progress: None })
-            .unwrap();
+        write(
+            &Transaction::at_once(),
+            &path,
+            picture,
+            &Options { compression, ..Options::default() },
+        )
+        .unwrap();
         fs::read(path).unwrap()
     }
 
@@ -386,7 +401,7 @@ mod tests {
                 &Transaction::at_once(),
                 &path,
                 &picture,
-                &Options { compression, progress: None },
+                &Options { compression, ..Options::default() },
             )
             .unwrap();
             let read = read_first_flat_layer_from_file(&path).unwrap().layer_data;

@@ -21,6 +21,12 @@ pub struct Outputs {
     pub indexed: bool,
     /// Light in bands as an ENVI cube.
     pub envi: bool,
+    /// What each copy of an object covers, in COCO's file: see [`crate::annotations`].
+    pub coco: bool,
+    /// The same with poses, models and masks in BOP's folder.
+    pub bop: bool,
+    /// Names by their shares of each pixel, as Cryptomatte.
+    pub cryptomatte: bool,
     /// The picture without its noise, as a layer beside it and as the picture's PNG: see
     /// [`crate::denoise`].
     pub denoised: bool,
@@ -38,11 +44,20 @@ impl Outputs {
         flo: false,
         indexed: false,
         envi: false,
+        coco: false,
+        bop: false,
+        cryptomatte: false,
         denoised: false,
     };
 
     /// All but what only single benchmarks read.
     pub const ALL: Self = Self { exr: true, png: true, npy: true, dng: true, ..Self::NONE };
+
+    /// Whether the scene's copies are told apart in files of their own.
+    #[must_use]
+    pub fn annotates(self) -> bool {
+        self.coco || self.bop
+    }
 
     /// From a comma-separated list such as `exr,png`.
     ///
@@ -62,10 +77,13 @@ impl Outputs {
                 "flo" => &mut outputs.flo,
                 "indexed" => &mut outputs.indexed,
                 "envi" => &mut outputs.envi,
+                "coco" => &mut outputs.coco,
+                "bop" => &mut outputs.bop,
+                "cryptomatte" => &mut outputs.cryptomatte,
                 other => {
                     return Err(format!(
                         "unknown kind \"{other}\"; known: exr, png, npy, dng, tum, kitti, flo, indexed, \
-                         envi"
+                         envi, coco, bop, cryptomatte"
                     ));
                 }
             };

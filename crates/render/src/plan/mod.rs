@@ -214,7 +214,8 @@ impl Plan {
             band_paths,
             rays,
             quality,
-            unseen: unseen(scene, passes),
+            // Mattes are of all samples of a pixel, and of what the lens gathers.
+            unseen: unseen(scene, passes).filter(|_| !outputs.cryptomatte),
             refine: scene.plan.refine != Some(false),
             precision,
             light_precision,

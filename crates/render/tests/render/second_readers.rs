@@ -129,7 +129,7 @@ fn write_all(folder: &Path, picture: &Picture) {
         }
     }
     for (name, compression) in [("none", exr::Compression::None), ("zip", exr::Compression::Zip)] {
-        let options = exr::Options { compression, progress: None };
+        let options = exr::Options { compression, ..Default::default() };
         exr::write(&Transaction::at_once(), &folder.join(format!("{name}.exr")), picture, &options)
             .unwrap();
     }

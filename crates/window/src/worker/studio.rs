@@ -126,6 +126,7 @@ impl PreviewRenderer {
     fn carry_out(&mut self, task: Task) {
         let done = match task {
             Task::Open(path) => self.open(path),
+            Task::Begin(name, json) => self.begin(name, json),
             Task::Save(path, scene) => self.save(path, &scene),
             Task::Render(folder, scene, frame) => self.render(folder, &scene, frame),
         };
@@ -148,6 +149,20 @@ impl PreviewRenderer {
         let scene = Arc::clone(&base);
         self.teller.tell(News::Opened(path.clone(), kind, Arc::clone(&base)));
         self.image = None;
+        self.open = Some(Open { path, session, base, scene, wish: None, files, cost: None });
+        Ok(())
+    }
+
+    /// Opens a scene that is in no file. Where it would be saved is the current folder.
+    fn begin(&mut self, name: &str, json: &str) -> Result<(), Error> {
+        let refused = |error: serde_json::Error| Error::Refused(error.to_string());
+        let scene: Value = serde_json::from_str(json).map_err(refused)?;
+        let session = Session::from_json_with(".", scene, self.options.clone())?;
+        let base = Arc::new(session.values().clone());
+        let (path, scene) = (PathBuf::from(name), Arc::clone(&base));
+        self.teller.tell(News::Opened(path.clone(), Kind::First, Arc::clone(&base)));
+        self.image = None;
+        let files = Vec::new();
         self.open = Some(Open { path, session, base, scene, wish: None, files, cost: None });
         Ok(())
     }
@@ -218,7 +233,7 @@ impl PreviewRenderer {
         match self.follow_to_the_end(wish) {
             Ok(()) => {}
             Err(error) if error.is_stopped() => {}
-            Err(error) => self.teller.tell(News::Refused(number, error.to_string())),
+            Err(error) => self.teller.tell(News::Refused(number, error.message())),
         }
     }
 
