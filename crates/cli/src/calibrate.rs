@@ -10,7 +10,7 @@ use crate::progress::{Phases, say};
 use crate::stop;
 
 pub(crate) fn run(arguments: &CalibrateArguments) -> Result<(), Fault> {
-    stop::listen();
+    stop::listen(say);
     let outputs = Outputs::from_list(&arguments.outputs)
         .map_err(|message| Fault::refused(format!("--outputs: {message}")))?;
     let of_layers = Outputs { png: false, npy: false, dng: false, ..outputs };

@@ -43,7 +43,7 @@ struct Told<'a> {
 }
 
 pub(crate) fn run(arguments: &MatchArguments) -> Result<(), Fault> {
-    stop::listen();
+    stop::listen(say);
     let photo = RawPhoto::open(&arguments.photo)?;
     let options = Options {
         settings: arguments.settings.clone(),

@@ -191,7 +191,7 @@ impl Tracing<'_> {
             self.camera.sample_rays(&film, &mut rays);
             self.accel.closest(&rays.rays, &mut hits);
             // Lenses may give the rays in another order than the samples.
-            let mut order: Vec<usize> = (0..rays.len()).collect();
+            let mut order: Vec<usize> = (0..rays.rays.len()).collect();
             order.sort_by_key(|&ray| rays.sample[ray]);
             let mut own = order.iter().copied().peekable();
             for end in (1..=pixels.len()).map(|k| k * self.samples as usize) {
