@@ -9,16 +9,7 @@ use etendue_scene::file::AccelName;
 
 use crate::error::RenderError;
 use crate::plan::{Plan, Unseen};
-
-/// The accelerators that this program was built with, the best first.
-#[must_use]
-pub fn accelerators() -> &'static [AccelName] {
-    if cfg!(feature = "embree") {
-        &[AccelName::Embree, AccelName::Bvh, AccelName::Exact]
-    } else {
-        &[AccelName::Bvh, AccelName::Exact]
-    }
-}
+use crate::precision::accelerators;
 
 /// What a build of the structure over `scene` is told.
 fn options_for(scene: &Scene, plan: &Plan, options: &BuildOptions) -> BuildOptions {

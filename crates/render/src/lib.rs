@@ -53,7 +53,7 @@ mod watch;
 
 pub use adaptive::SampleCounts;
 pub use band_paths::BandPaths;
-pub use build::{accelerators, build, build_without, rebuild};
+pub use build::{build, build_without, rebuild};
 pub use checkpoint::Checkpoint;
 pub use error::RenderError;
 pub use film::{NoMemory, Precision};
@@ -61,6 +61,7 @@ pub use film_file::{FilmError, FilmFile, FilmHeader, Identity};
 pub use images::Images;
 pub use other_frame::FollowedFrame;
 pub use plan::{Plan, Unseen};
+pub use precision::accelerators;
 pub use render::{Course, Film, Prepared, Progress, Rendered, finish, render, sample_set, trace};
 pub use report::{Report, Seconds};
 pub use shard::{Shard, ShardBy};

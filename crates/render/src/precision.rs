@@ -7,8 +7,17 @@ use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, LightPrecision};
 use etendue_tracer::spawn::roundings;
 
-use crate::build::accelerators;
 use crate::gaps::{CrossedSurfaces, Gap, crossed_surfaces};
+
+/// The accelerators that this program was built with, the best first.
+#[must_use]
+pub fn accelerators() -> &'static [AccelName] {
+    if cfg!(feature = "embree") {
+        &[AccelName::Embree, AccelName::Bvh, AccelName::Exact]
+    } else {
+        &[AccelName::Bvh, AccelName::Exact]
+    }
+}
 
 /// A pixel must be so many times as wide as f32 rounds the camera's rays by, or its rays fall beside it: a
 /// start and a direction, along two axes each, are rounded by half a unit in the last place.

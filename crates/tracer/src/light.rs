@@ -11,7 +11,6 @@ use crate::goniometric::Goniometric;
 use crate::light_tree::Cluster;
 use crate::projector::Projector;
 use crate::reference::SceneView;
-use crate::sky::Sky;
 use crate::{ClearSky, Color, Cube, LightGroup, Modulation, TextureUse};
 
 /// A light of the scene, beside its emissive surfaces.
@@ -267,12 +266,13 @@ pub(crate) fn mean(color: &Color) -> f64 {
     (color[0] + color[1] + color[2]) / 3.0
 }
 
-/// Irradiance (W/m²) of a surface that faces a light far away; 0 of any other.
-pub(crate) fn irradiance(light: &Light, sky: Option<&Sky>) -> f64 {
+/// Irradiance (W/m²) of a surface that faces a light far away, of which an environment's image has this `brightness`
+/// in the mean; 0 of any other.
+pub(crate) fn irradiance(light: &Light, brightness: f64) -> f64 {
     let own = mean(&light.color);
     match &light.kind {
         LightKind::Directional { .. } => own,
-        LightKind::Environment { .. } => PI * own * sky.map_or(1.0, Sky::mean),
+        LightKind::Environment { .. } => PI * own * brightness,
         LightKind::Point(_)
         | LightKind::Spot { .. }
         | LightKind::Projector(_)

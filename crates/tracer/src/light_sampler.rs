@@ -224,7 +224,7 @@ mod tests {
     use super::*;
 
     /// A lamp of one W/sr at the origin that shines along +Y.
-    fn area_light() -> Candidate {
+    fn facing_up() -> Candidate {
         let bounds = Bounds { min: DVec3::ZERO, max: DVec3::ZERO };
         let cluster =
             Cluster { bounds, axis: DVec3::Y, cone: 0.0, reach: FRAC_PI_2, intensity: 1.0 };
@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn chances_are_those_of_picks_and_go_with_distance() {
         let far = [2.0, 0.0, 1.0].map(|irradiance| Candidate::Far { irradiance });
-        let all = [far[0], area_light(), far[1], Candidate::Dark, far[2]];
+        let all = [far[0], facing_up(), far[1], Candidate::Dark, far[2]];
         let sampler = LightSampler::new(&all, scene());
         // By 1/d² against 3, and never below a quarter or above three; nothing behind it.
         let expected =
@@ -283,7 +283,7 @@ mod tests {
 
     #[test]
     fn a_few_lamps_alone_are_chosen_by_power_and_none_is_dark() {
-        let sampler = LightSampler::new(&[area_light(), area_light()], scene());
+        let sampler = LightSampler::new(&[facing_up(), facing_up()], scene());
         assert_eq!(sampler.chance(&open(DVec3::NEG_Y), 0), 0.5);
         assert!(sampler.are_several() && !sampler.is_empty());
         assert!(LightSampler::new(&[Candidate::Dark], scene()).is_empty());

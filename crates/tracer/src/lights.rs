@@ -1,5 +1,7 @@
 //! The lights of a scene: what each gives off, and a place on one that is chosen for a point.
 
+mod environment;
+
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -102,11 +104,12 @@ impl Lights {
             }
         }
         let sky = Sky::of(lights, map, spectral)?;
+        let brightness = sky.as_ref().map_or(1.0, Sky::mean);
         let candidate = |light: &Light| {
             let mean = mean(&light.modulation);
             match light.cluster(mean * light.intensity(), (scene, span)) {
                 Some(cluster) => Candidate::near(mean * power(light, scene), cluster),
-                None => Candidate::Far { irradiance: mean * irradiance(light, sky.as_ref()) },
+                None => Candidate::Far { irradiance: mean * irradiance(light, brightness) },
             }
         };
         let mut candidates: Vec<Candidate> = lights.iter().map(candidate).collect();

@@ -424,7 +424,7 @@ mod tests {
         let means = [flash.from_time(0.0), flash.from_time(7.0)].map(|it| it.mean([0.0, 0.01]));
         assert!(means.iter().all(|mean| (mean - 0.1).abs() < 1e-15), "{means:?}");
         let lamp = built(json!({ "type": "square", "frequency": 1 })).from_time(0.75);
-        assert_eq!([area_light.at(0.0), area_light.at(0.3)], [0.0, 1.0]);
+        assert_eq!([lamp.at(0.0), lamp.at(0.3)], [0.0, 1.0]);
     }
 
     #[test]

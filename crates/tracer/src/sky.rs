@@ -8,10 +8,9 @@ use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_spectrum::NoOverlap;
 
 use crate::Color;
-use crate::environment::{EnvironmentMap, MapSampler, OnMap, place};
+use crate::environment::{EnvironmentMap, MapSampler, OnMap};
 use crate::light::{EnvironmentImage, Light, LightKind};
 use crate::light_sampler::Receiver;
-use crate::lights::Lights;
 use crate::sampling::{Frame, cosine_direction, sphere_direction};
 use crate::spectral::Spectral;
 use crate::spectral_sky::{self, Spectrum};
@@ -21,16 +20,16 @@ use crate::spectral_sky::{self, Spectrum};
 pub(crate) struct Sky {
     /// Which of the lights it is.
     pub(crate) index: usize,
-    map: Option<(Arc<EnvironmentMap>, MapSampler)>,
-    spectra: Spectra,
-    world_from_map: DMat3,
+    pub(crate) map: Option<(Arc<EnvironmentMap>, MapSampler)>,
+    pub(crate) spectra: Spectra,
+    pub(crate) world_from_map: DMat3,
     /// The camera sees it.
     pub(crate) visible: bool,
 }
 
 /// What the bands of a sky are made of.
 #[derive(Debug)]
-enum Spectra {
+pub(crate) enum Spectra {
     /// Its colours.
     Colors,
     /// The spectra of a clear sky: a row for each band.
@@ -72,8 +71,8 @@ pub(crate) struct Asked {
     lanes: Vec<(usize, f64)>,
     squares: Vec<[f64; 2]>,
     /// With which the sky is chosen for each direction that was met.
-    chances: Vec<f64>,
-    there: OnMap,
+    pub(crate) chances: Vec<f64>,
+    pub(crate) there: OnMap,
 }
 
 impl Asked {
@@ -150,86 +149,9 @@ pub(crate) fn uniform_direction(receiver: &Receiver, square: [f64; 2]) -> (DVec3
 }
 
 /// The density (1/sr) with which [`uniform_direction`] gives a unit direction.
-fn uniform_density(receiver: &Receiver, direction: DVec3) -> f64 {
+pub(crate) fn uniform_density(receiver: &Receiver, direction: DVec3) -> f64 {
     match receiver.is_one_sided() {
         true => receiver.normal.dot(direction).max(0.0) / PI,
         false => 0.25 / PI,
-    }
-}
-
-impl Lights {
-    /// Radiance that comes to a point from each unit direction without meeting anything, and the density
-    /// (1/sr), chance included, with which [`Self::choose`] gives that direction for that point; 0 without a point.
-    /// Both go to `each`, with the number of the pair.
-    pub(crate) fn environment(
-        &self,
-        spectral: &Spectral,
-        wanted: impl Iterator<Item = (Option<Receiver>, DVec3)>,
-        asked: &mut Asked,
-        radiance: &mut [f64],
-        mut each: impl FnMut(usize, f64, &mut [f64]),
-    ) {
-        let Some(sky) = &self.sky else { return };
-        let own = self.bands_of(sky.index, radiance.len());
-        let Some((map, sampler)) = &sky.map else {
-            for (number, (receiver, direction)) in wanted.enumerate() {
-                radiance.copy_from_slice(own);
-                let density = receiver.map_or(0.0, |receiver| {
-                    uniform_density(&receiver, direction) * self.chance(&receiver, sky.index)
-                });
-                each(number, density, radiance);
-            }
-            return;
-        };
-        let Asked { chances, there, .. } = asked;
-        let map_from_world = sky.world_from_map.transpose();
-        chances.clear();
-        there.directions.clear();
-        for (receiver, world) in wanted {
-            chances.push(receiver.map_or(0.0, |receiver| self.chance(&receiver, sky.index)));
-            there.directions.push(map_from_world * world);
-        }
-        sampler.look_up(map, there);
-        let lit = there.places.iter().copied().zip(&there.colors);
-        for (number, (lit, (chance, pdf))) in
-            lit.zip(chances.iter().zip(&there.densities)).enumerate()
-        {
-            self.spread_sky(spectral, lit, radiance);
-            each(number, chance * pdf, radiance);
-        }
-    }
-
-    /// Radiance that the camera sees along the unit `direction` where nothing is.
-    pub(crate) fn backdrop(&self, spectral: &Spectral, direction: DVec3, radiance: &mut [f64]) {
-        let Some(sky) = self.sky.as_ref().filter(|sky| sky.visible) else { return };
-        match &sky.map {
-            None => radiance.copy_from_slice(self.bands_of(sky.index, radiance.len())),
-            Some((map, _)) => {
-                let at = place(sky.world_from_map.transpose() * direction);
-                self.spread_sky(spectral, (at, &map.radiance_at(at)), radiance);
-            }
-        }
-    }
-
-    /// The environment's image at a place where it has this colour, in all bands: by its spectra where it has some.
-    pub(crate) fn spread_sky(
-        &self,
-        spectral: &Spectral,
-        (at, color): ([f64; 2], &Color),
-        radiance: &mut [f64],
-    ) {
-        let Some(sky) = &self.sky else { return };
-        let own = self.bands_of(sky.index, radiance.len());
-        match (&sky.spectra, &sky.map) {
-            (Spectra::ClearSky(rows), Some((map, _))) => {
-                let values = map.spectrum_at(at);
-                for (band, row) in radiance.iter_mut().zip(rows) {
-                    *band = row.iter().zip(values).map(|(row, value)| row * value).sum();
-                }
-            }
-            (Spectra::Texels(texels), Some((map, _))) => map.bands_at(texels, at, radiance),
-            (Spectra::Colors, _) | (_, None) => spectral.spread(color, radiance),
-        }
-        radiance.iter_mut().zip(own).for_each(|(band, own)| *band *= own);
     }
 }

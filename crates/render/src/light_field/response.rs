@@ -15,7 +15,6 @@ use rayon::prelude::*;
 
 use super::centres::Centres;
 use super::gain::{Gain, Node};
-use super::views::weights;
 
 /// Lenslets a side at which rays are traced.
 const NODES: u32 = 5;
@@ -376,6 +375,13 @@ fn crossing(pose: &Pose, rays: &CameraRays, i: usize, unit: &ViewGrid) -> ([f64;
     let vergence = 1.0 / unit.focus();
     let place = |k: usize| (slopes[k] + pupil[k] * vergence) * unit.focal_length();
     (pupil.map(|x| x / unit.baseline()), [place(0), place(1)])
+}
+
+/// The weights of four neighbours for a place between the middle two, `t` in 0..=1.
+pub(super) fn weights(t: f64) -> [f64; 4] {
+    let near = |x: f64| (1.5 * x - 2.5) * x * x + 1.0;
+    let far = |x: f64| ((-0.5 * x + 2.5) * x - 4.0) * x + 2.0;
+    [far(1.0 + t), near(t), near(1.0 - t), far(2.0 - t)]
 }
 
 #[cfg(test)]

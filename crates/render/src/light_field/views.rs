@@ -8,7 +8,7 @@ use etendue_camera::{LightField, ViewGrid};
 use rayon::prelude::*;
 
 use super::centres::Centres;
-use super::response::ViewResponse;
+use super::response::{ViewResponse, weights};
 use super::{BANDS, planes};
 use crate::output::{Channel, Layer, Look, Picture, PictureError, Values};
 
@@ -169,13 +169,6 @@ pub(super) fn picture(
     let meaning = vec![("definition".to_owned(), definition.to_owned())];
     let layer = Layer { name: String::new(), look: Look::Color, channels, meaning };
     Picture::new(width, height, vec![layer], Vec::new())
-}
-
-/// The weights of four neighbours for a place between the middle two, `t` in 0..=1.
-pub(super) fn weights(t: f64) -> [f64; 4] {
-    let near = |x: f64| (1.5 * x - 2.5) * x * x + 1.0;
-    let far = |x: f64| ((-0.5 * x + 2.5) * x - 4.0) * x + 2.0;
-    [far(1.0 + t), near(t), near(1.0 - t), far(2.0 - t)]
 }
 
 /// A plane at a place (pixels from the corner).
