@@ -38,6 +38,7 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
         "lens" | "lens_report" => files("scenes/lenses", "json"),
         "rays" => vec![RAYS.into()],
         "zmx" | "zmx_report" => zmxs(),
+        "seq" => seqs(),
         "mask_png" => vec![picture(ImageFormat::Png, [7, 7, 7])],
         "texture" => {
             let color = [200, 90, 10];
@@ -273,6 +274,13 @@ fn zmxs() -> Vec<Vec<u8>> {
     );
     let wide = lens.encode_utf16().flat_map(u16::to_le_bytes);
     vec![[0xff, 0xfe].into_iter().chain(wide).collect(), lens.into_bytes()]
+}
+
+fn seqs() -> Vec<Vec<u8>> {
+    let lens = "RDM;LEN\nTITLE 'a'\nEPD 10\nDIM M\nWL 656 587 &\n 486\nREF 2\nYAN 0 7\nSO 0 0.1e14\n\
+        S 20 3 NBK7_SCHOTT\n  CIR 6\nS -50 2 517000.642000\n  ASP\n  K -0.5; A 1e-6\nS 0 1.5\n  STO\n  CIR 4\n\
+        S -90 -30 REFL\n  ADE 10\n  BEN\n  CIR 9\n  CIR HOL 1\nSI 0 0\nGO\n";
+    vec![lens.as_bytes().to_vec()]
 }
 
 fn picture(format: ImageFormat, color: [u8; 3]) -> Vec<u8> {

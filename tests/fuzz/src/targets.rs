@@ -38,6 +38,7 @@ pub const TARGETS: [Target; 23] = [
     Target { name: "lens", run: lens },
     Target { name: "rays", run: rays },
     Target { name: "zmx", run: zmx },
+    Target { name: "seq", run: seq },
     Target { name: "lens_report", run: lens_report },
     Target { name: "zmx_report", run: zmx_report },
     Target { name: "mask_png", run: mask_png },
@@ -153,6 +154,10 @@ fn sensor(bytes: &[u8], folder: &Path) {
 
 fn lens(bytes: &[u8], folder: &Path) {
     let _ = read_lens(&write(folder, "lens.json", bytes), Reach::OwnFolder, &[]);
+}
+
+fn seq(bytes: &[u8], folder: &Path) {
+    let _ = read_lens(&write(folder, "lens.seq", bytes), Reach::OwnFolder, &[]);
 }
 
 fn zmx(bytes: &[u8], folder: &Path) {

@@ -27,7 +27,7 @@ fn a_triplet_is_read_with_its_system_and_its_glasses() {
     assert_eq!(lens.fields, [0.0, 7.0, 10.0]);
     let elements = elements(TRIPLET);
     assert_eq!(elements.len(), 5);
-    assert_eq!(elements[0]["glass"], "Schott:N-BK7");
+    assert_eq!(elements[0]["glass"], "N-BK7");
     assert_eq!((&elements[0]["curvature"], &elements[0]["thickness"]), (&json!(0.05), &json!(3.0)));
     assert_eq!(elements[1]["glass"], json!({"nd": 1.517, "vd": 64.2}));
     assert_eq!((&elements[2]["type"], &elements[2]["stop"]), (&json!("aperture"), &json!(true)));
@@ -76,7 +76,7 @@ fn what_has_no_counterpart_and_what_is_cut_short_is_refused() {
     for command in ["DIF GRT", "XTO", "SPS ZRN", "RET S1", "ZDE 3"] {
         let why = refused("  STO\n", &format!("  STO\n  {command}\n"));
         let word = command.split(' ').next().unwrap();
-        assert!(why.starts_with("line 14") && why.contains(word), "{why}");
+        assert!(why.starts_with("line 15") && why.contains(word), "{why}");
     }
     assert!(refused("NBK7_SCHOTT", "NOGLASS_SCHOTT").contains("line 10"));
     assert!(refused("S 20.0 3.0", "S twenty 3.0").contains("`twenty` is not a number"));

@@ -362,10 +362,15 @@ fn signed(sense: f64, value: f64) -> f64 {
     if value == 0.0 { value } else { sense * value }
 }
 
-/// The axes behind the coordinate breaks that come next.
-fn after_breaks(axes: Axes, rows: &[SheetRow], unit: f64) -> Axes {
-    let breaks = rows.iter().take_while(|row| row.shape == SurfaceShape::CoordinateBreak);
-    breaks.fold(axes, |axes, row| axes.broken(&row.coordinate_break(unit)))
+/// The axes behind the coordinate breaks that come next, up to one from which light goes on a way.
+fn after_breaks(mut axes: Axes, rows: &[SheetRow], unit: f64) -> Axes {
+    for row in rows.iter().take_while(|row| row.shape == SurfaceShape::CoordinateBreak) {
+        axes = axes.broken(&row.coordinate_break(unit));
+        if row.thickness != 0.0 {
+            break;
+        }
+    }
+    axes
 }
 
 fn check_turn(row: &SheetRow, here: &Axes) -> Result<(), ZemaxError> {

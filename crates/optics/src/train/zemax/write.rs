@@ -139,8 +139,9 @@ fn placed(element: &ElementSpec, mut row: Row, rows: &mut Vec<Row>) {
         };
         rows.extend([turn(1), turn(0)]);
         let mut back = Row::new("COORDBRK");
-        back.parameter(1, -mount.decentre[0].0);
-        back.parameter(2, -mount.decentre[1].0);
+        for (i, length) in mount.decentre.iter().enumerate().filter(|(_, length)| length.0 != 0.0) {
+            back.parameter(i + 1, -length.0);
+        }
         back.thickness = mount.thickness.0;
         rows.push(back);
     } else {

@@ -1,0 +1,4 @@
+#![no_main]
+//! `seq` of `tests/fuzz`.
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| etendue_fuzz::guided::read("seq", data));
