@@ -58,6 +58,11 @@ pub fn read(bytes: &[u8], limits: Limits) -> Result<RawDng, String> {
             break;
         }
         let directory = file.directory(at)?;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a cast saturates"
+        )]
         open.extend(directory.all(330)?.into_iter().map(|at| at as usize));
         exposure = exposure.or(directory.first(33_434)?);
         // Neither a preview nor a mask.
@@ -272,6 +277,7 @@ impl Directory<'_> {
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_possible_truncation, reason = "small files")]
 mod tests {
     use super::*;
 

@@ -71,8 +71,8 @@ mod tests {
             // Sums of at most ten numbers of 10³.
             assert!((gained - share * wells * (well - dark)).abs() < 1e-9, "{share}: {gained}");
             let full = column.iter().filter(|v| (**v - (well - dark)).abs() < 1e-9).count();
-            let expected = 2 * (share * wells / 2.0).floor() as usize;
-            assert_eq!(full, expected, "{share} of {wells}");
+            let expected = 2.0 * (share * wells / 2.0_f64).floor();
+            assert_eq!(full as f64, expected, "{share} of {wells}");
             assert_eq!(column[19], column[21]);
             assert!(frame.values.iter().step_by(width).all(|&v| v == 0.0), "other columns");
         }

@@ -1,5 +1,7 @@
 //! Calibration sets of a scene's camera, and photographs matched by it.
 
+#![expect(clippy::cast_possible_truncation, reason = "pixels of a small picture")]
+
 use serde_json::{Value, json};
 
 use crate::run::{Bench, read_npy, text};

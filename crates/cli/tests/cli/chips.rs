@@ -76,7 +76,7 @@ fn all_frames_have_the_exposure_of_the_first() {
 #[test]
 fn maps_of_defects_are_read() {
     let numbers = |at: usize| match at {
-        9 => 2,
+        9 => 2_u8,
         20 => 3,
         _ => 0,
     };
@@ -101,12 +101,12 @@ fn maps_of_defects_are_read() {
         header.push('\n');
         let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
         bytes.extend(header.bytes());
-        (0..48).for_each(|at| bytes.extend((numbers(at) as f32).to_le_bytes()));
+        (0..48).for_each(|at| bytes.extend(f32::from(numbers(at)).to_le_bytes()));
         bench.write("map.npy", &bytes);
     };
     for map in ["map.png", "map.npy"] {
         let bench = with(map);
-        png(&bench, [8, 6], &|at| numbers(at) as u8);
+        png(&bench, [8, 6], &|at| numbers(at));
         npy(&bench);
         bench.render(&[]);
         let raw = bench.array("raw");

@@ -1,5 +1,7 @@
 //! Photographs matched: hidden parameters are found again, with the deviations that are stated.
 
+#![expect(clippy::cast_possible_truncation, reason = "films hold f32, numbers 16 bits")]
+
 use etendue_sensor::matching::{MatchError, Matched, Photograph};
 use etendue_sensor::{Exposure, Film, Sensor, SensorSpec};
 use serde_json::{Value, json};

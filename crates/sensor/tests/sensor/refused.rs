@@ -32,7 +32,7 @@ fn iso_settings() {
 
 #[test]
 fn numbers_out_of_range() {
-    for (keys, word) in [
+    each_is_refused(&[
         (json!({ "quantum_efficiency": 1.01 }), "the curve is 1.01 at every wavelength"),
         (json!({ "quantum_efficiency": -0.1 }), "must lie in 0..=1"),
         (json!({ "quantum_efficiency": [[400, 0.5], [500, 1.5]] }), "1.5 at 500 nm"),
@@ -66,6 +66,26 @@ fn numbers_out_of_range() {
         (json!({ "dead_pixels": -0.1 }), "sensor.dead_pixels: expected a fraction"),
         (json!({ "dead_pixels": 0.6, "stuck_pixels": 0.6 }), "all of them at most together"),
         (json!({ "crosstalk": 0.3 }), "four neighbours"),
+        (json!({ "analog_gain": 0 }), "sensor.analog_gain: expected a factor"),
+        (json!({ "converter_noise": -1 }), "sensor.converter_noise: expected DN"),
+        (json!({ "iso": 100 }), "sensor.iso_settings: is missing"),
+        (
+            json!({ "iso_settings": [{ "iso": 100, "system_gain": 1 }] }),
+            "sensor.system_gain: is of no use",
+        ),
+        (
+            json!({ "hot_pixels": { "share": 2, "dark_current": 1 } }),
+            "hot_pixels.share: expected a fraction in 0..=1, found 2",
+        ),
+        (json!({ "resolution": [0, 5] }), "sensor.resolution: expected "),
+        (json!({ "resolution": [70000, 5] }), "1 to 65535"),
+        (json!({ "pixel_pitch": 0 }), "sensor.pixel_pitch: expected "),
+    ]);
+}
+
+#[test]
+fn parts_of_chips_out_of_range() {
+    each_is_refused(&[
         (
             json!({ "blooming": 1.5, "system_gain": 1, "full_well": 9 }),
             "sensor.blooming: expected a fraction",
@@ -128,21 +148,12 @@ fn numbers_out_of_range() {
             json!({ "system_gain": 1, "second_readout": { "type": "dual_gain", "system_gain": 0 } }),
             "sensor.second_readout: expected DN per electron",
         ),
-        (json!({ "analog_gain": 0 }), "sensor.analog_gain: expected a factor"),
-        (json!({ "converter_noise": -1 }), "sensor.converter_noise: expected DN"),
-        (json!({ "iso": 100 }), "sensor.iso_settings: is missing"),
-        (
-            json!({ "iso_settings": [{ "iso": 100, "system_gain": 1 }] }),
-            "sensor.system_gain: is of no use",
-        ),
-        (
-            json!({ "hot_pixels": { "share": 2, "dark_current": 1 } }),
-            "hot_pixels.share: expected a fraction in 0..=1, found 2",
-        ),
-        (json!({ "resolution": [0, 5] }), "sensor.resolution: expected "),
-        (json!({ "resolution": [70000, 5] }), "1 to 65535"),
-        (json!({ "pixel_pitch": 0 }), "sensor.pixel_pitch: expected "),
-    ] {
+    ]);
+}
+
+/// Keys of a raw sensor, each with words of its refusal.
+fn each_is_refused(all: &[(Value, &str)]) {
+    for (keys, word) in all {
         let mut spec = json!({ "type": "raw", "system_gain": 1.0 });
         for (key, value) in keys.as_object().unwrap() {
             spec[key] = value.clone();
