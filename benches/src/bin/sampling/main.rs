@@ -120,7 +120,9 @@ fn main() -> anyhow::Result<()> {
     let studies: Vec<Study> = names.iter().map(open).collect::<Result<_, _>>()?;
     let uniform: Vec<Vec<PicturePairs>> = studies
         .iter()
-        .map(|study| effort.counts.iter().map(|n| PicturePairs::of(study, json!(n), effort.pairs)).collect())
+        .map(|study| {
+            effort.counts.iter().map(|n| PicturePairs::of(study, json!(n), effort.pairs)).collect()
+        })
         .collect();
     let noise = noise_table(&effort, &names, &studies, &uniform);
     text += &noise.text;

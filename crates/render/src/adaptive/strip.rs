@@ -249,7 +249,11 @@ impl StripOfPixels<'_> {
             let next = match needs > have {
                 true => {
                     let few = have + (have / STEP).max(2);
-                    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturated")]
+                    #[expect(
+                        clippy::cast_possible_truncation,
+                        clippy::cast_sign_loss,
+                        reason = "saturated"
+                    )]
                     let many = have.saturating_add((GROWTH * f64::from(have)) as u32).max(few);
                     needs.clamp(few, many).next_multiple_of(2).min(most.max(have))
                 }
