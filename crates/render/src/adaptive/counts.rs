@@ -175,7 +175,7 @@ mod tests {
     #[test]
     fn a_picture_of_few_flashes_cannot_be_judged() {
         let flashes = |every: usize| {
-            picture((0..4096).map(move |k| if k % every == 0 { 30.0 } else { 0.01 }))
+            picture((0..4096).map(move |k| if k % every == 0 { 300.0 } else { 0.01 }))
         };
         assert!(flashes(1024).is_unjudged() && !flashes(64).is_unjudged());
         assert!(flashes(1024).notes()[0].contains("cannot be judged"));

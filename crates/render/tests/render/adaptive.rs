@@ -131,69 +131,6 @@ fn what_stopped_too_early_is_counted_and_said() {
     }
 }
 
-/// Light that covers a thousandth, a fiftieth or a seventeenth of each pixel of the left half of a picture (the edge of
-/// a lamp) and all of the right half, with the fewest samples that there may be: how large the variance of each pixel is
-/// with its number of samples is known, and so which blocks stopped with more than twice of what is allowed. What is told
-/// of them is within a factor of 1.5 in the sum over seeds, or the pictures say that they cannot be judged.
-#[test]
-fn how_much_stopped_too_early_is_told_truly() {
-    let ([width, height], fraction, most) = ([96_u32, 32_u32], 0.1, 4096);
-    // One sample of each has some 400 times the variance that is allowed.
-    for (share, radiance) in [(0.001, 1.65), (0.02, 0.37), (0.06, 0.21)] {
-        let samples = json!({ "until": "sensor-noise", "fraction": fraction, "max": most });
-        let render = json!({ "samples": samples, "sampler": "independent" });
-        let mut value = strips([width, height], share, &render);
-        for column in width / 2..width {
-            value["objects"][column as usize]["width"] = json!(1.0);
-        }
-        value["camera"]["sensor"] = json!({ "type": "rgb", "resolution": [width, height],
-            "pixel_pitch": 2.4, "bit_depth": 12, "system_gain": 1.0, "read_noise": 30, "exposure": 0.01,
-            "quantum_efficiency": 0.6, "full_well": 50000 });
-        value["tracer"] = json!({ "type": "direct" });
-        value["materials"]["white"] =
-            json!({ "type": "emissive", "radiance": [radiance, radiance, radiance] });
-        let mut scene = loaded(value);
-        let sensor = scene.sensor.clone().unwrap().in_bands(etendue_spectrum::Bands::Rgb).unwrap();
-        let floor = sensor.noise_floor(0.01).unwrap();
-        let white = [0, 1, 2]
-            .map(|channel| floor.electrons_per_unit(channel).map(|e| e * radiance).sum::<f64>());
-        // Of one sample of a pixel of the left half.
-        let of_channel = |white: f64| {
-            let of_one = share * (1.0 - share) * (floor.slope(share * white) * white).powi(2);
-            of_one / floor.variance(share * white) / fraction
-        };
-        let of_one = white.map(of_channel).iter().sum::<f64>() / 3.0;
-        let plan = Plan::new(&scene, Outputs::NONE);
-        let (accel, images) = prepare(&scene, &plan);
-        let (mut told, mut early, mut given_up, mut unjudged, mut pixels) = (0, 0, 0, 0, 0);
-        for seed in 0..8 {
-            scene.render.seed = seed;
-            let done = steps::trace(&scene, &plan, &*accel, &images);
-            let numbers = layer(&done.picture, "SampleCount");
-            for (x, y) in (0..height / 8).flat_map(|y| (0..width / 16).map(move |x| (x, y))) {
-                let number = |k: u32| numbers[((8 * y + k / 8) * width + 8 * x + k % 8) as usize];
-                let done: Vec<f64> = (0..64).map(number).filter(|n| *n < f64::from(most)).collect();
-                let variance = done.iter().map(|n| of_one / n).sum::<f64>() / done.len() as f64;
-                early += if variance > 2.0 { done.len() as u64 } else { 0 };
-            }
-            let counts = done.sample_counts.unwrap();
-            told += counts.over;
-            given_up += counts.given_up;
-            unjudged += u32::from(counts.is_unjudged());
-            pixels += counts.pixels;
-        }
-        let [told, early, given_up] =
-            [told, early, given_up].map(|count| 100.0 * count as f64 / pixels as f64);
-        println!(
-            "{share}, {of_one:.0}: told {told:.2} %, are {early:.2} %, {given_up:.2} % given up, {unjudged} of 8 cannot \
-             be judged"
-        );
-        // One in a hundred is not worth a word.
-        let is_true = (early - 1.0) / 1.5 <= told && told <= 1.5 * early + 1.0;
-        assert!(is_true || unjudged > 6, "{share}: {told} {early} {unjudged}");
-    }
-}
-
 /// A caustic behind a ball of glass under a lamp of 4 mm: whose paths are so rare that seeds differ by more than a
 /// quarter of the floor's light there. Pictures say that they cannot be judged, or what of them is not reached.
 #[test]

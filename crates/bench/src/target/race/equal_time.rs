@@ -7,6 +7,9 @@ use crate::target::{AS_IT_IS, EqualTime, Outcome, Run, Strip, Verified};
 /// The most settings that are shown: the scene as it is, the soonest, and those next to it.
 const MOST: usize = 4;
 
+/// The share of a render's time that its samples take, at least.
+const LEAST_OF_SAMPLES: f64 = 0.1;
+
 /// Side of what is shown of the picture, at most (pixels).
 const SIDE: usize = 192;
 
@@ -64,7 +67,9 @@ impl<E: From<BenchError>> Race<'_, E> {
 fn within(points: &[super::Point], seconds: f64) -> Option<Forecast> {
     let (one, two) = apart(points)?;
     let [n, m] = [one, two].map(|point| f64::from(point.samples));
-    let slope = ((two.seconds - one.seconds) / (m - n)).max(1e-9);
+    // Two short times may be alike by chance: a tenth of the longer one is its samples', at least.
+    let least = LEAST_OF_SAMPLES * two.seconds / m;
+    let slope = ((two.seconds - one.seconds) / (m - n)).max(least).max(f64::MIN_POSITIVE);
     let samples = (m + (seconds - two.seconds) / slope).clamp(1.0, super::MOST_SAMPLES);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to a million")]
     Some(Forecast { samples: samples as u32, seconds })
@@ -128,6 +133,9 @@ mod tests {
         assert!((199..=200).contains(&found.samples), "{found:?}");
         assert_eq!(within(&[point(4), point(16)], 0.1).unwrap().samples, 1);
         assert_eq!(within(&[point(4)], 1.0), None);
+        // Times that do not differ are no reason for a million.
+        let same = [4, 16].map(|samples| Point { samples, seconds: 0.5, square: 0.0 });
+        assert_eq!(within(&same, 1.0).unwrap().samples, 176);
     }
 
     /// Of a wide picture the part is shown where the second differs, in the grey of the converged one's white.
