@@ -40,6 +40,9 @@ const MOST: u32 = 1024;
 /// The pair of random numbers whose first is a sample's time, as the picture has it.
 const TIME_PAIR: u32 = u32::MAX;
 
+/// Bytes that a pixel takes: the pairs of three mattes.
+pub(super) const BYTES_A_PIXEL: u64 = (3 * 2 * RANKS * size_of::<f32>()) as u64;
+
 /// Rows that are traced before a stop is heard.
 const ROWS: u32 = 16;
 
@@ -191,7 +194,7 @@ impl Tracing<'_> {
             self.camera.sample_rays(&film, &mut rays);
             self.accel.closest(&rays.rays, &mut hits);
             // Lenses may give the rays in another order than the samples.
-            let mut order: Vec<usize> = (0..rays.len()).collect();
+            let mut order: Vec<usize> = (0..rays.rays.len()).collect();
             order.sort_by_key(|&ray| rays.sample[ray]);
             let mut own = order.iter().copied().peekable();
             for end in (1..=pixels.len()).map(|k| k * self.samples as usize) {
