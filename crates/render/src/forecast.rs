@@ -12,7 +12,7 @@ use crate::images::{environment, wanted_images};
 use crate::light_field::refocused_bytes;
 use crate::output::Outputs;
 use crate::samples::BYTES_OF_SUM;
-use crate::{Plan, denoise, diffraction, expose};
+use crate::{Plan, annotations, denoise, diffraction, expose};
 
 const F32: u64 = size_of::<f32>() as u64;
 const U16: u64 = size_of::<u16>() as u64;
@@ -40,6 +40,7 @@ pub(crate) fn forecast(scene: &Scene, plan: &Plan, outputs: Outputs) -> MemoryFo
     let look = if is_gone_over && outputs.png { picture + woven + PNG } else { 0 };
     let png = if outputs.png { PNG } else { 0 };
     let denoised = if plan.denoised { denoise::BYTES } else { 0 };
+    let told_apart = annotations::bytes_a_pixel(outputs);
     let sensor = scene.sensor.as_ref().filter(|_| scene.picture.is_some());
     let sensor = sensor.map_or(0, |sensor| bytes_of_sensor(scene, sensor, plan));
     let film: u64 = plan.layers.iter().map(|layer| bytes_of_layer(*layer, plan)).sum();
@@ -51,7 +52,11 @@ pub(crate) fn forecast(scene: &Scene, plan: &Plan, outputs: Outputs) -> MemoryFo
         film: each(film).saturating_add(diffraction::bytes(scene, plan)),
         sums: each(bytes_of_sums(plan) + slots),
         sensor: each(if sensor > 0 { sensor.max(woven) } else { 0 }),
-        files: each(look.max(png + denoised).max(if sensor > 0 { 0 } else { woven })),
+        files: each(look.max(png + denoised).max(told_apart).max(if sensor > 0 {
+            0
+        } else {
+            woven
+        })),
         views: views(scene, plan, outputs),
         ..MemoryForecast::of(scene)
     }

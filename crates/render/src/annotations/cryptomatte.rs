@@ -40,6 +40,9 @@ const MOST: u32 = 1024;
 /// The pair of random numbers whose first is a sample's time, as the picture has it.
 const TIME_PAIR: u32 = u32::MAX;
 
+/// Bytes that a pixel takes: the pairs of three mattes.
+pub(super) const BYTES_A_PIXEL: u64 = (3 * 2 * RANKS * size_of::<f32>()) as u64;
+
 /// Rows that are traced before a stop is heard.
 const ROWS: u32 = 16;
 

@@ -153,6 +153,14 @@ pub struct Pose {
     pub model: String,
 }
 
+/// Bytes that a pixel takes while its annotations are made.
+pub(crate) fn bytes_a_pixel(outputs: Outputs) -> u64 {
+    let survey = if outputs.annotates() { survey::BYTES_A_PIXEL } else { 0 };
+    let mattes = if outputs.cryptomatte { cryptomatte::BYTES_A_PIXEL } else { 0 };
+    // One after the other.
+    survey.max(mattes)
+}
+
 /// Why `scene` has no such annotations, with the remedy; `None` where it has what `outputs` ask for.
 #[must_use]
 pub fn refusal(scene: &Scene, outputs: Outputs) -> Option<String> {

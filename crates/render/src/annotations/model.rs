@@ -156,7 +156,7 @@ impl Solid {
 struct Part {
     bounds: Bounds,
     points: Vec<DVec3>,
-    halves: Option<Box<[Part; 2]>>,
+    halves: Option<Box<[Self; 2]>>,
 }
 
 impl Part {

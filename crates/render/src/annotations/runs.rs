@@ -54,8 +54,7 @@ impl Mask {
         let mut digits = self.counts.bytes();
         while digits.len() > 0 {
             let (mut value, mut shift) = (0_i64, 0);
-            loop {
-                let Some(digit) = digits.next().map(|byte| i64::from(byte) - 48) else { break };
+            while let Some(digit) = digits.next().map(|byte| i64::from(byte) - 48) {
                 if shift < 60 {
                     value |= (digit & 0x1f) << shift;
                 }
@@ -68,7 +67,7 @@ impl Mask {
                 }
             }
             if let Some(before) = lengths.len().checked_sub(2).filter(|_| lengths.len() > 2) {
-                value += lengths[before];
+                value = value.saturating_add(lengths[before]);
             }
             lengths.push(value);
         }

@@ -22,6 +22,10 @@ use crate::{Plan, RenderError};
 /// and so on.
 const DEPTH_STEP: f64 = 0.1;
 
+/// Bytes that a pixel takes: copy and depth, once by columns and once together, and steps of depth as numbers and as the
+/// bytes of a file.
+pub(super) const BYTES_A_PIXEL: u64 = 2 * (4 + 8 + 4) + 2 + 2;
+
 /// Which copy each pixel sees, and how far away, down the columns.
 struct Seen {
     /// Index of the copy, or [`MISS`].
