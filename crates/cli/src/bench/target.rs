@@ -109,7 +109,7 @@ fn recorded(rendering: &Rendering) -> Result<(Vec<f64>, [usize; 3]), etendue::Er
     }
     let name = if rendering.layer(denoise::DENOISED).is_some() { denoise::DENOISED } else { "" };
     let channels = rendering.layer(name).map_or(&[][..], |layer| &layer.channels);
-    let [width, height] = rendering.resolution().map(|side| side as usize);
+    let [width, height] = rendering.resolution();
     let of_pixel = |i: usize| channels.iter().map(move |channel| channel.values.at(i).min(1.0));
     Ok(((0..width * height).flat_map(of_pixel).collect(), [width, height, channels.len()]))
 }
