@@ -41,7 +41,8 @@ pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
         })?;
         match ZemaxLens::is_named(path) {
             true => {
-                let refused = |why: String| Fault::refused(format!("--save {}: {why}", path.display()));
+                let refused =
+                    |why: String| Fault::refused(format!("--save {}: {why}", path.display()));
                 let text = file.to_zemax().map_err(refused)?;
                 to.write(path, |part| part.write_all(text.as_bytes()))?;
             }

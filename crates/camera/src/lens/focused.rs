@@ -101,7 +101,8 @@ impl Focused {
             .losses
             .check()
             .map_err(|(key, why)| CameraError::new(format!("losses.{key}"), why))?;
-        let train = stopped(train, setup)?.with_sensor(mount(setup)?).with_losses(setup.losses.clone());
+        let train =
+            stopped(train, setup)?.with_sensor(mount(setup)?).with_losses(setup.losses.clone());
         let unfocused = |fault: FocusError| {
             let key = match focus {
                 Focus::Sensor(_) => "sensor_distance",

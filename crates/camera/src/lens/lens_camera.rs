@@ -243,8 +243,12 @@ impl LensCamera {
     pub(super) fn runs_apart(&self) -> bool {
         let train = self.focused.train();
         let losses = train.losses();
-        let coated = matches!(losses.reflection, Some(Reflection::Coated(_) | Reflection::Stack(_)))
-            || train.elements().iter().any(|e| e.part.mirror().is_some_and(|m| m.coating.is_some()));
+        let coated =
+            matches!(losses.reflection, Some(Reflection::Coated(_) | Reflection::Stack(_)))
+                || train
+                    .elements()
+                    .iter()
+                    .any(|e| e.part.mirror().is_some_and(|m| m.coating.is_some()));
         let absorbs =
             losses.absorption && train.media().iter().any(|g| g.absorption(550.0).is_some());
         !self.one_wavelength && (coated || absorbs || train.is_dispersive())

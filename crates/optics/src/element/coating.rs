@@ -82,7 +82,9 @@ fn films(layers: &[LayerSpec]) -> Result<Stack, String> {
         let error = |why: String| format!("layers[{i}]: {why}");
         let thickness = layer.thickness.0;
         if !(0.0..=1e5).contains(&thickness) {
-            return Err(error(format!("thickness is {thickness} nm; it must be from 0 to 100000 nm")));
+            return Err(error(format!(
+                "thickness is {thickness} nm; it must be from 0 to 100000 nm"
+            )));
         }
         Ok((index(layer.index, layer.extinction).map_err(error)?, thickness))
     };
@@ -130,7 +132,12 @@ impl Stack {
     /// The shares of light of a wavelength (nm) that are reflected and let through from an index before into one behind, at
     /// this cosine of incidence.
     #[must_use]
-    pub fn shares(&self, [before, behind]: [Complex64; 2], cosine: f64, wavelength: f64) -> [f64; 2] {
+    pub fn shares(
+        &self,
+        [before, behind]: [Complex64; 2],
+        cosine: f64,
+        wavelength: f64,
+    ) -> [f64; 2] {
         let sine = before * (1.0 - cosine * cosine).max(0.0).sqrt();
         // Of the two roots that in which light behind goes on and fades.
         let cosine_in = |n: Complex64| {
@@ -223,9 +230,15 @@ mod tests {
             let spec: StackSpec = serde_json::from_str(json).unwrap();
             spec.build().unwrap_err()
         };
-        assert!(error(r#"{"layers": [{"index": 0, "thickness": 1}]}"#).contains("layers[0]: index is 0"));
-        assert!(error(r#"{"layers": [{"index": 1, "thickness": -1}]}"#).contains("thickness is -1"));
-        let metal: MirrorCoatingSpec = serde_json::from_str(r#"{"index": 1, "extinction": -2}"#).unwrap();
+        assert!(
+            error(r#"{"layers": [{"index": 0, "thickness": 1}]}"#)
+                .contains("layers[0]: index is 0")
+        );
+        assert!(
+            error(r#"{"layers": [{"index": 1, "thickness": -1}]}"#).contains("thickness is -1")
+        );
+        let metal: MirrorCoatingSpec =
+            serde_json::from_str(r#"{"index": 1, "extinction": -2}"#).unwrap();
         assert!(metal.build().unwrap_err().contains("extinction is -2"));
     }
 }

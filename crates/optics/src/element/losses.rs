@@ -144,15 +144,22 @@ impl Loss {
         };
         // Layers are told from the air on; a spec that is none has been refused.
         let films = match &spec.reflection {
-            Some(Reflection::Stack(stack)) if in_air && reflects => stack.build().ok().map(|stack| {
-                let met = if indices[0] == 1.0 { stack } else { stack.reversed() };
-                (Films::Glass(met.into()), wavelength)
-            }),
+            Some(Reflection::Stack(stack)) if in_air && reflects => {
+                stack.build().ok().map(|stack| {
+                    let met = if indices[0] == 1.0 { stack } else { stack.reversed() };
+                    (Films::Glass(met.into()), wavelength)
+                })
+            }
             _ => None,
         };
         let absorption = absorption.filter(|_| spec.absorption).unwrap_or(0.0);
-        (reflects || absorption > 0.0)
-            .then_some(Self { indices, reflects, layer, absorption, films })
+        (reflects || absorption > 0.0).then_some(Self {
+            indices,
+            reflects,
+            layer,
+            absorption,
+            films,
+        })
     }
 
     /// Of a mirror with films, in a medium of this index, and what else is lost on the way to it.

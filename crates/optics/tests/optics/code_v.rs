@@ -52,7 +52,9 @@ fn curvatures_units_and_mirrors_are_as_the_file_says() {
 #[test]
 fn a_bend_folds_the_axis_and_a_return_tilts_the_mirror_alone() {
     let text = |command: &str| {
-        format!("RDM;LEN\nEPD 4\nDIM M\nWL 550\nREF 1\nYAN 0\nSO 0 1e13\nS -200 -50 REFL\n  STO\n  CIR 9\n  ADE 10\n  {command}\nSI 0 0\nGO\n")
+        format!(
+            "RDM;LEN\nEPD 4\nDIM M\nWL 550\nREF 1\nYAN 0\nSO 0 1e13\nS -200 -50 REFL\n  STO\n  CIR 9\n  ADE 10\n  {command}\nSI 0 0\nGO\n"
+        )
     };
     let bent = &elements(&text("BEN"))[0];
     assert_eq!(bent["fold"], true);
@@ -84,5 +86,9 @@ fn what_has_no_counterpart_and_what_is_cut_short_is_refused() {
     assert!(refused("EPD 10.0", "EPD -1").contains("EPD: -1 must be positive"));
     // What does not change the light's way is told.
     let lens = read(&TRIPLET.replace("REF 2", "REF 2\nWTW 1 1 1\nVUY 0 0.1 0.2")).unwrap();
-    assert!(lens.notes.iter().any(|note| note.contains("WTW") && note.contains("VUY")), "{:?}", lens.notes);
+    assert!(
+        lens.notes.iter().any(|note| note.contains("WTW") && note.contains("VUY")),
+        "{:?}",
+        lens.notes
+    );
 }

@@ -208,7 +208,9 @@ fn lenses_come_back_from_zemax_files_as_they_went() {
         r#"{"type": "surface", "radius": 40, "tilt": [2, -1], "decentre": [0.3, 0.1], "thickness": 3, "glass": "N-BK7", "semi_diameter": 8, "stop": true}"#,
     ];
     for element in more {
-        let text = format!(r#"{{"elements": [{element}, {{"type": "surface", "radius": -90, "thickness": 40, "semi_diameter": 9}}]}}"#);
+        let text = format!(
+            r#"{{"elements": [{element}, {{"type": "surface", "radius": -90, "thickness": 40, "semi_diameter": 9}}]}}"#
+        );
         files.push(LensFile::from_json(&text).unwrap());
     }
     let tilted = r#"{"sensor": {"tilt": [3, 0], "decentre": [0, 1]}, "elements": [{"type": "mirror", "radius": -200, "tilt": [5, 3], "fold": true, "thickness": -100, "semi_diameter": 8, "stop": true}]}"#;
@@ -219,7 +221,11 @@ fn lenses_come_back_from_zemax_files_as_they_went() {
         let text = file.to_zemax().unwrap_or_else(|why| panic!("{}: {why}", file.name));
         let back = ZemaxLens::read(text.as_bytes(), &[]).unwrap_or_else(|e| panic!("{e}\n{text}"));
         let after = build(&back.file);
-        assert_eq!((before.elements().len(), before.stop()), (after.elements().len(), after.stop()), "{text}");
+        assert_eq!(
+            (before.elements().len(), before.stop()),
+            (after.elements().len(), after.stop()),
+            "{text}"
+        );
         for (a, b) in before.elements().iter().zip(after.elements()) {
             assert_eq!(a.part, b.part, "{text}");
             // Sums of thicknesses, and sines of angles there and back.
@@ -229,9 +235,11 @@ fn lenses_come_back_from_zemax_files_as_they_went() {
         }
         let wavelength = before.wavelength();
         let lenses = [&before, &after].map(|train| train.at(wavelength).unwrap());
-        let reach = 0.4 * before.paraxial(wavelength).unwrap().entrance_pupil.diameter.unwrap_or(4.0);
+        let reach =
+            0.4 * before.paraxial(wavelength).unwrap().entrance_pupil.diameter.unwrap_or(4.0);
         for i in 0..50_u32 {
-            let place = DVec3::new(reach * (f64::from(i)).sin(), reach * (1.7 * f64::from(i)).cos(), -30.0);
+            let place =
+                DVec3::new(reach * (f64::from(i)).sin(), reach * (1.7 * f64::from(i)).cos(), -30.0);
             let ray = Ray::new(place, DVec3::new(0.01, 0.0, 1.0)).unwrap();
             let [a, b] = lenses.each_ref().map(|at| at.run(Side::Object, Clip::On, ray));
             assert_eq!(a.status, b.status, "{text}");
@@ -250,9 +258,14 @@ fn what_zemax_files_have_no_counterpart_for_is_refused_by_its_element() {
         (r#"{"type": "aperture", "shape": "polygon", "radius": 1, "blades": 5}"#, "not circular"),
         (r#"{"type": "surface", "glass": {"cauchy": [1.5]}}"#, "AGF"),
         (r#"{"type": "mirror", "reflectance": 0.9}"#, "reflects"),
-        (r#"{"type": "freeform", "sag": [{"type": "q_con", "radius": 1, "coefficients": [1]}]}"#, "added"),
+        (
+            r#"{"type": "freeform", "sag": [{"type": "q_con", "radius": 1, "coefficients": [1]}]}"#,
+            "added",
+        ),
     ] {
-        let file = LensFile::from_json(&format!(r#"{{"elements": [{{"type": "surface"}}, {element}]}}"#)).unwrap();
+        let file =
+            LensFile::from_json(&format!(r#"{{"elements": [{{"type": "surface"}}, {element}]}}"#))
+                .unwrap();
         let why = file.to_zemax().unwrap_err();
         assert!(why.starts_with("elements[1]: ") && why.contains(word), "{why}");
     }

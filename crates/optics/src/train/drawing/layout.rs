@@ -115,11 +115,10 @@ pub(super) fn fan(
     let radius =
         report.paraxial.entrance_pupil.diameter.map_or(0.2 * train.lateral_scale(), |d| 0.5 * d);
     let across = DVec3::new(0.0, chief.direction.z, -chief.direction.y);
-    let lit =
-        |offset: f64| {
-            let position = chief.position + across * offset;
-            trace(train, at, (position, chief.direction), (end, spaces))
-        };
+    let lit = |offset: f64| {
+        let position = chief.position + across * offset;
+        trace(train, at, (position, chief.direction), (end, spaces))
+    };
     // Where the beam ends on both sides of its chief ray, to a percent of the pupil.
     let edge = |side: f64| {
         let mut steps = (0..=200).rev().map(|i| side * radius * 0.01 * f64::from(i));

@@ -22,8 +22,8 @@ const LETTERS: [&str; 9] = ["A", "B", "C", "D", "E", "F", "G", "H", "J"];
 
 /// Commands that would change the light's way and have no counterpart.
 const NOT_TAKEN: [&str; 24] = [
-    "CYL", "XTO", "YTO", "AAS", "DIF", "GRT", "GRO", "GRX", "GRY", "GRZ", "DOE", "HOE", "SPS", "UDS", "ZRN", "XDD", "YDD",
-    "GRN", "RET", "REV", "ZDE", "GLB", "NSS", "MFL",
+    "CYL", "XTO", "YTO", "AAS", "DIF", "GRT", "GRO", "GRX", "GRY", "GRZ", "DOE", "HOE", "SPS",
+    "UDS", "ZRN", "XDD", "YDD", "GRN", "RET", "REV", "ZDE", "GLB", "NSS", "MFL",
 ];
 
 /// What is read of one surface before it becomes rows.
@@ -107,7 +107,9 @@ impl ZemaxSheet {
                 continue;
             }
             match word.as_str() {
-                "RDM" => by_radius = !command.words.get(1).is_some_and(|yes| yes.starts_with(['N', 'n'])),
+                "RDM" => {
+                    by_radius = !command.words.get(1).is_some_and(|yes| yes.starts_with(['N', 'n']))
+                }
                 "LEN" | "GO" => {}
                 "S" | "SO" | "SI" => {
                     if let Some(surface) = surface.take() {
@@ -120,7 +122,9 @@ impl ZemaxSheet {
                 }
                 _ => {
                     let known = match &mut surface {
-                        Some(surface) => surface.read(&word, &command)? || sheet.header(&word, &command)?,
+                        Some(surface) => {
+                            surface.read(&word, &command)? || sheet.header(&word, &command)?
+                        }
                         None => sheet.header(&word, &command)?,
                     };
                     if !known {
@@ -135,7 +139,9 @@ impl ZemaxSheet {
                 let why = "the file ends before its image (SI): it is cut short";
                 return Err(ZemaxError::new(sheet.last_line.max(1), why));
             }
-            None => return Err(ZemaxError::new(1, "no SO in the file; is it a CODE V lens (.seq)?")),
+            None => {
+                return Err(ZemaxError::new(1, "no SO in the file; is it a CODE V lens (.seq)?"));
+            }
         }
         Ok(sheet)
     }
@@ -162,10 +168,20 @@ impl ZemaxSheet {
                 let micrometres = command.numbers()?.into_iter().map(|nm| nm * 1e-3);
                 self.set_wavelengths(micrometres.collect());
             }
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count, and it saturates")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a count, and it saturates"
+            )]
             "REF" => self.set_primary(command.number(1)? as usize),
-            "EPD" => self.aperture = Some((command.line, aperture(command.number(1)?, Aperture::EntrancePupil)?)),
-            "FNO" => self.aperture = Some((command.line, aperture(command.number(1)?, Aperture::FNumber)?)),
+            "EPD" => {
+                self.aperture =
+                    Some((command.line, aperture(command.number(1)?, Aperture::EntrancePupil)?))
+            }
+            "FNO" => {
+                self.aperture =
+                    Some((command.line, aperture(command.number(1)?, Aperture::FNumber)?))
+            }
             "NAO" => {
                 let sine = command.number(1)?;
                 if sine >= 1.0 {
@@ -215,14 +231,16 @@ fn begin(command: &Command<'_>, by_radius: bool) -> Result<Surface, ZemaxError> 
 fn glass(command: &Command<'_>, word: &str) -> Result<SheetGlass, ZemaxError> {
     let word = word.trim_matches(['\'', '"']);
     let line = command.line;
-    let model = |nd: f64, vd: f64| SheetGlass { line, name: word.to_owned(), model: Some([nd, vd]) };
+    let model =
+        |nd: f64, vd: f64| SheetGlass { line, name: word.to_owned(), model: Some([nd, vd]) };
     if let Some((nd, vd)) = word.split_once(':') {
         if let (Ok(nd), Ok(vd)) = (nd.parse::<f64>(), vd.parse::<f64>()) {
             return Ok(model(nd, vd));
         }
     }
     if let Some((index, abbe)) = word.split_once('.') {
-        let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+        let digits =
+            |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
         if digits(index) && digits(abbe) {
             let share = |text: &str| format!("0.{text}").parse::<f64>().unwrap_or(0.0);
             return Ok(model(1.0 + share(index), 100.0 * share(abbe)));

@@ -126,13 +126,8 @@ impl ZemaxLens {
         source: &str,
         glasses: &[AgfCatalogue],
     ) -> Result<Self, ZemaxError> {
-        let mut importer = Importer {
-            sheet,
-            glasses,
-            elements: Vec::new(),
-            notes: Vec::new(),
-            object_z: None,
-        };
+        let mut importer =
+            Importer { sheet, glasses, elements: Vec::new(), notes: Vec::new(), object_z: None };
         let sensor = importer.convert()?;
         let Importer { elements, mut notes, object_z, .. } = importer;
         if elements.is_empty() {

@@ -75,8 +75,7 @@ impl LensFile {
             "NAME {name}\nUNIT MM X W X CM MR CPMM\nFLOA\nWAVM 1 {:e} 1\nPWAV 1\n",
             wavelength * 1e-3
         );
-        let object =
-            Row { lines: vec!["TYPE STANDARD".to_owned()], thickness: f64::INFINITY };
+        let object = Row { lines: vec!["TYPE STANDARD".to_owned()], thickness: f64::INFINITY };
         let mut image = vec![Row::new("STANDARD")];
         if let Some(sensor) = self.sensor {
             let mount = crate::element::Mount {
@@ -154,7 +153,8 @@ fn placed(element: &ElementSpec, mut row: Row, rows: &mut Vec<Row>) {
 
 /// The row of an element between media.
 fn surface(element: &ElementSpec, before: Option<&GlassSpec>) -> Result<Row, String> {
-    let none = |what: &str| Err(format!("Zemax files have no counterpart for {what}; leave it out"));
+    let none =
+        |what: &str| Err(format!("Zemax files have no counterpart for {what}; leave it out"));
     let rim = |row: &mut Row, radius: Option<f64>| {
         if let Some(radius) = radius {
             row.push(format!("DIAM {radius:e} 1 0 0 1 \"\""));
@@ -274,7 +274,8 @@ fn powers(terms: &std::collections::BTreeMap<String, f64>) -> Result<Vec<(usize,
 }
 
 fn freeform(spec: &FreeformSpec) -> Result<Row, String> {
-    let none = |what: &str| Err(format!("Zemax files have no counterpart for {what}; leave it out"));
+    let none =
+        |what: &str| Err(format!("Zemax files have no counterpart for {what}; leave it out"));
     if spec.reflectance.is_some() || spec.hole.0 != 0.0 {
         return none("the hole or reflectance of a freeform mirror");
     }
@@ -282,7 +283,9 @@ fn freeform(spec: &FreeformSpec) -> Result<Row, String> {
     let evens = |row: &mut Row| {
         for (power, value) in &powers {
             if power % 2 == 1 || *power > 16 {
-                return Err(format!("the power {power} of r with what else this surface has has no counterpart in Zemax files"));
+                return Err(format!(
+                    "the power {power} of r with what else this surface has has no counterpart in Zemax files"
+                ));
             }
             row.parameter(power / 2, *value);
         }
@@ -325,7 +328,8 @@ fn freeform(spec: &FreeformSpec) -> Result<Row, String> {
             let mut values = Vec::new();
             for (key, value) in coefficients {
                 let number = key.parse::<usize>().ok().filter(|n| (1..=400).contains(n));
-                let number = number.ok_or_else(|| format!("sag[0]: no term has the number \"{key}\""))?;
+                let number =
+                    number.ok_or_else(|| format!("sag[0]: no term has the number \"{key}\""))?;
                 values.resize(values.len().max(number), 0.0);
                 values[number - 1] = *value;
             }
@@ -349,7 +353,8 @@ fn freeform(spec: &FreeformSpec) -> Result<Row, String> {
 }
 
 fn diffracting(phase: &PhaseSpec) -> Result<Row, String> {
-    let none = |what: &str| Err(format!("Zemax files have no counterpart for {what}; leave it out"));
+    let none =
+        |what: &str| Err(format!("Zemax files have no counterpart for {what}; leave it out"));
     if phase.blaze_wavelength.is_some() || phase.design_wavelength.is_some() {
         return none("a phase with a blaze_wavelength or design_wavelength");
     }
@@ -367,8 +372,8 @@ fn diffracting(phase: &PhaseSpec) -> Result<Row, String> {
             row.data(radius.0, coefficients);
             Ok(row)
         }
-        PatternSpec::Grating { .. } | PatternSpec::Polynomial { .. } | PatternSpec::Image { .. } => {
-            none("this pattern of phase")
-        }
+        PatternSpec::Grating { .. }
+        | PatternSpec::Polynomial { .. }
+        | PatternSpec::Image { .. } => none("this pattern of phase"),
     }
 }
