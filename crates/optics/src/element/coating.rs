@@ -18,7 +18,7 @@ const MOST_LAYERS: usize = 200;
 /// A film as a file writes it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct LayerSpec {
+pub struct ThinFilmSpec {
     /// Its index n.
     pub index: f64,
     /// Its coefficient of extinction k; 0 when absent.
@@ -33,7 +33,7 @@ pub struct LayerSpec {
 #[serde(deny_unknown_fields)]
 pub struct StackSpec {
     /// The films, that next to the air first.
-    pub layers: Vec<LayerSpec>,
+    pub layers: Vec<ThinFilmSpec>,
 }
 
 /// A metal or glass and the films on it, that reflect, as a file writes them.
@@ -47,7 +47,7 @@ pub struct MirrorCoatingSpec {
     pub extinction: f64,
     /// The films on it, that next to the light first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub layers: Vec<LayerSpec>,
+    pub layers: Vec<ThinFilmSpec>,
 }
 
 /// Films, ready to be asked.
@@ -74,11 +74,11 @@ fn index(n: f64, k: f64) -> Result<Complex64, String> {
     Ok(Complex64::new(n, -k))
 }
 
-fn films(layers: &[LayerSpec]) -> Result<Stack, String> {
+fn films(layers: &[ThinFilmSpec]) -> Result<Stack, String> {
     if layers.len() > MOST_LAYERS {
         return Err(format!("{} layers; {MOST_LAYERS} are the most", layers.len()));
     }
-    let film = |(i, layer): (usize, &LayerSpec)| {
+    let film = |(i, layer): (usize, &ThinFilmSpec)| {
         let error = |why: String| format!("layers[{i}]: {why}");
         let thickness = layer.thickness.0;
         if !(0.0..=1e5).contains(&thickness) {
@@ -185,7 +185,7 @@ mod tests {
             let spec = StackSpec {
                 layers: layers
                     .iter()
-                    .map(|&[index, extinction, thickness]| LayerSpec {
+                    .map(|&[index, extinction, thickness]| ThinFilmSpec {
                         index,
                         extinction,
                         thickness: Nanometres(thickness),
@@ -207,7 +207,7 @@ mod tests {
     #[test]
     fn without_absorption_nothing_is_lost_and_both_ways_are_alike() {
         let layers = [(1.38, 99.0), (2.1, 131.0), (1.62, 85.0)];
-        let layers = layers.map(|(index, nm)| LayerSpec {
+        let layers = layers.map(|(index, nm)| ThinFilmSpec {
             index,
             extinction: 0.0,
             thickness: Nanometres(nm),

@@ -40,7 +40,7 @@ pub use aperture::{
     ApertureSpec, CircularSpec, MaskSpec, Opening, Picture, PolygonSpec, grey_picture,
 };
 pub use biconic::{Biconic, BiconicSpec};
-pub use coating::{LayerSpec, MirrorCoating, MirrorCoatingSpec, Stack, StackSpec};
+pub use coating::{MirrorCoating, MirrorCoatingSpec, Stack, StackSpec, ThinFilmSpec};
 pub use freeform::{Freeform, FreeformSpec, HeightMapSpec, PatternSpec, PhaseSpec, SagSpec};
 pub use lattice::{Grid, Lattice, LatticeCell};
 pub(crate) use losses::Loss;
