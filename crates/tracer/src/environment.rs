@@ -2,7 +2,6 @@
 //!
 //! An image is a latitude–longitude map: its middle looks along −Z, its left and right edges along
 //! +Z, its top to +Y, and +X is right of the middle.
-#![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
 mod sampler;
 

@@ -24,7 +24,7 @@ pub struct Target {
 }
 
 /// All readers.
-pub const TARGETS: [Target; 23] = [
+pub const TARGETS: [Target; 24] = [
     Target { name: "gltf", run: gltf },
     Target { name: "glb", run: glb },
     Target { name: "obj", run: obj },

@@ -184,7 +184,7 @@ impl Fold {
     }
 
     /// The mirror's frame as light that comes from behind meets it, and the fold on its way.
-    pub(crate) fn from_behind(&self, frame: &Frame) -> (Frame, Self) {
+    pub(crate) fn seen_from_behind(&self, frame: &Frame) -> (Frame, Self) {
         let behind = self.frame_behind(frame);
         (behind, Self { axis: behind.rotation.z_axis, ..*self })
     }
@@ -239,9 +239,9 @@ impl Fold {
     /// Goes on with the rays of a block that were on their way, as `before` has it, and were reflected.
     #[inline(always)]
     pub(super) fn unfold(&self, block: &mut Block, before: &[u64; LANES], clip: Clip, ended: u64) {
-        for lane in 0..LANES {
+        for (lane, &before) in before.iter().enumerate() {
             let old = block.ray(lane);
-            let reflected = (before[lane] == 0) & (block.outcome[lane] == 0);
+            let reflected = (before == 0) & (block.outcome[lane] == 0);
             let stopped = reflected & (clip == Clip::On) & self.is_hole(old.position);
             let new = self.unfolded(old);
             let goes_on = reflected & !stopped;
@@ -297,6 +297,7 @@ impl Shadow {
             x * x + y * y
         };
         let within = square(self.rim[0]) <= self.rim[1];
-        within & !(square(self.hole[0]) < self.hole[1])
+        let through_hole = square(self.hole[0]) < self.hole[1];
+        within & !through_hole
     }
 }

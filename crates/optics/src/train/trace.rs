@@ -101,7 +101,7 @@ impl OpticalTrain {
                 steps.push(Step { element, frame, axial: frame.is_axial(), action, loss, fold });
             };
             add(&mut forward, towards_sensor, loss([before, behind], element), fold, placed.frame);
-            let (frame, fold) = match fold.map(|fold| fold.from_behind(&placed.frame)) {
+            let (frame, fold) = match fold.map(|fold| fold.seen_from_behind(&placed.frame)) {
                 Some((frame, fold)) => (frame, Some(fold)),
                 None => (placed.frame, None),
             };

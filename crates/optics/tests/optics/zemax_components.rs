@@ -57,9 +57,8 @@ fn a_newtonian_with_coordinate_breaks_is_the_one_of_the_lens_file() {
     for (a, b) in ours.elements().iter().zip(theirs.elements()) {
         assert_eq!(a.part, b.part);
         assert!((a.frame.vertex - b.frame.vertex).length() < 1e-12, "{a:?}");
-        for (x, y) in [(a.frame.rotation, b.frame.rotation)] {
-            assert!((x.z_axis - y.z_axis).length() < 1e-14);
-        }
+        let [x, y] = [a, b].map(|element| element.frame.rotation.z_axis);
+        assert!((x - y).length() < 1e-14);
     }
     let sensors = [&ours, &theirs].map(|train| {
         let z = train.sensor_z(etendue_optics::train::Focus::AsWritten).unwrap();

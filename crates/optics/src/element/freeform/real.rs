@@ -84,6 +84,7 @@ impl<T: Real> Sub for Dual<T> {
     }
 }
 
+#[expect(clippy::suspicious_arithmetic_impl, reason = "the rule of products")]
 impl<T: Real> Mul for Dual<T> {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
@@ -92,6 +93,7 @@ impl<T: Real> Mul for Dual<T> {
     }
 }
 
+#[expect(clippy::suspicious_arithmetic_impl, reason = "the rule of quotients")]
 impl<T: Real> Div for Dual<T> {
     type Output = Self;
     fn div(self, other: Self) -> Self {

@@ -108,7 +108,8 @@ impl ZemaxSheet {
             }
             match word.as_str() {
                 "RDM" => {
-                    by_radius = !command.words.get(1).is_some_and(|yes| yes.starts_with(['N', 'n']))
+                    by_radius =
+                        !command.words.get(1).is_some_and(|yes| yes.starts_with(['N', 'n']));
                 }
                 "LEN" | "GO" => {}
                 "S" | "SO" | "SI" => {
@@ -176,11 +177,11 @@ impl ZemaxSheet {
             "REF" => self.set_primary(command.number(1)? as usize),
             "EPD" => {
                 self.aperture =
-                    Some((command.line, aperture(command.number(1)?, Aperture::EntrancePupil)?))
+                    Some((command.line, aperture(command.number(1)?, Aperture::EntrancePupil)?));
             }
             "FNO" => {
                 self.aperture =
-                    Some((command.line, aperture(command.number(1)?, Aperture::FNumber)?))
+                    Some((command.line, aperture(command.number(1)?, Aperture::FNumber)?));
             }
             "NAO" => {
                 let sine = command.number(1)?;
@@ -233,10 +234,10 @@ fn glass(command: &Command<'_>, word: &str) -> Result<SheetGlass, ZemaxError> {
     let line = command.line;
     let model =
         |nd: f64, vd: f64| SheetGlass { line, name: word.to_owned(), model: Some([nd, vd]) };
-    if let Some((nd, vd)) = word.split_once(':') {
-        if let (Ok(nd), Ok(vd)) = (nd.parse::<f64>(), vd.parse::<f64>()) {
-            return Ok(model(nd, vd));
-        }
+    if let Some((nd, vd)) = word.split_once(':')
+        && let (Ok(nd), Ok(vd)) = (nd.parse::<f64>(), vd.parse::<f64>())
+    {
+        return Ok(model(nd, vd));
     }
     if let Some((index, abbe)) = word.split_once('.') {
         let digits =
