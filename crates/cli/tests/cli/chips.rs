@@ -289,7 +289,7 @@ fn what_a_camera_has_not_is_refused() {
     assert!(why.contains("photodiodes") && why.contains("from elsewhere"), "{why}");
     let rolling = json!({
         "camera": {
-            "type": "pinhole", "fov": 60, "shutter": { "type": "rolling", "exposure": 0.01, "row_time": 1e-5 },
+            "type": "pinhole", "fov": 60, "shutter": { "type": "rolling", "exposure": 0.01, "line_time": 1e-5 },
             "sensor": { "type": "raw", "resolution": [8, 6], "carrier_diffusion": 0.5 },
         },
     });

@@ -35,12 +35,12 @@ const ZMX: &[u8] = b"MODE SEQ\nENPD 8\nFTYP 0 0 1 1\nYFLN 0\nWAVL 0.55\nSURF 0\n
                      SURF 1\n  TYPE STANDARD\n  STOP\n  CURV 0.02\n  DISZ 4\n  GLAS ___BLANK 1 0 1.5 60\n  DIAM 4\n\
                      SURF 2\n  TYPE STANDARD\n  CURV -0.02\n  DISZ 48\n  DIAM 4\nSURF 3\n  TYPE STANDARD\n  DISZ 0\n";
 
-/// A grey picture of one level.
-fn grey() -> Vec<u8> {
+/// A grey picture of 2 × 2 pixels of one level.
+fn grey(level: u8) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, 2, 2);
     encoder.set_color(png::ColorType::Grayscale);
-    encoder.write_header().unwrap().write_image_data(&[255; 4]).unwrap();
+    encoder.write_header().unwrap().write_image_data(&[level; 4]).unwrap();
     bytes
 }
 
@@ -205,7 +205,7 @@ fn inputs() -> Vec<Input> {
     add(lens_keys, in_file, &[("lens.json", &written)], vec![longer(&written)]);
     let in_zemax = scene(&camera(&json!("lens.zmx")));
     add(lens_keys, in_zemax, &[("lens.zmx", ZMX)], vec![longer(ZMX)]);
-    let grey = grey();
+    let grey = grey(255);
     let mask: [(&str, &[u8]); 1] = [("mask.png", &grey)];
     let masked = through(
         &json!({"type": "aperture", "shape": "image", "file": "mask.png", "width": 4, "thickness": 1,
@@ -225,11 +225,27 @@ fn inputs() -> Vec<Input> {
     );
     let filter_keys: &[&str] = &["ElementSpec.image", "PlacedSpec.image"];
     add(filter_keys, scene(&camera(&filtered)), &mask, vec![longer(&grey)]);
+    let spread =
+        json!({"type": "height_map", "file": "mask.png", "width": 20, "height": 20, "depth": 0.01});
+    let mapped = json!({"type": "freeform", "semi_diameter": 4, "thickness": 1, "sag": [spread]});
+    let mapped = scene(&camera(&through(&mapped, &json!({}))));
+    add(&["SagSpec.file"], mapped, &mask, vec![longer(&grey)]);
+    let pattern =
+        json!({"type": "image", "file": "mask.png", "width": 20, "height": 20, "depth": 0.1});
+    let phased = json!({"type": "freeform", "semi_diameter": 4, "thickness": 1,
+        "phase": {"pattern": pattern, "order": 1}});
+    let phased = scene(&camera(&through(&phased, &json!({}))));
+    add(&["PatternSpec.file"], phased, &mask, vec![longer(&grey)]);
     let own = through(
         &json!({"type": "surface", "radius": 90, "thickness": 2, "glass": "OWN-1", "semi_diameter": 4}),
         &json!({"glass_catalogs": ["own.agf"]}),
     );
     add(&["LensFile.glass_catalogs"], scene(&camera(&own)), &[("own.agf", AGF)], vec![longer(AGF)]);
+    // Defects of a sensor.
+    let dead = self::grey(2);
+    let chip = json!({"camera": {"type": "pinhole", "pose": {"from": [0, 0, 3], "look_at": [0, 0, 0]},
+        "sensor": {"type": "raw", "resolution": [2, 2], "defect_map": "defects.png"}}});
+    add(&["DefectMap"], scene(&chip), &[("defects.png", &dead)], vec![longer(&dead)]);
     // Pixels of a slot.
     let slots = json!({"serial": [{"pixels": "pixels.png"}, {}], "camera": {"type": "pinhole",
         "pose": {"from": [0, 0, 3], "look_at": [0, 0, 0]}, "sensor": {"resolution": [2, 2]},

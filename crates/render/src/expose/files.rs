@@ -312,7 +312,7 @@ impl ExposureWriter<'_> {
         // Mean and variance, a file each.
         let moments = self.sensor.moments(self.film(), shot)?;
         let depth = moments.depth;
-        if self.outputs.png && matches!(depth, 1 | 3) {
+        if self.outputs.png && depth == 1 {
             self.ratios(&moments, &snr_name(self.sensor, self.digits, number), shot)?;
         }
         for ((stem, definition, unit, values), name) in [

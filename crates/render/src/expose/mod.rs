@@ -10,7 +10,7 @@
 //! | `raw_left.png`, `.npy`, `raw_right…`, `raw_top_left…`, … | the numbers of the photodiodes of dual and quad pixels |
 //! | `raw_second.png`, `raw_second.npy` | the second number of each pixel, of sensors that have two |
 //! | `raw_mean.npy`, `raw_variance.npy` | the expected value and variance of every pixel, once an exposure time, when asked for |
-//! | `raw_snr.preview.png` | beside those, the ratio of signal to noise from 0 to 50 dB; not data |
+//! | `raw_snr.preview.png` | beside those, of one number a pixel, the ratio of signal to noise from 0 to 50 dB; not data |
 //! | `raw_hdr.npy`, `raw_hdr_sigma.npy` | electrons a second of all exposures merged, when asked for |
 //! | `sensor.json` | what the numbers mean, and which file is which exposure |
 //!
