@@ -30,7 +30,8 @@ fn a_triplet_is_read_with_its_system_and_its_glasses() {
     assert_eq!(elements[0]["glass"], "N-BK7");
     assert_eq!((&elements[0]["curvature"], &elements[0]["thickness"]), (&json!(0.05), &json!(3.0)));
     assert_eq!(elements[1]["glass"], json!({"nd": 1.517, "vd": 64.2}));
-    assert_eq!((&elements[2]["type"], &elements[2]["stop"]), (&json!("aperture"), &json!(true)));
+    // The stop is the flat back of the second glass.
+    assert_eq!((&elements[2]["type"], &elements[2]["stop"]), (&json!("surface"), &json!(true)));
     assert_eq!(elements[3]["aspheric"], json!({"4": 1e-6, "6": -2e-8}));
     assert_eq!(elements[3]["conic"], -0.5);
     assert_eq!(elements[4]["semi_diameter"], 5.0);
