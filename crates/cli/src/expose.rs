@@ -38,6 +38,7 @@ pub(crate) fn run(arguments: &ExposeArguments) -> Result<(), Fault> {
     if folder_is_new {
         stop::made(&arguments.output);
     }
+    let mut metered = None;
     let open = |(frame, path): &(Option<u32>, PathBuf)| -> Result<_, etendue::Error> {
         let image =
             LightImage::open(path, arguments.wavelengths.as_deref(), arguments.memory_limit)?;
@@ -49,7 +50,8 @@ pub(crate) fn run(arguments: &ExposeArguments) -> Result<(), Fault> {
             frame: frame.unwrap_or(0),
             memory: arguments.memory_limit,
         };
-        Ok((*frame, image.on(&sensor, &options)?)) as Result<(Option<u32>, ExposedImage), _>
+        let exposed = image.on(&sensor, &options)?.in_sequence(&mut metered);
+        Ok((*frame, exposed)) as Result<(Option<u32>, ExposedImage), _>
     };
     let progress = Phases::new(arguments.quiet).progress(!arguments.quiet);
     let (mut done, of) = (0, images.len());

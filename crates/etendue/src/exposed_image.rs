@@ -24,6 +24,19 @@ impl ExposedImage {
         Self { light, inputs, notes }
     }
 
+    /// One of a sequence: all have the exposure that `auto_exposure` metered on the `first` of them with light (s), unless each
+    /// has its own.
+    #[must_use]
+    pub fn in_sequence(mut self, first: &mut Option<f64>) -> Self {
+        if self.light.sensor().spec().auto_exposure.is_some_and(|metering| !metering.each_frame) {
+            match *first {
+                Some(time) => self.light = self.light.at_exposure(time),
+                None => *first = self.light.metered(),
+            }
+        }
+        self
+    }
+
     /// The light on the sensor.
     #[must_use]
     pub fn sensor_light(&self) -> &SensorLight {

@@ -5,7 +5,7 @@ use std::path::Path;
 use etendue_image::{Limits, Samples, dng};
 use etendue_render::expose::ExposeError;
 use etendue_sensor::matching::{MatchError, Matched, Photograph};
-use etendue_sensor::{Exposure, Radiometry};
+use etendue_sensor::{Exposure, Radiometry, SensorSpec};
 
 use crate::{Error, Progress, Session};
 
@@ -67,6 +67,21 @@ pub struct PhotoMatch {
     pub settings: Vec<(String, f64)>,
 }
 
+/// A key of a sensor whose read-out is more than the fit has.
+fn beyond_the_fit(spec: &SensorSpec) -> Option<&'static str> {
+    [
+        ("analog_gain", spec.analog_gain.is_some_and(|gain| gain != 1.0)),
+        ("iso", spec.iso.is_some()),
+        ("auto_exposure", spec.auto_exposure.is_some()),
+        ("exposures", spec.exposures.as_ref().is_some_and(|times| times.len() > 1)),
+        ("second_readout", spec.second_readout.is_some()),
+        ("photodiodes", spec.photodiodes.is_some()),
+        ("nonlinearity", spec.nonlinearity.is_some()),
+    ]
+    .into_iter()
+    .find_map(|(key, is_given)| is_given.then_some(key))
+}
+
 /// Renders the scene of a session and fits its sensor's numbers and the level of its light to a photograph of it.
 ///
 /// # Errors
@@ -88,6 +103,12 @@ pub fn match_photo(
         // Before anything is rendered.
         let scene = session.scene(progress)?;
         let sensor = scene.sensor.as_ref().ok_or_else(idle)?;
+        if let Some(key) = beyond_the_fit(sensor.spec()) {
+            return Err(Error::Refused(format!(
+                "{of_scene}camera.sensor.{key}: a photograph is matched by one plain read-out, whose gain, noise, black and \
+                 exposure are fitted; leave it out, and say `system_gain` and `exposure` instead"
+            )));
+        }
         let size = sensor.resolution().map(|side| side as usize);
         if size != photo.size {
             let why = MatchError::Size { photo: photo.size, sensor: size };

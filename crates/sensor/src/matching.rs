@@ -17,7 +17,8 @@
 //!    σ of each parameter comes of the inverse of the normal equations.
 //!
 //! Pixels that are nearly saturated are left out by what is expected of them, not by what they are, which would favour
-//! the dark ones.
+//! the dark ones. Defective pixels are left out: those farther than eight deviations from what is expected, in units of the
+//! median deviation.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -31,6 +32,15 @@ const ROUNDS: usize = 12;
 
 /// Of saturation: what is expected to be brighter is left out.
 const NEARLY_SATURATED: f64 = 0.9;
+
+/// Standard deviations beyond which a number is that of a defective pixel: of normal noise one in 10¹⁵ is.
+const OUTLIER: f64 = 8.0;
+
+/// The median of the absolute value of a normal variable, over its standard deviation.
+const MEDIAN_DEVIATION: f64 = 0.674_489_750_196_081_7;
+
+/// Rows of which the median deviation is taken, evenly spread.
+const MOST_ROWS: usize = 512;
 
 /// The share of pixels that may be clipped, at either end.
 const MOST_CLIPPED: f64 = 0.02;
@@ -195,20 +205,17 @@ impl Sensor {
             columns: size[0],
         };
         let mut fit = self.first_fit(exposure);
-        let limit = |fit: &Fit| NEARLY_SATURATED * (white - fit.line[0]) + fit.line[0];
         // The first line is of what is dark enough by itself.
         let by_number = |_: usize, _: f64, y: f64| y < NEARLY_SATURATED * white;
         pixels.fit_line(&mut fit, &by_number)?;
         for _ in 0..ROUNDS {
-            let [line, most] = [fit.line.clone(), vec![limit(&fit)]];
-            let is_used =
-                move |channel: usize, x: f64, _: f64| line[0] + line[1 + channel] * x < most[0];
+            let kept = pixels.kept(&fit, white);
+            let is_used = |channel: usize, x: f64, y: f64| kept.has(channel, x, y);
             pixels.fit_noise(&mut fit, &is_used)?;
             pixels.fit_line(&mut fit, &is_used)?;
         }
-        let [line, most] = [fit.line.clone(), vec![limit(&fit)]];
-        let is_used =
-            move |channel: usize, x: f64, _: f64| line[0] + line[1 + channel] * x < most[0];
+        let kept = pixels.kept(&fit, white);
+        let is_used = |channel: usize, x: f64, y: f64| kept.has(channel, x, y);
         pixels.not_bent(&fit, &is_used)?;
         Ok(self.told(&fit, &pixels, &is_used, exposure))
     }
@@ -303,6 +310,28 @@ impl Sensor {
     }
 }
 
+/// What counts: pixels that are expected to be dark enough, and are no defects.
+struct Kept {
+    line: Vec<f64>,
+    /// DN, of what is expected.
+    most: f64,
+    gain: f64,
+    floor: f64,
+    prnu: f64,
+    /// Of the deviation that is expected: a number farther off is of a defective pixel.
+    reach: f64,
+}
+
+impl Kept {
+    fn has(&self, channel: usize, x: f64, y: f64) -> bool {
+        let signal = self.line[1 + channel] * x;
+        let expected = self.line[0] + signal;
+        let positive = signal.max(0.0);
+        let variance = self.gain * positive + self.floor + (self.prnu * positive).powi(2);
+        expected < self.most && (y - expected).abs() <= self.reach * variance.sqrt()
+    }
+}
+
 /// The pixels of a photograph with what is expected of them.
 struct Pixels<'a> {
     sensor: &'a Sensor,
@@ -335,6 +364,37 @@ impl Pixels<'_> {
         }
         let mean = |k: &usize| sums[*k][0] / f64::max(sums[*k][1], 1.0);
         (0..sums.len()).max_by(|a, b| mean(a).total_cmp(&mean(b))).unwrap_or(0)
+    }
+
+    /// What counts by a fit. Deviations are in units of their median, which defects do not bend, or of what is expected
+    /// where that is more.
+    fn kept(&self, fit: &Fit, white: f64) -> Kept {
+        let most = NEARLY_SATURATED * (white - fit.line[0]) + fit.line[0];
+        let all = Kept {
+            line: fit.line.clone(),
+            most,
+            gain: fit.gain,
+            floor: fit.floor,
+            prnu: fit.sensor_prnu,
+            reach: f64::INFINITY,
+        };
+        let step = self.rows().div_ceil(MOST_ROWS).max(1);
+        let of_row = |row: usize| {
+            let used = self.row(row).filter(|&(c, x, y)| all.has(c, x, y));
+            let deviation = |(channel, x, y): (usize, f64, f64)| {
+                let signal = fit.signal(channel, x);
+                (y - fit.line[0] - signal).abs() / fit.variance(signal).sqrt()
+            };
+            used.map(deviation).collect::<Vec<_>>()
+        };
+        let rows: Vec<usize> = (0..self.rows()).step_by(step).collect();
+        let mut deviations: Vec<f64> = rows.into_par_iter().flat_map_iter(of_row).collect();
+        let middle = deviations.len() / 2;
+        let median = match deviations.is_empty() {
+            true => 0.0,
+            false => *deviations.select_nth_unstable_by(middle, f64::total_cmp).1,
+        };
+        Kept { reach: OUTLIER * (median / MEDIAN_DEVIATION).max(1.0), ..all }
     }
 
     /// Fits the line of numbers over electrons, a slope for each channel.

@@ -210,7 +210,9 @@ impl LensCamera {
             ));
         }
         // As few nodes as will do.
-        let has_losses = !train.losses().is_none();
+
+        let has_losses = !train.losses().is_none()
+            || train.elements().iter().any(|element| element.part.is_coated_or_blazed());
         let mut least = (f64::INFINITY, f64::INFINITY);
         for count in 1..=MOST_NODES.min(wavelengths.len()) {
             let chosen = index.nodes(&wavelengths, count);

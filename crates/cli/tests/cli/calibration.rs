@@ -169,6 +169,10 @@ fn regions_bins_and_packed_numbers_fit_or_are_refused() {
         (&["--boards", "1", "--squares", "2x6"][..], "--squares 2,6: expected 3 to 64"),
         (&["--boards", "1", "--square", "1 m"][..], "is larger than what the camera sees"),
         (&["--set", "camera.sensor.dark_current=1e7"][..], "the dark signal alone"),
+        (
+            &["--set", r#"camera.sensor.second_readout={"type": "split_pixel", "ratio": 0.1}"#][..],
+            "camera.sensor.second_readout: a calibration is of one plain read-out",
+        ),
     ] {
         let base = ["calibrate", "scene.json", "-o", "none", "--quiet", "--boards", "0"];
         let without = ["calibrate", "scene.json", "-o", "none", "--quiet"];
@@ -243,6 +247,9 @@ fn a_photograph_with_hidden_numbers_is_matched() {
     let rgb = ["--set", "camera.sensor.type=rgb"];
     let why = refused(&bench, &[&["match", "photo.dng", "scene.json"][..], &rgb[..]].concat());
     assert!(why.contains("3 numbers a pixel"), "{why}");
+    let bent = ["--set", "camera.sensor.nonlinearity=[[0.4, 0.4], [1, 0.7]]"];
+    let why = refused(&bench, &[&["match", "photo.dng", "scene.json"][..], &bent[..]].concat());
+    assert!(why.contains("camera.sensor.nonlinearity") && why.contains("leave it out"), "{why}");
     hidden.render(&["--set", "camera.sensor.exposure=1", "--outputs", "dng"]);
     std::fs::copy(hidden.path("out/raw.dng"), bench.path("bright.dng")).unwrap();
     let why = refused(&bench, &["match", "bright.dng", "scene.json"]);

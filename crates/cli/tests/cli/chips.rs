@@ -72,6 +72,41 @@ fn all_frames_have_the_exposure_of_the_first() {
     );
 }
 
+/// Pictures of a folder have the exposure of the first; and what moves has to know the exposure beforehand.
+#[test]
+fn an_exposure_is_metered_once_and_never_while_things_move() {
+    let metering = json!({ "auto_exposure": { "percentile": 50, "target": 0.5 } });
+    let moving = json!({ "objects": [{
+        "shape": "sphere", "material": "paint", "motion": { "type": "velocity", "velocity": [1, 0, 0] }
+    }] });
+    let why = refused(&wall(&metering, &moving), &[]);
+    assert!(why.contains("camera.sensor.auto_exposure") && why.contains("shutter"), "{why}");
+    let shutter = json!({
+        "type": "pinhole", "fov": 60, "pose": { "from": [0, 0, 2], "look_at": [0, 0, 0] },
+        "shutter": { "exposure": 1e-3 },
+        "sensor": {
+            "type": "raw", "resolution": [8, 6], "system_gain": 0.5, "bit_depth": 14, "radiometry": "physical",
+            "auto_exposure": metering["auto_exposure"]
+        },
+    });
+    let mut told = moving;
+    told["camera"] = shutter;
+    wall(&metering, &told).render(&[]);
+    let bench = wall(&metering, &json!({}));
+    std::fs::create_dir(bench.path("light")).unwrap();
+    for (name, level) in [("light/0.npy", 1.0), ("light/1.npy", 2.0)] {
+        bench.write(name, &crate::expose::npy(&[6, 8], &[1e-3 * level; 48]));
+    }
+    let output =
+        bench.run(&["expose", "light", "--sensor", "scene.json", "--unit", "W/m2/nm", "-o", "out"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let metered = |frame: u32| {
+        bench.json(&format!("out/frames/00000{frame}/sensor.json"))["metered_exposure_s"].clone()
+    };
+    assert!(metered(0).as_f64().unwrap() > 0.0);
+    assert_eq!(metered(0), metered(1));
+}
+
 /// A map as a PNG and as the NPY of the same numbers are the list of them; others are refused by name.
 #[test]
 fn maps_of_defects_are_read() {

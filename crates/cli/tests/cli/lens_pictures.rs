@@ -150,3 +150,54 @@ fn a_lens_that_passes_nothing_is_refused_with_what_blocks() {
         assert!(!bench.path("out").exists(), "nothing is written");
     }
 }
+
+/// What mirrors reflect, and the share of light that an order of diffraction has, dims a picture as a filter does: by as much,
+/// out of the lens that loses none.
+#[test]
+fn mirrors_and_orders_dim_pictures_as_filters_do() {
+    let mean = |elements: &Value| {
+        let scene = json!({
+            "etendue": 1,
+            "camera": {
+                "type": "lens", "lens": { "elements": elements },
+                "sensor": { "resolution": [8, 6], "pixel_pitch": 100 },
+            },
+            "tracer": { "type": "direct" }, "render": { "samples": 16 },
+            "objects": [{ "shape": "sphere", "radius": 0.01, "transform": { "translate": [0, 500, 0] } }],
+            "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
+        });
+        let bench = Bench::with_scene(&scene.to_string());
+        bench.render(&[]);
+        let values = bench.array("picture");
+        values.iter().sum::<f64>() / values.len() as f64
+    };
+    let mirror = |more: &Value| {
+        let mut mirror = json!({
+            "type": "mirror", "radius": -200, "conic": -1, "semi_diameter": 10, "stop": true, "thickness": -100,
+        });
+        for (key, value) in more.as_object().unwrap() {
+            mirror[key] = value.clone();
+        }
+        mean(&json!([mirror]))
+    };
+    let bare = mirror(&json!({}));
+    // The same rays: what differs is the rounding of f32.
+    assert!((mirror(&json!({ "reflectance": 0.5 })) / bare - 0.5).abs() < 1e-6);
+    // Fresnel's ((n − 1)/(n + 1))²; at 3 degrees it is the same to 10⁻⁴.
+    assert!((mirror(&json!({ "coating": { "index": 1.5 } })) / bare / 0.04 - 1.0).abs() < 1e-3);
+    let order = |number: i32, blaze: Option<f64>| {
+        let pattern = json!({ "type": "radial", "radius": 10, "coefficients": [] });
+        let mut phase = json!({ "pattern": pattern, "order": number });
+        if let Some(nm) = blaze {
+            phase["blaze_wavelength"] = json!(nm);
+        }
+        mean(&json!([
+            { "type": "freeform", "semi_diameter": 10, "stop": true, "phase": phase },
+            { "type": "thin_lens", "focal_length": 50, "semi_diameter": 30, "thickness": 50 },
+        ]))
+    };
+    let all = order(1, None);
+    // sinc²(550/λ − 1) of the bands' wavelengths is 0.9 and more in the mean; of the second order a tenth at most.
+    let [first, second] = [1, 2].map(|number| order(number, Some(550.0)) / all);
+    assert!(first > 0.85 && first < 1.0 && second > 0.0 && second < 0.15, "{first} {second}");
+}

@@ -23,9 +23,10 @@ pub(super) struct Stage {
 impl Stage {
     /// Of a session's scene.
     pub(super) fn of(session: &mut Session, progress: &Progress) -> Result<Self, Error> {
-        let (camera, inputs, is_idle) = {
+        let (camera, inputs, spec) = {
             let scene = session.scene(progress)?;
-            (scene.camera.clone(), scene.inputs.clone(), scene.sensor.is_none())
+            let spec = scene.sensor.as_ref().map(|sensor| sensor.spec().clone());
+            (scene.camera.clone(), scene.inputs.clone(), spec)
         };
         let path = session.file().path().to_owned();
         let stage =
@@ -34,11 +35,23 @@ impl Stage {
             return Err(stage
                 .refused("camera: a calibration is of the scene's own camera, and it names none"));
         }
-        if is_idle {
+        let Some(spec) = spec else {
             return Err(stage.refused(
                 "camera.sensor: an ideal grid of pixels has nothing to calibrate; give it a sensor, such as \
                  { \"type\": \"raw\", \"model\": \"imx183\" }",
             ));
+        };
+        let more = [
+            ("auto_exposure", spec.auto_exposure.is_some()),
+            ("exposures", spec.exposures.is_some_and(|times| times.len() > 1)),
+            ("second_readout", spec.second_readout.is_some()),
+            ("photodiodes", spec.photodiodes.is_some()),
+        ];
+        if let Some((key, _)) = more.into_iter().find(|(_, is_given)| *is_given) {
+            return Err(stage.refused(&format!(
+                "camera.sensor.{key}: a calibration is of one plain read-out at one exposure; leave it out, and give the \
+                 `exposure` that it is for"
+            )));
         }
         Ok(stage)
     }

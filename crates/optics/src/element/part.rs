@@ -372,6 +372,28 @@ impl Part {
         }
     }
 
+    /// Whether coatings of mirrors or orders of diffraction take light, by angle or wavelength.
+    #[must_use]
+    pub fn is_coated_or_blazed(&self) -> bool {
+        let is_blazed = matches!(self, Self::Freeform(surface) if surface.is_blazed());
+        is_blazed || self.mirror().is_some_and(|mirror| mirror.coating.is_some())
+    }
+
+    /// The same with mirrors and orders of diffraction as `change` makes them.
+    pub(crate) fn with_mirror(&self, change: impl Fn(&mut MirrorMount)) -> Self {
+        let mut part = self.clone();
+        match &mut part {
+            Self::Mirror(mirror) => change(&mut mirror.mount),
+            Self::Freeform(surface) if surface.mirror.is_some() => {
+                let mut own = Freeform::clone(surface);
+                own.mirror.iter_mut().for_each(change);
+                *surface = own.into();
+            }
+            _ => {}
+        }
+        part
+    }
+
     /// The mirror's own, where it is one.
     #[must_use]
     pub fn mirror(&self) -> Option<&MirrorMount> {

@@ -89,6 +89,13 @@ impl SceneFile {
                        `exposure`";
             return Err(self.fault("camera.sensor.exposures", why));
         }
+        let is_metered = sensor.spec().auto_exposure.is_some();
+        if is_metered && given.is_none() && (camera.motion().is_some() || self.changes()) {
+            let why = "how long the shutter is open is known when the light is, and what moves or changes has to know it \
+                       before; give the shutter its `exposure`, or the sensor the `exposure` that a render of the still \
+                       scene reports";
+            return Err(self.fault("camera.sensor.auto_exposure", why));
+        }
         let is_written = self.value().pointer("/camera/sensor/exposure").is_some();
         match (given, first) {
             (Some(Seconds(given)), Some(exposure)) if is_written && given != exposure => {

@@ -201,7 +201,7 @@ fn samples_that_would_never_stop_or_are_none_are_refused_by_path() {
             noise(r#", "min": 64, "max": 16"#),
             "render.samples.min: at least 64 samples and at most 16",
         ),
-        (noise(r#", "max": 8"#), "render.samples.max: at least 16 samples and at most 8"),
+        (noise(r#", "max": 3"#), "render.samples.max: at least 4 samples and at most 3"),
         (noise(r#", "min": 0"#), "render.samples.min: 0 is below the least, 1"),
         (noise(r#", "frac": 1"#), "render.samples.frac: unknown key; known: `fraction`"),
         (noise(r#"}, "sampler": {"a": 1"#), "render.sampler"),

@@ -49,6 +49,12 @@ fn every_example_scene_reads_and_loads() {
             assert!(note.message.contains("a crop of nearly any sensor"), "{note:?}");
             continue;
         }
+        // What is unfolded is said.
+        if path.ends_with("mirror-lens.json") {
+            let [note] = &scene.notes[..] else { panic!("{:?}", scene.notes) };
+            assert!(note.message.contains("the lens has mirrors"), "{note:?}");
+            continue;
+        }
         assert!(scene.notes.is_empty(), "{}: {:?}", path.display(), scene.notes);
     }
 }

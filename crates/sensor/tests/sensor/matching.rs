@@ -52,11 +52,20 @@ fn hidden(k: usize) -> Hidden {
 
 /// What a sensor of hidden numbers takes of the chart, matched by one that knows them not.
 fn matched(of: &Hidden, seed: u64) -> Matched {
+    matched_with(of, seed, &json!({}))
+}
+
+/// The same of a chip with more keys.
+fn matched_with(of: &Hidden, seed: u64, more: &Value) -> Matched {
     let own = sensor(&json!({}));
     let film = chart(&own);
-    let taken_by = sensor(&json!({
+    let mut keys = json!({
         "system_gain": of.gain, "read_noise": of.read_noise, "black_level": of.black, "serial": seed,
-    }));
+    });
+    for (key, value) in more.as_object().unwrap() {
+        keys[key] = value.clone();
+    }
+    let taken_by = sensor(&keys);
     let film = Film { values: &film };
     let shot = Exposure { exposure: of.exposure, frame: 0 };
     let image = taken_by.expose(film, shot, seed).unwrap();
@@ -95,6 +104,19 @@ fn hidden_parameters_are_covered() {
 
 /// What is stated as standard deviation is that of fifty photographs within a factor of 1.5 (the spread of fifty is itself
 /// known to a tenth).
+/// Dead and stuck pixels are left out: what is found is as near as without them.
+#[test]
+fn defective_pixels_do_not_count() {
+    let of = hidden(4);
+    let clean = parameters(&matched(&of, 7));
+    for defects in [json!({ "dead_pixels": 0.002 }), json!({ "stuck_pixels": 0.002 })] {
+        let found = parameters(&matched_with(&of, 7, &defects));
+        for ([value, sigma], [without, _]) in found.into_iter().zip(clean) {
+            assert!((value - without).abs() < sigma, "{defects}: {value} {without} {sigma}");
+        }
+    }
+}
+
 #[test]
 fn stated_deviations_are_those_of_many_photographs() {
     let of = hidden(4);

@@ -438,17 +438,26 @@ fn through_focus(fields: &WeightedFields, frequency: f64, depth: f64) -> Through
     ThroughFocus { frequency, planes: (-PLANES..=PLANES).into_par_iter().map(plane).collect() }
 }
 
-/// Widths of the lit pupil in y and in x (direction cosines).
+/// Widths of the lit pupil in y and in x (direction cosines), over what is in its middle and however much it passes.
 fn widths(wave: &Wavefront) -> [f64; 2] {
     let pupil = &wave.pupil;
+    let most = pupil.lit().map(|i| pupil.clear[i].min(1.0)).fold(f64::MIN_POSITIVE, f64::max);
     [DVec2::Y, DVec2::X].map(|along| {
-        // Each line of cells is as long as it is clear.
-        let mut lines = vec![0.0_f64; pupil.cells];
+        // Each line of cells goes from its first to its last one, which may be covered in part.
+        let mut lines: Vec<Option<[(usize, f64); 2]>> = vec![None; pupil.cells];
         for i in pupil.lit() {
-            let line = if along == DVec2::Y { i % pupil.cells } else { i / pupil.cells };
-            lines[line] += pupil.clear[i].min(1.0);
+            let (row, column) = (i / pupil.cells, i % pupil.cells);
+            let (line, place) = if along == DVec2::Y { (column, row) } else { (row, column) };
+            let own = (place, pupil.clear[i].min(1.0) / most);
+            let [first, last] = lines[line].get_or_insert([own; 2]);
+            *first = if place < first.0 { own } else { *first };
+            *last = if place > last.0 { own } else { *last };
         }
-        lines.into_iter().fold(0.0, f64::max) * pupil.step
+        let length = |[(first, begin), (last, end)]: [(usize, f64); 2]| match last - first {
+            0 => begin,
+            cells => cells as f64 - 1.0 + begin + end,
+        };
+        lines.into_iter().flatten().map(length).fold(0.0, f64::max) * pupil.step
     })
 }
 

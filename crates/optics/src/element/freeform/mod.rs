@@ -238,6 +238,21 @@ impl Freeform {
         })
     }
 
+    /// Whether its order has a share of the light alone.
+    #[must_use]
+    pub fn is_blazed(&self) -> bool {
+        self.phase.as_ref().is_some_and(|phase| phase.blaze.is_some())
+    }
+
+    /// The same with all light in its order.
+    #[must_use]
+    pub fn without_blaze(mut self) -> Self {
+        if let Some(phase) = &mut self.phase {
+            phase.blaze = None;
+        }
+        self
+    }
+
     /// The share of light in the order of its phase at a wavelength (nm).
     #[must_use]
     pub fn efficiency(&self, wavelength: f64) -> f64 {

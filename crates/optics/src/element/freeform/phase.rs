@@ -82,7 +82,7 @@ pub enum PatternSpec {
 pub(super) struct Phase {
     pattern: Pattern,
     order: f64,
-    blaze: Option<f64>,
+    pub(super) blaze: Option<f64>,
     design: Option<f64>,
 }
 
@@ -128,7 +128,7 @@ impl PhaseSpec {
                     .to_owned(),
             );
         }
-        if self.order.is_some_and(|order| order.abs() > 1000) {
+        if self.order.is_some_and(|order| order.unsigned_abs() > 1000) {
             return Err("phase.order must be within -1000 to 1000".to_owned());
         }
         Ok(Phase {

@@ -1,6 +1,6 @@
 //! A lens with parts of it made clear: what its bounds do not depend on.
 
-use crate::element::{LossesSpec, Opening};
+use crate::element::{Freeform, LossesSpec, Opening};
 use crate::train::{OpticalTrain, Part};
 
 /// The same lens with masks clear: the bound goes around their whole rectangle.
@@ -29,7 +29,8 @@ impl OpticalTrain {
     }
 }
 
-/// The same lens with filters clear: what is left does not depend on the wavelength but for glass.
+/// The same lens with filters clear and mirrors that reflect alike at all wavelengths: what is left does not depend on the
+/// wavelength but for glass, coatings and orders of diffraction.
 pub fn without_filters(train: &OpticalTrain) -> OpticalTrain {
     let mut train = train.clone();
     for element in &mut train.elements {
@@ -40,11 +41,22 @@ pub fn without_filters(train: &OpticalTrain) -> OpticalTrain {
             let opening = Opening::Circle { radius: filter.radius() };
             element.part = Part::Aperture(opening.into());
         }
+        element.part = element.part.with_mirror(|mirror| mirror.reflectance = None);
     }
     train
 }
 
-/// The same lens with masks and filters clear, and nothing lost in glass.
+/// The same lens with masks and filters clear, and nothing lost in glass, at mirrors or to other orders of diffraction.
 pub fn without_dimming(train: &OpticalTrain) -> OpticalTrain {
-    without_filters(&without_masks(train)).with_losses(LossesSpec::default())
+    let mut train = without_filters(&without_masks(train)).with_losses(LossesSpec::default());
+    for element in &mut train.elements {
+        element.part = match &element.part {
+            Part::Freeform(surface) if surface.is_blazed() => {
+                Part::Freeform(Freeform::clone(surface).without_blaze().into())
+            }
+            other => other.clone(),
+        }
+        .with_mirror(|mirror| mirror.coating = None);
+    }
+    train
 }

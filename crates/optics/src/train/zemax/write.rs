@@ -208,7 +208,11 @@ fn surface(element: &ElementSpec, before: Option<&GlassSpec>) -> Result<Row, Str
             rim(&mut row, length(spec.semi_diameter));
             row
         }
-        PartSpec::Aperture(_) => return none("an aperture that is not circular"),
+        PartSpec::Aperture(_) => {
+            return Err("an aperture that is not circular is not written to Zemax files yet; \
+                        make it circular, or save it as .json"
+                .to_owned());
+        }
         PartSpec::Filter(_) => return none("a filter"),
         PartSpec::MicrolensArray(_) => return none("an array of lenslets"),
     };
