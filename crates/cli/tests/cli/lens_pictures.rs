@@ -1,5 +1,7 @@
 //! Pictures through lenses, with closed-form answers.
 
+use serde_json::{Value, json};
+
 use crate::run::{Bench, text};
 
 /// A white wall at 3 m, and what is special about the camera in front of it.
