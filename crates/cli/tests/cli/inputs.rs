@@ -245,7 +245,7 @@ fn inputs() -> Vec<Input> {
     let dead = self::grey(2);
     let chip = json!({"camera": {"type": "pinhole", "pose": {"from": [0, 0, 3], "look_at": [0, 0, 0]},
         "sensor": {"type": "raw", "resolution": [2, 2], "defect_map": "defects.png"}}});
-    add(&["DefectMap"], scene(&chip), &[("defects.png", &dead)], vec![longer(&dead)]);
+    add(&["DefectMap"], scene(&chip), &[("defects.png", &dead)], vec![self::grey(3)]);
     // Pixels of a slot.
     let slots = json!({"serial": [{"pixels": "pixels.png"}, {}], "camera": {"type": "pinhole",
         "pose": {"from": [0, 0, 3], "look_at": [0, 0, 0]}, "sensor": {"resolution": [2, 2]},

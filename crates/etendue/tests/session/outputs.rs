@@ -16,7 +16,7 @@ fn scene(frames: &Value) -> Value {
         "etendue": 1,
         "tracer": {"type": "direct"},
         "render": {"samples": {"relative_error": 0.5, "min": 4, "max": 8}},
-        "camera": {"type": "thin_lens", "focal_length": "50 mm", "f_number": 8, "focus_distance": "3 m",
+        "camera": {"type": "thin_lens", "focal_length": "50 mm", "f_number": 8, "focus_distance": "3 m", "sensor_height": "24 mm",
                    "pose": {"from": [0, 0, 4], "look_at": [0, 0, 0]},
                    "sensor": {"resolution": [6, 4]}},
         "objects": [{"shape": "sphere"}],
@@ -161,7 +161,10 @@ fn no_two_files_share_a_name() {
     let mut cameras: Vec<Value> = sensors
         .into_iter()
         .map(|sensor| {
-            json!({"type": "pinhole", "pose": {"from": [0, 0, 4], "look_at": [0, 0, 0]}, "sensor": sensor})
+            json!({
+                "type": "thin_lens", "focal_length": "50 mm", "f_number": 8, "focus_distance": "3 m",
+                "sensor_height": "24 mm", "pose": {"from": [0, 0, 4], "look_at": [0, 0, 0]}, "sensor": sensor
+            })
         })
         .collect();
     cameras.push(json!({

@@ -181,6 +181,9 @@ impl SensorLight {
                 (sensor, film)
             }
         };
+        // Layers of parts of the pupil may be there for themselves, and are no photodiodes.
+        let mut film = film;
+        film.parts.retain(|(layer, _)| part_names(&sensor).contains(&part_name(*layer)));
         let film = match film.parts.is_empty() {
             true => film.with_parts_of(&sensor, picture)?,
             false => film,
