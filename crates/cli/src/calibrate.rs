@@ -1,22 +1,18 @@
 //! `etendue calibrate`: the pictures by which a camera is calibrated.
 
-use etendue::{CalibrationOptions, Options, Outputs, Session, calibrate};
+use etendue::{CalibrationOptions, Options, Session, calibrate};
 use etendue_files::Reach;
 use etendue_sensor::{Packing, Window};
 
 use crate::arguments::{CalibrateArguments, PackedArgument};
+use crate::expose::sensor_outputs;
 use crate::fault::{Fault, print_text};
 use crate::progress::{Phases, say};
 use crate::stop;
 
 pub(crate) fn run(arguments: &CalibrateArguments) -> Result<(), Fault> {
     stop::listen(say);
-    let outputs = Outputs::from_list(&arguments.outputs)
-        .map_err(|message| Fault::refused(format!("--outputs: {message}")))?;
-    let of_layers = Outputs { png: false, npy: false, dng: false, ..outputs };
-    if of_layers != Outputs::NONE || outputs == Outputs::NONE {
-        return Err(Fault::refused("--outputs: a sensor's images are written as png, npy or dng"));
-    }
+    let outputs = sensor_outputs(&arguments.outputs)?;
     let options = CalibrationOptions {
         frames: arguments.frames,
         level: arguments.level,

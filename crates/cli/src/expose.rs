@@ -14,12 +14,7 @@ use crate::stop;
 
 pub(crate) fn run(arguments: &ExposeArguments) -> Result<(), Fault> {
     stop::listen(say);
-    let outputs = Outputs::from_list(&arguments.outputs)
-        .map_err(|message| Fault::refused(format!("--outputs: {message}")))?;
-    let of_layers = Outputs { png: false, npy: false, dng: false, ..outputs };
-    if of_layers != Outputs::NONE || outputs == Outputs::NONE {
-        return Err(Fault::refused("--outputs: a sensor's images are written as png, npy or dng"));
-    }
+    let outputs = sensor_outputs(&arguments.outputs)?;
     let reach = if arguments.allow_outside { Reach::Anywhere } else { Reach::OwnFolder };
     let opener = Opener::new(reach);
     let sensor = SensorFile::named(&opener, Path::new(&arguments.sensor), &arguments.settings)?;
@@ -76,6 +71,17 @@ pub(crate) fn run(arguments: &ExposeArguments) -> Result<(), Fault> {
     }
     let lines: Vec<String> = written.files.iter().map(|path| path.display().to_string()).collect();
     print_text(&lines.join("\n"))
+}
+
+/// What is written of a sensor's images, by its list of names.
+pub(crate) fn sensor_outputs(names: &str) -> Result<Outputs, Fault> {
+    let outputs = Outputs::from_list(names)
+        .map_err(|message| Fault::refused(format!("--outputs: {message}")))?;
+    let of_layers = Outputs { png: false, npy: false, dng: false, ..outputs };
+    if of_layers != Outputs::NONE || outputs == Outputs::NONE {
+        return Err(Fault::refused("--outputs: a sensor's images are written as png, npy or dng"));
+    }
+    Ok(outputs)
 }
 
 /// Refuses a folder in which a result would take the place of a picture or of the sensor's file.

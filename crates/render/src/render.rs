@@ -394,12 +394,14 @@ fn finished(
     let [width, height] = scene.camera.resolution().map(|side| side as usize);
     let mut band_film = None;
     let mut parts = Vec::new();
+    let photodiodes = scene.sensor.as_ref().map_or(&[][..], expose::photodiodes);
+    let is_photodiode = |spec| photodiodes.iter().any(|(layer, _)| *layer == spec);
     for layer in &mut film {
         let bands = layer.take_bands(&plan.bands)?;
-        // Of the picture and of parts of the pupil: other parts of its light are to look at.
+        // Of the picture and of photodiodes: other parts of its light are to look at.
         match (layer.spec, bands) {
             (LayerSpec::Radiance, bands) => band_film = bands,
-            (spec, Some(bands)) if spec.pupil_part().is_some() => parts.push((spec, bands.values)),
+            (spec, Some(bands)) if is_photodiode(spec) => parts.push((spec, bands.values)),
             _ => {}
         }
     }

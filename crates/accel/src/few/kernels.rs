@@ -1,6 +1,6 @@
 //! A block of rays against edges and triangles, in either precision.
 
-use std::ops::{Add, Mul, Sub};
+use std::ops::{Add, Div, Mul, Sub};
 
 use etendue_geometry::block::{Floats, LANES};
 use etendue_geometry::glam::DVec3;
@@ -11,34 +11,23 @@ use crate::single::round;
 
 /// A number of either precision.
 pub(super) trait Number:
-    Copy + Default + PartialOrd + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+    Copy
+    + Default
+    + PartialOrd
+    + From<f32>
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
 {
     /// The largest finite one.
     const LARGEST: Self;
-    /// A number of single precision.
-    fn of(x: f32) -> Self;
-    /// Its absolute value.
-    fn size(self) -> Self;
-    /// 1 over it.
-    fn inverse(self) -> Self;
     /// The number, rounded to single precision.
     fn single(self) -> f32;
 }
 
 impl Number for f32 {
     const LARGEST: Self = Self::MAX;
-    #[inline(always)]
-    fn of(x: f32) -> Self {
-        x
-    }
-    #[inline(always)]
-    fn size(self) -> Self {
-        self.abs()
-    }
-    #[inline(always)]
-    fn inverse(self) -> Self {
-        1.0 / self
-    }
     #[inline(always)]
     fn single(self) -> f32 {
         self
@@ -47,18 +36,6 @@ impl Number for f32 {
 
 impl Number for f64 {
     const LARGEST: Self = Self::MAX;
-    #[inline(always)]
-    fn of(x: f32) -> Self {
-        Self::from(x)
-    }
-    #[inline(always)]
-    fn size(self) -> Self {
-        self.abs()
-    }
-    #[inline(always)]
-    fn inverse(self) -> Self {
-        1.0 / self
-    }
     #[inline(always)]
     fn single(self) -> f32 {
         round(self)
@@ -135,7 +112,7 @@ impl<F: Number> Nearest<F> {
     #[inline(always)]
     pub(super) fn of(block: &RayBlock) -> Self {
         let zero = [F::default(); LANES];
-        Self { t: block.t_max.map(F::of), u: zero, v: zero, number: [MISS; LANES] }
+        Self { t: block.t_max.map(F::from), u: zero, v: zero, number: [MISS; LANES] }
     }
 }
 
@@ -152,8 +129,8 @@ struct BlockLines<F> {
 impl<F: Number> BlockLines<F> {
     #[inline(always)]
     fn of(block: &RayBlock) -> Self {
-        let origin = block.origin.map(|axis| axis.map(F::of));
-        let direction = block.direction.map(|axis| axis.map(F::of));
+        let origin = block.origin.map(|axis| axis.map(F::from));
+        let direction = block.direction.map(|axis| axis.map(F::from));
         let ([ox, oy, oz], [dx, dy, dz]) = (&origin, &direction);
         let zero = [F::default(); LANES];
         let (mut mx, mut my, mut mz) = (zero, zero, zero);
@@ -206,7 +183,7 @@ fn pass<F: Number>(
         for i in 0..LANES {
             let of_moment = dx[i] * moment[0] + dy[i] * moment[1] + dz[i] * moment[2];
             side[i] = of_moment + (mx[i] * along[0] + my[i] * along[1] + mz[i] * along[2]);
-            least[i] = lower(least[i], side[i].size());
+            least[i] = lower(least[i], higher(side[i], F::default() - side[i]));
         }
     }
 }
@@ -274,7 +251,7 @@ impl<F: Number> FewTriangle<F> {
         let mut t = [F::default(); LANES];
         for i in 0..LANES {
             let height = (cx - x[i]) * nx + (cy - y[i]) * ny + (cz - z[i]) * nz;
-            t[i] = height * (dx[i] * nx + dy[i] * ny + dz[i] * nz).inverse();
+            t[i] = height * (F::from(1.0) / (dx[i] * nx + dy[i] * ny + dz[i] * nz));
         }
         t
     }
@@ -289,7 +266,7 @@ fn closest<F: Number>(
     nearest: &mut Nearest<F>,
 ) -> Row<F> {
     let lines = BlockLines::of(block);
-    let t_min = block.t_min.map(F::of);
+    let t_min = block.t_min.map(F::from);
     let mut least = [F::LARGEST; LANES];
     for run in &few.runs {
         if !reaches(run.bounds, block, &lines.inverse) {
@@ -301,7 +278,7 @@ fn closest<F: Number>(
             let Some(passing) = triangle.passed(sides) else { continue };
             let t = triangle.distances(&lines);
             for i in 0..LANES {
-                let over = passing.total[i].inverse();
+                let over = F::from(1.0) / passing.total[i];
                 let is_between = (t[i] > t_min[i]) & (t[i] <= nearest.t[i]);
                 // A ray in the triangle's plane meets it nowhere.
                 let counts = passing.is_inside[i] & is_between & (t[i] <= F::LARGEST);
@@ -325,7 +302,7 @@ fn occluded<F: Number>(
     blocked: &mut [u32; LANES],
 ) -> Row<F> {
     let lines = BlockLines::of(block);
-    let [t_min, t_max] = [block.t_min, block.t_max].map(|limits| limits.map(F::of));
+    let [t_min, t_max] = [block.t_min, block.t_max].map(|limits| limits.map(F::from));
     let mut least = [F::LARGEST; LANES];
     for run in &few.runs {
         if !reaches(run.bounds, block, &lines.inverse) {

@@ -45,10 +45,10 @@ pub struct MirrorSpec {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub semi_diameter: Option<Millimetres>,
     /// The radius of a hole in its middle (mm), through which light passes on its way to other elements.
-    #[serde(skip_serializing_if = "is_none_at_all")]
+    #[serde(skip_serializing_if = "super::is_default")]
     pub hole: Millimetres,
     /// The conic constant: 0 a sphere, −1 a paraboloid.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "super::is_default")]
     pub conic: f64,
     /// Coefficients of the even asphere by their power of r, `{"4": 1e-6}` (mm to 1 − power).
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
@@ -64,16 +64,6 @@ pub struct MirrorSpec {
     /// Instead of `reflectance`: a metal or glass with films on it, that reflects by the angle.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coating: Option<MirrorCoatingSpec>,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
-fn is_none_at_all(value: &Millimetres) -> bool {
-    value.0 == 0.0
 }
 
 /// A mirror in its own frame (mm), as light that runs along +z meets it.

@@ -1,13 +1,13 @@
 //! The light of a picture in the bands of a sensor.
 
 use etendue_scene::Scene;
-use etendue_sensor::{Photodiodes, Radiometry, Sensor, SensorKind};
+use etendue_sensor::{Radiometry, Sensor, SensorKind};
 use etendue_spectrum::{Bands, Grid};
 use etendue_tracer::LayerSpec;
 use rayon::prelude::*;
 
-use super::LightUnit;
 use super::files::plain;
+use super::{LightUnit, photodiodes};
 use crate::film::{NoMemory, filled};
 use crate::output::{Channel, Layer, Look, Picture, Values};
 
@@ -129,17 +129,7 @@ impl BandFilm {
         sensor: &Sensor,
         picture: &Picture,
     ) -> Result<Self, NoMemory> {
-        let layers: &[LayerSpec] = match sensor.spec().photodiodes {
-            None => &[],
-            Some(Photodiodes::Dual) => &[LayerSpec::LeftPupil, LayerSpec::RightPupil],
-            Some(Photodiodes::Quad) => &[
-                LayerSpec::TopLeftPupil,
-                LayerSpec::TopRightPupil,
-                LayerSpec::BottomLeftPupil,
-                LayerSpec::BottomRightPupil,
-            ],
-        };
-        for layer in layers {
+        for (layer, _) in photodiodes(sensor) {
             let name = layer.row().name;
             let found = picture.layers().iter().find(|other| other.name == name);
             let Some(planes) = found.and_then(three_planes) else { continue };

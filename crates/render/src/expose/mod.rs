@@ -181,9 +181,6 @@ impl SensorLight {
                 (sensor, film)
             }
         };
-        // Layers of parts of the pupil may be there for themselves, and are no photodiodes.
-        let mut film = film;
-        film.parts.retain(|(layer, _)| part_names(&sensor).contains(&part_name(*layer)));
         let film = match film.parts.is_empty() {
             true => film.with_parts_of(&sensor, picture)?,
             false => film,
@@ -336,9 +333,15 @@ impl SensorLight {
         Film { values: &self.film.values }
     }
 
+    /// What the files of a photodiode are called, of which the light is a layer.
+    fn part_name(&self, layer: LayerSpec) -> &'static str {
+        let own = photodiodes(&self.sensor).iter().find(|(known, _)| *known == layer);
+        own.map_or("", |(_, name)| name)
+    }
+
     /// The parts of the pupil whose light is told apart, each by the name of its files.
     pub fn parts(&self) -> impl ExactSizeIterator<Item = &'static str> + '_ {
-        self.film.parts.iter().map(|(layer, _)| part_name(*layer))
+        self.film.parts.iter().map(|(layer, _)| self.part_name(*layer))
     }
 
     /// One exposure of the photodiodes that see a part of the pupil, by the number of the part: their electrons, and noise
@@ -350,7 +353,7 @@ impl SensorLight {
     pub fn expose_part(&self, part: usize, exposure: Exposure) -> Result<RawImage, SensorError> {
         let none = (LayerSpec::Radiance, Vec::new());
         let (layer, values) = self.film.parts.get(part).unwrap_or(&none);
-        let seed = etendue_sensor::mixed_seed(self.seeds[1], part_name(*layer).as_bytes());
+        let seed = etendue_sensor::mixed_seed(self.seeds[1], self.part_name(*layer).as_bytes());
         self.sensor.expose(Film { values }, exposure, seed)
     }
 }
@@ -404,26 +407,19 @@ pub fn write(
     Ok(writer.exposed)
 }
 
-/// What the files of a part of the pupil are called.
-fn part_name(layer: LayerSpec) -> &'static str {
-    match layer {
-        LayerSpec::LeftPupil => "raw_left",
-        LayerSpec::RightPupil => "raw_right",
-        LayerSpec::TopLeftPupil => "raw_top_left",
-        LayerSpec::TopRightPupil => "raw_top_right",
-        LayerSpec::BottomLeftPupil => "raw_bottom_left",
-        _ => "raw_bottom_right",
-    }
-}
-
-/// The names of files of the photodiodes of a sensor.
-fn part_names(sensor: &Sensor) -> &'static [&'static str] {
+/// The photodiodes that a sensor divides its pixels into: the layer of the light of each, and the name of its files.
+pub(crate) fn photodiodes(sensor: &Sensor) -> &'static [(LayerSpec, &'static str)] {
     match sensor.spec().photodiodes {
         None => &[],
-        Some(Photodiodes::Dual) => &["raw_left", "raw_right"],
-        Some(Photodiodes::Quad) => {
-            &["raw_top_left", "raw_top_right", "raw_bottom_left", "raw_bottom_right"]
+        Some(Photodiodes::Dual) => {
+            &[(LayerSpec::LeftPupil, "raw_left"), (LayerSpec::RightPupil, "raw_right")]
         }
+        Some(Photodiodes::Quad) => &[
+            (LayerSpec::TopLeftPupil, "raw_top_left"),
+            (LayerSpec::TopRightPupil, "raw_top_right"),
+            (LayerSpec::BottomLeftPupil, "raw_bottom_left"),
+            (LayerSpec::BottomRightPupil, "raw_bottom_right"),
+        ],
     }
 }
 
@@ -467,7 +463,7 @@ pub fn files_of(sensor: &Sensor) -> Vec<String> {
         ["png", "npy"].map(|ending| files::name(digits, files::SECOND, shot.frame, ending))
     };
     let second = second.flat_map(of_second);
-    let parts = part_names(sensor).iter().flat_map(|name| {
+    let parts = photodiodes(sensor).iter().flat_map(|(_, name)| {
         let of_part = |shot: &Exposure| {
             ["png", "npy"].map(|ending| files::name(digits, name, shot.frame, ending))
         };

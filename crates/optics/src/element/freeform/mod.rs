@@ -70,7 +70,7 @@ pub struct FreeformSpec {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub semi_diameter: Option<Millimetres>,
     /// The conic constant: 0 a sphere, −1 a paraboloid.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "super::is_default")]
     pub conic: f64,
     /// Coefficients by their power of r, 1 to 30, odd ones too (mm to 1 − power); of y on a toroid.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
@@ -100,11 +100,6 @@ pub struct FreeformSpec {
     /// Of a mirror: the share of light that it reflects (0..=1) by wavelength; all of it when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reflectance: Option<Curve>,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
 }
 
 /// A surface of any shape in its own frame (mm), as light that runs along +z meets it.
@@ -422,8 +417,8 @@ impl Profile for FreeformSurface {
             true => self.shape.base.flipped(),
             false => self.shape.base.clone(),
         };
-        let met = meet_conic::<false>(&base, ray, Root::Near);
-        if met.t.is_finite() { (met.ray, met.t) } else { on_plane() }
+        let hit = meet_conic::<false>(&base, ray, Root::Near);
+        if hit.t.is_finite() { (hit.ray, hit.t) } else { on_plane() }
     }
 
     fn sag_and_slope(&self, at: Ray) -> (f64, [f64; 2]) {

@@ -386,12 +386,42 @@ fn frame_at(
 }
 
 /// Raises `radii` to the outermost passing ray of each angle from `film` in the frame.
-fn widen(
+fn widen(radii: &mut [f64; 2 * ANGLES], lens: &MonochromaticTrain, film: DVec3, frame: [DVec2; 2]) {
+    for (radius, found) in radii.iter_mut().zip(limits(Limit::Outer, lens, film, frame)) {
+        *radius = found.map_or(*radius, |found| radius.max(found));
+    }
+}
+
+/// Lowers `radii` to the innermost passing ray of each angle from `film` in the frame; to 0 where none passes.
+fn narrow(
     radii: &mut [f64; 2 * ANGLES],
     lens: &MonochromaticTrain,
     film: DVec3,
-    [centre, half]: [DVec2; 2],
+    frame: [DVec2; 2],
 ) {
+    for (radius, found) in radii.iter_mut().zip(limits(Limit::Inner, lens, film, frame)) {
+        // Where nothing passes at an angle, nothing is known.
+        *radius = radius.min(found.unwrap_or(0.0));
+    }
+}
+
+/// Which of the passing rays of an angle is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Limit {
+    /// That of the greatest radius.
+    Outer,
+    /// That of the least.
+    Inner,
+}
+
+/// The radius of the last passing ray of each angle from `film` in the frame, rounded to the side where none passes;
+/// `None` where none does.
+fn limits(
+    limit: Limit,
+    lens: &MonochromaticTrain,
+    film: DVec3,
+    [centre, half]: [DVec2; 2],
+) -> [Option<f64>; 2 * ANGLES] {
     // Costly trains are measured more coarsely: to 0.003 of the radius, which [`MARGIN`] covers.
     let (scanned, halvings) = if lens.is_costly() { (16, 5) } else { (32, 12) };
     // The frame's corners are √2 from its centre.
@@ -406,80 +436,36 @@ fn widen(
         lens.trace(Side::Sensor, Clip::On, &mut rays);
         (0..rays.len()).map(|i| rays.status(i) == RayStatus::Exited).collect()
     };
-    let step = OUTERMOST / f64::from(scanned);
-    let scan: Vec<(usize, f64)> =
-        (0..2 * ANGLES).flat_map(|i| (0..scanned).map(move |s| (i, step * f64::from(s)))).collect();
-    let mut outermost = [None; 2 * ANGLES];
-    for (&(i, radius), passed) in scan.iter().zip(passes(&scan)) {
-        if passed {
-            outermost[i] = Some(radius);
-        }
-    }
-    let mut brackets: Vec<(usize, f64)> =
-        (0..2 * ANGLES).filter_map(|i| outermost[i].map(|radius| (i, radius))).collect();
-    let mut width = step;
-    for _ in 0..halvings {
-        width *= 0.5;
-        let middles: Vec<(usize, f64)> =
-            brackets.iter().map(|&(i, low)| (i, low + width)).collect();
-        for (bracket, passed) in brackets.iter_mut().zip(passes(&middles)) {
-            if passed {
-                bracket.1 += width;
-            }
-        }
-    }
-    for (i, low) in brackets {
-        radii[i] = radii[i].max(low + width);
-    }
-}
-
-/// Lowers `radii` to the innermost passing ray of each angle from `film` in the frame; to 0 where none passes.
-fn narrow(
-    radii: &mut [f64; 2 * ANGLES],
-    lens: &MonochromaticTrain,
-    film: DVec3,
-    [centre, half]: [DVec2; 2],
-) {
-    let (scanned, halvings) = if lens.is_costly() { (16, 5) } else { (32, 12) };
-    const OUTERMOST: f64 = 1.6;
-    let angle = |i: usize| DVec2::from_angle(0.5 * turn_of(i) * std::f64::consts::TAU) * half;
-    let directions: Vec<DVec2> = (0..2 * ANGLES).map(angle).collect();
-    let passes = |places: &[(usize, f64)]| -> Vec<bool> {
-        let mut rays = LensRays::with_capacity(places.len());
-        for &(i, radius) in places {
-            rays.push(film, towards_lens(centre + directions[i] * radius));
-        }
-        lens.trace(Side::Sensor, Clip::On, &mut rays);
-        (0..rays.len()).map(|i| rays.status(i) == RayStatus::Exited).collect()
+    // A radius moved farther beyond what passes.
+    let beyond = |radius: f64, by: f64| match limit {
+        Limit::Outer => radius + by,
+        Limit::Inner => (radius - by).max(0.0),
     };
-    let step = OUTERMOST / f64::from(scanned);
-    let scan: Vec<(usize, f64)> =
-        (0..2 * ANGLES).flat_map(|i| (0..scanned).map(move |s| (i, step * f64::from(s)))).collect();
-    let mut innermost = [None; 2 * ANGLES];
+    let mut width = OUTERMOST / f64::from(scanned);
+    let scan: Vec<(usize, f64)> = (0..2 * ANGLES)
+        .flat_map(|i| (0..scanned).map(move |s| (i, width * f64::from(s))))
+        .collect();
+    let mut last = [None; 2 * ANGLES];
     for (&(i, radius), passed) in scan.iter().zip(passes(&scan)) {
-        if passed && innermost[i].is_none() {
-            innermost[i] = Some(radius);
+        if passed && (limit == Limit::Outer || last[i].is_none()) {
+            last[i] = Some(radius);
         }
     }
-    let mut brackets: Vec<(usize, f64)> =
-        (0..2 * ANGLES).filter_map(|i| innermost[i].map(|radius| (i, radius))).collect();
-    let mut width = step;
+    let mut passing: Vec<(usize, f64)> =
+        (0..2 * ANGLES).filter_map(|i| last[i].map(|radius| (i, radius))).collect();
     for _ in 0..halvings {
         width *= 0.5;
         let middles: Vec<(usize, f64)> =
-            brackets.iter().map(|&(i, high)| (i, (high - width).max(0.0))).collect();
-        for (bracket, passed) in brackets.iter_mut().zip(passes(&middles)) {
+            passing.iter().map(|&(i, radius)| (i, beyond(radius, width))).collect();
+        for ((own, &(_, middle)), passed) in passing.iter_mut().zip(&middles).zip(passes(&middles))
+        {
             if passed {
-                bracket.1 = (bracket.1 - width).max(0.0);
+                own.1 = middle;
             }
         }
     }
-    // Where nothing passes at an angle, nothing is known.
-    let mut found = [0.0; 2 * ANGLES];
-    for (i, high) in brackets {
-        found[i] = (high - width).max(0.0);
+    for (i, radius) in passing {
+        last[i] = Some(beyond(radius, width));
     }
-    for (radius, found) in radii.iter_mut().zip(found) {
-        *radius = radius.min(found);
-    }
+    last
 }
