@@ -31,7 +31,7 @@ const STRUCTURED: f64 = 1.5;
 
 /// For machines.
 #[derive(Debug, Serialize)]
-struct Told<'a> {
+struct MatchReport<'a> {
     version: u32,
     photo: String,
     scene: String,
@@ -57,7 +57,7 @@ pub(crate) fn run(arguments: &MatchArguments) -> Result<(), Fault> {
     drop(progress);
     let mut inputs = session.inputs();
     inputs.push(arguments.photo.clone());
-    let told = Told {
+    let report = MatchReport {
         version: 1,
         photo: arguments.photo.display().to_string(),
         scene: arguments.scene.display().to_string(),
@@ -67,7 +67,7 @@ pub(crate) fn run(arguments: &MatchArguments) -> Result<(), Fault> {
         settings: &found.settings,
     };
     if let Some(folder) = &arguments.output {
-        write(folder, &inputs, &found, &told, arguments.quiet)?;
+        write(folder, &inputs, &found, &report, arguments.quiet)?;
     }
     if !arguments.quiet && found.matched.structure > STRUCTURED {
         say(&format!(
@@ -77,7 +77,7 @@ pub(crate) fn run(arguments: &MatchArguments) -> Result<(), Fault> {
         ));
     }
     if arguments.json {
-        return print_json(&told);
+        return print_json(&report);
     }
     print_text(&text(&found))
 }
@@ -116,7 +116,7 @@ fn write(
     folder: &Path,
     inputs: &[std::path::PathBuf],
     found: &PhotoMatch,
-    told: &Told<'_>,
+    report: &MatchReport<'_>,
     quiet: bool,
 ) -> Result<(), Fault> {
     let paths = FILES.map(|name| folder.join(name));
@@ -124,7 +124,7 @@ fn write(
     places::folder(folder)?;
     let to = Transaction::at_once().keeping(inputs);
     let [json, numbers, shown, drawn] = &paths;
-    sidecar::write_json(&to, json, told)?;
+    sidecar::write_json(&to, json, report)?;
     let residuals = &found.matched.residuals;
     let [width, height] = found.size;
     let picture = |values: Vec<f32>, look: Look| {

@@ -124,9 +124,9 @@ fn keep_exposure(
     if start.number == first.number && !(arguments.resume && is_there) {
         return Ok(());
     }
-    let told = out.join(pattern.place(first.number, "sensor.json"));
+    let sidecar = out.join(pattern.place(first.number, "sensor.json"));
     let read = || -> Option<f64> {
-        let text = std::fs::read(&told).ok()?;
+        let text = std::fs::read(&sidecar).ok()?;
         let sidecar: serde_json::Value = serde_json::from_slice(&text).ok()?;
         sidecar["metered_exposure_s"].as_f64().filter(|time| *time > 0.0)
     };

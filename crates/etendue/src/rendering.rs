@@ -450,8 +450,8 @@ pub(crate) fn certain_files(
         certain.map(|file| file.name(&layer)).collect::<Vec<_>>()
     };
     let files = layers.into_iter().flat_map(of);
-    let beside = annotation_files(outputs).filter(|name| name != COCO);
-    files.chain(outputs.exr.then(|| "layers.exr".to_owned())).chain(beside).collect()
+    let annotations = annotation_files(outputs).filter(|name| name != COCO);
+    files.chain(outputs.exr.then(|| "layers.exr".to_owned())).chain(annotations).collect()
 }
 
 /// The names in files of the layers that a scene asks for; the picture's is empty.

@@ -239,10 +239,10 @@ impl Directory<'_> {
             )]
             let start = *place as usize;
             let length = (wide * bits).div_ceil(8).saturating_mul(rows);
-            let told = lengths.get(k).copied().unwrap_or(f64::INFINITY);
+            let stated = lengths.get(k).copied().unwrap_or(f64::INFINITY);
             let block = start
                 .checked_add(length)
-                .filter(|_| told >= length as f64)
+                .filter(|_| stated >= length as f64)
                 .and_then(|end| self.file.bytes.get(start..end))
                 .ok_or_else(cut)?;
             for row in 0..rows.min(height - top) {

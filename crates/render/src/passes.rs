@@ -125,7 +125,7 @@ impl Job<'_> {
         };
         let judged = parts.iter().enumerate().find_map(place).unwrap_or((0, 0));
         let Sampling { samples, shard, .. } = self.sampling;
-        Adaptive::new(rule, samples, self.camera.resolution(), shard, judged, &self.met()?)
+        Adaptive::new(rule, samples, self.camera.resolution(), shard, judged, &self.chief_hits()?)
     }
 
     /// The samples after the next pass; `None` when there is no time for one.

@@ -12,7 +12,7 @@ use etendue_tracer::layer::{Columns, OtherFrame, Seen};
 use etendue_tracer::{LayerSpec, RayStats, SceneView, Traced};
 use rayon::prelude::*;
 
-use crate::adaptive::{Met, Rule};
+use crate::adaptive::{ChiefHit, Rule};
 use crate::checkpoint::Keeper;
 use crate::error::RenderError;
 use crate::film::{FilmLayer, NoMemory, Strip, filled, strips, take};
@@ -259,9 +259,9 @@ impl Job<'_> {
     }
 
     /// What the chief ray of each pixel meets, in rows from the top: by which pixels are alike.
-    pub(crate) fn met(&self) -> Result<Vec<Met>, NoMemory> {
+    pub(crate) fn chief_hits(&self) -> Result<Vec<ChiefHit>, NoMemory> {
         let [width, height] = self.camera.resolution();
-        let mut all = filled(Met::default(), width as usize * height as usize)?;
+        let mut all = filled(ChiefHit::default(), width as usize * height as usize)?;
         let strips = all.par_chunks_mut((width * TILE) as usize).enumerate();
         strips.filter(|(k, _)| self.sampling.shard.owns(*k)).for_each(|(k, met)| {
             let mut batch = RayBuffers::new(Detail::Surface);

@@ -217,7 +217,7 @@ impl Sensor {
         let kept = pixels.kept(&fit, white);
         let is_used = |channel: usize, x: f64, y: f64| kept.has(channel, x, y);
         pixels.not_bent(&fit, &is_used)?;
-        Ok(self.told(&fit, &pixels, &is_used, exposure))
+        Ok(self.estimates(&fit, &pixels, &is_used, exposure))
     }
 
     /// Mean photo-electrons of every pixel of a raw sensor, by rows.
@@ -248,7 +248,7 @@ impl Sensor {
     }
 
     /// Parameters and their deviations of a fit.
-    fn told(
+    fn estimates(
         &self,
         fit: &Fit,
         pixels: &Pixels<'_>,

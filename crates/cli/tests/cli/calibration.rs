@@ -100,9 +100,9 @@ fn a_set_is_of_the_scenes_own_camera() {
         assert!(bench.path("out").join(name).exists(), "{name}");
     }
     // About a corner two squares are dark and two bright, and opposite ones alike.
-    let told = bench.json("out/calibration.json");
+    let file = bench.json("out/calibration.json");
     let boards: Vec<&Value> =
-        told["sets"].as_array().unwrap().iter().filter(|set| set["pose"].is_object()).collect();
+        file["sets"].as_array().unwrap().iter().filter(|set| set["pose"].is_object()).collect();
     assert_eq!(boards.len(), 3);
     let mut seen = 0;
     for (number, board) in boards.iter().enumerate() {
@@ -214,7 +214,7 @@ fn a_photograph_with_hidden_numbers_is_matched() {
             "render.samples=256",
         ]);
         assert!(output.status.success(), "{}", text(&output.stderr));
-        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
         // Of 6144 pixels the noise of the dark ones tells the read-out's to a quarter.
         for (key, truth, least) in [
             ("system_gain", 0.31, 0.1),
@@ -222,17 +222,17 @@ fn a_photograph_with_hidden_numbers_is_matched() {
             ("black_level", 101.5, 0.02),
             ("exposure", 0.013, 0.1),
         ] {
-            let [value, sigma] = ["value", "sigma"].map(|part| told[key][part].as_f64().unwrap());
+            let [value, sigma] = ["value", "sigma"].map(|part| report[key][part].as_f64().unwrap());
             assert!(
                 (value - truth).abs() < 3.0 * sigma && sigma < least * truth,
                 "{key}: {value} ± {sigma}"
             );
         }
-        let structure = told["structure"].as_f64().unwrap();
+        let structure = report["structure"].as_f64().unwrap();
         assert!((structure - 1.0).abs() < 0.4, "{structure}");
     }
-    let told = bench.json("out/match.json");
-    assert_eq!(told["settings"][3][0], "camera.sensor.exposure");
+    let file = bench.json("out/match.json");
+    assert_eq!(file["settings"][3][0], "camera.sensor.exposure");
     let residuals = bench.array("residuals");
     let [mean, variance] =
         moments(&residuals.iter().copied().filter(|r| r.is_finite()).collect::<Vec<_>>());

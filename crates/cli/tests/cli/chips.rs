@@ -44,7 +44,7 @@ fn all_frames_have_the_exposure_of_the_first() {
         {}, { "materials.paint.color": [4e-5, 4e-5, 4e-5] }, { "materials.paint.color": [1e-5, 1e-5, 1e-5] }
     ]);
     let metering = |each: bool| json!({ "auto_exposure": { "percentile": 90, "target": 0.4, "each_frame": each } });
-    let told = |bench: &Bench, frame: u32| {
+    let metered = |bench: &Bench, frame: u32| {
         let sidecar = bench.json(&format!("out/frames/00000{frame}/sensor.json"));
         assert_eq!(sidecar["shots"][0]["exposure_s"], sidecar["metered_exposure_s"]);
         sidecar["metered_exposure_s"].as_f64().unwrap()
@@ -54,8 +54,8 @@ fn all_frames_have_the_exposure_of_the_first() {
     assert!(why.contains("auto_exposure") && why.contains("frame 0"), "{why}");
     bench.render(&["--frames", "0..1"]);
     bench.render(&["--frames", "1..3"]);
-    let first = told(&bench, 0);
-    assert_eq!([told(&bench, 1), told(&bench, 2)], [first; 2]);
+    let first = metered(&bench, 0);
+    assert_eq!([metered(&bench, 1), metered(&bench, 2)], [first; 2]);
     // 0.4 of the converter's (2¹⁴ − 1 − 100) above black; twice that in the second frame.
     let levels =
         [0, 1].map(|frame| read_npy(&bench.path(&format!("out/frames/00000{frame}/raw.npy")))[0]);
@@ -64,7 +64,7 @@ fn all_frames_have_the_exposure_of_the_first() {
     assert!((levels[1] - 100.0 - 2.0 * target).abs() <= 1.5, "{}", levels[1]);
     let bench = wall(&metering(true), &json!({ "frames": frames }));
     bench.render(&[]);
-    let times = [0, 1, 2].map(|frame| told(&bench, frame));
+    let times = [0, 1, 2].map(|frame| metered(&bench, frame));
     // Light is f32.
     assert!(
         (times[0] / times[1] - 2.0).abs() < 1e-5 && (times[2] / times[0] - 2.0).abs() < 1e-5,
@@ -89,9 +89,9 @@ fn an_exposure_is_metered_once_and_never_while_things_move() {
             "auto_exposure": metering["auto_exposure"]
         },
     });
-    let mut told = moving;
-    told["camera"] = shutter;
-    wall(&metering, &told).render(&[]);
+    let mut open = moving;
+    open["camera"] = shutter;
+    wall(&metering, &open).render(&[]);
     let bench = wall(&metering, &json!({}));
     std::fs::create_dir(bench.path("light")).unwrap();
     for (name, level) in [("light/0.npy", 1.0), ("light/1.npy", 2.0)] {
@@ -149,9 +149,9 @@ fn maps_of_defects_are_read() {
         assert!(
             raw.iter().enumerate().all(|(at, y)| numbers(at) > 0 || (*y > 110.0 && *y < 16_000.0))
         );
-        let told = bench.json("out/sensor.json")["defects"].clone();
+        let defects = bench.json("out/sensor.json")["defects"].clone();
         assert_eq!(
-            told,
+            defects,
             json!([{ "column": 1, "row": 1, "kind": "dead" }, { "column": 4, "row": 2, "kind": "stuck" }])
         );
     }
@@ -362,8 +362,8 @@ fn diffusion_and_pixels_have_the_modulation_of_their_formula() {
         bench.render(&[]);
         let output = bench.run(&["edge", "out/raw.png", "--raw", "--json", "--quiet"]);
         assert!(output.status.success(), "{}", text(&output.stderr));
-        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
-        let modulation = told["channels"][0]["modulation"].as_array().unwrap().clone();
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let modulation = report["channels"][0]["modulation"].as_array().unwrap().clone();
         let mut seen = 0;
         for point in modulation {
             let [f, found] = [0, 1].map(|k| point[k].as_f64().unwrap());

@@ -1,7 +1,7 @@
 //! The pictures by which a camera is calibrated, as its own simulation takes them: darks, flats, white images and a board.
 
 mod boards;
-mod stage;
+mod surroundings;
 
 use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ use serde_json::{Value, json};
 use crate::progress::Phase;
 use crate::{Channel, Error, Layer, Picture, Progress, Session, Values, Written, places};
 use boards::{Board, BoardPose};
-use stage::Stage;
+use surroundings::WhiteSurroundings;
 
 /// Points of the gain map of a DNG, along columns and rows.
 const SHADING: [u32; 2] = [17, 13];
@@ -69,7 +69,7 @@ impl Default for CalibrationOptions {
 
 /// `calibration.json`.
 #[derive(Debug, Serialize)]
-struct Told {
+struct CalibrationFile {
     software: &'static str,
     version: u32,
     sensor: Value,
@@ -80,14 +80,14 @@ struct Told {
     level: f64,
     black_level_dn: f64,
     saturation_level_dn: f64,
-    sets: Vec<ToldSet>,
+    sets: Vec<FrameSet>,
     #[serde(skip_serializing_if = "Option::is_none")]
     board: Option<Board>,
 }
 
 /// Frames of one kind.
 #[derive(Debug, Serialize)]
-struct ToldSet {
+struct FrameSet {
     kind: String,
     what: &'static str,
     files: Vec<String>,
@@ -116,18 +116,18 @@ pub fn calibrate(
 ) -> Result<Written, Error> {
     let start = Instant::now();
     check(options)?;
-    let stage = Stage::of(session, progress)?;
+    let surroundings = WhiteSurroundings::of(session, progress)?;
     // One picture of white, of which darks and flats are made, too.
-    let white = stage.take(Vec::new(), progress)?;
+    let white = surroundings.take(Vec::new(), progress)?;
     let sensor = white.sensor().clone();
     let first = Exposure { exposure: 0.01, frame: 0 };
     let shot = Exposure { frame: 0, ..sensor.shots().next().unwrap_or(first) };
-    let factor = stage.factor(&white, (shot, options.level))?;
+    let factor = surroundings.factor(&white, (shot, options.level))?;
     let board = match options.boards {
         0 => None,
         count => {
-            let board = Board::before(&stage.camera, options, count);
-            Some(board.map_err(|why| stage.refused(&why))?)
+            let board = Board::before(&surroundings.camera, options, count);
+            Some(board.map_err(|why| surroundings.refused(&why))?)
         }
     };
     let mut set = CalibrationSet {
@@ -143,10 +143,10 @@ pub fn calibrate(
     let resolution = set.fitting()?;
     places::folder(folder)?;
     let names = [MANIFEST.to_owned(), "calibration.json".to_owned()];
-    places::keep_apart(&stage.inputs, &names.map(|name| folder.join(name)))?;
+    places::keep_apart(&surroundings.inputs, &names.map(|name| folder.join(name)))?;
     let white = white.scaled(factor);
     let count = 3.0 + f64::from(options.boards);
-    places::recorded(Ledger::open(folder, "calibrate"), &stage.inputs, |to| {
+    places::recorded(Ledger::open(folder, "calibrate"), &surroundings.inputs, |to| {
         let goes_on = |done: f64| match progress.goes_on(Phase::Expose, done / count) {
             true => Ok(()),
             false => Err(Error::from(ExposeError::Stopped)),
@@ -156,11 +156,11 @@ pub fn calibrate(
         for (number, pose) in board.iter().flat_map(|board| &board.poses).enumerate() {
             goes_on(3.0 + number as f64)?;
             let objects = board.iter().flat_map(|board| board.objects(pose)).collect();
-            let light = stage.take(objects, progress)?.scaled(factor);
+            let light = surroundings.take(objects, progress)?.scaled(factor);
             let kind = format!("board_{number:03}");
-            let mut told = set.frames((to, folder), (&kind, "a chessboard"), &light)?;
-            told.pose = Some(pose.clone());
-            sets.push(told);
+            let mut frames = set.frames((to, folder), (&kind, "a chessboard"), &light)?;
+            frames.pose = Some(pose.clone());
+            sets.push(frames);
         }
         set.tell((to, folder), (sets, board.clone()), resolution)
     })?;
@@ -240,7 +240,7 @@ impl CalibrationSet<'_> {
         to: (&Transaction, &Path),
         white: &SensorLight,
         goes_on: &dyn Fn(f64) -> Result<(), Error>,
-    ) -> Result<Vec<ToldSet>, Error> {
+    ) -> Result<Vec<FrameSet>, Error> {
         self.shading = self.shading_of(white)?;
         let flat = white.clone().even(self.sensor.resolution().map(|side| side as usize / 2));
         let dark = flat.clone().scaled(0.0);
@@ -261,11 +261,11 @@ impl CalibrationSet<'_> {
     fn tell(
         &mut self,
         (to, folder): (&Transaction, &Path),
-        (sets, board): (Vec<ToldSet>, Option<Board>),
+        (sets, board): (Vec<FrameSet>, Option<Board>),
         resolution: [usize; 2],
     ) -> Result<(), Error> {
         let (sensor, options) = (self.sensor, self.options);
-        let told = Told {
+        let file = CalibrationFile {
             software: SOFTWARE,
             version: 1,
             sensor: json!(sensor.spec()),
@@ -284,7 +284,7 @@ impl CalibrationSet<'_> {
             }),
         };
         let path = folder.join("calibration.json");
-        sidecar::write_json(to, &path, &told)?;
+        sidecar::write_json(to, &path, &file)?;
         self.files.push(path);
         Ok(())
     }
@@ -325,7 +325,7 @@ impl CalibrationSet<'_> {
         to: (&Transaction, &Path),
         (kind, what): (&str, &'static str),
         light: &SensorLight,
-    ) -> Result<ToldSet, Error> {
+    ) -> Result<FrameSet, Error> {
         let mut files = Vec::new();
         let mut sums: Vec<f64> = Vec::new();
         let mut size = [0; 3];
@@ -351,7 +351,7 @@ impl CalibrationSet<'_> {
         let path = to.1.join(&mean);
         npy::write(to.0, &path, &picture, "Raw")?;
         self.files.push(path);
-        Ok(ToldSet { kind: kind.to_owned(), what, files, mean, pose: None })
+        Ok(FrameSet { kind: kind.to_owned(), what, files, mean, pose: None })
     }
 
     fn layer(&self, planes: Vec<Values>, look: Look, definition: &str) -> Layer {

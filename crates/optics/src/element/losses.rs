@@ -146,8 +146,8 @@ impl Loss {
         let films = match &spec.reflection {
             Some(Reflection::Stack(stack)) if in_air && reflects => {
                 stack.build().ok().map(|stack| {
-                    let met = if indices[0] == 1.0 { stack } else { stack.reversed() };
-                    (Films::Glass(met.into()), wavelength)
+                    let stack = if indices[0] == 1.0 { stack } else { stack.reversed() };
+                    (Films::Glass(stack.into()), wavelength)
                 })
             }
             _ => None,

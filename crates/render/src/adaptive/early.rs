@@ -55,17 +55,17 @@ pub(super) fn judge(blocks: &[Option<OwnVariance>], across: usize) -> Vec<Judgem
         let Some(own) = blocks[index] else { return Judgement::default() };
         let column = index % across;
         let columns = column.saturating_sub(BESIDE)..(column + BESIDE + 1).min(across);
-        let around: Vec<OwnVariance> = (0..rows)
+        let neighbours: Vec<OwnVariance> = (0..rows)
             .flat_map(|row| columns.clone().filter_map(move |x| blocks[row * across + x]))
             .filter(|other| 2 * other.pixels > own.pixels)
             .collect();
-        let count = around.len() as f64;
-        let mean = around.iter().map(|other| other.mean).sum::<f64>() / count;
+        let count = neighbours.len() as f64;
+        let mean = neighbours.iter().map(|other| other.mean).sum::<f64>() / count;
         // By chance alone, a block like these.
-        let by_chance = around.iter().map(|other| other.spread).sum::<f64>() / count;
+        let by_chance = neighbours.iter().map(|other| other.spread).sum::<f64>() / count;
         // Of flashes half of one more than fell: of what is rare none may have fallen yet (H. Jeffreys, 1946).
         let mean = if mean > 0.0 { mean + 0.5 * by_chance / (mean * count) } else { 0.0 };
-        let all = around.iter().map(|other| (other.mean - mean).powi(2)).sum::<f64>()
+        let all = neighbours.iter().map(|other| (other.mean - mean).powi(2)).sum::<f64>()
             / (count - 1.0).max(1.0);
         let spread = by_chance.max(own.spread);
         let between = (all - by_chance).max(0.0);
@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn blocks_over_the_limit_are_told_within_half() {
         let (across, pixels) = (40, 64);
-        let told = |of: &dyn Fn(u64, usize) -> Vec<f64>| {
+        let share = |of: &dyn Fn(u64, usize) -> Vec<f64>| {
             let seeds = 32;
             let mut sum = 0.0;
             for seed in 0..seeds {
@@ -146,13 +146,13 @@ mod tests {
         let normal = |seed: u64, k: usize, level: f64| -> Vec<f64> {
             squares(1 + seed * 1000 + k as u64, pixels).map(|v| level * v).collect()
         };
-        assert!(told(&|seed, k| normal(seed, k, 0.8)) < 0.01);
-        assert!(told(&|seed, k| normal(seed, k, 4.0)) > 0.99);
-        let mixed = told(&|seed, k| normal(seed, k, if k % 4 == 0 { 5.0 } else { 0.8 }));
+        assert!(share(&|seed, k| normal(seed, k, 0.8)) < 0.01);
+        assert!(share(&|seed, k| normal(seed, k, 4.0)) > 0.99);
+        let mixed = share(&|seed, k| normal(seed, k, if k % 4 == 0 { 5.0 } else { 0.8 }));
         assert!((0.25 / 1.5..0.25 * 1.5).contains(&mixed), "{mixed}");
         // Flashes: a square of a normal number is over 8.284 in one of 250.
         let flash = |level: f64| {
-            told(&|seed, k| {
+            share(&|seed, k| {
                 let all = squares(7 + seed * 1000 + k as u64, pixels);
                 all.map(|v| if v > 8.284 { level * 250.0 } else { 0.0 }).collect()
             })

@@ -13,20 +13,20 @@ const SCALES: [f32; 3] = [0.1, 0.3, 0.2];
 pub(super) const FEATURES: usize = 8;
 
 /// What a chief ray meets: base colour, geometric normal, and the logarithm of its distance; nothing for a miss.
-pub(crate) type Met = [f32; 7];
+pub(crate) type ChiefHit = [f32; 7];
 
 /// What tells which pixels are alike: colour, normal, and the steps of colour, and of normal or distance, to the pixels
 /// beside, each in units of what makes half a difference.
 pub(super) type Guide = [f32; FEATURES];
 
 /// The guides of the rows of a strip, of `width` columns.
-pub(super) fn guides(met: &[Met], width: usize) -> Vec<Guide> {
-    let height = met.len() / width.max(1);
-    let at = |x: usize, y: usize| &met[y * width + x];
+pub(super) fn guides(hits: &[ChiefHit], width: usize) -> Vec<Guide> {
+    let height = hits.len() / width.max(1);
+    let at = |x: usize, y: usize| &hits[y * width + x];
     let guide = |index: usize| {
         let (x, y) = (index % width, index / width);
         let own = at(x, y);
-        let beside = [
+        let neighbours = [
             (x > 0).then(|| at(x - 1, y)),
             (x + 1 < width).then(|| at(x + 1, y)),
             (y > 0).then(|| at(x, y - 1)),
@@ -34,7 +34,7 @@ pub(super) fn guides(met: &[Met], width: usize) -> Vec<Guide> {
         ];
         // The largest step of each part.
         let mut steps = [0.0_f32; 3];
-        for other in beside.into_iter().flatten() {
+        for other in neighbours.into_iter().flatten() {
             for (step, part) in steps.iter_mut().zip([0..3, 3..6, 6..7]) {
                 let squares = part.map(|k| (own[k] - other[k]).powi(2));
                 *step = step.max(squares.sum::<f32>().sqrt());
@@ -49,7 +49,7 @@ pub(super) fn guides(met: &[Met], width: usize) -> Vec<Guide> {
             _ => (steps[1] / normal).max(steps[2] / distance).min(3.0),
         })
     };
-    (0..met.len()).map(guide).collect()
+    (0..hits.len()).map(guide).collect()
 }
 
 /// How much alike two pixels are, 1 at most.
@@ -67,8 +67,8 @@ mod tests {
     #[test]
     fn edges_are_like_edges_and_plains_like_plains() {
         // Four columns and two rows: black up to an edge in the middle, then white.
-        let met: Vec<Met> = (0..8).map(|k| [f32::from(u8::from(k % 4 > 1)); 7]).collect();
-        let guides = guides(&met, 4);
+        let hits: Vec<ChiefHit> = (0..8).map(|k| [f32::from(u8::from(k % 4 > 1)); 7]).collect();
+        let guides = guides(&hits, 4);
         let like = |a: usize, b: usize| likeness(&guides[a], &guides[b]);
         assert_eq!(like(0, 4), 1.0);
         assert_eq!(like(1, 5), 1.0);

@@ -31,7 +31,7 @@ mod strip;
 use rayon::prelude::*;
 
 pub use counts::SampleCounts;
-pub(crate) use guide::Met;
+pub(crate) use guide::ChiefHit;
 pub(crate) use rule::{Rule, variance_of_mean};
 
 use crate::film::{FilmLayer, NoMemory, filled};
@@ -80,7 +80,7 @@ impl<'a> Adaptive<'a> {
         resolution: [u32; 2],
         shard: Shard,
         judged: (usize, usize),
-        met: &[Met],
+        hits: &[ChiefHit],
     ) -> Result<Self, NoMemory> {
         let [width, height] = resolution.map(|side| side as usize);
         let mut demands = filled(Demand::default(), width * height)?;
@@ -97,7 +97,7 @@ impl<'a> Adaptive<'a> {
             have: filled(0, width * height)?,
             demands,
             evidence: filled(Evidence::default(), width * height)?,
-            guides: met.chunks(a_strip).flat_map(|met| guides(met, width)).collect(),
+            guides: hits.chunks(a_strip).flat_map(|hits| guides(hits, width)).collect(),
             judged,
         })
     }
@@ -134,8 +134,8 @@ impl<'a> Adaptive<'a> {
                 have[index] = demands[index].next;
                 #[expect(clippy::cast_possible_truncation, reason = "a pixel of a strip")]
                 let place = [index as u32 % width, top + index as u32 / width];
-                let told = rule.told(&part.sampled(place, first), have[index] / 2);
-                evidence[index].learn(have[index], told);
+                let noise = rule.noise(&part.sampled(place, first), have[index] / 2);
+                evidence[index].learn(have[index], noise);
                 changed[index] = true;
             }
             StripOfPixels { width: width as usize, have, evidence, guides }
@@ -143,11 +143,11 @@ impl<'a> Adaptive<'a> {
         });
     }
 
-    /// Writes to the layers the means of what each pixel has, and to those `told` what sampling found of itself.
-    pub(crate) fn show(&self, parts: &mut [Averaging<'_>], told: &mut [&mut FilmLayer]) {
+    /// Writes to the layers the means of what each pixel has, and to `findings` what sampling found of itself.
+    pub(crate) fn show(&self, parts: &mut [Averaging<'_>], findings: &mut [&mut FilmLayer]) {
         parts.iter_mut().for_each(|part| part.show_counted(&self.have));
-        if !told.is_empty() {
-            parts[self.judged.0].tell(told, &self.have, self.judged.1);
+        if !findings.is_empty() {
+            parts[self.judged.0].tell(findings, &self.have, self.judged.1);
         }
     }
 

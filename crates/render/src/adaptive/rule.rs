@@ -25,7 +25,7 @@ enum Allowed {
 
 /// What the samples of a pixel tell.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Told {
+pub(super) struct PixelNoise {
     /// The variance of their mean: as a share of what the sensor's noise allows, or of light.
     pub(super) variance: f64,
     /// The mean of the light over its bands.
@@ -54,7 +54,11 @@ impl Rule {
     }
 
     /// What the two sets of a pixel's samples tell, `a_set` being in each.
-    pub(super) fn told(&self, Sampled { pixel, sets: [a, b] }: &Sampled<'_>, a_set: u32) -> Told {
+    pub(super) fn noise(
+        &self,
+        Sampled { pixel, sets: [a, b] }: &Sampled<'_>,
+        a_set: u32,
+    ) -> PixelNoise {
         let a_set = f64::from(a_set.max(1));
         let of_set = |set: usize, band: usize| [a, b][set][band].total() / a_set;
         let (mut variance, mut light) = (0.0, 0.0);
@@ -68,10 +72,10 @@ impl Rule {
             Allowed::SensorNoise(noise, share) => noise.share(*pixel, of_set) / share,
             Allowed::RelativeError(_) => variance / bands,
         };
-        Told { variance, light: light / bands }
+        PixelNoise { variance, light: light / bands }
     }
 
-    /// The variance that is allowed where the light is `light` in the mean, in the unit of [`Told::variance`].
+    /// The variance that is allowed where the light is `light` in the mean, in the unit of [`PixelNoise::variance`].
     pub(super) fn allowed(&self, light: f64) -> f64 {
         match &self.allowed {
             Allowed::SensorNoise(..) => 1.0,

@@ -61,10 +61,10 @@ impl Averaging<'_> {
         });
     }
 
-    /// Writes what sampling found of itself to `told`, for the layer whose first value is `first`.
-    pub(super) fn tell(&self, told: &mut [&mut FilmLayer], have: &[u32], first: usize) {
+    /// Writes what sampling found of itself to `findings`, for the layer whose first value is `first`.
+    pub(super) fn tell(&self, findings: &mut [&mut FilmLayer], have: &[u32], first: usize) {
         let resolution @ [width, _] = self.what.camera().resolution();
-        strips(told, resolution, TILE).par_iter().for_each(|strip| {
+        strips(findings, resolution, TILE).par_iter().for_each(|strip| {
             let Some(mut strip) = take(strip) else { return };
             let (top, pixels) = (strip.top, strip.height * width);
             for index in 0..pixels {

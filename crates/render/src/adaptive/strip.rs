@@ -3,7 +3,7 @@
 use super::counts::SampleCounts;
 use super::early::{self, OwnVariance};
 use super::guide::{Guide, likeness};
-use super::rule::{Rule, Told};
+use super::rule::{PixelNoise, Rule};
 
 /// Side of a block (pixels).
 const BLOCK: usize = 8;
@@ -36,7 +36,7 @@ const BISECTIONS: usize = 24;
 pub(super) struct Evidence {
     /// The sum of the variances of one sample that it told after each round, and of their weights: the squares of its
     /// numbers of samples.
-    told: f64,
+    sum: f64,
     weight: f64,
     /// What its samples tell now, of the mean of all.
     variance: f64,
@@ -45,16 +45,16 @@ pub(super) struct Evidence {
 
 impl Evidence {
     /// Learns what its `samples` samples tell.
-    pub(super) fn learn(&mut self, samples: u32, told: Told) {
+    pub(super) fn learn(&mut self, samples: u32, noise: PixelNoise) {
         let count = f64::from(samples);
-        self.told += count * count * (count * told.variance);
+        self.sum += count * count * (count * noise.variance);
         self.weight += count * count;
-        (self.variance, self.light) = (told.variance, told.light);
+        (self.variance, self.light) = (noise.variance, noise.light);
     }
 
     /// The variance of one sample.
     fn of_one(&self) -> f64 {
-        if self.weight > 0.0 { self.told / self.weight } else { 0.0 }
+        if self.weight > 0.0 { self.sum / self.weight } else { 0.0 }
     }
 }
 
@@ -160,21 +160,21 @@ impl StripOfPixels<'_> {
         let has_changed: Vec<bool> = (0..across * down)
             .map(|block| self.pixels([block % across, block / across]).any(|index| changed[index]))
             .collect();
-        let told: Vec<f64> = self.evidence.iter().map(Evidence::of_one).collect();
+        let variances: Vec<f64> = self.evidence.iter().map(Evidence::of_one).collect();
         for block in 0..across * down {
             let place @ [column, _] = [block % across, block / across];
-            let beside = column.saturating_sub(1)..(column + 2).min(across);
-            let is_new = |row: usize| beside.clone().any(|x| has_changed[row * across + x]);
+            let columns = column.saturating_sub(1)..(column + 2).min(across);
+            let is_new = |row: usize| columns.clone().any(|x| has_changed[row * across + x]);
             if (0..down).any(is_new) {
                 for half in 0..HALVES {
-                    self.ask_half(rule, most, &self.half(place, half, &told), demands);
+                    self.ask_half(rule, most, &self.half(place, half, &variances), demands);
                 }
             }
         }
     }
 
-    /// What the pixels of the other colour tell of those of one in a block: `told` is what each tells of one sample.
-    fn half(&self, place: [usize; 2], half: usize, told: &[f64]) -> HalfOfBlock {
+    /// What the pixels of the other colour tell of those of one in a block: `variances` is that of one sample of each.
+    fn half(&self, place: [usize; 2], half: usize, variances: &[f64]) -> HalfOfBlock {
         let pixels: Vec<usize> =
             self.pixels(place).filter(|&index| self.half_of(index) == half).collect();
         let window = Window::around(place, [self.width, self.height()]);
@@ -188,7 +188,7 @@ impl StripOfPixels<'_> {
             let (mut sum, mut total) = (0.0, 0.0);
             for (other, at) in window.others(index) {
                 let weight = f64::from(likeness(&self.guides[index], &self.guides[other]) + LEAST);
-                sum += weight * told[other];
+                sum += weight * variances[other];
                 light += weight * self.evidence[other].light;
                 total += weight;
                 weights.push((at, weight));
@@ -209,7 +209,7 @@ impl StripOfPixels<'_> {
         }
         let (mut sum, mut squares) = (0.0, 0.0);
         for (index, bears) in window.pixels().zip(bears) {
-            let part = told[index] * bears;
+            let part = variances[index] * bears;
             sum += part;
             squares += part * part;
         }
@@ -379,10 +379,10 @@ mod tests {
     /// mean that is allowed, and are the fewest that do.
     #[test]
     fn samples_go_by_the_root_of_the_variance() {
-        let told = |variance| Told { variance, light: 1.0 };
+        let noise = |variance| PixelNoise { variance, light: 1.0 };
         let mut evidence = vec![Evidence::default(); 64];
         for (index, pixel) in evidence.iter_mut().enumerate() {
-            pixel.learn(4, told(if index % 8 < 2 { 16.0 } else { 1.0 }));
+            pixel.learn(4, noise(if index % 8 < 2 { 16.0 } else { 1.0 }));
         }
         // Left columns are like each other alone.
         let mut guides = vec![[0.0; super::super::guide::FEATURES]; 64];

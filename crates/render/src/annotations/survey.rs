@@ -27,7 +27,7 @@ const DEPTH_STEP: f64 = 0.1;
 pub(super) const BYTES_A_PIXEL: u64 = 2 * (4 + 8 + 4) + 2 + 2;
 
 /// Which copy each pixel sees, and how far away, down the columns.
-struct Seen {
+struct CopiesByPixel {
     /// Index of the copy, or [`MISS`].
     copy: Vec<u32>,
     /// z of the camera (m); infinite where nothing is.
@@ -47,10 +47,10 @@ pub fn survey(
     progress: &(dyn Fn(f64) -> bool + Sync),
 ) -> Result<(Annotated, Vec<u16>), AnnotationError> {
     let [width, height] = scene.camera.resolution();
-    let seen = seen(scene, accel);
+    let pixels = copies_by_pixel(scene, accel);
     let copies = copies(&scene.geometry);
     let mut visible: Vec<Runs> = Vec::new();
-    for (pixel, &copy) in (0..).zip(&seen.copy).filter(|(_, copy)| **copy != MISS) {
+    for (pixel, &copy) in (0..).zip(&pixels.copy).filter(|(_, copy)| **copy != MISS) {
         let copy = copy as usize;
         if visible.len() <= copy {
             visible.resize_with(copy + 1, Runs::default);
@@ -87,7 +87,7 @@ pub fn survey(
         });
     }
     let (scale, depth) = match outputs.bop {
-        true => steps(&seen.depth, [width, height]),
+        true => steps(&pixels.depth, [width, height]),
         false => (DEPTH_STEP, Vec::new()),
     };
     let annotated = Annotated {
@@ -115,7 +115,7 @@ fn camera(scene: &Scene) -> Option<PinholeCamera> {
 }
 
 /// Columns of pixels, each traced as one batch.
-fn seen(scene: &Scene, accel: &dyn Accel) -> Seen {
+fn copies_by_pixel(scene: &Scene, accel: &dyn Accel) -> CopiesByPixel {
     let [width, height] = scene.camera.resolution();
     let column = |x: u32| {
         let (mut rays, mut hits) = (RayBatch::default(), HitBatch::new(Detail::Distance));
@@ -133,7 +133,7 @@ fn seen(scene: &Scene, accel: &dyn Accel) -> Seen {
     };
     let columns: Vec<_> = (0..width).into_par_iter().map(column).collect();
     let (copy, depth) = columns.into_iter().flatten().unzip();
-    Seen { copy, depth }
+    CopiesByPixel { copy, depth }
 }
 
 /// The chief rays of rows of a column.
@@ -180,12 +180,12 @@ fn silhouette(
             inside += 1;
         }
     }
-    let around = match pixels.is_empty() {
+    let bounds = match pixels.is_empty() {
         true => [-1; 4],
         false => [least[0], least[1], most[0] - least[0], most[1] - least[1]],
     };
     let all_pixels = u32::try_from(pixels.len()).unwrap_or(u32::MAX);
-    Ok(Silhouette { mask: runs.mask([height, width]), pixels: inside, all_pixels, around })
+    Ok(Silhouette { mask: runs.mask([height, width]), pixels: inside, all_pixels, around: bounds })
 }
 
 /// These placements with their meshes, and nothing else.

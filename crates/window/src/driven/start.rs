@@ -34,13 +34,13 @@ fn a_broken_file_at_first_says_what_the_command_line_says() {
     window.until("an error", |app| app.error.is_some());
     let error = window.app.error.clone().unwrap();
     assert!(error.contains("broken.json, line 3, column"), "{error}");
-    let told = match Session::open(&broken)
+    let message = match Session::open(&broken)
         .and_then(|mut session| session.scene(&Progress::none()).map(|_| ()))
     {
         Err(error) => error.message(),
         Ok(()) => panic!("it is broken"),
     };
-    assert_eq!(error, told);
+    assert_eq!(error, message);
     // There still is something to begin with.
     window.click(&format!("first={}", FIRST_SCENES[0].name));
     window.until("a picture", |app| app.picture.is_some());

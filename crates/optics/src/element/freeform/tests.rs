@@ -131,19 +131,19 @@ fn rays_meet_the_surface_and_a_fresnel_lens_bends_as_its_facets() {
     let surface = FreeformSurface::new(Arc::clone(&shape), 1.5, 550.0);
     for [x, y] in places() {
         let ray = Ray::new([x, y, -20.0].into(), [0.05, -0.02, 1.0].into()).unwrap();
-        let met = cross(&surface, Media::new(1.0, 1.5), ray, 1e9);
-        let [x, y, z] = met.ray.position;
-        assert!(met.hit && met.through && (z - shape.sag([x, y]).unwrap()).abs() < 1e-13);
+        let crossing = cross(&surface, Media::new(1.0, 1.5), ray, 1e9);
+        let [x, y, z] = crossing.ray.position;
+        assert!(crossing.hit && crossing.through && (z - shape.sag([x, y]).unwrap()).abs() < 1e-13);
     }
     // A parabola's slope at r is r/R: by Snell at the facet, from the plane.
     let fresnel = Arc::new(read(r#"{"radius": 40, "conic": -1, "fresnel": true}"#).unwrap());
     let surface = FreeformSurface::new(fresnel, 1.5, 550.0);
     let ray = Ray::new([0.0, 6.0, -5.0].into(), [0.0, 0.0, 1.0].into()).unwrap();
-    let met = cross(&surface, Media::new(1.0, 1.5), ray, 1e9);
+    let crossing = cross(&surface, Media::new(1.0, 1.5), ray, 1e9);
     let facet = (6.0_f64 / 40.0).atan();
     let bent = facet - (facet.sin() / 1.5).asin();
-    assert_eq!(met.ray.position, [0.0, 6.0, 0.0]);
-    assert!((met.ray.direction[1] + bent.sin()).abs() < 1e-15);
+    assert_eq!(crossing.ray.position, [0.0, 6.0, 0.0]);
+    assert!((crossing.ray.direction[1] + bent.sin()).abs() < 1e-15);
 }
 
 #[test]
@@ -159,12 +159,12 @@ fn gratings_obey_the_grating_equation_and_lose_what_is_evanescent() {
         for angle in [-20.0_f64, 0.0, 35.0] {
             let (sine, cosine) = angle.to_radians().sin_cos();
             let ray = Ray::new([0.3, 0.0, -5.0].into(), [0.0, sine, cosine].into()).unwrap();
-            let met = cross(&surface, Media::new(n, n1), ray, 1e9);
+            let crossing = cross(&surface, Media::new(n, n1), ray, 1e9);
             let expected = (n * sine + f64::from(order) * wavelength * 1e-6 / 0.005) / n1;
-            assert_eq!(met.through, expected.abs() <= 1.0, "order {order} at {angle}");
-            if met.through {
-                assert!((met.ray.direction[1] - expected).abs() < 1e-12);
-                let length: f64 = met.ray.direction.iter().map(|d| d * d).sum();
+            assert_eq!(crossing.through, expected.abs() <= 1.0, "order {order} at {angle}");
+            if crossing.through {
+                assert!((crossing.ray.direction[1] - expected).abs() < 1e-12);
+                let length: f64 = crossing.ray.direction.iter().map(|d| d * d).sum();
                 assert!((length - 1.0).abs() < 1e-15);
             }
         }

@@ -167,7 +167,7 @@ fn trace(
     let stop = last + out * ((end - last.z) / out.z);
     // Each point as the space before its element stands in the built lens; without spaces as they are.
     let place = |i: usize, point: DVec3| spaces.get(i).map_or(point, |space| space.place(point));
-    let met = path.points.iter().enumerate().map(|(i, &point)| place(i, point));
+    let vertices = path.points.iter().enumerate().map(|(i, &point)| place(i, point));
     let stop = match train.elements().last().and_then(|last| last.part.mirror()) {
         // The last point is before the fold: where it is behind it follows from the way back.
         Some(_) if !spaces.is_empty() => {
@@ -179,7 +179,7 @@ fn trace(
         }
         _ => place(path.points.len(), stop),
     };
-    let points = std::iter::once(start).chain(met).chain([stop]);
+    let points = std::iter::once(start).chain(vertices).chain([stop]);
     let points: Vec<[f64; 2]> = points.map(|point| [point.z, point.y]).collect();
     points.iter().flatten().all(|number| number.is_finite()).then_some(points)
 }

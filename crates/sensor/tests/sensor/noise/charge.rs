@@ -40,8 +40,8 @@ fn what_is_read_follows_the_curve() {
             let (image, _) = even_frame(&noisy, share * well, 0, 3);
             let [mean, variance] = moments(image.values.iter().map(|&y| f64::from(y)));
             let light = (share * well / noisy.electrons_per_unit(0)[0]) as f32;
-            let told = one.moments(Film { values: &[light] }, SHOT).unwrap();
-            let [m, v] = [told.mean[0], told.variance[0]].map(f64::from);
+            let moments = one.moments(Film { values: &[light] }, SHOT).unwrap();
+            let [m, v] = [moments.mean[0], moments.variance[0]].map(f64::from);
             // 65 536 pixels: five errors of a mean, and of a variance.
             assert!(
                 (mean - m).abs() < 5.0 * v.sqrt() / 256.0 + 1e-3,
@@ -116,9 +116,9 @@ fn listed_defects_are_those_of_the_list() {
     assert!(values[0] < 110, "dead: {}", values[0]);
     assert_eq!([values[1], values[3]], [4095; 2]);
     assert!(values[2] > good.values[places[2]], "hot: {}", values[2]);
-    let told: Vec<_> = bad.defects().collect();
+    let listed: Vec<_> = bad.defects().collect();
     assert_eq!(
-        told,
+        listed,
         [
             ([199, 0], 0, Defect::Dead),
             ([3, 7], 0, Defect::Stuck),

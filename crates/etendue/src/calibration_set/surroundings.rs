@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use crate::{Error, Options, Progress, Session};
 
 /// The scene's camera, and what stands before it.
-pub(super) struct Stage {
+pub(super) struct WhiteSurroundings {
     /// The scene's file.
     path: PathBuf,
     values: Value,
@@ -20,7 +20,7 @@ pub(super) struct Stage {
     pub(super) inputs: Vec<PathBuf>,
 }
 
-impl Stage {
+impl WhiteSurroundings {
     /// Of a session's scene.
     pub(super) fn of(session: &mut Session, progress: &Progress) -> Result<Self, Error> {
         let (camera, inputs, spec) = {
@@ -29,14 +29,14 @@ impl Stage {
             (scene.camera.clone(), scene.inputs.clone(), spec)
         };
         let path = session.file().path().to_owned();
-        let stage =
+        let surroundings =
             Self { path, values: session.values().clone(), reach: session.reach(), camera, inputs };
-        if stage.values.get("camera").is_none_or(Value::is_null) {
-            return Err(stage
+        if surroundings.values.get("camera").is_none_or(Value::is_null) {
+            return Err(surroundings
                 .refused("camera: a calibration is of the scene's own camera, and it names none"));
         }
         let Some(spec) = spec else {
-            return Err(stage.refused(
+            return Err(surroundings.refused(
                 "camera.sensor: an ideal grid of pixels has nothing to calibrate; give it a sensor, such as \
                  { \"type\": \"raw\", \"model\": \"imx183\" }",
             ));
@@ -48,12 +48,12 @@ impl Stage {
             ("photodiodes", spec.photodiodes.is_some()),
         ];
         if let Some((key, _)) = more.into_iter().find(|(_, is_given)| *is_given) {
-            return Err(stage.refused(&format!(
+            return Err(surroundings.refused(&format!(
                 "camera.sensor.{key}: a calibration is of one plain read-out at one exposure; leave it out, and give the \
                  `exposure` that it is for"
             )));
         }
-        Ok(stage)
+        Ok(surroundings)
     }
 
     pub(super) fn refused(&self, why: &str) -> Error {
