@@ -89,6 +89,13 @@ fn an_exposure_is_metered_once_and_never_while_things_move() {
             "auto_exposure": metering["auto_exposure"]
         },
     });
+    // Nor is there one to judge samples by.
+    let judged = json!({ "render": { "samples": { "until": "sensor-noise" } } });
+    let second = json!({ "second_readout": { "type": "split_pixel", "ratio": 0.1 } });
+    for (sensor, key) in [(&metering, "auto_exposure"), (&second, "second_readout")] {
+        let why = refused(&wall(sensor, &judged), &[]);
+        assert!(why.contains(&format!("camera.sensor.{key}: `render.samples`")), "{why}");
+    }
     let mut open = moving;
     open["camera"] = shutter;
     wall(&metering, &open).render(&[]);

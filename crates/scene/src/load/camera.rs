@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use crate::cache::{self, KeptCamera};
 use crate::error::not_found;
-use crate::file::SceneFile;
+use crate::file::{SamplesSpec, SceneFile};
 use crate::import::{ImportedCamera, Note, NoteKind, Projection, Strictness};
 use crate::scene::{LoadOptions, WorldVertices};
 use crate::{Cache, SceneError, facing};
@@ -176,10 +176,22 @@ impl SceneFile {
         Ok(())
     }
 
-    /// Refuses angles and diffusion where the camera cannot have them.
+    /// Refuses angles and diffusion where the camera cannot have them, and read-outs by whose noise no samples are judged.
     fn check_sensor_behind(&self, sensor: &SensorSpec, camera: &Camera) -> Result<(), SceneError> {
         let refused = |key: &str, why: &str| Err(self.fault(&format!("camera.sensor.{key}"), why));
         let has_lenslets = camera.light_field().is_some();
+        let more = [
+            ("auto_exposure", sensor.auto_exposure.is_some()),
+            ("second_readout", sensor.second_readout.is_some()),
+            ("photodiodes", sensor.photodiodes.is_some()),
+        ];
+        if let SamplesSpec::SensorNoise(_) = self.spec.render.samples
+            && let Some((key, _)) = more.into_iter().find(|(_, is_given)| *is_given)
+        {
+            let why = "`render.samples` until the sensor's noise goes by one plain read-out at an exposure that is known \
+                       beforehand; give it a number of samples or a `relative_error`, or leave this out";
+            return refused(key, why);
+        }
         if sensor.angular_response.is_some() && has_lenslets {
             return refused(
                 "angular_response",
