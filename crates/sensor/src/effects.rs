@@ -395,7 +395,12 @@ impl Effects {
                 return Err(SensorError::Missing { key: "hot_pixels", why });
             }
         }
-        listed.sort_by_key(|at| (at.row, at.column, at.channel));
+        let place = |at: &ListedDefect| (at.row, at.column, at.channel);
+        listed.sort_by_key(place);
+        if let Some(twice) = listed.windows(2).find(|pair| place(&pair[0]) == place(&pair[1])) {
+            let column = f64::from(twice[0].column);
+            SensorError::unless(false, "defect_map", column, "the column of each pixel once")?;
+        }
         Ok(Self {
             nonlinearity,
             blooming: share("blooming", spec.blooming)?,

@@ -379,17 +379,18 @@ impl Part {
         is_blazed || self.mirror().is_some_and(|mirror| mirror.coating.is_some())
     }
 
-    /// The same with mirrors and orders of diffraction as `change` makes them.
+    /// The same with what `change` makes of a mirror.
     pub(crate) fn with_mirror(&self, change: impl Fn(&mut MirrorMount)) -> Self {
         let mut part = self.clone();
         match &mut part {
             Self::Mirror(mirror) => change(&mut mirror.mount),
-            Self::Freeform(surface) if surface.mirror.is_some() => {
-                let mut own = Freeform::clone(surface);
-                own.mirror.iter_mut().for_each(change);
-                *surface = own.into();
-            }
-            _ => {}
+            Self::Freeform(surface) => Arc::make_mut(surface).mirror.iter_mut().for_each(change),
+            Self::Surface(_)
+            | Self::Biconic(_)
+            | Self::ThinLens(_)
+            | Self::Aperture(_)
+            | Self::Filter(_)
+            | Self::MicrolensArray(_) => {}
         }
         part
     }

@@ -111,6 +111,12 @@ fn parts_of_chips_out_of_range() {
             "columns of the sensor, found 1024",
         ),
         (
+            json!({ "defect_map": [
+                { "column": 3, "row": 5, "kind": "dead" }, { "column": 3, "row": 5, "kind": "stuck" }
+            ] }),
+            "sensor.defect_map: expected the column of each pixel once, found 3",
+        ),
+        (
             json!({ "defect_map": [{ "column": 0, "row": 0, "kind": "hot" }] }),
             "nobody says how hot",
         ),

@@ -239,13 +239,11 @@ impl Freeform {
         self.phase.as_ref().is_some_and(|phase| phase.blaze.is_some())
     }
 
-    /// The same with all light in its order.
-    #[must_use]
-    pub fn without_blaze(mut self) -> Self {
+    /// Has all light go into its order.
+    pub(crate) fn lose_no_light(&mut self) {
         if let Some(phase) = &mut self.phase {
             phase.blaze = None;
         }
-        self
     }
 
     /// The share of light in the order of its phase at a wavelength (nm).

@@ -1,6 +1,8 @@
 //! A lens with parts of it made clear: what its bounds do not depend on.
 
-use crate::element::{Freeform, LossesSpec, Opening};
+use std::sync::Arc;
+
+use crate::element::{LossesSpec, Opening};
 use crate::train::{OpticalTrain, Part};
 
 /// The same lens with masks clear: the bound goes around their whole rectangle.
@@ -50,13 +52,10 @@ pub fn without_filters(train: &OpticalTrain) -> OpticalTrain {
 pub fn without_dimming(train: &OpticalTrain) -> OpticalTrain {
     let mut train = without_filters(&without_masks(train)).with_losses(LossesSpec::default());
     for element in &mut train.elements {
-        element.part = match &element.part {
-            Part::Freeform(surface) if surface.is_blazed() => {
-                Part::Freeform(Freeform::clone(surface).without_blaze().into())
-            }
-            other => other.clone(),
+        if let Part::Freeform(surface) = &mut element.part {
+            Arc::make_mut(surface).lose_no_light();
         }
-        .with_mirror(|mirror| mirror.coating = None);
+        element.part = element.part.with_mirror(|mirror| mirror.coating = None);
     }
     train
 }
