@@ -1,10 +1,13 @@
 //! Measuring the outlines: frames at the nodes, radii on a grid twice as fine, and the closing check.
 
+use std::ops::Range;
+
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::place::{NodePlace, between};
 use super::search::Window;
+use super::wavelengths::Divided;
 use super::{ANGLES, ExitPupil, NodeLayout, Outline, PLANAR_INTERVALS, RADIAL_INTERVALS, turn_of};
 use crate::element::{Clip, LensRays, RayStatus};
 use crate::train::aim::towards_lens;
@@ -24,7 +27,7 @@ const BEND: [f64; 2] = [0.4, 0.1];
 /// How far outside of the bound the closing check looks, as a share of the radius.
 const CHECKED: f64 = 0.35;
 
-/// Random rays of the closing check.
+/// Random rays of a round of the closing check.
 pub(super) const CHECKS: u32 = 1 << 16;
 
 impl ExitPupil {
@@ -214,10 +217,9 @@ impl ExitPupil {
 
     /// Looks for rays that pass just outside of the bound, and widens it around them until there
     /// are none.
-    pub(super) fn widen_until_tight(&mut self, lenses: &[MonochromaticTrain]) {
+    pub(super) fn widen_until_tight(&mut self, lenses: &Divided) {
         for round in 0..4 {
-            let found: Vec<Stray> =
-                lenses.iter().flat_map(|lens| self.strays(lens, round * CHECKS)).collect();
+            let found = self.found_in_round(lenses, round, Self::strays);
             for stray in &found {
                 self.widen_around(stray);
             }
@@ -228,10 +230,9 @@ impl ExitPupil {
     }
 
     /// Looks for rays that pass just inside of the obscured middle, and lets them through until there are none.
-    pub(super) fn narrow_until_tight(&mut self, lenses: &[MonochromaticTrain]) {
+    pub(super) fn narrow_until_tight(&mut self, lenses: &Divided) {
         for round in 4..8 {
-            let found: Vec<Stray> =
-                lenses.iter().flat_map(|lens| self.inner_strays(lens, round * CHECKS)).collect();
+            let found = self.found_in_round(lenses, round, Self::inner_strays);
             for stray in &found {
                 let low = turn_index(stray.turn);
                 for (node, _) in stray.nodes.into_iter().filter(|&(_, weight)| weight > 0.0) {
@@ -249,18 +250,22 @@ impl ExitPupil {
         }
     }
 
-    /// Random rays within the obscured middle that pass.
-    pub(super) fn inner_strays(&self, lens: &MonochromaticTrain, first: u32) -> Vec<Stray> {
-        self.random_strays(lens, first, |place, u| {
+    /// Random rays of these numbers within the obscured middle that pass.
+    pub(super) fn inner_strays(
+        &self,
+        lens: &MonochromaticTrain,
+        numbers: Range<u32>,
+    ) -> Vec<Stray> {
+        self.random_strays(lens, numbers, |place, u| {
             let nodes = place.nodes.iter();
             let inner: f64 = nodes.map(|&(n, w)| between(&self.nodes[n].inner, u[1]) * w).sum();
             inner * (1.0 - CHECKED * u[2])
         })
     }
 
-    /// Random rays outside of the bound that pass.
-    pub(super) fn strays(&self, lens: &MonochromaticTrain, first: u32) -> Vec<Stray> {
-        self.random_strays(lens, first, |place, u| {
+    /// Random rays of these numbers outside of the bound that pass.
+    pub(super) fn strays(&self, lens: &MonochromaticTrain, numbers: Range<u32>) -> Vec<Stray> {
+        self.random_strays(lens, numbers, |place, u| {
             let nodes = place.nodes.iter();
             let bound: f64 = nodes.map(|&(n, w)| between(&self.nodes[n].reach, u[1]) * w).sum();
             bound * (1.0 + CHECKED * u[2])
@@ -270,10 +275,11 @@ impl ExitPupil {
     fn random_strays(
         &self,
         lens: &MonochromaticTrain,
-        first: u32,
+        numbers: Range<u32>,
         radius_at: impl Fn(&NodePlace, [f64; 4]) -> f64,
     ) -> Vec<Stray> {
-        let checks = if lens.is_costly() { CHECKS / 4 } else { CHECKS };
+        let checks = numbers.len() as u32 / if lens.is_costly() { 4 } else { 1 };
+        let first = numbers.start;
         let mut rays = LensRays::with_capacity(checks as usize);
         let mut strays = Vec::with_capacity(checks as usize);
         for i in first..first + checks {
