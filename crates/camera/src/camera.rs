@@ -478,6 +478,14 @@ impl Camera {
         Self { projection, ..self.clone() }
     }
 
+    /// The same with rays of its lens that run together in `count` groups of neighbouring bands, at most; `None` where
+    /// there is no lens that bends each its own way, or one that also dims each by its own share.
+    #[must_use]
+    pub fn with_bands_grouped(&self, count: usize) -> Option<Self> {
+        let lens = self.lens()?.with_bands_grouped(count)?;
+        Some(Self { projection: Projection::Lens(Arc::new(lens)), ..self.clone() })
+    }
+
     /// The same camera, in its place and with its pixels, shutter and motion, whose rays run as those of `other`.
     #[must_use]
     pub fn seen_through(&self, other: &Self) -> Self {

@@ -85,10 +85,21 @@ struct LoadedScene {
     accel: Option<Arc<dyn Accel>>,
     /// Other frames that it is compared with.
     neighbours: Vec<Neighbour>,
-    /// Images are those of this scene.
-    is_decoded: bool,
+    /// Whether images are those of this scene, and how much of them there is.
+    decoded: Decoded,
     /// What is rendered in its place, once that was looked for.
     coarse: Option<CoarseScene>,
+}
+
+/// What there is of a scene's images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Decoded {
+    /// Nothing yet.
+    Nothing,
+    /// All of those that are looked at.
+    Whole,
+    /// As much as the rays of the picture can tell apart, where the scene has a tolerance.
+    ForPicture,
 }
 
 impl fmt::Debug for Session {
@@ -309,7 +320,7 @@ impl Session {
         self.load(progress)?;
         if self.loaded()?.scene.tolerance.is_some() {
             self.build_for_picture(progress)?;
-            self.decode(progress)?;
+            self.decode_for_picture(progress)?;
             self.take(progress)?;
         }
         Ok(&self.loaded()?.plan)

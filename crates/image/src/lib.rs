@@ -8,6 +8,7 @@ pub mod npy;
 
 mod formats;
 mod raster;
+mod reduced;
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, Cursor, Seek};
@@ -18,6 +19,7 @@ use image::{ColorType, ImageDecoder, ImageReader};
 
 pub use cube::{BandAxis, Cube, Quantity};
 pub use raster::{Raster, Samples, linear_from_srgb};
+pub use reduced::Coarseness;
 
 /// Side of the largest image that is decoded (texels).
 pub const MOST_SIDE: u64 = 32_768;
@@ -25,13 +27,15 @@ pub const MOST_SIDE: u64 = 32_768;
 /// Bytes that the largest image takes when it is decoded: 16 384 × 16 384 texels of 16-bit RGBA.
 pub const MOST_BYTES: u64 = 1 << 31;
 
-/// The most that an image may take.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The most that an image may take, and how coarse it may be for that.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Bytes of its decoded values.
     pub bytes: u64,
     /// Bytes of its file, which are out of proportion to much more.
     file: u64,
+    /// As coarse as it may be decoded; as fine as its file where absent.
+    coarse: Option<Coarseness>,
 }
 
 /// Bytes that an image may take, however small its file is.
@@ -42,7 +46,7 @@ const MADE_PER_BYTE: u64 = 1024;
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { bytes: MOST_BYTES, file: u64::MAX }
+        Self { bytes: MOST_BYTES, file: u64::MAX, coarse: None }
     }
 }
 
@@ -51,6 +55,12 @@ impl Limits {
     #[must_use]
     pub fn within(memory: Option<u64>) -> Self {
         Self { bytes: memory.unwrap_or(MOST_BYTES).min(MOST_BYTES), ..Self::default() }
+    }
+
+    /// The same for an image that may be as coarse: it is decoded in linear light, in as few texels.
+    #[must_use]
+    pub fn coarse(self, coarse: Option<Coarseness>) -> Self {
+        Self { coarse, ..self }
     }
 
     /// The same, and no more than is in proportion to the `file`'s bytes.
@@ -183,8 +193,18 @@ fn giga(bytes: u64) -> f64 {
 pub fn decode(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeError> {
     // Decoders are others' code over hostile input. They get no state that a panic could leave broken:
     // all that one has seen is dropped with it.
-    let decoded = catch_unwind(AssertUnwindSafe(|| decode_unguarded(bytes, limits.of(bytes))));
-    decoded.unwrap_or(Err(DecodeError::Panic))
+    let decode = || {
+        let limits = limits.of(bytes);
+        if let Some(reduced) = reduced::png(bytes, limits)? {
+            return Ok(reduced);
+        }
+        let raster = decode_unguarded(bytes, limits)?;
+        match limits.coarse {
+            Some(coarse) => reduced::reduced(raster, coarse),
+            None => Ok(raster),
+        }
+    };
+    catch_unwind(AssertUnwindSafe(decode)).unwrap_or(Err(DecodeError::Panic))
 }
 
 /// The values of one channel of an EXR file, by rows.

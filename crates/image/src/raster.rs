@@ -181,6 +181,11 @@ static EIGHT: LazyLock<[f64; 256]> =
 static SIXTEEN: LazyLock<Vec<f64>> =
     LazyLock::new(|| (0..=65_535_u16).map(|i| linear_from_srgb(f64::from(i) / 65_535.0)).collect());
 
+/// Linear light of each 8-bit sRGB value.
+pub(crate) fn linear_of_bytes() -> &'static [f64; 256] {
+    &EIGHT
+}
+
 /// Linear light of an sRGB value in 0..=1 (IEC 61966-2-1, section 5.2).
 #[must_use]
 pub fn linear_from_srgb(c: f64) -> f64 {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use etendue_files::Stamp;
-use etendue_image::Limits;
+use etendue_image::{Coarseness, Limits};
 use etendue_scene::Scene;
 use etendue_spectrum::Bands;
 use etendue_tracer::spec::BRIGHTEST;
@@ -42,10 +42,11 @@ impl Images {
     /// When the environment cannot be read or decoded, or an image that the scene itself names is too
     /// large.
     pub fn decode(scene: &Scene, plan: &Plan, memory: Option<u64>) -> Result<Self, RenderError> {
-        Self::default().renewed(scene, plan, memory)
+        Self::default().renewed(scene, plan, memory, &[])
     }
 
-    /// As [`Self::decode`], with what these images have already.
+    /// As [`Self::decode`], with what these images have already. Those that may be `coarse`, of which there are none or
+    /// one for each texture, are decoded in as few texels ([`crate::tolerance::coarse_images`]).
     ///
     /// # Errors
     ///
@@ -55,6 +56,7 @@ impl Images {
         scene: &Scene,
         plan: &Plan,
         memory: Option<u64>,
+        coarse: &[Option<Coarseness>],
     ) -> Result<Self, RenderError> {
         let limits = Limits::within(memory);
         let wanted = wanted_images(scene, plan);
@@ -66,7 +68,8 @@ impl Images {
             .enumerate()
             .map(|(i, (texture, encodings))| {
                 let encodings = (*encodings)?;
-                let origin = ImageOrigin::of(texture, encodings);
+                let coarse = coarse.get(i).copied().flatten();
+                let origin = ImageOrigin { coarse, ..ImageOrigin::of(texture, encodings) };
                 Some(match self.known(i, &origin) {
                     Some(known) => Ok(known),
                     None => decoded(texture, origin, limits),
@@ -152,6 +155,19 @@ impl Images {
         Ok(())
     }
 
+    /// How many are decoded in fewer texels than their files have.
+    #[must_use]
+    pub fn coarser(&self, scene: &Scene) -> usize {
+        let all = scene.textures.iter().zip(&self.decoded).zip(&self.origins);
+        let is_coarser = |((texture, image), origin): &((&Texture, &Option<Arc<Image>>), _)| {
+            let origin: &&Option<ImageOrigin> = origin;
+            let may_be = origin.as_ref().is_some_and(|origin| origin.coarse.is_some());
+            let fewer = |image: &Arc<Image>| (image.bytes() as u64) < texture.decoded_bytes();
+            may_be && image.as_ref().is_some_and(fewer)
+        };
+        all.filter(is_coarser).count()
+    }
+
     /// Each decoded image: what it is called, columns, rows and bytes.
     #[must_use]
     pub fn sizes(&self, scene: &Scene) -> Vec<ImageSize> {
@@ -210,6 +226,8 @@ struct ImageOrigin {
     filter: Filter,
     /// How it is filtered by footprint.
     encodings: Encodings,
+    /// How coarse it may be.
+    coarse: Option<Coarseness>,
     fault: Option<String>,
 }
 
@@ -221,6 +239,7 @@ impl ImageOrigin {
             wrap: texture.wrap,
             filter: texture.filter,
             encodings,
+            coarse: None,
             fault: None,
         }
     }
@@ -236,6 +255,7 @@ impl ImageOrigin {
             && self.stamp == other.stamp
             && (self.wrap, self.filter) == (other.wrap, other.filter)
             && self.encodings == other.encodings
+            && self.coarse == other.coarse
     }
 }
 
@@ -251,7 +271,7 @@ fn decoded(
     limits: Limits,
 ) -> Result<(Arc<Image>, ImageOrigin), ImageError> {
     let decode = || -> Result<Image, ImageError> {
-        let mut image = texture.decode(limits)?;
+        let mut image = texture.decode(limits.coarse(origin.coarse))?;
         for encoding in origin.encodings.into_iter().flatten() {
             image.filter_by_footprint(encoding, &texture.name)?;
         }

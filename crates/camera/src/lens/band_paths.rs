@@ -39,6 +39,7 @@ use etendue_spectrum::{Bands, Spread};
 use glam::{DVec2, DVec3};
 
 use super::lens_camera::{LensCamera, filtered, place_of};
+use super::traced_at::TracedAt;
 use crate::{CameraRays, FilmSamples, Pose};
 
 /// The most wavelengths that a ray is traced at.
@@ -152,6 +153,9 @@ impl LensCamera {
 
     /// Why rays of different bands differ by more than where they land, if they do.
     fn parted(&self) -> Option<&'static str> {
+        if matches!(self.traced_at, TracedAt::Grouped(_)) {
+            return Some("groups of bands run each its own way");
+        }
         let train = self.focused.train();
         let is_mask = |element: &Element| matches!(element.part.opening(), Some(Opening::Image(_)));
         let is_patterned = |element: &Element| {

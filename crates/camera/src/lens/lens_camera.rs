@@ -19,6 +19,7 @@ use glam::{DVec2, DVec3};
 use super::band_paths::BandPaths;
 use super::chief::{ChiefTable, ImageCircle, LensletChiefs};
 use super::focused::{Focused, View};
+use super::traced_at::{TracedAt, grouped};
 
 use crate::{CameraError, Pose};
 use etendue_optics::element::{Clip, Ray, RayStatus, Reflection};
@@ -57,8 +58,7 @@ pub struct LensCamera {
     pub(super) opened: Option<Arc<Opened>>,
     /// The pupil at the design wavelength alone, once it was measured: that of a lens without dispersion, too.
     design_pupil: Option<Arc<DesignPupil>>,
-    /// Rays of all bands run as at the design wavelength.
-    pub(super) one_wavelength: bool,
+    pub(super) traced_at: TracedAt,
     /// How light is spread on the sensor.
     pub(super) spread: SpreadBy,
 }
@@ -105,7 +105,7 @@ impl PartialEq for LensCamera {
     fn eq(&self, other: &Self) -> bool {
         // All else follows from it.
         self.focused == other.focused
-            && self.one_wavelength == other.one_wavelength
+            && self.traced_at == other.traced_at
             && self.spread == other.spread
     }
 }
@@ -151,7 +151,7 @@ impl LensCamera {
         let solid_angle = unvignetted(focused.train(), &design, &focused);
         let straight = unbent.at(unbent.wavelength()).unwrap_or_else(|_| design.clone());
         let chief = ChiefTable::new(&unbent, &frame, half, &straight);
-        let (opened, design_pupil, one_wavelength, spread) = Default::default();
+        let (opened, design_pupil, traced_at, spread) = Default::default();
         Ok(Self {
             focused,
             design,
@@ -161,7 +161,7 @@ impl LensCamera {
             solid_angle,
             opened,
             design_pupil,
-            one_wavelength,
+            traced_at,
             spread,
         })
     }
@@ -198,7 +198,7 @@ impl LensCamera {
     ///
     /// When a glass has no index at a band's wavelength.
     pub fn lenslets_by_band(&self, bands: &Bands) -> Result<Vec<LensletChiefs>, CameraError> {
-        if self.lenslets.is_none() || self.one_wavelength || !self.focused.train().is_dispersive() {
+        if self.lenslets.is_none() || !self.parts_wavelengths() {
             return Ok(Vec::new());
         }
         let wavelengths = self.band_groups(bands).into_iter().filter_map(|group| group.wavelength);
@@ -221,7 +221,12 @@ impl LensCamera {
     /// The same with rays that run as at the design wavelength in all bands. What coloured filters pass stays
     /// each band's own.
     pub(crate) fn without_dispersion(&self) -> Self {
-        Self { one_wavelength: true, opened: None, ..self.clone() }
+        self.running_at(TracedAt::Design)
+    }
+
+    /// The same with rays that run at other wavelengths.
+    pub(super) fn running_at(&self, traced_at: TracedAt) -> Self {
+        Self { traced_at, opened: None, ..self.clone() }
     }
 
     /// The same whose light is spread another way.
@@ -239,28 +244,37 @@ impl LensCamera {
         curves.any(|curve| curve.as_flat().is_none()) || self.runs_apart()
     }
 
-    /// Whether glass, or what it loses, makes another lens of each wavelength.
-    pub(super) fn runs_apart(&self) -> bool {
+    /// Whether rays of other wavelengths run their own way.
+    pub(super) fn parts_wavelengths(&self) -> bool {
+        self.traced_at != TracedAt::Design && self.focused.train().is_dispersive()
+    }
+
+    /// Whether coatings or glass lose another share of each wavelength.
+    pub(super) fn dims_wavelengths_apart(&self) -> bool {
         let train = self.focused.train();
         let losses = train.losses();
         let coated =
             matches!(losses.reflection, Some(Reflection::Coated(_) | Reflection::Stack(_)))
-                || train
-                    .elements()
-                    .iter()
-                    .any(|e| e.part.mirror().is_some_and(|m| m.coating.is_some()));
-        let absorbs =
-            losses.absorption && train.media().iter().any(|g| g.absorption(550.0).is_some());
-        !self.one_wavelength && (coated || absorbs || train.is_dispersive())
+                || train.elements().iter().any(|e| e.part.is_coated_or_blazed());
+        coated || (losses.absorption && train.media().iter().any(|g| g.absorption(550.0).is_some()))
     }
 
-    /// Which of `bands` need rays of their own: each where the lens tells wavelengths apart and there
+    /// Whether glass, or what it loses, makes another lens of each wavelength.
+    pub(super) fn runs_apart(&self) -> bool {
+        self.traced_at != TracedAt::Design
+            && (self.dims_wavelengths_apart() || self.focused.train().is_dispersive())
+    }
+
+    /// Which of `bands` need rays of their own: each, or each group, where the lens tells wavelengths apart and there
     /// are several, else none.
     #[must_use]
     pub fn band_groups(&self, bands: &Bands) -> Vec<BandGroup> {
         let count = bands.count();
         if count < 2 || !self.tells_wavelengths_apart() {
             return vec![BandGroup { bands: 0..count, wavelength: None }];
+        }
+        if let TracedAt::Grouped(groups) = self.traced_at {
+            return grouped(bands, groups);
         }
         let group = |i| BandGroup { bands: i..i + 1, wavelength: Some(bands.wavelength(i)) };
         (0..count).map(group).collect()
@@ -369,6 +383,7 @@ impl LensCamera {
         let spread = bands.spread(group.bands.start, &uniform_filters(train));
         let one = |nm| Spread { wavelengths: vec![nm], overlap: spread.overlap };
         match group.wavelength {
+            Some(nm) if group.bands.len() > 1 => Spread { wavelengths: vec![nm], overlap: 1.0 },
             _ if !self.tells_wavelengths_apart() || group.bands.len() > 1 => {
                 Spread { wavelengths: vec![train.wavelength()], overlap: 1.0 }
             }

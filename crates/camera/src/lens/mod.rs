@@ -14,6 +14,7 @@
 //! | `alone` | a lens by itself as a camera |
 //! | `rays` | weighted rays of the pupil for pictures |
 //! | [`waves`] | how light is spread on the sensor as waves, and what of it arrives |
+//! | `traced_at` | bands whose rays run together through the lens |
 //! | `band_paths` | one ray of the scene for all bands, and where each band's light of it lands |
 
 mod alone;
@@ -25,6 +26,7 @@ mod paths;
 mod rays;
 pub mod source;
 pub mod spec;
+mod traced_at;
 pub mod waves;
 
 pub(crate) use alone::alone;

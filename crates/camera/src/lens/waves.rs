@@ -85,7 +85,7 @@ impl LensCamera {
     #[must_use]
     pub fn waves_to_trace(&self) -> (bool, usize) {
         let train = self.focused.train();
-        (is_ideal(train), if train.is_dispersive() && !self.one_wavelength { NODES } else { 1 })
+        (is_ideal(train), if self.parts_wavelengths() { NODES } else { 1 })
     }
 
     /// Whether what arrives in a picture of so many columns and rows is the same on both sides of its middle,
@@ -144,7 +144,7 @@ impl<'a> WaveLens<'a> {
         let all = || by_band.iter().flatten().copied();
         let (low, high) =
             (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
-        let disperses = train.is_dispersive() && !camera.one_wavelength;
+        let disperses = camera.parts_wavelengths();
         let nodes = match disperses && high - low > NARROW {
             true => {
                 (0..NODES).map(|k| low + (high - low) * k as f64 / (NODES - 1) as f64).collect()

@@ -13,7 +13,7 @@ use etendue_scene::file::SceneFile;
 use etendue_scene::memory::Budget;
 use etendue_scene::{LoadOptions, Scene, Strictness};
 
-use super::{LoadedScene, Ready, Session};
+use super::{Decoded, LoadedScene, Ready, Session};
 use crate::neighbours::{self, Neighbour};
 use crate::progress::Phase;
 use crate::words::in_words;
@@ -72,9 +72,8 @@ impl Session {
         let plan = Plan::new(&scene, self.options.outputs);
         let scene = Arc::new(scene);
         let (accel, coarse) = (None, None);
-        let is_decoded = false;
-        self.loaded =
-            Some(LoadedScene { scene, plan, notes, accel, neighbours, is_decoded, coarse });
+        let decoded = Decoded::Nothing;
+        self.loaded = Some(LoadedScene { scene, plan, notes, accel, neighbours, decoded, coarse });
         self.seconds.load += start.elapsed().as_secs_f64();
         Ok(())
     }
@@ -189,12 +188,29 @@ impl Session {
 
     /// Decodes the images that the plan wants, unless they are.
     pub(super) fn decode(&mut self, progress: &Progress) -> Result<(), Error> {
-        let LoadedScene { scene, plan, is_decoded, .. } = self.loaded()?;
-        if *is_decoded {
+        self.decode_as(Decoded::Whole, progress)
+    }
+
+    /// The same for the rays of the picture alone: in fewer texels where the scene's tolerance allows. Of several frames
+    /// each would tell others apart, and all have the whole images.
+    pub(super) fn decode_for_picture(&mut self, progress: &Progress) -> Result<(), Error> {
+        let is_single = self.file.spec.frames.is_none();
+        let has_tolerance = self.loaded()?.scene.tolerance.is_some();
+        let may_be_coarse = is_single && has_tolerance;
+        self.decode_as(if may_be_coarse { Decoded::ForPicture } else { Decoded::Whole }, progress)
+    }
+
+    fn decode_as(&mut self, wanted: Decoded, progress: &Progress) -> Result<(), Error> {
+        let LoadedScene { scene, plan, decoded, .. } = self.loaded()?;
+        if *decoded == wanted {
             return Ok(());
         }
         let start = Instant::now();
-        let images = self.images.renewed(scene, plan, self.options.memory_limit)?;
+        let coarse = match wanted {
+            Decoded::ForPicture => tolerance::coarse_images(scene, plan),
+            Decoded::Nothing | Decoded::Whole => Vec::new(),
+        };
+        let images = self.images.renewed(scene, plan, self.options.memory_limit, &coarse)?;
         if let (Strictness::Strict, Some(fault)) = (self.options.strictness, images.faults.first())
         {
             return Err(Error::Refused(fault.clone()));
@@ -202,7 +218,7 @@ impl Session {
         images.faults.iter().for_each(|fault| progress.note(fault));
         self.images = Arc::new(images);
         if let Some(loaded) = &mut self.loaded {
-            loaded.is_decoded = true;
+            loaded.decoded = wanted;
         }
         self.seconds.decode += start.elapsed().as_secs_f64();
         Ok(())
@@ -237,7 +253,7 @@ impl Session {
     /// As [`Self::prepare`].
     pub fn verify(&mut self, progress: &Progress) -> Result<Option<Verified>, Error> {
         self.build_for_picture(progress)?;
-        self.decode(progress)?;
+        self.decode_for_picture(progress)?;
         self.take(progress)?;
         // Where meshes are coarser, the scene with its own is built, too.
         let (full, accel) = self.in_full()?;
@@ -253,8 +269,9 @@ impl Session {
         let LoadedScene { scene, plan, .. } = self.loaded()?;
         let Some(taken) = &plan.taken else { return Ok(None) };
         let watch = |share: f64| progress.goes_on(Phase::Render, share);
-        let rendered = (&**scene, self.built()?);
-        let found = tolerance::verify((&full, &*accel), rendered, taken, &self.images, &watch)?;
+        let rendered = (&**scene, self.built()?, &*self.images);
+        let whole = self.images.renewed(&full, plan, self.options.memory_limit, &[])?;
+        let found = tolerance::verify((&full, &*accel, &whole), rendered, taken, &watch)?;
         Ok(Some(found))
     }
 }

@@ -68,7 +68,7 @@ impl Session {
         let clock = self.clock();
         self.open_denoiser(progress)?;
         self.build_for_picture(progress)?;
-        self.decode(progress)?;
+        self.decode_for_picture(progress)?;
         let film = if shares.are_of_samples() {
             self.trace(None, &shares.files, progress)?
         } else {
@@ -97,7 +97,7 @@ impl Session {
         progress: &Progress,
     ) -> Result<Film, Error> {
         self.build_for_picture(progress)?;
-        self.decode(progress)?;
+        self.decode_for_picture(progress)?;
         self.take(progress)?;
         let LoadedScene { scene, plan, .. } = self.loaded()?;
         let identity = match (&shard, &self.checkpoint) {

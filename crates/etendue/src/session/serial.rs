@@ -9,7 +9,7 @@ use etendue_scene::Scene;
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 
-use super::{LoadedScene, Session};
+use super::{Decoded, LoadedScene, Session};
 use crate::words::{fingerprints, header};
 use crate::{Error, Progress};
 
@@ -99,7 +99,7 @@ impl Session {
                 notes: Vec::new(),
                 accel: None,
                 neighbours: Vec::new(),
-                is_decoded: false,
+                decoded: Decoded::Nothing,
                 coarse: None,
             });
             self.build(progress)?;

@@ -374,9 +374,15 @@ impl Plan {
             let because = "what is taken of it is found when the scene is built";
             return Some(Decision::new(Kind::Tolerance, choice, because).forced(true));
         };
-        let camera = taken.camera.as_ref().map(|TakenCamera { finding, .. }| {
+        let camera = taken.camera.as_ref().map(|TakenCamera { camera, finding }| {
+            let groups = match camera.band_groups(&self.bands).len() {
+                groups if groups > 1 && groups < self.bands.count() => {
+                    format!(" in {groups} groups of {} bands", self.bands.count())
+                }
+                _ => String::new(),
+            };
             format!(
-                "the lens as `{}`, displaced by {:.3} px at most and {:.2} % of light",
+                "the lens as `{}`{groups}, displaced by {:.3} px at most and {:.2} % of light",
                 finding.model,
                 finding.displacement(),
                 100.0 * finding.light.value
@@ -395,7 +401,11 @@ impl Plan {
                 100.0 * light
             )
         });
-        let all: Vec<String> = camera.into_iter().chain(bounces).chain(detail).collect();
+        let images = (taken.images > 0).then(|| {
+            format!("{} images in as few texels as the nearest view can tell apart", taken.images)
+        });
+        let all = camera.into_iter().chain(bounces).chain(detail).chain(images);
+        let all: Vec<String> = all.collect();
         let what = if all.is_empty() { "nothing".to_owned() } else { all.join("; ") };
         let notes: String = taken.notes.iter().map(|note| format!("; {note}")).collect();
         let because = format!("the cheapest within it are taken: {what}{notes}");

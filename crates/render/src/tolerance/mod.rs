@@ -4,7 +4,9 @@
 //! Nothing is approximated unless a scene has the key `tolerance`: [`choose`] then says what is taken of it,
 //! [`crate::Plan::taking`] plans with that, and [`verify`] renders a small part with everything.
 
+mod coarse_images;
 mod detail;
+mod groups;
 pub mod lens_models;
 mod light;
 mod pixel_views;
@@ -23,6 +25,7 @@ use self::lens_models::{LensModel, LensModels, NoModels};
 use self::pixel_views::{Line, PlaceView, chief_rays, places, seen};
 use crate::{Images, Plan, RenderError, Watch};
 
+pub use self::coarse_images::coarse_images;
 pub use self::detail::{TakenDetail, coarser, with_meshes};
 pub use self::verify::{Verified, verify};
 
@@ -77,7 +80,7 @@ pub struct Place {
 /// What a model misses, and what it costs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// `pinhole`, `opencv`, `falloff`, `thin`, `thick`, `undispersed` or `full`.
+    /// `pinhole`, `opencv`, `falloff`, `thin`, `thick`, `undispersed`, `grouped` or `full`.
     pub model: &'static str,
     /// How far chief rays are from the train's (pixels).
     pub chief_ray: Worst,
@@ -367,8 +370,17 @@ pub struct Taken {
     pub bounces: Option<TakenBounces>,
     /// What is left out of its meshes.
     pub detail: Option<TakenDetail>,
+    /// How many of its images are decoded in as few texels as the nearest view can tell apart.
+    pub images: usize,
     /// Why not more is, in sentences.
     pub notes: Vec<String>,
+}
+
+impl Taken {
+    /// Nothing but the detail of meshes yet.
+    fn nothing(tolerance: ToleranceSpec, detail: Option<TakenDetail>) -> Self {
+        Self { tolerance, camera: None, bounces: None, detail, images: 0, notes: Vec::new() }
+    }
 }
 
 /// A simpler model of a lens that is taken.
@@ -408,7 +420,8 @@ pub fn choose(
     watch: &dyn Watch,
 ) -> Result<Option<Taken>, RenderError> {
     let Some(tolerance) = scene.tolerance else { return Ok(None) };
-    let mut taken = Taken { tolerance, camera: None, bounces: None, detail, notes: Vec::new() };
+    let mut taken = Taken::nothing(tolerance, detail);
+    taken.images = images.coarser(scene);
     if !plan.layers.contains(&LayerSpec::Radiance) {
         taken.notes.push("no light is rendered: data layers are exact".to_owned());
         return Ok(Some(taken));
@@ -471,8 +484,11 @@ fn simplest(
             return Ok(Some(TakenCamera { camera, finding }));
         }
     }
-    notes.push("no simpler model of the lens is within it".to_owned());
-    Ok(None)
+    let grouped = groups::fewest(scene, plan, accel, tolerance)?;
+    if grouped.is_none() {
+        notes.push("no simpler model of the lens is within it".to_owned());
+    }
+    Ok(grouped)
 }
 
 /// The tolerance of a scene as models are judged by.

@@ -64,21 +64,21 @@ impl fmt::Display for Verified {
 }
 
 /// Renders a small part of a scene with everything and, as what is rendered in its place, with what was `taken`, and
-/// compares both. Each is given with the structure over it; they are one where all meshes are the scene's own. What is
+/// compares both. Each is given with the structure over it and its images; they are one where all meshes are the scene's own. What is
 /// left out of meshes displaces places by its bound, to which what the lens does is added.
 ///
 /// # Errors
 ///
 /// As a render.
 pub fn verify(
-    (scene, accel): (&Scene, &dyn Accel),
-    rendered: (&Scene, &dyn Accel),
+    (scene, accel, images): (&Scene, &dyn Accel, &Images),
+    rendered: (&Scene, &dyn Accel, &Images),
     taken: &Taken,
-    images: &Images,
     watch: &dyn Watch,
 ) -> Result<Verified, RenderError> {
     let tolerance = Tolerance::from(taken.tolerance);
-    if taken.camera.is_none() && taken.bounces.is_none() && taken.detail.is_none() {
+    let is_nothing = taken.camera.is_none() && taken.bounces.is_none() && taken.detail.is_none();
+    if is_nothing && taken.images == 0 {
         let [displacement, light] = [[0.0, tolerance.pixels], [0.0, taken.tolerance.light.0]];
         return Ok(Verified { displacement, places: 0, light, noise: 0.0, blocks: 0 });
     }
@@ -104,7 +104,7 @@ pub fn verify(
     };
     let prepared = (accel, images);
     let all = values(scene, &full, prepared, (SAMPLES, None), watch)?;
-    let less = values(rendered.0, &full, (rendered.1, images), (SAMPLES, Some(own)), watch)?;
+    let less = values(rendered.0, &full, (rendered.1, rendered.2), (SAMPLES, Some(own)), watch)?;
     let mut other = scene.clone();
     other.render.seed ^= 0x9e37_79b9_7f4a_7c15;
     let again = values(&other, &full, prepared, (SAMPLES, None), watch)?;

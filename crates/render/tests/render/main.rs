@@ -4,6 +4,7 @@
 mod adaptive;
 mod band_paths;
 mod blocks;
+mod coarse_images;
 mod curves;
 mod diffraction;
 mod dispersion;

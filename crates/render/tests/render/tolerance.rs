@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use etendue_render::expose::SPECTRUM;
 use etendue_render::output::Outputs;
 use etendue_render::tolerance::{Taken, TakenBounces, choose, coarser, lens_models, with_meshes};
 use etendue_render::{BandPaths, Plan};
@@ -275,4 +276,77 @@ fn meshes_stay_as_they_are_where_something_could_show_more_of_them() {
         assert!(coarser(&fine_ball(&tolerance, &changes)).is_none(), "{what}");
     }
     assert!(coarser(&room(0.5, &Value::Null)).is_none());
+}
+
+/// A shining ball near a corner, in twelve bands, before a lens of crown glass whose stop stands in front of it: its
+/// colours lie more than a pixel apart there. The scene is traced for each band.
+fn parted_colours(pixels: &str) -> Scene {
+    let scene = json!({
+        "camera": { "type": "chromatic_real_lens", "glass": "N-BK7", "front_radius": 50, "rear_radius": -50,
+            "thickness": 6, "semi_diameter": 16, "sensor_distance": 48,
+            "elements": [{ "type": "aperture", "shape": "circular", "radius": 0.6, "at": -40, "stop": true }],
+            "sensor": { "type": "multispectral", "resolution": [96, 64], "pixel_pitch": 100,
+                "bands": { "from": 400, "to": 700, "count": 12 } },
+            "pose": { "from": [0, 0, 0], "look_at": [0, 0, -1] } },
+        "tracer": { "type": "path", "max_bounces": 3 }, "lights": [],
+        "tolerance": allowed(pixels, "10 %"), "plan": { "shared_paths": false },
+        "materials": { "lamp": { "type": "emissive", "radiance": [1, 1, 1] } },
+        "objects": [{ "shape": "sphere", "radius": 0.04, "material": "lamp",
+            "transform": { "translate": [0.17, 0.11, -2.2] } }],
+        "render": { "samples": 64 },
+    });
+    load_json(tempfile::tempdir().unwrap().path(), scene)
+}
+
+/// Where the middle of the light of each band lies (pixels).
+fn middles(scene: &Scene, taken: Option<Taken>) -> Vec<[f64; 2]> {
+    let plan = Plan::taking(scene, Outputs::ALL, taken);
+    let (accel, images) = prepare(scene, &plan);
+    let done = trace(scene, &plan, &*accel, &images);
+    let width = scene.camera.resolution()[0] as usize;
+    let middle = |band: Vec<f64>| {
+        let mut sums = [0.0; 3];
+        for (i, light) in band.iter().enumerate() {
+            let at = [1.0, (i % width) as f64, (i / width) as f64];
+            sums.iter_mut().zip(at).for_each(|(sum, at)| *sum += light * at);
+        }
+        [sums[1] / sums[0], sums[2] / sums[0]]
+    };
+    channels(&done.picture, SPECTRUM).into_iter().map(middle).collect()
+}
+
+#[test]
+fn bands_run_together_in_as_few_groups_as_the_tolerance_allows() {
+    let scene = parted_colours("0.3 px");
+    let taken = taken(&scene);
+    let camera = taken.camera.clone().expect("bands in groups");
+    assert_eq!(camera.finding.model, "grouped", "{:?}", camera.finding);
+    assert!(camera.finding.displacement() <= 0.3, "{:?}", camera.finding);
+    let plan = Plan::taking(&scene, Outputs::ALL, Some(taken.clone()));
+    let groups = camera.camera.band_groups(&plan.bands).len();
+    assert!((2..=6).contains(&groups), "{groups}");
+    let row = plan.decisions.iter().find(|row| row.kind == DecisionKind::Tolerance).unwrap();
+    assert!(row.reason.contains(&format!("`grouped` in {groups} groups of 12 bands")), "{row:?}");
+    // A third to a half of the rays of all bands.
+    assert!(plan.rays * 2 <= Plan::new(&scene, Outputs::ALL).rays, "{}", plan.rays);
+    let full = middles(&scene, None);
+    assert_eq!(full.len(), 12);
+    let farthest = |taken: Taken| {
+        let own = middles(&scene, Some(taken));
+        let off = own.iter().zip(&full).map(|(a, b)| f64::hypot(a[0] - b[0], a[1] - b[1]));
+        off.fold(0.0, f64::max)
+    };
+    // The middle of a disk of some hundred pixels with 64 samples each is known to a hundredth.
+    let found = farthest(taken.clone());
+    assert!(found <= 0.32 && found > 0.02, "{found}");
+    // All in one group displaces the outer bands by more, and the same comparison tells it.
+    let mut one = taken.clone();
+    one.camera.as_mut().unwrap().camera = scene.camera.with_bands_grouped(1).unwrap();
+    let found = farthest(one);
+    assert!(found > 0.4, "{found}");
+    // Bands that share the paths of the scene have nothing to save.
+    let mut shared = parted_colours("0.3 px");
+    shared.plan.shared_paths = None;
+    let own = self::taken(&shared);
+    assert!(own.camera.is_none(), "{:?}", own.camera);
 }
