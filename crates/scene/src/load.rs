@@ -27,6 +27,7 @@ use crate::parts::{Object, Parts};
 use crate::scene::{LoadOptions, LoadProgress, Scene};
 use crate::shape::{GoOn, ShapeError, ShapeSpec};
 use crate::{Cache, SceneError};
+use camera::CameraAhead;
 pub(crate) use camera::CameraFiles;
 use objects::{Origin, OriginKind, OwnParts};
 
@@ -47,7 +48,8 @@ impl SceneFile {
         let (textures, files) = (&mut own.textures, &mut own.files);
         let lights = self.named_lights((&folder, options.glasses), wanted, (textures, files))?;
         // What can be checked without the models is; a bad camera need not wait for them.
-        let size = self.resolution(&folder, options, kept)?;
+        let ahead = self.camera_ahead(&folder, options, kept)?;
+        let size = ahead.camera.resolution();
         let budget = Arc::new(Budget::new(options.memory_limit));
         if options.to_render {
             let film = memory::film(size, &self.spec.all_layers());
@@ -94,7 +96,7 @@ impl SceneFile {
         if self.spec.picture() == Some(LayerSpec::Radiance) && lights.is_none() {
             parts.studio_if_dark = !parts.light_by_default();
         }
-        let scene = self.finish(parts, &folder, options, (&budget, kept), since)?;
+        let scene = self.finish((parts, ahead), &folder, options, (&budget, kept), since)?;
         kept.sweep();
         Ok(Scene { slots: slot_count, ..scene })
     }
@@ -244,13 +246,14 @@ impl SceneFile {
 
     fn finish(
         &self,
-        parts: Parts,
+        (parts, ahead): (Parts, CameraAhead),
         folder: &InputFolder,
         options: &LoadOptions<'_>,
         (budget, kept): (&Budget, &Cache),
         since: SystemTime,
     ) -> Result<Scene, SceneError> {
-        let built = self.kept_camera(parts.geometry, &parts.cameras, (folder, options), kept)?;
+        let from = (folder, options);
+        let built = self.kept_camera(parts.geometry, &parts.cameras, from, kept, ahead)?;
         let KeptCamera { geometry, camera, origin: camera_origin, files: camera_files, .. } = built;
         let geometry = self.deformed(geometry, &parts.deformers, &camera, budget)?;
         let span = camera.exposure_span();

@@ -1,6 +1,7 @@
 //! The plan: the one place where it is decided what a scene needs, and why. What is off costs
 //! nothing: it is not read, not traced, not written.
 
+mod tolerance_words;
 mod unseen;
 mod words;
 

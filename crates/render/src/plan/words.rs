@@ -16,7 +16,7 @@ use super::{
     MOST_BYTES_OF_SUMS, Passes, Plan, RAYS_A_SAMPLE_OF_LIGHT, RAYS_PER_TRIANGLE, quality_for,
 };
 use crate::film::Precision;
-use crate::tolerance::{TakenBounces, TakenCamera, TakenDetail};
+use crate::tolerance::TakenBounces;
 use crate::{diffraction, expose, samples};
 
 /// What decisions are made by, beside the plan.
@@ -365,53 +365,6 @@ fn quality_name(quality: Quality) -> &'static str {
 }
 
 impl Plan {
-    /// What is taken of the scene's tolerance.
-    fn explain_tolerance(&self, scene: &Scene) -> Option<Decision> {
-        let tolerance = scene.tolerance?;
-        let choice =
-            format!("{} px, {} % of light", tolerance.displacement.0, 100.0 * tolerance.light.0);
-        let Some(taken) = &self.taken else {
-            let because = "what is taken of it is found when the scene is built";
-            return Some(Decision::new(Kind::Tolerance, choice, because).forced(true));
-        };
-        let camera = taken.camera.as_ref().map(|TakenCamera { camera, finding }| {
-            let groups = match camera.band_groups(&self.bands).len() {
-                groups if groups > 1 && groups < self.bands.count() => {
-                    format!(" in {groups} groups of {} bands", self.bands.count())
-                }
-                _ => String::new(),
-            };
-            format!(
-                "the lens as `{}`{groups}, displaced by {:.3} px at most and {:.2} % of light",
-                finding.model,
-                finding.displacement(),
-                100.0 * finding.light.value
-            )
-        });
-        let bounces = taken.bounces.map(|TakenBounces { bounces, share }| {
-            format!(
-                "{bounces} surfaces of a path, which leave out {:.2} % of light in 99 % of blocks of 8 × 8 pixels",
-                100.0 * share
-            )
-        });
-        let detail = taken.detail.map(|TakenDetail { triangles: [all, left], displacement, light, .. }| {
-            format!(
-                "{left} of {all} triangles, of which places are displaced by {displacement:.3} px at most and areas \
-                 differ by {:.2} %",
-                100.0 * light
-            )
-        });
-        let images = (taken.images > 0).then(|| {
-            format!("{} images in as few texels as the nearest view can tell apart", taken.images)
-        });
-        let all = camera.into_iter().chain(bounces).chain(detail).chain(images);
-        let all: Vec<String> = all.collect();
-        let what = if all.is_empty() { "nothing".to_owned() } else { all.join("; ") };
-        let notes: String = taken.notes.iter().map(|note| format!("; {note}")).collect();
-        let because = format!("the cheapest within it are taken: {what}{notes}");
-        Some(Decision::new(Kind::Tolerance, choice, because).forced(true))
-    }
-
     /// How far light is followed.
     fn explain_bounces(&self, scene: &Scene, needs: Needs) -> Decision {
         let own = explain_bounces(scene, needs);

@@ -2,7 +2,7 @@
 //!
 //! The cameras that models bring along, and which one is used.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::scene::{LoadOptions, WorldVertices};
 use crate::{Cache, SceneError, facing};
 use etendue_camera::{Camera, CameraError, CameraSpec, Pose};
 use etendue_files::InputFolder;
-use etendue_geometry::{Geometry, Transform};
+use etendue_geometry::{Bounds, Geometry, Transform};
 use etendue_optics::element::LensResources;
 use etendue_optics::glass::AgfCatalogue;
 use etendue_sensor::{Sensor, SensorSpec};
@@ -31,17 +31,26 @@ impl SceneFile {
         self.fault(&format!("camera{dot}{}", error.at), error.why.as_str())
     }
 
-    /// The picture's columns and rows, known without the models.
-    pub(super) fn resolution(
+    /// The camera as far as it is known before the models are.
+    pub(super) fn camera_ahead(
         &self,
         folder: &InputFolder,
         options: &LoadOptions<'_>,
         kept: &Cache,
-    ) -> Result<[u32; 2], SceneError> {
-        match kept.camera(&self.camera_words(options)) {
-            Some(known) => Ok(known.camera.resolution()),
-            None => Ok(self.camera_alone(folder, options.glasses)?.resolution()),
+    ) -> Result<CameraAhead, SceneError> {
+        if let Some(known) = kept.camera(&self.camera_words(options)) {
+            return Ok(CameraAhead { camera: known.camera, files: None });
         }
+        let (files, asks_for_models) =
+            (CameraFiles::new(folder, options.glasses), Cell::new(options.camera.is_some()));
+        let subject = || {
+            asks_for_models.set(true);
+            Bounds::default()
+        };
+        let spec = self.camera_spec();
+        let camera = spec.build(subject, &files).map_err(|error| self.camera_fault(&error))?;
+        let is_whole = spec.has_pose() && !asks_for_models.get();
+        Ok(CameraAhead { camera, files: is_whole.then(|| files.found.into_inner()) })
     }
 
     /// All that makes the camera but the geometry.
@@ -59,6 +68,7 @@ impl SceneFile {
         cameras: &[SceneCamera],
         (folder, options): (&InputFolder, &LoadOptions<'_>),
         kept: &Cache,
+        ahead: CameraAhead,
     ) -> Result<KeptCamera, SceneError> {
         let words = self.camera_words(options);
         let known = kept.camera(&words);
@@ -74,9 +84,15 @@ impl SceneFile {
             kept.keep_camera(same.clone());
             return Ok(same);
         }
-        let files = CameraFiles::new(folder, options.glasses);
-        let (camera, origin) = self.camera(&geometry, cameras, &files, options)?;
-        let files = cache::stamps(&files.found.into_inner());
+        let (camera, origin, files) = match ahead.files {
+            Some(files) => (self.with_its_dispersion(ahead.camera), CameraOrigin::Scene, files),
+            None => {
+                let files = CameraFiles::new(folder, options.glasses);
+                let (camera, origin) = self.camera(&geometry, cameras, &files, options)?;
+                (camera, origin, files.found.into_inner())
+            }
+        };
+        let files = cache::stamps(&files);
         let built = KeptCamera { words, geometry, camera, origin, files };
         kept.keep_camera(built.clone());
         Ok(built)
@@ -115,11 +131,15 @@ impl SceneFile {
         let camera = spec
             .build(|| facing::subject(&vertices), files)
             .map_err(|error| self.camera_fault(&error))?;
-        let camera = match self.spec.plan.dispersion {
+        Ok((self.with_its_dispersion(camera), origin))
+    }
+
+    /// A camera whose lens disperses, unless the scene says otherwise.
+    fn with_its_dispersion(&self, camera: Camera) -> Camera {
+        match self.spec.plan.dispersion {
             Some(false) => camera.without_dispersion(),
             Some(true) | None => camera,
-        };
-        Ok((camera, origin))
+        }
     }
 
     /// What is odd about the camera's lens. Glasses and filters that are not known at a wavelength
@@ -224,6 +244,13 @@ impl SceneFile {
         self.check_sensor_behind(sized.spec(), camera)?;
         Ok(Some(sized.with_resolution(camera.resolution())))
     }
+}
+
+/// A camera that was built before the models were read.
+pub(super) struct CameraAhead {
+    pub(super) camera: Camera,
+    /// The files that it names, where it is the scene's whatever the models are: then it need not be built again.
+    files: Option<Vec<PathBuf>>,
 }
 
 /// The files that a camera names, lenses and masks, and the user's glasses.
