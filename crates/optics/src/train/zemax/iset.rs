@@ -61,7 +61,12 @@ impl ZemaxSheet {
                 sheet.leave_out(other, 0);
             }
         }
-        sheet.add_interfaces(&interfaces)?;
+        let added = sheet.add_interfaces(&interfaces);
+        // Surfaces have no lines.
+        added.map_err(|error| match error.line {
+            0 => error,
+            line => ZemaxError::new(0, format!("{key}[{}]: {}", line - 1, error.why)),
+        })?;
         Ok(sheet)
     }
 }

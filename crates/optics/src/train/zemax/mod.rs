@@ -305,7 +305,7 @@ impl Importer<'_> {
     fn look_at_ends(&mut self, object: &SheetRow, image: &SheetRow) -> Result<(), ZemaxError> {
         if let Some(glass) = &object.glass {
             let why = format!(
-                "the object stands in a glass, and lenses here begin in air: take the glass out, or put it and its \
+                "the object stands in a glass, and lenses here begin in air: take the line out, or put the glass and its \
                  surface behind {}",
                 self.sheet.format.words().object
             );
