@@ -33,7 +33,8 @@ fn rays_of_a_second_package_end_at_the_same_places() {
         let path = entry.unwrap().path();
         let (lens, rays) = opinion(&path);
         let train = lens.file.build(&|name: &str| Err(name.to_owned())).unwrap();
-        let built = *train.built().last().unwrap();
+        let spaces = train.built();
+        let [.., before_last, built] = spaces[..] else { panic!("{}", path.display()) };
         let mount = lens.file.sensor.unwrap_or_default();
         // Of mirrors an even number, or a sensor that stands straight.
         let sensor = Frame::placed(
@@ -51,7 +52,8 @@ fn rays_of_a_second_package_end_at_the_same_places() {
         let mut apart = 0.0_f64;
         for (ours, [.., end]) in traced.rays.iter().zip(&rays) {
             assert!(ours.direction.is_some(), "{}: {ours:?}", path.display());
-            let from = built.place(DVec3::from_array(*ours.points.last().unwrap()));
+            // Points stand in the space before their element.
+            let from = before_last.place(DVec3::from_array(*ours.points.last().unwrap()));
             let along = built.direction(DVec3::from_array(ours.direction.unwrap()));
             let beside = (*end - from).cross(along).length();
             let normal = built.direction(sensor.rotation.z_axis);

@@ -30,6 +30,9 @@ use etendue_geometry::units::Millimetres;
 const MOST_SURFACES: usize = crate::train::MOST_ELEMENTS;
 const MOST_TERMS: usize = 10_000;
 
+/// Ways from one surface to the next that are none (mm).
+const NO_WAY: f64 = 1e-9;
+
 /// The deepest that coordinate systems stand in one another.
 const DEEPEST: usize = 32;
 
@@ -190,7 +193,9 @@ fn put_rows(
         axes.origin().truncate() == glam::DVec2::ZERO && axes.rotation() == DMat3::IDENTITY
     };
     if !places[1..].iter().all(straight) {
-        add_placed(rows, places, 1.0, sheet);
+        let mut places = places.to_vec();
+        face(&mut rows, &mut places)?;
+        add_placed(rows, &places, 1.0, sheet);
         return Ok(());
     }
     for i in 1..rows.len() {
@@ -198,6 +203,22 @@ fn put_rows(
         rows[i].thickness = next - places[i].origin().z;
     }
     sheet.rows = rows;
+    Ok(())
+}
+
+/// Turns surfaces about so that their axes run along the light and, behind an odd number of mirrors, against it, as the
+/// sheet has them; optiland's may stand either way.
+fn face(rows: &mut [SheetRow], places: &mut [Axes]) -> Result<(), ZemaxError> {
+    let mut sense = 1.0;
+    for i in 1..rows.len() {
+        let way = places[i].origin() - places[i.max(2) - 1].origin();
+        if sense * places[i].axis().dot(way) < -NO_WAY {
+            let turn = DMat3::from_rotation_x(std::f64::consts::PI);
+            places[i] = Axes::new(places[i].origin(), places[i].rotation() * turn);
+            rows[i].turn_about()?;
+        }
+        sense = if rows[i].mirror { -sense } else { sense };
+    }
     Ok(())
 }
 

@@ -198,6 +198,22 @@ impl SheetRow {
         ) && self.freeform.as_ref().is_none_or(|spec| spec.sag.is_empty() && spec.phase.is_none())
     }
 
+    /// The same surface in a frame that is turned about its x axis by half a turn.
+    pub(super) fn turn_about(&mut self) -> Result<(), ZemaxError> {
+        if !self.is_round() || self.shape == SurfaceShape::CoordinateBreak {
+            let why = "a surface that is not round stands with its back to the light; turn its coordinates by half a turn";
+            return Err(ZemaxError::new(self.line, why));
+        }
+        self.curvature = -self.curvature;
+        self.aperture_decentre[1] = -self.aperture_decentre[1];
+        // Of an extended asphere the first two are a number and a radius.
+        self.extra.range_mut(3..).for_each(|(_, parameter)| parameter.value = -parameter.value);
+        if let Some(spec) = &mut self.freeform {
+            spec.aspheric.values_mut().for_each(|value| *value = -*value);
+        }
+        Ok(())
+    }
+
     fn parameter(&self, number: usize) -> f64 {
         self.parameters.get(&number).map_or(0.0, |parameter| parameter.value)
     }
