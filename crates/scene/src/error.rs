@@ -43,8 +43,8 @@ pub enum SceneError {
     },
     /// A file that holds no lens.
     #[error(
-        "{}: {reason}; give a lens file (.json), a Zemax file (.zmx), a CODE V file (.seq), or a scene whose camera is a \
-         lens",
+        "{}: {reason}; give a lens file (.json), a file of Zemax (.zmx), CODE V (.seq), OSLO (.len), optiland or ISET \
+         (.json), pbrt (.dat) or PhotonsToPhotos (.txt), or a scene whose camera is a lens",
         file.display()
     )]
     NotALens {
@@ -53,7 +53,7 @@ pub enum SceneError {
         /// What it is instead.
         reason: String,
     },
-    /// A Zemax file that cannot be imported.
+    /// A file of another program that cannot be imported.
     #[error("{}, {source}", file.display())]
     Zemax {
         /// The file.

@@ -39,6 +39,13 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
         "rays" => vec![RAYS.into()],
         "zmx" | "zmx_report" => zmxs(),
         "seq" => seqs(),
+        "oslo" => vec![OSLO.into()],
+        "optiland" => files("crates/optics/tests/optics/optiland", "json"),
+        "iset" => vec![ISET_TABLE.into(), ISET_SPHERES.into()],
+        "pbrt_lens" => {
+            vec![b"# a\n50 4 1.5 20\n-50 1 1 20\n0 46 0 8\n60 2 1.6 18\n-60 0 1 18\n".into()]
+        }
+        "photons_to_photos" => vec![PHOTONS_TO_PHOTOS.into()],
         "mask_png" => vec![picture(ImageFormat::Png, [7, 7, 7])],
         "texture" => {
             let color = [200, 90, 10];
@@ -282,6 +289,24 @@ fn seqs() -> Vec<Vec<u8>> {
         S -90 -30 REFL\n  ADE 10\n  BEN\n  CIR 9\n  CIR HOL 1\nSI 0 0\nGO\n";
     vec![lens.as_bytes().to_vec()]
 }
+
+const OSLO: &str = "// OSLO\nLEN NEW \"a b\" 50 4\nEBR 5\nANG 10\nUNI 1\n// SRF 0\nAIR\nTH 1e20\nAP 1e20\nNXT\nGLA BK7\nRD 50; TH 4\n\
+    AP CHK 8\nAST\nCC -0.5; AD 1e-6\nNXT\nAIR\nRD -50\nTH 9\nASP ASX 9\nAS4 1e-6\nTLA 2; DCY 1\nRCO\nNXT\nRFL\nPK CVM 1 0.01\n\
+    TH -50\nTLA 20\nBEN\nNXT\nWV 0.58 0.48 0.65\nWW 1 1 1\nEND 4\nCFG NEW\nTH 3 2 -45\nEND\nRST NEW\nF 1 0 1 0 0 0 -1 1 -1 1 1\nEND\n";
+
+const ISET_TABLE: &str = r#"{"name": "a", "type": "multi element lens", "surfaces": [
+    {"radius": [50, 51], "thickness": 4, "ior": [[400, 500, 600, 700], [1.62, 1.61, 1.605, 1.602]], "semi_aperture": 10,
+    "conic_constant": [-0.5, -0.5]}, {"radius": -50, "thickness": 1, "ior": 1, "semi_aperture": 10},
+    {"radius": 0, "thickness": 46, "ior": 0, "semi_aperture": 4}]}"#;
+
+const ISET_SPHERES: &str = r#"{"units": "mm", "apertureMiddleD": 6, "surfaceArray": [
+    {"subtype": "refractive", "sRadius": 50, "sCenter": [0, 0, 46], "wave": [400, 700], "n": [1.5, 1.49], "apertureD": 20},
+    {"subtype": "refractive", "sRadius": -50, "sCenter": [0, 0, -51], "wave": [400, 700], "n": [1, 1], "apertureD": 20},
+    {"subtype": "diaphragm", "sRadius": 0, "sCenter": [0, 0, 0], "wave": [400, 700], "n": [1, 1], "apertureD": 20}]}"#;
+
+const PHOTONS_TO_PHOTOS: &str = "[descriptive data]\ntitle\ta\n[constants]\nAsphericalOddCount\t1\n[variable distances]\nFocal Length\t48\t60\n\
+    F-Number\t4\t5\nAngle of View\t40\t30\nd0\tInfinity\nd2\t1\t3\nBf\t40\n[lens data]\n1\t50\t4\t1.5\t20\t64.2\tN-BK7\tSCHOTT\n\
+    2\t-50\td2\t\t20\n3\tAS\t2\t\t9\n4\tInfinity\t2\t1.6\t18\t50\n5\t-60\tBf\t\t18\n[aspherical data]\n2\t-50\t-0.5\t1e-6\t-2e-9\t1e-12\n";
 
 fn picture(format: ImageFormat, color: [u8; 3]) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());

@@ -7,7 +7,7 @@ use etendue_files::{Opener, Reach};
 use etendue_geometry::Buffer;
 use etendue_image::{Cube, Limits, envi};
 use etendue_optics::element::Picture;
-use etendue_optics::train::{Focus, Inquiry, LensFile, LensReport};
+use etendue_optics::train::{Focus, Inquiry, LensFile, LensFormat, LensReport, ZemaxLens};
 use etendue_scene::file::{SensorFile, read_lens, trace_rays};
 use etendue_scene::import::{Options, import};
 use etendue_scene::{LoadOptions, SceneFile, Strictness, Wanted, doctor};
@@ -24,7 +24,7 @@ pub struct Target {
 }
 
 /// All readers.
-pub const TARGETS: [Target; 24] = [
+pub const TARGETS: [Target; 29] = [
     Target { name: "gltf", run: gltf },
     Target { name: "glb", run: glb },
     Target { name: "obj", run: obj },
@@ -39,6 +39,11 @@ pub const TARGETS: [Target; 24] = [
     Target { name: "rays", run: rays },
     Target { name: "zmx", run: zmx },
     Target { name: "seq", run: seq },
+    Target { name: "oslo", run: oslo },
+    Target { name: "optiland", run: optiland },
+    Target { name: "iset", run: iset },
+    Target { name: "pbrt_lens", run: pbrt_lens },
+    Target { name: "photons_to_photos", run: photons_to_photos },
     Target { name: "lens_report", run: lens_report },
     Target { name: "zmx_report", run: zmx_report },
     Target { name: "mask_png", run: mask_png },
@@ -158,6 +163,33 @@ fn lens(bytes: &[u8], folder: &Path) {
 
 fn seq(bytes: &[u8], folder: &Path) {
     let _ = read_lens(&write(folder, "lens.seq", bytes), Reach::OwnFolder, &[]);
+}
+
+fn oslo(bytes: &[u8], folder: &Path) {
+    imported(LensFormat::Oslo, &write(folder, "lens.len", bytes), bytes);
+}
+
+/// By its content, and as what it no longer says that it is.
+fn optiland(bytes: &[u8], folder: &Path) {
+    imported(LensFormat::Optiland, &write(folder, "lens.json", bytes), bytes);
+}
+
+fn iset(bytes: &[u8], folder: &Path) {
+    imported(LensFormat::Iset, &write(folder, "lens.json", bytes), bytes);
+}
+
+fn pbrt_lens(bytes: &[u8], folder: &Path) {
+    imported(LensFormat::Pbrt, &write(folder, "lens.dat", bytes), bytes);
+}
+
+fn photons_to_photos(bytes: &[u8], folder: &Path) {
+    imported(LensFormat::PhotonsToPhotos, &write(folder, "lens.txt", bytes), bytes);
+}
+
+/// As a file by its name, and as what it is meant to be.
+fn imported(format: LensFormat, path: &Path, bytes: &[u8]) {
+    let _ = read_lens(path, Reach::OwnFolder, &[]);
+    let _ = ZemaxLens::read_as(format, bytes, Some(2), &[]);
 }
 
 fn zmx(bytes: &[u8], folder: &Path) {

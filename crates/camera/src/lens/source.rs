@@ -14,7 +14,7 @@ use crate::{CameraError, PoseSpec, SensorSpec};
 use etendue_geometry::units::{Degrees, Metres, Millimetres};
 use etendue_optics::element::{ElementSpec, LensResources, LossesSpec, Resolve, element_schema};
 use etendue_optics::glass::AgfCatalogue;
-use etendue_optics::train::{Focus, LensError, LensFile, OpticalTrain, ZemaxLens};
+use etendue_optics::train::{Focus, LensError, LensFile, LensFormat, OpticalTrain, ZemaxLens};
 use etendue_spectrum::CurveFault;
 
 /// The longest text that is read as a lens (bytes).
@@ -44,13 +44,9 @@ impl LensSource {
                 let path = resolve.path(written).map_err(error)?;
                 let bytes = etendue_files::read(&path, LONGEST)
                     .map_err(|why| error(format!("{written}: cannot be read: {why}")))?;
-                let is_code_v = ZemaxLens::is_named_code_v(&path);
-                if is_code_v || ZemaxLens::is_named(&path) {
+                if let Some(format) = LensFormat::of(&path, &bytes) {
                     let fault = |why: String| error(format!("{written}, {why}"));
-                    let lens = match is_code_v {
-                        true => ZemaxLens::read_code_v(&bytes, resolve.glasses()),
-                        false => ZemaxLens::read(&bytes, resolve.glasses()),
-                    };
+                    let lens = ZemaxLens::read_as(format, &bytes, None, resolve.glasses());
                     let lens = lens.map_err(|e| fault(e.to_string()))?;
                     return lens.file.build(resolve).map_err(|e| fault(e.to_string()));
                 }

@@ -27,7 +27,8 @@ Examples:
 
 #[derive(Debug, Args)]
 pub(crate) struct LensArguments {
-    /// A lens file (.json), a Zemax file (.zmx), or a scene whose camera is a lens
+    /// A lens file (.json), a scene whose camera is a lens, or a file of Zemax (.zmx), CODE V (.seq), OSLO (.len),
+    /// optiland or ISET (.json), pbrt (.dat) or PhotonsToPhotos (.txt)
     #[arg(value_name = "LENS|ZMX|SCENE")]
     pub(crate) lens: PathBuf,
     /// Print JSON for machines, with all digits

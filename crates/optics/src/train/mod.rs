@@ -50,7 +50,7 @@ pub use paraxial::{Paraxial, Pupil};
 pub use pupil::{ExitPupil, ExitPupilError, PupilSample};
 pub use report::{Inquiry, LensReport, NOTES, ReportError, remove_notes};
 pub use trace::{MonochromaticTrain, RayPath, Registers, Side};
-pub use zemax::{ZemaxError, ZemaxLens};
+pub use zemax::{LensFormat, ZemaxError, ZemaxLens};
 
 /// Why a lens file makes no lens.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -8,8 +8,8 @@ use etendue_files::{InputFolder, Opener, Reach};
 use etendue_optics::element::GlassesAlone;
 use etendue_optics::glass::AgfCatalogue;
 use etendue_optics::train::{
-    Focus, LensError, LensFile, OpticalTrain, RayError, RaysFile, TracedRays, ZemaxError,
-    ZemaxLens, remove_notes,
+    Focus, LensError, LensFile, LensFormat, OpticalTrain, RayError, RaysFile, TracedRays,
+    ZemaxError, ZemaxLens, remove_notes,
 };
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
@@ -69,7 +69,7 @@ pub struct ReadLens {
     pub inputs: Vec<PathBuf>,
 }
 
-/// Reads the lens of a lens file (`.json`), of a Zemax file (`.zmx`), or that of the camera of a
+/// Reads the lens of a lens file (`.json`), of a file of another program ([`LensFormat`]), or that of the camera of a
 /// scene. The lens' own files (masks) must lie in its folder, and the scene's lens in the scene's,
 /// unless `reach` says otherwise. Glasses are looked up in `glasses` first, the last one before the
 /// others.
@@ -85,7 +85,7 @@ pub fn read_lens(
     read_lens_at(path, reach, None, glasses)
 }
 
-/// As [`read_lens`], at a configuration of a Zemax file, from 1.
+/// As [`read_lens`], at a configuration of another program's file, from 1.
 ///
 /// # Errors
 ///
@@ -96,14 +96,15 @@ pub fn read_lens_at(
     configuration: Option<usize>,
     glasses: &[AgfCatalogue],
 ) -> Result<ReadLens, SceneError> {
-    if ZemaxLens::is_named(path) {
-        return read_zemax(path, configuration, glasses);
-    }
-    if ZemaxLens::is_named_code_v(path) && configuration.is_none() {
-        return read_zemax(path, None, glasses);
+    if let Some(format) = format_of(path)? {
+        if configuration.is_none() || format.has_configurations() {
+            return import(path, format, configuration, glasses);
+        }
     }
     if configuration.is_some() {
-        let reason = "has no configurations, which Zemax files (.zmx) have".to_owned();
+        let reason = "has no configurations, which Zemax files (.zmx), those of OSLO (.len) and tables of PhotonsToPhotos \
+                      (.txt) may have"
+            .to_owned();
         return Err(SceneError::NotALens { file: path.to_owned(), reason });
     }
     let (written, value) = read(path)?;
@@ -133,8 +134,8 @@ pub fn read_lens_at(
     })
 }
 
-/// Whether the file at `path` is a lens by itself: a Zemax file by its name, or JSON that has elements and
-/// nothing of a scene.
+/// Whether the file at `path` is a lens by itself: one of another program by its name or content, or JSON that has
+/// elements and nothing of a scene.
 #[must_use]
 pub fn is_lens(path: &Path) -> bool {
     let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
@@ -142,8 +143,7 @@ pub fn is_lens(path: &Path) -> bool {
         let Ok((_, value)) = read(path) else { return false };
         value.get("elements").is_some() && !SCENE_KEYS.iter().any(|key| value.get(key).is_some())
     };
-    let is_of_designers = ZemaxLens::is_named(path) || ZemaxLens::is_named_code_v(path);
-    is_of_designers || (is_json && has_elements())
+    format_of(path).is_ok_and(|format| format.is_some()) || (is_json && has_elements())
 }
 
 /// Reads rays and traces them through a lens.
@@ -212,21 +212,32 @@ fn build(
     })
 }
 
-fn read_zemax(
+/// The other program that a file is of, by its name and, of JSON and text, by its content.
+fn format_of(path: &Path) -> Result<Option<LensFormat>, SceneError> {
+    let may_tell =
+        |ending: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
+    match LensFormat::named(path) {
+        Some(format) => Ok(Some(format)),
+        None if may_tell("json") || may_tell("txt") => {
+            Ok(LensFormat::of(path, &super::read_bytes(path).map_err(not_a_lens)?))
+        }
+        None => Ok(None),
+    }
+}
+
+fn import(
     path: &Path,
+    format: LensFormat,
     configuration: Option<usize>,
     glasses: &[AgfCatalogue],
 ) -> Result<ReadLens, SceneError> {
     let bytes = super::read_bytes(path).map_err(not_a_lens)?;
     let zemax = |source| SceneError::Zemax { file: path.to_owned(), source };
-    let lens = match ZemaxLens::is_named_code_v(path) {
-        true => ZemaxLens::read_code_v(&bytes, glasses),
-        false => ZemaxLens::read_configuration(&bytes, configuration, glasses),
-    };
+    let lens = ZemaxLens::read_as(format, &bytes, configuration, glasses);
     let ZemaxLens { file, fields, wavelengths, notes, .. } = lens.map_err(zemax)?;
     let train = file
         .build(&GlassesAlone(glasses))
-        .map_err(|error| zemax(ZemaxError { line: 1, why: error.to_string() }))?;
+        .map_err(|error| zemax(ZemaxError { line: 0, why: error.to_string() }))?;
     let focus = Focus::AsWritten;
     let inputs = vec![path.to_owned()];
     Ok(ReadLens {

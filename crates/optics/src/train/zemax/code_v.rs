@@ -9,6 +9,7 @@
 //! left-handed, γ right-handed.
 
 use super::ZemaxError;
+use super::format::LensFormat;
 use super::sheet::{
     Aperture, Parameter, SheetGlass, SheetOpening, SheetRow, SurfaceShape, ZemaxSheet,
 };
@@ -90,7 +91,7 @@ fn commands(text: &str) -> Vec<Command<'_>> {
 impl ZemaxSheet {
     /// Reads the text of a `.seq` file.
     pub(super) fn read_code_v(text: &str) -> Result<Self, ZemaxError> {
-        let mut sheet = Self::default();
+        let mut sheet = Self { format: LensFormat::CodeV, ..Self::default() };
         (sheet.unit, sheet.configurations, sheet.configuration) = (1.0, 1, 1);
         let mut surface: Option<Surface> = None;
         let (mut by_radius, mut is_whole) = (true, false);
@@ -232,8 +233,7 @@ fn begin(command: &Command<'_>, by_radius: bool) -> Result<Surface, ZemaxError> 
 fn glass(command: &Command<'_>, word: &str) -> Result<SheetGlass, ZemaxError> {
     let word = word.trim_matches(['\'', '"']);
     let line = command.line;
-    let model =
-        |nd: f64, vd: f64| SheetGlass { line, name: word.to_owned(), model: Some([nd, vd]) };
+    let model = |nd: f64, vd: f64| SheetGlass::model(line, word, nd, vd);
     if let Some((nd, vd)) = word.split_once(':')
         && let (Ok(nd), Ok(vd)) = (nd.parse::<f64>(), vd.parse::<f64>())
     {
@@ -251,18 +251,20 @@ fn glass(command: &Command<'_>, word: &str) -> Result<SheetGlass, ZemaxError> {
         Some((name, maker)) => (name, Some(maker)),
         None => (word, None),
     };
-    // Names have no hyphen there: NBK7 is N-BK7, and SLAH53 S-LAH53.
+    let makers: Vec<&str> = maker.into_iter().collect();
+    Ok(SheetGlass { line, name: hyphened(name, &makers), spec: None })
+}
+
+/// A name as the catalogue has it: NBK7 is N-BK7, and SLAH53 S-LAH53.
+pub(super) fn hyphened(name: &str, makers: &[&str]) -> String {
     let hyphened = (name.len() > 1 && name.is_char_boundary(1))
         .then(|| format!("{}-{}", &name[..1], &name[1..]));
-    let known = |name: &str| {
-        let makers: Vec<&str> = maker.into_iter().collect();
-        GlassSpec::Named(name.to_owned()).resolve_among(&[], Makers(&makers)).is_ok()
-    };
-    let name = match hyphened {
+    let known =
+        |name: &str| GlassSpec::Named(name.to_owned()).resolve_among(&[], Makers(makers)).is_ok();
+    match hyphened {
         Some(hyphened) if !known(name) && known(&hyphened) => hyphened,
         _ => name.to_owned(),
-    };
-    Ok(SheetGlass { line, name, model: None })
+    }
 }
 
 impl Surface {

@@ -143,8 +143,9 @@ const FEWEST_FIELDS: usize = 10;
 /// The field points of a file.
 #[derive(Debug, Default)]
 pub(super) struct Fields {
-    kind: usize,
-    count: Option<usize>,
+    /// 0 for angles, 1 for heights of the object, 2 and 3 for those of the paraxial and the real image.
+    pub(super) kind: usize,
+    pub(super) count: Option<usize>,
     /// How many wavelengths are in use, which stands in the same line.
     pub(super) wavelengths: Option<usize>,
     pub(super) x: Vec<f64>,
@@ -282,6 +283,31 @@ impl Default for Axes {
 }
 
 impl Axes {
+    pub(super) fn new(origin: DVec3, rotation: DMat3) -> Self {
+        Self { origin, rotation }
+    }
+
+    pub(super) fn rotation(&self) -> DMat3 {
+        self.rotation
+    }
+
+    /// The thickness along this axis and the break behind it that lead to other axes.
+    pub(super) fn to(&self, next: &Self) -> (f64, Break) {
+        let back = self.rotation.transpose();
+        let offset = back * (next.origin - self.origin);
+        let turn = back * next.rotation;
+        // R = Rx(a) Ry(b) Rz(c).
+        let [about_x, about_y, about_z] = [
+            (-turn.z_axis.y).atan2(turn.z_axis.z),
+            turn.z_axis.x.atan2(turn.z_axis.y.hypot(turn.z_axis.z)),
+            (-turn.y_axis.x).atan2(turn.x_axis.x),
+        ];
+        let clean = |value: f64, small: f64| if value.abs() <= small { 0.0 } else { value };
+        let tilt = [about_x, about_y, about_z].map(|angle| clean(angle.to_degrees(), NO_TILT));
+        let decentre = [offset.x, offset.y].map(|length| clean(length, NO_LENGTH));
+        (offset.z, Break { decentre, tilt, turned_first: false })
+    }
+
     pub(super) fn broken(self, by: &Break) -> Self {
         let [x, y, z] = by.tilt.map(f64::to_radians);
         let [x, y, z] =

@@ -1,11 +1,17 @@
-//! Lenses from Zemax OpticStudio's sequential `.zmx` files.
+//! Lenses from other programs' files: Zemax OpticStudio's sequential `.zmx` files and, by way of the same lens data
+//! sheet, those of CODE V, OSLO, optiland, ISET, pbrt and PhotonsToPhotos.
 //!
 //! | module | idea |
 //! |---|---|
 //! | `sheet` | lines to the rows of the lens data sheet |
 //! | `parts` | a row to what it is |
 //! | `configuration` | the values of one position of a zoom lens; field points to field angles; coordinate breaks to tilts and decentrings; bytes to lines: UTF-8 and UTF-16 |
+//! | `format` | which program a file is of, and what its users call things |
 //! | `code_v` | lines of CODE V's files to the same rows |
+//! | `oslo`, `oslo_surface` | statements of OSLO's files, and what they say of one surface |
+//! | `optiland` | optiland's JSON |
+//! | `pbrt`, `iset` | tables of pbrt's realistic camera, and ISET's JSON, which has the same |
+//! | `photons_to_photos` | tables of PhotonsToPhotos' Optical Bench |
 //! | `write` | a lens file to lines |
 //! | here | rows to the elements of a lens file |
 //!
@@ -19,7 +25,14 @@
 
 mod code_v;
 mod configuration;
+mod format;
+mod iset;
+mod optiland;
+mod oslo;
+mod oslo_surface;
 mod parts;
+mod pbrt;
+mod photons_to_photos;
 mod sheet;
 mod write;
 
@@ -32,16 +45,17 @@ use crate::element::{ApertureSpec, ElementSpec, GlassesAlone, PartSpec};
 use crate::glass::{AgfCatalogue, GlassSpec, Makers};
 use configuration::{Axes, SheetPlace};
 use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
+pub use format::LensFormat;
 use sheet::{Aperture, SheetRow, SurfaceShape, ZemaxSheet};
 
 /// A difference of focal lengths that is more than rounding (share).
 const SAME_FOCAL_LENGTH: f64 = 1e-3;
 
-/// Why a Zemax file gives no lens.
+/// Why another program's file gives no lens.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("line {line}: {why}")]
+#[error("{}{why}", match line { 0 => String::new(), line => format!("line {line}: ") })]
 pub struct ZemaxError {
-    /// The line, from 1.
+    /// The line, from 1; 0 where the words name the place.
     pub line: usize,
     /// What is wrong there and what would do.
     pub why: String,
@@ -53,7 +67,7 @@ impl ZemaxError {
     }
 }
 
-/// A lens as a Zemax file has it.
+/// A lens as another program's file has it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ZemaxLens {
     /// The lens.
@@ -75,10 +89,41 @@ impl ZemaxLens {
         path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("zmx"))
     }
 
-    /// Whether a file's name says that it is one of CODE V's.
-    #[must_use]
-    pub fn is_named_code_v(path: &Path) -> bool {
-        path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("seq"))
+    /// Reads the bytes of a file of any format, with the values of a configuration, from 1; those that the file stands
+    /// at without.
+    ///
+    /// # Errors
+    ///
+    /// When it is no such file, has a surface, glass or number that has no counterpart here, or has no such
+    /// configuration; the error names the line, or the surface of a file whose surfaces have none.
+    pub fn read_as(
+        format: LensFormat,
+        bytes: &[u8],
+        configuration: Option<usize>,
+        glasses: &[AgfCatalogue],
+    ) -> Result<Self, ZemaxError> {
+        let text = configuration::decode(bytes)?;
+        // The lines of the file, and the elements that they describe.
+        let mut sheet = match format {
+            LensFormat::Zemax => ZemaxSheet::read(&text)?,
+            LensFormat::CodeV => ZemaxSheet::read_code_v(&text)?,
+            LensFormat::Oslo => ZemaxSheet::read_oslo(&text, configuration)?,
+            LensFormat::Optiland => ZemaxSheet::read_optiland(&text)?,
+            LensFormat::Iset => ZemaxSheet::read_iset(&text)?,
+            LensFormat::Pbrt => ZemaxSheet::read_pbrt(&text)?,
+            LensFormat::PhotonsToPhotos => {
+                ZemaxSheet::read_photons_to_photos(&text, configuration)?
+            }
+        };
+        if let Some(configuration) = configuration {
+            sheet.choose(configuration)?;
+        }
+        Self::of_sheet(&sheet, glasses).map_err(|error| match format.words().surfaces {
+            Some(_) if error.line > 0 => {
+                ZemaxError::new(0, format!("{}: {}", sheet.place(error.line), error.why))
+            }
+            _ => error,
+        })
     }
 
     /// Reads the bytes of one of CODE V's `.seq` files.
@@ -87,8 +132,7 @@ impl ZemaxLens {
     ///
     /// As [`Self::read`].
     pub fn read_code_v(bytes: &[u8], glasses: &[AgfCatalogue]) -> Result<Self, ZemaxError> {
-        let text = configuration::decode(bytes)?;
-        Self::of_sheet(&ZemaxSheet::read_code_v(&text)?, "a CODE V file", glasses)
+        Self::read_as(LensFormat::CodeV, bytes, None, glasses)
     }
 
     /// Reads the bytes of a `.zmx` file.
@@ -111,21 +155,11 @@ impl ZemaxLens {
         configuration: Option<usize>,
         glasses: &[AgfCatalogue],
     ) -> Result<Self, ZemaxError> {
-        let text = configuration::decode(bytes)?;
-        // The lines of the file, and the elements that they describe.
-        let mut sheet = ZemaxSheet::read(&text)?;
-        if let Some(configuration) = configuration {
-            sheet.choose(configuration)?;
-        }
-        Self::of_sheet(&sheet, "a Zemax file", glasses)
+        Self::read_as(LensFormat::Zemax, bytes, configuration, glasses)
     }
 
     /// The lens of a data sheet.
-    fn of_sheet(
-        sheet: &ZemaxSheet,
-        source: &str,
-        glasses: &[AgfCatalogue],
-    ) -> Result<Self, ZemaxError> {
+    fn of_sheet(sheet: &ZemaxSheet, glasses: &[AgfCatalogue]) -> Result<Self, ZemaxError> {
         let mut importer =
             Importer { sheet, glasses, elements: Vec::new(), notes: Vec::new(), object_z: None };
         let sensor = importer.convert()?;
@@ -138,7 +172,7 @@ impl ZemaxLens {
         }
         // The lens that a lens file would hold.
         let mut file = LensFile { name: sheet.name.clone(), elements, ..LensFile::default() };
-        source.clone_into(&mut file.source);
+        sheet.format.words().source.clone_into(&mut file.source);
         file.sensor = (sensor != SensorMount::default()).then_some(sensor);
         let wavelengths = sheet.wavelengths_nm();
         file.wavelength = wavelengths.first().copied().map(Nanometres);
@@ -231,7 +265,8 @@ impl Importer<'_> {
                 medium_is_air = if row.mirror { medium_is_air } else { row.glass.is_none() };
             }
             if !row.thickness.is_finite() {
-                let why = "DISZ is infinite inside the lens";
+                let why =
+                    format!("{} is infinite inside the lens", self.sheet.format.words().thickness);
                 return Err(ZemaxError::new(row.line, why));
             }
             axes = axes.advanced(row.thickness * unit);
@@ -269,8 +304,11 @@ impl Importer<'_> {
 
     fn look_at_ends(&mut self, object: &SheetRow, image: &SheetRow) -> Result<(), ZemaxError> {
         if let Some(glass) = &object.glass {
-            let why = "the object stands in a glass, and lenses here begin in air: take the line out, or put \
-                       the glass and its surface behind SURF 0";
+            let why = format!(
+                "the object stands in a glass, and lenses here begin in air: take the line out, or put the glass and its \
+                 surface behind {}",
+                self.sheet.format.words().object
+            );
             return Err(ZemaxError::new(glass.line, why));
         }
         if object.thickness.is_finite() {
@@ -281,25 +319,23 @@ impl Importer<'_> {
             ));
         }
         if !image.is_flat() {
-            self.notes.push(format!("line {}: the curved image surface is taken flat", image.line));
+            let place = self.sheet.place(image.line);
+            self.notes.push(format!("{place}: the curved image surface is taken flat"));
         }
         Ok(())
     }
 
     fn glass(&self, glass: &sheet::SheetGlass) -> Result<GlassSpec, ZemaxError> {
-        let spec = match glass.model {
-            None => GlassSpec::Named(glass.name.clone()),
-            // OpticStudio takes an Abbe number of 0 for a glass without dispersion.
-            Some([nd, 0.0]) => GlassSpec::Constant(nd),
-            Some([nd, vd]) => GlassSpec::Abbe { nd, vd },
-        };
+        let words = self.sheet.format.words();
+        let spec = glass.spec.clone().unwrap_or_else(|| GlassSpec::Named(glass.name.clone()));
         let makers: Vec<&str> = self.sheet.makers.iter().map(String::as_str).collect();
         let found = spec.resolve_among(self.glasses, Makers(&makers)).map_err(|error| {
-            let remedy = match glass.model {
-                None => "; write its index into the file as GLAS ___BLANK 1 0 nd vd",
-                Some(_) => "",
+            let remedy = match glass.spec {
+                None => format!("; write its index into the file as {}", words.index),
+                Some(_) => String::new(),
             };
-            ZemaxError::new(glass.line, format!("GLAS {}: {error}{remedy}", glass.name))
+            let why = format!("{} {}: {error}{remedy}", words.glass, glass.name);
+            ZemaxError::new(glass.line, why)
         })?;
         Ok(match (&spec, &found.maker) {
             // With its maker in front, so that the lens file says which one is meant.
@@ -410,15 +446,21 @@ fn open_stop(
     let Some((line, aperture)) = sheet.aperture else {
         return float_stop(file, train, sheet, notes, build);
     };
+    let words = sheet.format.words();
     let index = train.stop();
     let written = train.stop_radius();
     let error = |error: LensError| ZemaxError::new(line, error.to_string());
     let stop_radius = match aperture {
         Aperture::EntrancePupil(diameter) => {
-            with_entrance_pupil(&train, "ENPD", |_| Ok(0.5 * diameter * sheet.unit)).map(Some)
+            with_entrance_pupil(&train, words.pupil, |_| Ok(0.5 * diameter * sheet.unit)).map(Some)
         }
-        Aperture::AtObject(sine) => with_entrance_pupil(&train, "OBNA", |pupil| {
-            let object = object_z.ok_or("OBNA: the object is at infinity; write ENPD or FNUM")?;
+        Aperture::AtObject(sine) => with_entrance_pupil(&train, words.object_aperture, |pupil| {
+            let object = object_z.ok_or_else(|| {
+                format!(
+                    "{}: the object is at infinity; write {} or {}",
+                    words.object_aperture, words.pupil, words.f_number
+                )
+            })?;
             Ok((pupil - object).abs() * sine.asin().tan())
         })
         .map(Some),
@@ -436,8 +478,9 @@ fn open_stop(
     let radius = opened.stop_radius();
     if written.is_finite() && written > 0.0 && (radius - written).abs() > 0.01 * written {
         notes.push(format!(
-            "line {line}: the system's aperture gives the stop a radius of {radius:.5} mm; its \
-             surface's is {written:.5} mm"
+            "{}: the system's aperture gives the stop a radius of {radius:.5} mm; its surface's is \
+             {written:.5} mm",
+            sheet.place(line)
         ));
     }
     let stop = &mut file.elements[index];
@@ -469,16 +512,20 @@ fn float_stop(
     }
     let row = sheet.rows.iter().find(|row| row.stop);
     let line = row.map_or(sheet.last_line, |row| row.line);
+    let words = sheet.format.words();
     let widest = train.widest_opening().ok_or_else(|| {
-        ZemaxError::new(
-            line,
-            "the stop has no DIAM, and no other surface limits the beam: write the stop's DIAM, or the \
-             system's aperture as ENPD or FNUM",
-        )
+        let why = format!(
+            "the stop has no {0}, and no other surface limits the beam: write the stop's {0}, or the system's aperture \
+             as {1} or {2}",
+            words.semi_diameter, words.pupil, words.f_number
+        );
+        ZemaxError::new(line, why)
     })?;
     notes.push(format!(
-        "line {line}: the stop has no DIAM; its radius is {:.5} mm, that of the widest beam on the axis that \
+        "{}: the stop has no {}; its radius is {:.5} mm, that of the widest beam on the axis that \
          the other surfaces let through",
+        sheet.place(line),
+        words.semi_diameter,
         widest.stop_radius
     ));
     file.elements[index].part = PartSpec::circular(widest.stop_radius);

@@ -34,8 +34,8 @@ impl Importer<'_> {
         if flat_in_air {
             if !row.stop && !row.has_fixed_rim() {
                 self.notes.push(format!(
-                    "line {}: a plane in air that does nothing is left out",
-                    row.line
+                    "{}: a plane in air that does nothing is left out",
+                    self.sheet.place(row.line)
                 ));
                 return Ok(None);
             }
@@ -80,6 +80,15 @@ impl Importer<'_> {
                     semi_diameter,
                 })
             }
+            (false, _) if row.shape == SurfaceShape::Freeform => PartSpec::Freeform(FreeformSpec {
+                curvature,
+                glass,
+                semi_diameter,
+                conic,
+                mirror: row.mirror,
+                hole,
+                ..row.freeform.as_deref().cloned().unwrap_or_default()
+            }),
             (false, _) => PartSpec::Freeform(FreeformSpec {
                 curvature,
                 glass,
@@ -90,7 +99,7 @@ impl Importer<'_> {
                 hole,
                 fresnel: row.shape == SurfaceShape::Fresnel,
                 rotation_radius: row.rotation_radius(unit),
-                sag: row.sag(unit)?,
+                sag: row.sag(unit, self.sheet.format.words().toroid)?,
                 phase: row.phase(unit)?,
                 ..FreeformSpec::default()
             }),
@@ -171,6 +180,7 @@ impl SheetRow {
             | SurfaceShape::Paraxial
             | SurfaceShape::CoordinateBreak
             | SurfaceShape::Biconic
+            | SurfaceShape::Freeform
             | SurfaceShape::Grating => {}
         }
         Ok(terms)
@@ -185,7 +195,23 @@ impl SheetRow {
                 | SurfaceShape::Grating
                 | SurfaceShape::ZernikeStandard
                 | SurfaceShape::ZernikeFringe
-        )
+        ) && self.freeform.as_ref().is_none_or(|spec| spec.sag.is_empty() && spec.phase.is_none())
+    }
+
+    /// The same surface in a frame that is turned about its x axis by half a turn.
+    pub(super) fn turn_about(&mut self) -> Result<(), ZemaxError> {
+        if !self.is_round() || self.shape == SurfaceShape::CoordinateBreak {
+            let why = "a surface that is not round stands with its back to the light; turn its coordinates by half a turn";
+            return Err(ZemaxError::new(self.line, why));
+        }
+        self.curvature = -self.curvature;
+        self.aperture_decentre[1] = -self.aperture_decentre[1];
+        // Of an extended asphere the first two are a number and a radius.
+        self.extra.range_mut(3..).for_each(|(_, parameter)| parameter.value = -parameter.value);
+        if let Some(spec) = &mut self.freeform {
+            spec.aspheric.values_mut().for_each(|value| *value = -*value);
+        }
+        Ok(())
     }
 
     fn parameter(&self, number: usize) -> f64 {
@@ -219,12 +245,14 @@ impl SheetRow {
         Ok((radius, (0..count.min(400)).map(value).collect()))
     }
 
-    fn sag(&self, unit: f64) -> Result<Vec<SagSpec>, ZemaxError> {
+    fn sag(&self, unit: f64, toroid: &str) -> Result<Vec<SagSpec>, ZemaxError> {
         let order = match self.shape {
             SurfaceShape::ZernikeStandard => ZernikeOrder::Noll,
             SurfaceShape::ZernikeFringe => ZernikeOrder::Fringe,
             SurfaceShape::Biconic => {
-                let why = "a biconic mirror has no counterpart here; write a toroid (TOROIDAL), or a glass";
+                let why = format!(
+                    "a biconic mirror has no counterpart here; write a toroid ({toroid}), or a glass"
+                );
                 return Err(ZemaxError::new(self.line, why));
             }
             _ => return Ok(Vec::new()),

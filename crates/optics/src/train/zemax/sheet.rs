@@ -7,6 +7,9 @@ use std::collections::BTreeMap;
 
 use super::ZemaxError;
 use super::configuration::{Break, ConfigurationValue, Fields};
+use super::format::LensFormat;
+use crate::element::FreeformSpec;
+use crate::glass::GlassSpec;
 
 /// The most surfaces.
 const MOST_SURFACES: usize = crate::train::MOST_ELEMENTS;
@@ -17,6 +20,7 @@ const MOST_WAVELENGTHS: usize = 24;
 /// A whole file.
 #[derive(Debug, Default)]
 pub(super) struct ZemaxSheet {
+    pub(super) format: LensFormat,
     pub(super) name: String,
     /// Millimetres in the file's unit of length.
     pub(super) unit: f64,
@@ -28,14 +32,18 @@ pub(super) struct ZemaxSheet {
     /// In the file's unit.
     pub(super) stated_efl: Option<f64>,
     pub(super) last_line: usize,
-    wavelengths: Vec<f64>,
-    primary: usize,
+    pub(super) wavelengths: Vec<f64>,
+    pub(super) primary: usize,
     pub(super) fields: Fields,
     /// How many there are, the one in place from 1, and the values of all.
     pub(super) configurations: usize,
     pub(super) configuration: usize,
     pub(super) values: Vec<ConfigurationValue>,
-    ignored: BTreeMap<String, Ignored>,
+    /// Of the wavelengths, in their order; empty where all weigh the same.
+    pub(super) wavelength_weights: Vec<f64>,
+    /// Sentences on what the file says, for its user.
+    pub(super) notes: Vec<String>,
+    pub(super) ignored: BTreeMap<String, Ignored>,
 }
 
 /// How wide the beam is.
@@ -68,9 +76,11 @@ pub(super) struct SheetRow {
     pub(super) stop: bool,
     pub(super) parameters: BTreeMap<usize, Parameter>,
     pub(super) extra: BTreeMap<usize, Parameter>,
+    /// Of a [`SurfaceShape::Freeform`]: all that it has beside its base, glass and rim, in millimetres.
+    pub(super) freeform: Option<Box<FreeformSpec>>,
     pub(super) semi_diameter: Option<f64>,
-    fixed: bool,
-    clear: Option<f64>,
+    pub(super) fixed: bool,
+    pub(super) clear: Option<f64>,
 }
 
 /// The types that have a counterpart here.
@@ -90,6 +100,7 @@ pub(super) enum SurfaceShape {
     ZernikeStandard,
     ZernikeFringe,
     Fresnel,
+    Freeform,
 }
 
 /// An aperture of a surface that is no rim.
@@ -107,12 +118,23 @@ pub(super) enum SheetOpening {
     Circle(f64),
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct SheetGlass {
     pub(super) line: usize,
     pub(super) name: String,
-    /// nd and Abbe number of a glass that is nothing else.
-    pub(super) model: Option<[f64; 2]>,
+    /// What it is where its name does not say so.
+    pub(super) spec: Option<GlassSpec>,
+}
+
+impl SheetGlass {
+    /// A glass by nd and Abbe number; one of 0 is a glass without dispersion.
+    pub(super) fn model(line: usize, name: &str, nd: f64, vd: f64) -> Self {
+        let spec = match vd {
+            0.0 => GlassSpec::Constant(nd),
+            _ => GlassSpec::Abbe { nd, vd },
+        };
+        Self { line, name: name.to_owned(), spec: Some(spec) }
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -122,7 +144,7 @@ pub(super) struct Parameter {
 }
 
 #[derive(Debug)]
-struct Ignored {
+pub(super) struct Ignored {
     first: usize,
     times: usize,
 }
@@ -354,8 +376,17 @@ impl ZemaxSheet {
         all
     }
 
+    /// Where something is: a line or, in files in which surfaces have none, a surface.
+    pub(super) fn place(&self, line: usize) -> String {
+        match (self.format.words().surfaces, line) {
+            (None, line) => format!("line {line}"),
+            (Some(_), 0) => "the file".to_owned(),
+            (Some(surfaces), number) => format!("{surfaces}[{}]", number - 1),
+        }
+    }
+
     pub(super) fn what_is_left_out(&self) -> Vec<String> {
-        let mut notes = Vec::new();
+        let mut notes = self.notes.clone();
         if self.configurations > 1 {
             notes.push(format!(
                 "of {} configurations, number {} is taken",
@@ -377,12 +408,14 @@ impl ZemaxSheet {
         let words: Vec<String> = left_out
             .iter()
             .map(|(command, ignored)| match ignored.times {
-                1 => format!("{command} (line {})", ignored.first),
-                times => format!("{command} ({times} times, first in line {})", ignored.first),
+                1 => format!("{command} ({})", self.place(ignored.first)),
+                times => {
+                    format!("{command} ({times} times, first in {})", self.place(ignored.first))
+                }
             })
             .collect();
         if !words.is_empty() {
-            notes.push(format!("commands left out: {}", words.join(", ")));
+            notes.push(format!("{} left out: {}", self.format.words().commands, words.join(", ")));
         }
         notes
     }
@@ -564,8 +597,11 @@ fn glass(line: &SheetLine<'_>) -> Result<Option<SheetGlass>, ZemaxError> {
         return Ok(None);
     }
     let is_model = name == "___BLANK" || line.word(1) == Some("1");
-    let model = if is_model { Some([line.number(3)?, line.number_or(4, 0.0)?]) } else { None };
-    Ok(Some(SheetGlass { line: line.number, name: name.to_owned(), model }))
+    Ok(Some(match is_model {
+        // OpticStudio takes an Abbe number of 0 for a glass without dispersion.
+        true => SheetGlass::model(line.number, name, line.number(3)?, line.number_or(4, 0.0)?),
+        false => SheetGlass { line: line.number, name: name.to_owned(), spec: None },
+    }))
 }
 
 /// `EFL 50`, `EFL=50 mm`, `EFFL: 50` somewhere in a title or a note.

@@ -1,0 +1,139 @@
+"""A second opinion: optiland 0.6.3 (from PyPI) traces rays through lenses of all shapes that both programs have.
+
+    python3 -m venv out/optiland && out/optiland/bin/pip install optiland==0.6.3
+    out/optiland/bin/python scripts/lens_rays_opinion.py crates/optics/tests/optics/optiland
+
+writes a file a lens: the lens as optiland saves it, and rays by where they start (mm, z from the first vertex), their
+direction, and where they end on the image, in the coordinates of the whole lens. `crates/optics/tests/optics/second_opinion.rs` reads
+the lenses and holds the rays to 1e-10 mm."""
+
+import json
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+from optiland.coordinate_system import CoordinateSystem
+from optiland.materials import IdealMaterial
+from optiland.optic import Optic
+from optiland.phase.linear_grating import LinearGratingPhaseProfile
+from optiland.phase.radial import RadialPhaseProfile
+from optiland.physical_apertures import RadialAperture
+from optiland.rays import RealRays
+
+warnings.simplefilter("ignore", DeprecationWarning)
+GLASS = 1.5168
+# Newton's method of optiland ends at this length (mm).
+TIGHT = {"tol": 1e-14, "max_iter": 200}
+
+
+def lens(front, back=None, image=60.0, **system):
+    """A lens of 5 mm of glass: `front` and `back` are what its surfaces have beside their places."""
+    optic = Optic(system.get("name"))
+    add = optic.surfaces.add
+    add(index=0, thickness=np.inf)
+    add(index=1, thickness=5.0, material=IdealMaterial(GLASS), is_stop=True, **front)
+    add(index=2, thickness=image, **(back or {"radius": -60.0}))
+    add(index=3)
+    return finished(optic)
+
+
+def finished(optic, pupil=16.0):
+    optic.set_aperture("EPD", pupil)
+    optic.fields.set_type("angle")
+    optic.fields.add(y=0)
+    optic.wavelengths.add(0.55, is_primary=True)
+    return optic
+
+
+def cassegrain():
+    optic = Optic("Cassegrain, 200 mm f/10")
+    add = optic.surfaces.add
+    add(index=0, thickness=np.inf)
+    add(index=1, radius=-1200.0, conic=-1.0, thickness=-450.0, material="mirror", is_stop=True,
+        aperture=RadialAperture(r_max=100.0, r_min=20.0))
+    add(index=2, radius=-400.0, conic=-2.777777777777778, thickness=600.0, material="mirror")
+    add(index=3)
+    return finished(optic, 200.0)
+
+
+def placed(turns, shift, back=(0.0, 0.0, 0.0)):
+    """A singlet whose front is turned about x and y and shifted."""
+    optic = Optic("tilted and decentred")
+    add = optic.surfaces.add
+    add(index=0, x=0.0, y=0.0, z=-np.inf)
+    add(index=1, x=0.0, y=0.0, z=0.0, radius=80.0, material=IdealMaterial(GLASS), is_stop=True)
+    add(index=2, x=shift[0], y=shift[1], z=5.0, rx=turns[0], ry=turns[1], radius=-60.0, conic=-0.4)
+    add(index=3, x=back[0], y=back[1], z=60.0, rx=back[2])
+    return finished(optic)
+
+
+def folded():
+    optic = Optic("lens and flat mirror at 45 degrees")
+    add = optic.surfaces.add
+    add(index=0, x=0.0, y=0.0, z=-np.inf)
+    add(index=1, x=0.0, y=0.0, z=0.0, radius=80.0, material=IdealMaterial(GLASS), is_stop=True)
+    add(index=2, x=0.0, y=0.0, z=5.0, radius=-60.0)
+    add(index=3, x=0.0, y=0.0, z=35.0, rx=np.pi / 4, material="mirror")
+    add(index=4, x=0.0, y=30.0, z=35.0, rx=np.pi / 2 * 3)
+    return finished(optic)
+
+
+LENSES = {
+    "cassegrain": cassegrain(),
+    "conic": lens({"radius": 50.0, "conic": -0.7}),
+    "even_asphere": lens({"radius": 50.0, "conic": -0.7, "surface_type": "even_asphere",
+                          "coefficients": [1e-4, -2e-6, 3e-9], **TIGHT}),
+    "odd_asphere": lens({"radius": 50.0, "conic": 0.2, "surface_type": "odd_asphere",
+                         "coefficients": [0.0, 1e-4, -2e-5, 1e-6, 0.0, -3e-9], **TIGHT}),
+    "toroid": lens({"radius_x": 70.0, "radius_y": 45.0, "conic": -0.3, "surface_type": "toroidal",
+                    "toroidal_coeffs_poly_y": [0.0, 2e-6, -1e-9], **TIGHT}),
+    "cylinder": lens({"radius_x": np.inf, "radius_y": 45.0, "surface_type": "toroidal", **TIGHT}),
+    "zernike_fringe": lens({"radius": 50.0, "conic": -0.2, "surface_type": "zernike", "norm_radius": 12.0,
+                            "zernike_type": "fringe",
+                            "coefficients": [0, 1e-3, -2e-3, 3e-3, 4e-3, -5e-3, 2e-3, 1e-3, 3e-3, 1e-3, -1e-3],
+                            **TIGHT}),
+    "zernike_noll": lens({"radius": 50.0, "surface_type": "zernike", "norm_radius": 12.0, "zernike_type": "noll",
+                          "coefficients": [0, 1e-3, -2e-3, 3e-3, 4e-3, -5e-3, 2e-3, 1e-3, 3e-3, 1e-3, -1e-3],
+                          **TIGHT}),
+    "chebyshev": lens({"radius": 50.0, "conic": 0.1, "surface_type": "chebyshev", "norm_x": 15.0, "norm_y": 14.0,
+                       "coefficients": [[0, 2e-3, 1e-3], [3e-3, -1e-3, 2e-3], [4e-3, 1e-3, -2e-3]], **TIGHT}),
+    "polynomial": lens({"radius": 50.0, "conic": 0.1, "surface_type": "polynomial",
+                        "coefficients": [[0, 1e-3, 1e-4], [2e-3, -1e-4, 1e-5], [3e-4, 2e-5, -1e-6]], **TIGHT}),
+    "radial_phase": lens({"radius": 50.0, "phase_profile": RadialPhaseProfile([-20.0, 0.03])}),
+    "linear_grating": lens({"radius": np.inf, "phase_profile": LinearGratingPhaseProfile(0.02, np.pi / 3, 1)}),
+    "tilted": placed((0.05, -0.08), (0.7, -0.4)),
+    "tilted_image": placed((0.0, 0.03), (0.0, 0.5), (0.3, -0.2, 0.1)),
+    "folded": folded(),
+}
+
+
+def rays_of(name):
+    """Places and directions that all pass."""
+    reach = 80.0 if name == "cassegrain" else 7.0
+    steps = np.array([-0.9, -0.35, 0.3, 0.8])
+    x, y = (reach * a.ravel() for a in np.meshgrid(steps, steps))
+    slope = 1e-3 if name == "cassegrain" else 0.04
+    l, m = slope * 0.7 * np.ones_like(x), -slope * np.ones_like(x)
+    return x, y, np.full_like(x, -10.0), l, m, np.sqrt(1 - l**2 - m**2)
+
+
+def main():
+    folder = Path(sys.argv[1])
+    for name, optic in LENSES.items():
+        x, y, z, l, m, n = rays_of(name)
+        start = list(zip(x.tolist(), y.tolist(), z.tolist(), l.tolist(), m.tolist(), n.tolist()))
+        rays = RealRays(x, y, z, l, m, n, np.ones_like(x), 0.55 * np.ones_like(x))
+        optic.surfaces.trace(rays)
+        if not np.isfinite(rays.x).all():
+            raise SystemExit(f"{name}: optiland lost rays")
+        saved = {"optic": optic.to_dict(), "rays": [
+            {"origin": s[:3], "direction": s[3:], "end": end}
+            for s, *end in zip(start, rays.x.tolist(), rays.y.tolist(), rays.z.tolist())
+        ]}
+        as_list = lambda value: value.tolist() if hasattr(value, "tolist") else value.item()
+        (folder / f"{name}.json").write_text(json.dumps(saved, default=as_list) + "\n")
+        print(name, len(start))
+
+
+main()
