@@ -8,8 +8,8 @@ const HEAD: &str = "\
 # Keys
 
 Every key of scene files, lens files and files of rays, with its values and its default: what the JSON Schemas in
-[`schema/`](../../schema) say, as tables. [scene-format.md](scene-format.md), [lenses.md](../how-to/lenses.md) and
-[sensors.md](../how-to/sensors.md) explain. Written by `make generated`.
+[`schema/`](../../schema) say, as tables. [scene-format.md](scene-format.md), [lens-files.md](lens-files.md) and
+[sensors.md](sensors.md) explain. Written by `make generated`.
 
 In every object, `\"$schema\"` and `\"comment\"` are allowed, too.
 ";
