@@ -22,34 +22,34 @@ help:
 	@echo "make dist          a tarball, a .deb and a wheel in out/dist, tried in bare Debian 12 and 13 roots"
 	@echo "make release       all that is published, tried: crates, those three, and a wheel for older systems"
 	@echo "make portable-wheel  the wheel of the pure-Rust renderer, for systems with glibc 2.28 and newer"
-	@echo "make bench         measure everything, write docs/benchmarks.md"
+	@echo "make bench         measure everything, write docs/measurements/benchmarks.md"
 	@echo "make bench-peers   add other programs at the same job, from PyPI"
 	@echo "make lens-waves    lenses in waves beside optiland, from PyPI"
 	@echo "make bench-lens    time rays through a lens against optiland, from PyPI"
 	@echo "make bench-python  rays from Python against Rust, Open3D and embreex; frames against their rays"
-	@echo "make bench-light   light against Mitsuba 3, from PyPI; writes docs/benchmarks-light.md"
-	@echo "make bench-cycles  light against Blender's Cycles, from PyPI; writes docs/benchmarks-cycles.md"
+	@echo "make bench-light   light against Mitsuba 3, from PyPI; writes docs/measurements/benchmarks-light.md"
+	@echo "make bench-cycles  light against Blender's Cycles, from PyPI; writes docs/measurements/benchmarks-cycles.md"
 	@echo "make bench-sensor  time one exposure against numpy, prysm and emva1288, from PyPI"
-	@echo "make bench-limits  scenes and pictures as large as most machines take; writes docs/limits.md"
-	@echo "make bench-sampling  what samples that stop save, and what an oracle would; writes the measured part of docs/sampling.md"
+	@echo "make bench-limits  scenes and pictures as large as most machines take; writes docs/measurements/limits.md"
+	@echo "make bench-sampling  what samples that stop save, and what an oracle would; writes docs/measurements/sampling.md"
 	@echo "make bench-forecast  render the example scenes, and hold the forecast of time against it"
 	@echo "make bench-memory   the same for the forecast of memory, and for copies, large shapes and frames"
-	@echo "make bench-masks   what a ray through a mask of small openings costs; writes a part of docs/cameras.md"
-	@echo "make bench-diffraction  what waves in the picture cost beside rays; writes a part of docs/cameras.md"
-	@echo "make bench-aspheres  what setting a camera up behind steep aspheres takes; writes a part of docs/limits.md"
-	@echo "make bench-bands   what bands cost beside RGB, and a lens that disperses; writes parts of docs/spectra.md, cameras.md"
-	@echo "make bench-time    what shutters, moving cameras, copies and shapes cost; writes a part of docs/time.md"
-	@echo "make bench-gaps    what finding the thinnest gap of a million triangles takes; writes a part of docs/light.md"
-	@echo "make bench-window  how soon and how often the window shows pictures; writes a part of docs/window.md"
+	@echo "make bench-masks   what a ray through a mask of small openings costs; writes a part of docs/measurements/costs.md"
+	@echo "make bench-diffraction  what waves in the picture cost beside rays; writes a part of docs/measurements/costs.md"
+	@echo "make bench-aspheres  what setting a camera up behind steep aspheres takes; writes a part of docs/measurements/limits.md"
+	@echo "make bench-bands   what bands cost beside RGB, and a lens that disperses; writes parts of docs/measurements/costs.md"
+	@echo "make bench-time    what shutters, moving cameras, copies and shapes cost; writes a part of docs/measurements/costs.md"
+	@echo "make bench-gaps    what finding the thinnest gap of a million triangles takes; writes a part of docs/measurements/costs.md"
+	@echo "make bench-window  how soon and how often the window shows pictures; writes a part of docs/measurements/costs.md"
 	@echo "make bench-decisions  what decisions of the plan save, each against the fuller model, and what overriding it by hand would"
 	@echo "make generated     schemas, tables of keys, the pages of the command line and of the Python package, as these write them"
-	@echo "make gallery       render the pictures of docs/gallery.md, and write there what they took"
+	@echo "make gallery       render the pictures of docs/guide/gallery.md, and write there what they took"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
-	@echo "make docs-time     render the pictures of docs/time.md anew"
-	@echo "make spectra       the pictures of docs/spectra.md, and what they lose by colours of three numbers"
-	@echo "make light-fields  the walk of docs/light-fields.md in a venv, its pictures, and another decoder's opinion"
-	@echo "make docs-charts   measure docs/speed-and-accuracy.md anew, with its charts"
-	@echo "make docs-stability  take every method to where it fails, at full scale, write docs/stability.md"
+	@echo "make docs-time     render the pictures of docs/how-to/time.md anew"
+	@echo "make spectra       the pictures of docs/explanation/spectra.md, and what they lose by colours of three numbers"
+	@echo "make light-fields  the walk of docs/how-to/light-fields.md in a venv, its pictures, and another decoder's opinion"
+	@echo "make docs-charts   measure docs/measurements/speed-and-accuracy.md anew, with its charts"
+	@echo "make docs-stability  take every method to where it fails, at full scale, write docs/measurements/stability.md"
 	@echo "make fingerprints  fingerprints of pictures, sensor images and lens tables, to move code without changing them"
 	@echo "make fuzz-smoke    changed inputs for every reader of files, a minute each"
 	@echo "make fuzz          an hour of coverage-guided fuzzing, which cargo-fuzz and a nightly compiler take"
@@ -209,7 +209,7 @@ docs-figures: setup docs-charts docs-stability light-fields gallery spectra
 	cargo run --release -p etendue-sensor --example approximation -- docs/images/normal-approximation.svg
 	$(MAKE) docs-time
 
-# The pictures of docs/time.md; COMMAND names another build than the release one.
+# The pictures of docs/how-to/time.md; COMMAND names another build than the release one.
 COMMAND ?= cargo run --release -p etendue-cli --
 docs-time:
 	for scene in moving rolling flicker serial pose; do \
@@ -222,23 +222,23 @@ docs-time:
 		install -D -m 644 out/docs-figures/time/picture.png docs/images/time/pose-$$moment.png || exit 1; \
 	done
 
-# What the program writes into the repository, which the tests hold against it: schema/, docs/keys.md,
-# docs/command-line.md.
+# What the program writes into the repository, which the tests hold against it: schema/, docs/reference/keys.md,
+# docs/reference/command-line.md.
 generated: setup
 	ETENDUE_GENERATE=1 cargo test -p etendue-cli --test cli generated::
 	python3 scripts/python_api.py
 
-# The commands of docs/gallery.md, their pictures and their times. ARGS="prism burst" takes some sections.
+# The commands of docs/guide/gallery.md, their pictures and their times. ARGS="prism burst" takes some sections.
 gallery: setup
 	cargo build --release -p etendue-cli
 	python3 benches/gallery.py $(ARGS)
 
-# The pictures of docs/spectra.md and the gallery's chart, and their colour errors.
+# The pictures of docs/explanation/spectra.md and the gallery's chart, and their colour errors.
 spectra: setup
 	cargo build --release -p etendue-cli
 	python3 benches/spectra.py
 
-# The Python of docs/light-fields.md and its pictures, and plenopticam's views against ours. ARGS go to the render.
+# The Python of docs/how-to/light-fields.md and its pictures, and plenopticam's views against ours. ARGS go to the render.
 light-fields: setup
 	@scripts/light-fields.sh $(ARGS)
 
@@ -249,7 +249,7 @@ fuzz-smoke: setup
 	target/debug/fuzz-smoke $(ARGS)
 
 # An hour of processor time, divided among all readers: ARGS="--minutes 10 glb texture" for less of fewer,
-# ARGS="--page docs/limits.md" to write the table there. What fails is kept in out/fuzz-guided.
+# ARGS="--page docs/measurements/limits.md" to write the table there. What fails is kept in out/fuzz-guided.
 fuzz: setup
 	python3 scripts/fuzz.py $(ARGS)
 

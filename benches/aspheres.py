@@ -2,7 +2,7 @@
 
 A stop in front, an asphere of one term, and a spherical surface: rays that are aimed at such a lens cross the asphere
 many times or not at all, so that nearly every ray by which its pupil is measured is searched for. Processor time of the
-whole process with one thread, the least of some rounds. The table goes into docs/limits.md. `--command` names another
+whole process with one thread, the least of some rounds. The table goes into docs/measurements/limits.md. `--command` names another
 build than the release one.
 """
 
@@ -74,7 +74,7 @@ def seconds(command, path, folder):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "limits.md")
+    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "measurements" / "limits.md")
     parser.add_argument("--command", type=Path, default=COMMAND)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--print-only", action="store_true", help="write no page")

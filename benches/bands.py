@@ -3,7 +3,7 @@
 
 Both are rendered in turn, and the median of the processor time of all rounds is compared: with the paths of the scene
 shared by the bands, and with each band traced by itself. The time is that of a render of many samples less that of one
-of few, so that start and camera do not count. The tables go into docs/spectra.md and docs/cameras.md. `--command` names
+of few, so that start and camera do not count. The tables go into docs/measurements/costs.md. `--command` names
 another build than the release one, `--only` one of the two.
 """
 
@@ -95,9 +95,9 @@ def main():
     arguments = parser.parse_args()
     about = (f"{section.machine()}; a room, paths of five bounces, {arguments.side} × {arguments.side} pixels, "
              f"{arguments.samples[1] - arguments.samples[0]} samples, the median of {arguments.rounds} rounds.")
-    for part, measure, page in [("bands", of_bands, "spectra.md"), ("lens", of_lens, "cameras.md")]:
+    for part, measure in [("bands", of_bands), ("lens", of_lens)]:
         if arguments.only in (None, part):
-            section.put(ROOT / "docs" / page, "bands", "\n".join([about, "", *measure(arguments)]))
+            section.put(ROOT / "docs" / "measurements" / "costs.md", part, "\n".join([about, "", *measure(arguments)]))
 
 
 def of_bands(arguments):

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Light in etendue and in Blender's Cycles, in one run, taking turns.
 
-    python3 benches/cycles_peers.py [--rounds N] [--output docs/benchmarks-cycles.md]
+    python3 benches/cycles_peers.py [--rounds N] [--output docs/measurements/benchmarks-cycles.md]
 
 The jobs are those scenes of `light_scenes.py` whose surfaces are matte. Cycles is `bpy` from PyPI, on processors, with
 its light tree, without its adaptive sampling, clamping and denoising, and with a box as the pixel's filter. Timed is
@@ -207,7 +207,7 @@ def page(results, arguments):
 
 
 def main():
-    parser = program.arguments(__doc__, "benchmarks-cycles.md", rounds=5)
+    parser = program.arguments(__doc__, "measurements/benchmarks-cycles.md", rounds=5)
     parser.add_argument("--jobs", nargs="+", choices=JOBS, default=JOBS)
     arguments = parser.parse_args()
     # An environment of its own: Blender brings a Python that it was built for.

@@ -2,7 +2,7 @@
 somebody who knows the scene saves by hand beside what the plan takes by itself.
 
 Both are rendered by the built command in turn, and the median of what the whole process takes is compared; so
-are the pictures. Writes two tables into docs/sampling.md.
+are the pictures. Writes two tables into docs/measurements/sampling.md.
 """
 
 import json
@@ -101,7 +101,7 @@ def overridden(etendue, rounds, folder):
 
 
 def main():
-    parser = program.arguments(__doc__, "sampling.md", rounds=5)
+    parser = program.arguments(__doc__, "measurements/sampling.md", rounds=5)
     parser.add_argument("--binary", help="the command to measure; that of the release build when absent")
     arguments = parser.parse_args()
     program.enter("decision-peers", ["numpy"])

@@ -1,7 +1,7 @@
 """Renders with and without diffraction in turn, and prints what waves cost beside rays; times a lens' report in waves.
 
 A picture's time is the processor time of a whole command, without data files. Of each pair the ratio is taken, and of five
-pairs the median. The table goes into docs/cameras.md. `--command` names another build than the release one.
+pairs the median. The table goes into docs/measurements/costs.md. `--command` names another build than the release one.
 """
 
 import argparse
@@ -42,7 +42,7 @@ def main():
     parser = argparse.ArgumentParser(description=" ".join(__doc__.split("\n\n")[0].split()))
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--command", type=Path, default=COMMAND)
-    parser.add_argument("--page", type=Path, default=ROOT / "docs" / "cameras.md")
+    parser.add_argument("--page", type=Path, default=ROOT / "docs" / "measurements" / "costs.md")
     parser.add_argument("--only", help="a part of the names of the scenes that are rendered")
     options = parser.parse_args()
     rows, missed = [], False

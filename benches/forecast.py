@@ -2,7 +2,7 @@
 
 Each scene is planned and rendered by the built command, in a folder of its own that goes when it is done;
 the machine is calibrated before the first. A scene is rendered with its own samples and with others, so that
-what is forecast holds for any number. The table goes into docs/sampling.md.
+what is forecast holds for any number. The table goes into docs/measurements/sampling.md.
 """
 
 import argparse
@@ -55,7 +55,7 @@ def factor(forecast, took):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "sampling.md")
+    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "measurements" / "sampling.md")
     parser.add_argument("scenes", nargs="*", type=Path)
     arguments = parser.parse_args()
     examples = ROOT / "scenes"

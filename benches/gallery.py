@@ -1,10 +1,10 @@
-"""Renders the pictures of docs/gallery.md by the commands of that page, and writes there what each took.
+"""Renders the pictures of docs/guide/gallery.md by the commands of that page, and writes there what each took.
 
 A section of the page is a heading, a block of commands, comments that say which of the files are shown, and
 a line between two comments for the times:
 
-    <!-- picture: images/fig3.png = fig3/picture.png -->
-    <!-- bands: images/gallery/bands.png = spectrum/views_spectrum.npy 1 4 8 11 -->
+    <!-- picture: ../images/fig3.png = fig3/picture.png -->
+    <!-- bands: ../images/gallery/bands.png = spectrum/views_spectrum.npy 1 4 8 11 -->
     <!-- took: begin -->...<!-- took: end -->
 
 Words choose among the sections: those whose heading or commands have one of them.
@@ -27,7 +27,7 @@ from pathlib import Path
 import program
 import section
 
-PAGE = program.ROOT / "docs" / "gallery.md"
+PAGE = program.ROOT / "docs" / "guide" / "gallery.md"
 OUT = "out/gallery"
 
 # Views of a light field have few pixels: each is shown as a square of so many.

@@ -3,7 +3,7 @@
 `etendue plan` of a body of glass of a million triangles, from a GLB and as a shape that is made, with
 `plan.light_precision` `auto`, which looks for the distances between surfaces, and `double`, which does not: the
 difference is the probes', structure to probe through included, and `double` is what reading takes. Processor time,
-the least of some rounds. The table goes into docs/light.md. `--command` and `--benchmarks` name other builds than the
+the least of some rounds. The table goes into docs/measurements/costs.md. `--command` and `--benchmarks` name other builds than the
 release ones.
 """
 
@@ -46,7 +46,7 @@ def scenes(folder, benchmarks, triangles):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "light.md")
+    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "measurements" / "costs.md")
     parser.add_argument("--command", type=Path, default=BUILT / "etendue")
     parser.add_argument("--benchmarks", type=Path, default=BUILT / "benchmarks")
     parser.add_argument("--triangles", type=int, default=1_000_000)

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Takes the same rays through the double Gauss with etendue and with optiland's numpy backend, one
-thread each, and writes the section of docs/lenses.md on it.
+thread each, and writes the section of docs/measurements/lenses.md on it.
 
-    python3 benches/lens_peers.py [--rounds N] [--output docs/lenses.md]
+    python3 benches/lens_peers.py [--rounds N] [--output docs/measurements/lenses.md]
 """
 
 import json
@@ -61,7 +61,7 @@ def optiland_rounds(lens, count):
 
 
 def main():
-    arguments = program.arguments(__doc__, "lenses.md", rounds=9).parse_args()
+    arguments = program.arguments(__doc__, "measurements/lenses.md", rounds=9).parse_args()
     # One thread against one thread.
     program.enter("lens-peers", ["optiland==0.6.3"], OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
     lens = json.loads(LENS.read_text())

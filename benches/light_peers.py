@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Light in etendue and in Mitsuba 3, in one run, taking turns.
 
-    python3 benches/light_peers.py [--rounds N] [--output docs/benchmarks-light.md]
+    python3 benches/light_peers.py [--rounds N] [--output docs/measurements/benchmarks-light.md]
     python3 benches/light_peers.py --against ETENDUE [--rounds N] [--jobs JOB ...]
 
 The second form times another build of the command in place of Mitsuba, and prints what it finds.
@@ -402,7 +402,7 @@ def goals(results):
 
 
 def main():
-    parser = program.arguments(__doc__, "benchmarks-light.md", rounds=6)
+    parser = program.arguments(__doc__, "measurements/benchmarks-light.md", rounds=6)
     parser.add_argument("--jobs", nargs="+", choices=ALL, default=ALL)
     parser.add_argument("--against", type=Path, help="another build of etendue, in place of Mitsuba")
     arguments = parser.parse_args()

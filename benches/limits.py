@@ -1,6 +1,6 @@
 """Scenes and pictures as large as most machines take, each rendered in a process of its own.
 
-Writes what they took into docs/limits.md: the time of the whole process and its peak of memory.
+Writes what they took into docs/measurements/limits.md: the time of the whole process and its peak of memory.
 """
 
 import json
@@ -56,7 +56,7 @@ def jobs(folder):
 
 
 def main():
-    arguments = program.arguments(__doc__, "limits.md", rounds=1).parse_args()
+    arguments = program.arguments(__doc__, "measurements/limits.md", rounds=1).parse_args()
     etendue = program.built("etendue")
     rows = ["| job | time (s) | peak of memory (MiB) |", "|---|---|---|"]
     with tempfile.TemporaryDirectory(dir=program.TARGET) as folder:

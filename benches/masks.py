@@ -2,7 +2,7 @@
 
 A mask takes the place of the stop, or stands behind the lens. The processor time is that of a render of many samples
 less that of one of few, so that setting up the camera does not count, over the rays that leave the lens towards the
-scene (`rays` of the report); each is the least of some rounds. The table goes into docs/cameras.md. `--command` names
+scene (`rays` of the report); each is the least of some rounds. The table goes into docs/measurements/costs.md. `--command` names
 another build than the release one.
 """
 
@@ -122,7 +122,7 @@ def cost(command, path, folder, rounds):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "cameras.md")
+    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "measurements" / "costs.md")
     parser.add_argument("--command", type=Path, default=COMMAND)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--print-only", action="store_true", help="write no page")

@@ -3,7 +3,7 @@
 Each scene is checked and rendered by the built command in a folder of its own that goes when it is done. What is
 held is the process's greatest resident set (VmHWM), program and libraries included, as the report has it; mapped
 files count as far as they are resident, so a forecast is right from its total to its total with them. The table
-goes into docs/limits.md. `--command` names another build than the release one.
+goes into docs/measurements/limits.md. `--command` names another build than the release one.
 """
 
 import argparse
@@ -89,7 +89,7 @@ def factor(forecast, held):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "limits.md")
+    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "measurements" / "limits.md")
     parser.add_argument("--command", type=Path, default=COMMAND)
     parser.add_argument("--samples", type=int, help="of the example scenes with light and a count of samples, instead of their own")
     parser.add_argument("--made-only", action="store_true", help="without the example scenes")

@@ -4,7 +4,7 @@ how many times as long a sample takes as in the same room standing still.
 All are rendered in turn, and the median of the ratios of all rounds counts. The time is the processor time of a render of many
 samples less that of one of few, so that start, models and structures do not count. A second table has what motion costs
 the caster of rays alone, beside Embree's own motion blur of the same things on the same rays (`benches/src/bin/motion.rs`). Both
-go into docs/time.md. `--command` names another build than the release one; the program `motion` is looked for beside it.
+go into docs/measurements/costs.md. `--command` names another build than the release one; the program `motion` is looked for beside it.
 """
 
 import argparse
@@ -165,7 +165,7 @@ def main():
         lines += ["", "What motion costs the caster of rays alone, and Embree's own motion blur of the same things on the same rays, each beside "
                   "its own time where all stands still:", ""]
         lines += caster(arguments.command, all_scenes, arguments.rounds, folder)
-    section.put(ROOT / "docs" / "time.md", "motion", "\n".join(lines))
+    section.put(ROOT / "docs" / "measurements" / "costs.md", "motion", "\n".join(lines))
 
 
 if __name__ == "__main__":

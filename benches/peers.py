@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Other programs at the same job, in one run, taking turns with etendue.
 
-    python3 benches/peers.py [--triangles N] [--rounds N] [--output docs/benchmarks.md]
+    python3 benches/peers.py [--triangles N] [--rounds N] [--output docs/measurements/benchmarks.md]
 
 The job: the blob of `benchmarks models`, depth and normals of 1024 x 1024 pixels through the same
 pinhole, once with one ray a pixel and, where a program can, with 16. Each program is timed twice:
@@ -294,7 +294,7 @@ def table(series, remarks, depths, arguments):
 
 
 def main():
-    parser = program.arguments(__doc__, "benchmarks.md", rounds=5)
+    parser = program.arguments(__doc__, "measurements/benchmarks.md", rounds=5)
     parser.add_argument("--triangles", type=int, nargs="+", default=[1_000_000, 10_000_000])
     arguments = parser.parse_args()
     program.enter("peers")

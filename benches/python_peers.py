@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The Python package against its own Rust and against other ray casters, and frames against their rays.
 
-    python3 benches/python_peers.py [--rounds N] [--output docs/benchmarks-python.md]
+    python3 benches/python_peers.py [--rounds N] [--output docs/measurements/benchmarks-python.md]
 
 * A million rays into the blob of a million triangles, from arrays to arrays of distance, triangle and
   normal: `etendue.Accel.closest`, the same call from Rust with rays in batches made beforehand (the
@@ -237,7 +237,7 @@ def memory():
 
 
 def main():
-    parser = program.arguments(__doc__, "benchmarks-python.md", rounds=7)
+    parser = program.arguments(__doc__, "measurements/benchmarks-python.md", rounds=7)
     arguments = parser.parse_args()
     program.enter("peers", ["trimesh", "numpy"])
     wheels = sorted((program.ROOT / "out" / "python" / "wheels").glob("*.whl"))

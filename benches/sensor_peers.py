@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Exposes frames with etendue, exactly and by the normal approximation, and the same frame with Python's
-ways to do it, one thread each; writes the section of docs/sensors.md on it.
+ways to do it, one thread each; writes the section of docs/measurements/sensors.md on it.
 
-    python3 benches/sensor_peers.py [--rounds N] [--output docs/sensors.md]
+    python3 benches/sensor_peers.py [--rounds N] [--output docs/measurements/sensors.md]
 
 Every program gets the same mean electrons (a ramp over the columns), 2.5 e- of read noise, 12 bits.
 """
@@ -149,7 +149,7 @@ def side_by_side(rounds, text, goals):
 
 
 def main():
-    arguments = program.arguments(__doc__, "sensors.md", rounds=5).parse_args()
+    arguments = program.arguments(__doc__, "measurements/sensors.md", rounds=5).parse_args()
     # One thread against one thread.
     program.enter("sensor-peers", ["numpy<2", "prysm==0.21.1", "emva1288==1.0.2"],
                   OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")

@@ -1,4 +1,4 @@
-"""Renders the pictures of docs/spectra.md and of the gallery's chart: the ColorChecker under three lamps by measured
+"""Renders the pictures of docs/explanation/spectra.md and of the gallery's chart: the ColorChecker under three lamps by measured
 curves, by colours of three numbers beside it, and the colour errors that these make.
 
     python3 benches/spectra.py

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The window, as a hand and an eye meet it: a real one on a screen in memory.
 
-    python3 benches/window.py [--rounds N] [--output docs/window.md] [SCENE...]
+    python3 benches/window.py [--rounds N] [--output docs/measurements/costs.md] [SCENE...]
 
 Xvfb keeps its screen in a file, so that a row of pixels of the picture costs nothing to read. For every scene:
 
@@ -196,7 +196,7 @@ def scenes():
 
 
 def main():
-    parser = program.arguments(__doc__, "window.md", rounds=5)
+    parser = program.arguments(__doc__, "measurements/costs.md", rounds=5)
     parser.add_argument("scenes", nargs="*", type=Path, help="what to look at")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:

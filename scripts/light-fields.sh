@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Renders scenes/light-field.json and light-field-focused.json, runs the Python of docs/light-fields.md on them in a
+# Renders scenes/light-field.json and light-field-focused.json, runs the Python of docs/how-to/light-fields.md on them in a
 # venv, makes the page's pictures, puts patches of a focused camera together by their published formula, and asks
 # plenopticam for its opinion where it installs (Python 3.11, numpy 1.26). ETENDUE names a command that is built
 # already, IMAGES another folder for the pictures than docs/images.
@@ -31,7 +31,7 @@ else
     "${pip[@]}" numpy pillow
 fi
 
-sed -n '/^```python$/,/^```$/{/^```/d;p}' docs/light-fields.md >"$out/page.py"
+sed -n '/^```python$/,/^```$/{/^```/d;p}' docs/how-to/light-fields.md >"$out/page.py"
 (cd "$out" && "$venv/bin/python" page.py)
 "$venv/bin/python" scripts/light_field_pictures.py "$out" "$images"
 "$venv/bin/python" scripts/light_field_patches.py "$ETENDUE" "$out/patches"

@@ -1,4 +1,4 @@
-"""The pictures of docs/light-fields.md: FOLDER holds what the page's Python left, IMAGES is where they go."""
+"""The pictures of docs/how-to/light-fields.md: FOLDER holds what the page's Python left, IMAGES is where they go."""
 
 import sys
 

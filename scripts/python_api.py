@@ -1,4 +1,4 @@
-"""Writes docs/python-api.md from the Python package's source: every public class, method, property and field.
+"""Writes docs/reference/python-api.md from the Python package's source: every public class, method, property and field.
 
     python3 scripts/python_api.py [--check]
 
@@ -14,14 +14,14 @@ import textwrap
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "crates/python/python/etendue/__init__.py"
-PAGE = ROOT / "docs/python-api.md"
+PAGE = ROOT / "docs/reference/python-api.md"
 SPECIAL = {
     "__init__": "{cls}(…)", "__getitem__": "[…]", "__setitem__": "[…] = …", "__delitem__": "del […]",
     "__contains__": "in", "__len__": "len(…)", "__iter__": "for … in",
 }  # fmt: skip
 HEAD = """# The Python package, name by name
 
-`make generated` writes this page from the package's source; a test fails when they differ. [python.md](python.md) is where to
+`make generated` writes this page from the package's source; a test fails when they differ. [The guide](../guide/python.md) is where to
 begin. Arrays are numpy's; `(h, w)` are rows and columns, rows from the top.
 """
 

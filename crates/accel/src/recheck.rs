@@ -30,7 +30,7 @@
 //! [`FLATTEST`] and those beside an edge are judged as before; so is a triangle that is met all the same.
 //!
 //! What is nearer than `b` over the start and does not touch the triangle is passed over: less than what
-//! single precision cannot tell apart in any case (docs/accuracy.md).
+//! single precision cannot tell apart in any case (docs/measurements/accuracy.md).
 
 use std::f64::consts::TAU;
 use std::ops::Range;

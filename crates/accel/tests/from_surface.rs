@@ -45,7 +45,7 @@ fn rays_neither_stick_nor_leak() {
         for k in 0..4000_u32 {
             let share = (f64::from(k) + 0.5) / 4000.0;
             // Places on the floor y = −1, near its edges as often as not. Nearer than 10⁻⁶ to another
-            // wall, single precision may start behind it and never find it: docs/accuracy.md tells.
+            // wall, single precision may start behind it and never find it: docs/measurements/accuracy.md tells.
             let near = 10.0_f64.powf(-1.0 - 5.0 * (share * 7.3).fract());
             let x = if k % 3 == 0 { 1.0 - near } else { 1.9 * (share * 31.7).fract() - 0.95 };
             let z = if k % 3 == 1 { near - 1.0 } else { 1.9 * (share * 57.1).fract() - 0.95 };

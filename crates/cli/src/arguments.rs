@@ -144,7 +144,7 @@ Examples:
 
 const VIEW_HELP: &str = "\
 Drag turns the scene, Shift+drag or the middle button moves it, the right button looks around, the wheel
-goes nearer, W A S D Q E fly; Ctrl+wheel enlarges the picture, a double click fits it. docs/window.md
+goes nearer, W A S D Q E fly; Ctrl+wheel enlarges the picture, a double click fits it. docs/reference/window.md
 tells the rest.
 
 Examples:

@@ -17,7 +17,7 @@ def test_the_page_is_that_of_the_source():
 
 
 def test_the_page_has_every_name_that_is_public():
-    page = (CHECKOUT / "docs" / "python-api.md").read_text()
+    page = (CHECKOUT / "docs/reference/python-api.md").read_text()
     for name in etendue.__all__:
         assert f"## `etendue.{name}`" in page
         for member in vars(getattr(etendue, name)) if isinstance(getattr(etendue, name), type) else []:

@@ -395,7 +395,7 @@ def test_an_unknown_accelerator_is_named():
 
 def test_the_lines_of_the_documentation_run(tmp_path, monkeypatch):
     monkeypatch.chdir(CHECKOUT)
-    for page, least in [("docs/python.md", 4), ("README.md", 1)]:
+    for page, least in [("docs/guide/python.md", 4), ("README.md", 1)]:
         blocks = re.findall(r"```python\n(.*?)```", (CHECKOUT / page).read_text(), re.S)
         assert len(blocks) >= least
         names = {"out": str(tmp_path)}

@@ -3,7 +3,7 @@
 //!
 //! A [`Case`] names a regime, what must happen there, and a function that goes there and measures. The
 //! tests run all of them at [`Scale::Quick`]; `cargo run --release -p etendue-stability` runs them at
-//! [`Scale::Full`] and writes `docs/stability.md` from what they report.
+//! [`Scale::Full`] and writes `docs/measurements/stability.md` from what they report.
 #![allow(
     clippy::disallowed_methods,
     reason = "programs of measurements and tests write their own files"

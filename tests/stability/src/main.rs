@@ -1,4 +1,4 @@
-//! Runs every case at full scale and writes `docs/stability.md`. With `--quick` at the scale of the tests;
+//! Runs every case at full scale and writes `docs/measurements/stability.md`. With `--quick` at the scale of the tests;
 //! with a word, runs the cases that have it in their names and writes nothing.
 #![allow(
     clippy::disallowed_methods,

@@ -5,13 +5,13 @@ use std::fmt::Write as _;
 use crate::{METHODS, Outcome, Scale};
 
 /// Where the page stands, whatever folder the program is run from.
-pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/stability.md");
+pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/measurements/stability.md");
 
 const HEAD: &str = "\
 # Stability
 
 Every method taken to where it is known to fail: the regime, what must happen there, and what happens.
-Written by the suite itself ([`tests/stability`](../tests/stability)) with
+Written by the suite itself ([`tests/stability`](../../tests/stability)) with
 
 ```sh
 make docs-stability

@@ -37,7 +37,7 @@ pub const METHOD: Method = Method {
             must: "the shares of 0 and 1 electrons show that it is no Poisson distribution",
             limit: Some(
                 "A normal distribution has no skewness and no floor. `noise: poisson` is the default; \
-                 docs/sensors.md says from how many electrons on the other will do.",
+                 docs/measurements/sensors.md says from how many electrons on the other will do.",
             ),
             run: normal_at_one_electron,
         },

@@ -54,7 +54,7 @@ fn page_names_cases() -> Result<(), Failed> {
         return Ok(());
     }
     Err(Failed::from(format!(
-        "docs/stability.md is not of this suite; run `make docs-stability`\n\
+        "docs/measurements/stability.md is not of this suite; run `make docs-stability`\n\
          not on the page: {missing:#?}\nnot in the suite: {stale:#?}"
     )))
 }

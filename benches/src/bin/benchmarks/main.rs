@@ -1,7 +1,7 @@
 //! Measures everything in one run, contestants taking turns, and writes the page of results.
 //!
 //! ```text
-//! benchmarks [--quick] [--rounds N] [--output docs/benchmarks.md]
+//! benchmarks [--quick] [--rounds N] [--output docs/measurements/benchmarks.md]
 //! benchmarks models FOLDER [--triangles N]     the models and scenes that other programs are given
 //! benchmarks memory SCENE                      memory after each stage of a render, as JSON
 //! benchmarks light-rays SCENE                  what the accelerator takes of a picture of light, as JSON
@@ -39,7 +39,7 @@ struct Arguments {
     #[command(flatten)]
     effort: Effort,
     /// The page to write
-    #[arg(long, default_value = "docs/benchmarks.md")]
+    #[arg(long, default_value = "docs/measurements/benchmarks.md")]
     output: PathBuf,
     /// Measure only these parts: traversal, threads, first-light, build, load, whole
     #[arg(long, value_delimiter = ',')]

@@ -28,7 +28,7 @@ use crate::page::Page;
 struct Arguments {
     #[command(flatten)]
     effort: Effort,
-    /// The folder of `speed-and-accuracy.md` and its images
+    /// The folder of the documents: `measurements/speed-and-accuracy.md` and its images
     #[arg(long, default_value = "docs")]
     output: PathBuf,
 }

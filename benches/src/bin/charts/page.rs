@@ -7,7 +7,7 @@ use anyhow::Context;
 use etendue_bench::timing;
 use etendue_chart::{Chart, Theme};
 
-/// The folder of the charts, below that of the page.
+/// The folder of the charts, below that of the documents, in which the page has one of its own.
 const IMAGES: &str = "images/speed-and-accuracy";
 
 /// The page while it is made.
@@ -18,7 +18,7 @@ pub(crate) struct Page {
 }
 
 impl Page {
-    /// A page that is to stand in `folder`.
+    /// A page of the documents in `folder`.
     pub(crate) fn new(folder: &Path, rounds: usize) -> anyhow::Result<Self> {
         let images = folder.join(IMAGES);
         std::fs::create_dir_all(&images).with_context(|| format!("{}", images.display()))?;
@@ -46,7 +46,7 @@ impl Page {
         let path = self.folder.join(IMAGES).join(format!("{stem}.svg"));
         let svg = chart.svg(Theme::Reader);
         std::fs::write(&path, svg).with_context(|| format!("{}", path.display()))?;
-        let _ = write!(self.text, "\n![{}]({IMAGES}/{stem}.svg)\n", chart.title);
+        let _ = write!(self.text, "\n![{}](../{IMAGES}/{stem}.svg)\n", chart.title);
         self.paragraph(advice);
         Ok(())
     }
@@ -62,7 +62,7 @@ impl Page {
 
     /// Writes the page and tells where it is.
     pub(crate) fn write(&self) -> anyhow::Result<PathBuf> {
-        let path = self.folder.join("speed-and-accuracy.md");
+        let path = self.folder.join("measurements/speed-and-accuracy.md");
         std::fs::write(&path, &self.text).with_context(|| format!("{}", path.display()))?;
         Ok(path)
     }
@@ -90,7 +90,7 @@ fn wrapped(words: &str) -> String {
 const HEAD: &str = "\
 # Speed and accuracy
 
-`make docs-charts` measures all of this in one run and writes this page. [`etendue bench`](bench.md) draws the same charts
+`make docs-charts` measures all of this in one run and writes this page. [`etendue bench`](../reference/bench.md) draws the same charts
 of your own scene on your own machine, and its page says what the columns and marks mean. Left is fast, low is accurate;
 an error of exactly zero has a place of its own below the axis. Contestants take turns; times are medians of the rounds.
 

@@ -1,5 +1,5 @@
 //! What samples that stop where they are enough save, against the same number for every pixel: writes the
-//! measured part of `docs/sampling.md` with its chart and its map.
+//! measured part of `docs/measurements/sampling.md` with its chart and its map.
 //!
 //! The light of each scene is scaled so that a quarter of the sensor's full well is filled in 10 ms, in the
 //! mean over the picture. The variance of a picture is measured from pairs of other
@@ -56,7 +56,7 @@ struct Arguments {
     /// The folder of the scenes.
     #[arg(long, default_value = "scenes")]
     scenes: PathBuf,
-    /// The folder of the page.
+    /// The folder of the documents.
     #[arg(long, default_value = "docs")]
     docs: PathBuf,
     /// Columns of the pictures: of fewer, blocks of 8 pixels show little that differs.
@@ -127,11 +127,11 @@ fn main() -> anyhow::Result<()> {
     let noise = noise_table(&effort, &names, &studies, &uniform);
     text += &noise.text;
     draw(&arguments.docs, &names, &noise.saved)?;
-    text += "\n![Samples saved against exposure time](images/sampling/saved.svg)\n";
+    text += "\n![Samples saved against exposure time](../images/sampling/saved.svg)\n";
     text += &relative_table(&effort, &names, &studies, &uniform);
     text += &map(&arguments.docs, (names[0], &studies[0]))?;
     text += &planner((names[0], &studies[0]));
-    let path = arguments.docs.join("sampling.md");
+    let path = arguments.docs.join("measurements/sampling.md");
     let page = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
     let written = page.split(MARK).next().unwrap_or_default().trim_end().to_owned();
     std::fs::write(&path, format!("{written}\n\n{MARK}{text}"))?;
@@ -315,7 +315,7 @@ fn map(docs: &Path, (name, study): (&str, &Study)) -> anyhow::Result<String> {
     let [fewest, most] = [counts.least, counts.most];
     Ok(format!(
         "\nWhere the samples of `{name}` go at {} ms: {fewest} (dark) to {most} (bright) a pixel.\n\n\
-         ![Samples of each pixel](images/sampling/map.png)\n",
+         ![Samples of each pixel](../images/sampling/map.png)\n",
         SHOWN[1] * 1e3
     ))
 }

@@ -327,13 +327,13 @@ fn lens_files_name_curves_from_their_own_folder() {
     }
 }
 
-/// The table and the Python of docs/spectra.md, on what its command leaves. Takes the interpreter that
+/// The table and the Python of docs/explanation/spectra.md, on what its command leaves. Takes the interpreter that
 /// `ETENDUE_PYTHON` names, else `python3`, where it has numpy.
 #[test]
 #[cfg(unix)]
 fn the_page_of_spectra_runs() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let page = std::fs::read_to_string(root.join("docs/spectra.md")).unwrap();
+    let page = std::fs::read_to_string(root.join("docs/explanation/spectra.md")).unwrap();
     let block = |kind: &str| {
         let rest = page.split(&format!("```{kind}\n")).nth(1).expect("a block");
         rest.split("```").next().expect("its end").to_owned()

@@ -10,8 +10,8 @@ use crate::run::{Bench, text};
 /// The page, and the folder that its commands are given in; `None` where the tests stand without them.
 fn page() -> Option<(String, PathBuf)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let Ok(page) = fs::read_to_string(root.join("docs/gallery.md")) else {
-        println!("skipped: there is no docs/gallery.md beside the sources");
+    let Ok(page) = fs::read_to_string(root.join("docs/guide/gallery.md")) else {
+        println!("skipped: there is no docs/guide/gallery.md beside the sources");
         return None;
     };
     Some((page, root))
@@ -91,7 +91,7 @@ fn scenes_of_the_gallery_check_and_render_small() {
         let is_there = file.starts_with("bench/") || bench.path("out/gallery").join(file).exists();
         assert!(is_there, "no command leaves {file}");
         assert!(page.contains(&format!("]({shown})")), "{shown} is not shown");
-        assert!(root.join("docs").join(shown).exists(), "docs/{shown} is missing: make gallery");
+        assert!(root.join("docs/guide").join(shown).exists(), "docs/guide/{shown} is missing: make gallery");
     }
 }
 

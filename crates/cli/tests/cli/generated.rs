@@ -50,7 +50,7 @@ fn schemas_are_those_of_the_program() {
 #[test]
 fn the_page_of_keys_is_that_of_the_schemas() {
     let [scene, lens, rays] = ["scene", "lens", "rays"].map(schema);
-    hold("docs/keys.md", &keys::page(&scene, &lens, &rays));
+    hold("docs/reference/keys.md", &keys::page(&scene, &lens, &rays));
 }
 
 /// The commands that `etendue --help` lists.
@@ -79,5 +79,5 @@ fn the_page_of_the_command_line_is_the_help_of_all_commands() {
     }
     // Trailing blanks of clap's empty lines.
     let lines: Vec<&str> = page.lines().map(str::trim_end).collect();
-    hold("docs/command-line.md", &(lines.join("\n") + "\n"));
+    hold("docs/reference/command-line.md", &(lines.join("\n") + "\n"));
 }

@@ -245,7 +245,7 @@ fn a_grid_of_cameras_has_the_disparity_of_its_spacing() {
     }
 }
 
-/// The Python of docs/light-fields.md on what a camera of these pages leaves: it checks itself. Takes the
+/// The Python of docs/how-to/light-fields.md on what a camera of these pages leaves: it checks itself. Takes the
 /// interpreter that `ETENDUE_PYTHON` names, else `python3`, where it has numpy.
 #[test]
 fn the_page_of_light_fields_runs() {
@@ -272,7 +272,7 @@ fn the_page_of_light_fields_runs() {
         ]);
         assert!(output.status.success(), "{}", text(&output.stderr));
     }
-    let page = std::fs::read_to_string(root.join("docs/light-fields.md")).unwrap();
+    let page = std::fs::read_to_string(root.join("docs/how-to/light-fields.md")).unwrap();
     let blocks = page.split("```python\n").skip(1).filter_map(|rest| rest.split("```").next());
     let program: String = blocks.collect();
     assert!(program.contains("refocused"), "{program}");

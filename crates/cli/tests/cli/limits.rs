@@ -1,4 +1,4 @@
-//! docs/limits.md: its list of unsafe code is the tree's.
+//! docs/measurements/limits.md: its list of unsafe code is the tree's.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -35,7 +35,7 @@ fn every_file_with_unsafe_code_stands_on_the_page() {
         .filter(|path| fs::read_to_string(path).expect("a source").lines().any(is_unsafe))
         .map(|path| path.strip_prefix(&root).expect("in the tree").display().to_string())
         .collect();
-    let page = fs::read_to_string(root.join("docs/limits.md")).expect("the page");
+    let page = fs::read_to_string(root.join("docs/measurements/limits.md")).expect("the page");
     let (_, list) = page.split_once("## Unsafe code").expect("the section");
     let listed = list.split('`').filter(|word| word.ends_with(".rs")).map(str::to_owned);
     assert_eq!(found, listed.collect());

@@ -1,4 +1,4 @@
-//! `docs/validation.md`: the files and the tests that it names exist.
+//! `docs/development/validation.md`: the files and the tests that it names exist.
 
 use std::fs;
 
@@ -11,7 +11,7 @@ fn code(cell: &str) -> Vec<&str> {
 
 #[test]
 fn every_effect_has_its_files_and_its_test() {
-    let page = fs::read_to_string(root().join("docs/validation.md")).expect("the page");
+    let page = fs::read_to_string(root().join("docs/development/validation.md")).expect("the page");
     let crates = root().join("crates");
     let mut effects = 0;
     for row in page.lines().filter(|line| line.starts_with("| ") && line.contains('`')) {

@@ -14,14 +14,32 @@ fn documents() -> Option<Vec<(PathBuf, String)>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut paths: Vec<PathBuf> =
         ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"].map(|name| root.join(name)).to_vec();
-    let Ok(folder) = fs::read_dir(root.join("docs")) else {
+    if !root.join("docs").exists() {
         println!("skipped: there is no folder docs beside the sources");
         return None;
-    };
-    let found = folder.map(|entry| entry.unwrap().path());
-    paths.extend(found.filter(|path| path.extension().is_some_and(|end| end == "md")));
+    }
+    files_below(&root.join("docs"), &mut paths);
+    paths.retain(|path| path.extension().is_some_and(|end| end == "md"));
+    for crates in ["crates", "sys"] {
+        let mut found = Vec::new();
+        files_below(&root.join(crates), &mut found);
+        paths.extend(found.into_iter().filter(|path| path.ends_with("README.md")));
+    }
     paths.sort();
     Some(paths.into_iter().map(|path| (path.clone(), fs::read_to_string(&path).unwrap())).collect())
+}
+
+/// Adds the files below a folder, at any depth, without those that builds and tests leave.
+fn files_below(folder: &Path, paths: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if path.is_file() {
+            paths.push(path);
+        } else if path.is_dir() && !matches!(&*name, "target" | "out" | ".git") {
+            files_below(&path, paths);
+        }
+    }
 }
 
 /// The blocks of JSON of a document.
@@ -112,6 +130,42 @@ fn links_lead_somewhere() {
     }
 }
 
+/// Comments, messages, scripts and the Makefile name documents by their paths in the repository.
+#[test]
+fn documents_that_the_sources_name_are_there() {
+    if documents().is_none() {
+        return;
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut files = vec![root.join("Makefile"), root.join("CONTRIBUTING.md")];
+    for folder in ["benches", "crates", "scenes", "schema", "scripts", "sys", "tests", "examples"] {
+        files_below(&root.join(folder), &mut files);
+    }
+    let is_text = |path: &PathBuf| {
+        let end = path.extension().unwrap_or_default().to_string_lossy().into_owned();
+        path.ends_with("Makefile") || ["rs", "py", "sh", "md", "json", "toml"].contains(&&*end)
+    };
+    let is_path = |c: char| c.is_alphanumeric() || matches!(c, '/' | '-' | '_' | '.');
+    let mut named = 0;
+    for file in files.iter().filter(|path| is_text(path)) {
+        let text = fs::read_to_string(file).unwrap_or_default();
+        for (at, _) in text.match_indices("docs/") {
+            // Of another place, as in an address, or pieced together from parts.
+            let before = text[..at].chars().next_back();
+            let rest = &text[at..];
+            let path = &rest[..rest.find(|c| !is_path(c)).unwrap_or(rest.len())];
+            let path = path.trim_end_matches('.');
+            let is_whole = [".md", ".png", ".svg"].iter().any(|end| path.ends_with(end));
+            if !is_whole || before.is_some_and(|c| is_path(c) && c != '/') {
+                continue;
+            }
+            assert!(root.join(path).exists(), "{}: no {path}", file.display());
+            named += 1;
+        }
+    }
+    assert!(named > 60, "only {named} were found");
+}
+
 #[test]
 fn the_map_of_the_tree_names_files_that_are_there() {
     let Some(documents) = documents() else { return };
@@ -123,7 +177,7 @@ fn the_map_of_the_tree_names_files_that_are_there() {
     assert!(paths.len() > 40, "{paths:?}");
     for path in paths {
         let found = [root.join("crates").join(path), root.join(path)].iter().any(|p| p.exists());
-        assert!(found, "docs/architecture.md: no {path}");
+        assert!(found, "docs/development/architecture.md: no {path}");
     }
 }
 
@@ -144,7 +198,7 @@ fn the_table_of_additions_names_what_its_files_have() {
             let brackets = behind.split(')').next().unwrap_or_default();
             for name in brackets.split('`').skip(1).step_by(2).filter(|name| is_name(name)) {
                 let last = name.rsplit("::").next().unwrap_or_default();
-                assert!(text.contains(last), "docs/architecture.md: no {name} in {file}");
+                assert!(text.contains(last), "docs/development/architecture.md: no {name} in {file}");
                 names += 1;
             }
         }

@@ -1,4 +1,4 @@
-//! `docs/keys.md`: the keys of all files, as tables, from their JSON Schemas.
+//! `docs/reference/keys.md`: the keys of all files, as tables, from their JSON Schemas.
 
 use std::fmt::Write as _;
 
@@ -8,7 +8,7 @@ const HEAD: &str = "\
 # Keys
 
 Every key of scene files, lens files and files of rays, with its values and its default: what the JSON Schemas in
-[`schema/`](../schema) say, as tables. [scene-format.md](scene-format.md), [lenses.md](lenses.md) and
+[`schema/`](../../schema) say, as tables. [scene-format.md](scene-format.md), [lens-files.md](lens-files.md) and
 [sensors.md](sensors.md) explain. Written by `make generated`.
 
 In every object, `\"$schema\"` and `\"comment\"` are allowed, too.
