@@ -4,6 +4,7 @@ mod asphere_crossings;
 mod code_v;
 mod components;
 mod exit_pupil;
+mod gradients;
 mod lens_limits;
 mod lens_properties;
 mod microlens_array;
