@@ -304,6 +304,20 @@ impl MonochromaticTrain {
         path
     }
 
+    /// Places (mm) of a ray's way from the object through the gradient before each element; none where there is none.
+    pub(crate) fn ways_through_gradients(&self, position: DVec3, direction: DVec3) -> Vec<Vec<DVec3>> {
+        /// Enough for a curve of a few pitches.
+        const PLACES: u32 = 48;
+        let Some(mut ray) = Ray::new(position, direction) else { return Vec::new() };
+        let steps = self.forward.iter().filter(|step| !step.is_shadow());
+        let mut way = |step: &Step| {
+            let places = step.graded_way(ray, PLACES);
+            ray = step.run_one(ray, Clip::Off).ray;
+            places
+        };
+        steps.map(&mut way).collect()
+    }
+
     /// One ray to its end.
     #[inline]
     pub fn run(&self, from: Side, clip: Clip, ray: Ray) -> End {

@@ -203,24 +203,24 @@ impl Gradient {
 
     /// Refuses an index that is not above 1 within the rim.
     fn check(&self, base: f64, thickness: f64) -> Result<(), String> {
-        for i in 0..=LOOKS {
-            for k in 0..=LOOKS {
-                let [r, z] = [(i, self.semi_diameter), (k, thickness)]
-                    .map(|(at, whole)| whole * f64::from(at) / f64::from(LOOKS));
-                let square = self.field(base, [0.0, r, z]).square;
-                if !(square > 1.0 && square.is_finite()) {
-                    let what = match square > 0.0 {
-                        true => format!("an index of {:.4}", square.sqrt()),
-                        false => format!("a squared index of {square:.4}"),
-                    };
-                    return Err(format!(
-                        "the gradient has {what} {r:.4} mm from the axis, {z:.4} mm behind its surface; it must exceed \
-                         1 within the rim: lessen its terms or its semi_diameter"
-                    ));
-                }
-            }
+        let places = (0..=LOOKS).flat_map(|i| (0..=LOOKS).map(move |k| [i, k]));
+        let squares = places.map(|[i, k]| {
+            let share = |at: u32| f64::from(at) / f64::from(LOOKS);
+            let (r, z) = (self.semi_diameter * share(i), thickness * share(k));
+            (self.field(base, [0.0, r, z]).square, r, z)
+        });
+        let Some((square, r, z)) = squares.min_by(|a, b| a.0.total_cmp(&b.0)) else { return Ok(()) };
+        if square > 1.0 && square.is_finite() {
+            return Ok(());
         }
-        Ok(())
+        let what = match square > 0.0 {
+            true => format!("an index of {:.4}", square.sqrt()),
+            false => format!("a squared index of {square:.4}"),
+        };
+        Err(format!(
+            "the gradient has {what} {r:.4} mm from the axis, {z:.4} mm behind its surface; it must exceed 1 within the \
+             rim: lessen its terms or its semi_diameter"
+        ))
     }
 
     /// Steps that follow the fastest swing within the rim.
