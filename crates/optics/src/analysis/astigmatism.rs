@@ -32,7 +32,7 @@ pub struct FieldFoci {
 
 /// The foci of an object point, in a lens that is round about its axis.
 ///
-/// `None` when it is not.
+/// `None` when it is not, or has a gradient.
 ///
 /// # Errors
 ///
@@ -43,6 +43,9 @@ pub fn foci(
     object: ObjectPoint,
     image_z: f64,
 ) -> Result<Option<FieldFoci>, AnalysisError> {
+    if train.is_graded() {
+        return Ok(None);
+    }
     let beam = Beam::new(train, at, object)?;
     let Some(mut ray) = beam.start() else { return Ok(None) };
     // 1/s and 1/t at the ray's place.

@@ -104,6 +104,9 @@ pub fn seidel(
     object: &ObjectPoint,
     colours: [f64; 2],
 ) -> Result<SeidelTable, AnalysisError> {
+    if train.is_graded() {
+        return Err(AnalysisError::Graded);
+    }
     let (marginal, chief) = rays(train, object)?;
     let mut table = sums(train, object, colours, (marginal, chief))?.0;
     let of = |without, across: f64, along: f64| -> Result<Option<StopShift>, AnalysisError> {

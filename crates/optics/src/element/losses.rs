@@ -174,6 +174,16 @@ impl Loss {
         Self { indices: [index; 2], reflects: true, layer: None, absorption, films }
     }
 
+    /// The share of light that is left after a way of `length` (mm) through the medium before.
+    pub(crate) fn absorbed(&self, length: f64) -> f64 {
+        (-self.absorption * length).exp()
+    }
+
+    /// The same between other indices.
+    pub(crate) fn between(&self, indices: [f64; 2]) -> Self {
+        Self { indices, ..self.clone() }
+    }
+
     /// The share of light that is left of a ray that came as `before` and goes on as `after`.
     pub(crate) fn share(&self, before: Ray, after: Ray) -> f64 {
         let mut share = 1.0;

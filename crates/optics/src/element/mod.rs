@@ -11,6 +11,7 @@ mod biconic;
 mod coating;
 mod crossings;
 mod freeform;
+pub(crate) mod gradient;
 mod lattice;
 mod lenslets;
 mod losses;
@@ -41,6 +42,7 @@ pub use aperture::{
 };
 pub use biconic::{Biconic, BiconicSpec};
 pub use coating::{MirrorCoating, MirrorCoatingSpec, Stack, StackSpec, ThinFilmSpec};
+pub use gradient::{GradedGap, Gradient, GradientSpec, GradientTerms};
 pub use freeform::{Freeform, FreeformSpec, HeightMapSpec, PatternSpec, PhaseSpec, SagSpec};
 pub use lattice::{Grid, Lattice, LatticeCell};
 pub(crate) use losses::Loss;
@@ -88,6 +90,9 @@ pub struct Mount {
     /// Moved across the axis by x and y (mm). The elements behind are not moved.
     #[serde(skip_serializing_if = "is_default")]
     pub decentre: [Millimetres; 2],
+    /// How the index of the glass behind a surface changes from place to place; it is the same everywhere when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gradient: Option<GradientSpec>,
 }
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
@@ -95,7 +100,7 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 }
 
 /// The keys of [`Mount`].
-const MOUNT_KEYS: [&str; 4] = ["thickness", "stop", "tilt", "decentre"];
+const MOUNT_KEYS: [&str; 5] = ["thickness", "stop", "tilt", "decentre", "gradient"];
 
 impl ElementSpec {
     /// A part on the axis, `thickness` (mm) before the next one.

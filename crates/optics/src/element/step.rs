@@ -13,6 +13,7 @@ use super::aperture::{Opening, in_circle, in_polygon};
 use super::biconic::Biconic;
 use super::crossings::{Slopes, cross_first, cross_first_after};
 use super::freeform::FreeformSurface;
+use super::gradient::step::Graded;
 use super::lenslets::Lenslets;
 use super::losses::{Filter, Loss};
 use super::mirror::{Fold, Shadow};
@@ -42,6 +43,8 @@ pub(crate) struct Step {
     pub(crate) loss: Option<Loss>,
     /// How light goes on behind a mirror.
     pub(crate) fold: Option<Fold>,
+    /// Gradients before or behind it.
+    pub(crate) graded: Option<Arc<Graded>>,
 }
 
 /// What an element does.
@@ -133,6 +136,9 @@ impl Step {
     /// Takes a block of rays through the element.
     #[inline(always)]
     pub(crate) fn run(&self, block: &mut Block, clip: Clip) {
+        if let Some(graded) = &self.graded {
+            return self.run_graded(graded, block, clip);
+        }
         let Some(fold) = &self.fold else { return self.meet(block, clip) };
         let before = block.outcome;
         self.meet(block, clip);
@@ -375,6 +381,9 @@ impl Step {
     /// Takes one ray through the element.
     #[inline]
     pub(crate) fn run_one(&self, ray: Ray, clip: Clip) -> Traversal {
+        if let Some(graded) = &self.graded {
+            return self.graded_one(graded, ray, clip);
+        }
         let mut traversal = self.pass_one(ray, clip);
         if let (Some(loss), RayStatus::Exited) = (&self.loss, traversal.status) {
             traversal.transmission *= loss.share(ray, traversal.ray);
@@ -398,7 +407,7 @@ impl Step {
     }
 
     #[inline]
-    fn pass_one(&self, ray: Ray, clip: Clip) -> Traversal {
+    pub(super) fn pass_one(&self, ray: Ray, clip: Clip) -> Traversal {
         if self.axial {
             let z = self.frame.vertex.z;
             let mut local = ray;

@@ -170,6 +170,7 @@ impl Entry {
             namesakes: Vec::new(),
             dispersion,
             extinction,
+            gradient: None,
         })
     }
 }

@@ -101,6 +101,8 @@ pub struct Glass {
     dispersion: Dispersion,
     /// `[nm, k]`: extinction coefficients in ascending order of wavelength.
     extinction: Vec<[f64; 2]>,
+    /// How the index changes from place to place behind an element of a lens.
+    pub(crate) gradient: Option<crate::element::GradedGap>,
 }
 
 impl Glass {
@@ -119,6 +121,7 @@ impl Glass {
             namesakes: Vec::new(),
             dispersion,
             extinction: Vec::new(),
+            gradient: None,
         }
     }
 

@@ -14,7 +14,10 @@ use super::{
     Element, LensError, MOST_ELEMENTS, MonochromaticTrain, OpticalTrain, RayPath, Side,
     remove_notes,
 };
-use crate::element::{Clip, ElementSpec, Frame, LossesSpec, PartSpec, RayStatus, Resolve};
+use crate::element::{
+    BiconicSpec, Clip, ElementSpec, Frame, FreeformSpec, GradedGap, Gradient, LossesSpec, PartSpec,
+    RayStatus, Resolve, SurfaceSpec,
+};
 use crate::glass::{AgfCatalogue, FRAUNHOFER_D, Glass, GlassError};
 use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
 
@@ -114,7 +117,17 @@ impl LensFile {
                 check_gap(spec.mount.thickness.0, sense).map_err(error)?;
             }
             elements.push(element);
-            media.push(behind(spec, index, &media, &catalogues)?);
+            let mut medium = behind(spec, index, &media, &catalogues)?;
+            if spec.part.medium_behind().is_none() && index > 0 {
+                // A sheet stands in what began farther in front.
+                let gap = z - elements[index - 1].frame.vertex.z;
+                medium.gradient = medium.gradient.map(|gradient| gradient.behind(gap));
+            }
+            if let Some(gradient) = self.gradient(index, &medium, wavelength)? {
+                medium.gradient = Some(GradedGap { gradient: gradient.into(), offset: 0.0, sense });
+                medium.name.push_str(", graded");
+            }
+            media.push(medium);
             z += sense * spec.mount.thickness.0;
         }
         let sensor = self.sensor.unwrap_or_default();
@@ -133,6 +146,56 @@ impl LensFile {
             notes: Vec::new(),
         };
         train.with_stop(self.stop()?)
+    }
+
+    /// The gradient behind an element, if it has one.
+    fn gradient(
+        &self,
+        index: usize,
+        medium: &Glass,
+        wavelength: f64,
+    ) -> Result<Option<Gradient>, LensError> {
+        let Some(gradient) = &self.elements[index].mount.gradient else { return Ok(None) };
+        let error = |why: String| LensError::Element { index, why };
+        let (PartSpec::Surface(SurfaceSpec { semi_diameter, .. })
+        | PartSpec::Biconic(BiconicSpec { semi_diameter, .. })
+        | PartSpec::Freeform(FreeformSpec { semi_diameter, mirror: false, .. })) =
+            &self.elements[index].part
+        else {
+            let why = "a gradient is that of the glass behind a surface, a biconic or a freeform; \
+                       write it there";
+            return Err(error(why.to_owned()));
+        };
+        let rim = semi_diameter.map_or(f64::INFINITY, |length| length.0);
+        let base = medium.index(wavelength).map_err(|source| LensError::Glass { index, source })?;
+        // Up to the surface that ends it, past sheets.
+        let behind = self.elements[index + 1..].iter();
+        let end = { behind }.position(|spec| {
+            !matches!(spec.part, PartSpec::Aperture(_) | PartSpec::Filter(_))
+        });
+        let Some(end) = end.map(|end| index + 1 + end) else {
+            let why = "a gradient ends at a surface; add the one behind it";
+            return Err(error(why.to_owned()));
+        };
+        for at in [index, end] {
+            let bends = match &self.elements[at].part {
+                PartSpec::Surface(_) | PartSpec::Biconic(_) => true,
+                PartSpec::Freeform(surface) => !surface.mirror && surface.phase.is_none(),
+                PartSpec::ThinLens(_)
+                | PartSpec::Aperture(_)
+                | PartSpec::Filter(_)
+                | PartSpec::MicrolensArray(_)
+                | PartSpec::Mirror(_) => false,
+            };
+            if !bends {
+                return Err(error(format!(
+                    "a gradient lies between surfaces without a phase, and elements[{at}] is none; put glass without a \
+                     gradient between"
+                )));
+            }
+        }
+        let thickness = self.elements[index..end].iter().map(|spec| spec.mount.thickness.0).sum();
+        gradient.build(rim, base, thickness).map(Some).map_err(error)
     }
 
     fn catalogues(&self, resolve: Resolve<'_>) -> Result<Vec<AgfCatalogue>, LensError> {

@@ -122,7 +122,12 @@ impl MonochromaticTrain {
             if traversal.status != RayStatus::Exited {
                 break;
             }
-            if let (true, Some(point)) = (step.moves(), traversal.point) {
+            if let Some(path) = step.graded_path(end.ray) {
+                end.length += path;
+                if let (true, Some(point)) = (step.moves(), traversal.point) {
+                    end.length += step.added_path(point.into());
+                }
+            } else if let (true, Some(point)) = (step.moves(), traversal.point) {
                 let way = DVec3::from(point) - DVec3::from(end.ray.position);
                 let index = self.index_before(step.element);
                 let mut length = way.dot(DVec3::from(end.ray.direction));

@@ -4,6 +4,8 @@
 //! power Φ = (n' − n) c is [1 0; −Φ 1], a gap t in index n is [1 t/n; 0 1] (A. Gerrard and J. M.
 //! Burch, *Introduction to Matrix Methods in Optics*, 1975). Both have determinant 1.
 //!
+//! A gap of [graded index](crate::element::gradient) has a matrix of its own.
+//!
 //! Tilts and decentrings are left out. Planes are given by their z in lens coordinates (mm).
 
 use schemars::JsonSchema;
@@ -210,13 +212,31 @@ impl OpticalTrain {
         match i.checked_sub(1) {
             Some(previous) => {
                 let gap = self.elements[i].frame.vertex.z - self.elements[previous].frame.vertex.z;
-                Abcd::gap(gap / indices[i])
+                match &self.media[i].gradient {
+                    None => Abcd::gap(gap / indices[i]),
+                    Some(gradient) => gradient.matrix(indices[i], gap),
+                }
             }
             None => Abcd::ONE,
         }
     }
 
     pub(crate) fn power(&self, indices: &Indices, i: usize) -> f64 {
-        self.elements[i].part.power(indices[i], indices[i + 1], indices.wavelength)
+        let [before, behind] = self.indices_at(indices, i);
+        self.elements[i].part.power(before, behind, indices.wavelength)
+    }
+
+    /// The indices on the axis at both sides of element `i`.
+    pub(crate) fn indices_at(&self, indices: &Indices, i: usize) -> [f64; 2] {
+        let z = |i: usize| self.elements[i].frame.vertex.z;
+        let before = match (&self.media[i].gradient, i.checked_sub(1)) {
+            (Some(gradient), Some(last)) => gradient.on_axis(indices[i], z(i) - z(last)),
+            _ => indices[i],
+        };
+        let behind = match &self.media[i + 1].gradient {
+            Some(gradient) => gradient.on_axis(indices[i + 1], 0.0),
+            None => indices[i + 1],
+        };
+        [before, behind]
     }
 }

@@ -1,5 +1,7 @@
 //! Rays through a lens at one wavelength.
 
+use std::sync::Arc;
+
 use etendue_spectrum::Curve;
 use glam::DVec3;
 use multiversion::multiversion;
@@ -8,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::OpticalTrain;
 use super::folds::Obstruction;
+use crate::element::gradient::step::{Graded, GradedMedium};
 use crate::element::{Action, Block, Clip, Fold, Frame, LensRays, Loss, Ray, RayStatus, Step};
 use crate::glass::GlassError;
 
@@ -98,7 +101,16 @@ impl OpticalTrain {
                        frame: Frame| {
                 // Sheets do not move rays: what absorbs before one is counted at the next surface.
                 let loss = loss.filter(|_| action.moves());
-                steps.push(Step { element, frame, axial: frame.is_axial(), action, loss, fold });
+                let graded = None;
+                steps.push(Step {
+                    element,
+                    frame,
+                    axial: frame.is_axial(),
+                    action,
+                    loss,
+                    fold,
+                    graded,
+                });
             };
             add(&mut forward, towards_sensor, loss([before, behind], element), fold, placed.frame);
             let (frame, fold) = match fold.map(|fold| fold.seen_from_behind(&placed.frame)) {
@@ -108,9 +120,46 @@ impl OpticalTrain {
             add(&mut backward, towards_object, loss([behind, before], element + 1), fold, frame);
         }
         shade(&obstructions[self.elements.len()], [&mut forward, &mut backward]);
+        for (steps, from) in [(&mut forward, Side::Object), (&mut backward, Side::Sensor)] {
+            self.grade(&indices, steps, from);
+        }
         backward.reverse();
         let is_costly = forward.len() > LONG || forward.iter().any(Step::has_wall);
         Ok(MonochromaticTrain { wavelength, indices, forward, backward, is_costly })
+    }
+
+    /// Gives steps the gradients on their sides.
+    fn grade(&self, indices: &Indices, steps: &mut [Step], from: Side) {
+        if !self.is_graded() {
+            return;
+        }
+        for step in steps.iter_mut().filter(|step| !step.is_shadow()) {
+            let element = step.element;
+            let medium = |index: usize| {
+                let gap = self.media[index].gradient.clone()?;
+                let before = index.checked_sub(1)?;
+                let z = |i: usize| self.elements.get(i).map(|element| element.frame.vertex.z);
+                let length = z(index)? - z(before)?;
+                Some(GradedMedium { gap, z: z(before)?, base: indices[index], element: before, length })
+            };
+            let mut media = [medium(element), medium(element + 1)];
+            let mut of = [indices[element], indices[element + 1]];
+            if from == Side::Sensor {
+                media.reverse();
+                of.reverse();
+            }
+            if media.iter().any(Option::is_some) {
+                let part = self.elements[element].part.clone();
+                let loss = step.loss.take();
+                step.graded = Some(Arc::new(Graded { media, indices: of, part, loss }));
+            }
+        }
+    }
+
+    /// Whether the index of a medium changes from place to place.
+    #[must_use]
+    pub fn is_graded(&self) -> bool {
+        self.media.iter().any(|medium| medium.gradient.is_some())
     }
 
     /// The index of each medium at `wavelength` (nm), from the object's to the sensor's.
@@ -148,6 +197,7 @@ fn shade(obstructions: &[Obstruction], steps: [&mut Vec<Step>; 2]) {
             action: Action::Shadow(obstruction.shadow),
             loss: None,
             fold: None,
+            graded: None,
         }));
     }
 }
@@ -252,6 +302,20 @@ impl MonochromaticTrain {
         path.status = RayStatus::Exited;
         path.direction = Some(ray.direction.into());
         path
+    }
+
+    /// Places (mm) of a ray's way from the object through the gradient before each element; none where there is none.
+    pub(crate) fn ways_through_gradients(&self, position: DVec3, direction: DVec3) -> Vec<Vec<DVec3>> {
+        /// Enough for a curve of a few pitches.
+        const PLACES: u32 = 48;
+        let Some(mut ray) = Ray::new(position, direction) else { return Vec::new() };
+        let steps = self.forward.iter().filter(|step| !step.is_shadow());
+        let mut way = |step: &Step| {
+            let places = step.graded_way(ray, PLACES);
+            ray = step.run_one(ray, Clip::Off).ray;
+            places
+        };
+        steps.map(&mut way).collect()
     }
 
     /// One ray to its end.

@@ -5,6 +5,7 @@ mod code_v;
 mod components;
 mod exit_pupil;
 mod lens_formats;
+mod gradients;
 mod lens_limits;
 mod lens_properties;
 mod microlens_array;

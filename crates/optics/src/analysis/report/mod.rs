@@ -250,7 +250,11 @@ impl WaveReport {
         };
         let foci = bench.foci(widest)?;
         if foci.is_empty() {
-            notes.push("no field curvature: the lens is not round about its axis".to_owned());
+            let why = match train.is_graded() {
+                true => "the index of a medium changes from place to place",
+                false => "the lens is not round about its axis",
+            };
+            notes.push(format!("no field curvature: {why}"));
         }
         let distortion_grid = bench.grid(widest)?;
         Ok(Self {

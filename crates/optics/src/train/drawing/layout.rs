@@ -167,7 +167,12 @@ fn trace(
     let stop = last + out * ((end - last.z) / out.z);
     // Each point as the space before its element stands in the built lens; without spaces as they are.
     let place = |i: usize, point: DVec3| spaces.get(i).map_or(point, |space| space.place(point));
-    let vertices = path.points.iter().enumerate().map(|(i, &point)| place(i, point));
+    // The way through a gradient before it, and the point on each element.
+    let mut ways = at.ways_through_gradients(position, direction).into_iter();
+    let vertices = path.points.iter().enumerate().flat_map(|(i, &point)| {
+        let way = ways.next().unwrap_or_default();
+        way.into_iter().chain([point]).map(move |point| place(i, point)).collect::<Vec<_>>()
+    });
     let stop = match train.elements().last().and_then(|last| last.part.mirror()) {
         // The last point is before the fold: where it is behind it follows from the way back.
         Some(_) if !spaces.is_empty() => {
@@ -188,7 +193,17 @@ fn trace(
 pub(super) fn heights(train: &OpticalTrain, fans: &[Fan]) -> Vec<f64> {
     let rays = || fans.iter().flat_map(|fan| &fan.rays);
     let reach = |i: usize| {
-        let heights = rays().filter_map(|ray| ray.get(i + 1)).map(|point| point[1].abs());
+        // Rays through a gradient have more points than there are elements.
+        let z = train.elements()[i].frame.vertex.z;
+        let nearest = |ray: &Vec<[f64; 2]>| {
+            let far = |point: &[f64; 2]| (point[0] - z).abs();
+            ray.iter().copied().min_by(|a, b| far(a).total_cmp(&far(b)))
+        };
+        let point = |ray: &Vec<[f64; 2]>| match train.is_graded() {
+            true => nearest(ray),
+            false => ray.get(i + 1).copied(),
+        };
+        let heights = rays().filter_map(point).map(|point| point[1].abs());
         1.1 * heights.fold(0.0, f64::max)
     };
     let height = |(i, element): (usize, &Element)| {

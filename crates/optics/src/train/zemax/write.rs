@@ -57,6 +57,9 @@ impl LensFile {
         let mut medium: Option<GlassSpec> = None;
         for (i, element) in self.elements.iter().enumerate() {
             let error = |why: String| format!("elements[{i}]: {why}");
+            if element.mount.gradient.is_some() {
+                return Err(error("a gradient has no counterpart here; save the lens as .json".to_owned()));
+            }
             let mut row = surface(element, medium.as_ref()).map_err(error)?;
             if let Some(behind) = element.part.medium_behind() {
                 medium = behind.cloned();

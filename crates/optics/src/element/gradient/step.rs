@@ -1,0 +1,233 @@
+//! A surface or a sheet with a gradient before it, behind it, or on both sides, as one ray meets it.
+//!
+//! A ray is taken through the gradient to the surface, and refracted there by the indices at that place. The kernels of
+//! the surface do both, first with the indices of the glasses to find the place where a ray comes through an even medium.
+
+use glam::DVec3;
+
+use super::path::{Arrival, OpticalRay};
+use super::GradedGap;
+use crate::element::losses::Loss;
+use crate::element::part::Part;
+use crate::element::rays::{Block, LANES, Ray, RayStatus};
+use crate::element::refract::Media;
+use crate::element::step::{Action, Clip, Step, Traversal};
+
+/// A gap with a gradient at one wavelength, in lens coordinates.
+#[derive(Debug, Clone)]
+pub(crate) struct GradedMedium {
+    /// The gradient and where it begins.
+    pub(crate) gap: GradedGap,
+    /// z of the vertex that the gap is behind (mm).
+    pub(crate) z: f64,
+    /// The glass' index.
+    pub(crate) base: f64,
+    /// The element that the gap is behind, by which a ray that leaves its side is counted.
+    pub(crate) element: usize,
+    /// The length of the gap (mm).
+    pub(crate) length: f64,
+}
+
+/// The media on both sides of an element, as light meets it, at least one of them a gradient.
+#[derive(Debug, Clone)]
+pub(crate) struct Graded {
+    /// The gradients before and behind.
+    pub(crate) media: [Option<GradedMedium>; 2],
+    /// The indices of the glasses before and behind.
+    pub(crate) indices: [f64; 2],
+    /// The element's shape.
+    pub(crate) part: Part,
+    /// What is lost here with the indices of the glasses.
+    pub(crate) loss: Option<Loss>,
+}
+
+impl GradedMedium {
+    /// The index at a place of the lens (mm).
+    fn index(&self, place: DVec3) -> f64 {
+        let place = self.own(place);
+        self.gap.gradient.field(self.base, place.to_array()).square.max(0.0).sqrt()
+    }
+
+    /// A place of the lens in the gradient's own frame.
+    fn own(&self, place: DVec3) -> DVec3 {
+        let GradedGap { offset, sense, .. } = self.gap;
+        DVec3::new(place.x, place.y, offset + sense * (place.z - self.z))
+    }
+
+    /// Back into the lens.
+    fn lens(&self, place: DVec3) -> DVec3 {
+        let GradedGap { offset, sense, .. } = self.gap;
+        DVec3::new(place.x, place.y, self.z + sense * (place.z - offset))
+    }
+
+    fn turned(&self, direction: DVec3) -> DVec3 {
+        DVec3::new(direction.x, direction.y, self.gap.sense * direction.z)
+    }
+
+    /// A ray to the surface that `height` (mm) is above.
+    fn follow(
+        &self,
+        ray: Ray,
+        height: impl Fn(DVec3) -> Option<f64>,
+        clip: Clip,
+    ) -> Arrival {
+        let place = DVec3::from(ray.position);
+        let optical = self.turned(ray.direction.into()) * self.index(place);
+        let start = OpticalRay { place: self.own(place), optical, path: 0.0, length: 0.0 };
+        let own = |place: DVec3| height(self.lens(place)).map(|above| self.gap.sense * above);
+        let arrival = self.gap.gradient.to_surface(
+            self.base,
+            start,
+            own,
+            clip == Clip::On,
+            self.length.abs(),
+        );
+        match arrival {
+            Arrival::On(ray) => Arrival::On(OpticalRay {
+                place: self.lens(ray.place),
+                optical: self.turned(ray.optical),
+                ..ray
+            }),
+            Arrival::Side(place) => Arrival::Side(self.lens(place)),
+            Arrival::Lost => Arrival::Lost,
+        }
+    }
+}
+
+impl Step {
+    /// Takes a block of rays through an element at a gradient, one by one.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn run_graded(&self, graded: &Graded, block: &mut Block, clip: Clip) {
+        for lane in 0..LANES {
+            if block.outcome[lane] == 0 {
+                let traversal = self.graded_one(graded, block.ray(lane), clip);
+                let mut ray = traversal.ray;
+                if let (RayStatus::Vignetted { .. }, Some(point)) =
+                    (traversal.status, traversal.point)
+                    && self.moves()
+                {
+                    ray.position = point;
+                }
+                block.set_ray(lane, ray);
+                block.throughput[lane] *= traversal.transmission;
+                block.outcome[lane] = traversal.status.code();
+            }
+        }
+    }
+
+    /// What is above the element at a place of the lens (mm).
+    fn height(&self, part: &Part, place: DVec3) -> Option<f64> {
+        let local = self.frame.rotation.transpose() * (place - self.frame.vertex);
+        Some(local.z - part.sag([local.x, local.y])?)
+    }
+
+    /// The way of a ray through the gradient before the element.
+    fn arrival(&self, graded: &Graded, medium: &GradedMedium, ray: Ray, clip: Clip) -> Arrival {
+        medium.follow(ray, |place| self.height(&graded.part, place), clip)
+    }
+
+    /// The optical path (mm) through the gradient before the element; `None` without one, or when the ray does not
+    /// arrive.
+    pub(crate) fn graded_path(&self, ray: Ray) -> Option<f64> {
+        let graded = self.graded.as_deref()?;
+        let medium = graded.media[0].as_ref()?;
+        match self.arrival(graded, medium, ray, Clip::Off) {
+            Arrival::On(end) => Some(end.path),
+            Arrival::Side(_) | Arrival::Lost => None,
+        }
+    }
+
+    /// Places (mm) of a ray's way through the gradient before the element, for drawings: `count` of them between its ends.
+    pub(crate) fn graded_way(&self, ray: Ray, count: u32) -> Vec<DVec3> {
+        let Some((graded, medium)) =
+            self.graded.as_deref().and_then(|graded| Some((graded, graded.media[0].as_ref()?)))
+        else {
+            return Vec::new();
+        };
+        let place = DVec3::from(ray.position);
+        let Arrival::On(end) = self.arrival(graded, medium, ray, Clip::Off) else {
+            return Vec::new();
+        };
+        let between = |i: u32| {
+            let z = place.z + (end.place.z - place.z) * f64::from(i) / f64::from(count + 1);
+            match medium.follow(ray, |place| Some(place.z - z), Clip::Off) {
+                Arrival::On(ray) => Some(ray.place),
+                Arrival::Side(_) | Arrival::Lost => None,
+            }
+        };
+        (1..=count).filter_map(between).collect()
+    }
+
+    /// One ray through the gradient before the element and the element itself.
+    pub(crate) fn graded_one(&self, graded: &Graded, ray: Ray, clip: Clip) -> Traversal {
+        let element = self.element;
+        let [before, behind] = &graded.media;
+        let (start, length) = match before {
+            None => (ray, 0.0),
+            Some(medium) => match self.arrival(graded, medium, ray, clip) {
+                Arrival::On(end) => {
+                    let direction = end.optical.normalize().to_array();
+                    (Ray { position: end.place.to_array(), direction }, end.length)
+                }
+                Arrival::Side(place) => {
+                    let status = RayStatus::Vignetted { element: medium.element };
+                    let point = Some(place.to_array());
+                    return Traversal { status, ray, point, transmission: 1.0 };
+                }
+                Arrival::Lost => {
+                    let status = RayStatus::Missed { element };
+                    return Traversal { status, ray, point: None, transmission: 1.0 };
+                }
+            },
+        };
+        let plain = self.pass_one(start, clip);
+        let Some(point) = plain.point else { return Traversal { ray, ..plain } };
+        let absorbed = graded.loss.as_ref().map_or(1.0, |loss| loss.absorbed(length));
+        if !self.moves() {
+            // It stays where it looks at the ray.
+            let ray = if plain.status == RayStatus::Exited { start } else { ray };
+            return Traversal { ray, transmission: plain.transmission * absorbed, ..plain };
+        }
+        let index = |medium: &Option<GradedMedium>, glass: f64| {
+            medium.as_ref().map_or(glass, |medium| medium.index(point.into()))
+        };
+        let indices = [index(before, graded.indices[0]), index(behind, graded.indices[1])];
+        let media = Media::new(indices[0], indices[1]);
+        let mut traversal = self.pass_one_with(start, clip, media);
+        if traversal.status != RayStatus::Exited {
+            return Traversal { ray, ..traversal };
+        }
+        traversal.transmission *= absorbed;
+        if let Some(loss) = &graded.loss {
+            traversal.transmission *= loss.between(indices).share(start, traversal.ray);
+        }
+        traversal
+    }
+
+    fn pass_one_with(&self, ray: Ray, clip: Clip, media: Media) -> Traversal {
+        let action = self.action.between(media);
+        let step = Step { action, graded: None, loss: None, ..self.clone() };
+        step.pass_one(ray, clip)
+    }
+}
+
+impl Action {
+    /// The same between other media. What does not refract stays as it is.
+    fn between(&self, between: Media) -> Self {
+        let mut action = self.clone();
+        match &mut action {
+            Self::Plane(refraction)
+            | Self::Sphere(refraction)
+            | Self::Conic(refraction)
+            | Self::Asphere(refraction) => refraction.media = between,
+            Self::Biconic { media, .. } | Self::Freeform { media, .. } => *media = between,
+            Self::ThinLens { .. }
+            | Self::Opening(_)
+            | Self::Filter { .. }
+            | Self::Lenslets(_)
+            | Self::Shadow(_) => {}
+        }
+        action
+    }
+}
