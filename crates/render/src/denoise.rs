@@ -9,10 +9,8 @@ use etendue_tracer::LayerSpec;
 use crate::RenderError;
 use crate::expose::{has_spectrum, three_planes};
 use crate::film::{NoMemory, filled};
+pub use crate::output::DENOISED;
 use crate::output::{Channel, Layer, Look, Picture, Values};
-
-/// The name of the layer.
-pub const DENOISED: &str = "Denoised";
 
 /// Bytes a pixel of the picture and its guides on their way through the library, which takes more by
 /// itself, and of what comes back.

@@ -9,7 +9,8 @@ use etendue_spectrum::Bands;
 use glam::{DMat3, DVec2, DVec3};
 
 use super::focused::View;
-use super::lens_camera::{LensCamera, SpreadBy, uniform_filters};
+use super::lens_camera::{LensCamera, SpreadBy};
+use super::opened::uniform_filters;
 use crate::{Camera, CameraError, CameraRays, FilmSamples};
 
 /// Wavelengths that fields are traced at, of a lens that disperses.
