@@ -186,16 +186,15 @@ impl CameraSpec {
         let shutter = self.shutter().cloned().unwrap_or_default();
         let shutter = shutter.build(self.sensor().resolution[1])?;
         if shutter.rows_differ() && matches!(self, Self::LightFieldReference(_)) {
-            let why = "rows of a reference's views are no rows of a sensor, which are read one after another; \
-                       set \"global\"";
+            let why = "rows of a reference's views are no rows of a sensor, which are read one after another\
+                       \nhint: set \"global\"";
             return Err(CameraError::new("shutter.type", why));
         }
         if !self.moves_through_poses() {
             return Ok((shutter, None));
         }
         if for_each_kind!(self, spec => spec.pose.is_some()) {
-            let why =
-                "is given beside `motion`, whose poses already say where the camera is; remove one";
+            let why = "is given beside `motion`, whose poses already say where the camera is\nhint: remove one";
             return Err(CameraError::new("pose", why));
         }
         let trajectory = self.motion().map(|motion| motion.build(None)).transpose()?;

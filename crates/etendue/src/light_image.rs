@@ -156,7 +156,9 @@ impl LightImage {
         }
         let raster = etendue_image::decode(&bytes, limits);
         let raster = raster.map_err(|error| {
-            refused(format!("{error}; pictures of light are EXR, NPY, ENVI and Radiance files"))
+            refused(format!(
+                "{error}\nhint: pictures of light are EXR, NPY, ENVI and Radiance files"
+            ))
         })?;
         if !matches!(raster.samples(), Samples::F16(_) | Samples::F32(_)) {
             let why = "holds codes for a screen and no light; pictures of light are EXR, NPY, ENVI and Radiance \

@@ -41,7 +41,7 @@ pub fn guide(scene: &mut Scene) -> Result<(), RenderError> {
     if has_spectrum(scene) {
         return refused(
             "knows red, green and blue alone, and camera.sensor is `multispectral`: its bands would keep \
-             their noise; leave it out",
+             their noise\nhint: leave it out",
         );
     }
     for layer in [LayerSpec::MeanAlbedo, LayerSpec::MeanNormal] {

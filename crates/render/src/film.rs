@@ -46,7 +46,7 @@ pub(crate) fn bytes_of_plane(spec: LayerSpec, precision: Precision) -> u64 {
 /// The system has less memory than the pixels of a picture take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the system has too little memory for {} more of the picture; ask for fewer pixels, layers or bands",
+    "the system has too little memory for {} more of the picture\nhint: ask for fewer pixels, layers or bands",
     Size(*bytes)
 )]
 pub struct NoMemory {

@@ -254,9 +254,9 @@ impl FilmFile {
         let bytes =
             etendue_files::read(path, u64::MAX).map_err(|error| refused(&error.to_string()))?;
         let body = bytes.strip_prefix(MAGIC).ok_or_else(|| {
-            refused("is no part of a render; give files that `etendue render --shard` wrote")
+            refused("is no part of a render\nhint: give files that `etendue render --shard` wrote")
         })?;
-        let torn = || refused("is not whole; remove it, and render this part again");
+        let torn = || refused("is not whole\nhint: remove it, and render this part again");
         let (content, hash) = bytes.split_last_chunk::<8>().ok_or_else(torn)?;
         if xxh3_64(content) != u64::from_le_bytes(*hash) {
             return Err(torn());
@@ -382,7 +382,7 @@ pub(crate) fn must_be_whole(shares: &[FilmFile], identity: &Identity) -> Result<
         }
         if let Some(twice) = found.insert(shard, share) {
             let other = twice.path.display();
-            return Err(format!("{path}: is share {shard}, as {other} is; give each once"));
+            return Err(format!("{path}: is share {shard}, as {other} is\nhint: give each once"));
         }
     }
     // None is missing.
@@ -399,7 +399,9 @@ pub(crate) fn must_be_whole(shares: &[FilmFile], identity: &Identity) -> Result<
             let left = count as usize - have - missing.len();
             let more = if left > 0 { format!(" and {left} more") } else { String::new() };
             let lack = missing.join(", ") + &more;
-            Err(format!("{have} of {count} shares are here; missing: {lack}; render them first"))
+            Err(format!(
+                "{have} of {count} shares are here; missing: {lack}\nhint: render them first"
+            ))
         }
     }
 }

@@ -130,7 +130,7 @@ impl FromStr for Shard {
             Some((number.trim().parse().ok()?, count.trim().parse().ok()?))
         });
         numbers.and_then(|(number, count)| Self::new(number, count)).ok_or_else(|| {
-            format!("\"{text}\" is no share; write NUMBER/COUNT, from 1/8 to 8/8 for eight of them")
+            format!("\"{text}\" is no share\nhint: write NUMBER/COUNT, from 1/8 to 8/8 for eight of them")
         })
     }
 }

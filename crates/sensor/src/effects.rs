@@ -384,7 +384,7 @@ impl Effects {
             None => Vec::new(),
             Some(DefectMap::List(list)) => list.clone(),
             Some(DefectMap::File(_)) => {
-                let why = "files are read where the scene is; give the list of pixels";
+                let why = "files are read where the scene is\nhint: give the list of pixels";
                 return Err(SensorError::Misplaced { key: "defect_map", why });
             }
         };

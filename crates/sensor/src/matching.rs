@@ -84,7 +84,7 @@ pub enum MatchError {
     },
     /// Numbers that do not go with the light.
     #[error(
-        "is not linear in the scene's light: its numbers bend by {0:.0} % of the brightest; it is gamma-encoded or developed, or shows another scene; give the raw numbers, linearised"
+        "is not linear in the scene's light: its numbers bend by {0:.0} % of the brightest; it is gamma-encoded or developed, or shows another scene\nhint: give the raw numbers, linearised"
     )]
     NotLinear(f64),
     /// One level of light, or none.

@@ -46,14 +46,14 @@ impl LensCamera {
         let refused = |why: &str| Err(CameraError::new("diffraction", why));
         if let Some(element) = self.focused.train().first_array() {
             return refused(&format!(
-                "elements[{element}] is a microlens array, behind which there is no one wavefront; \
-                 leave out the array, or `diffraction`"
+                "elements[{element}] is a microlens array, behind which there is no one wavefront\
+                 \nhint: leave out the array, or `diffraction`"
             ));
         }
         if let View::Parallel { .. } = self.focused.view() {
             return refused(
                 "the lens is telecentric towards the object: its picture has no one point that it is \
-                 seen from; leave out `diffraction`",
+                 seen from\nhint: leave out `diffraction`",
             );
         }
         Ok(self.spread_by(SpreadBy::Waves))

@@ -202,25 +202,32 @@ fn data_uris_that_are_cut_off_say_so() {
 #[test]
 fn scenes_say_what_is_allowed() {
     let cases: [(&str, &[&str]); 16] = [
-        (r#"{"etendue": 1.0}"#, &["etendue: 1.0 is not 1; write it without a point"]),
-        (r#"{"etendue": "1"}"#, &["etendue: \"1\" is not 1; write it without quotes"]),
-        (r#"{"etendue": 2}"#, &["etendue: 2 is not 1; 1 is all that this version reads"]),
+        (r#"{"etendue": 1.0}"#, &["etendue: 1.0 is not 1\nhint: write it without a point"]),
+        (r#"{"etendue": "1"}"#, &["etendue: \"1\" is not 1\nhint: write it without quotes"]),
+        (r#"{"etendue": 2}"#, &["etendue: 2 is not 1\nhint: 1 is all that this version reads"]),
         (r#"{}"#, &["the key `etendue` is missing", "give it 1"]),
         (
             r#"{"etendue": 1, "objects": [{"sahpe": "box"}]}"#,
-            &["column 29", "objects[0].sahpe: unknown key; did you mean `shape`?", "`sphere`"],
+            &[
+                "column 29",
+                "objects[0].sahpe: unknown key\nhint: did you mean `shape`?",
+                "`sphere`",
+            ],
         ),
         (
             r#"{"etendue": 1, "lights": [{"tpye": "point"}]}"#,
-            &["lights[0].tpye: unknown key; did you mean `type`?", "`environment`"],
+            &["lights[0].tpye: unknown key\nhint: did you mean `type`?", "`environment`"],
         ),
         (
             r#"{"etendue": 1, "materials": {"a": {"colour": [1, 1, 1]}}}"#,
-            &["materials.a.colour: unknown key; did you mean `color`?", "give the object `type`"],
+            &[
+                "materials.a.colour: unknown key\nhint: did you mean `color`?",
+                "give the object `type`",
+            ],
         ),
         (
             r#"{"etendue": 1, "camera": {"fov": 60}}"#,
-            &["camera: says not what it is; give it `type` (one of `pinhole`"],
+            &["camera: says not what it is\nhint: give it `type` (one of `pinhole`"],
         ),
         (
             r#"{"etendue": 1, "objects": [{"file": "a.glb", "shape": "box"}]}"#,
@@ -241,7 +248,7 @@ fn scenes_say_what_is_allowed() {
         ),
         (
             r#"{"etendue": 1, "render": {"seed": 7.0}}"#,
-            &["render.seed: expected a whole number, found 7.0; write it without a point"],
+            &["render.seed: expected a whole number, found 7.0\nhint: write it without a point"],
         ),
         (r#"{"etendue": 1"#, &["the text ends inside an object (EOF)"]),
         (r#"{"etendue": 1, "camera": }"#, &["a value should stand here"]),
