@@ -210,7 +210,7 @@ impl fmt::Debug for BuildOptions {
 pub enum BuildError {
     /// The build would pass the caller's memory limit.
     #[error(
-        "building the {backend} structure needs more than the limit of {limit} bytes; raise \
+        "building the {backend} structure needs more than the limit of {limit} bytes\nhint: raise \
          --memory-limit, or place fewer or lighter meshes"
     )]
     MemoryLimit {
@@ -232,7 +232,7 @@ pub enum BuildError {
         call: &'static str,
     },
     /// More triangles or corners than the backend can number.
-    #[error("mesh \"{mesh}\": {what} is over the {backend} limit of {limit}; split the mesh")]
+    #[error("mesh \"{mesh}\": {what} is over the {backend} limit of {limit}\nhint: split the mesh")]
     TooLarge {
         /// The mesh's name.
         mesh: String,

@@ -42,7 +42,7 @@ pub enum BenchError {
     #[error(transparent)]
     Build(#[from] BuildError),
     /// Threads could not be had.
-    #[error("{threads} threads: {why}; ask for fewer with --threads")]
+    #[error("{threads} threads: {why}\nhint: ask for fewer with --threads")]
     Threads {
         /// How many were asked for.
         threads: usize,
@@ -51,7 +51,7 @@ pub enum BenchError {
     },
     /// The scene has layers and no picture.
     #[error(
-        "the scene has no `tracer`, so there is no picture to compare; name one, such as facing"
+        "the scene has no `tracer`, so there is no picture to compare\nhint: name one, such as facing"
     )]
     NoPicture,
     /// The camera has no lens that could be simplified.

@@ -144,7 +144,7 @@ fn plausible([x, y]: [f64; 2]) -> Result<(), CameraError> {
     Err(CameraError::new(
         "distortion",
         format!(
-            "the picture reaches {angle:.4}° from the axis, where no lens of this model sees; check the focal \
+            "the picture reaches {angle:.4}° from the axis, where no lens of this model sees\nhint: check the focal \
              lengths (fx, fy) and the resolution, which are in pixels, or leave out the distortion"
         ),
     ))
@@ -154,7 +154,7 @@ fn folded(tangent: f64) -> CameraError {
     CameraError::new(
         "distortion",
         format!(
-            "the model folds back {:.2}° from the axis, and the picture reaches beyond; use fewer \
+            "the model folds back {:.2}° from the axis, and the picture reaches beyond\nhint: use fewer \
              pixels, or check the coefficients and their order (OpenCV's vector is k1, k2, p1, p2, \
              k3)",
             tangent.atan().to_degrees()

@@ -76,7 +76,7 @@ impl FalloffSpec {
         }
         if axis <= 0.0 {
             let why = format!(
-                "is {axis}: the picture would be black; give the light on the axis, such as 1"
+                "is {axis}: the picture would be black\nhint: give the light on the axis, such as 1"
             );
             return Err(CameraError::new("falloff.axis", why));
         }

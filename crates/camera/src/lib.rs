@@ -12,6 +12,7 @@
 
 pub mod camera;
 pub mod camera_file;
+pub mod camera_spec;
 pub mod curve_files;
 pub mod distortion;
 pub mod exposure;
@@ -31,8 +32,9 @@ pub mod samples;
 pub mod shutter;
 mod sobol;
 
-pub use camera::{Camera, CameraSpec, PixelExtent, Projection};
+pub use camera::{Camera, PixelExtent, Projection};
 pub use camera_file::{CameraFile, ProjectionName};
+pub use camera_spec::CameraSpec;
 pub use distortion::{Distortion, DistortionSpec};
 pub use exposure::CameraTime;
 pub use falloff::FalloffSpec;

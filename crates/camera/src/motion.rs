@@ -147,7 +147,8 @@ impl CameraMotionSpec {
         match self {
             Self::Velocity { velocity, angular_velocity, axes } => {
                 let Some(start) = start else {
-                    let why = "starts from the camera's `pose`, and there is none; give it one";
+                    let why =
+                        "starts from the camera's `pose`, and there is none\nhint: give it one";
                     return Err(CameraError::new("motion", why));
                 };
                 let axes = match axes {
@@ -167,7 +168,7 @@ impl CameraMotionSpec {
             Self::Poses { poses, times, translation, revolutions } => {
                 if poses.len() < 2 {
                     let why = format!(
-                        "{} do not move; give two or more, or leave `motion` out",
+                        "{} do not move\nhint: give two or more, or leave `motion` out",
                         poses.len()
                     );
                     return fault("poses", why);
@@ -254,7 +255,7 @@ fn keys(
         let whole = std::f64::consts::TAU * f64::from(revolutions[i]);
         let turn = if angle < NO_TURN {
             if revolutions[i] != 0 {
-                let why = "the two poses are turned alike, so that the axis of a whole turn is not known; put a pose \
+                let why = "the two poses are turned alike, so that the axis of a whole turn is not known\nhint: put a pose \
                            in between";
                 return Err(CameraError::new(format!("motion.revolutions[{i}]"), why));
             }

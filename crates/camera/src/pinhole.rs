@@ -73,7 +73,7 @@ impl PinholeSpec {
             (Some(_), Some(_)) => {
                 return Err(CameraError::new(
                     "fov",
-                    "is given beside `intrinsics`, which already fix it; remove one of them",
+                    "is given beside `intrinsics`, which already fix it\nhint: remove one of them",
                 ));
             }
             (Some(spec), None) => spec.build()?,
@@ -111,7 +111,7 @@ impl PinholeSpec {
             (None, _) => Ok(None),
             (Some(_), None) => Err(CameraError::new(
                 "distortion",
-                "has coefficients that hold for one K only; give `intrinsics` instead of `fov`",
+                "has coefficients that hold for one K only\nhint: give `intrinsics` instead of `fov`",
             )),
             (Some(spec), Some(_)) => {
                 let border = border(self.sensor.resolution);

@@ -237,7 +237,7 @@ impl PoseSpec {
         if unit(at - from).is_none() {
             return fault(
                 "pose.look_at",
-                "is the same point as `from`, so the camera looks nowhere; move one of them"
+                "is the same point as `from`, so the camera looks nowhere\nhint: move one of them"
                     .to_owned(),
             );
         }
@@ -248,8 +248,8 @@ impl PoseSpec {
             }
             None => fault(
                 "pose.up",
-                "lies along the view from `from` to `look_at`, so the picture has no upright; \
-                 choose another, such as [0, 0, -1]"
+                "lies along the view from `from` to `look_at`, so the picture has no upright\
+                 \nhint: choose another, such as [0, 0, -1]"
                     .to_owned(),
             ),
         }
@@ -296,7 +296,9 @@ fn rigid_parts(rows: &[[f64; 4]; 4]) -> Result<(DMat3, DVec3), CameraError> {
         ));
     }
     if rotation.determinant() < 0.0 {
-        return fault("its upper left 3×3 part mirrors; check the convention's signs".to_owned());
+        return fault(
+            "its upper left 3×3 part mirrors\nhint: check the convention's signs".to_owned(),
+        );
     }
     Ok((rotation, column(3)))
 }

@@ -109,12 +109,12 @@ impl ShutterSpec {
     pub fn build(&self, rows: u32) -> Result<Shutter, CameraError> {
         let exposure = self.exposure.map_or(0.0, |time| time.0);
         if !(exposure >= 0.0 && exposure.is_finite()) {
-            return fault("exposure", format!("{exposure} s is no duration; give 0 or more"));
+            return fault("exposure", format!("{exposure} s is no duration\nhint: give 0 or more"));
         }
         let line_time = match (self.kind, self.line_time) {
             (ShutterKind::Global, None) => 0.0,
             (ShutterKind::Global, Some(_)) => {
-                let why = "belongs to rows that are read one after another; set \"type\": \"rolling\", or \
+                let why = "belongs to rows that are read one after another\nhint: set \"type\": \"rolling\", or \
                            leave it out";
                 return fault("line_time", why.to_owned());
             }
@@ -125,7 +125,10 @@ impl ShutterSpec {
             }
             (_, Some(Seconds(time))) if time >= 0.0 && time.is_finite() => time,
             (_, Some(Seconds(time))) => {
-                return fault("line_time", format!("{time} s is no duration; give 0 or more"));
+                return fault(
+                    "line_time",
+                    format!("{time} s is no duration\nhint: give 0 or more"),
+                );
             }
         };
         if !(line_time * f64::from(rows)).is_finite() {
@@ -143,7 +146,7 @@ impl ShutterSpec {
         }
         if !open.is_empty() && self.kind == ShutterKind::GlobalReset && line_time > 0.0 {
             let key = if self.code.is_some() { "code" } else { "open" };
-            let why = "rows of a global reset are open for different times, which no one code fits; set \
+            let why = "rows of a global reset are open for different times, which no one code fits\nhint: set \
                        \"type\": \"global\" or \"rolling\"";
             return fault(key, why.to_owned());
         }
@@ -168,7 +171,8 @@ impl ShutterSpec {
             }
             (None, None) => Ok(Vec::new()),
             (Some(_), Some(_)) => {
-                let why = "is given beside `open`, which already says when it is open; remove one";
+                let why =
+                    "is given beside `open`, which already says when it is open\nhint: remove one";
                 fault("code", why.to_owned())
             }
             (Some(list), None) => listed(list, exposure),
@@ -229,13 +233,13 @@ fn coded(code: &str, chip: Option<Seconds>, exposure: f64) -> Result<Vec<[f64; 2
     let length = chip.map_or(exposure / count, |time| time.0);
     if !(length > 0.0 && length.is_finite()) {
         let why = format!(
-            "a chip lasts {length} s; give `chip` a time above 0, or the shutter an `exposure`"
+            "a chip lasts {length} s\nhint: give `chip` a time above 0, or the shutter an `exposure`"
         );
         return fault(if chip.is_some() { "chip" } else { "code" }, why);
     }
     if length * count > exposure * (1.0 + ROUNDING) {
         let why = format!(
-            "{count} chips of {length} s are longer than the exposure of {exposure} s; shorten `chip`"
+            "{count} chips of {length} s are longer than the exposure of {exposure} s\nhint: shorten `chip`"
         );
         return fault("code", why);
     }

@@ -86,7 +86,7 @@ pub(crate) fn run(arguments: &EdgeArguments) -> Result<(), Fault> {
 fn planes(still: &Still, arguments: &EdgeArguments) -> Result<Vec<(String, Vec<f64>)>, String> {
     if arguments.raw {
         return still.numbers().ok_or_else(|| {
-            "has no integers: its values are light already; leave out --raw".to_owned()
+            "has no integers: its values are light already\nhint: leave out --raw".to_owned()
         });
     }
     let layers = still.layers();

@@ -8,6 +8,7 @@ use etendue_bench::BenchError;
 use etendue_files::WriteError;
 use etendue_render::RenderError;
 use etendue_render::output::OutputError;
+use etendue_report::Refusal;
 use etendue_scene::SceneError;
 use etendue_scene::escape::{printable, printable_json};
 use etendue_sensor::emva::EmvaError;
@@ -36,16 +37,7 @@ impl Fault {
 
     pub(crate) fn print(&self) {
         let (Self::Refused(error) | Self::Failed(error)) = self;
-        let mut message = error.to_string();
-        for cause in error.chain().skip(1) {
-            let cause = cause.to_string();
-            // Some errors already quote what caused them.
-            if !message.contains(&cause) {
-                message.push_str(": ");
-                message.push_str(&cause);
-            }
-        }
-        say(&format!("error: {message}"));
+        say(&format!("error: {}", Refusal::of(error.as_ref())));
     }
 
     pub(crate) fn exit_code(&self) -> ExitCode {

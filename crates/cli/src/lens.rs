@@ -37,7 +37,7 @@ pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
     }
     if let Some(path) = &arguments.save {
         let file = lens.file.as_ref().ok_or_else(|| {
-            Fault::refused("--save: the lens of a scene cannot be saved; give its own file")
+            Fault::refused("--save: the lens of a scene cannot be saved\nhint: give its own file")
         })?;
         match ZemaxLens::is_named(path) {
             true => {

@@ -19,7 +19,9 @@ pub(crate) fn render_shard(
     progress: &Progress,
 ) -> Result<(), Fault> {
     if arguments.report.is_some() {
-        return Err(Fault::refused("--report is of a whole picture; give it to `etendue merge`"));
+        return Err(Fault::refused(
+            "--report is of a whole picture\nhint: give it to `etendue merge`",
+        ));
     }
     let folder = &arguments.output;
     let what = if shard.is_of_samples() { "samples" } else { "shard" };
@@ -86,7 +88,9 @@ fn as_asked(arguments: &MergeArguments, shares: &Shares) -> Result<RenderArgumen
         let scene = asked.scene.scene.display();
         let why = match arguments.scene {
             Some(_) => "--scene names no file",
-            None => "the shares are of this scene, which is not here; say by --scene where it is",
+            None => {
+                "the shares are of this scene, which is not here\nhint: say by --scene where it is"
+            }
         };
         return Err(Fault::refused(format!("{scene}: {why}")));
     }

@@ -90,7 +90,7 @@ fn pitch(lens: &ReadLens, arguments: &LensArguments, resolution: [u32; 2]) -> Re
     let [width, height] = resolution.map(f64::from);
     let pitch = radius.map(|mm| 2e3 * mm / width.hypot(height));
     pitch.filter(|um| *um > 0.0 && um.is_finite()).ok_or_else(|| {
-        refused(&"the size of its picture is not known; give the size of a pixel by --pixel-pitch")
+        refused(&"the size of its picture is not known\nhint: give the size of a pixel by --pixel-pitch")
     })
 }
 

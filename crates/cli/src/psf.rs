@@ -77,7 +77,7 @@ pub(crate) fn write(
         |why: String| Fault::refused(format!("{}: --psf: {why}", arguments.lens.display()));
     let (wavelengths, _) = waves::wavelengths(lens, report, arguments);
     let Some(sensor_z) = report.sensor_z else {
-        return Err(refused("the lens has no place for a sensor; give --focus".to_owned()));
+        return Err(refused("the lens has no place for a sensor\nhint: give --focus".to_owned()));
     };
     let depths = depths(report, arguments).map_err(refused)?;
     let fields = report.fields.clone();
@@ -233,7 +233,7 @@ fn by_huygens(
         points.iter().map(|p| p.pupil.lit().count() as f64).sum::<f64>() * (side * side) as f64;
     if terms > MOST_TERMS {
         return Err(format!(
-            "--huygens would add up {terms:.1e} waves, and {MOST_TERMS:.0e} are the most; give a smaller \
+            "--huygens would add up {terms:.1e} waves, and {MOST_TERMS:.0e} are the most\nhint: give a smaller \
              --psf-size, or fewer fields"
         ));
     }

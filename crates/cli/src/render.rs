@@ -65,7 +65,7 @@ pub(crate) fn verified(session: &mut Session, progress: &Progress) -> Result<Str
     match session.verify(progress)? {
         Some(verified) => Ok(format!("note: {verified}")),
         None => Err(Fault::refused(
-            "--verify compares what is taken of a `tolerance` with everything, and the scene has none; give it one, \
+            "--verify compares what is taken of a `tolerance` with everything, and the scene has none\nhint: give it one, \
              such as --tolerance \"0.5 px, 2 %\"",
         )),
     }
@@ -212,7 +212,7 @@ pub(crate) fn refuse_result(arguments: &RenderArguments, results: &[PathBuf]) ->
     match results.iter().find(is_it) {
         None => Ok(()),
         Some(_) => Err(Fault::refused(format!(
-            "--report {}: a result has this name; choose another one",
+            "--report {}: a result has this name\nhint: choose another one",
             report.display()
         ))),
     }

@@ -36,8 +36,8 @@ pub(crate) fn secure(threads: usize) -> Result<(), Fault> {
     }
     let plural = if threads == 1 { "" } else { "s" };
     Err(Fault::refused(format!(
-        "the shell's limit (ulimit -v) leaves {}, and the program itself needs {} with {threads} thread{plural}; \
-         raise the limit",
+        "the shell's limit (ulimit -v) leaves {}, and the program itself needs {} with {threads} thread{plural}\
+         \nhint: raise the limit",
         Size(left),
         Size(needed)
     )))

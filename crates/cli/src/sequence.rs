@@ -21,8 +21,7 @@ pub(crate) fn render(
     progress: &Progress,
 ) -> Result<(), Fault> {
     if arguments.shard.is_some() {
-        let why =
-            "--shard divides one picture; divide a scene with `frames` by --frames, e.g. 0..100";
+        let why = "--shard divides one picture\nhint: divide a scene with `frames` by --frames, e.g. 0..100";
         return Err(Fault::refused(why));
     }
     let out = &arguments.output;
@@ -135,7 +134,7 @@ fn keep_exposure(
         None => {
             let why = format!(
                 "camera.sensor.auto_exposure: all frames have the exposure that is metered on frame {}, which is \
-                 neither rendered by this run nor in {}; render it first, give sensor.exposure, or set \
+                 neither rendered by this run nor in {}\nhint: render it first, give sensor.exposure, or set \
                  camera.sensor.auto_exposure.each_frame=true",
                 first.number,
                 out.display()

@@ -98,7 +98,7 @@ fn lamp(word: &str) -> Result<Curve, Fault> {
     };
     let known: Illuminant = serde_json::from_value(value).map_err(|_| {
         Fault::refused(format!(
-            "{word}: neither a file nor a lamp; name a .csv, .spd or .yml file, a lamp (a, c, d50, d65, \
+            "{word}: neither a file nor a lamp\nhint: name a .csv, .spd or .yml file, a lamp (a, c, d50, d65, \
              equal_energy, fl1 to fl12, led_b1 to led_b5, led_bh1, led_rgb1, led_v1, led_v2) or the \
              temperature of a black body in kelvin"
         ))

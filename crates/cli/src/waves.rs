@@ -73,7 +73,7 @@ fn premise(arguments: &LensArguments) -> Option<&'static str> {
 pub(crate) fn check(arguments: &LensArguments) -> Result<(), Fault> {
     match premise(arguments) {
         Some(name) if arguments.rays.is_some() || arguments.fit_opencv => Err(Fault::refused(
-            format!("{name} is for the analysis in waves; leave out --rays and --fit-opencv"),
+            format!("{name} is for the analysis in waves\nhint: leave out --rays and --fit-opencv"),
         )),
         _ => Ok(()),
     }
@@ -97,14 +97,15 @@ pub(crate) fn analyse(
     let mut train = lens.train.clone();
     if arguments.afocal {
         if let Some(efl) = report.paraxial.efl {
-            let why = format!("--afocal: the lens has a focal length of {efl} mm; leave it out");
+            let why =
+                format!("--afocal: the lens has a focal length of {efl} mm\nhint: leave it out");
             return Err(refused(&why));
         }
         train = train.with_eyepiece(EYEPIECE);
     }
     let planes = conjugate.planes(&train, focus).map_err(|error| match error {
         AnalysisError::Focus(FocusError::Afocal) => refused(
-            &"the lens is afocal: it images infinity to infinity, and has no focus; give --afocal to \
+            &"the lens is afocal: it images infinity to infinity, and has no focus\nhint: give --afocal to \
               analyse it by angles",
         ),
         error => refused(&error),
@@ -166,7 +167,7 @@ fn frequencies(arguments: &LensArguments) -> Result<Vec<f64>, Fault> {
     let frequencies = arguments.frequencies.clone().unwrap_or_default();
     match frequencies.iter().find(|f| !(**f >= 0.0 && f.is_finite())) {
         Some(wrong) => Err(Fault::refused(format!(
-            "--frequencies: {wrong} cycles/mm is no frequency; give numbers from 0 on"
+            "--frequencies: {wrong} cycles/mm is no frequency\nhint: give numbers from 0 on"
         ))),
         None => Ok(frequencies),
     }

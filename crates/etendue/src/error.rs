@@ -9,6 +9,7 @@ use etendue_render::annotations::AnnotationError;
 use etendue_render::expose::ExposeError;
 use etendue_render::light_field::LightFieldError;
 use etendue_render::output::{OutputError, PictureError};
+use etendue_report::Refusal;
 use etendue_scene::SceneError;
 
 impl From<LightFieldError> for Error {
@@ -66,20 +67,11 @@ pub enum Error {
 }
 
 impl Error {
-    /// What the command line says of it: the sentence, and behind it those of its causes that it does not quote.
+    /// What the command line says of it: the sentence, behind it those of its causes that it does not quote, and the
+    /// remedy on a line of its own.
     #[must_use]
     pub fn message(&self) -> String {
-        let mut message = self.to_string();
-        let mut cause = std::error::Error::source(self);
-        while let Some(inner) = cause {
-            let words = inner.to_string();
-            if !message.contains(&words) {
-                message.push_str(": ");
-                message.push_str(&words);
-            }
-            cause = inner.source();
-        }
-        message
+        Refusal::of(self).to_string()
     }
 
     /// Whether it is no fault: the caller asked to stop.

@@ -1,26 +1,22 @@
 //! Pictures of light from elsewhere, and what a sensor makes of them.
 
+mod exposed;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use etendue_files::MappedFile;
-use etendue_geometry::units::Micrometres;
 use etendue_image::{
     Cube, ExrChannels, Limits, MOST_BYTES, Plane, Quantity, Samples, cube, envi, npy,
 };
-use etendue_render::expose::{
-    self, BandFilm, KNOWN_UNITS, LightUnit, PictureLight, PixelLight, SensorLight,
-    pupil_solid_angle,
-};
+use etendue_render::expose::{BandFilm, LightUnit, PictureLight, PixelLight};
 use etendue_render::output::LayerFile;
-use etendue_scene::file::{RenderSpec, SensorFile};
 use etendue_scene::memory::Budget;
-use etendue_sensor::{Radiometry, Sensor, SensorError, SensorSpec};
 use etendue_spectrum::{Bands, Grid};
 use serde_json::Value;
 
+use crate::Error;
 use crate::words::{LIGHT_UNIT, NOISE_SEED, PITCH, PUPIL};
-use crate::{Error, ExposedImage};
 
 /// A picture of light: an EXR file in red, green and blue or in the layout of spectral images, an NPY array, an ENVI
 /// cube, or a Radiance picture.
@@ -156,7 +152,9 @@ impl LightImage {
         }
         let raster = etendue_image::decode(&bytes, limits);
         let raster = raster.map_err(|error| {
-            refused(format!("{error}; pictures of light are EXR, NPY, ENVI and Radiance files"))
+            refused(format!(
+                "{error}\nhint: pictures of light are EXR, NPY, ENVI and Radiance files"
+            ))
         })?;
         if !matches!(raster.samples(), Samples::F16(_) | Samples::F32(_)) {
             let why = "holds codes for a screen and no light; pictures of light are EXR, NPY, ENVI and Radiance \
@@ -396,173 +394,12 @@ impl LightImage {
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
-
-    /// What `sensor` makes of the picture: its pixels are the picture's.
-    ///
-    /// # Errors
-    ///
-    /// When nobody says in which unit the values are, radiance comes without an f-number, the sensor is for light
-    /// of another kind or of other pixels, or sees none of the bands.
-    pub fn on(self, sensor: &SensorFile, options: &ExposeOptions) -> Result<ExposedImage, Error> {
-        let path = self.path.clone();
-        let unit = self.resolved_unit(options)?;
-        let factor = self.factor(unit, options)?;
-        let mut notes: Vec<String> = self.notes.clone();
-        refuse_what_a_camera_knows(sensor)?;
-        let sensor = for_light(sensor, (unit, self.pixel_pitch), &path)?;
-        notes.extend(self.judge_size(&sensor)?);
-        let [columns, rows] = self.picture.size;
-        let bytes = SensorLight::bytes_of(&sensor, &self.picture);
-        fits(options.memory, bytes, [columns, rows, self.picture.depth()])
-            .map_err(|why| refused(&path, why))?;
-        let seed = match (options.seed, self.noise_seed) {
-            (Some(seed), _) => frame_seed(seed, options.frame),
-            (None, Some(seed)) => seed,
-            (None, None) => frame_seed(0, options.frame),
-        };
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let header = [
-            ("exposed_from", name),
-            ("light_unit", unit.to_string()),
-            ("noise_seed", seed.to_string()),
-        ];
-        let header = header.map(|(key, text)| (key.to_owned(), text)).to_vec();
-        let seeds = [options.seed.unwrap_or(seed), seed];
-        let light = SensorLight::from_picture(&sensor, self.picture, factor, (seeds, header));
-        let light = light.map_err(|error| match error {
-            expose::ExposeError::Sensor(error) => {
-                refused(&path, format!("its bands miss what the sensor sees: {error}"))
-            }
-            other => other.into(),
-        })?;
-        Ok(ExposedImage::new(light, self.inputs, notes))
-    }
-
-    fn resolved_unit(&self, options: &ExposeOptions) -> Result<LightUnit, Error> {
-        if self.quantity == Quantity::Reflectance {
-            let why =
-                "holds what is reflected and no light: multiply it by the light that falls on it";
-            return Err(refused(&self.path, why.to_owned()));
-        }
-        match (options.unit, &self.unit) {
-            (Some(unit), _) => Ok(unit),
-            (None, Some(text)) => LightUnit::parse(text).map_err(|_| {
-                let text = text.escape_debug();
-                let why = format!(
-                    "gives its values in \"{text}\", which is not read: give --unit, {KNOWN_UNITS}"
-                );
-                refused(&self.path, why)
-            }),
-            (None, None) => {
-                let why = format!(
-                    "does not say in which unit its values are: give --unit, {KNOWN_UNITS}"
-                );
-                Err(refused(&self.path, why))
-            }
-        }
-    }
-
-    /// W·m⁻²·nm⁻¹ on the sensor of a value of 1.
-    fn factor(&self, unit: LightUnit, options: &ExposeOptions) -> Result<f64, Error> {
-        let is_radiance = matches!(unit, LightUnit::Radiance(_));
-        let Some(f_number) = options.f_number else {
-            return match (is_radiance, self.solid_angle) {
-                (true, Some(solid_angle)) => Ok(unit.irradiance(solid_angle)),
-                (true, None) => Err(refused(
-                    &self.path,
-                    "its values are radiance, of which a lens lets a part onto the sensor: give its --f-number N \
-                     (E = π L / (1 + 4 N² (1 + m)²)), or irradiance on the sensor with its --unit W/m2/nm"
-                        .to_owned(),
-                )),
-                (false, _) => Ok(unit.irradiance(1.0)),
-            };
-        };
-        if !is_radiance {
-            let why = format!(
-                "an f-number makes irradiance of radiance, and the values are in {unit}: leave it out"
-            );
-            return Err(refused(&self.path, why));
-        }
-        let m = options.magnification;
-        if !(f_number > 0.0 && f_number.is_finite() && m >= 0.0 && m.is_finite()) {
-            let why = format!(
-                "f-number {f_number}, magnification {m}: above 0, and 0 or more, are needed"
-            );
-            return Err(refused(&self.path, why));
-        }
-        Ok(unit.irradiance(pupil_solid_angle(f_number, m)))
-    }
-
-    /// Refuses a sensor that says it has other pixels; a note where a preset has.
-    fn judge_size(&self, sensor: &Sensor) -> Result<Option<String>, Error> {
-        let [columns, rows] = self.picture.size;
-        if columns.max(rows) > 65_535 {
-            return Err(refused(&self.path, "is larger than 65535 pixels a side".to_owned()));
-        }
-        let [wide, high] = sensor.resolution().map(|side| side as usize);
-        if [wide, high] == [columns, rows] {
-            return Ok(None);
-        }
-        if sensor.spec().resolution.is_some() {
-            let why = format!(
-                "has {columns} x {rows} pixels, and the sensor's `resolution` is {wide} x {high}: leave that out, or \
-                 --set it"
-            );
-            return Err(refused(&self.path, why));
-        }
-        let known = sensor.spec().model.map(|model| model.preset().name);
-        Ok(known.map(|name| {
-            format!(
-                "the picture has {columns} x {rows} pixels, of the {wide} x {high} of an {name}"
-            )
-        }))
-    }
-}
-
-/// The seed of a frame's noise, as a render has it.
-fn frame_seed(seed: u64, frame: u32) -> u64 {
-    RenderSpec { seed, frame, ..RenderSpec::default() }.frame_seed()
 }
 
 /// The film of a cube.
 fn film(axis: &cube::BandAxis, values: Vec<f32>) -> Result<BandFilm, String> {
     let grid = Grid::from_edges(axis.edges().to_vec()).map_err(|error| error.to_string())?;
     Ok(BandFilm { bands: Bands::Spectral(grid), values, parts: Vec::new() })
-}
-
-/// The sensor of `file` with the radiometry that light in `unit` has, and with pixels of `pitch` (µm) where it says
-/// nothing of its own.
-fn for_light(
-    file: &SensorFile,
-    (unit, pitch): (LightUnit, Option<f64>),
-    path: &Path,
-) -> Result<Sensor, Error> {
-    let wanted = match unit {
-        LightUnit::FullScale => Radiometry::Digital,
-        LightUnit::Radiance(_) | LightUnit::Irradiance(_) => Radiometry::Physical,
-    };
-    match file.spec.radiometry {
-        Some(own) if own != wanted => {
-            let [own, wanted] = [own, wanted].map(|radiometry| match radiometry {
-                Radiometry::Digital => "digital",
-                Radiometry::Physical => "physical",
-            });
-            Err(refused(
-                path,
-                format!(
-                    "its values are in {unit}, for a sensor of {wanted} radiometry, and this one's `radiometry` is \
-                     {own}: leave that out, or give another --unit"
-                ),
-            ))
-        }
-        _ => {
-            let mut spec = SensorSpec { radiometry: Some(wanted), ..file.spec.clone() };
-            if spec.model.is_none() && spec.pixel_pitch.is_none() {
-                spec.pixel_pitch = pitch.map(Micrometres);
-            }
-            Ok(Sensor::new(&spec).map_err(|error| file.fault(&error))?)
-        }
-    }
 }
 
 /// The ENVI cube of which `path` is one of the two files, and both.
@@ -582,26 +419,4 @@ fn fits(memory: Option<u64>, bytes: u64, [columns, rows, depth]: [usize; 3]) -> 
 
 fn refused(path: &Path, why: impl std::fmt::Display) -> Error {
     Error::Refused(format!("{}: {why}", path.display()))
-}
-
-/// Refuses parts of a sensor that ask a camera which a picture from elsewhere has not.
-fn refuse_what_a_camera_knows(sensor: &SensorFile) -> Result<(), Error> {
-    let spec = &sensor.spec;
-    let diffuses = spec.carrier_diffusion.is_some_and(|way| way.0 > 0.0);
-    let (key, why) = if spec.photodiodes.is_some() {
-        (
-            "photodiodes",
-            "a picture from elsewhere does not say through which part of the pupil its light came",
-        )
-    } else if spec.angular_response.is_some() {
-        ("angular_response", "a picture from elsewhere does not say at which angle its light came")
-    } else if diffuses {
-        (
-            "carrier_diffusion",
-            "a picture from elsewhere does not say what light fell between the middles of its pixels",
-        )
-    } else {
-        return Ok(());
-    };
-    Err(sensor.fault(&SensorError::Misplaced { key, why }).into())
 }

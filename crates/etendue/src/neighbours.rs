@@ -132,7 +132,7 @@ pub(crate) fn refuse_views(scene: &Scene) -> Result<(), Error> {
         && scene.layers.iter().any(|layer| layer.step().is_some_and(|to| to.moment().is_some()))
     {
         return Err(Error::Refused(format!(
-            "{}: layers: `to`: \"open\" and \"close\" are moments of one camera's exposure; leave them out, or `serial`",
+            "{}: layers: `to`: \"open\" and \"close\" are moments of one camera's exposure\nhint: leave them out, or `serial`",
             scene.path.display()
         )));
     }

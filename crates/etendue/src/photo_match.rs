@@ -40,8 +40,9 @@ impl RawPhoto {
             let dng::RawDng { size, numbers, white, exposure, .. } = read;
             return Ok(Self { size, numbers, white, exposure });
         }
-        let raster = etendue_image::decode(&bytes, Limits::default())
-            .map_err(|error| refuse(format!("{error}; give a DNG, or a PNG of raw numbers")))?;
+        let raster = etendue_image::decode(&bytes, Limits::default()).map_err(|error| {
+            refuse(format!("{error}\nhint: give a DNG, or a PNG of raw numbers"))
+        })?;
         let developed = "is a developed picture, gamma-encoded: give the camera's raw numbers, as a DNG or a grey PNG of 16 bits";
         match (raster.size(), raster.channels(), raster.into_samples()) {
             (size, 1, Samples::U16(numbers)) => {
@@ -95,7 +96,7 @@ pub fn match_photo(
     let of_scene = format!("{}: ", session.file().path().display());
     let idle = || {
         Error::Refused(format!(
-            "{of_scene}camera.sensor: a photograph is matched by a sensor that counts electrons; give it one, such as \
+            "{of_scene}camera.sensor: a photograph is matched by a sensor that counts electrons\nhint: give it one, such as \
              {{ \"type\": \"raw\", \"system_gain\": 0.3, \"bit_depth\": 12 }}"
         ))
     };
@@ -106,7 +107,7 @@ pub fn match_photo(
         if let Some(key) = beyond_the_fit(sensor.spec()) {
             return Err(Error::Refused(format!(
                 "{of_scene}camera.sensor.{key}: a photograph is matched by one plain read-out, whose gain, noise, black and \
-                 exposure are fitted; leave it out, and say `system_gain` and `exposure` instead"
+                 exposure are fitted\nhint: leave it out, and say `system_gain` and `exposure` instead"
             )));
         }
         let size = sensor.resolution().map(|side| side as usize);

@@ -38,8 +38,9 @@ pub fn keep_apart<'p>(
 ) -> Result<(), Error> {
     if let Some(path) = outputs.iter().find(|path| path.is_dir()) {
         let path = path.display();
-        let why =
-            format!("{path}: is a folder, where a file is to be written; remove or rename it");
+        let why = format!(
+            "{path}: is a folder, where a file is to be written\nhint: remove or rename it"
+        );
         return Err(Error::Refused(why));
     }
     let files = Transaction::new().keeping(inputs);

@@ -218,7 +218,7 @@ impl Session {
             {
                 return Err(Error::Refused(format!(
                     "--camera {camera}: frames set {path} of the scene's own camera, which it takes the place \
-                     of; leave one of them out"
+                     of\nhint: leave one of them out"
                 )));
             }
         }

@@ -120,7 +120,7 @@ impl InputFolder {
     /// When there is no such file, or it is none that may be read.
     pub fn find(&self, written: &str) -> Result<FoundFile, FindError> {
         if written.is_empty() {
-            return Err(FindError::Refused("is empty; name a file".to_owned()));
+            return Err(FindError::Refused("is empty\nhint: name a file".to_owned()));
         }
         // Judged by its text first, so that a scene cannot ask which files exist elsewhere.
         if self.limit().is_some() {
@@ -147,7 +147,9 @@ impl InputFolder {
             _ => FindError::Refused(format!("\"{written}\" cannot be read: {error}")),
         })?;
         if real.is_dir() {
-            return Err(FindError::Refused(format!("\"{written}\" is a folder; name a file")));
+            return Err(FindError::Refused(format!(
+                "\"{written}\" is a folder\nhint: name a file"
+            )));
         }
         self.opener.record([path.clone()]);
         Ok(FoundFile { path, real })
@@ -155,7 +157,7 @@ impl InputFolder {
 
     fn outside(&self, written: &str, how: &str) -> FindError {
         FindError::Refused(format!(
-            "\"{written}\" {how}the scene's folder {}; move the file there, or pass --allow-outside",
+            "\"{written}\" {how}the scene's folder {}\nhint: move the file there, or pass --allow-outside",
             self.real.display()
         ))
     }

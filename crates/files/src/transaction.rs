@@ -193,7 +193,7 @@ fn identity(path: &Path) -> Option<FileIdentity> {
 #[non_exhaustive]
 pub enum WriteError {
     /// The system refused.
-    #[error("cannot write {}: {source}; {remedy}", path.display())]
+    #[error("cannot write {}: {source}\nhint: {remedy}", path.display())]
     Io {
         /// The file or folder.
         path: PathBuf,
@@ -204,8 +204,8 @@ pub enum WriteError {
     },
     /// The file is an input.
     #[error(
-        "{} would be written over, and is read by this command{}; nothing was written: choose \
-         another folder or name",
+        "{} would be written over, and is read by this command{}; nothing was written\n\
+         hint: choose another folder or name",
         path.display(),
         also_called(path, input)
     )]

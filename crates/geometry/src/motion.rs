@@ -74,7 +74,7 @@ impl Steady {
 pub enum MotionError {
     /// No key, or not one time for each transform.
     #[error(
-        "there are {times} times and {transforms} transforms; give as many times as transforms, at least one"
+        "there are {times} times and {transforms} transforms\nhint: give as many times as transforms, at least one"
     )]
     Count {
         /// Times that were given.
@@ -83,7 +83,7 @@ pub enum MotionError {
         transforms: usize,
     },
     /// A number is infinite or none.
-    #[error("{0} is not finite; give finite numbers")]
+    #[error("{0} is not finite\nhint: give finite numbers")]
     NotFinite(String),
     /// Times that do not increase.
     #[error(
@@ -96,13 +96,15 @@ pub enum MotionError {
         time: f64,
     },
     /// A transform that is no rotation and scale along the axes.
-    #[error("transform {0} shears; give a translation, a rotation and a scale")]
+    #[error("transform {0} shears\nhint: give a translation, a rotation and a scale")]
     Shear(usize),
     /// A scale that is 0 at a key or on the way to the next one.
-    #[error("the scale passes through 0 at or after transform {0}; keep its sign from key to key")]
+    #[error(
+        "the scale passes through 0 at or after transform {0}\nhint: keep its sign from key to key"
+    )]
     Scale(usize),
     /// A spin about no axis.
-    #[error("the spin has an axis of length 0; give a direction")]
+    #[error("the spin has an axis of length 0\nhint: give a direction")]
     Axis,
 }
 

@@ -20,7 +20,7 @@ pub struct Steps {
 pub enum StepsError {
     /// No time, or not one list of corners, and of normals if any, for each.
     #[error(
-        "{times} times, {corners} lists of corners and {normals} of normals; give one of each for each time"
+        "{times} times, {corners} lists of corners and {normals} of normals\nhint: give one of each for each time"
     )]
     Count {
         /// Times.
@@ -34,7 +34,9 @@ pub enum StepsError {
     #[error("time {0} is not finite or not after the one before it; sort the times")]
     Order(usize),
     /// Lists of different lengths, or shorter than what triangles name.
-    #[error("the shape at time {0} has not all corners; give each shape as many as the first has")]
+    #[error(
+        "the shape at time {0} has not all corners\nhint: give each shape as many as the first has"
+    )]
     Corners(usize),
     /// A corner of a triangle that is not finite.
     #[error("a corner of a triangle is not finite at time {0}")]

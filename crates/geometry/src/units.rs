@@ -62,7 +62,7 @@ const TIMES: &[Unit] = &[
 #[non_exhaustive]
 pub enum QuantityError {
     /// No number in front.
-    #[error("\"{text}\" does not start with a number; write for example \"{example}\"")]
+    #[error("\"{text}\" does not start with a number\nhint: write for example \"{example}\"")]
     NoNumber {
         /// The string.
         text: String,
@@ -70,7 +70,7 @@ pub enum QuantityError {
         example: String,
     },
     /// A number and nothing behind it.
-    #[error("\"{text}\" has no unit; write \"{text} {unit}\", or the number without quotes")]
+    #[error("\"{text}\" has no unit\nhint: write \"{text} {unit}\", or the number without quotes")]
     NoUnit {
         /// The string.
         text: String,
@@ -312,7 +312,7 @@ mod tests {
             error("50 mn"),
             "\"50 mn\": unknown unit `mn`, known: cm, ft, in, km, m, mm, nm, um"
         );
-        assert!(error("50").contains("has no unit; write \"50 mm\""), "{}", error("50"));
+        assert!(error("50").contains("has no unit\nhint: write \"50 mm\""), "{}", error("50"));
         assert!(error("mm").contains("does not start with a number"), "{}", error("mm"));
         assert!(error("nan mm").contains("does not start with a number"), "{}", error("nan mm"));
         assert!(error("1e308 km").contains("finite"), "{}", error("1e308 km"));

@@ -187,7 +187,7 @@ impl Directory<'_> {
         let channels = self.first(277)?.unwrap_or(1.0);
         if channels != 1.0 {
             return Err(format!(
-                "has {channels} numbers a pixel: it is developed, and no raw; give the camera's own numbers"
+                "has {channels} numbers a pixel: it is developed, and no raw\nhint: give the camera's own numbers"
             ));
         }
         let compression = self.first(259)?.unwrap_or(1.0);

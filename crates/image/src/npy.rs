@@ -70,7 +70,8 @@ fn read_as<T>(
     rounded: impl Fn(f64) -> T,
 ) -> Result<(Vec<usize>, Vec<T>), String> {
     let (text, data) = split(bytes)?;
-    let broken = |why: String| format!("has a broken header: {why}; write it with numpy.save");
+    let broken =
+        |why: String| format!("has a broken header: {why}\nhint: write it with numpy.save");
     let text = std::str::from_utf8(text).map_err(|_| broken("it is not UTF-8".to_owned()))?;
     // What kind of numbers, in which order, and how many.
     let header = NpyHeader::parse(text).map_err(broken)?;
@@ -115,10 +116,10 @@ fn read_as<T>(
 
 /// The header's text and the bytes behind it.
 fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
-    let cut_off = || "ends inside its header; copy it again".to_owned();
-    let rest = bytes
-        .strip_prefix(b"\x93NUMPY")
-        .ok_or("is no NPY file: it does not start with \"\\x93NUMPY\"; write it with numpy.save")?;
+    let cut_off = || "ends inside its header\nhint: copy it again".to_owned();
+    let rest = bytes.strip_prefix(b"\x93NUMPY").ok_or(
+        "is no NPY file: it does not start with \"\\x93NUMPY\"\nhint: write it with numpy.save",
+    )?;
     let (&[version, _minor], rest) = rest.split_first_chunk().ok_or_else(cut_off)?;
     let (length, rest) = match version {
         1 => {
@@ -133,7 +134,7 @@ fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
     };
     if length > LONGEST_HEADER {
         return Err(format!(
-            "has a header of {length} bytes, where an array of numbers needs a hundred; write it \
+            "has a header of {length} bytes, where an array of numbers needs a hundred\nhint: write it \
              with numpy.save"
         ));
     }

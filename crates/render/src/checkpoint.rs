@@ -1,17 +1,20 @@
-//! What there is of a render, kept on disk on the way: after an interruption it goes on from there.
+//! What there is of a render, kept on disk on the way: after an interruption it goes on from there. And what there
+//! is in shares of its samples.
 
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use etendue_files::Transaction;
+use etendue_optics::element::StatusCounts;
 use etendue_scene::Scene;
 
-use crate::film::FilmLayer;
+use crate::film::{FilmLayer, filled};
 use crate::film_file::{FilmError, FilmFile, Identity, Writing};
-use crate::samples::{Averaging, Sum};
+use crate::samples::Averaging;
 use crate::shard::Shard;
-use crate::tiles::RayCounts;
+use crate::sum::Sum;
+use crate::tile::RayCounts;
 
 /// Where what a render has so far is kept, and how often.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -116,4 +119,32 @@ impl<'a> Keeper<'a> {
             .map(|error| format!("no checkpoint could be kept: {error}"));
         state.written = Instant::now();
     }
+}
+
+/// Puts the shares of a render's samples together, in the order of the samples, whatever that of the files
+/// is: sums with what rounding took from them, and layers that are not sampled from the first share.
+pub(crate) fn put_together(
+    shares: &[FilmFile],
+    resolution: [u32; 2],
+    centres: &mut [&mut FilmLayer],
+    averaged: &mut [Averaging<'_>],
+) -> Result<RayCounts, FilmError> {
+    let counts = Mutex::new(RayCounts::default());
+    let mut shares: Vec<&FilmFile> = shares.iter().collect();
+    shares.sort_by_key(|share| share.header.shard);
+    for share in shares {
+        let lengths = averaged.iter().map(|part| part.sums().len());
+        let mut own = lengths
+            .map(|length| filled(Sum::default(), length))
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(|error| share.error(error.to_string()))?;
+        let mut sums: Vec<&mut [Sum]> = own.iter_mut().map(Vec::as_mut_slice).collect();
+        let has_data = share.header.shard.has_data();
+        share.fill(if has_data { &mut *centres } else { &mut [] }, &mut sums, resolution)?;
+        for (part, own) in averaged.iter_mut().zip(&own) {
+            part.sums_mut().iter_mut().zip(own).for_each(|(sum, own)| sum.add_sum(*own));
+        }
+        RayCounts::add(&counts, share.counts(), &StatusCounts::default());
+    }
+    Ok(counts.into_inner().unwrap_or_else(PoisonError::into_inner))
 }

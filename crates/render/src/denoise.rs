@@ -9,10 +9,8 @@ use etendue_tracer::LayerSpec;
 use crate::RenderError;
 use crate::expose::{has_spectrum, three_planes};
 use crate::film::{NoMemory, filled};
+pub use crate::output::DENOISED;
 use crate::output::{Channel, Layer, Look, Picture, Values};
-
-/// The name of the layer.
-pub const DENOISED: &str = "Denoised";
 
 /// Bytes a pixel of the picture and its guides on their way through the library, which takes more by
 /// itself, and of what comes back.
@@ -43,7 +41,7 @@ pub fn guide(scene: &mut Scene) -> Result<(), RenderError> {
     if has_spectrum(scene) {
         return refused(
             "knows red, green and blue alone, and camera.sensor is `multispectral`: its bands would keep \
-             their noise; leave it out",
+             their noise\nhint: leave it out",
         );
     }
     for layer in [LayerSpec::MeanAlbedo, LayerSpec::MeanNormal] {

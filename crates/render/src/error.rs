@@ -17,11 +17,13 @@ pub enum RenderError {
     #[error(transparent)]
     Build(#[from] BuildError),
     /// The backend was left out when this program was built.
-    #[error("this program was built without {0}; use `--accel bvh`, or build it with the feature")]
+    #[error(
+        "this program was built without {0}\nhint: use `--accel bvh`, or build it with the feature"
+    )]
     Absent(&'static str),
     /// An instruction set was asked for that the backend cannot be told.
     #[error(
-        "only Embree can be told an instruction set; leave `--isa` out, or use `--accel embree`"
+        "only Embree can be told an instruction set\nhint: leave `--isa` out, or use `--accel embree`"
     )]
     NotEmbree,
     /// The result is no picture; a fault of this program.
@@ -51,7 +53,7 @@ pub enum RenderError {
     Diffraction(String),
     /// A light's spectrum is of no use to the sensor.
     #[error(
-        "a light's spectrum: {0}; give the light `equal_energy`, `a` or {{\"black_body\": kelvin}}, \
+        "a light's spectrum: {0}\nhint: give the light `equal_energy`, `a` or {{\"black_body\": kelvin}}, \
          which reach further, or a curve or cube that does, or the sensor a quantum_efficiency or bands that see it"
     )]
     Lights(String),
@@ -60,20 +62,20 @@ pub enum RenderError {
     Image(#[from] ImageError),
     /// What there is of samples that go on until an error is reached is not kept on the way.
     #[error(
-        "--checkpoint: samples that go on until an error is reached are not kept on the way; give \
+        "--checkpoint: samples that go on until an error is reached are not kept on the way\nhint: give \
          `render.samples` a number, or divide the render by --shard"
     )]
     Checkpoint,
     /// Which samples are taken is judged from all before them.
     #[error(
-        "--shard-by samples: samples that go on until an error is reached are not known beforehand; give \
+        "--shard-by samples: samples that go on until an error is reached are not known beforehand\nhint: give \
          `render.samples` a number, or divide the rows, by --shard alone"
     )]
     SampleShares,
     /// A time ends differently on each machine, so that parts of a picture do not fit together.
     #[error(
         "--shard, --checkpoint: a time (`render.samples.time`) ends at another number of samples in each \
-         part; give `render.samples` a number"
+         part\nhint: give `render.samples` a number"
     )]
     Timed,
     /// A file of what is filled of a film cannot be used.

@@ -8,7 +8,6 @@ use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 use etendue_tracer::layer::{self, Kept, Look, Taken};
 
-use crate::expose::BandFilm;
 use crate::output::{Channel, Layer, Values};
 
 /// How finely data layers are kept.
@@ -47,7 +46,7 @@ pub(crate) fn bytes_of_plane(spec: LayerSpec, precision: Precision) -> u64 {
 /// The system has less memory than the pixels of a picture take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the system has too little memory for {} more of the picture; ask for fewer pixels, layers or bands",
+    "the system has too little memory for {} more of the picture\nhint: ask for fewer pixels, layers or bands",
     Size(*bytes)
 )]
 pub struct NoMemory {
@@ -75,8 +74,8 @@ pub(crate) fn filled<T: Clone>(value: T, count: usize) -> Result<Vec<T>, NoMemor
 pub(crate) struct FilmLayer {
     pub(crate) spec: LayerSpec,
     row: layer::Layer,
-    names: Vec<String>,
-    planes: Vec<Values>,
+    pub(crate) names: Vec<String>,
+    pub(crate) planes: Vec<Values>,
 }
 
 /// Rows of one plane, lent to one thread.
@@ -170,24 +169,6 @@ impl FilmLayer {
         };
         let planes = names.iter().map(|_| plane()).collect::<Result<_, _>>()?;
         Ok(Self { spec, row, names, planes })
-    }
-
-    /// Takes light out of its bands, whose place red, green and blue take; `None` when they are the bands
-    /// already.
-    pub(crate) fn take_bands(&mut self, bands: &Bands) -> Result<Option<BandFilm>, NoMemory> {
-        if !self.spec.is_light() || *bands == Bands::Rgb {
-            return Ok(None);
-        }
-        let planes = self.planes.iter().filter_map(|plane| match plane {
-            Values::F32(values) => Some(values.as_slice()),
-            Values::F64(_) | Values::U16(_) | Values::U32(_) => None,
-        });
-        let film = BandFilm::woven(bands.clone(), &planes.collect::<Vec<_>>())?;
-        // Bands are not kept twice while colours are made of them.
-        self.planes.clear();
-        self.names = ["R", "G", "B"].map(str::to_owned).into();
-        self.planes = film.colors()?.map(Values::F32).into();
-        Ok(Some(film))
     }
 
     /// Each plane with the name that it has in files of shards.

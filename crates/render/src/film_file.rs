@@ -18,10 +18,10 @@ use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 use crate::adaptive::SampleCounts;
 use crate::film::FilmLayer;
 use crate::output::{OutputError, Values};
-use crate::samples::Sum;
-use crate::shard::Shard;
+use crate::shard::{Shard, ShardBy};
 use crate::sparkles::Sparkles;
-use crate::tiles::RayCounts;
+use crate::sum::Sum;
+use crate::tile::RayCounts;
 use etendue_files::Transaction;
 
 const MAGIC: &[u8] = b"etendue film 1\n";
@@ -254,9 +254,9 @@ impl FilmFile {
         let bytes =
             etendue_files::read(path, u64::MAX).map_err(|error| refused(&error.to_string()))?;
         let body = bytes.strip_prefix(MAGIC).ok_or_else(|| {
-            refused("is no part of a render; give files that `etendue render --shard` wrote")
+            refused("is no part of a render\nhint: give files that `etendue render --shard` wrote")
         })?;
-        let torn = || refused("is not whole; remove it, and render this part again");
+        let torn = || refused("is not whole\nhint: remove it, and render this part again");
         let (content, hash) = bytes.split_last_chunk::<8>().ok_or_else(torn)?;
         if xxh3_64(content) != u64::from_le_bytes(*hash) {
             return Err(torn());
@@ -354,6 +354,54 @@ impl FilmFile {
         match wanted.into_keys().next() {
             Some(name) => Err(self.error(format!("lacks {name}"))),
             None => Ok(()),
+        }
+    }
+}
+
+/// Refuses shares that are not one of each of one render, by name.
+pub(crate) fn must_be_whole(shares: &[FilmFile], identity: &Identity) -> Result<(), String> {
+    let Some(first) = shares.first() else {
+        return Err("there is no share to put together".to_owned());
+    };
+    let Shard { count, by, .. } = first.header.shard;
+    let mut found: BTreeMap<Shard, &FilmFile> = BTreeMap::new();
+    // Each is of the same render and the same division, and none is there twice.
+    for share in shares {
+        share.must_be_of(identity).map_err(|error| error.to_string())?;
+        let shard = share.header.shard;
+        let (path, other) = (share.path.display(), first.path.display());
+        if shard.count != count {
+            return Err(format!("{path}: is share {shard}, and {other} is one of {count}"));
+        }
+        if shard.by != by {
+            let of = |by| if by == ShardBy::Rows { "rows" } else { "samples" };
+            let (this, that) = (of(shard.by), of(by));
+            return Err(format!(
+                "{path}: is a share of the {this}, and {other} is one of the {that}"
+            ));
+        }
+        if let Some(twice) = found.insert(shard, share) {
+            let other = twice.path.display();
+            return Err(format!("{path}: is share {shard}, as {other} is\nhint: give each once"));
+        }
+    }
+    // None is missing.
+    let missing = (0..count).map(|index| Shard { index, count, by });
+    let missing: Vec<String> = missing
+        .filter(|shard| !found.contains_key(shard))
+        .map(|shard| shard.to_string())
+        .take(8)
+        .collect();
+    match missing.as_slice() {
+        [] => Ok(()),
+        missing => {
+            let have = found.len();
+            let left = count as usize - have - missing.len();
+            let more = if left > 0 { format!(" and {left} more") } else { String::new() };
+            let lack = missing.join(", ") + &more;
+            Err(format!(
+                "{have} of {count} shares are here; missing: {lack}\nhint: render them first"
+            ))
         }
     }
 }

@@ -16,6 +16,7 @@
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests set their stage by hand"))]
 
 mod adaptive;
+mod adding;
 mod alike;
 pub mod annotations;
 mod band_paths;
@@ -33,6 +34,7 @@ mod images;
 pub mod light_field;
 mod lighting;
 pub mod losses;
+mod merge;
 mod names;
 mod other_frame;
 pub mod output;
@@ -43,10 +45,13 @@ mod radiance;
 pub mod render;
 pub mod report;
 mod samples;
+mod sampling;
 pub mod serial;
 mod shard;
 mod sparkles;
 mod stopping;
+mod sum;
+mod tile;
 mod tiles;
 pub mod tolerance;
 mod watch;

@@ -20,7 +20,7 @@ use crate::output::{
     Development, Layer, LayerFile, Look, Outputs, Picture, PictureError, Values, luminance,
 };
 use crate::radiance::LightPass;
-use crate::samples::Sampling;
+use crate::sampling::Sampling;
 use crate::shard::Shard;
 use crate::tiles::Job;
 use crate::watch::Watcher;

@@ -4,34 +4,17 @@ use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use crate::adaptive::{Adaptive, Rule, SampleCounts};
+use crate::adaptive::{Adaptive, Rule};
 use crate::error::RenderError;
 use crate::film::{FilmLayer, NoMemory};
-use crate::samples::{Averaging, Sampling};
-use crate::tiles::{Job, RayCounts};
+use crate::samples::Averaging;
+use crate::sampling::Sampling;
+use crate::tile::RayCounts;
+use crate::tiles::{Beside, Job, Passed};
 use crate::watch::{SoFar, Watcher};
 
 /// The share of what is left of a time that a pass may be reckoned to take.
 const SHARE_OF_TIME: f64 = 0.95;
-
-/// What the passes left.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Passed {
-    /// Samples that every pixel has.
-    pub(crate) samples: u32,
-    /// Whether that is all that was wanted.
-    pub(crate) is_complete: bool,
-    /// How many samples the pixels have, where that differs.
-    pub(crate) counts: Option<SampleCounts>,
-}
-
-/// The layers that are not averaged.
-pub(crate) struct Beside<'a, 'f> {
-    /// Along chief rays.
-    pub(crate) centres: &'a [&'f mut FilmLayer],
-    /// Those that tell of sampling.
-    pub(crate) told: &'a mut [&'f mut FilmLayer],
-}
 
 impl Job<'_> {
     /// Takes the passes after the first `samples` samples. When it is stopped after one, the layers hold
@@ -93,8 +76,8 @@ impl Job<'_> {
     ) -> Result<Passed, RenderError> {
         let mut passed: Option<Passed> = None;
         while adaptive.goes_on() {
-            let wanted = adaptive.wanted();
-            let mut add = |part: &mut Averaging<'_>| part.add_wanted(wanted, watcher, traffic);
+            let wanted = |pixel| adaptive.wanted(pixel);
+            let mut add = |part: &mut Averaging<'_>| part.add_wanted(&wanted, watcher, traffic);
             if let Err(stopped) = parts.iter_mut().try_for_each(&mut add) {
                 return passed.ok_or(stopped.into());
             }

@@ -3,12 +3,12 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use etendue_camera::{BandGroup, Camera, CameraRays, FilmSamples, PixelSamples, squares_of_pair};
+use etendue_camera::{BandGroup, Camera, CameraRays, FilmSamples};
 use etendue_geometry::RayBatch;
 use etendue_tracer::transport::{Parts, RaySamples};
-use etendue_tracer::{LayerSpec, LightGroup, LightingContext, Modulation, Rules, Samples};
+use etendue_tracer::{LayerSpec, LightGroup, LightingContext, Modulation, Rules};
 
-use crate::samples::{Averaged, CAMERA_PAIRS, Memory};
+use crate::sampling::{Averaged, Memory};
 
 /// Samples that are traced together: enough that what is left of a batch after a few bounces still
 /// fills packets, and few enough that its arrays stay in the cache.
@@ -147,22 +147,6 @@ fn counts(layer: LayerSpec, group: LightGroup) -> [bool; 2] {
         LayerSpec::Indirect => [false, true],
         LayerSpec::LightGroup { group: wanted } => [wanted == group; 2],
         _ => [true; 2],
-    }
-}
-
-/// The random numbers of a batch of rays.
-#[derive(Debug, Default)]
-pub(crate) struct SampleNumbers {
-    /// The pixel's numbers and the sample's index of each sample of the film.
-    pub(crate) samples: Vec<(PixelSamples, u32)>,
-    /// The sample of each ray.
-    of_ray: Vec<u32>,
-}
-
-impl Samples for SampleNumbers {
-    fn squares_of_pair(&self, rays: &[u32], pair: u32, out: &mut Vec<[f64; 2]>) {
-        let samples = rays.iter().map(|&ray| self.samples[self.of_ray[ray as usize] as usize]);
-        squares_of_pair(samples, CAMERA_PAIRS + pair, out);
     }
 }
 

@@ -20,16 +20,17 @@ use crate::adaptive::{Rule, SampleCounts};
 use crate::checkpoint::{Checkpoint, Keeper};
 use crate::error::RenderError;
 use crate::film::{FilmLayer, NoMemory};
-use crate::film_file::{FilmFile, Identity};
+use crate::film_file::{FilmFile, Identity, must_be_whole};
 use crate::images::Images;
 use crate::other_frame::FollowedFrame;
 use crate::output::{Development, Layer, Picture, PictureError};
-use crate::passes::Passed;
 use crate::radiance::LightPass;
-use crate::samples::{Sampling, Sum, short_passes};
-use crate::shard::{Shard, must_be_whole};
+use crate::sampling::{Sampling, short_passes};
+use crate::shard::Shard;
 use crate::stopping::Stopping;
-use crate::tiles::{Done, Job, RayCounts};
+use crate::sum::Sum;
+use crate::tile::RayCounts;
+use crate::tiles::{Done, Job, Passed};
 use crate::watch::{Watch, Watcher};
 use crate::{Plan, diffraction, expose, lighting, names};
 
@@ -397,7 +398,7 @@ fn finished(
     let photodiodes = scene.sensor.as_ref().map_or(&[][..], expose::photodiodes);
     let is_photodiode = |spec| photodiodes.iter().any(|(layer, _)| *layer == spec);
     for layer in &mut film {
-        let bands = layer.take_bands(&plan.bands)?;
+        let bands = expose::BandFilm::taken_from(layer, &plan.bands)?;
         // Of the picture and of photodiodes: other parts of its light are to look at.
         match (layer.spec, bands) {
             (LayerSpec::Radiance, bands) => band_film = bands,
@@ -448,7 +449,7 @@ fn so_far(
     let layers = match picture {
         Some(layer) => {
             let mut layer = FilmLayer::clone(layer);
-            layer.take_bands(&plan.bands)?;
+            expose::BandFilm::taken_from(&mut layer, &plan.bands)?;
             layer.into_layers(true)
         }
         None => Vec::new(),

@@ -1,28 +1,12 @@
 //! Shares of a render: it is divided over machines, and its picture is the same to the bit.
 
-use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
-use std::path::Path;
-use std::sync::{Mutex, PoisonError};
-
-use etendue_files::Transaction;
-use etendue_optics::element::StatusCounts;
-use etendue_scene::Scene;
 use serde::{Deserialize, Serialize};
 
-use crate::Plan;
-use crate::adaptive::SampleCounts;
-use crate::error::RenderError;
-use crate::film::{FilmLayer, filled};
-use crate::film_file::{FilmError, FilmFile, Identity, Writing};
-use crate::output::OutputError;
-use crate::passes::Passed;
-use crate::render::{Film, empty_film};
-use crate::samples::{Averaging, Sum};
-use crate::tiles::{RayCounts, TILE};
+use crate::tile::TILE;
 
 /// What of a render is dealt out to its shares.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
@@ -38,10 +22,10 @@ pub enum ShardBy {
 /// A share of a render.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Shard {
-    index: u32,
-    count: u32,
+    pub(crate) index: u32,
+    pub(crate) count: u32,
     #[serde(default)]
-    by: ShardBy,
+    pub(crate) by: ShardBy,
 }
 
 impl Shard {
@@ -146,154 +130,8 @@ impl FromStr for Shard {
             Some((number.trim().parse().ok()?, count.trim().parse().ok()?))
         });
         numbers.and_then(|(number, count)| Self::new(number, count)).ok_or_else(|| {
-            format!("\"{text}\" is no share; write NUMBER/COUNT, from 1/8 to 8/8 for eight of them")
+            format!("\"{text}\" is no share\nhint: write NUMBER/COUNT, from 1/8 to 8/8 for eight of them")
         })
-    }
-}
-
-impl Film {
-    /// Writes it to a file: which render it is of, and how that was asked for, goes with it.
-    ///
-    /// # Errors
-    ///
-    /// When the file cannot be written.
-    pub fn write(
-        &self,
-        to: (&Transaction, &Path),
-        identity: &Identity,
-        origin: &serde_json::Value,
-    ) -> Result<(), OutputError> {
-        let (shard, sums) = (self.shard, &self.sums);
-        let is_written = |layer: &&FilmLayer| match shard.is_of_samples() {
-            true => shard.has_data() && self.centres.contains(&layer.spec),
-            false => true,
-        };
-        let layers: Vec<&FilmLayer> = self.layers.iter().filter(is_written).collect();
-        let writing = Writing {
-            identity,
-            origin,
-            shard,
-            samples: self.passed.samples,
-            sample_counts: self.passed.counts,
-            counts: &self.counts,
-            trace_time: self.trace_time,
-            resolution: self.resolution,
-        };
-        writing.write(to, &layers, &sums.iter().map(Vec::as_slice).collect::<Vec<_>>())
-    }
-
-    /// Puts the shares of a render's rows together.
-    ///
-    /// # Errors
-    ///
-    /// When one is of another render, is there twice, or is missing.
-    pub fn merged(
-        scene: &Scene,
-        plan: &Plan,
-        shares: &[FilmFile],
-        identity: &Identity,
-    ) -> Result<Self, RenderError> {
-        let resolution = scene.camera.resolution();
-        let mut layers = empty_film(scene, plan)?;
-        must_be_whole(shares, identity).map_err(RenderError::Shares)?;
-        let counts = Mutex::new(RayCounts::default());
-        // Each fills its own pixels, or adds its own samples.
-        for share in shares {
-            share.fill(&mut layers.iter_mut().collect::<Vec<_>>(), &mut [], resolution)?;
-            RayCounts::add(&counts, share.counts(), &StatusCounts::default());
-        }
-        let counts = counts.into_inner().unwrap_or_else(PoisonError::into_inner);
-        // Samples by pixel, where the shares counted them.
-        let of_pixels = shares.iter().filter_map(|share| share.header.sample_counts);
-        let of_pixels = of_pixels.reduce(SampleCounts::and);
-        let samples = of_pixels.map_or(plan.samples, |counts| counts.least);
-        let passed = Passed { samples, is_complete: true, counts: of_pixels };
-        Ok(Self {
-            layers,
-            resolution,
-            shard: Shard::ALL,
-            counts,
-            passed,
-            sums: Vec::new(),
-            centres: Vec::new(),
-            trace_time: shares.iter().map(FilmFile::trace_time).sum(),
-            notes: Vec::new(),
-            camera: None,
-        })
-    }
-}
-
-/// Puts the shares of a render's samples together, in the order of the samples, whatever that of the files
-/// is: sums with what rounding took from them, and layers that are not sampled from the first share.
-pub(crate) fn put_together(
-    shares: &[FilmFile],
-    resolution: [u32; 2],
-    centres: &mut [&mut FilmLayer],
-    averaged: &mut [Averaging<'_>],
-) -> Result<RayCounts, FilmError> {
-    let counts = Mutex::new(RayCounts::default());
-    let mut shares: Vec<&FilmFile> = shares.iter().collect();
-    shares.sort_by_key(|share| share.header.shard);
-    for share in shares {
-        let lengths = averaged.iter().map(|part| part.sums().len());
-        let mut own = lengths
-            .map(|length| filled(Sum::default(), length))
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(|error| share.error(error.to_string()))?;
-        let mut sums: Vec<&mut [Sum]> = own.iter_mut().map(Vec::as_mut_slice).collect();
-        let has_data = share.header.shard.has_data();
-        share.fill(if has_data { &mut *centres } else { &mut [] }, &mut sums, resolution)?;
-        for (part, own) in averaged.iter_mut().zip(&own) {
-            part.sums_mut().iter_mut().zip(own).for_each(|(sum, own)| sum.add_sum(*own));
-        }
-        RayCounts::add(&counts, share.counts(), &StatusCounts::default());
-    }
-    Ok(counts.into_inner().unwrap_or_else(PoisonError::into_inner))
-}
-
-/// Refuses shares that are not one of each of one render, by name.
-pub(crate) fn must_be_whole(shares: &[FilmFile], identity: &Identity) -> Result<(), String> {
-    let Some(first) = shares.first() else {
-        return Err("there is no share to put together".to_owned());
-    };
-    let Shard { count, by, .. } = first.header.shard;
-    let mut found: BTreeMap<Shard, &FilmFile> = BTreeMap::new();
-    // Each is of the same render and the same division, and none is there twice.
-    for share in shares {
-        share.must_be_of(identity).map_err(|error| error.to_string())?;
-        let shard = share.header.shard;
-        let (path, other) = (share.path.display(), first.path.display());
-        if shard.count != count {
-            return Err(format!("{path}: is share {shard}, and {other} is one of {count}"));
-        }
-        if shard.by != by {
-            let of = |by| if by == ShardBy::Rows { "rows" } else { "samples" };
-            let (this, that) = (of(shard.by), of(by));
-            return Err(format!(
-                "{path}: is a share of the {this}, and {other} is one of the {that}"
-            ));
-        }
-        if let Some(twice) = found.insert(shard, share) {
-            let other = twice.path.display();
-            return Err(format!("{path}: is share {shard}, as {other} is; give each once"));
-        }
-    }
-    // None is missing.
-    let missing = (0..count).map(|index| Shard { index, count, by });
-    let missing: Vec<String> = missing
-        .filter(|shard| !found.contains_key(shard))
-        .map(|shard| shard.to_string())
-        .take(8)
-        .collect();
-    match missing.as_slice() {
-        [] => Ok(()),
-        missing => {
-            let have = found.len();
-            let left = count as usize - have - missing.len();
-            let more = if left > 0 { format!(" and {left} more") } else { String::new() };
-            let lack = missing.join(", ") + &more;
-            Err(format!("{have} of {count} shares are here; missing: {lack}; render them first"))
-        }
     }
 }
 

@@ -9,24 +9,21 @@ use etendue_camera::{BandGroup, Camera, CameraRays};
 use etendue_geometry::{Detail, HitBatch, HitPrecision, RayBatch};
 use etendue_optics::element::StatusCounts;
 use etendue_tracer::layer::{Columns, OtherFrame, Seen};
-use etendue_tracer::{LayerSpec, RayStats, SceneView, Traced};
+use etendue_tracer::{LayerSpec, SceneView, Traced};
 use rayon::prelude::*;
 
-use crate::adaptive::{ChiefHit, Rule};
-use crate::checkpoint::Keeper;
+use crate::adaptive::{ChiefHit, Rule, SampleCounts};
+use crate::checkpoint::{Keeper, put_together};
 use crate::error::RenderError;
 use crate::film::{FilmLayer, NoMemory, Strip, filled, strips, take};
 use crate::film_file::{FilmError, FilmFile};
 use crate::output::{Picture, PictureError};
-use crate::passes::{Beside, Passed};
 use crate::radiance::LightPass;
-use crate::samples::{Averaged, Averaging, Memory, Sampling, Sum};
-use crate::shard::put_together;
-use crate::sparkles::Sparkles;
+use crate::samples::Averaging;
+use crate::sampling::{Averaged, Memory, Sampling};
+use crate::sum::Sum;
+use crate::tile::{RayCounts, TILE, Tile};
 use crate::watch::{Stopped, Watcher};
-
-/// Side of a tile (pixels): its rays are one batch.
-pub(crate) const TILE: u32 = 16;
 
 /// Rays a batch of colours when several go through each pixel.
 const BATCH: u32 = TILE * TILE;
@@ -66,36 +63,6 @@ pub(crate) struct Job<'a> {
     pub(crate) keeper: Option<Keeper<'a>>,
 }
 
-/// What was traced.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct RayCounts {
-    /// Rays of the camera for layers without light.
-    pub(crate) chief_rays: u64,
-    /// Rays of the radiance pass.
-    pub(crate) light: RayStats,
-    /// What became of rays inside the camera's lens.
-    pub(crate) statuses: StatusCounts,
-    /// Light that a handful of samples carries.
-    pub(crate) sparkles: Sparkles,
-}
-
-impl RayCounts {
-    /// Adds what one thread traced, and the statuses of its rays.
-    pub(crate) fn add(all: &Mutex<Self>, own: Self, statuses: &StatusCounts) {
-        let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
-        all.merge(&own);
-        all.statuses.merge(statuses);
-    }
-
-    /// Adds what was traced elsewhere.
-    pub(crate) fn merge(&mut self, other: &Self) {
-        self.chief_rays += other.chief_rays;
-        self.light += other.light;
-        self.sparkles.merge(&other.sparkles);
-        self.statuses.merge(&other.statuses);
-    }
-}
-
 /// What of a job was done.
 #[derive(Debug)]
 pub(crate) struct Done {
@@ -105,6 +72,25 @@ pub(crate) struct Done {
     pub(crate) sums: Vec<Vec<Sum>>,
     /// The layers that are not averaged.
     pub(crate) centres: Vec<LayerSpec>,
+}
+
+/// What the passes left.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Passed {
+    /// Samples that every pixel has.
+    pub(crate) samples: u32,
+    /// Whether that is all that was wanted.
+    pub(crate) is_complete: bool,
+    /// How many samples the pixels have, where that differs.
+    pub(crate) counts: Option<SampleCounts>,
+}
+
+/// The layers that are not averaged.
+pub(crate) struct Beside<'a, 'f> {
+    /// Along chief rays.
+    pub(crate) centres: &'a [&'f mut FilmLayer],
+    /// Those that tell of sampling.
+    pub(crate) told: &'a mut [&'f mut FilmLayer],
 }
 
 impl Job<'_> {
@@ -339,41 +325,6 @@ impl Averaged for Colors<'_> {
             }
         }
     }
-}
-
-/// A rectangle of the picture, at most [`TILE`] a side.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Tile {
-    pub(crate) left: u32,
-    pub(crate) top: u32,
-    width: u32,
-    height: u32,
-}
-
-impl Tile {
-    /// The tiles of a strip of that top and height, from left to right.
-    pub(crate) fn across(width: u32, [top, height]: [u32; 2]) -> impl Iterator<Item = Self> {
-        let lefts = (0..width).step_by(TILE as usize);
-        lefts.map(move |left| Self { left, top, width: TILE.min(width - left), height })
-    }
-
-    /// Pixels from the tile's corner along a Z-order curve, so that any 4, 8 or 16 of them in a row,
-    /// as many as go into a packet, are a block.
-    pub(crate) fn pixels(self) -> impl Iterator<Item = (u32, u32)> {
-        (0..TILE * TILE)
-            .map(|k| (even_bits(k), even_bits(k >> 1)))
-            .filter(move |&(x, y)| x < self.width && y < self.height)
-    }
-
-    /// Where a pixel of the tile stands in the rows of its strip.
-    pub(crate) fn index(self, x: u32, y: u32, width: u32) -> usize {
-        y as usize * width as usize + (self.left + x) as usize
-    }
-}
-
-/// Bits 0, 2, 4 and 6 of `k`, put together.
-fn even_bits(k: u32) -> u32 {
-    k & 1 | k >> 1 & 2 | k >> 2 & 4 | k >> 3 & 8
 }
 
 /// One thread's rays and hits.

@@ -7,14 +7,17 @@
 //! |---|---|
 //! | `table` | cells in columns |
 //! | `decision` | what is decided, how, why, what it saves, and by which key it is decided otherwise |
+//! | `refusal` | where, why not, and what would do |
 //! | [`Size`], [`Span`] | bytes and times with the digits that a forecast has |
 
 mod decision;
+mod refusal;
 mod table;
 
 use std::fmt;
 
 pub use decision::{Decision, DecisionKind, DecisionValue, Saving, Tabled};
+pub use refusal::Refusal;
 pub use table::{Cell, Table};
 
 /// Bytes as people read them.

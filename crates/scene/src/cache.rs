@@ -196,7 +196,7 @@ pub(crate) struct Digests(Mutex<HashMap<PathBuf, (Stamp, u128)>>);
 impl Digests {
     /// XXH3-128 of the contents of the file at `path`.
     pub(crate) fn of(&self, path: &Path) -> Result<u128, SceneError> {
-        let unreadable = |source| SceneError::unreadable(path, source);
+        let unreadable = |source| SceneError::unreadable(path, &source);
         let stamp = Stamp::from(&path.metadata().map_err(unreadable)?);
         if let Some((_, digest)) = locked(&self.0).get(path).filter(|(known, _)| *known == stamp) {
             return Ok(*digest);

@@ -4,35 +4,21 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use etendue_files::FindError;
+use etendue_report::Refusal;
 
-use crate::ImportError;
-use crate::file::{Origin, OverrideError, Place};
-use crate::memory::TooMuch;
+use crate::file::Origin;
 use crate::words::nearest;
 
-/// Why a scene cannot be read or loaded. The message names the file, the place in it, and a remedy.
+/// Why a scene cannot be read or loaded. The message names the file and the place in it, and ends in a remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
     /// A file that is not there.
-    #[error("{}: no such file{}", file.display(), did_you_mean(near.as_deref()))]
-    Missing {
-        /// The file.
-        file: PathBuf,
-        /// The name in its folder that is the most like it.
-        near: Option<String>,
-    },
-    /// A file that cannot be opened.
-    #[error("{}: cannot be read: {source}", file.display())]
-    Unreadable {
-        /// The file.
-        file: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    Missing(Refusal),
     /// A file that is no JSON text at all.
     #[error(
-        "{}: {reason}; give a JSON scene, or a model ending in .gltf, .glb, .obj or .ply",
+        "{}: {reason}\nhint: give a JSON scene, or a model ending in .gltf, .glb, .obj or .ply",
         file.display()
     )]
     NotAScene {
@@ -41,41 +27,8 @@ pub enum SceneError {
         /// What it is instead.
         reason: String,
     },
-    /// A file that holds no lens.
-    #[error(
-        "{}: {reason}; give a lens file (.json), a file of Zemax (.zmx), CODE V (.seq), OSLO (.len), optiland or ISET \
-         (.json), pbrt (.dat) or PhotonsToPhotos (.txt), or a scene whose camera is a lens",
-        file.display()
-    )]
-    NotALens {
-        /// The file.
-        file: PathBuf,
-        /// What it is instead.
-        reason: String,
-    },
-    /// A file of another program that cannot be imported.
-    #[error("{}, {source}", file.display())]
-    Zemax {
-        /// The file.
-        file: PathBuf,
-        /// Where and why.
-        source: etendue_optics::train::ZemaxError,
-    },
-    /// Broken JSON.
-    #[error("{}, line {}, column {}: broken JSON: {reason}\n{excerpt}",
-        file.display(), place.line, place.column)]
-    Syntax {
-        /// The file.
-        file: PathBuf,
-        /// Where.
-        place: Place,
-        /// What is wrong.
-        reason: String,
-        /// The line, with a caret below the place.
-        excerpt: String,
-    },
     /// A value that the format does not allow.
-    #[error("{}", invalid(file, path, place, reason))]
+    #[error("{}", invalid(file, path, place, why))]
     Invalid {
         /// The file.
         file: PathBuf,
@@ -84,54 +37,11 @@ pub enum SceneError {
         /// Where it was written.
         place: Origin,
         /// What is wrong and what would do.
-        reason: String,
+        why: Refusal,
     },
-    /// A setting of the command line that leads nowhere.
-    #[error("--set {setting}: {source}")]
-    Override {
-        /// The setting.
-        setting: String,
-        /// Why.
-        source: OverrideError,
-    },
-    /// A model that cannot be imported.
-    #[error("{source}{}", asked_for_by(file, path))]
-    Import {
-        /// The scene file.
-        file: PathBuf,
-        /// The JSON path of the object that names the model; empty when the model was given itself.
-        path: String,
-        /// Why.
-        source: Box<ImportError>,
-    },
-    /// A camera that no model of the scene has.
-    #[error("--camera {wanted}: {reason}")]
-    NoSuchCamera {
-        /// The name or number asked for.
-        wanted: String,
-        /// The cameras that there are.
-        reason: String,
-    },
-    /// More than the formats inside can number.
-    #[error("{}: has more than {limit} {what}; split the scene", file.display())]
-    TooMany {
-        /// The scene file.
-        file: PathBuf,
-        /// Of what.
-        what: &'static str,
-        /// The most.
-        limit: u64,
-    },
-    /// More memory than there may be.
-    #[error("{}: {what} {source}", file.display())]
-    Memory {
-        /// The scene file.
-        file: PathBuf,
-        /// What needs it.
-        what: String,
-        /// How much, and how much there is.
-        source: TooMuch,
-    },
+    /// Something else.
+    #[error(transparent)]
+    Refused(#[from] Refusal),
     /// The caller's progress function asked to stop.
     #[error("loading was stopped")]
     Stopped,
@@ -145,19 +55,33 @@ impl SceneError {
     #[must_use]
     pub fn is_missing_file(&self) -> bool {
         match self {
-            Self::Missing { .. } => true,
-            Self::Invalid { reason, .. } => reason.contains(NO_SUCH_FILE),
-            _ => false,
+            Self::Missing(_) => true,
+            Self::Invalid { why, .. } => why.why().contains(NO_SUCH_FILE),
+            Self::NotAScene { .. } | Self::Refused(_) | Self::Stopped => false,
         }
     }
 
     /// The error of a file that cannot be opened; with the most similar name when it is missing.
-    pub(crate) fn unreadable(file: &Path, source: io::Error) -> Self {
-        let file = file.to_owned();
+    pub(crate) fn unreadable(file: &Path, source: &io::Error) -> Self {
         match source.kind() {
-            io::ErrorKind::NotFound => Self::Missing { near: similar_name(&file), file },
-            _ => Self::Unreadable { file, source },
+            io::ErrorKind::NotFound => {
+                let why = NO_SUCH_FILE.to_owned() + &did_you_mean(similar_name(file).as_deref());
+                Self::Missing(Refusal::new(why).at(file.display()))
+            }
+            _ => Self::refused(file, format!("cannot be read: {source}")),
         }
+    }
+
+    /// The error of a whole file.
+    pub(crate) fn refused(file: &Path, why: impl Into<Refusal>) -> Self {
+        Self::Refused(why.into().at(file.display()))
+    }
+
+    /// The error of a file that holds no lens.
+    pub(crate) fn not_a_lens(file: &Path, reason: &str) -> Self {
+        let remedy = "give a lens file (.json), a file of Zemax (.zmx), CODE V (.seq), OSLO (.len), optiland or ISET \
+                      (.json), pbrt (.dat) or PhotonsToPhotos (.txt), or a scene whose camera is a lens";
+        Self::refused(file, Refusal::new(reason).hint(remedy))
     }
 }
 
@@ -187,22 +111,18 @@ pub(crate) fn not_found(error: FindError) -> String {
     format!("{error}{}", did_you_mean(near.as_deref()))
 }
 
-/// `; did you mean …?`
+/// The hint `did you mean …?`
 pub(crate) fn did_you_mean(near: Option<&str>) -> String {
-    near.map_or_else(String::new, |near| format!("; did you mean \"{near}\"?"))
+    near.map_or_else(String::new, |near| format!("\nhint: did you mean \"{near}\"?"))
 }
 
-fn invalid(file: &Path, path: &str, place: &Origin, reason: &str) -> String {
-    let file = match place {
+fn invalid(file: &Path, path: &str, place: &Origin, why: &Refusal) -> Refusal {
+    let why = why.clone().at(path);
+    match place {
         Origin::Text(place) => {
-            format!("{}, line {}, column {}", file.display(), place.line, place.column)
+            why.at(format_args!("{}, line {}, column {}", file.display(), place.line, place.column))
         }
-        Origin::Setting(setting) => setting.clone(),
-        Origin::Nowhere => file.display().to_string(),
-    };
-    if path.is_empty() { format!("{file}: {reason}") } else { format!("{file}: {path}: {reason}") }
-}
-
-fn asked_for_by(file: &Path, path: &str) -> String {
-    if path.is_empty() { String::new() } else { format!(" (from {}: {path})", file.display()) }
+        Origin::Setting(setting) => why.at(setting),
+        Origin::Nowhere => why.at(file.display()),
+    }
 }

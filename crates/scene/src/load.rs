@@ -14,6 +14,7 @@ use etendue_camera::Camera;
 use etendue_files::{InputFolder, Opener};
 use etendue_geometry::{Bounds, Geometry};
 use etendue_optics::glass::AgfCatalogue;
+use etendue_report::Refusal;
 use etendue_tracer::{LayerSpec, Light, Material, Texture};
 use rayon::prelude::*;
 
@@ -104,7 +105,7 @@ impl SceneFile {
     /// The folder that the scene's paths start at.
     pub(crate) fn open_folder(&self, opener: &Opener) -> Result<InputFolder, SceneError> {
         let path = self.folder();
-        opener.folder(path).map_err(|source| SceneError::unreadable(path, source))
+        opener.folder(path).map_err(|source| SceneError::unreadable(path, &source))
     }
 
     /// The camera as far as it is known without the models: one that frames the scene sees nothing
@@ -125,15 +126,14 @@ impl SceneFile {
         bytes: u64,
         what: impl FnOnce() -> String,
     ) -> Result<(), SceneError> {
-        budget.take(bytes).map_err(|source| SceneError::Memory {
-            file: self.path().to_owned(),
-            what: what(),
-            source,
-        })
+        budget
+            .take(bytes)
+            .map_err(|source| SceneError::refused(self.path(), format!("{} {source}", what())))
     }
 
     fn too_many(&self, what: &'static str) -> SceneError {
-        SceneError::TooMany { file: self.path().to_owned(), what, limit: u32::MAX.into() }
+        let why = format!("has more than {} {what}\nhint: split the scene", u32::MAX);
+        SceneError::refused(self.path(), why)
     }
 
     fn import_all(
@@ -236,12 +236,11 @@ impl SceneFile {
         Ok(import.clone())
     }
 
-    fn import_fault(&self, at: String, source: import::ImportError) -> SceneError {
-        let path = match self.kind() {
-            FileKind::Model => String::new(),
-            FileKind::Scene => at,
-        };
-        SceneError::Import { file: self.path().to_owned(), path, source: Box::new(source) }
+    fn import_fault(&self, at: String, why: Refusal) -> SceneError {
+        SceneError::Refused(match self.kind() {
+            FileKind::Model => why,
+            FileKind::Scene => why.and(&format!(" (from {}: {at})", self.path().display())),
+        })
     }
 
     fn finish(

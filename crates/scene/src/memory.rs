@@ -192,7 +192,7 @@ impl Budget {
 /// More memory than there may be. The sentence goes on after what needs it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "needs {}{}, and {limit}; ask for less (fewer pixels, layers, triangles or copies), or give it \
+    "needs {}{}, and {limit}\nhint: ask for less (fewer pixels, layers, triangles or copies), or give it \
      more memory",
     Size(*bytes),
     beside(*before)

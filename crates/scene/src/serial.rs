@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 use etendue_files::{InputFolder, Opener};
 use etendue_optics::element::grey_picture;
+use etendue_report::Refusal;
 use serde_json::{Value, json};
 
 use crate::SceneError;
@@ -107,13 +108,13 @@ impl SceneFile {
                 self.along(&at, path, (opener, &mut Vec::new()), start)?
             }
             FramesSpec::Path(_) => {
-                let why = "goes by the scene as it is loaded, which a slot does not know; give `poses`, a `trajectory`, \
+                let why = "goes by the scene as it is loaded, which a slot does not know\nhint: give `poses`, a `trajectory`, \
                            or a list of settings";
                 return Err(self.fault(&at, why));
             }
         };
         if frames.is_empty() {
-            return Err(self.fault(&at, "there is no frame; leave `along` out for one slot"));
+            return Err(self.fault(&at, "there is no frame\nhint: leave `along` out for one slot"));
         }
         for frame in &frames {
             for (path, _) in &frame.settings {
@@ -155,7 +156,8 @@ impl SceneFile {
             return Err(self.fault("serial", why));
         }
         if self.spec.render.alpha {
-            let why = "a picture of several slots has no one backdrop; leave `render.alpha` out";
+            let why =
+                "a picture of several slots has no one backdrop\nhint: leave `render.alpha` out";
             return Err(self.fault("serial", why));
         }
         let camera = self.camera_spec();
@@ -163,12 +165,12 @@ impl SceneFile {
         let spec = camera.shutter().cloned().unwrap_or_default();
         let shutter = spec.build(rows).map_err(|error| self.camera_fault(&error))?;
         if shutter.exposure() <= 0.0 {
-            let why = "slots divide an exposure, and there is none; give `camera.shutter` an `exposure`, or \
+            let why = "slots divide an exposure, and there is none\nhint: give `camera.shutter` an `exposure`, or \
                        `camera.sensor`";
             return Err(self.fault("serial", why));
         }
         if shutter.kind() == ShutterKind::GlobalReset && shutter.line_time() > 0.0 {
-            let why = "rows of a global reset are open for different times, which no slots divide alike; set \
+            let why = "rows of a global reset are open for different times, which no slots divide alike\nhint: set \
                        `camera.shutter.type` to \"global\" or \"rolling\"";
             return Err(self.fault("serial", why));
         }
@@ -194,7 +196,7 @@ impl SceneFile {
             }
             if !(duration > 0.0 && duration.is_finite()) {
                 let why = match slot.duration {
-                    Some(_) => format!("{duration} s is no duration; give more than 0"),
+                    Some(_) => format!("{duration} s is no duration\nhint: give more than 0"),
                     None => format!(
                         "is missing, and other slots leave {} s of an exposure of {exposure} s",
                         exposure - given
@@ -205,7 +207,7 @@ impl SceneFile {
             end = start + duration;
             if end > exposure * (1.0 + ROUNDING) {
                 let why = format!(
-                    "ends {end} s after the start of an exposure of {exposure} s; shorten it, or lengthen the exposure"
+                    "ends {end} s after the start of an exposure of {exposure} s\nhint: shorten it, or lengthen the exposure"
                 );
                 return Err(self.fault(&at, why));
             }
@@ -251,8 +253,8 @@ impl SceneFile {
         let settings: Vec<(String, String)> = own.chain(set).collect();
         let file = self.with(&settings).map_err(|error| {
             let why = match error {
-                SceneError::Invalid { path, reason, .. } => format!("{path}: {reason}"),
-                other => other.to_string(),
+                SceneError::Invalid { path, why, .. } => why.at(path),
+                other => Refusal::new(other.to_string()),
             };
             self.fault(&at, why)
         })?;
@@ -321,7 +323,7 @@ fn not_of_a_slot(path: &str) -> Option<&'static str> {
     let below = path.strip_prefix("camera").map(|rest| rest.trim_start_matches('.'));
     let key = below.map(|below| below.split(['.', '[']).next().unwrap_or_default());
     matches!(key, Some("" | "sensor" | "shutter")).then_some(
-        "holds the sensor or the shutter, which are those of the whole exposure; set other keys",
+        "holds the sensor or the shutter, which are those of the whole exposure\nhint: set other keys",
     )
 }
 

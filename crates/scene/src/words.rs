@@ -46,7 +46,7 @@ pub(crate) fn kind_of(value: &Value) -> &'static str {
     }
 }
 
-/// `; did you mean …? known: …`, with the nearest of `known` when one is near.
+/// The hint `did you mean …? known: …`, with the nearest of `known` when one is near.
 pub(crate) fn suggest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let mut known: Vec<&str> = known.into_iter().collect();
     known.sort_unstable();
@@ -58,8 +58,8 @@ pub(crate) fn suggest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>)
         _ => format!("known: {}", listed.join(", ")),
     };
     match nearest(wrong, known) {
-        Some(near) => format!("; did you mean `{near}`? {all}"),
-        None => format!("; {all}"),
+        Some(near) => format!("\nhint: did you mean `{near}`? {all}"),
+        None => format!("\nhint: {all}"),
     }
 }
 
@@ -198,7 +198,10 @@ mod tests {
         let long = format!("\"{}\"", "x".repeat(1000));
         assert_eq!(said::<u8>(&long), "expected a whole number from 0, found a long string");
         let word = said::<Word>("\"shpere\"");
-        assert!(word.starts_with("\"shpere\" is not known here; did you mean `sphere`?"), "{word}");
+        assert!(
+            word.starts_with("\"shpere\" is not known here\nhint: did you mean `sphere`?"),
+            "{word}"
+        );
         assert!(word.contains("`box`"), "{word}");
     }
 

@@ -22,10 +22,7 @@
 
 use std::sync::Arc;
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-use crate::effects::Effects;
+use crate::effects::{Defect, Effects};
 use crate::moments::PixelLaw;
 use crate::normal::{ln, pair};
 use crate::philox::{PhiloxKey, Site, Stage, unit32, unit52};
@@ -102,18 +99,6 @@ impl BlockPlace {
     fn fixed(self, i: usize, stage: Stage) -> [u32; 4] {
         Site { frame: 0, ..self.site }.counter(self.at(i), stage, 0)
     }
-}
-
-/// What is wrong with a pixel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Defect {
-    /// It has much more dark current than others.
-    Hot,
-    /// It collects no electrons.
-    Dead,
-    /// It is always saturated.
-    Stuck,
 }
 
 /// Exposes one block: mean photo-electrons in, digital numbers out. `offset` holds what rows and

@@ -13,24 +13,11 @@
 //! image stays as it is.
 
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-use crate::spec::{ChannelSet, Channels};
+use crate::spec::{ChannelSet, Channels, Method};
 use crate::{CfaSpec, RawImage, Sensor};
 use etendue_spectrum::Bands;
 use etendue_spectrum::colour::{SRGB_FROM_XYZ, XYZ_FROM_SRGB, srgb_encode, transpose};
-
-/// How missing colours are found.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Method {
-    /// From the same filter alone; any pattern.
-    Bilinear,
-    /// Guided by the pixel's own filter; Bayer patterns, bilinear for others.
-    #[default]
-    Malvar,
-}
 
 /// A mosaic: one number a pixel.
 #[derive(Debug, Clone, Copy)]

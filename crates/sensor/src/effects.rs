@@ -3,7 +3,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::chain::Defect;
 use crate::{SensorError, SensorSpec};
 
 /// The most pixels that a map of defects lists.
@@ -43,6 +42,18 @@ pub enum DefectMap {
     File(String),
     /// The list of them, as `sensor.json` has it.
     List(Vec<ListedDefect>),
+}
+
+/// What is wrong with a pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Defect {
+    /// It has much more dark current than others.
+    Hot,
+    /// It collects no electrons.
+    Dead,
+    /// It is always saturated.
+    Stuck,
 }
 
 /// A pixel with which something is wrong.
@@ -373,7 +384,7 @@ impl Effects {
             None => Vec::new(),
             Some(DefectMap::List(list)) => list.clone(),
             Some(DefectMap::File(_)) => {
-                let why = "files are read where the scene is; give the list of pixels";
+                let why = "files are read where the scene is\nhint: give the list of pixels";
                 return Err(SensorError::Misplaced { key: "defect_map", why });
             }
         };

@@ -170,12 +170,12 @@ impl SensorError {
             ),
             Self::Blind { channel, bands: [from, to], .. } => format!(
                 "the channel `{channel}` sees nothing of {from}..={to} nm, the wavelengths that are \
-                 rendered: the image would be black; give it a curve (in `filters`, or as \
+                 rendered: the image would be black\nhint: give it a curve (in `filters`, or as \
                  `quantum_efficiency`) or `bands` that overlap; ideal r, g and b pass visible light alone"
             ),
             Self::Dark { sensor: [a, b], light: [from, to] } => format!(
                 "the sensor sees {a}..={b} nm, the lights shine at {from}..={to} nm: the image would be \
-                 black; give a light the illuminant `a`, `equal_energy` or {{\"black_body\": kelvin}}, \
+                 black\nhint: give a light the illuminant `a`, `equal_energy` or {{\"black_body\": kelvin}}, \
                  which reach further, or the sensor a curve that reaches into the light"
             ),
             Self::BlindAt { wavelength } => format!(

@@ -66,9 +66,8 @@ mod window;
 
 pub use bands::{BandChoice, Factor, Illumination, Times};
 pub use cfa::CfaSpec;
-pub use chain::Defect;
 pub use effects::{
-    AngularResponse, AutoExposure, DefectMap, ListedDefect, Photodiodes, SecondReadout,
+    AngularResponse, AutoExposure, Defect, DefectMap, ListedDefect, Photodiodes, SecondReadout,
 };
 pub use error::SensorError;
 pub use film::{Exposure, Film, InvalidValues, Moments, NoiseFloor, RawImage};

@@ -60,8 +60,8 @@ impl Packing {
         SensorError::unless(divides, "packed", columns as f64, demand)?;
         let most = image.values.iter().copied().max().unwrap_or(0);
         let demand = match self {
-            Self::Raw10 => "numbers of 10 bits at most; set sensor.bit_depth to 10 or less",
-            Self::Raw12 => "numbers of 12 bits at most; set sensor.bit_depth to 12 or less",
+            Self::Raw10 => "numbers of 10 bits at most\nhint: set sensor.bit_depth to 10 or less",
+            Self::Raw12 => "numbers of 12 bits at most\nhint: set sensor.bit_depth to 12 or less",
         };
         SensorError::unless(most >> self.bits() == 0, "packed", f64::from(most), demand)?;
         let low = self.bits() - 8;

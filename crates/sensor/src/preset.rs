@@ -6,8 +6,6 @@ use etendue_spectrum::Curve;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::presets::PRESETS;
-
 /// A sensor of the trade.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
@@ -59,12 +57,6 @@ impl Model {
             name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
         };
         Self::ALL.into_iter().find(|model| plain(model.preset().name) == plain(name))
-    }
-
-    /// What is known of it.
-    #[must_use]
-    pub fn preset(self) -> &'static Preset {
-        &PRESETS[self as usize]
     }
 }
 
@@ -306,7 +298,6 @@ mod tests {
     fn presets_hold_together() {
         assert_eq!(Model::from_name("kaf 8300"), Some(Model::Kaf8300));
         assert_eq!(Model::from_name("imx999"), None);
-        assert_eq!(PRESETS.len(), Model::ALL.len());
         for model in Model::ALL {
             let preset = model.preset();
             let plain: String =

@@ -1,7 +1,7 @@
 //! The table of presets, in the order of [`Model`](crate::Model).
 
 use crate::preset::Efficiency::{Curve, Points, Shape};
-use crate::preset::{Fact, KnownCurve, Preset};
+use crate::preset::{Fact, KnownCurve, Model, Preset};
 
 /// 20 °C.
 const ROOM: f64 = 293.15;
@@ -27,7 +27,15 @@ const CCD_DSNU: Fact<f64> = Fact::assumed(1.0);
 /// Silicon doubles its dark current about every 6 to 8 K.
 const DOUBLING: Fact<f64> = Fact::assumed(7.0);
 
-pub(crate) static PRESETS: [Preset; 14] = [
+impl Model {
+    /// What is known of it.
+    #[must_use]
+    pub fn preset(self) -> &'static Preset {
+        &PRESETS[self as usize]
+    }
+}
+
+static PRESETS: [Preset; Model::ALL.len()] = [
     Preset {
         name: "IMX174",
         kind: "Sony CMOS, global shutter",

@@ -6,7 +6,8 @@ use etendue_geometry::units::Micrometres;
 use etendue_spectrum::{Bands, Curve};
 use rayon::prelude::*;
 
-use crate::chain::{Chain, Defect};
+use crate::chain::Chain;
+use crate::effects::Defect;
 use crate::exposing::Exposing;
 use crate::film::{Exposure, Film, InvalidValues, Moments, RawImage};
 use crate::philox::{PhiloxKey, Site};

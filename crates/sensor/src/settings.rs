@@ -277,8 +277,7 @@ impl SensorSettings {
                 return Err(SensorError::Missing { key: "exposures", why });
             }
             if self.radiometry == Radiometry::Digital {
-                let why =
-                    "with radiometry `digital` longer exposures have no more light; set `physical`";
+                let why = "with radiometry `digital` longer exposures have no more light\nhint: set `physical`";
                 return Err(SensorError::Misplaced { key: "hdr", why });
             }
         }
@@ -292,8 +291,7 @@ impl SensorSettings {
                 return Err(SensorError::Misplaced { key: "auto_exposure", why });
             }
             if self.radiometry == Radiometry::Digital {
-                let why =
-                    "with radiometry `digital` longer exposures have no more light; set `physical`";
+                let why = "with radiometry `digital` longer exposures have no more light\nhint: set `physical`";
                 return Err(SensorError::Misplaced { key: "auto_exposure", why });
             }
         }

@@ -88,7 +88,7 @@ pub enum EdgeError {
     /// No step.
     #[error(
         "there is no edge in it: dark and bright side differ by {step:.3e}, and values scatter by \
-         {noise:.3e} about them; choose a region that one edge crosses from side to side"
+         {noise:.3e} about them\nhint: choose a region that one edge crosses from side to side"
     )]
     NoStep {
         /// Between the means of both sides.

@@ -11,7 +11,6 @@ use schemars::JsonSchema;
 use serde::de::{self, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::demosaic::Method;
 use crate::effects::{AngularResponse, AutoExposure, DefectMap, Photodiodes, SecondReadout};
 use crate::{CfaSpec, Model};
 
@@ -202,6 +201,17 @@ pub enum SensorKind {
     Rgb,
     /// Any number of bands at every pixel.
     Multispectral,
+}
+
+/// How missing colours are found.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// From the same filter alone; any pattern.
+    Bilinear,
+    /// Guided by the pixel's own filter; Bayer patterns, bilinear for others.
+    #[default]
+    Malvar,
 }
 
 /// How electrons are drawn.

@@ -82,7 +82,10 @@ impl Table {
         let index = match wanted {
             None if count == 1 => 0,
             None => {
-                return Err(format!("has {count} columns; name one by `column`: {}", known()));
+                return Err(format!(
+                    "has {count} columns\nhint: name one by `column`: {}",
+                    known()
+                ));
             }
             Some(Column::Number(number)) => match (*number as usize).checked_sub(1) {
                 Some(index) if index < count => index,
@@ -157,7 +160,7 @@ pub fn refractive_index_info(text: &str) -> Result<[Curve; 2], String> {
         if table.is_empty() {
             return Err(format!(
                 "has no table of {name} (\"type: tabulated nk\" or \"tabulated {name}\"): a metal \
-                 needs n and k; choose an entry of refractiveindex.info that has both"
+                 needs n and k\nhint: choose an entry of refractiveindex.info that has both"
             ));
         }
     }

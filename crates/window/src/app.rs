@@ -6,59 +6,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use eframe::egui::{self, Context};
-use etendue::{Inspector, LensView, Options, Preview, Probe, Screen, Still, Viewpoint};
+use etendue::{Inspector, LensView, Options, Screen, Still, Viewpoint};
 use serde_json::Value;
 
-use crate::canvas::PictureCanvas;
-use crate::document::{Document, Edit, View};
+use crate::document::{Document, Edit, FirstScene, View};
 use crate::form::Form;
-use crate::panels;
-use crate::panels::asking::Listing;
 use crate::panels::lens_curves::LensCurves;
 use crate::panels::light_field::{LightFieldPanel, Shows};
-use crate::panels::start::FirstScene;
+use crate::state::{Asking, Listing, PictureCanvas, PixelQuery, ShownPicture, Tool};
 use crate::worker::{Kind, News, Shown, Task, Wake, Wish, Worker};
-
-/// What a click on the picture does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum Tool {
-    /// Asks the pixel.
-    #[default]
-    Inspect,
-    /// Focuses the lens there.
-    Focus,
-}
-
-/// The picture that is shown.
-pub(crate) struct ShownPicture {
-    pub(crate) screen: Screen,
-    pub(crate) factor: u32,
-    pub(crate) samples: Option<[u32; 2]>,
-    /// The wish that it answers, and whether there is none finer to come.
-    pub(crate) number: u64,
-    pub(crate) layer: String,
-    pub(crate) layers: Vec<String>,
-    pub(crate) is_final: bool,
-    /// What it was made of.
-    pub(crate) preview: Option<Arc<Preview>>,
-    pub(crate) texture: egui::TextureHandle,
-}
-
-/// What was asked of a pixel.
-#[derive(Debug, Clone)]
-pub(crate) struct PixelQuery {
-    /// Column and row coordinates (pixels from the picture's corner).
-    pub(crate) place: [f64; 2],
-    pub(crate) probe: Option<Probe>,
-}
-
-/// A window in the window that asks for a path.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Asking {
-    Open,
-    SaveAs,
-    Render,
-}
 
 /// All of the window.
 pub(crate) struct App {
@@ -96,7 +52,7 @@ pub(crate) struct App {
     /// What there is to choose from, while a path is asked for.
     pub(crate) listing: Listing,
     /// The window's title.
-    titled: String,
+    pub(crate) titled: String,
     /// The number of the last wish, and of the last one that was accepted.
     number: u64,
     accepted: Option<(u64, Arc<Value>)>,
@@ -169,28 +125,7 @@ impl App {
         format!("{name}{changed}{working} - etendue")
     }
 
-    /// One pass of the user interface.
-    pub(crate) fn show(&mut self, ctx: &Context) {
-        self.take_news(ctx);
-        self.take_drops(ctx);
-        self.take_shortcuts(ctx);
-        panels::bar::show_bar(self, ctx);
-        panels::bar::show_status(self, ctx);
-        panels::lens::show(self, ctx);
-        panels::inspect::show_scene(self, ctx);
-        panels::inspect::show_inspect(self, ctx);
-        egui::CentralPanel::default().frame(egui::Frame::NONE).show(ctx, |ui| {
-            crate::canvas::show(self, ui);
-        });
-        panels::asking::show(self, ctx);
-        let title = self.title();
-        if title != self.titled {
-            ctx.send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
-            self.titled = title;
-        }
-    }
-
-    fn take_news(&mut self, ctx: &Context) {
+    pub(crate) fn take_news(&mut self, ctx: &Context) {
         let news: Vec<News> = self.worker.news().collect();
         for news in news {
             match news {
@@ -471,11 +406,5 @@ impl App {
             }
         }
         self.edit(ctx, &edits);
-    }
-}
-
-impl eframe::App for App {
-    fn update(&mut self, ctx: &Context, _frame: &mut eframe::Frame) {
-        self.show(ctx);
     }
 }

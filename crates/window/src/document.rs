@@ -266,6 +266,42 @@ fn name_of(layer: &Value) -> Option<&str> {
     layer.as_str().or_else(|| layer.get("type")?.as_str())
 }
 
+/// A scene that is built in: its file name, its title, what it shows, and the scene.
+pub(crate) struct FirstScene {
+    pub(crate) name: &'static str,
+    pub(crate) title: &'static str,
+    pub(crate) about: &'static str,
+    pub(crate) json: &'static str,
+}
+
+/// Scenes that name no files.
+pub(crate) const FIRST_SCENES: [FirstScene; 4] = [
+    FirstScene {
+        name: "glass.json",
+        title: "Glass and gold",
+        about: "all paths of light, with depth and normals",
+        json: include_str!("../first/glass.json"),
+    },
+    FirstScene {
+        name: "lens.json",
+        title: "Behind a lens",
+        about: "one thick lens with its aberrations: click with the tool Focus",
+        json: include_str!("../first/lens.json"),
+    },
+    FirstScene {
+        name: "sensor.json",
+        title: "A sensor's noise",
+        about: "raw numbers behind a colour filter array",
+        json: include_str!("../first/sensor.json"),
+    },
+    FirstScene {
+        name: "light-field.json",
+        title: "A light field",
+        about: "a plenoptic camera: look through its lenslets, and refocus",
+        json: include_str!("../first/light-field.json"),
+    },
+];
+
 #[cfg(test)]
 mod tests {
     use serde_json::json;

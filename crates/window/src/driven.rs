@@ -17,9 +17,11 @@ use eframe::egui::{self, Event, Key, Modifiers, PointerButton, Pos2, Rect, Vec2}
 use etendue::{Options, Progress, Session};
 use serde_json::{Value, json};
 
-use crate::app::{App, Tool};
+use crate::app::App;
 use crate::document::{Edit, View};
 use crate::form::marked;
+use crate::panels;
+use crate::state::Tool;
 
 /// How long anything may take before a test gives up.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -53,7 +55,7 @@ impl Driver {
         let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, Vec2::new(1200.0, 800.0)));
         let input = egui::RawInput { screen_rect, time: Some(self.time), ..input };
         let app = &mut self.app;
-        let _ = self.ctx.clone().run(input, |ctx| app.show(ctx));
+        let _ = self.ctx.clone().run(input, |ctx| panels::show(app, ctx));
     }
 
     fn until(&mut self, what: &str, is_so: impl Fn(&App) -> bool) {

@@ -345,3 +345,43 @@ pub(crate) fn mark(ctx: &egui::Context, name: &str, place: egui::Rect) {
 pub(crate) fn marked(ctx: &egui::Context, name: &str) -> Option<egui::Rect> {
     ctx.data(|data| data.get_temp(egui::Id::new(("mark", name))))
 }
+
+/// A number with four significant digits.
+pub(crate) fn short(number: f64) -> String {
+    match number.abs() {
+        0.0 => "0".to_owned(),
+        size if !(1e-3..1e6).contains(&size) => format!("{number:.3e}"),
+        size => {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 6")]
+            let digits = (3.0 - size.log10().floor()).clamp(0.0, 6.0) as usize;
+            let text = format!("{number:.digits$}");
+            match text.contains('.') {
+                true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+                false => text,
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_right() {
+        let cases = [(0.0, "0"), (1.5, "1.5"), (1234.56, "1235"), (0.012_345, "0.01235")];
+        for (number, text) in cases {
+            assert_eq!(short(number), text);
+        }
+        assert_eq!(short(2.5e-7), "2.500e-7");
+        assert_eq!(short(100_000.0), "100000", "zeros of a whole number stay");
+    }
+
+    #[test]
+    fn a_picture_fits_into_the_canvas() {
+        let canvas = Rect::from_min_size(Pos2::new(100.0, 50.0), Vec2::new(400.0, 400.0));
+        let place = PictureCanvas::default().place(canvas, [200.0, 100.0]);
+        assert_eq!(place.center(), canvas.center());
+        assert_eq!(place.size(), Vec2::new(400.0, 200.0));
+    }
+}

@@ -7,27 +7,17 @@
 //! | `worker` | the thread that renders, always at the latest wish |
 //! | `document` | the scene that is edited, with undo and redo |
 //! | `form` | widgets for any value that a JSON Schema describes |
-//! | `canvas` | the picture: shown, moved about in, clicked |
-//! | `panels` | what stands around it |
+//! | `state` | what the window holds besides the scene |
+//! | `panels` | one pass of the user interface: the picture in the middle, and what stands around it |
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests set their stage by hand"))]
 
 mod app;
-mod canvas;
 mod document;
 #[cfg(test)]
 mod driven;
 mod form;
-mod panels {
-    //! What stands around the picture.
-
-    pub(crate) mod asking;
-    pub(crate) mod bar;
-    pub(crate) mod inspect;
-    pub(crate) mod lens;
-    pub(crate) mod lens_curves;
-    pub(crate) mod light_field;
-    pub(crate) mod start;
-}
+mod panels;
+mod state;
 mod worker;
 
 use std::path::PathBuf;

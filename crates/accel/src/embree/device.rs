@@ -178,7 +178,7 @@ fn check_isa(isa: &str) -> Result<&str, BuildError> {
     let refuse = |message: String| Err(BuildError::Library { call: "isa", message });
     match known.iter().find(|(name, _)| *name == isa) {
         Some((_, true)) => Ok(isa),
-        Some((_, false)) => refuse(format!("this processor has no {isa}; leave `isa` out")),
+        Some((_, false)) => refuse(format!("this processor has no {isa}\nhint: leave `isa` out")),
         None => refuse(format!(
             "unknown instruction set \"{isa}\"; known here: {}",
             known.map(|(name, _)| name).join(", ")

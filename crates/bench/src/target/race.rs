@@ -1,6 +1,7 @@
 //! The rounds in which contenders are rendered, and what is foretold of them.
 
 mod equal_time;
+mod forecast;
 
 use std::time::Instant;
 
@@ -9,6 +10,7 @@ use super::{
 };
 use crate::pictures::{mean, mean_square};
 use crate::{BenchError, Progress};
+use forecast::{Forecast, MOST_SAMPLES, Point, forecast, seconds_of};
 
 /// Samples of the first two renders of everybody.
 const FIRST: [u32; 2] = [4, 16];
@@ -30,69 +32,12 @@ const MOST_TRIES: usize = 6;
 /// By how much rounding may take an error over the target.
 const ROUNDING: f64 = 1e-9;
 
-/// The most samples that are foretold, and rendered.
-const MOST_SAMPLES: f64 = 1e6;
-
 /// What is known of a contender.
 struct Entry {
     contender: Contender,
     points: Vec<Point>,
     renders: usize,
     is_out: bool,
-}
-
-/// One render of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Point {
-    samples: u32,
-    seconds: f64,
-    /// The squared error over the squared mean, less that of the converged picture.
-    square: f64,
-}
-
-/// Samples and time (s) at which the target is reached.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Forecast {
-    samples: u32,
-    seconds: f64,
-}
-
-/// The render with most samples, and one before it with half as many at most, where there is one: what two of nearly
-/// one number differ by is noise, and that a number is a power of two.
-fn apart(points: &[Point]) -> Option<(&Point, &Point)> {
-    let (two, before) = points.split_last()?;
-    let half = before.iter().rev().find(|one| 2 * one.samples <= two.samples);
-    Some((half.or(before.first())?, two))
-}
-
-/// The last two renders carried on to a squared error: as b² + v/n, and a + c n. `None` where no number of samples
-/// is enough, or nothing is known.
-fn forecast(points: &[Point], target: f64) -> Option<Forecast> {
-    let (one, two) = apart(points)?;
-    let [n, m] = [one, two].map(|point| f64::from(point.samples));
-    let fallen = (one.square - two.square) / (1.0 / n - 1.0 / m);
-    // Faster than 1/n leaves nothing that samples do not mend; no fall at all is noise or such a rest.
-    let (variance, rest) = match two.square - fallen / m {
-        rest if fallen <= 0.0 => (0.0, rest.max(two.square)),
-        rest if rest > 0.0 => (fallen, rest),
-        _ => (two.square * m, 0.0),
-    };
-    let left = target * target - rest;
-    let samples = if left > 0.0 { (variance / left).max(1.0) } else { f64::INFINITY };
-    if samples > MOST_SAMPLES {
-        return None;
-    }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to a million")]
-    let samples = samples.ceil() as u32;
-    Some(Forecast { samples, seconds: seconds_of(points, samples) })
-}
-
-/// The time (s) of so many samples by the last two renders: as a + c n.
-fn seconds_of(points: &[Point], samples: u32) -> f64 {
-    let Some((one, two)) = apart(points) else { return f64::INFINITY };
-    let [n, m] = [one, two].map(|point| f64::from(point.samples));
-    let slope = ((two.seconds - one.seconds) / (m - n)).max(0.0);
-    (two.seconds + slope * (f64::from(samples) - m)).max(0.0)
 }
 
 /// Renders the scene and its changes until it is known which reach the target soonest. `axes` are lists of changes of

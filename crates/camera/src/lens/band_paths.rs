@@ -38,12 +38,11 @@ use etendue_optics::train::{Element, MonochromaticTrain, Side};
 use etendue_spectrum::{Bands, Spread};
 use glam::{DVec2, DVec3};
 
-use super::lens_camera::{LensCamera, filtered, place_of};
+use super::lens_camera::LensCamera;
+use super::nodes::{Interpolation, MOST_NODES, Variable};
+use super::opened::{BandPaths, filtered, place_of};
 use super::traced_at::TracedAt;
 use crate::{CameraRays, FilmSamples, Pose};
-
-/// The most wavelengths that a ray is traced at.
-const MOST_NODES: usize = 8;
 
 /// How near an interpolated place is to the traced one, at most (pixels).
 const FINEST: f64 = 0.01;
@@ -77,31 +76,6 @@ pub struct SharedPaths {
     pub error: f64,
     /// How many rows of pixels from where a ray starts its light lands, at most.
     pub rows: u32,
-}
-
-/// How bands share rays.
-#[derive(Debug)]
-pub(super) struct BandPaths {
-    /// The lens at its leading wavelengths, with filters clear.
-    nodes: Vec<MonochromaticTrain>,
-    /// By band and by wavelength that it is drawn from.
-    bands: Vec<Vec<Interpolation>>,
-    /// Whether glass takes light.
-    has_losses: bool,
-    /// From where a ray leaves the lens to where one starts that comes back (mm).
-    lead: f64,
-    /// How far places of a ray part, at most: rows of pixels and their size (mm).
-    reach: f64,
-    error: f64,
-}
-
-/// A wavelength between nodes.
-#[derive(Debug, Clone, Copy)]
-struct Interpolation {
-    /// What each node counts.
-    weights: [f64; MOST_NODES],
-    /// What filters pass.
-    filters: f64,
 }
 
 /// Where the light of each band lands that comes along rays which all bands share, `[ray][band]`.
@@ -186,7 +160,7 @@ impl LensCamera {
             self.band_groups(bands).iter().map(|group| self.spread(bands, group)).collect();
         let clear = without_filters(train);
         let at = |nm: f64| clear.at(nm).map_err(|error| error.to_string());
-        let index = Variable::of(self);
+        let index = Variable::of(train);
         let mut wavelengths: Vec<f64> = match self.runs_apart() {
             true => spreads.iter().flat_map(|spread| spread.wavelengths.clone()).collect(),
             false => vec![train.wavelength()],
@@ -500,65 +474,4 @@ fn error_of(weights: &[f64; MOST_NODES], nodes: &[Landed], found: &Landed) -> [f
         errors[1] = errors[1].max((sum.1 - share).abs() / share);
     }
     errors
-}
-
-/// What places are polynomials in.
-struct Variable<'a> {
-    camera: &'a LensCamera,
-}
-
-impl<'a> Variable<'a> {
-    fn of(camera: &'a LensCamera) -> Self {
-        Self { camera }
-    }
-
-    /// The mean index of the dispersive media at a wavelength (nm); by the wavelength itself where there are
-    /// none.
-    fn at(&self, nm: f64) -> f64 {
-        let media = self.camera.focused.train().media().iter();
-        let indices = media.filter(|glass| glass.is_dispersive());
-        let indices: Vec<f64> = indices.filter_map(|glass| glass.index(nm).ok()).collect();
-        match indices.len() {
-            0 => 1e-3 * nm,
-            count => indices.iter().sum::<f64>() / count as f64,
-        }
-    }
-
-    /// `count` nodes among ascending wavelengths and between them: those of Chebyshev with both ends.
-    fn nodes(&self, wavelengths: &[f64], count: usize) -> Vec<f64> {
-        let last = wavelengths.len() - 1;
-        let (from, to) = (wavelengths[0], wavelengths[last]);
-        if count > last {
-            return wavelengths.to_vec();
-        }
-        if count == 1 {
-            return vec![wavelengths[last / 2]];
-        }
-        let fine = |k: u32| from + (to - from) * f64::from(k) / 256.0;
-        let ends = [self.at(from), self.at(to)];
-        let node = |k: usize| {
-            let cosine = (std::f64::consts::PI * k as f64 / (count - 1) as f64).cos();
-            let wanted = 0.5 * (ends[0] + ends[1]) + 0.5 * cosine * (ends[0] - ends[1]);
-            let off = |nm: &f64| (self.at(*nm) - wanted).abs();
-            let inner = (1..256).map(fine).min_by(|a, b| off(a).total_cmp(&off(b)));
-            match k {
-                0 => from,
-                _ if k == count - 1 => to,
-                _ => inner.unwrap_or(from),
-            }
-        };
-        (0..count).map(node).collect()
-    }
-
-    /// What each node counts at a wavelength (nm): Lagrange's polynomials.
-    fn weights(&self, nodes: &[f64], nm: f64) -> [f64; MOST_NODES] {
-        let x = self.at(nm);
-        let at: Vec<f64> = nodes.iter().map(|&node| self.at(node)).collect();
-        let mut weights = [0.0; MOST_NODES];
-        for (j, weight) in weights.iter_mut().enumerate().take(nodes.len()) {
-            let others = (0..nodes.len()).filter(|&k| k != j);
-            *weight = others.map(|k| (x - at[k]) / (at[j] - at[k])).product();
-        }
-        weights
-    }
 }

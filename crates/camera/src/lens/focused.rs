@@ -288,7 +288,7 @@ fn pitch(train: &OpticalTrain, setup: &Setup<'_>, z: f64) -> Result<f64, CameraE
         (Some(pitch), [false, false]) => Ok(1e-3 * pitch.0),
         (None, [false, false]) => Err(CameraError::new(
             "sensor.pixel_pitch",
-            "is missing: behind a lens the size of the pixels matters; give this, `sensor_height` \
+            "is missing: behind a lens the size of the pixels matters\nhint: give this, `sensor_height` \
              or `fov`",
         )),
         (None, [true, false]) => positive(setup.sensor_height, "sensor_height").map(|h| h / rows),
@@ -314,7 +314,7 @@ fn pitch(train: &OpticalTrain, setup: &Setup<'_>, z: f64) -> Result<f64, CameraE
                 (true, false) => "`sensor.pixel_pitch` and `fov`",
                 (false, _) => "`sensor_height` and `fov`",
             };
-            let why = format!("{other} both give the size of the pixels; remove one of them");
+            let why = format!("{other} both give the size of the pixels\nhint: remove one of them");
             Err(CameraError::new(if height { "sensor_height" } else { "fov" }, why))
         }
     }

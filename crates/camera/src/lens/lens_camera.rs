@@ -16,23 +16,16 @@ use etendue_geometry::{RayBatch, RaysMut};
 use etendue_spectrum::{Bands, Curve, Outside, Spread};
 use glam::{DVec2, DVec3};
 
-use super::band_paths::BandPaths;
 use super::chief::{ChiefTable, ImageCircle, LensletChiefs};
 use super::focused::{Focused, View};
+use super::opened::{Opened, OpenedGroup, through_filters, uniform_filters};
 use super::traced_at::{TracedAt, grouped};
 
 use crate::{CameraError, Pose};
 use etendue_optics::element::{Clip, Ray, RayStatus, Reflection};
-use etendue_optics::glass::GlassError;
 use etendue_optics::train::analysis::projected_solid_angle;
 use etendue_optics::train::pupil::{Disk, Window, blocked, without_dimming, without_filters};
 use etendue_optics::train::{ExitPupil, ExitPupilError, MonochromaticTrain, OpticalTrain, Side};
-
-/// Focal lengths that lenses of cameras have (mm): from an endoscope's to a telescope's.
-const PLAUSIBLE_FOCAL_LENGTHS: std::ops::RangeInclusive<f64> = 0.2..=2e4;
-
-/// The least diagonal of a sensor that is not told (mm); those of endoscopes have 1.
-const LEAST_DIAGONAL: f64 = 2.0;
 
 /// Bands whose rays run the same way.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,24 +74,6 @@ struct DesignPupil {
     /// Half the sensor's width and height (mm).
     half_size: [f64; 2],
     pupil: ExitPupil,
-}
-
-/// The exit pupil measured at the wavelengths that are wanted.
-#[derive(Debug)]
-pub(super) struct Opened {
-    bands: Bands,
-    /// In the order of [`LensCamera::band_groups`].
-    pub(super) groups: Vec<OpenedGroup>,
-    pub(super) pupil: ExitPupil,
-    /// How all bands share a ray; `None` where they do not.
-    pub(super) paths: Option<BandPaths>,
-}
-
-/// The lens as it is for a group of bands.
-#[derive(Debug)]
-pub(super) struct OpenedGroup {
-    /// One, or as many as share the group's light.
-    pub(super) lenses: Vec<MonochromaticTrain>,
 }
 
 impl PartialEq for LensCamera {
@@ -507,51 +482,6 @@ impl LensCamera {
         curves.filter(|curve| curve.as_flat().is_none()).cloned().collect()
     }
 
-    /// Sizes that no camera has, in sentences: most likely a unit that was not meant.
-    #[must_use]
-    pub fn implausible(&self) -> Vec<String> {
-        let mut notes = Vec::new();
-        let efl = self.focused.paraxial().efl.map(f64::abs);
-        if let Some(efl) = efl.filter(|efl| !PLAUSIBLE_FOCAL_LENGTHS.contains(efl)) {
-            let meant = if efl < 1.0 { "metres" } else { "micrometres" };
-            notes.push(format!(
-                "the focal length is {efl:.4} mm: did you mean {meant}? Lengths inside a lens are \
-                 millimetres, or strings with a unit"
-            ));
-        }
-        notes.extend(self.mismatch());
-        let [width, height] = (2.0 * self.focused.film().half_size()).to_array();
-        if width.hypot(height) < LEAST_DIAGONAL {
-            notes.push(format!(
-                "the sensor is {width:.3} x {height:.3} mm with pixels of {:.4} um: a crop of \
-                 nearly any sensor; give more pixels, or their size by `sensor_height` or `fov`",
-                self.focused.pixel_pitch()
-            ));
-        }
-        notes
-    }
-
-    /// A sentence on lenslets whose f-number is not that of the lens before them.
-    fn mismatch(&self) -> Option<String> {
-        let [diameter, pitch] = self.lenslets.as_ref()?.fit();
-        let share = diameter / pitch;
-        let [diameter, pitch] = [diameter, pitch].map(|length| 1e3 * length);
-        if share > 1.02 {
-            return Some(format!(
-                "the main lens is faster than the lenslets: its opening's images are {diameter:.2} um \
-                 wide and {pitch:.2} um apart, so neighbours overlap; close the main lens, or put the \
-                 sensor nearer to the lenslets"
-            ));
-        }
-        (share < 0.9).then(|| {
-            format!(
-                "the main lens is slower than the lenslets: its opening's images are {diameter:.2} um \
-                 wide and {pitch:.2} um apart, so pixels between them are dark; open the main lens, or \
-                 put the sensor farther from the lenslets"
-            )
-        })
-    }
-
     /// What is odd about the lens, and what of it is not known at the wavelengths of `bands`.
     #[must_use]
     pub fn out_of_range(&self, bands: &Bands) -> Vec<String> {
@@ -560,78 +490,6 @@ impl LensCamera {
             groups.flat_map(|group| self.spread(bands, &group).wavelengths).collect();
         self.focused.train().outside_of_range(&wavelengths)
     }
-}
-
-impl OpenedGroup {
-    /// Which lens serves a place of the spectrum in 0..1.
-    pub(super) fn lens_at(&self, u: f64) -> usize {
-        place_of(u, self.lenses.len())
-    }
-}
-
-/// In which of `count` equal parts of 0..1 a number lies.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "at most a few dozen lenses"
-)]
-pub(super) fn place_of(u: f64, count: usize) -> usize {
-    ((u * count as f64) as usize).min(count - 1)
-}
-
-/// Curves of filters that are the same all over and pass some wavelengths better than others.
-pub(super) fn uniform_filters(train: &OpticalTrain) -> Vec<&Curve> {
-    let filters = train.elements().iter().filter_map(|element| element.part.uniform_curve());
-    filters.filter(|curve| curve.as_flat().is_none()).collect()
-}
-
-/// The lens at each of a band's wavelengths, with filters that pass what they pass of the band.
-///
-/// The wavelengths are already those that uniform filters leave, so these pass their mean over the
-/// band, all of them together the mean of their product. What a picture of filters passes differs
-/// from wavelength to wavelength, about the same mean.
-fn through_filters(
-    train: &OpticalTrain,
-    bands: &Bands,
-    band: usize,
-    wavelengths: &[f64],
-    overlap: f64,
-) -> Result<Vec<MonochromaticTrain>, GlassError> {
-    let uniform = uniform_filters(train);
-    let passes =
-        |curve: &Curve, nm| passed(bands, (band, wavelengths, overlap), &uniform, curve, nm);
-    let lens = |&nm: &f64| train.at_with(nm, &|curve| passes(curve, nm));
-    wavelengths.iter().map(lens).collect()
-}
-
-/// What filters that are the same all over pass together of a band at each of its wavelengths.
-pub(super) fn filtered(
-    train: &OpticalTrain,
-    bands: &Bands,
-    band: usize,
-    Spread { wavelengths, overlap }: &Spread,
-) -> Vec<f64> {
-    let uniform = uniform_filters(train);
-    let all = || train.elements().iter().filter_map(|element| element.part.uniform_curve());
-    let passes = |curve, nm| passed(bands, (band, wavelengths, *overlap), &uniform, curve, nm);
-    wavelengths.iter().map(|&nm| all().map(|curve| passes(curve, nm)).product()).collect()
-}
-
-/// What a curve of a filter passes of a band at one of its wavelengths (nm): see [`through_filters`].
-fn passed(
-    bands: &Bands,
-    (band, wavelengths, overlap): (usize, &[f64], f64),
-    uniform: &[&Curve],
-    curve: &Curve,
-    nm: f64,
-) -> f64 {
-    let mean = bands.from_curve(curve, Outside::Held).map_or(0.0, |means| means[band]);
-    if uniform.contains(&curve) {
-        return mean * overlap.powf(1.0 / uniform.len().max(1) as f64);
-    }
-    let all: f64 = wavelengths.iter().map(|&nm| curve.held(nm)).sum();
-    let share = curve.held(nm) * wavelengths.len() as f64 / all;
-    if all > 0.0 { mean * share } else { mean }
 }
 
 /// The pupil as seen from the axis with all filters and masks clear; from elsewhere when the axis is

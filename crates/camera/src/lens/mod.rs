@@ -10,6 +10,9 @@
 //! | [`focused`] | a lens and its sensor: where pixels lie, and the paraxial camera of both |
 //! | [`chief`] | the chief rays of a whole sensor; which lenslet a place on the sensor belongs to; the part of the sensor that light reaches |
 //! | [`lens_camera`] | chief rays for data, and what is measured for pictures |
+//! | `opened` | the same measured for the bands of a picture |
+//! | `nodes` | wavelengths that rays of all bands are traced at |
+//! | `implausible` | sizes that no camera has |
 //! | `paths` | rays of a pixel on their way through the lens |
 //! | `alone` | a lens by itself as a camera |
 //! | `rays` | weighted rays of the pupil for pictures |
@@ -21,7 +24,10 @@ mod alone;
 mod band_paths;
 pub mod chief;
 pub mod focused;
+mod implausible;
 pub mod lens_camera;
+mod nodes;
+mod opened;
 mod paths;
 mod rays;
 pub mod source;

@@ -81,7 +81,7 @@ macro_rules! camera_with_a_lens {
                     (Some(_), Some(_)) => {
                         return Err(CameraError::new(
                             "sensor_distance",
-                            "is given beside `focus_distance`, which already fixes it; remove one \
+                            "is given beside `focus_distance`, which already fixes it\nhint: remove one \
                              of them",
                         ));
                     }
@@ -290,12 +290,12 @@ impl ThinLensCameraSpec {
             (Some(pitch), None) => 1e-3 * pitch.0 * rows,
             (None, height @ Some(_)) => positive(height, "sensor_height")?,
             (None, None) => {
-                let why = "is missing: with `fov` alone the lens has no size; give this, \
+                let why = "is missing: with `fov` alone the lens has no size\nhint: give this, \
                            `sensor.pixel_pitch` or `sensor_height`";
                 return Err(CameraError::new("focal_length", why));
             }
             (Some(_), Some(_)) => {
-                let why = "is given beside `sensor.pixel_pitch`; remove one of them";
+                let why = "is given beside `sensor.pixel_pitch`\nhint: remove one of them";
                 return Err(CameraError::new("sensor_height", why));
             }
         };
@@ -338,7 +338,7 @@ impl ThinLensCameraSpec {
             (None, None) if !self.elements.iter().any(has_opening) => {
                 return Err(CameraError::new(
                     "f_number",
-                    "is missing: a thin lens needs an opening; give this, or `aperture`",
+                    "is missing: a thin lens needs an opening\nhint: give this, or `aperture`",
                 ));
             }
             _ => None,

@@ -9,7 +9,8 @@ use etendue_spectrum::Bands;
 use glam::{DMat3, DVec2, DVec3};
 
 use super::focused::View;
-use super::lens_camera::{LensCamera, SpreadBy, uniform_filters};
+use super::lens_camera::{LensCamera, SpreadBy};
+use super::opened::uniform_filters;
 use crate::{Camera, CameraError, CameraRays, FilmSamples};
 
 /// Wavelengths that fields are traced at, of a lens that disperses.
@@ -45,14 +46,14 @@ impl LensCamera {
         let refused = |why: &str| Err(CameraError::new("diffraction", why));
         if let Some(element) = self.focused.train().first_array() {
             return refused(&format!(
-                "elements[{element}] is a microlens array, behind which there is no one wavefront; \
-                 leave out the array, or `diffraction`"
+                "elements[{element}] is a microlens array, behind which there is no one wavefront\
+                 \nhint: leave out the array, or `diffraction`"
             ));
         }
         if let View::Parallel { .. } = self.focused.view() {
             return refused(
                 "the lens is telecentric towards the object: its picture has no one point that it is \
-                 seen from; leave out `diffraction`",
+                 seen from\nhint: leave out `diffraction`",
             );
         }
         Ok(self.spread_by(SpreadBy::Waves))

@@ -172,7 +172,7 @@ fn images_must_be_sampled([image_diameter, image_pitch]: [f64; 2]) -> Result<(),
             "microlenses.pitch",
             format!(
                 "the images of the lenslets are {image_pitch:.2} pixels apart: a light field needs 2 or \
-                 more; give smaller pixels or a larger pitch"
+                 more\nhint: give smaller pixels or a larger pitch"
             ),
         ));
     }
@@ -181,7 +181,7 @@ fn images_must_be_sampled([image_diameter, image_pitch]: [f64; 2]) -> Result<(),
             "f_number",
             format!(
                 "the images that lenslets make of the main lens' opening are {image_diameter:.2} pixels \
-                 wide, smaller than a pixel: no pixel sees a part of the opening; open the lens, or give \
+                 wide, smaller than a pixel: no pixel sees a part of the opening\nhint: open the lens, or give \
                  smaller pixels or lenslets of a longer focal length"
             ),
         ));
@@ -222,7 +222,7 @@ impl LightField {
                 format!(
                     "{views} views, {step} pixels apart, need more than the {image_pitch:.2} pixels from a \
                      lenslet's image to the next: there are no samples of the opening for more than \
-                     {:.0}; ask for fewer, for a smaller view_step, or for smaller pixels",
+                     {:.0}\nhint: ask for fewer, for a smaller view_step, or for smaller pixels",
                     ((image_pitch - 1.0) / step).floor() + 1.0
                 ),
             ));

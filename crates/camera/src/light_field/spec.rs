@@ -274,12 +274,12 @@ impl LightFieldSpec {
             (Some(pitch), None) => Ok([columns, rows].map(|side| 1e-3 * pitch.0 * side)),
             (None, Some(Millimetres(height))) => Ok([height * columns / rows, height]),
             (None, None) => {
-                let why = "is missing: behind lenslets the size of the pixels matters; give this, or \
+                let why = "is missing: behind lenslets the size of the pixels matters\nhint: give this, or \
                            `sensor_height`";
                 Err(CameraError::new("sensor.pixel_pitch", why))
             }
             (Some(_), Some(_)) => {
-                let why = "is given beside `sensor.pixel_pitch`; remove one of them";
+                let why = "is given beside `sensor.pixel_pitch`\nhint: remove one of them";
                 Err(CameraError::new("sensor_height", why))
             }
         }
@@ -302,8 +302,8 @@ impl MicrolensesSpec {
         // Light from the picture to a lenslet's rim would run at more than 45 degrees.
         if picture != 0.0 && 2.0 * picture.abs() < pitch {
             let why = format!(
-                "{picture} mm is less than half the pitch of {pitch} mm: no lenslet images a picture so near; \
-                 give a picture farther away, or 0 for an unfocused camera"
+                "{picture} mm is less than half the pitch of {pitch} mm: no lenslet images a picture so near\
+                 \nhint: give a picture farther away, or 0 for an unfocused camera"
             );
             return Err(fault("picture_distance", why));
         }
@@ -338,7 +338,7 @@ impl MicrolensesSpec {
         if !(distance > 0.0 && distance.is_finite()) {
             let why = format!(
                 "is {distance:.4} mm by the lenslets' focal length of {:.4} mm and a picture {picture} mm \
-                 in front of them: it must be above zero; give a picture farther away than the focal length, or \
+                 in front of them: it must be above zero\nhint: give a picture farther away than the focal length, or \
                  lenslets that gather light and are thinner than their focal length",
                 view.focal_length(0)
             );
@@ -384,12 +384,12 @@ impl MicrolensesSpec {
         let thickness = self.thickness.ok_or_else(|| lacks("thickness"))?.0;
         let glass = self.glass.clone().ok_or_else(|| lacks("glass"))?;
         if self.focal_length.is_some() || self.f_number.is_some() || !self.types.is_empty() {
-            let why = "gives thick lenslets, which have no `focal_length`, `f_number` or `types`; remove \
+            let why = "gives thick lenslets, which have no `focal_length`, `f_number` or `types`\nhint: remove \
                        those, or `radii`";
             return Err(CameraError::new("microlenses.radii", why));
         }
         if front.is_none() && rear.is_none() {
-            let why = "are both flat: such lenslets bend no light; give one face a radius";
+            let why = "are both flat: such lenslets bend no light\nhint: give one face a radius";
             return Err(CameraError::new("microlenses.radii", why));
         }
         let face = |radius: Option<Millimetres>, glass: Option<GlassSpec>, first: bool| match radius
@@ -421,7 +421,7 @@ impl MicrolensesSpec {
         // The distance of the sensor that a focal length is to go with.
         let distance = match (self.focal_length, self.f_number, self.sensor_distance) {
             (Some(_), Some(_), _) => {
-                let why = "is given beside `focal_length`; remove one of them";
+                let why = "is given beside `focal_length`\nhint: remove one of them";
                 return Err(CameraError::new("microlenses.f_number", why));
             }
             (Some(Millimetres(focal_length)), None, _) => return Ok(focal_length),
@@ -433,7 +433,8 @@ impl MicrolensesSpec {
                 return Err(CameraError::new("microlenses.f_number", why));
             }
             (None, Some(_), Some(_)) => {
-                let why = "is given beside `sensor_distance`, which fixes it; remove one of them";
+                let why =
+                    "is given beside `sensor_distance`, which fixes it\nhint: remove one of them";
                 return Err(CameraError::new("microlenses.f_number", why));
             }
             (None, None, Some(Millimetres(distance))) => distance,

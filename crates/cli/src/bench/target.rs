@@ -26,7 +26,7 @@ pub(super) fn race(
 ) -> Result<Target, Fault> {
     if scene.picture != Some(LayerSpec::Radiance) {
         return Err(Fault::refused(
-            "--target: the scene has no picture of light, whose error samples could mend; name a `tracer` such as path",
+            "--target: the scene has no picture of light, whose error samples could mend\nhint: name a `tracer` such as path",
         ));
     }
     let seconds = arguments.seconds.unwrap_or(SECONDS[usize::from(arguments.quick)]);

@@ -110,7 +110,7 @@ fn values_that_no_material_or_light_can_have_are_refused_by_path() {
         (light(r#"{"type": "environment", "radiance": [1e308, 1, 1]}"#), "above 1e30"),
         (
             material(r#"{"type": "emissive", "radiance": [1, 1, 1], "illuminant": "d66"}"#),
-            "materials.m.illuminant: \"d66\" is not known here; did you mean `d65`?",
+            "materials.m.illuminant: \"d66\" is not known here\nhint: did you mean `d65`?",
         ),
         (material(r#"{"type": "dielectric", "ior": 0.9}"#), "materials.m.ior: 0.9 is below 1"),
         (material(r#"{"type": "dielectric", "ior": {"nd": 0.5, "vd": 60}}"#), "materials.m.ior"),

@@ -1,6 +1,8 @@
 //! What is wrong with a file, in words that who wrote it knows: no types of Rust, no bytes of
 //! another format, who refers to what is not there, and what is allowed instead.
 
+use std::fmt::Write;
+
 use crate::run::{Bench, text};
 
 /// Words that no message may have.
@@ -202,25 +204,32 @@ fn data_uris_that_are_cut_off_say_so() {
 #[test]
 fn scenes_say_what_is_allowed() {
     let cases: [(&str, &[&str]); 16] = [
-        (r#"{"etendue": 1.0}"#, &["etendue: 1.0 is not 1; write it without a point"]),
-        (r#"{"etendue": "1"}"#, &["etendue: \"1\" is not 1; write it without quotes"]),
-        (r#"{"etendue": 2}"#, &["etendue: 2 is not 1; 1 is all that this version reads"]),
+        (r#"{"etendue": 1.0}"#, &["etendue: 1.0 is not 1\nhint: write it without a point"]),
+        (r#"{"etendue": "1"}"#, &["etendue: \"1\" is not 1\nhint: write it without quotes"]),
+        (r#"{"etendue": 2}"#, &["etendue: 2 is not 1\nhint: 1 is all that this version reads"]),
         (r#"{}"#, &["the key `etendue` is missing", "give it 1"]),
         (
             r#"{"etendue": 1, "objects": [{"sahpe": "box"}]}"#,
-            &["column 29", "objects[0].sahpe: unknown key; did you mean `shape`?", "`sphere`"],
+            &[
+                "column 29",
+                "objects[0].sahpe: unknown key\nhint: did you mean `shape`?",
+                "`sphere`",
+            ],
         ),
         (
             r#"{"etendue": 1, "lights": [{"tpye": "point"}]}"#,
-            &["lights[0].tpye: unknown key; did you mean `type`?", "`environment`"],
+            &["lights[0].tpye: unknown key\nhint: did you mean `type`?", "`environment`"],
         ),
         (
             r#"{"etendue": 1, "materials": {"a": {"colour": [1, 1, 1]}}}"#,
-            &["materials.a.colour: unknown key; did you mean `color`?", "give the object `type`"],
+            &[
+                "materials.a.colour: unknown key\nhint: did you mean `color`?",
+                "give the object `type`",
+            ],
         ),
         (
             r#"{"etendue": 1, "camera": {"fov": 60}}"#,
-            &["camera: says not what it is; give it `type` (one of `pinhole`"],
+            &["camera: says not what it is\nhint: give it `type` (one of `pinhole`"],
         ),
         (
             r#"{"etendue": 1, "objects": [{"file": "a.glb", "shape": "box"}]}"#,
@@ -241,7 +250,7 @@ fn scenes_say_what_is_allowed() {
         ),
         (
             r#"{"etendue": 1, "render": {"seed": 7.0}}"#,
-            &["render.seed: expected a whole number, found 7.0; write it without a point"],
+            &["render.seed: expected a whole number, found 7.0\nhint: write it without a point"],
         ),
         (r#"{"etendue": 1"#, &["the text ends inside an object (EOF)"]),
         (r#"{"etendue": 1, "camera": }"#, &["a value should stand here"]),
@@ -263,4 +272,80 @@ fn names_of_files_send_nothing_to_the_terminal() {
     refused("m.obj", b"v 0 0 \x1b[31mx\nf 1 1 1\n", &["line 1"]);
     refused("s.json", b"{\"etendue\": 1, \"\\u001b[2J\": 1}", &["unknown key"]);
     refused("s.json", b"{\"etendue\": 1, \"camera\": \"\x1b[2J\"}", &["line 1"]);
+}
+
+/// A refusal, whole: the place from the outside in, why, and the remedy on a line of its own.
+#[test]
+fn refusals_are_whole() {
+    let bench = Bench::with_scene(
+        r#"{"etendue": 1, "camera": {"type": "pinhole"}, "objects": [{"shape": "box"}]}"#,
+    );
+    let scenes = [
+        ("comma.json", r#"{"etendue": 1 "camera": {"type": "pinhole"}}"#),
+        ("key.json", r#"{"etendue": 1, "camera": {"type": "pinhole", "fvo": 30}}"#),
+        ("kind.json", r#"{"etendue": 1, "camera": {"fov": 30}}"#),
+        ("word.json", r#"{"etendue": 1, "camera": {"type": "pinhol"}}"#),
+        (
+            "material.json",
+            r#"{"etendue": 1, "objects": [{"shape": "box", "material": "cley"}], "materials": {"clay": {"type": "matte"}}, "camera": {"type": "pinhole"}}"#,
+        ),
+        (
+            "file.json",
+            r#"{"etendue": 1, "camera": {"type": "pinhole"}, "objects": [{"file": "nodel.obj"}]}"#,
+        ),
+        (
+            "outside.json",
+            r#"{"etendue": 1, "camera": {"type": "pinhole"}, "objects": [{"file": "../model.obj"}]}"#,
+        ),
+        (
+            "text.json",
+            r#"{"etendue": 1, "camera": {"type": "pinhole"}, "objects": [{"file": "text.obj"}]}"#,
+        ),
+        (
+            "unit.json",
+            r#"{"etendue": 1, "camera": {"type": "thin_lens", "focal_length": "50", "f_number": 2, "fov": 30}}"#,
+        ),
+        (
+            "opening.json",
+            r#"{"etendue": 1, "camera": {"type": "thin_lens", "focal_length": "50 mm", "fov": 30}}"#,
+        ),
+        ("twice.json", r#"{"etendue": 1, "etendue": 1}"#),
+        (
+            "frames.json",
+            r#"{"etendue": 1, "camera": {"type": "pinhole"}, "frames": [{"camera.fvo": 3}]}"#,
+        ),
+    ];
+    for (name, scene) in scenes {
+        bench.write(name, scene.as_bytes());
+    }
+    bench.write("solid.stl", b"solid cube");
+    bench.write("model.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    bench.write("text.obj", b"v 0 0 0\nf 1 2 3\n");
+    let extensions = r#""extensionsRequired": ["EXT_none", "KHR_texture_basisu"]"#;
+    bench.write("extensions.gltf", &gltf(extensions));
+    let mut commands: Vec<Vec<&str>> =
+        scenes.iter().map(|(name, _)| vec!["check", *name]).collect();
+    commands.extend([
+        vec!["check", "scnee.json"],
+        vec!["check", "solid.stl"],
+        vec!["check", "extensions.gltf"],
+        vec!["check", "scene.json", "--set", "objects[9].shape=box"],
+        vec!["check", "scene.json", "--set", "camera..fov=3"],
+        vec!["check", "scene.json", "--set", "camera.fov=300"],
+        vec!["check", "model.obj", "--camera", "nobody"],
+        vec!["lens", "scene.json"],
+        vec!["lens", "solid.stl"],
+        vec!["merge", "model.obj"],
+        vec!["render", "scene.json", "--shard", "9/8"],
+        vec!["render", "scene.json", "--report", "scene.json"],
+    ]);
+    let folder = bench.path("").canonicalize().expect("the folder").display().to_string();
+    let mut all = String::new();
+    for arguments in &commands {
+        let output = bench.run(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", text(&output.stderr));
+        let said = text(&output.stderr).replace(&folder, "FOLDER");
+        writeln!(all, "$ etendue {}\n{said}", arguments.join(" ")).expect("a string");
+    }
+    insta::assert_snapshot!(all);
 }

@@ -178,7 +178,7 @@ fn focus_of(camera: &Camera) -> Result<f64, String> {
     match distance.is_finite() && distance > 0.0 {
         true => Ok(distance),
         false => Err(
-            "--distance: the lens is focused at infinity, where no board can be; say how far it is"
+            "--distance: the lens is focused at infinity, where no board can be\nhint: say how far it is"
                 .to_owned(),
         ),
     }
@@ -188,7 +188,7 @@ fn focus_of(camera: &Camera) -> Result<f64, String> {
 fn half_extent(camera: &Camera, distance: f64) -> Result<[f64; 2], String> {
     if let Projection::Views(_) = camera.projection() {
         return Err(
-            "camera: many views are no camera to calibrate; take one with a lens or a pinhole"
+            "camera: many views are no camera to calibrate\nhint: take one with a lens or a pinhole"
                 .to_owned(),
         );
     }

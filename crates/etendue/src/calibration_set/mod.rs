@@ -227,7 +227,7 @@ impl CalibrationSet<'_> {
             let [own, most] = [self.sensor.bit_depth(), packing.bits()];
             if own > most {
                 return Err(Error::Refused(format!(
-                    "--packed: the sensor has {own} bits, the format {most}; set camera.sensor.bit_depth"
+                    "--packed: the sensor has {own} bits, the format {most}\nhint: set camera.sensor.bit_depth"
                 )));
             }
         }

@@ -37,7 +37,7 @@ impl WhiteSurroundings {
         }
         let Some(spec) = spec else {
             return Err(surroundings.refused(
-                "camera.sensor: an ideal grid of pixels has nothing to calibrate; give it a sensor, such as \
+                "camera.sensor: an ideal grid of pixels has nothing to calibrate\nhint: give it a sensor, such as \
                  { \"type\": \"raw\", \"model\": \"imx183\" }",
             ));
         };
@@ -49,7 +49,7 @@ impl WhiteSurroundings {
         ];
         if let Some((key, _)) = more.into_iter().find(|(_, is_given)| *is_given) {
             return Err(surroundings.refused(&format!(
-                "camera.sensor.{key}: a calibration is of one plain read-out at one exposure; leave it out, and give the \
+                "camera.sensor.{key}: a calibration is of one plain read-out at one exposure\nhint: leave it out, and give the \
                  `exposure` that it is for"
             )));
         }

@@ -80,7 +80,9 @@ fn checked<const N: usize>(
     let Some(values) = values else { return Ok(None) };
     if values.len() != count {
         let given = values.len();
-        return Err(format!("{given} {name} are given for {count} vertices; give each vertex one"));
+        return Err(format!(
+            "{given} {name} are given for {count} vertices\nhint: give each vertex one"
+        ));
     }
     match values.iter().position(|value| !value.iter().all(|x| x.is_finite())) {
         Some(vertex) => Err(format!("{name}: that of vertex {vertex} is {:?}", values[vertex])),

@@ -25,16 +25,16 @@ impl Session {
     /// Refuses what is not divided into slots.
     fn allows_slots(&self, scene: &Scene, course: &Course<'_>) -> Result<(), Error> {
         let why = if scene.picture != Some(LayerSpec::Radiance) {
-            "adds up light, and the picture shows none; give the scene a `tracer` of light, such as \
+            "adds up light, and the picture shows none\nhint: give the scene a `tracer` of light, such as \
              {\"type\": \"path\"}"
         } else if scene.camera.light_field().is_some() {
-            "does not go with a light-field camera, whose views are rendered from one camera; leave one of them out"
+            "does not go with a light-field camera, whose views are rendered from one camera\nhint: leave one of them out"
         } else if scene.layers.iter().any(|layer| layer.is_of_sampling()) {
-            "has samples of its own in each slot, of which `sample_count` and `variance` do not tell; leave them out"
+            "has samples of its own in each slot, of which `sample_count` and `variance` do not tell\nhint: leave them out"
         } else if course.checkpoint.is_some() {
-            "is not kept on the way; leave `--checkpoint` out, or render rows with `--shard`"
+            "is not kept on the way\nhint: leave `--checkpoint` out, or render rows with `--shard`"
         } else if course.shard.is_some_and(Shard::is_of_samples) || !course.shares.is_empty() {
-            "is not divided by samples; use `--shard-by rows`"
+            "is not divided by samples\nhint: use `--shard-by rows`"
         } else {
             return Ok(());
         };

@@ -28,6 +28,8 @@ mod rule;
 mod sampled;
 mod strip;
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 pub use counts::SampleCounts;
@@ -37,23 +39,9 @@ pub(crate) use rule::{Rule, variance_of_mean};
 use crate::film::{FilmLayer, NoMemory, filled};
 use crate::samples::Averaging;
 use crate::shard::Shard;
-use crate::tiles::TILE;
+use crate::tile::TILE;
 use guide::{Guide, guides};
 use strip::{Demand, Evidence, StripOfPixels};
-
-/// The samples that pixels have, and those that are to be taken next, in rows from the top.
-#[derive(Clone, Copy)]
-pub(crate) struct Wanted<'a> {
-    have: &'a [u32],
-    demands: &'a [Demand],
-}
-
-impl Wanted<'_> {
-    /// The samples of a pixel, from those that it has to those that it is to have.
-    pub(crate) fn of(&self, index: usize) -> std::ops::Range<u32> {
-        self.have[index]..self.demands[index].next
-    }
-}
 
 /// Judges the samples of a picture.
 pub(crate) struct Adaptive<'a> {
@@ -102,9 +90,10 @@ impl<'a> Adaptive<'a> {
         })
     }
 
-    /// The samples that are to be taken next.
-    pub(crate) fn wanted(&self) -> Wanted<'_> {
-        Wanted { have: &self.have, demands: &self.demands }
+    /// The samples of a pixel, by its place in rows from the top: from those that it has to those that it is to
+    /// have.
+    pub(crate) fn wanted(&self, pixel: usize) -> Range<u32> {
+        self.have[pixel]..self.demands[pixel].next
     }
 
     /// Whether any pixel wants more.

@@ -5,9 +5,11 @@ use etendue_tracer::LayerSpec;
 use rayon::prelude::*;
 
 use super::variance_of_mean;
+use crate::adding::put;
 use crate::film::{FilmLayer, PlaneRows, strips, take};
-use crate::samples::{Averaging, Sum, put, split};
-use crate::tiles::TILE;
+use crate::samples::{Averaging, split};
+use crate::sum::Sum;
+use crate::tile::TILE;
 
 /// The sets that the samples of a pixel are of.
 const SETS_OF_PIXEL: usize = SETS as usize;

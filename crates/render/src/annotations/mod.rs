@@ -172,11 +172,13 @@ pub fn refusal(scene: &Scene, outputs: Outputs) -> Option<String> {
     let refuse = |why: &str| Some(format!("outputs: `{kind}` {why}, or leave `{kind}` out"));
     if scene.picture.is_none() || !outputs.png {
         return refuse(
-            "annotates picture.png, which is not written; give the scene a `tracer`, `png` to the outputs",
+            "annotates picture.png, which is not written\nhint: give the scene a `tracer`, `png` to the outputs",
         );
     }
     if scene.camera.light_field().is_some() {
-        return refuse("annotates one view, and a light-field camera has many; take a `pinhole`");
+        return refuse(
+            "annotates one view, and a light-field camera has many\nhint: take a `pinhole`",
+        );
     }
     if !outputs.bop {
         return None;
@@ -187,19 +189,19 @@ pub fn refusal(scene: &Scene, outputs: Outputs) -> Option<String> {
     };
     if !is_plain {
         return refuse(
-            "has cameras that K alone describes; take a `pinhole` without `distortion` (`etendue plan --models` \
+            "has cameras that K alone describes\nhint: take a `pinhole` without `distortion` (`etendue plan --models` \
              prints that of a lens)",
         );
     }
     if scene.camera.rows_differ() {
         return refuse(
-            "has one pose a picture, and rows of this one see different moments; set `camera.shutter.type` to `global`",
+            "has one pose a picture, and rows of this one see different moments\nhint: set `camera.shutter.type` to `global`",
         );
     }
     if let Some(mesh) = scene.geometry.meshes.iter().find(|mesh| mesh.steps.is_some()) {
         let name = etendue_scene::escape::printable(&mesh.name);
         return refuse(&format!(
-            "has rigid models, and the mesh \"{name}\" changes its shape while the shutter is open; set `exposure` to 0"
+            "has rigid models, and the mesh \"{name}\" changes its shape while the shutter is open\nhint: set `exposure` to 0"
         ));
     }
     let copies = scene.copies.iter().map(|copies| copies.count as usize).sum::<usize>();

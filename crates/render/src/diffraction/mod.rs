@@ -25,7 +25,7 @@ use crate::film::FilmLayer;
 use crate::output::{Outputs, Values};
 use crate::render::{Course, Film, Prepared, trace};
 use crate::stopping::Stopping;
-use crate::tiles::RayCounts;
+use crate::tile::RayCounts;
 use crate::watch::{SoFar, Watch};
 use crate::{Plan, Shard};
 

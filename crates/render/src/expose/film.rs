@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::files::plain;
 use super::{LightUnit, photodiodes};
-use crate::film::{NoMemory, filled};
+use crate::film::{FilmLayer, NoMemory, filled};
 use crate::output::{Channel, Layer, Look, Picture, Values};
 
 /// Light in spectral bands, as a sensor is given it.
@@ -37,6 +37,27 @@ impl BandFilm {
             }
         });
         Ok(Self { bands, values, parts: Vec::new() })
+    }
+
+    /// The light of a layer of the film in its bands, whose place red, green and blue take; `None` when they are the bands
+    /// already.
+    pub(crate) fn taken_from(
+        light: &mut FilmLayer,
+        bands: &Bands,
+    ) -> Result<Option<Self>, NoMemory> {
+        if !light.spec.is_light() || *bands == Bands::Rgb {
+            return Ok(None);
+        }
+        let planes = light.planes.iter().filter_map(|plane| match plane {
+            Values::F32(values) => Some(values.as_slice()),
+            Values::F64(_) | Values::U16(_) | Values::U32(_) => None,
+        });
+        let film = Self::woven(bands.clone(), &planes.collect::<Vec<_>>())?;
+        // Bands are not kept twice while colours are made of them.
+        light.planes.clear();
+        light.names = ["R", "G", "B"].map(str::to_owned).into();
+        light.planes = film.colors()?.map(Values::F32).into();
+        Ok(Some(film))
     }
 
     /// One plane a band of `grid`: the plain mean of the light over its wavelengths.

@@ -12,7 +12,9 @@ use crate::film::NoMemory;
 #[non_exhaustive]
 pub enum PictureError {
     /// A side of no pixels, or more pixels than memory has addresses.
-    #[error("a picture of {width} x {height} pixels cannot be; give both sides at least one pixel")]
+    #[error(
+        "a picture of {width} x {height} pixels cannot be\nhint: give both sides at least one pixel"
+    )]
     Size {
         /// Pixels a row.
         width: usize,
@@ -23,7 +25,7 @@ pub enum PictureError {
     #[error(transparent)]
     Memory(#[from] NoMemory),
     /// No layer, or a layer of no channels.
-    #[error("{what} is empty; ask for at least one")]
+    #[error("{what} is empty\nhint: ask for at least one")]
     Empty {
         /// The picture or the layer.
         what: String,
@@ -39,7 +41,7 @@ pub enum PictureError {
         expected: usize,
     },
     /// A layer whose channels are of different types.
-    #[error("layer \"{layer}\" mixes {first} with {other}; split it into a layer a type")]
+    #[error("layer \"{layer}\" mixes {first} with {other}\nhint: split it into a layer a type")]
     Mixed {
         /// The layer's name.
         layer: String,
@@ -50,7 +52,7 @@ pub enum PictureError {
     },
     /// A name that some file format or file system cannot take.
     #[error(
-        "\"{name}\" cannot name a {what}; use 1 to 64 of the characters A-Z a-z 0-9 _ - \
+        "\"{name}\" cannot name a {what}\nhint: use 1 to 64 of the characters A-Z a-z 0-9 _ - \
          (inside, a layer may have dots and an entry spaces)"
     )]
     Name {
@@ -66,7 +68,7 @@ pub enum PictureError {
         name: String,
     },
     /// A header string with a zero byte, which would cut it short.
-    #[error("the text of \"{name}\" holds a zero byte; remove it")]
+    #[error("the text of \"{name}\" holds a zero byte\nhint: remove it")]
     ZeroByte {
         /// The entry's name.
         name: String,

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use super::DENOISED;
 use super::conventions::{self, KITTI_DEPTH, TUM_DEPTH};
 use super::png::Bits;
 use super::{Look, OutputError, Outputs, Picture, envi, npy, png};
-use crate::denoise::DENOISED;
 use crate::expose::SPECTRUM;
 use etendue_files::Transaction;
 

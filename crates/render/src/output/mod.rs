@@ -62,3 +62,6 @@ pub use look::Look;
 pub use outputs::Outputs;
 pub use picture::{Channel, Layer, Picture, Values};
 pub use screen::{DistanceScale, Screen};
+
+/// The name of the layer.
+pub const DENOISED: &str = "Denoised";

@@ -12,10 +12,10 @@ use std::path::Path;
 use ::png::text_metadata::ITXtChunk;
 use ::png::{BitDepth, ColorType, EncodingError, Info, SrgbRenderingIntent};
 
+use super::DENOISED;
 pub use super::look::Bits;
 use super::look::{Channels, Shown, mask, palette, show};
 use super::{Layer, Look, OutputError, Picture};
-use crate::denoise::DENOISED;
 use crate::film::check_room;
 use etendue_files::{PartFile, SOFTWARE, Transaction};
 

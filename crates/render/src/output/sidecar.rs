@@ -7,8 +7,8 @@ use etendue_scene::escape::printable_json;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
 
+use super::DENOISED;
 use super::{OutputError, Picture};
-use crate::denoise::DENOISED;
 use etendue_files::{SOFTWARE, Transaction};
 
 /// Names and texts as a JSON object, in their own order; a text that is an object in JSON is that object.

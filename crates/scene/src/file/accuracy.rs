@@ -170,13 +170,13 @@ impl AccuracySpec {
         };
         self.set().find_map(|setting| match (setting.used_for, precision) {
             (AccuracyUse::Bands, _) if has_bands => {
-                let why = "contradicts `bands` of the camera's sensor, which are taken as they are; leave one \
+                let why = "contradicts `bands` of the camera's sensor, which are taken as they are\nhint: leave one \
                            of them out";
                 Some((setting.path, why.to_owned()))
             }
             (AccuracyUse::LightPrecision, Some(word)) => {
                 let why = format!(
-                    "contradicts `plan.light_precision` \"{word}\", which decides by itself; leave one of \
+                    "contradicts `plan.light_precision` \"{word}\", which decides by itself\nhint: leave one of \
                      them out"
                 );
                 Some((setting.path, why))

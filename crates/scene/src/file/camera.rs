@@ -66,16 +66,19 @@ impl CameraFile {
         };
         let (document, mut value) = match read_document(&path) {
             Err(SceneError::NotAScene { reason, .. }) => {
-                return Ok(Err(format!("\"{written}\" {reason}; {}", remedy())));
+                return Ok(Err(format!("\"{written}\" {reason}\nhint: {}", remedy())));
             }
             read => read?,
         };
         let Value::Object(members) = &value else {
             let kind = kind_of(&value);
-            return Ok(Err(format!("\"{written}\" holds {kind}, not an object; {}", remedy())));
+            return Ok(Err(format!(
+                "\"{written}\" holds {kind}, not an object\nhint: {}",
+                remedy()
+            )));
         };
         if SCENE_KEYS.iter().any(|key| members.contains_key(*key)) {
-            return Ok(Err(format!("\"{written}\" is a whole scene; {}", remedy())));
+            return Ok(Err(format!("\"{written}\" is a whole scene\nhint: {}", remedy())));
         }
         let own = Path::new(written).parent().unwrap_or(Path::new(""));
         if !own.as_os_str().is_empty() {
@@ -153,15 +156,17 @@ impl WrittenPlaces {
             return Ok(([columns, rows], list));
         }
         let raster = etendue_image::decode(&bytes, etendue_image::Limits::default())
-            .map_err(|error| format!("{error}; give a PNG or NPY"))?;
+            .map_err(|error| format!("{error}\nhint: give a PNG or NPY"))?;
         let size @ [columns, _] = raster.size();
         if raster.channels() != 1 {
-            return Err(format!("has {} channels; give a grey picture", raster.channels()));
+            return Err(format!("has {} channels\nhint: give a grey picture", raster.channels()));
         }
         let list = match raster.samples() {
             Samples::U8(all) => DefectMap::of_numbers(all.iter().map(|&n| f64::from(n)), columns),
             Samples::U16(all) => DefectMap::of_numbers(all.iter().map(|&n| f64::from(n)), columns),
-            Samples::F16(_) | Samples::F32(_) => Err("has no integers; give a PNG or NPY".into()),
+            Samples::F16(_) | Samples::F32(_) => {
+                Err("has no integers\nhint: give a PNG or NPY".into())
+            }
         }?;
         Ok((size, list))
     }
@@ -257,7 +262,7 @@ impl SensorFile {
             let known: Vec<&str> = Model::ALL.iter().map(|model| model.preset().name).collect();
             let known = known.join(", ");
             let why = format!(
-                "neither a file nor a preset; name a scene, a sensor's JSON file, or one of {known}"
+                "neither a file nor a preset\nhint: name a scene, a sensor's JSON file, or one of {known}"
             );
             written.fault("", why)
         })?;
@@ -293,7 +298,7 @@ impl SensorFile {
         written.read_defects(&mut value, place)?;
         let object = if in_scene { value.pointer("/camera/sensor") } else { Some(&value) };
         let object = object.ok_or_else(|| {
-            let why = "the scene has no sensor; give it one, such as { \"type\": \"raw\", \
+            let why = "the scene has no sensor\nhint: give it one, such as { \"type\": \"raw\", \
                        \"model\": \"imx183\" }";
             written.fault(IN_SCENE, why)
         })?;

@@ -193,7 +193,8 @@ impl<'a> Checker<'a> {
         let about =
             about.map_or_else(String::new, |text| format!(": {}", text.trim_end_matches('.')));
         let allowed = member.and_then(|member| self.allowed(member));
-        let allowed = allowed.map_or_else(String::new, |allowed| format!("; give it {allowed}"));
+        let allowed =
+            allowed.map_or_else(String::new, |allowed| format!("\nhint: give it {allowed}"));
         format!("the key `{key}` is missing{about}{allowed}")
     }
 
@@ -376,14 +377,14 @@ fn not_the_one(value: &Value, expected: &Value) -> String {
         }
         _ => format!("{} is all that this version reads", quoted(expected)),
     };
-    format!("{} is not {expected}; {remedy}", show(value))
+    format!("{} is not {expected}\nhint: {remedy}", show(value))
 }
 
 /// That `value` is of none of the kinds `expected`.
 fn wrong_kind(value: &Value, expected: &[&str]) -> String {
     let whole = value.as_f64().is_some_and(|number| number.fract() == 0.0 && number.abs() < 1e15);
     let hint = match expected.contains(&"integer") && value.is_f64() && whole {
-        true => "; write it without a point",
+        true => "\nhint: write it without a point",
         false => "",
     };
     format!("expected {}, found {}{hint}", words_for(expected), show(value))

@@ -172,8 +172,9 @@ impl Scanner<'_> {
                 }
                 if keys.contains(&key) {
                     let member = join(path, &key);
-                    let reason =
-                        format!("the key {member} stands here a second time; remove one of them");
+                    let reason = format!(
+                        "the key {member} stands here a second time\nhint: remove one of them"
+                    );
                     return Err(wrong(reason));
                 }
                 keys.insert(key);
@@ -237,7 +238,7 @@ const MOST_STEPS: usize = 64;
 pub enum OverrideError {
     /// The path cannot be read.
     #[error(
-        "`{path}` is no path; write keys with dots between and indices in brackets, such as \
+        "`{path}` is no path\nhint: write keys with dots between and indices in brackets, such as \
              objects[0].transform.scale"
     )]
     Path {

@@ -54,7 +54,7 @@ impl ImuSpec {
         let fault = |key: &str, why: String| Some((key.to_owned(), why));
         if !(self.rate > 0.0 && self.rate <= FASTEST) {
             let why = format!(
-                "{} readings a second; give a number above 0, and at most {FASTEST}",
+                "{} readings a second\nhint: give a number above 0, and at most {FASTEST}",
                 self.rate
             );
             return fault("rate", why);

@@ -11,6 +11,7 @@ use etendue_optics::train::{
     Focus, LensError, LensFile, LensFormat, OpticalTrain, RayError, RaysFile, TracedRays,
     ZemaxError, ZemaxLens, remove_notes,
 };
+use etendue_report::Refusal;
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::de::DeserializeOwned;
@@ -103,9 +104,8 @@ pub fn read_lens_at(
     }
     if configuration.is_some() {
         let reason = "has no configurations, which Zemax files (.zmx), those of OSLO (.len) and tables of PhotonsToPhotos \
-                      (.txt) may have"
-            .to_owned();
-        return Err(SceneError::NotALens { file: path.to_owned(), reason });
+                      (.txt) may have";
+        return Err(SceneError::not_a_lens(path, reason));
     }
     let (written, value) = read(path)?;
     if !SCENE_KEYS.iter().any(|key| value.get(key).is_some()) {
@@ -117,7 +117,8 @@ pub fn read_lens_at(
     let Some(lens) = camera.lens() else {
         let kind = scene.value().pointer("/camera/type");
         let kind = kind.and_then(Value::as_str).unwrap_or("pinhole");
-        let why = format!("a \"{kind}\" has no lens to look at; give a scene whose camera has");
+        let why =
+            format!("a \"{kind}\" has no lens to look at\nhint: give a scene whose camera has");
         return Err(scene.fault("camera.type", why));
     };
     let focused = lens.focused();
@@ -182,7 +183,7 @@ fn folder(file: &Path, reach: Reach) -> Result<InputFolder, SceneError> {
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
     let opened = Opener::new(reach).folder(folder);
-    opened.map_err(|source| SceneError::unreadable(folder, source))
+    opened.map_err(|source| SceneError::unreadable(folder, &source))
 }
 
 /// `file` and what was found in its folder.
@@ -232,7 +233,9 @@ fn import(
     glasses: &[AgfCatalogue],
 ) -> Result<ReadLens, SceneError> {
     let bytes = super::read_bytes(path).map_err(not_a_lens)?;
-    let zemax = |source| SceneError::Zemax { file: path.to_owned(), source };
+    let zemax = |source: ZemaxError| {
+        SceneError::Refused(Refusal::new(format!("{}, {source}", path.display())))
+    };
     let lens = ZemaxLens::read_as(format, &bytes, configuration, glasses);
     let ZemaxLens { file, fields, wavelengths, notes, .. } = lens.map_err(zemax)?;
     let train = file
@@ -254,7 +257,7 @@ fn import(
 
 fn not_a_lens(error: SceneError) -> SceneError {
     match error {
-        SceneError::NotAScene { file, reason } => SceneError::NotALens { file, reason },
+        SceneError::NotAScene { file, reason } => SceneError::not_a_lens(&file, &reason),
         error => error,
     }
 }

@@ -19,6 +19,7 @@ use std::path::{Path, PathBuf};
 
 use etendue_files::Opener;
 use etendue_optics::train::remove_notes;
+use etendue_report::Refusal;
 use etendue_sensor::{Photodiodes, Sensor, SensorKind};
 use etendue_tracer::LayerSpec;
 use serde_json::{Value, json};
@@ -280,13 +281,13 @@ impl SceneFile {
         let tracer = self.value.get("tracer").filter(|_| path.starts_with("tracer"))?;
         let word = tracer.get("type").unwrap_or(tracer).as_str()?;
         LayerSpec::NAMES.contains(&word).then(|| {
-            format!("; `{word}` is a layer, beside the picture or in its place: \"layers\": [\"{word}\"]")
+            format!("\nhint: `{word}` is a layer, beside the picture or in its place: \"layers\": [\"{word}\"]")
         })
     }
 
     /// The error that the value at the JSON path `path` is wrong because of `reason`.
-    pub(crate) fn fault(&self, path: &str, reason: impl Into<String>) -> SceneError {
-        self.written.fault(path, reason)
+    pub(crate) fn fault(&self, path: &str, why: impl Into<Refusal>) -> SceneError {
+        self.written.fault(path, why)
     }
 
     /// The file.
@@ -339,7 +340,7 @@ impl WrittenPlaces {
         let Value::String(written) = &*place else { return Ok(()) };
         let folder = self.folder();
         let folder =
-            self.opener.folder(folder).map_err(|why| SceneError::unreadable(folder, why))?;
+            self.opener.folder(folder).map_err(|why| SceneError::unreadable(folder, &why))?;
         let (file, camera) =
             CameraFile::read(&folder, written)?.map_err(|why| self.fault("camera", why))?;
         *place = camera;
@@ -354,7 +355,7 @@ impl WrittenPlaces {
         for (key, text) in all {
             let setting = format!("{key}={text}");
             let applied = document::apply(value, key, text)
-                .map_err(|source| SceneError::Override { setting: setting.clone(), source })?;
+                .map_err(|why| Refusal::new(why.to_string()).at(format_args!("--set {setting}")))?;
             let is_camera = applied == "camera";
             self.settings.insert(applied, setting);
             if is_camera {
@@ -366,18 +367,13 @@ impl WrittenPlaces {
     }
 
     /// The error that the value at the JSON path `path` is wrong because of `reason`.
-    fn fault(&self, path: &str, reason: impl Into<String>) -> SceneError {
+    fn fault(&self, path: &str, why: impl Into<Refusal>) -> SceneError {
         let place = self.place(path);
         let file = self.camera.as_ref().zip(CameraFile::own_path(path));
         // A setting is told as it was written, from the scene's top.
         let file = file.filter(|_| !matches!(place, Origin::Setting(_)));
         let (file, path) = file.map_or((&self.path, path), |(file, own)| (&file.path, own));
-        SceneError::Invalid {
-            file: file.clone(),
-            path: path.to_owned(),
-            place,
-            reason: reason.into(),
-        }
+        SceneError::Invalid { file: file.clone(), path: path.to_owned(), place, why: why.into() }
     }
 
     /// Where the value at `path`, or the nearest that holds it, was written.
@@ -456,11 +452,11 @@ fn read_document(path: &Path) -> Result<(Document, Value), SceneError> {
     if !is_named_json && !text.trim_start().starts_with(['{', '[']) {
         return Err(not_a_scene("is text that is no JSON".to_owned()));
     }
-    Document::parse(text.clone()).map_err(|fault| SceneError::Syntax {
-        file: path.to_owned(),
-        place: fault.place,
-        excerpt: excerpt(&text, fault.place),
-        reason: fault.reason,
+    Document::parse(text.clone()).map_err(|fault| {
+        let Place { line, column } = fault.place;
+        let why = Refusal::new(fault.reason).and(&format!("\n{}", excerpt(&text, fault.place)));
+        let place = format!("{}, line {line}, column {column}: broken JSON", path.display());
+        SceneError::Refused(why.at(place))
     })
 }
 
@@ -471,6 +467,6 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, SceneError> {
         io::ErrorKind::Other => {
             SceneError::NotAScene { file: path.to_owned(), reason: source.to_string() }
         }
-        _ => SceneError::unreadable(path, source),
+        _ => SceneError::unreadable(path, &source),
     })
 }

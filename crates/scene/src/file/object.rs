@@ -88,11 +88,13 @@ impl ObjectMotionSpec {
             }
             Self::Transforms { transforms, times, translation } => {
                 if *transform != TransformSpec::default() {
-                    let why = "is given beside `transform`, whose place it takes; leave that out";
+                    let why =
+                        "is given beside `transform`, whose place it takes\nhint: leave that out";
                     return Err(("transforms".to_owned(), why.to_owned()));
                 }
                 if transforms.len() < 2 {
-                    let why = "do not move; give two or more, or `transform` without `motion`";
+                    let why =
+                        "do not move\nhint: give two or more, or `transform` without `motion`";
                     return Err(("transforms".to_owned(), why.to_owned()));
                 }
                 let mut built = Vec::with_capacity(transforms.len());
@@ -363,7 +365,7 @@ impl TransformSpec {
             ("scale", self.scale.is_some()),
         ];
         if let Some((key, _)) = others.into_iter().find(|(_, given)| *given) {
-            return Err((key, "is given beside `matrix`; give one or the other".to_owned()));
+            return Err((key, "is given beside `matrix`\nhint: give one or the other".to_owned()));
         }
         if rows[3] != [0.0, 0.0, 0.0, 1.0] {
             let why = format!(
@@ -379,7 +381,7 @@ impl TransformSpec {
         let volume: f64 = (0..3).map(|k| column(k).length()).product();
         let determinant = linear.determinant().abs();
         if determinant.is_nan() || determinant <= 1e-12 * volume {
-            let why = "is singular: it flattens the object; check the rows".to_owned();
+            let why = "is singular: it flattens the object\nhint: check the rows".to_owned();
             return Err(("matrix", why));
         }
         Ok(Transform::new(linear, column(3)))
@@ -387,9 +389,10 @@ impl TransformSpec {
 
     fn rotation(&self) -> Result<DMat3, TransformFault> {
         match (self.rotate, self.quaternion) {
-            (Some(_), Some(_)) => {
-                Err(("quaternion", "is given beside `rotate`; give one or the other".to_owned()))
-            }
+            (Some(_), Some(_)) => Err((
+                "quaternion",
+                "is given beside `rotate`\nhint: give one or the other".to_owned(),
+            )),
             (Some([x, y, z, degrees]), None) => match DVec3::new(x, y, z).try_normalize() {
                 Some(axis) => Ok(turn(axis, degrees)),
                 None => Err((

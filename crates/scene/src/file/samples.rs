@@ -158,7 +158,7 @@ pub(super) fn fault(
     let [min, max] = match render.samples {
         SamplesSpec::Count(_) | SamplesSpec::Time(_) if !layers.is_empty() => {
             let why = format!(
-                "the layer `{}` is of samples that go on until an error is reached; give \
+                "the layer `{}` is of samples that go on until an error is reached\nhint: give \
                  `render.samples` {{\"until\": \"sensor-noise\"}} or {{\"relative_error\": 0.02}}, or \
                  leave the layer out",
                 layers[0]
@@ -167,17 +167,17 @@ pub(super) fn fault(
         }
         SamplesSpec::Count(_) => return None,
         SamplesSpec::Time(TimeSpec { time, .. }) if time.0 <= 0.0 => {
-            return at(".time", "no samples are taken in no time; give it more than 0 s");
+            return at(".time", "no samples are taken in no time\nhint: give it more than 0 s");
         }
         SamplesSpec::Time(_) => [0, 0],
         SamplesSpec::SensorNoise(SensorNoiseSpec { fraction, .. }) if fraction < LEAST_ERROR => {
-            let why = "sampling would never stop; give it more than 1e-9, such as 0.1";
+            let why = "sampling would never stop\nhint: give it more than 1e-9, such as 0.1";
             return at(".fraction", why);
         }
         SamplesSpec::RelativeError(RelativeErrorSpec { relative_error, .. })
             if relative_error < LEAST_ERROR =>
         {
-            let why = "sampling would never stop; give it more than 1e-9, such as 0.02";
+            let why = "sampling would never stop\nhint: give it more than 1e-9, such as 0.02";
             return at(".relative_error", why);
         }
         SamplesSpec::SensorNoise(SensorNoiseSpec { min, max, .. })
@@ -190,13 +190,13 @@ pub(super) fn fault(
             None => ".max",
         };
         let why = format!(
-            "at least {min} samples and at most {max} is none at all; give a `min` up to `max`"
+            "at least {min} samples and at most {max} is none at all\nhint: give a `min` up to `max`"
         );
         return at(key, &why);
     }
     if matches!(render.sampler, Sampler::Stratified | Sampler::Hammersley | Sampler::BlueNoise) {
-        let why = "has to be told the number of samples beforehand, and `render.samples` is none; \
-                   take `sobol` or `independent`";
+        let why = "has to be told the number of samples beforehand, and `render.samples` is none\
+                   \nhint: take `sobol` or `independent`";
         return Some(("render.sampler".to_owned(), why.to_owned()));
     }
     None

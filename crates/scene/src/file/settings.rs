@@ -213,18 +213,19 @@ impl PlanSpec {
         };
         match (self.refine, of_f64) {
             (Some(false), Some(name)) => {
-                let why = format!("{name} works in f64 alone; leave this out, or take `embree`");
+                let why =
+                    format!("{name} works in f64 alone\nhint: leave this out, or take `embree`");
                 return Some(("refine", why));
             }
             (Some(false), None) if self.light_precision == LightPrecision::Double => {
                 let why = "contradicts `light_precision` \"double\": without it there are hits in f32 \
-                           alone; leave one of them out";
+                           alone\nhint: leave one of them out";
                 return Some(("refine", why.to_owned()));
             }
             _ => {}
         }
         (self.textures == Some(false) && self.texture_filter == Some(true)).then(|| {
-            let why = "contradicts `textures` false: no image is read that could be averaged; leave one \
+            let why = "contradicts `textures` false: no image is read that could be averaged\nhint: leave one \
                        of them out";
             ("texture_filter", why.to_owned())
         })

@@ -131,7 +131,7 @@ impl SceneSpec {
             return None;
         }
         let number = self.layers.iter().position(|layer| layer.is_light())?;
-        let why = "is a part of the picture's light, and the picture shows none; give the scene a `tracer` \
+        let why = "is a part of the picture's light, and the picture shows none\nhint: give the scene a `tracer` \
                    of light, such as {\"type\": \"path\"}, or leave the layer out";
         Some((format!("layers[{number}]"), why.to_owned()))
     }
@@ -193,7 +193,7 @@ pub(super) fn read_resolution(value: &mut Value, at: &str) -> Result<(), String>
     let sides: Vec<Option<u32>> =
         text.split(['x', 'X', '×']).map(|side| side.trim().parse().ok()).collect();
     let [Some(width), Some(height)] = sides[..] else {
-        return Err(format!("\"{text}\" is no resolution; write [640, 480] or \"640x480\""));
+        return Err(format!("\"{text}\" is no resolution\nhint: write [640, 480] or \"640x480\""));
     };
     *place = json!([width, height]);
     Ok(())

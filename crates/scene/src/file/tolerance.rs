@@ -76,13 +76,13 @@ impl ShareSpec {
 }
 
 fn wrong_pixels() -> String {
-    "is no number of pixels above 0, such as \"0.5 px\"; leave `tolerance` out for a picture without \
+    "is no number of pixels above 0, such as \"0.5 px\"\nhint: leave `tolerance` out for a picture without \
      approximations"
         .to_owned()
 }
 
 fn wrong_share() -> String {
-    "is no share of the light above 0 and below 1, such as \"2 %\" or 0.02; leave `tolerance` out for a picture \
+    "is no share of the light above 0 and below 1, such as \"2 %\" or 0.02\nhint: leave `tolerance` out for a picture \
      without approximations"
         .to_owned()
 }
@@ -146,13 +146,13 @@ impl ToleranceSpec {
         has_slots: bool,
     ) -> Option<(&'static str, String)> {
         if plan.dispersion == Some(true) {
-            let why = "contradicts `tolerance`, which decides whether rays of all bands run together; leave one of \
+            let why = "contradicts `tolerance`, which decides whether rays of all bands run together\nhint: leave one of \
                        them out";
             return Some(("plan.dispersion", why.to_owned()));
         }
         has_slots.then(|| {
             let why =
-                "is of one camera, and the slots of `serial` have one each; leave one of them out";
+                "is of one camera, and the slots of `serial` have one each\nhint: leave one of them out";
             ("tolerance", why.to_owned())
         })
     }

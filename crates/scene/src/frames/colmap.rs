@@ -111,7 +111,7 @@ pub(in crate::frames) fn cameras_in_binary(bytes: &[u8]) -> Result<Cameras, Stri
     }
     rest.end()?;
     match cameras.is_empty() {
-        true => Err("has no camera; export the model again, or remove the file".to_owned()),
+        true => Err("has no camera\nhint: export the model again, or remove the file".to_owned()),
         false => Ok(cameras),
     }
 }
@@ -130,7 +130,7 @@ impl ByteCursor<'_> {
     }
 
     fn cut_off(&self) -> String {
-        format!("ends inside what begins at byte {}; copy it again", self.at)
+        format!("ends inside what begins at byte {}\nhint: copy it again", self.at)
     }
 
     fn word(&mut self) -> Result<u32, String> {
@@ -283,7 +283,7 @@ fn unknown(what: &str) -> String {
     let is_known = |model: &Model| !matches!(model.bend, Bend::Unknown(_));
     let known: Vec<&str> = MODELS.iter().filter(|m| is_known(m)).map(|model| model.name).collect();
     format!(
-        "a {what} camera; known: {}. `colmap image_undistorter` makes PINHOLE cameras of the others",
+        "a {what} camera\nhint: known: {}. `colmap image_undistorter` makes PINHOLE cameras of the others",
         known.join(", ")
     )
 }
@@ -304,8 +304,8 @@ pub(in crate::frames) fn images_in_text(text: &str) -> Result<Vec<Image>, String
         match (may_be_points, may_be_image(&words)) {
             (true, true) if is_after_image => {
                 return Err(format!(
-                    "has line {number}, which may be an image and may be the points of the one before; \
-                     write an empty line after each image, or rename this one"
+                    "has line {number}, which may be an image and may be the points of the one before\
+                     \nhint: write an empty line after each image, or rename this one"
                 ));
             }
             (true, false) if is_after_image => is_after_image = false,
@@ -400,7 +400,7 @@ pub(in crate::frames) fn cameras_in_text(text: &str) -> Result<Cameras, String> 
         }
     }
     match cameras.is_empty() {
-        true => Err("has no camera; export the model again, or remove the file".to_owned()),
+        true => Err("has no camera\nhint: export the model again, or remove the file".to_owned()),
         false => Ok(cameras),
     }
 }

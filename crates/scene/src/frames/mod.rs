@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use etendue_camera::{CameraSpec, Convention, Maps, Pose, PoseSpec};
 use etendue_files::Opener;
 use etendue_geometry::glam::DVec3;
+use etendue_report::Refusal;
 use serde_json::Value;
 
 use crate::error::not_found;
@@ -119,7 +120,7 @@ impl SceneFile {
     ) -> Result<Option<Frames>, SceneError> {
         let Some(spec) = &self.spec.frames else { return Ok(None) };
         if self.spec.render.frame != 0 {
-            let why = "each of `frames` has its own number; leave one of the two out";
+            let why = "each of `frames` has its own number\nhint: leave one of the two out";
             return Err(self.fault("render.frame", why));
         }
         let mut notes = Vec::new();
@@ -150,7 +151,7 @@ impl SceneFile {
         }
         if frames.is_empty() {
             return Err(
-                self.fault("frames", "there is no frame; leave `frames` out for one picture")
+                self.fault("frames", "there is no frame\nhint: leave `frames` out for one picture")
             );
         }
         self.check_frame_times(&frames)?;
@@ -186,8 +187,8 @@ impl SceneFile {
         let in_frame = |error: SceneError| {
             let why = match error {
                 // Its place is the frame, which is told here.
-                SceneError::Invalid { path, reason, .. } => format!("{path}: {reason}"),
-                other => other.to_string(),
+                SceneError::Invalid { path, why, .. } => why.at(path),
+                other => Refusal::new(other.to_string()),
             };
             self.fault(&join_index("frames", frame.number), why)
         };

@@ -266,7 +266,7 @@ fn place(camera: &RigCameraSpec) -> Result<Pose, (&'static str, String)> {
     if let Some(path) = settings.keys().find(|path| path.starts_with("camera.pose")) {
         return Err((
             "settings",
-            format!("{path} is where the rig stands; set `at` or `pose` instead"),
+            format!("{path} is where the rig stands\nhint: set `at` or `pose` instead"),
         ));
     }
     match (at, pose) {

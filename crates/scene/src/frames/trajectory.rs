@@ -114,7 +114,7 @@ fn told_by_name(path: &Path) -> Result<TrajectoryFormat, String> {
         "txt" | "tum" => Ok(TrajectoryFormat::Tum),
         "kitti" => Ok(TrajectoryFormat::Kitti),
         _ => Err(
-            "does not tell its format by its name; set `format` to npy, tum, kitti, colmap or nerfstudio"
+            "does not tell its format by its name\nhint: set `format` to npy, tum, kitti, colmap or nerfstudio"
                 .to_owned(),
         ),
     }

@@ -85,15 +85,16 @@ type Notes = Vec<(NoteKind, String)>;
 pub(super) fn read(text: &str, scene: ScenePicture) -> Result<(Vec<Station>, Notes), String> {
     let remedy = "a list `frames` of objects with a transform_matrix is wanted";
     let file: Map<String, Value> = serde_json::from_str(text)
-        .map_err(|error| format!("is no transforms.json: {error}; {remedy}"))?;
+        .map_err(|error| format!("is no transforms.json: {error}\nhint: {remedy}"))?;
     let frames = file.get("frames").and_then(Value::as_array);
     let frames = frames.ok_or_else(|| format!("is no transforms.json: {remedy}"))?;
     let mut said = Said::default();
     let mut stations = Vec::with_capacity(frames.len());
     for (number, frame) in frames.iter().enumerate() {
         let in_frame = |why: String| format!("has a frame {number} {why}");
-        let own =
-            frame.as_object().ok_or_else(|| in_frame(format!("that is no object; {remedy}")))?;
+        let own = frame
+            .as_object()
+            .ok_or_else(|| in_frame(format!("that is no object\nhint: {remedy}")))?;
         let keys = Keys { file: &file, own };
         stations.push(keys.station(scene, &mut said).map_err(in_frame)?);
     }
@@ -159,7 +160,7 @@ impl<'v> Keys<'v> {
     fn station(&self, scene: ScenePicture, said: &mut Said) -> Result<Station, String> {
         if let Some(key) = REFUSED.iter().find(|key| self.get(key).is_some_and(is_on)) {
             return Err(format!(
-                "with {key}, which changes its rays or its pose in a way that is not done here; remove the key to \
+                "with {key}, which changes its rays or its pose in a way that is not done here\nhint: remove the key to \
                  have them without it"
             ));
         }
@@ -208,7 +209,7 @@ impl<'v> Keys<'v> {
         let Some(fx) = x.or(y) else {
             if let Some(key) = OF_LENS.iter().find(|key| self.get(key).is_some_and(is_on)) {
                 return Err(format!(
-                    "with {key} and without a focal length; give fl_x (pixels) or camera_angle_x (radians)"
+                    "with {key} and without a focal length\nhint: give fl_x (pixels) or camera_angle_x (radians)"
                 ));
             }
             said.lacks_focal = true;
@@ -219,7 +220,7 @@ impl<'v> Keys<'v> {
         };
         let is_in_pixels = ["fl_x", "fl_y", "cx", "cy"].iter().any(|key| self.get(key).is_some());
         if resolution.is_none() && is_in_pixels && !scene.is_given {
-            return Err("with a focal length or a principal point in pixels and without its size; give w and h, or \
+            return Err("with a focal length or a principal point in pixels and without its size\nhint: give w and h, or \
                         camera.sensor.resolution in the scene"
                 .to_owned());
         }
@@ -246,8 +247,8 @@ impl<'v> Keys<'v> {
         match [side("w")?, side("h")?] {
             [Some(w), Some(h)] => Ok(Some([w, h])),
             [None, None] => Ok(None),
-            [Some(_), None] => Err("with w and without h; give both".to_owned()),
-            [None, Some(_)] => Err("with h and without w; give both".to_owned()),
+            [Some(_), None] => Err("with w and without h\nhint: give both".to_owned()),
+            [None, Some(_)] => Err("with h and without w\nhint: give both".to_owned()),
         }
     }
 
@@ -318,7 +319,7 @@ impl<'v> Keys<'v> {
                 Ok(Some(distortion("fisheye", self.terms(&["k1", "k2", "k3", "k4"])?)))
             }
             other => Err(format!(
-                "with the camera model \"{other}\"; known: OPENCV, OPENCV_FISHEYE, PINHOLE, SIMPLE_PINHOLE, \
+                "with the camera model \"{other}\"\nhint: known: OPENCV, OPENCV_FISHEYE, PINHOLE, SIMPLE_PINHOLE, \
                  RADIAL, SIMPLE_RADIAL"
             )),
         }

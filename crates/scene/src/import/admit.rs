@@ -8,7 +8,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Buffer, Mesh, Positions, Vertices, is_degenerate};
 use rayon::prelude::*;
 
-use super::{ImportError, Note, NoteKind, Options, Strictness};
+use super::{Note, NoteKind, Options, Refusal, Strictness, error};
 
 /// Triangles that one task looks at: large enough to forget the cost of a task, small enough to
 /// share 100 000 triangles among many cores.
@@ -47,7 +47,7 @@ pub(super) fn admit(
     candidate: Candidate,
     file: &Path,
     options: &Options,
-) -> Result<Admitted, ImportError> {
+) -> Result<Admitted, Refusal> {
     let mut gate =
         Gate { file, place: &candidate.place, strictness: options.strictness, notes: Vec::new() };
     let survey = gate.survey(&candidate.positions, &candidate.triangles)?;
@@ -101,7 +101,7 @@ struct Gate<'a> {
 }
 
 impl Gate<'_> {
-    fn survey(&self, positions: &Positions, triangles: &[[u32; 3]]) -> Result<Survey, ImportError> {
+    fn survey(&self, positions: &Positions, triangles: &[[u32; 3]]) -> Result<Survey, Refusal> {
         match positions {
             Positions::F32(vertices) => {
                 let (floats, stride): (&[f32], _) = (vertices.floats(), vertices.stride());
@@ -123,7 +123,7 @@ impl Gate<'_> {
         vertices: usize,
         triangles: &[[u32; 3]],
         position: impl Fn(u32) -> DVec3 + Sync,
-    ) -> Result<Survey, ImportError> {
+    ) -> Result<Survey, Refusal> {
         let parts: Vec<Option<Survey>> = triangles
             .par_chunks(CHUNK)
             .map(|chunk| {
@@ -143,15 +143,15 @@ impl Gate<'_> {
         Ok(survey)
     }
 
-    fn out_of_range(&self, vertices: usize, triangles: &[[u32; 3]], from: usize) -> ImportError {
+    fn out_of_range(&self, vertices: usize, triangles: &[[u32; 3]], from: usize) -> Refusal {
         let found = triangles[from..]
             .iter()
             .enumerate()
             .find_map(|(i, t)| Some((i, *t.iter().find(|&&corner| corner as usize >= vertices)?)));
         let (i, corner) = found.unwrap_or_default();
         self.damaged(format!(
-            "triangle {} names vertex {corner}, but there are only {vertices} vertices; \
-             export the file again",
+            "triangle {} names vertex {corner}, but there are only {vertices} vertices\
+             \nhint: export the file again",
             from + i
         ))
     }
@@ -162,7 +162,7 @@ impl Gate<'_> {
         vertices: Vertices<N>,
         what: &str,
         instead: f32,
-    ) -> Result<Vertices<N>, ImportError> {
+    ) -> Result<Vertices<N>, Refusal> {
         let is_finite = |i: usize| vertices.get(i).iter().all(|value| value.is_finite());
         let bad = (0..vertices.len()).into_par_iter().filter(|&i| !is_finite(i)).count() as u64;
         if bad == 0 {
@@ -177,13 +177,7 @@ impl Gate<'_> {
     }
 
     /// Notes `count` defects, or refuses the file for them.
-    fn defect(
-        &mut self,
-        count: u64,
-        what: &str,
-        wrong: &str,
-        done: &str,
-    ) -> Result<(), ImportError> {
+    fn defect(&mut self, count: u64, what: &str, wrong: &str, done: &str) -> Result<(), Refusal> {
         let plural = if count == 1 { "" } else { "s" };
         if self.strictness == Strictness::Strict {
             return Err(self.damaged(format!(
@@ -195,8 +189,8 @@ impl Gate<'_> {
         Ok(())
     }
 
-    fn damaged(&self, reason: String) -> ImportError {
-        ImportError::Damaged { file: self.file.to_owned(), place: self.place.to_owned(), reason }
+    fn damaged(&self, reason: String) -> Refusal {
+        error::damaged(self.file, self.place, reason)
     }
 }
 

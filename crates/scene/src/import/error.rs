@@ -1,103 +1,35 @@
-//! Why a model could not be read.
+//! Why a model could not be read: refusals that name the file, the place in it, and what to do.
 //!
 //! What an import has to say without refusing the file.
 
-use std::io;
-use std::path::PathBuf;
+use std::fmt::Display;
+use std::path::Path;
 
+use etendue_report::Refusal;
 use serde::Serialize;
 
 use crate::memory::TooMuch;
 
-/// Why a model could not be read. The message names the file, the place in it, and what to do.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ImportError {
-    /// A file cannot be opened.
-    #[error("cannot read {}: {source}", file.display())]
-    Unreadable {
-        /// The file.
-        file: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// The ending is none that is known.
-    #[error("{}: not a format that can be read; use .gltf, .glb, .obj or .ply", file.display())]
-    UnknownFormat {
-        /// The file.
-        file: PathBuf,
-    },
-    /// A path inside the model leads out of the allowed folder.
-    #[error(
-        "{}: \"{written}\" leads out of the folder {}; move the file there, or pass --allow-outside",
-        file.display(), root.display()
-    )]
-    Outside {
-        /// The file that names the path.
-        file: PathBuf,
-        /// The path as the file has it.
-        written: String,
-        /// The folder it may not leave.
-        root: PathBuf,
-    },
-    /// The text is not what its format prescribes.
-    #[error("{}, line {line}, column {column}: {reason}{}", file.display(), excerpt(text))]
-    Text {
-        /// The file.
-        file: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// The column, from 1.
-        column: usize,
-        /// What is wrong.
-        reason: String,
-        /// The line itself, shortened where it is long; may be empty.
-        text: String,
-    },
-    /// Something in the file contradicts its format or itself.
-    #[error("{}: {place}: {reason}", file.display())]
-    Damaged {
-        /// The file.
-        file: PathBuf,
-        /// Where in the file.
-        place: String,
-        /// What is wrong and what to do about it.
-        reason: String,
-    },
-    /// More memory than there may be.
-    #[error("{}: {place}: what it makes {source}", file.display())]
-    Memory {
-        /// The file.
-        file: PathBuf,
-        /// Where in the file.
-        place: String,
-        /// How much, and how much there is.
-        source: TooMuch,
-    },
-    /// The file needs an extension that is not supported.
-    #[error("{}: needs {name}, not supported: {remedy}", file.display())]
-    UnsupportedExtension {
-        /// The file.
-        file: PathBuf,
-        /// The extension.
-        name: String,
-        /// What to do about it.
-        remedy: String,
-    },
+/// A file that contradicts its format, or itself, at a place in it.
+pub(super) fn damaged(file: &Path, place: impl Display, why: impl Into<Refusal>) -> Refusal {
+    why.into().at(place).at(file.display())
 }
 
-impl ImportError {
-    /// Two unsupported extensions of one file as one error; of other errors the first.
-    pub(crate) fn and(mut self, other: Self) -> Self {
-        if let (
-            Self::UnsupportedExtension { remedy, .. },
-            Self::UnsupportedExtension { name, remedy: other, .. },
-        ) = (&mut self, other)
-        {
-            *remedy = format!("{remedy}\n    and {name}, not supported: {other}");
-        }
-        self
-    }
+/// A file whose contents take more memory than there may be.
+pub(super) fn too_much(file: &Path, place: impl Display, why: TooMuch) -> Refusal {
+    damaged(file, place, format!("what it makes {why}"))
+}
+
+/// A text that is not what its format prescribes, with the line itself, which may be empty, shortened where it is long.
+/// Line and column are counted from 1.
+pub(super) fn wrong_text(
+    file: &Path,
+    (line, column): (usize, usize),
+    why: String,
+    text: &str,
+) -> Refusal {
+    let place = format!("{}, line {line}, column {column}", file.display());
+    Refusal::new(why).and(&excerpt(text)).at(place)
 }
 
 /// The offending line below the message; nothing when it is no text that one could read.

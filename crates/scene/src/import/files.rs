@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use etendue_files::MappedFile;
 use etendue_report::Size;
 
-use super::{ImportError, Options};
+use super::{Options, Refusal, error};
 use crate::memory::Budget;
 
 /// Bytes that a model may make appear, however small its files are.
@@ -34,7 +34,7 @@ pub(super) struct Files {
 
 impl Files {
     /// For the model at `path`, whose relative paths start at its own folder.
-    pub(super) fn beside(path: &Path, options: &Options) -> Result<Self, ImportError> {
+    pub(super) fn beside(path: &Path, options: &Options) -> Result<Self, Refusal> {
         let folder = match path.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
             _ => PathBuf::from("."),
@@ -57,32 +57,24 @@ impl Files {
     /// # Errors
     ///
     /// When they are over what there may be, or out of all proportion to the model's files.
-    pub(super) fn take(
-        &self,
-        bytes: u64,
-        place: impl FnOnce() -> String,
-    ) -> Result<(), ImportError> {
+    pub(super) fn take(&self, bytes: u64, place: impl FnOnce() -> String) -> Result<(), Refusal> {
         let made = self.made.fetch_add(bytes, Ordering::Relaxed).saturating_add(bytes);
         if made > MADE_OF_NOTHING {
             let held: u64 = self.opened().iter().map(|(_, size)| size).sum();
             if made > MADE_OF_NOTHING.saturating_add(held.saturating_mul(MADE_PER_BYTE)) {
-                return Err(ImportError::Damaged {
-                    file: self.model.clone(),
-                    place: place(),
-                    reason: format!(
-                        "the model would take {} of memory and has {} of files; export it again, \
+                return Err(error::damaged(
+                    &self.model,
+                    place(),
+                    format!(
+                        "the model would take {} of memory and has {} of files\nhint: export it again, \
                          with the data in the file and fewer instances",
                         Size(made),
                         Size(held)
                     ),
-                });
+                ));
             }
         }
-        self.budget.take(bytes).map_err(|source| ImportError::Memory {
-            file: self.model.clone(),
-            place: place(),
-            source,
-        })
+        self.budget.take(bytes).map_err(|source| error::too_much(&self.model, place(), source))
     }
 
     /// The most that [`take`](Self::take) would still grant (bytes), as of now.
@@ -97,22 +89,13 @@ impl Files {
     /// # Errors
     ///
     /// When it has not so many bytes now.
-    pub(super) fn require_room(
-        &self,
-        file: &Path,
-        place: &str,
-        bytes: u64,
-    ) -> Result<(), ImportError> {
+    pub(super) fn require_room(&self, file: &Path, place: &str, bytes: u64) -> Result<(), Refusal> {
         // Not of the model's own account: it is given back as soon as the place is read.
-        Budget::default().take(bytes).map_err(|source| ImportError::Memory {
-            file: file.to_owned(),
-            place: place.to_owned(),
-            source,
-        })
+        Budget::default().take(bytes).map_err(|source| error::too_much(file, place, source))
     }
 
     /// Where `written`, a path inside the model, leads; see [`Self::locate_beside`].
-    pub(super) fn locate(&self, written: &str) -> Result<Option<PathBuf>, ImportError> {
+    pub(super) fn locate(&self, written: &str) -> Result<Option<PathBuf>, Refusal> {
         self.locate_in(&self.folder, written)
     }
 
@@ -124,11 +107,11 @@ impl Files {
         &self,
         file: &Path,
         written: &str,
-    ) -> Result<Option<PathBuf>, ImportError> {
+    ) -> Result<Option<PathBuf>, Refusal> {
         self.locate_in(file.parent().unwrap_or(Path::new("")), written)
     }
 
-    fn locate_in(&self, folder: &Path, written: &str) -> Result<Option<PathBuf>, ImportError> {
+    fn locate_in(&self, folder: &Path, written: &str) -> Result<Option<PathBuf>, Refusal> {
         let mut spellings = vec![folder.join(written)];
         if written.contains('\\') {
             spellings.push(folder.join(written.replace('\\', "/")));
@@ -137,46 +120,45 @@ impl Files {
         if let Some(root) = &self.root
             && !spellings.iter().all(|path| etendue_files::is_inside(root, path))
         {
-            return Err(ImportError::Outside {
-                file: self.model.clone(),
-                written: written.to_owned(),
-                root: root.clone(),
-            });
+            return Err(Refusal::new(format!(
+                "\"{written}\" leads out of the folder {}",
+                root.display()
+            ))
+            .hint("move the file there, or pass --allow-outside")
+            .at(self.model.display()));
         }
         Ok(spellings.into_iter().find(|path| path.is_file()))
     }
 
     /// The bytes of the model at `path`, mapped; an empty file is none.
-    pub(super) fn map_model(&self, path: &Path) -> Result<Arc<MappedFile>, ImportError> {
+    pub(super) fn map_model(&self, path: &Path) -> Result<Arc<MappedFile>, Refusal> {
         let map = self.map(path)?;
         if map.bytes().is_empty() {
-            return Err(ImportError::Damaged {
-                file: path.to_owned(),
-                place: "the file".to_owned(),
-                reason: "it is empty; copy or export it again".to_owned(),
-            });
+            return Err(error::damaged(
+                path,
+                "the file",
+                "it is empty\nhint: copy or export it again",
+            ));
         }
         Ok(map)
     }
 
     /// The bytes of the file at `path`, mapped, or copied where that is asked for.
-    pub(super) fn map(&self, path: &Path) -> Result<Arc<MappedFile>, ImportError> {
+    pub(super) fn map(&self, path: &Path) -> Result<Arc<MappedFile>, Refusal> {
         let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(file) = opened.get(path) {
             return Ok(Arc::clone(file));
         }
         let file = if self.copy {
             let length = path.metadata().map_or(0, |about| about.len());
-            self.budget.take(length).map_err(|source| ImportError::Memory {
-                file: path.to_owned(),
-                place: "a copy of it".to_owned(),
-                source,
-            })?;
+            self.budget
+                .take(length)
+                .map_err(|source| error::too_much(path, "a copy of it", source))?;
             MappedFile::copy(path)
         } else {
             MappedFile::open(path)
         };
-        let file = Arc::new(file.map_err(|source| unreadable(path, source))?);
+        let file = Arc::new(file.map_err(|source| unreadable(path, &source))?);
         opened.insert(path.to_owned(), Arc::clone(&file));
         Ok(file)
     }
@@ -188,10 +170,10 @@ impl Files {
     }
 }
 
-fn canonical(folder: &Path) -> Result<PathBuf, ImportError> {
-    folder.canonicalize().map_err(|source| unreadable(folder, source))
+fn canonical(folder: &Path) -> Result<PathBuf, Refusal> {
+    folder.canonicalize().map_err(|source| unreadable(folder, &source))
 }
 
-fn unreadable(path: &Path, source: io::Error) -> ImportError {
-    ImportError::Unreadable { file: path.to_owned(), source }
+fn unreadable(path: &Path, source: &io::Error) -> Refusal {
+    Refusal::new(format!("cannot be read: {source}")).at(path.display())
 }

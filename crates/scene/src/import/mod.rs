@@ -38,7 +38,9 @@ use files::Files;
 pub(crate) use admit::count_degenerate;
 pub use deformer::Deformer;
 pub(crate) use deformer::NoSteps;
-pub use error::{ImportError, Note, NoteKind};
+use etendue_report::Refusal;
+
+pub use error::{Note, NoteKind};
 
 /// What the render will look at; the rest of the file is left alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -265,13 +267,13 @@ pub struct Stats {
 }
 
 /// Refuses a file whose bytes are those of something else than `wanted`.
-fn refuse_other_kind(file: &Path, bytes: &[u8], wanted: &str) -> Result<(), ImportError> {
+fn refuse_other_kind(file: &Path, bytes: &[u8], wanted: &str) -> Result<(), Refusal> {
     match what_it_is(bytes) {
-        Some(what) => Err(ImportError::Damaged {
-            file: file.to_owned(),
-            place: "the file".to_owned(),
-            reason: format!("it is {what}, not {wanted}; name the model itself"),
-        }),
+        Some(what) => Err(error::damaged(
+            file,
+            "the file",
+            format!("it is {what}, not {wanted}\nhint: name the model itself"),
+        )),
         None => Ok(()),
     }
 }
@@ -282,7 +284,7 @@ fn refuse_other_kind(file: &Path, bytes: &[u8], wanted: &str) -> Result<(), Impo
 ///
 /// When the file, or one that it names, cannot be read, is damaged, leaves [`Options::root`], or
 /// needs an extension that is not supported; under [`Strictness::Strict`] also for defective data.
-pub fn import(path: &Path, wanted: Wanted, options: &Options) -> Result<Import, ImportError> {
+pub fn import(path: &Path, wanted: Wanted, options: &Options) -> Result<Import, Refusal> {
     let files = Files::beside(path, options)?;
     let extension =
         path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
@@ -291,7 +293,10 @@ pub fn import(path: &Path, wanted: Wanted, options: &Options) -> Result<Import, 
         "obj" => obj::import(path, &files, wanted, options),
         "ply" => ply::import(path, &files, wanted, options),
 
-        _ => Err(ImportError::UnknownFormat { file: path.to_owned() }),
+        _ => Err({
+            let why = "not a format that can be read\nhint: use .gltf, .glb, .obj or .ply";
+            Refusal::new(why).at(path.display())
+        }),
     }?;
     import.stats.files = files.opened();
     Ok(import)

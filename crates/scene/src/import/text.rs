@@ -3,7 +3,9 @@
 use std::borrow::Cow;
 use std::path::Path;
 
-use super::ImportError;
+use etendue_report::Refusal;
+
+use super::error::wrong_text;
 
 /// A place in a text that is wrong, and why.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -19,7 +21,7 @@ impl Fault {
     }
 
     /// The fault with its line and column in `text`.
-    pub(super) fn locate(self, file: &Path, text: &[u8]) -> ImportError {
+    pub(super) fn locate(self, file: &Path, text: &[u8]) -> Refusal {
         let at = self.at.min(text.len());
         // A carriage return ends a line, too, unless a newline follows.
         let ends = |i: usize| {
@@ -28,13 +30,10 @@ impl Fault {
         let start = (0..at).rev().find(|&i| ends(i)).map_or(0, |end| end + 1);
         let end = (start..text.len()).find(|&i| ends(i)).unwrap_or(text.len());
         let line = &text[start..end];
-        ImportError::Text {
-            file: file.to_owned(),
-            line: (0..at).filter(|&i| ends(i)).count() + 1,
-            column: self.at.saturating_sub(start) + 1,
-            reason: self.reason,
-            text: String::from_utf8_lossy(&line[..line.len().min(80)]).trim_end().to_owned(),
-        }
+        let number = (0..at).filter(|&i| ends(i)).count() + 1;
+        let column = self.at.saturating_sub(start) + 1;
+        let shown = String::from_utf8_lossy(&line[..line.len().min(80)]);
+        wrong_text(file, (number, column), self.reason, shown.trim_end())
     }
 }
 

@@ -17,6 +17,7 @@ use etendue_files::InputFolder;
 use etendue_geometry::{Bounds, Geometry, Transform};
 use etendue_optics::element::LensResources;
 use etendue_optics::glass::AgfCatalogue;
+use etendue_report::Refusal;
 use etendue_sensor::{Sensor, SensorSpec};
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
@@ -109,9 +110,8 @@ impl SceneFile {
         // A camera of the model, with the scene's own sensor when it has one; else the scene's.
         let (spec, origin) = match options.camera {
             Some(wanted) => {
-                let (index, camera) = pick(cameras, wanted).map_err(|reason| {
-                    SceneError::NoSuchCamera { wanted: wanted.to_owned(), reason }
-                })?;
+                let (index, camera) = pick(cameras, wanted)
+                    .map_err(|reason| Refusal::new(reason).at(format_args!("--camera {wanted}")))?;
                 let mut spec = camera.spec.clone();
                 let given = |key| self.value().pointer("/camera/sensor")?.get(key);
                 if given("resolution").or_else(|| given("model")).is_some() {
@@ -180,11 +180,11 @@ impl SceneFile {
             let why = if !camera.has_pupil() || has_lenslets {
                 "parts of the pupil want a camera with one lens: thin_lens, real_lens or lens"
             } else if camera.diffracts() {
-                "light that is spread as waves are came through all of the pupil; leave out `diffraction`"
+                "light that is spread as waves are came through all of the pupil\nhint: leave out `diffraction`"
             } else if camera.motion().is_some() {
-                "the pupil moves with the camera; leave out its `motion`"
+                "the pupil moves with the camera\nhint: leave out its `motion`"
             } else if self.spec.picture() != Some(LayerSpec::Radiance) {
-                "base colours come through no pupil; give the scene a `tracer` of light, such as \
+                "base colours come through no pupil\nhint: give the scene a `tracer` of light, such as \
                  {\"type\": \"path\"}"
             } else {
                 ""
@@ -209,7 +209,7 @@ impl SceneFile {
             && let Some((key, _)) = more.into_iter().find(|(_, is_given)| *is_given)
         {
             let why = "`render.samples` until the sensor's noise goes by one plain read-out at an exposure that is known \
-                       beforehand; give it a number of samples or a `relative_error`, or leave this out";
+                       beforehand\nhint: give it a number of samples or a `relative_error`, or leave this out";
             return refused(key, why);
         }
         if sensor.angular_response.is_some() && has_lenslets {
@@ -220,12 +220,12 @@ impl SceneFile {
         }
         if sensor.carrier_diffusion.is_some_and(|way| way.0 > 0.0) {
             if camera.diffracts() {
-                let why = "light that is spread as waves are is traced along chief rays; leave out `diffraction`, or \
+                let why = "light that is spread as waves are is traced along chief rays\nhint: leave out `diffraction`, or \
                            this";
                 return refused("carrier_diffusion", why);
             }
             if camera.shutter().is_some() {
-                let why = "a shutter looks at rows of the light, and carriers come from beside them; leave out \
+                let why = "a shutter looks at rows of the light, and carriers come from beside them\nhint: leave out \
                            `shutter`, or this";
                 return refused("carrier_diffusion", why);
             }

@@ -67,17 +67,16 @@ impl SceneFile {
 
     fn no_steps(&self, name: &str, count: u32, why: NoSteps<TooMuch>) -> SceneError {
         match why {
-            NoSteps::Room(source) => SceneError::Memory {
-                file: self.path().to_owned(),
-                what: format!(
+            NoSteps::Room(why) => {
+                let what = format!(
                     "step {count} of the shapes of mesh \"{name}\" while the shutter is open (a shorter exposure has \
-                     fewer, and without `plays` there is one)"
-                ),
-                source,
-            },
+                     fewer, and without `plays` there is one) {why}"
+                );
+                SceneError::refused(self.path(), what)
+            }
             NoSteps::Broken(error) => {
                 let why = format!(
-                    "mesh \"{name}\" of an animation that plays: {error}; export it again, or leave `plays` out"
+                    "mesh \"{name}\" of an animation that plays: {error}\nhint: export it again, or leave `plays` out"
                 );
                 self.fault("objects", why)
             }

@@ -234,7 +234,7 @@ impl SceneFile {
         if self.kind() == FileKind::Model && written == own_name {
             let path = self.path().to_owned();
             let real =
-                path.canonicalize().map_err(|source| SceneError::unreadable(&path, source))?;
+                path.canonicalize().map_err(|source| SceneError::unreadable(&path, &source))?;
             return Ok(FoundFile { path, real });
         }
         let at = join(&join_index("objects", index), "file");

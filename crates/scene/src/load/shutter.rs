@@ -44,7 +44,7 @@ impl SceneFile {
         if let Some(rate) = render.rate
             && !(rate > 0.0 && rate.is_finite())
         {
-            let why = format!("{rate} frames a second; give a number above 0");
+            let why = format!("{rate} frames a second\nhint: give a number above 0");
             return Err(self.fault("render.rate", why));
         }
         if let Some((key, why)) = render.imu.as_ref().and_then(ImuSpec::fault) {
@@ -67,7 +67,7 @@ impl SceneFile {
         if shutter.kind != ShutterKind::Global && readout > 1.0 / rate {
             let why = format!(
                 "{rows} rows of {line_time} s are read in {readout} s, longer than the {} s from frame to frame of \
-                 `render.rate`; shorten it, or lower the rate",
+                 `render.rate`\nhint: shorten it, or lower the rate",
                 1.0 / rate
             );
             return Err(self.fault("camera.shutter.line_time", why));
@@ -84,7 +84,7 @@ impl SceneFile {
         let first = sensor.shots().next().map(|shot| shot.exposure);
         let differ = sensor.shots().any(|shot| Some(shot.exposure) != first);
         if differ && given.is_none() && (camera.motion().is_some() || self.changes()) {
-            let why = "the light is rendered once for all of them, and what moves or changes is otherwise in each; give \
+            let why = "the light is rendered once for all of them, and what moves or changes is otherwise in each\nhint: give \
                        the exposures to `frames`, such as [{\"camera.sensor.exposure\": 0.01}], or the shutter one \
                        `exposure`";
             return Err(self.fault("camera.sensor.exposures", why));
@@ -92,7 +92,7 @@ impl SceneFile {
         let is_metered = sensor.spec().auto_exposure.is_some();
         if is_metered && given.is_none() && (camera.motion().is_some() || self.changes()) {
             let why = "how long the shutter is open is known when the light is, and what moves or changes has to know it \
-                       before; give the shutter its `exposure`, or the sensor the `exposure` that a render of the still \
+                       before\nhint: give the shutter its `exposure`, or the sensor the `exposure` that a render of the still \
                        scene reports";
             return Err(self.fault("camera.sensor.auto_exposure", why));
         }
@@ -100,7 +100,7 @@ impl SceneFile {
         match (given, first) {
             (Some(Seconds(given)), Some(exposure)) if is_written && given != exposure => {
                 let why = format!(
-                    "{given} s, and `camera.sensor.exposure` {exposure} s; leave one of them out"
+                    "{given} s, and `camera.sensor.exposure` {exposure} s\nhint: leave one of them out"
                 );
                 Err(self.fault("camera.shutter.exposure", why))
             }
@@ -150,7 +150,7 @@ impl SceneFile {
         if !needs || is_timed {
             return Ok(());
         }
-        let why = "something moves or changes, and nobody says when each frame is taken; give `render.rate` (frames a second), \
+        let why = "something moves or changes, and nobody says when each frame is taken\nhint: give `render.rate` (frames a second), \
                    or each frame its `render.time`";
         Err(self.fault("frames", why))
     }

@@ -8,7 +8,8 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Mesh, Positions, Vertices};
 use rayon::prelude::*;
 
-use super::{GoOn, Relief, sin_cos_turns};
+use super::GoOn;
+use super::relief::{Relief, sin_cos_turns};
 use crate::import::{Wanted, count_degenerate};
 
 /// Vertices that one task makes.

@@ -80,7 +80,7 @@ fn other_files_are_no_scenes() {
 fn a_missing_scene_names_the_nearest() {
     let (folder, _) = folder("{\"etendue\": 1}");
     let error = load(&folder.path().join("scnee.json"), &[]).unwrap_err().to_string();
-    assert!(error.contains("no such file; did you mean \"scene.json\"?"), "{error}");
+    assert!(error.contains("no such file\nhint: did you mean \"scene.json\"?"), "{error}");
 }
 
 #[test]
@@ -88,13 +88,13 @@ fn unknown_keys_name_the_nearest() {
     assert_says(
         "{\n\"etendue\": 1,\n  \"objcets\": []}",
         &[
-            "line 3, column 3: objcets: unknown key; did you mean `objects`?",
+            "line 3, column 3: objcets: unknown key\nhint: did you mean `objects`?",
             "known: `accuracy`, `camera`",
         ],
     );
     assert_says(
         r#"{"etendue": 1, "camera": {"type": "pinhole", "fvo": 3}}"#,
-        &["line 1, column 46: camera.fvo: unknown key; did you mean `fov`?", "`intrinsics`"],
+        &["line 1, column 46: camera.fvo: unknown key\nhint: did you mean `fov`?", "`intrinsics`"],
     );
     assert_says(
         r#"{"etendue": 1, "camera": {"type": "pinhole", "sensor": {"resolutoin": [1, 1]}}}"#,
@@ -120,12 +120,12 @@ fn unknown_keys_name_the_nearest() {
 fn unknown_words_name_the_nearest() {
     assert_says(
         r#"{"etendue": 1, "camera": {"type": "pinhol"}}"#,
-        &["camera.type: unknown type \"pinhol\"; did you mean `pinhole`?", "`orthographic`"],
+        &["camera.type: unknown type \"pinhol\"\nhint: did you mean `pinhole`?", "`orthographic`"],
     );
     assert_says(r#"{"etendue": 1, "layers": ["dept"]}"#, &["layers[0]", "did you mean `depth`?"]);
     assert_says(
         r#"{"etendue": 1, "objects": [{"shape": "shpere"}]}"#,
-        &["objects[0].shape: unknown shape \"shpere\"; did you mean `sphere`?"],
+        &["objects[0].shape: unknown shape \"shpere\"\nhint: did you mean `sphere`?"],
     );
     assert_says(
         r#"{"etendue": 1, "objects": [{"material": "m"}]}"#,
@@ -203,7 +203,7 @@ fn samples_that_would_never_stop_or_are_none_are_refused_by_path() {
         ),
         (noise(r#", "max": 3"#), "render.samples.max: at least 4 samples and at most 3"),
         (noise(r#", "min": 0"#), "render.samples.min: 0 is below the least, 1"),
-        (noise(r#", "frac": 1"#), "render.samples.frac: unknown key; known: `fraction`"),
+        (noise(r#", "frac": 1"#), "render.samples.frac: unknown key\nhint: known: `fraction`"),
         (noise(r#"}, "sampler": {"a": 1"#), "render.sampler"),
         (r#"{"samples": {"until": "noise"}}"#.to_owned(), "render.samples.until: \"noise\" is not"),
         (r#"{"samples": {"relative_error": 0}}"#.to_owned(), "would never stop"),
@@ -246,7 +246,7 @@ fn overrides_of_the_plan_that_contradict_each_other_are_refused_by_path() {
             "plan.texture_filter: contradicts `textures` false",
         ),
         (r#""plan": {"build_quality": "best"}"#, "plan.build_quality: \"best\" is not known here"),
-        (r#""plan": {"textur": true}"#, "plan.textur: unknown key; did you mean `textures`?"),
+        (r#""plan": {"textur": true}"#, "plan.textur: unknown key\nhint: did you mean `textures`?"),
     ];
     for (text, part) in cases {
         assert_says(&format!(r#"{{"etendue": 1, {text}}}"#), &[part]);
@@ -295,7 +295,7 @@ fn impossible_objects_are_refused_by_path() {
         (r#""transform": {"scale": [1, 2]}"#, "objects[0].transform.scale: expected 3 values"),
         (
             r#""material": "cley""#,
-            "objects[0].material: unknown material \"cley\"; did you mean `clay`?",
+            "objects[0].material: unknown material \"cley\"\nhint: did you mean `clay`?",
         ),
         (r#""size": [1, 0, 1]"#, "objects[0].size"),
         (r#""size": ["1 m", "1 mn", 1]"#, "objects[0].size[1]: \"1 mn\": unknown unit `mn`"),

@@ -127,7 +127,7 @@ fn what_is_no_camera_file_is_refused_with_a_remedy() {
     fs::write(folder.path().join("scene.json"), scene).unwrap();
     let error = message(folder.path(), &[]);
     assert!(
-        error.contains("camera: no such file: \"mnie.json\"; did you mean \"mine.json\"?"),
+        error.contains("camera: no such file: \"mnie.json\"\nhint: did you mean \"mine.json\"?"),
         "{error}"
     );
 }

@@ -119,7 +119,7 @@ fn faults_of_a_lens_are_told_with_their_place() {
         ),
         (
             r#""type": "lens", "lens": {"elements": [{"type": "surface", "radious": 3}]}"#,
-            "camera.lens.elements[0].radious: unknown key; did you mean `radius`?",
+            "camera.lens.elements[0].radious: unknown key\nhint: did you mean `radius`?",
         ),
         (r#""type": "lens""#, "the key `lens` is missing: A lens file's path"),
         (r#""type": "thin_lens", "focal_length": 50, "fov": 30"#, "camera.f_number"),

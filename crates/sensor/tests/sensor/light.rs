@@ -3,7 +3,7 @@
 
 #![expect(clippy::cast_possible_truncation, reason = "films hold f32")]
 
-use etendue_sensor::demosaic::Method;
+use etendue_sensor::spec::Method;
 use etendue_sensor::{Exposure, Film, Model, RawImage, Sensor, SensorSpec};
 use etendue_spectrum::{Bands, Curve, Grid, integral};
 use serde_json::{Value, json};

@@ -4,18 +4,18 @@
 //!
 //! An image that is looked at instead of a scene.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use eframe::egui::{self, Context, Key, KeyboardShortcut, Modifiers};
 
-use super::{App, Asking, PixelQuery};
-use crate::canvas::PictureCanvas;
+use super::App;
 use crate::document::Edit;
-use crate::panels;
 use crate::panels::light_field::LightFieldPanel;
+use crate::state::{Asking, PictureCanvas, PixelQuery};
 use crate::worker::Shown;
 use etendue::Still;
+use serde_json::Value;
 
 const UNDO: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::Z);
 const REDO: KeyboardShortcut =
@@ -28,14 +28,14 @@ const THEME: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::T
 const CLOSE: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::Q);
 
 impl App {
-    pub(super) fn take_drops(&mut self, ctx: &Context) {
+    pub(crate) fn take_drops(&mut self, ctx: &Context) {
         let dropped = ctx.input(|input| input.raw.dropped_files.first().cloned());
         if let Some(path) = dropped.and_then(|file| file.path) {
             self.open(&path);
         }
     }
 
-    pub(super) fn take_shortcuts(&mut self, ctx: &Context) {
+    pub(crate) fn take_shortcuts(&mut self, ctx: &Context) {
         let pressed = |shortcut: &KeyboardShortcut| ctx.input_mut(|i| i.consume_shortcut(shortcut));
         // The longer one first, of which the shorter is a part.
         if pressed(&REDO) || pressed(&REDO_TOO) {
@@ -83,9 +83,8 @@ impl App {
         self.lens = lens.map(|lens| lens.map_err(|error| error.to_string()));
         self.lens_curves.forget();
         let document = self.document.as_ref().filter(|_| self.lens.is_some());
-        self.written_lens = document.and_then(|document| {
-            panels::lens::written(document.at("/camera/lens"), &document.path)
-        });
+        self.written_lens =
+            document.and_then(|document| written_lens(document.at("/camera/lens"), &document.path));
     }
 
     /// The same place, after the scene has changed.
@@ -147,5 +146,17 @@ impl App {
             }
             Err(error) => self.error = Some(error.to_string()),
         }
+    }
+}
+
+/// The lens as the scene has it, or its file does; whether it is a file's.
+fn written_lens(lens: &Value, scene: &Path) -> Option<(Value, bool)> {
+    match lens {
+        Value::Object(_) => Some((lens.clone(), false)),
+        Value::String(path) => {
+            let folder = scene.parent().unwrap_or(Path::new(""));
+            Some((etendue::lens_values(&folder.join(path)).ok()?, true))
+        }
+        _ => None,
     }
 }

@@ -1,7 +1,7 @@
 //! The window before there is a picture: scenes to begin with, broken files, files that take long, names of what goes.
 
 use super::*;
-use crate::panels::start::FIRST_SCENES;
+use crate::document::FIRST_SCENES;
 
 #[test]
 fn every_first_scene_becomes_a_picture_and_is_saved_where_one_says() {
@@ -83,7 +83,7 @@ fn what_removes_a_section_names_it() {
             ..Default::default()
         };
         let app = &mut window.app;
-        let output = window.ctx.clone().run(input, |ctx| app.show(ctx));
+        let output = window.ctx.clone().run(input, |ctx| crate::panels::show(app, ctx));
         words = output
             .shapes
             .iter()

@@ -4,9 +4,10 @@
 
 use eframe::egui::{self, Context, Ui};
 
-use crate::app::{App, Asking, Tool};
+use crate::app::App;
 use crate::document::View;
 use crate::form::mark;
+use crate::state::{Asking, Tool};
 
 pub(crate) fn show_bar(app: &mut App, ctx: &Context) {
     egui::TopBottomPanel::top("bar").show(ctx, |ui| {

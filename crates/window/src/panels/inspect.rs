@@ -8,9 +8,8 @@ use serde_json::{Value, json};
 use etendue::Inspector;
 
 use crate::app::App;
-use crate::canvas::short;
 use crate::document::Edit;
-use crate::form::mark;
+use crate::form::{mark, short};
 
 pub(crate) fn show_inspect(app: &mut App, ctx: &Context) {
     if app.document.is_none() && app.still.is_none() {
@@ -19,14 +18,28 @@ pub(crate) fn show_inspect(app: &mut App, ctx: &Context) {
     egui::SidePanel::left("inspect").default_width(250.0).show(ctx, |ui| {
         egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             section(ui, "Pixel", |ui| pixel(app, ui));
-            if super::light_field::is_there(app) {
-                section(ui, "Light field", |ui| super::light_field::show(app, ui));
+            let camera = app.inspector.as_ref().map(|inspector| &inspector.scene().camera);
+            if camera.is_some_and(|camera| camera.light_field().is_some()) {
+                section(ui, "Light field", |ui| light_field(app, ui));
             }
             section(ui, "Histogram", |ui| histogram(app, ui));
             section(ui, "Notes", |ui| notes(app, ui));
             egui::CollapsingHeader::new("Decisions").show(ui, |ui| decisions(app, ui));
         });
     });
+}
+
+fn light_field(app: &mut App, ui: &mut Ui) {
+    let scene = app.inspector.as_ref().map(Inspector::scene);
+    if let Some(why) = scene.and_then(|scene| scene.camera.no_views()) {
+        ui.weak(format!("no views: {why}"));
+    }
+    let picture = app.picture.as_ref().filter(|picture| picture.is_final);
+    match app.light_field.show(ui, picture.and_then(|of| of.preview.as_deref())) {
+        Ok(true) => app.show_light_field(ui.ctx()),
+        Ok(false) => {}
+        Err(error) => app.error = Some(error.to_string()),
+    }
 }
 
 fn section(ui: &mut Ui, title: &str, show: impl FnOnce(&mut Ui)) {

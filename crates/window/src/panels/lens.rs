@@ -1,26 +1,17 @@
 //! The lens: cut along its axis with the rays of the pixel that was asked, and its spots or curves. Surfaces and gaps
 //! can be dragged.
 
-use std::path::Path;
-
 use eframe::egui::{self, Color32, Context, Id, Pos2, Rect, Sense, Stroke, Ui, Vec2};
 use etendue::LensView;
 use serde_json::Value;
 
+use super::lens_curves::COLORS;
 use crate::app::App;
-use crate::canvas::short;
 use crate::document::Edit;
-use crate::form::mark;
+use crate::form::{mark, short};
 
 /// Rays of the pixel that was asked.
 const RAYS: u32 = 7;
-
-/// Colours of fields, on dark and on light.
-pub(super) const COLORS: [[Color32; 2]; 3] = [
-    [Color32::from_rgb(121, 192, 255), Color32::from_rgb(5, 80, 174)],
-    [Color32::from_rgb(86, 211, 100), Color32::from_rgb(26, 127, 55)],
-    [Color32::from_rgb(255, 123, 114), Color32::from_rgb(207, 34, 46)],
-];
 
 /// From millimetres to points on the screen.
 struct DrawingScale {
@@ -197,18 +188,6 @@ fn handles(app: &App, ui: &Ui, view: &LensView, scale: &DrawingScale, edits: &mu
 /// A length to a micrometre (mm).
 fn rounded(length: f64) -> f64 {
     (length * 1e3).round() / 1e3
-}
-
-/// The lens as the scene has it, or its file does; whether it is a file's.
-pub(crate) fn written(lens: &Value, scene: &Path) -> Option<(Value, bool)> {
-    match lens {
-        Value::Object(_) => Some((lens.clone(), false)),
-        Value::String(path) => {
-            let folder = scene.parent().unwrap_or(Path::new(""));
-            Some((etendue::lens_values(&folder.join(path)).ok()?, true))
-        }
-        _ => None,
-    }
 }
 
 fn about(element: &Value, i: usize) -> String {

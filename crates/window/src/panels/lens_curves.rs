@@ -6,9 +6,14 @@ use std::time::Duration;
 use eframe::egui::{self, Color32, Pos2, Rect, Shape, Stroke, Ui, Vec2};
 use etendue::{LensView, LensWaves};
 
-use super::lens::COLORS;
-use crate::canvas::short;
-use crate::form::mark;
+use crate::form::{mark, short};
+
+/// Colours of fields, on dark and on light.
+pub(super) const COLORS: [[Color32; 2]; 3] = [
+    [Color32::from_rgb(121, 192, 255), Color32::from_rgb(5, 80, 174)],
+    [Color32::from_rgb(86, 211, 100), Color32::from_rgb(26, 127, 55)],
+    [Color32::from_rgb(255, 123, 114), Color32::from_rgb(207, 34, 46)],
+];
 
 /// What stands beside the section.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -2,11 +2,9 @@
 //! are by what their lenslets see.
 
 use eframe::egui::{self, Pos2, Rect, Sense, Ui, Vec2};
-use etendue::{Error, LightFieldViews, Picture, Screen};
+use etendue::{Error, LightFieldViews, Picture, Preview, Screen};
 
-use crate::app::App;
-use crate::canvas::short;
-use crate::form::mark;
+use crate::form::{mark, short};
 
 /// What of a light field is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -45,7 +43,7 @@ impl LightFieldPanel {
     }
 
     /// Takes the views out of a picture, once.
-    fn find(&mut self, preview: Option<&etendue::Preview>) -> Result<(), Error> {
+    fn find(&mut self, preview: Option<&Preview>) -> Result<(), Error> {
         // Lenslets are told apart at the picture's own size alone.
         if let (None, Some(preview)) = (&self.views, preview.filter(|of| of.factor() == 1)) {
             self.views = preview.light_field()?;
@@ -59,10 +57,7 @@ impl LightFieldPanel {
     }
 
     /// What is to be shown instead of the picture itself.
-    pub(crate) fn screen(
-        &mut self,
-        preview: Option<&etendue::Preview>,
-    ) -> Result<Option<Screen>, Error> {
+    pub(crate) fn screen(&mut self, preview: Option<&Preview>) -> Result<Option<Screen>, Error> {
         self.find(preview)?;
         let Some(views) = &self.views else { return Ok(None) };
         let picture: Picture = match self.shows {
@@ -75,49 +70,42 @@ impl LightFieldPanel {
         };
         Ok(Some(Screen::of_layer(&picture, "")?))
     }
-}
 
-pub(crate) fn show(app: &mut App, ui: &mut Ui) {
-    let scene = app.inspector.as_ref().map(|inspector| inspector.scene());
-    if let Some(why) = scene.and_then(|scene| scene.camera.no_views()) {
-        ui.weak(format!("no views: {why}"));
-    }
-    let preview = app.picture.as_ref().filter(|picture| picture.is_final);
-    if let Err(error) = app.light_field.find(preview.and_then(|of| of.preview.as_deref())) {
-        app.error = Some(error.to_string());
-    }
-    let before = app.light_field.shows;
-    let mut shows = before;
-    let Some(Offered { count, focus, distances }) = app.light_field.offered else { return };
-    let focus = if focus.is_finite() && focus > 0.0 { focus } else { 1.0 };
-    ui.horizontal(|ui| {
-        let mut choice = |title: &str, is_on: bool, kind: Shows| {
-            let one = ui.selectable_label(is_on, title);
-            mark(ui.ctx(), &format!("light field={title}"), one.rect);
-            if one.clicked() && !is_on {
-                shows = kind;
+    /// Shows what there is to choose from; whether something else is chosen now. `picture` is the whole one, where it is
+    /// there.
+    pub(crate) fn show(&mut self, ui: &mut Ui, picture: Option<&Preview>) -> Result<bool, Error> {
+        self.find(picture)?;
+        let before = self.shows;
+        let mut shows = before;
+        let Some(Offered { count, focus, distances }) = self.offered else { return Ok(false) };
+        let focus = if focus.is_finite() && focus > 0.0 { focus } else { 1.0 };
+        ui.horizontal(|ui| {
+            let mut choice = |title: &str, is_on: bool, kind: Shows| {
+                let one = ui.selectable_label(is_on, title);
+                mark(ui.ctx(), &format!("light field={title}"), one.rect);
+                if one.clicked() && !is_on {
+                    shows = kind;
+                }
+            };
+            choice("raw", before == Shows::Raw, Shows::Raw);
+            if count > 0 {
+                choice("view", matches!(before, Shows::View(_)), Shows::View([0, 0]));
             }
-        };
-        choice("raw", before == Shows::Raw, Shows::Raw);
-        if count > 0 {
-            choice("view", matches!(before, Shows::View(_)), Shows::View([0, 0]));
+            choice("refocus", matches!(before, Shows::Focused(_)), Shows::Focused(focus));
+        });
+        match &mut shows {
+            Shows::Raw => {}
+            Shows::View(at) => pupil(ui, count, at),
+            Shows::Focused(depth) => {
+                let slider = egui::Slider::new(depth, distances[0]..=distances[1])
+                    .logarithmic(true)
+                    .suffix(" m");
+                let slider = ui.add(slider.custom_formatter(|depth, _| short(depth)));
+                mark(ui.ctx(), "refocus", slider.rect);
+            }
         }
-        choice("refocus", matches!(before, Shows::Focused(_)), Shows::Focused(focus));
-    });
-    match &mut shows {
-        Shows::Raw => {}
-        Shows::View(at) => pupil(ui, count, at),
-        Shows::Focused(depth) => {
-            let slider = egui::Slider::new(depth, distances[0]..=distances[1])
-                .logarithmic(true)
-                .suffix(" m");
-            let slider = ui.add(slider.custom_formatter(|depth, _| short(depth)));
-            mark(ui.ctx(), "refocus", slider.rect);
-        }
-    }
-    if shows != before {
-        app.light_field.shows = shows;
-        app.show_light_field(ui.ctx());
+        self.shows = shows;
+        Ok(shows != before)
     }
 }
 
@@ -148,10 +136,4 @@ fn pupil(ui: &mut Ui, count: u32, at: &mut [u32; 2]) {
         }
     }
     ui.weak(format!("view {}, {} of {count} \u{d7} {count}", at[0], at[1]));
-}
-
-/// Whether the camera of the scene has views.
-pub(crate) fn is_there(app: &App) -> bool {
-    let inspector = app.inspector.as_ref();
-    inspector.is_some_and(|inspector| inspector.scene().camera.light_field().is_some())
 }

@@ -4,42 +4,7 @@ use eframe::egui::{self, RichText, Ui};
 
 use super::bar::button;
 use crate::app::App;
-
-/// A scene that is built in: its file name, its title, what it shows, and the scene.
-pub(crate) struct FirstScene {
-    pub(crate) name: &'static str,
-    title: &'static str,
-    about: &'static str,
-    pub(crate) json: &'static str,
-}
-
-/// Scenes that name no files.
-pub(crate) const FIRST_SCENES: [FirstScene; 4] = [
-    FirstScene {
-        name: "glass.json",
-        title: "Glass and gold",
-        about: "all paths of light, with depth and normals",
-        json: include_str!("../../first/glass.json"),
-    },
-    FirstScene {
-        name: "lens.json",
-        title: "Behind a lens",
-        about: "one thick lens with its aberrations: click with the tool Focus",
-        json: include_str!("../../first/lens.json"),
-    },
-    FirstScene {
-        name: "sensor.json",
-        title: "A sensor's noise",
-        about: "raw numbers behind a colour filter array",
-        json: include_str!("../../first/sensor.json"),
-    },
-    FirstScene {
-        name: "light-field.json",
-        title: "A light field",
-        about: "a plenoptic camera: look through its lenslets, and refocus",
-        json: include_str!("../../first/light-field.json"),
-    },
-];
+use crate::document::FIRST_SCENES;
 
 /// In the middle of the canvas.
 pub(crate) fn show(app: &mut App, ui: &mut Ui) {

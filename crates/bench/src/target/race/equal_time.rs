@@ -1,6 +1,7 @@
 //! The pictures that the soonest settings and a few others give in one time, side by side, as papers show them.
 
-use super::{Forecast, Race, apart};
+use super::Race;
+use super::forecast::{Forecast, apart};
 use crate::BenchError;
 use crate::target::{AS_IT_IS, EqualTime, Outcome, Run, Strip, Verified};
 

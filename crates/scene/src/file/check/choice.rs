@@ -137,13 +137,13 @@ impl<'a> Checker<'a> {
         match members.keys().find(|key| !known.contains(&key.as_str())) {
             Some(key) => {
                 let near = match nearest(key, std::iter::once(tag).chain(known)) {
-                    Some(near) => format!("did you mean `{near}`? "),
-                    None => String::new(),
+                    Some(near) => format!("did you mean `{near}`? give"),
+                    None => "give".to_owned(),
                 };
-                let reason = format!("unknown key; {near}give the object {ways}");
+                let reason = format!("unknown key\nhint: {near} the object {ways}");
                 problem(&join(path, key), reason)
             }
-            None => problem(path, format!("says not what it is; give it {ways}")),
+            None => problem(path, format!("says not what it is\nhint: give it {ways}")),
         }
     }
 
@@ -179,7 +179,7 @@ fn at_home_elsewhere(
     match members.keys().find(elsewhere) {
         Some(key) => {
             let known = known.rsplit_once("known: ").map_or("", |(_, known)| known);
-            let reason = format!("`{key}` does not go with `{word}`; known: {known}");
+            let reason = format!("`{key}` does not go with `{word}`\nhint: known: {known}");
             Problem { path: found.path, reason }
         }
         None => found,

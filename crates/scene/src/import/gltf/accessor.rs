@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::Reader;
 use super::buffers::{Bytes, View, size};
-use crate::import::ImportError;
+use crate::import::Refusal;
 
 /// Floats that Embree reads from the start of the last vertex on.
 const LAST_READ: usize = 4;
@@ -38,11 +38,7 @@ struct Sparse<'a> {
 
 impl<'a> Reader<'a> {
     /// Accessor `index`, which `place` names.
-    pub(super) fn accessor(
-        &'a self,
-        index: usize,
-        place: &str,
-    ) -> Result<Accessor<'a>, ImportError> {
+    pub(super) fn accessor(&'a self, index: usize, place: &str) -> Result<Accessor<'a>, Refusal> {
         let place = format!("{place} (accessor {index})");
         let Some(accessor) = self.document.root.accessors.get(index) else {
             let count = self.document.root.accessors.len();
@@ -60,7 +56,7 @@ impl<'a> Reader<'a> {
             return Err(self.damaged(
                 place,
                 format!(
-                    "{} elements are more than 32 bits can count; split the mesh",
+                    "{} elements are more than 32 bits can count\nhint: split the mesh",
                     accessor.count.0
                 ),
             ));
@@ -99,7 +95,7 @@ impl<'a> Reader<'a> {
         view: usize,
         offset: Option<usize>,
         place: &str,
-    ) -> Result<(), ImportError> {
+    ) -> Result<(), Refusal> {
         let view = self.view(view, place)?;
         let element = accessor.components * accessor.component.size();
         accessor.stride = view.stride.unwrap_or(element);
@@ -126,7 +122,7 @@ impl<'a> Reader<'a> {
             return Err(self.damaged(
                 place,
                 format!(
-                    "its {} elements do not fit into its buffer view of {} bytes; export the file \
+                    "its {} elements do not fit into its buffer view of {} bytes\nhint: export the file \
                      again",
                     accessor.count, view.len
                 ),
@@ -142,7 +138,7 @@ impl<'a> Reader<'a> {
         of: &Accessor<'a>,
         sparse: &json::accessor::sparse::Sparse,
         place: &str,
-    ) -> Result<Sparse<'a>, ImportError> {
+    ) -> Result<Sparse<'a>, Refusal> {
         let Checked::Valid(index_type) = &sparse.indices.component_type else {
             return Err(self.damaged(place, "its sparse indices are of no type that glTF allows"));
         };

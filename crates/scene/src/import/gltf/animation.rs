@@ -12,7 +12,7 @@ use serde_json::{Map, Value};
 use super::document::Node;
 use super::{Reader, damaged};
 use crate::import::error::{Note, NoteKind};
-use crate::import::{Import, ImportError, Play};
+use crate::import::{Import, Play, Refusal};
 
 /// An animation.
 #[derive(Debug, Default, Deserialize)]
@@ -101,7 +101,7 @@ pub(super) fn moved(
     reader: &Reader<'_>,
     play: &Play,
     import: &mut Import,
-) -> Result<Vec<Moved>, ImportError> {
+) -> Result<Vec<Moved>, Refusal> {
     let (number, animation) = chosen(reader, play)?;
     let mut moved = Vec::new();
     for (k, channel) in animation.channels.iter().enumerate() {
@@ -128,7 +128,7 @@ pub(super) fn moved(
 }
 
 /// Puts what moved in place of what the nodes have at rest.
-pub(super) fn apply(file: &Path, moved: &[Moved], nodes: &mut [Node]) -> Result<(), ImportError> {
+pub(super) fn apply(file: &Path, moved: &[Moved], nodes: &mut [Node]) -> Result<(), Refusal> {
     for Moved { node: index, property, values, .. } in moved {
         let node = &mut nodes[*index];
         if node.matrix.is_some() && *property != Property::Weights {
@@ -161,7 +161,7 @@ pub(super) fn playing(
     moved: Vec<Moved>,
     time: f64,
     nodes: &[Node],
-) -> Result<Playing, ImportError> {
+) -> Result<Playing, Refusal> {
     let mut playing = Playing::default();
     for Moved { node: index, property, track, .. } in
         moved.into_iter().filter(|it| it.track.changes())
@@ -193,7 +193,7 @@ pub(super) fn playing(
     for (index, joint) in &playing.joints {
         if let Some(why) = joint.fault() {
             let reason = format!(
-                "{why} while its animation plays; leave `plays` out, or export it otherwise"
+                "{why} while its animation plays\nhint: leave `plays` out, or export it otherwise"
             );
             return Err(damaged(file, format!("nodes[{index}]"), reason));
         }
@@ -202,7 +202,7 @@ pub(super) fn playing(
 }
 
 /// The animation by name or number, the first when none is named.
-fn chosen(reader: &Reader<'_>, play: &Play) -> Result<(usize, Animation), ImportError> {
+fn chosen(reader: &Reader<'_>, play: &Play) -> Result<(usize, Animation), Refusal> {
     let all = reader.document.animations.as_slice();
     let name = |value: &Value| value.get("name").and_then(Value::as_str).map(str::to_owned);
     let number = match &play.which {
@@ -219,7 +219,7 @@ fn chosen(reader: &Reader<'_>, play: &Play) -> Result<(usize, Animation), Import
             .map(|(k, value)| format!("{k} \"{}\"", name(value).unwrap_or_default()))
             .collect();
         let reason = match (&play.which, known.as_slice()) {
-            (_, []) => "there is none; take `animation` out of the scene".to_owned(),
+            (_, []) => "there is none\nhint: take `animation` out of the scene".to_owned(),
             (Some(wanted), known) => {
                 format!("there is no animation \"{wanted}\"; the file has {}", known.join(", "))
             }
@@ -251,14 +251,14 @@ impl Track {
         sampler: &Sampler,
         property: Property,
         place: &str,
-    ) -> Result<Self, ImportError> {
+    ) -> Result<Self, Refusal> {
         let interpolation = match sampler.interpolation.as_deref() {
             None | Some("LINEAR") => Interpolation::Linear,
             Some("STEP") => Interpolation::Step,
             Some("CUBICSPLINE") => Interpolation::CubicSpline,
             Some(other) => {
                 let reason = format!(
-                    "\"{other}\" is none of STEP, LINEAR and CUBICSPLINE; export the file again"
+                    "\"{other}\" is none of STEP, LINEAR and CUBICSPLINE\nhint: export the file again"
                 );
                 return Err(reader.damaged(format!("{place}.interpolation"), reason));
             }
@@ -284,8 +284,11 @@ impl Track {
             Property::Weights => values.len() / (parts * times.len()),
         };
         if values.len() != width * parts * times.len() || width == 0 {
-            let reason =
-                format!("{} numbers for {} keys; export the file again", values.len(), times.len());
+            let reason = format!(
+                "{} numbers for {} keys\nhint: export the file again",
+                values.len(),
+                times.len()
+            );
             return Err(reader.damaged(place, reason));
         }
         Ok(Self { property, interpolation, times, width, values })
@@ -393,16 +396,16 @@ fn numbers<const N: usize>(
     reader: &Reader<'_>,
     accessor: usize,
     place: &str,
-) -> Result<Vec<f64>, ImportError> {
+) -> Result<Vec<f64>, Refusal> {
     let accessor = reader.accessor(accessor, place)?;
     let values = (accessor.components == N).then(|| accessor.floats::<N>(0.0)).flatten();
     let Some(values) = values else {
         let reason = format!("{} components where {N} are due", accessor.components);
-        return Err(reader.damaged(place, reason + "; export the file again"));
+        return Err(reader.damaged(place, reason + "\nhint: export the file again"));
     };
     let numbers: Vec<f64> = (0..values.len()).flat_map(|i| values.get(i)).map(f64::from).collect();
     match numbers.iter().all(|number| number.is_finite()) {
         true => Ok(numbers),
-        false => Err(reader.damaged(place, "a number is not finite; export the file again")),
+        false => Err(reader.damaged(place, "a number is not finite\nhint: export the file again")),
     }
 }

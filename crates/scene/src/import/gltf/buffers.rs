@@ -16,7 +16,7 @@ use super::meshopt::MeshoptView;
 use super::{Reader, damaged};
 use crate::import::files::Files;
 use crate::import::text::without_mark;
-use crate::import::{ImportError, refuse_other_kind};
+use crate::import::{Refusal, refuse_other_kind};
 use etendue_files::MappedFile;
 use etendue_geometry::Buffer;
 
@@ -79,7 +79,7 @@ impl Buffers {
         files: &Files,
         document: &Document,
         binary: Option<Bytes>,
-    ) -> Result<Self, ImportError> {
+    ) -> Result<Self, Refusal> {
         let mut used = vec![false; document.root.buffers.len()];
         for view in &document.root.buffer_views {
             // The buffer of a compressed view itself is a placeholder, or holds it in plain.
@@ -105,12 +105,12 @@ impl Buffers {
 
 impl Reader<'_> {
     /// The bytes of buffer `index`, which `from` names.
-    fn buffer(&self, index: usize, from: &str) -> Result<&Bytes, ImportError> {
+    fn buffer(&self, index: usize, from: &str) -> Result<&Bytes, Refusal> {
         match self.buffers.buffers.get(index) {
             Some(Ok(bytes)) => Ok(bytes),
             Some(Err(Unread)) => Err(self.damaged(
                 format!("buffers[{index}]"),
-                "it has neither a uri nor a binary chunk; export the file again",
+                "it has neither a uri nor a binary chunk\nhint: export the file again",
             )),
             None => Err(self.absent(
                 format!("{from}.buffer"),
@@ -123,7 +123,7 @@ impl Reader<'_> {
 
     /// The buffer of view `index`, and where in it the view starts and how long it is (bytes);
     /// `from` is who names the view.
-    pub(super) fn view(&self, index: usize, from: &str) -> Result<View<'_>, ImportError> {
+    pub(super) fn view(&self, index: usize, from: &str) -> Result<View<'_>, Refusal> {
         let place = || format!("bufferViews[{index}]");
         let views = &self.document.root.buffer_views;
         let Some(view) = views.get(index) else {
@@ -143,7 +143,7 @@ impl Reader<'_> {
             return Err(self.damaged(
                 place(),
                 format!(
-                    "{} bytes from byte {} on lie outside its buffer of {total} bytes; export the \
+                    "{} bytes from byte {} on lie outside its buffer of {total} bytes\nhint: export the \
                      file again",
                     view.byte_length.0,
                     view.byte_offset.unwrap_or_default().0
@@ -154,11 +154,7 @@ impl Reader<'_> {
     }
 
     /// The bytes of the compressed view `index`, decoded once.
-    fn decompressed(
-        &self,
-        index: usize,
-        compressed: &MeshoptView<'_>,
-    ) -> Result<&Bytes, ImportError> {
+    fn decompressed(&self, index: usize, compressed: &MeshoptView<'_>) -> Result<&Bytes, Refusal> {
         let known = &self.buffers.decoded[index];
         if let Some(bytes) = known.get() {
             return Ok(bytes);
@@ -169,7 +165,7 @@ impl Reader<'_> {
         let end = stream.start.checked_add(stream.len);
         let Some(packed) = end.and_then(|end| buffer.get(stream.start..end)) else {
             let reason = format!(
-                "{} bytes from byte {} on lie outside its buffer of {} bytes; export the file again",
+                "{} bytes from byte {} on lie outside its buffer of {} bytes\nhint: export the file again",
                 stream.len,
                 stream.start,
                 buffer.len()
@@ -196,7 +192,7 @@ fn open_uri(
     index: usize,
     buffer: &json::Buffer,
     uri: &str,
-) -> Result<Bytes, ImportError> {
+) -> Result<Bytes, Refusal> {
     let place = || format!("buffers[{index}].uri");
     if let Some(data) = data_uri(uri) {
         let bytes = data.map_err(|reason| damaged(path, place(), reason))?;
@@ -207,7 +203,7 @@ fn open_uri(
         return Err(damaged(
             path,
             place(),
-            format!("\"{written}\" does not exist; put it beside the model"),
+            format!("\"{written}\" does not exist\nhint: put it beside the model"),
         ));
     };
     let file = files.map(&found)?;
@@ -221,7 +217,7 @@ fn checked(
     index: usize,
     buffer: &json::Buffer,
     bytes: Bytes,
-) -> Result<Bytes, ImportError> {
+) -> Result<Bytes, Refusal> {
     let has = bytes.as_slice().len();
     let promised = buffer.byte_length.0;
     match usize::try_from(promised) {
@@ -233,7 +229,7 @@ fn checked(
             path,
             format!("buffers[{index}]"),
             format!(
-                "it should have {promised} bytes but is cut off after {has}; copy or export the \
+                "it should have {promised} bytes but is cut off after {has}\nhint: copy or export the \
                  file again"
             ),
         )),
@@ -265,7 +261,7 @@ fn not_base64(error: &DecodeError) -> String {
         }
         DecodeError::InvalidPadding => "the `=` at its end are too few or too many".to_owned(),
     };
-    format!("the data URI is not sound base64: {why}; export the file again")
+    format!("the data URI is not sound base64: {why}\nhint: export the file again")
 }
 
 /// `uri` with its percent escapes (RFC 3986, section 2.1) undone; those that are none stay.
@@ -315,10 +311,7 @@ pub(super) struct Container<'a> {
 
 /// Splits `map` into JSON and bytes. A file without GLB's magic number is JSON throughout,
 /// whatever its ending.
-pub(super) fn open<'a>(
-    path: &Path,
-    map: &'a Arc<MappedFile>,
-) -> Result<Container<'a>, ImportError> {
+pub(super) fn open<'a>(path: &Path, map: &'a Arc<MappedFile>) -> Result<Container<'a>, Refusal> {
     let bytes = map.bytes();
     if !bytes.starts_with(MAGIC) {
         refuse_other_kind(path, bytes, "glTF")?;
@@ -326,18 +319,20 @@ pub(super) fn open<'a>(
     }
     let broken = |reason: String| damaged(path, "GLB header", reason);
     let (Some(version), Some(length)) = (word(bytes, 4), word(bytes, 8)) else {
-        return Err(broken("the file ends inside its header; copy or export it again".into()));
+        return Err(broken(
+            "the file ends inside its header\nhint: copy or export it again".into(),
+        ));
     };
     if version == 1 {
         return Err(broken(super::first_version()));
     }
     if version != 2 {
-        return Err(broken(format!("version {version} instead of 2; export it as glTF 2.0")));
+        return Err(broken(format!("version {version} instead of 2\nhint: export it as glTF 2.0")));
     }
     let length = length as usize;
     let Some(bytes) = bytes.get(..length) else {
         return Err(broken(format!(
-            "it should be {length} bytes long but is cut off after {}; copy or export it again",
+            "it should be {length} bytes long but is cut off after {}\nhint: copy or export it again",
             bytes.len()
         )));
     };
@@ -347,7 +342,7 @@ pub(super) fn open<'a>(
         Some((kind, ..)) => {
             let kind = String::from_utf8_lossy(&kind.to_le_bytes()).escape_debug().to_string();
             let reason =
-                format!("the first chunk is of kind \"{kind}\", not JSON; export it again");
+                format!("the first chunk is of kind \"{kind}\", not JSON\nhint: export it again");
             return Err(broken(reason));
         }
         None => {
@@ -372,7 +367,7 @@ struct Chunks<'a> {
 
 impl Chunks<'_> {
     /// The kind, start and length of the next chunk.
-    fn next(&mut self, path: &Path) -> Result<Option<(u32, usize, usize)>, ImportError> {
+    fn next(&mut self, path: &Path) -> Result<Option<(u32, usize, usize)>, Refusal> {
         // Up to three bytes of padding may follow the last chunk.
         if self.at + 8 > self.bytes.len() {
             return Ok(None);
@@ -388,7 +383,7 @@ impl Chunks<'_> {
                 format!("GLB chunk at byte {}", self.at),
                 format!(
                     "it should be {len} bytes long but only {} follow: this length is wrong, {}the \
-                     file is cut off; copy or export it again",
+                     file is cut off\nhint: copy or export it again",
                     self.bytes.len() - start,
                     if self.at > 12 { "or that of the chunk before, or " } else { "or " }
                 ),

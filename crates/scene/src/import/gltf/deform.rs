@@ -15,7 +15,7 @@ use super::part::Part;
 use super::pose::{Pose, exists};
 use crate::import::deformer::{Deformer, Influences, Joints, Morph, number};
 use crate::import::error::NoteKind;
-use crate::import::{ImportError, Strictness, precise_enough, single};
+use crate::import::{Refusal, Strictness, precise_enough, single};
 use etendue_geometry::glam::{DMat3, DVec3, DVec4};
 use etendue_geometry::{Link, Positions, Track, Transform, Vertices};
 
@@ -47,7 +47,7 @@ impl Part<'_> {
         skin: Option<&Skin>,
         positions: Vertices<3>,
         normals: Option<Vertices<3>>,
-    ) -> Result<Corners, ImportError> {
+    ) -> Result<Corners, Refusal> {
         let influences = match skin {
             Some(skin) => self.influences(skin, positions.len())?,
             None => None,
@@ -98,7 +98,7 @@ impl Part<'_> {
     }
 
     /// The morph targets to which `shape` gives a weight at some time, with it.
-    fn target_weights(&mut self, shape: &Shape) -> Result<Vec<(usize, Track)>, ImportError> {
+    fn target_weights(&mut self, shape: &Shape) -> Result<Vec<(usize, Track)>, Refusal> {
         let targets = self.primitive.targets.as_ref().map_or(0, Vec::len);
         let weights: Vec<Track> = match self.reader.playing.morphed.get(&shape.played_by()) {
             Some(tracks) => tracks.clone(),
@@ -120,7 +120,7 @@ impl Part<'_> {
         attribute: &str,
         count: usize,
         of: impl Fn(&MorphTarget) -> &Option<json::Index<json::Accessor>>,
-    ) -> Result<Option<Vertices<3>>, ImportError> {
+    ) -> Result<Option<Vertices<3>>, Refusal> {
         let target = self.primitive.targets.as_ref().and_then(|targets| targets.get(number));
         let Some(index) = target.and_then(|target| of(target).as_ref()) else { return Ok(None) };
         let place = format!("{}.targets[{number}].{attribute}", self.place);
@@ -129,7 +129,7 @@ impl Part<'_> {
             Some(moves) if accessor.components == 3 => moves,
             _ => {
                 let reason = format!("it has {} components, not 3", accessor.components);
-                return Err(self.reader.damaged(place, reason + "; export the file again"));
+                return Err(self.reader.damaged(place, reason + "\nhint: export the file again"));
             }
         };
         if moves.len() != count {
@@ -144,11 +144,7 @@ impl Part<'_> {
     }
 
     /// The joints of each vertex; `None`, with a note, for a primitive that names none.
-    fn influences(
-        &mut self,
-        skin: &Skin,
-        vertices: usize,
-    ) -> Result<Option<Influences>, ImportError> {
+    fn influences(&mut self, skin: &Skin, vertices: usize) -> Result<Option<Influences>, Refusal> {
         let mut sets = Vec::new();
         // glTF numbers sets without gaps.
         while let Ok(set) = u32::try_from(sets.len()) {
@@ -160,7 +156,7 @@ impl Part<'_> {
                 return Err(self.reader.damaged(
                     format!("{}, JOINTS_{set}", self.place),
                     format!(
-                        "{joints} joints and {weights} weights for {vertices} positions; export \
+                        "{joints} joints and {weights} weights for {vertices} positions\nhint: export \
                          the file again"
                     ),
                 ));
@@ -184,7 +180,7 @@ impl Part<'_> {
         skin: &Skin,
         influences: &Influences,
         vertices: usize,
-    ) -> Result<(), ImportError> {
+    ) -> Result<(), Refusal> {
         let count = skin.model_from_bound.0.len();
         let absent = |i: usize| {
             let is_absent = |&(joint, _): &(f32, f64)| number(joint, count).is_none();
@@ -194,7 +190,7 @@ impl Part<'_> {
             Some((vertex, joint)) => Err(self.reader.damaged(
                 self.place.clone(),
                 format!(
-                    "vertex {vertex} names joint {joint}, but its skin has {count}; export the \
+                    "vertex {vertex} names joint {joint}, but its skin has {count}\nhint: export the \
                      file again"
                 ),
             )),
@@ -203,11 +199,7 @@ impl Part<'_> {
     }
 
     /// Says which weights do not sum to 1; refused when none weighs anything.
-    fn check_weights(
-        &mut self,
-        influences: &Influences,
-        vertices: usize,
-    ) -> Result<(), ImportError> {
+    fn check_weights(&mut self, influences: &Influences, vertices: usize) -> Result<(), Refusal> {
         let count = |off: &(dyn Fn(f64) -> bool + Sync)| {
             (0..vertices).into_par_iter().filter(|&i| off(influences.total(i))).count() as u64
         };
@@ -263,7 +255,7 @@ impl Skin {
         index: usize,
         user: usize,
         (pose, chains): (&Pose, &Chains<'_>),
-    ) -> Result<Self, ImportError> {
+    ) -> Result<Self, Refusal> {
         let document = reader.document;
         let Some(skin) = document.skins.get(index) else {
             let from = format!("nodes[{user}].skin");
@@ -271,9 +263,10 @@ impl Skin {
         };
         let place = format!("skins[{index}].joints");
         match skin.joints.len() {
-            0 => return Err(reader.damaged(place, "it has none; export the file again")),
+            0 => return Err(reader.damaged(place, "it has none\nhint: export the file again")),
             n if n > MOST_JOINTS => {
-                let reason = format!("{n} are more than vertices can name ({MOST_JOINTS}); split");
+                let reason =
+                    format!("{n} are more than vertices can name ({MOST_JOINTS})\nhint: split");
                 return Err(reader.damaged(place, format!("{reason} the skin")));
             }
             _ => {}
@@ -288,7 +281,7 @@ impl Skin {
                     "stands nowhere: it is its own ancestor, or its transform or one above";
                 return Err(reader.damaged(
                     place(),
-                    format!("node {joint} {reason} is not finite; export the file again"),
+                    format!("node {joint} {reason} is not finite\nhint: export the file again"),
                 ));
             };
             let joint_from_bound = bound.get(k).copied().unwrap_or_default();
@@ -313,7 +306,7 @@ impl Skin {
 }
 
 /// The inverse bind matrices of skin `index`; none when it has none, which stands for the identity.
-fn inverse_bind_matrices(reader: &Reader<'_>, index: usize) -> Result<Vec<Transform>, ImportError> {
+fn inverse_bind_matrices(reader: &Reader<'_>, index: usize) -> Result<Vec<Transform>, Refusal> {
     let skin = &reader.document.skins[index];
     let Some(accessor) = skin.inverse_bind_matrices else { return Ok(Vec::new()) };
     let place = format!("skins[{index}].inverseBindMatrices");
@@ -321,7 +314,7 @@ fn inverse_bind_matrices(reader: &Reader<'_>, index: usize) -> Result<Vec<Transf
     let joints = skin.joints.len();
     if accessor.components != 16 || accessor.count < joints {
         let reason = format!(
-            "{} elements of {} numbers for {joints} joints; export the file again, with a 4 × 4 \
+            "{} elements of {} numbers for {joints} joints\nhint: export the file again, with a 4 × 4 \
              matrix a joint",
             accessor.count, accessor.components
         );

@@ -6,7 +6,8 @@ use gltf::json;
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
-use crate::import::ImportError;
+use crate::import::Refusal;
+use crate::import::error::wrong_text;
 use crate::words::plain;
 
 /// A glTF document: crate `gltf`'s types, but for what is read in f64 here.
@@ -105,7 +106,7 @@ struct InF64 {
 }
 
 /// Reads the JSON of the glTF file at `path`, whole or a chunk of a GLB.
-pub(super) fn parse(path: &Path, json: &[u8], in_glb: bool) -> Result<Document, ImportError> {
+pub(super) fn parse(path: &Path, json: &[u8], in_glb: bool) -> Result<Document, Refusal> {
     let mut rest: Map<String, Value> =
         serde_json::from_slice(json).map_err(|error| broken(path, json, in_glb, &error))?;
     require_version_2(path, &rest)?;
@@ -131,7 +132,7 @@ pub(super) fn parse(path: &Path, json: &[u8], in_glb: bool) -> Result<Document, 
     Ok(Document { root, nodes, scenes, cameras, skins, animations })
 }
 
-fn require_version_2(path: &Path, document: &Map<String, Value>) -> Result<(), ImportError> {
+fn require_version_2(path: &Path, document: &Map<String, Value>) -> Result<(), Refusal> {
     let asset = document.get("asset");
     let written = |key| asset.and_then(|asset| asset.get(key));
     // glTF 1.0 keeps its parts by name, and some of its files have a number here, or no version.
@@ -143,7 +144,7 @@ fn require_version_2(path: &Path, document: &Map<String, Value>) -> Result<(), I
         Some(Value::Number(version)) if version.as_f64() == Some(1.0) => super::first_version(),
         None if is_first => super::first_version(),
         Some(Value::String(other)) => {
-            format!("glTF {other} is not supported; export it as glTF 2.0")
+            format!("glTF {other} is not supported\nhint: export it as glTF 2.0")
         }
         Some(other) => {
             format!("{other} is no version; it must be the text \"2.0\" of a glTF 2.0 file")
@@ -154,15 +155,15 @@ fn require_version_2(path: &Path, document: &Map<String, Value>) -> Result<(), I
 }
 
 /// `value` as a `T`, or where in the document it is not one.
-fn typed<T: for<'de> Deserialize<'de>>(path: &Path, value: Value) -> Result<T, ImportError> {
+fn typed<T: for<'de> Deserialize<'de>>(path: &Path, value: Value) -> Result<T, Refusal> {
     serde_path_to_error::deserialize(value)
         .map_err(|error| super::damaged(path, error.path().to_string(), plain(error.inner())))
 }
 
 /// The error of a text that is no JSON.
-fn broken(path: &Path, json: &[u8], in_glb: bool, error: &serde_json::Error) -> ImportError {
+fn broken(path: &Path, json: &[u8], in_glb: bool, error: &serde_json::Error) -> Refusal {
     let len = json.len();
-    let wrong = "its length in the GLB is wrong, or the file is damaged; export it again";
+    let wrong = "its length in the GLB is wrong, or the file is damaged\nhint: export it again";
     let reason = match plain(error) {
         _ if in_glb && error.is_eof() => {
             format!("the JSON chunk ends after {len} bytes, inside the document: {wrong}")
@@ -171,13 +172,8 @@ fn broken(path: &Path, json: &[u8], in_glb: bool, error: &serde_json::Error) -> 
         reason => format!("this is not the JSON of a glTF file: {reason}"),
     };
     let line = json.split(|&byte| byte == b'\n').nth(error.line().saturating_sub(1));
-    ImportError::Text {
-        file: path.to_owned(),
-        line: error.line(),
-        column: error.column(),
-        reason,
-        text: excerpt(line.unwrap_or_default(), error.column()),
-    }
+    let shown = excerpt(line.unwrap_or_default(), error.column());
+    wrong_text(path, (error.line(), error.column()), reason, &shown)
 }
 
 /// The keys of glTF that hold an object, and those that hold a list of objects.
@@ -235,8 +231,8 @@ fn refuse_arrays(value: &Value, at: &str) -> Result<(), String> {
     Ok(())
 }
 
-fn not_an_object(path: &Path, place: String) -> ImportError {
-    super::damaged(path, place, "expected an object, found an array; export the file again")
+fn not_an_object(path: &Path, place: String) -> Refusal {
+    super::damaged(path, place, "expected an object, found an array\nhint: export the file again")
 }
 
 /// At most 80 characters of a line around `column`.

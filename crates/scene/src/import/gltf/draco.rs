@@ -20,7 +20,7 @@ use super::Reader;
 use super::accessor::Accessor;
 use super::buffers::{Bytes, View};
 use super::document::Document;
-use crate::import::ImportError;
+use crate::import::Refusal;
 use crate::words::plain;
 
 pub(super) const NAME: &str = "KHR_draco_mesh_compression";
@@ -74,7 +74,7 @@ impl Reader<'_> {
         &self,
         primitive: &Primitive,
         place: &str,
-    ) -> Result<Option<(Compressed, &Decoded)>, ImportError> {
+    ) -> Result<Option<(Compressed, &Decoded)>, Refusal> {
         let Some(compressed) = Compressed::of(primitive) else { return Ok(None) };
         // Some files keep a plain copy beside it, which has lost nothing.
         let accessors = &self.document.root.accessors;
@@ -92,7 +92,7 @@ impl Reader<'_> {
     }
 
     /// The mesh of view `index`, decoded once.
-    fn decoded(&self, index: usize, place: &str) -> Result<&Decoded, ImportError> {
+    fn decoded(&self, index: usize, place: &str) -> Result<&Decoded, Refusal> {
         let View { bytes, start, len, .. } = self.view(index, place)?;
         // There is such a view.
         let known = &self.meshes_of_views[index];
@@ -110,10 +110,10 @@ impl Reader<'_> {
         MeshDecoder::new().decode(&mut stream, &mut mesh).map_err(|error| {
             let why = match error.kind() {
                 ErrorKind::LimitExceeded => format!(
-                    "its {len} bytes become more than the {} that there are for it; split the mesh",
+                    "its {len} bytes become more than the {} that there are for it\nhint: split the mesh",
                     Size(left)
                 ),
-                _ => format!("its stream is damaged ({error}); copy or export the file again"),
+                _ => format!("its stream is damaged ({error})\nhint: copy or export the file again"),
             };
             self.damaged(place, why)
         })?;
@@ -129,7 +129,9 @@ impl Decoded {
         let triangles: Vec<[u32; 3]> =
             mesh.faces().iter().map(|face| face.map(|PointIndex(point)| point)).collect();
         if let Some(point) = triangles.iter().flatten().find(|&&p| p as usize >= points) {
-            return Err(format!("a triangle has point {point} of only {points}; export it again"));
+            return Err(format!(
+                "a triangle has point {point} of only {points}\nhint: export it again"
+            ));
         }
         let mut attributes = BTreeMap::new();
         for id in 0..mesh.num_attributes() {
@@ -163,7 +165,7 @@ impl Decoded {
         let id = compressed.attributes.get(semantic)?;
         let Some(Attribute { component, components, bytes }) = self.attributes.get(id) else {
             return Some(Err(format!(
-                "its stream has no attribute {id} that glTF could take; export the file again"
+                "its stream has no attribute {id} that glTF could take\nhint: export the file again"
             )));
         };
         Some(Ok(Accessor::of_packed(bytes, (*component, *components), self.points, normalized)))
@@ -180,7 +182,7 @@ fn values(attribute: &PointAttribute, points: usize, size: usize) -> Result<Vec<
         let at = value.checked_mul(stride).filter(|_| value < attribute.size());
         let value = at.and_then(|at| stored.get(at..)?.get(..size));
         bytes.extend_from_slice(value.ok_or_else(|| {
-            format!("point {point} of its stream has no value; copy or export the file again")
+            format!("point {point} of its stream has no value\nhint: copy or export the file again")
         })?);
     }
     Ok(bytes)

@@ -7,7 +7,7 @@ use gltf::json;
 
 use super::document::Document;
 use crate::import::error::{self, Note, NoteKind};
-use crate::import::{ImportError, Wanted};
+use crate::import::{Refusal, Wanted};
 
 /// How far an extension is supported.
 enum Support {
@@ -82,19 +82,19 @@ pub(super) fn check(
     document: &Document,
     wanted: Wanted,
     notes: &mut Vec<Note>,
-) -> Result<(), ImportError> {
-    let mut missing = document.root.extensions_required.iter().filter_map(|name| {
+) -> Result<(), Refusal> {
+    let missing = document.root.extensions_required.iter().filter_map(|name| {
         match support(name) {
             Some(Support::Full | Support::As(_) | Support::Without(_)) => None,
             // A required look (a thin film, say) changes no geometry.
             Some(Support::Look) if !wanted.light => None,
-            Some(Support::Look) => Some(refused(path, name, UNKNOWN)),
-            Some(Support::Encoded(command)) => Some(refused(path, name, command)),
-            None => Some(refused(path, name, UNKNOWN)),
+            Some(Support::Look) | None => Some((name.as_str(), UNKNOWN)),
+            Some(Support::Encoded(command)) => Some((name.as_str(), command)),
         }
     });
-    if let Some(first) = missing.next() {
-        return Err(missing.fold(first, ImportError::and));
+    let missing: Vec<_> = missing.collect();
+    if !missing.is_empty() {
+        return Err(refused(path, &missing));
     }
     let (used, required) = (&document.root.extensions_used, &document.root.extensions_required);
     // What is required should be among what is used, and is not always.
@@ -128,26 +128,28 @@ pub(super) fn encoded_texture(
     path: &Path,
     texture: &json::Texture,
     wanted: Wanted,
-) -> Result<Option<Note>, ImportError> {
+) -> Result<Option<Note>, Refusal> {
     for name in ["KHR_texture_basisu", "EXT_texture_avif"] {
         if !texture.extensions.as_ref().is_some_and(|e| e.others.contains_key(name)) {
             continue;
         }
         let command = if name == "KHR_texture_basisu" { TO_PNG } else { FROM_AVIF };
         if wanted.textures {
-            return Err(refused(path, name, command));
+            return Err(refused(path, &[(name, command)]));
         }
         return Ok(Some(Note::new(NoteKind::Extension, name, with_name(path, command))));
     }
     Ok(None)
 }
 
-fn refused(path: &Path, name: &str, command: &str) -> ImportError {
-    ImportError::UnsupportedExtension {
-        file: path.to_owned(),
-        name: name.to_owned(),
-        remedy: with_name(path, command),
-    }
+/// That extensions are needed, each with the command that takes it out of a file.
+fn refused(path: &Path, missing: &[(&str, &str)]) -> Refusal {
+    let names: Vec<&str> = missing.iter().map(|(name, _)| *name).collect();
+    let why = Refusal::new(format!("needs {}, not supported", names.join(" and ")));
+    let mut remedies: Vec<String> =
+        missing.iter().map(|(_, command)| with_name(path, command)).collect();
+    remedies.dedup();
+    remedies.into_iter().fold(why, Refusal::hint).at(path.display())
 }
 
 /// The command with the file's own name in it, quoted for a shell where it has blanks.

@@ -7,7 +7,7 @@ use super::document::Document;
 use super::pose::Pose;
 use super::{absent, damaged};
 use crate::import::error::Note;
-use crate::import::{ImportError, ImportedCamera, ImportedLight, Projection};
+use crate::import::{ImportedCamera, ImportedLight, Projection, Refusal};
 use etendue_geometry::Transform;
 
 /// What stands in the scene.
@@ -73,7 +73,7 @@ pub(super) fn walk(
     document: &Document,
     playing: &Playing,
     notes: &mut Vec<Note>,
-) -> Result<Scene, ImportError> {
+) -> Result<Scene, Refusal> {
     let pose = Pose::at_rest(path, document)?;
     let mut scene = Scene::default();
     for &index in &pose.shown {
@@ -103,7 +103,7 @@ fn placed_camera(
     node: usize,
     index: usize,
     model_from_camera: Transform,
-) -> Result<ImportedCamera, ImportError> {
+) -> Result<ImportedCamera, Refusal> {
     let place = || format!("cameras[{index}]");
     let Some(camera) = document.cameras.get(index) else {
         let from = format!("nodes[{node}].camera");

@@ -9,7 +9,7 @@ use json::validation::Checked;
 
 use super::buffers::{Bytes, data_uri, percent_decoded};
 use super::{Reader, extensions};
-use crate::import::{Import, ImportError, Strictness, error};
+use crate::import::{Import, Refusal, Strictness, error};
 
 /// What crate `gltf` puts for an image that a texture does not name.
 const NO_IMAGE: usize = u32::MAX as usize;
@@ -33,7 +33,7 @@ impl<'a> Images<'a> {
         info: &json::texture::Info,
         encoding: Encoding,
         import: &mut Import,
-    ) -> Result<Option<TextureUse>, ImportError> {
+    ) -> Result<Option<TextureUse>, Refusal> {
         let index = info.index.value();
         let known = self.of_texture.get(index).copied().flatten();
         let texture = match known {
@@ -62,7 +62,7 @@ impl<'a> Images<'a> {
         index: usize,
         from: &str,
         import: &mut Import,
-    ) -> Result<Option<u32>, ImportError> {
+    ) -> Result<Option<u32>, Refusal> {
         let reader = self.reader;
         let root = &reader.document.root;
         let place = || format!("textures[{index}]");
@@ -76,7 +76,7 @@ impl<'a> Images<'a> {
                 error::push(&mut import.notes, note);
                 return Ok(None);
             }
-            return Err(reader.damaged(place(), "it has no image; export the file again"));
+            return Err(reader.damaged(place(), "it has no image\nhint: export the file again"));
         };
         let Some(image) = root.images.get(source) else {
             return Err(reader.absent(place() + ".source", "image", source, root.images.len()));
@@ -111,7 +111,7 @@ impl<'a> Images<'a> {
         index: usize,
         image: &json::Image,
         import: &mut Import,
-    ) -> Result<Option<ImageSource>, ImportError> {
+    ) -> Result<Option<ImageSource>, Refusal> {
         let reader = self.reader;
         let place = || format!("images[{index}]");
         if let Some(view) = image.buffer_view {

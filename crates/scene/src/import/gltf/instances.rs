@@ -8,7 +8,7 @@ use super::document::Node;
 use super::hierarchy::Scene;
 use super::pose::trs;
 use super::primitive::Shapes;
-use crate::import::{Import, ImportError, ImportedPlacement};
+use crate::import::{Import, ImportedPlacement, Refusal};
 use etendue_geometry::glam::{DQuat, DVec3};
 use etendue_geometry::{Link, Placement, Transform, Vertices};
 
@@ -18,7 +18,7 @@ pub(super) fn place(
     (scene, chains): (&Scene, &Chains<'_>),
     shapes: &Shapes,
     import: &mut Import,
-) -> Result<(), ImportError> {
+) -> Result<(), Refusal> {
     for placed in &scene.meshes {
         let node = &reader.document.nodes[placed.node];
         let instances = transforms(reader, node, placed.node)?;
@@ -61,11 +61,7 @@ fn has(node: &Node) -> bool {
 }
 
 /// Where the instances of `node` stand in its frame: one at the node itself without the extension.
-fn transforms(
-    reader: &Reader<'_>,
-    node: &Node,
-    index: usize,
-) -> Result<Vec<Transform>, ImportError> {
+fn transforms(reader: &Reader<'_>, node: &Node, index: usize) -> Result<Vec<Transform>, Refusal> {
     let Some(extension) = node.extensions.get(NAME) else {
         return Ok(vec![Transform::IDENTITY]);
     };
@@ -83,7 +79,7 @@ fn transforms(
     if counts.iter().flatten().any(|&each| each != count) {
         return Err(reader.damaged(
             place("attributes"),
-            "they differ in their number of instances; export the file again",
+            "they differ in their number of instances\nhint: export the file again",
         ));
     }
     let bytes = (count * size_of::<Transform>()) as u64;
@@ -111,22 +107,24 @@ fn values<const N: usize>(
     attributes: Option<&Value>,
     name: &str,
     place: &impl Fn(&str) -> String,
-) -> Result<Option<Vertices<N>>, ImportError> {
+) -> Result<Option<Vertices<N>>, Refusal> {
     let Some(index) = attributes.and_then(|a| a.get(name)) else {
         return Ok(None);
     };
     let place = place(name);
     let Some(index) = index.as_u64().and_then(|index| usize::try_from(index).ok()) else {
-        return Err(
-            reader.damaged(place, "expected the number of an accessor; export the file again")
-        );
+        return Err(reader
+            .damaged(place, "expected the number of an accessor\nhint: export the file again"));
     };
     let accessor = reader.accessor(index, &place)?;
     match accessor.floats(0.0) {
         Some(values) if accessor.components == N => Ok(Some(values)),
         _ => Err(reader.damaged(
             place,
-            format!("it has {} components, not {N}; export the file again", accessor.components),
+            format!(
+                "it has {} components, not {N}\nhint: export the file again",
+                accessor.components
+            ),
         )),
     }
 }

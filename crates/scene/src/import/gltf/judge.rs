@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::Reader;
 use crate::import::error::{self, Note, NoteKind};
-use crate::import::{Import, ImportError, Strictness};
+use crate::import::{Import, Refusal, Strictness};
 
 /// The judge of one material's numbers.
 pub(super) struct Judge<'a> {
@@ -16,15 +16,10 @@ pub(super) struct Judge<'a> {
 
 impl Judge<'_> {
     /// Says that the material's `what` is wrong and what is done about it; refused when strict.
-    pub(super) fn say(
-        &self,
-        what: &str,
-        remedy: &str,
-        import: &mut Import,
-    ) -> Result<(), ImportError> {
+    pub(super) fn say(&self, what: &str, remedy: &str, import: &mut Import) -> Result<(), Refusal> {
         if self.reader.options.strictness == Strictness::Strict {
             let place = format!("material \"{}\"", self.subject);
-            return Err(self.reader.damaged(place, format!("its {what}; export it again")));
+            return Err(self.reader.damaged(place, format!("its {what}\nhint: export it again")));
         }
         let message = format!("its {what}; {remedy}");
         error::push(&mut import.notes, Note::new(NoteKind::Irregular, &self.subject, message));
@@ -43,7 +38,7 @@ impl Judge<'_> {
         value: f64,
         [low, high]: [f64; 2],
         import: &mut Import,
-    ) -> Result<f64, ImportError> {
+    ) -> Result<f64, Refusal> {
         if !(low..=high).contains(&value) {
             let what = match high {
                 f64::INFINITY => format!("{key} {value} is below {low}"),
@@ -61,7 +56,7 @@ impl Judge<'_> {
         name: &str,
         key: &str,
         import: &mut Import,
-    ) -> Result<Option<f64>, ImportError> {
+    ) -> Result<Option<f64>, Refusal> {
         let extension = material.extensions.as_ref().and_then(|e| e.others.get(name));
         let Some(extension) = extension else { return Ok(None) };
         let value = match (extension.is_object(), extension.get(key)) {

@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use super::damaged;
 use super::document::{Document, Node};
-use crate::import::ImportError;
+use crate::import::Refusal;
 use crate::import::error::{self, Note, NoteKind};
 use crate::words::{kind_of, plain};
 
@@ -56,10 +56,11 @@ fn eighth_turn() -> f64 {
 }
 
 /// Light `number` of the document.
-fn read(path: &Path, number: &Value, value: &Value) -> Result<Written, ImportError> {
+fn read(path: &Path, number: &Value, value: &Value) -> Result<Written, Refusal> {
     let place = format!("extensions.{NAME}.lights[{number}]");
     if !value.is_object() {
-        let reason = format!("expected an object, found {}; export the file again", kind_of(value));
+        let reason =
+            format!("expected an object, found {}\nhint: export the file again", kind_of(value));
         return Err(damaged(path, place, reason));
     }
     serde_path_to_error::deserialize(value).map_err(|error| {
@@ -76,7 +77,7 @@ pub(super) fn placed(
     node: &Node,
     index: usize,
     notes: &mut Vec<Note>,
-) -> Result<Option<Light>, ImportError> {
+) -> Result<Option<Light>, Refusal> {
     let Some(number) = node.extensions.get(NAME).and_then(|e| e.get("light")) else {
         return Ok(None);
     };
@@ -86,7 +87,7 @@ pub(super) fn placed(
     let found = number.as_u64().and_then(|n| usize::try_from(n).ok());
     let Some(value) = found.and_then(|n| all?.get(n)) else {
         let reason = format!(
-            "there is no light {number}; the file has {}; export it again",
+            "there is no light {number}; the file has {}\nhint: export it again",
             all.map_or(0, Vec::len)
         );
         return Err(damaged(path, place() + ".light", reason));

@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use super::images::Images;
 use super::judge::Judge;
-use crate::import::{Import, ImportError};
+use crate::import::{Import, Refusal};
 use etendue_tracer::scattering::{Absorption, Glass, GltfSurface};
 use etendue_tracer::texture::Encoding;
 use etendue_tracer::{Ior, Scattering, TextureUse};
@@ -33,13 +33,13 @@ pub(super) fn add(
     material: &json::Material,
     read: &mut GltfSurface,
     import: &mut Import,
-) -> Result<(), ImportError> {
+) -> Result<(), Refusal> {
     const SHARE: [f64; 2] = [0.0, 1.0];
     let written = |name: &str| material.extensions.as_ref().and_then(|all| all.others.get(name));
     let mut texture = |name: &str, key: &str, encoding, import: &mut Import| {
         let info = written(name).and_then(|extension| extension.get(key));
         let info = info.and_then(|info| json::texture::Info::deserialize(info).ok());
-        info.map_or(Ok::<Option<TextureUse>, ImportError>(None), |info| {
+        info.map_or(Ok::<Option<TextureUse>, Refusal>(None), |info| {
             images.use_of(&judge.place(key), &info, encoding, import)
         })
     };
@@ -105,7 +105,7 @@ impl Glossiness {
         judge: &Judge<'_>,
         material: &json::Material,
         import: &mut Import,
-    ) -> Result<Option<Self>, ImportError> {
+    ) -> Result<Option<Self>, Refusal> {
         let written: Option<&Value> =
             material.extensions.as_ref().and_then(|extensions| extensions.others.get(GLOSSINESS));
         let Some(written) = written else { return Ok(None) };
@@ -122,7 +122,7 @@ impl Glossiness {
         images: &mut Images<'_>,
         judge: &Judge<'_>,
         import: &mut Import,
-    ) -> Result<GltfSurface, ImportError> {
+    ) -> Result<GltfSurface, Refusal> {
         const SHARE: [f64; 2] = [0.0, 1.0];
         let glossiness = judge.factor("glossinessFactor", self.glossiness_factor, SHARE, import)?;
         let mut specular_color = self.specular_factor;
@@ -156,7 +156,7 @@ pub(super) fn body(
     material: &json::Material,
     read: GltfSurface,
     import: &mut Import,
-) -> Result<Scattering, ImportError> {
+) -> Result<Scattering, Refusal> {
     let extension = material.extensions.as_ref().and_then(|e| e.others.get(VOLUME));
     let thickness = judge.number(material, VOLUME, "thicknessFactor", import)?.unwrap_or(0.0);
     let thin = |read| Ok(Scattering::Gltf(Box::new(read)));
@@ -178,11 +178,7 @@ pub(super) fn body(
 }
 
 /// The share of light that is left after the distance.
-fn left(
-    judge: &Judge<'_>,
-    extension: &Value,
-    import: &mut Import,
-) -> Result<[f64; 3], ImportError> {
+fn left(judge: &Judge<'_>, extension: &Value, import: &mut Import) -> Result<[f64; 3], Refusal> {
     let Some(written) = extension.get("attenuationColor") else { return Ok([1.0; 3]) };
     let color = <[f64; 3]>::deserialize(written).ok();
     let color = color.filter(|color| color.iter().all(|c| (0.0..=1.0).contains(c)));

@@ -19,14 +19,14 @@ use super::images::Images;
 use super::judge::Judge;
 use super::lobes::{Glossiness, MIRROR};
 use super::{Reader, lobes};
-use crate::import::{Import, ImportError};
+use crate::import::{Import, Refusal};
 
 /// The number of the material of `primitive`, which messages call `place`.
 pub(super) fn number(
     reader: &Reader<'_>,
     primitive: &json::mesh::Primitive,
     place: impl Fn() -> String,
-) -> Result<u32, ImportError> {
+) -> Result<u32, Refusal> {
     let materials = reader.document.root.materials.len();
     let index = primitive.material.map_or(materials, |material| material.value());
     match u32::try_from(index) {
@@ -36,7 +36,7 @@ pub(super) fn number(
 }
 
 /// Reads the document's materials into `import`, and the nameless one behind them.
-pub(super) fn load(reader: &Reader<'_>, import: &mut Import) -> Result<(), ImportError> {
+pub(super) fn load(reader: &Reader<'_>, import: &mut Import) -> Result<(), Refusal> {
     let mut images = Images::new(reader);
     for (index, material) in reader.document.root.materials.iter().enumerate() {
         let named = material.name.clone().filter(|name| !name.is_empty());
@@ -53,7 +53,7 @@ fn read(
     judge: &mut Judge<'_>,
     material: &json::Material,
     import: &mut Import,
-) -> Result<Material, ImportError> {
+) -> Result<Material, Refusal> {
     let name = material.name.clone().unwrap_or_default();
     let surface = &material.pbr_metallic_roughness;
     let glossiness = Glossiness::of(judge, material, import)?;
@@ -128,7 +128,7 @@ fn reflectance(
     judge: &Judge<'_>,
     factor: [f64; 3],
     import: &mut Import,
-) -> Result<[f64; 3], ImportError> {
+) -> Result<[f64; 3], Refusal> {
     if !factor.iter().all(|c| (0.0..=1.0).contains(c)) {
         let what = format!("base colour {factor:?} is outside 0 to 1");
         judge.say(&what, "it is brought there", import)?;
@@ -166,7 +166,7 @@ fn scattering(
     judge: &Judge<'_>,
     material: &json::Material,
     import: &mut Import,
-) -> Result<Scattering, ImportError> {
+) -> Result<Scattering, Refusal> {
     let extension = |name: &str| material.extensions.as_ref().and_then(|e| e.others.get(name));
     if is_unlit(material) {
         return Ok(Scattering::Unlit);
@@ -235,7 +235,7 @@ fn specular_color(
     judge: &Judge<'_>,
     written: &Value,
     import: &mut Import,
-) -> Result<[f64; 3], ImportError> {
+) -> Result<[f64; 3], Refusal> {
     let color = <[f64; 3]>::deserialize(written).ok();
     let color = color.filter(|color| color.iter().all(|c| c.is_finite() && *c >= 0.0));
     if color.is_none() {
@@ -249,7 +249,7 @@ fn emission(
     judge: &Judge<'_>,
     material: &json::Material,
     import: &mut Import,
-) -> Result<Option<Emission>, ImportError> {
+) -> Result<Option<Emission>, Refusal> {
     let factor = material.emissive_factor.0.map(f64::from);
     if factor == [0.0; 3] {
         return Ok(None);

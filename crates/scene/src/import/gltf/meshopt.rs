@@ -74,12 +74,12 @@ impl<'a> MeshoptView<'a> {
     /// What it says of its stream; why not, when it makes no sense.
     pub(super) fn stream(&self) -> Result<Stream, String> {
         if !self.written.is_object() {
-            return Err("expected an object; export the file again".to_owned());
+            return Err("expected an object\nhint: export the file again".to_owned());
         }
         let stream: Stream = serde_path_to_error::deserialize(self.written).map_err(|error| {
             let path = error.path().to_string();
             let inside = if path == "." { String::new() } else { format!("{path}: ") };
-            format!("{inside}{}; export the file again", plain(error.inner()))
+            format!("{inside}{}\nhint: export the file again", plain(error.inner()))
         })?;
         stream.check()?;
         Ok(stream)
@@ -108,7 +108,7 @@ impl Stream {
         if !fits {
             return Err(format!(
                 "{count} elements of {stride} bytes (mode {:?}, filter {:?}) are none that the \
-                 extension has; export the file again",
+                 extension has\nhint: export the file again",
                 self.mode, self.filter
             ));
         }
@@ -116,7 +116,7 @@ impl Stream {
         match count.checked_mul(stride) {
             Some(bytes) if bytes <= most => Ok(()),
             _ => Err(format!(
-                "{count} elements of {stride} bytes cannot come from {} bytes; export the file again",
+                "{count} elements of {stride} bytes cannot come from {} bytes\nhint: export the file again",
                 self.len
             )),
         }
@@ -124,7 +124,7 @@ impl Stream {
 
     /// The elements that `packed` holds.
     pub(super) fn decode(&self, packed: &[u8]) -> Result<Vec<u8>, String> {
-        let broken = || "its stream is damaged; copy or export the file again".to_owned();
+        let broken = || "its stream is damaged\nhint: copy or export the file again".to_owned();
         let bytes = match (self.mode, self.byte_stride) {
             (Mode::Attributes, stride) => attributes(packed, self.count, stride),
             (Mode::Triangles, 2) => meshopt::decode_index_buffer::<u16>(packed, self.count)

@@ -28,11 +28,12 @@ mod part;
 mod pose;
 mod primitive;
 
+use std::fmt::Display;
 use std::path::Path;
 use std::sync::OnceLock;
 
 use super::files::Files;
-use super::{Import, ImportError, ImportedLight, Options, Wanted, error};
+use super::{Import, ImportedLight, Options, Refusal, Wanted, error};
 use crate::memory::of_json;
 use animation::Playing;
 use buffers::Buffers;
@@ -57,42 +58,30 @@ pub(super) struct Reader<'a> {
 
 impl Reader<'_> {
     /// An error that names the file, `place` and `reason`.
-    fn damaged(&self, place: impl Into<String>, reason: impl Into<String>) -> ImportError {
+    fn damaged(&self, place: impl Display, reason: impl Into<Refusal>) -> Refusal {
         damaged(self.file, place, reason)
     }
 
     /// The error that `from` names the `what` number `index`, of which there are only `count`.
-    fn absent(
-        &self,
-        from: impl Into<String>,
-        what: &str,
-        index: usize,
-        count: usize,
-    ) -> ImportError {
+    fn absent(&self, from: impl Display, what: &str, index: usize, count: usize) -> Refusal {
         absent(self.file, from, what, index, count)
     }
 }
 
 /// What to do about a file of glTF's first version.
 fn first_version() -> String {
-    "this is glTF 1.0, which is not supported; convert it: npx gltf-pipeline -i OLD.gltf -o NEW.glb, or \
+    "this is glTF 1.0, which is not supported\nhint: convert it: npx gltf-pipeline -i OLD.gltf -o NEW.glb, or \
      export it as glTF 2.0"
         .to_owned()
 }
 
-fn absent(
-    file: &Path,
-    from: impl Into<String>,
-    what: &str,
-    index: usize,
-    count: usize,
-) -> ImportError {
-    let reason = format!("there is no {what} {index}; the file has {count}; export it again");
+fn absent(file: &Path, from: impl Display, what: &str, index: usize, count: usize) -> Refusal {
+    let reason = format!("there is no {what} {index}; the file has {count}\nhint: export it again");
     damaged(file, from, reason)
 }
 
-fn damaged(file: &Path, place: impl Into<String>, reason: impl Into<String>) -> ImportError {
-    ImportError::Damaged { file: file.to_owned(), place: place.into(), reason: reason.into() }
+fn damaged(file: &Path, place: impl Display, why: impl Into<Refusal>) -> Refusal {
+    error::damaged(file, place, why)
 }
 
 /// Reads the glTF or GLB file at `path`.
@@ -101,7 +90,7 @@ pub(super) fn import(
     files: &Files,
     wanted: Wanted,
     options: &Options,
-) -> Result<Import, ImportError> {
+) -> Result<Import, Refusal> {
     let map = files.map_model(path)?;
     let container = buffers::open(path, &map)?;
     files.require_room(path, "its JSON", of_json(container.json))?;

@@ -10,7 +10,7 @@ use super::Reader;
 use super::accessor::Accessor;
 use super::draco::{Compressed, Decoded};
 use crate::import::error::{Note, NoteKind};
-use crate::import::{ImportError, Strictness};
+use crate::import::{Refusal, Strictness};
 
 /// A primitive being read.
 pub(super) struct Part<'a> {
@@ -38,14 +38,14 @@ impl<'a> Part<'a> {
         &self,
         semantic: &Semantic,
         fill: f32,
-    ) -> Result<Option<Vertices<N>>, ImportError> {
+    ) -> Result<Option<Vertices<N>>, Refusal> {
         let Some((accessor, place)) = self.accessor(semantic)? else { return Ok(None) };
         match accessor.floats(fill) {
             Some(floats) => Ok(Some(floats)),
             None => Err(self.reader.damaged(
                 place,
                 format!(
-                    "it has {} components, not {N}; export the file again",
+                    "it has {} components, not {N}\nhint: export the file again",
                     accessor.components
                 ),
             )),
@@ -59,7 +59,7 @@ impl<'a> Part<'a> {
         semantic: &Semantic,
         fill: f32,
         positions: &Vertices<3>,
-    ) -> Result<Option<Vertices<N>>, ImportError> {
+    ) -> Result<Option<Vertices<N>>, Refusal> {
         let Some(values) = self.attribute(semantic, fill)? else { return Ok(None) };
         if values.len() == positions.len() {
             return Ok(Some(values));
@@ -74,7 +74,7 @@ impl<'a> Part<'a> {
         Ok(None)
     }
 
-    pub(super) fn uvs(&mut self, positions: &Vertices<3>) -> Result<Vec<Vertices<2>>, ImportError> {
+    pub(super) fn uvs(&mut self, positions: &Vertices<3>) -> Result<Vec<Vertices<2>>, Refusal> {
         let mut sets = Vec::new();
         // glTF numbers sets without gaps.
         while let Ok(set) = u32::try_from(sets.len()) {
@@ -86,7 +86,7 @@ impl<'a> Part<'a> {
         Ok(sets)
     }
 
-    fn accessor(&self, semantic: &Semantic) -> Result<Option<(Accessor<'a>, String)>, ImportError> {
+    fn accessor(&self, semantic: &Semantic) -> Result<Option<(Accessor<'a>, String)>, Refusal> {
         let wanted = semantic.to_string();
         let found = self.primitive.attributes.iter().find(|(known, _)| match known {
             Checked::Valid(known) => known.to_string() == wanted,
@@ -111,7 +111,7 @@ impl<'a> Part<'a> {
         &mut self,
         mode: Mode,
         vertices: usize,
-    ) -> Result<Buffer<[u32; 3]>, ImportError> {
+    ) -> Result<Buffer<[u32; 3]>, Refusal> {
         if let Some((_, decoded)) = &self.draco {
             return Ok(decoded.triangles.clone().into());
         }
@@ -126,7 +126,7 @@ impl<'a> Part<'a> {
         if !accessor.is_index() {
             return Err(self.reader.damaged(
                 place,
-                "they are not scalars of componentType 5121, 5123 or 5125; export the file again",
+                "they are not scalars of componentType 5121, 5123 or 5125\nhint: export the file again",
             ));
         }
         self.whole_triangles(mode, accessor.count)?;
@@ -140,7 +140,7 @@ impl<'a> Part<'a> {
         Ok(assemble(mode, corners.len(), |i| corners[i]).into())
     }
 
-    fn whole_triangles(&mut self, mode: Mode, corners: usize) -> Result<(), ImportError> {
+    fn whole_triangles(&mut self, mode: Mode, corners: usize) -> Result<(), Refusal> {
         match corners % 3 {
             left @ 1.. if mode == Mode::Triangles => self.irregular(
                 &format!("{left} of {corners} corners make no whole triangle"),
@@ -150,7 +150,7 @@ impl<'a> Part<'a> {
         }
     }
 
-    pub(super) fn irregular(&mut self, reason: &str, done: &str) -> Result<(), ImportError> {
+    pub(super) fn irregular(&mut self, reason: &str, done: &str) -> Result<(), Refusal> {
         if self.reader.options.strictness == Strictness::Strict {
             return Err(self.reader.damaged(
                 self.place.clone(),

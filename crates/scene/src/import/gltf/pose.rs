@@ -7,7 +7,7 @@ use etendue_geometry::glam::{DMat3, DQuat, DVec3};
 
 use super::document::{Document, Node};
 use super::{absent, damaged};
-use crate::import::ImportError;
+use crate::import::Refusal;
 
 /// The nodes of a document with each of them somewhere.
 #[derive(Debug, Default)]
@@ -29,7 +29,7 @@ impl Pose {
     ///
     /// When the default scene has a node that is absent, stands below itself or two parents, or has
     /// a transform that is not finite.
-    pub(super) fn at_rest(path: &Path, document: &Document) -> Result<Self, ImportError> {
+    pub(super) fn at_rest(path: &Path, document: &Document) -> Result<Self, Refusal> {
         Self::evaluate(path, document, |index, node| local(path, node, index))
     }
 
@@ -37,8 +37,8 @@ impl Pose {
     fn evaluate(
         path: &Path,
         document: &Document,
-        local: impl Fn(usize, &Node) -> Result<Transform, ImportError>,
-    ) -> Result<Self, ImportError> {
+        local: impl Fn(usize, &Node) -> Result<Transform, Refusal>,
+    ) -> Result<Self, Refusal> {
         let count = document.nodes.len();
         let (hidden, model_from_node) = (vec![false; count], vec![None; count]);
         let mut pose = Self { shown: Vec::new(), hidden, model_from_node };
@@ -70,7 +70,7 @@ impl Pose {
     fn evaluate_others(
         &mut self,
         document: &Document,
-        local: impl Fn(usize, &Node) -> Result<Transform, ImportError>,
+        local: impl Fn(usize, &Node) -> Result<Transform, Refusal>,
     ) {
         let mut open: Vec<(usize, Transform)> =
             orphans(document).into_iter().map(|node| (node, Transform::IDENTITY)).collect();
@@ -99,7 +99,7 @@ pub(super) fn exists(
     node: usize,
     count: usize,
     from: impl Fn() -> String,
-) -> Result<(), ImportError> {
+) -> Result<(), Refusal> {
     if node < count {
         return Ok(());
     }
@@ -108,7 +108,7 @@ pub(super) fn exists(
 
 /// The roots of the default scene: the one that the document names, else its first; a document
 /// without scenes shows all nodes that are nobody's children.
-fn roots(path: &Path, document: &Document) -> Result<Vec<usize>, ImportError> {
+fn roots(path: &Path, document: &Document) -> Result<Vec<usize>, Refusal> {
     if document.scenes.is_empty() {
         return Ok(orphans(document));
     }
@@ -140,7 +140,7 @@ fn is_hidden(node: &Node) -> bool {
 }
 
 /// From the node's frame to its parent's, as the file has it.
-pub(super) fn local(path: &Path, node: &Node, index: usize) -> Result<Transform, ImportError> {
+pub(super) fn local(path: &Path, node: &Node, index: usize) -> Result<Transform, Refusal> {
     let place = || format!("nodes[{index}]");
     let transform = match node.matrix {
         Some(matrix) => affine(&matrix).ok_or_else(|| {

@@ -18,7 +18,7 @@ use super::part::Part;
 use crate::import::admit::{Admitted, Candidate, admit, cost};
 use crate::import::deformer::Deformer;
 use crate::import::error::{self, Note, NoteKind};
-use crate::import::{Import, ImportError};
+use crate::import::{Import, Refusal};
 
 /// A primitive that became a mesh.
 pub(super) struct Loaded {
@@ -80,7 +80,7 @@ pub(super) fn load(
     reader: &Reader<'_>,
     (scene, chains): (&Scene, &Chains<'_>),
     import: &mut Import,
-) -> Result<Shapes, ImportError> {
+) -> Result<Shapes, Refusal> {
     let meshes = &reader.document.root.meshes;
     let mut shown = vec![false; meshes.len()];
     for placed in &scene.meshes {
@@ -125,7 +125,7 @@ pub(super) fn load(
 fn skins(
     reader: &Reader<'_>,
     (scene, chains): (&Scene, &Chains<'_>),
-) -> Result<BTreeMap<usize, Skin>, ImportError> {
+) -> Result<BTreeMap<usize, Skin>, Refusal> {
     let mut skins = BTreeMap::new();
     for placed in &scene.meshes {
         if let Some(index) = placed.shape.skin
@@ -138,7 +138,7 @@ fn skins(
 }
 
 /// Adds a mesh to `import`; its index.
-fn take(read: Read, import: &mut Import, reader: &Reader<'_>) -> Result<u32, ImportError> {
+fn take(read: Read, import: &mut Import, reader: &Reader<'_>) -> Result<u32, Refusal> {
     let index = u32::try_from(import.meshes.len())
         .map_err(|_| reader.damaged("meshes", "there are more than 32 bits can count"))?;
     import.stats.bytes_copied += read.copied;
@@ -182,13 +182,15 @@ fn read(
     skin: Option<&Skin>,
     number: usize,
     primitive: &Primitive,
-) -> Result<Option<Read>, ImportError> {
+) -> Result<Option<Read>, Refusal> {
     let name = reader.document.root.meshes[shape.mesh].name.clone().unwrap_or_default();
     let place = place(reader, shape.mesh, number);
     // Each primitive has the mesh's name for itself, and another one in messages.
     reader.files.take(2 * name.len() as u64, || format!("meshes[{}].name", shape.mesh))?;
     let Checked::Valid(mode) = primitive.mode else {
-        return Err(reader.damaged(place, "its mode is none of 0 to 6; export the file again"));
+        return Err(
+            reader.damaged(place, "its mode is none of 0 to 6\nhint: export the file again")
+        );
     };
     if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
         return Ok(None);

@@ -31,7 +31,7 @@ use super::admit::{self, Admitted};
 use super::error::{self, Note, NoteKind};
 use super::files::Files;
 use super::text::{Fault, pieces, with_newlines, without_mark};
-use super::{Import, ImportError, ImportedPlacement, Options, Wanted};
+use super::{Import, ImportedPlacement, Options, Refusal, Wanted};
 use chunk::{Chunk, Segment, WantedColumns};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Mesh, Transform};
@@ -49,7 +49,7 @@ pub(super) fn import(
     files: &Files,
     wanted: Wanted,
     options: &Options,
-) -> Result<Import, ImportError> {
+) -> Result<Import, Refusal> {
     let map = files.map_model(path)?;
     super::refuse_other_kind(path, map.bytes(), "an OBJ model")?;
     let text = with_newlines(without_mark(map.bytes()));
@@ -100,7 +100,7 @@ fn refuse_zero_bytes(text: &[u8]) -> Result<(), Fault> {
         return Ok(());
     }
     let at = text.iter().position(|&byte| byte == 0).unwrap_or_default();
-    Err(Fault::new(at, "a zero byte: this is no text, hence no OBJ; export the model again"))
+    Err(Fault::new(at, "a zero byte: this is no text, hence no OBJ\nhint: export the model again"))
 }
 
 /// Refuses text of another format: no line of it is one of OBJ, and some line is no comment.
@@ -119,7 +119,7 @@ fn refuse_foreign(chunks: &[Chunk], pieces: &[(usize, &[u8])]) -> Result<(), Fau
         _ => "this is another format",
     };
     let why = format!(
-        "no line is one of Wavefront's OBJ, such as `v 0 0 0` or `f 1 2 3`: {what}; convert it to OBJ, PLY or \
+        "no line is one of Wavefront's OBJ, such as `v 0 0 0` or `f 1 2 3`: {what}\nhint: convert it to OBJ, PLY or \
          glTF"
     );
     Err(Fault::new(at, why))
@@ -131,7 +131,7 @@ fn place(
     segment: &Segment,
     [material, node]: [u32; 2],
     import: &mut Import,
-) -> Result<(), ImportError> {
+) -> Result<(), Refusal> {
     import.stats.bytes_copied += admitted.mesh.heap_bytes() as u64;
     import.stats.dropped += admitted.dropped;
     for note in admitted.notes {

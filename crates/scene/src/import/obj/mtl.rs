@@ -22,7 +22,7 @@ use super::chunk::Segment;
 use crate::import::error::{self, Note, NoteKind};
 use crate::import::files::Files;
 use crate::import::text::with_newlines;
-use crate::import::{Import, ImportError, Strictness, Wanted};
+use crate::import::{Import, Refusal, Strictness, Wanted};
 
 /// The most material files of a model that are looked for.
 const MOST_LIBRARIES: usize = 1000;
@@ -41,7 +41,7 @@ pub(super) fn load(
     wanted: Wanted,
     strictness: Strictness,
     import: &mut Import,
-) -> Result<Vec<u32>, ImportError> {
+) -> Result<Vec<u32>, Refusal> {
     let mut defined: HashMap<String, Defined> = HashMap::new();
     for file in find(libraries, files, &mut import.notes)? {
         for material in read(&file, files, &mut import.notes)? {
@@ -74,11 +74,7 @@ pub(super) fn load(
 
 /// The files that `mtllib` lines name: each line is one name, or several with blanks between them
 /// and `\ ` for a blank inside one.
-fn find(
-    libraries: &[&str],
-    files: &Files,
-    notes: &mut Vec<Note>,
-) -> Result<Vec<PathBuf>, ImportError> {
+fn find(libraries: &[&str], files: &Files, notes: &mut Vec<Note>) -> Result<Vec<PathBuf>, Refusal> {
     let mut found: Vec<PathBuf> = Vec::new();
     let (mut seen, mut looked_for) = (HashSet::new(), 0);
     for line in libraries.iter().filter(|line| seen.insert(**line)) {
@@ -127,11 +123,7 @@ fn split_names(line: &str) -> Vec<String> {
     names
 }
 
-fn read(
-    file: &Path,
-    files: &Files,
-    notes: &mut Vec<Note>,
-) -> Result<Vec<tobj::Material>, ImportError> {
+fn read(file: &Path, files: &Files, notes: &mut Vec<Note>) -> Result<Vec<tobj::Material>, Refusal> {
     let map = files.map(file)?;
     let mut text = String::new();
     for (number, line) in String::from_utf8_lossy(&with_newlines(map.bytes())).lines().enumerate() {
@@ -149,11 +141,7 @@ fn read(
     }
     match tobj::load_mtl_buf(&mut text.as_bytes()) {
         Ok((materials, _)) => Ok(materials),
-        Err(error) => Err(ImportError::Damaged {
-            file: file.to_owned(),
-            place: "material file".to_owned(),
-            reason: error.to_string(),
-        }),
+        Err(error) => Err(error::damaged(file, "material file", error.to_string())),
     }
 }
 
@@ -195,7 +183,7 @@ fn resolve(
     maps: &mut MtlMaps<'_>,
     wanted: Wanted,
     import: &mut Import,
-) -> Result<Material, ImportError> {
+) -> Result<Material, Refusal> {
     let material = &defined.material;
     let image = match &material.diffuse_texture {
         Some(map) if wanted.textures => maps.use_of(map, &defined.file, import)?,
@@ -203,11 +191,11 @@ fn resolve(
     };
     for what in chunk::impossible(material) {
         if maps.strictness == Strictness::Strict {
-            return Err(ImportError::Damaged {
-                file: defined.file.clone(),
-                place: format!("material \"{}\"", material.name),
-                reason: what.split(';').next().unwrap_or_default().to_owned(),
-            });
+            return Err(error::damaged(
+                &defined.file,
+                format!("material \"{}\"", material.name),
+                what.split(';').next().unwrap_or_default().to_owned(),
+            ));
         }
         let note = Note::new(NoteKind::Irregular, material.name.clone(), what);
         error::push(&mut import.notes, note);
@@ -307,16 +295,16 @@ impl MtlMaps<'_> {
         written: &str,
         library: &Path,
         import: &mut Import,
-    ) -> Result<Option<TextureUse>, ImportError> {
+    ) -> Result<Option<TextureUse>, Refusal> {
         let map = Map::parse(written);
         let (key, source) = match self.files.locate_beside(library, &map.name)? {
             Some(file) => (file.clone(), ImageSource::File(file)),
             None if self.strictness == Strictness::Strict => {
-                return Err(ImportError::Damaged {
-                    file: library.to_owned(),
-                    place: "map_Kd".to_owned(),
-                    reason: format!("\"{}\" does not exist", map.name),
-                });
+                return Err(error::damaged(
+                    library,
+                    "map_Kd",
+                    format!("\"{}\" does not exist", map.name),
+                ));
             }
             None => {
                 error::push(&mut import.notes, error::missing_image(map.name.clone()));

@@ -12,7 +12,7 @@ use super::chunk::{Chunk, KINDS, NONE, Polygon, Segment, V, VN, VT};
 use crate::import::admit::Candidate;
 use crate::import::files::Files;
 use crate::import::text::{Fault, Words, whole};
-use crate::import::{ImportError, Strictness, polygon, precise_enough};
+use crate::import::{Refusal, Strictness, polygon, precise_enough};
 use etendue_geometry::Vertices;
 use etendue_geometry::glam::DVec3;
 
@@ -43,7 +43,7 @@ impl<'a> Welder<'a> {
         path: &Path,
         files: &Files,
         only: bool,
-    ) -> Result<Candidate, ImportError> {
+    ) -> Result<Candidate, Refusal> {
         let (has_uvs, has_normals) = (self.has(segment, VT), self.has(segment, VN));
         let title = if segment.name.is_empty() { stem(path) } else { segment.name.clone() };
         let place = match &segment.material {
@@ -343,7 +343,7 @@ fn bad_corner(
         let before = i64::try_from(defined[kind]).ok()?;
         if index > count || (index < 0 && before + index < 0) {
             return Some(format!(
-                "\"{}\" names number {index} of {} {}; export the file again",
+                "\"{}\" names number {index} of {} {}\nhint: export the file again",
                 String::from_utf8_lossy(word),
                 if index < 0 { before } else { count },
                 names[kind]

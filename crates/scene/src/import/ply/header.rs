@@ -158,7 +158,10 @@ impl Header {
                 return Err(Fault::new(start, reason));
             }
         }
-        Err(Fault::new(file.len(), "the file ends inside its header; copy or export it again"))
+        Err(Fault::new(
+            file.len(),
+            "the file ends inside its header\nhint: copy or export it again",
+        ))
     }
 }
 

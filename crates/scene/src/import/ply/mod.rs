@@ -22,7 +22,7 @@ use etendue_tracer::Material;
 use super::admit::{self, Candidate, cost};
 use super::files::Files;
 use super::text::Fault;
-use super::{Import, ImportError, ImportedPlacement, Options, Wanted};
+use super::{Import, ImportedPlacement, Options, Refusal, Wanted, error};
 use header::{Format, Header};
 
 /// Reads the PLY file at `path`.
@@ -31,18 +31,14 @@ pub(super) fn import(
     files: &Files,
     wanted: Wanted,
     options: &Options,
-) -> Result<Import, ImportError> {
+) -> Result<Import, Refusal> {
     let map = files.map_model(path)?;
     if !map.bytes().starts_with(b"ply") {
         super::refuse_other_kind(path, map.bytes(), "a PLY model")?;
     }
     let fault = |fault: Fault| fault.locate(path, map.bytes());
     let header = Header::parse(map.bytes()).map_err(fault)?;
-    let damaged = |reason: String| ImportError::Damaged {
-        file: path.to_owned(),
-        place: "PLY data".to_owned(),
-        reason,
-    };
+    let damaged = |reason: String| error::damaged(path, "PLY data", reason);
     let bytes = header.bytes_to_make(map.bytes().len());
     files.take(bytes, || "vertices and faces".to_owned())?;
     let (vertices, faces) = match header.format {

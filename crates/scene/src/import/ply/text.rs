@@ -43,11 +43,14 @@ pub(super) fn read_text(
     if needed.is_none_or(|needed| before < needed) {
         return Err(Fault::new(
             map.bytes().len(),
-            format!("the file ends after {before} rows of data; copy or export it again"),
+            format!("the file ends after {before} rows of data\nhint: copy or export it again"),
         ));
     }
     let Some(element) = header.elements.iter().find(|element| element.name == "vertex") else {
-        return Err(Fault::new(header.data, "there is no vertex element; export the file again"));
+        return Err(Fault::new(
+            header.data,
+            "there is no vertex element\nhint: export the file again",
+        ));
     };
     let columns =
         Columns::of(element, wanted, true).map_err(|reason| Fault::new(header.data, reason))?;
@@ -191,7 +194,7 @@ pub(super) fn read_binary(
     for element in &header.elements {
         let cut_off = || {
             format!(
-                "the file ends inside its {} {} rows; copy or export it again",
+                "the file ends inside its {} {} rows\nhint: copy or export it again",
                 element.count, element.name
             )
         };
@@ -218,13 +221,15 @@ pub(super) fn read_binary(
                 }
             }
             (None, None) if element.name == "vertex" => {
-                return Err("vertices with lists are not supported; export without them".into());
+                return Err(
+                    "vertices with lists are not supported\nhint: export without them".into()
+                );
             }
             (None, None) => Walk { element, bytes, order }.skip().ok_or_else(cut_off)?,
         };
         at += size;
     }
-    let vertices = vertices.ok_or("there is no vertex element; export the file again")?;
+    let vertices = vertices.ok_or("there is no vertex element\nhint: export the file again")?;
     Ok((vertices, faces))
 }
 

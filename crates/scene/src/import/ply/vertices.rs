@@ -56,7 +56,7 @@ impl Columns {
             Some([a?, b?, c?])
         };
         let Some(xyz) = all([&["x"], &["y"], &["z"]]) else {
-            return Err("the vertices have no x, y and z; export the file again".to_owned());
+            return Err("the vertices have no x, y and z\nhint: export the file again".to_owned());
         };
         let color = all([
             &["red", "r", "diffuse_red"],

@@ -16,7 +16,8 @@ use std::path::{Path, PathBuf};
 
 use etendue_geometry::Mesh;
 use etendue_geometry::glam::DVec3;
-use etendue_scene::import::{Import, ImportError, Options, Strictness, Wanted, import};
+use etendue_scene::Refusal;
+use etendue_scene::import::{Import, Options, Strictness, Wanted, import};
 use tempfile::TempDir;
 
 pub(crate) fn folder() -> TempDir {
@@ -53,7 +54,7 @@ pub(crate) fn super_import(path: &Path) -> Import {
     import(path, Wanted::EVERYTHING, &Options::default()).unwrap()
 }
 
-pub(crate) fn import_strict(path: &Path) -> Result<Import, ImportError> {
+pub(crate) fn import_strict(path: &Path) -> Result<Import, Refusal> {
     import(path, Wanted::EVERYTHING, &strict())
 }
 

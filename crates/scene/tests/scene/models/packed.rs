@@ -178,7 +178,11 @@ fn damaged_streams_are_refused_with_their_place() {
         ("buffer", |e| e["buffer"] = json!(9), "no buffer 9; the file has 2"),
         ("count", |e| e["count"] = json!(u32::MAX), "cannot come from"),
         ("stride", |e| e["byteStride"] = json!(10), "1600 elements of 10 bytes"),
-        ("mode", |e| e["mode"] = json!("TRIANGLE"), "\"TRIANGLE\" is not known here; did you mean"),
+        (
+            "mode",
+            |e| e["mode"] = json!("TRIANGLE"),
+            "\"TRIANGLE\" is not known here\nhint: did you mean",
+        ),
         ("filter", |e| e["filter"] = json!("QUATERNION"), "filter Quaternion"),
         ("missing", |e| *e = json!({"buffer": 0}), "the key `byteLength` is missing"),
     ];

@@ -3,11 +3,12 @@
 use eframe::egui::{self, Color32, Key, PointerButton, Pos2, Rect, Response, Sense, Ui, Vec2};
 use etendue::{DistanceScale, Viewpoint};
 
-use crate::app::{App, Tool};
+use super::light_field::Shows;
+use super::start;
+use crate::app::App;
 use crate::document::Edit;
-use crate::form::mark;
-use crate::panels;
-use crate::panels::light_field::Shows;
+use crate::form::{mark, short};
+use crate::state::Tool;
 
 /// A drag of this many points turns the camera by a radian.
 const POINTS_PER_RADIAN: f32 = 160.0;
@@ -18,37 +19,6 @@ const SPEED: f64 = 0.8;
 /// A camera that was moved is taken as it is now when nobody has moved it for this long (s).
 const GESTURE: f64 = 0.5;
 
-/// How the picture is shown, and the hand on it.
-#[derive(Default)]
-pub(crate) struct PictureCanvas {
-    /// Points per pixel of the screen's fit; 1 shows all of the picture.
-    zoom: Option<f32>,
-    /// How far the picture's middle is from the canvas' (points).
-    shift: Vec2,
-    /// The camera in the hand, and when it was moved last (s).
-    hand: Option<(Viewpoint, f64)>,
-    /// Keys that are held to fly.
-    flying: Vec<Key>,
-    /// The left half shows this picture, for comparison.
-    pub(crate) before: Option<egui::TextureHandle>,
-    /// Where the two meet, as a share of the width.
-    pub(crate) split: f32,
-}
-
-impl PictureCanvas {
-    /// Lets go of the camera.
-    pub(crate) fn release(&mut self) {
-        self.hand = None;
-    }
-
-    /// Where the picture of this many columns and rows lies.
-    fn place(&self, canvas: Rect, size: [f32; 2]) -> Rect {
-        let fit = (canvas.width() / size[0]).min(canvas.height() / size[1]);
-        let size = Vec2::from(size) * fit * self.zoom.unwrap_or(1.0);
-        Rect::from_center_size(canvas.center() + self.shift, size)
-    }
-}
-
 pub(crate) fn show(app: &mut App, ui: &mut Ui) {
     let canvas = ui.available_rect_before_wrap();
     let response = ui.allocate_rect(canvas, Sense::click_and_drag());
@@ -56,7 +26,7 @@ pub(crate) fn show(app: &mut App, ui: &mut Ui) {
     ui.painter().rect_filled(canvas, 0.0, backdrop(ui));
     let Some(picture) = &app.picture else {
         let inside = egui::UiBuilder::new().max_rect(canvas);
-        ui.scope_builder(inside, |ui| panels::start::show(app, ui));
+        ui.scope_builder(inside, |ui| start::show(app, ui));
         return;
     };
     let size = resolution(app);
@@ -120,23 +90,6 @@ fn scale_bar(painter: &egui::Painter, canvas: Rect, scale: DistanceScale) {
         let text = format!("{} m", short(scale.distance(1.0 - share)));
         let font = egui::FontId::proportional(12.0);
         painter.text(at, egui::Align2::RIGHT_CENTER, text, font, Color32::WHITE);
-    }
-}
-
-/// A number with four significant digits.
-pub(crate) fn short(number: f64) -> String {
-    match number.abs() {
-        0.0 => "0".to_owned(),
-        size if !(1e-3..1e6).contains(&size) => format!("{number:.3e}"),
-        size => {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 6")]
-            let digits = (3.0 - size.log10().floor()).clamp(0.0, 6.0) as usize;
-            let text = format!("{number:.digits$}");
-            match text.contains('.') {
-                true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-                false => text,
-            }
-        }
     }
 }
 
@@ -287,27 +240,4 @@ fn walk(app: &mut App, ui: &Ui, response: &Response) {
     let step = SPEED * f64::from(dt.min(0.1));
     turn(app, ui.ctx(), |viewpoint| viewpoint.flown(keys.map(|key| key * step)));
     ui.ctx().request_repaint();
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_short_and_right() {
-        let cases = [(0.0, "0"), (1.5, "1.5"), (1234.56, "1235"), (0.012_345, "0.01235")];
-        for (number, text) in cases {
-            assert_eq!(short(number), text);
-        }
-        assert_eq!(short(2.5e-7), "2.500e-7");
-        assert_eq!(short(100_000.0), "100000", "zeros of a whole number stay");
-    }
-
-    #[test]
-    fn a_picture_fits_into_the_canvas() {
-        let canvas = Rect::from_min_size(Pos2::new(100.0, 50.0), Vec2::new(400.0, 400.0));
-        let place = PictureCanvas::default().place(canvas, [200.0, 100.0]);
-        assert_eq!(place.center(), canvas.center());
-        assert_eq!(place.size(), Vec2::new(400.0, 200.0));
-    }
 }

@@ -1,0 +1,114 @@
+//! A lens as it is measured for the bands of a picture: its exit pupil, itself at each wavelength with what its
+//! filters pass of a band, and how bands share rays.
+
+use etendue_optics::glass::GlassError;
+use etendue_optics::train::{ExitPupil, MonochromaticTrain, OpticalTrain};
+use etendue_spectrum::{Bands, Curve, Outside, Spread};
+
+use super::nodes::Interpolation;
+
+/// The exit pupil measured at the wavelengths that are wanted.
+#[derive(Debug)]
+pub(super) struct Opened {
+    pub(super) bands: Bands,
+    /// In the order of [`LensCamera::band_groups`].
+    pub(super) groups: Vec<OpenedGroup>,
+    pub(super) pupil: ExitPupil,
+    /// How all bands share a ray; `None` where they do not.
+    pub(super) paths: Option<BandPaths>,
+}
+
+/// The lens as it is for a group of bands.
+#[derive(Debug)]
+pub(super) struct OpenedGroup {
+    /// One, or as many as share the group's light.
+    pub(super) lenses: Vec<MonochromaticTrain>,
+}
+
+/// How bands share rays.
+#[derive(Debug)]
+pub(super) struct BandPaths {
+    /// The lens at its leading wavelengths, with filters clear.
+    pub(super) nodes: Vec<MonochromaticTrain>,
+    /// By band and by wavelength that it is drawn from.
+    pub(super) bands: Vec<Vec<Interpolation>>,
+    /// Whether glass takes light.
+    pub(super) has_losses: bool,
+    /// From where a ray leaves the lens to where one starts that comes back (mm).
+    pub(super) lead: f64,
+    /// How far places of a ray part, at most: rows of pixels and their size (mm).
+    pub(super) reach: f64,
+    pub(super) error: f64,
+}
+
+impl OpenedGroup {
+    /// Which lens serves a place of the spectrum in 0..1.
+    pub(super) fn lens_at(&self, u: f64) -> usize {
+        place_of(u, self.lenses.len())
+    }
+}
+
+/// In which of `count` equal parts of 0..1 a number lies.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "at most a few dozen lenses"
+)]
+pub(super) fn place_of(u: f64, count: usize) -> usize {
+    ((u * count as f64) as usize).min(count - 1)
+}
+
+/// Curves of filters that are the same all over and pass some wavelengths better than others.
+pub(super) fn uniform_filters(train: &OpticalTrain) -> Vec<&Curve> {
+    let filters = train.elements().iter().filter_map(|element| element.part.uniform_curve());
+    filters.filter(|curve| curve.as_flat().is_none()).collect()
+}
+
+/// The lens at each of a band's wavelengths, with filters that pass what they pass of the band.
+///
+/// The wavelengths are already those that uniform filters leave, so these pass their mean over the
+/// band, all of them together the mean of their product. What a picture of filters passes differs
+/// from wavelength to wavelength, about the same mean.
+pub(super) fn through_filters(
+    train: &OpticalTrain,
+    bands: &Bands,
+    band: usize,
+    wavelengths: &[f64],
+    overlap: f64,
+) -> Result<Vec<MonochromaticTrain>, GlassError> {
+    let uniform = uniform_filters(train);
+    let passes =
+        |curve: &Curve, nm| passed(bands, (band, wavelengths, overlap), &uniform, curve, nm);
+    let lens = |&nm: &f64| train.at_with(nm, &|curve| passes(curve, nm));
+    wavelengths.iter().map(lens).collect()
+}
+
+/// What filters that are the same all over pass together of a band at each of its wavelengths.
+pub(super) fn filtered(
+    train: &OpticalTrain,
+    bands: &Bands,
+    band: usize,
+    Spread { wavelengths, overlap }: &Spread,
+) -> Vec<f64> {
+    let uniform = uniform_filters(train);
+    let all = || train.elements().iter().filter_map(|element| element.part.uniform_curve());
+    let passes = |curve, nm| passed(bands, (band, wavelengths, *overlap), &uniform, curve, nm);
+    wavelengths.iter().map(|&nm| all().map(|curve| passes(curve, nm)).product()).collect()
+}
+
+/// What a curve of a filter passes of a band at one of its wavelengths (nm): see [`through_filters`].
+fn passed(
+    bands: &Bands,
+    (band, wavelengths, overlap): (usize, &[f64], f64),
+    uniform: &[&Curve],
+    curve: &Curve,
+    nm: f64,
+) -> f64 {
+    let mean = bands.from_curve(curve, Outside::Held).map_or(0.0, |means| means[band]);
+    if uniform.contains(&curve) {
+        return mean * overlap.powf(1.0 / uniform.len().max(1) as f64);
+    }
+    let all: f64 = wavelengths.iter().map(|&nm| curve.held(nm)).sum();
+    let share = curve.held(nm) * wavelengths.len() as f64 / all;
+    if all > 0.0 { mean * share } else { mean }
+}

@@ -1,0 +1,357 @@
+//! One pass over a strip of rows: rays of the samples of its pixels, batch by batch, and their values added to sums.
+
+use std::ops::Range;
+
+use etendue_camera::{CameraRays, LensCamera, PixelSamples, squares_of_pair};
+use etendue_tracer::layer::Taken;
+
+use crate::film::{PlaneRows, Strip};
+use crate::sampling::{Averaged, DIFFUSION_PAIR, Memory, Run, Sampling, TIME_PAIR};
+use crate::sum::{Sum, add_run};
+use crate::tile::{TILE, Tile};
+use crate::watch::{Stopped, Watcher};
+
+/// The samples of a pixel, by its place in rows from the top: from those that it has to those that it is to have.
+pub(crate) type Wanted<'a> = &'a (dyn Fn(usize) -> Range<u32> + Sync);
+
+/// Writes the means of a pixel of a strip.
+pub(crate) fn put(strip: &mut Strip<'_>, index: usize, sums: &[Sum], bands: usize, samples: u32) {
+    for (layer, sums) in strip.layers.iter_mut().zip(sums.chunks(bands)) {
+        if let (Taken::PictureShare, &[part, all, _]) = (layer.taken, sums) {
+            let (part, all) = (part.total(), all.total());
+            let share = if all > 0.0 { (part / all).clamp(0.0, 1.0) } else { 0.0 };
+            layer.planes[0].put(index, share);
+            continue;
+        }
+        for (plane, sum) in layer.planes.iter_mut().zip(sums) {
+            PlaneRows::put(plane, index, sum.total() / f64::from(samples));
+        }
+    }
+}
+
+/// Sums of the pixels of some rows, on which light of a strip lands.
+pub(crate) struct Window<'a> {
+    /// The topmost row.
+    pub(crate) first: u32,
+    /// How many rows from where it starts light lands, at most.
+    pub(crate) rows: u32,
+    pub(crate) sums: &'a mut [Sum],
+}
+
+/// Which samples are added.
+#[derive(Clone, Copy)]
+pub(crate) enum Work<'a> {
+    /// These of every pixel.
+    Pass(&'a Range<u32>),
+    /// What each pixel wants, half of it of each set.
+    Wanted(Wanted<'a>),
+}
+
+/// One pass of a strip.
+pub(crate) struct Adding<'a> {
+    pub(crate) what: &'a dyn Averaged,
+    pub(crate) sampling: Sampling,
+    pub(crate) work: Work<'a>,
+    pub(crate) watcher: &'a Watcher<'a>,
+}
+
+impl Adding<'_> {
+    /// Adds to the sums that are kept, or else fills the layers.
+    pub(crate) fn fill(
+        &self,
+        strip: &mut Strip<'_>,
+        mut kept: Option<&mut [Sum]>,
+        memory: &mut Memory,
+    ) -> Result<(), Stopped> {
+        let [width, _] = self.what.camera().resolution();
+        let [layers, bands] = self.what.shape();
+        let count = layers * bands * self.sampling.sets as usize;
+        for tile in Tile::across(width, [strip.top, strip.height]) {
+            let range = |x: u32, y: u32| match self.work {
+                Work::Pass(pass) => pass.clone(),
+                Work::Wanted(wanted) => {
+                    let above = strip.top as usize * width as usize;
+                    wanted(above + tile.index(x, y, width))
+                }
+            };
+            // Pixels that want more samples, with what they have so far.
+            let pixels: Vec<(u32, u32)> =
+                tile.pixels().filter(|&(x, y)| !range(x, y).is_empty()).collect();
+            let places = pixels.iter().map(|&(x, y)| tile.index(x, y, width));
+            memory.sums.clear();
+            match &kept {
+                Some(kept) => places.clone().for_each(|at| {
+                    memory.sums.extend_from_slice(&kept[at * count..(at + 1) * count]);
+                }),
+                None => memory.sums.resize(pixels.len() * count, Sum::default()),
+            }
+            // Samples for these, and back to where their sums are kept.
+            match self.work {
+                Work::Pass(pass) => self.tile(tile, &pixels, pass, memory)?,
+                Work::Wanted(_) => self.tile_of_wanted(tile, &pixels, &range, memory)?,
+            }
+            for (at, sums) in places.zip(memory.sums.chunks(count)) {
+                match (&mut kept, self.work) {
+                    (Some(kept), _) => kept[at * count..(at + 1) * count].copy_from_slice(sums),
+                    (None, Work::Pass(pass)) => put(strip, at, sums, bands, pass.end),
+                    // What pixels want is always kept.
+                    (None, Work::Wanted(_)) => {}
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the same samples of each of `pixels`.
+    fn tile(
+        &self,
+        tile: Tile,
+        pixels: &[(u32, u32)],
+        pass: &Range<u32>,
+        memory: &mut Memory,
+    ) -> Result<(), Stopped> {
+        let at_once = (pass.end - pass.start).clamp(1, self.what.batch());
+        let pixels_at_once = (self.what.batch() / at_once) as usize;
+        let mut runs = Vec::with_capacity(pixels_at_once);
+        for (pixels, slot) in pixels.chunks(pixels_at_once).zip((0_u32..).step_by(pixels_at_once)) {
+            for first in pass.clone().step_by(at_once as usize) {
+                let range = first..pass.end.min(first + at_once);
+                let of_pixel = |(&pixel, slot)| Run { pixel, set: 0, range: range.clone(), slot };
+                runs.clear();
+                runs.extend(pixels.iter().zip(slot..).map(of_pixel));
+                self.add_runs(tile, &runs, memory)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds to each of `pixels` the samples `range` of both its sets together, which are even numbers.
+    fn tile_of_wanted(
+        &self,
+        tile: Tile,
+        pixels: &[(u32, u32)],
+        range: &dyn Fn(u32, u32) -> Range<u32>,
+        memory: &mut Memory,
+    ) -> Result<(), Stopped> {
+        let (batch, sets) = (self.what.batch(), self.sampling.sets);
+        let (mut runs, mut room) = (Vec::new(), batch);
+        for (&pixel, slot) in pixels.iter().zip((0..).step_by(sets as usize)) {
+            let Range { start, end } = range(pixel.0, pixel.1);
+            for set in 0..sets {
+                let (mut first, end) = (start / sets, end / sets);
+                while first < end {
+                    let last = end.min(first + room);
+                    runs.push(Run { pixel, set, range: first..last, slot: slot + set });
+                    (room, first) = (room - (last - first), last);
+                    if room == 0 {
+                        self.add_runs(tile, &runs, memory)?;
+                        runs.clear();
+                        room = batch;
+                    }
+                }
+            }
+        }
+        if runs.is_empty() { Ok(()) } else { self.add_runs(tile, &runs, memory) }
+    }
+
+    /// Adds the samples of a batch.
+    fn add_runs(&self, tile: Tile, runs: &[Run], memory: &mut Memory) -> Result<(), Stopped> {
+        self.place(tile, runs, memory);
+        memory.slots.clear();
+        for run in runs {
+            memory.slots.extend(run.range.clone().map(|_| run.slot));
+        }
+        for (number, group) in self.what.groups().iter().enumerate() {
+            memory.film.group = number;
+            self.what.camera().sample_rays(&memory.film, &mut memory.rays);
+            self.what.trace(&group.bands, memory);
+            memory.add(self.what.shape(), &group.bands);
+        }
+        self.watcher.did(memory.slots.len() as u64)
+    }
+
+    /// Adds the light of a strip's samples where it lands.
+    pub(crate) fn fill_window(
+        &self,
+        (strip, pass): ([u32; 2], &Range<u32>),
+        window: &mut Window<'_>,
+        memory: &mut Memory,
+    ) -> Result<(), Stopped> {
+        let [width, height] = self.what.camera().resolution();
+        let [_, bands] = self.what.shape();
+        let shard = self.sampling.shard;
+        let owns = |row: u32| shard.owns((row / TILE) as usize);
+        // Rows from which light lands on rows of the share.
+        let rows = window.rows;
+        let lands = |row: u32| {
+            let last = (row + rows).min(height - 1);
+            (row.saturating_sub(rows) / TILE..=last / TILE).any(|strip| owns(strip * TILE))
+        };
+        for tile in Tile::across(width, strip) {
+            let pixels: Vec<(u32, u32)> =
+                tile.pixels().filter(|&(_, y)| lands(tile.top + y)).collect();
+            let at_once = (pass.end - pass.start).clamp(1, self.what.batch());
+            for pixels in pixels.chunks((self.what.batch() / at_once) as usize) {
+                for first in pass.clone().step_by(at_once as usize) {
+                    let range = first..pass.end.min(first + at_once);
+                    let a_pixel = range.end - range.start;
+                    let of_pixel = |&pixel| Run { pixel, set: 0, range: range.clone(), slot: 0 };
+                    let runs: Vec<Run> = pixels.iter().map(of_pixel).collect();
+                    self.place(tile, &runs, memory);
+                    let Memory { film, rays, landings, .. } = memory;
+                    self.what.camera().sample_band_rays(film, rays, landings);
+                    self.what.trace(&(0..bands), memory);
+                    memory.add_where_it_lands(window, self.what.shape(), width as usize);
+                    let own = pixels.iter().filter(|&&(_, y)| owns(tile.top + y)).count();
+                    self.watcher.did(own as u64 * u64::from(a_pixel))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Refills the batch with the samples of `runs`. A camera without a lens looks at places alone.
+    fn place(&self, tile: Tile, runs: &[Run], memory: &mut Memory) {
+        let Memory { numbers, film, .. } = memory;
+        let numbers: &mut Vec<(PixelSamples, u32)> = &mut numbers.samples;
+        numbers.clear();
+        // The numbers of all samples of these pixels.
+        let pixel = |run: &Run| [tile.left + run.pixel.0, tile.top + run.pixel.1];
+        for run in runs {
+            self.sampling.extend(pixel(run), run, numbers);
+        }
+        let count = numbers.len();
+        // Their places on the sensor, in the pupil, and in the spectrum.
+        let draw = |pair, out: &mut Vec<_>| squares_of_pair(numbers.iter().copied(), pair, out);
+        film.clear();
+        let mut places = Vec::new();
+        draw(0, &mut places);
+        let mut first = 0;
+        for run in runs {
+            let (corner, end) = (pixel(run).map(f64::from), first + run.range.len());
+            film.columns.extend(places[first..end].iter().map(|place| corner[0] + place[0]));
+            film.rows.extend(places[first..end].iter().map(|place| corner[1] + place[1]));
+            first = end;
+        }
+        // Carriers that a pixel collects were freed beside where they are collected: the pixel sees its own square,
+        // spread by a normal distribution.
+        if self.sampling.diffusion > 0.0 {
+            draw(DIFFUSION_PAIR, &mut places);
+            let moved = film.columns.iter_mut().zip(&mut film.rows).zip(&places);
+            for ((column, row), &[u, v]) in moved {
+                let radius = self.sampling.diffusion * (-2.0 * (1.0 - u).ln()).sqrt();
+                let (sine, cosine) = (std::f64::consts::TAU * v).sin_cos();
+                *column += radius * cosine;
+                *row += radius * sine;
+            }
+        }
+        let lens = self.what.camera().lens();
+        match self.what.camera().has_pupil() {
+            true => draw(1, &mut film.pupil),
+            false => film.pupil.resize(count, [0.5; 2]),
+        }
+        let is_shared = self.what.shared_rows().is_some();
+        if is_shared || lens.is_some_and(LensCamera::draws_wavelengths) {
+            draw(2, &mut places);
+            film.spectrum.extend(places.iter().map(|place| place[0]));
+            film.leading.extend(places.iter().map(|place| place[1]));
+        } else {
+            film.spectrum.resize(count, 0.5);
+            film.leading.resize(count, 0.5);
+        }
+        // Their times, where something moves, and what comes through the shutter.
+        let camera = self.what.camera();
+        let Some(shutter) = camera.shutter() else { return };
+        let rows = film.rows.iter().map(|row| row.floor() + 0.5);
+        if camera.is_timed() {
+            squares_of_pair(numbers.iter().copied(), TIME_PAIR, &mut places);
+            let moments =
+                rows.clone().zip(&places).map(|(row, place)| shutter.moment(row, place[0]));
+            film.times.extend(moments);
+        }
+        if self.what.is_light() && !shutter.is_fully_open() {
+            film.open_shares.extend(rows.map(|row| shutter.open_share(row)));
+        }
+    }
+}
+
+impl Memory {
+    /// Adds the values of the batch's rays, sample by sample, to their sums.
+    fn add(&mut self, [layers, bands]: [usize; 2], group: &Range<usize>) {
+        let Self { rays: CameraRays { sample, weight, .. }, values, sums, slots, order, .. } = self;
+        let count = layers * bands;
+        if group.len() == count && sample.is_sorted() {
+            // Samples of one sum lie side by side.
+            let mut first = 0;
+            while let Some(&of_first) = sample.get(first) {
+                let slot = slots[of_first as usize];
+                let is_of_sum = |other: &&u32| slots[**other as usize] == slot;
+                let of_sum = sample[first..].iter().take_while(is_of_sum).count();
+                let (at, end) = (slot as usize * count, first + of_sum);
+                let values = &values[first * count..end * count];
+                add_run(&mut sums[at..at + count], values, &weight[first..end]);
+                first = end;
+            }
+            return;
+        }
+        let mut add = |ray: usize| {
+            let (at, weight) = (slots[sample[ray] as usize] as usize * count, weight[ray]);
+            let sums = sums[at..at + count].chunks_exact_mut(bands.max(1));
+            let values = values[ray * count..(ray + 1) * count].chunks_exact(bands.max(1));
+            for (sums, values) in sums.zip(values) {
+                let values = &values[group.clone()];
+                sums[group.clone()].iter_mut().zip(values).for_each(|(sum, v)| sum.add(v * weight));
+            }
+        };
+        in_order(sample, order, &mut add);
+    }
+
+    /// Adds the values of the batch's rays, sample by sample, to the sums of the pixels on which each band of
+    /// them lands.
+    fn add_where_it_lands(
+        &mut self,
+        window: &mut Window<'_>,
+        [layers, bands]: [usize; 2],
+        width: usize,
+    ) {
+        let Self { rays, values, landings, film, order, .. } = self;
+        let count = layers * bands;
+        let Window { first, rows, sums } = window;
+        let mut add = |ray: usize| {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a row of a picture"
+            )]
+            let start = film.rows[rays.sample[ray] as usize] as u32;
+            let nearest = start.saturating_sub(*rows) as usize * width;
+            let farthest = (start + *rows + 1) as usize * width;
+            let first = *first as usize * width;
+            for band in 0..bands {
+                let pixel = landings.pixel[ray * bands + band] as usize;
+                // Nowhere is beyond every row.
+                if pixel < nearest || pixel >= farthest {
+                    continue;
+                }
+                let weight = landings.weight[ray * bands + band];
+                for layer in 0..layers {
+                    let value = values[ray * count + layer * bands + band];
+                    sums[(pixel - first) * count + layer * bands + band].add(value * weight);
+                }
+            }
+        };
+        in_order(&rays.sample, order, &mut add);
+    }
+}
+
+/// Adds rays in the order of their samples.
+fn in_order(sample: &[u32], order: &mut Vec<u32>, add: &mut dyn FnMut(usize)) {
+    if sample.is_sorted() {
+        return (0..sample.len()).for_each(add);
+    }
+    // A lens that disperses sorts its rays by wavelength.
+    order.clear();
+    order.extend(0..u32::try_from(sample.len()).unwrap_or(u32::MAX));
+    order.sort_unstable_by_key(|&ray| sample[ray as usize]);
+    order.iter().for_each(|&ray| add(ray as usize));
+}

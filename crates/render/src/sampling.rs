@@ -1,0 +1,193 @@
+//! How pixels are sampled: in which passes, by which random numbers, what is averaged, and the memory that a thread
+//! needs for it.
+
+use std::ops::Range;
+
+use etendue_camera::{
+    BandGroup, BandLandings, Camera, CameraRays, FilmSamples, PixelSamples, Sampler,
+    squares_of_pair,
+};
+use etendue_geometry::HitBatch;
+use etendue_tracer::layer::Columns;
+use etendue_tracer::{Samples, Scratch};
+
+use crate::shard::Shard;
+use crate::sum::Sum;
+use crate::tile::RayCounts;
+
+/// Samples of the first pass: they fill the batches of a tile.
+const FIRST_PASS: u32 = 4;
+
+/// The most samples of a pass.
+const LONGEST_PASS: u32 = 1024;
+
+/// The same where what a render has so far is kept on disk after passes.
+const LONGEST_KEPT_PASS: u32 = 16;
+
+/// A pass is no longer than this share of all: what a stopped render loses.
+const SHARE_OF_PASS: u32 = 8;
+
+/// Pairs of random numbers that the camera uses before light does: place in the pixel, place in the
+/// pupil, and of the third one number for the wavelength.
+pub(crate) const CAMERA_PAIRS: u32 = 3;
+
+/// The pair of random numbers whose first is a sample's time: the last that there is, which light never gets to.
+pub(crate) const TIME_PAIR: u32 = u32::MAX;
+
+/// The pair of random numbers by which carriers diffuse.
+pub(crate) const DIFFUSION_PAIR: u32 = u32::MAX - 1;
+
+/// The passes of `samples` a pixel: the first has few, so that there is soon something to see, and
+/// each takes as many as all before it until they are a small share of all.
+pub(crate) fn passes(samples: u32) -> Vec<Range<u32>> {
+    up_to(samples, (samples / SHARE_OF_PASS).clamp(FIRST_PASS, LONGEST_PASS))
+}
+
+/// Shorter passes, after each of which a render can be kept on disk.
+pub(crate) fn short_passes(samples: u32) -> Vec<Range<u32>> {
+    up_to(samples, LONGEST_KEPT_PASS)
+}
+
+fn up_to(samples: u32, longest: u32) -> Vec<Range<u32>> {
+    let mut passes = Vec::new();
+    let mut start = 0;
+    while start < samples {
+        let length = start.clamp(FIRST_PASS, longest);
+        let left = samples - start;
+        // What would be left for a short pass is done by this one.
+        let length = if left < length + length / 2 { left } else { length };
+        passes.push(start..start + length);
+        start += length;
+    }
+    passes
+}
+
+/// How pixels are sampled.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sampling {
+    /// Rays a pixel of coloured layers.
+    pub(crate) samples: u32,
+    pub(crate) sampler: Sampler,
+    pub(crate) seed: u64,
+    /// The share of the pixels, or of the samples, that is rendered.
+    pub(crate) shard: Shard,
+    /// Sets that the samples of a pixel are of, each of which is a sequence of its own: two, of one size, where they
+    /// are judged, or one.
+    pub(crate) sets: u32,
+    /// Standard deviation of the way that carriers diffuse in the sensor (pixels).
+    pub(crate) diffusion: f64,
+}
+
+/// What the seed of the second set's sequence differs by.
+const SECOND_SET: u64 = 0xD1B5_4A32_D192_ED03;
+
+/// Samples of a pixel, side by side.
+#[derive(Debug, Clone)]
+pub(crate) struct Run {
+    /// The pixel from its tile's corner, and which of its sequences they are of.
+    pub(crate) pixel: (u32, u32),
+    pub(crate) set: u32,
+    pub(crate) range: Range<u32>,
+    /// The sum that they are added to.
+    pub(crate) slot: u32,
+}
+
+impl Sampling {
+    /// Appends what each sample of a run at a pixel is sampled by, and its index there.
+    pub(crate) fn extend(
+        &self,
+        pixel: [u32; 2],
+        run: &Run,
+        numbers: &mut Vec<(PixelSamples, u32)>,
+    ) {
+        let seed = if run.set == 0 { self.seed } else { self.seed ^ SECOND_SET };
+        let pixel = self.sampler.pixel(seed, pixel[0], pixel[1], self.samples);
+        numbers.extend(run.range.clone().map(|index| (pixel, index)));
+    }
+
+    /// The samples that the share has.
+    pub(crate) fn range(&self) -> Range<u32> {
+        self.shard.samples(self.samples)
+    }
+}
+
+/// What is averaged over the samples of a pixel: colours of surfaces, or light.
+pub(crate) trait Averaged: Sync {
+    /// The camera, opened for these bands.
+    fn camera(&self) -> &Camera;
+    /// The bands that the camera sends separate ways.
+    fn groups(&self) -> &[BandGroup];
+    /// Where the groups share rays, whose light lands beside the pixel that it starts from: how many rows from
+    /// it, at most.
+    fn shared_rows(&self) -> Option<u32> {
+        None
+    }
+    /// Whether it is light, of which a row gets as much as its shutter lets through.
+    fn is_light(&self) -> bool;
+    /// Layers, and the bands of each.
+    fn shape(&self) -> [usize; 2];
+    /// Samples that are traced together.
+    fn batch(&self) -> u32;
+    /// Fills `memory.values`, `[ray][layer][band]`, for the rays of one group of bands.
+    fn trace(&self, bands: &Range<usize>, memory: &mut Memory);
+}
+
+/// One thread's memory for it.
+#[derive(Debug, Default)]
+pub(crate) struct Memory {
+    /// What the samples of the batch are sampled by, and the sample of each ray.
+    pub(crate) numbers: SampleNumbers,
+    pub(crate) rays: CameraRays,
+    pub(crate) values: Vec<f64>,
+    /// `[ray][part][band]`, where light is told apart.
+    pub(crate) light_in_parts: Vec<f64>,
+    pub(crate) hits: HitBatch,
+    pub(crate) columns: Columns,
+    pub(crate) scratch: Scratch,
+    pub(crate) traffic: RayCounts,
+    pub(crate) landings: BandLandings,
+    /// Where the samples of the batch lie.
+    pub(crate) film: FilmSamples,
+    /// `[pixel of the tile][set][layer][band]`.
+    pub(crate) sums: Vec<Sum>,
+    /// The sum that each sample of the batch is added to: its number among those of a pixel's set.
+    pub(crate) slots: Vec<u32>,
+    pub(crate) order: Vec<u32>,
+}
+
+/// The random numbers of a batch of rays.
+#[derive(Debug, Default)]
+pub(crate) struct SampleNumbers {
+    /// The pixel's numbers and the sample's index of each sample of the film.
+    pub(crate) samples: Vec<(PixelSamples, u32)>,
+    /// The sample of each ray.
+    pub(crate) of_ray: Vec<u32>,
+}
+
+impl Samples for SampleNumbers {
+    fn squares_of_pair(&self, rays: &[u32], pair: u32, out: &mut Vec<[f64; 2]>) {
+        let samples = rays.iter().map(|&ray| self.samples[self.of_ray[ray as usize] as usize]);
+        squares_of_pair(samples, CAMERA_PAIRS + pair, out);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn passes_cover_all_samples_once_and_none_is_a_large_share() {
+        for samples in (1..300).chain([1000, 1024, 4095, 4096, 65_537, 1 << 20]) {
+            let passes = passes(samples);
+            assert_eq!(passes[0].start, 0);
+            assert_eq!(passes.last().unwrap().end, samples);
+            assert!(passes.windows(2).all(|pair| pair[0].end == pair[1].start), "{passes:?}");
+            // Half of a pass more is the most that the last takes.
+            let most = (samples / SHARE_OF_PASS).max(FIRST_PASS) * 3 / 2;
+            assert!(passes.iter().all(|pass| pass.end - pass.start <= most), "{passes:?}");
+            assert!(samples < 6 || passes[0].end == FIRST_PASS, "{passes:?}");
+        }
+        assert_eq!((passes(5).len(), passes(64).len()), (1, 9));
+        assert_eq!(passes(256)[..4], [0..4, 4..8, 8..16, 16..32]);
+    }
+}

@@ -1,0 +1,85 @@
+//! Sums that lose nothing to rounding.
+//!
+//! They are compensated (Neumaier, "Rundungsfehleranalyse einiger Verfahren zur Summation endlicher
+//! Summen", 1974), so the mean of a million samples is as exact as that of ten.
+
+/// Bytes that sums take a value of the film when there are several passes.
+pub(crate) const BYTES_OF_SUM: u64 = size_of::<Sum>() as u64;
+
+/// A sum and what rounding took from it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Sum {
+    sum: f64,
+    lost: f64,
+}
+
+impl Sum {
+    /// By Knuth's sum of two numbers without loss, which asks neither for the larger.
+    #[inline]
+    pub(crate) fn add(&mut self, value: f64) {
+        let sum = self.sum + value;
+        let of_value = sum - self.sum;
+        self.lost += (self.sum - (sum - of_value)) + (value - of_value);
+        self.sum = sum;
+    }
+
+    /// The sum, and what rounding took from it.
+    pub(crate) fn parts(self) -> [f64; 2] {
+        [self.sum, self.lost]
+    }
+
+    /// From its [`Self::parts`].
+    pub(crate) fn of_parts([sum, lost]: [f64; 2]) -> Self {
+        Self { sum, lost }
+    }
+
+    /// Adds what another has, as exactly as both are.
+    pub(crate) fn add_sum(&mut self, other: Self) {
+        self.add(other.sum);
+        self.lost += other.lost;
+    }
+
+    pub(crate) fn total(self) -> f64 {
+        self.sum + self.lost
+    }
+}
+
+/// Adds the values of rays side by side, as many each as there are sums, times the weight of each.
+pub(crate) fn add_run(sums: &mut [Sum], values: &[f64], weights: &[f64]) {
+    match sums.len() {
+        1 => add_run_of::<1>(sums, values, weights),
+        3 => add_run_of::<3>(sums, values, weights),
+        count => {
+            for (values, weight) in values.chunks_exact(count.max(1)).zip(weights) {
+                sums.iter_mut().zip(values).for_each(|(sum, value)| sum.add(value * weight));
+            }
+        }
+    }
+}
+
+/// The same of a number of sums that is known, which stay in registers.
+fn add_run_of<const N: usize>(sums: &mut [Sum], values: &[f64], weights: &[f64]) {
+    let Some(sums) = sums.first_chunk_mut::<N>() else { return };
+    let mut own = *sums;
+    for (values, weight) in values.as_chunks::<N>().0.iter().zip(weights) {
+        for (sum, value) in own.iter_mut().zip(values) {
+            sum.add(value * weight);
+        }
+    }
+    *sums = own;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sum_keeps_what_rounding_takes() {
+        let mut sum = Sum::default();
+        for value in [1.0, 1e100, 1.0, -1e100] {
+            sum.add(value);
+        }
+        // The example of Neumaier's paper: naive summation gives 0.
+        assert_eq!(sum.total(), 2.0);
+    }
+}

@@ -1,0 +1,157 @@
+use std::fmt;
+
+/// Why something is not done: where, why, and what would do.
+///
+/// Written as `place: why`, with the remedy on a line of its own below it:
+///
+/// ```
+/// # use etendue_report::Refusal;
+/// let refusal = Refusal::new("180° is no angle of view").at("camera.fov").at("scene.json");
+/// let text = refusal.hint("give less than 180°").to_string();
+/// assert_eq!(text, "scene.json: camera.fov: 180° is no angle of view\nhint: give less than 180°");
+/// assert_eq!(Refusal::from(text).remedy(), Some("give less than 180°"));
+/// ```
+///
+/// Whoever knows no place says why in a text, with the remedy behind `\nhint: ` where there is one: whoever adds the
+/// place makes a refusal of it, and so the remedy stays at the end, through errors that are texts alone, too.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Refusal {
+    place: String,
+    why: String,
+    remedy: Option<String>,
+}
+
+/// What stands before a remedy.
+const HINT: &str = "\nhint: ";
+
+impl Refusal {
+    /// A refusal of something whose place whoever asked knows. `why` may end in a remedy.
+    #[must_use]
+    pub fn new(why: impl Into<String>) -> Self {
+        let why = why.into();
+        let (why, remedy) = match why.split_once(HINT) {
+            Some((why, remedy)) => (why.to_owned(), Some(remedy.to_owned())),
+            None => (why, None),
+        };
+        Self { place: String::new(), why, remedy }
+    }
+
+    /// What an error says, and behind it what those of its causes say that it does not quote.
+    #[must_use]
+    pub fn of(error: &dyn std::error::Error) -> Self {
+        let mut refusal = Self::new(error.to_string());
+        let mut cause = error.source();
+        while let Some(inner) = cause {
+            let said = Self::new(inner.to_string());
+            if !refusal.why.contains(&said.why) {
+                refusal = refusal.and(": ").and(&said.why);
+                if let Some(remedy) = said.remedy {
+                    refusal = refusal.hint(remedy);
+                }
+            }
+            cause = inner.source();
+        }
+        refusal
+    }
+
+    /// The same at a place, which stands before those that it has: a file, a line, a key.
+    #[must_use]
+    pub fn at(mut self, place: impl fmt::Display) -> Self {
+        let inner = std::mem::take(&mut self.place);
+        self.place = place.to_string();
+        if !self.place.is_empty() && !inner.is_empty() {
+            self.place.push_str(": ");
+        }
+        self.place.push_str(&inner);
+        self
+    }
+
+    /// The same with more words behind those that say why.
+    #[must_use]
+    pub fn and(mut self, words: &str) -> Self {
+        self.why.push_str(words);
+        self
+    }
+
+    /// The same with a remedy, below those that it has.
+    #[must_use]
+    pub fn hint(mut self, remedy: impl Into<String>) -> Self {
+        let remedy = remedy.into();
+        self.remedy = Some(match self.remedy {
+            Some(before) => before + HINT + &remedy,
+            None => remedy,
+        });
+        self
+    }
+
+    /// Where; empty where that is not known.
+    #[must_use]
+    pub fn place(&self) -> &str {
+        &self.place
+    }
+
+    /// Why.
+    #[must_use]
+    pub fn why(&self) -> &str {
+        &self.why
+    }
+
+    /// What would do.
+    #[must_use]
+    pub fn remedy(&self) -> Option<&str> {
+        self.remedy.as_deref()
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.place.is_empty() {
+            write!(f, "{}: ", self.place)?;
+        }
+        f.write_str(&self.why)?;
+        match &self.remedy {
+            Some(remedy) => write!(f, "{HINT}{remedy}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl std::error::Error for Refusal {}
+
+impl From<String> for Refusal {
+    fn from(why: String) -> Self {
+        Self::new(why)
+    }
+}
+
+impl From<&String> for Refusal {
+    fn from(why: &String) -> Self {
+        Self::new(why)
+    }
+}
+
+impl From<&str> for Refusal {
+    fn from(why: &str) -> Self {
+        Self::new(why)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_remedy_stays_behind_all_that_is_added() {
+        let inner = Refusal::new("no such file: \"a\"\nhint: did you mean \"b\"?");
+        let outer = Refusal::from(inner.at("objects[0].file").to_string()).at("scene.json, line 3");
+        let outer = outer.and(" (from here)").hint("leave it out");
+        assert_eq!(
+            outer.to_string(),
+            "scene.json, line 3: objects[0].file: no such file: \"a\" (from here)\nhint: did you mean \"b\"?\
+             \nhint: leave it out"
+        );
+        assert_eq!(Refusal::new("why").to_string(), "why");
+        assert_eq!(Refusal::new("why").at("").at("b").at("a").to_string(), "a: b: why");
+        assert_eq!(Refusal::from(outer.to_string()).remedy(), outer.remedy());
+    }
+}
