@@ -91,7 +91,10 @@ fn scenes_of_the_gallery_check_and_render_small() {
         let is_there = file.starts_with("bench/") || bench.path("out/gallery").join(file).exists();
         assert!(is_there, "no command leaves {file}");
         assert!(page.contains(&format!("]({shown})")), "{shown} is not shown");
-        assert!(root.join("docs/guide").join(shown).exists(), "docs/guide/{shown} is missing: make gallery");
+        assert!(
+            root.join("docs/guide").join(shown).exists(),
+            "docs/guide/{shown} is missing: make gallery"
+        );
     }
 }
 

@@ -40,6 +40,68 @@ fn a_white_wall_falls_off_with_the_fourth_power_of_the_cosine() {
     assert_eq!(report["lens_losses"], serde_json::json!([]), "no sample misses the pupil");
 }
 
+/// The integral over a disk of radius 25 at the distance 50, `offset` off its axis, of cosⁿθ dA/d², by cells.
+fn over_the_disk(offset: f64, power: i32) -> f64 {
+    let cells = 400;
+    let step = 25.0 / f64::from(cells);
+    let turn = std::f64::consts::TAU / f64::from(cells);
+    let cell = |i: i32, k: i32| {
+        let (radius, angle) = ((f64::from(i) + 0.5) * step, (f64::from(k) + 0.5) * turn);
+        let (x, y) = (radius * angle.cos() - offset, radius * angle.sin());
+        let cosine = (1.0 + (x * x + y * y) / 2500.0).powf(-0.5);
+        cosine.powi(power) * radius * step * turn / 2500.0
+    };
+    (0..cells).map(|i| (0..cells).map(|k| cell(i, k)).sum::<f64>()).sum()
+}
+
+/// What docs/explanation/paper.md says of the exponent in Eq. (1) of Nürnberg et al. 2019: behind a wide pupil the
+/// picture is ∫ L cosθ dΩ = ∫ L cos⁴θ dA/d², and neither cos⁴ of the chief ray nor ∫ L cos⁴θ dΩ = ∫ L cos⁷θ dA/d².
+#[test]
+fn a_wide_pupil_gives_the_cosine_over_its_solid_angle() {
+    let bench = wall(
+        r#""type": "thin_lens", "focal_length": 50, "f_number": 1, "sensor_distance": 50,
+           "sensor": {"resolution": [48, 32], "pixel_pitch": 750}"#,
+        r#""tracer": {"type": "flat"}, "render": {"samples": 256}"#,
+    );
+    bench.render(&["--outputs", "npy"]);
+    // A disk that shines evenly, seen from a plane that is parallel to it (Foote 1915; Walsh 1958).
+    let irradiance = |squared: f64| {
+        let [near, sum] = [-625.0, 625.0].map(|area| 2500.0 + squared + area);
+        std::f64::consts::FRAC_PI_2 * (1.0 - near / (sum * sum - 2500.0 * squared).sqrt())
+    };
+    let pupil = bench.json("out/camera.json")["lens"]["pupil_solid_angle_sr"].as_f64().unwrap();
+    assert!((pupil / irradiance(0.0) - 1.0).abs() < 1e-12, "{pupil}");
+    let (mut cosine, mut chief, mut printed) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for (i, pixel) in bench.array("picture").chunks(3).enumerate() {
+        let (x, y) = (0.75 * ((i % 48) as f64 - 23.5), 0.75 * ((i / 48) as f64 - 15.5));
+        let squared = x * x + y * y;
+        let light = pixel[1] * pupil;
+        cosine = cosine.max((light / irradiance(squared) - 1.0).abs());
+        chief = chief.max((pixel[1] * (1.0 + squared / 2500.0).powi(2) - 1.0).abs());
+        // In a corner, where it differs most.
+        if i == 0 {
+            let offset = squared.sqrt();
+            // The closed form is the integral over area of the fourth power; cells leave 1e-6 of it.
+            assert!((over_the_disk(offset, 4) / irradiance(squared) - 1.0).abs() < 2e-6);
+            printed = over_the_disk(offset, 7) / light;
+        }
+    }
+    // 256 points of Sobol's over a pupil whose weights differ by a few percent: 2e-4 at worst.
+    assert!(cosine < 1e-3, "{cosine}");
+    // 0.110 in the corner by the closed form: cos⁴ of the chief ray is that of a small pupil.
+    assert!((chief - 0.110).abs() < 2e-3, "{chief}");
+    // 0.762 of it, by the integral over cells: the fourth power over solid angle counts cos³ twice.
+    assert!((printed - 0.762).abs() < 2e-3, "{printed}");
+    // Under an even sky, whose irradiance is π: the midpoint rule over polar angles, to 1e-6 of it.
+    let sky = |power: i32| -> f64 {
+        let step = std::f64::consts::FRAC_PI_2 / 4096.0;
+        let rings = (0..4096).map(|ring| (f64::from(ring) + 0.5) * step);
+        rings.map(|t| std::f64::consts::TAU * t.cos().powi(power) * t.sin() * step).sum()
+    };
+    assert!((sky(1) / std::f64::consts::PI - 1.0).abs() < 1e-6);
+    assert!((sky(4) / (0.4 * std::f64::consts::PI) - 1.0).abs() < 1e-6);
+}
+
 #[test]
 fn data_through_a_lens_are_those_of_the_chief_ray() {
     let bench = wall(

@@ -130,6 +130,35 @@ fn links_lead_somewhere() {
     }
 }
 
+/// What a user reads is bounded: the pages of guides, how-tos and explanations, and the README. Words are those between
+/// blanks; blocks of code and rows of tables are not counted, nor are reference, measurements and development.
+#[test]
+fn the_pages_that_a_user_reads_are_few_and_short() {
+    let Some(documents) = documents() else { return };
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let kinds = ["docs/guide", "docs/how-to", "docs/explanation"].map(|kind| root.join(kind));
+    let is_read = |path: &Path| {
+        path == root.join("README.md") || kinds.iter().any(|kind| path.starts_with(kind))
+    };
+    let pages: Vec<_> = documents.iter().filter(|(path, _)| is_read(path)).collect();
+    let words = |text: &str| -> usize {
+        let text = prose(text);
+        let lines = text.lines().filter(|line| !line.trim_start().starts_with('|'));
+        lines.map(|line| line.split_whitespace().count()).sum()
+    };
+    let counts = pages.iter().map(|(path, text)| (path.file_name().unwrap(), words(text)));
+    let counts: Vec<_> = counts.collect();
+    let sum: usize = counts.iter().map(|(_, count)| count).sum();
+    assert!((6..=12).contains(&counts.len()), "{counts:?}");
+    assert!((5_000..=25_000).contains(&sum), "{sum}: {counts:?}");
+    // Each page of the documents is of one kind, and the README leads to it, or to its folder.
+    let (_, readme) = documents.iter().find(|(path, _)| *path == root.join("README.md")).unwrap();
+    for (path, _) in documents.iter().filter(|(path, _)| path.starts_with(root.join("docs"))) {
+        let name = path.strip_prefix(&root).unwrap().to_string_lossy().into_owned();
+        assert!(readme.contains(&format!("]({name})")), "README.md does not lead to {name}");
+    }
+}
+
 /// Comments, messages, scripts and the Makefile name documents by their paths in the repository.
 #[test]
 fn documents_that_the_sources_name_are_there() {
@@ -198,7 +227,10 @@ fn the_table_of_additions_names_what_its_files_have() {
             let brackets = behind.split(')').next().unwrap_or_default();
             for name in brackets.split('`').skip(1).step_by(2).filter(|name| is_name(name)) {
                 let last = name.rsplit("::").next().unwrap_or_default();
-                assert!(text.contains(last), "docs/development/architecture.md: no {name} in {file}");
+                assert!(
+                    text.contains(last),
+                    "docs/development/architecture.md: no {name} in {file}"
+                );
                 names += 1;
             }
         }

@@ -86,7 +86,7 @@ fn broken_obj_is_refused_with_its_line() {
     assert!(error(&write(&folder, "empty.obj", "")).contains("it is empty"));
 }
 
-/// Each rule of `docs/explanation/light.md`: glass, mirrors, a coat over a matte base, thin surfaces, lamps.
+/// Each rule of `docs/reference/models.md`: glass, mirrors, a coat over a matte base, thin surfaces, lamps.
 #[test]
 fn text_of_another_format_is_refused_as_such() {
     let folder = folder();
