@@ -43,7 +43,7 @@ use glam::DVec3;
 use super::{Isometry, LensError, LensFile, OpticalTrain, SensorMount};
 use crate::element::{ApertureSpec, ElementSpec, GlassesAlone, PartSpec};
 use crate::glass::{AgfCatalogue, GlassSpec, Makers};
-use configuration::{Axes, SheetPlace};
+use configuration::{Axes, Break};
 use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
 pub use format::LensFormat;
 use sheet::{Aperture, SheetRow, SurfaceShape, ZemaxSheet};
@@ -76,6 +76,8 @@ pub struct ZemaxLens {
     pub fields: Vec<f64>,
     /// Wavelengths (nm), the primary one first.
     pub wavelengths: Vec<f64>,
+    /// What each of them weighs; empty where the file weighs none.
+    pub weights: Vec<f64>,
     /// What was changed, assumed or left out, in sentences.
     pub notes: Vec<String>,
     /// The effective focal length that the file states (mm).
@@ -174,7 +176,7 @@ impl ZemaxLens {
         let mut file = LensFile { name: sheet.name.clone(), elements, ..LensFile::default() };
         sheet.format.words().source.clone_into(&mut file.source);
         file.sensor = (sensor != SensorMount::default()).then_some(sensor);
-        let wavelengths = sheet.wavelengths_nm();
+        let (wavelengths, weights) = sheet.wavelengths_nm();
         file.wavelength = wavelengths.first().copied().map(Nanometres);
         // What only the built train tells: the stop, field angles, and whether the focal length is
         // as stated.
@@ -185,6 +187,7 @@ impl ZemaxLens {
             fields,
             file,
             wavelengths,
+            weights,
             notes,
             stated_efl: sheet.stated_efl.map(|efl| efl * sheet.unit),
         };
@@ -238,10 +241,12 @@ impl Importer<'_> {
         let mut axes = Axes::default();
         let mut medium_is_air = true;
         let mut first_z = None;
-        let mut way = Way { space: Isometry::ONE, sense: 1.0, last_z: None };
+        let mut way = Way { space: Isometry::ONE, sense: 1.0, last_z: None, run: None };
         for (i, row) in inner.iter().enumerate() {
             if row.shape == SurfaceShape::CoordinateBreak {
-                axes = axes.broken(&row.coordinate_break(unit));
+                let by = row.coordinate_break(unit);
+                axes = axes.broken(&by);
+                way.run = way.run.filter(|_| by == Break::default());
             } else {
                 let flat_in_air =
                     row.is_flat() && medium_is_air && row.glass.is_none() && !row.mirror;
@@ -256,7 +261,7 @@ impl Importer<'_> {
                         check_turn(row, &here)?;
                     }
                     first_z = first_z.or(Some(here.placed().z));
-                    self.place(part, row, &here.placed(), &mut way);
+                    self.place(part, row, &here, &mut way);
                     if row.mirror {
                         let turned = after_breaks(axes, &rows[i + 2..], unit);
                         self.fold(&here, &turned, &mut way);
@@ -270,11 +275,11 @@ impl Importer<'_> {
                 return Err(ZemaxError::new(row.line, why));
             }
             axes = axes.advanced(row.thickness * unit);
+            way.run = way.run.map(|run| run + row.thickness * unit);
         }
-        let image = axes.unfolded(&way.space, way.sense).placed();
-        if let (Some(last), Some(z)) = (self.elements.last_mut(), way.last_z) {
-            last.mount.thickness = Millimetres(signed(way.sense, image.z - z));
-        }
+        let here = axes.unfolded(&way.space, way.sense);
+        let image = here.placed();
+        self.close_gap(&here, &mut way);
         // Lens coordinates begin at the first element, which need not be the first row.
         self.object_z = (object.thickness.is_finite())
             .then(|| -object.thickness * unit - first_z.unwrap_or_default());
@@ -346,8 +351,9 @@ impl Importer<'_> {
         })
     }
 
-    fn place(&mut self, part: PartSpec, row: &SheetRow, placed: &SheetPlace, way: &mut Way) {
-        self.close_gap(placed.z, way);
+    fn place(&mut self, part: PartSpec, row: &SheetRow, here: &Axes, way: &mut Way) {
+        self.close_gap(here, way);
+        let placed = here.placed();
         let mut element = ElementSpec::new(part, 0.0);
         element.mount.stop = row.stop;
         element.mount.tilt = placed.tilt.map(|angle| Degrees(signed(way.sense, angle)));
@@ -363,20 +369,24 @@ impl Importer<'_> {
         here: &Axes,
         way: &mut Way,
     ) {
-        let moved = here.shifted(decentre).placed();
-        self.close_gap(moved.z, way);
+        let moved = here.shifted(decentre);
+        self.close_gap(&moved, way);
+        let moved = moved.placed();
         let mut element = ElementSpec::new(PartSpec::Aperture(opening), 0.0);
         element.mount.tilt = moved.tilt.map(|angle| Degrees(signed(way.sense, angle)));
         element.mount.decentre = moved.decentre.map(Millimetres);
         self.elements.push(element);
     }
 
-    /// Ends the gap behind the last element at `z` (mm).
-    fn close_gap(&mut self, z: f64, way: &mut Way) {
+    /// Ends the gap behind the last element where `here` stands.
+    fn close_gap(&mut self, here: &Axes, way: &mut Way) {
+        let z = here.placed().z;
         if let (Some(last), Some(before)) = (self.elements.last_mut(), way.last_z) {
-            last.mount.thickness = Millimetres(signed(way.sense, z - before));
+            let along = way.run.filter(|_| here.axis() == DVec3::Z);
+            let gap = along.unwrap_or_else(|| signed(way.sense, z - before));
+            last.mount.thickness = Millimetres(gap);
         }
-        way.last_z = Some(z);
+        (way.last_z, way.run) = (Some(z), Some(0.0));
     }
 }
 
@@ -388,6 +398,9 @@ struct Way {
     sense: f64,
     /// z of the last element (mm).
     last_z: Option<f64>,
+    /// The thicknesses since then (mm), as the file has them, where nothing breaks the axis: differences of z
+    /// would round them.
+    run: Option<f64>,
 }
 
 /// Axes (their sines) that count as one.

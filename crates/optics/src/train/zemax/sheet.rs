@@ -17,6 +17,9 @@ const MOST_SURFACES: usize = crate::train::MOST_ELEMENTS;
 /// The most wavelengths, as OpticStudio has it.
 const MOST_WAVELENGTHS: usize = 24;
 
+/// The most surfaces of which a note of one kind is made.
+const MOST_TOLD: usize = 5;
+
 /// A whole file.
 #[derive(Debug, Default)]
 pub(super) struct ZemaxSheet {
@@ -64,6 +67,8 @@ pub(super) struct SheetRow {
     pub(super) curvature: f64,
     pub(super) conic: f64,
     pub(super) thickness: f64,
+    /// Whether the file says how thick it is.
+    pub(super) is_closed: bool,
     pub(super) glass: Option<SheetGlass>,
     /// Whether its glass is MIRROR.
     pub(super) mirror: bool,
@@ -101,6 +106,23 @@ pub(super) enum SurfaceShape {
     ZernikeFringe,
     Fresnel,
     Freeform,
+}
+
+impl SurfaceShape {
+    /// The numbers of the parameters that it reads.
+    fn parameters(self) -> std::ops::RangeInclusive<usize> {
+        match self {
+            // PARM 0 is not in use, and what others mean is in extra data.
+            Self::Standard | Self::Freeform => usize::MAX..=usize::MAX,
+            Self::EvenAsphere | Self::OddAsphere | Self::Toroidal => 1..=8,
+            Self::ZernikeStandard | Self::ZernikeFringe | Self::Fresnel => 1..=8,
+            Self::ExtendedAsphere => usize::MAX..=usize::MAX,
+            Self::Paraxial => 1..=1,
+            Self::CoordinateBreak => 1..=6,
+            Self::Biconic | Self::Grating => 1..=2,
+            Self::Binary2 => 0..=8,
+        }
+    }
 }
 
 /// An aperture of a surface that is no rim.
@@ -231,7 +253,37 @@ impl ZemaxSheet {
         if sheet.rows.is_empty() {
             return Err(ZemaxError::new(1, "no SURF in the file; is it a sequential Zemax lens?"));
         }
+        sheet.check_end(in_surface && !text.ends_with(['\n', '\r']))?;
         Ok(sheet)
+    }
+
+    /// Refuses a file whose end is missing: its last surface is no image. `in_line` is whether the text ends inside
+    /// of a line of it.
+    fn check_end(&self, in_line: bool) -> Result<(), ZemaxError> {
+        // What has no surface between is told by who wants one.
+        let [_, .., image] = self.rows.as_slice() else { return Ok(()) };
+        let number = self.rows.len() - 1;
+        let why = if in_line && image.is_closed {
+            "the last line has no end".to_owned()
+        } else if !image.is_closed {
+            format!("SURF {number} has no DISZ")
+        } else if image.thickness != 0.0 {
+            format!(
+                "the last surface, SURF {number}, has a distance of {} behind it (DISZ)",
+                image.thickness
+            )
+        } else if image.glass.is_some() || image.mirror || image.stop {
+            format!(
+                "the last surface, SURF {number}, is a glass, a mirror or the stop, and no image"
+            )
+        } else {
+            return Ok(());
+        };
+        let why = format!(
+            "{why}: the file is cut short. Save it again; where it is whole, end it by an image surface with DISZ 0 and a \
+             line break"
+        );
+        Err(ZemaxError::new(self.last_line, why))
     }
 
     fn begin_surface(&mut self, line: &SheetLine<'_>) -> Result<(), ZemaxError> {
@@ -256,7 +308,21 @@ impl ZemaxSheet {
             // The stop's own size.
             "FLOA" => self.aperture = None,
             "GCAT" => self.makers = line.rest.split_whitespace().map(maker).collect(),
-            "WAVM" => self.set_wavelength(line.index(0)?, line.number(1)?),
+            "WAVM" => {
+                let (number, weight) = (line.index(0)?, line.number_or(2, 1.0)?);
+                self.set_wavelength(number, line.number(1)?);
+                let slot = number.clamp(1, MOST_WAVELENGTHS) - 1;
+                self.wavelength_weights.resize(self.wavelength_weights.len().max(slot + 1), 1.0);
+                self.wavelength_weights[slot] = weight;
+            }
+            "WWGT" | "WWGN" => self.wavelength_weights = line.numbers()?,
+            "FWGT" | "FWGN" => self.fields.weights = line.numbers()?,
+            "VDXN" | "VDYN" | "VCXN" | "VCYN" | "VANN" | "VDSZ" => {
+                // Slots of fields that are not in use stand there as well.
+                if line.numbers()?.iter().any(|factor| *factor != 0.0) {
+                    self.fields.vignetted.push((line.number, line.command.to_owned()));
+                }
+            }
             "WAVL" | "WAVN" => self.wavelengths = line.numbers()?,
             "PWAV" | "PRIM" => self.primary = line.index(0)?,
             "FTYP" => self.fields.set_kind(line)?,
@@ -352,8 +418,8 @@ impl ZemaxSheet {
         Ok(())
     }
 
-    /// Wavelengths (nm) in use, the primary one first.
-    pub(super) fn wavelengths_nm(&self) -> Vec<f64> {
+    /// Wavelengths (nm) in use, the primary one first, and their weights; none where the file weighs none.
+    pub(super) fn wavelengths_nm(&self) -> (Vec<f64>, Vec<f64>) {
         let used = match self.fields.wavelengths {
             Some(count) if count > 0 => count,
             // Slots that are not in use repeat the same value.
@@ -364,16 +430,26 @@ impl ZemaxSheet {
             }
         };
         let used = &self.wavelengths[..used.min(self.wavelengths.len()).min(MOST_WAVELENGTHS)];
-        let mut all: Vec<f64> = Vec::new();
-        let primary = used.get(self.primary.max(1) - 1).or(used.first());
-        for &micrometres in primary.into_iter().chain(used) {
+        let (mut all, mut weights): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+        let primary = self.primary.max(1) - 1;
+        let primary = if primary < used.len() { primary } else { 0 };
+        for i in std::iter::once(primary).chain(0..used.len()) {
+            let Some(micrometres) = used.get(i) else { continue };
             // Micrometres to three decimals more than anyone writes: 0.55 * 1000 is 550.
             let nanometres = (micrometres * 1e9).round() / 1e6;
             if nanometres > 0.0 && !all.contains(&nanometres) {
                 all.push(nanometres);
+                weights.push(self.wavelength_weights.get(i).copied().unwrap_or(1.0));
             }
         }
-        all
+        // Those that make no mean weigh nothing against each other.
+        let is_mean = weights.iter().all(|weight| *weight >= 0.0 && weight.is_finite())
+            && weights.iter().any(|weight| *weight > 0.0);
+        let are_equal = weights.iter().all(|weight| Some(weight) == weights.first());
+        if are_equal || !is_mean {
+            weights.clear();
+        }
+        (all, weights)
     }
 
     /// Where something is: a line or, in files in which surfaces have none, a surface.
@@ -385,8 +461,48 @@ impl ZemaxSheet {
         }
     }
 
+    /// Sentences on numbers of surfaces that their type has no use for here.
+    fn unread_parameters(&self) -> Vec<String> {
+        let unread = |row: &SheetRow| {
+            let known = row.shape.parameters();
+            let is_unread = |(number, parameter): &(&usize, &Parameter)| {
+                !known.contains(*number) && parameter.value != 0.0
+            };
+            let numbers: Vec<(usize, usize)> = row
+                .parameters
+                .iter()
+                .filter(is_unread)
+                .map(|(number, parameter)| (*number, parameter.line))
+                .collect();
+            let (_, line) = *numbers.first()?;
+            let names: Vec<String> =
+                numbers.iter().map(|(number, _)| format!("PARM {number}")).collect();
+            let which = names.join(", ");
+            Some(format!(
+                "line {line}: {which} of this type of surface is left out; it is read as if it were 0"
+            ))
+        };
+        self.rows.iter().filter_map(unread).take(MOST_TOLD).collect()
+    }
+
     pub(super) fn what_is_left_out(&self) -> Vec<String> {
         let mut notes = self.notes.clone();
+        if let [first, ..] = &self.fields.vignetted[..] {
+            let names: Vec<&str> =
+                self.fields.vignetted.iter().map(|(_, name)| name.as_str()).collect();
+            notes.push(format!(
+                "line {}: vignetting factors ({}) are left out: rays end at the rims of surfaces, and not at a smaller \
+                 pupil",
+                first.0,
+                names.join(", ")
+            ));
+        }
+        let used = self.fields.count.unwrap_or(self.fields.weights.len());
+        let weights = &self.fields.weights[..used.min(self.fields.weights.len())];
+        if weights.iter().any(|weight| Some(weight) != weights.first()) {
+            notes.push(format!("the weights of fields (FWGN), {weights:?}, are left out: nothing here takes a mean of fields"));
+        }
+        notes.extend(self.unread_parameters());
         if self.configurations > 1 {
             notes.push(format!(
                 "of {} configurations, number {} is taken",
@@ -429,8 +545,11 @@ impl SheetRow {
             "TYPE" => self.shape = shape(line)?,
             "CURV" => self.curvature = line.number(0)?,
             "CONI" => self.conic = line.number(0)?,
-            "DISZ" if line.rest.starts_with("INF") => self.thickness = f64::INFINITY,
-            "DISZ" => self.thickness = line.number(0)?,
+            "DISZ" => {
+                let is_far = line.rest.starts_with("INF");
+                self.thickness = if is_far { f64::INFINITY } else { line.number(0)? };
+                self.is_closed = true;
+            }
             "GLAS" if line.word(0) == Some("MIRROR") => self.mirror = true,
             "GLAS" => self.glass = glass(line)?,
             "PARM" => {
@@ -498,6 +617,21 @@ impl SheetRow {
             _ => return Ok(false),
         }
         Ok(true)
+    }
+
+    /// Puts another glass by its name; none for the air.
+    pub(super) fn change_glass(&mut self, line: usize, name: &str) -> Result<(), ZemaxError> {
+        let is_mirror = name.eq_ignore_ascii_case("MIRROR");
+        if is_mirror != self.mirror {
+            let why = "GLSS: a configuration makes a mirror of a surface, or none of one, which has no counterpart";
+            return Err(ZemaxError::new(line, why));
+        }
+        let is_air = ["AIR", "0", "\"\""].iter().any(|air| name.eq_ignore_ascii_case(air));
+        if !is_mirror {
+            let glass = SheetGlass { line, name: name.to_owned(), spec: None };
+            self.glass = (!is_air).then_some(glass);
+        }
+        Ok(())
     }
 
     /// How far from the axis light passes, in the file's unit.
