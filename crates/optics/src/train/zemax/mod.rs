@@ -3,13 +3,14 @@
 //!
 //! | module | idea |
 //! |---|---|
-//! | `sheet` | lines to the rows of the lens data sheet |
+//! | `sheet`, `row` | lines to the lens data sheet, and to its rows |
 //! | `parts` | a row to what it is |
 //! | `configuration` | the values of one position of a zoom lens; field points to field angles; coordinate breaks to tilts and decentrings; bytes to lines: UTF-8 and UTF-16 |
 //! | `format` | which program a file is of, and what its users call things |
 //! | `code_v` | lines of CODE V's files to the same rows |
-//! | `oslo`, `oslo_surface` | statements of OSLO's files, and what they say of one surface |
-//! | `optiland` | optiland's JSON |
+//! | `oslo`, `oslo_statement`, `oslo_surface` | OSLO's files, their statements, and what those say of one surface |
+//! | `optiland`, `optiland_system`, `python_json` | surfaces of optiland's JSON, what it says of the whole, and its numbers |
+//! | `stop` | the stop's opening |
 //! | `pbrt`, `iset` | tables of pbrt's realistic camera, and ISET's JSON, which has the same |
 //! | `photons_to_photos` | tables of PhotonsToPhotos' Optical Bench |
 //! | `write` | a lens file to lines |
@@ -28,25 +29,32 @@ mod configuration;
 mod format;
 mod iset;
 mod optiland;
+mod optiland_system;
 mod oslo;
+mod oslo_statement;
 mod oslo_surface;
 mod parts;
 mod pbrt;
 mod photons_to_photos;
+mod python_json;
+mod row;
 mod sheet;
+mod stop;
 mod write;
 
 use std::path::Path;
 
 use glam::DVec3;
 
-use super::{Isometry, LensError, LensFile, OpticalTrain, SensorMount};
-use crate::element::{ApertureSpec, ElementSpec, GlassesAlone, PartSpec};
+use super::{Isometry, LensFile, OpticalTrain, SensorMount};
+use crate::element::{ApertureSpec, ElementSpec, PartSpec};
 use crate::glass::{AgfCatalogue, GlassSpec, Makers};
 use configuration::{Axes, Break};
 use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
 pub use format::LensFormat;
-use sheet::{Aperture, SheetRow, SurfaceShape, ZemaxSheet};
+use row::{SheetGlass, SheetRow, SurfaceShape};
+use sheet::ZemaxSheet;
+use stop::open_stop;
 
 /// A difference of focal lengths that is more than rounding (share).
 const SAME_FOCAL_LENGTH: f64 = 1e-3;
@@ -330,7 +338,7 @@ impl Importer<'_> {
         Ok(())
     }
 
-    fn glass(&self, glass: &sheet::SheetGlass) -> Result<GlassSpec, ZemaxError> {
+    fn glass(&self, glass: &SheetGlass) -> Result<GlassSpec, ZemaxError> {
         let words = self.sheet.format.words();
         let spec = glass.spec.clone().unwrap_or_else(|| GlassSpec::Named(glass.name.clone()));
         let makers: Vec<&str> = self.sheet.makers.iter().map(String::as_str).collect();
@@ -429,120 +437,6 @@ fn check_turn(row: &SheetRow, here: &Axes) -> Result<(), ZemaxError> {
         return Err(ZemaxError::new(row.line, why));
     }
     Ok(())
-}
-
-/// The stop's radius (mm) that makes the entrance pupil as wide as `radius` says, from its z (mm).
-fn with_entrance_pupil(
-    train: &OpticalTrain,
-    command: &str,
-    radius: impl FnOnce(f64) -> Result<f64, String>,
-) -> Result<f64, String> {
-    let paraxial = train.paraxial(train.wavelength()).ok();
-    let found = paraxial.and_then(|p| Some((p.entrance_pupil.z?, p.stop_magnification?)));
-    let (z, magnification) =
-        found.ok_or_else(|| format!("{command}: the entrance pupil is at infinity"))?;
-    Ok(radius(z)? * magnification.abs())
-}
-
-/// Sets the stop by the system's aperture, and gives the lens.
-fn open_stop(
-    file: &mut LensFile,
-    (sheet, glasses): (&ZemaxSheet, &[AgfCatalogue]),
-    object_z: Option<f64>,
-    notes: &mut Vec<String>,
-) -> Result<OpticalTrain, ZemaxError> {
-    let build = |file: &LensFile| {
-        file.build(&GlassesAlone(glasses))
-            .map_err(|error| ZemaxError::new(sheet.last_line, error.to_string()))
-    };
-    let train = build(file)?;
-    let Some((line, aperture)) = sheet.aperture else {
-        return float_stop(file, train, sheet, notes, build);
-    };
-    let words = sheet.format.words();
-    let index = train.stop();
-    let written = train.stop_radius();
-    let error = |error: LensError| ZemaxError::new(line, error.to_string());
-    let stop_radius = match aperture {
-        Aperture::EntrancePupil(diameter) => {
-            with_entrance_pupil(&train, words.pupil, |_| Ok(0.5 * diameter * sheet.unit)).map(Some)
-        }
-        Aperture::AtObject(sine) => with_entrance_pupil(&train, words.object_aperture, |pupil| {
-            let object = object_z.ok_or_else(|| {
-                format!(
-                    "{}: the object is at infinity; write {} or {}",
-                    words.object_aperture, words.pupil, words.f_number
-                )
-            })?;
-            Ok((pupil - object).abs() * sine.asin().tan())
-        })
-        .map(Some),
-        Aperture::FNumber(_) => Ok(None),
-    };
-    let opened = match (stop_radius.map_err(|why| ZemaxError::new(line, why))?, aperture) {
-        (Some(radius), _) => train.with_stop_radius(radius).map_err(error)?,
-        (None, Aperture::FNumber(f_number)) => {
-            // What the file says; whether a beam fills it is among the lens' notes.
-            let radius = train.stop_radius_at(f_number).map_err(error)?;
-            train.with_stop_radius(radius).map_err(error)?
-        }
-        (None, _) => train,
-    };
-    let radius = opened.stop_radius();
-    if written.is_finite() && written > 0.0 && (radius - written).abs() > 0.01 * written {
-        notes.push(format!(
-            "{}: the system's aperture gives the stop a radius of {radius:.5} mm; its surface's is \
-             {written:.5} mm",
-            sheet.place(line)
-        ));
-    }
-    let stop = &mut file.elements[index];
-    stop.mount.stop = true;
-    match &mut stop.part {
-        PartSpec::Surface(surface) => surface.semi_diameter = Some(Millimetres(radius)),
-        PartSpec::ThinLens(lens) => lens.semi_diameter = Some(Millimetres(radius)),
-        PartSpec::Biconic(surface) => surface.semi_diameter = Some(Millimetres(radius)),
-        PartSpec::Mirror(mirror) => mirror.semi_diameter = Some(Millimetres(radius)),
-        PartSpec::Freeform(surface) => surface.semi_diameter = Some(Millimetres(radius)),
-        part => *part = PartSpec::circular(radius),
-    }
-    build(file)
-}
-
-/// The lens whose stop is as large as its own surface says, and, where it says nothing, as the widest beam
-/// that the other rims let through.
-fn float_stop(
-    file: &mut LensFile,
-    train: OpticalTrain,
-    sheet: &ZemaxSheet,
-    notes: &mut Vec<String>,
-    build: impl Fn(&LensFile) -> Result<OpticalTrain, ZemaxError>,
-) -> Result<OpticalTrain, ZemaxError> {
-    let index = train.stop();
-    let is_closed = |part: &PartSpec| *part == PartSpec::circular(0.0);
-    if !file.elements[index].mount.stop || !is_closed(&file.elements[index].part) {
-        return Ok(train);
-    }
-    let row = sheet.rows.iter().find(|row| row.stop);
-    let line = row.map_or(sheet.last_line, |row| row.line);
-    let words = sheet.format.words();
-    let widest = train.widest_opening().ok_or_else(|| {
-        let why = format!(
-            "the stop has no {0}, and no other surface limits the beam: write the stop's {0}, or the system's aperture \
-             as {1} or {2}",
-            words.semi_diameter, words.pupil, words.f_number
-        );
-        ZemaxError::new(line, why)
-    })?;
-    notes.push(format!(
-        "{}: the stop has no {}; its radius is {:.5} mm, that of the widest beam on the axis that \
-         the other surfaces let through",
-        sheet.place(line),
-        words.semi_diameter,
-        widest.stop_radius
-    ));
-    file.elements[index].part = PartSpec::circular(widest.stop_radius);
-    build(file)
 }
 
 #[cfg(test)]
