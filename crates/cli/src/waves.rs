@@ -130,9 +130,17 @@ pub(crate) fn analyse(
         }
     };
     let is_near = planes.object_z.is_some();
+    // Weights of a file are those of its own wavelengths.
+    let (weights, of_weights) = match &arguments.weights {
+        Some(weights) => (weights.clone(), "option"),
+        None if of_wavelengths == "file" && !lens.weights.is_empty() => {
+            (lens.weights.clone(), "file")
+        }
+        None => (Vec::new(), "default"),
+    };
     let inquiry = WaveInquiry {
         wavelengths,
-        weights: arguments.weights.clone().unwrap_or_default(),
+        weights,
         fields,
         fields_are_asked: of_fields == "option",
         conjugate,
@@ -144,7 +152,7 @@ pub(crate) fn analyse(
         taken: Taken {
             fields: of_fields,
             wavelengths: of_wavelengths,
-            weights: if arguments.weights.is_some() { "option" } else { "default" },
+            weights: of_weights,
             object: if is_near { "option" } else { "default" },
         },
     };

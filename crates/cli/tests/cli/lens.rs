@@ -234,6 +234,82 @@ fn a_position_of_a_zoom_lens_is_chosen_and_saved() {
     refused(&bench, &["long.json", "--configuration", "1"], &["long.json", ".zmx"]);
 }
 
+/// Each of the same biconvex lens of n = 1.5, radii 50 and −50 mm, 4 mm thick, and a stop behind it.
+const PBRT: &str = "50 4 1.5 20\n-50 1 1 20\n0 46 0 8\n";
+const ISET: &str = r#"{"name": "a", "surfaces": [{"radius": 50, "thickness": 4, "ior": 1.5, "semi_aperture": 10},
+    {"radius": -50, "thickness": 1, "ior": 1, "semi_aperture": 10}, {"radius": 0, "thickness": 46, "ior": 0, "semi_aperture": 4}]}"#;
+const OSLO: &str = "LEN NEW \"a\" 50 4\nEBR 4\nANG 5\nTH 1e20\nNXT\nGLA 1.5\nRD 50\nTH 4\nAP 10\nNXT\nRD -50\nTH 1\nAP 10\nNXT\nTH 46\n\
+    AST\nNXT\nEND 4\n";
+const OPTBENCH: &str = "[variable distances]\nBf\t46\t50\n[lens data]\n1\t50\t4\t1.5\t20\n2\t-50\t1\t\t20\n3\tAS\tBf\t\t8\n";
+const OPTILAND: &str = r#"{"aperture": {"type": "float_by_stop_size", "value": 8}, "surface_group": {"surfaces": [
+    {"geometry": {"type": "Plane", "cs": {"z": -Infinity}}},
+    {"geometry": {"type": "StandardGeometry", "cs": {"z": 0}, "radius": 50}, "material_post": {"type": "IdealMaterial", "index": 1.5}},
+    {"geometry": {"type": "StandardGeometry", "cs": {"z": 4}, "radius": -50}},
+    {"geometry": {"type": "Plane", "cs": {"z": 5}}, "is_stop": true}, {"geometry": {"type": "Plane", "cs": {"z": 51}}}]}}"#;
+
+#[test]
+fn lenses_of_other_programs_are_read_and_saved_and_taken_by_scenes() {
+    let bench = Bench::new();
+    let files = [
+        ("lens.dat", PBRT),
+        ("iset.json", ISET),
+        ("lens.len", OSLO),
+        ("lens.txt", OPTBENCH),
+        ("optiland.json", OPTILAND),
+    ];
+    // The lensmaker's formula.
+    let expected = 1.0 / (0.5 * (0.04 - 0.5 * 4.0 * 0.0004 / 1.5));
+    let efl = |name: &str, more: &[&str]| {
+        let output = bench.run(&[&["lens", name, "--json"], more].concat());
+        assert!(output.status.success(), "{name}: {}", text(&output.stderr));
+        let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        number(&report["paraxial"]["efl"])
+    };
+    for (name, content) in files {
+        bench.write(name, content.as_bytes());
+        let saved = format!("{name}.saved.json");
+        assert!((efl(name, &["--save", &saved]) - expected).abs() < 1e-9, "{name}");
+        assert!((efl(&saved, &[]) - expected).abs() < 1e-9, "{saved}");
+        let scene = json!({"etendue": 1, "camera": {"type": "lens", "lens": name, "fov": 5}});
+        bench.write("scene.json", scene.to_string().as_bytes());
+        assert!((efl("scene.json", &[]) - expected).abs() < 1e-9, "{name} in a scene");
+        // Broken, it is told as what it is, and none of Zemax' words.
+        bench.write(name, content.replace("1.5", "0.5").as_bytes());
+        let output = bench.run(&["lens", name]);
+        let told = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.contains(name) && !told.contains("GLAS") && !told.contains("Zemax"), "{told}");
+    }
+    bench.write("lens.txt", OPTBENCH.as_bytes());
+    efl("lens.txt", &["--configuration", "2"]);
+    refused(
+        &bench,
+        &["lens.txt", "--configuration", "3"],
+        &["lens.txt", "configuration 3", "has 2"],
+    );
+    refused(&bench, &["lens.dat", "--configuration", "1"], &["lens.dat", "no configurations"]);
+}
+
+#[test]
+fn weights_of_a_zemax_file_are_those_of_its_means() {
+    let bench = Bench::new();
+    let weighted = ZMX.replace("SURF 0", "WAVM 1 0.48 1\nWAVM 2 0.65 3\nSURF 0").replacen(
+        "FTYP 0 0 2 1",
+        "FTYP 0 0 2 2",
+        1,
+    );
+    bench.write("lens.zmx", weighted.as_bytes());
+    let output = bench.run(&["lens", "lens.zmx", "--waves", "--json"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(
+        report["waves"]["premises"]["weights"],
+        json!([0.25, 0.75]),
+        "{}",
+        report["waves"]["premises"]
+    );
+}
+
 #[test]
 fn drawings_are_written_whole() {
     let bench = Bench::new();

@@ -68,3 +68,89 @@ fn glasses_without_published_data_are_read_from_a_catalogue() {
         assert!(ZemaxLens::read(text.as_bytes(), &own).is_ok(), "{name}");
     }
 }
+
+/// What a file that is cut behind one of its surfaces would be: another lens.
+#[test]
+fn files_that_are_cut_short_are_refused_wherever_they_are_cut() {
+    let whole = file("", "", GLASS);
+    assert!(read(&whole).is_ok());
+    let lines: Vec<&str> = whole.split_inclusive('\n').collect();
+    let image = lines.iter().position(|line| line.starts_with("SURF 3")).unwrap();
+    // Behind every line of the surfaces, and in the middle of it.
+    for kept in 9..lines.len() {
+        let cut = lines[..kept].concat();
+        assert!(read(&cut).is_err(), "{cut}");
+        if kept > image {
+            says(&cut, &["SURF 3 has no DISZ", "cut short"]);
+        }
+        let middle = format!("{cut}{}", &lines[kept][..lines[kept].len() / 2]);
+        assert!(read(&middle).is_err(), "{middle}");
+    }
+    // At the end of a surface.
+    says(&lines[..image].concat(), &["line 20", "SURF 2", "48", "DISZ", "cut short"]);
+    says(whole.trim_end(), &["line 23", "no end", "line break"]);
+    says(&whole.replace("DISZ 0\n", "DISZ 0\n  GLAS N-BK7 0 0 1.5 64\n"), &["SURF 3", "no image"]);
+}
+
+#[test]
+fn weights_of_wavelengths_are_taken_and_those_of_fields_are_told() {
+    let weighted = |more: &str| read(&file("", "", GLASS).replace("WAVL 0.55\n", more)).unwrap();
+    let lens = weighted("WAVM 1 0.48 0.5\nWAVM 2 0.55 1\nWAVM 3 0.65 0.25\nPWAV 2\n");
+    let lens = (lens.wavelengths, lens.weights);
+    // Those behind FTYP's count of one are slots that are not in use.
+    assert_eq!(lens, (vec![480.0], vec![]));
+    let three = file("", "", GLASS).replace("FTYP 0 0 1 1", "FTYP 0 0 1 3");
+    let three =
+        three.replace("WAVL 0.55\n", "WAVM 1 0.48 0.5\nWAVM 2 0.55 1\nWAVM 3 0.65 0.25\nPWAV 2\n");
+    let lens = read(&three).unwrap();
+    assert_eq!(lens.wavelengths, [550.0, 480.0, 650.0]);
+    assert_eq!(lens.weights, [1.0, 0.5, 0.25]);
+    // Equal ones weigh nothing against each other, and those of zero make no mean.
+    assert!(
+        read(&three.replace("0.5\nWAVM", "1\nWAVM").replace("0.65 0.25", "0.65 1"))
+            .unwrap()
+            .weights
+            .is_empty()
+    );
+    let fields = file("", "", GLASS)
+        .replace("FTYP 0 0 1 1", "FTYP 0 0 2 1")
+        .replace("YFLN 0\n", "YFLN 0 5 9\nFWGN 1 3 1\nVDXN 0 0.1 0\nVDYN 0 0 0\nVCYN 0 0.2 0\n");
+    let notes = read(&fields).unwrap().notes.join("\n");
+    for word in ["FWGN", "[1.0, 3.0]", "VDXN, VCYN", "line 6"] {
+        assert!(notes.contains(word), "{word}: {notes}");
+    }
+    assert!(!notes.contains("VDYN"), "{notes}");
+}
+
+#[test]
+fn numbers_of_surfaces_that_are_not_read_are_told() {
+    let notes = |more: &str| read(&file("", more, GLASS)).unwrap().notes.join("\n");
+    assert!(notes("  PARM 3 0.5\n").contains("line 16: PARM 3"), "{}", notes("  PARM 3 0.5\n"));
+    assert!(!notes("  PARM 3 0\n").contains("PARM"));
+    let toroid = "  TYPE TOROIDAL\n  PARM 1 50\n  PARM 9 1e-9\n";
+    assert!(notes(toroid).contains("line 18: PARM 9"), "{}", notes(toroid));
+}
+
+#[test]
+fn configurations_change_glasses_wavelengths_and_weights() {
+    let values = "MNUM 2 1\nGLSS 1 1 N-BK7 0\nGLSS 1 2 SF11 0\nWAVE 1 1 0.55 0\nWAVE 1 2 0.65 0\nTHIC 1 2 5 0\n\
+                  FLWT 1 2 2 0\nWLWT 1 2 3 0\n";
+    let text = file("", "", GLASS) + values;
+    let at = |number| ZemaxLens::read_configuration(text.as_bytes(), Some(number), &[]).unwrap();
+    let glass = |lens: &ZemaxLens| {
+        serde_json::to_value(&lens.file).unwrap()["elements"][0]["glass"].clone()
+    };
+    assert_eq!((glass(&at(1)), at(1).wavelengths), (serde_json::json!("N-BK7"), vec![550.0]));
+    assert_eq!((glass(&at(2)), at(2).wavelengths), (serde_json::json!("SF11"), vec![650.0]));
+    assert_eq!(at(2).file.elements[0].mount.thickness.0, 5.0);
+    for (bad, word) in [
+        ("GLSS 9 2 SF11 0", "no surface 9"),
+        ("GLSS 1 2 MIRROR 0", "mirror"),
+        ("WAVE 4 2 0.5 0", "no wavelength 4"),
+        ("WLWT 4 2 0.5 0", "no wavelength or field 4"),
+    ] {
+        let text = format!("{text}{bad}\n");
+        let error = ZemaxLens::read_configuration(text.as_bytes(), Some(2), &[]).unwrap_err();
+        assert!(error.to_string().contains(word), "{error}");
+    }
+}

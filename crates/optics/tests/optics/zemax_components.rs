@@ -269,3 +269,63 @@ fn what_zemax_files_have_no_counterpart_for_is_refused_by_its_element() {
         assert!(why.starts_with("elements[1]: ") && why.contains(word), "{why}");
     }
 }
+
+/// Every lens of `scenes/lenses` to a Zemax file and back: the same parts at the same places to the last bit, and from there
+/// on the same lens file.
+#[test]
+fn lenses_of_scenes_come_back_exactly_or_are_refused_by_element() {
+    let folder = format!("{}/../../scenes/lenses", env!("CARGO_MANIFEST_DIR"));
+    let (mut exact, mut refused) = (0, Vec::new());
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.display();
+        let file = LensFile::from_json(&std::fs::read_to_string(&path).unwrap()).unwrap();
+        let text = match file.to_zemax() {
+            Ok(text) => text,
+            Err(why) => {
+                assert!(why.starts_with("elements["), "{name}: {why}");
+                refused.push(why);
+                continue;
+            }
+        };
+        let once = ZemaxLens::read(text.as_bytes(), &[]).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let (before, after) = (build(&file), build(&once.file));
+        assert_eq!(
+            (before.elements().len(), before.stop()),
+            (after.elements().len(), after.stop())
+        );
+        assert_eq!(
+            (before.name(), before.wavelength()),
+            (after.name(), after.wavelength()),
+            "{name}"
+        );
+        let is_straight = |e: &etendue_optics::train::Element| {
+            e.frame == etendue_optics::element::Frame::on_axis(e.frame.vertex.z)
+        };
+        let straight = before.elements().iter().all(is_straight);
+        for (i, (a, b)) in before.elements().iter().zip(after.elements()).enumerate() {
+            assert_eq!(a.part, b.part, "{name}: elements[{i}]");
+            match straight {
+                true => assert_eq!(a.frame, b.frame, "{name}: elements[{i}]"),
+                // Sines of angles there and back.
+                false => assert!(
+                    (a.frame.vertex - b.frame.vertex).length() < 1e-12,
+                    "{name}: elements[{i}]"
+                ),
+            }
+        }
+        let thickness =
+            |file: &LensFile| file.elements.iter().map(|e| e.mount.thickness).collect::<Vec<_>>();
+        if straight {
+            assert_eq!(thickness(&file), thickness(&once.file), "{name}");
+        }
+        let again = once.file.to_zemax().unwrap();
+        let twice = ZemaxLens::read(again.as_bytes(), &[]).unwrap();
+        match straight {
+            true => assert_eq!(twice.file, once.file, "{name}"),
+            false => assert_eq!(twice.file.elements.len(), once.file.elements.len(), "{name}"),
+        }
+        exact += usize::from(straight);
+    }
+    assert!(exact >= 9, "{exact} lenses are exact; refused: {refused:?}");
+}

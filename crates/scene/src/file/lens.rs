@@ -64,6 +64,8 @@ pub struct ReadLens {
     pub fields: Vec<f64>,
     /// Wavelengths (nm) that its file names, the main one first.
     pub wavelengths: Vec<f64>,
+    /// What each of them weighs; empty where the file weighs none.
+    pub weights: Vec<f64>,
     /// What was changed, assumed or left out when it was imported, in sentences.
     pub notes: Vec<String>,
     /// Every file that it was read from.
@@ -130,6 +132,7 @@ pub fn read_lens_at(
         camera: Some(camera.clone()),
         fields: Vec::new(),
         wavelengths: Vec::new(),
+        weights: Vec::new(),
         notes: Vec::new(),
         inputs: inputs(path, &folder),
     })
@@ -208,6 +211,7 @@ fn build(
         camera: None,
         fields: Vec::new(),
         wavelengths: Vec::new(),
+        weights: Vec::new(),
         notes: Vec::new(),
         inputs: inputs(&written.path, &folder),
     })
@@ -237,7 +241,7 @@ fn import(
         SceneError::Refused(Refusal::new(format!("{}, {source}", path.display())))
     };
     let lens = ZemaxLens::read_as(format, &bytes, configuration, glasses);
-    let ZemaxLens { file, fields, wavelengths, notes, .. } = lens.map_err(zemax)?;
+    let ZemaxLens { file, fields, wavelengths, weights, notes, .. } = lens.map_err(zemax)?;
     let train = file
         .build(&GlassesAlone(glasses))
         .map_err(|error| zemax(ZemaxError { line: 0, why: error.to_string() }))?;
@@ -250,6 +254,7 @@ fn import(
         camera: None,
         fields,
         wavelengths,
+        weights,
         notes,
         inputs,
     })

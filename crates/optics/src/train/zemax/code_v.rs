@@ -10,9 +10,8 @@
 
 use super::ZemaxError;
 use super::format::LensFormat;
-use super::sheet::{
-    Aperture, Parameter, SheetGlass, SheetOpening, SheetRow, SurfaceShape, ZemaxSheet,
-};
+use super::row::{Parameter, SheetGlass, SheetOpening, SheetRow, SurfaceShape};
+use super::sheet::{Aperture, ZemaxSheet};
 use crate::glass::{GlassSpec, Makers};
 
 /// Thicknesses from here on are infinite.

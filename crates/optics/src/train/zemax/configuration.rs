@@ -25,10 +25,11 @@ use crate::train::{Focus, Isometry, OpticalTrain};
 const INFINITE: f64 = 1e10;
 
 /// Operands whose values are taken, and what others do to the light's way.
-const TAKEN: [&str; 7] = ["THIC", "CRVT", "CONN", "SDIA", "APER", "XFIE", "YFIE"];
-const NOT_TAKEN: [&str; 15] = [
-    "GLSS", "STPS", "PRAM", "EDVA", "MABB", "MIND", "CADX", "CADY", "CATX", "CATY", "CATZ", "CAOR",
-    "WAVE", "PRWV", "IGNR",
+const TAKEN: [&str; 11] =
+    ["THIC", "CRVT", "CONN", "SDIA", "APER", "XFIE", "YFIE", "GLSS", "WAVE", "WLWT", "FLWT"];
+const NOT_TAKEN: [&str; 13] = [
+    "STPS", "PRAM", "EDVA", "MABB", "MIND", "CADX", "CADY", "CATX", "CATY", "CATZ", "CAOR", "PRWV",
+    "IGNR",
 ];
 
 /// A value of one configuration.
@@ -101,8 +102,28 @@ impl ZemaxSheet {
     }
 
     fn take(&mut self, value: &ConfigurationValue) -> Result<(), ZemaxError> {
-        let number = value.number()?;
         let missing = |what: &str| value.error(&format!("there is no {what} {}", value.index));
+        if value.operand == "GLSS" {
+            let row = self.rows.get_mut(value.index).ok_or_else(|| missing("surface"))?;
+            return row.change_glass(value.line, &value.value);
+        }
+        let number = value.number()?;
+        let slot = value.index.checked_sub(1);
+        if value.operand == "WAVE" {
+            let wavelength = slot.and_then(|slot| self.wavelengths.get_mut(slot));
+            *wavelength.ok_or_else(|| missing("wavelength"))? = number;
+            return Ok(());
+        }
+        if let "WLWT" | "FLWT" = value.operand {
+            let (weights, count) = match value.operand {
+                "WLWT" => (&mut self.wavelength_weights, self.wavelengths.len()),
+                _ => (&mut self.fields.weights, self.fields.x.len().max(self.fields.y.len())),
+            };
+            weights.resize(weights.len().max(count), 1.0);
+            let weight = slot.and_then(|slot| weights.get_mut(slot));
+            *weight.ok_or_else(|| missing("wavelength or field"))? = number;
+            return Ok(());
+        }
         if value.operand == "APER" {
             self.aperture = match self.aperture {
                 Some((line, Aperture::EntrancePupil(_))) => {
@@ -150,6 +171,10 @@ pub(super) struct Fields {
     pub(super) wavelengths: Option<usize>,
     pub(super) x: Vec<f64>,
     pub(super) y: Vec<f64>,
+    /// What each of them weighs.
+    pub(super) weights: Vec<f64>,
+    /// Lines and commands of vignetting factors that are not 0.
+    pub(super) vignetted: Vec<(usize, String)>,
 }
 
 impl Fields {

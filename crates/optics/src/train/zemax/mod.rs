@@ -3,13 +3,14 @@
 //!
 //! | module | idea |
 //! |---|---|
-//! | `sheet` | lines to the rows of the lens data sheet |
+//! | `sheet`, `row` | lines to the lens data sheet, and to its rows |
 //! | `parts` | a row to what it is |
 //! | `configuration` | the values of one position of a zoom lens; field points to field angles; coordinate breaks to tilts and decentrings; bytes to lines: UTF-8 and UTF-16 |
 //! | `format` | which program a file is of, and what its users call things |
 //! | `code_v` | lines of CODE V's files to the same rows |
-//! | `oslo`, `oslo_surface` | statements of OSLO's files, and what they say of one surface |
-//! | `optiland` | optiland's JSON |
+//! | `oslo`, `oslo_statement`, `oslo_surface` | OSLO's files, their statements, and what those say of one surface |
+//! | `optiland`, `optiland_system`, `python_json` | surfaces of optiland's JSON, what it says of the whole, and its numbers |
+//! | `stop` | the stop's opening |
 //! | `pbrt`, `iset` | tables of pbrt's realistic camera, and ISET's JSON, which has the same |
 //! | `photons_to_photos` | tables of PhotonsToPhotos' Optical Bench |
 //! | `write` | a lens file to lines |
@@ -28,25 +29,32 @@ mod configuration;
 mod format;
 mod iset;
 mod optiland;
+mod optiland_system;
 mod oslo;
+mod oslo_statement;
 mod oslo_surface;
 mod parts;
 mod pbrt;
 mod photons_to_photos;
+mod python_json;
+mod row;
 mod sheet;
+mod stop;
 mod write;
 
 use std::path::Path;
 
 use glam::DVec3;
 
-use super::{Isometry, LensError, LensFile, OpticalTrain, SensorMount};
-use crate::element::{ApertureSpec, ElementSpec, GlassesAlone, PartSpec};
+use super::{Isometry, LensFile, OpticalTrain, SensorMount};
+use crate::element::{ApertureSpec, ElementSpec, PartSpec};
 use crate::glass::{AgfCatalogue, GlassSpec, Makers};
-use configuration::{Axes, SheetPlace};
+use configuration::{Axes, Break};
 use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
 pub use format::LensFormat;
-use sheet::{Aperture, SheetRow, SurfaceShape, ZemaxSheet};
+use row::{SheetGlass, SheetRow, SurfaceShape};
+use sheet::ZemaxSheet;
+use stop::open_stop;
 
 /// A difference of focal lengths that is more than rounding (share).
 const SAME_FOCAL_LENGTH: f64 = 1e-3;
@@ -76,6 +84,8 @@ pub struct ZemaxLens {
     pub fields: Vec<f64>,
     /// Wavelengths (nm), the primary one first.
     pub wavelengths: Vec<f64>,
+    /// What each of them weighs; empty where the file weighs none.
+    pub weights: Vec<f64>,
     /// What was changed, assumed or left out, in sentences.
     pub notes: Vec<String>,
     /// The effective focal length that the file states (mm).
@@ -174,7 +184,7 @@ impl ZemaxLens {
         let mut file = LensFile { name: sheet.name.clone(), elements, ..LensFile::default() };
         sheet.format.words().source.clone_into(&mut file.source);
         file.sensor = (sensor != SensorMount::default()).then_some(sensor);
-        let wavelengths = sheet.wavelengths_nm();
+        let (wavelengths, weights) = sheet.wavelengths_nm();
         file.wavelength = wavelengths.first().copied().map(Nanometres);
         // What only the built train tells: the stop, field angles, and whether the focal length is
         // as stated.
@@ -185,6 +195,7 @@ impl ZemaxLens {
             fields,
             file,
             wavelengths,
+            weights,
             notes,
             stated_efl: sheet.stated_efl.map(|efl| efl * sheet.unit),
         };
@@ -238,10 +249,12 @@ impl Importer<'_> {
         let mut axes = Axes::default();
         let mut medium_is_air = true;
         let mut first_z = None;
-        let mut way = Way { space: Isometry::ONE, sense: 1.0, last_z: None };
+        let mut way = Way { space: Isometry::ONE, sense: 1.0, last_z: None, run: None };
         for (i, row) in inner.iter().enumerate() {
             if row.shape == SurfaceShape::CoordinateBreak {
-                axes = axes.broken(&row.coordinate_break(unit));
+                let by = row.coordinate_break(unit);
+                axes = axes.broken(&by);
+                way.run = way.run.filter(|_| by == Break::default());
             } else {
                 let flat_in_air =
                     row.is_flat() && medium_is_air && row.glass.is_none() && !row.mirror;
@@ -256,7 +269,7 @@ impl Importer<'_> {
                         check_turn(row, &here)?;
                     }
                     first_z = first_z.or(Some(here.placed().z));
-                    self.place(part, row, &here.placed(), &mut way);
+                    self.place(part, row, &here, &mut way);
                     if row.mirror {
                         let turned = after_breaks(axes, &rows[i + 2..], unit);
                         self.fold(&here, &turned, &mut way);
@@ -270,11 +283,11 @@ impl Importer<'_> {
                 return Err(ZemaxError::new(row.line, why));
             }
             axes = axes.advanced(row.thickness * unit);
+            way.run = way.run.map(|run| run + row.thickness * unit);
         }
-        let image = axes.unfolded(&way.space, way.sense).placed();
-        if let (Some(last), Some(z)) = (self.elements.last_mut(), way.last_z) {
-            last.mount.thickness = Millimetres(signed(way.sense, image.z - z));
-        }
+        let here = axes.unfolded(&way.space, way.sense);
+        let image = here.placed();
+        self.close_gap(&here, &mut way);
         // Lens coordinates begin at the first element, which need not be the first row.
         self.object_z = (object.thickness.is_finite())
             .then(|| -object.thickness * unit - first_z.unwrap_or_default());
@@ -325,7 +338,7 @@ impl Importer<'_> {
         Ok(())
     }
 
-    fn glass(&self, glass: &sheet::SheetGlass) -> Result<GlassSpec, ZemaxError> {
+    fn glass(&self, glass: &SheetGlass) -> Result<GlassSpec, ZemaxError> {
         let words = self.sheet.format.words();
         let spec = glass.spec.clone().unwrap_or_else(|| GlassSpec::Named(glass.name.clone()));
         let makers: Vec<&str> = self.sheet.makers.iter().map(String::as_str).collect();
@@ -346,8 +359,9 @@ impl Importer<'_> {
         })
     }
 
-    fn place(&mut self, part: PartSpec, row: &SheetRow, placed: &SheetPlace, way: &mut Way) {
-        self.close_gap(placed.z, way);
+    fn place(&mut self, part: PartSpec, row: &SheetRow, here: &Axes, way: &mut Way) {
+        self.close_gap(here, way);
+        let placed = here.placed();
         let mut element = ElementSpec::new(part, 0.0);
         element.mount.stop = row.stop;
         element.mount.tilt = placed.tilt.map(|angle| Degrees(signed(way.sense, angle)));
@@ -363,20 +377,24 @@ impl Importer<'_> {
         here: &Axes,
         way: &mut Way,
     ) {
-        let moved = here.shifted(decentre).placed();
-        self.close_gap(moved.z, way);
+        let moved = here.shifted(decentre);
+        self.close_gap(&moved, way);
+        let moved = moved.placed();
         let mut element = ElementSpec::new(PartSpec::Aperture(opening), 0.0);
         element.mount.tilt = moved.tilt.map(|angle| Degrees(signed(way.sense, angle)));
         element.mount.decentre = moved.decentre.map(Millimetres);
         self.elements.push(element);
     }
 
-    /// Ends the gap behind the last element at `z` (mm).
-    fn close_gap(&mut self, z: f64, way: &mut Way) {
+    /// Ends the gap behind the last element where `here` stands.
+    fn close_gap(&mut self, here: &Axes, way: &mut Way) {
+        let z = here.placed().z;
         if let (Some(last), Some(before)) = (self.elements.last_mut(), way.last_z) {
-            last.mount.thickness = Millimetres(signed(way.sense, z - before));
+            let along = way.run.filter(|_| here.axis() == DVec3::Z);
+            let gap = along.unwrap_or_else(|| signed(way.sense, z - before));
+            last.mount.thickness = Millimetres(gap);
         }
-        way.last_z = Some(z);
+        (way.last_z, way.run) = (Some(z), Some(0.0));
     }
 }
 
@@ -388,6 +406,9 @@ struct Way {
     sense: f64,
     /// z of the last element (mm).
     last_z: Option<f64>,
+    /// The thicknesses since then (mm), as the file has them, where nothing breaks the axis: differences of z
+    /// would round them.
+    run: Option<f64>,
 }
 
 /// Axes (their sines) that count as one.
@@ -416,120 +437,6 @@ fn check_turn(row: &SheetRow, here: &Axes) -> Result<(), ZemaxError> {
         return Err(ZemaxError::new(row.line, why));
     }
     Ok(())
-}
-
-/// The stop's radius (mm) that makes the entrance pupil as wide as `radius` says, from its z (mm).
-fn with_entrance_pupil(
-    train: &OpticalTrain,
-    command: &str,
-    radius: impl FnOnce(f64) -> Result<f64, String>,
-) -> Result<f64, String> {
-    let paraxial = train.paraxial(train.wavelength()).ok();
-    let found = paraxial.and_then(|p| Some((p.entrance_pupil.z?, p.stop_magnification?)));
-    let (z, magnification) =
-        found.ok_or_else(|| format!("{command}: the entrance pupil is at infinity"))?;
-    Ok(radius(z)? * magnification.abs())
-}
-
-/// Sets the stop by the system's aperture, and gives the lens.
-fn open_stop(
-    file: &mut LensFile,
-    (sheet, glasses): (&ZemaxSheet, &[AgfCatalogue]),
-    object_z: Option<f64>,
-    notes: &mut Vec<String>,
-) -> Result<OpticalTrain, ZemaxError> {
-    let build = |file: &LensFile| {
-        file.build(&GlassesAlone(glasses))
-            .map_err(|error| ZemaxError::new(sheet.last_line, error.to_string()))
-    };
-    let train = build(file)?;
-    let Some((line, aperture)) = sheet.aperture else {
-        return float_stop(file, train, sheet, notes, build);
-    };
-    let words = sheet.format.words();
-    let index = train.stop();
-    let written = train.stop_radius();
-    let error = |error: LensError| ZemaxError::new(line, error.to_string());
-    let stop_radius = match aperture {
-        Aperture::EntrancePupil(diameter) => {
-            with_entrance_pupil(&train, words.pupil, |_| Ok(0.5 * diameter * sheet.unit)).map(Some)
-        }
-        Aperture::AtObject(sine) => with_entrance_pupil(&train, words.object_aperture, |pupil| {
-            let object = object_z.ok_or_else(|| {
-                format!(
-                    "{}: the object is at infinity; write {} or {}",
-                    words.object_aperture, words.pupil, words.f_number
-                )
-            })?;
-            Ok((pupil - object).abs() * sine.asin().tan())
-        })
-        .map(Some),
-        Aperture::FNumber(_) => Ok(None),
-    };
-    let opened = match (stop_radius.map_err(|why| ZemaxError::new(line, why))?, aperture) {
-        (Some(radius), _) => train.with_stop_radius(radius).map_err(error)?,
-        (None, Aperture::FNumber(f_number)) => {
-            // What the file says; whether a beam fills it is among the lens' notes.
-            let radius = train.stop_radius_at(f_number).map_err(error)?;
-            train.with_stop_radius(radius).map_err(error)?
-        }
-        (None, _) => train,
-    };
-    let radius = opened.stop_radius();
-    if written.is_finite() && written > 0.0 && (radius - written).abs() > 0.01 * written {
-        notes.push(format!(
-            "{}: the system's aperture gives the stop a radius of {radius:.5} mm; its surface's is \
-             {written:.5} mm",
-            sheet.place(line)
-        ));
-    }
-    let stop = &mut file.elements[index];
-    stop.mount.stop = true;
-    match &mut stop.part {
-        PartSpec::Surface(surface) => surface.semi_diameter = Some(Millimetres(radius)),
-        PartSpec::ThinLens(lens) => lens.semi_diameter = Some(Millimetres(radius)),
-        PartSpec::Biconic(surface) => surface.semi_diameter = Some(Millimetres(radius)),
-        PartSpec::Mirror(mirror) => mirror.semi_diameter = Some(Millimetres(radius)),
-        PartSpec::Freeform(surface) => surface.semi_diameter = Some(Millimetres(radius)),
-        part => *part = PartSpec::circular(radius),
-    }
-    build(file)
-}
-
-/// The lens whose stop is as large as its own surface says, and, where it says nothing, as the widest beam
-/// that the other rims let through.
-fn float_stop(
-    file: &mut LensFile,
-    train: OpticalTrain,
-    sheet: &ZemaxSheet,
-    notes: &mut Vec<String>,
-    build: impl Fn(&LensFile) -> Result<OpticalTrain, ZemaxError>,
-) -> Result<OpticalTrain, ZemaxError> {
-    let index = train.stop();
-    let is_closed = |part: &PartSpec| *part == PartSpec::circular(0.0);
-    if !file.elements[index].mount.stop || !is_closed(&file.elements[index].part) {
-        return Ok(train);
-    }
-    let row = sheet.rows.iter().find(|row| row.stop);
-    let line = row.map_or(sheet.last_line, |row| row.line);
-    let words = sheet.format.words();
-    let widest = train.widest_opening().ok_or_else(|| {
-        let why = format!(
-            "the stop has no {0}, and no other surface limits the beam: write the stop's {0}, or the system's aperture \
-             as {1} or {2}",
-            words.semi_diameter, words.pupil, words.f_number
-        );
-        ZemaxError::new(line, why)
-    })?;
-    notes.push(format!(
-        "{}: the stop has no {}; its radius is {:.5} mm, that of the widest beam on the axis that \
-         the other surfaces let through",
-        sheet.place(line),
-        words.semi_diameter,
-        widest.stop_radius
-    ));
-    file.elements[index].part = PartSpec::circular(widest.stop_radius);
-    build(file)
 }
 
 #[cfg(test)]

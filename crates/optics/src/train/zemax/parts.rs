@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use etendue_geometry::units::{Degrees, Millimetres};
 
-use super::sheet::{Parameter, SheetOpening, SheetRow, SurfaceShape};
+use super::row::{Parameter, SheetOpening, SheetRow, SurfaceShape};
 use super::{Importer, ZemaxError};
 use crate::analysis::ZernikeOrder;
 use crate::element::{

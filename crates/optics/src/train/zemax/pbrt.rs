@@ -10,7 +10,8 @@
 
 use super::ZemaxError;
 use super::format::LensFormat;
-use super::sheet::{Parameter, SheetGlass, SheetRow, SurfaceShape, ZemaxSheet};
+use super::row::{Parameter, SheetGlass, SheetRow, SurfaceShape};
+use super::sheet::ZemaxSheet;
 use crate::glass::GlassSpec;
 
 /// One surface of a camera that traces through a table of them (mm).

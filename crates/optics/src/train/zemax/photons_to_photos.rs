@@ -15,7 +15,8 @@ use std::collections::BTreeMap;
 
 use super::ZemaxError;
 use super::format::LensFormat;
-use super::sheet::{Aperture, Parameter, SheetGlass, SheetRow, SurfaceShape, ZemaxSheet};
+use super::row::{Parameter, SheetGlass, SheetRow, SurfaceShape};
+use super::sheet::{Aperture, ZemaxSheet};
 use crate::glass::{GlassSpec, Makers};
 
 /// The most configurations; zoom lenses are stated at three to six.

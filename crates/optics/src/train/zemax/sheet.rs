@@ -6,16 +6,18 @@
 use std::collections::BTreeMap;
 
 use super::ZemaxError;
-use super::configuration::{Break, ConfigurationValue, Fields};
+use super::configuration::{ConfigurationValue, Fields};
 use super::format::LensFormat;
-use crate::element::FreeformSpec;
-use crate::glass::GlassSpec;
+use super::row::{Parameter, SheetRow};
 
 /// The most surfaces.
 const MOST_SURFACES: usize = crate::train::MOST_ELEMENTS;
 
 /// The most wavelengths, as OpticStudio has it.
 const MOST_WAVELENGTHS: usize = 24;
+
+/// The most surfaces of which a note of one kind is made.
+const MOST_TOLD: usize = 5;
 
 /// A whole file.
 #[derive(Debug, Default)]
@@ -56,93 +58,6 @@ pub(super) enum Aperture {
     AtObject(f64),
 }
 
-/// A surface.
-#[derive(Debug, Default)]
-pub(super) struct SheetRow {
-    pub(super) line: usize,
-    pub(super) shape: SurfaceShape,
-    pub(super) curvature: f64,
-    pub(super) conic: f64,
-    pub(super) thickness: f64,
-    pub(super) glass: Option<SheetGlass>,
-    /// Whether its glass is MIRROR.
-    pub(super) mirror: bool,
-    /// What it stops of light beside its rim, in the file's unit.
-    pub(super) openings: Vec<SheetOpening>,
-    /// Where those stand across its axis.
-    pub(super) aperture_decentre: [f64; 2],
-    /// Its own inner radius.
-    pub(super) inner: f64,
-    pub(super) stop: bool,
-    pub(super) parameters: BTreeMap<usize, Parameter>,
-    pub(super) extra: BTreeMap<usize, Parameter>,
-    /// Of a [`SurfaceShape::Freeform`]: all that it has beside its base, glass and rim, in millimetres.
-    pub(super) freeform: Option<Box<FreeformSpec>>,
-    pub(super) semi_diameter: Option<f64>,
-    pub(super) fixed: bool,
-    pub(super) clear: Option<f64>,
-}
-
-/// The types that have a counterpart here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum SurfaceShape {
-    #[default]
-    Standard,
-    EvenAsphere,
-    ExtendedAsphere,
-    Paraxial,
-    CoordinateBreak,
-    OddAsphere,
-    Toroidal,
-    Biconic,
-    Grating,
-    Binary2,
-    ZernikeStandard,
-    ZernikeFringe,
-    Fresnel,
-    Freeform,
-}
-
-/// An aperture of a surface that is no rim.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum SheetOpening {
-    /// A disk of this radius in the way.
-    Disk(f64),
-    /// By half its sides.
-    Rectangle([f64; 2]),
-    /// By half its axes.
-    Ellipse([f64; 2]),
-    /// Width and number of arms.
-    Spider(f64, u32),
-    /// A circle that stands beside the axis, by its radius.
-    Circle(f64),
-}
-
-#[derive(Debug, Clone)]
-pub(super) struct SheetGlass {
-    pub(super) line: usize,
-    pub(super) name: String,
-    /// What it is where its name does not say so.
-    pub(super) spec: Option<GlassSpec>,
-}
-
-impl SheetGlass {
-    /// A glass by nd and Abbe number; one of 0 is a glass without dispersion.
-    pub(super) fn model(line: usize, name: &str, nd: f64, vd: f64) -> Self {
-        let spec = match vd {
-            0.0 => GlassSpec::Constant(nd),
-            _ => GlassSpec::Abbe { nd, vd },
-        };
-        Self { line, name: name.to_owned(), spec: Some(spec) }
-    }
-}
-
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Parameter {
-    pub(super) line: usize,
-    pub(super) value: f64,
-}
-
 #[derive(Debug)]
 pub(super) struct Ignored {
     first: usize,
@@ -153,7 +68,7 @@ pub(super) struct Ignored {
 pub(super) struct SheetLine<'a> {
     pub(super) number: usize,
     pub(super) command: &'a str,
-    rest: &'a str,
+    pub(super) rest: &'a str,
 }
 
 impl SheetLine<'_> {
@@ -165,13 +80,13 @@ impl SheetLine<'_> {
         self.rest.split_whitespace().nth(i)
     }
 
-    fn number(&self, i: usize) -> Result<f64, ZemaxError> {
+    pub(super) fn number(&self, i: usize) -> Result<f64, ZemaxError> {
         let word = self.word(i).ok_or_else(|| self.error("a number is missing"))?;
         self.parse(word)
     }
 
     /// The number at `i`, or `absent`.
-    fn number_or(&self, i: usize, absent: f64) -> Result<f64, ZemaxError> {
+    pub(super) fn number_or(&self, i: usize, absent: f64) -> Result<f64, ZemaxError> {
         self.word(i).map_or(Ok(absent), |word| self.parse(word))
     }
 
@@ -231,7 +146,37 @@ impl ZemaxSheet {
         if sheet.rows.is_empty() {
             return Err(ZemaxError::new(1, "no SURF in the file; is it a sequential Zemax lens?"));
         }
+        sheet.check_end(in_surface && !text.ends_with(['\n', '\r']))?;
         Ok(sheet)
+    }
+
+    /// Refuses a file whose end is missing: its last surface is no image. `in_line` is whether the text ends inside
+    /// of a line of it.
+    fn check_end(&self, in_line: bool) -> Result<(), ZemaxError> {
+        // What has no surface between is told by who wants one.
+        let [_, .., image] = self.rows.as_slice() else { return Ok(()) };
+        let number = self.rows.len() - 1;
+        let why = if in_line && image.is_closed {
+            "the last line has no end".to_owned()
+        } else if !image.is_closed {
+            format!("SURF {number} has no DISZ")
+        } else if image.thickness != 0.0 {
+            format!(
+                "the last surface, SURF {number}, has a distance of {} behind it (DISZ)",
+                image.thickness
+            )
+        } else if image.glass.is_some() || image.mirror || image.stop {
+            format!(
+                "the last surface, SURF {number}, is a glass, a mirror or the stop, and no image"
+            )
+        } else {
+            return Ok(());
+        };
+        let why = format!(
+            "{why}: the file is cut short. Save it again; where it is whole, end it by an image surface with DISZ 0 and a \
+             line break"
+        );
+        Err(ZemaxError::new(self.last_line, why))
     }
 
     fn begin_surface(&mut self, line: &SheetLine<'_>) -> Result<(), ZemaxError> {
@@ -256,7 +201,21 @@ impl ZemaxSheet {
             // The stop's own size.
             "FLOA" => self.aperture = None,
             "GCAT" => self.makers = line.rest.split_whitespace().map(maker).collect(),
-            "WAVM" => self.set_wavelength(line.index(0)?, line.number(1)?),
+            "WAVM" => {
+                let (number, weight) = (line.index(0)?, line.number_or(2, 1.0)?);
+                self.set_wavelength(number, line.number(1)?);
+                let slot = number.clamp(1, MOST_WAVELENGTHS) - 1;
+                self.wavelength_weights.resize(self.wavelength_weights.len().max(slot + 1), 1.0);
+                self.wavelength_weights[slot] = weight;
+            }
+            "WWGT" | "WWGN" => self.wavelength_weights = line.numbers()?,
+            "FWGT" | "FWGN" => self.fields.weights = line.numbers()?,
+            "VDXN" | "VDYN" | "VCXN" | "VCYN" | "VANN" | "VDSZ" => {
+                // Slots of fields that are not in use stand there as well.
+                if line.numbers()?.iter().any(|factor| *factor != 0.0) {
+                    self.fields.vignetted.push((line.number, line.command.to_owned()));
+                }
+            }
             "WAVL" | "WAVN" => self.wavelengths = line.numbers()?,
             "PWAV" | "PRIM" => self.primary = line.index(0)?,
             "FTYP" => self.fields.set_kind(line)?,
@@ -352,8 +311,8 @@ impl ZemaxSheet {
         Ok(())
     }
 
-    /// Wavelengths (nm) in use, the primary one first.
-    pub(super) fn wavelengths_nm(&self) -> Vec<f64> {
+    /// Wavelengths (nm) in use, the primary one first, and their weights; none where the file weighs none.
+    pub(super) fn wavelengths_nm(&self) -> (Vec<f64>, Vec<f64>) {
         let used = match self.fields.wavelengths {
             Some(count) if count > 0 => count,
             // Slots that are not in use repeat the same value.
@@ -364,16 +323,26 @@ impl ZemaxSheet {
             }
         };
         let used = &self.wavelengths[..used.min(self.wavelengths.len()).min(MOST_WAVELENGTHS)];
-        let mut all: Vec<f64> = Vec::new();
-        let primary = used.get(self.primary.max(1) - 1).or(used.first());
-        for &micrometres in primary.into_iter().chain(used) {
+        let (mut all, mut weights): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+        let primary = self.primary.max(1) - 1;
+        let primary = if primary < used.len() { primary } else { 0 };
+        for i in std::iter::once(primary).chain(0..used.len()) {
+            let Some(micrometres) = used.get(i) else { continue };
             // Micrometres to three decimals more than anyone writes: 0.55 * 1000 is 550.
             let nanometres = (micrometres * 1e9).round() / 1e6;
             if nanometres > 0.0 && !all.contains(&nanometres) {
                 all.push(nanometres);
+                weights.push(self.wavelength_weights.get(i).copied().unwrap_or(1.0));
             }
         }
-        all
+        // Those that make no mean weigh nothing against each other.
+        let is_mean = weights.iter().all(|weight| *weight >= 0.0 && weight.is_finite())
+            && weights.iter().any(|weight| *weight > 0.0);
+        let are_equal = weights.iter().all(|weight| Some(weight) == weights.first());
+        if are_equal || !is_mean {
+            weights.clear();
+        }
+        (all, weights)
     }
 
     /// Where something is: a line or, in files in which surfaces have none, a surface.
@@ -385,8 +354,48 @@ impl ZemaxSheet {
         }
     }
 
+    /// Sentences on numbers of surfaces that their type has no use for here.
+    fn unread_parameters(&self) -> Vec<String> {
+        let unread = |row: &SheetRow| {
+            let known = row.shape.parameters();
+            let is_unread = |(number, parameter): &(&usize, &Parameter)| {
+                !known.contains(*number) && parameter.value != 0.0
+            };
+            let numbers: Vec<(usize, usize)> = row
+                .parameters
+                .iter()
+                .filter(is_unread)
+                .map(|(number, parameter)| (*number, parameter.line))
+                .collect();
+            let (_, line) = *numbers.first()?;
+            let names: Vec<String> =
+                numbers.iter().map(|(number, _)| format!("PARM {number}")).collect();
+            let which = names.join(", ");
+            Some(format!(
+                "line {line}: {which} of this type of surface is left out; it is read as if it were 0"
+            ))
+        };
+        self.rows.iter().filter_map(unread).take(MOST_TOLD).collect()
+    }
+
     pub(super) fn what_is_left_out(&self) -> Vec<String> {
         let mut notes = self.notes.clone();
+        if let [first, ..] = &self.fields.vignetted[..] {
+            let names: Vec<&str> =
+                self.fields.vignetted.iter().map(|(_, name)| name.as_str()).collect();
+            notes.push(format!(
+                "line {}: vignetting factors ({}) are left out: rays end at the rims of surfaces, and not at a smaller \
+                 pupil",
+                first.0,
+                names.join(", ")
+            ));
+        }
+        let used = self.fields.count.unwrap_or(self.fields.weights.len());
+        let weights = &self.fields.weights[..used.min(self.fields.weights.len())];
+        if weights.iter().any(|weight| Some(weight) != weights.first()) {
+            notes.push(format!("the weights of fields (FWGN), {weights:?}, are left out: nothing here takes a mean of fields"));
+        }
+        notes.extend(self.unread_parameters());
         if self.configurations > 1 {
             notes.push(format!(
                 "of {} configurations, number {} is taken",
@@ -421,134 +430,6 @@ impl ZemaxSheet {
     }
 }
 
-impl SheetRow {
-    /// Whether the line is understood.
-    fn read(&mut self, line: &SheetLine<'_>) -> Result<bool, ZemaxError> {
-        match line.command {
-            "STOP" => self.stop = true,
-            "TYPE" => self.shape = shape(line)?,
-            "CURV" => self.curvature = line.number(0)?,
-            "CONI" => self.conic = line.number(0)?,
-            "DISZ" if line.rest.starts_with("INF") => self.thickness = f64::INFINITY,
-            "DISZ" => self.thickness = line.number(0)?,
-            "GLAS" if line.word(0) == Some("MIRROR") => self.mirror = true,
-            "GLAS" => self.glass = glass(line)?,
-            "PARM" => {
-                let parameter = Parameter { line: line.number, value: line.number(1)? };
-                self.parameters.insert(line.index(0)?, parameter);
-            }
-            "XDAT" => {
-                let parameter = Parameter { line: line.number, value: line.number(1)? };
-                self.extra.insert(line.index(0)?, parameter);
-            }
-            "DIAM" => {
-                let length = line.number(0)?;
-                if length < 0.0 {
-                    return Err(
-                        line.error(format!("a semi-diameter of {length} must not be below zero"))
-                    );
-                }
-                self.semi_diameter = Some(length).filter(|length| *length > 0.0);
-                self.fixed = line.number_or(1, 0.0)? == 1.0;
-            }
-            "CLAP" | "FLAP" => {
-                self.inner = line.number(0)?;
-                self.clear = Some(line.number(1)?).filter(|length| *length > 0.0);
-                if self.inner < 0.0 || self.clear.is_some_and(|clear| self.inner >= clear) {
-                    return Err(
-                        line.error("the inner radius must be from 0 on and below the outer one")
-                    );
-                }
-            }
-            "OBDC" => self.aperture_decentre = [line.number(0)?, line.number_or(1, 0.0)?],
-            // One that covers nothing.
-            "OBSC" if line.number_or(1, 0.0)? == 0.0 => {}
-            "OBSC" if line.number(0)? == 0.0 && line.number(1)? > 0.0 => {
-                self.openings.push(SheetOpening::Disk(line.number(1)?));
-            }
-            "SQAP" | "ELAP" => {
-                let half = [line.number(0)?, line.number(1)?];
-                if half.iter().any(|half| *half <= 0.0) {
-                    return Err(line.error("both half widths must be positive"));
-                }
-                self.openings.push(match line.command {
-                    "SQAP" => SheetOpening::Rectangle(half),
-                    _ => SheetOpening::Ellipse(half),
-                });
-            }
-            "SPID" => {
-                let arms = u32::try_from(line.index(1)?).unwrap_or(u32::MAX);
-                self.openings.push(SheetOpening::Spider(line.number(0)?, arms));
-            }
-            "OBSC" | "SQOB" | "ELOB" => {
-                return Err(line.error(
-                    "of what stands in the way of the light only round disks (OBSC 0 and a radius) and spiders (SPID) \
-                     can be imported; take the line out for the lens without it, and add its shadow to the lens file \
-                     that --save writes, as an `aperture` with a mask (\"shape\": \"image\")",
-                ));
-            }
-            "UDAP" => {
-                return Err(line.error(
-                    "an aperture by points of the user's cannot be imported; write CLAP 0 and the radius that the \
-                     light is to go by, SQAP or ELAP with half widths, or take the line out to go by the \
-                     semi-diameter",
-                ));
-            }
-            // The substrate of a mirror, of which every surface has one; a mirror is GLAS MIRROR.
-            _ => return Ok(false),
-        }
-        Ok(true)
-    }
-
-    /// How far from the axis light passes, in the file's unit.
-    pub(super) fn semi_diameter(&self) -> Option<f64> {
-        // One that stands beside the axis is a sheet of its own, and rims of rectangles are corners.
-        let is_beside = self.aperture_decentre != [0.0; 2];
-        match self.clear {
-            Some(_) if is_beside => None,
-            Some(clear) => Some(clear),
-            None if is_beside || self.has_corners() => None,
-            None => self.semi_diameter,
-        }
-    }
-
-    /// Sets the radius of its clear aperture, in the file's unit.
-    pub(super) fn set_clear(&mut self, radius: f64) {
-        self.clear = Some(radius).filter(|radius| *radius > 0.0);
-    }
-
-    /// Sets that of its edge.
-    pub(super) fn set_semi_diameter(&mut self, radius: f64) {
-        self.semi_diameter = Some(radius).filter(|radius| *radius > 0.0);
-    }
-
-    /// The radius of its own clear aperture.
-    pub(super) fn clear_radius(&self) -> Option<f64> {
-        self.clear
-    }
-
-    fn has_corners(&self) -> bool {
-        let is_shape = |opening: &SheetOpening| {
-            matches!(opening, SheetOpening::Rectangle(_) | SheetOpening::Ellipse(_))
-        };
-        self.openings.iter().any(is_shape)
-    }
-
-    /// Whether someone wants this surface to stop light.
-    pub(super) fn has_fixed_rim(&self) -> bool {
-        self.clear.is_some() || (self.fixed && self.semi_diameter.is_some())
-    }
-
-    pub(super) fn coordinate_break(&self, unit: f64) -> Break {
-        let parameter = |i: usize| self.parameters.get(&i).map_or(0.0, |p| p.value);
-        Break {
-            decentre: [parameter(1) * unit, parameter(2) * unit],
-            tilt: [parameter(3), parameter(4), parameter(5)],
-            turned_first: parameter(6) != 0.0,
-        }
-    }
-}
-
 fn unit(line: &SheetLine<'_>) -> Result<f64, ZemaxError> {
     match line.word(0) {
         Some("MM") => Ok(1.0),
@@ -565,43 +446,6 @@ fn unit(line: &SheetLine<'_>) -> Result<f64, ZemaxError> {
 /// A catalogue's name as ours: `SCHOTT_2000` is Schott.
 fn maker(catalogue: &str) -> String {
     catalogue.split(['_', '-']).next().unwrap_or_default().to_owned()
-}
-
-fn shape(line: &SheetLine<'_>) -> Result<SurfaceShape, ZemaxError> {
-    match line.word(0) {
-        Some("STANDARD") => Ok(SurfaceShape::Standard),
-        Some("EVENASPH") => Ok(SurfaceShape::EvenAsphere),
-        Some("XASPHERE") => Ok(SurfaceShape::ExtendedAsphere),
-        Some("PARAXIAL") => Ok(SurfaceShape::Paraxial),
-        Some("COORDBRK") => Ok(SurfaceShape::CoordinateBreak),
-        Some("ODDASPHE") => Ok(SurfaceShape::OddAsphere),
-        Some("TOROIDAL") => Ok(SurfaceShape::Toroidal),
-        Some("BICONICX") => Ok(SurfaceShape::Biconic),
-        Some("DGRATING") => Ok(SurfaceShape::Grating),
-        Some("BINARY_2") => Ok(SurfaceShape::Binary2),
-        Some("SZERNSAG") => Ok(SurfaceShape::ZernikeStandard),
-        Some("FZERNSAG") => Ok(SurfaceShape::ZernikeFringe),
-        Some("FRESNELS") => Ok(SurfaceShape::Fresnel),
-        other => Err(line.error(format!(
-            "the surface type {} has no counterpart here; known: STANDARD, EVENASPH, XASPHERE, ODDASPHE, \
-             TOROIDAL, BICONICX, SZERNSAG, FZERNSAG, FRESNELS, DGRATING, BINARY_2, PARAXIAL, COORDBRK",
-            other.unwrap_or_default()
-        ))),
-    }
-}
-
-fn glass(line: &SheetLine<'_>) -> Result<Option<SheetGlass>, ZemaxError> {
-    let name = line.word(0).ok_or_else(|| line.error("a name is missing"))?;
-    // Old files name the air.
-    if name == "AIR" {
-        return Ok(None);
-    }
-    let is_model = name == "___BLANK" || line.word(1) == Some("1");
-    Ok(Some(match is_model {
-        // OpticStudio takes an Abbe number of 0 for a glass without dispersion.
-        true => SheetGlass::model(line.number, name, line.number(3)?, line.number_or(4, 0.0)?),
-        false => SheetGlass { line: line.number, name: name.to_owned(), spec: None },
-    }))
 }
 
 /// `EFL 50`, `EFL=50 mm`, `EFFL: 50` somewhere in a title or a note.
