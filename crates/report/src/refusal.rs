@@ -15,7 +15,11 @@ use std::fmt;
 /// Whoever knows no place says why in a text, with the remedy behind `\nhint: ` where there is one: whoever adds the
 /// place makes a refusal of it, and so the remedy stays at the end, through errors that are texts alone, too.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Refusal {
+pub struct Refusal(Box<Words>);
+
+/// What it is made of, in a box: results that hardly ever are refusals stay small.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+struct Words {
     place: String,
     why: String,
     remedy: Option<String>,
@@ -33,7 +37,7 @@ impl Refusal {
             Some((why, remedy)) => (why.to_owned(), Some(remedy.to_owned())),
             None => (why, None),
         };
-        Self { place: String::new(), why, remedy }
+        Self(Box::new(Words { place: String::new(), why, remedy }))
     }
 
     /// What an error says, and behind it what those of its causes say that it does not quote.
@@ -43,9 +47,9 @@ impl Refusal {
         let mut cause = error.source();
         while let Some(inner) = cause {
             let said = Self::new(inner.to_string());
-            if !refusal.why.contains(&said.why) {
-                refusal = refusal.and(": ").and(&said.why);
-                if let Some(remedy) = said.remedy {
+            if !refusal.why().contains(said.why()) {
+                refusal = refusal.and(": ").and(said.why());
+                if let Some(remedy) = said.0.remedy {
                     refusal = refusal.hint(remedy);
                 }
             }
@@ -57,19 +61,19 @@ impl Refusal {
     /// The same at a place, which stands before those that it has: a file, a line, a key.
     #[must_use]
     pub fn at(mut self, place: impl fmt::Display) -> Self {
-        let inner = std::mem::take(&mut self.place);
-        self.place = place.to_string();
-        if !self.place.is_empty() && !inner.is_empty() {
-            self.place.push_str(": ");
+        let inner = std::mem::replace(&mut self.0.place, place.to_string());
+        let outer = &mut self.0.place;
+        if !outer.is_empty() && !inner.is_empty() {
+            outer.push_str(": ");
         }
-        self.place.push_str(&inner);
+        outer.push_str(&inner);
         self
     }
 
     /// The same with more words behind those that say why.
     #[must_use]
     pub fn and(mut self, words: &str) -> Self {
-        self.why.push_str(words);
+        self.0.why.push_str(words);
         self
     }
 
@@ -77,7 +81,7 @@ impl Refusal {
     #[must_use]
     pub fn hint(mut self, remedy: impl Into<String>) -> Self {
         let remedy = remedy.into();
-        self.remedy = Some(match self.remedy {
+        self.0.remedy = Some(match self.0.remedy.take() {
             Some(before) => before + HINT + &remedy,
             None => remedy,
         });
@@ -87,29 +91,30 @@ impl Refusal {
     /// Where; empty where that is not known.
     #[must_use]
     pub fn place(&self) -> &str {
-        &self.place
+        &self.0.place
     }
 
     /// Why.
     #[must_use]
     pub fn why(&self) -> &str {
-        &self.why
+        &self.0.why
     }
 
     /// What would do.
     #[must_use]
     pub fn remedy(&self) -> Option<&str> {
-        self.remedy.as_deref()
+        self.0.remedy.as_deref()
     }
 }
 
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if !self.place.is_empty() {
-            write!(f, "{}: ", self.place)?;
+        let Words { place, why, remedy } = &*self.0;
+        if !place.is_empty() {
+            write!(f, "{place}: ")?;
         }
-        f.write_str(&self.why)?;
-        match &self.remedy {
+        f.write_str(why)?;
+        match remedy {
             Some(remedy) => write!(f, "{HINT}{remedy}"),
             None => Ok(()),
         }

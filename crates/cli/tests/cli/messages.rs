@@ -287,7 +287,7 @@ fn refusals_are_whole() {
         ("word.json", r#"{"etendue": 1, "camera": {"type": "pinhol"}}"#),
         (
             "material.json",
-            r#"{"etendue": 1, "objects": [{"shape": "box", "material": "cley"}], "materials": {"clay": {"type": "matte"}}, "camera": {"type": "pinhole"}}"#,
+            r#"{"etendue": 1, "objects": [{"shape": "box", "material": "cley"}], "materials": {"clay": {"type": "matte", "color": [1, 1, 1]}}, "camera": {"type": "pinhole"}}"#,
         ),
         (
             "file.json",
@@ -335,9 +335,9 @@ fn refusals_are_whole() {
         vec!["check", "model.obj", "--camera", "nobody"],
         vec!["lens", "scene.json"],
         vec!["lens", "solid.stl"],
-        vec!["merge", "model.obj"],
+        vec!["merge", "out", "model.obj"],
         vec!["render", "scene.json", "--shard", "9/8"],
-        vec!["render", "scene.json", "--report", "scene.json"],
+        vec!["render", "scene.json", "-o", "out", "--report", "scene.json"],
     ]);
     let folder = bench.path("").canonicalize().expect("the folder").display().to_string();
     let mut all = String::new();

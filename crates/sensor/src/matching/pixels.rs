@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::{Fit, MatchError, NEARLY_SATURATED};
-use crate::least_squares::NormalEquations;
 use crate::Sensor;
+use crate::least_squares::NormalEquations;
 
 /// The share of the brightest signal by which a photograph may be bent.
 const MOST_BENT: f64 = 0.05;

@@ -146,10 +146,11 @@ pub(super) fn encoded_texture(
 fn refused(path: &Path, missing: &[(&str, &str)]) -> Refusal {
     let names: Vec<&str> = missing.iter().map(|(name, _)| *name).collect();
     let why = Refusal::new(format!("needs {}, not supported", names.join(" and ")));
-    let mut remedies: Vec<String> =
-        missing.iter().map(|(_, command)| with_name(path, command)).collect();
-    remedies.dedup();
-    remedies.into_iter().fold(why, Refusal::hint).at(path.display())
+    let remedies = missing.iter().map(|&(name, command)| match missing.len() {
+        1 => with_name(path, command),
+        _ => format!("{name}: {}", with_name(path, command)),
+    });
+    remedies.fold(why, Refusal::hint).at(path.display())
 }
 
 /// The command with the file's own name in it, quoted for a shell where it has blanks.

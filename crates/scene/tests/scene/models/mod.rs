@@ -72,7 +72,7 @@ pub(crate) fn refused(name: &str, bytes: Vec<u8>, words: &[&str]) {
 fn what_cannot_be_opened_is_named() {
     let folder = folder();
     let missing = error(&folder.path().join("none.glb"));
-    assert!(missing.contains("none.glb") && missing.contains("cannot read"), "{missing}");
+    assert!(missing.contains("none.glb") && missing.contains("cannot be read"), "{missing}");
     assert!(error(&write(&folder, "a.fbx", "x")).contains("use .gltf, .glb, .obj or .ply"));
     std::fs::create_dir(folder.path().join("dir.obj")).unwrap();
     assert!(error(&folder.path().join("dir.obj")).contains("not a regular file"));
