@@ -187,7 +187,7 @@ mod tests {
         let mut state = 1_u32;
         let mut byte = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 24) as u8
+            state.to_be_bytes()[0]
         };
         let texels = (0..4 * width * height).map(|_| byte()).collect();
         DynamicImage::ImageRgba8(image::RgbaImage::from_raw(width, height, texels).unwrap())
