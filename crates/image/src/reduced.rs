@@ -246,7 +246,7 @@ mod tests {
             }
         }
         // Black and white are half of the light, not of the bytes.
-        let checker = |x: u32, y: u32| image::Luma([255 * u8::from((x + y) % 2 == 0)]);
+        let checker = |x: u32, y: u32| image::Luma([255 * u8::from((x + y).is_multiple_of(2))]);
         let checker = DynamicImage::ImageLuma8(image::ImageBuffer::from_fn(8, 8, checker));
         let bytes = encoded(&checker, ImageFormat::Png);
         let mean = decode(&bytes, within(1.0, true)).unwrap();
