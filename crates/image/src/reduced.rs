@@ -187,7 +187,7 @@ mod tests {
         let mut state = 1_u32;
         let mut byte = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 24) as u8
+            state.to_be_bytes()[0]
         };
         let texels = (0..4 * width * height).map(|_| byte()).collect();
         DynamicImage::ImageRgba8(image::RgbaImage::from_raw(width, height, texels).unwrap())
@@ -246,7 +246,7 @@ mod tests {
             }
         }
         // Black and white are half of the light, not of the bytes.
-        let checker = |x: u32, y: u32| image::Luma([255 * u8::from((x + y) % 2 == 0)]);
+        let checker = |x: u32, y: u32| image::Luma([255 * u8::from((x + y).is_multiple_of(2))]);
         let checker = DynamicImage::ImageLuma8(image::ImageBuffer::from_fn(8, 8, checker));
         let bytes = encoded(&checker, ImageFormat::Png);
         let mean = decode(&bytes, within(1.0, true)).unwrap();

@@ -44,7 +44,10 @@ impl Plan {
             )
         });
         let images = (taken.images > 0).then(|| {
-            format!("{} images in as few texels as the nearest view can tell apart", taken.images)
+            format!(
+                "images in as few texels as the nearest view can tell apart: {} of them",
+                taken.images
+            )
         });
         let all = camera.into_iter().chain(bounces).chain(detail).chain(images);
         let all: Vec<String> = all.collect();

@@ -170,7 +170,7 @@ fn nearest(scene: &Scene, uses: &[PlacedImage]) -> Option<f64> {
         }
         let distances = (0..mesh.triangles.len()).into_par_iter().map(|triangle| {
             let corners = mesh.corners(triangle).map(|p| placement.world_from_mesh.point(p));
-            to_box(eye, Bounds::of_points(corners.into_iter()))
+            to_box(eye, Bounds::of_points(corners))
         });
         distances.reduce(|| f64::INFINITY, f64::min)
     };

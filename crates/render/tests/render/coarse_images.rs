@@ -20,8 +20,10 @@ fn sign(folder: &Path, changes: &[(&str, Value)]) -> Scene {
     if !file.exists() {
         let wave = |x: u32, y: u32| {
             let phase = f64::from(x) / 90.0 + (f64::from(y) / 160.0).sin();
-            let fine = if (x / 2 + y / 2) % 2 == 0 { 30.0 } else { -30.0 };
-            (128.0 + 90.0 * phase.sin() + fine) as u8
+            let fine = if (x / 2 + y / 2).is_multiple_of(2) { 30.0 } else { -30.0 };
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "8 to 248")]
+            let byte = (128.0 + 90.0 * phase.sin() + fine) as u8;
+            byte
         };
         let image =
             image::RgbImage::from_fn(SIDE, SIDE, |x, y| image::Rgb([wave(x, y), wave(y, x), 200]));

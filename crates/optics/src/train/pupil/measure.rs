@@ -278,7 +278,7 @@ impl ExitPupil {
         numbers: Range<u32>,
         radius_at: impl Fn(&NodePlace, [f64; 4]) -> f64,
     ) -> Vec<Stray> {
-        let checks = numbers.len() as u32 / if lens.is_costly() { 4 } else { 1 };
+        let checks = (numbers.end - numbers.start) / if lens.is_costly() { 4 } else { 1 };
         let first = numbers.start;
         let mut rays = LensRays::with_capacity(checks as usize);
         let mut strays = Vec::with_capacity(checks as usize);

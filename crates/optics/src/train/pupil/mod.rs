@@ -182,7 +182,8 @@ impl Outline {
 
 impl ExitPupil {
     /// Measures the exit pupil for a sensor of half width and half height `half_size` (mm) at
-    /// `sensor_z`, tilted and decentred as the lens file says, at all of `wavelengths` (nm).
+    /// `sensor_z`, tilted and decentred as the lens file says, for light of all of `wavelengths` (nm): at a few of them,
+    /// and checked at the others.
     ///
     /// # Errors
     ///
