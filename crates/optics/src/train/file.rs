@@ -10,13 +10,14 @@ use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::folds::{self, Isometry};
 use super::{
     Element, LensError, MOST_ELEMENTS, MonochromaticTrain, OpticalTrain, RayPath, Side,
     remove_notes,
 };
 use crate::element::{
-    BiconicSpec, Clip, ElementSpec, Frame, FreeformSpec, GradedGap, Gradient, LossesSpec, PartSpec,
-    RayStatus, Resolve, SurfaceSpec,
+    BiconicSpec, Clip, CoordinateBreak, CoordinateBreakSpec, ElementSpec, Frame, FreeformSpec,
+    GradedGap, Gradient, LossesSpec, Mount, Part, PartSpec, RayStatus, Resolve, SurfaceSpec,
 };
 use crate::glass::{AgfCatalogue, FRAUNHOFER_D, Glass, GlassError};
 use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
@@ -111,7 +112,11 @@ impl LensFile {
         let (mut z, mut sense) = (0.0, 1.0);
         for (index, spec) in self.elements.iter().enumerate() {
             let error = |why| LensError::Element { index, why };
-            let element = place(spec, (z, sense), resolve).map_err(error)?;
+            let mut element = place(spec, (z, sense), resolve).map_err(error)?;
+            if let PartSpec::CoordinateBreak(broken) = &spec.part {
+                let turn = self.axis_behind(index, broken, (z, sense), &elements).map_err(error)?;
+                element = Element { part: Part::CoordinateBreak(turn), frame: Frame::on_axis(z) };
+            }
             if element.part.mirror().is_some() {
                 sense = -sense;
                 check_gap(spec.mount.thickness.0, sense).map_err(error)?;
@@ -148,6 +153,43 @@ impl LensFile {
         train.with_stop(self.stop()?)
     }
 
+    /// How the axis runs behind a break at z (mm) of the way of light.
+    fn axis_behind(
+        &self,
+        index: usize,
+        broken: &CoordinateBreakSpec,
+        (z, sense): (f64, f64),
+        before: &[Element],
+    ) -> Result<CoordinateBreak, String> {
+        let mount = &self.elements[index].mount;
+        if mount.stop {
+            return Err(
+                "a coordinate_break stops nothing; mark another element as the stop".to_owned()
+            );
+        }
+        let tilt = mount.tilt.map(|angle| along(sense, angle.0));
+        let decentre = mount.decentre.map(|length| length.0);
+        if !broken.rotation.0.is_finite() {
+            return Err("rotation must be finite".to_owned());
+        }
+        let Some(to) = broken.return_to else { return Ok(broken.build(tilt, decentre)) };
+        let bare = Mount { thickness: mount.thickness, ..Mount::default() };
+        let alone = CoordinateBreakSpec { return_to: Some(to), ..CoordinateBreakSpec::default() };
+        if *mount != bare || *broken != alone {
+            return Err("give either return_to, or tilt, rotation and decentre".to_owned());
+        }
+        if to >= index {
+            return Err(format!("return_to is {to}; it must be an element before this one"));
+        }
+        let spaces = folds::built(before);
+        let there = spaces[to].after(&Isometry::along(before[to].frame.vertex.z - z));
+        spaces[index].inverse().after(&there).to_break(z).ok_or_else(|| {
+            format!(
+                "return_to is {to}, and an odd number of mirrors stands between; write the turns"
+            )
+        })
+    }
+
     /// The gradient behind an element, if it has one.
     fn gradient(
         &self,
@@ -170,9 +212,8 @@ impl LensFile {
         let base = medium.index(wavelength).map_err(|source| LensError::Glass { index, source })?;
         // Up to the surface that ends it, past sheets.
         let behind = self.elements[index + 1..].iter();
-        let end = { behind }.position(|spec| {
-            !matches!(spec.part, PartSpec::Aperture(_) | PartSpec::Filter(_))
-        });
+        let end = { behind }
+            .position(|spec| !matches!(spec.part, PartSpec::Aperture(_) | PartSpec::Filter(_)));
         let Some(end) = end.map(|end| index + 1 + end) else {
             let why = "a gradient ends at a surface; add the one behind it";
             return Err(error(why.to_owned()));
@@ -185,7 +226,8 @@ impl LensFile {
                 | PartSpec::Aperture(_)
                 | PartSpec::Filter(_)
                 | PartSpec::MicrolensArray(_)
-                | PartSpec::Mirror(_) => false,
+                | PartSpec::Mirror(_)
+                | PartSpec::CoordinateBreak(_) => false,
             };
             if !bends {
                 return Err(error(format!(

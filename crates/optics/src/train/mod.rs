@@ -417,6 +417,12 @@ impl OpticalTrain {
                     .to_owned(),
             );
         }
+        if self.elements.iter().any(|e| matches!(e.part, Part::CoordinateBreak(_))) {
+            notes.push(
+                "the axis breaks: places and directions behind a coordinate_break are told along the new axis"
+                    .to_owned(),
+            );
+        }
         if !self.elements.iter().all(|e| e.frame.is_axial()) {
             notes.push(
                 "the paraxial analysis leaves tilts and decentrings out; rays do not".to_owned(),

@@ -3,6 +3,7 @@
 mod asphere_crossings;
 mod code_v;
 mod components;
+mod coordinate_breaks;
 mod exit_pupil;
 mod gradients;
 mod lens_limits;
