@@ -14,11 +14,13 @@
 //! | [`optical_path`] | optical path lengths along rays |
 //! | [`pupil`] | the exit pupil as seen from the sensor, and samples of it |
 //! | [`report`] | all of it in one piece |
+//! | `behind` | gradients of a lens file's glass, and axes that break |
 //! | [`drawing`] | pictures of it |
 //! | [`zemax`] | lenses from Zemax files |
 
 pub mod aim;
 pub mod analysis;
+mod behind;
 pub mod drawing;
 pub mod file;
 pub mod focus;

@@ -13,6 +13,7 @@ mod mirrors;
 mod openings;
 mod optics_reference;
 mod reports;
+mod schmidt_cassegrain;
 mod small_openings;
 mod waves;
 mod zemax_commands;
