@@ -34,6 +34,51 @@ fn beam(radius: f64) -> LensRays {
     rays
 }
 
+/// Ten spheres that all rays pass, as mirrors that face each other or as surfaces between glass and air.
+fn spheres(are_mirrors: bool) -> OpticalTrain {
+    let element = |i: u32| {
+        let sign = if i.is_multiple_of(2) { -1.0 } else { 1.0 };
+        let (radius, thickness) = (1e4 * sign, 100.0);
+        match are_mirrors {
+            true => format!(
+                r#"{{"type": "mirror", "radius": {radius}, "thickness": {}}}"#,
+                sign * thickness
+            ),
+            false => {
+                let glass = if sign < 0.0 { r#", "glass": {"n": 1.5}"# } else { "" };
+                format!(
+                    r#"{{"type": "surface", "radius": {radius}, "thickness": {thickness}{glass}}}"#
+                )
+            }
+        }
+    };
+    let elements: Vec<String> = (0..10).map(element).collect();
+    lens(&format!(r#"{{"elements": [{}]}}"#, elements.join(", ")))
+}
+
+/// What a mirror costs beside a surface, and a gradient beside both.
+fn mirrors(criterion: &mut Criterion) {
+    let rod = include_str!("../../../scenes/lenses/selfoc-relay.json");
+    let mut group = criterion.benchmark_group("ten_spheres");
+    group.throughput(Throughput::Elements(u64::from(RAYS)));
+    for (name, train, radius) in [
+        ("surfaces", spheres(false), 10.0),
+        ("mirrors", spheres(true), 10.0),
+        ("selfoc-rod", lens(rod), 0.3),
+    ] {
+        let at = train.at(train.wavelength()).expect("glasses have indices");
+        let rays = beam(radius);
+        group.bench_function(name, |bencher| {
+            let mut work = rays.clone();
+            bencher.iter(|| {
+                work.clone_from(&rays);
+                at.trace(Side::Object, Clip::On, black_box(&mut work));
+            });
+        });
+    }
+    group.finish();
+}
+
 fn transfer(criterion: &mut Criterion) {
     let presets = [
         ("double-gauss", include_str!("../../../scenes/lenses/double-gauss.json"), 10.0),
@@ -168,5 +213,5 @@ fn pupil(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, transfer, lenslets, pupil);
+criterion_group!(benches, transfer, mirrors, lenslets, pupil);
 criterion_main!(benches);

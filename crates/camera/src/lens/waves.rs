@@ -116,7 +116,8 @@ fn is_ideal(train: &OpticalTrain) -> bool {
         | Part::Biconic(_)
         | Part::MicrolensArray(_)
         | Part::Mirror(_)
-        | Part::Freeform(_) => false,
+        | Part::Freeform(_)
+        | Part::CoordinateBreak(_) => false,
     })
 }
 

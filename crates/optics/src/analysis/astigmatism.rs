@@ -60,7 +60,10 @@ pub fn foci(
             Part::Aperture(_) | Part::Filter(_) => continue,
             _ if !element.frame.is_axial() => return Ok(None),
             Part::Surface(_) | Part::ThinLens(_) | Part::Mirror(_) => true,
-            Part::Biconic(_) | Part::MicrolensArray(_) | Part::Freeform(_) => false,
+            Part::Biconic(_)
+            | Part::MicrolensArray(_)
+            | Part::Freeform(_)
+            | Part::CoordinateBreak(_) => false,
         };
         let Some(point) = traversal.point.filter(|_| bends) else { return Ok(None) };
         let way = DVec3::from(point) - DVec3::from(ray.position);

@@ -79,7 +79,9 @@ pub enum AnalysisError {
         field: String,
     },
     /// The sums of a gradient are not made.
-    #[error("the index of a medium changes from place to place, which third-order sums leave out; rays follow it")]
+    #[error(
+        "the index of a medium changes from place to place, which third-order sums leave out; rays follow it"
+    )]
     Graded,
     /// Nothing ends the beam.
     #[error("nothing limits the beam: give the stop a radius, or a surface a semi_diameter")]

@@ -199,9 +199,11 @@ fn sums(
                 let shape = (surface.paraxial_curvature(), 0.0);
                 at_surface([n, behind], shape, dispersion, [marginal, chief], invariant)
             }
-            Part::ThinLens(_) | Part::Aperture(_) | Part::Filter(_) | Part::MicrolensArray(_) => {
-                SeidelSums::default()
-            }
+            Part::ThinLens(_)
+            | Part::Aperture(_)
+            | Part::Filter(_)
+            | Part::MicrolensArray(_)
+            | Part::CoordinateBreak(_) => SeidelSums::default(),
         };
         table.total.add(&sums);
         table.surfaces.push(sums);

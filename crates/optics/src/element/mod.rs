@@ -9,6 +9,7 @@
 pub(crate) mod aperture;
 mod biconic;
 mod coating;
+mod coordinate_break;
 mod crossings;
 mod freeform;
 pub(crate) mod gradient;
@@ -42,8 +43,9 @@ pub use aperture::{
 };
 pub use biconic::{Biconic, BiconicSpec};
 pub use coating::{MirrorCoating, MirrorCoatingSpec, Stack, StackSpec, ThinFilmSpec};
-pub use gradient::{GradedGap, Gradient, GradientSpec, GradientTerms};
+pub use coordinate_break::{CoordinateBreak, CoordinateBreakSpec};
 pub use freeform::{Freeform, FreeformSpec, HeightMapSpec, PatternSpec, PhaseSpec, SagSpec};
+pub use gradient::{GradedGap, Gradient, GradientSpec, GradientTerms};
 pub use lattice::{Grid, Lattice, LatticeCell};
 pub(crate) use losses::Loss;
 pub use losses::{Coating, Filter, FilterSpec, LossesSpec, Plain, Reflection};
@@ -337,7 +339,7 @@ mod tests {
         let schema = schemars::schema_for!(ElementSpec).to_value();
         let mut kinds = Vec::new();
         leaves(&schema, &mut kinds);
-        assert_eq!(kinds.len(), 14, "seven shapes of apertures");
+        assert_eq!(kinds.len(), 15, "seven shapes of apertures");
         for kind in kinds {
             assert_eq!(kind["additionalProperties"], false, "{kind}");
             let keys = kind["properties"].as_object().unwrap();

@@ -8,6 +8,7 @@ use etendue_spectrum::Curve;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::coordinate_break::{CoordinateBreak, CoordinateBreakSpec};
 use super::crossings::Slopes;
 use super::freeform::{Freeform, FreeformSpec, FreeformSurface};
 use super::lenslets::Lenslets;
@@ -41,6 +42,8 @@ pub enum PartSpec {
     Mirror(MirrorSpec),
     /// A surface of any shape.
     Freeform(FreeformSpec),
+    /// From here on the axis runs elsewhere.
+    CoordinateBreak(CoordinateBreakSpec),
 }
 
 /// What an element is, ready to be traced.
@@ -62,6 +65,8 @@ pub enum Part {
     Mirror(Mirror),
     /// A surface of any shape.
     Freeform(Arc<Freeform>),
+    /// From here on the axis runs elsewhere.
+    CoordinateBreak(CoordinateBreak),
 }
 
 /// How drawings show a part.
@@ -78,6 +83,8 @@ pub enum Symbol {
     Opening,
     /// By two lines.
     Sheet,
+    /// Not at all.
+    Nothing,
 }
 
 impl From<SurfaceSpec> for PartSpec {
@@ -110,7 +117,11 @@ impl PartSpec {
             Self::Biconic(surface) => Some(surface.glass.as_ref()),
             Self::Freeform(surface) => (!surface.mirror).then_some(surface.glass.as_ref()),
             Self::MicrolensArray(array) => array.has_faces().then_some(array.glass.as_ref()),
-            Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) | Self::Mirror(_) => None,
+            Self::ThinLens(_)
+            | Self::Aperture(_)
+            | Self::Filter(_)
+            | Self::Mirror(_)
+            | Self::CoordinateBreak(_) => None,
         }
     }
 
@@ -129,6 +140,8 @@ impl PartSpec {
             Self::MicrolensArray(array) => Part::MicrolensArray(array.build()?.into()),
             Self::Mirror(mirror) => Part::Mirror(mirror.build()?),
             Self::Freeform(surface) => Part::Freeform(surface.build(resolve)?.into()),
+            // By how it is mounted, which the lens knows.
+            Self::CoordinateBreak(_) => Part::CoordinateBreak(CoordinateBreak::default()),
         })
     }
 }
@@ -146,6 +159,7 @@ impl Part {
             Self::MicrolensArray(_) => "microlens_array",
             Self::Mirror(_) => "mirror",
             Self::Freeform(_) => "freeform",
+            Self::CoordinateBreak(_) => "coordinate_break",
         }
     }
 
@@ -161,6 +175,7 @@ impl Part {
             Self::MicrolensArray(array) => array.radius(),
             Self::Mirror(mirror) => mirror.surface.semi_diameter,
             Self::Freeform(surface) => surface.semi_diameter,
+            Self::CoordinateBreak(_) => f64::INFINITY,
         }
     }
 
@@ -182,6 +197,7 @@ impl Part {
             Self::MicrolensArray(_) => return Err("it is a microlens array"),
             Self::Mirror(mirror) => mirror.surface.semi_diameter = radius,
             Self::Freeform(surface) => Arc::make_mut(surface).semi_diameter = radius,
+            Self::CoordinateBreak(_) => return Err("it is a break of the coordinates"),
         }
         Ok(())
     }
@@ -194,7 +210,8 @@ impl Part {
             | Self::Biconic(_)
             | Self::MicrolensArray(_)
             | Self::Mirror(_)
-            | Self::Freeform(_) => false,
+            | Self::Freeform(_)
+            | Self::CoordinateBreak(_) => false,
             Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) => true,
         }
     }
@@ -206,9 +223,11 @@ impl Part {
             Self::Surface(surface) => surface.is_plane(),
             Self::Biconic(surface) => surface.curvature == [0.0; 2],
             Self::Aperture(_) | Self::Filter(_) => true,
-            Self::ThinLens(_) | Self::MicrolensArray(_) | Self::Mirror(_) | Self::Freeform(_) => {
-                false
-            }
+            Self::ThinLens(_)
+            | Self::MicrolensArray(_)
+            | Self::Mirror(_)
+            | Self::Freeform(_)
+            | Self::CoordinateBreak(_) => false,
         }
     }
 
@@ -223,7 +242,8 @@ impl Part {
             | Self::Filter(_)
             | Self::MicrolensArray(_)
             | Self::Mirror(_)
-            | Self::Freeform(_) => None,
+            | Self::Freeform(_)
+            | Self::CoordinateBreak(_) => None,
         }
     }
 
@@ -235,9 +255,11 @@ impl Part {
             Self::Biconic(surface) => surface.domain(),
             Self::Mirror(mirror) => mirror.surface.domain(),
             Self::Freeform(surface) => surface.domain(),
-            Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => {
-                f64::INFINITY
-            }
+            Self::ThinLens(_)
+            | Self::Aperture(_)
+            | Self::Filter(_)
+            | Self::MicrolensArray(_)
+            | Self::CoordinateBreak(_) => f64::INFINITY,
         }
     }
 
@@ -249,9 +271,11 @@ impl Part {
             Self::Biconic(surface) => surface.sag([x, y]),
             Self::Mirror(mirror) => mirror.surface.sag(x.hypot(y)),
             Self::Freeform(surface) => surface.sag([x, y]),
-            Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => {
-                Some(0.0)
-            }
+            Self::ThinLens(_)
+            | Self::Aperture(_)
+            | Self::Filter(_)
+            | Self::MicrolensArray(_)
+            | Self::CoordinateBreak(_) => Some(0.0),
         }
     }
 
@@ -265,7 +289,10 @@ impl Part {
             Self::Mirror(mirror) => 1.0 / mirror.surface.curvature,
             Self::Freeform(surface) => 1.0 / surface.base_curvature(),
             Self::ThinLens(lens) => 1.0 / lens.power,
-            Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => f64::INFINITY,
+            Self::Aperture(_)
+            | Self::Filter(_)
+            | Self::MicrolensArray(_)
+            | Self::CoordinateBreak(_) => f64::INFINITY,
         }
     }
 
@@ -288,6 +315,7 @@ impl Part {
                 let [pitch, width, height] = [pitch, width, height].map(significant);
                 vec![format!("lenslets every {pitch} mm on {width} x {height} mm")]
             }
+            Self::CoordinateBreak(_) => vec!["the axis runs elsewhere behind it".to_owned()],
             Self::ThinLens(_) | Self::Filter(_) => Vec::new(),
         }
     }
@@ -302,6 +330,7 @@ impl Part {
             Self::ThinLens(lens) => Symbol::ThinLens { converging: lens.power.signum() },
             Self::Aperture(_) => Symbol::Opening,
             Self::Filter(_) | Self::MicrolensArray(_) => Symbol::Sheet,
+            Self::CoordinateBreak(_) => Symbol::Nothing,
         }
     }
 
@@ -314,7 +343,7 @@ impl Part {
             Self::Biconic(surface) => surface.is_round(),
             Self::Aperture(opening) => opening.is_round(),
             Self::Filter(filter) => filter.is_uniform(),
-            Self::MicrolensArray(_) => false,
+            Self::MicrolensArray(_) | Self::CoordinateBreak(_) => false,
         }
     }
 
@@ -327,7 +356,11 @@ impl Part {
             Self::Mirror(_) | Self::Freeform(_) => {
                 self.mirror().map_or(&[], |mirror| mirror.reflectance.as_slice())
             }
-            Self::Surface(_) | Self::Biconic(_) | Self::ThinLens(_) | Self::Aperture(_) => &[],
+            Self::Surface(_)
+            | Self::Biconic(_)
+            | Self::ThinLens(_)
+            | Self::Aperture(_)
+            | Self::CoordinateBreak(_) => &[],
         }
     }
 
@@ -348,7 +381,8 @@ impl Part {
             | Self::ThinLens(_)
             | Self::Aperture(_)
             | Self::Filter(_)
-            | Self::MicrolensArray(_) => None,
+            | Self::MicrolensArray(_)
+            | Self::CoordinateBreak(_) => None,
         }
     }
 
@@ -368,7 +402,10 @@ impl Part {
                 };
                 change * surface.paraxial_curvature() + surface.phase_power(wavelength)
             }
-            Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => 0.0,
+            Self::Aperture(_)
+            | Self::Filter(_)
+            | Self::MicrolensArray(_)
+            | Self::CoordinateBreak(_) => 0.0,
         }
     }
 
@@ -390,7 +427,8 @@ impl Part {
             | Self::ThinLens(_)
             | Self::Aperture(_)
             | Self::Filter(_)
-            | Self::MicrolensArray(_) => {}
+            | Self::MicrolensArray(_)
+            | Self::CoordinateBreak(_) => {}
         }
         part
     }
@@ -406,7 +444,8 @@ impl Part {
             | Self::ThinLens(_)
             | Self::Aperture(_)
             | Self::Filter(_)
-            | Self::MicrolensArray(_) => None,
+            | Self::MicrolensArray(_)
+            | Self::CoordinateBreak(_) => None,
         }
     }
 
@@ -421,7 +460,10 @@ impl Part {
             }
             Self::MicrolensArray(array) => Self::MicrolensArray(array.flipped().into()),
             Self::Freeform(surface) => Self::Freeform(surface.flipped().into()),
-            Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) => self,
+            // A break is made by the way of light.
+            Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) | Self::CoordinateBreak(_) => {
+                self
+            }
         }
     }
 
@@ -467,6 +509,7 @@ impl Part {
             }
             Self::ThinLens(lens) => [lens.power, -lens.power]
                 .map(|power| Action::ThinLens { power, semi_diameter: lens.semi_diameter }),
+            Self::CoordinateBreak(turn) => [Action::Turn(*turn), Action::Turn(turn.reversed())],
             Self::Aperture(opening) => both(Action::Opening(Arc::clone(opening))),
             Self::Filter(filter) => {
                 let transmissions = filter.curves.iter().map(transmission).collect();

@@ -11,6 +11,7 @@ use glam::DVec3;
 use super::Frame;
 use super::aperture::{Opening, in_circle, in_polygon};
 use super::biconic::Biconic;
+use super::coordinate_break::CoordinateBreak;
 use super::crossings::{Slopes, cross_first, cross_first_after};
 use super::freeform::FreeformSurface;
 use super::gradient::step::Graded;
@@ -77,12 +78,14 @@ pub(crate) enum Action {
     },
     /// A mirror in the way to another element.
     Shadow(Shadow),
+    /// The axis runs elsewhere behind it: rays are written down anew, and stay where they are.
+    Turn(CoordinateBreak),
 }
 
 impl Action {
     /// Whether it moves rays to itself; sheets only look at them.
     pub(crate) fn moves(&self) -> bool {
-        !matches!(self, Self::Opening(_) | Self::Filter { .. } | Self::Shadow(_))
+        !matches!(self, Self::Opening(_) | Self::Filter { .. } | Self::Shadow(_) | Self::Turn(_))
     }
 
     /// The kernel that a surface needs.
@@ -237,6 +240,10 @@ impl Step {
             }
             Action::Shadow(shadow) => {
                 self.shade(block, shadow, clip, z);
+                false
+            }
+            Action::Turn(turn) => {
+                turn.renew(block, z);
                 false
             }
         };
@@ -422,7 +429,8 @@ impl Step {
 
     /// Rays that end, and rays that only pass a sheet, stay as they came to the last bit.
     fn settle(&self, ray: Ray, traversal: Traversal) -> Traversal {
-        if traversal.status == RayStatus::Exited && self.moves() {
+        let changes = self.moves() || matches!(self.action, Action::Turn(_));
+        if traversal.status == RayStatus::Exited && changes {
             traversal
         } else {
             Traversal { ray, ..traversal }
@@ -465,6 +473,7 @@ impl Step {
                 let crossing = cross_first(surface, (*media, &Slopes::default()), ray, clip2);
                 Traversal { transmission: *efficiency, ..self.crossed(crossing) }
             }
+            Action::Turn(turn) => turn.renewed_one(ray),
             Action::Shadow(shadow) => {
                 let stopped = clip == Clip::On && shadow.stops(ray);
                 let status = match stopped {

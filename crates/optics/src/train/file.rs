@@ -15,8 +15,7 @@ use super::{
     remove_notes,
 };
 use crate::element::{
-    BiconicSpec, Clip, ElementSpec, Frame, FreeformSpec, GradedGap, Gradient, LossesSpec, PartSpec,
-    RayStatus, Resolve, SurfaceSpec,
+    Clip, ElementSpec, Frame, GradedGap, LossesSpec, Part, PartSpec, RayStatus, Resolve,
 };
 use crate::glass::{AgfCatalogue, FRAUNHOFER_D, Glass, GlassError};
 use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
@@ -111,7 +110,11 @@ impl LensFile {
         let (mut z, mut sense) = (0.0, 1.0);
         for (index, spec) in self.elements.iter().enumerate() {
             let error = |why| LensError::Element { index, why };
-            let element = place(spec, (z, sense), resolve).map_err(error)?;
+            let mut element = place(spec, (z, sense), resolve).map_err(error)?;
+            if let PartSpec::CoordinateBreak(broken) = &spec.part {
+                let turn = self.axis_behind(index, broken, (z, sense), &elements).map_err(error)?;
+                element = Element { part: Part::CoordinateBreak(turn), frame: Frame::on_axis(z) };
+            }
             if element.part.mirror().is_some() {
                 sense = -sense;
                 check_gap(spec.mount.thickness.0, sense).map_err(error)?;
@@ -148,56 +151,6 @@ impl LensFile {
         train.with_stop(self.stop()?)
     }
 
-    /// The gradient behind an element, if it has one.
-    fn gradient(
-        &self,
-        index: usize,
-        medium: &Glass,
-        wavelength: f64,
-    ) -> Result<Option<Gradient>, LensError> {
-        let Some(gradient) = &self.elements[index].mount.gradient else { return Ok(None) };
-        let error = |why: String| LensError::Element { index, why };
-        let (PartSpec::Surface(SurfaceSpec { semi_diameter, .. })
-        | PartSpec::Biconic(BiconicSpec { semi_diameter, .. })
-        | PartSpec::Freeform(FreeformSpec { semi_diameter, mirror: false, .. })) =
-            &self.elements[index].part
-        else {
-            let why = "a gradient is that of the glass behind a surface, a biconic or a freeform; \
-                       write it there";
-            return Err(error(why.to_owned()));
-        };
-        let rim = semi_diameter.map_or(f64::INFINITY, |length| length.0);
-        let base = medium.index(wavelength).map_err(|source| LensError::Glass { index, source })?;
-        // Up to the surface that ends it, past sheets.
-        let behind = self.elements[index + 1..].iter();
-        let end = { behind }.position(|spec| {
-            !matches!(spec.part, PartSpec::Aperture(_) | PartSpec::Filter(_))
-        });
-        let Some(end) = end.map(|end| index + 1 + end) else {
-            let why = "a gradient ends at a surface; add the one behind it";
-            return Err(error(why.to_owned()));
-        };
-        for at in [index, end] {
-            let bends = match &self.elements[at].part {
-                PartSpec::Surface(_) | PartSpec::Biconic(_) => true,
-                PartSpec::Freeform(surface) => !surface.mirror && surface.phase.is_none(),
-                PartSpec::ThinLens(_)
-                | PartSpec::Aperture(_)
-                | PartSpec::Filter(_)
-                | PartSpec::MicrolensArray(_)
-                | PartSpec::Mirror(_) => false,
-            };
-            if !bends {
-                return Err(error(format!(
-                    "a gradient lies between surfaces without a phase, and elements[{at}] is none; put glass without a \
-                     gradient between"
-                )));
-            }
-        }
-        let thickness = self.elements[index..end].iter().map(|spec| spec.mount.thickness.0).sum();
-        gradient.build(rim, base, thickness).map(Some).map_err(error)
-    }
-
     fn catalogues(&self, resolve: Resolve<'_>) -> Result<Vec<AgfCatalogue>, LensError> {
         let read = |(index, name): (usize, &String)| {
             resolve
@@ -226,7 +179,7 @@ impl LensFile {
 }
 
 /// A number that changes its sign where light runs against the axis; 0 keeps its own.
-fn along(sense: f64, value: f64) -> f64 {
+pub(super) fn along(sense: f64, value: f64) -> f64 {
     if value == 0.0 { value } else { sense * value }
 }
 

@@ -13,7 +13,7 @@
 use glam::{DMat3, DVec3};
 
 use super::{Element, OpticalTrain};
-use crate::element::{Fold, Frame, Part, Shadow};
+use crate::element::{CoordinateBreak, Fold, Frame, Part, Shadow};
 
 /// How near (mm) two vertices count as one.
 const SAME_PLACE: f64 = 1e-6;
@@ -35,6 +35,24 @@ impl Isometry {
         let column = |axis: DVec3| axis - 2.0 * normal.dot(axis) * normal;
         let turn = DMat3::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z));
         Self { turn, shift: point - turn * point }
+    }
+
+    /// From the space behind a break at z (mm) to that before it.
+    pub(crate) fn behind(turn: &CoordinateBreak, z: f64) -> Self {
+        let vertex = DVec3::new(0.0, 0.0, z);
+        Self { turn: turn.turn, shift: vertex + turn.shift - turn.turn * vertex }
+    }
+
+    /// The break at z (mm) from whose space behind it takes to that before it; `None` where it is one with a reflection.
+    pub(crate) fn to_break(self, z: f64) -> Option<CoordinateBreak> {
+        let vertex = DVec3::new(0.0, 0.0, z);
+        let shift = self.place(vertex) - vertex;
+        (self.turn.determinant() > 0.0).then_some(CoordinateBreak { turn: self.turn, shift })
+    }
+
+    /// A shift along z (mm).
+    pub(crate) fn along(z: f64) -> Self {
+        Self { turn: DMat3::IDENTITY, shift: DVec3::new(0.0, 0.0, z) }
     }
 
     /// Where it takes a place (mm).
@@ -105,16 +123,7 @@ impl OpticalTrain {
     /// From the unfolded space before each element, and at last from that behind all, to the lens as it is built.
     #[must_use]
     pub fn built(&self) -> Vec<Isometry> {
-        let mut spaces = Vec::with_capacity(self.elements.len() + 1);
-        let mut here = Isometry::ONE;
-        spaces.push(here);
-        for Element { part, frame } in &self.elements {
-            if let Some(mount) = part.mirror() {
-                here = here.after(&Fold::new(mount, frame, 1.0).map().into());
-            }
-            spaces.push(here);
-        }
-        spaces
+        built(&self.elements)
     }
 
     /// The mirrors in the way of each leg: before each element, and at last behind all.
@@ -127,8 +136,12 @@ impl OpticalTrain {
         let spaces = self.built();
         let end = self.end_of_light();
         // The elements at which a leg begins and ends, but for sheets, which only look at rays.
-        let bends =
-            |i: &usize| !matches!(self.elements[*i].part, Part::Aperture(_) | Part::Filter(_));
+        let bends = |i: &usize| {
+            !matches!(
+                self.elements[*i].part,
+                Part::Aperture(_) | Part::Filter(_) | Part::CoordinateBreak(_)
+            )
+        };
         for (leg, obstructions) in legs.iter_mut().enumerate() {
             let (before, behind) = ((0..leg).rev().find(bends), (leg..count).find(bends));
             let z = |i: usize| self.elements[i].frame.vertex.z;
@@ -211,4 +224,21 @@ impl Element {
             hole: [depth(mount.hole).unwrap_or(0.0), mount.hole * mount.hole],
         })
     }
+}
+
+/// From the unfolded space before each element, and at last from that behind all, to the lens as it is built.
+pub(super) fn built(elements: &[Element]) -> Vec<Isometry> {
+    let mut spaces = Vec::with_capacity(elements.len() + 1);
+    let mut here = Isometry::ONE;
+    spaces.push(here);
+    for Element { part, frame } in elements {
+        if let Some(mount) = part.mirror() {
+            here = here.after(&Fold::new(mount, frame, 1.0).map().into());
+        }
+        if let Part::CoordinateBreak(turn) = part {
+            here = here.after(&Isometry::behind(turn, frame.vertex.z));
+        }
+        spaces.push(here);
+    }
+    spaces
 }

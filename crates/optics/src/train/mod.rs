@@ -14,11 +14,13 @@
 //! | [`optical_path`] | optical path lengths along rays |
 //! | [`pupil`] | the exit pupil as seen from the sensor, and samples of it |
 //! | [`report`] | all of it in one piece |
+//! | `behind` | gradients of a lens file's glass, and axes that break |
 //! | [`drawing`] | pictures of it |
 //! | [`zemax`] | lenses from Zemax files |
 
 pub mod aim;
 pub mod analysis;
+mod behind;
 pub mod drawing;
 pub mod file;
 pub mod focus;
@@ -414,6 +416,12 @@ impl OpticalTrain {
         if self.is_folded() {
             notes.push(
                 "the lens has mirrors: places and directions are unfolded, z counts along the way of light"
+                    .to_owned(),
+            );
+        }
+        if self.elements.iter().any(|e| matches!(e.part, Part::CoordinateBreak(_))) {
+            notes.push(
+                "the axis breaks: places and directions behind a coordinate_break are told along the new axis"
                     .to_owned(),
             );
         }

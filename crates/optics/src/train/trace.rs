@@ -94,24 +94,21 @@ impl OpticalTrain {
                 let reflectance = mirror.reflectance.as_ref().map_or(1.0, transmission);
                 Fold::new(mirror, &placed.frame, reflectance)
             });
-            let add = |steps: &mut Vec<Step>,
-                       action: Action,
-                       loss: Option<Loss>,
-                       fold,
-                       frame: Frame| {
-                // Sheets do not move rays: what absorbs before one is counted at the next surface.
-                let loss = loss.filter(|_| action.moves());
-                let graded = None;
-                steps.push(Step {
-                    element,
-                    frame,
-                    axial: frame.is_axial(),
-                    action,
-                    loss,
-                    fold,
-                    graded,
-                });
-            };
+            let add =
+                |steps: &mut Vec<Step>, action: Action, loss: Option<Loss>, fold, frame: Frame| {
+                    // Sheets do not move rays: what absorbs before one is counted at the next surface.
+                    let loss = loss.filter(|_| action.moves());
+                    let graded = None;
+                    steps.push(Step {
+                        element,
+                        frame,
+                        axial: frame.is_axial(),
+                        action,
+                        loss,
+                        fold,
+                        graded,
+                    });
+                };
             add(&mut forward, towards_sensor, loss([before, behind], element), fold, placed.frame);
             let (frame, fold) = match fold.map(|fold| fold.seen_from_behind(&placed.frame)) {
                 Some((frame, fold)) => (frame, Some(fold)),
@@ -140,7 +137,13 @@ impl OpticalTrain {
                 let before = index.checked_sub(1)?;
                 let z = |i: usize| self.elements.get(i).map(|element| element.frame.vertex.z);
                 let length = z(index)? - z(before)?;
-                Some(GradedMedium { gap, z: z(before)?, base: indices[index], element: before, length })
+                Some(GradedMedium {
+                    gap,
+                    z: z(before)?,
+                    base: indices[index],
+                    element: before,
+                    length,
+                })
             };
             let mut media = [medium(element), medium(element + 1)];
             let mut of = [indices[element], indices[element + 1]];
@@ -305,7 +308,11 @@ impl MonochromaticTrain {
     }
 
     /// Places (mm) of a ray's way from the object through the gradient before each element; none where there is none.
-    pub(crate) fn ways_through_gradients(&self, position: DVec3, direction: DVec3) -> Vec<Vec<DVec3>> {
+    pub(crate) fn ways_through_gradients(
+        &self,
+        position: DVec3,
+        direction: DVec3,
+    ) -> Vec<Vec<DVec3>> {
         /// Enough for a curve of a few pitches.
         const PLACES: u32 = 48;
         let Some(mut ray) = Ray::new(position, direction) else { return Vec::new() };

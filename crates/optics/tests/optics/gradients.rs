@@ -2,7 +2,7 @@
 
 use etendue_optics::element::{Clip, LensRays, Ray, RayStatus};
 use etendue_optics::train::optical_path::ThinLensPhases;
-use etendue_optics::train::{LensFile, OpticalTrain, Side};
+use etendue_optics::train::{Focus, LensFile, OpticalTrain, Side};
 use glam::{DVec2, DVec3};
 use serde_json::{Value, json};
 
@@ -76,7 +76,8 @@ fn rays_of_a_parabolic_rod_follow_its_closed_form_over_many_pitches() {
                     let error = (along.length - path).abs();
                     assert!(error < tolerance * (1.0 + 1e-2 * length), "{g} {pitches} {error}");
                     // And back to where it came from.
-                    let back = Ray::new(found.ray.position.into(), -DVec3::from(found.ray.direction));
+                    let back =
+                        Ray::new(found.ray.position.into(), -DVec3::from(found.ray.direction));
                     let back = at.run(Side::Sensor, Clip::Off, back.unwrap());
                     let error = (DVec3::from(back.ray.position) - place.extend(0.0)).length();
                     assert!(error < 2.0 * tolerance, "{error}");
@@ -98,7 +99,8 @@ fn rays_along_a_gradient_of_the_squared_index_are_parabolas() {
             // z = T t + b t²/4.
             let first = (n0 * n0 - across.length_squared()).sqrt();
             let t = 2.0 * length / (first + (first * first + b * length).sqrt());
-            let end = at.run(Side::Object, Clip::Off, Ray::new(place.extend(0.0), unit(across)).unwrap());
+            let end =
+                at.run(Side::Object, Clip::Off, Ray::new(place.extend(0.0), unit(across)).unwrap());
             let there = DVec3::from(end.ray.position).truncate();
             // Runge and Kutta's rule has a constant force without an error.
             assert!((there - place - across * t).length() < 1e-11, "{b}: {there}");
@@ -140,14 +142,18 @@ fn paraxial_data_of_a_rod_are_its_cosines_and_those_of_any_gradient_what_rays_ne
         .unwrap();
         let at = train.at(D).unwrap();
         let h = 1e-4;
-        let end = at.run(Side::Object, Clip::Off, Ray::new(DVec3::new(0.0, h, -1.0), DVec3::Z).unwrap());
+        let end =
+            at.run(Side::Object, Clip::Off, Ray::new(DVec3::new(0.0, h, -1.0), DVec3::Z).unwrap());
         let [place, direction] = [end.ray.position, end.ray.direction];
         let slope = direction[1] / direction[2];
         let paraxial = train.paraxial(D).unwrap();
         // Aberrations are the square of a height of 10⁻⁴ mm over a few millimetres.
         assert!((-h / slope / paraxial.efl.unwrap() - 1.0).abs() < 1e-7, "{gradient} {slope}");
         let focus = place[2] - place[1] / slope;
-        assert!((focus - paraxial.image_z.unwrap()).abs() < 1e-6 * focus.abs(), "{gradient} {focus}");
+        assert!(
+            (focus - paraxial.image_z.unwrap()).abs() < 1e-6 * focus.abs(),
+            "{gradient} {focus}"
+        );
     }
 }
 
@@ -162,7 +168,8 @@ fn sheets_in_a_rod_change_no_ray_and_batches_are_as_single_rays() {
     let stop = json!({"type": "aperture", "shape": "circular", "radius": 0.7, "thickness": 4.0, "stop": true});
     let plain = build(json!([front(7.0), back])).unwrap();
     let stopped = build(json!([front(3.0), stop, back])).unwrap();
-    let aspheric = json!({"type": "surface", "radius": -8.0, "aspheric": {"4": 1e-4}, "semi_diameter": 1.2});
+    let aspheric =
+        json!({"type": "surface", "radius": -8.0, "aspheric": {"4": 1e-4}, "semi_diameter": 1.2});
     let aspheric = build(json!([front(3.0), stop, aspheric])).unwrap();
     for nm in [450.0, D] {
         let [one, other] = [&plain, &stopped].map(|train| train.at(nm).unwrap());
@@ -195,6 +202,32 @@ fn sheets_in_a_rod_change_no_ray_and_batches_are_as_single_rays() {
     }
 }
 
+/// The relay of `scenes/lenses`: what is to be focused, and how, follows from its cosines.
+#[test]
+fn a_rod_of_a_little_more_than_half_a_pitch_relays_upright_where_its_cosines_say() {
+    let train = crate::preset("selfoc-relay");
+    // 0.6 of a pitch: infinity is behind the rod's end at cos/(n₀ g sin), and a second picture stands upright.
+    let (n0, g, length): (f64, f64, f64) = (1.5637, 0.2, 0.6 * std::f64::consts::TAU / 0.2);
+    let (sine, cosine) = (g * length).sin_cos();
+    let paraxial = train.paraxial(train.wavelength()).unwrap();
+    assert!((paraxial.efl.unwrap() * n0 * g * sine - 1.0).abs() < 1e-9, "n₀ is that of the d line");
+    let z = train.sensor_z(Focus::Infinity).unwrap();
+    assert!((z - length - cosine / (n0 * g * sine)).abs() < 1e-8);
+    // The efl is negative: what is above stays above.
+    assert!(paraxial.efl.unwrap() < 0.0);
+    let at = train.at(train.wavelength()).unwrap();
+    let chief = train.chief_ray(&at, 3.0).unwrap();
+    let end = at.run(Side::Object, Clip::On, Ray::new(chief.position, chief.direction).unwrap());
+    assert_eq!(end.status, RayStatus::Exited);
+    let [place, way] = [end.ray.position, end.ray.direction].map(DVec3::from);
+    let height = place.y + way.y / way.z * (z - place.z);
+    // Distortion is of the third order: a thousandth of the height at 3°.
+    let paper = paraxial.efl.unwrap() * 3_f64.to_radians().tan();
+    assert!((height / paper - 1.0).abs() < 3e-3, "{height} {paper}");
+    let wave = train.to_plane(z).unwrap();
+    assert!(wave.a.abs() < 1e-9, "infinity is sharp there");
+}
+
 #[test]
 fn a_ray_that_leaves_the_side_of_a_rod_is_stopped_there_by_its_element() {
     let train = rod(1.6, 10.0, json!({"type": "rod", "g": 0.3, "semi_diameter": 0.5}));
@@ -216,7 +249,8 @@ fn a_ray_that_leaves_the_side_of_a_rod_is_stopped_there_by_its_element() {
 #[test]
 fn gradients_that_are_none_are_refused_by_element_and_remedy() {
     let lens = |gradient: Value, semi_diameter: f64, behind: Value| {
-        let mut front = json!({"type": "surface", "glass": {"n": 1.5}, "thickness": 5.0, "gradient": gradient});
+        let mut front =
+            json!({"type": "surface", "glass": {"n": 1.5}, "thickness": 5.0, "gradient": gradient});
         if semi_diameter > 0.0 {
             front["semi_diameter"] = json!(semi_diameter);
         }

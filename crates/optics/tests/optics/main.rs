@@ -3,6 +3,7 @@
 mod asphere_crossings;
 mod code_v;
 mod components;
+mod coordinate_breaks;
 mod exit_pupil;
 mod lens_formats;
 mod gradients;
@@ -14,6 +15,7 @@ mod openings;
 mod optics_reference;
 mod reports;
 mod second_opinion;
+mod schmidt_cassegrain;
 mod small_openings;
 mod waves;
 mod zemax_commands;

@@ -217,6 +217,11 @@ fn lenses_come_back_from_zemax_files_as_they_went() {
     let mut compared = 0;
     for file in &files {
         let Ok(before) = file.build(&|name: &str| Err(name.to_owned())) else { continue };
+        if before.is_graded() {
+            let why = file.to_zemax().unwrap_err();
+            assert!(why.contains("elements[0]: a gradient has no counterpart"), "{why}");
+            continue;
+        }
         let text = file.to_zemax().unwrap_or_else(|why| panic!("{}: {why}", file.name));
         let back = ZemaxLens::read(text.as_bytes(), &[]).unwrap_or_else(|e| panic!("{e}\n{text}"));
         let after = build(&back.file);

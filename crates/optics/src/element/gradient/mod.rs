@@ -209,7 +209,9 @@ impl Gradient {
             let (r, z) = (self.semi_diameter * share(i), thickness * share(k));
             (self.field(base, [0.0, r, z]).square, r, z)
         });
-        let Some((square, r, z)) = squares.min_by(|a, b| a.0.total_cmp(&b.0)) else { return Ok(()) };
+        let Some((square, r, z)) = squares.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+            return Ok(());
+        };
         if square > 1.0 && square.is_finite() {
             return Ok(());
         }

@@ -5,8 +5,8 @@
 
 use glam::DVec3;
 
-use super::path::{Arrival, OpticalRay};
 use super::GradedGap;
+use super::path::{Arrival, OpticalRay};
 use crate::element::losses::Loss;
 use crate::element::part::Part;
 use crate::element::rays::{Block, LANES, Ray, RayStatus};
@@ -65,12 +65,7 @@ impl GradedMedium {
     }
 
     /// A ray to the surface that `height` (mm) is above.
-    fn follow(
-        &self,
-        ray: Ray,
-        height: impl Fn(DVec3) -> Option<f64>,
-        clip: Clip,
-    ) -> Arrival {
+    fn follow(&self, ray: Ray, height: impl Fn(DVec3) -> Option<f64>, clip: Clip) -> Arrival {
         let place = DVec3::from(ray.position);
         let optical = self.turned(ray.direction.into()) * self.index(place);
         let start = OpticalRay { place: self.own(place), optical, path: 0.0, length: 0.0 };
@@ -226,7 +221,8 @@ impl Action {
             | Self::Opening(_)
             | Self::Filter { .. }
             | Self::Lenslets(_)
-            | Self::Shadow(_) => {}
+            | Self::Shadow(_)
+            | Self::Turn(_) => {}
         }
         action
     }

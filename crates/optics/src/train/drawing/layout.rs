@@ -393,6 +393,7 @@ pub(super) fn strokes(element: &Element, height: f64, pixel: f64) -> Vec<(Vec<[f
             }
             _ => vec![(section(element, height), 1.2)],
         },
+        Symbol::Nothing => Vec::new(),
         Symbol::ThinLens { converging } => {
             let tip = 0.05 * height * converging;
             let arrow = |side: f64| {

@@ -58,7 +58,13 @@ impl LensFile {
         for (i, element) in self.elements.iter().enumerate() {
             let error = |why: String| format!("elements[{i}]: {why}");
             if element.mount.gradient.is_some() {
-                return Err(error("a gradient has no counterpart here; save the lens as .json".to_owned()));
+                return Err(error(
+                    "a gradient has no counterpart here; save the lens as .json".to_owned(),
+                ));
+            }
+            if let PartSpec::CoordinateBreak(broken) = &element.part {
+                rows.push(axis_break(broken, &element.mount).map_err(error)?);
+                continue;
             }
             let mut row = surface(element, medium.as_ref()).map_err(error)?;
             if let Some(behind) = element.part.medium_behind() {
@@ -116,6 +122,27 @@ fn coordinate_break(mount: &crate::element::Mount, sense: f64) -> Row {
         row.parameter(6, 1.0);
     }
     row
+}
+
+/// A break of the axis for all that follows.
+fn axis_break(
+    broken: &crate::element::CoordinateBreakSpec,
+    mount: &crate::element::Mount,
+) -> Result<Row, String> {
+    if broken.return_to.is_some() {
+        return Err(
+            "return_to is not written; write the turns and decentres of the way back".to_owned()
+        );
+    }
+    let mut row = coordinate_break(mount, 1.0);
+    if broken.rotation.0 != 0.0 {
+        row.parameter(5, broken.rotation.0);
+    }
+    if broken.tilt_first {
+        row.parameter(6, 1.0);
+    }
+    row.thickness = mount.thickness.0;
+    Ok(row)
 }
 
 /// Adds the row of an element with the breaks that it takes.
@@ -216,6 +243,7 @@ fn surface(element: &ElementSpec, before: Option<&GlassSpec>) -> Result<Row, Str
                         make it circular, or save it as .json"
                 .to_owned());
         }
+        PartSpec::CoordinateBreak(_) => return none("this break"),
         PartSpec::Filter(_) => return none("a filter"),
         PartSpec::MicrolensArray(_) => return none("an array of lenslets"),
     };
