@@ -376,12 +376,4 @@ mod tests {
         assert_eq!(short(2.5e-7), "2.500e-7");
         assert_eq!(short(100_000.0), "100000", "zeros of a whole number stay");
     }
-
-    #[test]
-    fn a_picture_fits_into_the_canvas() {
-        let canvas = Rect::from_min_size(Pos2::new(100.0, 50.0), Vec2::new(400.0, 400.0));
-        let place = PictureCanvas::default().place(canvas, [200.0, 100.0]);
-        assert_eq!(place.center(), canvas.center());
-        assert_eq!(place.size(), Vec2::new(400.0, 200.0));
-    }
 }

@@ -203,4 +203,12 @@ mod tests {
         listing.read("/no/such/folder/");
         assert!(listing.entries.is_empty());
     }
+
+    #[test]
+    fn a_picture_fits_into_the_canvas() {
+        let canvas = Rect::from_min_size(egui::Pos2::new(100.0, 50.0), Vec2::new(400.0, 400.0));
+        let place = PictureCanvas::default().place(canvas, [200.0, 100.0]);
+        assert_eq!(place.center(), canvas.center());
+        assert_eq!(place.size(), Vec2::new(400.0, 200.0));
+    }
 }
