@@ -48,6 +48,12 @@ pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
             }
             false => sidecar::write_json(&to, path, file)?,
         }
+        let are_named = !lens.fields.is_empty() || !lens.wavelengths.is_empty();
+        if are_named && !arguments.quiet {
+            say(
+                "note: --save: the fields, and the wavelengths but the main one, are left out; give them as `--fields` and `--wavelengths`",
+            );
+        }
     }
     lens.train = adjusted(lens.train, arguments)?;
     match &arguments.rays {

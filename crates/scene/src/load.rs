@@ -284,6 +284,13 @@ impl SceneFile {
         notes.extend(nothing_to_draw(&geometry));
         if self.spec.picture() == Some(LayerSpec::Radiance) {
             notes.extend(objects::of(&geometry, &parts.materials, &parts.lights));
+        } else if camera.lens().is_some_and(|lens| lens.diffracts()) {
+            notes.push(Note {
+                kind: NoteKind::Unused,
+                subject: "`camera.diffraction`".to_owned(),
+                message: "spreads light alone, and nothing here traces any: set `tracer` to `path` or `direct`".to_owned(),
+                count: 1,
+            });
         }
         let sensor = self.sensor_behind(&camera)?;
         notes.extend(self.lens_notes(&camera, options.strictness)?);

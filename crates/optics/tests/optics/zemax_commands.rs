@@ -89,6 +89,10 @@ fn files_that_are_cut_short_are_refused_wherever_they_are_cut() {
     // At the end of a surface.
     says(&lines[..image].concat(), &["line 20", "SURF 2", "48", "DISZ", "cut short"]);
     says(whole.trim_end(), &["line 23", "no end", "line break"]);
+    // An exponent is the end of a number, though nothing follows.
+    let exponent = whole.trim_end().replace("DISZ 0", "DISZ 0.0000E+00");
+    assert!(read(&exponent).is_ok());
+    says(exponent.trim_end_matches('0'), &["line 23", "no end"]);
     says(&whole.replace("DISZ 0\n", "DISZ 0\n  GLAS N-BK7 0 0 1.5 64\n"), &["SURF 3", "no image"]);
 }
 
@@ -141,7 +145,7 @@ fn configurations_change_glasses_wavelengths_and_weights() {
         serde_json::to_value(&lens.file).unwrap()["elements"][0]["glass"].clone()
     };
     assert_eq!((glass(&at(1)), at(1).wavelengths), (serde_json::json!("N-BK7"), vec![550.0]));
-    assert_eq!((glass(&at(2)), at(2).wavelengths), (serde_json::json!("SF11"), vec![650.0]));
+    assert_eq!((glass(&at(2)), at(2).wavelengths), (serde_json::json!("Schott:SF11"), vec![650.0]));
     assert_eq!(at(2).file.elements[0].mount.thickness.0, 5.0);
     for (bad, word) in [
         ("GLSS 9 2 SF11 0", "no surface 9"),

@@ -107,7 +107,10 @@ pub fn read_lens_at(
     if configuration.is_some() {
         let reason = "has no configurations, which Zemax files (.zmx), those of OSLO (.len) and tables of PhotonsToPhotos \
                       (.txt) may have";
-        return Err(SceneError::not_a_lens(path, reason));
+        return Err(SceneError::refused(
+            path,
+            Refusal::new(reason).hint("leave `--configuration` out"),
+        ));
     }
     let (written, value) = read(path)?;
     if !SCENE_KEYS.iter().any(|key| value.get(key).is_some()) {

@@ -33,6 +33,10 @@ const LEAST_STEPS: f64 = 100.0;
 /// Steps along the gap itself that an integration may take.
 const MOST_STEPS: f64 = 1e5;
 
+/// The greatest index that a gradient may have: no medium of light has more, and what is far beyond it would be
+/// followed in steps without number.
+const MOST_INDEX: f64 = 10.0;
+
 /// Places in each direction at which the index is looked at.
 const LOOKS: u32 = 64;
 
@@ -153,9 +157,12 @@ impl GradientSpec {
         };
         let steps = thickness.abs() / gradient.step;
         if steps > MOST_STEPS {
+            let remedy = match step {
+                Some(_) => "write a longer gradient.step",
+                None => "lessen the thickness or the gradient",
+            };
             return Err(format!(
-                "gradient.step of {} mm makes {steps:.0} steps of the thickness, and {MOST_STEPS} are the most; write a \
-                 longer one",
+                "a gradient over {thickness} mm takes more than {MOST_STEPS} steps of {:.3e} mm; {remedy}",
                 gradient.step
             ));
         }
@@ -201,7 +208,7 @@ impl Gradient {
         }
     }
 
-    /// Refuses an index that is not above 1 within the rim.
+    /// Refuses an index that is not above 1 within the rim, or above [`MOST_INDEX`].
     fn check(&self, base: f64, thickness: f64) -> Result<(), String> {
         let places = (0..=LOOKS).flat_map(|i| (0..=LOOKS).map(move |k| [i, k]));
         let squares = places.map(|[i, k]| {
@@ -209,19 +216,17 @@ impl Gradient {
             let (r, z) = (self.semi_diameter * share(i), thickness * share(k));
             (self.field(base, [0.0, r, z]).square, r, z)
         });
-        let Some((square, r, z)) = squares.min_by(|a, b| a.0.total_cmp(&b.0)) else {
-            return Ok(());
-        };
-        if square > 1.0 && square.is_finite() {
-            return Ok(());
-        }
+        let is_index = |square: f64| square > 1.0 && square <= MOST_INDEX * MOST_INDEX;
+        let mut wrong = squares.filter(|(square, ..)| !is_index(*square));
+        let Some((square, r, z)) = wrong.next() else { return Ok(()) };
         let what = match square > 0.0 {
+            true if square > 1.0 => format!("an index of {:.4e}", square.sqrt()),
             true => format!("an index of {:.4}", square.sqrt()),
             false => format!("a squared index of {square:.4}"),
         };
         Err(format!(
-            "the gradient has {what} {r:.4} mm from the axis, {z:.4} mm behind its surface; it must exceed 1 within the \
-             rim: lessen its terms or its semi_diameter"
+            "the gradient has {what} {r:.4} mm from the axis, {z:.4} mm behind its surface; it must exceed 1 within \
+             the rim, and be at most {MOST_INDEX}: lessen its terms or its semi_diameter"
         ))
     }
 
@@ -229,8 +234,8 @@ impl Gradient {
     fn own_step(&self, base: f64, thickness: f64) -> f64 {
         let of_gap = thickness.abs() / LEAST_STEPS;
         let swing = match &self.law {
-            // In closed form: steps only find the surface and the rim.
-            Law::Rod { g } => return (4.0 * PHASE_STEP / g).min(of_gap * 25.0),
+            // In closed form: steps of a fifteenth of a pitch only find the surface and the rim.
+            Law::Rod { g } => return (40.0 * PHASE_STEP / g).min(of_gap * 25.0),
             Law::Sum { .. } => (0..=LOOKS)
                 .flat_map(|i| (0..=LOOKS).map(move |k| (i, k)))
                 .map(|(i, k)| {

@@ -136,7 +136,15 @@ impl Gradient {
         if side2.is_infinite() || !(before > 0.0 && after < 0.0) {
             return None;
         }
-        let farthest = self.advanced(base, here, h * before / (before - after));
+        // By the secant, and once more from there: the second is off by the cube of what the first is.
+        let at = h * before / (before - after);
+        let near = self.advanced(base, here, at);
+        let slope = outwards(&near);
+        let further = match slope > 0.0 {
+            true => at + (h - at) * slope / (slope - after),
+            false => at * before / (before - slope),
+        };
+        let farthest = self.advanced(base, here, further);
         beyond(&farthest).then_some(farthest.place)
     }
 

@@ -54,6 +54,10 @@ impl Command<'_> {
     /// The number at `i`, behind a surface such as `S3` where there is one.
     fn number(&self, i: usize) -> Result<f64, ZemaxError> {
         let word = self.words.get(i).ok_or_else(|| self.error("a number is missing"))?;
+        // The program itself writes 0.1e21.
+        if word.eq_ignore_ascii_case("inf") {
+            return Ok(1e20);
+        }
         let number = word.parse::<f64>().ok().filter(|number| number.is_finite());
         number.ok_or_else(|| self.error(format!("`{word}` is not a number")))
     }

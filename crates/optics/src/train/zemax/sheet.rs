@@ -146,7 +146,7 @@ impl ZemaxSheet {
         if sheet.rows.is_empty() {
             return Err(ZemaxError::new(1, "no SURF in the file; is it a sequential Zemax lens?"));
         }
-        sheet.check_end(in_surface && !text.ends_with(['\n', '\r']))?;
+        sheet.check_end(in_surface && ends_inside_of_a_line(text))?;
         Ok(sheet)
     }
 
@@ -441,6 +441,15 @@ fn unit(line: &SheetLine<'_>) -> Result<f64, ZemaxError> {
             Err(line.error(format!("unknown unit `{found}`; known: MM, CM, IN, METER")))
         }
     }
+}
+
+/// Whether a text may have lost the rest of its last line: there is no line break behind it, nor an exponent of two
+/// digits, which programs write in full.
+fn ends_inside_of_a_line(text: &str) -> bool {
+    let exponent = text.rsplit_once(['e', 'E']).map_or("", |(_, exponent)| exponent);
+    let digits = exponent.trim_start_matches(['+', '-']);
+    let is_whole = digits.len() >= 2 && digits.bytes().all(|byte| byte.is_ascii_digit());
+    !(text.ends_with(['\n', '\r']) || is_whole)
 }
 
 /// A catalogue's name as ours: `SCHOTT_2000` is Schott.

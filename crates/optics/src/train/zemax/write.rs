@@ -84,6 +84,10 @@ impl LensFile {
             "NAME {name}\nUNIT MM X W X CM MR CPMM\nFLOA\nWAVM 1 {:e} 1\nPWAV 1\n",
             wavelength * 1e-3
         );
+        let makers = self.glass_makers();
+        if !makers.is_empty() {
+            let _ = writeln!(text, "GCAT {}", makers.join(" "));
+        }
         let object = Row { lines: vec!["TYPE STANDARD".to_owned()], thickness: f64::INFINITY };
         let mut image = vec![Row::new("STANDARD")];
         if let Some(sensor) = self.sensor {
@@ -107,6 +111,23 @@ impl LensFile {
             }
         }
         Ok(text)
+    }
+
+    /// The makers that its glasses name, in the order in which they do: where two have a glass of one name, that of
+    /// the first is taken when the file is read.
+    fn glass_makers(&self) -> Vec<String> {
+        let mut makers = Vec::new();
+        for element in &self.elements {
+            if let Some(Some(GlassSpec::Named(name))) = element.part.medium_behind()
+                && let Some((maker, _)) = name.split_once(':')
+            {
+                let maker = maker.to_uppercase();
+                if !makers.contains(&maker) {
+                    makers.push(maker);
+                }
+            }
+        }
+        makers
     }
 }
 
