@@ -1,4 +1,4 @@
-//! Files of OSLO, optiland, ISET, pbrt and PhotonsToPhotos: what each command becomes, and what is refused.
+//! Files of OSLO, optiland, ISET, pbrt and `PhotonsToPhotos`: what each command becomes, and what is refused.
 
 use etendue_optics::element::PartSpec;
 use etendue_optics::train::{Focus, LensFile, LensFormat, OpticalTrain, ZemaxLens};

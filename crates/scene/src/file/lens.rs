@@ -99,10 +99,10 @@ pub fn read_lens_at(
     configuration: Option<usize>,
     glasses: &[AgfCatalogue],
 ) -> Result<ReadLens, SceneError> {
-    if let Some(format) = format_of(path)? {
-        if configuration.is_none() || format.has_configurations() {
-            return import(path, format, configuration, glasses);
-        }
+    if let Some(format) = format_of(path)?
+        && (configuration.is_none() || format.has_configurations())
+    {
+        return import(path, format, configuration, glasses);
     }
     if configuration.is_some() {
         let reason = "has no configurations, which Zemax files (.zmx), those of OSLO (.len) and tables of PhotonsToPhotos \

@@ -202,7 +202,7 @@ impl Step {
 
     fn pass_one_with(&self, ray: Ray, clip: Clip, media: Media) -> Traversal {
         let action = self.action.between(media);
-        let step = Step { action, graded: None, loss: None, ..self.clone() };
+        let step = Self { action, graded: None, loss: None, ..self.clone() };
         step.pass_one(ray, clip)
     }
 }

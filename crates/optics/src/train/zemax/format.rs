@@ -18,7 +18,7 @@ pub enum LensFormat {
     Iset,
     /// Tables of pbrt's realistic camera, `.dat`.
     Pbrt,
-    /// Tables of PhotonsToPhotos' Optical Bench, `.txt`.
+    /// Tables of `PhotonsToPhotos`' Optical Bench, `.txt`.
     PhotonsToPhotos,
 }
 

@@ -233,8 +233,9 @@ fn cauchy(micrometres: &[f64], indices: &[f64]) -> Option<Vec<f64>> {
         }
         for k in (0..count).filter(|&k| k != i) {
             let share = rows[k][i] / rows[i][i];
-            for column in i..=count {
-                rows[k][column] -= share * rows[i][column];
+            let pivot = rows[i].clone();
+            for (own, of_pivot) in rows[k].iter_mut().zip(&pivot).skip(i) {
+                *own -= share * of_pivot;
             }
         }
     }

@@ -1,5 +1,5 @@
 //! Lenses from other programs' files: Zemax OpticStudio's sequential `.zmx` files and, by way of the same lens data
-//! sheet, those of CODE V, OSLO, optiland, ISET, pbrt and PhotonsToPhotos.
+//! sheet, those of CODE V, OSLO, optiland, ISET, pbrt and `PhotonsToPhotos`.
 //!
 //! | module | idea |
 //! |---|---|
@@ -12,7 +12,7 @@
 //! | `optiland`, `optiland_system`, `python_json` | surfaces of optiland's JSON, what it says of the whole, and its numbers |
 //! | `stop` | the stop's opening |
 //! | `pbrt`, `iset` | tables of pbrt's realistic camera, and ISET's JSON, which has the same |
-//! | `photons_to_photos` | tables of PhotonsToPhotos' Optical Bench |
+//! | `photons_to_photos` | tables of `PhotonsToPhotos`' Optical Bench |
 //! | `write` | a lens file to lines |
 //! | here | rows to the elements of a lens file |
 //!

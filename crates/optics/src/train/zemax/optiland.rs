@@ -363,7 +363,8 @@ fn even(geometry: &Value, row: &mut SheetRow) -> Result<(), String> {
     };
     // As an extended asphere has them: their number, a radius of 1, and the coefficients.
     if coefficients.iter().any(|value| *value != 0.0) {
-        (put(1, 15.0), put(2, 1.0));
+        put(1, 15.0);
+        put(2, 1.0);
         for (i, value) in coefficients.iter().take(15).enumerate() {
             put(i + 3, *value);
         }

@@ -30,11 +30,11 @@ enum Asphere {
     /// AD to AG.
     #[default]
     Four,
-    /// `ASR`: ASn of r²ⁿ.
+    /// `ASR`: `ASn` of r²ⁿ.
     Even,
-    /// `ARA`: ASn of rⁿ.
+    /// `ARA`: `ASn` of rⁿ.
     Every,
-    /// `ASX`: ASn of xⁱ yʲ by degree, x first.
+    /// `ASX`: `ASn` of xⁱ yʲ by degree, x first.
     Plane,
 }
 

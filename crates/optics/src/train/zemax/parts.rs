@@ -22,14 +22,7 @@ impl Importer<'_> {
         let unit = self.sheet.unit;
         let semi_diameter = row.semi_diameter().map(|length| length * unit);
         if row.shape == SurfaceShape::Paraxial {
-            let focal_length = row.parameters.get(&1).map_or(100.0, |p| p.value) * unit;
-            if focal_length == 0.0 {
-                return Err(ZemaxError::new(row.line, "a paraxial lens of focal length 0"));
-            }
-            return Ok(Some(PartSpec::ThinLens(ThinLensSpec {
-                focal_length: Millimetres(focal_length),
-                semi_diameter: semi_diameter.map(Millimetres),
-            })));
+            return row.thin_lens(unit).map(Some);
         }
         if flat_in_air {
             if !row.stop && !row.has_fixed_rim() {
@@ -108,6 +101,18 @@ impl Importer<'_> {
 }
 
 impl SheetRow {
+    /// A paraxial lens.
+    fn thin_lens(&self, unit: f64) -> Result<PartSpec, ZemaxError> {
+        let focal_length = self.parameters.get(&1).map_or(100.0, |p| p.value) * unit;
+        if focal_length == 0.0 {
+            return Err(ZemaxError::new(self.line, "a paraxial lens of focal length 0"));
+        }
+        Ok(PartSpec::ThinLens(ThinLensSpec {
+            focal_length: Millimetres(focal_length),
+            semi_diameter: self.semi_diameter().map(|length| Millimetres(length * unit)),
+        }))
+    }
+
     /// Whether it is a plane that does nothing but between media.
     pub(super) fn is_flat(&self) -> bool {
         let bends = |(number, parameter): (&usize, &Parameter)| {

@@ -1,4 +1,4 @@
-//! Tables of PhotonsToPhotos' Optical Bench to the rows of the lens data sheet.
+//! Tables of `PhotonsToPhotos`' Optical Bench to the rows of the lens data sheet.
 //!
 //! Sections in brackets, cells between tabs. `[lens data]` has a row a surface: its name, radius (`AS` is the stop, `FS` a
 //! field stop, `CG` a plane of cover glass), thickness, nd of what follows, diameter, Abbe number. A cell may name a row of
