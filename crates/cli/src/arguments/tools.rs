@@ -28,7 +28,7 @@ Examples:
 #[derive(Debug, Args)]
 pub(crate) struct LensArguments {
     /// A lens file (.json), a scene whose camera is a lens, or a file of Zemax (.zmx), CODE V (.seq), OSLO (.len),
-    /// optiland or ISET (.json), pbrt (.dat) or PhotonsToPhotos (.txt)
+    /// optiland or ISET (.json), pbrt (.dat) or `PhotonsToPhotos` (.txt)
     #[arg(value_name = "LENS|ZMX|SCENE")]
     pub(crate) lens: PathBuf,
     /// Print JSON for machines, with all digits
