@@ -217,8 +217,10 @@ impl Gradient {
             (self.field(base, [0.0, r, z]).square, r, z)
         });
         let is_index = |square: f64| square > 1.0 && square <= MOST_INDEX * MOST_INDEX;
-        let mut wrong = squares.filter(|(square, ..)| !is_index(*square));
-        let Some((square, r, z)) = wrong.next() else { return Ok(()) };
+        let wrong = squares.filter(|(square, ..)| !is_index(*square));
+        let Some((square, r, z)) = wrong.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+            return Ok(());
+        };
         let what = match square > 0.0 {
             true if square > 1.0 => format!("an index of {:.4e}", square.sqrt()),
             true => format!("an index of {:.4}", square.sqrt()),
