@@ -92,7 +92,7 @@ fn files_that_are_cut_short_are_refused_wherever_they_are_cut() {
     // An exponent is the end of a number, though nothing follows.
     let exponent = whole.trim_end().replace("DISZ 0", "DISZ 0.0000E+00");
     assert!(read(&exponent).is_ok());
-    says(exponent.trim_end_matches('0'), &["line 23", "no end"]);
+    says(&exponent[..exponent.len() - 1], &["line 23", "no end"]);
     says(&whole.replace("DISZ 0\n", "DISZ 0\n  GLAS N-BK7 0 0 1.5 64\n"), &["SURF 3", "no image"]);
 }
 
