@@ -4,7 +4,7 @@
 //! power Φ = (n' − n) c is [1 0; −Φ 1], a gap t in index n is [1 t/n; 0 1] (A. Gerrard and J. M.
 //! Burch, *Introduction to Matrix Methods in Optics*, 1975). Both have determinant 1.
 //!
-//! A gap of [graded index](crate::element::gradient) has a matrix of its own.
+//! A gap of graded index has a matrix of its own.
 //!
 //! Tilts and decentrings are left out. Planes are given by their z in lens coordinates (mm).
 
