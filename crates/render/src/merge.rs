@@ -16,7 +16,7 @@ use crate::output::OutputError;
 use crate::render::{Film, empty_film};
 use crate::shard::Shard;
 use crate::tile::RayCounts;
-use crate::tiles::Passed;
+use crate::tiles::SamplesTaken;
 
 impl Film {
     /// Writes it to a file: which render it is of, and how that was asked for, goes with it.
@@ -74,7 +74,7 @@ impl Film {
         let of_pixels = shares.iter().filter_map(|share| share.header.sample_counts);
         let of_pixels = of_pixels.reduce(SampleCounts::and);
         let samples = of_pixels.map_or(plan.samples, |counts| counts.least);
-        let passed = Passed { samples, is_complete: true, counts: of_pixels };
+        let passed = SamplesTaken { samples, is_complete: true, counts: of_pixels };
         Ok(Self {
             layers,
             resolution,

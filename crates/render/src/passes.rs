@@ -10,7 +10,7 @@ use crate::film::{FilmLayer, NoMemory};
 use crate::samples::Averaging;
 use crate::sampling::Sampling;
 use crate::tile::RayCounts;
-use crate::tiles::{Beside, Job, Passed};
+use crate::tiles::{Job, OtherLayers, SamplesTaken};
 use crate::watch::{SoFar, Watcher};
 
 /// The share of what is left of a time that a pass may be reckoned to take.
@@ -23,13 +23,13 @@ impl Job<'_> {
         &self,
         mut samples: u32,
         parts: &mut [Averaging<'_>],
-        beside: Beside<'_, '_>,
+        others: OtherLayers<'_, '_>,
         watcher: &Watcher<'_>,
         traffic: &Mutex<RayCounts>,
-    ) -> Result<Passed, RenderError> {
+    ) -> Result<SamplesTaken, RenderError> {
         let Range { start: first, end: all } = self.sampling.range();
         if parts.is_empty() {
-            return Ok(Passed { samples: all, is_complete: true, counts: None });
+            return Ok(SamplesTaken { samples: all, is_complete: true, counts: None });
         }
         if !self.shares.is_empty() || samples >= all {
             parts.iter_mut().for_each(|part| part.show(samples));
@@ -38,9 +38,9 @@ impl Job<'_> {
             && self.shares.is_empty()
         {
             let adaptive = self.adaptive(rule, parts)?;
-            return self.rounds(adaptive, parts, beside, watcher, traffic);
+            return self.rounds(adaptive, parts, others, watcher, traffic);
         }
-        let mut passed = Passed { samples, is_complete: samples >= all, counts: None };
+        let mut passed = SamplesTaken { samples, is_complete: samples >= all, counts: None };
         let start = Instant::now();
         while let (false, Some(end)) = (passed.is_complete, self.end_of_pass(samples, start)) {
             let pass = samples..end;
@@ -50,19 +50,19 @@ impl Job<'_> {
             }
             samples = end;
             parts.iter_mut().for_each(|part| part.show(samples));
-            passed = Passed { samples, is_complete: samples >= all, counts: None };
+            passed = SamplesTaken { samples, is_complete: samples >= all, counts: None };
             self.expect(start, watcher);
             if !passed.is_complete {
                 self.look(samples, parts, watcher);
                 if let Some(keeper) = &self.keeper {
-                    let centres: Vec<&FilmLayer> = beside.centres.iter().map(|l| &**l).collect();
+                    let centres: Vec<&FilmLayer> = others.centres.iter().map(|l| &**l).collect();
                     let counts = traffic.lock().unwrap_or_else(PoisonError::into_inner).clone();
                     keeper.keep(samples, &centres, parts, &counts);
                 }
             }
         }
         // What ends for want of time is all that was wanted.
-        Ok(Passed { is_complete: true, ..passed })
+        Ok(SamplesTaken { is_complete: true, ..passed })
     }
 
     /// Takes the samples that are wanted, round by round, until no pixel wants more.
@@ -70,11 +70,11 @@ impl Job<'_> {
         &self,
         mut adaptive: Adaptive<'_>,
         parts: &mut [Averaging<'_>],
-        beside: Beside<'_, '_>,
+        others: OtherLayers<'_, '_>,
         watcher: &Watcher<'_>,
         traffic: &Mutex<RayCounts>,
-    ) -> Result<Passed, RenderError> {
-        let mut passed: Option<Passed> = None;
+    ) -> Result<SamplesTaken, RenderError> {
+        let mut passed: Option<SamplesTaken> = None;
         while adaptive.goes_on() {
             let wanted = |pixel| adaptive.wanted(pixel);
             let mut add = |part: &mut Averaging<'_>| part.add_wanted(&wanted, watcher, traffic);
@@ -82,17 +82,18 @@ impl Job<'_> {
                 return passed.ok_or(stopped.into());
             }
             adaptive.judge(parts);
-            adaptive.show(parts, beside.told);
+            adaptive.show(parts, others.of_sampling);
             watcher.expect(adaptive.to_come() * parts.len() as u64);
             let counts = adaptive.counts();
             let least = counts.map_or(self.sampling.samples, |counts| counts.least);
             if adaptive.goes_on() {
                 self.look(least, parts, watcher);
             }
-            passed = Some(Passed { samples: least, is_complete: !adaptive.goes_on(), counts });
+            passed =
+                Some(SamplesTaken { samples: least, is_complete: !adaptive.goes_on(), counts });
         }
         // A share without rows wants nothing.
-        let all = Passed { samples: self.sampling.samples, is_complete: true, counts: None };
+        let all = SamplesTaken { samples: self.sampling.samples, is_complete: true, counts: None };
         Ok(passed.unwrap_or(all))
     }
 

@@ -30,7 +30,7 @@ use crate::shard::Shard;
 use crate::stopping::Stopping;
 use crate::sum::Sum;
 use crate::tile::RayCounts;
-use crate::tiles::{Done, Job, Passed};
+use crate::tiles::{Done, Job, SamplesTaken};
 use crate::watch::{Watch, Watcher};
 use crate::{Plan, diffraction, expose, lighting, names};
 
@@ -112,7 +112,7 @@ pub struct Film {
     pub(crate) resolution: [u32; 2],
     pub(crate) shard: Shard,
     pub(crate) counts: RayCounts,
-    pub(crate) passed: Passed,
+    pub(crate) passed: SamplesTaken,
     pub(crate) trace_time: Duration,
     /// Of a share of the samples, the sums of what is averaged.
     pub(crate) sums: Vec<Vec<Sum>>,
@@ -307,7 +307,7 @@ impl Film {
             resolution,
             shard,
             counts: RayCounts::default(),
-            passed: Passed { samples, is_complete: true, counts: None },
+            passed: SamplesTaken { samples, is_complete: true, counts: None },
             trace_time: Duration::ZERO,
             sums: Vec::new(),
             centres: Vec::new(),
@@ -348,7 +348,7 @@ pub fn finish(
     accel: Option<&dyn Accel>,
 ) -> Result<Rendered, RenderError> {
     let Film { layers, counts, passed, trace_time, mut notes, camera, .. } = film;
-    let Passed { samples, is_complete, counts: sample_counts } = passed;
+    let SamplesTaken { samples, is_complete, counts: sample_counts } = passed;
     let samples_wanted = if is_complete { samples } else { plan.samples };
     let RayCounts { chief_rays, light, statuses, sparkles } = counts;
     // A lens through which no ray came has no picture.

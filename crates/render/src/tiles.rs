@@ -67,7 +67,7 @@ pub(crate) struct Job<'a> {
 #[derive(Debug)]
 pub(crate) struct Done {
     pub(crate) traffic: RayCounts,
-    pub(crate) passed: Passed,
+    pub(crate) passed: SamplesTaken,
     /// Of a share of the samples, the sums of what is averaged.
     pub(crate) sums: Vec<Vec<Sum>>,
     /// The layers that are not averaged.
@@ -76,7 +76,7 @@ pub(crate) struct Done {
 
 /// What the passes left.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Passed {
+pub(crate) struct SamplesTaken {
     /// Samples that every pixel has.
     pub(crate) samples: u32,
     /// Whether that is all that was wanted.
@@ -86,11 +86,11 @@ pub(crate) struct Passed {
 }
 
 /// The layers that are not averaged.
-pub(crate) struct Beside<'a, 'f> {
+pub(crate) struct OtherLayers<'a, 'f> {
     /// Along chief rays.
     pub(crate) centres: &'a [&'f mut FilmLayer],
     /// Those that tell of sampling.
-    pub(crate) told: &'a mut [&'f mut FilmLayer],
+    pub(crate) of_sampling: &'a mut [&'f mut FilmLayer],
 }
 
 impl Job<'_> {
@@ -102,7 +102,7 @@ impl Job<'_> {
         watcher: &Watcher<'_>,
     ) -> Result<Done, RenderError> {
         let traffic = Mutex::new(RayCounts::default());
-        let (mut told, film): (Vec<_>, Vec<_>) =
+        let (mut of_sampling, film): (Vec<_>, Vec<_>) =
             film.iter_mut().partition(|layer| layer.spec.is_of_sampling());
         let (lit, seen): (Vec<_>, Vec<_>) =
             film.into_iter().partition(|layer| layer.spec.is_light());
@@ -136,8 +136,8 @@ impl Job<'_> {
             None if shard.has_data() => self.centres(&mut centre, watcher, &traffic)?,
             None => {}
         }
-        let beside = Beside { centres: &centre, told: &mut told };
-        let passed = self.passes(done, &mut averaged, beside, watcher, &traffic)?;
+        let others = OtherLayers { centres: &centre, of_sampling: &mut of_sampling };
+        let passed = self.passes(done, &mut averaged, others, watcher, &traffic)?;
         let traffic = traffic.into_inner().unwrap_or_else(PoisonError::into_inner);
         let sums = averaged.into_iter().map(|part| part.sums).filter(|_| shard.is_of_samples());
         let (sums, centres) = (sums.collect(), centre.iter().map(|layer| layer.spec).collect());

@@ -276,9 +276,12 @@ fn lenses_of_other_programs_are_read_and_saved_and_taken_by_scenes() {
         // Broken, it is told as what it is, and none of Zemax' words.
         bench.write(name, content.replace("1.5", "0.5").as_bytes());
         let output = bench.run(&["lens", name]);
-        let told = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{told}");
-        assert!(told.contains(name) && !told.contains("GLAS") && !told.contains("Zemax"), "{told}");
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(
+            message.contains(name) && !message.contains("GLAS") && !message.contains("Zemax"),
+            "{message}"
+        );
     }
     bench.write("lens.txt", OPTBENCH.as_bytes());
     efl("lens.txt", &["--configuration", "2"]);

@@ -55,10 +55,10 @@ fn rays_of_a_second_package_end_at_the_same_places() {
             // Points stand in the space before their element.
             let from = before_last.place(DVec3::from_array(*ours.points.last().unwrap()));
             let along = built.direction(DVec3::from_array(ours.direction.unwrap()));
-            let beside = (*end - from).cross(along).length();
+            let distance = (*end - from).cross(along).length();
             let normal = built.direction(sensor.rotation.z_axis);
             let before = (*end - built.place(sensor.vertex)).dot(normal).abs();
-            apart = apart.max(beside).max(before);
+            apart = apart.max(distance).max(before);
         }
         assert_eq!(traced.rays.len(), 16);
         worst.push((path.file_stem().unwrap().to_string_lossy().into_owned(), apart));

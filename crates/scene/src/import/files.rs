@@ -34,7 +34,7 @@ pub(super) struct Files {
 
 impl Files {
     /// For the model at `path`, whose relative paths start at its own folder.
-    pub(super) fn beside(path: &Path, options: &Options) -> Result<Self, Refusal> {
+    pub(super) fn of_model(path: &Path, options: &Options) -> Result<Self, Refusal> {
         let folder = match path.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
             _ => PathBuf::from("."),

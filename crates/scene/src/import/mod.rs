@@ -285,7 +285,7 @@ fn refuse_other_kind(file: &Path, bytes: &[u8], wanted: &str) -> Result<(), Refu
 /// When the file, or one that it names, cannot be read, is damaged, leaves [`Options::root`], or
 /// needs an extension that is not supported; under [`Strictness::Strict`] also for defective data.
 pub fn import(path: &Path, wanted: Wanted, options: &Options) -> Result<Import, Refusal> {
-    let files = Files::beside(path, options)?;
+    let files = Files::of_model(path, options)?;
     let extension =
         path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let mut import = match extension.as_str() {
