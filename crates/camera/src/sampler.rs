@@ -173,6 +173,33 @@ pub fn squares_of_pair(
     sobol::points(&keys, dimensions, out);
 }
 
+/// [`squares_of_pair`] in single precision, the numbers below 1, in two columns.
+pub fn floats_of_pair(
+    samples: impl Iterator<Item = (PixelSamples, u32)> + Clone,
+    pair: u32,
+    out: &mut [Vec<f32>; 2],
+) {
+    let count = samples.size_hint().0;
+    let mut keys = Vec::with_capacity(count);
+    let (mut dimensions, mut is_sobol) = (0, true);
+    let mut sequence = Sequence::default();
+    for (pixel, index) in samples.clone() {
+        is_sobol &= pixel.sampler.is_sobol();
+        let (key, first) = pixel.sobol_key(index, pair, &mut sequence);
+        keys.push(key);
+        dimensions = first;
+    }
+    out.iter_mut().for_each(|column| column.resize(keys.len(), 0.0));
+    let [first, second] = out;
+    if is_sobol {
+        sobol::floats(&keys, dimensions, [first, second]);
+        return;
+    }
+    for (((pixel, index), x), y) in samples.zip(first).zip(second) {
+        [*x, *y] = pixel.square(index, pair).map(sobol::float);
+    }
+}
+
 /// The scrambling of the sequence that was asked for last: that of nearly all samples of a batch.
 #[derive(Debug, Default)]
 struct Sequence {
@@ -312,10 +339,18 @@ mod tests {
             let pixel = |i: u32| sampler.pixel(5, i % 7, i / 7, 80_000);
             let samples = (0..200).map(|i| (pixel(i), i * 381));
             let mut out = Vec::new();
+            let mut floats = [Vec::new(), Vec::new()];
             for pair in [0, 3, 200] {
                 squares_of_pair(samples.clone(), pair, &mut out);
                 let one_by_one = samples.clone().map(|(pixel, i)| pixel.square(i, pair));
                 assert_eq!(out, one_by_one.collect::<Vec<_>>(), "{sampler:?} pair {pair}");
+                floats_of_pair(samples.clone(), pair, &mut floats);
+                let [x, y] = floats.each_ref().map(|column| column.iter().copied().map(f64::from));
+                for ([a, b], own) in x.zip(y).map(<[f64; 2]>::from).zip(&out).map(|([a, b], own)| ([a, b], own)) {
+                    // 24 bits of each.
+                    let error = (own[0] - a).abs().max((own[1] - b).abs());
+                    assert!(error < 1.0 / 16_777_216.0 && a < 1.0 && b < 1.0, "{sampler:?} {own:?}");
+                }
             }
         }
     }

@@ -50,6 +50,17 @@ pub(crate) fn points(keys: &[SobolKey], first: usize, out: &mut [[f64; 2]]) {
     scrambled(keys, first, &DIRECTIONS, out);
 }
 
+/// The same points to 24 bits, in two columns as long as `keys`.
+pub(crate) fn floats(keys: &[SobolKey], first: usize, out: [&mut [f32]; 2]) {
+    scrambled_floats(keys, first, &DIRECTIONS, out);
+}
+
+/// The first 24 bits of a number below 1.
+#[expect(clippy::cast_possible_truncation, reason = "a whole number below 2²⁴ is one of single precision")]
+pub(crate) fn float(x: f64) -> f32 {
+    ((x * TWO_TO_24).floor() / TWO_TO_24) as f32
+}
+
 /// The point of one key in dimensions `first` and `first + 1`.
 pub(crate) fn point(key: SobolKey, first: usize) -> [f64; 2] {
     let [point] = side_by_side([key.index], |_| key.seed, first, &DIRECTIONS);
@@ -73,6 +84,44 @@ fn scrambled(
         lanes[..rest.len()].copy_from_slice(rest);
         to_rest.copy_from_slice(&chunk(&lanes, first, directions)[..rest.len()]);
     }
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn scrambled_floats(
+    keys: &[SobolKey],
+    first: usize,
+    directions: &[[u32; BITS]; DIMENSIONS],
+    [x, y]: [&mut [f32]; 2],
+) {
+    for ((keys, x), y) in keys.chunks(LANES).zip(x.chunks_mut(LANES)).zip(y.chunks_mut(LANES)) {
+        let mut lanes = [keys[0]; LANES];
+        lanes[..keys.len()].copy_from_slice(keys);
+        let [across, up] = numbers_of(&lanes, first, directions);
+        let (mut a, mut b) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            // Their upper 24 bits, which single precision holds.
+            a[i] = (across[i] >> 8) as f32 / 16_777_216.0;
+            b[i] = (up[i] >> 8) as f32 / 16_777_216.0;
+        }
+        x.copy_from_slice(&a[..x.len()]);
+        y.copy_from_slice(&b[..y.len()]);
+    }
+}
+
+/// The upper 32 bits of the points of some keys.
+#[inline(always)]
+fn numbers_of(
+    keys: &[SobolKey; LANES],
+    first: usize,
+    directions: &[[u32; BITS]; DIMENSIONS],
+) -> [[u32; LANES]; 2] {
+    let [index, seeds] = [keys.map(|key| key.index), keys.map(|key| key.seed)];
+    let seed = seeds[0];
+    let numbers = match seeds.iter().fold(0, |others, other| others | (other ^ seed)) {
+        0 => upper_bits(index, |_| seed, first, directions),
+        _ => upper_bits(index, |i| seeds[i], first, directions),
+    };
+    numbers.map(|(number, _)| number)
 }
 
 /// Where all are of one scrambling, as nearly always, what goes into it is hashed once.
@@ -101,21 +150,22 @@ fn second_reversed(index: u32) -> u32 {
     bits ^ ((bits >> 16) & 0x0000_ffff)
 }
 
+/// The scrambled upper 32 bits of each dimension, with what they were scrambled by.
 #[inline(always)]
-fn side_by_side<const N: usize>(
+fn upper_bits<const N: usize>(
     keys: [u32; N],
     seed: impl Fn(usize) -> u32,
     first: usize,
     directions: &[[u32; BITS]; DIMENSIONS],
-) -> [[f64; 2]; N] {
+) -> [([u32; N], [u32; N]); 2] {
     const DIMENSION: [u32; 2] = [0x912f_69ba, 0x174f_18ab];
     // The scrambled index of each sequence.
     let mut index = [0; N];
     for i in 0..N {
         index[i] = owen_scramble_rev(keys[i].reverse_bits(), hash(seed(i))).reverse_bits();
     }
-    let mut out = [[0.0; 2]; N];
-    for k in 0..2 {
+    let mut out = [([0; N], [0; N]); 2];
+    for (k, (high, scrambles)) in out.iter_mut().enumerate() {
         // A dimension of Sobol's sequence: XOR of the direction numbers of the index' bits.
         let mut number = [0; N];
         match first + k {
@@ -129,18 +179,37 @@ fn side_by_side<const N: usize>(
                 }
             }
         }
-        // Scrambled by Owen's method: 32 bits of it, and 21 more by hashing.
+        // Scrambled by Owen's method.
         let salt = hash(DIMENSION[k].wrapping_add(u32::try_from(first).unwrap_or(0)));
         for i in 0..N {
-            let scramble = hash(hash(seed(i)) ^ salt);
-            let high = owen_scramble_rev(number[i], scramble).reverse_bits();
-            let low = hash(high ^ scramble) >> 11;
-            out[i][k] = (f64::from(high) + f64::from(low) / TWO_TO_21) / TWO_TO_32;
+            scrambles[i] = hash(hash(seed(i)) ^ salt);
+            high[i] = owen_scramble_rev(number[i], scrambles[i]).reverse_bits();
         }
     }
     out
 }
 
+/// 32 bits that are scrambled, and 21 more by hashing.
+#[inline(always)]
+fn side_by_side<const N: usize>(
+    keys: [u32; N],
+    seed: impl Fn(usize) -> u32,
+    first: usize,
+    directions: &[[u32; BITS]; DIMENSIONS],
+) -> [[f64; 2]; N] {
+    let mut out = [[0.0; 2]; N];
+    for (k, (high, scrambles)) in
+        upper_bits(keys, seed, first, directions).into_iter().enumerate()
+    {
+        for i in 0..N {
+            let low = hash(high[i] ^ scrambles[i]) >> 11;
+            out[i][k] = (f64::from(high[i]) + f64::from(low) / TWO_TO_21) / TWO_TO_32;
+        }
+    }
+    out
+}
+
+const TWO_TO_24: f64 = 16_777_216.0;
 const TWO_TO_21: f64 = 2_097_152.0;
 const TWO_TO_32: f64 = 4_294_967_296.0;
 

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use etendue_camera::{
     BandGroup, BandLandings, Camera, CameraRays, FilmSamples, PixelSamples, Sampler,
-    squares_of_pair,
+    floats_of_pair, squares_of_pair,
 };
 use etendue_geometry::HitBatch;
 use etendue_tracer::layer::Columns;
@@ -168,6 +168,11 @@ impl Samples for SampleNumbers {
     fn squares_of_pair(&self, rays: &[u32], pair: u32, out: &mut Vec<[f64; 2]>) {
         let samples = rays.iter().map(|&ray| self.samples[self.of_ray[ray as usize] as usize]);
         squares_of_pair(samples, CAMERA_PAIRS + pair, out);
+    }
+
+    fn floats_of_pair(&self, rays: &[u32], pair: u32, out: &mut [Vec<f32>; 2]) {
+        let samples = rays.iter().map(|&ray| self.samples[self.of_ray[ray as usize] as usize]);
+        floats_of_pair(samples, CAMERA_PAIRS + pair, out);
     }
 }
 

@@ -61,6 +61,16 @@ impl Emitters {
         Some(Self { accel: Some(accel), numbers, centre, radius })
     }
 
+    /// A sphere around them in single precision, about `origin` (m): its centre and its radius, with room for
+    /// rounding.
+    #[expect(clippy::cast_possible_truncation, reason = "the radius has room for it")]
+    pub(crate) fn sphere(&self, origin: DVec3) -> ([f32; 3], f32) {
+        let centre = self.centre - origin;
+        let room = 4.0 * f64::from(f32::EPSILON) * (centre.length() + self.radius);
+        let radius = if self.radius >= 0.0 { self.radius + room } else { -1.0 };
+        (centre.to_array().map(|axis| axis as f32), radius as f32)
+    }
+
     /// Whether a ray may meet any of them: `false` for most, at hardly a cost.
     pub(crate) fn may_meet(&self, origin: DVec3, direction: DVec3) -> bool {
         let way = self.centre - origin;

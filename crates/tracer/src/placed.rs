@@ -16,6 +16,46 @@ pub struct PlacedSurfaces {
     all: Vec<Option<PlacedSurface>>,
     /// The boundaries of bodies that lie over one another.
     pub(crate) touching: Coplanar,
+    /// What is known of all where each is matte and of one colour, and what it is of none behind the last; empty
+    /// elsewhere.
+    plain: Vec<PlainSurface>,
+    /// The diagonal of the box around all (m).
+    size: f64,
+}
+
+/// A matte surface of one colour, or one that only shines, in single precision.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct PlainSurface {
+    pub(crate) color: [f32; 3],
+    /// [`PlacedSurface::magnitudes`] (m).
+    pub(crate) magnitudes: [f32; 3],
+    pub(crate) is_there: bool,
+    pub(crate) scatters: bool,
+    pub(crate) shines: bool,
+}
+
+impl PlainSurface {
+    /// `None` of a surface of another kind.
+    #[expect(clippy::cast_possible_truncation, reason = "single precision is the purpose")]
+    fn of(placed: &PlacedSurface, material: &Material) -> Option<Self> {
+        let scatters = match placed.kind {
+            SurfaceKind::Matte => true,
+            SurfaceKind::Black => false,
+            SurfaceKind::Sheet | SurfaceKind::Smooth | SurfaceKind::Other => return None,
+        };
+        let is_unlit = material.scattering == Scattering::Unlit;
+        if placed.has_alpha || placed.may_vanish() || is_unlit || (scatters && placed.is_tilted) {
+            return None;
+        }
+        let color = if scatters { placed.color?.color } else { [0.0; 3] };
+        Some(Self {
+            color: color.map(|band| band as f32),
+            magnitudes: placed.magnitudes.to_array().map(|size| size as f32),
+            is_there: true,
+            scatters,
+            shines: placed.is_seen,
+        })
+    }
 }
 
 /// As what hits are worked on, where a surface is wholly there.
@@ -125,7 +165,31 @@ impl PlacedSurfaces {
             true => Coplanar::among(geometry, &may_touch),
             false => Coplanar::default(),
         };
-        Self { all: geometry.placements.iter().zip(bodies).map(surface).collect(), touching }
+        let all: Vec<_> = geometry.placements.iter().zip(bodies).map(surface).collect();
+        let bounds = geometry.loose_bounds();
+        let size = bounds.diagonal();
+        let [least, most] = crate::transport::PLAIN_SIZES;
+        let fits = size >= least && size + bounds.centre().length() <= most && spectral.is_rgb();
+        let row = |(placed, placement): (&Option<PlacedSurface>, &etendue_geometry::Placement)| {
+            PlainSurface::of(placed.as_ref()?, materials.get(placement.material as usize)?)
+        };
+        let rows = all.iter().zip(&geometry.placements).map(row);
+        let plain: Option<Vec<_>> = if fits { rows.collect() } else { None };
+        let mut plain = plain.unwrap_or_default();
+        if !plain.is_empty() {
+            plain.push(PlainSurface::default());
+        }
+        Self { all, touching, plain, size }
+    }
+
+    /// All in single precision and, behind the last, none: where all are matte and of one colour each.
+    pub(crate) fn plain(&self) -> Option<&[PlainSurface]> {
+        (!self.plain.is_empty()).then_some(&*self.plain)
+    }
+
+    /// The diagonal of the box around all (m).
+    pub(crate) fn size(&self) -> f64 {
+        self.size
     }
 
     /// Whether all scatter light as Lambert's law has it, or not at all.

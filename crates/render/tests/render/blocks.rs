@@ -115,8 +115,11 @@ fn print(scene: &mut Scene) {
     surface.metallic_roughness = Some(data);
 }
 
-/// That the scene's picture is the same by both ways, where there are two; how many structures have both.
-fn compare(name: &str, scene: &Scene, plan: &Plan) -> usize {
+/// The picture, and its parts.
+const LAYERS: [&str; 3] = ["", "Direct", "Indirect"];
+
+/// That `layers` of the scene are the same by both ways, where there are two; how many structures have both.
+fn compare(name: &str, scene: &Scene, plan: &Plan, layers: &[&str]) -> usize {
     let (accel, images) = prepare(scene, plan);
     let bvh = Bvh::build(Arc::clone(&scene.geometry), &BuildOptions::default()).unwrap();
     let structures: [&dyn Accel; 2] = [&*accel, &bvh];
@@ -129,7 +132,7 @@ fn compare(name: &str, scene: &Scene, plan: &Plan) -> usize {
         compared += 1;
         let blocks = trace(scene, plan, accel, &images);
         let batches = trace(scene, plan, &Batches(accel), &images);
-        for layer in ["", "Direct", "Indirect"] {
+        for &layer in layers {
             let [own, other] =
                 [&blocks, &batches].map(|done| channels(&done.picture, layer).concat());
             let total: f64 = other.iter().sum();
@@ -194,11 +197,40 @@ fn blocks_and_batches_follow_the_same_paths() {
             print(&mut scene);
         }
         let mut plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
-        assert!(compare(name, &scene, &plan) > 0, "{name} is traced in batches alone");
+        assert!(compare(name, &scene, &plan, &LAYERS) > 0, "{name} is traced in batches alone");
         if name == "metals" || name == "flint" || name == "flint in amber" {
             plan.bands = Bands::Spectral(Grid::of_width(400.0, 700.0, 60.0).unwrap());
-            compare(&format!("{name} in bands"), &scene, &plan);
+            compare(&format!("{name} in bands"), &scene, &plan, &LAYERS);
         }
+    }
+}
+
+/// Matte surfaces of one colour under few lamps are worked on in single precision as a whole, by blocks alone.
+#[test]
+fn plain_scenes_are_the_same_in_single_precision() {
+    const ANOTHER: &str = r#", {"shape": "rectangle", "material": "sign", "width": 0.4, "height": 0.8,
+        "transform": {"rotate": [0, 1, 0, 40], "translate": [-1.2, 1.1, 0.4]}}"#;
+    let two = format!("{LAMP}{ANOTHER}");
+    let path = |bounces: u32| format!(r#"{{"type": "path", "max_bounces": {bounces}}}"#);
+    let direct = r#"{"type": "direct"}"#.to_owned();
+    for (name, tracer, lamps) in [
+        ("direct", &direct, LAMP),
+        ("direct, two lamps", &direct, &two),
+        ("one bounce", &path(1), LAMP),
+        ("three", &path(3), &two),
+        // Dim paths end by chance.
+        ("twelve", &path(12), &two),
+    ] {
+        let text = room(tracer, "", lamps, "box")
+            .replace(r#""layers": ["direct", "indirect"],"#, "")
+            .replace(
+                r#"{"type": "checker", "colors": [[0.8, 0.8, 0.7], [0.2, 0.3, 0.4]], "squares": 8}"#,
+                r#"{"type": "matte", "color": [0.8, 0.8, 0.7]},
+                "sign": {"type": "emissive", "radiance": [0.5, 2, 4], "two_sided": true}"#,
+            );
+        let scene = load_in(Path::new("."), &text);
+        let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
+        assert!(compare(&format!("plain, {name}"), &scene, &plan, &[""]) > 0);
     }
 }
 

@@ -20,6 +20,7 @@ mod kernels;
 mod media;
 mod patch;
 mod paths;
+mod plain;
 mod rays;
 mod rules;
 mod scatter;
@@ -36,6 +37,8 @@ use etendue_geometry::{Geometry, HitPrecision, RayBatch};
 
 use self::patch::Patch;
 use self::paths::Workspace;
+use self::plain::PlainScratch;
+pub(crate) use self::plain::SIZES as PLAIN_SIZES;
 use self::rays::{Batch, Blocks};
 pub use self::rules::{Follow, Rules};
 use crate::bsdf::{Bsdf, Weights, metal};
@@ -190,6 +193,22 @@ pub trait Samples: Debug {
     /// A point of the unit square of one pair for each of `rays`: `out` is refilled. Pairs are counted from 0, which
     /// no ray has used before.
     fn squares_of_pair(&self, rays: &[u32], pair: u32, out: &mut Vec<[f64; 2]>);
+
+    /// The same in single precision, the numbers below 1, in two columns.
+    fn floats_of_pair(&self, rays: &[u32], pair: u32, out: &mut [Vec<f32>; 2]) {
+        let mut squares = Vec::new();
+        self.squares_of_pair(rays, pair, &mut squares);
+        for (k, column) in out.iter_mut().enumerate() {
+            column.clear();
+            column.extend(squares.iter().map(|square| below_one(square[k])));
+        }
+    }
+}
+
+/// A number in single precision, which stays below 1.
+#[expect(clippy::cast_possible_truncation, reason = "single precision is the purpose")]
+fn below_one(x: f64) -> f32 {
+    (x as f32).min(1.0 - f32::EPSILON / 2.0)
 }
 
 /// What became of a batch.
@@ -217,6 +236,7 @@ pub struct Scratch {
     blocks: Workspace<Blocks>,
     batches: Workspace<Batch>,
     patch: Box<Patch>,
+    plain: PlainScratch,
 }
 
 /// Traces the camera's rays by `rules`.
@@ -237,7 +257,7 @@ fn trace_bands<const RGB: bool>(
     rules: Rules,
     ctx: &LightingContext<'_>,
     camera: &RaySamples<'_>,
-    Scratch { blocks, batches, patch }: &mut Scratch,
+    Scratch { blocks, batches, patch, plain }: &mut Scratch,
     out: &mut Vec<f64>,
 ) -> RayStats {
     out.clear();
@@ -249,6 +269,10 @@ fn trace_bands<const RGB: bool>(
         times: camera.rays.times(),
         tally: RayStats::default(),
     };
+    if let Some((surfaces, lights)) = tracing.plain() {
+        tracing.trace_plain(camera, (surfaces, &lights), (plain, blocks), out);
+        return tracing.tally;
+    }
     match ctx.precision {
         HitPrecision::Single if ctx.accel.blocks().is_some() => {
             tracing.trace(camera, blocks, patch, out);

@@ -1,0 +1,522 @@
+//! One step of a plain scene's paths: what is looked up for sixteen hits first, then arithmetic on their rows, then
+//! the rays that leave them side by side.
+#![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
+
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
+
+use etendue_geometry::block::{Floats as Row, LANES};
+use etendue_geometry::glam::DVec3;
+use etendue_geometry::RayBlock;
+
+use super::{Columns, RayColumns};
+use crate::area_light::AreaLight;
+use crate::placed::PlainSurface;
+use crate::transport::paths::{DRAWS, Draw};
+
+/// Roundings of a hit and of the rays that leave it: those of [`crate::spawn`] in single precision, and as many
+/// again of the point, of the normal and of the start, which are of single precision, too.
+const ROUNDINGS: f32 = 12.0 * f32::EPSILON;
+
+/// How far rays that leave hits beside an edge start back, over the bound ([`super::super::kernels`]).
+const BACK: f32 = 0.25;
+
+/// Hits are beside an edge below this barycentric weight ([`super::super::patch::BESIDE`]).
+const BESIDE: f32 = 1.0 / 256.0;
+
+/// The largest number below 1.
+const ONE_BELOW: f32 = 1.0 - f32::EPSILON / 2.0;
+
+const ZERO: Row = [0.0; LANES];
+
+/// A lamp that is a triangle, its places relative to the blocks' origin (m).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Lamp {
+    corner: [f32; 3],
+    edges: [[f32; 3]; 2],
+    normal: [f32; 3],
+    magnitudes: [f32; 3],
+    area: f32,
+    two_sided: bool,
+}
+
+impl Lamp {
+    pub(super) fn of(own: &AreaLight, origin: DVec3) -> Self {
+        let [corner, rest] = own.corner;
+        Self {
+            corner: single((corner - origin) + rest),
+            edges: own.shape.edges.map(single),
+            normal: single(own.shape.normal),
+            magnitudes: single(own.magnitudes),
+            area: round(own.shape.area),
+            two_sided: own.two_sided,
+        }
+    }
+}
+
+/// The lamps of a plain scene.
+#[derive(Debug)]
+pub(in crate::transport) struct Lights {
+    lamps: Vec<Lamp>,
+    /// The sum of the chances of all before each, and 1 at the end.
+    below: Vec<f32>,
+    /// What blocks' coordinates are relative to (m).
+    pub(super) origin: DVec3,
+}
+
+impl Lights {
+    pub(super) fn new(lamps: Vec<Lamp>, below: &[f64], origin: DVec3) -> Self {
+        Self { lamps, below: below.iter().map(|&sum| round(sum)).collect(), origin }
+    }
+}
+
+/// What a step does, and its random numbers by use, a number a lane.
+pub(super) struct Numbers<'a> {
+    pub(super) is_scattered: bool,
+    pub(super) is_last: bool,
+    pub(super) roulette: bool,
+    pub(super) drawn: &'a [[Vec<f32>; 2]; DRAWS as usize],
+}
+
+/// Where rays go that leave hits.
+pub(super) struct Leaving<'a> {
+    pub(super) shadows: &'a mut RayColumns,
+    pub(super) next: &'a mut RayColumns,
+    pub(super) seen: &'a mut Vec<u32>,
+}
+
+/// A sphere around all that shines, relative to the blocks' origin: its centre and its radius (m).
+pub(super) type Sphere = ([f32; 3], f32);
+
+/// What is looked up for the hits of a block.
+struct Found {
+    color: [Row; 3],
+    magnitudes: [Row; 3],
+    scatters: [bool; LANES],
+}
+
+/// The hits of a block.
+struct Hits {
+    point: [Row; 3],
+    normal: [Row; 3],
+    error: Row,
+    back: [Row; 3],
+}
+
+/// A step of all paths of some blocks: lists those that met what shines, and notes the rays that leave.
+#[multiversion::multiversion(targets = "simd")]
+pub(super) fn leave_blocks(
+    (surfaces, lights): (&[PlainSurface], &Lights),
+    (blocks, carried): (&[RayBlock], &Columns),
+    (numbers, sphere): (Numbers<'_>, Option<Sphere>),
+    Leaving { shadows, next, seen }: Leaving<'_>,
+) {
+    let Some(last) = surfaces.len().checked_sub(1) else { return };
+    for (number, block) in (0_u32..).zip(blocks) {
+        let first = number as usize * LANES;
+        let mut found = Found { color: [ZERO; 3], magnitudes: [ZERO; 3], scatters: [false; LANES] };
+        let mut any = false;
+        for lane in 0..LANES {
+            let surface = &surfaces[(block.placement[lane] as usize).min(last)];
+            for axis in 0..3 {
+                found.color[axis][lane] = surface.color[axis];
+                found.magnitudes[axis][lane] = surface.magnitudes[axis];
+            }
+            let is_hit = surface.is_there & (lane < carried.len.saturating_sub(first));
+            found.scatters[lane] = surface.scatters & is_hit;
+            any |= found.scatters[lane];
+            if surface.shines & is_hit {
+                seen.push(number * LANES as u32 + lane as u32);
+            }
+        }
+        if !(any & numbers.is_scattered) {
+            continue;
+        }
+        let hits = measure(block, &found.magnitudes, lights.origin);
+        let run = first..first + LANES;
+        let row = |column: &[f32]| -> Row { column[run.clone()].try_into().unwrap_or(ZERO) };
+        let mut throughput = carried.throughput.each_ref().map(|band| row(band));
+        for band in 0..3 {
+            for i in 0..LANES {
+                throughput[band][i] *= found.color[band][i];
+            }
+        }
+        let square = |draw: Draw| {
+            numbers.drawn[draw as usize].each_ref().map(|half| row(half))
+        };
+        let ray: [u32; LANES] = carried.ray[run.clone()].try_into().unwrap_or([0; LANES]);
+        let light = square(Draw::Light);
+        ask(lights, &hits, light, (&found.scatters, &throughput, &ray), shadows);
+        let direction = square(Draw::Direction);
+        let (start, along, pdf, mut goes) = scatter(&hits, direction);
+        for i in 0..LANES {
+            goes[i] &= found.scatters[i];
+        }
+        let mut most = ZERO;
+        for i in 0..LANES {
+            let [r, g, b] = [throughput[0][i], throughput[1][i], throughput[2][i]];
+            let larger = if g > r { g } else { r };
+            most[i] = if b > larger { b } else { larger };
+            goes[i] &= most[i] > 0.0;
+        }
+        if let Some(sphere) = &sphere {
+            keep_those_that_may_meet(sphere, (&start, &along), &mut goes);
+        }
+        if numbers.roulette {
+            let [_, chance] = square(Draw::Chance);
+            for i in 0..LANES {
+                // Its root: where few paths come this far, ending them saves little and leaves noise.
+                let root = most[i].sqrt();
+                let survival = if root < 1.0 { root } else { 1.0 };
+                goes[i] &= chance[i] < survival;
+                let inverse = if survival > 0.0 { 1.0 / survival } else { 0.0 };
+                for band in 0..3 {
+                    throughput[band][i] *= inverse;
+                }
+            }
+        }
+        let (picked, count) = compress(&goes);
+        let at = next.len;
+        for axis in 0..3 {
+            put(&mut next.start[axis], at, &start[axis], &picked);
+            put(&mut next.along[axis], at, &along[axis], &picked);
+            put(&mut next.carried.throughput[axis], at, &throughput[axis], &picked);
+        }
+        put(&mut next.carried.pdf, at, &pdf, &picked);
+        put(&mut next.carried.ray, at, &ray, &picked);
+        put(&mut next.reach, at, &[f32::INFINITY; LANES], &picked);
+        put(&mut next.left, at, &lanes_from(first), &picked);
+        next.len += count;
+    }
+}
+
+/// The numbers of a block's lanes, counted from the first block.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "a batch has few")]
+fn lanes_from(first: usize) -> [u32; LANES] {
+    let mut lanes = [0; LANES];
+    for i in 0..LANES {
+        lanes[i] = (first + i) as u32;
+    }
+    lanes
+}
+
+/// Points, their errors, and normals on the viewer's side, as [`super::super::kernels::measure`] has them.
+#[inline(always)]
+fn measure(block: &RayBlock, magnitudes: &[Row; 3], origin: DVec3) -> Hits {
+    let [x, y, z] = &block.normal;
+    let [dx, dy, dz] = &block.direction;
+    let mut normal = [ZERO; 3];
+    for i in 0..LANES {
+        let squared = x[i] * x[i] + y[i] * y[i] + z[i] * z[i];
+        let along = x[i] * dx[i] + y[i] * dy[i] + z[i] * dz[i];
+        let scale = if along <= 0.0 { 1.0 } else { -1.0 } / squared.sqrt();
+        normal[0][i] = x[i] * scale;
+        normal[1][i] = y[i] * scale;
+        normal[2][i] = z[i] * scale;
+    }
+    let (mut point, mut error, mut most) = ([ZERO; 3], ZERO, ZERO);
+    // Blocks' coordinates are those of the world less their origin, whose roundings count as well.
+    let offset = single(origin).map(|axis| 2.0 * axis.abs());
+    for axis in 0..3 {
+        let (start, direction) = (&block.origin[axis], &block.direction[axis]);
+        for i in 0..LANES {
+            let here = start[i] + direction[i] * block.t_max[i];
+            let size = (here.abs() + start[i].abs()) + (magnitudes[axis][i] + offset[axis]);
+            point[axis][i] = here;
+            error[i] += normal[axis][i].abs() * size;
+            most[i] = if size > most[i] { size } else { most[i] };
+        }
+    }
+    let mut back = [ZERO; 3];
+    for i in 0..LANES {
+        error[i] *= ROUNDINGS;
+        let (u, v) = (block.u[i], block.v[i]);
+        let (rest, least) = (1.0 - u - v, if u < v { u } else { v });
+        let least = if rest < least { rest } else { least };
+        let amount = if least < BESIDE { BACK * ROUNDINGS * most[i] } else { 0.0 };
+        let across =
+            normal[0][i] * dx[i] + normal[1][i] * dy[i] + normal[2][i] * dz[i];
+        back[0][i] = (normal[0][i] * across - dx[i]) * amount;
+        back[1][i] = (normal[1][i] * across - dy[i]) * amount;
+        back[2][i] = (normal[2][i] * across - dz[i]) * amount;
+    }
+    Hits { point, normal, error, back }
+}
+
+/// Places on lamps, one for each hit.
+struct Places {
+    /// From the hit (m).
+    way: [Row; 3],
+    normal: [Row; 3],
+    /// What its own numbers add to the rounding of the place (m).
+    magnitudes: [Row; 3],
+    /// Of the place (1/m²).
+    density: Row,
+    two_sided: [bool; LANES],
+    lamp: [u32; LANES],
+}
+
+/// Chooses a lamp for each hit, and a place on it.
+#[inline(always)]
+fn place(lights: &Lights, hits: &Hits, [mut u, v]: [Row; 2]) -> Places {
+    let mut places = Places {
+        way: [ZERO; 3],
+        normal: [ZERO; 3],
+        magnitudes: [ZERO; 3],
+        density: ZERO,
+        two_sided: [false; LANES],
+        lamp: [0; LANES],
+    };
+    let below = &*lights.below;
+    let mut chance = [1.0; LANES];
+    if lights.lamps.len() > 1 {
+        let (mut start, mut end) = (ZERO, [1.0; LANES]);
+        for (number, of_lamp) in (0_u32..).zip(below.windows(2)) {
+            for i in 0..LANES {
+                let is_in = (of_lamp[0] <= u[i]) & (of_lamp[0] < of_lamp[1]);
+                start[i] = if is_in { of_lamp[0] } else { start[i] };
+                end[i] = if is_in { of_lamp[1] } else { end[i] };
+                places.lamp[i] = if is_in { number } else { places.lamp[i] };
+            }
+        }
+        for i in 0..LANES {
+            chance[i] = end[i] - start[i];
+            let rest = (u[i] - start[i]) / chance[i];
+            let rest = if rest > 0.0 { rest } else { 0.0 };
+            u[i] = if rest < ONE_BELOW { rest } else { ONE_BELOW };
+        }
+    }
+    let (mut second, mut third) = (ZERO, ZERO);
+    for i in 0..LANES {
+        let root = u[i].sqrt();
+        second[i] = root * (1.0 - v[i]);
+        third[i] = v[i] * root;
+    }
+    for (number, lamp) in (0_u32..).zip(&lights.lamps) {
+        for axis in 0..3 {
+            let (corner, normal) = (lamp.corner[axis], lamp.normal[axis]);
+            let (along, across) = (lamp.edges[0][axis], lamp.edges[1][axis]);
+            for i in 0..LANES {
+                let is_own = places.lamp[i] == number;
+                let there = (corner - hits.point[axis][i]) + (along * second[i] + across * third[i]);
+                places.way[axis][i] = if is_own { there } else { places.way[axis][i] };
+                places.normal[axis][i] = if is_own { normal } else { places.normal[axis][i] };
+                let magnitudes = &mut places.magnitudes[axis][i];
+                *magnitudes = if is_own { lamp.magnitudes[axis] } else { *magnitudes };
+            }
+        }
+        let inverse = 1.0 / lamp.area;
+        for i in 0..LANES {
+            let is_own = places.lamp[i] == number;
+            places.density[i] = if is_own { chance[i] * inverse } else { places.density[i] };
+            places.two_sided[i] = if is_own { lamp.two_sided } else { places.two_sided[i] };
+        }
+    }
+    places
+}
+
+/// Notes the rays to lamps, each with the share of the lamp's radiance that it brings, as
+/// [`super::super::kernels::aim`] and [`super::super::kernels::reflect`] have them.
+#[inline(always)]
+fn ask(
+    lights: &Lights,
+    hits: &Hits,
+    square: [Row; 2],
+    (scatters, throughput, ray): (&[bool; LANES], &[Row; 3], &[u32; LANES]),
+    shadows: &mut RayColumns,
+) {
+    let places = place(lights, hits, square);
+    let (mut squared, mut facing, mut above, mut blur) = (ZERO, ZERO, ZERO, ZERO);
+    let offset = single(lights.origin).map(|axis| 2.0 * axis.abs());
+    for axis in 0..3 {
+        for i in 0..LANES {
+            let (here, way) = (hits.point[axis][i], places.way[axis][i]);
+            squared[i] += way * way;
+            facing[i] -= way * places.normal[axis][i];
+            above[i] += way * hits.normal[axis][i];
+            let size = (here.abs() + (here + way).abs())
+                + (places.magnitudes[axis][i] + offset[axis]);
+            blur[i] += places.normal[axis][i].abs() * size;
+        }
+    }
+    let mut value = ZERO;
+    for i in 0..LANES {
+        let inverse = 1.0 / squared[i].sqrt();
+        let shown = facing[i] * inverse;
+        let shines = (shown > 0.0) | ((shown < 0.0) & places.two_sided[i]);
+        let pdf = places.density[i] * squared[i] / shown.abs();
+        let reflected = above[i] * inverse * FRAC_1_PI;
+        let ratio = reflected / pdf;
+        let share = reflected / ((1.0 + ratio * ratio) * pdf);
+        value[i] = if shines & (reflected > 0.0) { share } else { 0.0 };
+        blur[i] *= if shown < 0.0 { -ROUNDINGS } else { ROUNDINGS };
+    }
+    let (mut start, mut along, mut length) = ([ZERO; 3], [ZERO; 3], ZERO);
+    for axis in 0..3 {
+        for i in 0..LANES {
+            let lifted = hits.normal[axis][i] * hits.error[i] + hits.back[axis][i];
+            let way = (places.way[axis][i] + places.normal[axis][i] * blur[i]) - lifted;
+            start[axis][i] = hits.point[axis][i] + lifted;
+            along[axis][i] = way;
+            length[i] += way * way;
+        }
+    }
+    let mut goes = [false; LANES];
+    for i in 0..LANES {
+        length[i] = length[i].sqrt();
+        // Any comparison with NaN is false.
+        goes[i] = scatters[i] & (value[i] > 0.0) & (value[i] < f32::INFINITY);
+    }
+    for axis in 0..3 {
+        for i in 0..LANES {
+            // Points that fall together see each other: a ray of no length meets nothing.
+            along[axis][i] /= if length[i] > 0.0 { length[i] } else { 1.0 };
+        }
+    }
+    let mut share = [ZERO; 3];
+    for band in 0..3 {
+        for i in 0..LANES {
+            share[band][i] = throughput[band][i] * value[i];
+        }
+    }
+    let (picked, count) = compress(&goes);
+    let at = shadows.len;
+    for axis in 0..3 {
+        put(&mut shadows.start[axis], at, &start[axis], &picked);
+        put(&mut shadows.along[axis], at, &along[axis], &picked);
+        put(&mut shadows.carried.throughput[axis], at, &share[axis], &picked);
+    }
+    put(&mut shadows.reach, at, &length, &picked);
+    put(&mut shadows.lamp, at, &places.lamp, &picked);
+    put(&mut shadows.carried.ray, at, ray, &picked);
+    shadows.len += count;
+}
+
+/// Where rays start (m), their unit directions about the normals with density cos θ / π (1/sr), that density, and
+/// whether there is one, as [`super::super::kernels::scatter`] has them.
+#[inline(always)]
+fn scatter(hits: &Hits, [u, v]: [Row; 2]) -> ([Row; 3], [Row; 3], Row, [bool; LANES]) {
+    let [nx, ny, nz] = &hits.normal;
+    let (mut along, mut start, mut pdf) = ([ZERO; 3], [ZERO; 3], ZERO);
+    let mut goes = [false; LANES];
+    let (mut a, mut b) = (ZERO, ZERO);
+    for i in 0..LANES {
+        [a[i], b[i]] = disk_point([u[i], v[i]]);
+    }
+    for i in 0..LANES {
+        let (x, y, z, a, b) = (nx[i], ny[i], nz[i], a[i], b[i]);
+        let rest = 1.0 - a * a - b * b;
+        let c = if rest > 0.0 { rest } else { 0.0 }.sqrt();
+        // Duff et al., "Building an Orthonormal Basis, Revisited", 2017.
+        let sign = if z < 0.0 { -1.0 } else { 1.0 };
+        let f = -1.0 / (sign + z);
+        let g = x * y * f;
+        let dx = (1.0 + sign * x * x * f) * a + g * b + x * c;
+        let dy = sign * g * a + (sign + y * y * f) * b + y * c;
+        let dz = z * c - sign * x * a - y * b;
+        let inverse = 1.0 / (dx * dx + dy * dy + dz * dz).sqrt();
+        along[0][i] = dx * inverse;
+        along[1][i] = dy * inverse;
+        along[2][i] = dz * inverse;
+        pdf[i] = c * FRAC_1_PI;
+        goes[i] = (dx * x + dy * y + dz * z > 0.0) & (c > 0.0);
+    }
+    for axis in 0..3 {
+        for i in 0..LANES {
+            let lifted = hits.normal[axis][i] * hits.error[i] + hits.back[axis][i];
+            start[axis][i] = hits.point[axis][i] + lifted;
+        }
+    }
+    (start, along, pdf, goes)
+}
+
+/// A point of the unit square on the unit disk, as [`etendue_geometry::disk::point`] has it.
+#[inline(always)]
+fn disk_point([u, v]: [f32; 2]) -> [f32; 2] {
+    let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
+    let flat = a.abs() > b.abs();
+    let (radius, other) = if flat { (a, b) } else { (b, a) };
+    let ratio = if radius == 0.0 { 0.0 } else { other / radius };
+    // Taylor's series as far as π/4: what is left out is below 4 · 10⁻⁹.
+    let angle = FRAC_PI_4 * ratio;
+    let x = angle * angle;
+    let sine = 1.0 + x * (-1.0 / 6.0 + x * (1.0 / 120.0 + x * (-1.0 / 5_040.0 + x / 362_880.0)));
+    let cosine = -0.5 + x * (1.0 / 24.0 + x * (-1.0 / 720.0 + x / 40_320.0));
+    let (sine, cosine) = (angle * sine, 1.0 + x * cosine);
+    if flat { [radius * cosine, radius * sine] } else { [radius * sine, radius * cosine] }
+}
+
+/// Leaves out rays that meet nothing of a sphere for sure.
+#[inline(always)]
+fn keep_those_that_may_meet(
+    (centre, radius): &Sphere,
+    (start, along): (&[Row; 3], &[Row; 3]),
+    goes: &mut [bool; LANES],
+) {
+    let (mut foot, mut squared) = (ZERO, ZERO);
+    for axis in 0..3 {
+        for i in 0..LANES {
+            let way = centre[axis] - start[axis][i];
+            foot[i] += way * along[axis][i];
+            squared[i] += way * way;
+        }
+    }
+    let within = radius * radius;
+    for i in 0..LANES {
+        let is_ahead = (foot[i] >= 0.0) | (squared[i] <= within);
+        // Roundings of what is subtracted.
+        let slack = ROUNDINGS * squared[i];
+        goes[i] &= (*radius >= 0.0) & is_ahead & (squared[i] - foot[i] * foot[i] <= within + slack);
+    }
+}
+
+/// The lanes of a mask in order, and how many there are: without a branch, as nothing tells beforehand which they
+/// are.
+#[inline(always)]
+fn compress(mask: &[bool; LANES]) -> ([u8; LANES], usize) {
+    let (mut picked, mut count) = ([0; LANES], 0);
+    for (lane, &is_in) in (0_u8..).zip(mask) {
+        picked[count & (LANES - 1)] = lane;
+        count += usize::from(is_in);
+    }
+    (picked, count)
+}
+
+/// Puts the picked lanes of a row into a column, which has room for all lanes.
+#[inline(always)]
+fn put<T: Copy>(column: &mut [T], at: usize, row: &[T; LANES], picked: &[u8; LANES]) {
+    let to = &mut column[at..at + LANES];
+    for (to, &lane) in to.iter_mut().zip(picked) {
+        *to = row[usize::from(lane) & (LANES - 1)];
+    }
+}
+
+fn single(v: DVec3) -> [f32; 3] {
+    v.to_array().map(round)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "rounding to single precision is the purpose")]
+fn round(x: f64) -> f32 {
+    x as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use etendue_geometry::disk;
+
+    use super::*;
+
+    #[test]
+    fn points_on_the_disk_are_those_of_double_precision() {
+        for i in 0..=64_u8 {
+            for k in 0..=64_u8 {
+                let square = [i, k].map(|n| f32::from(n) / 64.0);
+                let [own, other] =
+                    [disk_point(square).map(f64::from), disk::point(square.map(f64::from))];
+                // Some roundings of numbers below 1.
+                let error = (own[0] - other[0]).abs().max((own[1] - other[1]).abs());
+                assert!(error < 4.0 * f64::from(f32::EPSILON), "{square:?}: {error}");
+            }
+        }
+    }
+}
