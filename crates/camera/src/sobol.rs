@@ -56,7 +56,10 @@ pub(crate) fn floats(keys: &[SobolKey], first: usize, out: [&mut [f32]; 2]) {
 }
 
 /// The first 24 bits of a number below 1.
-#[expect(clippy::cast_possible_truncation, reason = "a whole number below 2²⁴ is one of single precision")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a whole number below 2²⁴ is one of single precision"
+)]
 pub(crate) fn float(x: f64) -> f32 {
     ((x * TWO_TO_24).floor() / TWO_TO_24) as f32
 }
@@ -198,8 +201,7 @@ fn side_by_side<const N: usize>(
     directions: &[[u32; BITS]; DIMENSIONS],
 ) -> [[f64; 2]; N] {
     let mut out = [[0.0; 2]; N];
-    for (k, (high, scrambles)) in
-        upper_bits(keys, seed, first, directions).into_iter().enumerate()
+    for (k, (high, scrambles)) in upper_bits(keys, seed, first, directions).into_iter().enumerate()
     {
         for i in 0..N {
             let low = hash(high[i] ^ scrambles[i]) >> 11;

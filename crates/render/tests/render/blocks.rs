@@ -210,6 +210,8 @@ fn blocks_and_batches_follow_the_same_paths() {
 fn plain_scenes_are_the_same_in_single_precision() {
     const ANOTHER: &str = r#", {"shape": "rectangle", "material": "sign", "width": 0.4, "height": 0.8,
         "transform": {"rotate": [0, 1, 0, 40], "translate": [-1.2, 1.1, 0.4]}}"#;
+    let folder = tempfile::tempdir().unwrap();
+    save_waves(folder.path());
     let two = format!("{LAMP}{ANOTHER}");
     let path = |bounces: u32| format!(r#"{{"type": "path", "max_bounces": {bounces}}}"#);
     let direct = r#"{"type": "direct"}"#.to_owned();
@@ -228,7 +230,7 @@ fn plain_scenes_are_the_same_in_single_precision() {
                 r#"{"type": "matte", "color": [0.8, 0.8, 0.7]},
                 "sign": {"type": "emissive", "radiance": [0.5, 2, 4], "two_sided": true}"#,
             );
-        let scene = load_in(Path::new("."), &text);
+        let scene = load_in(folder.path(), &text);
         let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
         assert!(compare(&format!("plain, {name}"), &scene, &plan, &[""]) > 0);
     }

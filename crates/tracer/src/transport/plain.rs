@@ -96,9 +96,9 @@ impl RayColumns {
     }
 }
 
-impl<const RGB: bool> Tracing<'_, RGB> {
+impl<'a, const RGB: bool> Tracing<'a, RGB> {
     /// The surfaces and lamps of a plain scene; `None` of any other.
-    pub(super) fn plain(&self) -> Option<(&[PlainSurface], Lights)> {
+    pub(super) fn plain(&self) -> Option<(&'a [PlainSurface], Lights)> {
         let LightingContext { lights, placed, emitters, traits, .. } = self.ctx;
         let is_taken = RGB
             && self.ctx.precision == HitPrecision::Single
@@ -149,7 +149,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             if is_scattered {
                 self.draw_plain(camera, number, roulette, plain);
             }
-            let numbers = Numbers { is_scattered, is_last, roulette, drawn: &plain.numbers };
+            let numbers = Numbers { is_scattered, roulette, drawn: &plain.numbers };
             let leaving = Leaving {
                 shadows: &mut plain.shadows,
                 next: &mut plain.next,
@@ -277,7 +277,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         onward.of_last.clear();
         let origin = self.ctx.accel.blocks().map_or(DVec3::ZERO, |blocks| blocks.origin());
         for i in 0..next.len {
-            let vector = |axes: &[Vec<f32>; 3]| DVec3::from_array(axes.each_ref().map(|axis| f64::from(axis[i])));
+            let vector = |axes: &[Vec<f32>; 3]| {
+                DVec3::from_array(axes.each_ref().map(|axis| f64::from(axis[i])))
+            };
             onward.last.push(origin + vector(&next.start), vector(&next.along).normalize());
             let left = next.left[i] as usize;
             let (block, lane) = (&plain.rays.blocks()[left / LANES], left % LANES);
@@ -290,7 +292,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 is_last: true,
                 normal: [0.0; 3],
             });
-            of_last.throughput.extend(next.carried.throughput.iter().map(|band| f64::from(band[i])));
+            of_last
+                .throughput
+                .extend(next.carried.throughput.iter().map(|band| f64::from(band[i])));
         }
         let step = Step { camera, number, asks_emitters: true, is_mixed: false };
         self.ask_emitters(&step, workspace, out);

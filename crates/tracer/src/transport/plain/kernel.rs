@@ -4,9 +4,9 @@
 
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
 
+use etendue_geometry::RayBlock;
 use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::RayBlock;
 
 use super::{Columns, RayColumns};
 use crate::area_light::AreaLight;
@@ -72,7 +72,6 @@ impl Lights {
 /// What a step does, and its random numbers by use, a number a lane.
 pub(super) struct Numbers<'a> {
     pub(super) is_scattered: bool,
-    pub(super) is_last: bool,
     pub(super) roulette: bool,
     pub(super) drawn: &'a [[Vec<f32>; 2]; DRAWS as usize],
 }
@@ -140,9 +139,7 @@ pub(super) fn leave_blocks(
                 throughput[band][i] *= found.color[band][i];
             }
         }
-        let square = |draw: Draw| {
-            numbers.drawn[draw as usize].each_ref().map(|half| row(half))
-        };
+        let square = |draw: Draw| numbers.drawn[draw as usize].each_ref().map(|half| row(half));
         let ray: [u32; LANES] = carried.ray[run.clone()].try_into().unwrap_or([0; LANES]);
         let light = square(Draw::Light);
         ask(lights, &hits, light, (&found.scatters, &throughput, &ray), shadows);
@@ -234,8 +231,7 @@ fn measure(block: &RayBlock, magnitudes: &[Row; 3], origin: DVec3) -> Hits {
         let (rest, least) = (1.0 - u - v, if u < v { u } else { v });
         let least = if rest < least { rest } else { least };
         let amount = if least < BESIDE { BACK * ROUNDINGS * most[i] } else { 0.0 };
-        let across =
-            normal[0][i] * dx[i] + normal[1][i] * dy[i] + normal[2][i] * dz[i];
+        let across = normal[0][i] * dx[i] + normal[1][i] * dy[i] + normal[2][i] * dz[i];
         back[0][i] = (normal[0][i] * across - dx[i]) * amount;
         back[1][i] = (normal[1][i] * across - dy[i]) * amount;
         back[2][i] = (normal[2][i] * across - dz[i]) * amount;
@@ -298,7 +294,8 @@ fn place(lights: &Lights, hits: &Hits, [mut u, v]: [Row; 2]) -> Places {
             let (along, across) = (lamp.edges[0][axis], lamp.edges[1][axis]);
             for i in 0..LANES {
                 let is_own = places.lamp[i] == number;
-                let there = (corner - hits.point[axis][i]) + (along * second[i] + across * third[i]);
+                let there =
+                    (corner - hits.point[axis][i]) + (along * second[i] + across * third[i]);
                 places.way[axis][i] = if is_own { there } else { places.way[axis][i] };
                 places.normal[axis][i] = if is_own { normal } else { places.normal[axis][i] };
                 let magnitudes = &mut places.magnitudes[axis][i];
@@ -334,8 +331,8 @@ fn ask(
             squared[i] += way * way;
             facing[i] -= way * places.normal[axis][i];
             above[i] += way * hits.normal[axis][i];
-            let size = (here.abs() + (here + way).abs())
-                + (places.magnitudes[axis][i] + offset[axis]);
+            let size =
+                (here.abs() + (here + way).abs()) + (places.magnitudes[axis][i] + offset[axis]);
             blur[i] += places.normal[axis][i].abs() * size;
         }
     }
