@@ -43,6 +43,18 @@ pub struct Lights {
     groups: Groups,
 }
 
+/// Few lights: points first, then triangles.
+#[derive(Debug)]
+pub(crate) struct FewLamps<'a> {
+    /// m.
+    pub(crate) points: Vec<DVec3>,
+    pub(crate) triangles: &'a [Option<AreaLight>],
+    /// `[light][band]` of both.
+    pub(crate) bands: [&'a [f64]; 2],
+    /// The sum of the chances of all before each, and 1 at the end.
+    pub(crate) below: &'a [f64],
+}
+
 /// The spectrum of what a surface gives off, in bands.
 #[derive(Debug)]
 enum EmissionBands {
@@ -200,6 +212,22 @@ impl Lights {
         let are_plain =
             are_few && !self.area_lights.is_empty() && self.area_lights.iter().all(is_plain);
         are_plain.then_some((&self.area_lights, &self.area_light_bands))
+    }
+
+    /// The lights of a scene that has few to choose from, all of them points that stand still or triangles that shine
+    /// alike all over and are kept ready.
+    pub(crate) fn few_lamps(&self) -> Option<FewLamps<'_>> {
+        let below = self.few()?;
+        let point = |light: &Light| match &light.kind {
+            LightKind::Point(at) => light.motion.is_none().then_some(*at),
+            _ => None,
+        };
+        let points = self.lights.iter().map(point).collect::<Option<Vec<_>>>()?;
+        let triangle = |own: &Option<AreaLight>| own.as_ref().is_some_and(|own| own.is_plain);
+        let are_ready = self.area_lights.len() == self.triangles.len();
+        let are_plain = are_ready && self.area_lights.iter().all(triangle);
+        let bands = [&*self.bands, &*self.area_light_bands];
+        are_plain.then_some(FewLamps { points, triangles: &self.area_lights, bands, below })
     }
 
     /// The number among all lights of a triangle that shines.

@@ -215,15 +215,19 @@ fn plain_scenes_are_the_same_in_single_precision() {
     let two = format!("{LAMP}{ANOTHER}");
     let path = |bounces: u32| format!(r#"{{"type": "path", "max_bounces": {bounces}}}"#);
     let direct = r#"{"type": "direct"}"#.to_owned();
-    for (name, tracer, lamps) in [
-        ("direct", &direct, LAMP),
-        ("direct, two lamps", &direct, &two),
-        ("one bounce", &path(1), LAMP),
-        ("three", &path(3), &two),
+    let points = r#"{"type": "point", "at": [1, 2, 1], "intensity": [1, 2, 3]},
+        {"type": "point", "at": [-1.2, 0.3, 1.4], "intensity": [0.5, 0.4, 0.1]}"#;
+    for (name, tracer, lights, lamps) in [
+        ("direct", &direct, "", LAMP),
+        ("direct, two lamps", &direct, "", &two),
+        ("direct, points", &direct, points, ""),
+        ("one bounce", &path(1), "", LAMP),
+        ("three", &path(3), "", &two),
+        ("three, points", &path(3), points, ""),
         // Dim paths end by chance.
-        ("twelve", &path(12), &two),
+        ("twelve", &path(12), points, &two),
     ] {
-        let text = room(tracer, "", lamps, "box")
+        let text = room(tracer, lights, lamps, "box")
             .replace(r#""layers": ["direct", "indirect"],"#, "")
             .replace(
                 r#"{"type": "checker", "colors": [[0.8, 0.8, 0.7], [0.2, 0.3, 0.4]], "squares": 8}"#,

@@ -15,6 +15,7 @@ use super::paths::{DRAWS, Draw, Step, Way, Workspace};
 use super::rays::{Blocks, RayHit};
 use super::trace::Encounter;
 use super::{LightingContext, Parts, RaySamples, Tracing};
+use crate::area_light::AreaLight;
 use crate::light_sampler::Receiver;
 use crate::placed::PlainSurface;
 
@@ -99,7 +100,7 @@ impl RayColumns {
 impl<'a, const RGB: bool> Tracing<'a, RGB> {
     /// The surfaces and lamps of a plain scene; `None` of any other.
     pub(super) fn plain(&self) -> Option<(&'a [PlainSurface], Lights)> {
-        let LightingContext { lights, placed, emitters, traits, .. } = self.ctx;
+        let &LightingContext { lights, placed, emitters, traits, .. } = self.ctx;
         let is_taken = RGB
             && self.ctx.precision == HitPrecision::Single
             && self.parts == Parts::Whole
@@ -111,13 +112,11 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         let surfaces = placed.plain().filter(|_| is_taken)?;
         let origin = self.ctx.accel.blocks()?.origin();
         let least = LEAST_AREA * placed.size().powi(2);
-        let (area_lights, _) = lights.few_triangles()?;
-        let lamps = area_lights.iter().map(|area_light| {
-            let area_light = area_light.as_ref().filter(|own| own.shape.area > least)?;
-            Some(kernel::Lamp::of(area_light, origin))
-        });
-        let below = lights.few()?;
-        Some((surfaces, Lights::new(lamps.collect::<Option<_>>()?, below, origin)))
+        let few = lights.few_lamps()?;
+        let fits = |own: &AreaLight| own.shape.area > least;
+        let near = |at: &DVec3| (*at - origin).length() < SIZES[1];
+        let are_taken = few.triangles.iter().flatten().all(fits) && few.points.iter().all(near);
+        are_taken.then(|| (surfaces, Lights::new(&few, origin)))
     }
 
     /// Traces the camera's rays through a plain scene.
@@ -145,11 +144,13 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             plain.shadows.restart(len);
             plain.next.restart(len);
             plain.seen.clear();
+            // Nobody comes upon points.
+            let goes_on = !is_last || self.ctx.lights.is_hittable();
             let roulette = !is_last && self.rules.roulette.is_some_and(|after| number + 1 >= after);
             if is_scattered {
-                self.draw_plain(camera, number, roulette, plain);
+                self.draw_plain(camera, number, [goes_on, roulette], plain);
             }
-            let numbers = Numbers { is_scattered, roulette, drawn: &plain.numbers };
+            let numbers = Numbers { is_scattered, goes_on, roulette, drawn: &plain.numbers };
             let leaving = Leaving {
                 shadows: &mut plain.shadows,
                 next: &mut plain.next,
@@ -164,7 +165,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
                 leaving,
             );
             self.meet_plain(number, plain, workspace, out);
-            self.light_plain(plain, coherent, out);
+            self.light_plain(plain, lights, coherent, out);
             if is_last {
                 self.ask_emitters_plain(camera, number, plain, workspace, out);
                 break;
@@ -181,13 +182,13 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         &self,
         camera: &RaySamples<'_>,
         number: u32,
-        roulette: bool,
+        [goes_on, roulette]: [bool; 2],
         plain: &mut PlainScratch,
     ) {
         let rays = &plain.carried.ray[..plain.rays.len()];
         let padded = rays.len().next_multiple_of(LANES);
         for (draw, needs) in
-            [(Draw::Light, true), (Draw::Direction, true), (Draw::Chance, roulette)]
+            [(Draw::Light, true), (Draw::Direction, goes_on), (Draw::Chance, roulette)]
         {
             if needs {
                 let drawn = &mut plain.numbers[draw as usize];
@@ -237,9 +238,14 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
     }
 
     /// Adds what lamps bring along shadow rays that nothing blocks.
-    fn light_plain(&mut self, plain: &mut PlainScratch, coherent: bool, out: &mut [f64]) {
+    fn light_plain(
+        &mut self,
+        plain: &mut PlainScratch,
+        lights: &Lights,
+        coherent: bool,
+        out: &mut [f64],
+    ) {
         let PlainScratch { shadows, shadow_rays, .. } = plain;
-        let Some((_, bands)) = self.ctx.lights.few_triangles() else { return };
         let Some(accel) = self.ctx.accel.blocks().filter(|_| shadows.len > 0) else { return };
         self.tally.shadow_rays += shadows.len as u64;
         shadows.pack(shadow_rays);
@@ -252,7 +258,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
                     continue;
                 }
                 let i = first + lane;
-                let radiance = &bands[shadows.lamp[i] as usize * 3..][..3];
+                let radiance = lights.radiance[shadows.lamp[i] as usize];
                 let light = [
                     f64::from(red[i]) * radiance[0],
                     f64::from(green[i]) * radiance[1],

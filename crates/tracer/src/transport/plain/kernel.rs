@@ -10,6 +10,7 @@ use etendue_geometry::glam::DVec3;
 
 use super::{Columns, RayColumns};
 use crate::area_light::AreaLight;
+use crate::lights::FewLamps;
 use crate::placed::PlainSurface;
 use crate::transport::paths::{DRAWS, Draw};
 
@@ -28,19 +29,25 @@ const ONE_BELOW: f32 = 1.0 - f32::EPSILON / 2.0;
 
 const ZERO: Row = [0.0; LANES];
 
-/// A lamp that is a triangle, its places relative to the blocks' origin (m).
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Lamp {
+/// A triangle that shines, or a point, relative to the blocks' origin (m).
+#[derive(Debug, Clone, Copy, Default)]
+struct Lamp {
     corner: [f32; 3],
     edges: [[f32; 3]; 2],
     normal: [f32; 3],
     magnitudes: [f32; 3],
+    /// m²; 1 of a point, whose density is that of its choice.
     area: f32,
     two_sided: bool,
+    is_point: bool,
 }
 
 impl Lamp {
-    pub(super) fn of(own: &AreaLight, origin: DVec3) -> Self {
+    fn point(at: DVec3, origin: DVec3) -> Self {
+        Self { corner: single(at - origin), area: 1.0, is_point: true, ..Self::default() }
+    }
+
+    fn triangle(own: &AreaLight, origin: DVec3) -> Self {
         let [corner, rest] = own.corner;
         Self {
             corner: single((corner - origin) + rest),
@@ -49,6 +56,7 @@ impl Lamp {
             magnitudes: single(own.magnitudes),
             area: round(own.shape.area),
             two_sided: own.two_sided,
+            is_point: false,
         }
     }
 }
@@ -59,19 +67,30 @@ pub(in crate::transport) struct Lights {
     lamps: Vec<Lamp>,
     /// The sum of the chances of all before each, and 1 at the end.
     below: Vec<f32>,
+    /// Radiance of triangles, intensity of points.
+    pub(super) radiance: Vec<[f64; 3]>,
     /// What blocks' coordinates are relative to (m).
     pub(super) origin: DVec3,
 }
 
 impl Lights {
-    pub(super) fn new(lamps: Vec<Lamp>, below: &[f64], origin: DVec3) -> Self {
-        Self { lamps, below: below.iter().map(|&sum| round(sum)).collect(), origin }
+    pub(super) fn new(few: &FewLamps<'_>, origin: DVec3) -> Self {
+        let points = few.points.iter().map(|&at| Lamp::point(at, origin));
+        let triangles = few.triangles.iter().flatten().map(|own| Lamp::triangle(own, origin));
+        let radiance = few.bands.iter().flat_map(|bands| bands.as_chunks().0).copied();
+        Self {
+            lamps: points.chain(triangles).collect(),
+            below: few.below.iter().map(|&sum| round(sum)).collect(),
+            radiance: radiance.collect(),
+            origin,
+        }
     }
 }
 
 /// What a step does, and its random numbers by use, a number a lane.
 pub(super) struct Numbers<'a> {
     pub(super) is_scattered: bool,
+    pub(super) goes_on: bool,
     pub(super) roulette: bool,
     pub(super) drawn: &'a [[Vec<f32>; 2]; DRAWS as usize],
 }
@@ -143,6 +162,9 @@ pub(super) fn leave_blocks(
         let ray: [u32; LANES] = carried.ray[run.clone()].try_into().unwrap_or([0; LANES]);
         let light = square(Draw::Light);
         ask(lights, &hits, light, (&found.scatters, &throughput, &ray), shadows);
+        if !numbers.goes_on {
+            continue;
+        }
         let direction = square(Draw::Direction);
         let (start, along, pdf, mut goes) = scatter(&hits, direction);
         for i in 0..LANES {
@@ -249,6 +271,7 @@ struct Places {
     /// Of the place (1/m²).
     density: Row,
     two_sided: [bool; LANES],
+    is_point: [bool; LANES],
     lamp: [u32; LANES],
 }
 
@@ -261,6 +284,7 @@ fn place(lights: &Lights, hits: &Hits, [mut u, v]: [Row; 2]) -> Places {
         magnitudes: [ZERO; 3],
         density: ZERO,
         two_sided: [false; LANES],
+        is_point: [false; LANES],
         lamp: [0; LANES],
     };
     let below = &*lights.below;
@@ -307,6 +331,7 @@ fn place(lights: &Lights, hits: &Hits, [mut u, v]: [Row; 2]) -> Places {
             let is_own = places.lamp[i] == number;
             places.density[i] = if is_own { chance[i] * inverse } else { places.density[i] };
             places.two_sided[i] = if is_own { lamp.two_sided } else { places.two_sided[i] };
+            places.is_point[i] = if is_own { lamp.is_point } else { places.is_point[i] };
         }
     }
     places
@@ -340,10 +365,12 @@ fn ask(
     for i in 0..LANES {
         let inverse = 1.0 / squared[i].sqrt();
         let shown = facing[i] * inverse;
-        let shines = (shown > 0.0) | ((shown < 0.0) & places.two_sided[i]);
-        let pdf = places.density[i] * squared[i] / shown.abs();
+        let is_point = places.is_point[i];
+        let shines = (shown > 0.0) | ((shown < 0.0) & places.two_sided[i]) | is_point;
+        let pdf = places.density[i] * squared[i] / if is_point { 1.0 } else { shown.abs() };
         let reflected = above[i] * inverse * FRAC_1_PI;
-        let ratio = reflected / pdf;
+        // No direction comes upon a point by chance.
+        let ratio = if is_point { 0.0 } else { reflected / pdf };
         let share = reflected / ((1.0 + ratio * ratio) * pdf);
         value[i] = if shines & (reflected > 0.0) { share } else { 0.0 };
         blur[i] *= if shown < 0.0 { -ROUNDINGS } else { ROUNDINGS };
