@@ -129,10 +129,11 @@ pub(super) fn leave_blocks(
     Leaving { shadows, next, seen }: Leaving<'_>,
 ) {
     let Some(last) = surfaces.len().checked_sub(1) else { return };
-    for (number, block) in (0_u32..).zip(blocks) {
-        let first = number as usize * LANES;
+    for (number, block) in blocks.iter().enumerate() {
+        let first = number * LANES;
         let mut found = Found { color: [ZERO; 3], magnitudes: [ZERO; 3], scatters: [false; LANES] };
         let mut any = false;
+        let numbers_of_lanes = lanes_from(first);
         for lane in 0..LANES {
             let surface = &surfaces[(block.placement[lane] as usize).min(last)];
             for axis in 0..3 {
@@ -143,7 +144,7 @@ pub(super) fn leave_blocks(
             found.scatters[lane] = surface.scatters & is_hit;
             any |= found.scatters[lane];
             if surface.shines & is_hit {
-                seen.push(number * LANES as u32 + lane as u32);
+                seen.push(numbers_of_lanes[lane]);
             }
         }
         if !(any & numbers.is_scattered) {
@@ -203,7 +204,7 @@ pub(super) fn leave_blocks(
         put(&mut next.carried.pdf, at, &pdf, &picked);
         put(&mut next.carried.ray, at, &ray, &picked);
         put(&mut next.reach, at, &[f32::INFINITY; LANES], &picked);
-        put(&mut next.left, at, &lanes_from(first), &picked);
+        put(&mut next.left, at, &numbers_of_lanes, &picked);
         next.len += count;
     }
 }
