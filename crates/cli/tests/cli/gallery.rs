@@ -45,19 +45,28 @@ fn copy_small(from: &Path, to: &Path) {
         fs::copy(&path, &copy).unwrap();
         let written =
             fs::read_to_string(&path).ok().and_then(|text| serde_json::from_str(&text).ok());
-        if let Some(mut scene @ Value::Object(_)) = written
-            && scene["etendue"] == 1
-        {
-            shrink(&mut scene);
-            fs::write(&copy, scene.to_string()).unwrap();
+        if let Some(mut written @ Value::Object(_)) = written {
+            if written["etendue"] == 1 {
+                shrink(&mut written);
+            } else if written["pose"].is_object() {
+                shrink_camera(&mut written);
+            }
+            fs::write(&copy, written.to_string()).unwrap();
         }
     }
 }
 
-fn shrink(scene: &mut Value) {
+fn shrink_camera(camera: &mut Value) {
     // Behind exaggerated lenslets a few have to be whole.
-    let size = if scene["camera"]["microlenses"].is_null() { [24, 18] } else { [72, 54] };
-    scene["camera"]["sensor"]["resolution"] = json!(size);
+    let size = if camera["microlenses"].is_null() { [24, 18] } else { [72, 54] };
+    camera["sensor"]["resolution"] = json!(size);
+}
+
+fn shrink(scene: &mut Value) {
+    // A camera may stand in a file of its own.
+    if scene["camera"].is_object() {
+        shrink_camera(&mut scene["camera"]);
+    }
     scene["render"]["samples"] = json!(1);
     for object in scene["objects"].as_array_mut().into_iter().flatten() {
         if object["triangles"].as_u64().is_some_and(|count| count > 2000) {
