@@ -244,7 +244,7 @@ spectra: setup
 # The pictures of docs/reference/window.md: six states, as their test reaches them.
 docs-window:
 	@scripts/setup.sh test
-	RESOLUTION=[480,320] SAMPLES=16 scripts/window-states.sh
+	RESOLUTION=[480,320] SAMPLES=4 scripts/window-states.sh
 	install -D -m 644 -t docs/images/window $(foreach state,start broken heavy layers remove sensor,out/window/state-$(state).png)
 
 # The Python of docs/how-to/light-fields.md and its pictures, and plenopticam's views against ours. ARGS go to the render.
