@@ -65,13 +65,13 @@ close_window
 echo '{"etendue": 1, "tracer": {"type": "facing"}, "objects": [{"shape": "blob", "triangles": 60000000}]}' \
     >"$home/heavy.json"
 start 1 "$home/heavy.json"
-until_so 30 title_is 'heavy.json (rendering) - etendue' || fail "a heavy file is not being read"
+until_so 120 title_is "heavy.json (rendering) - etendue" || fail "a heavy file is not being read"
 # The bar stands in the middle, which is one colour otherwise.
 has_bar() {
     keep heavy
     [ "$(convert "$shots/state-heavy.png" -crop 400x160+440+250 -format %k info:)" -gt 8 ]
 }
-until_so 60 has_bar || fail "what is done of a heavy file is not shown"
+until_so 180 has_bar || fail "what is done of a heavy file is not shown"
 xdotool mousemove 640 324 sleep 0.3 click 1
 until_so 60 is_idle || fail "a heavy file is not left"
 keep left
