@@ -29,7 +29,7 @@ fi
 python3 scripts/notices.py "${notices[@]}"
 
 features=()
-[ "$profile" != dev ] || [ "${AUDITWHEEL:-skip}" = repair ] || features=(--features checkout)
+[ "$profile" != dev ] || features=(--features checkout)
 rm -rf "$out/wheels"
 PATH="$venv/bin:$PATH" "$venv/bin/maturin" build --manifest-path crates/python/Cargo.toml --locked \
     --profile "$profile" "${features[@]}" --auditwheel "${AUDITWHEEL:-skip}" --out "$out/wheels"
