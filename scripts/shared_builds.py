@@ -47,13 +47,18 @@ def own(unit):
 
 
 def main():
-    whole = units(["test", "--no-run", "--lib", "--bins", "--tests", *WHOLE])
+    tests = ["test", "--no-run", "--lib", "--bins", "--tests"]
+    whole = units([*tests, *WHOLE])
     parts = {
-        "tests without Embree": ["test", "--no-run", "--lib", "--bins", "--tests", "--no-default-features", *packages(WITHOUT_EMBREE)],
-        "tests against Embree 4": ["test", "--no-run", "--lib", "--bins", "--tests", *packages(WITH_EMBREE_4)],
+        "tests without Embree": [*tests, "--no-default-features", *packages(WITHOUT_EMBREE)],
+        "tests against Embree 4": [*tests, *packages(WITH_EMBREE_4)],
         "Python package": ["build", "--lib", "-p", "etendue-python", "--features", "etendue-python/checkout"],
     }
-    twice = False
+    # The package that names all of them must not bring builds of its own.
+    brought = whole - units([*tests, *WHOLE, "--exclude", "etendue-dependencies"])
+    names = sorted({one[0][0] for one in brought if not own(one)})
+    print(f"etendue-dependencies itself: {len(names)} dependencies more", *names, sep="\n    " if names else " ")
+    twice = bool(names)
     for part, arguments in parts.items():
         # Crates of this workspace are built again where they trace by another Embree; the Python package is not.
         again = [one for one in units(arguments) - whole if not own(one) or part == "Python package"]
