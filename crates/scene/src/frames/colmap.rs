@@ -11,7 +11,6 @@
 use std::collections::BTreeMap;
 
 use super::Station;
-use super::trajectory::numbers;
 use super::transforms::{FileCamera, distortion};
 use etendue_camera::{Convention, Maps, PoseSpec};
 
@@ -408,4 +407,15 @@ pub(in crate::frames) fn cameras_in_text(text: &str) -> Result<Cameras, String> 
 fn whole(word: &str, number: usize) -> Result<u32, String> {
     word.parse()
         .map_err(|_| format!("has \"{word}\" in line {number}, where a whole number is due"))
+}
+
+/// Numbers of a line of text, all finite; 0 beyond its last.
+pub(super) fn numbers<const N: usize>(words: &[&str], line: usize) -> Result<[f64; N], String> {
+    let mut numbers = [0.0; N];
+    for (number, word) in numbers.iter_mut().zip(words) {
+        *number = word.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| {
+            format!("has \"{word}\" in line {line}, where a finite number is due")
+        })?;
+    }
+    Ok(numbers)
 }

@@ -6,8 +6,9 @@
 
 use std::path::{Path, PathBuf};
 
+use super::Station;
+use super::colmap::{self, numbers};
 use super::transforms::{self, ScenePicture};
-use super::{Station, colmap};
 use crate::error::not_found;
 use crate::file::TrajectoryFormat;
 use crate::import::{Note, NoteKind};
@@ -127,17 +128,6 @@ fn read_npy(bytes: &[u8], axes: (Maps, Convention)) -> Result<Vec<Station>, Stri
     })?;
     let rows = array.shape[1];
     Ok(array.numbers.chunks_exact(4 * rows).map(|pose| Station::of_rows(pose, axes)).collect())
-}
-
-/// Numbers of a line of text, all finite; 0 beyond its last.
-pub(super) fn numbers<const N: usize>(words: &[&str], line: usize) -> Result<[f64; N], String> {
-    let mut numbers = [0.0; N];
-    for (number, word) in numbers.iter_mut().zip(words) {
-        *number = word.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| {
-            format!("has \"{word}\" in line {line}, where a finite number is due")
-        })?;
-    }
-    Ok(numbers)
 }
 
 /// Words of a line of KITTI's.

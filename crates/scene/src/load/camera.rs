@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use crate::cache::{self, KeptCamera};
 use crate::error::not_found;
-use crate::file::{SamplesSpec, SceneFile};
+use crate::file::{SamplesSpec, SceneFile, ScenePath};
 use crate::import::{ImportedCamera, Note, NoteKind, Projection, Strictness};
 use crate::scene::{LoadOptions, WorldVertices};
 use crate::{Cache, SceneError, facing};
@@ -28,8 +28,7 @@ impl SceneFile {
     }
 
     pub(crate) fn camera_fault(&self, error: &CameraError) -> SceneError {
-        let dot = if error.at.is_empty() { "" } else { "." };
-        self.fault(&format!("camera{dot}{}", error.at), error.why.as_str())
+        self.fault(ScenePath::of("camera").join(&error.at), error.why.as_str())
     }
 
     /// The camera as far as it is known before the models are.

@@ -11,6 +11,7 @@ use serde_json::{Map, Value};
 
 use super::document::Node;
 use super::{Reader, damaged};
+use crate::file::{ScenePath, read_value};
 use crate::import::error::{Note, NoteKind};
 use crate::import::{Import, Play, Refusal};
 
@@ -227,8 +228,8 @@ fn chosen(reader: &Reader<'_>, play: &Play) -> Result<(usize, Animation), Refusa
         };
         return Err(reader.damaged("animations", reason));
     };
-    let animation = Animation::deserialize(value).map_err(|error| {
-        reader.damaged(format!("animations[{number}]"), crate::words::plain(&error))
+    let animation = read_value(value).map_err(|(inside, why)| {
+        reader.damaged(ScenePath::of("animations").index(number).join(inside), why)
     })?;
     Ok((number, animation))
 }

@@ -4,11 +4,13 @@ use std::path::Path;
 
 use gltf::json;
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
+use crate::file::{Document as JsonText, Fault as TextFault, Place, read_value};
 use crate::import::Refusal;
 use crate::import::error::wrong_text;
-use crate::words::plain;
+use crate::words::kind_of;
 
 /// A glTF document: crate `gltf`'s types, but for what is read in f64 here.
 pub(super) struct Document {
@@ -122,13 +124,13 @@ pub(super) fn parse(path: &Path, json: &[u8], in_glb: bool) -> Result<Document, 
     }
     let whole = Value::Object(taken);
     refuse_arrays(&whole, "").map_err(|place| not_an_object(path, place))?;
-    let InF64 { nodes, scenes, cameras, skins } = typed(path, whole)?;
+    let InF64 { nodes, scenes, cameras, skins } = typed(path, &whole)?;
     // The crate refuses documents for parts that are not wanted, as animations that extensions
     // point elsewhere than to nodes.
     rest.retain(|key, _| READ.contains(&key.as_str()));
     let whole = Value::Object(rest);
     refuse_arrays(&whole, "").map_err(|place| not_an_object(path, place))?;
-    let root = typed(path, whole)?;
+    let root = typed(path, &whole)?;
     Ok(Document { root, nodes, scenes, cameras, skins, animations })
 }
 
@@ -155,25 +157,38 @@ fn require_version_2(path: &Path, document: &Map<String, Value>) -> Result<(), R
 }
 
 /// `value` as a `T`, or where in the document it is not one.
-fn typed<T: for<'de> Deserialize<'de>>(path: &Path, value: Value) -> Result<T, Refusal> {
-    serde_path_to_error::deserialize(value)
-        .map_err(|error| super::damaged(path, error.path().to_string(), plain(error.inner())))
+fn typed<T: DeserializeOwned>(path: &Path, value: &Value) -> Result<T, Refusal> {
+    read_value(value).map_err(|(place, why)| super::damaged(path, place, why))
 }
 
-/// The error of a text that is no JSON.
+/// The error of a text that is no JSON object.
 fn broken(path: &Path, json: &[u8], in_glb: bool, error: &serde_json::Error) -> Refusal {
     let len = json.len();
+    let TextFault { place, reason } = fault_of(json, error);
     let wrong = "its length in the GLB is wrong, or the file is damaged\nhint: export it again";
-    let reason = match plain(error) {
-        _ if in_glb && error.is_eof() => {
+    let reason = match in_glb {
+        true if error.is_eof() => {
             format!("the JSON chunk ends after {len} bytes, inside the document: {wrong}")
         }
-        reason if in_glb => format!("the JSON chunk of {len} bytes is damaged: {reason}"),
-        reason => format!("this is not the JSON of a glTF file: {reason}"),
+        true => format!("the JSON chunk of {len} bytes is damaged: {reason}"),
+        false => format!("this is not the JSON of a glTF file: {reason}"),
     };
-    let line = json.split(|&byte| byte == b'\n').nth(error.line().saturating_sub(1));
-    let shown = excerpt(line.unwrap_or_default(), error.column());
-    wrong_text(path, (error.line(), error.column()), reason, &shown)
+    let line = json.split(|&byte| byte == b'\n').nth(place.line - 1);
+    let shown = excerpt(line.unwrap_or_default(), place.column);
+    wrong_text(path, (place.line, place.column), reason, &shown)
+}
+
+/// Where a text is no JSON object, and why.
+fn fault_of(json: &[u8], error: &serde_json::Error) -> TextFault {
+    let at_its = |reason: String| TextFault {
+        place: Place { line: error.line().max(1), column: error.column().max(1) },
+        reason,
+    };
+    match str::from_utf8(json).map(|text| JsonText::parse(text.to_owned())) {
+        Ok(Err(fault)) => fault,
+        Ok(Ok((_, value))) => at_its(format!("expected an object, found {}", kind_of(&value))),
+        Err(error) => at_its(format!("is not UTF-8 text (byte {})", error.valid_up_to())),
+    }
 }
 
 /// The keys of glTF that hold an object, and those that hold a list of objects.

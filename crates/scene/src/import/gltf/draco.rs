@@ -20,8 +20,8 @@ use super::Reader;
 use super::accessor::Accessor;
 use super::buffers::{Bytes, View};
 use super::document::Document;
+use crate::file::read_value;
 use crate::import::Refusal;
-use crate::words::plain;
 
 pub(super) const NAME: &str = "KHR_draco_mesh_compression";
 
@@ -59,7 +59,7 @@ impl Compressed {
     /// The compressed form of `primitive`; `None` when it has none.
     pub(super) fn of(primitive: &Primitive) -> Option<Result<Self, String>> {
         let written = primitive.extensions.as_ref()?.others.get(NAME)?;
-        Some(Self::deserialize(written).map_err(|error| plain(&error)))
+        Some(read_value(written).map_err(|(_, why)| why))
     }
 }
 

@@ -14,9 +14,10 @@ use serde_json::Value;
 
 use super::damaged;
 use super::document::{Document, Node};
+use crate::file::{ScenePath, read_value};
 use crate::import::Refusal;
 use crate::import::error::{self, Note, NoteKind};
-use crate::words::{kind_of, plain};
+use crate::words::kind_of;
 
 const NAME: &str = "KHR_lights_punctual";
 
@@ -63,11 +64,8 @@ fn read(path: &Path, number: &Value, value: &Value) -> Result<Written, Refusal> 
             format!("expected an object, found {}\nhint: export the file again", kind_of(value));
         return Err(damaged(path, place, reason));
     }
-    serde_path_to_error::deserialize(value).map_err(|error| {
-        let inside = error.path().to_string();
-        let place = if inside == "." { place } else { format!("{place}.{inside}") };
-        damaged(path, place, plain(error.inner()))
-    })
+    read_value(value)
+        .map_err(|(inside, why)| damaged(path, ScenePath::of(&place).join(inside), why))
 }
 
 /// The light of a node, at the origin of its frame; `None` when it has none, or a dark one.

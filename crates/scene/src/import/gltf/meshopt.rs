@@ -7,7 +7,8 @@ use gltf::json;
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::words::plain;
+use crate::Refusal;
+use crate::file::read_value;
 
 const NAMES: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 
@@ -76,10 +77,8 @@ impl<'a> MeshoptView<'a> {
         if !self.written.is_object() {
             return Err("expected an object\nhint: export the file again".to_owned());
         }
-        let stream: Stream = serde_path_to_error::deserialize(self.written).map_err(|error| {
-            let path = error.path().to_string();
-            let inside = if path == "." { String::new() } else { format!("{path}: ") };
-            format!("{inside}{}\nhint: export the file again", plain(error.inner()))
+        let stream: Stream = read_value(self.written).map_err(|(place, why)| {
+            Refusal::new(why).at(place).hint("export the file again").to_string()
         })?;
         stream.check()?;
         Ok(stream)
