@@ -309,7 +309,7 @@ impl SceneFile {
             lights: parts.lights,
             studio_if_dark: parts.studio_if_dark,
             tracer: self.spec.tracer,
-            camera,
+            camera: camera.sharing_within(self.spec.accuracy.sharing()),
             sensor,
             camera_origin,
             cameras: parts.cameras,
