@@ -20,12 +20,12 @@ use etendue_spectrum::CurveFault;
 
 /// The file that holds a scene's camera.
 #[derive(Debug, Clone)]
-pub(super) struct CameraFile {
+pub(super) struct CameraDocument {
     pub(super) path: PathBuf,
     pub(super) document: Document,
 }
 
-impl CameraFile {
+impl CameraDocument {
     /// Reads the camera file that a scene in `folder` calls `written`, with its paths from that folder. A
     /// text is an error that belongs to the scene's key `camera`.
     pub(super) fn read(

@@ -17,7 +17,7 @@ pub struct Place {
 
 /// Why a text is no JSON document for us.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Fault {
+pub(crate) struct JsonFault {
     pub(crate) place: Place,
     pub(crate) reason: String,
 }
@@ -33,12 +33,12 @@ const MOST_LEVELS: usize = 127;
 pub(crate) struct Document {
     text: String,
     /// All values in the order of the text, each before those inside it.
-    values: Vec<Written>,
+    values: Vec<ValueSpan>,
 }
 
 /// A value in the text, of at most 4 GiB.
 #[derive(Debug, Clone, Copy)]
-struct Written {
+struct ValueSpan {
     /// The byte where it starts, or its key where it has one.
     start: u32,
     /// The number of the next value that is not inside it.
@@ -49,7 +49,7 @@ struct Written {
 impl Document {
     /// Parses `text` into the document and its values; refused when it is not JSON (RFC 8259), or an object
     /// has a key twice.
-    pub(crate) fn parse(text: String) -> Result<(Self, Value), Fault> {
+    pub(crate) fn parse(text: String) -> Result<(Self, Value), JsonFault> {
         let mut reader =
             Reader { text: &text, at: 0, values: Vec::new(), path: Vec::new(), levels: 0 };
         match reader.document() {
@@ -57,7 +57,7 @@ impl Document {
                 let values = reader.values;
                 Ok((Self { text, values }, value))
             }
-            Err(Wrong { at, reason }) => Err(Fault { place: place_of(&text, at), reason }),
+            Err(Wrong { at, reason }) => Err(JsonFault { place: place_of(&text, at), reason }),
         }
     }
 
@@ -129,7 +129,7 @@ fn place_of(text: &str, at: usize) -> Place {
 struct Reader<'a> {
     text: &'a str,
     at: usize,
-    values: Vec<Written>,
+    values: Vec<ValueSpan>,
     /// The place of the value that is read.
     path: Vec<PathStep>,
     levels: usize,
@@ -178,7 +178,7 @@ impl Reader<'_> {
     fn value(&mut self, start: usize, is_member: bool) -> Result<Value, Wrong> {
         let number = self.values.len();
         let place = |byte: usize| u32::try_from(byte).unwrap_or(u32::MAX);
-        self.values.push(Written { start: place(start), next: 0, is_member });
+        self.values.push(ValueSpan { start: place(start), next: 0, is_member });
         let value = match self.peek() {
             b'{' => self.nested(Self::object).map(Value::Object),
             b'[' => self.nested(Self::array).map(Value::Array),

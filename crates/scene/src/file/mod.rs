@@ -50,13 +50,13 @@ pub use settings::{
 pub use spec::{FormatVersion, SceneSpec, scene_schema};
 pub use tolerance::{DisplacementSpec, ShareSpec, ToleranceSpec};
 
-pub(crate) use document::{Document, Fault};
+pub(crate) use document::{Document, JsonFault};
 pub(crate) use values::read as read_value;
 
 use crate::SceneError;
 use crate::memory::{has_room, of_json};
 use crate::sniff::what_it_is;
-use camera::CameraFile;
+use camera::CameraDocument;
 use document::excerpt;
 
 /// The endings of models that may stand in for a scene file.
@@ -94,7 +94,7 @@ struct WrittenPlaces {
     /// Opens the camera's file, where the scene names one.
     opener: Opener,
     /// That file, once it is read.
-    camera: Option<CameraFile>,
+    camera: Option<CameraDocument>,
     /// Which paths the command line set, and how it was written there.
     settings: BTreeMap<ScenePath, String>,
     /// Of which frame they are; none for the command line's.
@@ -348,7 +348,7 @@ impl WrittenPlaces {
         let folder =
             self.opener.folder(folder).map_err(|why| SceneError::unreadable(folder, &why))?;
         let (file, camera) =
-            CameraFile::read(&folder, written)?.map_err(|why| self.fault("camera", why))?;
+            CameraDocument::read(&folder, written)?.map_err(|why| self.fault("camera", why))?;
         *place = camera;
         // What it says stands there, not where it is named.
         self.settings.remove(&ScenePath::of("camera"));
@@ -376,7 +376,7 @@ impl WrittenPlaces {
     fn fault(&self, path: impl Into<ScenePath>, why: impl Into<Refusal>) -> SceneError {
         let path = path.into();
         let place = self.place(&path);
-        let file = self.camera.as_ref().zip(CameraFile::own_path(&path));
+        let file = self.camera.as_ref().zip(CameraDocument::own_path(&path));
         // A setting is named as it was written, from the scene's top.
         let file = file.filter(|_| !matches!(place, Origin::Setting(_)));
         let (file, path) = match file {
@@ -395,7 +395,7 @@ impl WrittenPlaces {
                 None => format!("--set {setting}"),
             });
         }
-        let place = match self.camera.as_ref().zip(CameraFile::own_path(path)) {
+        let place = match self.camera.as_ref().zip(CameraDocument::own_path(path)) {
             Some((camera, own)) => camera.document.near(&own),
             None => self.document.as_ref().and_then(|document| document.near(path)),
         };

@@ -17,7 +17,7 @@ use crate::error::not_found;
 use crate::file::{CameraPath, FramesSpec, SceneFile, ScenePath};
 use crate::import::Note;
 use crate::{Scene, SceneError};
-use trajectory::Trajectory;
+use trajectory::TrajectorySource;
 use transforms::ScenePicture;
 
 /// The most frames of a scene. All are made before the first is shown, of a few kilobytes each.
@@ -242,7 +242,7 @@ impl SceneFile {
                 let found = folder.find(file).map_err(|error| fault(("file", not_found(error))))?;
                 let maps = maps.unwrap_or(Maps::WorldFromCamera);
                 let convention = convention.unwrap_or(Convention::Opencv);
-                let trajectory = Trajectory {
+                let trajectory = TrajectorySource {
                     folder: &folder,
                     file,
                     format: *format,

@@ -20,7 +20,7 @@ const LONGEST: u64 = 1 << 30;
 
 /// A file of poses, and how the scene wants it read.
 #[derive(Debug)]
-pub(super) struct Trajectory<'a> {
+pub(super) struct TrajectorySource<'a> {
     /// The folder of the scene.
     pub(super) folder: &'a InputFolder,
     /// The file, as the scene writes it.
@@ -33,7 +33,7 @@ pub(super) struct Trajectory<'a> {
     pub(super) picture: ScenePicture,
 }
 
-impl Trajectory<'_> {
+impl TrajectorySource<'_> {
     /// The poses, and what a user should know of the file. The error goes on after the file's name.
     pub(super) fn read(&self, path: &Path) -> Result<(Vec<Station>, Vec<Note>), String> {
         let mut notes = Vec::new();

@@ -37,12 +37,12 @@ pub(super) enum OriginKind {
 
 impl OriginKind {
     /// As the cache knows it.
-    pub(super) fn kept(&self) -> Option<cache::Origin> {
+    pub(super) fn kept(&self) -> Option<cache::ModelOrigin> {
         match self {
-            Self::File(path, _) => Some(cache::Origin::File(path.clone())),
+            Self::File(path, _) => Some(cache::ModelOrigin::File(path.clone())),
             // Shapes are made of numbers and words, which always serialise.
             Self::Shape(shape) => {
-                Some(cache::Origin::Shape(serde_json::to_string(shape).unwrap_or_default()))
+                Some(cache::ModelOrigin::Shape(serde_json::to_string(shape).unwrap_or_default()))
             }
             Self::Given(_) => None,
         }

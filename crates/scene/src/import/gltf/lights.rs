@@ -13,7 +13,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::damaged;
-use super::document::{Document, Node};
+use super::document::{GltfDocument, GltfNode};
 use crate::file::{ScenePath, read_value};
 use crate::import::Refusal;
 use crate::import::error::{self, Note, NoteKind};
@@ -22,7 +22,7 @@ use crate::words::kind_of;
 const NAME: &str = "KHR_lights_punctual";
 
 #[derive(Debug, Deserialize)]
-struct Written {
+struct WrittenLight {
     #[serde(rename = "type")]
     kind: String,
     #[serde(default = "white")]
@@ -32,12 +32,12 @@ struct Written {
     #[serde(default)]
     name: Option<String>,
     #[serde(default)]
-    spot: Option<Cone>,
+    spot: Option<LightCone>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-struct Cone {
+struct LightCone {
     #[serde(default)]
     inner_cone_angle: f64,
     #[serde(default = "eighth_turn")]
@@ -57,7 +57,7 @@ fn eighth_turn() -> f64 {
 }
 
 /// Light `number` of the document.
-fn read(path: &Path, number: &Value, value: &Value) -> Result<Written, Refusal> {
+fn read(path: &Path, number: &Value, value: &Value) -> Result<WrittenLight, Refusal> {
     let place = format!("extensions.{NAME}.lights[{number}]");
     if !value.is_object() {
         let reason =
@@ -71,8 +71,8 @@ fn read(path: &Path, number: &Value, value: &Value) -> Result<Written, Refusal> 
 /// The light of a node, at the origin of its frame; `None` when it has none, or a dark one.
 pub(super) fn placed(
     path: &Path,
-    document: &Document,
-    node: &Node,
+    document: &GltfDocument,
+    node: &GltfNode,
     index: usize,
     notes: &mut Vec<Note>,
 ) -> Result<Option<Light>, Refusal> {
