@@ -34,12 +34,7 @@ fn members(
     }
 }
 
-fn values(
-    path: &ScenePath,
-    before: &Value,
-    after: &Value,
-    changes: &mut Vec<(ScenePath, Value)>,
-) {
+fn values(path: &ScenePath, before: &Value, after: &Value, changes: &mut Vec<(ScenePath, Value)>) {
     match (before, after) {
         _ if before == after => {}
         (Value::Object(old), Value::Object(new)) if old.keys().all(|key| new.contains_key(key)) => {

@@ -163,7 +163,7 @@ impl Session {
                 let texts = changes.iter().map(|(path, value)| (path.to_string(), value.clone()));
                 let texts: Vec<(String, Value)> = texts.collect();
                 self.set_all(texts.iter().map(|(path, value)| (&**path, value.clone())))
-            },
+            }
         }
     }
 

@@ -131,7 +131,7 @@ pub(super) fn sweeps(
     keys: &[(String, Vec<String>)],
     file: &SceneFile,
 ) -> Result<Vec<Vec<Change>>, Fault> {
-    let axis = |(key, values): &(String, Vec<String>)| {
+    let axis = |(key, values): &(String, Vec<String>)| -> Result<Vec<Change>, Fault> {
         let values = match values.is_empty() {
             true => by_itself(key)?,
             false => values.clone(),

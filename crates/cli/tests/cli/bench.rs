@@ -234,8 +234,19 @@ fn the_settings_that_reach_an_error_soonest_are_found_and_verified() {
 fn numbers_of_accuracy_contend_for_a_target() {
     let bench = Bench::with_scene(LIT);
     let output = bench.run(&[
-        "bench", "scene.json", "-o", "out", "--quick", "--target", "20%", "--seconds", "100",
-        "--sweep", "accuracy.roulette_after", "--sweep", "accuracy.path_noise=0.1,1",
+        "bench",
+        "scene.json",
+        "-o",
+        "out",
+        "--quick",
+        "--target",
+        "20%",
+        "--seconds",
+        "100",
+        "--sweep",
+        "accuracy.roulette_after",
+        "--sweep",
+        "accuracy.path_noise=0.1,1",
     ]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let found = &bench.json("out/bench.json")["target"];

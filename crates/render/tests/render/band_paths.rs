@@ -71,7 +71,8 @@ fn grid() -> Bands {
 fn the_scene_says_how_nearly_shared_paths_land() {
     let shared = |error: f64| {
         let more = json!({ "accuracy": { "band_place_error": error } });
-        let plan = Plan::new(&scene(singlet(), false, 1, &more), Outputs::from_list("exr").unwrap());
+        let plan =
+            Plan::new(&scene(singlet(), false, 1, &more), Outputs::from_list("exr").unwrap());
         let BandPaths::Shared(shared) = plan.band_paths else { panic!("{:?}", plan.band_paths) };
         assert!(shared.error <= error, "{shared:?}");
         shared.traced

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Positions, Transform};
-use etendue_scene::import::{NoteKind, CameraProjection, Wanted};
+use etendue_scene::import::{CameraProjection, NoteKind, Wanted};
 use etendue_tracer::texture::{Filter, Wrap};
 use etendue_tracer::{Absorption, Glass, ImageSource, Ior, Paint, Scattering};
 use serde_json::{Value, json};
