@@ -8,7 +8,7 @@ use etendue_geometry::units::Millimetres;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::real::Real;
+use crate::element::real::Real;
 use crate::element::Resolve;
 use crate::element::aperture::Picture;
 

@@ -13,7 +13,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::grid::Grid;
-use super::real::Real;
+use crate::element::real::Real;
 use super::terms::{pairs, polynomial};
 use crate::element::Resolve;
 use crate::element::aperture::Picture;

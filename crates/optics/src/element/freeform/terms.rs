@@ -13,7 +13,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::grid::{Grid, HeightMapSpec};
-use super::real::{Real, power};
+use crate::element::real::{Real, power};
 use crate::analysis::zernike::ZernikeOrder;
 use crate::element::Resolve;
 
