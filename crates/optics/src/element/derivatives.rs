@@ -42,9 +42,10 @@ impl Step {
             Action::Freeform { surface, media, .. } => cross_at(surface, *media, ray, place),
             Action::ThinLens { power, .. } => at_thin_lens(*power, ray, open).ray,
             Action::Turn(turn) => turn.renewed(ray),
-            Action::Opening(_) | Action::Filter { .. } | Action::Lenslets(_) | Action::Shadow(_) => {
-                ray
-            }
+            Action::Opening(_)
+            | Action::Filter { .. }
+            | Action::Lenslets(_)
+            | Action::Shadow(_) => ray,
         }
     }
 }

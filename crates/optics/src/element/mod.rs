@@ -58,10 +58,10 @@ pub use microlens_array::{
 pub(crate) use mirror::{Fold, Shadow};
 pub use mirror::{Mirror, MirrorMount, MirrorSpec};
 pub use part::{Part, PartSpec, Symbol};
-use rays::{moved, turned};
 pub use rays::{Block, LANES, LensRays, Ray, RayStatus, StatusCounts};
-pub(crate) use refract::Refraction;
+use rays::{moved, turned};
 pub use real::Real;
+pub(crate) use refract::Refraction;
 pub use shapes::{AnnularSpec, BoxSpec, OutlineSpec, Shape, SpiderSpec};
 pub use step::Clip;
 pub(crate) use step::{Action, Step};

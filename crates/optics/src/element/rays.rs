@@ -282,7 +282,6 @@ impl Ray {
         let ray = Self { position: position.to_array(), direction: unit.to_array() };
         unit.is_finite().then_some(ray)
     }
-
 }
 
 impl<T: Real> Ray<T> {

@@ -122,7 +122,11 @@ impl BoxSpec {
         if !self.rotation.0.is_finite() {
             return Err("rotation must be finite".to_owned());
         }
-        Ok(Shape { kind, turn: turn(self.rotation), around: self.obscures.then_some(f64::INFINITY) })
+        Ok(Shape {
+            kind,
+            turn: turn(self.rotation),
+            around: self.obscures.then_some(f64::INFINITY),
+        })
     }
 }
 
@@ -133,7 +137,8 @@ impl OutlineSpec {
             let [fewest, most] = [CORNERS.start(), CORNERS.end()];
             return Err(format!("corners has {count}; an outline has {fewest} to {most}"));
         }
-        let corners: Vec<[f64; 2]> = self.corners.iter().map(|corner| corner.map(|c| c.0)).collect();
+        let corners: Vec<[f64; 2]> =
+            self.corners.iter().map(|corner| corner.map(|c| c.0)).collect();
         if let Some(i) = corners.iter().position(|c| !(c[0].is_finite() && c[1].is_finite())) {
             return Err(format!("corners[{i}] must be finite lengths"));
         }
@@ -217,7 +222,9 @@ impl ShapeKind {
         match self {
             Self::Rectangle([a, b]) => a.hypot(*b),
             Self::Ellipse([a, b]) => a.max(*b),
-            Self::Outline(corners) => corners.iter().fold(0.0, |most, [x, y]| most.max(x.hypot(*y))),
+            Self::Outline(corners) => {
+                corners.iter().fold(0.0, |most, [x, y]| most.max(x.hypot(*y)))
+            }
             Self::Ring { outer, .. } => *outer,
         }
     }
@@ -252,9 +259,9 @@ impl Shape {
         let kind = match &self.kind {
             ShapeKind::Rectangle(half) => ShapeKind::Rectangle(half.map(|half| half * scale)),
             ShapeKind::Ellipse(half) => ShapeKind::Ellipse(half.map(|half| half * scale)),
-            ShapeKind::Outline(corners) => ShapeKind::Outline(
-                corners.iter().map(|corner| corner.map(|c| c * scale)).collect(),
-            ),
+            ShapeKind::Outline(corners) => {
+                ShapeKind::Outline(corners.iter().map(|corner| corner.map(|c| c * scale)).collect())
+            }
             ShapeKind::Ring { inner, outer, arms, half_width } => {
                 let scale = if outer.is_finite() && radius.is_finite() { scale } else { 1.0 };
                 ShapeKind::Ring {

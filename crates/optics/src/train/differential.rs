@@ -153,7 +153,8 @@ mod tests {
         let at = lost.at(550.0).unwrap();
         let ray = start(DVec3::new(0.0, 9.0, -10.0), DVec3::Z);
         assert_eq!(at.differential(Side::Object, ray), None);
-        let lenslets = r#"{"type": "microlens_array", "size": [4, 4], "pitch": 1, "focal_length": 5}"#;
+        let lenslets =
+            r#"{"type": "microlens_array", "size": [4, 4], "pitch": 1, "focal_length": 5}"#;
         let at = built(lenslets).at(550.0).unwrap();
         let ray = start(DVec3::new(0.0, 0.0, -10.0), DVec3::Z);
         assert_eq!(at.differential(Side::Object, ray), None);

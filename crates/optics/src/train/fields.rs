@@ -86,7 +86,8 @@ impl VignettingSpec {
     #[must_use]
     pub fn place(&self, whole: DVec2) -> DVec2 {
         let left = DVec2::ONE - DVec2::from(self.compression);
-        DVec2::from_angle(self.rotation.0.to_radians()).rotate(DVec2::from(self.decentre) + whole * left)
+        DVec2::from_angle(self.rotation.0.to_radians())
+            .rotate(DVec2::from(self.decentre) + whole * left)
     }
 
     /// The share of the pupil's area that is left.

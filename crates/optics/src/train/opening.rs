@@ -160,8 +160,7 @@ impl OpticalTrain {
         /// Rays across the beam, in each direction.
         const RAYS: u32 = 1024;
         let radius = self.paraxial(self.wavelength).ok().and_then(|p| p.entrance_pupil.diameter);
-        let (Some(diameter), true, Ok(at)) =
-            (radius, self.is_obscured(), self.at(self.wavelength))
+        let (Some(diameter), true, Ok(at)) = (radius, self.is_obscured(), self.at(self.wavelength))
         else {
             return Ok(());
         };

@@ -70,7 +70,8 @@ fn every_kind_of_surface_has_a_lens() {
     for (_, file, _) in lenses() {
         used(&file, &mut shown);
         let text = file.to_string();
-        let all = ["fresnel", "rotation_radius", "blaze_wavelength", "design_wavelength", "coating"];
+        let all =
+            ["fresnel", "rotation_radius", "blaze_wavelength", "design_wavelength", "coating"];
         keys.extend(all.into_iter().filter(|key| text.contains(&format!("\"{key}\":"))));
     }
     let missing: Vec<&String> = kinds.difference(&shown).collect();

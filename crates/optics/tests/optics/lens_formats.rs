@@ -173,7 +173,10 @@ fn a_table_of_photons_to_photos_is_read_with_its_configurations() {
     let format = LensFormat::PhotonsToPhotos;
     let lens = read(format, ZOOM);
     assert_eq!(lens.file.name, "Zoom of ours");
-    assert_eq!((lens.file.field_angles().as_slice(), lens.file.wavelengths_nm()[0]), (&[0.0, 14.0, 20.0][..], 587.56));
+    assert_eq!(
+        (lens.file.field_angles().as_slice(), lens.file.wavelengths_nm()[0]),
+        (&[0.0, 14.0, 20.0][..], 587.56)
+    );
     let all = elements(&lens);
     assert_eq!(all[0]["glass"], json!({"nd": 1.5, "vd": 64.2}));
     assert_eq!((&all[0]["semi_diameter"], &all[1]["thickness"]), (&json!(10.0), &json!(1.0)));
@@ -277,14 +280,20 @@ fn a_lens_of_oslo_is_read_with_its_system() {
     assert!((pupil.diameter.unwrap() - 10.0).abs() < 1e-12, "EBR is a radius");
     // Shares of a field are shares of its tangent.
     let part = (0.7 * 10_f64.to_radians().tan()).atan().to_degrees();
-    assert_eq!(lens.file.field_angles(), [0.0, part, (10_f64.to_radians().tan()).atan().to_degrees()]);
+    assert_eq!(
+        lens.file.field_angles(),
+        [0.0, part, (10_f64.to_radians().tan()).atan().to_degrees()]
+    );
     let all = elements(&lens);
     assert_eq!((&all[0]["glass"], &all[0]["curvature"]), (&json!("BK7"), &json!(0.02)));
     assert_eq!((&all[0]["stop"], &all[1]["semi_diameter"]), (&json!(true), &json!(8.0)));
     // Fields by the table behind the lens: y and then x.
     let table = "RST NEW\nF 1 0 0 0 0 0 -1 1 -1 1 1\nF 2 -0.5 0 0 0 0 -1 1 -1 1 1\nEND\n";
     let lens = read(LensFormat::Oslo, &oslo("FNO 5\nANG 10", FRONT, BACK, table));
-    assert_eq!(lens.file.field_angles(), [0.0, -(0.5 * 10_f64.to_radians().tan()).atan().to_degrees()]);
+    assert_eq!(
+        lens.file.field_angles(),
+        [0.0, -(0.5 * 10_f64.to_radians().tan()).atan().to_degrees()]
+    );
     let train = build(&lens);
     assert!((train.paraxial(587.56).unwrap().f_number.unwrap() - 5.0).abs() < 1e-9);
     // Units of 10 mm.

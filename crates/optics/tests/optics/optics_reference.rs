@@ -232,7 +232,8 @@ fn spots_agree() {
         let at = system.at(587.56);
         for theirs in system.json["spots"].as_array().unwrap() {
             let field = number(&theirs["field_deg"]);
-            let ours = spot(&system.train, &at, &FieldSpec::at(field), system.reference_z()).unwrap();
+            let ours =
+                spot(&system.train, &at, &FieldSpec::at(field), system.reference_z()).unwrap();
             let what = format!("{} at {field}°", system.name);
             assert_eq!(ours.rays_launched, index(&theirs["rays_launched"]), "{what}");
             assert_eq!(ours.rays_passed, index(&theirs["rays_passed"]), "{what}");

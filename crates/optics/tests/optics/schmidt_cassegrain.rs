@@ -96,7 +96,8 @@ fn a_published_schmidt_cassegrain_has_the_focal_length_and_spots_of_a_second_pac
         });
         let ends: Vec<DVec3> = rays
             .map(|(radius, turn)| {
-                let place = DVec3::new(radius * turn.cos(), radius * turn.sin() - 10.0 * sine, -10.0);
+                let place =
+                    DVec3::new(radius * turn.cos(), radius * turn.sin() - 10.0 * sine, -10.0);
                 let end = at.run(Side::Object, Clip::Off, Ray::new(place, direction).unwrap()).ray;
                 let [place, direction] = [end.position, end.direction].map(DVec3::from);
                 place + direction * ((z - place.z) / direction.z)

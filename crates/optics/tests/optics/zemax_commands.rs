@@ -127,20 +127,14 @@ fn weights_and_vignetting_factors_are_those_of_the_file() {
         .replace("FTYP 0 0 1 1", "FTYP 0 0 2 1")
         .replace("YFLN 0\n", "YFLN 0 5 9\nFWGN 1 3 1\nVDXN 0 0.1 0\nVDYN 0 0 0\nVCYN 0 0.2 0\n");
     let lens = read(&fields).unwrap().file;
-    let vignetting = VignettingSpec {
-        decentre: [0.1, 0.0],
-        compression: [0.0, 0.2],
-        rotation: Degrees(0.0),
-    };
+    let vignetting =
+        VignettingSpec { decentre: [0.1, 0.0], compression: [0.0, 0.2], rotation: Degrees(0.0) };
     let second = FieldSpec { weight: 3.0, vignetting, ..FieldSpec::at(5.0) };
     assert_eq!(lens.fields, [FieldSpec::at(0.0), second]);
     // Half the pupil's height, moved up by a fifth of its radius and turned by a right angle.
     let place = |spec: VignettingSpec, x, y| spec.place(DVec2::new(x, y));
-    let turned = VignettingSpec {
-        decentre: [0.0, 0.2],
-        compression: [0.0, 0.5],
-        rotation: Degrees(90.0),
-    };
+    let turned =
+        VignettingSpec { decentre: [0.0, 0.2], compression: [0.0, 0.5], rotation: Degrees(90.0) };
     assert!((place(turned, 0.0, 1.0) - DVec2::new(-0.7, 0.0)).length() < 1e-15);
     assert!((place(turned, 1.0, 0.0) - DVec2::new(-0.2, 1.0)).length() < 1e-15);
     assert_eq!(turned.area(), 0.5);
@@ -192,8 +186,14 @@ fn configurations_change_glasses_wavelengths_and_weights() {
     let glass = |lens: &ZemaxLens| {
         serde_json::to_value(&lens.file).unwrap()["elements"][0]["glass"].clone()
     };
-    assert_eq!((glass(&at(1)), at(1).file.wavelengths_nm()), (serde_json::json!("N-BK7"), vec![550.0]));
-    assert_eq!((glass(&at(2)), at(2).file.wavelengths_nm()), (serde_json::json!("Schott:SF11"), vec![650.0]));
+    assert_eq!(
+        (glass(&at(1)), at(1).file.wavelengths_nm()),
+        (serde_json::json!("N-BK7"), vec![550.0])
+    );
+    assert_eq!(
+        (glass(&at(2)), at(2).file.wavelengths_nm()),
+        (serde_json::json!("Schott:SF11"), vec![650.0])
+    );
     assert_eq!(at(2).file.elements[0].mount.thickness.0, 5.0);
     for (bad, word) in [
         ("GLSS 9 2 SF11 0", "no surface 9"),

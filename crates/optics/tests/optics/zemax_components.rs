@@ -102,8 +102,14 @@ fn apertures_become_sheets_at_the_vertex() {
     let back = "TYPE STANDARD; CURV -0.02; DISZ 48; DIAM 8";
     for (line, expected) in [
         ("OBSC 0 1.5 0", json!({"shape": "annular", "inner_radius": 1.5})),
-        ("SQOB 3 2 0", json!({"shape": "rectangular", "width": 6.0, "height": 4.0, "obscures": true})),
-        ("ELOB 3 2 0", json!({"shape": "elliptical", "width": 6.0, "height": 4.0, "obscures": true})),
+        (
+            "SQOB 3 2 0",
+            json!({"shape": "rectangular", "width": 6.0, "height": 4.0, "obscures": true}),
+        ),
+        (
+            "ELOB 3 2 0",
+            json!({"shape": "elliptical", "width": 6.0, "height": 4.0, "obscures": true}),
+        ),
         ("CLAP 2 1E+10 0", json!({"shape": "annular", "inner_radius": 2.0})),
         ("CLAP 2 7 0", json!({"shape": "annular", "inner_radius": 2.0})),
         ("SQAP 3 2 0", json!({"shape": "rectangular", "width": 6.0, "height": 4.0})),
@@ -266,8 +272,14 @@ fn lenses_come_back_from_zemax_files_as_they_went() {
         }
         let wavelength = before.wavelength();
         let lenses = [&before, &after].map(|train| train.at(wavelength).unwrap());
-        let reach =
-            0.4 * before.paraxial(wavelength).unwrap().entrance_pupil.diameter.filter(|d| d.is_finite()).unwrap_or(4.0);
+        let reach = 0.4
+            * before
+                .paraxial(wavelength)
+                .unwrap()
+                .entrance_pupil
+                .diameter
+                .filter(|d| d.is_finite())
+                .unwrap_or(4.0);
         for i in 0..50_u32 {
             let place =
                 DVec3::new(reach * (f64::from(i)).sin(), reach * (1.7 * f64::from(i)).cos(), -30.0);
@@ -303,15 +315,26 @@ fn fields_and_wavelengths_come_back_exactly() {
     for (wrong, word) in [
         (r#""angle": 200"#, "fields[1]: angle is 200 degrees"),
         (r#""angle": 10.1, "weight": -1"#, "fields[1]: weight is -1"),
-        (r#""angle": 10.1, "vignetting": {"compression": [0, 1]}"#, "fields[1]: vignetting: compression has 1"),
+        (
+            r#""angle": 10.1, "vignetting": {"compression": [0, 1]}"#,
+            "fields[1]: vignetting: compression has 1",
+        ),
     ] {
         let file = text.replacen(r#""angle": 10.1, "weight": 2, "vignetting": {"decentre": [0, -0.1], "compression": [0.05, 0.3]}"#, wrong, 1);
         let error = LensFile::from_json(&file).unwrap().build(&|n: &str| Err(n.to_owned()));
         assert!(error.unwrap_err().to_string().contains(word), "{word}");
     }
     for (from, to, word) in [
-        (r#""weights": [1, 0.5, 0.25]"#, r#""weights": [1, 0.5]"#, "weights: give one for each of the 3"),
-        (r#""weights": [1, 0.5, 0.25]"#, r#""wavelength": 500"#, "wavelengths: 587.5618 nm is the first"),
+        (
+            r#""weights": [1, 0.5, 0.25]"#,
+            r#""weights": [1, 0.5]"#,
+            "weights: give one for each of the 3",
+        ),
+        (
+            r#""weights": [1, 0.5, 0.25]"#,
+            r#""wavelength": 500"#,
+            "wavelengths: 587.5618 nm is the first",
+        ),
         ("486.1327", "-1", "wavelengths[1]: -1 nm"),
     ] {
         let error = LensFile::from_json(&text.replace(from, to)).unwrap();

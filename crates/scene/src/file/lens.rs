@@ -258,14 +258,7 @@ fn import(
         .map_err(|error| zemax(ZemaxError { line: 0, why: error.to_string() }))?;
     let focus = Focus::AsWritten;
     let inputs = vec![path.to_owned()];
-    Ok(ReadLens {
-        train,
-        file: Some(file),
-        focus,
-        camera: None,
-        notes,
-        inputs,
-    })
+    Ok(ReadLens { train, file: Some(file), focus, camera: None, notes, inputs })
 }
 
 fn not_a_lens(error: SceneError) -> SceneError {

@@ -34,12 +34,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::phase::Phase;
-use super::real::{Dual, Real};
 use self::terms::Term;
 use super::Resolve;
 use super::mirror::MirrorMount;
 use super::newton::Profile;
 use super::rays::Ray;
+use super::real::{Dual, Real};
 use super::refract::{Media, Root, meet_conic};
 use super::surface::{Surface, checked_semi_diameter, vertex_curvature};
 use crate::glass::GlassSpec;

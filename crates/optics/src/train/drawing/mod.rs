@@ -15,8 +15,8 @@ use glam::DVec2;
 
 use super::LensReport;
 use crate::glass::GlassError;
-use crate::train::{FieldSpec, OpticalTrain};
 use crate::train::analysis::{FieldIllumination, Spot, illumination, spot};
+use crate::train::{FieldSpec, OpticalTrain};
 use etendue_chart::{Axis, Canvas, Chart, Series, TextAnchor, Theme, round_length, short};
 use layout::{bodies, drawn_fields, end_of, fan, heights, strokes};
 

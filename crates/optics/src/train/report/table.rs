@@ -144,9 +144,10 @@ impl LensReport {
         if self.vignetted.is_empty() {
             return Ok(());
         }
-        let mut table = Table::new(&["field", "factors leave", "rims leave", "RMS spot", "largest"])
-            .with_units(&["deg", "%", "%", "um", "um"])
-            .indented(2);
+        let mut table =
+            Table::new(&["field", "factors leave", "rims leave", "RMS spot", "largest"])
+                .with_units(&["deg", "%", "%", "um", "um"])
+                .indented(2);
         for row in &self.vignetted {
             let values = [
                 row.spot.field,

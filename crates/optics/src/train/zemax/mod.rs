@@ -254,13 +254,19 @@ impl Importer<'_> {
                 let may_be_alone = flat_in_air && (!row.stop || self.sheet.aperture.is_none());
                 let alone = may_be_alone.then(|| row.opening_alone(unit)).flatten();
                 let is_alone = alone.is_some();
-                for (opening, decentre) in alone.map_or_else(|| row.sheets(unit), |sheet| vec![sheet]) {
+                for (opening, decentre) in
+                    alone.map_or_else(|| row.sheets(unit), |sheet| vec![sheet])
+                {
                     check_turn(row, &here)?;
                     self.place_sheet(opening, decentre, &here, &mut way);
                     first_z = first_z.or(Some(here.placed().z));
                 }
                 if is_alone {
-                    self.elements.iter_mut().last().into_iter().for_each(|e| e.mount.stop = row.stop);
+                    self.elements
+                        .iter_mut()
+                        .last()
+                        .into_iter()
+                        .for_each(|e| e.mount.stop = row.stop);
                 } else if let Some(part) = self.part(row, flat_in_air)? {
                     if !row.is_round() {
                         check_turn(row, &here)?;

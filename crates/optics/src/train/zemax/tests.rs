@@ -363,7 +363,11 @@ fn heights_become_the_angles_of_their_chief_rays() {
     let dummy: &[&str] = &["TYPE STANDARD", "CURV 0.0", "DISZ 10", "DIAM 30 0"];
     let further =
         near(190.0, &["FTYP 1 0 2 1 0 0 0", "YFLN 0 20"], &[dummy, SINGLET[0], SINGLET[1]]);
-    assert!((further.file.field_angles()[1] - object[1]).abs() < 1e-12, "{:?}", further.file.field_angles());
+    assert!(
+        (further.file.field_angles()[1] - object[1]).abs() < 1e-12,
+        "{:?}",
+        further.file.field_angles()
+    );
     let nowhere = by(1, "0 7");
     assert!(nowhere.notes.iter().any(|note| note.contains("object at infinity")));
     assert!(by(4, "0 7").notes.iter().any(|note| note.contains("kind 4")));

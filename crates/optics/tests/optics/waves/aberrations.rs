@@ -178,7 +178,12 @@ fn foci_behind_a_tilted_sphere_and_a_biconic_are_those_of_coddington() {
         let power = (n * behind - cosine) / radius;
         let turned = degrees.to_radians() - (sine / n).asin();
         close(foci.sagittal.unwrap(), n / power * turned.cos(), 1e-12, "sagittal");
-        close(foci.tangential.unwrap(), n * behind * behind / power * turned.cos(), 1e-12, "tangential");
+        close(
+            foci.tangential.unwrap(),
+            n * behind * behind / power * turned.cos(),
+            1e-12,
+            "tangential",
+        );
     }
     let biconic = build(
         r#"{"elements": [{"type": "biconic", "radius": 50, "radius_x": -80, "glass": {"n": 1.5}, "semi_diameter": 5}]}"#,
