@@ -341,7 +341,7 @@ mod tests {
         let schema = schemars::schema_for!(ElementSpec).to_value();
         let mut kinds = Vec::new();
         leaves(&schema, &mut kinds);
-        assert_eq!(kinds.len(), 15, "seven shapes of apertures");
+        assert_eq!(kinds.len(), 16, "eight shapes of apertures");
         for kind in kinds {
             assert_eq!(kind["additionalProperties"], false, "{kind}");
             let keys = kind["properties"].as_object().unwrap();
