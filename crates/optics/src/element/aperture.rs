@@ -13,7 +13,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Resolve;
-use super::shapes::{AnnularSpec, BoxSpec, Shape, SpiderSpec};
+use super::shapes::{AnnularSpec, BoxSpec, OutlineSpec, Shape, SpiderSpec};
 use etendue_geometry::units::{Degrees, Millimetres};
 use etendue_image::{Limits, Samples};
 
@@ -35,6 +35,8 @@ pub enum ApertureSpec {
     Annular(AnnularSpec),
     /// A ring crossed by arms.
     Spider(SpiderSpec),
+    /// An outline by its corners.
+    Outline(OutlineSpec),
 }
 
 /// A round hole.
@@ -129,6 +131,7 @@ impl ApertureSpec {
             Self::Elliptical(spec) => spec.ellipse().map(Opening::Shaped),
             Self::Annular(spec) => spec.build().map(Opening::Shaped),
             Self::Spider(spec) => spec.build().map(Opening::Shaped),
+            Self::Outline(spec) => spec.build().map(Opening::Shaped),
         }
     }
 }

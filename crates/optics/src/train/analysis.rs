@@ -20,7 +20,7 @@ use crate::element::{Clip, LensRays, RayStatus};
 use crate::glass::GlassError;
 use crate::train::aim::towards_lens;
 use crate::train::pupil::Window;
-use crate::train::{MonochromaticTrain, OpticalTrain, Side};
+use crate::train::{FieldSpec, MonochromaticTrain, OpticalTrain, Side};
 
 /// How the image of one wavelength stands to that of the design wavelength.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -250,8 +250,8 @@ const SPOT_GRID: u32 = 32;
 /// Where the rays of one field point meet the reference plane.
 ///
 /// Rays start on a grid of 32 × 32 cell centres in the square around the paraxial entrance pupil,
-/// of which those inside the circle count, all in the direction (0, sin field, cos field). Radii are
-/// from the centroid.
+/// of which those inside the circle count, all in the direction (0, sin field, cos field). Vignetting factors move
+/// them to what is left of the pupil. Radii are from the centroid.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Spot {
     /// The angle off the axis (degrees).
@@ -277,14 +277,23 @@ pub struct Spot {
     pub points: Vec<DVec2>,
 }
 
-/// The spot of the field angle `field` (degrees) on the plane at `reference_z` (mm).
+impl Spot {
+    /// The share of its rays that passed.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "counts of some hundred rays")]
+    pub fn passed(&self) -> f64 {
+        self.rays_passed as f64 / self.rays_launched.max(1) as f64
+    }
+}
+
+/// The spot of a field on the plane at `reference_z` (mm).
 ///
 /// `None` when the lens has no finite entrance pupil or no ray passes.
 #[must_use]
 pub fn spot(
     train: &OpticalTrain,
     at: &MonochromaticTrain,
-    field: f64,
+    field: &FieldSpec,
     reference_z: f64,
 ) -> Option<Spot> {
     let rays = beam(train, at, field)?;
@@ -315,7 +324,7 @@ pub fn spot(
     };
     let ((rms, geometric), (best_rms, best_geometric)) = (radii(0.0), radii(best_focus));
     Some(Spot {
-        field,
+        field: field.angle.0,
         rays_launched: rays.len(),
         rays_passed: hits.len(),
         centroid_y: centroid.y,
@@ -328,20 +337,21 @@ pub fn spot(
     })
 }
 
-/// The beam of a field angle, traced.
-fn beam(train: &OpticalTrain, at: &MonochromaticTrain, field: f64) -> Option<LensRays> {
+/// The beam of a field, traced.
+fn beam(train: &OpticalTrain, at: &MonochromaticTrain, field: &FieldSpec) -> Option<LensRays> {
     let pupil = train.paraxial(at.wavelength()).ok()?.entrance_pupil;
     let (z, radius) = (pupil.z?, 0.5 * pupil.diameter?);
-    let (sine, cosine) = field.to_radians().sin_cos();
+    let (sine, cosine) = field.angle.0.to_radians().sin_cos();
     let direction = DVec3::new(0.0, sine, cosine);
     let back = train.far_in_front(z) + radius;
-    let coordinate = |i: u32| (2.0 * (f64::from(i) + 0.5) / f64::from(SPOT_GRID) - 1.0) * radius;
+    let coordinate = |i: u32| 2.0 * (f64::from(i) + 0.5) / f64::from(SPOT_GRID) - 1.0;
     let mut rays = LensRays::with_capacity((SPOT_GRID * SPOT_GRID) as usize);
     for row in 0..SPOT_GRID {
         for column in 0..SPOT_GRID {
-            let (x, y) = (coordinate(column), coordinate(row));
-            if x * x + y * y <= radius * radius {
-                rays.push(DVec3::new(x, y, z) - direction * back, direction);
+            let place = DVec2::new(coordinate(column), coordinate(row));
+            if place.length_squared() <= 1.0 {
+                let place = field.vignetting.place(place) * radius;
+                rays.push(place.extend(z) - direction * back, direction);
             }
         }
     }

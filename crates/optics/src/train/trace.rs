@@ -239,7 +239,7 @@ impl MonochromaticTrain {
         &self.forward
     }
 
-    fn steps(&self, from: Side) -> &[Step] {
+    pub(super) fn steps(&self, from: Side) -> &[Step] {
         match from {
             Side::Object => &self.forward,
             Side::Sensor => &self.backward,
