@@ -7,7 +7,7 @@ export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
 .PHONY: help setup render install view dist release portable-wheel test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens lens-waves bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-diffraction bench-aspheres bench-bands bench-time bench-gaps bench-decisions bench-window docs-figures docs-charts \
-	docs-stability docs-time generated gallery spectra light-fields fingerprints fuzz fuzz-smoke fuzz-seeds sanitize clean
+	docs-stability docs-time docs-window generated gallery spectra light-fields fingerprints fuzz fuzz-smoke fuzz-seeds sanitize clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
@@ -45,6 +45,7 @@ help:
 	@echo "make generated     schemas, tables of keys, the pages of the command line and of the Python package, as these write them"
 	@echo "make gallery       render the pictures of docs/guide/gallery.md, and write there what they took"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
+	@echo "make docs-window   screenshots of six states of the window, into docs/images/window"
 	@echo "make docs-time     render the pictures of docs/how-to/time.md anew"
 	@echo "make spectra       the pictures of docs/explanation/spectra.md, and what they lose by colours of three numbers"
 	@echo "make light-fields  the walk of docs/how-to/light-fields.md in a venv, its pictures, and another decoder's opinion"
@@ -73,6 +74,7 @@ view: setup
 test-window:
 	@scripts/setup.sh test
 	@scripts/test-window.sh
+	@scripts/window-states.sh
 	@scripts/test-wayland.sh
 
 test:
@@ -228,15 +230,22 @@ generated: setup
 	ETENDUE_GENERATE=1 cargo test -p etendue-cli --test cli generated::
 	python3 scripts/python_api.py
 
-# The commands of docs/guide/gallery.md, their pictures and their times. ARGS="prism burst" takes some sections.
+# The commands of docs/guide/gallery.md, their pictures and their times. ARGS="prism burst" takes some sections, ARGS=--noise
+# measures what noise the denoised pictures have.
 gallery: setup
 	cargo build --release -p etendue-cli
-	python3 benches/gallery.py $(ARGS)
+	ETENDUE_OIDN="$$(scripts/oidn.sh)" python3 benches/gallery.py $(ARGS)
 
 # The pictures of docs/explanation/spectra.md and the gallery's chart, and their colour errors.
 spectra: setup
 	cargo build --release -p etendue-cli
 	python3 benches/spectra.py
+
+# The pictures of docs/reference/window.md: six states, as their test reaches them.
+docs-window:
+	@scripts/setup.sh test
+	RESOLUTION=[480,320] SAMPLES=4 scripts/window-states.sh
+	install -D -m 644 -t docs/images/window $(foreach state,start broken heavy layers remove sensor,out/window/state-$(state).png)
 
 # The Python of docs/how-to/light-fields.md and its pictures, and plenopticam's views against ours. ARGS go to the render.
 light-fields: setup

@@ -5,9 +5,13 @@ a line between two comments for the times:
 
     <!-- picture: ../images/fig3.png = fig3/picture.png -->
     <!-- bands: ../images/gallery/bands.png = spectrum/views_spectrum.npy 1 4 8 11 -->
+    <!-- refocus: ../images/gallery/refocus.webp = refocus/reference.npy 3.2 2.4 -->
     <!-- took: begin -->...<!-- took: end -->
+    <!-- noise: begin -->...<!-- noise: end -->
 
-Words choose among the sections: those whose heading or commands have one of them.
+A picture whose name ends in `.jpg` is kept as JPEG. Words choose among the sections: those whose heading or commands have
+one of them. With `--noise` the pictures are left as they are: each is rendered once more with another seed, and what
+noise the two have is written between the comments.
 """
 
 import argparse
@@ -22,7 +26,6 @@ import time
 import zlib
 from array import array
 from ast import literal_eval
-from pathlib import Path
 
 import program
 import section
@@ -32,13 +35,18 @@ OUT = "out/gallery"
 
 # Views of a light field have few pixels: each is shown as a square of so many.
 MAGNIFIED = 8
+# Pictures of an animation on its way from near to far.
+REFOCUSED = 16
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("words", nargs="*", help="of the sections to render; all when there are none")
-    words = parser.parse_args().words
+    parser.add_argument("--noise", action="store_true", help="measure the noise of pictures that are there")
+    arguments = parser.parse_args()
+    words = arguments.words
+    program.enter("gallery-venv", ["numpy", "pillow"])
     etendue = program.built("etendue")
     parts = re.split(r"(?m)^(?=## )", PAGE.read_text())
     for number, part in enumerate(parts):
@@ -46,15 +54,22 @@ def main():
         if not commands or words and not any(word in part_key(part, commands) for word in words):
             continue
         print(part.splitlines()[0], file=sys.stderr)
+        if arguments.noise:
+            parts[number] = with_noise(etendue, part, commands)
+            PAGE.write_text("".join(parts))
+            continue
         times = [took(etendue, command) for command in commands]
         for target, source in comments(part, "picture"):
             show(source, target)
         for target, source in comments(part, "bands"):
             bands(*source.split(), target=target)
+        for target, source in comments(part, "refocus"):
+            refocus(*source.split(), target=target)
         parts[number] = with_times(part, times)
         # What is done stays when a later command fails.
         PAGE.write_text("".join(parts))
-    section.put(PAGE, "machine", f"Machine: {section.machine()}; {len(os.sched_getaffinity(0))} processors.")
+    if not arguments.noise:
+        section.put(PAGE, "machine", f"Machine: {section.machine()}; {len(os.sched_getaffinity(0))} processors.")
 
 
 def commands_of(part):
@@ -97,6 +112,12 @@ def show(source, target):
     """Puts a file that was rendered where the page shows it; pictures as small as they get."""
     source, target = program.ROOT / OUT / source, PAGE.parent / target
     target.parent.mkdir(parents=True, exist_ok=True)
+    if target.suffix == ".jpg":
+        from PIL import Image
+
+        # Colours at full resolution: coloured edges are what some of these pictures are about.
+        Image.open(source).convert("RGB").save(target, quality=90, subsampling=0, optimize=True)
+        return
     if source.suffix != ".png":
         shutil.copyfile(source, target)
         return
@@ -148,6 +169,73 @@ def bands(source, *numbers, target):
     size = [width * len(numbers) * MAGNIFIED, height * MAGNIFIED]
     header = struct.pack(">IIBBBBB", *size, 8, 0, 0, 0, 0)
     write_png(PAGE.parent / target, header, bytes(rows))
+
+
+def refocus(source, near, far, *, target):
+    """Views of a light field, moved against one another by `near` to `far` pixels a view and back, and added up: an
+    animation whose sharp plane goes through the scene."""
+    import numpy as np
+    from PIL import Image
+
+    views = np.load(program.ROOT / OUT / source, mmap_mode="r")
+    count = views.shape[0]
+    steps = np.linspace(float(near), float(far), REFOCUSED)
+    white = np.percentile(views[count // 2, count // 2], 99.5)
+    frames = []
+    for step in steps:
+        total = 0.0
+        for down in range(count):
+            for across in range(count):
+                by = [step * (down - (count - 1) / 2), step * (across - (count - 1) / 2)]
+                total = total + moved(views[down, across], by)
+        light = np.clip(total / count**2 / white, 0, 1)
+        code = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+        frames.append(Image.fromarray(np.rint(255 * code).astype(np.uint8)))
+    frames += frames[-2:0:-1]
+    frames[0].save(PAGE.parent / target, save_all=True, append_images=frames[1:], duration=90, loop=0, quality=75,
+                   method=6)
+
+
+def moved(view, by):
+    """A picture moved down and right by parts of pixels, its border repeated: bilinear."""
+    import numpy as np
+
+    whole = np.floor(by).astype(int)
+    rest = np.array(by) - whole
+    total = 0.0
+    for down in (0, 1):
+        for across in (0, 1):
+            weight = (rest[0] if down else 1 - rest[0]) * (rest[1] if across else 1 - rest[1])
+            rows = np.clip(np.arange(view.shape[0]) - whole[0] - down, 0, view.shape[0] - 1)
+            columns = np.clip(np.arange(view.shape[1]) - whole[1] - across, 0, view.shape[1] - 1)
+            total = total + weight * view[np.ix_(rows, columns)].astype(np.float64)
+    return total
+
+
+def with_noise(etendue, part, commands):
+    """The section with the noise of its denoised pictures: of each two renders with different seeds."""
+    found = []
+    for command in commands:
+        words = command.split()
+        if "--denoise" not in words:
+            continue
+        folder = words[words.index("-o") + 1]
+        again = folder.replace(OUT, "out/gallery-again")
+        took(etendue, command.replace(f"-o {folder}", f"-o {again}") + " --seed 1")
+        found.append(noise(*(program.ROOT / name / "denoised.npy" for name in (folder, again))))
+    if not found:
+        return part
+    shares = ", ".join(f"{100 * share:.2f} %" for share in found)
+    return re.sub(r"(?s)(<!-- noise: begin -->).*?(<!-- noise: end -->)", rf"\1Noise: {shares}.\2", part)
+
+
+def noise(*paths):
+    """The standard deviation of a pixel's light, root mean square over the picture, as a share of full scale, from two
+    pictures that differ by their seeds; light above full scale is white, as it is shown."""
+    import numpy as np
+
+    first, second = (np.clip(np.load(path).astype(np.float64), 0, 1) for path in paths)
+    return float(np.sqrt(np.mean((first - second) ** 2) / 2))
 
 
 def encoded(light):

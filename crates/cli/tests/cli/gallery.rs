@@ -45,19 +45,28 @@ fn copy_small(from: &Path, to: &Path) {
         fs::copy(&path, &copy).unwrap();
         let written =
             fs::read_to_string(&path).ok().and_then(|text| serde_json::from_str(&text).ok());
-        if let Some(mut scene @ Value::Object(_)) = written
-            && scene["etendue"] == 1
-        {
-            shrink(&mut scene);
-            fs::write(&copy, scene.to_string()).unwrap();
+        if let Some(mut written @ Value::Object(_)) = written {
+            if written["etendue"] == 1 {
+                shrink(&mut written);
+            } else if written["pose"].is_object() {
+                shrink_camera(&mut written);
+            }
+            fs::write(&copy, written.to_string()).unwrap();
         }
     }
 }
 
-fn shrink(scene: &mut Value) {
+fn shrink_camera(camera: &mut Value) {
     // Behind exaggerated lenslets a few have to be whole.
-    let size = if scene["camera"]["microlenses"].is_null() { [24, 18] } else { [72, 54] };
-    scene["camera"]["sensor"]["resolution"] = json!(size);
+    let size = if camera["microlenses"].is_null() { [24, 18] } else { [72, 54] };
+    camera["sensor"]["resolution"] = json!(size);
+}
+
+fn shrink(scene: &mut Value) {
+    // A camera may stand in a file of its own.
+    if scene["camera"].is_object() {
+        shrink_camera(&mut scene["camera"]);
+    }
     scene["render"]["samples"] = json!(1);
     for object in scene["objects"].as_array_mut().into_iter().flatten() {
         if object["triangles"].as_u64().is_some_and(|count| count > 2000) {
@@ -73,19 +82,24 @@ fn scenes_of_the_gallery_check_and_render_small() {
     copy_small(&root.join("scenes"), &bench.path("scenes"));
     let mut rendered = 0;
     for command in commands(&page) {
+        // What the picture is without its noise is for tests that have the library.
+        let command = command.replace(" --denoise", "").replace("/denoised.npy", "/picture.npy");
         let arguments: Vec<&str> = command.split_whitespace().collect();
-        if arguments[0] != "render" {
-            continue;
+        match arguments[0] {
+            "render" => {
+                let check = bench.run(&["check", arguments[1]]);
+                assert!(check.status.success(), "{command}: {}", text(&check.stderr));
+            }
+            "expose" => {}
+            _ => continue,
         }
-        let check = bench.run(&["check", arguments[1]]);
-        assert!(check.status.success(), "{command}: {}", text(&check.stderr));
         let render = bench.run(&[&*arguments, &["--quiet"]].concat());
         assert!(render.status.success(), "{command}: {}", text(&render.stderr));
         rendered += 1;
     }
     assert!(rendered > 20, "only {rendered} were found");
-    let pictures = comments(&page, "picture").into_iter().chain(comments(&page, "bands"));
-    for (shown, source) in pictures {
+    let kinds = ["picture", "bands", "refocus"];
+    for (shown, source) in kinds.into_iter().flat_map(|kind| comments(&page, kind)) {
         let file = source.split_whitespace().next().unwrap();
         // Benchmarks are not run here.
         let is_there = file.starts_with("bench/") || bench.path("out/gallery").join(file).exists();
@@ -110,4 +124,15 @@ fn every_figure_and_every_scene_of_the_gallery_is_on_its_page() {
             assert!(!is_scene || commands.contains(&scene), "no command renders {scene}");
         }
     }
+}
+
+#[test]
+fn a_dozen_pictures_of_the_gallery_are_large() {
+    let Some((page, root)) = page() else { return };
+    let large = comments(&page, "picture").into_iter().filter(|(shown, _)| {
+        let path = root.join("docs/guide").join(shown);
+        image::image_dimensions(&path).is_ok_and(|(width, _)| width >= 1280)
+    });
+    let large: Vec<_> = large.map(|(shown, _)| shown).collect();
+    assert!(large.len() >= 12, "1280 pixels and wider: {large:?}");
 }
