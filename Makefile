@@ -6,7 +6,7 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render install view dist release portable-wheel test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens lens-waves bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-diffraction bench-aspheres bench-bands bench-time bench-gaps bench-decisions bench-window docs-figures docs-charts \
+.PHONY: help setup render install view dist release portable-wheel test test-embree4 test-window test-slurm test-denoise test-aarch64 check-platforms python bench bench-peers bench-python bench-workers bench-light bench-cycles bench-lens lens-waves bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-diffraction bench-aspheres bench-bands bench-time bench-gaps bench-decisions bench-window docs-figures docs-charts \
 	docs-stability docs-time docs-window generated gallery spectra light-fields fingerprints fuzz fuzz-smoke fuzz-seeds sanitize clean
 
 help:
@@ -17,6 +17,8 @@ help:
 	@echo "make test-window   drive real windows on screens in memory: X11 (Xvfb) and Wayland (sway)"
 	@echo "make test-slurm    run the jobs of scenes/cluster on a Slurm of one node, made for it"
 	@echo "make test-denoise  run the tests of render --denoise with Open Image Denoise from PyPI"
+	@echo "make test-aarch64  the pure-Rust renderer cross-built for ARM, and its tests under QEMU"
+	@echo "make check-platforms  the pure-Rust renderer checked for macOS and Windows, linked for Windows, run by Wine"
 	@echo "make python        build the Python package's wheel and test it in a fresh venv"
 	@echo "make install       install the command below PREFIX, /usr/local when it is not given"
 	@echo "make dist          a tarball, a .deb and a wheel in out/dist, tried in bare Debian 12 and 13 roots"
@@ -27,6 +29,7 @@ help:
 	@echo "make lens-waves    lenses in waves beside optiland, from PyPI"
 	@echo "make bench-lens    time rays through a lens against optiland, from PyPI"
 	@echo "make bench-python  rays from Python against Rust, Open3D and embreex; frames against their rays"
+	@echo "make bench-workers  frames from Python by one worker process, by two and by sixteen"
 	@echo "make bench-light   light against Mitsuba 3, from PyPI; writes docs/measurements/benchmarks-light.md"
 	@echo "make bench-cycles  light against Blender's Cycles, from PyPI; writes docs/measurements/benchmarks-cycles.md"
 	@echo "make bench-sensor  time one exposure against numpy, prysm and emva1288, from PyPI"
@@ -81,6 +84,15 @@ test:
 	@scripts/setup.sh test
 	@scripts/test.sh
 
+# ARGS="-E 'test(spheres)'" chooses tests, as cargo nextest does.
+test-aarch64: setup
+	cargo build -p etendue-cli
+	scripts/test-aarch64.sh $(ARGS)
+
+check-platforms: setup
+	cargo build -p etendue-cli
+	scripts/check-platforms.sh $(ARGS)
+
 # The wheel, in out/python/wheels, tested in a fresh venv. PROFILE=dev is quick to build and slow to run.
 python: setup
 	@scripts/python.sh
@@ -127,6 +139,10 @@ bench-peers: setup
 bench-python: setup
 	cargo build --release -p etendue-benches
 	scripts/bench-peers.sh python_peers.py $(ARGS)
+
+# Of the wheel that `make python` made last, on a machine with nothing else to do.
+bench-workers:
+	out/python/venv/bin/python benches/workers.py --output docs/measurements/benchmarks-python.md $(ARGS)
 
 bench-light: setup
 	cargo build --release -p etendue-cli -p etendue-benches

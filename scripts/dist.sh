@@ -53,7 +53,10 @@ build_wheel() {
 }
 
 build() {
-    cargo build --profile "$profile" --locked -p etendue-cli
+    # For a trial the dependencies as the whole workspace has built them.
+    local parts=(-p etendue-cli)
+    [ "$profile" != dev ] || parts+=(-p etendue-dependencies)
+    cargo build --profile "$profile" --locked "${parts[@]}"
     rm -rf "$dist"
     bundle_libraries
     write_notices

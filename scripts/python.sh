@@ -28,9 +28,11 @@ if [ "${AUDITWHEEL:-skip}" = repair ] && [ "${FEATURES:-embree}" = embree ]; the
 fi
 python3 scripts/notices.py "${notices[@]}"
 
+features=()
+[ "$profile" != dev ] || features=(--features checkout)
 rm -rf "$out/wheels"
 PATH="$venv/bin:$PATH" "$venv/bin/maturin" build --manifest-path crates/python/Cargo.toml --locked \
-    --profile "$profile" --auditwheel "${AUDITWHEEL:-skip}" --out "$out/wheels"
+    --profile "$profile" "${features[@]}" --auditwheel "${AUDITWHEEL:-skip}" --out "$out/wheels"
 "$venv/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps "$out"/wheels/*.whl
 
 # From elsewhere, so that the installed package is what is imported.

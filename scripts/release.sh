@@ -30,7 +30,7 @@ crates() {
     local arguments=(--workspace --locked --allow-dirty) private
     rm -f target/package/*.crate
     # Tools of this checkout, and the core of the wheel, are no crates for others.
-    for private in benches fuzz stability python; do arguments+=(--exclude "etendue-$private"); done
+    for private in benches dependencies fuzz stability python; do arguments+=(--exclude "etendue-$private"); done
     if [ -n "${NO_VERIFY:-}" ]; then
         cargo package "${arguments[@]}" --no-verify
     else

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs the tests that touch Embree against Embree 4, in a Debian 13 root below target/.
 #
-# The root is made once (a minute) and kept, and so is what cargo builds in it. All mounts live in a
+# The root is made once (a minute) and kept, and so is what cargo builds for it. All mounts live in a
 # mount namespace of their own: they end with the process, however it ends, and nobody else sees them.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -36,8 +36,8 @@ make_root() {
     # shellcheck disable=SC2016
     in_namespace 'mount --bind "$1" /mnt; debootstrap --variant=minbase --include="$2" trixie /mnt' \
         "$PWD/$root.part" "$packages" &&
-        as_root mkdir -p "$root.part"/{assets,cargo,checkout,target,toolchain} &&
-        as_root chown "$(id -u):$(id -g)" "$root.part/target" &&
+        as_root mkdir -p "$root.part"/assets "$root.part"/target/debug &&
+        as_root chown -R "$(id -u):$(id -g)" "$root.part/target" &&
         mv "$root.part" "$root"
 }
 
@@ -54,21 +54,29 @@ why=$(in_namespace true 2>&1) || skip "this system lets not even root mount ($wh
 elsewhere=$(printf -- '--skip %s:: ' files gallery inputs lamps lens lens_pictures lens_reference light_fields memory models \
     openings_and_glasses shards stopping waves)
 
-# Everything from here on is offline. The toolchain is entered directly: rustup stays outside.
+# Everything from here on is offline. The toolchain is entered directly: rustup stays outside. Checkout, cargo and toolchain
+# have the paths that they have outside, and what cargo has built there lies below an overlay: what does not ask which
+# Embree there is, is taken as it is, and what is built anew stays in target/trixie-debug.
 cargo fetch --locked --target "$(rustc --version --verbose | sed -n 's/^host: //p')"
+mkdir -p target/debug target/trixie-debug/upper target/trixie-debug/work
 # shellcheck disable=SC2016
 in_namespace '
-    root=$1 cargo=$2 toolchain=$3 assets=$4 user=$5
+    root=$1 cargo=$2 toolchain=$3 assets=$4 user=$5 checkout=$PWD
     mount --bind "$root" /mnt
     for system in proc sys dev; do mount --rbind "/$system" "/mnt/$system"; done
-    mount --bind -o ro . /mnt/checkout
-    mount --bind -o ro "$cargo" /mnt/cargo
-    mount --bind -o ro "$toolchain" /mnt/toolchain
+    mkdir -p "/mnt$checkout" "/mnt$cargo" "/mnt$toolchain" /mnt/target/debug
+    mount --bind -o ro . "/mnt$checkout"
+    mount --bind -o ro "$cargo" "/mnt$cargo"
+    mount --bind -o ro "$toolchain" "/mnt$toolchain"
     [ -z "$assets" ] || mount --bind -o ro "$assets" /mnt/assets
-    exec chroot --userspec="$user" /mnt env -i HOME=/tmp LANG=C.UTF-8 PATH=/toolchain/bin:/usr/bin:/bin \
-        CARGO_HOME=/cargo CARGO_TARGET_DIR=/target ${assets:+ETENDUE_ASSETS=/assets} \
+    mount --bind /mnt/target "/mnt$checkout/target"
+    mount -t overlay overlay "/mnt$checkout/target/debug" \
+        -o lowerdir=target/debug,upperdir=target/trixie-debug/upper,workdir=target/trixie-debug/work ||
+        echo "This system has no overlays to build on: all is built once more."
+    exec chroot --userspec="$user" /mnt env -i HOME=/tmp LANG=C.UTF-8 PATH="$toolchain/bin:/usr/bin:/bin" \
+        CARGO_HOME="$cargo" ${assets:+ETENDUE_ASSETS=/assets} \
         CARGO_INCREMENTAL="${CARGO_INCREMENTAL:-1}" CARGO_PROFILE_DEV_DEBUG="${CARGO_PROFILE_DEV_DEBUG:-line-tables-only}" \
-        sh -c "cd /checkout; exec cargo test --offline --locked -p etendue-embree-sys -p etendue-accel -p etendue-stability -p etendue \
-            -p etendue-cli -- $6"
-' "$PWD/$root" "${CARGO_HOME:-$HOME/.cargo}" "$(rustc --print sysroot)" "${ETENDUE_ASSETS:-}" \
+        sh -c "cd \"\$1\"; exec cargo test --offline --locked -p etendue-dependencies -p etendue-embree-sys -p etendue-accel \
+            -p etendue-stability -p etendue -p etendue-cli -- $6" sh "$checkout"
+' "$PWD/$root" "$(realpath "${CARGO_HOME:-$HOME/.cargo}")" "$(rustc --print sysroot)" "${ETENDUE_ASSETS:-}" \
     "$(id -u):$(id -g)" "$elsewhere"

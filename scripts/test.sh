@@ -23,13 +23,15 @@ step "lints"
 cargo clippy --workspace --features etendue-cli/window --all-targets -- -D warnings
 
 # An empty EMBREE_DIR would stop the bindings' build, so this also shows that nothing asks for them.
+# With etendue-dependencies, which has no code, parts of the workspace take what the whole of it has built.
 step "lints without Embree"
-EMBREE_DIR=/nonexistent cargo clippy -p etendue-accel -p etendue -p etendue-cli --no-default-features \
-    --all-targets -- -D warnings
+without_embree=(-p etendue-dependencies -p etendue-accel -p etendue -p etendue-cli --no-default-features)
+EMBREE_DIR=/nonexistent cargo clippy "${without_embree[@]}" --all-targets -- -D warnings
+python3 scripts/shared_builds.py
 
 step "documentation"
-RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
-# With the features of the tests below, so that dependencies are built once.
+# With the features of the lints and the tests, so that dependencies are built once.
+RUSTDOCFLAGS="-D warnings" cargo doc --workspace --features etendue-cli/window --no-deps
 cargo test --workspace --features etendue-cli/window --doc
 
 if cargo deny --version >/dev/null 2>&1; then
@@ -49,7 +51,6 @@ NO_VERIFY=1 scripts/release.sh crates
 # What does not trace, or traces by `bvh` in the tests of the workspace, too, is not run twice.
 step "tests without Embree"
 elsewhere='/^(files|gallery|inputs|lamps|lens|lens_pictures|lens_reference|light_fields|many_renders|memory|models|openings_and_glasses|shards|stopping|waves)(::|_)/'
-without_embree=(-p etendue-accel -p etendue -p etendue-cli --no-default-features)
 if cargo nextest --version >/dev/null 2>&1; then
     without_embree+=(-E "not test($elsewhere)")
 fi

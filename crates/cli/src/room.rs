@@ -3,9 +3,6 @@
 //! What a scene takes is forecast and refused by name. Stacks of threads, and the lists of a few bytes
 //! that are everywhere, are not: without room for them a library ends the process.
 
-use std::os::unix::process::CommandExt;
-use std::process::Command;
-
 use etendue_report::Size;
 use etendue_scene::memory::addresses;
 
@@ -44,12 +41,19 @@ pub(crate) fn secure(threads: usize) -> Result<(), Fault> {
 }
 
 /// The same command once more, in this process. Returns where that cannot be had, and then goes on.
+#[cfg(unix)]
 fn restart() {
+    use std::os::unix::process::CommandExt;
+    use std::process::Command;
     let Ok(program) = std::env::current_exe() else { return };
     let mut arguments = std::env::args_os();
     let name = arguments.next().unwrap_or_else(|| program.clone().into_os_string());
     let _ = Command::new(program).arg0(name).args(arguments).env(ARENAS.0, ARENAS.1).exec();
 }
+
+/// Other systems have neither such limits nor such arenas.
+#[cfg(not(unix))]
+fn restart() {}
 
 /// As many as the thread pool takes.
 fn all_threads() -> usize {

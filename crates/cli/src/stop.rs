@@ -3,12 +3,17 @@
 //! to save.
 
 use std::path::{Path, PathBuf};
+#[cfg(not(unix))]
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use etendue_files::remove_open_parts;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+#[cfg(unix)]
+use signal_hook::consts::SIGHUP;
+use signal_hook::consts::{SIGINT, SIGTERM};
+#[cfg(unix)]
 use signal_hook::iterator::Signals;
 use signal_hook::low_level::exit;
 
@@ -32,6 +37,7 @@ pub(crate) const STOPPED: &str = "stopped; no unfinished file was left";
 
 /// Takes over Ctrl-C and the termination signals for the rest of the process, whose end is said by `say`. A
 /// signal that it was started to ignore, as by `nohup`, stays ignored.
+#[cfg(unix)]
 pub(crate) fn listen(say: fn(&str)) {
     let ignored = ignored();
     let wanted = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|n| ignored >> (n - 1) & 1 == 0);
@@ -39,20 +45,45 @@ pub(crate) fn listen(say: fn(&str)) {
     let Ok(mut signals) = Signals::new(wanted) else { return };
     let _ = std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
         for _ in signals.forever() {
-            if REQUESTS.fetch_add(1, Ordering::Relaxed) > 0 {
-                end(say);
+            came(say);
+        }
+    });
+}
+
+/// Takes over Ctrl-C and the request to end for the rest of the process, whose end is said by `say`. Where
+/// signals cannot be waited for they are looked for, as often as work is patient.
+#[cfg(not(unix))]
+pub(crate) fn listen(say: fn(&str)) {
+    let asked = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        // Without a handler the signal ends the process as ever; open parts then stay behind.
+        let _ = signal_hook::flag::register(signal, Arc::clone(&asked));
+    }
+    let _ = std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
+        loop {
+            std::thread::sleep(PATIENCE);
+            if asked.swap(false, Ordering::Relaxed) {
+                came(say);
             }
-            let _ = std::thread::Builder::new().spawn(move || {
-                std::thread::sleep(PATIENCE);
-                if !HEEDED.load(Ordering::Relaxed) && !SAVES.load(Ordering::Relaxed) {
-                    end(say);
-                }
-            });
+        }
+    });
+}
+
+/// A signal came: the first asks the work to stop, the second ends the process.
+fn came(say: fn(&str)) {
+    if REQUESTS.fetch_add(1, Ordering::Relaxed) > 0 {
+        end(say);
+    }
+    let _ = std::thread::Builder::new().spawn(move || {
+        std::thread::sleep(PATIENCE);
+        if !HEEDED.load(Ordering::Relaxed) && !SAVES.load(Ordering::Relaxed) {
+            end(say);
         }
     });
 }
 
 /// The signals that the process was started to ignore, one a bit, where the system tells.
+#[cfg(unix)]
 fn ignored() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

@@ -7,7 +7,6 @@
 use std::collections::BTreeSet;
 use std::fs::{self, File, Metadata};
 use std::io::{self, Read};
-use std::os::unix::fs::MetadataExt;
 use std::path::{Component, Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::SystemTime;
@@ -251,7 +250,11 @@ pub struct Stamp {
     length: u64,
     modified: Option<SystemTime>,
     /// Device and number there.
+    #[cfg(unix)]
     node: [u64; 2],
+    /// When it was made, where the system numbers no files.
+    #[cfg(not(unix))]
+    created: Option<SystemTime>,
 }
 
 impl Stamp {
@@ -264,10 +267,15 @@ impl Stamp {
 
 impl From<&Metadata> for Stamp {
     fn from(metadata: &Metadata) -> Self {
+        #[cfg(unix)]
+        use std::os::unix::fs::MetadataExt;
         Self {
             length: metadata.len(),
             modified: metadata.modified().ok(),
+            #[cfg(unix)]
             node: [metadata.dev(), metadata.ino()],
+            #[cfg(not(unix))]
+            created: metadata.created().ok(),
         }
     }
 }

@@ -401,3 +401,19 @@ def test_the_lines_of_the_documentation_run(tmp_path, monkeypatch):
         names = {"out": str(tmp_path)}
         for block in blocks:
             exec(compile(block, page, "exec"), names)  # one after the other, as a reader does
+
+
+def test_the_data_set_of_the_documentation_goes_through_pytorch(monkeypatch):
+    """By hand, where PyTorch installs: it is as large as all else that is tested with."""
+    data = pytest.importorskip("torch.utils.data")
+    monkeypatch.chdir(CHECKOUT)
+    blocks = re.findall(r"```python\n(.*?)```", (CHECKOUT / "docs/guide/python.md").read_text(), re.S)
+    names = {}
+    exec(next(block for block in blocks if "class Depths" in block), names)
+    found = names["data"]
+    assert isinstance(found, data.Dataset)
+    batches = list(data.DataLoader(found, batch_size=4, num_workers=16))
+    assert [tuple(picture.shape) for picture, _ in batches] == [(4, 3, 48, 64)] * 3
+    for index, (picture, depth) in enumerate(pair for batch in batches for pair in zip(*batch)):
+        alone = found[index]
+        assert np.array_equal(picture.numpy(), alone[0]) and np.array_equal(depth.numpy(), alone[1])
