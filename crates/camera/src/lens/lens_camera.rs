@@ -274,7 +274,9 @@ impl LensCamera {
         let known = match &self.design_pupil {
             Some(known) if known.half_size == half_size => Arc::clone(known),
             _ => {
-                let pupil = self.measured(&without_filters(train), &[train.wavelength()])?;
+                let (clear, z) = (without_filters(train), self.focused.sensor_z());
+                let pupil = ExitPupil::roughly(&clear, train.wavelength(), z, half_size)
+                    .map_err(|error| CameraError::new("", error.to_string()))?;
                 Arc::new(DesignPupil { half_size, pupil })
             }
         };

@@ -6,7 +6,7 @@
 //!
 //! Grey pictures of a stated physical size: coded apertures and filter maps.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::DVec2;
 use schemars::JsonSchema;
@@ -247,6 +247,8 @@ const LONGEST: u64 = 1 << 30;
 /// from the sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
+    /// The file that it was read from.
+    pub file: PathBuf,
     /// Width and height (mm).
     pub size: [f64; 2],
     /// Columns and rows.
@@ -279,13 +281,13 @@ impl Picture {
         if !good(width) || !good(height) {
             return Err(format!("{file}: width and height must be positive lengths"));
         }
-        Ok(Self { size: [width, height], pixels, values, levels })
+        Ok(Self { file: path, size: [width, height], pixels, values, levels })
     }
 
     /// A white picture of the same size.
     #[must_use]
     pub fn blank(&self) -> Self {
-        Self { size: self.size, pixels: [1, 1], values: vec![1.0], levels: 1.0 }
+        Self { pixels: [1, 1], values: vec![1.0], levels: 1.0, ..self.clone() }
     }
 
     /// The index of the pixel that covers the point `x`, `y` (mm); `None` outside of the picture.

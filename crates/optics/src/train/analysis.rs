@@ -136,6 +136,12 @@ fn grid(elements: usize) -> u32 {
     rays.isqrt().clamp(LEAST_GRID, PUPIL_GRID)
 }
 
+/// Rings around the axis of a round lens.
+const RINGS: u32 = 1024;
+
+/// Steps in which the edge between two of them is sought.
+const EDGE_BISECTIONS: u32 = 40;
+
 /// Fractions of the golden ratio and of the root of 2, whose multiples are even over 0 to 1, and those
 /// of their sum and difference, too, so that diagonals fare as well.
 const SHIFTS: [f64; 2] = [0.618_033_988_749_895, 0.414_213_562_373_095];
@@ -180,6 +186,10 @@ pub fn illumination(
 #[must_use]
 pub fn projected_solid_angle(train: &OpticalTrain, at: &MonochromaticTrain, film: DVec3) -> f64 {
     let Some(window) = Window::find(train, at, film) else { return 0.0 };
+    if film.truncate() == DVec2::ZERO && train.is_rotationally_symmetric() {
+        let corner = window.min.abs().max(window.max.abs());
+        return solid_angle_of_rings(at, film, corner.max_element());
+    }
     let grid = grid(train.elements().len());
     let size = (window.max - window.min) / f64::from(grid);
     let mut rays = LensRays::with_capacity(grid as usize);
@@ -200,6 +210,40 @@ pub fn projected_solid_angle(train: &OpticalTrain, at: &MonochromaticTrain, film
         sum += rays.passed_throughput();
     }
     sum * size.x * size.y
+}
+
+/// The same from a place on the axis of a round lens, for slopes up to `steepest`: of rings, each with what a ray in its
+/// middle passes, whose borders are where rays begin or cease to pass.
+fn solid_angle_of_rings(at: &MonochromaticTrain, film: DVec3, steepest: f64) -> f64 {
+    let traced = |slopes: &[f64]| {
+        let mut rays = LensRays::with_capacity(slopes.len());
+        slopes.iter().for_each(|&slope| rays.push(film, towards_lens(DVec2::new(slope, 0.0))));
+        at.trace(Side::Sensor, Clip::On, &mut rays);
+        let passed = |i| (rays.status(i) == RayStatus::Exited).then(|| rays.throughput(i));
+        (0..slopes.len()).map(passed).collect::<Vec<Option<f64>>>()
+    };
+    let width = steepest / f64::from(RINGS);
+    let middles: Vec<f64> = (0..RINGS).map(|k| (f64::from(k) + 0.5) * width).collect();
+    let passed = traced(&middles);
+    // ∫ cos θ dΩ within a slope is π sin² θ.
+    let within = |slope: f64| std::f64::consts::PI * slope * slope / (1.0 + slope * slope);
+    let mut inner = 0.0;
+    let mut sum = 0.0;
+    for (k, own) in passed.iter().enumerate() {
+        let next = passed.get(k + 1).unwrap_or(own);
+        let mut outer = (k + 1) as f64 * width;
+        if own.is_some() != next.is_some() {
+            let mut between = [middles[k], middles[k + 1]];
+            for _ in 0..EDGE_BISECTIONS {
+                outer = 0.5 * (between[0] + between[1]);
+                let is_alike = traced(&[outer])[0].is_some() == own.is_some();
+                between[usize::from(!is_alike)] = outer;
+            }
+        }
+        sum += own.unwrap_or(0.0) * (within(outer) - within(inner));
+        inner = outer;
+    }
+    sum
 }
 
 /// The greatest distance from the axis on a sensor at `sensor_z` (mm) from which light can leave

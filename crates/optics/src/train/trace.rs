@@ -218,6 +218,12 @@ impl MonochromaticTrain {
         self.is_costly
     }
 
+    /// The same, searched as coarsely as one that is costly.
+    pub(crate) fn searched_coarsely(mut self) -> Self {
+        self.is_costly = true;
+        self
+    }
+
     /// The index of the medium between the last element and the sensor.
     #[must_use]
     pub fn index_before_sensor(&self) -> f64 {

@@ -10,11 +10,11 @@ mod groups;
 pub mod lens_models;
 mod light;
 mod pixel_views;
+mod small_things;
 mod verify;
 
 use etendue_accel::Accel;
-use etendue_camera::{Camera, CameraSpec, FalloffSpec, LensCamera};
-use etendue_optics::element::Opening;
+use etendue_camera::{Camera, CameraSpec, FalloffSpec};
 use etendue_scene::Scene;
 use etendue_scene::file::ToleranceSpec;
 use etendue_spectrum::Bands;
@@ -352,13 +352,6 @@ fn some_of(count: usize, most: usize) -> Vec<usize> {
     (0..most).map(|k| k * (count - 1) / (most - 1).max(1)).collect()
 }
 
-/// Whether the pattern of a mask in the lens shows in what is out of focus.
-#[must_use]
-pub fn has_mask(lens: &LensCamera) -> bool {
-    let elements = lens.focused().train().elements();
-    elements.iter().any(|element| matches!(element.part.opening(), Some(Opening::Image(_))))
-}
-
 /// What is taken of a scene's tolerance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Taken {
@@ -470,12 +463,8 @@ fn simplest(
             return Ok(None);
         }
     };
-    let is_masked = has_mask(lens);
-    for LensModel { name, camera, .. } in models {
-        // The root mean square of a blur says nothing of the pattern in it.
-        if is_masked && ["thin", "thick"].contains(&name) {
-            continue;
-        }
+    // The root mean square of a blur says nothing of the pattern in it.
+    for LensModel { name, camera, .. } in models.into_iter().filter(|model| !model.lacks_mask) {
         if view.chief_displacement(&camera) > tolerance.pixels {
             continue;
         }

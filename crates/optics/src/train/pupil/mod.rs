@@ -194,6 +194,31 @@ impl ExitPupil {
         sensor_z: f64,
         half_size: [f64; 2],
     ) -> Result<Self, ExitPupilError> {
+        Self::searched(train, wavelengths, (sensor_z, half_size), |lens| lens)
+    }
+
+    /// The same by coarser searches at one wavelength (nm), whose outlines are wider by a third of a percent at most: for
+    /// looking at a few rays, where measuring would take longer than these.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::new`].
+    pub fn roughly(
+        train: &OpticalTrain,
+        wavelength: f64,
+        sensor_z: f64,
+        half_size: [f64; 2],
+    ) -> Result<Self, ExitPupilError> {
+        let search = MonochromaticTrain::searched_coarsely;
+        Self::searched(train, &[wavelength], (sensor_z, half_size), search)
+    }
+
+    fn searched(
+        train: &OpticalTrain,
+        wavelengths: &[f64],
+        (sensor_z, half_size): (f64, [f64; 2]),
+        search: impl Fn(MonochromaticTrain) -> MonochromaticTrain,
+    ) -> Result<Self, ExitPupilError> {
         let half_size = DVec2::from(half_size);
         if !half_size.is_finite() || half_size.min_element() < 0.0 || !sensor_z.is_finite() {
             return Err(ExitPupilError::Sensor);
@@ -233,7 +258,8 @@ impl ExitPupil {
         }
         let masked = train;
         let train = &without_masks(masked);
-        let lenses = wavelengths.iter().map(|&nm| train.at(nm)).collect::<Result<Vec<_>, _>>()?;
+        let lenses = wavelengths.iter().map(|&nm| train.at(nm).map(&search));
+        let lenses = lenses.collect::<Result<Vec<_>, _>>()?;
         let Some(first) = lenses.first() else { return Err(ExitPupilError::Sensor) };
         pupil.index2 = first.index_before_sensor().powi(2);
         // A round opening as the only rim is known in closed form.
