@@ -5,7 +5,7 @@ use std::sync::Arc;
 use etendue_geometry::RayBatch;
 use etendue_spectrum::Bands;
 
-use crate::lens::{self, focused::View};
+use crate::lens::{self, SharingLimits, focused::View};
 use crate::{
     BandGroup, BandLandings, CameraError, CameraRays, CameraTime, Distortion, DistortionSpec,
     FilmSamples, Intrinsics, LensCamera, LightField, Orthographic, Pinhole, PixelBlock, Pose,
@@ -217,6 +217,12 @@ impl Camera {
     pub fn with_bands_grouped(&self, count: usize) -> Option<Self> {
         let lens = self.lens()?.with_bands_grouped(count)?;
         Some(Self { projection: Projection::Lens(Arc::new(lens)), ..self.clone() })
+    }
+
+    /// The same with bands that share rays of its lens within `limits`.
+    #[must_use]
+    pub fn sharing_within(&self, limits: SharingLimits) -> Self {
+        self.with_lens(|lens| lens.sharing_within(limits))
     }
 
     /// The same camera, in its place and with its pixels, shutter and motion, whose rays run as those of `other`.

@@ -42,7 +42,7 @@ pub use framing::{Subject, SupportFunction, Viewpoint};
 pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin, SensorSpec};
 pub use lens::{
     BandGroup, BandLandings, ChromaticRealLensCameraSpec, LensCamera, LensCameraSpec,
-    RealLensCameraSpec, SharedPaths, ThinLensCameraSpec, WaveLens,
+    RealLensCameraSpec, SharedPaths, SharingLimits, ThinLensCameraSpec, WaveLens,
 };
 pub use light_field::{LightField, LightFieldSpec, ViewGrid};
 pub use motion::{CameraMotionSpec, Kinematics, MotionAxes, Trajectory};

@@ -84,7 +84,9 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
         pictures(arguments, (scene, accel), phases, &mut findings)?;
     }
     if let Some(target) = arguments.target {
-        let found = target::race(arguments, target, (session.scene(&progress)?, phases))?;
+        let mut axes = target::axes(session.scene(&progress)?);
+        axes.extend(target::sweeps(&arguments.sweep, session.file())?);
+        let found = target::race(arguments, target, (session.scene(&progress)?, phases), &axes)?;
         findings.notes.extend(found.notes.iter().cloned());
         findings.target = Some(found);
     }

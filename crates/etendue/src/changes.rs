@@ -1,30 +1,32 @@
 //! What is to be set to make one scene out of another.
 
+use etendue_scene::ScenePath;
 use serde_json::{Map, Value};
 
 /// Paths and values that turn `before` into `after`, both JSON objects: as few and as deep as possible,
 /// so that an error about one of them names what was changed. Where keys have gone, the object that had
 /// them is set whole.
-pub(crate) fn between(before: &Value, after: &Value) -> Vec<(String, Value)> {
+pub(crate) fn between(before: &Value, after: &Value) -> Vec<(ScenePath, Value)> {
     let mut changes = Vec::new();
     // A null at the top is an absent key to the format; the top itself has no path.
     if let (Value::Object(old), Value::Object(new)) = (before, after) {
+        let top = ScenePath::default();
         for key in old.keys().filter(|key| !new.contains_key(*key)) {
-            changes.push((step("", key), Value::Null));
+            changes.push((top.key(key), Value::Null));
         }
-        members("", old, new, &mut changes);
+        members(&top, old, new, &mut changes);
     }
     changes
 }
 
 fn members(
-    path: &str,
+    path: &ScenePath,
     before: &Map<String, Value>,
     after: &Map<String, Value>,
-    changes: &mut Vec<(String, Value)>,
+    changes: &mut Vec<(ScenePath, Value)>,
 ) {
     for (key, new) in after {
-        let path = step(path, key);
+        let path = path.key(key);
         match before.get(key) {
             Some(old) => values(&path, old, new, changes),
             None => changes.push((path, new.clone())),
@@ -32,7 +34,7 @@ fn members(
     }
 }
 
-fn values(path: &str, before: &Value, after: &Value, changes: &mut Vec<(String, Value)>) {
+fn values(path: &ScenePath, before: &Value, after: &Value, changes: &mut Vec<(ScenePath, Value)>) {
     match (before, after) {
         _ if before == after => {}
         (Value::Object(old), Value::Object(new)) if old.keys().all(|key| new.contains_key(key)) => {
@@ -40,19 +42,10 @@ fn values(path: &str, before: &Value, after: &Value, changes: &mut Vec<(String, 
         }
         (Value::Array(old), Value::Array(new)) if old.len() == new.len() => {
             for (i, (old, new)) in old.iter().zip(new).enumerate() {
-                values(&format!("{path}[{i}]"), old, new, changes);
+                values(&path.index(i), old, new, changes);
             }
         }
-        _ => changes.push((path.to_owned(), after.clone())),
-    }
-}
-
-fn step(path: &str, key: &str) -> String {
-    let plain = !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '-');
-    match (path.is_empty(), plain) {
-        (true, true) => key.to_owned(),
-        (false, true) => format!("{path}.{key}"),
-        (_, false) => format!("{path}[{key:?}]"),
+        _ => changes.push((path.clone(), after.clone())),
     }
 }
 
@@ -75,7 +68,7 @@ mod tests {
             ("lights", json!([])),
             ("objects[0][\"my name\"]", json!(1)),
         ];
-        let expected = expected.map(|(path, value)| (path.to_owned(), value));
+        let expected = expected.map(|(path, value)| (ScenePath::of(path), value));
         assert_eq!(between(&before, &after), expected);
     }
 
@@ -84,7 +77,7 @@ mod tests {
         let before = json!({"camera": {"type": "thin_lens", "f_number": 2}, "layers": [1, 2]});
         let after = json!({"camera": {"type": "pinhole"}, "layers": [1]});
         let expected = [("camera", json!({"type": "pinhole"})), ("layers", json!([1]))];
-        let expected = expected.map(|(path, value)| (path.to_owned(), value));
+        let expected = expected.map(|(path, value)| (ScenePath::of(path), value));
         assert_eq!(between(&before, &after), expected);
     }
 }

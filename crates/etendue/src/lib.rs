@@ -66,7 +66,7 @@ pub use etendue_render::tolerance::Verified;
 pub use etendue_render::{Checkpoint, Plan, Report, Shard, ShardBy, SoFar};
 pub use etendue_report::{Decision, DecisionKind, DecisionValue, Saving, Tabled};
 pub use etendue_scene::file::scene_schema;
-pub use etendue_scene::{Frame, RigCamera, Scene, Strictness};
+pub use etendue_scene::{Frame, RigCamera, Scene, ScenePath, Strictness};
 pub use exposed_image::{ExposedImage, write_frames};
 pub use forecast::{Calibration, Prospect, TimeForecast};
 pub use frame_files::FramePattern;

@@ -20,7 +20,7 @@ use etendue_render::expose::SPECTRUM;
 use etendue_render::output::{LayerFile, Outputs};
 use etendue_render::{Checkpoint, Images, Plan, Seconds, denoise};
 use etendue_scene::file::{FramesSpec, SceneFile, texts_of};
-use etendue_scene::{Cache, Frame, Frames, Scene, SceneError, Start};
+use etendue_scene::{Cache, Frame, Frames, Scene, SceneError, ScenePath, Start};
 use etendue_tracer::LayerSpec;
 use serde_json::Value;
 
@@ -159,7 +159,11 @@ impl Session {
         let changes = changes::between(before, after);
         match changes.is_empty() {
             true => Ok(()),
-            false => self.set_all(changes.iter().map(|(path, value)| (&**path, value.clone()))),
+            false => {
+                let texts = changes.iter().map(|(path, value)| (path.to_string(), value.clone()));
+                let texts: Vec<(String, Value)> = texts.collect();
+                self.set_all(texts.iter().map(|(path, value)| (&**path, value.clone())))
+            }
         }
     }
 
@@ -210,8 +214,8 @@ impl Session {
         };
         if let Some(camera) = &self.options.camera {
             let sets_camera = |(path, _): &&(String, Value)| {
-                path == "camera"
-                    || path.starts_with("camera.") && !path.starts_with("camera.sensor")
+                let path = ScenePath::of(path);
+                path.root() == Some("camera") && path.inside(&"camera.sensor".into()).is_none()
             };
             if let Some((path, _)) =
                 frames.iter().flat_map(|frame| &frame.settings).find(sets_camera)
@@ -251,8 +255,7 @@ impl Session {
     /// When one is not.
     pub fn check_outputs(&self, frames: &[Frame]) -> Result<(), Error> {
         let mut layers = self.file.spec.all_layers();
-        let sets_layers =
-            |frame: &&Frame| frame.settings.iter().any(|(path, _)| path.starts_with("layers"));
+        let sets_layers = |frame: &&Frame| frame.sets(&["layers"]);
         for frame in frames.iter().filter(sets_layers) {
             layers.extend(self.file.at(frame)?.spec.all_layers());
         }
@@ -376,8 +379,7 @@ impl Session {
         let common = file_names(&loaded.scene, &loaded.plan, outputs);
         for frame in frames {
             let mut names = common.clone();
-            let mut paths = frame.settings.iter().map(|(path, _)| path);
-            if paths.any(|path| path.starts_with("layers") || path.starts_with("tracer")) {
+            if frame.sets(&["layers", "tracer"]) {
                 let shown = self.file.at(frame).map_err(Error::from)?;
                 let layers = rendering::layer_names(&shown.spec);
                 names.extend(layers.flat_map(|layer| rendering::layer_files(&layer, outputs)));

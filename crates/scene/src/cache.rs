@@ -20,7 +20,7 @@ use crate::{CameraOrigin, SceneError};
 #[derive(Debug, Default)]
 pub struct Cache {
     given: BTreeMap<String, Given>,
-    kept: Mutex<Vec<Kept>>,
+    kept: Mutex<Vec<KeptModel>>,
     camera: Mutex<Option<KeptCamera>>,
     digests: Arc<Digests>,
 }
@@ -34,7 +34,7 @@ struct Given {
 
 /// Where a model comes from.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Origin {
+pub(crate) enum ModelOrigin {
     /// A file, by its path.
     File(PathBuf),
     /// A shape, by its JSON.
@@ -52,8 +52,8 @@ pub(crate) struct ImportManner {
 }
 
 #[derive(Debug)]
-struct Kept {
-    origin: Origin,
+struct KeptModel {
+    origin: ModelOrigin,
     manner: ImportManner,
     import: Arc<Import>,
     /// Its files as they were.
@@ -124,7 +124,7 @@ impl Cache {
     }
 
     /// The model, where it was read in this manner and its files have not changed since.
-    pub(crate) fn model(&self, origin: &Origin, manner: &ImportManner) -> Option<Arc<Import>> {
+    pub(crate) fn model(&self, origin: &ModelOrigin, manner: &ImportManner) -> Option<Arc<Import>> {
         let mut kept = locked(&self.kept);
         let known = kept.iter_mut().find(|k| k.origin == *origin && k.manner == *manner)?;
         if !are_current(&known.files) {
@@ -136,7 +136,7 @@ impl Cache {
 
     /// Keeps a model. Corners and triangles that are the same as before, when less or more was read of
     /// the file, are in memory once.
-    pub(crate) fn keep(&self, origin: Origin, manner: ImportManner, import: &mut Import) {
+    pub(crate) fn keep(&self, origin: ModelOrigin, manner: ImportManner, import: &mut Import) {
         let mut kept = locked(&self.kept);
         kept.retain(|k| !(k.origin == origin && k.manner == manner));
         for other in kept.iter().filter(|k| k.origin == origin) {
@@ -145,16 +145,22 @@ impl Cache {
             }
         }
         let files = stamps(import.stats.files.iter().map(|(path, _)| path));
-        kept.push(Kept { origin, manner, import: Arc::new(import.clone()), files, is_used: true });
+        kept.push(KeptModel {
+            origin,
+            manner,
+            import: Arc::new(import.clone()),
+            files,
+            is_used: true,
+        });
     }
 
     /// Drops the models whose origin the last load did not use.
     pub(crate) fn sweep(&self) {
         let mut kept = locked(&self.kept);
-        let used: Vec<Origin> =
+        let used: Vec<ModelOrigin> =
             kept.iter().filter(|k| k.is_used).map(|k| k.origin.clone()).collect();
         // Moments of an animation are as many as there are frames.
-        let stays = |k: &Kept| k.manner.play.is_none() && used.contains(&k.origin);
+        let stays = |k: &KeptModel| k.manner.play.is_none() && used.contains(&k.origin);
         kept.retain(|k| k.is_used || stays(k));
         kept.iter_mut().for_each(|k| k.is_used = false);
     }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use etendue_files::FindError;
 use etendue_report::Refusal;
 
-use crate::file::Origin;
+use crate::file::{Origin, ScenePath};
 use crate::words::nearest;
 
 /// Why a scene cannot be read or loaded. The message names the file and the place in it, and ends in a remedy.
@@ -32,8 +32,8 @@ pub enum SceneError {
     Invalid {
         /// The file.
         file: PathBuf,
-        /// The JSON path of the value.
-        path: String,
+        /// The place of the value in the file.
+        path: ScenePath,
         /// Where it was written.
         place: Origin,
         /// What is wrong and what would do.
@@ -116,7 +116,7 @@ pub(crate) fn did_you_mean(near: Option<&str>) -> String {
     near.map_or_else(String::new, |near| format!("\nhint: did you mean \"{near}\"?"))
 }
 
-fn invalid(file: &Path, path: &str, place: &Origin, why: &Refusal) -> Refusal {
+fn invalid(file: &Path, path: &ScenePath, place: &Origin, why: &Refusal) -> Refusal {
     let why = why.clone().at(path);
     match place {
         Origin::Text(place) => {

@@ -49,7 +49,7 @@ pub use doctor::{Diagnosis, MemoryForecast};
 pub use envi::{EnviFault, read_envi};
 pub use error::SceneError;
 pub use etendue_report::Refusal;
-pub use file::{FileKind, SceneFile, SceneSpec, scene_schema};
+pub use file::{FileKind, PathStep, SceneFile, ScenePath, SceneSpec, scene_schema};
 pub use frames::{Frame, Frames, RigCamera, Start};
 pub use identity::{Copies, IdName, SceneHash, SceneNode};
 pub use import::{Import, Note, NoteKind, Strictness, Wanted};

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 
 use crate::cache::{ImportManner, KeptCamera};
 use crate::doctor::memory;
-use crate::file::{FileKind, ObjectSpec, SceneFile, join, join_index};
+use crate::file::{FileKind, ObjectSpec, SceneFile, ScenePath};
 use crate::identity::Ingredients;
 use crate::import::{self, Import, ImportedPlacement, Note, NoteKind, Wanted};
 use crate::memory::Budget;
@@ -172,7 +172,7 @@ impl SceneFile {
         let imports: Vec<Result<Import, SceneError>> = origins
             .par_iter()
             .map(|origin| {
-                let at = join_index("objects", origin.user);
+                let at = ScenePath::of("objects").index(origin.user);
                 let known = origin.kind.kept();
                 let manner = ImportManner { play: origin.kind.play(), ..manner.clone() };
                 if let Some(import) = known.as_ref().and_then(|known| kept.model(known, &manner)) {
@@ -205,7 +205,7 @@ impl SceneFile {
                             format!("{at}: a {} of {triangles} triangles", shape.name())
                         })?;
                         of_shape(shape, wanted, &|| goes_on(origin, done.load(Ordering::Relaxed)))
-                            .map_err(|fault| self.fault(&join(&at, fault.key), fault.reason))?
+                            .map_err(|fault| self.fault(at.join(fault.key), fault.reason))?
                             .ok_or(SceneError::Stopped)?
                     }
                 };
@@ -236,7 +236,7 @@ impl SceneFile {
         Ok(import.clone())
     }
 
-    fn import_fault(&self, at: String, why: Refusal) -> SceneError {
+    fn import_fault(&self, at: ScenePath, why: Refusal) -> SceneError {
         SceneError::Refused(match self.kind() {
             FileKind::Model => why,
             FileKind::Scene => why.and(&format!(" (from {}: {at})", self.path().display())),
@@ -309,7 +309,7 @@ impl SceneFile {
             lights: parts.lights,
             studio_if_dark: parts.studio_if_dark,
             tracer: self.spec.tracer,
-            camera,
+            camera: camera.sharing_within(self.spec.accuracy.sharing()),
             sensor,
             camera_origin,
             cameras: parts.cameras,

@@ -16,9 +16,8 @@ use serde_json::Value;
 use crate::SceneError;
 use crate::cubes;
 use crate::error::not_found;
-use crate::file::{SceneFile, join, join_index};
+use crate::file::{SceneFile, ScenePath, read_value};
 use crate::import::Wanted;
-use crate::words::plain;
 
 /// The scene's own materials in the order of their names, and the images that they name.
 #[derive(Debug, Default)]
@@ -46,8 +45,9 @@ impl SceneFile {
                 files: &mut own.files,
                 curves: &mut curves,
             };
-            let fault =
-                |Fault { key, why }| self.fault(&below(&join("materials", name), &key), why);
+            let fault = |Fault { key, why }| {
+                self.fault(ScenePath::of("materials").key(name).join(&key), why)
+            };
             let mut material = spec.build(name, &mut supply).map_err(fault)?;
             if let Some(emission) = &mut material.emission {
                 start_at(&mut emission.modulation, self.spec.render.time());
@@ -68,14 +68,14 @@ impl SceneFile {
         let Some(specs) = &self.spec.lights else { return Ok(None) };
         let mut lights: Vec<Light> = Vec::new();
         for (index, spec) in specs.iter().enumerate() {
-            let at = join_index("lights", index);
+            let at = ScenePath::of("lights").index(index);
             let curves = &mut 0;
             let mut supply = Named { folder, glasses, wanted, textures, files, curves };
-            let fault = |Fault { key, why }| self.fault(&below(&at, &key), why);
+            let fault = |Fault { key, why }| self.fault(at.join(&key), why);
             let time = self.spec.render.time();
             let mut built = spec.build(&mut supply).map_err(fault)?;
             let motion = spec.motion().map(|(motion, place)| motion.build(place, time));
-            let below = |Fault { key, why }| self.fault(&format!("{at}.motion.{key}"), why);
+            let below = |Fault { key, why }| self.fault(at.key("motion").join(&key), why);
             let motion = motion.transpose().map_err(below)?.map(Arc::new);
             for light in &mut built {
                 start_at(&mut light.modulation, time);
@@ -99,10 +99,6 @@ fn start_at(modulation: &mut Option<Arc<Modulation>>, time: f64) {
 }
 
 /// The path `key`, which may be of several parts or none, below `at`.
-fn below(at: &str, key: &str) -> String {
-    if key.is_empty() { at.to_owned() } else { format!("{at}.{key}") }
-}
-
 /// The longest table of a curve that is read (bytes).
 const LONGEST_TABLE: u64 = 1 << 26;
 
@@ -182,7 +178,7 @@ impl Supply for Named<'_> {
             IorSpec::Glass(name) => Value::from(name.as_str()),
             IorSpec::Abbe(abbe) => serde_json::json!({ "nd": abbe.nd, "vd": abbe.vd }),
         };
-        let spec: GlassSpec = serde_json::from_value(words).map_err(|e| plain(&e))?;
+        let spec: GlassSpec = read_value(&words).map_err(|(_, why)| why)?;
         let glass = spec.resolve_in(self.glasses).map_err(|e| e.to_string())?;
         let step = 5.0;
         let samples: Vec<[f64; 2]> = (50..=500)

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::error::not_found;
-use crate::file::{InstancesSpec, TransformSpec, join, join_index};
+use crate::file::{InstancesSpec, ScenePath, TransformSpec};
 use crate::identity::Register;
 use crate::import::{self, Deformer, Import, ImportedPlacement, Note, NoteKind};
 use crate::load::camera::SceneCamera;
@@ -299,29 +299,26 @@ pub(crate) struct Instances {
 }
 
 impl Instances {
-    /// The copies that a scene file asks for. `at` is the JSON path of
-    /// the list; the error is the path of what is wrong, and the reason. So many copies as `fits` refuses are
+    /// The copies that a scene file asks for. `at` is the place of
+    /// the list; the error is the place of what is wrong, and the reason. So many copies as `fits` refuses are
     /// not made.
     pub(crate) fn resolve(
         spec: Option<&InstancesSpec>,
-        at: &str,
+        at: &ScenePath,
         folder: &InputFolder,
         fits: &dyn Fn(u64) -> Result<(), String>,
-    ) -> Result<Self, (String, String)> {
+    ) -> Result<Self, (ScenePath, String)> {
         match spec {
             None => Ok(Self { transforms: vec![Transform::IDENTITY], file: None }),
             Some(InstancesSpec::List(list)) => {
-                fits(list.len() as u64).map_err(|why| (at.to_owned(), why))?;
+                fits(list.len() as u64).map_err(|why| (at.clone(), why))?;
                 let built = list.iter().enumerate().map(|(index, spec)| {
-                    spec.build().map_err(|(key, why)| {
-                        let at = join_index(at, index);
-                        (if key.is_empty() { at } else { join(&at, key) }, why)
-                    })
+                    spec.build().map_err(|(key, why)| (at.index(index).join(key), why))
                 });
                 Ok(Self { transforms: built.collect::<Result<_, _>>()?, file: None })
             }
             Some(InstancesSpec::File(written)) => {
-                let fault = |why: String| (at.to_owned(), why);
+                let fault = |why: String| (at.clone(), why);
                 let path = folder.find(written).map_err(|error| fault(not_found(error)))?.path;
                 let transforms =
                     read(&path, fits).map_err(|why| fault(format!("\"{written}\" {why}")))?;

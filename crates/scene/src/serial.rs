@@ -12,7 +12,9 @@ use serde_json::{Value, json};
 
 use crate::SceneError;
 use crate::error::not_found;
-use crate::file::{CameraPath, FramesSpec, PixelsSpec, SceneFile, SlotSpec, join_index, texts_of};
+use crate::file::{
+    CameraPath, FramesSpec, PathStep, PixelsSpec, SceneFile, ScenePath, SlotSpec, texts_of,
+};
 use crate::frames::listed;
 use etendue_camera::{Shutter, ShutterKind};
 
@@ -99,7 +101,7 @@ impl SceneFile {
         slot: &SlotSpec,
     ) -> Result<Vec<Vec<(String, Value)>>, SceneError> {
         let Some(along) = &slot.along else { return Ok(vec![Vec::new()]) };
-        let at = format!("{}.along", join_index("serial", number));
+        let at = place_of(number).key("along");
         let frames = match along {
             FramesSpec::List(list) => listed(list),
             FramesSpec::Path(path @ (CameraPath::Poses { .. } | CameraPath::Trajectory { .. })) => {
@@ -119,8 +121,7 @@ impl SceneFile {
         for frame in &frames {
             for (path, _) in &frame.settings {
                 if let Some(why) = not_of_a_slot(path) {
-                    let at = join_index(&at, frame.number);
-                    return Err(self.fault(&at, format!("`{path}` {why}")));
+                    return Err(self.fault(at.index(frame.number), format!("`{path}` {why}")));
                 }
             }
         }
@@ -137,13 +138,13 @@ impl SceneFile {
         for (number, slot) in self.spec.serial.iter().enumerate() {
             for path in slot.set.keys() {
                 if let Some(why) = not_of_a_slot(path) {
-                    let at = format!("{}.set", join_index("serial", number));
-                    return Err(self.fault(&at, format!("`{path}` {why}")));
+                    let at = place_of(number).key("set");
+                    return Err(self.fault(at, format!("`{path}` {why}")));
                 }
             }
             if let Some(PixelsSpec::Tile(rows)) = &slot.pixels {
-                let at = format!("{}.pixels", join_index("serial", number));
-                check_tile(rows).map_err(|why| self.fault(&at, why))?;
+                let at = place_of(number).key("pixels");
+                check_tile(rows).map_err(|why| self.fault(at, why))?;
             }
         }
         Ok(())
@@ -187,12 +188,12 @@ impl SceneFile {
         let mut spans = Vec::with_capacity(slots.len());
         let mut end = 0.0;
         for (number, slot) in slots.iter().enumerate() {
-            let at = join_index("serial", number);
+            let at = place_of(number);
             let start = slot.start.map_or(end, |time| time.0);
             let duration = slot.duration.map_or(share, |time| time.0);
             if !(start >= 0.0 && start.is_finite()) {
                 let why = format!("{start} s is not within the exposure");
-                return Err(self.fault(&format!("{at}.start"), why));
+                return Err(self.fault(at.key("start"), why));
             }
             if !(duration > 0.0 && duration.is_finite()) {
                 let why = match slot.duration {
@@ -202,7 +203,7 @@ impl SceneFile {
                         exposure - given
                     ),
                 };
-                return Err(self.fault(&format!("{at}.duration"), why));
+                return Err(self.fault(at.key("duration"), why));
             }
             end = start + duration;
             if end > exposure * (1.0 + ROUNDING) {
@@ -224,7 +225,7 @@ impl SceneFile {
         ([start, end], frame): ([f64; 2], &[(String, Value)]),
         shutter: &Shutter,
     ) -> Result<Slot, SceneError> {
-        let at = join_index("serial", number);
+        let at = place_of(number);
         // When the shutter is open anyhow, from the opening of a row.
         let row = 0.5;
         let opening = shutter.span(row)[0];
@@ -273,7 +274,7 @@ impl SceneFile {
                 Some(PixelShares { size, values: rows.concat() })
             }
             Some(PixelsSpec::File(written)) => {
-                let fault = |why: String| self.fault(&format!("{at}.pixels"), why);
+                let fault = |why: String| self.fault(at.key("pixels"), why);
                 let found = folder.find(written).map_err(|error| fault(not_found(error)))?;
                 let read = grey_picture(&found.path);
                 let (size, values) = read.map_err(|why| fault(format!("\"{written}\" {why}")))?;
@@ -300,7 +301,7 @@ impl SceneFile {
             let [width, height] = resolution;
             if pixels.size != [width as usize, height as usize] {
                 let [columns, rows] = pixels.size;
-                let at = format!("{}.pixels", join_index("serial", number));
+                let at = place_of(number).key("pixels");
                 let why = format!(
                     "\"{written}\" has {columns} x {rows} pixels, and the sensor {width} x {height}; a mask has one \
                      for each"
@@ -312,17 +313,27 @@ impl SceneFile {
     }
 }
 
+/// The place of a slot.
+fn place_of(number: usize) -> ScenePath {
+    ScenePath::of("serial").index(number)
+}
+
 /// Why a slot may not set what is at a path.
 fn not_of_a_slot(path: &str) -> Option<&'static str> {
-    let root = path.split(['.', '[']).next().unwrap_or_default();
-    if !ROOTS.contains(&root) {
+    let path = ScenePath::of(path);
+    if !path.root().is_some_and(|root| ROOTS.contains(&root)) {
         return Some(
             "is of the whole exposure; slots set `camera`, `lights`, `objects` and `materials`",
         );
     }
-    let below = path.strip_prefix("camera").map(|rest| rest.trim_start_matches('.'));
-    let key = below.map(|below| below.split(['.', '[']).next().unwrap_or_default());
-    matches!(key, Some("" | "sensor" | "shutter")).then_some(
+    let holds_the_exposures = match path.steps() {
+        [PathStep::Key(root), rest @ ..] if root == "camera" => match rest {
+            [PathStep::Key(key), ..] => ["sensor", "shutter"].contains(&key.as_str()),
+            _ => true,
+        },
+        _ => false,
+    };
+    holds_the_exposures.then_some(
         "holds the sensor or the shutter, which are those of the whole exposure\nhint: set other keys",
     )
 }

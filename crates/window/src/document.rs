@@ -5,7 +5,8 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use serde_json::{Map, Value, json};
+use etendue::ScenePath;
+use serde_json::{Value, json};
 
 /// Earlier values that are kept.
 const MOST_STEPS: usize = 200;
@@ -153,65 +154,24 @@ impl Document {
 }
 
 fn apply(value: &mut Value, edit: &Edit) {
-    let pointer = edit.pointer();
-    let Some((parents, key)) = pointer.rsplit_once('/') else { return };
-    let mut here = value;
-    for step in parents.split('/').skip(1).map(unescaped) {
-        here = match here {
-            Value::Array(elements) => {
-                let Some(element) = step.parse::<usize>().ok().and_then(|i| elements.get_mut(i))
-                else {
-                    return;
-                };
-                element
-            }
-            Value::Object(members) => match edit {
-                Edit::Set(..) => members.entry(step).or_insert(Value::Null),
-                Edit::Remove(_) => match members.get_mut(&step) {
-                    Some(member) => member,
-                    None => return,
-                },
-            },
-            Value::Null if matches!(edit, Edit::Set(..)) => {
-                *here = Value::Object(Map::new());
-                here.as_object_mut().expect("just made").entry(step).or_insert(Value::Null)
-            }
-            _ => return,
-        };
-    }
-    if here.is_null() && matches!(edit, Edit::Set(..)) {
-        *here = Value::Object(Map::new());
-    }
-    let key = unescaped(key);
-    match (here, edit) {
-        (Value::Object(members), Edit::Set(_, new)) => {
-            members.insert(key, new.clone());
+    let path = ScenePath::from_pointer(edit.pointer());
+    let Some((holder, key)) = path.split_last() else { return };
+    match (edit, holder.find(value)) {
+        (Edit::Set(_, new), Some(Value::Array(elements)))
+            if key.as_index() == Some(elements.len()) =>
+        {
+            elements.push(new.clone());
         }
-        (Value::Object(members), Edit::Remove(_)) => {
-            members.remove(&key);
-        }
-        (Value::Array(elements), edit) => {
-            let Ok(index) = key.parse::<usize>() else { return };
-            match edit {
-                Edit::Set(_, new) if index < elements.len() => elements[index] = new.clone(),
-                Edit::Set(_, new) if index == elements.len() => elements.push(new.clone()),
-                Edit::Remove(_) if index < elements.len() => {
-                    elements.remove(index);
-                }
-                _ => {}
+        // What leads nowhere is not set.
+        (Edit::Set(_, new), _) => drop(path.set(value, new.clone())),
+        (Edit::Remove(_), Some(Value::Object(members))) => drop(members.remove(&key.text())),
+        (Edit::Remove(_), Some(Value::Array(elements))) => {
+            if let Some(index) = key.as_index().filter(|&index| index < elements.len()) {
+                elements.remove(index);
             }
         }
-        _ => {}
+        (Edit::Remove(_), _) => {}
     }
-}
-
-/// A key as a step of a JSON pointer (RFC 6901).
-pub(crate) fn escaped(key: &str) -> String {
-    key.replace('~', "~0").replace('/', "~1")
-}
-
-fn unescaped(step: &str) -> String {
-    step.replace("~1", "/").replace("~0", "~")
 }
 
 /// What the window shows.

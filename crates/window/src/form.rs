@@ -3,9 +3,10 @@
 mod leaf;
 
 use eframe::egui::{self, Ui};
+use etendue::ScenePath;
 use serde_json::{Map, Value, json};
 
-use crate::document::{Edit, escaped};
+use crate::document::Edit;
 
 /// Keys that no panel shows: what the format allows for editors and remarks.
 const HIDDEN: [&str; 2] = ["$schema", "comment"];
@@ -36,7 +37,7 @@ impl Form {
     /// Widgets for the key `key` of the top, whose value is `value`. What the user changes is added to
     /// `edits`.
     pub(crate) fn show(&self, ui: &mut Ui, key: &str, value: &Value, edits: &mut Vec<Edit>) {
-        let pointer = format!("/{}", escaped(key));
+        let pointer = pointer_below("", key);
         let schema = &self.schema["properties"][key];
         let field = Field { schema, pointer: &pointer, value, is_required: true };
         self.inner(ui, field, edits);
@@ -232,7 +233,7 @@ impl Form {
         let (there, absent): (Vec<_>, Vec<_>) =
             known.partition(|(key, _)| members.get(*key).is_some_and(|value| !value.is_null()));
         for (key, schema) in there {
-            let pointer = format!("{}/{}", field.pointer, escaped(key));
+            let pointer = pointer_below(field.pointer, key);
             let is_required = needed.contains(&&**key);
             let below = Field { schema, pointer: &pointer, value: &members[key], is_required };
             self.field(ui, key, below, edits);
@@ -241,7 +242,7 @@ impl Form {
         let others = &schema["additionalProperties"];
         if others.is_object() {
             for (key, value) in members {
-                let pointer = format!("{}/{}", field.pointer, escaped(key));
+                let pointer = pointer_below(field.pointer, key);
                 let below = Field { schema: others, pointer: &pointer, value, is_required: false };
                 self.field(ui, key, below, edits);
             }
@@ -277,7 +278,7 @@ impl Form {
                     let button = ui.button(key.replace('_', " "));
                     mark(ui.ctx(), &format!("{pointer}/{key}+"), button.rect);
                     if hint(button, about).clicked() {
-                        let place = format!("{pointer}/{}", escaped(key));
+                        let place = pointer_below(pointer, key);
                         edits.push(Edit::set(place, self.something(schema)));
                         ui.close();
                     }
@@ -321,6 +322,11 @@ fn variants(schema: &Value) -> Option<(&'static str, Vec<(&str, &Value)>)> {
             .collect();
         Some((tag, named?))
     })
+}
+
+/// The JSON pointer of the key of an object.
+fn pointer_below(pointer: &str, key: &str) -> String {
+    ScenePath::from_pointer(pointer).key(key).pointer()
 }
 
 fn required(schema: &Value) -> impl Iterator<Item = &str> {

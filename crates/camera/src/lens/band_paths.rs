@@ -29,7 +29,7 @@
 //!
 //! Leading wavelengths are the nodes of a polynomial in the mean index of the lens' dispersive media, by which
 //! places move nearly in proportion. As many nodes are taken as bring the places of all wavelengths that are
-//! drawn within [`FINEST`] of where rays land that are traced, over film and pupil. A ray that ends at some node is
+//! drawn within [`SharingLimits::places`](super::SharingLimits) of where rays land that are traced, over film and pupil. A ray that ends at some node is
 //! traced at every band's wavelength by itself.
 
 use etendue_optics::element::{Clip, LensRays, Opening, Ray, RayStatus};
@@ -43,12 +43,6 @@ use super::nodes::{Interpolation, MOST_NODES, Variable};
 use super::opened::{BandPaths, filtered, place_of};
 use super::traced_at::TracedAt;
 use crate::{CameraRays, FilmSamples, Pose};
-
-/// How near an interpolated place is to the traced one, at most (pixels).
-const FINEST: f64 = 0.01;
-
-/// The same of what the lens passes, where glass takes light.
-const FINEST_SHARE: f64 = 1e-4;
 
 /// Wavelengths at which interpolation is checked, at most.
 const CHECKS: usize = 16;
@@ -188,7 +182,7 @@ impl LensCamera {
             ));
         }
         // As few nodes as will do.
-
+        let limits = self.sharing;
         let has_losses = !train.losses().is_none()
             || train.elements().iter().any(|element| element.part.is_coated_or_blazed());
         let mut least = (f64::INFINITY, f64::INFINITY);
@@ -202,7 +196,7 @@ impl LensCamera {
             let errors = checks.iter().zip(&checked).map(errors);
             let [error, share] = errors.fold([0.0_f64; 2], |[a, b], [c, d]| [a.max(c), b.max(d)]);
             least = (least.0.min(error), least.1.min(share));
-            if error > FINEST || (has_losses && share > FINEST_SHARE) {
+            if error > limits.places || (has_losses && share > limits.shares) {
                 continue;
             }
             let nodes = chosen.iter().map(|&nm| at(nm)).collect::<Result<Vec<_>, _>>()?;
@@ -218,9 +212,9 @@ impl LensCamera {
             return Ok(BandPaths { nodes, bands, has_losses, lead, reach, error });
         }
         Err(format!(
-            "places between {MOST_NODES} wavelengths are {:.2} pixels off, {FINEST} being the most, and \
+            "places between {MOST_NODES} wavelengths are {:.2} pixels off, {} being the most, and \
              what passes {:.1e}",
-            least.0, least.1
+            least.0, limits.places, least.1
         ))
     }
 

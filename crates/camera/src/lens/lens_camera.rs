@@ -18,6 +18,7 @@ use glam::{DVec2, DVec3};
 
 use super::chief::{ChiefTable, ImageCircle, LensletChiefs};
 use super::focused::{Focused, View};
+use super::nodes::SharingLimits;
 use super::opened::{Opened, OpenedGroup, through_filters, uniform_filters};
 use super::traced_at::{TracedAt, grouped};
 
@@ -54,6 +55,8 @@ pub struct LensCamera {
     pub(super) traced_at: TracedAt,
     /// How light is spread on the sensor.
     pub(super) spread: SpreadBy,
+    /// How nearly bands that share rays are where their own would be.
+    pub(super) sharing: SharingLimits,
 }
 
 /// By what light of a point is spread on the sensor.
@@ -82,6 +85,7 @@ impl PartialEq for LensCamera {
         self.focused == other.focused
             && self.traced_at == other.traced_at
             && self.spread == other.spread
+            && self.sharing == other.sharing
     }
 }
 
@@ -138,6 +142,7 @@ impl LensCamera {
             design_pupil,
             traced_at,
             spread,
+            sharing: SharingLimits::DEFAULT,
         })
     }
 
@@ -202,6 +207,12 @@ impl LensCamera {
     /// The same with rays that run at other wavelengths.
     pub(super) fn running_at(&self, traced_at: TracedAt) -> Self {
         Self { traced_at, opened: None, ..self.clone() }
+    }
+
+    /// The same whose bands share rays within other limits.
+    pub(crate) fn sharing_within(&self, sharing: SharingLimits) -> Self {
+        let opened = self.opened.clone().filter(|_| sharing == self.sharing);
+        Self { sharing, opened, ..self.clone() }
     }
 
     /// The same whose light is spread another way.

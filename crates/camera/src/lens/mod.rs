@@ -40,6 +40,7 @@ pub use band_paths::{BandLandings, SharedPaths};
 pub use chief::LensletChiefs;
 pub use focused::Focused;
 pub use lens_camera::{BandGroup, LensCamera};
+pub use nodes::SharingLimits;
 pub use source::{LensSource, PlacedSpec};
 pub use spec::{
     ChromaticRealLensCameraSpec, LensCameraSpec, RealLensCameraSpec, ThinLensCameraSpec,

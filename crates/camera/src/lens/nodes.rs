@@ -5,6 +5,20 @@ use etendue_optics::train::OpticalTrain;
 /// The most wavelengths that a ray is traced at.
 pub(super) const MOST_NODES: usize = 8;
 
+/// Limits within which the rays of bands are interpolated between those of some wavelengths.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SharingLimits {
+    /// The greatest distance of an interpolated place from the traced one (pixels).
+    pub places: f64,
+    /// The greatest difference of what the lens passes (share of the light), where it takes some.
+    pub shares: f64,
+}
+
+impl SharingLimits {
+    /// Those of a scene that does not say.
+    pub const DEFAULT: Self = Self { places: 0.01, shares: 1e-4 };
+}
+
 /// A wavelength between nodes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Interpolation {

@@ -19,6 +19,17 @@ pub(super) fn setting(text: &str) -> Result<(String, String), String> {
     }
 }
 
+/// A key and the values that it takes in turn; none where the key stands alone.
+pub(super) fn sweep(text: &str) -> Result<(String, Vec<String>), String> {
+    let Ok((key, values)) = setting(text) else {
+        return match text.contains('=') {
+            true => Err("expected KEY=VALUES, such as accuracy.path_noise=0.1,1".to_owned()),
+            false => Ok((text.trim().to_owned(), Vec::new())),
+        };
+    };
+    Ok((key, values.split(',').map(|value| value.trim().to_owned()).collect()))
+}
+
 /// A share from a number of hundredths, such as 1%.
 pub(super) fn share(text: &str) -> Result<f64, String> {
     let percent = text.trim().strip_suffix('%').map(str::trim);

@@ -465,6 +465,10 @@ pub(crate) struct BenchArguments {
     /// program; the parts of --only are measured where they are named, too
     #[arg(long, value_name = "SHARE", value_parser = parse::share)]
     pub(crate) target: Option<f64>,
+    /// Values of a key that contend for --target, too, e.g. render.seed=1,2; of a number of `accuracy` the key alone
+    /// takes a quarter, half, twice and four times its default. Several keys with several of these
+    #[arg(long, value_name = "KEY=VALUES", value_parser = parse::sweep, requires = "target")]
+    pub(crate) sweep: Vec<(String, Vec<String>)>,
     /// Stop when a structure would need more than this, e.g. 800M or 4G (bytes, 1024-based)
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     pub(crate) memory_limit: Option<u64>,

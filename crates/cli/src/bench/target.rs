@@ -6,7 +6,7 @@ use etendue_bench::target::{
 };
 use etendue_render::{accelerators, denoise};
 use etendue_scene::Scene;
-use etendue_scene::file::{AccelName, TracerSpec};
+use etendue_scene::file::{AccelName, AccuracySpec, SceneFile, TracerSpec};
 use etendue_tracer::LayerSpec;
 
 use crate::arguments::BenchArguments;
@@ -20,11 +20,12 @@ const SECONDS: [f64; 2] = [600.0, 50.0];
 /// Surfaces to which light is followed, where the scene follows it farther.
 const BOUNCES: [u32; 3] = [8, 4, 2];
 
-/// Finds the settings. `scene` is the scene as it is.
+/// Finds the settings among the changes of `axes`. `scene` is the scene as it is.
 pub(super) fn race(
     arguments: &BenchArguments,
     target: f64,
     (scene, phases): (&Scene, Phases),
+    axes: &[Vec<Change>],
 ) -> Result<Target, Fault> {
     if scene.picture != Some(LayerSpec::Radiance) {
         return Err(Fault::refused(
@@ -45,7 +46,7 @@ pub(super) fn race(
     // The picture that all are compared with has everything.
     let in_full = [("tolerance".to_owned(), "null".to_owned())];
     let effort = Effort { target, seconds };
-    measure((&axes(scene), &in_full), effort, &mut program, &|share| progress(share))
+    measure((axes, &in_full), effort, &mut program, &|share| progress(share))
 }
 
 /// What makes a scene have no layers of sampling, which there are of samples that stop by themselves alone; nothing
@@ -115,8 +116,59 @@ fn recorded(rendering: &Rendering) -> Result<(Vec<f64>, [usize; 3]), etendue::Er
 /// What stands for the output `--denoise` among settings.
 const DENOISE: &str = "--denoise";
 
+/// Shares of a number's default that it is swept over by itself.
+const SWEPT: [f64; 4] = [0.25, 0.5, 2.0, 4.0];
+
+/// Changes of keys that take some values in turn, an axis a key: of a number of `accuracy` without values, shares of
+/// its default within its limits.
+///
+/// # Errors
+///
+/// When the scene does not take a value.
+pub(super) fn sweeps(
+    keys: &[(String, Vec<String>)],
+    file: &SceneFile,
+) -> Result<Vec<Vec<Change>>, Fault> {
+    let axis = |(key, values): &(String, Vec<String>)| -> Result<Vec<Change>, Fault> {
+        let values = match values.is_empty() {
+            true => by_itself(key)?,
+            false => values.clone(),
+        };
+        let change = |value: String| {
+            let settings = vec![(key.clone(), value)];
+            file.with(&settings)?;
+            let name = format!("{key} {}", settings[0].1);
+            Ok::<_, Fault>(Change { name, settings })
+        };
+        values.into_iter().map(change).collect()
+    };
+    keys.iter().map(axis).collect()
+}
+
+/// The values that a number of `accuracy` is swept over.
+fn by_itself(key: &str) -> Result<Vec<String>, Fault> {
+    let settings = AccuracySpec::default().settings();
+    let Some(setting) = settings.iter().find(|setting| setting.path == key) else {
+        let known: Vec<&str> = settings.iter().map(|setting| setting.path).collect();
+        return Err(Fault::refused(format!(
+            "--sweep {key}: no number of `accuracy`, which alone are swept without values\nhint: write --sweep \
+             {key}=VALUE,VALUE, or one of {}",
+            known.join(", ")
+        )));
+    };
+    let [least, most] = setting.range;
+    let whole = setting.default.fract() == 0.0 && least.fract() == 0.0;
+    let value = |share: f64| {
+        let value = (share * setting.default).clamp(least, most);
+        if whole { value.round() } else { value }.to_string()
+    };
+    let mut values: Vec<String> = SWEPT.into_iter().map(value).collect();
+    values.dedup();
+    Ok(values)
+}
+
 /// What can be changed of a scene: lists of which each change excludes the others.
-fn axes(scene: &Scene) -> Vec<Vec<Change>> {
+pub(super) fn axes(scene: &Scene) -> Vec<Vec<Change>> {
     let change = |name: &str, path: &str, value: &str| Change {
         name: name.to_owned(),
         settings: vec![(path.to_owned(), value.to_owned())],

@@ -238,6 +238,49 @@ fn the_settings_that_reach_an_error_soonest_are_found_and_verified() {
 }
 
 #[test]
+fn numbers_of_accuracy_contend_for_a_target() {
+    let bench = Bench::with_scene(LIT);
+    let output = bench.run(&[
+        "bench",
+        "scene.json",
+        "-o",
+        "out",
+        "--quick",
+        "--target",
+        "20%",
+        "--seconds",
+        "100",
+        "--sweep",
+        "accuracy.roulette_after",
+        "--sweep",
+        "accuracy.path_noise=0.1,1",
+    ]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let found = &bench.json("out/bench.json")["target"];
+    let contenders = found["contenders"].as_array().unwrap();
+    let settings = |name: &str| {
+        let contender = contenders.iter().find(|contender| contender["name"] == name);
+        contender.unwrap_or_else(|| panic!("{name}: {contenders:?}"))["settings"].clone()
+    };
+    // A quarter, half, twice and four times 5, in whole numbers.
+    for value in ["1", "3", "10", "20"] {
+        let name = format!("accuracy.roulette_after {value}");
+        assert_eq!(settings(&name), serde_json::json!([["accuracy.roulette_after", value]]));
+    }
+    settings("accuracy.path_noise 0.1");
+    settings("accuracy.path_noise 1");
+    let refused = |sweep: &str| {
+        let words = ["bench", "scene.json", "-o", "no", "--target", "20%", "--sweep", sweep];
+        let output = bench.run(&words);
+        assert_eq!(output.status.code(), Some(2), "{sweep}");
+        text(&output.stderr)
+    };
+    assert!(refused("render.seed").contains("hint: write --sweep render.seed=VALUE,VALUE"));
+    assert!(refused("accuracy.path_noise=-1").contains("--set accuracy.path_noise=-1"));
+    assert!(refused("accuracy.pathnoise=1").contains("`path_noise`"));
+}
+
+#[test]
 fn a_target_that_is_none_is_refused() {
     let bench = Bench::with_scene(LIT);
     for target in ["0", "150%", "-1%", "much"] {

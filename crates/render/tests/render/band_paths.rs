@@ -67,6 +67,20 @@ fn grid() -> Bands {
     Bands::Spectral(Grid::equal(400.0, 710.0, 31).unwrap())
 }
 
+#[test]
+fn the_scene_says_how_nearly_shared_paths_land() {
+    let shared = |error: f64| {
+        let more = json!({ "accuracy": { "band_place_error": error } });
+        let plan =
+            Plan::new(&scene(singlet(), false, 1, &more), Outputs::from_list("exr").unwrap());
+        let BandPaths::Shared(shared) = plan.band_paths else { panic!("{:?}", plan.band_paths) };
+        assert!(shared.error <= error, "{shared:?}");
+        shared.traced
+    };
+    // One wavelength displaces blue and red by pixels, which half a pixel does not allow.
+    assert!(1 < shared(0.5) && shared(0.5) < shared(1e-4), "{} {}", shared(0.5), shared(1e-4));
+}
+
 /// The light of each band, with shared paths or without.
 fn light(scene: &Scene, bands: &Bands, shares: bool) -> Vec<Vec<f64>> {
     let mut plan = Plan::new(scene, Outputs::from_list("exr").unwrap());

@@ -33,7 +33,7 @@ pub struct Diagnosis {
     /// Meshes, as often as they are placed.
     pub placements: usize,
     /// The tight box around everything in world space (m); null when there is no triangle.
-    pub bounds: Option<Extent>,
+    pub bounds: Option<BoxExtent>,
     /// Whether the size looks like metres, and what to do when not.
     pub units: Units,
     /// The objects, by the numbers of `Id.object`.
@@ -69,7 +69,7 @@ pub struct Diagnosis {
 
 /// A box.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Extent {
+pub struct BoxExtent {
     /// The lower corner (m).
     pub min: [f64; 3],
     /// The upper corner (m).
@@ -180,7 +180,7 @@ impl Diagnosis {
             meshes: geometry.meshes.len(),
             placements: geometry.placements.len(),
             bounds: (!around.is_empty())
-                .then(|| Extent { min: around.min.to_array(), max: around.max.to_array() }),
+                .then(|| BoxExtent { min: around.min.to_array(), max: around.max.to_array() }),
             units: units(&around, kind, &scene.path),
             objects: objects(scene),
             instances: scene.instance_names(),

@@ -4,6 +4,7 @@
 //! The manner is that of `GalSim`'s `GSParams` (B. Rowe et al., "GALSIM: The modular galaxy image simulation
 //! toolkit", 2015, section 6): every such number has a name, and a scene may set it.
 
+use etendue_camera::SharingLimits;
 use etendue_report::{Decision, DecisionKind};
 use etendue_sensor::bands::TOLERANCE;
 use etendue_tracer::Rules;
@@ -42,6 +43,8 @@ pub enum AccuracyUse {
     Bands,
     /// The choice between f32 and f64 for light.
     LightPrecision,
+    /// Rays that bands of light share behind a lens that sends each its own way.
+    SharedPaths,
     /// The ends of paths and samples.
     Samples,
     /// Views of a light field.
@@ -117,6 +120,13 @@ accuracy_settings! {
     LightPrecision path_probes: u32 = 32_768, 64 to 16_777_216, "triangles",
         "Triangles that are probed for the thin places of what light crosses, at most",
         "More find what is thin over a smaller part of a large mesh, and take longer before the render";
+    SharedPaths band_place_error: f64 = SharingLimits::DEFAULT.places, 1e-6 to 1.0, "pixels",
+        "Distance from where its own ray would land that light of a band may land at which shares another's",
+        "Less traces each shared ray through the lens at more wavelengths, and at last the scene once a band; more \
+         displaces colours by as much";
+    SharedPaths band_share_error: f64 = SharingLimits::DEFAULT.shares, 1e-9 to 0.5, "share of the light",
+        "Difference of what a lens with coatings or dark glass passes of a band that shares another's rays",
+        "Less traces each shared ray at more wavelengths, and at last the scene once a band; more is off by as much";
     Samples roulette_after: u32 = Rules::ROULETTE_AFTER, 1 to 1024, "surfaces",
         "Surfaces of a path of the tracer `path` after which it may end by chance",
         "More follow dim paths farther, which takes time; fewer end paths sooner, which adds noise and no bias";
@@ -157,6 +167,11 @@ impl AccuracySpec {
         self.set().map(row).collect()
     }
 
+    /// Limits within which bands share rays of the camera's lens.
+    pub(crate) fn sharing(&self) -> SharingLimits {
+        SharingLimits { places: self.band_place_error, shares: self.band_share_error }
+    }
+
     /// What contradicts what the plan is told, or bands that the sensor is given (`has_bands`): the path, and why.
     pub(super) fn contradiction(
         &self,
@@ -172,6 +187,11 @@ impl AccuracySpec {
             (AccuracyUse::Bands, _) if has_bands => {
                 let why = "contradicts `bands` of the camera's sensor, which are taken as they are\nhint: leave one \
                            of them out";
+                Some((setting.path, why.to_owned()))
+            }
+            (AccuracyUse::SharedPaths, _) if plan.shared_paths == Some(false) => {
+                let why = "contradicts `plan.shared_paths` false, with which no rays are shared\nhint: leave one of \
+                           them out";
                 Some((setting.path, why.to_owned()))
             }
             (AccuracyUse::LightPrecision, Some(word)) => {

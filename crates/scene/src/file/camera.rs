@@ -2,19 +2,15 @@
 //!
 //! A sensor alone: what `etendue sensor` reads.
 
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde_json::{Value, json};
 
 use super::document::Document;
-use super::lens::SCENE_KEYS;
-use super::{WrittenPlaces, check, join, read_document, spec};
+use super::{SCENE_KEYS, ScenePath, WrittenPlaces, check, read_document, spec, values};
 use crate::SceneError;
 use crate::error::not_found;
-use crate::words::{kind_of, plain};
-use etendue_camera::CameraSpec;
+use crate::words::kind_of;
 use etendue_camera::curve_files::{self, LONGEST_TABLE};
 use etendue_files::{InputFolder, Opener};
 use etendue_image::Samples;
@@ -22,38 +18,14 @@ use etendue_optics::train::remove_notes;
 use etendue_sensor::{DefectMap, ListedDefect, Model, Sensor, SensorError, SensorSpec};
 use etendue_spectrum::CurveFault;
 
-/// The schema of a scene's `camera`: the object, or the file that holds it, in whose place its values stand
-/// once it is read.
-pub(super) struct CameraSource;
-
-impl JsonSchema for CameraSource {
-    fn schema_name() -> Cow<'static, str> {
-        "CameraSource".into()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let camera = generator.subschema_for::<CameraSpec>();
-        json_schema!({
-            "anyOf": [
-                {
-                    "description": "The path of a JSON file that holds the camera, from the scene's folder. The \
-                                    file's own paths start at its own folder.",
-                    "type": "string"
-                },
-                camera
-            ]
-        })
-    }
-}
-
 /// The file that holds a scene's camera.
 #[derive(Debug, Clone)]
-pub(super) struct CameraFile {
+pub(super) struct CameraDocument {
     pub(super) path: PathBuf,
     pub(super) document: Document,
 }
 
-impl CameraFile {
+impl CameraDocument {
     /// Reads the camera file that a scene in `folder` calls `written`, with its paths from that folder. A
     /// text is an error that belongs to the scene's key `camera`.
     pub(super) fn read(
@@ -87,13 +59,9 @@ impl CameraFile {
         Ok(Ok((Self { path, document }, value)))
     }
 
-    /// What the scene calls `path`, in the words of the file.
-    pub(super) fn own_path(path: &str) -> Option<&str> {
-        let inside = path.strip_prefix("camera")?;
-        match inside.strip_prefix('.') {
-            Some(inside) => Some(inside),
-            None => (inside.is_empty() || inside.starts_with('[')).then_some(inside),
-        }
+    /// The scene's `path`, counted from the top of the camera's file.
+    pub(super) fn own_path(path: &ScenePath) -> Option<ScenePath> {
+        path.inside(&ScenePath::of("camera"))
     }
 }
 
@@ -109,21 +77,25 @@ impl WrittenPlaces {
             String::from_utf8(bytes).map_err(|_| "is no text".to_owned())
         };
         let read = curve_files::read_curves(camera, read);
-        read.map_err(|CurveFault { key, why }| self.fault(&join("camera", &key), why))?;
+        read.map_err(|CurveFault { key, why }| self.fault(ScenePath::of("camera").join(key), why))?;
         Ok(())
     }
 
     /// Puts the list of defects in the place of the picture of them that the sensor at `place` names.
-    pub(super) fn read_defects(&self, value: &mut Value, place: &str) -> Result<(), SceneError> {
-        let pointer = if place.is_empty() { String::new() } else { IN_SCENE_POINTER.to_owned() };
-        let Some(map) = value.pointer_mut(&format!("{pointer}/defect_map")) else { return Ok(()) };
+    pub(super) fn read_defects(
+        &self,
+        value: &mut Value,
+        sensor: &ScenePath,
+    ) -> Result<(), SceneError> {
+        let place = sensor.key("defect_map");
+        let Some(map) = place.find(value) else { return Ok(()) };
         let Value::String(written) = &*map else { return Ok(()) };
-        let (size, list) = self.defects_in(written).map_err(|why| {
-            self.fault(&inside(place, "defect_map"), format!("\"{written}\" {why}"))
-        })?;
+        let (size, list) = self
+            .defects_in(written)
+            .map_err(|why| self.fault(&place, format!("\"{written}\" {why}")))?;
         *map = json!(list);
         // A map of other columns and rows belongs to another sensor.
-        let sensor = value.pointer(&pointer).unwrap_or(&Value::Null);
+        let sensor = value.pointer(&sensor.pointer()).unwrap_or(&Value::Null);
         let resolution = sensor.get("resolution").cloned().or_else(|| {
             let model: Model = serde_json::from_value(sensor.get("model")?.clone()).ok()?;
             Some(json!(model.preset().resolution.value))
@@ -134,7 +106,7 @@ impl WrittenPlaces {
                 "has {} columns and {} rows, the sensor {resolution}: give a map of the sensor's own",
                 size[0], size[1]
             );
-            return Err(self.fault(&inside(place, "defect_map"), why));
+            return Err(self.fault(place, why));
         }
         Ok(())
     }
@@ -175,9 +147,6 @@ impl WrittenPlaces {
 /// The longest map of defects that is read (bytes).
 const LONGEST_MAP: u64 = 1 << 30;
 
-/// Where a scene keeps its sensor, as a JSON pointer.
-const IN_SCENE_POINTER: &str = "/camera/sensor";
-
 fn remedy() -> &'static str {
     "name a JSON file that holds what a scene's `camera` does, such as {\"type\": \"pinhole\", \"fov\": 40}"
 }
@@ -209,8 +178,10 @@ fn move_paths(value: &mut Value, own: &Path) {
     }
 }
 
-/// Where a scene keeps its sensor.
-const IN_SCENE: &str = "camera.sensor";
+/// The place of a scene's sensor.
+pub(super) fn place_in_scene() -> ScenePath {
+    ScenePath::of("camera.sensor")
+}
 
 /// A sensor that was read and checked: a scene's `camera.sensor`, or the same object in a file of
 /// its own.
@@ -222,7 +193,7 @@ pub struct SensorFile {
     pub sensor: Sensor,
     written: WrittenPlaces,
     /// The path of the sensor's object; empty when the file is the sensor.
-    place: &'static str,
+    place: ScenePath,
 }
 
 impl SensorFile {
@@ -291,42 +262,40 @@ impl SensorFile {
         written.set(&mut value, overrides)?;
         remove_notes(&mut value);
         let in_scene = value.get("etendue").is_some() || value.get("camera").is_some();
-        let place = if in_scene { IN_SCENE } else { "" };
-        let resolution = inside(place, "resolution");
+        let place = if in_scene { place_in_scene() } else { ScenePath::default() };
+        let resolution = place.key("resolution");
         spec::read_resolution(&mut value, &resolution)
             .map_err(|why| written.fault(&resolution, why))?;
-        written.read_defects(&mut value, place)?;
-        let object = if in_scene { value.pointer("/camera/sensor") } else { Some(&value) };
+        written.read_defects(&mut value, &place)?;
+        let object = value.pointer(&place.pointer());
         let object = object.ok_or_else(|| {
             let why = "the scene has no sensor\nhint: give it one, such as { \"type\": \"raw\", \
                        \"model\": \"imx183\" }";
-            written.fault(IN_SCENE, why)
+            written.fault(&place, why)
         })?;
         check::check(&spec::SENSOR, object)
-            .map_err(|problem| written.fault(&inside(place, &problem.path), problem.reason))?;
-        let (spec, sensor) = built(object, place, &written)?;
+            .map_err(|problem| written.fault(place.join(problem.path), problem.reason))?;
+        let (spec, sensor) = built(object, &place, &written)?;
         Ok(Self { spec, sensor, written, place })
     }
 
     /// The error with the place in the file that it is about.
     #[must_use]
     pub fn fault(&self, error: &SensorError) -> SceneError {
-        self.written.fault(&inside(self.place, error.at()), error.why())
+        self.written.fault(self.place.join(error.at()), error.why())
     }
 }
 
 /// The sensor that `object`, which fits the schema, describes; it stands at `place`.
 fn built(
     object: &Value,
-    place: &str,
+    place: &ScenePath,
     written: &WrittenPlaces,
 ) -> Result<(SensorSpec, Sensor), SceneError> {
-    let spec: SensorSpec = serde_path_to_error::deserialize(object).map_err(|error| {
-        let path = inside(place, &error.path().to_string());
-        written.fault(&path, plain(error.inner()))
-    })?;
-    let sensor = Sensor::new(&spec)
-        .map_err(|error| written.fault(&inside(place, error.at()), error.why()))?;
+    let spec: SensorSpec =
+        values::read(object).map_err(|(path, why)| written.fault(place.join(path), why))?;
+    let sensor =
+        Sensor::new(&spec).map_err(|error| written.fault(place.join(error.at()), error.why()))?;
     Ok((spec, sensor))
 }
 
@@ -340,7 +309,7 @@ pub(super) fn split(
     else {
         return Ok(None);
     };
-    let (spec, sensor) = built(object, IN_SCENE, written)?;
+    let (spec, sensor) = built(object, &place_in_scene(), written)?;
     let mut grid = json!({});
     if spec.resolution.is_some() || spec.model.is_some() {
         grid["resolution"] = json!(sensor.resolution());
@@ -350,12 +319,4 @@ pub(super) fn split(
     }
     *object = grid;
     Ok(spec.exposes().then_some(sensor))
-}
-
-fn inside(place: &str, key: &str) -> String {
-    match (place, key) {
-        (_, "" | ".") => place.to_owned(),
-        ("", _) => key.to_owned(),
-        _ => format!("{place}.{key}"),
-    }
 }

@@ -11,7 +11,7 @@ mod choice;
 
 use serde_json::{Map, Value};
 
-use super::document::{join, join_index};
+use super::path::ScenePath;
 use crate::words::{kind_of, nearest, suggest};
 use etendue_geometry::units::Dimension;
 use etendue_optics::train::NOTES;
@@ -19,16 +19,18 @@ use etendue_optics::train::NOTES;
 /// What is wrong, and where.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Problem {
-    /// The JSON path; empty for the whole file.
-    pub(crate) path: String,
+    /// The value.
+    pub(crate) path: ScenePath,
     /// What is wrong, what was expected.
     pub(crate) reason: String,
+    /// The key at the end of the path is none that is known there.
+    is_unknown_key: bool,
 }
 
 /// The first value of `value` that `schema` does not allow.
 pub(crate) fn check(schema: &Value, value: &Value) -> Result<(), Problem> {
     let definitions = schema.get("$defs").and_then(Value::as_object);
-    Checker { definitions }.visit(schema, value, "")
+    Checker { definitions }.visit(schema, value, &ScenePath::default())
 }
 
 struct Checker<'a> {
@@ -37,8 +39,8 @@ struct Checker<'a> {
 
 type Outcome = Result<(), Problem>;
 
-fn problem(path: &str, reason: String) -> Outcome {
-    Err(Problem { path: path.to_owned(), reason })
+fn problem(path: &ScenePath, reason: String) -> Outcome {
+    Err(Problem { path: path.clone(), reason, is_unknown_key: false })
 }
 
 impl<'a> Checker<'a> {
@@ -54,7 +56,7 @@ impl<'a> Checker<'a> {
         schema
     }
 
-    fn visit(&self, schema: &'a Value, value: &Value, path: &str) -> Outcome {
+    fn visit(&self, schema: &'a Value, value: &Value, path: &ScenePath) -> Outcome {
         let schema = self.resolve(schema);
         if let (Some(dimension), Some(text)) = (schema.get("x-quantity"), value.as_str()) {
             // Words that stand for a quantity, such as "infinity".
@@ -88,7 +90,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    fn quantity(&self, schema: &Value, dimension: &Value, text: &str, path: &str) -> Outcome {
+    fn quantity(&self, schema: &Value, dimension: &Value, text: &str, path: &ScenePath) -> Outcome {
         let dimension = dimension.as_str().and_then(Dimension::from_name);
         let unit = schema.get("x-unit").and_then(Value::as_str);
         match (dimension, unit) {
@@ -100,7 +102,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    fn kind(&self, schema: &Value, value: &Value, path: &str) -> Outcome {
+    fn kind(&self, schema: &Value, value: &Value, path: &ScenePath) -> Outcome {
         let Some(expected) = schema.get("type") else { return Ok(()) };
         let expected: Vec<&str> = match expected {
             Value::String(one) => vec![one],
@@ -113,7 +115,7 @@ impl<'a> Checker<'a> {
         problem(path, wrong_kind(value, &expected))
     }
 
-    fn range(schema: &Value, value: &Value, path: &str) -> Outcome {
+    fn range(schema: &Value, value: &Value, path: &ScenePath) -> Outcome {
         let Some(number) = value.as_f64() else { return Ok(()) };
         let least = schema.get("minimum").and_then(Value::as_f64);
         let most = match schema.get("format").and_then(Value::as_str) {
@@ -132,7 +134,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    fn array(&self, schema: &'a Value, elements: &[Value], path: &str) -> Outcome {
+    fn array(&self, schema: &'a Value, elements: &[Value], path: &ScenePath) -> Outcome {
         let bound = |key: &str| schema.get(key).and_then(Value::as_u64);
         let len = elements.len() as u64;
         match (bound("minItems"), bound("maxItems")) {
@@ -151,22 +153,21 @@ impl<'a> Checker<'a> {
             return Ok(());
         };
         for (index, element) in elements.iter().enumerate() {
-            self.visit(items, element, &join_index(path, index))?;
+            self.visit(items, element, &path.index(index))?;
         }
         Ok(())
     }
 
-    fn object(&self, schema: &'a Value, members: &Map<String, Value>, path: &str) -> Outcome {
+    fn object(&self, schema: &'a Value, members: &Map<String, Value>, path: &ScenePath) -> Outcome {
         let known = schema.get("properties").and_then(Value::as_object);
         let others = schema.get("additionalProperties");
         for (key, member) in members {
-            let inside = join(path, key);
+            let inside = path.key(key);
             match (known.and_then(|known| known.get(key)), others) {
                 (Some(schema), _) => self.visit(schema, member, &inside)?,
                 (None, Some(Value::Bool(false))) => {
-                    let keys = known.into_iter().flatten().map(|(key, _)| key.as_str());
-                    let keys = keys.filter(|key| !NOTES.contains(key));
-                    return problem(&inside, format!("unknown key{}", suggest(key, keys)));
+                    let reason = format!("unknown key{}", suggest(key, keys_of(schema)));
+                    return Err(Problem { path: inside, reason, is_unknown_key: true });
                 }
                 (None, Some(schema @ Value::Object(_))) => self.visit(schema, member, &inside)?,
                 (None, _) => {}
@@ -216,6 +217,13 @@ impl<'a> Checker<'a> {
         let branches = branches.and_then(Value::as_array);
         branches.into_iter().flatten().flat_map(|branch| self.kinds(branch)).collect()
     }
+}
+
+/// The keys that the schema of an object knows, but for those of notes.
+fn keys_of(schema: &Value) -> impl Iterator<Item = &str> {
+    let keys = schema.get("properties").and_then(Value::as_object);
+    let keys = keys.into_iter().flatten().map(|(key, _)| key.as_str());
+    keys.filter(|key| !NOTES.contains(key))
 }
 
 fn is_kind(kind: &str, value: &Value) -> bool {

@@ -1,12 +1,10 @@
-//! A JSON text, its values, and where in the text each of them stands.
-//!
-//! `--set camera.fov=30`: single values of a scene file, changed from the command line.
+//! A JSON text, its values, and where in the text each of them stands: read once.
 
-use std::collections::HashSet;
+use std::str::FromStr;
 
-use serde_json::{Map, Value};
+use serde_json::{Map, Number, Value};
 
-use crate::words::{kind_of, plain};
+use super::path::{PathStep, ScenePath};
 
 /// A place in a text, both counted from 1; the column in characters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,7 +17,7 @@ pub struct Place {
 
 /// Why a text is no JSON document for us.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Fault {
+pub(crate) struct JsonFault {
     pub(crate) place: Place,
     pub(crate) reason: String,
 }
@@ -27,49 +25,76 @@ pub(crate) struct Fault {
 /// The longest key (bytes). Keys stand in the paths of all that is below them.
 const LONGEST_KEY: usize = 1000;
 
-/// A parsed text, without its values.
+/// The most arrays and objects that may stand in each other, as `serde_json` has it.
+const MOST_LEVELS: usize = 127;
+
+/// A parsed text, and the places of its values.
 #[derive(Debug, Clone)]
 pub(crate) struct Document {
     text: String,
+    /// All values in the order of the text, each before those inside it.
+    values: Vec<ValueSpan>,
+}
+
+/// A value in the text, of at most 4 GiB.
+#[derive(Debug, Clone, Copy)]
+struct ValueSpan {
+    /// The byte where it starts, or its key where it has one.
+    start: u32,
+    /// The number of the next value that is not inside it.
+    next: u32,
+    is_member: bool,
 }
 
 impl Document {
-    /// Parses `text` into the document and its values; refused when it is not JSON, or an object
+    /// Parses `text` into the document and its values; refused when it is not JSON (RFC 8259), or an object
     /// has a key twice.
-    pub(crate) fn parse(text: String) -> Result<(Self, Value), Fault> {
-        let value: Value = serde_json::from_str(&text).map_err(|error| {
-            let place = character_place(&text, error.line(), error.column());
-            Fault { place, reason: plain(&error) }
-        })?;
-        let mut scanner = Scanner { text: &text, at: 0, wanted: None, found: None };
-        if let Err(Wrong { at, reason }) = scanner.value("") {
-            return Err(Fault { place: place_of(&text, at), reason });
+    pub(crate) fn parse(text: String) -> Result<(Self, Value), JsonFault> {
+        let mut reader =
+            Reader { text: &text, at: 0, values: Vec::new(), path: Vec::new(), levels: 0 };
+        match reader.document() {
+            Ok(value) => {
+                let values = reader.values;
+                Ok((Self { text, values }, value))
+            }
+            Err(Wrong { at, reason }) => Err(JsonFault { place: place_of(&text, at), reason }),
         }
-        Ok((Self { text }, value))
     }
 
-    /// Where the value at `path` stands in the text.
-    pub(crate) fn place(&self, path: &str) -> Option<Place> {
-        let mut scanner = Scanner { text: &self.text, at: 0, wanted: Some(path), found: None };
-        // The text was walked through before, so nothing is wrong with it.
-        let _ = scanner.value("");
-        scanner.found.map(|at| place_of(&self.text, at))
+    /// Where the value at `path`, or the nearest that holds it, stands in the text; `None` for the whole.
+    pub(crate) fn near(&self, path: &ScenePath) -> Option<Place> {
+        path.holders().find_map(|path| self.place(&path))
     }
-}
 
-/// A JSON path one step longer: `objects[2]` and `transform` give `objects[2].transform`.
-pub(crate) fn join(path: &str, key: &str) -> String {
-    let plain = !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '-');
-    match (path.is_empty(), plain) {
-        (true, true) => key.to_owned(),
-        (false, true) => format!("{path}.{key}"),
-        (_, false) => format!("{path}[{key:?}]"),
+    /// Where the value at `path` stands in the text; `None` for the whole.
+    pub(crate) fn place(&self, path: &ScenePath) -> Option<Place> {
+        if path.steps().is_empty() {
+            return None;
+        }
+        let mut here = 0;
+        for step in path.steps() {
+            let mut inside = self.inside(here);
+            here = match (self.values.get(here + 1)?.is_member, step) {
+                (true, PathStep::Key(key)) => inside.find(|&at| self.key(at).as_ref() == Some(key)),
+                (true, PathStep::Index(_)) => None,
+                (false, step) => inside.nth(step.as_index()?),
+            }?;
+        }
+        Some(place_of(&self.text, self.values[here].start as usize))
     }
-}
 
-/// A JSON path one step longer, into an array.
-pub(crate) fn join_index(path: &str, index: usize) -> String {
-    format!("{path}[{index}]")
+    /// The numbers of the values right inside the value `number`.
+    fn inside(&self, number: usize) -> impl Iterator<Item = usize> + '_ {
+        let end = self.values[number].next as usize;
+        let next = move |at: &usize| self.values.get(*at).map(|value| value.next as usize);
+        std::iter::successors(Some(number + 1), next).take_while(move |&at| at < end)
+    }
+
+    /// The key of the value `number`.
+    fn key(&self, number: usize) -> Option<String> {
+        let text = self.text.get(self.values[number].start as usize..)?;
+        serde_json::Deserializer::from_str(text).into_iter().next()?.ok()
+    }
 }
 
 /// The line at `place` with its number, and a caret below the column.
@@ -91,16 +116,6 @@ pub(crate) fn excerpt(text: &str, place: Place) -> String {
     format!("  {number} | {shown}\n  {margin} | {indent}^")
 }
 
-/// The place of `serde_json`'s line and byte column.
-fn character_place(text: &str, line: usize, column: usize) -> Place {
-    let content = text.split('\n').nth(line.saturating_sub(1)).unwrap_or_default();
-    let mut end = column.saturating_sub(1).min(content.len());
-    while !content.is_char_boundary(end) {
-        end -= 1;
-    }
-    Place { line: line.max(1), column: content[..end].chars().count() + 1 }
-}
-
 fn place_of(text: &str, at: usize) -> Place {
     let before = text.get(..at).unwrap_or(text);
     let line_start = before.rfind('\n').map_or(0, |i| i + 1);
@@ -110,278 +125,222 @@ fn place_of(text: &str, at: usize) -> Place {
     }
 }
 
-/// Walks over a text that is known to be JSON.
-struct Scanner<'a> {
+/// Reads a text once, from its start.
+struct Reader<'a> {
     text: &'a str,
     at: usize,
-    /// The path to look for; without one, keys are checked.
-    wanted: Option<&'a str>,
-    /// The byte where the wanted value's key (or the value, in an array) starts.
-    found: Option<usize>,
+    values: Vec<ValueSpan>,
+    /// The place of the value that is read.
+    path: Vec<PathStep>,
+    levels: usize,
 }
 
-/// A key that may not be there: its byte, and why.
+/// What cannot be there: its byte, and why.
 struct Wrong {
     at: usize,
     reason: String,
 }
 
-impl Scanner<'_> {
+/// What should stand where a value does.
+const A_VALUE: &str =
+    "a value should stand here: a string in quotes, a number, true, false, null, [ or {";
+
+impl Reader<'_> {
+    /// The next byte that is no blank; 0 at the end.
     fn peek(&mut self) -> u8 {
         let bytes = self.text.as_bytes();
-        while bytes.get(self.at).is_some_and(u8::is_ascii_whitespace) {
+        while let Some(b' ' | b'\n' | b'\t' | b'\r') = bytes.get(self.at) {
             self.at += 1;
         }
         bytes.get(self.at).copied().unwrap_or(b'\0')
     }
 
-    fn value(&mut self, path: &str) -> Result<(), Wrong> {
-        match self.peek() {
-            b'{' => self.object(path),
-            b'[' => self.array(path),
-            b'"' => {
-                self.string();
-                Ok(())
-            }
-            _ => {
-                let rest = &self.text[self.at..];
-                let end = rest.find([',', ']', '}']).unwrap_or(rest.len());
-                self.at += end;
-                Ok(())
-            }
+    /// The error at the next byte, which should be another; `inside` what the text ends where it has ended.
+    fn wrong<T>(&self, reason: &str, inside: &str) -> Result<T, Wrong> {
+        let reason = match self.at < self.text.len() {
+            true => reason.to_owned(),
+            false => format!("the text ends inside {inside} (EOF)"),
+        };
+        Err(Wrong { at: self.at, reason })
+    }
+
+    fn document(&mut self) -> Result<Value, Wrong> {
+        self.peek();
+        let value = self.value(self.at, false)?;
+        self.peek();
+        match self.at < self.text.len() {
+            true => self.wrong("the document has ended, but text goes on", ""),
+            false => Ok(value),
         }
     }
 
-    fn object(&mut self, path: &str) -> Result<(), Wrong> {
+    /// The value at the next byte, whose key stands at `start` where it `is_member` of an object.
+    fn value(&mut self, start: usize, is_member: bool) -> Result<Value, Wrong> {
+        let number = self.values.len();
+        let place = |byte: usize| u32::try_from(byte).unwrap_or(u32::MAX);
+        self.values.push(ValueSpan { start: place(start), next: 0, is_member });
+        let value = match self.peek() {
+            b'{' => self.nested(Self::object).map(Value::Object),
+            b'[' => self.nested(Self::array).map(Value::Array),
+            b'"' => self.string().map(Value::String),
+            b'-' | b'0'..=b'9' => self.number(),
+            b't' => self.word("true", Value::Bool(true)),
+            b'f' => self.word("false", Value::Bool(false)),
+            b'n' => self.word("null", Value::Null),
+            _ => self.wrong(A_VALUE, "a value"),
+        }?;
+        self.values[number].next = place(self.values.len());
+        Ok(value)
+    }
+
+    fn nested<T>(&mut self, read: impl FnOnce(&mut Self) -> Result<T, Wrong>) -> Result<T, Wrong> {
+        if self.levels == MOST_LEVELS {
+            let reason = format!("nested too deeply (recursion limit: {})", MOST_LEVELS + 1);
+            return Err(Wrong { at: self.at, reason });
+        }
+        self.levels += 1;
         self.at += 1;
-        let mut keys = HashSet::new();
-        while self.peek() != b'}' && self.at < self.text.len() {
-            if self.peek() == b',' {
-                self.at += 1;
-                continue;
+        let value = read(self)?;
+        self.levels -= 1;
+        Ok(value)
+    }
+
+    fn object(&mut self) -> Result<Map<String, Value>, Wrong> {
+        let mut members = Map::new();
+        if self.peek() == b'}' {
+            self.at += 1;
+            return Ok(members);
+        }
+        loop {
+            match self.peek() {
+                b'"' => {}
+                b'}' => return self.wrong("a comma with nothing behind it", "an object"),
+                _ => return self.wrong("a key in double quotes should stand here", "an object"),
             }
             let start = self.at;
-            let key = self.string();
-            let member = self.step(start, || join(path, &key));
-            // Keys that stand twice, or are too long to be shown.
-            if self.wanted.is_none() {
-                let wrong = |reason| Wrong { at: start, reason };
-                if key.len() > LONGEST_KEY {
-                    let long = key.len();
-                    return Err(wrong(format!("a key of {long} bytes; {LONGEST_KEY} is the most")));
-                }
-                if keys.contains(&key) {
-                    let member = join(path, &key);
-                    let reason = format!(
-                        "the key {member} stands here a second time\nhint: remove one of them"
-                    );
-                    return Err(wrong(reason));
-                }
-                keys.insert(key);
+            let key = self.string()?;
+            let wrong = |reason| Err(Wrong { at: start, reason });
+            if key.len() > LONGEST_KEY {
+                let long = key.len();
+                return wrong(format!("a key of {long} bytes; {LONGEST_KEY} is the most"));
             }
-            if self.peek() == b':' {
-                self.at += 1;
+            if self.peek() != b':' {
+                return self.wrong("expected `:`", "an object");
             }
-            self.value(&member)?;
+            self.at += 1;
+            self.path.push(PathStep::Key(key.clone()));
+            if members.contains_key(&key) {
+                let key = self.path.drain(..).collect::<ScenePath>();
+                return wrong(format!(
+                    "the key {key} stands here a second time\nhint: remove one of them"
+                ));
+            }
+            self.peek();
+            let value = self.value(start, true)?;
+            self.path.pop();
+            members.insert(key, value);
+            match self.peek() {
+                b',' => self.at += 1,
+                b'}' => break,
+                _ => return self.wrong("expected `,` or `}`", "an object"),
+            }
         }
         self.at += 1;
-        Ok(())
+        Ok(members)
     }
 
-    fn array(&mut self, path: &str) -> Result<(), Wrong> {
-        self.at += 1;
-        let mut index = 0;
-        while self.peek() != b']' && self.at < self.text.len() {
-            if self.peek() == b',' {
-                self.at += 1;
-                continue;
+    fn array(&mut self) -> Result<Vec<Value>, Wrong> {
+        let mut elements = Vec::new();
+        if self.peek() == b']' {
+            self.at += 1;
+            return Ok(elements);
+        }
+        loop {
+            if self.peek() == b']' {
+                return self.wrong("a comma with nothing behind it", "an array");
             }
-            let element = self.step(self.at, || join_index(path, index));
-            self.value(&element)?;
-            index += 1;
+            self.path.push(PathStep::Index(elements.len()));
+            elements.push(self.value(self.at, false)?);
+            self.path.pop();
+            match self.peek() {
+                b',' => self.at += 1,
+                b']' => break,
+                _ => return self.wrong("expected `,` or `]`", "an array"),
+            }
         }
         self.at += 1;
-        Ok(())
+        Ok(elements)
     }
 
-    /// The path of the value that starts at byte `at`.
-    fn step(&mut self, at: usize, path: impl FnOnce() -> String) -> String {
-        let path = path();
-        if self.wanted == Some(&*path) {
-            self.found.get_or_insert(at);
-        }
-        path
-    }
-
-    /// Passes over a string and gives what it says.
-    fn string(&mut self) -> String {
+    fn string(&mut self) -> Result<String, Wrong> {
         let start = self.at;
-        self.at += 1;
         let bytes = self.text.as_bytes();
-        while let Some(&byte) = bytes.get(self.at) {
-            self.at += if byte == b'\\' { 2 } else { 1 };
-            if byte == b'"' {
-                break;
+        let mut end = start + 1;
+        let mut is_plain = true;
+        // To the quote that ends it.
+        loop {
+            match bytes.get(end) {
+                Some(b'"') => break,
+                Some(b'\\') => {
+                    is_plain = false;
+                    end += 2;
+                }
+                Some(0..=0x1f) => {
+                    let reason = "a line break or another control character inside a string";
+                    return Err(Wrong { at: end, reason: reason.to_owned() });
+                }
+                Some(_) => end += 1,
+                None => {
+                    self.at = bytes.len();
+                    return self.wrong("", "a string");
+                }
             }
         }
-        let raw = self.text.get(start..self.at).unwrap_or_default();
-        serde_json::from_str(raw).unwrap_or_else(|_| raw.to_owned())
-    }
-}
-
-/// The most steps of a path: half as many as the levels of a JSON text.
-const MOST_STEPS: usize = 64;
-
-/// Why a setting cannot be applied.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum OverrideError {
-    /// The path cannot be read.
-    #[error(
-        "`{path}` is no path\nhint: write keys with dots between and indices in brackets, such as \
-             objects[0].transform.scale"
-    )]
-    Path {
-        /// The path as given.
-        path: String,
-    },
-    /// More steps than a scene has levels.
-    #[error("the path has {steps} steps; the format needs no more than {MOST_STEPS}")]
-    TooDeep {
-        /// Its steps.
-        steps: usize,
-    },
-    /// An index past the end.
-    #[error("{array} has {len} entries, so there is no {array}[{index}]")]
-    Index {
-        /// The array's path.
-        array: String,
-        /// Its length.
-        len: usize,
-        /// The index asked for.
-        index: String,
-    },
-    /// A number that 64 bits do not hold.
-    #[error("{text} is beyond the numbers that a computer holds (1.8e308)")]
-    TooLarge {
-        /// The number as given.
-        text: String,
-    },
-    /// JSON that no scene file may hold.
-    #[error("{reason}")]
-    Refused {
-        /// Why.
-        reason: String,
-    },
-    /// A value on the way that has nothing inside.
-    #[error("{parent} is {found}, which has no `{step}`")]
-    Leaf {
-        /// The value's path.
-        parent: String,
-        /// What it is.
-        found: &'static str,
-        /// The step asked for.
-        step: String,
-    },
-}
-
-/// Sets `path` of `root` to `text`: JSON when it is JSON, else a string. Objects on the way that
-/// are missing are made. Returns the path as messages write it.
-///
-/// # Errors
-///
-/// When the path cannot be read or leads nowhere.
-pub(crate) fn apply(root: &mut Value, path: &str, text: &str) -> Result<String, OverrideError> {
-    let steps = split(path).ok_or_else(|| OverrideError::Path { path: path.to_owned() })?;
-    if steps.len() > MOST_STEPS {
-        return Err(OverrideError::TooDeep { steps: steps.len() });
-    }
-    // From the root along the steps; missing objects are made.
-    let mut here = root;
-    let mut walked = String::new();
-    for step in &steps {
-        let parent = if walked.is_empty() { "the scene".to_owned() } else { walked.clone() };
-        if here.is_null() {
-            *here = Value::Object(Map::new());
+        self.at = end + 1;
+        if is_plain {
+            return Ok(self.text[start + 1..end].to_owned());
         }
-        here = match here {
-            Value::Object(members) => {
-                walked = join(&walked, step);
-                members.entry(step.clone()).or_insert(Value::Null)
-            }
-            Value::Array(elements) => {
-                let len = elements.len();
-                let index = step.parse::<usize>().ok().filter(|&index| index < len);
-                let Some(index) = index else {
-                    let index = step.clone();
-                    return Err(OverrideError::Index { array: parent, len, index });
-                };
-                walked = join_index(&walked, index);
-                &mut elements[index]
-            }
-            leaf => {
-                let found = kind_of(leaf);
-                return Err(OverrideError::Leaf { parent, found, step: step.clone() });
-            }
-        };
+        serde_json::from_str(&self.text[start..=end]).map_err(|error| {
+            let reason = "a backslash before a character that JSON does not escape".to_owned();
+            // Its column is the last byte that was looked at.
+            Wrong { at: (start + error.column()).saturating_sub(1).min(end), reason }
+        })
     }
-    // JSON where it reads as such, else a string.
-    let is_number = text.trim_start().starts_with(|c: char| c.is_ascii_digit() || c == '-');
-    *here = match serde_json::from_str::<Value>(text) {
-        // As strictly as files are read.
-        Ok(_) => match Document::parse(text.to_owned()) {
-            Ok((_, value)) => value,
-            Err(fault) => return Err(OverrideError::Refused { reason: fault.reason }),
-        },
-        Err(_) if is_number && text.trim().parse().is_ok_and(f64::is_infinite) => {
-            return Err(OverrideError::TooLarge { text: text.trim().to_owned() });
-        }
-        Err(_) => Value::String(text.to_owned()),
-    };
-    Ok(walked)
-}
 
-/// The steps of `a.b[0]["c.d"]`; `None` when it is no path.
-fn split(path: &str) -> Option<Vec<String>> {
-    let mut steps = Vec::new();
-    let mut rest = path;
-    while !rest.is_empty() {
-        if let Some(inside) = rest.strip_prefix('[') {
-            let (step, tail) = if inside.starts_with('"') {
-                let mut strings = serde_json::Deserializer::from_str(inside).into_iter::<String>();
-                let step = strings.next()?.ok()?;
-                (step, &inside[strings.byte_offset()..])
-            } else {
-                let end = inside.find(']')?;
-                inside[..end].parse::<usize>().ok()?;
-                (inside[..end].to_owned(), &inside[end..])
+    fn number(&mut self) -> Result<Value, Wrong> {
+        let start = self.at;
+        let is_part = |c: char| c.is_ascii_digit() || matches!(c, '+' | '-' | '.' | 'e' | 'E');
+        let rest = &self.text[start..];
+        let text = &rest[..rest.find(|c| !is_part(c)).unwrap_or(rest.len())];
+        self.at += text.len();
+        Number::from_str(text).map(Value::Number).map_err(|_| {
+            let reason = match text.parse().is_ok_and(f64::is_infinite) {
+                true => "a number out of range: the largest is about 1.8e308".to_owned(),
+                false => format!("{text} is no number as JSON writes it"),
             };
-            steps.push(step);
-            rest = tail.strip_prefix(']')?;
-        } else {
-            let rest_of_key = if steps.is_empty() { rest } else { rest.strip_prefix('.')? };
-            let end = rest_of_key.find(['.', '[']).unwrap_or(rest_of_key.len());
-            if end == 0 {
-                return None;
-            }
-            steps.push(rest_of_key[..end].to_owned());
-            rest = &rest_of_key[end..];
-        }
+            Wrong { at: start, reason }
+        })
     }
-    (!steps.is_empty()).then_some(steps)
+
+    fn word(&mut self, word: &str, value: Value) -> Result<Value, Wrong> {
+        if !self.text[self.at..].starts_with(word) {
+            let reason = "a word that JSON does not know; strings stand in quotes";
+            return Err(Wrong { at: self.at, reason: reason.to_owned() });
+        }
+        self.at += word.len();
+        Ok(value)
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
-
     use super::*;
 
     #[test]
     fn every_value_knows_its_place() {
         let text = "{\n  \"a\": [1, {\"b\": \"}\\\"\"}],\n  \"é\": 2, \"x y\": {\"c\": null}\n}";
         let (document, _) = Document::parse(text.to_owned()).unwrap();
-        let place = |path| document.place(path).map(|p| (p.line, p.column));
+        let place = |path: &str| document.place(&path.into()).map(|p| (p.line, p.column));
         assert_eq!(place("a"), Some((2, 3)));
         assert_eq!(place("a[0]"), Some((2, 9)));
         assert_eq!(place("a[1].b"), Some((2, 13)));
@@ -430,43 +389,100 @@ mod tests {
         assert!(shown.ends_with('^'));
     }
 
-    fn set(path: &str, text: &str) -> Result<Value, String> {
-        let mut scene = json!({
-            "camera": {"fov": 40, "type": "pinhole"},
-            "objects": [{"file": "a.obj"}, {"file": "b.obj"}],
-            "materials": {"a.b": {"type": "matte"}}
-        });
-        apply(&mut scene, path, text).map_err(|error| error.to_string())?;
-        Ok(scene)
+    /// Whether `text` is read as `serde_json` reads it: the independent reference.
+    fn check_against_serde(text: &str) {
+        match (serde_json::from_str::<Value>(text), Document::parse(text.to_owned())) {
+            (Ok(theirs), Ok((_, ours))) => assert_eq!(ours, theirs, "{text}"),
+            // What JSON leaves open and we do not.
+            (Ok(_), Err(fault)) => {
+                let is_ours = fault.reason.contains("a second time");
+                assert!(is_ours, "{text}: {}", fault.reason);
+            }
+            (Err(_), Err(_)) => {}
+            (Err(theirs), Ok(_)) => panic!("{text}: {theirs}"),
+        }
     }
 
     #[test]
-    fn values_are_json_or_bare_strings() {
-        assert_eq!(set("camera.fov", "30.5").unwrap()["camera"]["fov"], json!(30.5));
-        assert_eq!(set("camera.fov", "50 deg").unwrap()["camera"]["fov"], json!("50 deg"));
-        assert_eq!(set("camera.type", "orthographic").unwrap()["camera"]["type"], "orthographic");
-        assert_eq!(set("layers", "[\"depth\"]").unwrap()["layers"], json!(["depth"]));
+    fn texts_are_read_as_serde_json_reads_them() {
+        let texts = [
+            "-",
+            "-0",
+            "-0.0",
+            "01",
+            "1.",
+            ".5",
+            "1e",
+            "1e+",
+            "1e5",
+            "1E-400",
+            "1e400",
+            "+1",
+            "0x1",
+            "18446744073709551615",
+            "18446744073709551616",
+            "-9223372036854775809",
+            "123456789.125e-3",
+            "nul",
+            "nulll",
+            "true1",
+            "True",
+            "NaN",
+            "\"\\u00e9\\ud83d\\ude00\"",
+            "\"\\ud83d\"",
+            "\"\\x\"",
+            "\"\\u12\"",
+            "\"a\nb\"",
+            "\"a\\\"",
+            "\"\\\\\"",
+            "[1,]",
+            "[,]",
+            "[1 2]",
+            "{,}",
+            "{\"a\":1,}",
+            "{\"a\" 1}",
+            "{a:1}",
+            "{\"a\":}",
+            "[]]",
+            " [\t1\r\n] ",
+            "\u{a0}1",
+            "\u{feff}1",
+            "1\u{0}",
+            "",
+            "{\"a\":{\"b\":[]},\"c\":[{},[[]]]}",
+            "{\"\\u0061\":1,\"a\":2}",
+        ];
+        texts.iter().for_each(|text| check_against_serde(text));
+        for levels in 126..=129 {
+            check_against_serde(&("[".repeat(levels) + &"]".repeat(levels)));
+            check_against_serde(&("{\"a\":".repeat(levels) + "1" + &"}".repeat(levels)));
+        }
     }
 
     #[test]
-    fn paths_reach_arrays_and_make_objects() {
-        assert_eq!(set("objects[1].file", "c.obj").unwrap()["objects"][1]["file"], "c.obj");
-        assert_eq!(set("objects.0.file", "c.obj").unwrap()["objects"][0]["file"], "c.obj");
-        let made = set("camera.sensor.resolution", "[4, 3]").unwrap();
-        assert_eq!(made["camera"]["sensor"], json!({"resolution": [4, 3]}));
-        let dotted = set("materials[\"a.b\"].type", "checker").unwrap();
-        assert_eq!(dotted["materials"]["a.b"]["type"], "checker");
-    }
-
-    #[test]
-    fn paths_that_lead_nowhere_are_refused() {
-        let error = |path: &str| set(path, "1").unwrap_err();
-        assert_eq!(error("objects[2].file"), "objects has 2 entries, so there is no objects[2]");
-        assert!(error("objects.first").contains("no objects[first]"));
-        assert_eq!(error("camera.fov.x"), "camera.fov is a number, which has no `x`");
-        assert!(error("a.".repeat(60_000).trim_end_matches('.')).contains("60000 steps"));
-        for path in ["", ".", "a..b", "a.", "a[", "a[x]", "a[0]b", "[\"a\"", ".a"] {
-            assert!(error(path).contains("is no path"), "{path}: {}", error(path));
+    fn changed_texts_are_read_as_serde_json_reads_them() {
+        let text = include_str!("../../../../scenes/mirror-lens.json");
+        check_against_serde(text);
+        let alphabet = b"{}[]:,\"\\ \n0123456789-+.eEtrufalsn";
+        let mut state = 1_u64;
+        // Numerical Recipes' generator (Press et al., 2007, section 7.1): the same changes in each run.
+        let mut random = |below: usize| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (state >> 33) as usize % below
+        };
+        for _ in 0..2000 {
+            let mut bytes = text.as_bytes().to_vec();
+            for _ in 0..=random(2) {
+                let (at, byte) = (random(bytes.len()), alphabet[random(alphabet.len())]);
+                match random(3) {
+                    0 => bytes[at] = byte,
+                    1 => bytes.insert(at, byte),
+                    _ => drop(bytes.remove(at)),
+                }
+            }
+            if let Ok(text) = String::from_utf8(bytes) {
+                check_against_serde(&text);
+            }
         }
     }
 }

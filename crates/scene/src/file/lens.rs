@@ -17,13 +17,9 @@ use schemars::generate::SchemaSettings;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::{SceneFile, WrittenPlaces, check, read_document, spec};
+use super::{SCENE_KEYS, SceneFile, ScenePath, WrittenPlaces, check, read_document, spec, values};
 use crate::SceneError;
 use crate::load::CameraFiles;
-use crate::words::plain;
-
-/// The keys of a scene that no lens file has.
-pub(super) const SCENE_KEYS: [&str; 3] = ["etendue", "camera", "objects"];
 
 /// The schemas of lens files and of files of rays, made once.
 static LENS: LazyLock<Value> = LazyLock::new(lens_schema);
@@ -188,12 +184,8 @@ fn read_as<T: DeserializeOwned>(
     written: &WrittenPlaces,
     value: &Value,
 ) -> Result<T, SceneError> {
-    check::check(schema, value).map_err(|problem| written.fault(&problem.path, problem.reason))?;
-    serde_path_to_error::deserialize(value).map_err(|error| {
-        let path = error.path().to_string();
-        let path = if path == "." { "" } else { &path };
-        written.fault(path, plain(error.inner()))
-    })
+    check::check(schema, value).map_err(|problem| written.fault(problem.path, problem.reason))?;
+    values::read(value).map_err(|(path, why)| written.fault(path, why))
 }
 
 fn folder(file: &Path, reach: Reach) -> Result<InputFolder, SceneError> {
@@ -270,18 +262,18 @@ fn not_a_lens(error: SceneError) -> SceneError {
 
 /// The error with the place in the file that it is about.
 fn fault(written: &WrittenPlaces, error: &LensError) -> SceneError {
-    let element = |index: &usize| format!("elements[{index}]");
+    let element = |index: &usize| ScenePath::of("elements").index(*index);
     match error {
         LensError::Empty => written.fault("elements", "has no element; a lens needs at least one"),
         LensError::Element { index, why } | LensError::Stop { index, why } => {
-            written.fault(&element(index), why)
+            written.fault(element(index), why)
         }
         LensError::Glass { index, source } => {
-            written.fault(&format!("{}.glass", element(index)), source.to_string())
+            written.fault(element(index).key("glass"), source.to_string())
         }
         LensError::Stops { first, second } => {
             let why = format!("{} is the stop already; mark one of them", element(first));
-            written.fault(&format!("{}.stop", element(second)), why)
+            written.fault(element(second).key("stop"), why)
         }
         LensError::Key { key, why } => written.fault(key, why),
         LensError::Wavelength(_) => written.fault("wavelength", error.to_string()),

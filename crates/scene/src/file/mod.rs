@@ -8,10 +8,13 @@ mod frames;
 mod imu;
 mod lens;
 mod object;
+mod overrides;
+mod path;
 mod samples;
 mod settings;
 mod spec;
 mod tolerance;
+mod values;
 
 use std::collections::BTreeMap;
 use std::io;
@@ -26,7 +29,7 @@ use serde_json::{Value, json};
 
 pub use accuracy::{AccuracySetting, AccuracySpec, AccuracyUse};
 pub use camera::SensorFile;
-pub use document::{OverrideError, Place};
+pub use document::Place;
 pub use frames::{
     CameraPath, FramesSpec, PixelsSpec, RigCameraSpec, SlotSpec, TrajectoryFormat, texts_of,
 };
@@ -35,6 +38,8 @@ pub use lens::{ReadLens, is_lens, lens_schema, rays_schema, read_lens, read_lens
 pub use object::{
     AnimationSpec, InstancesSpec, ObjectMotionSpec, ObjectSpec, Scale, Source, TransformSpec, Up,
 };
+pub use overrides::OverrideError;
+pub use path::{PathStep, ScenePath};
 pub use samples::{
     LEAST_SAMPLES, RelativeErrorSpec, SETS, SamplesSpec, SensorNoiseSpec, TimeSpec, Until,
 };
@@ -45,17 +50,20 @@ pub use settings::{
 pub use spec::{FormatVersion, SceneSpec, scene_schema};
 pub use tolerance::{DisplacementSpec, ShareSpec, ToleranceSpec};
 
-pub(crate) use document::{join, join_index};
+pub(crate) use document::{Document, JsonFault};
+pub(crate) use values::read as read_value;
 
 use crate::SceneError;
 use crate::memory::{has_room, of_json};
 use crate::sniff::what_it_is;
-use crate::words::plain;
-use camera::CameraFile;
-use document::{Document, excerpt};
+use camera::CameraDocument;
+use document::excerpt;
 
 /// The endings of models that may stand in for a scene file.
 const MODELS: [&str; 4] = ["gltf", "glb", "obj", "ply"];
+
+/// The keys of a scene that no lens file has.
+const SCENE_KEYS: [&str; 3] = ["etendue", "camera", "objects"];
 
 /// What messages call a scene that stands in no file.
 const IN_MEMORY: &str = "scene in memory";
@@ -86,9 +94,9 @@ struct WrittenPlaces {
     /// Opens the camera's file, where the scene names one.
     opener: Opener,
     /// That file, once it is read.
-    camera: Option<CameraFile>,
+    camera: Option<CameraDocument>,
     /// Which paths the command line set, and how it was written there.
-    settings: BTreeMap<String, String>,
+    settings: BTreeMap<ScenePath, String>,
     /// Of which frame they are; none for the command line's.
     frame: Option<usize>,
 }
@@ -194,9 +202,11 @@ impl SceneFile {
         }
         remove_notes(&mut value);
         written.read_curves(&mut value)?;
-        spec::read_resolution(&mut value, "camera.sensor.resolution")
-            .map_err(|why| written.fault("camera.sensor.resolution", why))?;
-        written.read_defects(&mut value, "camera.sensor")?;
+        let sensor = camera::place_in_scene();
+        let resolution = sensor.key("resolution");
+        spec::read_resolution(&mut value, &resolution)
+            .map_err(|why| written.fault(resolution, why))?;
+        written.read_defects(&mut value, &sensor)?;
         let mut file = Self { written, kind, value, spec: SceneSpec::default(), sensor: None };
         (file.spec, file.sensor) = file.check()?;
         let spec = &file.spec;
@@ -218,7 +228,7 @@ impl SceneFile {
                 Some((path.to_owned(), why))
             });
         match fault {
-            Some((path, why)) => Err(file.fault(&path, why)),
+            Some((path, why)) => Err(file.fault(path, why)),
             None => {
                 file.check_times()?;
                 file.check_serial()?;
@@ -264,29 +274,25 @@ impl SceneFile {
     fn check(&self) -> Result<(SceneSpec, Option<Sensor>), SceneError> {
         check::check(&spec::SCENE, &self.value).map_err(|problem| {
             let hint = self.hint(&problem.path).unwrap_or_default();
-            self.fault(&problem.path, problem.reason + &hint)
+            self.fault(problem.path, problem.reason + &hint)
         })?;
         let mut value = self.value.clone();
         let sensor = camera::split(&mut value, &self.written)?;
-        let spec = serde_path_to_error::deserialize(&value).map_err(|error| {
-            let path = error.path().to_string();
-            let path = if path == "." { String::new() } else { path };
-            self.fault(&path, plain(error.inner()))
-        })?;
+        let spec = values::read(&value).map_err(|(path, why)| self.fault(path, why))?;
         Ok((spec, sensor))
     }
 
     /// What was probably meant by the value at `path`, when that belongs elsewhere.
-    fn hint(&self, path: &str) -> Option<String> {
-        let tracer = self.value.get("tracer").filter(|_| path.starts_with("tracer"))?;
+    fn hint(&self, path: &ScenePath) -> Option<String> {
+        let tracer = self.value.get("tracer").filter(|_| path.root() == Some("tracer"))?;
         let word = tracer.get("type").unwrap_or(tracer).as_str()?;
         LayerSpec::NAMES.contains(&word).then(|| {
             format!("\nhint: `{word}` is a layer, beside the picture or in its place: \"layers\": [\"{word}\"]")
         })
     }
 
-    /// The error that the value at the JSON path `path` is wrong because of `reason`.
-    pub(crate) fn fault(&self, path: &str, why: impl Into<Refusal>) -> SceneError {
+    /// The error that the value at `path` is wrong because of `why`.
+    pub(crate) fn fault(&self, path: impl Into<ScenePath>, why: impl Into<Refusal>) -> SceneError {
         self.written.fault(path, why)
     }
 
@@ -342,10 +348,10 @@ impl WrittenPlaces {
         let folder =
             self.opener.folder(folder).map_err(|why| SceneError::unreadable(folder, &why))?;
         let (file, camera) =
-            CameraFile::read(&folder, written)?.map_err(|why| self.fault("camera", why))?;
+            CameraDocument::read(&folder, written)?.map_err(|why| self.fault("camera", why))?;
         *place = camera;
         // What it says stands there, not where it is named.
-        self.settings.remove("camera");
+        self.settings.remove(&ScenePath::of("camera"));
         self.camera = Some(file);
         Ok(())
     }
@@ -354,9 +360,9 @@ impl WrittenPlaces {
     fn set(&mut self, value: &mut Value, all: &[(String, String)]) -> Result<(), SceneError> {
         for (key, text) in all {
             let setting = format!("{key}={text}");
-            let applied = document::apply(value, key, text)
+            let applied = overrides::apply(value, key, text)
                 .map_err(|why| Refusal::new(why.to_string()).at(format_args!("--set {setting}")))?;
-            let is_camera = applied == "camera";
+            let is_camera = applied == ScenePath::of("camera");
             self.settings.insert(applied, setting);
             if is_camera {
                 self.camera = None;
@@ -366,36 +372,34 @@ impl WrittenPlaces {
         Ok(())
     }
 
-    /// The error that the value at the JSON path `path` is wrong because of `reason`.
-    fn fault(&self, path: &str, why: impl Into<Refusal>) -> SceneError {
-        let place = self.place(path);
-        let file = self.camera.as_ref().zip(CameraFile::own_path(path));
-        // A setting is told as it was written, from the scene's top.
+    /// The error that the value at `path` is wrong because of `why`.
+    fn fault(&self, path: impl Into<ScenePath>, why: impl Into<Refusal>) -> SceneError {
+        let path = path.into();
+        let place = self.place(&path);
+        let file = self.camera.as_ref().zip(CameraDocument::own_path(&path));
+        // A setting is named as it was written, from the scene's top.
         let file = file.filter(|_| !matches!(place, Origin::Setting(_)));
-        let (file, path) = file.map_or((&self.path, path), |(file, own)| (&file.path, own));
-        SceneError::Invalid { file: file.clone(), path: path.to_owned(), place, why: why.into() }
+        let (file, path) = match file {
+            Some((camera, own)) => (camera.path.clone(), own),
+            None => (self.path.clone(), path),
+        };
+        SceneError::Invalid { file, path, place, why: why.into() }
     }
 
     /// Where the value at `path`, or the nearest that holds it, was written.
-    fn place(&self, path: &str) -> Origin {
-        let holders = || std::iter::successors(Some(path), |path| holder(path));
+    fn place(&self, path: &ScenePath) -> Origin {
         // A setting replaces all that the text has below it.
-        let setting = holders().find_map(|path| self.settings.get(path));
-        let camera = self.camera.as_ref().zip(CameraFile::own_path(path));
-        let place = match camera {
-            Some((file, path)) => std::iter::successors(Some(path), |path| holder(path))
-                .chain([""])
-                .find_map(|path| file.document.place(path)),
-            None => holders().find_map(|path| self.document.as_ref()?.place(path)),
-        };
-        match (setting, place) {
-            (Some(setting), _) => Origin::Setting(match self.frame {
+        if let Some(setting) = path.holders().find_map(|path| self.settings.get(&path)) {
+            return Origin::Setting(match self.frame {
                 Some(number) => format!("frames[{number}]: {setting}"),
                 None => format!("--set {setting}"),
-            }),
-            (None, Some(place)) => Origin::Text(place),
-            (None, None) => Origin::Nowhere,
+            });
         }
+        let place = match self.camera.as_ref().zip(CameraDocument::own_path(path)) {
+            Some((camera, own)) => camera.document.near(&own),
+            None => self.document.as_ref().and_then(|document| document.near(path)),
+        };
+        place.map_or(Origin::Nowhere, Origin::Text)
     }
 }
 
@@ -410,11 +414,6 @@ fn layers_of(photodiodes: Photodiodes) -> &'static [LayerSpec] {
             LayerSpec::BottomRightPupil,
         ],
     }
-}
-
-/// The path of the value that holds the one at `path`.
-fn holder(path: &str) -> Option<&str> {
-    path.rfind(['.', '[']).map(|end| &path[..end])
 }
 
 /// Where a value was written.

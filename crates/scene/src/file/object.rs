@@ -12,6 +12,7 @@ use serde::ser::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
+use super::values::read_within;
 use crate::shape::ShapeSpec;
 
 /// One entry of `objects`.
@@ -243,17 +244,14 @@ impl<'de> Deserialize<'de> for ObjectSpec {
             }
         }
         let Common { name, material, materials, up, animation, transform, instances, motion } =
-            serde_json::from_value(Value::Object(common)).map_err(D::Error::custom)?;
+            read_within::<_, D::Error>(&Value::Object(common))?;
         let source = match own.remove("file") {
             Some(Value::String(path)) if own.is_empty() => Source::File(path),
             Some(Value::String(_)) => {
                 return Err(D::Error::custom("a model with a `file` has no keys of a shape"));
             }
             Some(_) => return Err(D::Error::custom("`file` is not a string")),
-            None => {
-                let shape = serde_json::from_value(Value::Object(own));
-                Source::Shape(shape.map_err(D::Error::custom)?)
-            }
+            None => Source::Shape(read_within::<_, D::Error>(&Value::Object(own))?),
         };
         Ok(Self { source, name, material, materials, up, animation, transform, instances, motion })
     }

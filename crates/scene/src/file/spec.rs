@@ -15,9 +15,8 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
-use super::camera::CameraSource;
 use super::{
-    AccuracySpec, FramesSpec, ObjectSpec, PlanSpec, RenderSpec, SlotSpec, ToleranceSpec,
+    AccuracySpec, FramesSpec, ObjectSpec, PlanSpec, RenderSpec, ScenePath, SlotSpec, ToleranceSpec,
     TracerSpec, Up,
 };
 use etendue_camera::CameraSpec;
@@ -184,11 +183,34 @@ impl JsonSchema for FormatVersion {
     }
 }
 
-/// Makes `[640, 480]` of a resolution written `"640x480"` at the dotted path `at`. The error says how
+/// The schema of a scene's `camera`: the object, or the file that holds it, in whose place its values stand
+/// once it is read.
+struct CameraSource;
+
+impl JsonSchema for CameraSource {
+    fn schema_name() -> Cow<'static, str> {
+        "CameraSource".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let camera = generator.subschema_for::<CameraSpec>();
+        json_schema!({
+            "anyOf": [
+                {
+                    "description": "The path of a JSON file that holds the camera, from the scene's folder. The \
+                                    file's own paths start at its own folder.",
+                    "type": "string"
+                },
+                camera
+            ]
+        })
+    }
+}
+
+/// Makes `[640, 480]` of a resolution written `"640x480"` at `at`. The error says how
 /// it is written.
-pub(super) fn read_resolution(value: &mut Value, at: &str) -> Result<(), String> {
-    let pointer = format!("/{}", at.replace('.', "/"));
-    let Some(place) = value.pointer_mut(&pointer) else { return Ok(()) };
+pub(super) fn read_resolution(value: &mut Value, at: &ScenePath) -> Result<(), String> {
+    let Some(place) = at.find(value) else { return Ok(()) };
     let Value::String(text) = &*place else { return Ok(()) };
     let sides: Vec<Option<u32>> =
         text.split(['x', 'X', '×']).map(|side| side.trim().parse().ok()).collect();

@@ -37,7 +37,7 @@ pub struct ShareSpec(
 /// A number, or words.
 #[derive(Deserialize)]
 #[serde(untagged)]
-enum Written {
+enum NumberOrWords {
     Number(f64),
     Words(String),
 }
@@ -89,9 +89,9 @@ fn wrong_share() -> String {
 
 impl<'de> Deserialize<'de> for DisplacementSpec {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let read = match Written::deserialize(deserializer)? {
-            Written::Number(pixels) => Self::new(pixels),
-            Written::Words(text) => Self::from_words(&text),
+        let read = match NumberOrWords::deserialize(deserializer)? {
+            NumberOrWords::Number(pixels) => Self::new(pixels),
+            NumberOrWords::Words(text) => Self::from_words(&text),
         };
         read.map_err(D::Error::custom)
     }
@@ -99,9 +99,9 @@ impl<'de> Deserialize<'de> for DisplacementSpec {
 
 impl<'de> Deserialize<'de> for ShareSpec {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let read = match Written::deserialize(deserializer)? {
-            Written::Number(share) => Self::new(share),
-            Written::Words(text) => Self::from_words(&text),
+        let read = match NumberOrWords::deserialize(deserializer)? {
+            NumberOrWords::Number(share) => Self::new(share),
+            NumberOrWords::Words(text) => Self::from_words(&text),
         };
         read.map_err(D::Error::custom)
     }

@@ -11,7 +11,6 @@
 use std::collections::BTreeMap;
 
 use super::Station;
-use super::trajectory::numbers;
 use super::transforms::{FileCamera, distortion};
 use etendue_camera::{Convention, Maps, PoseSpec};
 
@@ -22,7 +21,7 @@ pub(super) use self::{
 
 /// An image that was reconstructed.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Image {
+pub(super) struct ColmapImage {
     /// Where it stands in its file, as sentences go on: `in line 3`.
     place: String,
     /// World to camera, the real part first.
@@ -40,12 +39,12 @@ pub(super) type Cameras = BTreeMap<u32, FileCamera>;
 /// The images in the order of their names, as COLMAP's own tools have them; without `cameras` they have the
 /// scene's. The error goes on after the name of the file of images.
 pub(super) fn stations(
-    mut images: Vec<Image>,
+    mut images: Vec<ColmapImage>,
     cameras: Option<&Cameras>,
 ) -> Result<Vec<Station>, String> {
     images.sort_by(|a, b| a.name.cmp(&b.name));
-    let station = |image: Image| {
-        let Image { place, quaternion: [w, x, y, z], translation, camera, .. } = image;
+    let station = |image: ColmapImage| {
+        let ColmapImage { place, quaternion: [w, x, y, z], translation, camera, .. } = image;
         let pose = PoseSpec::Quaternion {
             quaternion: [x, y, z, w],
             translation,
@@ -72,7 +71,7 @@ pub(super) fn stations(
 const POINT_BYTES: u64 = 24;
 
 /// The images. The error goes on after the file's name.
-pub(in crate::frames) fn images_in_binary(bytes: &[u8]) -> Result<Vec<Image>, String> {
+pub(in crate::frames) fn images_in_binary(bytes: &[u8]) -> Result<Vec<ColmapImage>, String> {
     let mut rest = ByteCursor { bytes, at: 0 };
     let mut images = Vec::new();
     for _ in 0..rest.long()? {
@@ -84,7 +83,7 @@ pub(in crate::frames) fn images_in_binary(bytes: &[u8]) -> Result<Vec<Image>, St
         let name = rest.text()?;
         let points = rest.long()?;
         rest.skip(points.saturating_mul(POINT_BYTES))?;
-        images.push(Image { place, quaternion, translation, camera, name });
+        images.push(ColmapImage { place, quaternion, translation, camera, name });
     }
     rest.end()?;
     Ok(images)
@@ -98,7 +97,7 @@ pub(in crate::frames) fn cameras_in_binary(bytes: &[u8]) -> Result<Cameras, Stri
         let at = rest.at;
         let wrong = |why: String| format!("has at byte {at} {why}");
         let id = rest.word()?;
-        let model = Model::by_number(i32::from_le_bytes(rest.take()?)).map_err(wrong)?;
+        let model = ColmapModel::by_number(i32::from_le_bytes(rest.take()?)).map_err(wrong)?;
         let mut side = || {
             let side = rest.long()?;
             u32::try_from(side)
@@ -181,7 +180,7 @@ impl ByteCursor<'_> {
 
 /// A camera model.
 #[derive(Debug, Clone, Copy)]
-struct Model {
+struct ColmapModel {
     /// Its number in binary files.
     number: i32,
     /// Its name in text files.
@@ -203,37 +202,52 @@ enum Bend {
     Unknown(usize),
 }
 
-const MODELS: [Model; 12] = [
-    Model { number: 0, name: "SIMPLE_PINHOLE", focals: 1, bend: Bend::Nothing },
-    Model { number: 1, name: "PINHOLE", focals: 2, bend: Bend::Nothing },
-    Model { number: 2, name: "SIMPLE_RADIAL", focals: 1, bend: Bend::BrownConrady(&["k1"]) },
-    Model { number: 3, name: "RADIAL", focals: 1, bend: Bend::BrownConrady(&["k1", "k2"]) },
-    Model {
+const MODELS: [ColmapModel; 12] = [
+    ColmapModel { number: 0, name: "SIMPLE_PINHOLE", focals: 1, bend: Bend::Nothing },
+    ColmapModel { number: 1, name: "PINHOLE", focals: 2, bend: Bend::Nothing },
+    ColmapModel { number: 2, name: "SIMPLE_RADIAL", focals: 1, bend: Bend::BrownConrady(&["k1"]) },
+    ColmapModel { number: 3, name: "RADIAL", focals: 1, bend: Bend::BrownConrady(&["k1", "k2"]) },
+    ColmapModel {
         number: 4,
         name: "OPENCV",
         focals: 2,
         bend: Bend::BrownConrady(&["k1", "k2", "p1", "p2"]),
     },
-    Model {
+    ColmapModel {
         number: 5,
         name: "OPENCV_FISHEYE",
         focals: 2,
         bend: Bend::Fisheye(&["k1", "k2", "k3", "k4"]),
     },
-    Model {
+    ColmapModel {
         number: 6,
         name: "FULL_OPENCV",
         focals: 2,
         bend: Bend::BrownConrady(&["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]),
     },
-    Model { number: 7, name: "FOV", focals: 2, bend: Bend::Unknown(1) },
-    Model { number: 8, name: "SIMPLE_RADIAL_FISHEYE", focals: 1, bend: Bend::Fisheye(&["k1"]) },
-    Model { number: 9, name: "RADIAL_FISHEYE", focals: 1, bend: Bend::Fisheye(&["k1", "k2"]) },
-    Model { number: 10, name: "THIN_PRISM_FISHEYE", focals: 2, bend: Bend::Unknown(8) },
-    Model { number: 11, name: "RAD_TAN_THIN_PRISM_FISHEYE", focals: 2, bend: Bend::Unknown(12) },
+    ColmapModel { number: 7, name: "FOV", focals: 2, bend: Bend::Unknown(1) },
+    ColmapModel {
+        number: 8,
+        name: "SIMPLE_RADIAL_FISHEYE",
+        focals: 1,
+        bend: Bend::Fisheye(&["k1"]),
+    },
+    ColmapModel {
+        number: 9,
+        name: "RADIAL_FISHEYE",
+        focals: 1,
+        bend: Bend::Fisheye(&["k1", "k2"]),
+    },
+    ColmapModel { number: 10, name: "THIN_PRISM_FISHEYE", focals: 2, bend: Bend::Unknown(8) },
+    ColmapModel {
+        number: 11,
+        name: "RAD_TAN_THIN_PRISM_FISHEYE",
+        focals: 2,
+        bend: Bend::Unknown(12),
+    },
 ];
 
-impl Model {
+impl ColmapModel {
     /// The model of this name; the error says which are known.
     fn by_name(name: &str) -> Result<Self, String> {
         let found = MODELS.into_iter().find(|model| model.name == name);
@@ -280,7 +294,7 @@ impl Model {
 
 /// That there is no such camera here, with what there is.
 fn unknown(what: &str) -> String {
-    let is_known = |model: &Model| !matches!(model.bend, Bend::Unknown(_));
+    let is_known = |model: &ColmapModel| !matches!(model.bend, Bend::Unknown(_));
     let known: Vec<&str> = MODELS.iter().filter(|m| is_known(m)).map(|model| model.name).collect();
     format!(
         "a {what} camera\nhint: known: {}. `colmap image_undistorter` makes PINHOLE cameras of the others",
@@ -294,7 +308,7 @@ const UNIT: f64 = 1e-3;
 /// `IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME`, each followed by a line of points
 /// `X, Y, POINT3D_ID, …`, which may be empty and which some tools leave out: a line after an image is of points
 /// when it is empty, or its words come in threes of two numbers and a whole one; else it is the next image.
-pub(in crate::frames) fn images_in_text(text: &str) -> Result<Vec<Image>, String> {
+pub(in crate::frames) fn images_in_text(text: &str) -> Result<Vec<ColmapImage>, String> {
     let mut images = Vec::new();
     let lines = (1..).zip(text.lines()).filter(|(_, line)| !line.trim_start().starts_with('#'));
     let mut is_after_image = false;
@@ -340,7 +354,7 @@ fn may_be_image(words: &[&str]) -> bool {
     })
 }
 
-fn image(words: &[&str], number: usize) -> Result<Image, String> {
+fn image(words: &[&str], number: usize) -> Result<ColmapImage, String> {
     let [id, pose @ .., camera, _] = &words[..words.len().min(10)] else {
         return Err(short(words, number));
     };
@@ -349,7 +363,7 @@ fn image(words: &[&str], number: usize) -> Result<Image, String> {
     }
     whole(id, number)?;
     let [w, x, y, z, a, b, c] = numbers(pose, number)?;
-    Ok(Image {
+    Ok(ColmapImage {
         place: format!("in line {number}"),
         quaternion: [w, x, y, z],
         translation: [a, b, c],
@@ -381,7 +395,8 @@ pub(in crate::frames) fn cameras_in_text(text: &str) -> Result<Cameras, String> 
                 words.len()
             ));
         };
-        let model = Model::by_name(model).map_err(|why| format!("has in line {number} {why}"))?;
+        let model =
+            ColmapModel::by_name(model).map_err(|why| format!("has in line {number} {why}"))?;
         if parameters.len() != model.count() {
             return Err(format!(
                 "has {} parameters in line {number}, where {} has {}",
@@ -408,4 +423,15 @@ pub(in crate::frames) fn cameras_in_text(text: &str) -> Result<Cameras, String> 
 fn whole(word: &str, number: usize) -> Result<u32, String> {
     word.parse()
         .map_err(|_| format!("has \"{word}\" in line {number}, where a whole number is due"))
+}
+
+/// Numbers of a line of text, all finite; 0 beyond its last.
+pub(super) fn numbers<const N: usize>(words: &[&str], line: usize) -> Result<[f64; N], String> {
+    let mut numbers = [0.0; N];
+    for (number, word) in numbers.iter_mut().zip(words) {
+        *number = word.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| {
+            format!("has \"{word}\" in line {line}, where a finite number is due")
+        })?;
+    }
+    Ok(numbers)
 }

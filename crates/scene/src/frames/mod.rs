@@ -14,10 +14,10 @@ use etendue_report::Refusal;
 use serde_json::Value;
 
 use crate::error::not_found;
-use crate::file::{CameraPath, FramesSpec, SceneFile, join, join_index};
+use crate::file::{CameraPath, FramesSpec, SceneFile, ScenePath};
 use crate::import::Note;
 use crate::{Scene, SceneError};
-use trajectory::Trajectory;
+use trajectory::TrajectorySource;
 use transforms::ScenePicture;
 
 /// The most frames of a scene. All are made before the first is shown, of a few kilobytes each.
@@ -34,6 +34,16 @@ pub struct Frame {
     pub settings: Vec<(String, Value)>,
     /// Which camera of a rig it is, where there is one.
     pub rig: Option<RigCamera>,
+}
+
+impl Frame {
+    /// Whether it sets some of the scene's keys `roots`, or what is inside of them.
+    #[must_use]
+    pub fn sets(&self, roots: &[&str]) -> bool {
+        let is_in =
+            |path: &String| ScenePath::of(path).root().is_some_and(|it| roots.contains(&it));
+        self.settings.iter().any(|(path, _)| is_in(path))
+    }
 }
 
 /// A camera of a rig, at a moment of the rig's path.
@@ -138,13 +148,15 @@ impl SceneFile {
                         ));
                     }
                     FramesSpec::Path(path) => {
-                        self.along("frames.path", path, (opener, &mut notes), || Ok(start))?
+                        self.along(&"frames.path".into(), path, (opener, &mut notes), || Ok(start))?
                     }
                 };
                 path::rig_frames(self, cameras, &moments, &pose)
-                    .map_err(|(place, why)| self.fault(&place, why))?
+                    .map_err(|(place, why)| self.fault(place, why))?
             }
-            FramesSpec::Path(path) => self.along("frames", path, (opener, &mut notes), start)?,
+            FramesSpec::Path(path) => {
+                self.along(&"frames".into(), path, (opener, &mut notes), start)?
+            }
         };
         if frames.len() > MOST_FRAMES {
             return Err(self.fault("frames", too_many(frames.len())));
@@ -190,7 +202,7 @@ impl SceneFile {
                 SceneError::Invalid { path, why, .. } => why.at(path),
                 other => Refusal::new(other.to_string()),
             };
-            self.fault(&join_index("frames", frame.number), why)
+            self.fault(ScenePath::of("frames").index(frame.number), why)
         };
         self.without_frames()?.of_frame(frame.number).with(&settings).map_err(in_frame)
     }
@@ -198,12 +210,12 @@ impl SceneFile {
     /// The frames along a path of the camera, which is written at `place`.
     pub(crate) fn along(
         &self,
-        place: &str,
+        place: &ScenePath,
         path: &CameraPath,
         (opener, notes): (&Opener, &mut Vec<Note>),
         start: impl FnOnce() -> Result<Start, SceneError>,
     ) -> Result<Vec<Frame>, SceneError> {
-        let fault = |(key, why): (&str, String)| self.fault(&join(place, key), why);
+        let fault = |(key, why): (&str, String)| self.fault(place.join(key), why);
         let stations = match path {
             CameraPath::Animation { .. } => {
                 return path::animation_frames(self, path).map_err(fault);
@@ -230,7 +242,7 @@ impl SceneFile {
                 let found = folder.find(file).map_err(|error| fault(("file", not_found(error))))?;
                 let maps = maps.unwrap_or(Maps::WorldFromCamera);
                 let convention = convention.unwrap_or(Convention::Opencv);
-                let trajectory = Trajectory {
+                let trajectory = TrajectorySource {
                     folder: &folder,
                     file,
                     format: *format,

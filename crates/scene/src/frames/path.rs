@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::{Frame, MOST_FRAMES, RigCamera, Start, Station, too_many};
 use crate::file::{
-    AnimationSpec, CameraPath, ObjectSpec, RigCameraSpec, SceneFile, Source, join, join_index,
+    AnimationSpec, CameraPath, ObjectSpec, RigCameraSpec, SceneFile, ScenePath, Source,
 };
 use etendue_camera::{CameraSpec, Convention, Maps, Pose, PoseSpec};
 use etendue_geometry::glam::{DMat3, DQuat, DVec3};
@@ -124,7 +124,7 @@ pub(super) fn animation_frames(
             let moment = AnimationSpec { time: Seconds(time), name: name.clone(), plays };
             // Numbers and words always serialise.
             let value = serde_json::to_value(&moment).unwrap_or_default();
-            (join(&join_index("objects", *object), "animation"), value)
+            (ScenePath::of("objects").index(*object).key("animation").to_string(), value)
         };
         Frame {
             number,
@@ -215,22 +215,22 @@ pub(super) fn rig_frames(
     cameras: &[RigCameraSpec],
     moments: &[Frame],
     start: &Pose,
-) -> Result<Vec<Frame>, (String, String)> {
+) -> Result<Vec<Frame>, (ScenePath, String)> {
     let count = cameras.len();
     if count == 0 || count > MOST_CAMERAS {
         let why = format!("{count} cameras; a rig has 1 to {MOST_CAMERAS}");
-        return Err((CAMERAS.to_owned(), why));
+        return Err((CAMERAS.into(), why));
     }
     if count.saturating_mul(moments.len()) > MOST_FRAMES {
-        return Err((CAMERAS.to_owned(), too_many(count.saturating_mul(moments.len()))));
+        return Err((CAMERAS.into(), too_many(count.saturating_mul(moments.len()))));
     }
     let places = (0..).zip(cameras).map(|(i, camera)| {
-        place(camera).map_err(|(key, why)| (join(&join_index(CAMERAS, i), key), why))
+        place(camera).map_err(|(key, why)| (ScenePath::of(CAMERAS).index(i).join(key), why))
     });
     let places = places.collect::<Result<Vec<Pose>, _>>()?;
     let mut frames = Vec::with_capacity(count * moments.len());
     for moment in moments {
-        let in_path = |why| ("frames.path".to_owned(), format!("frame {}: {why}", moment.number));
+        let in_path = |why| ("frames.path".into(), format!("frame {}: {why}", moment.number));
         let rig = pose_at(file, moment, start).map_err(in_path)?;
         for (camera, place) in places.iter().enumerate() {
             let pose = Pose {

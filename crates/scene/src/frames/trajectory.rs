@@ -6,8 +6,9 @@
 
 use std::path::{Path, PathBuf};
 
+use super::Station;
+use super::colmap::{self, numbers};
 use super::transforms::{self, ScenePicture};
-use super::{Station, colmap};
 use crate::error::not_found;
 use crate::file::TrajectoryFormat;
 use crate::import::{Note, NoteKind};
@@ -19,7 +20,7 @@ const LONGEST: u64 = 1 << 30;
 
 /// A file of poses, and how the scene wants it read.
 #[derive(Debug)]
-pub(super) struct Trajectory<'a> {
+pub(super) struct TrajectorySource<'a> {
     /// The folder of the scene.
     pub(super) folder: &'a InputFolder,
     /// The file, as the scene writes it.
@@ -32,7 +33,7 @@ pub(super) struct Trajectory<'a> {
     pub(super) picture: ScenePicture,
 }
 
-impl Trajectory<'_> {
+impl TrajectorySource<'_> {
     /// The poses, and what a user should know of the file. The error goes on after the file's name.
     pub(super) fn read(&self, path: &Path) -> Result<(Vec<Station>, Vec<Note>), String> {
         let mut notes = Vec::new();
@@ -127,17 +128,6 @@ fn read_npy(bytes: &[u8], axes: (Maps, Convention)) -> Result<Vec<Station>, Stri
     })?;
     let rows = array.shape[1];
     Ok(array.numbers.chunks_exact(4 * rows).map(|pose| Station::of_rows(pose, axes)).collect())
-}
-
-/// Numbers of a line of text, all finite; 0 beyond its last.
-pub(super) fn numbers<const N: usize>(words: &[&str], line: usize) -> Result<[f64; N], String> {
-    let mut numbers = [0.0; N];
-    for (number, word) in numbers.iter_mut().zip(words) {
-        *number = word.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| {
-            format!("has \"{word}\" in line {line}, where a finite number is due")
-        })?;
-    }
-    Ok(numbers)
 }
 
 /// Words of a line of KITTI's.

@@ -16,7 +16,7 @@ const CHUNK: usize = 1 << 14;
 
 /// A mesh as a file has it, before anything is known of it.
 #[derive(Debug)]
-pub(super) struct Candidate {
+pub(super) struct MeshCandidate {
     /// What the file calls it.
     pub name: String,
     /// Where it is in the file, for messages.
@@ -44,7 +44,7 @@ pub(super) struct Admitted {
 /// When a triangle names a vertex that does not exist; under [`Strictness::Strict`] also when a
 /// value is not finite.
 pub(super) fn admit(
-    candidate: Candidate,
+    candidate: MeshCandidate,
     file: &Path,
     options: &Options,
 ) -> Result<Admitted, Refusal> {

@@ -191,7 +191,7 @@ impl Deformer {
         {
             return Ok(Arc::clone(steps));
         }
-        let mut way = Way { deformer: self, tolerance, take, steps: Vec::new() };
+        let mut way = DeformationSteps { deformer: self, tolerance, take, steps: Vec::new() };
         let marks = self.marks(span);
         way.add(marks[0], self.shape(marks[0])).map_err(NoSteps::Room)?;
         for pair in marks.windows(2) {
@@ -237,14 +237,14 @@ fn add(values: &mut [DVec3], weight: f64, moves: Option<&Vertices<3>>) {
 }
 
 /// Steps on their way through an exposure.
-struct Way<'a, E> {
+struct DeformationSteps<'a, E> {
     deformer: &'a Deformer,
     tolerance: Tolerance<'a>,
     take: &'a mut dyn FnMut(u64) -> Result<(), E>,
     steps: Vec<(f64, Shape)>,
 }
 
-impl<E> Way<'_, E> {
+impl<E> DeformationSteps<'_, E> {
     fn add(&mut self, time: f64, shape: Shape) -> Result<(), E> {
         (self.take)(self.deformer.step_bytes())?;
         self.steps.push((time, shape));

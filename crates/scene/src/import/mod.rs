@@ -231,12 +231,12 @@ pub struct ImportedCamera {
     /// hold the scale of the nodes above, which glTF tells readers to leave out of the view.
     pub model_from_camera: Transform,
     /// What it sees.
-    pub projection: Projection,
+    pub projection: CameraProjection,
 }
 
 /// What a glTF camera sees. Clip planes are not kept: rays have none.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Projection {
+pub enum CameraProjection {
     /// A pinhole.
     Perspective {
         /// Full vertical field of view (rad).

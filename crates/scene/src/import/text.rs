@@ -9,13 +9,13 @@ use super::error::wrong_text;
 
 /// A place in a text that is wrong, and why.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Fault {
+pub(super) struct TextFault {
     /// Byte of the text.
     pub at: usize,
     pub reason: String,
 }
 
-impl Fault {
+impl TextFault {
     pub(super) fn new(at: usize, reason: impl Into<String>) -> Self {
         Self { at, reason: reason.into() }
     }

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use crate::cache::{self, KeptCamera};
 use crate::error::not_found;
-use crate::file::{SamplesSpec, SceneFile};
-use crate::import::{ImportedCamera, Note, NoteKind, Projection, Strictness};
+use crate::file::{SamplesSpec, SceneFile, ScenePath};
+use crate::import::{CameraProjection, ImportedCamera, Note, NoteKind, Strictness};
 use crate::scene::{LoadOptions, WorldVertices};
 use crate::{Cache, SceneError, facing};
 use etendue_camera::{Camera, CameraError, CameraSpec, Pose};
@@ -28,8 +28,7 @@ impl SceneFile {
     }
 
     pub(crate) fn camera_fault(&self, error: &CameraError) -> SceneError {
-        let dot = if error.at.is_empty() { "" } else { "." };
-        self.fault(&format!("camera{dot}{}", error.at), error.why.as_str())
+        self.fault(ScenePath::of("camera").join(&error.at), error.why.as_str())
     }
 
     /// The camera as far as it is known before the models are.
@@ -316,12 +315,12 @@ impl SceneCamera {
         let world = world_from_model.then_inner(&camera.model_from_camera);
         let pose = Pose::from_node(world.linear, world.translation + world.translation_low)?;
         let spec = match camera.projection {
-            Projection::Perspective { yfov, aspect_ratio } => {
+            CameraProjection::Perspective { yfov, aspect_ratio } => {
                 let aspect = aspect_ratio.unwrap_or(1.0);
                 let usable = yfov > 0.0 && yfov < std::f64::consts::PI && is_size(aspect);
                 usable.then(|| CameraSpec::perspective(pose, yfov, aspect))
             }
-            Projection::Orthographic { xmag, ymag } => {
+            CameraProjection::Orthographic { xmag, ymag } => {
                 let (xmag, ymag) = (xmag.abs(), ymag.abs());
                 // Nodes above may scale the view's extent along up.
                 let height = 2.0 * ymag * world.linear.y_axis.length();

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use crate::doctor::memory;
 use crate::error::not_found;
-use crate::file::{AnimationSpec, FileKind, ObjectSpec, SceneFile, Source, Up, join, join_index};
+use crate::file::{AnimationSpec, FileKind, ObjectSpec, SceneFile, ScenePath, Source, Up};
 use crate::import::{Import, Note, NoteKind, Play};
 use crate::memory::Budget;
 use crate::parts::{Instances, Object, Parts};
@@ -37,12 +37,12 @@ pub(super) enum OriginKind {
 
 impl OriginKind {
     /// As the cache knows it.
-    pub(super) fn kept(&self) -> Option<cache::Origin> {
+    pub(super) fn kept(&self) -> Option<cache::ModelOrigin> {
         match self {
-            Self::File(path, _) => Some(cache::Origin::File(path.clone())),
+            Self::File(path, _) => Some(cache::ModelOrigin::File(path.clone())),
             // Shapes are made of numbers and words, which always serialise.
             Self::Shape(shape) => {
-                Some(cache::Origin::Shape(serde_json::to_string(shape).unwrap_or_default()))
+                Some(cache::ModelOrigin::Shape(serde_json::to_string(shape).unwrap_or_default()))
             }
             Self::Given(_) => None,
         }
@@ -68,7 +68,7 @@ impl SceneFile {
         let mut files: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
         let mut objects = Vec::new();
         for (index, spec) in self.spec.objects.iter().enumerate() {
-            let at = join_index("objects", index);
+            let at = ScenePath::of("objects").index(index);
             let origin = match &spec.source {
                 Source::File(written) if own.kept.given(written).is_some() => {
                     let kind = OriginKind::Given(written.clone());
@@ -88,7 +88,7 @@ impl SceneFile {
                 }
                 Source::Shape(_) if spec.animation.is_some() => {
                     let why = "a shape has no animation; models of glTF files have";
-                    return Err(self.fault(&join(&at, "animation"), why));
+                    return Err(self.fault(at.key("animation"), why));
                 }
                 Source::Shape(shape) => {
                     let kind = OriginKind::Shape(shape.clone());
@@ -104,17 +104,21 @@ impl SceneFile {
     }
 
     /// The moment of a model's animation that is shown.
-    pub(super) fn play(&self, spec: &ObjectSpec, at: &str) -> Result<Option<Play>, SceneError> {
+    pub(super) fn play(
+        &self,
+        spec: &ObjectSpec,
+        at: &ScenePath,
+    ) -> Result<Option<Play>, SceneError> {
         let Some(AnimationSpec { time, name, plays }) = &spec.animation else { return Ok(None) };
         if !time.0.is_finite() {
-            return Err(self.fault(&join(at, "animation.time"), "is not finite"));
+            return Err(self.fault(at.join("animation.time"), "is not finite"));
         }
         match &spec.source {
             Source::File(path) if !names_no_up(path) => {
                 Ok(Some(Play { which: name.clone(), time: time.0, plays: *plays }))
             }
             Source::File(_) | Source::Shape(_) => {
-                Err(self.fault(&join(at, "animation"), "only glTF files have animations"))
+                Err(self.fault(at.key("animation"), "only glTF files have animations"))
             }
         }
     }
@@ -123,36 +127,36 @@ impl SceneFile {
     pub(super) fn object(
         &self,
         spec: &ObjectSpec,
-        at: &str,
+        at: &ScenePath,
         origin: usize,
         folder: &InputFolder,
         own: &mut OwnParts<'_>,
     ) -> Result<Object, SceneError> {
-        let world_from_object = spec.transform.build().map_err(|(key, why)| {
-            let at = join(at, "transform");
-            self.fault(&if key.is_empty() { at } else { join(&at, key) }, why)
-        })?;
+        let world_from_object = spec
+            .transform
+            .build()
+            .map_err(|(key, why)| self.fault(at.key("transform").join(key), why))?;
         let motion = spec.motion.as_ref().map(|motion| {
             let built = motion.build(&spec.transform, self.spec.render.time());
-            built.map_err(|(key, why)| self.fault(&format!("{at}.motion.{key}"), why))
+            built.map_err(|(key, why)| self.fault(at.key("motion").join(key), why))
         });
         let motion = motion.transpose()?;
         // Where it stands at the frame's time.
         let world_from_object = motion.as_ref().map_or(world_from_object, |motion| motion.at(0.0));
         // The scene's own materials, for all of the object or by the model's names.
-        let named = |name: &str, at: &str| {
+        let named = |name: &str, at: ScenePath| {
             let position = own.materials.iter().position(|material| material.name == name);
             let position = position.and_then(|position| u32::try_from(position).ok());
             position.ok_or_else(|| self.fault(at, unknown_material(name, own.materials)))
         };
         let material = match &spec.material {
-            Some(name) => Some(named(name, &join(at, "material"))?),
+            Some(name) => Some(named(name, at.key("material"))?),
             None => None,
         };
         let mut overrides = BTreeMap::new();
         for (theirs, ours) in &spec.materials {
-            let at = join(&join(at, "materials"), theirs);
-            overrides.insert(theirs.clone(), named(ours, &at)?);
+            let place = at.key("materials").key(theirs);
+            overrides.insert(theirs.clone(), named(ours, place)?);
         }
         // Each copy is turned upright, placed among the copies, and then in the world.
         let budget = own.budget;
@@ -160,9 +164,9 @@ impl SceneFile {
             let taken = budget.map_or(Ok(()), |budget| budget.take(memory::copies(count)));
             taken.map_err(|error| format!("{count} copies: {error}"))
         };
-        let at = join(at, "instances");
+        let at = at.key("instances");
         let instances = Instances::resolve(spec.instances.as_ref(), &at, folder, &fits)
-            .map_err(|(at, why)| self.fault(&at, why))?;
+            .map_err(|(at, why)| self.fault(at, why))?;
         own.files.extend(instances.file);
         let turn = self.up_of(spec).turn();
         let copies = instances.transforms.iter();
@@ -215,7 +219,7 @@ impl SceneFile {
         match object.overrides.keys().find(|name| !known.contains(&name.as_str())) {
             None => Ok(()),
             Some(name) => {
-                let at = join(&join(&join_index("objects", index), "materials"), name);
+                let at = ScenePath::of("objects").index(index).key("materials").key(name);
                 let known = known.into_iter().filter(|name| !name.is_empty());
                 let why = format!("the model has no material \"{name}\"{}", suggest(name, known));
                 Err(self.fault(&at, why))
@@ -237,7 +241,7 @@ impl SceneFile {
                 path.canonicalize().map_err(|source| SceneError::unreadable(&path, &source))?;
             return Ok(FoundFile { path, real });
         }
-        let at = join(&join_index("objects", index), "file");
+        let at = ScenePath::of("objects").index(index).key("file");
         folder.find(written).map_err(|error| self.fault(&at, not_found(error)))
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::SceneError;
-use crate::file::{ImuSpec, ObjectMotionSpec, ObjectSpec, SceneFile, join_index};
+use crate::file::{ImuSpec, ObjectMotionSpec, ObjectSpec, SceneFile, ScenePath};
 use crate::frames::Frame;
 use crate::import::{Deformer, Note, NoteKind};
 use etendue_camera::{Camera, CameraMotionSpec, CameraSpec, ShutterKind};
@@ -216,7 +216,9 @@ pub(crate) fn held(
 /// A note for each light that is dark as long as the shutter is open.
 pub(crate) fn dark_lights(camera: &Camera, lights: &[Light], materials: &[Material]) -> Vec<Note> {
     let [open, close] = camera.exposure_span();
-    let lamps = (0..).zip(lights).map(|(i, light)| (join_index("lights", i), &light.modulation));
+    let lamps = (0..)
+        .zip(lights)
+        .map(|(i, light)| (ScenePath::of("lights").index(i).to_string(), &light.modulation));
     let surfaces = materials.iter().filter_map(|material| {
         Some((material.name.clone(), &material.emission.as_ref()?.modulation))
     });

@@ -61,4 +61,11 @@ fn what_the_scene_says_elsewhere_is_contradicted_by_name() {
     assert!(error.contains("accuracy.band_error") && error.contains("`bands`"), "{error}");
     // A multispectral sensor's bands are its channels, which are divided further.
     assert!(read(sensor("multispectral")).is_ok());
+    let shared =
+        json!({ "accuracy": { "band_place_error": 0.1 }, "plan": { "shared_paths": false } });
+    let error = read(shared).unwrap_err();
+    assert!(
+        error.contains("accuracy.band_place_error") && error.contains("`plan.shared_paths`"),
+        "{error}"
+    );
 }

@@ -2,11 +2,16 @@
 
 use serde_json::{Map, Value};
 
-use super::{Checker, Outcome, Problem, join, nearest, problem, show, suggest, wrong_kind};
+use crate::file::PathStep;
+use crate::words::known_words;
+
+use super::{
+    Checker, Outcome, Problem, ScenePath, keys_of, nearest, problem, show, suggest, wrong_kind,
+};
 
 impl<'a> Checker<'a> {
     /// Goes on in the branch that was meant: by tag, by the kind of value, or by the keys.
-    pub(super) fn choose(&self, branches: &'a [Value], value: &Value, path: &str) -> Outcome {
+    pub(super) fn choose(&self, branches: &'a [Value], value: &Value, path: &ScenePath) -> Outcome {
         let branches: Vec<&Value> = branches.iter().map(|branch| self.resolve(branch)).collect();
         let fitting: Vec<&Value> =
             branches.iter().copied().filter(|branch| self.may_be(branch, value)).collect();
@@ -41,7 +46,7 @@ impl<'a> Checker<'a> {
         &self,
         branches: &[&'a Value],
         members: &Map<String, Value>,
-        path: &str,
+        path: &ScenePath,
     ) -> Outcome {
         let tag_of = |branch: &'a Value| {
             let properties = branch.get("properties").and_then(Value::as_object)?;
@@ -63,7 +68,7 @@ impl<'a> Checker<'a> {
                     }
                     None => self
                         .object(branch, members, path)
-                        .map_err(|found| at_home_elsewhere(found, branches, members, path, word)),
+                        .map_err(|found| at_home_elsewhere(found, path, branch, branches, word)),
                 };
             }
         }
@@ -72,7 +77,7 @@ impl<'a> Checker<'a> {
             let words = tags.iter().flatten().filter(|(k, _)| k == key).map(|(_, word)| *word);
             let given = &members[*key];
             let known = suggest(given.as_str().unwrap_or_default(), words);
-            return problem(&join(path, key), format!("unknown {key} {}{known}", show(given)));
+            return problem(&path.key(key), format!("unknown {key} {}{known}", show(given)));
         }
         self.choose_by_keys(branches, &tags, members, path)
     }
@@ -84,7 +89,7 @@ impl<'a> Checker<'a> {
         branches: &[&'a Value],
         tags: &[Option<(&str, &str)>],
         members: &Map<String, Value>,
-        path: &str,
+        path: &ScenePath,
     ) -> Outcome {
         let score = |branch: &Value| {
             let has = |key: &String| branch.get("properties").and_then(|p| p.get(key)).is_some();
@@ -116,7 +121,7 @@ impl<'a> Checker<'a> {
         branches: &[&'a Value],
         tag: &'a str,
         members: &Map<String, Value>,
-        path: &str,
+        path: &ScenePath,
     ) -> Outcome {
         let mut ways = Vec::new();
         let mut words = Vec::new();
@@ -141,13 +146,13 @@ impl<'a> Checker<'a> {
                     None => "give".to_owned(),
                 };
                 let reason = format!("unknown key\nhint: {near} the object {ways}");
-                problem(&join(path, key), reason)
+                problem(&path.key(key), reason)
             }
             None => problem(path, format!("says not what it is\nhint: give it {ways}")),
         }
     }
 
-    pub(super) fn no_such_word(words: &[&Value], value: &Value, path: &str) -> Outcome {
+    pub(super) fn no_such_word(words: &[&Value], value: &Value, path: &ScenePath) -> Outcome {
         if words.contains(&value) {
             return Ok(());
         }
@@ -157,31 +162,21 @@ impl<'a> Checker<'a> {
     }
 }
 
-/// The keys that a branch knows.
-fn keys_of(branch: &Value) -> impl Iterator<Item = &str> {
-    let keys = branch.get("properties").and_then(Value::as_object);
-    keys.into_iter().flatten().map(|(key, _)| key.as_str())
-}
-
 /// A key that a branch refuses and another one knows does not go with the word that chose the branch.
 fn at_home_elsewhere(
     found: Problem,
+    path: &ScenePath,
+    branch: &Value,
     branches: &[&Value],
-    members: &Map<String, Value>,
-    path: &str,
     word: &str,
 ) -> Problem {
-    let Some(known) = found.reason.strip_prefix("unknown key") else { return found };
-    let elsewhere = |key: &&String| {
-        found.path == join(path, key)
-            && branches.iter().any(|b| keys_of(b).any(|k| k == key.as_str()))
-    };
-    match members.keys().find(elsewhere) {
-        Some(key) => {
-            let known = known.rsplit_once("known: ").map_or("", |(_, known)| known);
-            let reason = format!("`{key}` does not go with `{word}`\nhint: known: {known}");
-            Problem { path: found.path, reason }
+    let inside = found.path.inside(path).filter(|_| found.is_unknown_key);
+    match inside.as_ref().map(ScenePath::steps) {
+        Some([PathStep::Key(key)]) if branches.iter().any(|b| keys_of(b).any(|k| k == key)) => {
+            let known = known_words(keys_of(branch));
+            let reason = format!("`{key}` does not go with `{word}`\nhint: {known}");
+            Problem { reason, ..found }
         }
-        None => found,
+        _ => found,
     }
 }

@@ -9,8 +9,8 @@ use json::accessor::{ComponentType, Type};
 use json::validation::Checked;
 use rayon::prelude::*;
 
-use super::Reader;
-use super::buffers::{Bytes, View, size};
+use super::GltfReader;
+use super::buffers::{BufferView, Bytes, size};
 use crate::import::Refusal;
 
 /// Floats that Embree reads from the start of the last vertex on.
@@ -18,7 +18,7 @@ const LAST_READ: usize = 4;
 
 /// An accessor whose sizes have been checked.
 pub(super) struct Accessor<'a> {
-    view: Option<View<'a>>,
+    view: Option<BufferView<'a>>,
     /// Where in the buffer the first element is (bytes).
     start: usize,
     /// From one element to the next (bytes).
@@ -36,7 +36,7 @@ struct Sparse<'a> {
     values: Box<Accessor<'a>>,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> GltfReader<'a> {
     /// Accessor `index`, which `place` names.
     pub(super) fn accessor(&'a self, index: usize, place: &str) -> Result<Accessor<'a>, Refusal> {
         let place = format!("{place} (accessor {index})");
@@ -186,7 +186,7 @@ impl<'a> Accessor<'a> {
     ) -> Self {
         let len = bytes.as_slice().len();
         Self {
-            view: Some(View { bytes, start: 0, len, stride: None }),
+            view: Some(BufferView { bytes, start: 0, len, stride: None }),
             start: 0,
             stride: components * component.size(),
             count,

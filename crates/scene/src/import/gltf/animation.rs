@@ -9,8 +9,9 @@ use etendue_geometry::{self as geometry, Between, Joint};
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
-use super::document::Node;
-use super::{Reader, damaged};
+use super::document::GltfNode;
+use super::{GltfReader, damaged};
+use crate::file::{ScenePath, read_value};
 use crate::import::error::{Note, NoteKind};
 use crate::import::{Import, Play, Refusal};
 
@@ -18,26 +19,26 @@ use crate::import::{Import, Play, Refusal};
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 struct Animation {
-    channels: Vec<Channel>,
-    samplers: Vec<Sampler>,
+    channels: Vec<KeyChannel>,
+    samplers: Vec<KeySampler>,
 }
 
 /// Which property of which node a sampler moves.
 #[derive(Debug, Deserialize)]
-struct Channel {
+struct KeyChannel {
     sampler: usize,
-    target: Target,
+    target: KeyTarget,
 }
 
 #[derive(Debug, Deserialize)]
-struct Target {
+struct KeyTarget {
     node: Option<usize>,
     path: String,
     #[serde(default)]
     extensions: Map<String, Value>,
 }
 
-impl Target {
+impl KeyTarget {
     /// What is moved, in words: a path, or a pointer of `KHR_animation_pointer`.
     fn words(&self) -> &str {
         let extension = self.extensions.get("KHR_animation_pointer");
@@ -46,7 +47,7 @@ impl Target {
     }
 
     /// The node and its property; `None` for what is no node's.
-    fn aim(&self) -> Option<(usize, Property)> {
+    fn aim(&self) -> Option<(usize, KeyProperty)> {
         let words = self.words();
         let (node, path) = match words.strip_prefix("/nodes/").and_then(|rest| rest.split_once('/'))
         {
@@ -54,10 +55,10 @@ impl Target {
             None => (self.node, words),
         };
         let property = match path {
-            "translation" => Property::Translation,
-            "rotation" => Property::Rotation,
-            "scale" => Property::Scale,
-            "weights" => Property::Weights,
+            "translation" => KeyProperty::Translation,
+            "rotation" => KeyProperty::Rotation,
+            "scale" => KeyProperty::Scale,
+            "weights" => KeyProperty::Weights,
             _ => return None,
         };
         Some((node?, property))
@@ -66,7 +67,7 @@ impl Target {
 
 /// Times and values, as accessors.
 #[derive(Debug, Deserialize)]
-struct Sampler {
+struct KeySampler {
     input: usize,
     output: usize,
     interpolation: Option<String>,
@@ -75,14 +76,14 @@ struct Sampler {
 /// What a channel makes of a node.
 pub(super) struct Moved {
     node: usize,
-    property: Property,
+    property: KeyProperty,
     values: Vec<f64>,
     /// Its keys.
-    track: Track,
+    track: PropertyTrack,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Property {
+enum KeyProperty {
     Translation,
     Rotation,
     Scale,
@@ -90,7 +91,7 @@ enum Property {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Interpolation {
+enum KeyInterpolation {
     Step,
     Linear,
     CubicSpline,
@@ -98,7 +99,7 @@ enum Interpolation {
 
 /// The nodes that the animation moves, as they are at its time.
 pub(super) fn moved(
-    reader: &Reader<'_>,
+    reader: &GltfReader<'_>,
     play: &Play,
     import: &mut Import,
 ) -> Result<Vec<Moved>, Refusal> {
@@ -121,25 +122,25 @@ pub(super) fn moved(
             return Err(reader.absent(place, "sampler", channel.sampler, count));
         };
         let place = format!("animations[{number}].samplers[{}]", channel.sampler);
-        let track = Track::read(reader, sampler, property, &place)?;
+        let track = PropertyTrack::read(reader, sampler, property, &place)?;
         moved.push(Moved { node, property, values: track.at(play.time), track });
     }
     Ok(moved)
 }
 
 /// Puts what moved in place of what the nodes have at rest.
-pub(super) fn apply(file: &Path, moved: &[Moved], nodes: &mut [Node]) -> Result<(), Refusal> {
+pub(super) fn apply(file: &Path, moved: &[Moved], nodes: &mut [GltfNode]) -> Result<(), Refusal> {
     for Moved { node: index, property, values, .. } in moved {
         let node = &mut nodes[*index];
-        if node.matrix.is_some() && *property != Property::Weights {
+        if node.matrix.is_some() && *property != KeyProperty::Weights {
             let reason = "it has a matrix and is animated, which moves translation, rotation and scale; \
                           export the file again";
             return Err(damaged(file, format!("nodes[{index}]"), reason));
         }
         match (property, &values[..]) {
-            (Property::Translation, &[x, y, z]) => node.translation = Some([x, y, z]),
-            (Property::Scale, &[x, y, z]) => node.scale = Some([x, y, z]),
-            (Property::Rotation, &[x, y, z, w]) => node.rotation = Some([x, y, z, w]),
+            (KeyProperty::Translation, &[x, y, z]) => node.translation = Some([x, y, z]),
+            (KeyProperty::Scale, &[x, y, z]) => node.scale = Some([x, y, z]),
+            (KeyProperty::Rotation, &[x, y, z, w]) => node.rotation = Some([x, y, z, w]),
             _ => node.weights = Some(values.clone()),
         }
     }
@@ -160,13 +161,13 @@ pub(super) fn playing(
     file: &Path,
     moved: Vec<Moved>,
     time: f64,
-    nodes: &[Node],
+    nodes: &[GltfNode],
 ) -> Result<Playing, Refusal> {
     let mut playing = Playing::default();
     for Moved { node: index, property, track, .. } in
         moved.into_iter().filter(|it| it.track.changes())
     {
-        if property == Property::Weights {
+        if property == KeyProperty::Weights {
             playing.morphed.insert(index, track.each_since(time));
             continue;
         }
@@ -185,9 +186,9 @@ pub(super) fn playing(
         });
         let track = track.since(time);
         match property {
-            Property::Translation => joint.translation = track,
-            Property::Rotation => joint.rotation = track,
-            Property::Scale | Property::Weights => joint.scale = track,
+            KeyProperty::Translation => joint.translation = track,
+            KeyProperty::Rotation => joint.rotation = track,
+            KeyProperty::Scale | KeyProperty::Weights => joint.scale = track,
         }
     }
     for (index, joint) in &playing.joints {
@@ -202,7 +203,7 @@ pub(super) fn playing(
 }
 
 /// The animation by name or number, the first when none is named.
-fn chosen(reader: &Reader<'_>, play: &Play) -> Result<(usize, Animation), Refusal> {
+fn chosen(reader: &GltfReader<'_>, play: &Play) -> Result<(usize, Animation), Refusal> {
     let all = reader.document.animations.as_slice();
     let name = |value: &Value| value.get("name").and_then(Value::as_str).map(str::to_owned);
     let number = match &play.which {
@@ -227,16 +228,16 @@ fn chosen(reader: &Reader<'_>, play: &Play) -> Result<(usize, Animation), Refusa
         };
         return Err(reader.damaged("animations", reason));
     };
-    let animation = Animation::deserialize(value).map_err(|error| {
-        reader.damaged(format!("animations[{number}]"), crate::words::plain(&error))
+    let animation = read_value(value).map_err(|(inside, why)| {
+        reader.damaged(ScenePath::of("animations").index(number).join(inside), why)
     })?;
     Ok((number, animation))
 }
 
 /// The keys of one property.
-struct Track {
-    property: Property,
-    interpolation: Interpolation,
+struct PropertyTrack {
+    property: KeyProperty,
+    interpolation: KeyInterpolation,
     /// Times of the keys (s), growing.
     times: Vec<f64>,
     /// Numbers of a value.
@@ -245,17 +246,17 @@ struct Track {
     values: Vec<f64>,
 }
 
-impl Track {
+impl PropertyTrack {
     fn read(
-        reader: &Reader<'_>,
-        sampler: &Sampler,
-        property: Property,
+        reader: &GltfReader<'_>,
+        sampler: &KeySampler,
+        property: KeyProperty,
         place: &str,
     ) -> Result<Self, Refusal> {
         let interpolation = match sampler.interpolation.as_deref() {
-            None | Some("LINEAR") => Interpolation::Linear,
-            Some("STEP") => Interpolation::Step,
-            Some("CUBICSPLINE") => Interpolation::CubicSpline,
+            None | Some("LINEAR") => KeyInterpolation::Linear,
+            Some("STEP") => KeyInterpolation::Step,
+            Some("CUBICSPLINE") => KeyInterpolation::CubicSpline,
             Some(other) => {
                 let reason = format!(
                     "\"{other}\" is none of STEP, LINEAR and CUBICSPLINE\nhint: export the file again"
@@ -271,17 +272,17 @@ impl Track {
         }
         let place = format!("{place}.output");
         let values = match property {
-            Property::Translation | Property::Scale => {
+            KeyProperty::Translation | KeyProperty::Scale => {
                 numbers::<3>(reader, sampler.output, &place)?
             }
-            Property::Rotation => numbers::<4>(reader, sampler.output, &place)?,
-            Property::Weights => numbers::<1>(reader, sampler.output, &place)?,
+            KeyProperty::Rotation => numbers::<4>(reader, sampler.output, &place)?,
+            KeyProperty::Weights => numbers::<1>(reader, sampler.output, &place)?,
         };
-        let parts = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
+        let parts = if interpolation == KeyInterpolation::CubicSpline { 3 } else { 1 };
         let width = match property {
-            Property::Translation | Property::Scale => 3,
-            Property::Rotation => 4,
-            Property::Weights => values.len() / (parts * times.len()),
+            KeyProperty::Translation | KeyProperty::Scale => 3,
+            KeyProperty::Rotation => 4,
+            KeyProperty::Weights => values.len() / (parts * times.len()),
         };
         if values.len() != width * parts * times.len() || width == 0 {
             let reason = format!(
@@ -308,15 +309,15 @@ impl Track {
         let step = self.times[to] - self.times[from];
         let t = (time - self.times[from]) / step;
         match self.interpolation {
-            Interpolation::Step => self.key(from).to_vec(),
-            Interpolation::Linear if self.property == Property::Rotation => {
+            KeyInterpolation::Step => self.key(from).to_vec(),
+            KeyInterpolation::Linear if self.property == KeyProperty::Rotation => {
                 slerp(self.key(from), self.key(to), t)
             }
-            Interpolation::Linear => {
+            KeyInterpolation::Linear => {
                 let pairs = self.key(from).iter().zip(self.key(to));
                 pairs.map(|(a, b)| (1.0 - t) * a + t * b).collect()
             }
-            Interpolation::CubicSpline => {
+            KeyInterpolation::CubicSpline => {
                 let (t2, t3) = (t * t, t * t * t);
                 let hermite = |i: usize| {
                     (2.0 * t3 - 3.0 * t2 + 1.0) * self.key(from)[i]
@@ -332,7 +333,7 @@ impl Track {
     /// Whether its value is another at some time.
     fn changes(&self) -> bool {
         let first = self.key(0);
-        let is_cubic = self.interpolation == Interpolation::CubicSpline && self.times.len() > 1;
+        let is_cubic = self.interpolation == KeyInterpolation::CubicSpline && self.times.len() > 1;
         is_cubic || (1..self.times.len()).any(|key| self.key(key) != first)
     }
 
@@ -353,16 +354,16 @@ impl Track {
     /// A track of what `vector` picks of its numbers, in s from `time` on.
     fn picked_since(&self, time: f64, vector: impl Fn(&[f64]) -> DVec4) -> geometry::Track {
         let key = |key: usize| match self.interpolation {
-            Interpolation::CubicSpline => [0, 1, 2].map(|part| vector(self.part(key, part))),
-            Interpolation::Step | Interpolation::Linear => {
+            KeyInterpolation::CubicSpline => [0, 1, 2].map(|part| vector(self.part(key, part))),
+            KeyInterpolation::Step | KeyInterpolation::Linear => {
                 [DVec4::ZERO, vector(self.key(key)), DVec4::ZERO]
             }
         };
         geometry::Track {
             between: match self.interpolation {
-                Interpolation::Step => Between::Step,
-                Interpolation::Linear => Between::Linear,
-                Interpolation::CubicSpline => Between::Cubic,
+                KeyInterpolation::Step => Between::Step,
+                KeyInterpolation::Linear => Between::Linear,
+                KeyInterpolation::CubicSpline => Between::Cubic,
             },
             times: self.times.iter().map(|key| key - time).collect(),
             keys: (0..self.times.len()).map(key).collect(),
@@ -371,8 +372,8 @@ impl Track {
 
     fn key(&self, key: usize) -> &[f64] {
         match self.interpolation {
-            Interpolation::CubicSpline => self.part(key, 1),
-            Interpolation::Step | Interpolation::Linear => {
+            KeyInterpolation::CubicSpline => self.part(key, 1),
+            KeyInterpolation::Step | KeyInterpolation::Linear => {
                 &self.values[key * self.width..(key + 1) * self.width]
             }
         }
@@ -393,7 +394,7 @@ fn slerp(from: &[f64], to: &[f64], t: f64) -> Vec<f64> {
 
 /// All numbers of an accessor of so many components, finite.
 fn numbers<const N: usize>(
-    reader: &Reader<'_>,
+    reader: &GltfReader<'_>,
     accessor: usize,
     place: &str,
 ) -> Result<Vec<f64>, Refusal> {

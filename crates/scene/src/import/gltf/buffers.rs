@@ -11,9 +11,9 @@ use base64::{DecodeError, Engine as _};
 use bytemuck::AnyBitPattern;
 use gltf::json;
 
-use super::document::Document;
+use super::document::GltfDocument;
 use super::meshopt::MeshoptView;
-use super::{Reader, damaged};
+use super::{GltfReader, damaged};
 use crate::import::files::Files;
 use crate::import::text::without_mark;
 use crate::import::{Refusal, refuse_other_kind};
@@ -77,7 +77,7 @@ impl Buffers {
     pub(super) fn open(
         path: &Path,
         files: &Files,
-        document: &Document,
+        document: &GltfDocument,
         binary: Option<Bytes>,
     ) -> Result<Self, Refusal> {
         let mut used = vec![false; document.root.buffers.len()];
@@ -103,7 +103,7 @@ impl Buffers {
     }
 }
 
-impl Reader<'_> {
+impl GltfReader<'_> {
     /// The bytes of buffer `index`, which `from` names.
     fn buffer(&self, index: usize, from: &str) -> Result<&Bytes, Refusal> {
         match self.buffers.buffers.get(index) {
@@ -123,7 +123,7 @@ impl Reader<'_> {
 
     /// The buffer of view `index`, and where in it the view starts and how long it is (bytes);
     /// `from` is who names the view.
-    pub(super) fn view(&self, index: usize, from: &str) -> Result<View<'_>, Refusal> {
+    pub(super) fn view(&self, index: usize, from: &str) -> Result<BufferView<'_>, Refusal> {
         let place = || format!("bufferViews[{index}]");
         let views = &self.document.root.buffer_views;
         let Some(view) = views.get(index) else {
@@ -132,7 +132,7 @@ impl Reader<'_> {
         let stride = view.byte_stride.map(|stride| stride.0).filter(|&stride| stride > 0);
         if let Some(compressed) = MeshoptView::of(view) {
             let bytes = self.decompressed(index, &compressed)?;
-            return Ok(View { bytes, start: 0, len: bytes.as_slice().len(), stride });
+            return Ok(BufferView { bytes, start: 0, len: bytes.as_slice().len(), stride });
         }
         let bytes = self.buffer(view.buffer.value(), &place())?;
         let total = bytes.as_slice().len();
@@ -150,7 +150,7 @@ impl Reader<'_> {
                 ),
             ));
         };
-        Ok(View { bytes, start, len, stride })
+        Ok(BufferView { bytes, start, len, stride })
     }
 
     /// The bytes of the compressed view `index`, decoded once.
@@ -179,7 +179,7 @@ impl Reader<'_> {
 
 /// Part of a buffer.
 #[derive(Clone, Copy)]
-pub(super) struct View<'a> {
+pub(super) struct BufferView<'a> {
     pub bytes: &'a Bytes,
     pub start: usize,
     pub len: usize,

@@ -2,20 +2,20 @@
 
 use etendue_geometry::{Link, Transform};
 
-use super::Reader;
-use super::pose::{Pose, local};
+use super::GltfReader;
+use super::pose::{NodePoses, local};
 use crate::import::Import;
 use crate::import::error::{Note, NoteKind, push};
 
 /// What each node hangs on.
 pub(super) struct Chains<'a> {
-    reader: &'a Reader<'a>,
+    reader: &'a GltfReader<'a>,
     parents: Vec<Option<usize>>,
 }
 
 impl<'a> Chains<'a> {
     /// Those of a document whose nodes have one parent each.
-    pub(super) fn new(reader: &'a Reader<'a>) -> Self {
+    pub(super) fn new(reader: &'a GltfReader<'a>) -> Self {
         let nodes = &reader.document.nodes;
         let mut parents = vec![None; nodes.len()];
         for (parent, node) in nodes.iter().enumerate() {
@@ -67,7 +67,7 @@ impl<'a> Chains<'a> {
     }
 
     /// Notes that cameras of nodes that move stand still.
-    pub(super) fn note(&self, pose: &Pose, import: &mut Import) {
+    pub(super) fn note(&self, pose: &NodePoses, import: &mut Import) {
         let document = self.reader.document;
         for &node in pose.shown.iter().filter(|node| self.moves(**node)) {
             let shown = &document.nodes[node];

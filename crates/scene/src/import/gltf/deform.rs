@@ -8,11 +8,11 @@ use gltf::json;
 use json::mesh::{MorphTarget, Semantic};
 use rayon::prelude::*;
 
-use super::Reader;
+use super::GltfReader;
 use super::chains::Chains;
-use super::hierarchy::Shape;
-use super::part::Part;
-use super::pose::{Pose, exists};
+use super::hierarchy::NodeShape;
+use super::part::PrimitiveReader;
+use super::pose::{NodePoses, exists};
 use crate::import::deformer::{Deformer, Influences, Joints, Morph, number};
 use crate::import::error::NoteKind;
 use crate::import::{Refusal, Strictness, precise_enough, single};
@@ -24,7 +24,7 @@ use etendue_geometry::{Link, Positions, Track, Transform, Vertices};
 const WEIGHTS_OFF: f64 = 2e-3;
 
 /// The positions and normals of a primitive.
-pub(super) struct Corners {
+pub(super) struct PrimitiveCorners {
     pub positions: Positions,
     pub normals: Option<Vertices<3>>,
     /// Whether a skin placed them in the model's frame, and its node no longer does.
@@ -38,16 +38,16 @@ pub(super) struct Corners {
 /// Bytes that a position or normal takes while it is moved: as the file has it, as it is moved, and as it is kept.
 const BYTES_PER_VECTOR: u64 = 3 * size_of::<DVec3>() as u64;
 
-impl Part<'_> {
+impl PrimitiveReader<'_> {
     /// The primitive's `positions` and `normals` as `shape` has them; the very same when it neither
     /// morphs nor has a skin.
     pub(super) fn deformed(
         &mut self,
-        shape: &Shape,
+        shape: &NodeShape,
         skin: Option<&Skin>,
         positions: Vertices<3>,
         normals: Option<Vertices<3>>,
-    ) -> Result<Corners, Refusal> {
+    ) -> Result<PrimitiveCorners, Refusal> {
         let influences = match skin {
             Some(skin) => self.influences(skin, positions.len())?,
             None => None,
@@ -55,7 +55,7 @@ impl Part<'_> {
         let weights = self.target_weights(shape)?;
         if influences.is_none() && weights.is_empty() {
             let positions = Positions::F32(positions);
-            return Ok(Corners {
+            return Ok(PrimitiveCorners {
                 positions,
                 normals,
                 skinned: false,
@@ -94,11 +94,17 @@ impl Part<'_> {
         let points: Vec<[f64; 3]> = points.into_par_iter().map(|p| p.to_array()).collect();
         let plays = deformer.played_span().is_some();
         let deformer = plays.then_some(deformer);
-        Ok(Corners { positions: precise_enough(&points), normals, skinned, mirrored, deformer })
+        Ok(PrimitiveCorners {
+            positions: precise_enough(&points),
+            normals,
+            skinned,
+            mirrored,
+            deformer,
+        })
     }
 
     /// The morph targets to which `shape` gives a weight at some time, with it.
-    fn target_weights(&mut self, shape: &Shape) -> Result<Vec<(usize, Track)>, Refusal> {
+    fn target_weights(&mut self, shape: &NodeShape) -> Result<Vec<(usize, Track)>, Refusal> {
         let targets = self.primitive.targets.as_ref().map_or(0, Vec::len);
         let weights: Vec<Track> = match self.reader.playing.morphed.get(&shape.played_by()) {
             Some(tracks) => tracks.clone(),
@@ -251,10 +257,10 @@ impl Skin {
     /// When the skin or a joint is absent, a joint stands nowhere, or an inverse bind matrix is
     /// missing or not finite.
     pub(super) fn read(
-        reader: &Reader<'_>,
+        reader: &GltfReader<'_>,
         index: usize,
         user: usize,
-        (pose, chains): (&Pose, &Chains<'_>),
+        (pose, chains): (&NodePoses, &Chains<'_>),
     ) -> Result<Self, Refusal> {
         let document = reader.document;
         let Some(skin) = document.skins.get(index) else {
@@ -306,7 +312,7 @@ impl Skin {
 }
 
 /// The inverse bind matrices of skin `index`; none when it has none, which stands for the identity.
-fn inverse_bind_matrices(reader: &Reader<'_>, index: usize) -> Result<Vec<Transform>, Refusal> {
+fn inverse_bind_matrices(reader: &GltfReader<'_>, index: usize) -> Result<Vec<Transform>, Refusal> {
     let skin = &reader.document.skins[index];
     let Some(accessor) = skin.inverse_bind_matrices else { return Ok(Vec::new()) };
     let place = format!("skins[{index}].inverseBindMatrices");

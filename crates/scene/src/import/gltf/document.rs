@@ -4,19 +4,21 @@ use std::path::Path;
 
 use gltf::json;
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
+use crate::file::{Document as JsonText, JsonFault, Place, read_value};
 use crate::import::Refusal;
 use crate::import::error::wrong_text;
-use crate::words::plain;
+use crate::words::kind_of;
 
 /// A glTF document: crate `gltf`'s types, but for what is read in f64 here.
-pub(super) struct Document {
+pub(super) struct GltfDocument {
     pub root: json::Root,
-    pub nodes: Vec<Node>,
-    pub scenes: Vec<Scene>,
-    pub cameras: Vec<Camera>,
-    pub skins: Vec<Skin>,
+    pub nodes: Vec<GltfNode>,
+    pub scenes: Vec<SceneRoots>,
+    pub cameras: Vec<GltfCamera>,
+    pub skins: Vec<GltfSkin>,
     /// Each as it is written; only one that is played is looked at.
     pub animations: Vec<Value>,
 }
@@ -41,7 +43,7 @@ const READ: [&str; 13] = [
 /// A node. A mesh, a camera, both or neither, below its parent by a matrix or by TRS.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-pub(super) struct Node {
+pub(super) struct GltfNode {
     pub name: Option<String>,
     pub children: Vec<usize>,
     pub matrix: Option<[f64; 16]>,
@@ -59,14 +61,14 @@ pub(super) struct Node {
 /// The roots of a hierarchy.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-pub(super) struct Scene {
+pub(super) struct SceneRoots {
     pub nodes: Vec<usize>,
 }
 
 /// The joints that carry a mesh.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
-pub(super) struct Skin {
+pub(super) struct GltfSkin {
     /// Nodes.
     pub joints: Vec<usize>,
     /// An accessor.
@@ -76,10 +78,10 @@ pub(super) struct Skin {
 /// A camera.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-pub(super) struct Camera {
+pub(super) struct GltfCamera {
     pub name: Option<String>,
     pub perspective: Option<Perspective>,
-    pub orthographic: Option<Orthographic>,
+    pub orthographic: Option<GltfOrthographic>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -90,7 +92,7 @@ pub(super) struct Perspective {
 }
 
 #[derive(Debug, Deserialize)]
-pub(super) struct Orthographic {
+pub(super) struct GltfOrthographic {
     pub xmag: f64,
     pub ymag: f64,
 }
@@ -99,14 +101,14 @@ pub(super) struct Orthographic {
 #[derive(Default, Deserialize)]
 #[serde(default)]
 struct InF64 {
-    nodes: Vec<Node>,
-    scenes: Vec<Scene>,
-    cameras: Vec<Camera>,
-    skins: Vec<Skin>,
+    nodes: Vec<GltfNode>,
+    scenes: Vec<SceneRoots>,
+    cameras: Vec<GltfCamera>,
+    skins: Vec<GltfSkin>,
 }
 
 /// Reads the JSON of the glTF file at `path`, whole or a chunk of a GLB.
-pub(super) fn parse(path: &Path, json: &[u8], in_glb: bool) -> Result<Document, Refusal> {
+pub(super) fn parse(path: &Path, json: &[u8], in_glb: bool) -> Result<GltfDocument, Refusal> {
     let mut rest: Map<String, Value> =
         serde_json::from_slice(json).map_err(|error| broken(path, json, in_glb, &error))?;
     require_version_2(path, &rest)?;
@@ -122,14 +124,14 @@ pub(super) fn parse(path: &Path, json: &[u8], in_glb: bool) -> Result<Document, 
     }
     let whole = Value::Object(taken);
     refuse_arrays(&whole, "").map_err(|place| not_an_object(path, place))?;
-    let InF64 { nodes, scenes, cameras, skins } = typed(path, whole)?;
+    let InF64 { nodes, scenes, cameras, skins } = typed(path, &whole)?;
     // The crate refuses documents for parts that are not wanted, as animations that extensions
     // point elsewhere than to nodes.
     rest.retain(|key, _| READ.contains(&key.as_str()));
     let whole = Value::Object(rest);
     refuse_arrays(&whole, "").map_err(|place| not_an_object(path, place))?;
-    let root = typed(path, whole)?;
-    Ok(Document { root, nodes, scenes, cameras, skins, animations })
+    let root = typed(path, &whole)?;
+    Ok(GltfDocument { root, nodes, scenes, cameras, skins, animations })
 }
 
 fn require_version_2(path: &Path, document: &Map<String, Value>) -> Result<(), Refusal> {
@@ -155,25 +157,38 @@ fn require_version_2(path: &Path, document: &Map<String, Value>) -> Result<(), R
 }
 
 /// `value` as a `T`, or where in the document it is not one.
-fn typed<T: for<'de> Deserialize<'de>>(path: &Path, value: Value) -> Result<T, Refusal> {
-    serde_path_to_error::deserialize(value)
-        .map_err(|error| super::damaged(path, error.path().to_string(), plain(error.inner())))
+fn typed<T: DeserializeOwned>(path: &Path, value: &Value) -> Result<T, Refusal> {
+    read_value(value).map_err(|(place, why)| super::damaged(path, place, why))
 }
 
-/// The error of a text that is no JSON.
+/// The error of a text that is no JSON object.
 fn broken(path: &Path, json: &[u8], in_glb: bool, error: &serde_json::Error) -> Refusal {
     let len = json.len();
+    let JsonFault { place, reason } = fault_of(json, error);
     let wrong = "its length in the GLB is wrong, or the file is damaged\nhint: export it again";
-    let reason = match plain(error) {
-        _ if in_glb && error.is_eof() => {
+    let reason = match in_glb {
+        true if error.is_eof() => {
             format!("the JSON chunk ends after {len} bytes, inside the document: {wrong}")
         }
-        reason if in_glb => format!("the JSON chunk of {len} bytes is damaged: {reason}"),
-        reason => format!("this is not the JSON of a glTF file: {reason}"),
+        true => format!("the JSON chunk of {len} bytes is damaged: {reason}"),
+        false => format!("this is not the JSON of a glTF file: {reason}"),
     };
-    let line = json.split(|&byte| byte == b'\n').nth(error.line().saturating_sub(1));
-    let shown = excerpt(line.unwrap_or_default(), error.column());
-    wrong_text(path, (error.line(), error.column()), reason, &shown)
+    let line = json.split(|&byte| byte == b'\n').nth(place.line - 1);
+    let shown = excerpt(line.unwrap_or_default(), place.column);
+    wrong_text(path, (place.line, place.column), reason, &shown)
+}
+
+/// Where a text is no JSON object, and why.
+fn fault_of(json: &[u8], error: &serde_json::Error) -> JsonFault {
+    let at_its = |reason: String| JsonFault {
+        place: Place { line: error.line().max(1), column: error.column().max(1) },
+        reason,
+    };
+    match str::from_utf8(json).map(|text| JsonText::parse(text.to_owned())) {
+        Ok(Err(fault)) => fault,
+        Ok(Ok((_, value))) => at_its(format!("expected an object, found {}", kind_of(&value))),
+        Err(error) => at_its(format!("is not UTF-8 text (byte {})", error.valid_up_to())),
+    }
 }
 
 /// The keys of glTF that hold an object, and those that hold a list of objects.

@@ -16,12 +16,12 @@ use json::accessor::ComponentType;
 use json::mesh::Primitive;
 use serde::Deserialize;
 
-use super::Reader;
+use super::GltfReader;
 use super::accessor::Accessor;
-use super::buffers::{Bytes, View};
-use super::document::Document;
+use super::buffers::{BufferView, Bytes};
+use super::document::GltfDocument;
+use crate::file::read_value;
 use crate::import::Refusal;
-use crate::words::plain;
 
 pub(super) const NAME: &str = "KHR_draco_mesh_compression";
 
@@ -33,7 +33,7 @@ const PER_POINT: u64 = 128;
 /// What a primitive says of its compressed form.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct Compressed {
+pub(super) struct DracoPrimitive {
     buffer_view: usize,
     /// Numbers of Draco's attributes by their names in glTF.
     attributes: BTreeMap<String, u32>,
@@ -41,7 +41,7 @@ pub(super) struct Compressed {
 
 /// The mesh of a compressed view.
 #[derive(Debug)]
-pub(super) struct Decoded {
+pub(super) struct DracoMesh {
     points: usize,
     pub triangles: Vec<[u32; 3]>,
     /// Values by Draco's numbers, one for each point.
@@ -55,27 +55,27 @@ struct Attribute {
     bytes: Bytes,
 }
 
-impl Compressed {
+impl DracoPrimitive {
     /// The compressed form of `primitive`; `None` when it has none.
     pub(super) fn of(primitive: &Primitive) -> Option<Result<Self, String>> {
         let written = primitive.extensions.as_ref()?.others.get(NAME)?;
-        Some(Self::deserialize(written).map_err(|error| plain(&error)))
+        Some(read_value(written).map_err(|(_, why)| why))
     }
 }
 
 /// A place for the mesh of each view of a document.
-pub(super) fn undecoded(document: &Document) -> Vec<OnceLock<Decoded>> {
+pub(super) fn undecoded(document: &GltfDocument) -> Vec<OnceLock<DracoMesh>> {
     document.root.buffer_views.iter().map(|_| OnceLock::new()).collect()
 }
 
-impl Reader<'_> {
+impl GltfReader<'_> {
     /// The mesh of `primitive` when it is there in compressed form alone.
     pub(super) fn draco(
         &self,
         primitive: &Primitive,
         place: &str,
-    ) -> Result<Option<(Compressed, &Decoded)>, Refusal> {
-        let Some(compressed) = Compressed::of(primitive) else { return Ok(None) };
+    ) -> Result<Option<(DracoPrimitive, &DracoMesh)>, Refusal> {
+        let Some(compressed) = DracoPrimitive::of(primitive) else { return Ok(None) };
         // Some files keep a plain copy beside it, which has lost nothing.
         let accessors = &self.document.root.accessors;
         let is_plain = primitive.attributes.values().chain(&primitive.indices).all(|index| {
@@ -92,8 +92,8 @@ impl Reader<'_> {
     }
 
     /// The mesh of view `index`, decoded once.
-    fn decoded(&self, index: usize, place: &str) -> Result<&Decoded, Refusal> {
-        let View { bytes, start, len, .. } = self.view(index, place)?;
+    fn decoded(&self, index: usize, place: &str) -> Result<&DracoMesh, Refusal> {
+        let BufferView { bytes, start, len, .. } = self.view(index, place)?;
         // There is such a view.
         let known = &self.meshes_of_views[index];
         if let Some(decoded) = known.get() {
@@ -117,13 +117,13 @@ impl Reader<'_> {
             };
             self.damaged(place, why)
         })?;
-        let decoded = Decoded::of(&mesh).map_err(|why| self.damaged(place, why))?;
+        let decoded = DracoMesh::of(&mesh).map_err(|why| self.damaged(place, why))?;
         self.files.take(decoded.bytes(), || place.to_owned())?;
         Ok(known.get_or_init(|| decoded))
     }
 }
 
-impl Decoded {
+impl DracoMesh {
     fn of(mesh: &Mesh) -> Result<Self, String> {
         let points = mesh.num_points();
         let triangles: Vec<[u32; 3]> =
@@ -158,7 +158,7 @@ impl Decoded {
     /// not, when they should be.
     pub(super) fn accessor(
         &self,
-        compressed: &Compressed,
+        compressed: &DracoPrimitive,
         semantic: &str,
         normalized: bool,
     ) -> Option<Result<Accessor<'_>, String>> {

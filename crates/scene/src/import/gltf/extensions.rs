@@ -5,7 +5,7 @@ use std::path::Path;
 
 use gltf::json;
 
-use super::document::Document;
+use super::document::GltfDocument;
 use crate::import::error::{self, Note, NoteKind};
 use crate::import::{Refusal, Wanted};
 
@@ -79,7 +79,7 @@ fn support(name: &str) -> Option<Support> {
 /// requires for what is not wanted.
 pub(super) fn check(
     path: &Path,
-    document: &Document,
+    document: &GltfDocument,
     wanted: Wanted,
     notes: &mut Vec<Note>,
 ) -> Result<(), Refusal> {

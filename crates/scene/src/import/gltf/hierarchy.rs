@@ -3,17 +3,17 @@
 use std::path::Path;
 
 use super::animation::Playing;
-use super::document::Document;
-use super::pose::Pose;
+use super::document::GltfDocument;
+use super::pose::NodePoses;
 use super::{absent, damaged};
 use crate::import::error::Note;
-use crate::import::{ImportedCamera, ImportedLight, Projection, Refusal};
+use crate::import::{CameraProjection, ImportedCamera, ImportedLight, Refusal};
 use etendue_geometry::Transform;
 
 /// What stands in the scene.
 #[derive(Default)]
-pub(super) struct Scene {
-    pub pose: Pose,
+pub(super) struct SceneNodes {
+    pub pose: NodePoses,
     pub meshes: Vec<PlacedMesh>,
     pub cameras: Vec<ImportedCamera>,
     /// With the nodes that they are of.
@@ -23,14 +23,14 @@ pub(super) struct Scene {
 /// A node with a mesh.
 pub(super) struct PlacedMesh {
     pub node: usize,
-    pub shape: Shape,
+    pub shape: NodeShape,
     pub model_from_node: Transform,
 }
 
 /// A mesh of the document as a node shows it: with a skin, and with weights for its morph targets.
 /// Each is loaded once; a mesh of two skins is two of them.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Shape {
+pub(super) struct NodeShape {
     pub mesh: usize,
     pub skin: Option<usize>,
     /// The bits of the weights; none when all are 0.
@@ -39,9 +39,9 @@ pub(super) struct Shape {
     played_by: Option<usize>,
 }
 
-impl Shape {
+impl NodeShape {
     /// `mesh` as node `index` shows it: the node's weights go before the mesh's own.
-    fn of(document: &Document, index: usize, mesh: usize, playing: &Playing) -> Self {
+    fn of(document: &GltfDocument, index: usize, mesh: usize, playing: &Playing) -> Self {
         let node = &document.nodes[index];
         let own = document.root.meshes.get(mesh).and_then(|mesh| mesh.weights.as_ref());
         let weights: Vec<f64> = match (&node.weights, own) {
@@ -70,18 +70,18 @@ impl Shape {
 /// Collects what the nodes of the default scene show.
 pub(super) fn walk(
     path: &Path,
-    document: &Document,
+    document: &GltfDocument,
     playing: &Playing,
     notes: &mut Vec<Note>,
-) -> Result<Scene, Refusal> {
-    let pose = Pose::at_rest(path, document)?;
-    let mut scene = Scene::default();
+) -> Result<SceneNodes, Refusal> {
+    let pose = NodePoses::at_rest(path, document)?;
+    let mut scene = SceneNodes::default();
     for &index in &pose.shown {
         let node = &document.nodes[index];
         let model_from_node = pose.of(index).unwrap_or_default();
         let hidden = pose.hidden[index];
         if let Some(mesh) = node.mesh.filter(|_| !hidden) {
-            let shape = Shape::of(document, index, mesh, playing);
+            let shape = NodeShape::of(document, index, mesh, playing);
             scene.meshes.push(PlacedMesh { node: index, shape, model_from_node });
         }
         if let Some(camera) = node.camera {
@@ -99,7 +99,7 @@ pub(super) fn walk(
 
 fn placed_camera(
     path: &Path,
-    document: &Document,
+    document: &GltfDocument,
     node: usize,
     index: usize,
     model_from_camera: Transform,
@@ -116,11 +116,11 @@ fn placed_camera(
                 && view.yfov < std::f64::consts::PI
                 && view.aspect_ratio.is_none_or(positive) =>
         {
-            Projection::Perspective { yfov: view.yfov, aspect_ratio: view.aspect_ratio }
+            CameraProjection::Perspective { yfov: view.yfov, aspect_ratio: view.aspect_ratio }
         }
         // Some exporters write negative magnifications for mirrored views.
         (None, Some(view)) if positive(view.xmag.abs()) && positive(view.ymag.abs()) => {
-            Projection::Orthographic { xmag: view.xmag.abs(), ymag: view.ymag.abs() }
+            CameraProjection::Orthographic { xmag: view.xmag.abs(), ymag: view.ymag.abs() }
         }
         _ => {
             return Err(damaged(

@@ -8,22 +8,22 @@ use json::texture::{MagFilter, WrappingMode};
 use json::validation::Checked;
 
 use super::buffers::{Bytes, data_uri, percent_decoded};
-use super::{Reader, extensions};
+use super::{GltfReader, extensions};
 use crate::import::{Import, Refusal, Strictness, error};
 
 /// What crate `gltf` puts for an image that a texture does not name.
 const NO_IMAGE: usize = u32::MAX as usize;
 
 /// The textures that materials name, each located once.
-pub(super) struct Images<'a> {
-    pub(super) reader: &'a Reader<'a>,
+pub(super) struct GltfImages<'a> {
+    pub(super) reader: &'a GltfReader<'a>,
     /// For each texture of the document: unseen, unusable, or its index in the import.
     of_texture: Vec<Option<Option<u32>>>,
 }
 
-impl<'a> Images<'a> {
+impl<'a> GltfImages<'a> {
     /// Those of a document, none of them looked at yet.
-    pub(super) fn new(reader: &'a Reader<'a>) -> Self {
+    pub(super) fn new(reader: &'a GltfReader<'a>) -> Self {
         Self { reader, of_texture: vec![None; reader.document.root.textures.len()] }
     }
 

@@ -2,21 +2,21 @@
 
 use serde_json::Value;
 
-use super::Reader;
+use super::GltfReader;
 use super::chains::Chains;
-use super::document::Node;
-use super::hierarchy::Scene;
+use super::document::GltfNode;
+use super::hierarchy::SceneNodes;
 use super::pose::trs;
-use super::primitive::Shapes;
+use super::primitive::ShapeSet;
 use crate::import::{Import, ImportedPlacement, Refusal};
 use etendue_geometry::glam::{DQuat, DVec3};
 use etendue_geometry::{Link, Placement, Transform, Vertices};
 
 /// Places the primitives of each mesh at each of its nodes, and at each instance of those.
 pub(super) fn place(
-    reader: &Reader<'_>,
-    (scene, chains): (&Scene, &Chains<'_>),
-    shapes: &Shapes,
+    reader: &GltfReader<'_>,
+    (scene, chains): (&SceneNodes, &Chains<'_>),
+    shapes: &ShapeSet,
     import: &mut Import,
 ) -> Result<(), Refusal> {
     for placed in &scene.meshes {
@@ -56,12 +56,16 @@ pub(super) fn place(
 const NAME: &str = "EXT_mesh_gpu_instancing";
 
 /// Whether `node` says so.
-fn has(node: &Node) -> bool {
+fn has(node: &GltfNode) -> bool {
     node.extensions.contains_key(NAME)
 }
 
 /// Where the instances of `node` stand in its frame: one at the node itself without the extension.
-fn transforms(reader: &Reader<'_>, node: &Node, index: usize) -> Result<Vec<Transform>, Refusal> {
+fn transforms(
+    reader: &GltfReader<'_>,
+    node: &GltfNode,
+    index: usize,
+) -> Result<Vec<Transform>, Refusal> {
     let Some(extension) = node.extensions.get(NAME) else {
         return Ok(vec![Transform::IDENTITY]);
     };
@@ -103,7 +107,7 @@ fn transforms(reader: &Reader<'_>, node: &Node, index: usize) -> Result<Vec<Tran
 }
 
 fn values<const N: usize>(
-    reader: &Reader<'_>,
+    reader: &GltfReader<'_>,
     attributes: Option<&Value>,
     name: &str,
     place: &impl Fn(&str) -> String,

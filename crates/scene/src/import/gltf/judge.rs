@@ -3,13 +3,13 @@
 use gltf::json;
 use serde_json::Value;
 
-use super::Reader;
+use super::GltfReader;
 use crate::import::error::{self, Note, NoteKind};
 use crate::import::{Import, Refusal, Strictness};
 
 /// The judge of one material's numbers.
 pub(super) struct Judge<'a> {
-    pub reader: &'a Reader<'a>,
+    pub reader: &'a GltfReader<'a>,
     /// What the material is called in messages.
     pub subject: String,
 }

@@ -13,15 +13,16 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::damaged;
-use super::document::{Document, Node};
+use super::document::{GltfDocument, GltfNode};
+use crate::file::{ScenePath, read_value};
 use crate::import::Refusal;
 use crate::import::error::{self, Note, NoteKind};
-use crate::words::{kind_of, plain};
+use crate::words::kind_of;
 
 const NAME: &str = "KHR_lights_punctual";
 
 #[derive(Debug, Deserialize)]
-struct Written {
+struct WrittenLight {
     #[serde(rename = "type")]
     kind: String,
     #[serde(default = "white")]
@@ -31,12 +32,12 @@ struct Written {
     #[serde(default)]
     name: Option<String>,
     #[serde(default)]
-    spot: Option<Cone>,
+    spot: Option<LightCone>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-struct Cone {
+struct LightCone {
     #[serde(default)]
     inner_cone_angle: f64,
     #[serde(default = "eighth_turn")]
@@ -56,25 +57,22 @@ fn eighth_turn() -> f64 {
 }
 
 /// Light `number` of the document.
-fn read(path: &Path, number: &Value, value: &Value) -> Result<Written, Refusal> {
+fn read(path: &Path, number: &Value, value: &Value) -> Result<WrittenLight, Refusal> {
     let place = format!("extensions.{NAME}.lights[{number}]");
     if !value.is_object() {
         let reason =
             format!("expected an object, found {}\nhint: export the file again", kind_of(value));
         return Err(damaged(path, place, reason));
     }
-    serde_path_to_error::deserialize(value).map_err(|error| {
-        let inside = error.path().to_string();
-        let place = if inside == "." { place } else { format!("{place}.{inside}") };
-        damaged(path, place, plain(error.inner()))
-    })
+    read_value(value)
+        .map_err(|(inside, why)| damaged(path, ScenePath::of(&place).join(inside), why))
 }
 
 /// The light of a node, at the origin of its frame; `None` when it has none, or a dark one.
 pub(super) fn placed(
     path: &Path,
-    document: &Document,
-    node: &Node,
+    document: &GltfDocument,
+    node: &GltfNode,
     index: usize,
     notes: &mut Vec<Note>,
 ) -> Result<Option<Light>, Refusal> {

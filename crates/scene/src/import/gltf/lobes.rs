@@ -12,7 +12,7 @@ use gltf::json;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::images::Images;
+use super::images::GltfImages;
 use super::judge::Judge;
 use crate::import::{Import, Refusal};
 use etendue_tracer::scattering::{Absorption, Glass, GltfSurface};
@@ -28,7 +28,7 @@ const ANISOTROPY: &str = "KHR_materials_anisotropy";
 
 /// Adds to `read` what these extensions of `material` say.
 pub(super) fn add(
-    images: &mut Images<'_>,
+    images: &mut GltfImages<'_>,
     judge: &Judge<'_>,
     material: &json::Material,
     read: &mut GltfSurface,
@@ -119,7 +119,7 @@ impl Glossiness {
     /// The surface that reflects as much.
     pub(super) fn surface(
         &self,
-        images: &mut Images<'_>,
+        images: &mut GltfImages<'_>,
         judge: &Judge<'_>,
         import: &mut Import,
     ) -> Result<GltfSurface, Refusal> {

@@ -15,15 +15,15 @@ use json::validation::Checked;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::images::Images;
+use super::images::GltfImages;
 use super::judge::Judge;
 use super::lobes::{Glossiness, MIRROR};
-use super::{Reader, lobes};
+use super::{GltfReader, lobes};
 use crate::import::{Import, Refusal};
 
 /// The number of the material of `primitive`, which messages call `place`.
 pub(super) fn number(
-    reader: &Reader<'_>,
+    reader: &GltfReader<'_>,
     primitive: &json::mesh::Primitive,
     place: impl Fn() -> String,
 ) -> Result<u32, Refusal> {
@@ -36,8 +36,8 @@ pub(super) fn number(
 }
 
 /// Reads the document's materials into `import`, and the nameless one behind them.
-pub(super) fn load(reader: &Reader<'_>, import: &mut Import) -> Result<(), Refusal> {
-    let mut images = Images::new(reader);
+pub(super) fn load(reader: &GltfReader<'_>, import: &mut Import) -> Result<(), Refusal> {
+    let mut images = GltfImages::new(reader);
     for (index, material) in reader.document.root.materials.iter().enumerate() {
         let named = material.name.clone().filter(|name| !name.is_empty());
         let subject = named.unwrap_or_else(|| format!("materials[{index}]"));
@@ -49,7 +49,7 @@ pub(super) fn load(reader: &Reader<'_>, import: &mut Import) -> Result<(), Refus
 }
 
 fn read(
-    images: &mut Images<'_>,
+    images: &mut GltfImages<'_>,
     judge: &mut Judge<'_>,
     material: &json::Material,
     import: &mut Import,
@@ -162,7 +162,7 @@ fn is_unlit(material: &json::Material) -> bool {
 
 /// The metallic-roughness surface and the extensions that change it.
 fn scattering(
-    images: &mut Images<'_>,
+    images: &mut GltfImages<'_>,
     judge: &Judge<'_>,
     material: &json::Material,
     import: &mut Import,
@@ -245,7 +245,7 @@ fn specular_color(
 }
 
 fn emission(
-    images: &mut Images<'_>,
+    images: &mut GltfImages<'_>,
     judge: &Judge<'_>,
     material: &json::Material,
     import: &mut Import,

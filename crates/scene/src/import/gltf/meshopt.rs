@@ -7,7 +7,8 @@ use gltf::json;
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::words::plain;
+use crate::Refusal;
+use crate::file::read_value;
 
 const NAMES: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 
@@ -35,14 +36,14 @@ pub(super) struct Stream {
     pub len: usize,
     byte_stride: usize,
     count: usize,
-    mode: Mode,
+    mode: CompressionMode,
     #[serde(default)]
     filter: MeshoptFilter,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(rename_all = "SCREAMING_SNAKE_CASE")]
-enum Mode {
+enum CompressionMode {
     Attributes,
     Triangles,
     Indices,
@@ -76,10 +77,8 @@ impl<'a> MeshoptView<'a> {
         if !self.written.is_object() {
             return Err("expected an object\nhint: export the file again".to_owned());
         }
-        let stream: Stream = serde_path_to_error::deserialize(self.written).map_err(|error| {
-            let path = error.path().to_string();
-            let inside = if path == "." { String::new() } else { format!("{path}: ") };
-            format!("{inside}{}\nhint: export the file again", plain(error.inner()))
+        let stream: Stream = read_value(self.written).map_err(|(place, why)| {
+            Refusal::new(why).at(place).hint("export the file again").to_string()
         })?;
         stream.check()?;
         Ok(stream)
@@ -92,18 +91,18 @@ impl Stream {
     fn check(&self) -> Result<(), String> {
         let (stride, count) = (self.byte_stride, self.count);
         let fits = match (self.mode, self.filter) {
-            (Mode::Attributes, MeshoptFilter::None | MeshoptFilter::Exponential) => {
+            (CompressionMode::Attributes, MeshoptFilter::None | MeshoptFilter::Exponential) => {
                 stride.is_multiple_of(4) && (4..=256).contains(&stride)
             }
-            (Mode::Attributes, MeshoptFilter::Octahedral | MeshoptFilter::Color) => {
+            (CompressionMode::Attributes, MeshoptFilter::Octahedral | MeshoptFilter::Color) => {
                 matches!(stride, 4 | 8)
             }
-            (Mode::Attributes, MeshoptFilter::Quaternion) => stride == 8,
-            (Mode::Triangles, MeshoptFilter::None) => {
+            (CompressionMode::Attributes, MeshoptFilter::Quaternion) => stride == 8,
+            (CompressionMode::Triangles, MeshoptFilter::None) => {
                 matches!(stride, 2 | 4) && count.is_multiple_of(3)
             }
-            (Mode::Indices, MeshoptFilter::None) => matches!(stride, 2 | 4),
-            (Mode::Triangles | Mode::Indices, _) => false,
+            (CompressionMode::Indices, MeshoptFilter::None) => matches!(stride, 2 | 4),
+            (CompressionMode::Triangles | CompressionMode::Indices, _) => false,
         };
         if !fits {
             return Err(format!(
@@ -126,19 +125,27 @@ impl Stream {
     pub(super) fn decode(&self, packed: &[u8]) -> Result<Vec<u8>, String> {
         let broken = || "its stream is damaged\nhint: copy or export the file again".to_owned();
         let bytes = match (self.mode, self.byte_stride) {
-            (Mode::Attributes, stride) => attributes(packed, self.count, stride),
-            (Mode::Triangles, 2) => meshopt::decode_index_buffer::<u16>(packed, self.count)
-                .ok()
-                .map(|values| to_bytes(&values)),
-            (Mode::Triangles, _) => meshopt::decode_index_buffer::<u32>(packed, self.count)
-                .ok()
-                .map(|values| to_bytes(&values)),
-            (Mode::Indices, 2) => meshopt::decode_index_sequence::<u16>(packed, self.count)
-                .ok()
-                .map(|values| to_bytes(&values)),
-            (Mode::Indices, _) => meshopt::decode_index_sequence::<u32>(packed, self.count)
-                .ok()
-                .map(|values| to_bytes(&values)),
+            (CompressionMode::Attributes, stride) => attributes(packed, self.count, stride),
+            (CompressionMode::Triangles, 2) => {
+                meshopt::decode_index_buffer::<u16>(packed, self.count)
+                    .ok()
+                    .map(|values| to_bytes(&values))
+            }
+            (CompressionMode::Triangles, _) => {
+                meshopt::decode_index_buffer::<u32>(packed, self.count)
+                    .ok()
+                    .map(|values| to_bytes(&values))
+            }
+            (CompressionMode::Indices, 2) => {
+                meshopt::decode_index_sequence::<u16>(packed, self.count)
+                    .ok()
+                    .map(|values| to_bytes(&values))
+            }
+            (CompressionMode::Indices, _) => {
+                meshopt::decode_index_sequence::<u32>(packed, self.count)
+                    .ok()
+                    .map(|values| to_bytes(&values))
+            }
         };
         let mut bytes = bytes.ok_or_else(broken)?;
         self.undo_filter(&mut bytes);

@@ -38,25 +38,25 @@ use crate::memory::of_json;
 use animation::Playing;
 use buffers::Buffers;
 use chains::Chains;
-use document::Document;
-use draco::Decoded;
+use document::GltfDocument;
+use draco::DracoMesh;
 
 /// What the parts of the reader share.
-pub(super) struct Reader<'a> {
+pub(super) struct GltfReader<'a> {
     /// The model, for messages.
     file: &'a Path,
     files: &'a Files,
-    document: &'a Document,
+    document: &'a GltfDocument,
     buffers: &'a Buffers,
     /// The meshes of views that Draco compressed, once somebody needs them.
-    meshes_of_views: Vec<OnceLock<Decoded>>,
+    meshes_of_views: Vec<OnceLock<DracoMesh>>,
     wanted: Wanted,
     options: &'a Options,
     /// What goes on from the moment that is shown.
     playing: &'a Playing,
 }
 
-impl Reader<'_> {
+impl GltfReader<'_> {
     /// An error that names the file, `place` and `reason`.
     fn damaged(&self, place: impl Display, reason: impl Into<Refusal>) -> Refusal {
         damaged(self.file, place, reason)
@@ -104,7 +104,7 @@ pub(super) fn import(
         let moved = {
             let (document, buffers, playing) = (&document, &buffers, &playing);
             let meshes_of_views = draco::undecoded(document);
-            let reader = Reader {
+            let reader = GltfReader {
                 file: path,
                 files,
                 document,
@@ -123,7 +123,7 @@ pub(super) fn import(
     }
     let scene = hierarchy::walk(path, &document, &playing, &mut import.notes)?;
     let buffers = Buffers::open(path, files, &document, container.binary)?;
-    let reader = Reader {
+    let reader = GltfReader {
         file: path,
         files,
         document: &document,

@@ -6,28 +6,28 @@ use json::mesh::{Mode, Primitive, Semantic};
 use json::validation::Checked;
 use rayon::prelude::*;
 
-use super::Reader;
+use super::GltfReader;
 use super::accessor::Accessor;
-use super::draco::{Compressed, Decoded};
+use super::draco::{DracoMesh, DracoPrimitive};
 use crate::import::error::{Note, NoteKind};
 use crate::import::{Refusal, Strictness};
 
 /// A primitive being read.
-pub(super) struct Part<'a> {
-    pub reader: &'a Reader<'a>,
+pub(super) struct PrimitiveReader<'a> {
+    pub reader: &'a GltfReader<'a>,
     pub primitive: &'a Primitive,
     /// Where its vertices and triangles are, when they are compressed.
-    draco: Option<(Compressed, &'a Decoded)>,
+    draco: Option<(DracoPrimitive, &'a DracoMesh)>,
     pub place: String,
     pub notes: Vec<Note>,
 }
 
-impl<'a> Part<'a> {
+impl<'a> PrimitiveReader<'a> {
     /// A primitive that messages call `place`, of which nothing is read yet.
     pub(super) fn new(
-        reader: &'a Reader<'a>,
+        reader: &'a GltfReader<'a>,
         primitive: &'a Primitive,
-        draco: Option<(Compressed, &'a Decoded)>,
+        draco: Option<(DracoPrimitive, &'a DracoMesh)>,
         place: String,
     ) -> Self {
         Self { reader, primitive, draco, place, notes: Vec::new() }

@@ -5,13 +5,13 @@ use std::path::Path;
 use etendue_geometry::Transform;
 use etendue_geometry::glam::{DMat3, DQuat, DVec3};
 
-use super::document::{Document, Node};
+use super::document::{GltfDocument, GltfNode};
 use super::{absent, damaged};
 use crate::import::Refusal;
 
 /// The nodes of a document with each of them somewhere.
 #[derive(Debug, Default)]
-pub(super) struct Pose {
+pub(super) struct NodePoses {
     /// The nodes of the default scene, parents before children, in the order of the file.
     pub shown: Vec<usize>,
     /// For each node whether it or one above it is hidden (`KHR_node_visibility`): its mesh and
@@ -22,22 +22,22 @@ pub(super) struct Pose {
     model_from_node: Vec<Option<Transform>>,
 }
 
-impl Pose {
+impl NodePoses {
     /// The nodes as the file has them at rest.
     ///
     /// # Errors
     ///
     /// When the default scene has a node that is absent, stands below itself or two parents, or has
     /// a transform that is not finite.
-    pub(super) fn at_rest(path: &Path, document: &Document) -> Result<Self, Refusal> {
+    pub(super) fn at_rest(path: &Path, document: &GltfDocument) -> Result<Self, Refusal> {
         Self::evaluate(path, document, |index, node| local(path, node, index))
     }
 
     /// The nodes with each one's transform to its parent's frame by `local`.
     fn evaluate(
         path: &Path,
-        document: &Document,
-        local: impl Fn(usize, &Node) -> Result<Transform, Refusal>,
+        document: &GltfDocument,
+        local: impl Fn(usize, &GltfNode) -> Result<Transform, Refusal>,
     ) -> Result<Self, Refusal> {
         let count = document.nodes.len();
         let (hidden, model_from_node) = (vec![false; count], vec![None; count]);
@@ -69,8 +69,8 @@ impl Pose {
     /// sees these nodes: broken ones are passed over.
     fn evaluate_others(
         &mut self,
-        document: &Document,
-        local: impl Fn(usize, &Node) -> Result<Transform, Refusal>,
+        document: &GltfDocument,
+        local: impl Fn(usize, &GltfNode) -> Result<Transform, Refusal>,
     ) {
         let mut open: Vec<(usize, Transform)> =
             orphans(document).into_iter().map(|node| (node, Transform::IDENTITY)).collect();
@@ -108,7 +108,7 @@ pub(super) fn exists(
 
 /// The roots of the default scene: the one that the document names, else its first; a document
 /// without scenes shows all nodes that are nobody's children.
-fn roots(path: &Path, document: &Document) -> Result<Vec<usize>, Refusal> {
+fn roots(path: &Path, document: &GltfDocument) -> Result<Vec<usize>, Refusal> {
     if document.scenes.is_empty() {
         return Ok(orphans(document));
     }
@@ -124,7 +124,7 @@ fn roots(path: &Path, document: &Document) -> Result<Vec<usize>, Refusal> {
 }
 
 /// The nodes that are nobody's children.
-fn orphans(document: &Document) -> Vec<usize> {
+fn orphans(document: &GltfDocument) -> Vec<usize> {
     let mut is_child = vec![false; document.nodes.len()];
     for &child in document.nodes.iter().flat_map(|node| &node.children) {
         if let Some(is_child) = is_child.get_mut(child) {
@@ -134,13 +134,13 @@ fn orphans(document: &Document) -> Vec<usize> {
     (0..is_child.len()).filter(|&node| !is_child[node]).collect()
 }
 
-fn is_hidden(node: &Node) -> bool {
+fn is_hidden(node: &GltfNode) -> bool {
     let visible = node.extensions.get("KHR_node_visibility").and_then(|e| e.get("visible"));
     visible.and_then(serde_json::Value::as_bool) == Some(false)
 }
 
 /// From the node's frame to its parent's, as the file has it.
-pub(super) fn local(path: &Path, node: &Node, index: usize) -> Result<Transform, Refusal> {
+pub(super) fn local(path: &Path, node: &GltfNode, index: usize) -> Result<Transform, Refusal> {
     let place = || format!("nodes[{index}]");
     let transform = match node.matrix {
         Some(matrix) => affine(&matrix).ok_or_else(|| {

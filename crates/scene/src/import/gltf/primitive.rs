@@ -10,12 +10,12 @@ use json::mesh::{Mode, Primitive, Semantic};
 use json::validation::Checked;
 use rayon::prelude::*;
 
-use super::Reader;
+use super::GltfReader;
 use super::chains::Chains;
-use super::deform::{Corners, Skin};
-use super::hierarchy::{Scene, Shape};
-use super::part::Part;
-use crate::import::admit::{Admitted, Candidate, admit, cost};
+use super::deform::{PrimitiveCorners, Skin};
+use super::hierarchy::{NodeShape, SceneNodes};
+use super::part::PrimitiveReader;
+use crate::import::admit::{Admitted, MeshCandidate, admit, cost};
 use crate::import::deformer::Deformer;
 use crate::import::error::{self, Note, NoteKind};
 use crate::import::{Import, Refusal};
@@ -31,17 +31,18 @@ pub(super) struct Loaded {
 }
 
 /// The shapes that a scene shows, each loaded once.
-pub(super) struct Shapes {
+pub(super) struct ShapeSet {
     /// In order.
-    shapes: Vec<Shape>,
+    shapes: Vec<NodeShape>,
     /// For each the primitives that have triangles.
     primitives: Vec<Vec<Loaded>>,
 }
 
-impl Shapes {
+impl ShapeSet {
     /// The shapes of `scene`, not loaded yet.
-    fn of(scene: &Scene) -> Self {
-        let mut shapes: Vec<Shape> = scene.meshes.iter().map(|mesh| mesh.shape.clone()).collect();
+    fn of(scene: &SceneNodes) -> Self {
+        let mut shapes: Vec<NodeShape> =
+            scene.meshes.iter().map(|mesh| mesh.shape.clone()).collect();
         shapes.sort_unstable();
         shapes.dedup();
         let mut primitives = Vec::new();
@@ -50,7 +51,7 @@ impl Shapes {
     }
 
     /// The primitives of `shape` that have triangles.
-    pub(super) fn primitives(&self, shape: &Shape) -> &[Loaded] {
+    pub(super) fn primitives(&self, shape: &NodeShape) -> &[Loaded] {
         self.shapes.binary_search(shape).map_or(&[], |found| &self.primitives[found])
     }
 }
@@ -77,10 +78,10 @@ impl Read {
 
 /// Loads the meshes that `scene` shows. Materials are numbered as in the document.
 pub(super) fn load(
-    reader: &Reader<'_>,
-    (scene, chains): (&Scene, &Chains<'_>),
+    reader: &GltfReader<'_>,
+    (scene, chains): (&SceneNodes, &Chains<'_>),
     import: &mut Import,
-) -> Result<Shapes, Refusal> {
+) -> Result<ShapeSet, Refusal> {
     let meshes = &reader.document.root.meshes;
     let mut shown = vec![false; meshes.len()];
     for placed in &scene.meshes {
@@ -92,7 +93,7 @@ pub(super) fn load(
     }
     note_unused(&shown, &mut import.notes);
     let skins = skins(reader, (scene, chains))?;
-    let mut shapes = Shapes::of(scene);
+    let mut shapes = ShapeSet::of(scene);
     let wanted: Vec<(usize, usize, &Primitive)> = (shapes.shapes.iter().enumerate())
         .flat_map(|(s, shape)| {
             let primitives = meshes[shape.mesh].primitives.iter().enumerate();
@@ -123,8 +124,8 @@ pub(super) fn load(
 
 /// The skins that nodes of `scene` wear.
 fn skins(
-    reader: &Reader<'_>,
-    (scene, chains): (&Scene, &Chains<'_>),
+    reader: &GltfReader<'_>,
+    (scene, chains): (&SceneNodes, &Chains<'_>),
 ) -> Result<BTreeMap<usize, Skin>, Refusal> {
     let mut skins = BTreeMap::new();
     for placed in &scene.meshes {
@@ -138,7 +139,7 @@ fn skins(
 }
 
 /// Adds a mesh to `import`; its index.
-fn take(read: Read, import: &mut Import, reader: &Reader<'_>) -> Result<u32, Refusal> {
+fn take(read: Read, import: &mut Import, reader: &GltfReader<'_>) -> Result<u32, Refusal> {
     let index = u32::try_from(import.meshes.len())
         .map_err(|_| reader.damaged("meshes", "there are more than 32 bits can count"))?;
     import.stats.bytes_copied += read.copied;
@@ -166,7 +167,7 @@ fn note_no_triangles(notes: &mut Vec<Note>) {
 }
 
 /// What messages call a primitive.
-fn place(reader: &Reader<'_>, mesh: usize, number: usize) -> String {
+fn place(reader: &GltfReader<'_>, mesh: usize, number: usize) -> String {
     let name = reader.document.root.meshes[mesh].name.as_deref().unwrap_or_default();
     if name.is_empty() {
         format!("meshes[{mesh}].primitives[{number}]")
@@ -177,8 +178,8 @@ fn place(reader: &Reader<'_>, mesh: usize, number: usize) -> String {
 
 /// Reads and checks one primitive of `shape`; `None` for points and lines.
 fn read(
-    reader: &Reader<'_>,
-    shape: &Shape,
+    reader: &GltfReader<'_>,
+    shape: &NodeShape,
     skin: Option<&Skin>,
     number: usize,
     primitive: &Primitive,
@@ -196,7 +197,7 @@ fn read(
         return Ok(None);
     }
     let draco = reader.draco(primitive, &place)?;
-    let mut part = Part::new(reader, primitive, draco, place);
+    let mut part = PrimitiveReader::new(reader, primitive, draco, place);
     let Some(positions) = part.attribute::<3>(&Semantic::Positions, 0.0)? else {
         part.note(NoteKind::Irregular, "a primitive without positions is left out");
         return Ok(Some(Read::empty(name, part.notes)));
@@ -208,7 +209,7 @@ fn read(
     let uvs = if wanted.uvs { part.uvs(&positions)? } else { Vec::new() };
     let colors =
         if wanted.colors { part.vertex_data(&Semantic::Colors(0), 1.0, &positions)? } else { None };
-    let Corners { positions, normals, skinned, mirrored, deformer } =
+    let PrimitiveCorners { positions, normals, skinned, mirrored, deformer } =
         part.deformed(shape, skin, positions, normals)?;
     let triangles = if mirrored { turned_over(&triangles) } else { triangles };
     let (mut copied, mut mapped) = cost(&triangles, triangles.len());
@@ -224,7 +225,7 @@ fn read(
     uvs.iter().for_each(|v| add(cost(v.floats(), v.len() * 2)));
     colors.iter().for_each(|v| add(cost(v.floats(), v.len() * 4)));
     let candidate =
-        Candidate { name, place: part.place, positions, triangles, normals, uvs, colors };
+        MeshCandidate { name, place: part.place, positions, triangles, normals, uvs, colors };
     let admitted = admit(candidate, reader.file, reader.options)?;
     Ok(Some(Read { skinned, admitted, deformer, copied, mapped, notes: part.notes }))
 }

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use crate::import::single;
-use crate::import::text::{Fault, Words, number, whole};
+use crate::import::text::{TextFault, Words, number, whole};
 use etendue_tracer::spec::BRIGHTEST;
 
 /// The index of a corner that has none.
@@ -57,7 +57,7 @@ pub(super) struct Chunk {
     /// Where faces with other than three corners are.
     pub polygons: Vec<Polygon>,
     /// Statements, with the number of corners read before each.
-    pub statements: Vec<(usize, Statement)>,
+    pub statements: Vec<(usize, FaceStatement)>,
     /// Lines and points, which have no surface.
     pub without_surface: u64,
     /// Curves and surfaces of splines.
@@ -80,7 +80,7 @@ pub(super) struct Polygon {
 
 /// A line that changes how faces are read.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Statement {
+pub(super) enum FaceStatement {
     /// `o` or `g`.
     Name(String),
     /// `usemtl`.
@@ -91,7 +91,7 @@ pub(super) enum Statement {
 
 impl Chunk {
     /// Reads `text`, which starts and ends with whole lines.
-    pub(super) fn parse(text: &[u8], wish: WantedColumns) -> Result<Self, Fault> {
+    pub(super) fn parse(text: &[u8], wish: WantedColumns) -> Result<Self, TextFault> {
         let mut chunk = Self::default();
         let mut words = Words::new(text);
         while !words.is_done() {
@@ -103,17 +103,17 @@ impl Chunk {
                 Some(b"vt") => chunk.uv(&mut words, wish)?,
                 Some(b"vn") => chunk.normal(&mut words, wish)?,
                 Some(b"o" | b"g") => {
-                    let name = Statement::Name(string(words.rest()));
+                    let name = FaceStatement::Name(string(words.rest()));
                     chunk.statements.push((chunk.corners[V].len(), name));
                     continue;
                 }
                 Some(b"usemtl") => {
-                    let name = Statement::Material(string(words.rest()));
+                    let name = FaceStatement::Material(string(words.rest()));
                     chunk.statements.push((chunk.corners[V].len(), name));
                     continue;
                 }
                 Some(b"mtllib") => {
-                    let files = Statement::Library(string(words.rest()));
+                    let files = FaceStatement::Library(string(words.rest()));
                     chunk.statements.push((chunk.corners[V].len(), files));
                     continue;
                 }
@@ -130,7 +130,7 @@ impl Chunk {
         Ok(chunk)
     }
 
-    fn vertex(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), Fault> {
+    fn vertex(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), TextFault> {
         let position = floats::<3>(words, 3)?;
         self.positions.push(position);
         self.defined[V] += 1;
@@ -152,7 +152,7 @@ impl Chunk {
         self.colors.push(color);
     }
 
-    fn uv(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), Fault> {
+    fn uv(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), TextFault> {
         self.defined[VT] += 1;
         if wish.uvs {
             let [u, v] = floats::<2>(words, 1)?;
@@ -162,7 +162,7 @@ impl Chunk {
         Ok(())
     }
 
-    fn normal(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), Fault> {
+    fn normal(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), TextFault> {
         self.defined[VN] += 1;
         if wish.normals {
             self.normals.push(floats::<3>(words, 3)?.map(single));
@@ -170,7 +170,7 @@ impl Chunk {
         Ok(())
     }
 
-    fn face(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), Fault> {
+    fn face(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), TextFault> {
         let first = self.corners[V].len();
         while let Some(word) = words.word() {
             let at = words.at() - word.len();
@@ -213,7 +213,7 @@ impl Chunk {
         corner: usize,
         word: Option<&[u8]>,
         at: usize,
-    ) -> Result<(), Fault> {
+    ) -> Result<(), TextFault> {
         let word = match word {
             None | Some([]) if kind != V => return Ok(()),
             word => word.unwrap_or_default(),
@@ -228,7 +228,7 @@ impl Chunk {
             }
         };
         let Some(index) = index else {
-            return Err(Fault::new(
+            return Err(TextFault::new(
                 at,
                 format!(
                     "\"{}\" is not the number of a vertex; they count from 1, or back from -1",
@@ -247,7 +247,7 @@ impl Chunk {
 
 /// The next `N` numbers of the line, of which the first `needed` have to be there.
 #[inline]
-fn floats<const N: usize>(words: &mut Words<'_>, needed: usize) -> Result<[f64; N], Fault> {
+fn floats<const N: usize>(words: &mut Words<'_>, needed: usize) -> Result<[f64; N], TextFault> {
     let mut values = [0.0; N];
     for (i, value) in values.iter_mut().enumerate() {
         match words.word() {
@@ -256,11 +256,11 @@ fn floats<const N: usize>(words: &mut Words<'_>, needed: usize) -> Result<[f64; 
                 None => {
                     let word_at = words.at() - word.len();
                     let text = String::from_utf8_lossy(word);
-                    return Err(Fault::new(word_at, format!("\"{text}\" is not a number")));
+                    return Err(TextFault::new(word_at, format!("\"{text}\" is not a number")));
                 }
             },
             None if i < needed => {
-                return Err(Fault::new(words.at(), format!("{needed} numbers are needed")));
+                return Err(TextFault::new(words.at(), format!("{needed} numbers are needed")));
             }
             None => break,
         }
@@ -356,9 +356,9 @@ pub(super) fn divide(chunks: &[Chunk]) -> Vec<Segment> {
                 from = end;
             }
             match statement {
-                Some(Statement::Name(name)) => current.0.clone_from(name),
-                Some(Statement::Material(name)) => current.1 = Some(name.clone()),
-                Some(Statement::Library(_)) | None => {}
+                Some(FaceStatement::Name(name)) => current.0.clone_from(name),
+                Some(FaceStatement::Material(name)) => current.1 = Some(name.clone()),
+                Some(FaceStatement::Library(_)) | None => {}
             }
         }
     }
@@ -373,7 +373,7 @@ pub(super) fn libraries(chunks: &[Chunk]) -> Vec<&str> {
     let statements = chunks.iter().flat_map(|chunk| &chunk.statements);
     statements
         .filter_map(|(_, statement)| match statement {
-            Statement::Library(files) => Some(files.as_str()),
+            FaceStatement::Library(files) => Some(files.as_str()),
             _ => None,
         })
         .collect()

@@ -30,7 +30,7 @@ use rayon::prelude::*;
 use super::admit::{self, Admitted};
 use super::error::{self, Note, NoteKind};
 use super::files::Files;
-use super::text::{Fault, pieces, with_newlines, without_mark};
+use super::text::{TextFault, pieces, with_newlines, without_mark};
 use super::{Import, ImportedPlacement, Options, Refusal, Wanted};
 use chunk::{Chunk, Segment, WantedColumns};
 use etendue_geometry::glam::DVec3;
@@ -54,7 +54,7 @@ pub(super) fn import(
     super::refuse_other_kind(path, map.bytes(), "an OBJ model")?;
     let text = with_newlines(without_mark(map.bytes()));
     let text: &[u8] = &text;
-    let fault = |fault: Fault| fault.locate(path, text);
+    let fault = |fault: TextFault| fault.locate(path, text);
     let wish = WantedColumns { uvs: wanted.uvs, normals: wanted.normals, colors: wanted.colors };
     let bytes = PARSED_PER_BYTE * text.len() as u64;
     files.take(bytes, || "the numbers of the text".to_owned())?;
@@ -64,7 +64,7 @@ pub(super) fn import(
         .map(|&(start, piece)| {
             refuse_zero_bytes(piece)
                 .and_then(|()| Chunk::parse(piece, wish))
-                .map_err(|Fault { at, reason }| Fault { at: start + at, reason })
+                .map_err(|TextFault { at, reason }| TextFault { at: start + at, reason })
         })
         .collect::<Result<_, _>>()
         .map_err(fault)?;
@@ -95,16 +95,19 @@ pub(super) fn import(
 }
 
 /// Files of other formats would else pass for models of lines that mean nothing.
-fn refuse_zero_bytes(text: &[u8]) -> Result<(), Fault> {
+fn refuse_zero_bytes(text: &[u8]) -> Result<(), TextFault> {
     if !text.contains(&0) {
         return Ok(());
     }
     let at = text.iter().position(|&byte| byte == 0).unwrap_or_default();
-    Err(Fault::new(at, "a zero byte: this is no text, hence no OBJ\nhint: export the model again"))
+    Err(TextFault::new(
+        at,
+        "a zero byte: this is no text, hence no OBJ\nhint: export the model again",
+    ))
 }
 
 /// Refuses text of another format: no line of it is one of OBJ, and some line is no comment.
-fn refuse_foreign(chunks: &[Chunk], pieces: &[(usize, &[u8])]) -> Result<(), Fault> {
+fn refuse_foreign(chunks: &[Chunk], pieces: &[(usize, &[u8])]) -> Result<(), TextFault> {
     if chunks.iter().any(|chunk| chunk.is_obj) {
         return Ok(());
     }
@@ -122,7 +125,7 @@ fn refuse_foreign(chunks: &[Chunk], pieces: &[(usize, &[u8])]) -> Result<(), Fau
         "no line is one of Wavefront's OBJ, such as `v 0 0 0` or `f 1 2 3`: {what}\nhint: convert it to OBJ, PLY or \
          glTF"
     );
-    Err(Fault::new(at, why))
+    Err(TextFault::new(at, why))
 }
 
 /// Adds a mesh where the file has it.

@@ -9,9 +9,9 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::chunk::{Chunk, KINDS, NONE, Polygon, Segment, V, VN, VT};
-use crate::import::admit::Candidate;
+use crate::import::admit::MeshCandidate;
 use crate::import::files::Files;
-use crate::import::text::{Fault, Words, whole};
+use crate::import::text::{TextFault, Words, whole};
 use crate::import::{Refusal, Strictness, polygon, precise_enough};
 use etendue_geometry::Vertices;
 use etendue_geometry::glam::DVec3;
@@ -43,7 +43,7 @@ impl<'a> Welder<'a> {
         path: &Path,
         files: &Files,
         only: bool,
-    ) -> Result<Candidate, Refusal> {
+    ) -> Result<MeshCandidate, Refusal> {
         let (has_uvs, has_normals) = (self.has(segment, VT), self.has(segment, VN));
         let title = if segment.name.is_empty() { stem(path) } else { segment.name.clone() };
         let place = match &segment.material {
@@ -63,7 +63,7 @@ impl<'a> Welder<'a> {
         }
         if plain {
             let triangles = self.corners(segment, |chunk, corner| chunk.corners[V][corner]);
-            return Ok(Candidate {
+            return Ok(MeshCandidate {
                 name: title,
                 place,
                 positions: precise_enough(&pool.positions),
@@ -82,7 +82,7 @@ impl<'a> Welder<'a> {
         take(keys.len(), 2 * size_of::<[f64; 3]>() + size_of::<[f32; 5]>())?;
         let positions: Vec<[f64; 3]> =
             keys.par_iter().map(|key| pool.positions[key[V] as usize]).collect();
-        Ok(Candidate {
+        Ok(MeshCandidate {
             name: title,
             place,
             positions: precise_enough(&positions),
@@ -305,7 +305,7 @@ pub(super) fn find_bad_index(
     chunk: usize,
     chunks: &[Chunk],
     strictness: Strictness,
-) -> Fault {
+) -> TextFault {
     let kinds = if strictness == Strictness::Strict { KINDS } else { V + 1 };
     let (bases, total) = bases(chunks);
     let (start, text) = pieces[chunk];
@@ -319,7 +319,7 @@ pub(super) fn find_bad_index(
             Some(b"f" | b"fo") => {
                 while let Some(word) = words.word() {
                     if let Some(reason) = bad_corner(word, kinds, defined, total) {
-                        return Fault::new(start + words.at() - word.len(), reason);
+                        return TextFault::new(start + words.at() - word.len(), reason);
                     }
                 }
             }
@@ -327,7 +327,7 @@ pub(super) fn find_bad_index(
         }
         words.end_line();
     }
-    Fault::new(start, "a face names a vertex that does not exist")
+    TextFault::new(start, "a face names a vertex that does not exist")
 }
 
 fn bad_corner(

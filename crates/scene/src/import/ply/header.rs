@@ -1,6 +1,6 @@
 //! The header: what elements follow, and how they are written.
 
-use crate::import::text::{Fault, Words, whole, without_mark};
+use crate::import::text::{TextFault, Words, whole, without_mark};
 
 /// How the data is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,7 +40,7 @@ pub(super) struct Property {
 
 /// Rows of the same properties.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Element {
+pub(super) struct RowElement {
     pub name: String,
     pub count: usize,
     pub properties: Vec<Property>,
@@ -50,7 +50,7 @@ pub(super) struct Element {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Header {
     pub format: Format,
-    pub elements: Vec<Element>,
+    pub elements: Vec<RowElement>,
     /// Where the data starts (bytes).
     pub data: usize,
 }
@@ -81,7 +81,7 @@ impl Type {
     }
 }
 
-impl Element {
+impl RowElement {
     /// The number of the property with one of these names.
     pub(super) fn find(&self, names: &[&str]) -> Option<usize> {
         self.properties.iter().position(|property| names.contains(&property.name.as_str()))
@@ -108,11 +108,11 @@ impl Header {
     pub(super) fn bytes_to_make(&self, length: usize) -> u64 {
         // Text has a digit and a blank for each number.
         let in_text = matches!(self.format, Format::Text);
-        let row = |element: &Element| -> usize {
+        let row = |element: &RowElement| -> usize {
             let sizes = element.properties.iter().map(|p| p.list.unwrap_or(p.kind).size());
             if in_text { 2 * element.properties.len() } else { sizes.sum() }
         };
-        let made = |element: &Element| -> u64 {
+        let made = |element: &RowElement| -> u64 {
             let rows = element.count.min(length / row(element).max(1)) as u64;
             let kept: u64 = match element.name.as_str() {
                 // Text is read into a table of f64 first.
@@ -125,7 +125,7 @@ impl Header {
         self.elements.iter().map(made).fold(0, u64::saturating_add)
     }
 
-    pub(super) fn parse(file: &[u8]) -> Result<Self, Fault> {
+    pub(super) fn parse(file: &[u8]) -> Result<Self, TextFault> {
         let mut lines = HeaderLines::new(file)?;
         let (mut format, mut elements, mut properties) = (None, Vec::new(), 0);
         while let Some((start, line)) = lines.next() {
@@ -139,15 +139,15 @@ impl Header {
                     match elements.last_mut() {
                         _ if properties > MOST_PROPERTIES => {
                             let reason = format!("more than {MOST_PROPERTIES} properties");
-                            return Err(Fault::new(start, reason));
+                            return Err(TextFault::new(start, reason));
                         }
-                        Some(Element { properties, .. }) => properties.push(property),
-                        None => return Err(Fault::new(start, "a property before any element")),
+                        Some(RowElement { properties, .. }) => properties.push(property),
+                        None => return Err(TextFault::new(start, "a property before any element")),
                     }
                 }
                 Some(b"end_header") => {
                     let Some(format) = format else {
-                        return Err(Fault::new(start, "the header has no `format` line"));
+                        return Err(TextFault::new(start, "the header has no `format` line"));
                     };
                     return Ok(Self { format, elements, data: lines.at });
                 }
@@ -155,10 +155,10 @@ impl Header {
             }
             if lines.at > LONGEST {
                 let reason = format!("the header has no end in its first {LONGEST} bytes");
-                return Err(Fault::new(start, reason));
+                return Err(TextFault::new(start, reason));
             }
         }
-        Err(Fault::new(
+        Err(TextFault::new(
             file.len(),
             "the file ends inside its header\nhint: copy or export it again",
         ))
@@ -180,7 +180,7 @@ struct HeaderLines<'a> {
 
 impl<'a> HeaderLines<'a> {
     /// From behind the word `ply`, which is all of the first line.
-    fn new(file: &'a [u8]) -> Result<Self, Fault> {
+    fn new(file: &'a [u8]) -> Result<Self, TextFault> {
         let text = without_mark(file);
         let rest = text.strip_prefix(b"ply").map(|rest| {
             let blanks = rest.iter().take_while(|byte| matches!(byte, b' ' | b'\t')).count();
@@ -192,7 +192,7 @@ impl<'a> HeaderLines<'a> {
             Some([b'\r', ..]) => b'\r',
             _ => {
                 let reason = "a PLY file starts with the line `ply`; this one does not";
-                return Err(Fault::new(0, reason));
+                return Err(TextFault::new(0, reason));
             }
         };
         // The rest of the first line comes next, and is blank.
@@ -209,33 +209,33 @@ impl<'a> HeaderLines<'a> {
     }
 }
 
-fn parse_format(words: &mut Words<'_>, start: usize) -> Result<Format, Fault> {
+fn parse_format(words: &mut Words<'_>, start: usize) -> Result<Format, TextFault> {
     match words.word() {
         Some(b"ascii") => Ok(Format::Text),
         Some(b"binary_little_endian") => Ok(Format::Binary(Order::Little)),
         Some(b"binary_big_endian") => Ok(Format::Binary(Order::Big)),
-        _ => Err(Fault::new(
+        _ => Err(TextFault::new(
             start,
             "the format is none of ascii, binary_little_endian and binary_big_endian",
         )),
     }
 }
 
-fn parse_element(words: &mut Words<'_>, start: usize) -> Result<Element, Fault> {
+fn parse_element(words: &mut Words<'_>, start: usize) -> Result<RowElement, TextFault> {
     let name = words.word();
     let count = words.word().and_then(whole).and_then(|count| usize::try_from(count).ok());
     match (name, count) {
-        (Some(name), Some(count)) => Ok(Element {
+        (Some(name), Some(count)) => Ok(RowElement {
             name: String::from_utf8_lossy(name).into_owned(),
             count,
             properties: Vec::new(),
         }),
-        _ => Err(Fault::new(start, "an element needs a name and a whole number")),
+        _ => Err(TextFault::new(start, "an element needs a name and a whole number")),
     }
 }
 
-fn parse_property(words: &mut Words<'_>, start: usize) -> Result<Property, Fault> {
-    let unknown = || Fault::new(start, "a property needs a type and a name");
+fn parse_property(words: &mut Words<'_>, start: usize) -> Result<Property, TextFault> {
+    let unknown = || TextFault::new(start, "a property needs a type and a name");
     let first = words.word().ok_or_else(unknown)?;
     let (list, kind) = if first == b"list" {
         let length = words.word().and_then(Type::parse).ok_or_else(unknown)?;

@@ -19,9 +19,9 @@ use std::path::Path;
 use etendue_geometry::{Positions, Transform};
 use etendue_tracer::Material;
 
-use super::admit::{self, Candidate, cost};
+use super::admit::{self, MeshCandidate, cost};
 use super::files::Files;
-use super::text::Fault;
+use super::text::TextFault;
 use super::{Import, ImportedPlacement, Options, Refusal, Wanted, error};
 use header::{Format, Header};
 
@@ -36,7 +36,7 @@ pub(super) fn import(
     if !map.bytes().starts_with(b"ply") {
         super::refuse_other_kind(path, map.bytes(), "a PLY model")?;
     }
-    let fault = |fault: Fault| fault.locate(path, map.bytes());
+    let fault = |fault: TextFault| fault.locate(path, map.bytes());
     let header = Header::parse(map.bytes()).map_err(fault)?;
     let damaged = |reason: String| error::damaged(path, "PLY data", reason);
     let bytes = header.bytes_to_make(map.bytes().len());
@@ -63,7 +63,7 @@ pub(super) fn import(
     vertices.normals.iter().for_each(|v| add(cost(v.floats(), v.len() * 3)));
     vertices.uvs.iter().for_each(|v| add(cost(v.floats(), v.len() * 2)));
     vertices.colors.iter().for_each(|v| add(cost(v.floats(), v.len() * 4)));
-    let candidate = Candidate {
+    let candidate = MeshCandidate {
         place: format!("\"{name}\""),
         name: name.clone(),
         positions: vertices.positions,

@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::header::{Element, Header, Order, Property, Type};
-use super::vertices::{Columns, Faces, Lists, Table, VertexData};
+use super::header::{Header, Order, Property, RowElement, Type};
+use super::vertices::{Faces, Lists, VertexColumns, VertexData, VertexTable};
 use crate::import::Wanted;
-use crate::import::text::{Fault, Words, number, pieces, with_newlines};
+use crate::import::text::{TextFault, Words, number, pieces, with_newlines};
 use etendue_files::MappedFile;
 use etendue_geometry::{Buffer, Vertices};
 
@@ -21,7 +21,7 @@ pub(super) fn read_text(
     map: &MappedFile,
     header: &Header,
     wanted: Wanted,
-) -> Result<(VertexData, Faces), Fault> {
+) -> Result<(VertexData, Faces), TextFault> {
     let text = with_newlines(&map.bytes()[header.data..]);
     let pieces = pieces(&text, PIECE);
     let lines: Vec<usize> = pieces.par_iter().map(|(_, piece)| count_rows(piece)).collect();
@@ -31,29 +31,31 @@ pub(super) fn read_text(
         starts.push(before);
         before += count;
     }
-    let parts: Vec<Part> = pieces
+    let parts: Vec<TextPiece> = pieces
         .par_iter()
         .zip(starts)
         .map(|(&(start, piece), row)| {
-            Part::parse(piece, header, row)
-                .map_err(|fault| Fault { at: header.data + start + fault.at, reason: fault.reason })
+            TextPiece::parse(piece, header, row).map_err(|fault| TextFault {
+                at: header.data + start + fault.at,
+                reason: fault.reason,
+            })
         })
         .collect::<Result<_, _>>()?;
     let needed = header.elements.iter().try_fold(0_usize, |sum, e| sum.checked_add(e.count));
     if needed.is_none_or(|needed| before < needed) {
-        return Err(Fault::new(
+        return Err(TextFault::new(
             map.bytes().len(),
             format!("the file ends after {before} rows of data\nhint: copy or export it again"),
         ));
     }
     let Some(element) = header.elements.iter().find(|element| element.name == "vertex") else {
-        return Err(Fault::new(
+        return Err(TextFault::new(
             header.data,
             "there is no vertex element\nhint: export the file again",
         ));
     };
-    let columns =
-        Columns::of(element, wanted, true).map_err(|reason| Fault::new(header.data, reason))?;
+    let columns = VertexColumns::of(element, wanted, true)
+        .map_err(|reason| TextFault::new(header.data, reason))?;
     let mut matrix = Matrix { width: element.properties.len(), values: Vec::new() };
     matrix.values.reserve_exact(parts.iter().map(|part| part.values.len()).sum());
     let mut faces = Faces::default();
@@ -75,7 +77,7 @@ struct Matrix {
     values: Vec<f64>,
 }
 
-impl Table for Matrix {
+impl VertexTable for Matrix {
     fn rows(&self) -> usize {
         self.values.len() / self.width.max(1)
     }
@@ -87,14 +89,14 @@ impl Table for Matrix {
 
 /// What a piece of the text holds.
 #[derive(Default)]
-struct Part {
+struct TextPiece {
     values: Vec<f64>,
     faces: Faces,
 }
 
-impl Part {
+impl TextPiece {
     /// Reads `text`, whose first row is number `row` of the data.
-    fn parse(text: &[u8], header: &Header, row: usize) -> Result<Self, Fault> {
+    fn parse(text: &[u8], header: &Header, row: usize) -> Result<Self, TextFault> {
         let mut part = Self::default();
         let mut words = Words::new(text);
         let mut corners = Vec::new();
@@ -124,11 +126,11 @@ impl Part {
         Ok(part)
     }
 
-    fn vertex(&mut self, words: &mut Words<'_>, element: &Element) -> Result<(), Fault> {
+    fn vertex(&mut self, words: &mut Words<'_>, element: &RowElement) -> Result<(), TextFault> {
         for property in &element.properties {
             if property.list.is_some() {
                 let reason = "vertices with lists are not supported; export without them";
-                return Err(Fault::new(words.at(), reason));
+                return Err(TextFault::new(words.at(), reason));
             }
             self.values.push(next_number(words)?);
         }
@@ -139,10 +141,10 @@ impl Part {
 /// The list `column` of a face.
 fn face(
     words: &mut Words<'_>,
-    element: &Element,
+    element: &RowElement,
     column: usize,
     corners: &mut Vec<u32>,
-) -> Result<(), Fault> {
+) -> Result<(), TextFault> {
     corners.clear();
     for (i, property) in element.properties.iter().enumerate().take(column + 1) {
         let count = match property.list {
@@ -160,25 +162,25 @@ fn face(
     Ok(())
 }
 
-fn next_number(words: &mut Words<'_>) -> Result<f64, Fault> {
+fn next_number(words: &mut Words<'_>) -> Result<f64, TextFault> {
     let Some(word) = words.word() else {
-        return Err(Fault::new(words.at(), "the row has too few numbers"));
+        return Err(TextFault::new(words.at(), "the row has too few numbers"));
     };
     number(word).ok_or_else(|| {
         let text = String::from_utf8_lossy(word);
-        Fault::new(words.at() - word.len(), format!("\"{text}\" is not a number"))
+        TextFault::new(words.at() - word.len(), format!("\"{text}\" is not a number"))
     })
 }
 
 /// A whole number; below zero as its two's complement, as the strips' −1.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be whole")]
-fn next_index(words: &mut Words<'_>) -> Result<u32, Fault> {
+fn next_index(words: &mut Words<'_>) -> Result<u32, TextFault> {
     let start = words.at();
     let value = next_number(words)?;
     if value.fract() == 0.0 && value >= -1.0 && value <= f64::from(u32::MAX) {
         Ok(value as i64 as u32)
     } else {
-        Err(Fault::new(start, format!("{value} is not the number of a vertex")))
+        Err(TextFault::new(start, format!("{value} is not the number of a vertex")))
     }
 }
 
@@ -204,8 +206,8 @@ pub(super) fn read_binary(
                 let size = row.checked_mul(element.count).ok_or_else(cut_off)?;
                 let data = bytes.get(..size).ok_or_else(cut_off)?;
                 if element.name == "vertex" {
-                    let columns = Columns::of(element, wanted, false)?;
-                    let table = Rows { map, start: at, data, row, element, order };
+                    let columns = VertexColumns::of(element, wanted, false)?;
+                    let table = RowsOfSize { map, start: at, data, row, element, order };
                     vertices = Some(columns.read(&table));
                 }
                 size
@@ -271,24 +273,24 @@ fn index(kind: Type, order: Order, bytes: &[u8]) -> u32 {
 }
 
 /// Rows of one size.
-struct Rows<'a> {
+struct RowsOfSize<'a> {
     map: &'a Arc<MappedFile>,
     /// Where the rows start in the file.
     start: usize,
     data: &'a [u8],
     row: usize,
-    element: &'a Element,
+    element: &'a RowElement,
     order: Order,
 }
 
-impl Rows<'_> {
+impl RowsOfSize<'_> {
     /// Where a property is in its row.
     fn offset(&self, property: usize) -> usize {
         self.element.properties[..property].iter().map(|p| p.kind.size()).sum()
     }
 }
 
-impl Table for Rows<'_> {
+impl VertexTable for RowsOfSize<'_> {
     fn rows(&self) -> usize {
         self.element.count
     }
@@ -330,7 +332,7 @@ fn filled<'a>(
 
 /// Rows with lists.
 struct Walk<'a> {
-    element: &'a Element,
+    element: &'a RowElement,
     bytes: &'a [u8],
     order: Order,
 }

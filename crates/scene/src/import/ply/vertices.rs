@@ -4,13 +4,13 @@
 
 use rayon::prelude::*;
 
-use super::header::{Element, Type};
+use super::header::{RowElement, Type};
 use crate::import::{Wanted, polygon, precise_enough, single};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Buffer, Positions, Vertices};
 
 /// Numbers by row and by property of the vertex element.
-pub(super) trait Table: Sync {
+pub(super) trait VertexTable: Sync {
     /// The number of rows.
     fn rows(&self) -> usize;
 
@@ -34,7 +34,7 @@ pub(super) struct VertexData {
 
 /// Which properties are read.
 #[derive(Debug, Clone)]
-pub(super) struct Columns {
+pub(super) struct VertexColumns {
     xyz: [usize; 3],
     normal: Option<[usize; 3]>,
     uv: Option<[usize; 2]>,
@@ -45,9 +45,9 @@ pub(super) struct Columns {
     byte_color: bool,
 }
 
-impl Columns {
+impl VertexColumns {
     /// The wanted properties of `element`; an error without x, y and z.
-    pub(super) fn of(element: &Element, wanted: Wanted, in_text: bool) -> Result<Self, String> {
+    pub(super) fn of(element: &RowElement, wanted: Wanted, in_text: bool) -> Result<Self, String> {
         let plain = |names: &[&str]| {
             element.find(names).filter(|&column| element.properties[column].list.is_none())
         };
@@ -76,7 +76,7 @@ impl Columns {
     }
 
     /// Reads the columns of `table`.
-    pub(super) fn read(&self, table: &impl Table) -> VertexData {
+    pub(super) fn read(&self, table: &impl VertexTable) -> VertexData {
         VertexData {
             positions: self.positions(table),
             normals: self.normal.map(|columns| singles(table, columns)),
@@ -87,7 +87,7 @@ impl Columns {
         }
     }
 
-    fn positions(&self, table: &impl Table) -> Positions {
+    fn positions(&self, table: &impl VertexTable) -> Positions {
         if let Some(mapped) = table.mapped_positions(self.xyz) {
             return Positions::F32(mapped);
         }
@@ -99,7 +99,7 @@ impl Columns {
         precise_enough(&points)
     }
 
-    fn colors(&self, table: &impl Table, columns: [usize; 3]) -> Vertices<4> {
+    fn colors(&self, table: &impl VertexTable, columns: [usize; 3]) -> Vertices<4> {
         let linear = |value: f64| if self.byte_color { linear(value / 255.0) } else { value };
         each(table, |row| {
             let [red, green, blue] = columns.map(|column| single(linear(table.get(row, column))));
@@ -117,13 +117,13 @@ fn linear(encoded: f64) -> f64 {
     if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
 }
 
-fn singles(table: &impl Table, columns: [usize; 3]) -> Vertices<3> {
+fn singles(table: &impl VertexTable, columns: [usize; 3]) -> Vertices<3> {
     each(table, |row| columns.map(|column| single(table.get(row, column))))
 }
 
 /// `N` floats for each row, with the padding that Embree wants behind them.
 fn each<const N: usize>(
-    table: &impl Table,
+    table: &impl VertexTable,
     values: impl Fn(usize) -> [f32; N] + Sync,
 ) -> Vertices<N> {
     let mut floats = vec![0.0; table.rows() * N + 4];
@@ -144,7 +144,7 @@ pub(super) enum Lists {
 
 impl Lists {
     /// The lists of `element` and the number of the property; `None` when it has no surface.
-    pub(super) fn of(element: &Element) -> Option<(Self, usize)> {
+    pub(super) fn of(element: &RowElement) -> Option<(Self, usize)> {
         let kind = match element.name.as_str() {
             "face" | "faces" => Self::Polygons,
             "tristrips" => Self::Strips,

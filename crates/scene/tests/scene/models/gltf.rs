@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Positions, Transform};
-use etendue_scene::import::{NoteKind, Projection, Wanted};
+use etendue_scene::import::{CameraProjection, NoteKind, Wanted};
 use etendue_tracer::texture::{Filter, Wrap};
 use etendue_tracer::{Absorption, Glass, ImageSource, Ior, Paint, Scattering};
 use serde_json::{Value, json};
@@ -231,9 +231,9 @@ fn cameras_keep_their_view_and_place() {
         load(&write(&folder, "cameras.gltf", Builder::default().document(rest).to_string()));
     let [eye, plan] = &import.cameras[..] else { panic!("{:?}", import.cameras) };
     let aspect_ratio = Some(1.5);
-    assert_eq!(eye.projection, Projection::Perspective { yfov: 0.7, aspect_ratio });
+    assert_eq!(eye.projection, CameraProjection::Perspective { yfov: 0.7, aspect_ratio });
     assert_eq!((eye.name.as_str(), eye.model_from_camera.translation.z), ("eye", 3.0));
-    assert_eq!(plan.projection, Projection::Orthographic { xmag: 2.0, ymag: 1.0 });
+    assert_eq!(plan.projection, CameraProjection::Orthographic { xmag: 2.0, ymag: 1.0 });
     assert_eq!((plan.name.as_str(), plan.model_from_camera), ("plan", Transform::IDENTITY));
 }
 

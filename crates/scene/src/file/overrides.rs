@@ -1,0 +1,131 @@
+//! `--set camera.fov=30`: single values of a scene file, changed from the command line.
+
+use serde_json::Value;
+
+use super::document::Document;
+use super::path::{MOST_STEPS, ScenePath};
+
+/// Why a setting cannot be applied.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum OverrideError {
+    /// The path cannot be read.
+    #[error(
+        "`{path}` is no path\nhint: write keys with dots between and indices in brackets, such as \
+             objects[0].transform.scale"
+    )]
+    Path {
+        /// The path as given.
+        path: String,
+    },
+    /// More steps than a scene has levels.
+    #[error("the path has {steps} steps; the format needs no more than {MOST_STEPS}")]
+    TooDeep {
+        /// Its steps.
+        steps: usize,
+    },
+    /// An index past the end.
+    #[error("{array} has {len} entries, so there is no {array}[{index}]")]
+    Index {
+        /// The array's path.
+        array: String,
+        /// Its length.
+        len: usize,
+        /// The index asked for.
+        index: String,
+    },
+    /// A number that 64 bits do not hold.
+    #[error("{text} is beyond the numbers that a computer holds (1.8e308)")]
+    TooLarge {
+        /// The number as given.
+        text: String,
+    },
+    /// JSON that no scene file may hold.
+    #[error("{reason}")]
+    Refused {
+        /// Why.
+        reason: String,
+    },
+    /// A value on the way that has nothing inside.
+    #[error("{parent} is {found}, which has no `{step}`")]
+    Leaf {
+        /// The value's path.
+        parent: String,
+        /// What it is.
+        found: &'static str,
+        /// The step asked for.
+        step: String,
+    },
+}
+
+/// Sets `path` of `root` to `text`: JSON when it is JSON, else a string. Objects on the way that
+/// are missing are made. Returns the path as messages write it.
+///
+/// # Errors
+///
+/// When the path cannot be read or leads nowhere.
+pub(crate) fn apply(root: &mut Value, path: &str, text: &str) -> Result<ScenePath, OverrideError> {
+    path.parse::<ScenePath>()?.set(root, read(text)?)
+}
+
+/// JSON, as strictly as files are read, where the text is JSON at all, else a string.
+fn read(text: &str) -> Result<Value, OverrideError> {
+    let is_number = text.trim_start().starts_with(|c: char| c.is_ascii_digit() || c == '-');
+    match serde_json::from_str::<serde::de::IgnoredAny>(text) {
+        Ok(_) => match Document::parse(text.to_owned()) {
+            Ok((_, value)) => Ok(value),
+            Err(fault) => Err(OverrideError::Refused { reason: fault.reason }),
+        },
+        Err(_) if is_number && text.trim().parse().is_ok_and(f64::is_infinite) => {
+            Err(OverrideError::TooLarge { text: text.trim().to_owned() })
+        }
+        Err(_) => Ok(Value::String(text.to_owned())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn set(path: &str, text: &str) -> Result<Value, String> {
+        let mut scene = json!({
+            "camera": {"fov": 40, "type": "pinhole"},
+            "objects": [{"file": "a.obj"}, {"file": "b.obj"}],
+            "materials": {"a.b": {"type": "matte"}}
+        });
+        apply(&mut scene, path, text).map_err(|error| error.to_string())?;
+        Ok(scene)
+    }
+
+    #[test]
+    fn values_are_json_or_bare_strings() {
+        assert_eq!(set("camera.fov", "30.5").unwrap()["camera"]["fov"], json!(30.5));
+        assert_eq!(set("camera.fov", "50 deg").unwrap()["camera"]["fov"], json!("50 deg"));
+        assert_eq!(set("camera.type", "orthographic").unwrap()["camera"]["type"], "orthographic");
+        assert_eq!(set("layers", "[\"depth\"]").unwrap()["layers"], json!(["depth"]));
+    }
+
+    #[test]
+    fn paths_reach_arrays_and_make_objects() {
+        assert_eq!(set("objects[1].file", "c.obj").unwrap()["objects"][1]["file"], "c.obj");
+        assert_eq!(set("objects.0.file", "c.obj").unwrap()["objects"][0]["file"], "c.obj");
+        let made = set("camera.sensor.resolution", "[4, 3]").unwrap();
+        assert_eq!(made["camera"]["sensor"], json!({"resolution": [4, 3]}));
+        let dotted = set("materials[\"a.b\"].type", "checker").unwrap();
+        assert_eq!(dotted["materials"]["a.b"]["type"], "checker");
+    }
+
+    #[test]
+    fn paths_that_lead_nowhere_are_refused() {
+        let error = |path: &str| set(path, "1").unwrap_err();
+        assert_eq!(error("objects[2].file"), "objects has 2 entries, so there is no objects[2]");
+        assert!(error("objects.first").contains("no objects[first]"));
+        assert_eq!(error("camera.fov.x"), "camera.fov is a number, which has no `x`");
+        assert!(error("a.".repeat(60_000).trim_end_matches('.')).contains("60000 steps"));
+        for path in ["", ".", "a..b", "a.", "a[", "a[x]", "a[0]b", "[\"a\"", ".a"] {
+            assert!(error(path).contains("is no path"), "{path}: {}", error(path));
+        }
+    }
+}
