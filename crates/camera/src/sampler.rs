@@ -346,9 +346,7 @@ mod tests {
                 assert_eq!(out, one_by_one.collect::<Vec<_>>(), "{sampler:?} pair {pair}");
                 floats_of_pair(samples.clone(), pair, &mut floats);
                 let [x, y] = floats.each_ref().map(|column| column.iter().copied().map(f64::from));
-                for ([a, b], own) in
-                    x.zip(y).map(<[f64; 2]>::from).zip(&out).map(|([a, b], own)| ([a, b], own))
-                {
+                for ((a, b), own) in x.zip(y).zip(&out) {
                     // 24 bits of each.
                     let error = (own[0] - a).abs().max((own[1] - b).abs());
                     assert!(

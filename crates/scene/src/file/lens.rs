@@ -170,7 +170,7 @@ pub fn trace_rays(lens: &OpticalTrain, path: &Path) -> Result<TracedRays, SceneE
     let (written, value) = read(path)?;
     let file: RaysFile = read_as(&RAYS, &written, &value)?;
     lens.trace_file(&file)
-        .map_err(|RayError { index, key, why }| written.fault(&format!("rays[{index}].{key}"), why))
+        .map_err(|RayError { index, key, why }| written.fault(format!("rays[{index}].{key}"), why))
 }
 
 fn read(path: &Path) -> Result<(WrittenPlaces, Value), SceneError> {

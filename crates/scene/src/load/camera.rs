@@ -197,7 +197,7 @@ impl SceneFile {
 
     /// Refuses angles and diffusion where the camera cannot have them, and read-outs by whose noise no samples are judged.
     fn check_sensor_behind(&self, sensor: &SensorSpec, camera: &Camera) -> Result<(), SceneError> {
-        let refused = |key: &str, why: &str| Err(self.fault(&format!("camera.sensor.{key}"), why));
+        let refused = |key: &str, why: &str| Err(self.fault(format!("camera.sensor.{key}"), why));
         let has_lenslets = camera.light_field().is_some();
         let more = [
             ("auto_exposure", sensor.auto_exposure.is_some()),

@@ -48,7 +48,7 @@ impl SceneFile {
             return Err(self.fault("render.rate", why));
         }
         if let Some((key, why)) = render.imu.as_ref().and_then(ImuSpec::fault) {
-            return Err(self.fault(&format!("render.imu.{key}"), why));
+            return Err(self.fault(format!("render.imu.{key}"), why));
         }
         let camera = self.spec.camera.as_ref();
         let is_timed = |it: &&CameraSpec| it.shutter().is_some() || it.motion().is_some();

@@ -155,6 +155,21 @@ impl SheetRow {
                 self.semi_diameter = Some(length).filter(|length| *length > 0.0);
                 self.fixed = line.number_or(1, 0.0)? == 1.0;
             }
+            // The tab of a surface's tilts and decentres.
+            "SCBD" if line.rest.split_whitespace().any(|word| word.parse() != Ok(0.0)) => {
+                return Err(line.error(
+                    "the tilt or decentre of a surface by itself cannot be imported; write COORDBRK before and behind \
+                     it (in OpticStudio: Tilt/Decenter Elements)",
+                ));
+            }
+            _ => return self.read_aperture(line),
+        }
+        Ok(true)
+    }
+
+    /// Whether the line is one of an aperture's.
+    fn read_aperture(&mut self, line: &SheetLine<'_>) -> Result<bool, ZemaxError> {
+        match line.command {
             // Without an end is how a file writes that there is none outside.
             "CLAP" | "FLAP" => {
                 let is_open = |i: usize| line.word(i).is_some_and(|word| word.starts_with("INF"));
@@ -208,13 +223,6 @@ impl SheetRow {
                 return Err(line.error(
                     "an aperture by points of the user's cannot be imported; take the line out, and add the points to \
                      the lens file that --save writes, as an `aperture` of \"shape\": \"outline\" with its `corners`",
-                ));
-            }
-            // The tab of a surface's tilts and decentres.
-            "SCBD" if line.rest.split_whitespace().any(|word| word.parse() != Ok(0.0)) => {
-                return Err(line.error(
-                    "the tilt or decentre of a surface by itself cannot be imported; write COORDBRK before and behind \
-                     it (in OpticStudio: Tilt/Decenter Elements)",
                 ));
             }
             // The substrate of a mirror, of which every surface has one; a mirror is GLAS MIRROR.
