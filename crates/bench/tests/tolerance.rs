@@ -23,6 +23,17 @@ fn compared_with(
     tolerance: Tolerance,
     thing: Option<Value>,
 ) -> Result<Comparison, BenchError> {
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+    compared_in(&scenes, camera, tolerance, thing)
+}
+
+/// The same of a scene in a folder.
+fn compared_in(
+    folder: &Path,
+    camera: &Value,
+    tolerance: Tolerance,
+    thing: Option<Value>,
+) -> Result<Comparison, BenchError> {
     let mut camera = camera.clone();
     camera["pose"] = json!({ "from": [1, 2, 3], "look_at": [1, 2, 0] });
     let scene = json!({
@@ -31,8 +42,7 @@ fn compared_with(
     });
     let mut scene = scene;
     scene["objects"].as_array_mut().unwrap().extend(thing);
-    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
-    let file = SceneFile::from_json(&LoadOptions::default().opener, &scenes, scene).unwrap();
+    let file = SceneFile::from_json(&LoadOptions::default().opener, folder, scene).unwrap();
     let scene = file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default()).unwrap();
     let own = Plan::new(&scene, Outputs::ALL);
     let accel = build(&scene, &own, &BuildOptions::default()).unwrap();
@@ -152,20 +162,19 @@ fn simpler_lenses_keep_the_mask_of_the_stop() {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     let gauss = std::fs::read(scenes.join("lenses/double-gauss.json")).unwrap();
     let mut lens: Value = serde_json::from_slice(&gauss).unwrap();
-    let mask =
-        json!({ "type": "aperture", "shape": "image", "file": mask, "width": 4, "thickness": 4.5 });
+    let mask = json!({ "type": "aperture", "shape": "image", "file": "mask.png", "width": 4, "thickness": 4.5 });
     let elements = lens["elements"].as_array_mut().unwrap();
     let stop = elements.iter().position(|element| element["stop"] == true).unwrap();
     elements[stop] = mask.clone();
     elements[stop]["stop"] = json!(true);
     let camera = |lens: &Value| {
-        let path = folder.path().join("lens.json");
-        std::fs::write(&path, serde_json::to_vec(lens).unwrap()).unwrap();
-        json!({ "type": "lens", "lens": path, "focus_distance": 1, "sensor_height": 2,
+        let bytes = serde_json::to_vec(lens).unwrap();
+        std::fs::write(folder.path().join("lens.json"), bytes).unwrap();
+        json!({ "type": "lens", "lens": "lens.json", "focus_distance": 1, "sensor_height": 2,
             "sensor": { "resolution": [150, 100] } })
     };
     let tolerance = Tolerance { pixels: 1.0, light: None };
-    let all = compared(&camera(&lens), tolerance).unwrap();
+    let all = compared_in(folder.path(), &camera(&lens), tolerance, None).unwrap();
     // The corner of the mask that is open is 1 mm to two sides of the axis: the light of a wall beyond the focus lies as
     // far to a side of the chief ray, which a mask that is upside down or round would not have.
     let [pinhole, thick] = ["pinhole", "thick"].map(|name| model(&all, name));
@@ -178,7 +187,7 @@ fn simpler_lenses_keep_the_mask_of_the_stop() {
     before["elements"][stop] = json!({ "type": "aperture", "shape": "circular", "radius": 8.55,
         "thickness": 4.5, "stop": true });
     before["elements"].as_array_mut().unwrap().insert(0, mask);
-    let all = compared(&camera(&before), tolerance).unwrap();
+    let all = compared_in(folder.path(), &camera(&before), tolerance, None).unwrap();
     assert!(!model(&all, "thick").is_within && !model(&all, "thin").is_within);
     assert!(all.notes.iter().any(|note| note.contains("mask")), "{:?}", all.notes);
 }

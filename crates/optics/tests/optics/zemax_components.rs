@@ -316,7 +316,11 @@ fn fields_and_wavelengths_come_back_exactly() {
     let back = ZemaxLens::read(zemax.as_bytes(), &[]).unwrap().file;
     assert_eq!((&back.fields, &back.wavelengths), (&file.fields, &file.wavelengths));
     assert_eq!(back.weights, file.weights);
-    assert_eq!(back.elements, file.elements);
+    let [own, other] = [&file, &back].map(build);
+    let parts = |train: &OpticalTrain| {
+        train.elements().iter().map(|e| format!("{:?}", e.part)).collect::<Vec<_>>()
+    };
+    assert_eq!(parts(&own), parts(&other));
     for (wrong, word) in [
         (r#""angle": 200"#, "fields[1]: angle is 200 degrees"),
         (r#""angle": 10.1, "weight": -1"#, "fields[1]: weight is -1"),

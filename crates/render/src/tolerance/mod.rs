@@ -47,8 +47,6 @@ pub struct Field {
     pub rays: u32,
     /// Bands, at most, that are looked at: the first, the last, and some in between.
     pub bands: usize,
-    /// Whether the pupil is measured at one wavelength alone.
-    pub rough: bool,
     /// Chief rays across the neighbourhood of a place, at most, by which its depths are found: one every two pixels
     /// where that is enough.
     pub across: u32,
@@ -56,13 +54,11 @@ pub struct Field {
 
 impl Field {
     /// What a user who compares models gets.
-    pub const FINE: Self =
-        Self { size: [9, 7], rays: 1024, bands: usize::MAX, rough: false, across: 256 };
+    pub const FINE: Self = Self { size: [9, 7], rays: 1024, bands: usize::MAX, across: 256 };
     /// What a render does before it begins.
-    pub const QUICK: Self = Self { size: [9, 7], rays: 256, bands: 3, rough: true, across: 64 };
+    pub const QUICK: Self = Self { size: [9, 7], rays: 256, bands: 3, across: 64 };
     /// What a choice is verified by: places in between, and more bands.
-    pub const BETWEEN: Self =
-        Self { size: [16, 12], rays: 256, bands: 5, rough: false, across: 64 };
+    pub const BETWEEN: Self = Self { size: [16, 12], rays: 256, bands: 5, across: 64 };
 }
 
 /// A place of the picture.
@@ -166,7 +162,7 @@ impl FullView {
             places.iter_mut().for_each(|place| place.depths.push(depth));
         }
         let chosen = some_of(bands.count(), field.bands);
-        let camera = open(&scene.camera, bands, field.rough)?;
+        let camera = open(&scene.camera, bands)?;
         let seen = seen((&camera, bands), &chosen, &places, field.rays);
         let scale = lens_models::scale(&scene.camera).unwrap_or(f64::NAN);
         let bands = bands.clone();
@@ -268,8 +264,8 @@ impl FullView {
         camera: &Camera,
         tolerance: Tolerance,
     ) -> Result<Finding, RenderError> {
-        let Field { rays, rough, .. } = self.field;
-        let camera = open(camera, &self.bands, rough)?;
+        let rays = self.field.rays;
+        let camera = open(camera, &self.bands)?;
         let own = seen((&camera, &self.bands), &self.chosen, &self.places, rays);
         Ok(self.compared(model, &own, tolerance))
     }
@@ -339,9 +335,8 @@ fn with_falloff(full: &Camera, spec: CameraSpec, falloff: FalloffSpec) -> Option
     lens_models::model("falloff", full, &CameraSpec::Pinhole(spec)).ok()
 }
 
-fn open(camera: &Camera, bands: &Bands, rough: bool) -> Result<Camera, RenderError> {
-    let opened = if rough { camera.opened_roughly(bands) } else { camera.opened(bands) };
-    opened.map_err(|error| RenderError::Camera(error.why))
+fn open(camera: &Camera, bands: &Bands) -> Result<Camera, RenderError> {
+    camera.opened(bands).map_err(|error| RenderError::Camera(error.why))
 }
 
 /// Of so many bands a few numbers: the first, the last, and even ones in between.

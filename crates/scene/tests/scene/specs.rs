@@ -44,6 +44,10 @@ fn scenes_lenses_and_sensors_written_and_read_again_are_the_same() {
     let mut counts = [0; 3];
     for (path, value) in examples() {
         let name = path.display().to_string();
+        // Sensors are read with the scenes that name them.
+        if value.get("etendue").is_none() && value.get("elements").is_none() {
+            continue;
+        }
         if value.get("etendue").is_none() {
             let lens = LensFile::from_json(&value.to_string());
             again(&name, &lens.unwrap_or_else(|error| panic!("{name}: {error}")));
