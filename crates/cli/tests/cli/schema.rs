@@ -48,6 +48,10 @@ fn example_files_name_their_schema_and_satisfy_it() {
     assert!(paths.len() > 30, "{} files", paths.len());
     for path in paths {
         let value: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+        // Cameras and sensors in files of their own are parts of the scenes that name them.
+        if value["etendue"].is_null() && value["elements"].is_null() {
+            continue;
+        }
         let (kind, validator) = &kinds[usize::from(value["etendue"].is_null())];
         validator.validate(&value).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         let named = value["$schema"].as_str().unwrap_or_default();
