@@ -156,15 +156,7 @@ pub fn squares_of_pair(
     out: &mut Vec<[f64; 2]>,
 ) {
     out.clear();
-    let mut keys = Vec::with_capacity(samples.size_hint().0);
-    let (mut dimensions, mut is_sobol) = (0, true);
-    let mut sequence = Sequence::default();
-    for (pixel, index) in samples.clone() {
-        is_sobol &= pixel.sampler.is_sobol();
-        let (key, first) = pixel.sobol_key(index, pair, &mut sequence);
-        keys.push(key);
-        dimensions = first;
-    }
+    let SobolKeys { keys, dimensions, is_sobol } = SobolKeys::of(samples.clone(), pair);
     if !is_sobol {
         out.extend(samples.map(|(pixel, index)| pixel.square(index, pair)));
         return;
@@ -179,16 +171,7 @@ pub fn floats_of_pair(
     pair: u32,
     out: &mut [Vec<f32>; 2],
 ) {
-    let count = samples.size_hint().0;
-    let mut keys = Vec::with_capacity(count);
-    let (mut dimensions, mut is_sobol) = (0, true);
-    let mut sequence = Sequence::default();
-    for (pixel, index) in samples.clone() {
-        is_sobol &= pixel.sampler.is_sobol();
-        let (key, first) = pixel.sobol_key(index, pair, &mut sequence);
-        keys.push(key);
-        dimensions = first;
-    }
+    let SobolKeys { keys, dimensions, is_sobol } = SobolKeys::of(samples.clone(), pair);
     out.iter_mut().for_each(|column| column.resize(keys.len(), 0.0));
     let [first, second] = out;
     if is_sobol {
@@ -197,6 +180,30 @@ pub fn floats_of_pair(
     }
     for (((pixel, index), x), y) in samples.zip(first).zip(second) {
         [*x, *y] = pixel.square(index, pair).map(sobol::float);
+    }
+}
+
+/// The points of Sobol's sequence that a pair of dimensions is of some samples.
+struct SobolKeys {
+    keys: Vec<SobolKey>,
+    /// The first of the pair.
+    dimensions: usize,
+    /// Whether all of them are of samplers that have such points.
+    is_sobol: bool,
+}
+
+impl SobolKeys {
+    fn of(samples: impl Iterator<Item = (PixelSamples, u32)>, pair: u32) -> Self {
+        let keys = Vec::with_capacity(samples.size_hint().0);
+        let mut all = Self { keys, dimensions: 0, is_sobol: true };
+        let mut sequence = Sequence::default();
+        for (pixel, index) in samples {
+            all.is_sobol &= pixel.sampler.is_sobol();
+            let (key, first) = pixel.sobol_key(index, pair, &mut sequence);
+            all.keys.push(key);
+            all.dimensions = first;
+        }
+        all
     }
 }
 

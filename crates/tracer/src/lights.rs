@@ -1,6 +1,7 @@
 //! The lights of a scene: what each gives off, and a place on one that is chosen for a point.
 
 mod environment;
+mod few;
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -9,6 +10,7 @@ use etendue_geometry::MISS;
 use etendue_geometry::glam::DVec3;
 use etendue_spectrum::{NoOverlap, Outside};
 
+pub(crate) use self::few::FewLamps;
 use crate::area_light::{self, AreaLight, AreaLightMotion, triangle_power};
 use crate::environment::EnvironmentMap;
 use crate::group::Groups;
@@ -41,18 +43,6 @@ pub struct Lights {
     area_lights: Vec<Option<AreaLight>>,
     area_light_bands: Vec<f64>,
     groups: Groups,
-}
-
-/// Few lights: points first, then triangles.
-#[derive(Debug)]
-pub(crate) struct FewLamps<'a> {
-    /// m.
-    pub(crate) points: Vec<DVec3>,
-    pub(crate) triangles: &'a [Option<AreaLight>],
-    /// `[light][band]` of both.
-    pub(crate) bands: [&'a [f64]; 2],
-    /// The sum of the chances of all before each, and 1 at the end.
-    pub(crate) below: &'a [f64],
 }
 
 /// The spectrum of what a surface gives off, in bands.
@@ -186,12 +176,6 @@ impl Lights {
         self.sampler.pick(choices);
     }
 
-    /// What [`Self::pick`] picks by, where that is a short list: the sum of the chances of all lights before
-    /// each, and 1 at the end.
-    pub(crate) fn few(&self) -> Option<&[f64]> {
-        self.sampler.few()
-    }
-
     /// Light `index` and its bands, if it is a triangle that is kept ready and shines alike all over.
     #[inline(always)]
     pub(crate) fn plain_triangle(
@@ -202,32 +186,6 @@ impl Lights {
         let number = index.checked_sub(self.lights.len())?;
         let area_light = self.area_lights.get(number)?.as_ref().filter(|own| own.is_plain)?;
         Some((area_light, &self.area_light_bands[number * count..(number + 1) * count]))
-    }
-
-    /// All lights and their bands, if they are few triangles that are kept ready and shine alike all over.
-    pub(crate) fn few_triangles(&self) -> Option<(&[Option<AreaLight>], &[f64])> {
-        let is_plain =
-            |area_light: &Option<AreaLight>| area_light.as_ref().is_some_and(|own| own.is_plain);
-        let are_few = self.lights.is_empty() && self.few().is_some();
-        let are_plain =
-            are_few && !self.area_lights.is_empty() && self.area_lights.iter().all(is_plain);
-        are_plain.then_some((&self.area_lights, &self.area_light_bands))
-    }
-
-    /// The lights of a scene that has few to choose from, all of them points that stand still or triangles that shine
-    /// alike all over and are kept ready.
-    pub(crate) fn few_lamps(&self) -> Option<FewLamps<'_>> {
-        let below = self.few()?;
-        let point = |light: &Light| match &light.kind {
-            LightKind::Point(at) => light.motion.is_none().then_some(*at),
-            _ => None,
-        };
-        let points = self.lights.iter().map(point).collect::<Option<Vec<_>>>()?;
-        let triangle = |own: &Option<AreaLight>| own.as_ref().is_some_and(|own| own.is_plain);
-        let are_ready = self.area_lights.len() == self.triangles.len();
-        let are_plain = are_ready && self.area_lights.iter().all(triangle);
-        let bands = [&*self.bands, &*self.area_light_bands];
-        are_plain.then_some(FewLamps { points, triangles: &self.area_lights, bands, below })
     }
 
     /// The number among all lights of a triangle that shines.

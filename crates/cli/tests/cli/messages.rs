@@ -109,7 +109,7 @@ fn values_of_the_wrong_kind_are_told_in_words_of_json() {
         (r#""accessors": [{}]"#, &["accessors[0]: the key `count` is missing"]),
         (
             r#""accessors": [{"count": 1, "type": "VEC3", "componentType": "f"}]"#,
-            &["accessors[0].componentType: expected any of: [5120, 5121", "found \"f\""],
+            &["accessors[0].componentType: expected one of 5120, 5121", "found \"f\""],
         ),
         (
             r#""materials": [{"pbrMetallicRoughness": [{}]}]"#,

@@ -17,9 +17,15 @@ struct Validator {
 
 impl Validator {
     fn of(kind: &str) -> Self {
+        Self::of_part(kind, "")
+    }
+
+    /// That of one definition, by its pointer.
+    fn of_part(kind: &str, pointer: &str) -> Self {
         let path = root().join(format!("schema/{kind}.schema.json"));
         let (mut schemas, mut compiler) = (Schemas::new(), Compiler::new());
-        let index = compiler.compile(path.to_str().expect("UTF-8"), &mut schemas);
+        let index =
+            compiler.compile(&format!("{}{pointer}", path.to_str().expect("UTF-8")), &mut schemas);
         Self { index: index.unwrap_or_else(|error| panic!("{kind}: {error}")), schemas }
     }
 
@@ -43,13 +49,17 @@ fn files(folder: &Path, into: &mut Vec<PathBuf>) {
 #[test]
 fn example_files_name_their_schema_and_satisfy_it() {
     let kinds = ["scene", "lens"].map(|kind| (kind, Validator::of(kind)));
+    let parts = ["CameraSpec", "SensorSpec"]
+        .map(|part| Validator::of_part("scene", &format!("#/$defs/{part}")));
     let mut paths = Vec::new();
     files(&root().join("scenes"), &mut paths);
     assert!(paths.len() > 30, "{} files", paths.len());
     for path in paths {
         let value: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
-        // Cameras and sensors in files of their own are parts of the scenes that name them.
+        // Cameras and sensors in files of their own are parts of scenes.
         if value["etendue"].is_null() && value["elements"].is_null() {
+            let part = &parts[usize::from(value["pose"].is_null())];
+            part.validate(&value).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
             continue;
         }
         let (kind, validator) = &kinds[usize::from(value["etendue"].is_null())];

@@ -184,6 +184,10 @@ fn kind(expected: &dyn de::Expected) -> String {
     if let Some(count) = after("an array of length ").or_else(|| after("a tuple of size ")) {
         return format!("an array of {count} values");
     }
+    // glTF's numbers that stand for kinds.
+    if let Some(known) = after("any of: [").and_then(|list| list.strip_suffix(']')) {
+        return format!("one of {known}");
+    }
     match (expected.as_str(), expected.split(' ').next().unwrap_or_default()) {
         ("usize" | "u8" | "u16" | "u32" | "u64" | "index into child of root", _) => {
             "a whole number from 0"

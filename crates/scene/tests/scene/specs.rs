@@ -4,6 +4,7 @@ use std::fmt::Debug;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use etendue_camera::CameraSpec;
 use etendue_files::Opener;
 use etendue_optics::train::LensFile;
 use etendue_scene::SceneFile;
@@ -44,8 +45,15 @@ fn scenes_lenses_and_sensors_written_and_read_again_are_the_same() {
     let mut counts = [0; 3];
     for (path, value) in examples() {
         let name = path.display().to_string();
-        // Sensors are read with the scenes that name them.
         if value.get("etendue").is_none() && value.get("elements").is_none() {
+            // A camera or a sensor in a file of its own.
+            if value.get("pose").is_some() {
+                let camera: Result<CameraSpec, _> = serde_json::from_value(value);
+                again(&name, &camera.unwrap_or_else(|error| panic!("{name}: {error}")));
+            } else {
+                let sensor = SensorFile::read(&Opener::default(), &path, &[]);
+                again(&name, &sensor.unwrap_or_else(|error| panic!("{name}: {error}")).spec);
+            }
             continue;
         }
         if value.get("etendue").is_none() {

@@ -84,7 +84,7 @@ pub(super) fn measure(patch: &mut Patch, roundings: f64) {
 
 /// How far rays that leave hits of f32 beside an edge start back, over the bound of [`crate::spawn`], which
 /// counts more roundings for safety than these two: of the hit, and of the origin of the ray that leaves it.
-const BACK: f64 = 0.25;
+pub(super) const BACK: f64 = 0.25;
 
 /// What rays that leave hits of f32 beside edges start back by, along the surface, against the ray that hit.
 /// In f32 a hit is misplaced, and what leaves it is rounded, by some 10⁻⁷ of the coordinates: where two walls

@@ -5,12 +5,14 @@
 //! same up to the roundings of single precision. What is rare, such as the light of a lamp that is met, is done there.
 
 mod kernel;
+mod lamps;
 
 use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitPrecision, RayBlocks};
 
-use self::kernel::{Leaving, Lights, Numbers, leave_blocks};
+use self::kernel::{Leaving, Numbers, leave_blocks};
+use self::lamps::Lights;
 use super::paths::{DRAWS, Draw, Step, Way, Workspace};
 use super::rays::{Blocks, RayHit};
 use super::trace::Encounter;

@@ -8,84 +8,23 @@ use etendue_geometry::RayBlock;
 use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::glam::DVec3;
 
+use super::lamps::{Lights, place};
 use super::{Columns, RayColumns};
-use crate::area_light::AreaLight;
-use crate::lights::FewLamps;
 use crate::placed::PlainSurface;
 use crate::transport::paths::{DRAWS, Draw};
+use crate::transport::{kernels, patch};
 
 /// Roundings of a hit and of the rays that leave it: those of [`crate::spawn`] in single precision, and as many
 /// again of the point, of the normal and of the start, which are of single precision, too.
 const ROUNDINGS: f32 = 12.0 * f32::EPSILON;
 
-/// How far rays that leave hits beside an edge start back, over the bound ([`super::super::kernels`]).
-const BACK: f32 = 0.25;
+/// [`kernels::BACK`] and [`patch::BESIDE`], which single precision holds.
+#[expect(clippy::cast_possible_truncation, reason = "a power of two")]
+const BACK: f32 = kernels::BACK as f32;
+#[expect(clippy::cast_possible_truncation, reason = "a power of two")]
+const BESIDE: f32 = patch::BESIDE as f32;
 
-/// Hits are beside an edge below this barycentric weight ([`super::super::patch::BESIDE`]).
-const BESIDE: f32 = 1.0 / 256.0;
-
-/// The largest number below 1.
-const ONE_BELOW: f32 = 1.0 - f32::EPSILON / 2.0;
-
-const ZERO: Row = [0.0; LANES];
-
-/// A triangle that shines, or a point, relative to the blocks' origin (m).
-#[derive(Debug, Clone, Copy, Default)]
-struct Lamp {
-    corner: [f32; 3],
-    edges: [[f32; 3]; 2],
-    normal: [f32; 3],
-    magnitudes: [f32; 3],
-    /// m²; 1 of a point, whose density is that of its choice.
-    area: f32,
-    two_sided: bool,
-    is_point: bool,
-}
-
-impl Lamp {
-    fn point(at: DVec3, origin: DVec3) -> Self {
-        Self { corner: single(at - origin), area: 1.0, is_point: true, ..Self::default() }
-    }
-
-    fn triangle(own: &AreaLight, origin: DVec3) -> Self {
-        let [corner, rest] = own.corner;
-        Self {
-            corner: single((corner - origin) + rest),
-            edges: own.shape.edges.map(single),
-            normal: single(own.shape.normal),
-            magnitudes: single(own.magnitudes),
-            area: round(own.shape.area),
-            two_sided: own.two_sided,
-            is_point: false,
-        }
-    }
-}
-
-/// The lamps of a plain scene.
-#[derive(Debug)]
-pub(in crate::transport) struct Lights {
-    lamps: Vec<Lamp>,
-    /// The sum of the chances of all before each, and 1 at the end.
-    below: Vec<f32>,
-    /// Radiance of triangles, intensity of points.
-    pub(super) radiance: Vec<[f64; 3]>,
-    /// What blocks' coordinates are relative to (m).
-    pub(super) origin: DVec3,
-}
-
-impl Lights {
-    pub(super) fn new(few: &FewLamps<'_>, origin: DVec3) -> Self {
-        let points = few.points.iter().map(|&at| Lamp::point(at, origin));
-        let triangles = few.triangles.iter().flatten().map(|own| Lamp::triangle(own, origin));
-        let radiance = few.bands.iter().flat_map(|bands| bands.as_chunks().0).copied();
-        Self {
-            lamps: points.chain(triangles).collect(),
-            below: few.below.iter().map(|&sum| round(sum)).collect(),
-            radiance: radiance.collect(),
-            origin,
-        }
-    }
-}
+pub(super) const ZERO: Row = [0.0; LANES];
 
 /// What a step does, and its random numbers by use, a number a lane.
 pub(super) struct Numbers<'a> {
@@ -262,82 +201,6 @@ fn measure(block: &RayBlock, magnitudes: &[Row; 3], origin: DVec3) -> Hits {
     Hits { point, normal, error, back }
 }
 
-/// Places on lamps, one for each hit.
-struct Places {
-    /// From the hit (m).
-    way: [Row; 3],
-    normal: [Row; 3],
-    /// What its own numbers add to the rounding of the place (m).
-    magnitudes: [Row; 3],
-    /// Of the place (1/m²).
-    density: Row,
-    two_sided: [bool; LANES],
-    is_point: [bool; LANES],
-    lamp: [u32; LANES],
-}
-
-/// Chooses a lamp for each hit, and a place on it.
-#[inline(always)]
-fn place(lights: &Lights, hits: &Hits, [mut u, v]: [Row; 2]) -> Places {
-    let mut places = Places {
-        way: [ZERO; 3],
-        normal: [ZERO; 3],
-        magnitudes: [ZERO; 3],
-        density: ZERO,
-        two_sided: [false; LANES],
-        is_point: [false; LANES],
-        lamp: [0; LANES],
-    };
-    let below = &*lights.below;
-    let mut chance = [1.0; LANES];
-    if lights.lamps.len() > 1 {
-        let (mut start, mut end) = (ZERO, [1.0; LANES]);
-        for (number, of_lamp) in (0_u32..).zip(below.windows(2)) {
-            for i in 0..LANES {
-                let is_in = (of_lamp[0] <= u[i]) & (of_lamp[0] < of_lamp[1]);
-                start[i] = if is_in { of_lamp[0] } else { start[i] };
-                end[i] = if is_in { of_lamp[1] } else { end[i] };
-                places.lamp[i] = if is_in { number } else { places.lamp[i] };
-            }
-        }
-        for i in 0..LANES {
-            chance[i] = end[i] - start[i];
-            let rest = (u[i] - start[i]) / chance[i];
-            let rest = if rest > 0.0 { rest } else { 0.0 };
-            u[i] = if rest < ONE_BELOW { rest } else { ONE_BELOW };
-        }
-    }
-    let (mut second, mut third) = (ZERO, ZERO);
-    for i in 0..LANES {
-        let root = u[i].sqrt();
-        second[i] = root * (1.0 - v[i]);
-        third[i] = v[i] * root;
-    }
-    for (number, lamp) in (0_u32..).zip(&lights.lamps) {
-        for axis in 0..3 {
-            let (corner, normal) = (lamp.corner[axis], lamp.normal[axis]);
-            let (along, across) = (lamp.edges[0][axis], lamp.edges[1][axis]);
-            for i in 0..LANES {
-                let is_own = places.lamp[i] == number;
-                let there =
-                    (corner - hits.point[axis][i]) + (along * second[i] + across * third[i]);
-                places.way[axis][i] = if is_own { there } else { places.way[axis][i] };
-                places.normal[axis][i] = if is_own { normal } else { places.normal[axis][i] };
-                let magnitudes = &mut places.magnitudes[axis][i];
-                *magnitudes = if is_own { lamp.magnitudes[axis] } else { *magnitudes };
-            }
-        }
-        let inverse = 1.0 / lamp.area;
-        for i in 0..LANES {
-            let is_own = places.lamp[i] == number;
-            places.density[i] = if is_own { chance[i] * inverse } else { places.density[i] };
-            places.two_sided[i] = if is_own { lamp.two_sided } else { places.two_sided[i] };
-            places.is_point[i] = if is_own { lamp.is_point } else { places.is_point[i] };
-        }
-    }
-    places
-}
-
 /// Notes the rays to lamps, each with the share of the lamp's radiance that it brings, as
 /// [`super::super::kernels::aim`] and [`super::super::kernels::reflect`] have them.
 #[inline(always)]
@@ -348,7 +211,7 @@ fn ask(
     (scatters, throughput, ray): (&[bool; LANES], &[Row; 3], &[u32; LANES]),
     shadows: &mut RayColumns,
 ) {
-    let places = place(lights, hits, square);
+    let places = place(lights, &hits.point, square);
     let (mut squared, mut facing, mut above, mut blur) = (ZERO, ZERO, ZERO, ZERO);
     let offset = single(lights.origin).map(|axis| 2.0 * axis.abs());
     for axis in 0..3 {
@@ -516,12 +379,12 @@ fn put<T: Copy>(column: &mut [T], at: usize, row: &[T; LANES], picked: &[u8; LAN
     }
 }
 
-fn single(v: DVec3) -> [f32; 3] {
+pub(super) fn single(v: DVec3) -> [f32; 3] {
     v.to_array().map(round)
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "rounding to single precision is the purpose")]
-fn round(x: f64) -> f32 {
+pub(super) fn round(x: f64) -> f32 {
     x as f32
 }
 

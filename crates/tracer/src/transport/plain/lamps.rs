@@ -1,0 +1,145 @@
+//! The lamps of a plain scene in single precision, and places that are chosen on them.
+#![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
+
+use etendue_geometry::block::{Floats as Row, LANES};
+use etendue_geometry::glam::DVec3;
+
+use super::kernel::{ZERO, round, single};
+use crate::area_light::AreaLight;
+use crate::lights::FewLamps;
+
+/// The largest number below 1.
+const ONE_BELOW: f32 = 1.0 - f32::EPSILON / 2.0;
+
+/// A triangle that shines, or a point, relative to the blocks' origin (m).
+#[derive(Debug, Clone, Copy, Default)]
+struct Lamp {
+    corner: [f32; 3],
+    edges: [[f32; 3]; 2],
+    normal: [f32; 3],
+    magnitudes: [f32; 3],
+    /// m²; 1 of a point, whose density is that of its choice.
+    area: f32,
+    two_sided: bool,
+    is_point: bool,
+}
+
+impl Lamp {
+    fn point(at: DVec3, origin: DVec3) -> Self {
+        Self { corner: single(at - origin), area: 1.0, is_point: true, ..Self::default() }
+    }
+
+    fn triangle(own: &AreaLight, origin: DVec3) -> Self {
+        let [corner, rest] = own.corner;
+        Self {
+            corner: single((corner - origin) + rest),
+            edges: own.shape.edges.map(single),
+            normal: single(own.shape.normal),
+            magnitudes: single(own.magnitudes),
+            area: round(own.shape.area),
+            two_sided: own.two_sided,
+            is_point: false,
+        }
+    }
+}
+
+/// The lamps of a plain scene.
+#[derive(Debug)]
+pub(in crate::transport) struct Lights {
+    lamps: Vec<Lamp>,
+    /// The sum of the chances of all before each, and 1 at the end.
+    below: Vec<f32>,
+    /// Radiance of triangles, intensity of points.
+    pub(super) radiance: Vec<[f64; 3]>,
+    /// What blocks' coordinates are relative to (m).
+    pub(super) origin: DVec3,
+}
+
+impl Lights {
+    pub(super) fn new(few: &FewLamps<'_>, origin: DVec3) -> Self {
+        let points = few.points.iter().map(|&at| Lamp::point(at, origin));
+        let triangles = few.triangles.iter().flatten().map(|own| Lamp::triangle(own, origin));
+        let radiance = few.bands.iter().flat_map(|bands| bands.as_chunks().0).copied();
+        Self {
+            lamps: points.chain(triangles).collect(),
+            below: few.below.iter().map(|&sum| round(sum)).collect(),
+            radiance: radiance.collect(),
+            origin,
+        }
+    }
+}
+
+/// Places on lamps, one for each of sixteen points.
+pub(super) struct Places {
+    /// From the point (m).
+    pub(super) way: [Row; 3],
+    pub(super) normal: [Row; 3],
+    /// What its own numbers add to the rounding of the place (m).
+    pub(super) magnitudes: [Row; 3],
+    /// Of the place (1/m²).
+    pub(super) density: Row,
+    pub(super) two_sided: [bool; LANES],
+    pub(super) is_point: [bool; LANES],
+    pub(super) lamp: [u32; LANES],
+}
+
+/// Chooses a lamp for each of sixteen points, and a place on it.
+#[inline(always)]
+pub(super) fn place(lights: &Lights, points: &[Row; 3], [mut u, v]: [Row; 2]) -> Places {
+    let mut places = Places {
+        way: [ZERO; 3],
+        normal: [ZERO; 3],
+        magnitudes: [ZERO; 3],
+        density: ZERO,
+        two_sided: [false; LANES],
+        is_point: [false; LANES],
+        lamp: [0; LANES],
+    };
+    let below = &*lights.below;
+    let mut chance = [1.0; LANES];
+    if lights.lamps.len() > 1 {
+        let (mut start, mut end) = (ZERO, [1.0; LANES]);
+        for (number, of_lamp) in (0_u32..).zip(below.windows(2)) {
+            for i in 0..LANES {
+                let is_in = (of_lamp[0] <= u[i]) & (of_lamp[0] < of_lamp[1]);
+                start[i] = if is_in { of_lamp[0] } else { start[i] };
+                end[i] = if is_in { of_lamp[1] } else { end[i] };
+                places.lamp[i] = if is_in { number } else { places.lamp[i] };
+            }
+        }
+        for i in 0..LANES {
+            chance[i] = end[i] - start[i];
+            let rest = (u[i] - start[i]) / chance[i];
+            let rest = if rest > 0.0 { rest } else { 0.0 };
+            u[i] = if rest < ONE_BELOW { rest } else { ONE_BELOW };
+        }
+    }
+    let (mut second, mut third) = (ZERO, ZERO);
+    for i in 0..LANES {
+        let root = u[i].sqrt();
+        second[i] = root * (1.0 - v[i]);
+        third[i] = v[i] * root;
+    }
+    for (number, lamp) in (0_u32..).zip(&lights.lamps) {
+        for axis in 0..3 {
+            let (corner, normal) = (lamp.corner[axis], lamp.normal[axis]);
+            let (along, across) = (lamp.edges[0][axis], lamp.edges[1][axis]);
+            for i in 0..LANES {
+                let is_own = places.lamp[i] == number;
+                let there = (corner - points[axis][i]) + (along * second[i] + across * third[i]);
+                places.way[axis][i] = if is_own { there } else { places.way[axis][i] };
+                places.normal[axis][i] = if is_own { normal } else { places.normal[axis][i] };
+                let magnitudes = &mut places.magnitudes[axis][i];
+                *magnitudes = if is_own { lamp.magnitudes[axis] } else { *magnitudes };
+            }
+        }
+        let inverse = 1.0 / lamp.area;
+        for i in 0..LANES {
+            let is_own = places.lamp[i] == number;
+            places.density[i] = if is_own { chance[i] * inverse } else { places.density[i] };
+            places.two_sided[i] = if is_own { lamp.two_sided } else { places.two_sided[i] };
+            places.is_point[i] = if is_own { lamp.is_point } else { places.is_point[i] };
+        }
+    }
+    places
+}
