@@ -19,6 +19,17 @@ run_tests() {
 step "format"
 cargo fmt --all --check
 
+if cargo deny --version >/dev/null 2>&1; then
+    step "licences, sources and advisories of dependencies"
+    cargo deny check bans licenses sources
+    # The database of advisories is a repository of its own, which not every machine reaches.
+    if timeout 120 cargo deny fetch db >/dev/null 2>&1; then
+        cargo deny check --disable-fetch advisories
+    else
+        echo "advisories: passed over, https://github.com/RustSec/advisory-db cannot be had from here"
+    fi
+fi
+
 step "lints"
 cargo clippy --workspace --features etendue-cli/window --all-targets -- -D warnings
 
@@ -33,17 +44,6 @@ step "documentation"
 # With the features of the lints and the tests, so that dependencies are built once.
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --features etendue-cli/window --no-deps
 cargo test --workspace --features etendue-cli/window --doc
-
-if cargo deny --version >/dev/null 2>&1; then
-    step "licences, sources and advisories of dependencies"
-    cargo deny check bans licenses sources
-    # The database of advisories is a repository of its own, which not every machine reaches.
-    if timeout 120 cargo deny fetch db >/dev/null 2>&1; then
-        cargo deny check --disable-fetch advisories
-    else
-        echo "advisories: passed over, https://github.com/RustSec/advisory-db cannot be had from here"
-    fi
-fi
 
 step "crates as crates.io would take them, not built once more"
 NO_VERIFY=1 scripts/release.sh crates
