@@ -77,6 +77,7 @@ view: setup
 test-window:
 	@scripts/setup.sh test
 	@scripts/test-window.sh
+	@scripts/window-states.sh
 	@scripts/test-wayland.sh
 
 test:

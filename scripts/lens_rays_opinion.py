@@ -3,7 +3,7 @@
     python3 -m venv out/optiland && out/optiland/bin/pip install optiland==0.6.3
     out/optiland/bin/python scripts/lens_rays_opinion.py crates/optics/tests/optics/optiland
 
-writes a file a lens: the lens as optiland saves it, and rays by where they start (mm, z from the first vertex), their
+writes `../schmidt-cassegrain-spots.json`, focal length and spots of a published telescope, and a file a lens: the lens as optiland saves it, and rays by where they start (mm, z from the first vertex), their
 direction, and where they end on the image, in the coordinates of the whole lens. `crates/optics/tests/optics/second_opinion.rs` reads
 the lenses and holds the rays to 1e-10 mm."""
 
@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from optiland.coordinate_system import CoordinateSystem
-from optiland.materials import IdealMaterial
+from optiland.materials import IdealMaterial, Material
 from optiland.optic import Optic
 from optiland.phase.linear_grating import LinearGratingPhaseProfile
 from optiland.phase.radial import RadialPhaseProfile
@@ -79,6 +79,41 @@ def folded():
     return finished(optic)
 
 
+def published_telescope():
+    """OpticStudio's sample "Schmidt-Cassegrain spider obscuration", in inches as ROBAST's tutorial has it (A. Okumura et
+    al., Astropart. Phys. 76, 38 (2016)), in mm."""
+    inch = 25.4
+    optic = Optic("Schmidt-Cassegrain")
+    add = optic.surfaces.add
+    add(index=0, thickness=np.inf)
+    add(index=1, thickness=0.65 * inch, material=Material("N-BK7", "schott"))
+    add(index=2, radius=-inch / 8.721454939626e-5, thickness=72 * inch, is_stop=True, surface_type="even_asphere",
+        coefficients=[0.0, 3.68090959e-7 / inch**3, 2.73643352e-11 / inch**5, 3.20036892e-14 / inch**7], **TIGHT)
+    add(index=3, radius=-inch / 1.049567394559e-2, conic=0.077235, thickness=-30.86635 * inch, material="mirror")
+    add(index=4, radius=-inch / 2.01270013787e-2, thickness=50.6706488 * inch, material="mirror")
+    add(index=5)
+    return finished(optic, 24 * inch)
+
+
+def spots_of_telescope():
+    """Focal length and bundles by field (degrees) and wavelength (nm): 12 rays at each of 5 heights, from a plane
+    before the lens, and the root mean square of where they end from their mean."""
+    optic, spots = published_telescope(), []
+    turns = 2 * np.pi * np.arange(12) / 12
+    radii = np.array([125.0, 170.0, 215.0, 260.0, 300.0])
+    x, y = (np.outer(radii, part).ravel() for part in (np.cos(turns), np.sin(turns)))
+    for field in (0.0, 0.1):
+        for wavelength in (486.1, 587.6, 656.33):
+            m = np.full_like(x, np.sin(np.radians(field)))
+            z = np.full_like(x, -10.0)
+            rays = RealRays(x, y - 10 * m, z, 0 * m, m, np.sqrt(1 - m**2), np.ones_like(x), np.full_like(x, 1e-3 * wavelength))
+            optic.surfaces.trace(rays)
+            across = np.hypot(rays.x - rays.x.mean(), rays.y - rays.y.mean())
+            spots.append({"field": field, "wavelength": wavelength, "centroid": float(rays.y.mean()),
+                          "rms": float(np.sqrt((across**2).mean()))})
+    return {"efl": float(optic.paraxial.f2()), "spots": spots}
+
+
 LENSES = {
     "cassegrain": cassegrain(),
     "conic": lens({"radius": 50.0, "conic": -0.7}),
@@ -120,6 +155,7 @@ def rays_of(name):
 
 def main():
     folder = Path(sys.argv[1])
+    (folder / "../schmidt-cassegrain-spots.json").write_text(json.dumps(spots_of_telescope(), indent=1) + "\n")
     for name, optic in LENSES.items():
         x, y, z, l, m, n = rays_of(name)
         start = list(zip(x.tolist(), y.tolist(), z.tolist(), l.tolist(), m.tolist(), n.tolist()))

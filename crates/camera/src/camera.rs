@@ -250,20 +250,6 @@ impl Camera {
         Ok(Self { projection, ..self.clone() })
     }
 
-    /// The same as [`opened`](Self::opened) with the pupil measured at one wavelength alone, which takes a few times
-    /// less: what others pass beside it is not seen.
-    ///
-    /// # Errors
-    ///
-    /// When no light gets through.
-    pub fn opened_roughly(&self, bands: &Bands) -> Result<Self, CameraError> {
-        let mut opened = self.clone();
-        if let Projection::Lens(lens) = &self.projection {
-            opened.projection = Projection::Lens(Arc::new(lens.opened_roughly(bands)?));
-        }
-        Ok(opened)
-    }
-
     /// The same as [`opened`](Self::opened) with the filters of lens and lenslets clear.
     ///
     /// # Errors

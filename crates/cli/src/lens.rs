@@ -48,12 +48,6 @@ pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
             }
             false => sidecar::write_json(&to, path, file)?,
         }
-        let are_named = !lens.fields.is_empty() || !lens.wavelengths.is_empty();
-        if are_named && !arguments.quiet {
-            say(
-                "note: --save: the fields, and the wavelengths but the main one, are left out; give them as `--fields` and `--wavelengths`",
-            );
-        }
     }
     lens.train = adjusted(lens.train, arguments)?;
     match &arguments.rays {
@@ -88,10 +82,11 @@ fn adjusted(mut train: OpticalTrain, arguments: &LensArguments) -> Result<Optica
 }
 
 fn report(lens: &ReadLens, arguments: &LensArguments, to: &Transaction) -> Result<(), Fault> {
-    let named = |list: &[f64]| (!list.is_empty()).then(|| list.to_vec());
+    let named = |list: Vec<f64>| (!list.is_empty()).then_some(list);
     let inquiry = Inquiry {
-        wavelengths: arguments.wavelengths.clone().or_else(|| named(&lens.wavelengths)),
-        fields: arguments.fields.clone().or_else(|| named(&lens.fields)),
+        wavelengths: arguments.wavelengths.clone().or_else(|| named(lens.wavelengths())),
+        fields: arguments.fields.clone().or_else(|| named(lens.fields())),
+        stated: lens.file.as_ref().map(|file| file.fields.clone()).unwrap_or_default(),
         focus: arguments.focus.unwrap_or(lens.focus),
     };
     let mut report = LensReport::new(&lens.train, &inquiry)

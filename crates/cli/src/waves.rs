@@ -117,7 +117,7 @@ pub(crate) fn analyse(
     let (wavelengths, of_wavelengths) = wavelengths(lens, report, arguments);
     let (fields, of_fields) = match (&arguments.fields, planes.magnification) {
         (Some(fields), _) => (fields.clone(), "option"),
-        (None, None) if !lens.fields.is_empty() => (lens.fields.clone(), "file"),
+        (None, None) if !lens.fields().is_empty() => (lens.fields(), "file"),
         (None, None) => (report.fields.clone(), "default"),
         (None, Some(magnification)) => {
             let radius = report.image_circle.map_or(0.0, |diameter| 0.5 * diameter);
@@ -133,8 +133,8 @@ pub(crate) fn analyse(
     // Weights of a file are those of its own wavelengths.
     let (weights, of_weights) = match &arguments.weights {
         Some(weights) => (weights.clone(), "option"),
-        None if of_wavelengths == "file" && !lens.weights.is_empty() => {
-            (lens.weights.clone(), "file")
+        None if of_wavelengths == "file" && !lens.weights().is_empty() => {
+            (lens.weights().to_vec(), "file")
         }
         None => (Vec::new(), "default"),
     };
@@ -189,7 +189,7 @@ pub(crate) fn wavelengths(
 ) -> (Vec<f64>, &'static str) {
     let (mut list, from) = match &arguments.wavelengths {
         Some(list) => (list.clone(), "option"),
-        None if !lens.wavelengths.is_empty() => (lens.wavelengths.clone(), "file"),
+        None if !lens.wavelengths().is_empty() => (lens.wavelengths(), "file"),
         None => (report.colour.iter().map(|row| row.wavelength).collect(), "default"),
     };
     if from == "default" {

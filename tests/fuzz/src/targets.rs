@@ -201,8 +201,9 @@ fn report(path: &Path) {
     let Ok(lens) = read_lens(path, Reach::OwnFolder, &[]) else { return };
     let named = |list: Vec<f64>| (!list.is_empty()).then_some(list);
     let inquiry = Inquiry {
-        wavelengths: named(lens.wavelengths),
-        fields: named(lens.fields),
+        wavelengths: named(lens.wavelengths()),
+        fields: named(lens.fields()),
+        stated: lens.file.map(|file| file.fields).unwrap_or_default(),
         focus: lens.focus,
     };
     if let Ok(report) = LensReport::new(&lens.train, &inquiry) {

@@ -49,6 +49,33 @@ impl Contender {
     }
 }
 
+/// The path of the number of samples, for which a change may set a rule that stops them.
+pub const SAMPLES: &str = "render.samples";
+
+/// A rule that stops samples at a relative error, at the sensor's noise.
+pub const RULES: [&str; 2] = ["relative_error", "sensor-noise"];
+
+/// `settings` of a scene rendered with so many samples. A rule has an error that falls as those of so many samples do: one
+/// over their root, and a variance of one over them.
+#[must_use]
+pub fn rendered_with(settings: &[(String, String)], samples: u32) -> Vec<(String, String)> {
+    let most = samples.saturating_mul(64);
+    let variance = 1.0 / f64::from(samples.max(2));
+    let [relative, noise] = RULES;
+    let mut all = settings.to_vec();
+    match all.iter_mut().find(|(path, _)| path == SAMPLES) {
+        Some((_, rule)) if rule == relative => {
+            *rule = format!(r#"{{"{relative}": {:.6}, "max": {most}}}"#, variance.sqrt());
+        }
+        Some((_, rule)) if rule == noise => {
+            *rule = format!(r#"{{"until": "{noise}", "fraction": {variance:.9}, "max": {most}}}"#);
+        }
+        Some(_) => {}
+        None => all.push((SAMPLES.to_owned(), samples.to_string())),
+    }
+    all
+}
+
 /// What the scene without changes is called.
 pub const AS_IT_IS: &str = "as the plan takes it";
 
@@ -215,18 +242,21 @@ impl Target {
         };
         let settings = self.contenders.iter().find(|own| own.name == found.name);
         let settings = settings.map_or(&[][..], |own| &own.settings);
-        let set: String =
-            settings.iter().map(|(path, value)| format!(" --set '{path}={value}'")).collect();
+        // What is no key of a scene is an option.
+        let word = |(path, value): &(String, String)| match path.starts_with("--") {
+            true => format!(" {path}"),
+            false => format!(" --set '{path}={value}'"),
+        };
+        let set: String = rendered_with(settings, found.samples).iter().map(word).collect();
         format!(
             "Soonest: {} with {} samples: {:.2} s foretold, {:.2} s taken (a factor of {:.2}), an error of {:.2} %.\n\
-             It is rendered with --samples {}{set}",
+             It is rendered with{set}",
             found.name,
             found.samples,
             found.foretold,
             found.seconds,
             found.factor(),
-            100.0 * found.error,
-            found.samples
+            100.0 * found.error
         )
     }
 }

@@ -16,7 +16,7 @@ use etendue_scene::Scene;
 use serde::Serialize;
 use serde_json::Value;
 
-use etendue_render::tolerance::{Field, FullView, has_mask};
+use etendue_render::tolerance::{Field, FullView};
 pub use etendue_render::tolerance::{Finding, Place, Tolerance, Worst};
 
 pub use self::waves::WaveFinding;
@@ -73,12 +73,15 @@ pub fn compare(
     let mut notes = view.notes.clone();
     notes.extend(found.notes);
     let (mut findings, mut models, mut scenes) = (Vec::new(), Vec::new(), Vec::new());
-    let is_masked = scene.camera.lens().is_some_and(has_mask);
     for model in found.models {
         let mut finding = view.finding(model.name, &model.camera, tolerance)?;
-        if is_masked && ["thin", "thick"].contains(&model.name) {
+        if model.lacks_mask {
             finding.is_within = false;
-            notes.push(format!("`{}` has no mask in its stop: its blur is another", model.name));
+            notes.push(format!(
+                "`{}` has not the lens' mask, which is kept where it is alone, in the stop and upright: its blur is \
+                 another",
+                model.name
+            ));
         }
         findings.push(finding);
         models.push(opened(&plan, &model.camera)?);

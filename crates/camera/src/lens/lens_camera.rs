@@ -50,8 +50,6 @@ pub struct LensCamera {
     /// Projected solid angle of the unvignetted pupil seen from the axis (sr).
     pub(super) solid_angle: f64,
     pub(super) opened: Option<Arc<Opened>>,
-    /// The pupil at the design wavelength alone, once it was measured: that of a lens without dispersion, too.
-    design_pupil: Option<Arc<DesignPupil>>,
     pub(super) traced_at: TracedAt,
     /// How light is spread on the sensor.
     pub(super) spread: SpreadBy,
@@ -69,14 +67,6 @@ pub(super) enum SpreadBy {
     Waves,
     /// Not at all: each place sees along its chief ray.
     Nothing,
-}
-
-/// An exit pupil measured at the design wavelength, with filters clear.
-#[derive(Debug)]
-struct DesignPupil {
-    /// Half the sensor's width and height (mm).
-    half_size: [f64; 2],
-    pupil: ExitPupil,
 }
 
 impl PartialEq for LensCamera {
@@ -130,7 +120,7 @@ impl LensCamera {
         let solid_angle = unvignetted(focused.train(), &design, &focused);
         let straight = unbent.at(unbent.wavelength()).unwrap_or_else(|_| design.clone());
         let chief = ChiefTable::new(&unbent, &frame, half, &straight);
-        let (opened, design_pupil, traced_at, spread) = Default::default();
+        let (opened, traced_at, spread) = Default::default();
         Ok(Self {
             focused,
             design,
@@ -139,7 +129,6 @@ impl LensCamera {
             lit,
             solid_angle,
             opened,
-            design_pupil,
             traced_at,
             spread,
             sharing: SharingLimits::DEFAULT,
@@ -277,34 +266,6 @@ impl LensCamera {
         Ok(Self { opened: Some(Arc::new(opened)), ..self.clone() })
     }
 
-    /// The same with its exit pupil measured at one wavelength alone, for looking at a few rays of single bands:
-    /// what other wavelengths pass beside it is left out.
-    pub(crate) fn opened_roughly(&self, bands: &Bands) -> Result<Self, CameraError> {
-        let train = self.focused.train();
-        let half_size = self.focused.film().half_size().to_array();
-        let known = match &self.design_pupil {
-            Some(known) if known.half_size == half_size => Arc::clone(known),
-            _ => {
-                let pupil = self.measured(&without_filters(train), &[train.wavelength()])?;
-                Arc::new(DesignPupil { half_size, pupil })
-            }
-        };
-        let known = Self { design_pupil: Some(known), ..self.clone() };
-        let opened = known.open_at(bands, train, Some(train.wavelength()))?;
-        Ok(Self { opened: Some(Arc::new(opened)), ..known })
-    }
-
-    /// The exit pupil of a train with clear filters at these wavelengths (nm).
-    fn measured(
-        &self,
-        clear: &OpticalTrain,
-        wavelengths: &[f64],
-    ) -> Result<ExitPupil, CameraError> {
-        let half_size = self.focused.film().half_size().to_array();
-        ExitPupil::new(clear, wavelengths, self.focused.sensor_z(), half_size)
-            .map_err(|error| CameraError::new("", error.to_string()))
-    }
-
     /// The same with filters clear.
     pub(crate) fn opened_clear(&self, bands: &Bands) -> Result<Self, CameraError> {
         let clear = without_filters(self.focused.train());
@@ -313,16 +274,6 @@ impl LensCamera {
 
     /// The lens opened, of which `train` is as much as light of `bands` is to meet.
     fn open(&self, bands: &Bands, train: &OpticalTrain) -> Result<Opened, CameraError> {
-        self.open_at(bands, train, None)
-    }
-
-    /// The same with the pupil measured at `one` wavelength (nm), or at those of the bands.
-    fn open_at(
-        &self,
-        bands: &Bands,
-        train: &OpticalTrain,
-        one: Option<f64>,
-    ) -> Result<Opened, CameraError> {
         let fault = |why: String| CameraError::new("", why);
         for (i, element) in train.elements().iter().enumerate() {
             for curve in element.part.curves() {
@@ -343,18 +294,10 @@ impl LensCamera {
             measured.extend(few);
             groups.push(OpenedGroup { lenses });
         }
-        if let Some(nm) = one {
-            measured = vec![nm];
-        }
         let half_size = self.focused.film().half_size().to_array();
         let clear = without_filters(train);
-        let known = self.design_pupil.as_ref().filter(|known| {
-            known.half_size == half_size && measured == [self.focused.train().wavelength()]
-        });
-        let pupil = match known {
-            Some(known) => known.pupil.clone(),
-            None => self.measured(&clear, &measured)?,
-        };
+        let pupil = ExitPupil::new(&clear, &measured, self.focused.sensor_z(), half_size)
+            .map_err(|error| fault(error.to_string()))?;
         let all: Vec<f64> =
             groups.iter().flat_map(|g| &g.lenses).map(MonochromaticTrain::wavelength).collect();
         let pupil =

@@ -1,7 +1,9 @@
 //! `etendue bench --target`: which settings reach a given error of what the sensor records soonest.
 
 use etendue::{Denoiser, Options, Outputs, Progress, Rendering, Session};
-use etendue_bench::target::{Change, Effort, Outcome, Run, Target, WholeRun, measure};
+use etendue_bench::target::{
+    Change, Effort, Outcome, RULES, Run, SAMPLES, Target, WholeRun, measure, rendered_with,
+};
 use etendue_render::{accelerators, denoise};
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, AccuracySpec, SceneFile, TracerSpec};
@@ -73,18 +75,14 @@ fn whole_run(
 ) -> Result<WholeRun, etendue::Error> {
     let mut options =
         Options { memory_limit: arguments.memory_limit, ..render::options(&arguments.scene) };
-    let set = |(path, value): (&str, String)| (path.to_owned(), value);
-    let mut settings = run.contender.settings.clone();
+    let mut settings = rendered_with(&run.contender.settings, run.samples);
+    let wanted = settings.len();
     // What is no key of a scene is an output.
     settings.retain(|(path, _)| path != DENOISE);
-    options.outputs =
-        Outputs { denoised: settings.len() < run.contender.settings.len(), ..Outputs::ALL };
+    options.outputs = Outputs { denoised: settings.len() < wanted, ..Outputs::ALL };
     options.settings.extend(layers.iter().cloned());
     options.settings.extend(settings);
-    options.settings.extend(
-        [("render.samples", run.samples.to_string()), ("render.seed", run.seed.to_string())]
-            .map(set),
-    );
+    options.settings.push(("render.seed".to_owned(), run.seed.to_string()));
     let progress = Progress::new(|_, _| !stop::asked());
     let outputs = options.outputs;
     let rendering = Session::open_with(&arguments.scene.scene, options)?.render(&progress)?;
@@ -207,6 +205,18 @@ pub(super) fn axes(scene: &Scene) -> Vec<Vec<Change>> {
             models.push(change("no dispersion", "plan.dispersion", "false"));
         }
         axes.push(models);
+    }
+    let [relative, noise] = RULES;
+    let mut rules = vec![change("samples by the light", SAMPLES, relative)];
+    if scene.sensor.is_some() {
+        rules.push(change("samples by the sensor's noise", SAMPLES, noise));
+    }
+    axes.push(rules);
+    if scene.camera.lens().is_some() {
+        axes.push(vec![
+            change("a path for all bands", "plan.shared_paths", "true"),
+            change("a path for each band", "plan.shared_paths", "false"),
+        ]);
     }
     if !scene.textures.is_empty() {
         axes.push(vec![

@@ -193,7 +193,7 @@ fn the_settings_that_reach_an_error_soonest_are_found_and_verified() {
     let output = bench.run(&words);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let table = text(&output.stdout);
-    assert!(table.contains("Soonest: ") && table.contains("--samples "), "{table}");
+    assert!(table.contains("Soonest: ") && table.contains("'render.samples="), "{table}");
     let found = &bench.json("out/bench.json")["target"];
     let verified = &found["verified"];
     // It was rendered for itself, and is within the target; how long it took, no test asserts.
@@ -205,7 +205,14 @@ fn the_settings_that_reach_an_error_soonest_are_found_and_verified() {
         .iter()
         .map(|c| c["name"].as_str().unwrap())
         .collect();
-    for name in ["as the plan takes it", "independent samples", "2 surfaces", "a high build"] {
+    let all = [
+        "as the plan takes it",
+        "independent samples",
+        "2 surfaces",
+        "a high build",
+        "samples by the light",
+    ];
+    for name in all {
         assert!(names.contains(&name), "{names:?}");
     }
     // Independent samples are noisier than Sobol's points.

@@ -238,6 +238,9 @@ impl Session {
         let prepared = (self.built()?, &*self.images);
         let taken = tolerance::choose(scene, plan, prepared, loaded.detail(), &watch)?;
         let plan = Plan::taking(scene, self.options.outputs, taken);
+        if self.options.memory_limit.is_some() {
+            fits(scene, &plan, self.options.memory_limit)?;
+        }
         if let Some(loaded) = &mut self.loaded {
             loaded.plan = plan;
         }

@@ -112,7 +112,12 @@ pub enum AnalysisError {
     /// A grid too coarse for the wavefront.
     #[error(
         "{cells} x {cells} cells over the pupil are too few: the wavefront changes by {steepest:.2} \
-         waves from one cell to the next, and half a wave is the most; it needs {needed} cells a side"
+         waves from one cell to the next, and half a wave is the most; it needs {needed} cells a side{}",
+        if *needed > MOST_CELLS {
+            format!(", and {MOST_CELLS} are the most: refocus, stop down or take a smaller field")
+        } else {
+            String::new()
+        }
     )]
     Coarse {
         /// Cells a side.

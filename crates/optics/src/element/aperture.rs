@@ -6,14 +6,14 @@
 //!
 //! Grey pictures of a stated physical size: coded apertures and filter maps.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::DVec2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Resolve;
-use super::shapes::{AnnularSpec, BoxSpec, Shape, SpiderSpec};
+use super::shapes::{AnnularSpec, BoxSpec, OutlineSpec, Shape, SpiderSpec};
 use etendue_geometry::units::{Degrees, Millimetres};
 use etendue_image::{Limits, Samples};
 
@@ -35,6 +35,8 @@ pub enum ApertureSpec {
     Annular(AnnularSpec),
     /// A ring crossed by arms.
     Spider(SpiderSpec),
+    /// An outline by its corners.
+    Outline(OutlineSpec),
 }
 
 /// A round hole.
@@ -129,6 +131,7 @@ impl ApertureSpec {
             Self::Elliptical(spec) => spec.ellipse().map(Opening::Shaped),
             Self::Annular(spec) => spec.build().map(Opening::Shaped),
             Self::Spider(spec) => spec.build().map(Opening::Shaped),
+            Self::Outline(spec) => spec.build().map(Opening::Shaped),
         }
     }
 }
@@ -244,6 +247,8 @@ const LONGEST: u64 = 1 << 30;
 /// from the sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
+    /// The file that it was read from.
+    pub file: PathBuf,
     /// Width and height (mm).
     pub size: [f64; 2],
     /// Columns and rows.
@@ -276,13 +281,13 @@ impl Picture {
         if !good(width) || !good(height) {
             return Err(format!("{file}: width and height must be positive lengths"));
         }
-        Ok(Self { size: [width, height], pixels, values, levels })
+        Ok(Self { file: path, size: [width, height], pixels, values, levels })
     }
 
     /// A white picture of the same size.
     #[must_use]
     pub fn blank(&self) -> Self {
-        Self { size: self.size, pixels: [1, 1], values: vec![1.0], levels: 1.0 }
+        Self { pixels: [1, 1], values: vec![1.0], levels: 1.0, ..self.clone() }
     }
 
     /// The index of the pixel that covers the point `x`, `y` (mm); `None` outside of the picture.

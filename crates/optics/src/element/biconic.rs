@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::newton::{Profile, squares_along};
 use super::rays::Ray;
+use super::real::Real;
 use super::refract::{Media, Root, meet_conic};
 use super::surface::{Surface, checked_semi_diameter, vertex_curvature};
 use crate::glass::GlassSpec;
@@ -129,15 +130,16 @@ impl Biconic {
 
     /// The sag, and its derivatives by x and y.
     #[inline(always)]
-    fn profile(&self, [x, y]: [f64; 2]) -> (f64, [f64; 2]) {
+    fn profile<T: Real>(&self, [x, y]: [T; 2]) -> (T, [T; 2]) {
         let [a, b] = self.limits();
         let [c, d] = self.curvature;
-        let rise = c * x * x + d * y * y;
-        let root = (1.0 - a * x * x - b * y * y).max(0.0).sqrt();
-        let below = 1.0 + root;
+        let rise = x.times(c) * x + y.times(d) * y;
+        let root = (T::constant(1.0) - x.times(a) * x - y.times(b) * y).at_least(0.0).root();
+        let below = root.plus(1.0);
         // d/dx of rise/below: the root's own derivative is −a x/root.
-        let bend = rise / (below * below * root.max(1e-12));
-        (rise / below, [x * (2.0 * c / below + a * bend), y * (2.0 * d / below + b * bend)])
+        let bend = rise / (below * below * root.at_least(1e-12));
+        let slope = |x: T, c: f64, a: f64| x * (T::constant(2.0 * c) / below + bend.times(a));
+        (rise / below, [slope(x, c, a), slope(y, d, b)])
     }
 }
 
@@ -180,7 +182,7 @@ impl Biconic {
 
 impl Profile for Biconic {
     /// ∂z/∂x and ∂z/∂y.
-    type Slope = [f64; 2];
+    type Slope<T: Real> = [T; 2];
 
     #[inline(always)]
     fn begin(&self, ray: Ray) -> (Ray, f64) {
@@ -189,7 +191,7 @@ impl Profile for Biconic {
     }
 
     #[inline(always)]
-    fn sag_and_slope(&self, at: Ray) -> (f64, [f64; 2]) {
+    fn sag_and_slope<T: Real>(&self, at: Ray<T>) -> (T, [T; 2]) {
         let [x, y, _] = at.position;
         self.profile([x, y])
     }
@@ -200,7 +202,7 @@ impl Profile for Biconic {
     }
 
     #[inline(always)]
-    fn along(&self, at: Ray, [along_x, along_y]: [f64; 2]) -> f64 {
+    fn along<T: Real>(&self, at: Ray<T>, [along_x, along_y]: [T; 2]) -> T {
         let [u, v, w] = at.direction;
         w - along_x * u - along_y * v
     }
@@ -212,10 +214,16 @@ impl Profile for Biconic {
     }
 
     #[inline(always)]
-    fn refract(&self, media: Media, at: Ray, [along_x, along_y]: [f64; 2]) -> (Ray, bool) {
-        let normal = [-along_x, -along_y, 1.0];
-        let along: f64 = (0..3).map(|i| at.direction[i] * normal[i]).sum();
-        let length2 = 1.0 + along_x * along_x + along_y * along_y;
+    fn refract<T: Real>(
+        &self,
+        media: Media,
+        at: Ray<T>,
+        [along_x, along_y]: [T; 2],
+    ) -> (Ray<T>, bool) {
+        let (one, [u, v, w]) = (T::constant(1.0), at.direction);
+        let normal = [-along_x, -along_y, one];
+        let along = u * normal[0] + v * normal[1] + w;
+        let length2 = one + along_x * along_x + along_y * along_y;
         media.refract(at, normal, length2, along * along, along)
     }
 
@@ -308,16 +316,16 @@ impl Surface {
 
 impl Profile for Surface {
     /// (∂z/∂x)/x.
-    type Slope = f64;
+    type Slope<T: Real> = T;
 
     #[inline(always)]
     fn begin(&self, ray: Ray) -> (Ray, f64) {
-        let met = meet_conic::<false>(self, ray, Root::Near);
+        let met = meet_conic::<false, f64>(self, ray, Root::Near);
         (met.ray, met.t)
     }
 
     #[inline(always)]
-    fn sag_and_slope(&self, at: Ray) -> (f64, f64) {
+    fn sag_and_slope<T: Real>(&self, at: Ray<T>) -> (T, T) {
         let [x, y, _] = at.position;
         self.profile(x * x + y * y)
     }
@@ -349,7 +357,7 @@ impl Profile for Surface {
     }
 
     #[inline(always)]
-    fn along(&self, at: Ray, slope: f64) -> f64 {
+    fn along<T: Real>(&self, at: Ray<T>, slope: T) -> T {
         let Ray { position: [x, y, _], direction: [u, v, w] } = at;
         w - slope * (x * u + y * v)
     }
@@ -360,11 +368,12 @@ impl Profile for Surface {
     }
 
     #[inline(always)]
-    fn refract(&self, media: Media, at: Ray, slope: f64) -> (Ray, bool) {
+    fn refract<T: Real>(&self, media: Media, at: Ray<T>, slope: T) -> (Ray<T>, bool) {
         let Ray { position: [x, y, _], direction: [u, v, w] } = at;
-        let m = [-slope * x, -slope * y, 1.0];
+        let one = T::constant(1.0);
+        let m = [-slope * x, -slope * y, one];
         let along = u * m[0] + v * m[1] + w;
-        media.refract(at, m, 1.0 + slope * slope * (x * x + y * y), along * along, along)
+        media.refract(at, m, one + slope * slope * (x * x + y * y), along * along, along)
     }
 
     fn extent(&self) -> [f64; 2] {

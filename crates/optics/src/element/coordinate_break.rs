@@ -13,7 +13,8 @@ use glam::{DMat3, DVec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::rays::{Block, LANES, Ray, RayStatus};
+use super::rays::{Block, LANES, Ray, RayStatus, moved, turned};
+use super::real::Real;
 use super::step::Traversal;
 
 /// A break as a lens file writes it, beside the element's `tilt` (about x and y) and `decentre`.
@@ -74,12 +75,10 @@ impl CoordinateBreak {
 
     /// A ray in the frame before it, written down in that behind it.
     #[inline(always)]
-    fn renewed(&self, ray: Ray) -> Ray {
+    pub(super) fn renewed<T: Real>(&self, ray: Ray<T>) -> Ray<T> {
         let back = self.turn.transpose();
-        Ray {
-            position: (back * (DVec3::from(ray.position) - self.shift)).to_array(),
-            direction: (back * DVec3::from(ray.direction)).to_array(),
-        }
+        let place = moved(ray.position, -self.shift);
+        Ray { position: turned(&back, place), direction: turned(&back, ray.direction) }
     }
 
     /// The rays of a block that are on their way, at z (mm).

@@ -194,7 +194,7 @@ impl Lenslets {
         let place = self.place(form, [x, y], clip);
         let centre = [x - place.away[0], y - place.away[1]];
         let local = moved(ray, [-centre[0], -centre[1]]);
-        let met = face.at_near_root::<true>(local, f64::INFINITY);
+        let met = face.at_near_root::<true, f64>(local, f64::INFINITY);
         let same =
             self.array.lattice.is_well_inside(form.0, met.ray.position[0], met.ray.position[1]);
         let met = Refracted { hit: met.hit & same, ..moved(met, centre) };

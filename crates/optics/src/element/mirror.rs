@@ -26,6 +26,7 @@ use serde::{Deserialize, Serialize};
 use super::Frame;
 use super::coating::{MirrorCoating, MirrorCoatingSpec};
 use super::rays::{Block, LANES, Ray, RayStatus};
+use super::real::Real;
 use super::step::{Clip, Traversal};
 use super::surface::{Surface, SurfaceSpec};
 
@@ -214,15 +215,17 @@ impl Fold {
 
     /// A ray as a kernel of μ = −1 leaves it, in the unfolded space.
     #[inline(always)]
-    fn unfolded(&self, ray: Ray) -> Ray {
+    pub(super) fn unfolded<T: Real>(&self, ray: Ray<T>) -> Ray<T> {
         let Ray { position: [x, y, z], direction: [u, v, w] } = ray;
-        let n = self.normal;
-        let twice = 2.0
-            * ((x - self.vertex.x) * n.x + (y - self.vertex.y) * n.y + (z - self.vertex.z) * n.z);
-        let along = 2.0 * (u * n.x + v * n.y + w * n.z);
+        let (n, vertex) = (self.normal, self.vertex);
+        let twice = (x.plus(-vertex.x).times(n.x)
+            + y.plus(-vertex.y).times(n.y)
+            + z.plus(-vertex.z).times(n.z))
+        .times(2.0);
+        let along = (u.times(n.x) + v.times(n.y) + w.times(n.z)).times(2.0);
         Ray {
-            position: [x - twice * n.x, y - twice * n.y, z - twice * n.z],
-            direction: [along * n.x - u, along * n.y - v, along * n.z - w],
+            position: [x - twice.times(n.x), y - twice.times(n.y), z - twice.times(n.z)],
+            direction: [along.times(n.x) - u, along.times(n.y) - v, along.times(n.z) - w],
         }
     }
 

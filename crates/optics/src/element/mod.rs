@@ -11,6 +11,7 @@ mod biconic;
 mod coating;
 mod coordinate_break;
 mod crossings;
+mod derivatives;
 mod freeform;
 pub(crate) mod gradient;
 mod lattice;
@@ -21,10 +22,12 @@ mod mirror;
 mod newton;
 mod part;
 mod rays;
+pub(crate) mod real;
 mod refract;
 mod shapes;
 mod step;
 mod surface;
+mod thin_lens;
 
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -56,12 +59,14 @@ pub(crate) use mirror::{Fold, Shadow};
 pub use mirror::{Mirror, MirrorMount, MirrorSpec};
 pub use part::{Part, PartSpec, Symbol};
 pub use rays::{Block, LANES, LensRays, Ray, RayStatus, StatusCounts};
+use rays::{moved, turned};
+pub use real::Real;
 pub(crate) use refract::Refraction;
-pub use refract::{ThinLens, ThinLensSpec};
-pub use shapes::{AnnularSpec, BoxSpec, Shape, SpiderSpec};
+pub use shapes::{AnnularSpec, BoxSpec, OutlineSpec, Shape, SpiderSpec};
 pub use step::Clip;
 pub(crate) use step::{Action, Step};
 pub use surface::{Surface, SurfaceSpec};
+pub use thin_lens::{ThinLens, ThinLensSpec};
 
 /// An element of a lens file: a part, and how it is mounted.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -97,7 +102,7 @@ pub struct Mount {
     pub gradient: Option<GradientSpec>,
 }
 
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+pub(crate) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
@@ -241,19 +246,16 @@ impl Frame {
         self.vertex + self.rotation * local
     }
 
-    pub(crate) fn enter(&self, ray: Ray) -> Ray {
-        let turned = self.rotation.transpose();
-        Ray {
-            position: (turned * (DVec3::from(ray.position) - self.vertex)).to_array(),
-            direction: (turned * DVec3::from(ray.direction)).to_array(),
-        }
+    pub(crate) fn enter<T: Real>(&self, ray: Ray<T>) -> Ray<T> {
+        let back = self.rotation.transpose();
+        let place = moved(ray.position, -self.vertex);
+        Ray { position: turned(&back, place), direction: turned(&back, ray.direction) }
     }
 
-    pub(crate) fn leave(&self, ray: Ray) -> Ray {
-        Ray {
-            position: self.point(ray.position.into()).to_array(),
-            direction: (self.rotation * DVec3::from(ray.direction)).to_array(),
-        }
+    pub(crate) fn leave<T: Real>(&self, ray: Ray<T>) -> Ray<T> {
+        let place = turned(&self.rotation, ray.position);
+        let direction = turned(&self.rotation, ray.direction);
+        Ray { position: moved(place, self.vertex), direction }
     }
 }
 
@@ -339,7 +341,7 @@ mod tests {
         let schema = schemars::schema_for!(ElementSpec).to_value();
         let mut kinds = Vec::new();
         leaves(&schema, &mut kinds);
-        assert_eq!(kinds.len(), 15, "seven shapes of apertures");
+        assert_eq!(kinds.len(), 16, "eight shapes of apertures");
         for kind in kinds {
             assert_eq!(kind["additionalProperties"], false, "{kind}");
             let keys = kind["properties"].as_object().unwrap();

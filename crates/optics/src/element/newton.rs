@@ -8,6 +8,7 @@
 
 use super::crossings::Slopes;
 use super::rays::{Block, LANES, PENDING, Ray, at_lane};
+use super::real::Real;
 use super::refract::{Media, Refracted, TOUCH, each_numbered_lane};
 
 /// The step (mm) at which the method has arrived.
@@ -19,8 +20,8 @@ const PIECES: u32 = 256;
 
 /// A surface in its own frame (mm), as the search for its crossing with a ray asks for it.
 pub(super) trait Profile {
-    /// The slope at a place.
-    type Slope: Copy + Default;
+    /// The slope at a place, in any number.
+    type Slope<T: Real>: Copy + Default;
 
     /// The ray at the place where the method begins, and how far that is (mm); not finite where there
     /// is no such place.
@@ -28,15 +29,15 @@ pub(super) trait Profile {
 
     /// The sag (mm) and the slope at the ray's place. Beyond its domain the surface goes on as if at
     /// the edge, which keeps an iteration going and is refused in the end.
-    fn sag_and_slope(&self, at: Ray) -> (f64, Self::Slope);
+    fn sag_and_slope<T: Real>(&self, at: Ray<T>) -> (T, Self::Slope<T>);
 
     /// The same at `N` places at once, to the same bits.
     #[inline(always)]
     fn sags_and_slopes<const N: usize>(
         &self,
         position: &[[f64; N]; 3],
-    ) -> ([f64; N], [Self::Slope; N]) {
-        let (mut sags, mut slopes) = ([0.0; N], [Self::Slope::default(); N]);
+    ) -> ([f64; N], [Self::Slope<f64>; N]) {
+        let (mut sags, mut slopes) = ([0.0; N], [Self::Slope::<f64>::default(); N]);
         for lane in 0..N {
             let at = Ray { position: at_lane(position, lane), direction: [0.0; 3] };
             (sags[lane], slopes[lane]) = self.sag_and_slope(at);
@@ -45,16 +46,16 @@ pub(super) trait Profile {
     }
 
     /// The slope at the root, where the last step began with `slope`, within [`SETTLED`] of it.
-    fn slope_at(&self, root: Ray, slope: Self::Slope) -> Self::Slope;
+    fn slope_at(&self, root: Ray, slope: Self::Slope<f64>) -> Self::Slope<f64>;
 
     /// dF/dt at the ray's place.
-    fn along(&self, at: Ray, slope: Self::Slope) -> f64;
+    fn along<T: Real>(&self, at: Ray<T>, slope: Self::Slope<T>) -> T;
 
     /// Whether the surface exists at a place.
     fn exists(&self, place: [f64; 2]) -> bool;
 
     /// The ray as it goes on from its place on the surface, and whether it does.
-    fn refract(&self, media: Media, at: Ray, slope: Self::Slope) -> (Ray, bool);
+    fn refract<T: Real>(&self, media: Media, at: Ray<T>, slope: Self::Slope<T>) -> (Ray<T>, bool);
 
     /// The distance from the axis beyond which none of it exists, and another of the size of its radii
     /// of curvature (mm).
@@ -137,6 +138,22 @@ pub(super) fn cross_by_newton<P: Profile>(
     Newton::<1, P>::run(surface, |_| (ray, true)).refracted(surface, media, clip2, 0)
 }
 
+/// A ray in the surface's frame as it goes on from the place (mm) where it is known to meet the surface, in any number:
+/// a last step of Newton's method has the derivatives of the place, since F is 0 there.
+pub(super) fn cross_at<P: Profile, T: Real>(
+    surface: &P,
+    media: Media,
+    ray: Ray<T>,
+    place: [f64; 3],
+) -> Ray<T> {
+    let start = ray.value();
+    let travel: f64 = (0..3).map(|i| (place[i] - start.position[i]) * start.direction[i]).sum();
+    let near = ray.advanced(T::constant(travel));
+    let (sag, slope) = surface.sag_and_slope(near);
+    let root = near.advanced((sag - near.position[2]) / surface.along(near, slope));
+    surface.refract(media, root, surface.sag_and_slope(root).1).0
+}
+
 /// A ray in the surface's frame that Newton's method does not bring to it.
 pub(super) fn cross_by_search<P: Profile>(
     surface: &P,
@@ -161,7 +178,7 @@ struct Newton<const N: usize, P: Profile> {
     /// The step taken last (mm).
     last: [f64; N],
     /// The slope where the last step began.
-    slope: [P::Slope; N],
+    slope: [P::Slope<f64>; N],
     /// 1 while the ray has not settled; a settled one is left alone, so that no ray's last bits
     /// depend on its neighbours.
     active: [u64; N],
@@ -187,7 +204,7 @@ impl<const N: usize, P: Profile> Newton<N, P> {
             direction: [[0.0; N]; 3],
             travel: [0.0; N],
             last: [f64::INFINITY; N],
-            slope: [P::Slope::default(); N],
+            slope: [P::Slope::<f64>::default(); N],
             active: [0; N],
         };
         for lane in 0..N {

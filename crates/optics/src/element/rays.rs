@@ -1,7 +1,9 @@
 //! Rays inside a lens: a structure of arrays in blocks of a few vector registers, and what became
 //! of each ray.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
+
+use super::real::Real;
 
 /// Rays of one block. A block is 2 kB and stays in the first-level cache from the first element to
 /// the last.
@@ -235,16 +237,31 @@ pub(crate) fn at_lane<const N: usize>(axes: &[[f64; N]; 3], lane: usize) -> [f64
     [axes[0][lane], axes[1][lane], axes[2][lane]]
 }
 
+/// A vector by a matrix.
+#[inline(always)]
+pub(super) fn turned<T: Real>(matrix: &DMat3, [x, y, z]: [T; 3]) -> [T; 3] {
+    let columns = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
+    std::array::from_fn(|i| {
+        x.times(columns[0][i]) + y.times(columns[1][i]) + z.times(columns[2][i])
+    })
+}
+
+/// A place moved by a vector.
+#[inline(always)]
+pub(super) fn moved<T: Real>([x, y, z]: [T; 3], by: DVec3) -> [T; 3] {
+    [x.plus(by.x), y.plus(by.y), z.plus(by.z)]
+}
+
 /// Nothing is farther (mm): squares of more overflow, and sums of them are no numbers.
 const FARTHEST: f64 = 1e150;
 
 /// One ray (mm), by components so that vector kernels see plain numbers.
 #[derive(Debug, Clone, Copy)]
-pub struct Ray {
+pub struct Ray<T = f64> {
     /// Place (mm).
-    pub position: [f64; 3],
+    pub position: [T; 3],
     /// Unit direction.
-    pub direction: [f64; 3],
+    pub direction: [T; 3],
 }
 
 impl Ray {
@@ -265,10 +282,18 @@ impl Ray {
         let ray = Self { position: position.to_array(), direction: unit.to_array() };
         unit.is_finite().then_some(ray)
     }
+}
+
+impl<T: Real> Ray<T> {
+    /// The ray without derivatives.
+    pub(crate) fn value(self) -> Ray {
+        let values = |axes: [T; 3]| axes.map(T::value);
+        Ray { position: values(self.position), direction: values(self.direction) }
+    }
 
     /// The ray `distance` further on.
     #[inline(always)]
-    pub(crate) fn advanced(self, distance: f64) -> Self {
+    pub(crate) fn advanced(self, distance: T) -> Self {
         let Self { position: [x, y, z], direction: [u, v, w] } = self;
         Self { position: [x + distance * u, y + distance * v, z + distance * w], ..self }
     }
@@ -278,10 +303,12 @@ impl Ray {
     #[inline(always)]
     pub(crate) fn unit(self) -> Self {
         const ROUNDINGS: f64 = 1e-14;
-        let length2: f64 = self.direction.iter().map(|d| d * d).sum();
-        let off = length2 - 1.0;
-        let scale = if off.abs() > ROUNDINGS { 1.0 - 0.5 * off } else { 1.0 };
-        Self { direction: self.direction.map(|d| d * scale), ..self }
+        let [u, v, w] = self.direction;
+        let one = T::constant(1.0);
+        let off = u * u + v * v + w * w - one;
+        let is_off = off.value().abs() > ROUNDINGS;
+        let scale = if is_off { one - off.times(0.5) } else { one };
+        Self { direction: [u * scale, v * scale, w * scale], ..self }
     }
 }
 

@@ -18,19 +18,11 @@
 //! roundings of the place make that untrue, as on conics of −10⁶ or spheres of a nanometre, the
 //! direction is made a unit vector again. Equal indices leave every direction as it is, to the last
 //! bit.
-//!
-//! The ideal thin lens: every point is imaged to a point by 1/s' − 1/s = 1/f, at any angle.
-//!
-//! Such a lens takes straight lines to straight lines, so with slopes X = dx/dz, Y = dy/dz a ray
-//! through (x, y) leaves with X − x/f, Y − y/f.
-
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use super::crossings::Slopes;
 use super::rays::{Block, LANES, PENDING, Ray, RayStatus};
-use super::surface::{LARGEST_CURVATURE, SMALLEST_RADIUS, Surface, checked_semi_diameter};
-use etendue_geometry::units::Millimetres;
+use super::real::Real;
+use super::surface::Surface;
 
 /// Steps that end this little before the last element (mm) still count, so that elements may touch.
 pub(crate) const TOUCH: f64 = 1e-9;
@@ -55,11 +47,11 @@ pub(crate) struct Media {
 
 /// What a ray does at a surface.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Refracted {
+pub(crate) struct Refracted<T = f64> {
     /// Where it meets the surface, and how it goes on.
-    pub(crate) ray: Ray,
+    pub(crate) ray: Ray<T>,
     /// How far it went (mm).
-    pub(crate) t: f64,
+    pub(crate) t: T,
     /// It meets the surface.
     pub(crate) hit: bool,
     /// Inside the clear aperture.
@@ -90,45 +82,45 @@ impl Media {
     /// Refracts at `ray`'s position, where the normal is `m` with |m|² = `length2`, d·m has the
     /// sign of `sign`, and (d·m)² = `along2` with the root `along`.
     #[inline(always)]
-    pub(crate) fn refract(
+    pub(crate) fn refract<T: Real>(
         &self,
-        ray: Ray,
-        m: [f64; 3],
-        length2: f64,
-        along2: f64,
-        along: f64,
-    ) -> (Ray, bool) {
-        let behind2 = self.rest * length2 + self.ratio * self.ratio * along2;
-        let g = (behind2.sqrt().copysign(along) - self.ratio * along) / length2;
+        ray: Ray<T>,
+        m: [T; 3],
+        length2: T,
+        along2: T,
+        along: T,
+    ) -> (Ray<T>, bool) {
+        let behind2 = length2.times(self.rest) + along2.times(self.ratio * self.ratio);
+        let g = (behind2.root().signed_as(along) - along.times(self.ratio)) / length2;
         let direction = [
-            self.ratio * ray.direction[0] + g * m[0],
-            self.ratio * ray.direction[1] + g * m[1],
-            self.ratio * ray.direction[2] + g * m[2],
+            ray.direction[0].times(self.ratio) + g * m[0],
+            ray.direction[1].times(self.ratio) + g * m[1],
+            ray.direction[2].times(self.ratio) + g * m[2],
         ];
-        (Ray { direction, ..ray }, (0.0..f64::INFINITY).contains(&behind2))
+        (Ray { direction, ..ray }, (0.0..f64::INFINITY).contains(&behind2.value()))
     }
 }
 
 impl Media {
     /// As [`Self::refract`] at a surface whose phase adds `kick` to the direction in its tangent plane. What is
     /// evanescent does not go on.
-    pub(crate) fn diffract(
+    pub(crate) fn diffract<T: Real>(
         &self,
-        ray: Ray,
-        m: [f64; 3],
-        length2: f64,
-        along: f64,
-        kick: [f64; 3],
-    ) -> (Ray, bool) {
-        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        ray: Ray<T>,
+        m: [T; 3],
+        length2: T,
+        along: T,
+        kick: [T; 3],
+    ) -> (Ray<T>, bool) {
+        let dot = |a: [T; 3], b: [T; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let (across, of_kick) = (along / length2, dot(kick, m) / length2);
-        let tangent: [f64; 3] = std::array::from_fn(|i| {
-            self.ratio * (ray.direction[i] - across * m[i]) + kick[i] - of_kick * m[i]
+        let tangent: [T; 3] = std::array::from_fn(|i| {
+            (ray.direction[i] - across * m[i]).times(self.ratio) + kick[i] - of_kick * m[i]
         });
-        let behind2 = 1.0 - dot(tangent, tangent);
-        let rise = (behind2 / length2).sqrt().copysign(along);
+        let behind2 = T::constant(1.0) - dot(tangent, tangent);
+        let rise = (behind2 / length2).root().signed_as(along);
         let direction = std::array::from_fn(|i| tangent[i] + rise * m[i]);
-        (Ray { direction, ..ray }, (0.0..f64::INFINITY).contains(&behind2))
+        (Ray { direction, ..ray }, (0.0..f64::INFINITY).contains(&behind2.value()))
     }
 }
 
@@ -146,113 +138,135 @@ impl Refraction {
 
     /// A ray in the surface's frame at a plane.
     #[inline(always)]
-    pub(crate) fn at_plane(&self, ray: Ray, clip2: f64) -> Refracted {
+    pub(crate) fn at_plane<T: Real>(&self, ray: Ray<T>, clip2: f64) -> Refracted<T> {
         let w = ray.direction[2];
         let t = -ray.position[2] / w;
         let mut there = ray.advanced(t);
-        there.position[2] = 0.0;
-        let [x, y, _] = there.position;
-        let (out, through) = self.media.refract(there, [0.0, 0.0, 1.0], 1.0, w * w, w);
-        let hit = (t > -TOUCH) & (t < f64::INFINITY);
-        Refracted { ray: out, t, hit, clear: x * x + y * y <= clip2, through }
+        let (zero, one) = (T::constant(0.0), T::constant(1.0));
+        there.position[2] = zero;
+        let (out, through) = self.media.refract(there, [zero, zero, one], one, w * w, w);
+        Refracted { ray: out, t, hit: is_ahead(t), clear: is_within(there, clip2), through }
     }
 
     /// A ray in the surface's frame at a conic; with `SPHERE` the conic constant is taken to be 0.
     #[inline(always)]
-    pub(crate) fn at_conic<const SPHERE: bool>(
+    pub(crate) fn at_conic<const SPHERE: bool, T: Real>(
         &self,
-        ray: Ray,
+        ray: Ray<T>,
         clip2: f64,
         which: Root,
-    ) -> Refracted {
-        let met = meet_conic::<SPHERE>(&self.surface, ray, which);
+    ) -> Refracted<T> {
+        let met = meet_conic::<SPHERE, T>(&self.surface, ray, which);
         let [x, y, z] = met.ray.position;
         let (c, k) = (self.surface.curvature, self.surface.conic);
         let r2 = x * x + y * y;
-        let (stretch, length2) = if SPHERE { (1.0, 1.0) } else { (1.0 + k, 1.0 - k * c * c * r2) };
-        let m = [-c * x, -c * y, 1.0 - stretch * c * z];
+        let one = T::constant(1.0);
+        let stretch = if SPHERE { 1.0 } else { 1.0 + k };
+        let length2 = if SPHERE { one } else { one - r2.times(k * c * c) };
+        let m = [x.times(-c), y.times(-c), one - z.times(stretch * c)];
         let (out, through) = self.media.refract(met.ray, m, length2, met.along2, met.along);
         let out = out.unit();
         // A ray that misses has a NaN for a root, which is not greater than anything.
-        let hit = (met.t > -TOUCH) & (met.t < f64::INFINITY) & (m[2] >= 0.0);
-        Refracted { ray: out, t: met.t, hit, clear: r2 <= clip2, through }
+        let hit = is_ahead(met.t) & (m[2].value() >= 0.0);
+        Refracted { ray: out, t: met.t, hit, clear: r2.value() <= clip2, through }
     }
 
     /// A ray in the frame of any surface but an asphere, exactly by the rule.
-    pub(crate) fn exactly(&self, ray: Ray, clip2: f64) -> Refracted {
+    pub(crate) fn exactly<T: Real>(&self, ray: Ray<T>, clip2: f64) -> Refracted<T> {
         if self.surface.is_plane() {
             self.at_plane(ray, clip2)
         } else if self.surface.conic == 0.0 {
-            self.at_nearest::<true>(ray, clip2)
+            self.at_nearest::<true, T>(ray, clip2)
         } else {
-            self.at_nearest::<false>(ray, clip2)
+            self.at_nearest::<false, T>(ray, clip2)
         }
     }
 
     #[inline(always)]
-    fn at_nearest<const SPHERE: bool>(&self, ray: Ray, clip2: f64) -> Refracted {
-        let near = self.at_near_root::<SPHERE>(ray, clip2);
+    fn at_nearest<const SPHERE: bool, T: Real>(&self, ray: Ray<T>, clip2: f64) -> Refracted<T> {
+        let near = self.at_near_root::<SPHERE, T>(ray, clip2);
         if near.hit {
             return near;
         }
-        let at = |which| self.at_conic::<SPHERE>(ray, clip2, which);
+        let at = |which| self.at_conic::<SPHERE, T>(ray, clip2, which);
         let (near, far) = (at(Root::Near), at(Root::Far));
-        if far.hit && (!near.hit || far.t < near.t) { far } else { near }
+        if far.hit && (!near.hit || far.t.value() < near.t.value()) { far } else { near }
     }
 
     /// A ray in the surface's frame at the near root of a conic; no hit where that might not be the
     /// nearest, for [`Self::exactly`] to decide.
     #[inline(always)]
-    pub(crate) fn at_near_root<const SPHERE: bool>(&self, ray: Ray, clip2: f64) -> Refracted {
-        let crossing = self.at_conic::<SPHERE>(ray, clip2, Root::Near);
-        let clear = rival_is_elsewhere::<SPHERE>(&self.surface, ray);
+    pub(crate) fn at_near_root<const SPHERE: bool, T: Real>(
+        &self,
+        ray: Ray<T>,
+        clip2: f64,
+    ) -> Refracted<T> {
+        let crossing = self.at_conic::<SPHERE, T>(ray, clip2, Root::Near);
+        let clear = rival_is_elsewhere::<SPHERE, T>(&self.surface, ray);
         Refracted { hit: crossing.hit & clear, ..crossing }
     }
 }
 
+/// Whether a place so far on (mm) is ahead of a ray; a root that is no number is not.
+#[inline(always)]
+pub(super) fn is_ahead<T: Real>(t: T) -> bool {
+    (t.value() > -TOUCH) & (t.value() < f64::INFINITY)
+}
+
+/// Whether a ray's place is within a clear aperture, by the square of its radius (mm²).
+#[inline(always)]
+pub(super) fn is_within<T: Real>(there: Ray<T>, clip2: f64) -> bool {
+    let [x, y, _] = there.position;
+    (x * x + y * y).value() <= clip2
+}
+
 /// Where a ray meets a conic.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Intersection {
+pub(crate) struct Intersection<T = f64> {
     /// The ray, moved there.
-    pub(crate) ray: Ray,
+    pub(crate) ray: Ray<T>,
     /// Distance from where it was.
-    pub(crate) t: f64,
+    pub(crate) t: T,
     /// (d·m)²; negative when the ray misses.
-    pub(crate) along2: f64,
+    pub(crate) along2: T,
     /// d·m.
-    pub(crate) along: f64,
+    pub(crate) along: T,
 }
 
 /// The quadratic of a ray and a conic, from the foot of the perpendicular on.
-struct Quadratic {
-    moved: Ray,
-    foot: f64,
-    a: f64,
-    d: f64,
-    along2: f64,
-    along: f64,
-    q: f64,
+struct Quadratic<T> {
+    moved: Ray<T>,
+    foot: T,
+    a: T,
+    d: T,
+    along2: T,
+    along: T,
+    q: T,
 }
 
 #[inline(always)]
-fn quadratic<const SPHERE: bool>(s: &Surface, ray: Ray) -> Quadratic {
+fn quadratic<const SPHERE: bool, T: Real>(s: &Surface, ray: Ray<T>) -> Quadratic<T> {
     let Ray { position: [x, y, z], direction: [u, v, w] } = ray;
     let (c, k) = (s.curvature, s.conic);
     let foot = -(x * u + y * v + z * w);
     let moved = ray.advanced(foot);
     let [x, y, z] = moved.position;
     let stretch = if SPHERE { 1.0 } else { 1.0 + k };
-    let a = if SPHERE { c } else { c * (1.0 + k * (w * w)) };
-    let b = c * (x * u + y * v + stretch * (z * w)) - w;
-    let d = c * (x * x + y * y + stretch * (z * z)) - 2.0 * z;
+    let a = if SPHERE { T::constant(c) } else { (w * w).times(k).plus(1.0).times(c) };
+    let b = (x * u + y * v + (z * w).times(stretch)).times(c) - w;
+    let d = (x * x + y * y + (z * z).times(stretch)).times(c) - z.times(2.0);
     let along2 = b * b - a * d;
-    let along = along2.sqrt().copysign(b);
+    let along = along2.root().signed_as(b);
     Quadratic { moved, foot, a, d, along2, along, q: -(b + along) }
 }
 
 #[inline(always)]
-pub(crate) fn meet_conic<const SPHERE: bool>(s: &Surface, ray: Ray, which: Root) -> Intersection {
-    let Quadratic { moved, foot, a, d, along2, along, q } = quadratic::<SPHERE>(s, ray);
+pub(crate) fn meet_conic<const SPHERE: bool, T: Real>(
+    s: &Surface,
+    ray: Ray<T>,
+    which: Root,
+) -> Intersection<T> {
+    let Quadratic { moved, foot, a, d, along2, along, q } = quadratic::<SPHERE, T>(s, ray);
     // m is minus half the gradient of the conic, hence the signs.
     let (t, along) = match which {
         Root::Near => (d / q, -along),
@@ -263,12 +277,13 @@ pub(crate) fn meet_conic<const SPHERE: bool>(s: &Surface, ray: Ray, which: Root)
 
 /// Whether the far root comes after the near one, or lies on the other sheet; without a division.
 #[inline(always)]
-fn rival_is_elsewhere<const SPHERE: bool>(s: &Surface, ray: Ray) -> bool {
-    let Quadratic { moved, a, q, .. } = quadratic::<SPHERE>(s, ray);
-    let (c, k, w) = (s.curvature, s.conic, ray.direction[2]);
+fn rival_is_elsewhere<const SPHERE: bool, T: Real>(s: &Surface, ray: Ray<T>) -> bool {
+    let Quadratic { moved, a, q, .. } = quadratic::<SPHERE, T>(s, ray);
+    let (a, q, z) = (a.value(), q.value(), moved.position[2].value());
+    let (c, k, w) = (s.curvature, s.conic, ray.direction[2].value());
     // 1 − (1 + k) c (z + q/a · w), times the square of a/c = 1 + k w².
     let (stretch, e) = if SPHERE { (1.0, 1.0) } else { (1.0 + k, 1.0 + k * (w * w)) };
-    let sheet = e * (e * (1.0 - stretch * c * moved.position[2]) - stretch * (q * w));
+    let sheet = e * (e * (1.0 - stretch * c * z) - stretch * (q * w));
     (a * q >= 0.0) | (sheet < 0.0)
 }
 
@@ -318,64 +333,6 @@ pub(crate) fn each_numbered_lane(
         pending |= u64::from(outcome == PENDING);
     }
     pending != 0
-}
-
-/// A thin lens as a lens file writes it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ThinLensSpec {
-    /// The focal length (mm), negative for a diverging lens. In a medium it is that in the medium.
-    pub focal_length: Millimetres,
-    /// Half the clear diameter (mm). Unlimited when absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub semi_diameter: Option<Millimetres>,
-}
-
-/// A thin lens in its own frame (mm).
-#[derive(Debug, Clone, PartialEq)]
-pub struct ThinLens {
-    /// 1/f (1/mm).
-    pub power: f64,
-    /// Half the clear diameter; infinite when unlimited.
-    pub semi_diameter: f64,
-}
-
-impl ThinLensSpec {
-    /// The lens.
-    ///
-    /// # Errors
-    ///
-    /// A sentence on the number that describes no lens.
-    pub fn build(&self) -> Result<ThinLens, String> {
-        let semi_diameter = checked_semi_diameter(self.semi_diameter)?;
-        // An infinite focal length is a lens without power.
-        let power = 1.0 / self.focal_length.0;
-        if power.abs() <= LARGEST_CURVATURE {
-            Ok(ThinLens { power, semi_diameter })
-        } else {
-            Err(format!(
-                "focal_length is {} mm; it must be at least {SMALLEST_RADIUS:e} mm",
-                self.focal_length.0
-            ))
-        }
-    }
-}
-
-/// Light from the object meets `power`, light traced from the sensor `−power`.
-#[inline(always)]
-pub(crate) fn at_thin_lens(power: f64, ray: Ray, clip2: f64) -> Refracted {
-    let w = ray.direction[2];
-    let t = -ray.position[2] / w;
-    let mut there = ray.advanced(t);
-    there.position[2] = 0.0;
-    let [x, y, _] = there.position;
-    // (u/w − x/f, v/w − y/f, 1) times w.
-    let (u, v) = (ray.direction[0] - x * power * w, ray.direction[1] - y * power * w);
-    let length = (u * u + v * v + w * w).sqrt();
-    let scale = if power == 0.0 { 1.0 } else { 1.0 / length };
-    there.direction = [u * scale, v * scale, w * scale];
-    let hit = (t > -TOUCH) & (t < f64::INFINITY) & (length < f64::INFINITY);
-    Refracted { ray: there, t, hit, clear: x * x + y * y <= clip2, through: true }
 }
 
 #[cfg(test)]
@@ -446,10 +403,10 @@ mod tests {
         let start = ray([0.0, -30.0, 9.0], [0.0, sine, cosine]);
         let at = s.exactly(start, 1e9);
         assert!(at.hit && at.ray.position[1] < 0.0, "{:?}", at.ray);
-        assert!(!s.at_near_root::<true>(start, 1e9).hit, "left to the exact path");
+        assert!(!s.at_near_root::<true, f64>(start, 1e9).hit, "left to the exact path");
         let ordinary = ray([0.0, 3.0, -5.0], [0.0, 0.1, 1.0]);
-        assert!(s.at_near_root::<true>(ordinary, 1e9).hit);
-        assert!(sphere(-10.0, 1.0, 1.5).at_near_root::<true>(ordinary, 1e9).hit);
+        assert!(s.at_near_root::<true, f64>(ordinary, 1e9).hit);
+        assert!(sphere(-10.0, 1.0, 1.5).at_near_root::<true, f64>(ordinary, 1e9).hit);
     }
 
     #[test]
@@ -487,39 +444,5 @@ mod tests {
         let critical = 1.0 / 1.5;
         assert!(at(critical - 1e-12).through);
         assert!(!at(critical + 1e-12).through);
-    }
-
-    #[test]
-    fn points_are_imaged_to_points_at_any_angle_both_ways() {
-        let (f, s) = (50.0, -75.0);
-        let image = 1.0 / (1.0 / f + 1.0 / s);
-        let object = [4.0, -3.0, s];
-        for (x, y) in [(0.0, 0.0), (20.0, 0.0), (-60.0, 70.0), (1.0, -300.0)] {
-            let towards = [x - object[0], y - object[1], -object[2]];
-            let ray = Ray::new(object.into(), towards.into()).unwrap();
-            let out = at_thin_lens(1.0 / f, ray, f64::INFINITY);
-            assert!(out.hit && out.clear && out.through);
-            let t = image / out.ray.direction[2];
-            let magnification = image / s;
-            let at = out.ray.advanced(t).position;
-            assert!((at[0] - object[0] * magnification).abs() < 1e-11, "{x} {y}: {at:?}");
-            assert!((at[1] - object[1] * magnification).abs() < 1e-11, "{x} {y}: {at:?}");
-            // Back from the image to the object.
-            let mut back = out.ray.advanced(t);
-            back.direction = back.direction.map(|c| -c);
-            let home = at_thin_lens(-1.0 / f, back, f64::INFINITY).ray;
-            let home = home.advanced((s - home.position[2]) / home.direction[2]);
-            assert!((home.position[0] - object[0]).abs() < 1e-10);
-            assert!((home.position[1] - object[1]).abs() < 1e-10);
-        }
-    }
-
-    #[test]
-    fn no_power_changes_nothing_and_no_focal_length_is_refused() {
-        let spec = |f| ThinLensSpec { focal_length: Millimetres(f), semi_diameter: None };
-        let flat = spec(f64::INFINITY).build().unwrap();
-        let ray = Ray::new([1.0, 2.0, -3.0].into(), [0.1, 0.2, 1.0].into()).unwrap();
-        assert_eq!(at_thin_lens(flat.power, ray, 1e9).ray.direction, ray.direction);
-        assert!(spec(0.0).build().unwrap_err().contains("at least 1e-9 mm"));
     }
 }

@@ -1,4 +1,5 @@
-//! Openings that are no circle, polygon or mask: rectangles, ellipses, rings, and rings behind a spider.
+//! Openings that are no circle, polygon or mask: rectangles, ellipses, outlines by their corners, rings, and rings
+//! behind a spider. Rectangles, ellipses and outlines may be what is in the way instead of what is open.
 
 use etendue_geometry::units::{Degrees, Millimetres};
 use schemars::JsonSchema;
@@ -17,6 +18,21 @@ pub struct BoxSpec {
     /// Turned about the axis from +x towards +y (degrees).
     #[serde(default, skip_serializing_if = "super::is_default")]
     pub rotation: Degrees,
+    /// Whether it is in the way: opaque inside, and open all around.
+    #[serde(default, skip_serializing_if = "super::is_default")]
+    pub obscures: bool,
+}
+
+/// An outline by its corners.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OutlineSpec {
+    /// `[x, y]` of the corners in their order (mm), 3 to 1024; the last is joined to the first. Where the outline
+    /// crosses itself, places are inside that a line from afar reaches by an odd number of crossings.
+    pub corners: Vec<[Millimetres; 2]>,
+    /// Whether it is in the way: opaque inside, and open all around.
+    #[serde(default, skip_serializing_if = "super::is_default")]
+    pub obscures: bool,
 }
 
 /// A ring around a disk that is in the way.
@@ -52,12 +68,17 @@ pub struct SpiderSpec {
 /// The most arms.
 const MOST_ARMS: u32 = 64;
 
+/// The fewest and the most corners.
+const CORNERS: std::ops::RangeInclusive<usize> = 3..=1024;
+
 /// An opening in its own plane (mm).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shape {
     kind: ShapeKind,
     /// Cosine and sine of how far it is turned.
     turn: [f64; 2],
+    /// Of what is in the way: the radius of the opening around it (mm), infinite when unlimited.
+    around: Option<f64>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -66,6 +87,8 @@ enum ShapeKind {
     Rectangle([f64; 2]),
     /// By its half axes.
     Ellipse([f64; 2]),
+    /// By its corners.
+    Outline(Vec<[f64; 2]>),
     /// A ring, with the unit vectors along its arms and half their width.
     Ring { inner: f64, outer: f64, arms: Vec<[f64; 2]>, half_width: f64 },
 }
@@ -88,11 +111,40 @@ impl BoxSpec {
     }
 
     pub(super) fn rectangle(&self) -> Result<Shape, String> {
-        Ok(Shape { kind: ShapeKind::Rectangle(self.half()?), turn: turn(self.rotation) })
+        self.shape(ShapeKind::Rectangle(self.half()?))
     }
 
     pub(super) fn ellipse(&self) -> Result<Shape, String> {
-        Ok(Shape { kind: ShapeKind::Ellipse(self.half()?), turn: turn(self.rotation) })
+        self.shape(ShapeKind::Ellipse(self.half()?))
+    }
+
+    fn shape(&self, kind: ShapeKind) -> Result<Shape, String> {
+        if !self.rotation.0.is_finite() {
+            return Err("rotation must be finite".to_owned());
+        }
+        Ok(Shape {
+            kind,
+            turn: turn(self.rotation),
+            around: self.obscures.then_some(f64::INFINITY),
+        })
+    }
+}
+
+impl OutlineSpec {
+    pub(super) fn build(&self) -> Result<Shape, String> {
+        let count = self.corners.len();
+        if !CORNERS.contains(&count) {
+            let [fewest, most] = [CORNERS.start(), CORNERS.end()];
+            return Err(format!("corners has {count}; an outline has {fewest} to {most}"));
+        }
+        let corners: Vec<[f64; 2]> =
+            self.corners.iter().map(|corner| corner.map(|c| c.0)).collect();
+        if let Some(i) = corners.iter().position(|c| !(c[0].is_finite() && c[1].is_finite())) {
+            return Err(format!("corners[{i}] must be finite lengths"));
+        }
+        let kind = ShapeKind::Outline(corners);
+        length("the distance of the farthest of corners", kind.radius())?;
+        Ok(Shape { kind, turn: [1.0, 0.0], around: self.obscures.then_some(f64::INFINITY) })
     }
 }
 
@@ -113,7 +165,7 @@ impl AnnularSpec {
     pub(super) fn build(&self) -> Result<Shape, String> {
         let [inner, outer] = ring(self.inner_radius.0, self.radius)?;
         let kind = ShapeKind::Ring { inner, outer, arms: Vec::new(), half_width: 0.0 };
-        Ok(Shape { kind, turn: [1.0, 0.0] })
+        Ok(Shape { kind, turn: [1.0, 0.0], around: None })
     }
 }
 
@@ -133,20 +185,31 @@ impl SpiderSpec {
         Ok(Shape {
             kind: ShapeKind::Ring { inner, outer, arms, half_width },
             turn: turn(self.rotation),
+            around: None,
         })
     }
 }
 
-impl Shape {
-    /// Whether a place (mm) is open.
-    #[must_use]
-    pub fn is_open(&self, x: f64, y: f64) -> bool {
-        let [c, s] = self.turn;
-        let (x, y) = (c * x + s * y, c * y - s * x);
-        match &self.kind {
-            ShapeKind::Rectangle([a, b]) => x.abs() <= *a && y.abs() <= *b,
-            ShapeKind::Ellipse([a, b]) => (x / a).powi(2) + (y / b).powi(2) <= 1.0,
-            ShapeKind::Ring { inner, outer, arms, half_width } => {
+/// Whether a place lies inside of an outline, by the crossings of a line from there to afar along x.
+fn is_in_outline(corners: &[[f64; 2]], x: f64, y: f64) -> bool {
+    let mut before = corners[corners.len() - 1];
+    let mut is_inside = false;
+    for &corner in corners {
+        let ([u, v], [p, q]) = (before, corner);
+        let is_crossed = (v > y) != (q > y) && x < u + (y - v) / (q - v) * (p - u);
+        is_inside ^= is_crossed;
+        before = corner;
+    }
+    is_inside
+}
+
+impl ShapeKind {
+    fn holds(&self, x: f64, y: f64) -> bool {
+        match self {
+            Self::Rectangle([a, b]) => x.abs() <= *a && y.abs() <= *b,
+            Self::Ellipse([a, b]) => (x / a).powi(2) + (y / b).powi(2) <= 1.0,
+            Self::Outline(corners) => is_in_outline(corners, x, y),
+            Self::Ring { inner, outer, arms, half_width } => {
                 let square = x * x + y * y;
                 let is_on =
                     |[u, v]: &[f64; 2]| x * u + y * v > 0.0 && (y * u - x * v).abs() < *half_width;
@@ -155,23 +218,50 @@ impl Shape {
         }
     }
 
-    /// The radius of the circle around it (mm).
+    fn radius(&self) -> f64 {
+        match self {
+            Self::Rectangle([a, b]) => a.hypot(*b),
+            Self::Ellipse([a, b]) => a.max(*b),
+            Self::Outline(corners) => {
+                corners.iter().fold(0.0, |most, [x, y]| most.max(x.hypot(*y)))
+            }
+            Self::Ring { outer, .. } => *outer,
+        }
+    }
+}
+
+impl Shape {
+    /// Whether a place (mm) is open.
     #[must_use]
-    pub fn radius(&self) -> f64 {
-        match &self.kind {
-            ShapeKind::Rectangle([a, b]) => a.hypot(*b),
-            ShapeKind::Ellipse([a, b]) => a.max(*b),
-            ShapeKind::Ring { outer, .. } => *outer,
+    pub fn is_open(&self, x: f64, y: f64) -> bool {
+        let [c, s] = self.turn;
+        let (along, across) = (c * x + s * y, c * y - s * x);
+        match self.around {
+            None => self.kind.holds(along, across),
+            Some(around) => !self.kind.holds(along, across) && x * x + y * y <= around * around,
         }
     }
 
-    /// The same in another size, by the circle around it (mm). A ring whose opening is not limited keeps its disk.
+    /// The radius of the circle around what is open (mm).
+    #[must_use]
+    pub fn radius(&self) -> f64 {
+        self.around.unwrap_or_else(|| self.kind.radius())
+    }
+
+    /// The same in another size, by the circle around it (mm). A ring whose opening is not limited keeps its disk, and
+    /// so does what is in the way.
     #[must_use]
     pub fn with_radius(&self, radius: f64) -> Self {
+        if self.around.is_some() {
+            return Self { around: Some(radius), ..self.clone() };
+        }
         let scale = radius / self.radius();
         let kind = match &self.kind {
             ShapeKind::Rectangle(half) => ShapeKind::Rectangle(half.map(|half| half * scale)),
             ShapeKind::Ellipse(half) => ShapeKind::Ellipse(half.map(|half| half * scale)),
+            ShapeKind::Outline(corners) => {
+                ShapeKind::Outline(corners.iter().map(|corner| corner.map(|c| c * scale)).collect())
+            }
             ShapeKind::Ring { inner, outer, arms, half_width } => {
                 let scale = if outer.is_finite() && radius.is_finite() { scale } else { 1.0 };
                 ShapeKind::Ring {
@@ -182,7 +272,7 @@ impl Shape {
                 }
             }
         };
-        Self { kind, turn: self.turn }
+        Self { kind, turn: self.turn, around: None }
     }
 
     /// Whether a turn about the axis changes nothing.
@@ -191,17 +281,23 @@ impl Shape {
         matches!(&self.kind, ShapeKind::Ring { arms, .. } if arms.is_empty())
     }
 
-    /// Whether its middle is closed.
+    /// Whether something stands in the middle of what is open.
     #[must_use]
     pub fn is_obscured(&self) -> bool {
-        matches!(&self.kind, ShapeKind::Ring { inner, .. } if *inner > 0.0)
+        self.around.is_some() || matches!(&self.kind, ShapeKind::Ring { inner, .. } if *inner > 0.0)
     }
 
     /// Words on it.
     pub(super) fn words(&self) -> String {
+        let around = if self.around.is_some() { "around a " } else { "" };
         match &self.kind {
-            ShapeKind::Rectangle([a, b]) => format!("rectangle of {} x {} mm", 2.0 * a, 2.0 * b),
-            ShapeKind::Ellipse([a, b]) => format!("ellipse of {} x {} mm", 2.0 * a, 2.0 * b),
+            ShapeKind::Rectangle([a, b]) => {
+                format!("{around}rectangle of {} x {} mm", 2.0 * a, 2.0 * b)
+            }
+            ShapeKind::Ellipse([a, b]) => {
+                format!("{around}ellipse of {} x {} mm", 2.0 * a, 2.0 * b)
+            }
+            ShapeKind::Outline(corners) => format!("{around}outline of {} corners", corners.len()),
             ShapeKind::Ring { inner, arms, .. } if arms.is_empty() => {
                 format!("around a disk of radius {inner} mm")
             }
@@ -242,6 +338,25 @@ mod tests {
                 r#"{"shape": "spider", "arms": 3, "width": 0.2, "radius": 1.5, "inner_radius": 0.5, "rotation": 10}"#,
                 2.0 * pi - 0.6,
             ),
+            // An L of 3 mm², and a bow tie, whose two triangles of 1 mm² are both inside.
+            (
+                r#"{"shape": "outline", "corners": [[-1, -1], [1, -1], [1, 0], [0, 0], [0, 1], [-1, 1]]}"#,
+                3.0,
+            ),
+            (r#"{"shape": "outline", "corners": [[-1, -1], [1, 1], [1, -1], [-1, 1]]}"#, 2.0),
+            // What is in the way takes its area from the square.
+            (
+                r#"{"shape": "rectangular", "width": 2, "height": 1, "rotation": 30, "obscures": true}"#,
+                14.0,
+            ),
+            (
+                r#"{"shape": "elliptical", "width": 2, "height": 1, "obscures": true}"#,
+                16.0 - 0.5 * pi,
+            ),
+            (
+                r#"{"shape": "outline", "corners": [[0, 0], [1, 0], [0, 1]], "obscures": true}"#,
+                15.5,
+            ),
         ] {
             assert!((area(json) - expected).abs() < 0.01, "{json}: {} {expected}", area(json));
         }
@@ -271,6 +386,13 @@ mod tests {
                 .contains("nothing is open")
         );
         assert!(error(r#"{"shape": "spider", "arms": 0, "width": 1}"#).contains("arms is 0"));
+        assert!(
+            error(r#"{"shape": "outline", "corners": [[0, 0], [1, 0]]}"#).contains("corners has 2")
+        );
+        assert!(
+            error(r#"{"shape": "outline", "corners": [[0, 0], [0, 0], [0, 0]]}"#)
+                .contains("farthest of corners is 0 mm")
+        );
         assert!(
             error(r#"{"shape": "annular", "inner_radius": -1}"#).contains("inner_radius is -1")
         );

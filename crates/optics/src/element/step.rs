@@ -20,7 +20,8 @@ use super::losses::{Filter, Loss};
 use super::mirror::{Fold, Shadow};
 use super::newton::{Profile, cross_block};
 use super::rays::{Block, LANES, PENDING, Ray, RayStatus};
-use super::refract::{Media, Refracted, Refraction, at_thin_lens, each_lane};
+use super::refract::{Media, Refracted, Refraction, each_lane};
+use super::thin_lens::at_thin_lens;
 
 /// Whether clear apertures stop rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -190,12 +191,12 @@ impl Step {
             }
             Action::Sphere(refraction) => {
                 let clip2 = limit(refraction.surface.semi_diameter, clip);
-                let near = |ray| refraction.at_near_root::<true>(ray, clip2);
+                let near = |ray| refraction.at_near_root::<true, f64>(ray, clip2);
                 each_lane(block, self.element, z, near)
             }
             Action::Conic(refraction) => {
                 let clip2 = limit(refraction.surface.semi_diameter, clip);
-                let near = |ray| refraction.at_near_root::<false>(ray, clip2);
+                let near = |ray| refraction.at_near_root::<false, f64>(ray, clip2);
                 each_lane(block, self.element, z, near)
             }
             Action::Asphere(refraction) => {

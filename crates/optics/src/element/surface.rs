@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::real::Real;
 use crate::glass::GlassSpec;
 use etendue_geometry::units::Millimetres;
 
@@ -202,9 +203,9 @@ impl Surface {
     }
 
     #[inline(always)]
-    fn conic_root(&self, u: f64) -> f64 {
+    fn conic_root<T: Real>(&self, u: T) -> T {
         let c = self.curvature;
-        (1.0 - (1.0 + self.conic) * c * c * u).max(0.0).sqrt()
+        (T::constant(1.0) - u.times((1.0 + self.conic) * c * c)).at_least(0.0).root()
     }
 
     /// The sag of the conic underneath (mm) at u = r²; it rises or falls all the way.
@@ -248,26 +249,27 @@ impl Surface {
     /// The sag and its derivative by u/2, that is (∂z/∂x)/x, at u = r². Beyond the domain the conic
     /// goes on as if at its edge, which keeps an iteration going and is refused in the end.
     #[inline(always)]
-    pub(crate) fn profile(&self, u: f64) -> (f64, f64) {
+    pub(crate) fn profile<T: Real>(&self, u: T) -> (T, T) {
         self.with_conic(u, polynomial(&self.aspheric, u))
     }
 
     /// [`Self::profile`] by what [`polynomial`] has at u.
     #[inline(always)]
-    pub(super) fn with_conic(&self, u: f64, (value, slope): (f64, f64)) -> (f64, f64) {
+    pub(super) fn with_conic<T: Real>(&self, u: T, (value, slope): (T, T)) -> (T, T) {
         let c = self.curvature;
         let root = self.conic_root(u);
-        (c * u / (1.0 + root) + value, c / root.max(1e-12) + 2.0 * slope)
+        let sag = u.times(c) / root.plus(1.0) + value;
+        (sag, T::constant(c) / root.at_least(1e-12) + slope.times(2.0))
     }
 }
 
 /// Σ Aᵢ uⁱ from i = 1, and its derivative by u (Horner).
 #[inline(always)]
-pub(crate) fn polynomial(coefficients: &[f64], u: f64) -> (f64, f64) {
-    let (mut value, mut slope) = (0.0, 0.0);
+pub(crate) fn polynomial<T: Real>(coefficients: &[f64], u: T) -> (T, T) {
+    let (mut value, mut slope) = (T::constant(0.0), T::constant(0.0));
     for &a in coefficients.iter().rev() {
         slope = slope * u + value;
-        value = value * u + a;
+        value = (value * u).plus(a);
     }
     (value * u, value + slope * u)
 }

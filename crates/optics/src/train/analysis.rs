@@ -20,7 +20,7 @@ use crate::element::{Clip, LensRays, RayStatus};
 use crate::glass::GlassError;
 use crate::train::aim::towards_lens;
 use crate::train::pupil::Window;
-use crate::train::{MonochromaticTrain, OpticalTrain, Side};
+use crate::train::{FieldSpec, MonochromaticTrain, OpticalTrain, Side};
 
 /// How the image of one wavelength stands to that of the design wavelength.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -122,19 +122,30 @@ pub fn chief_height(
 }
 
 /// Cells a side over the rectangle of passing directions.
-const PUPIL_GRID: u32 = 500;
+const PUPIL_GRID: f64 = 500.0;
 
 /// The same in the least, for the longest trains.
-const LEAST_GRID: u32 = 100;
+const LEAST_GRID: f64 = 100.0;
 
-/// Rays times elements that one point is worth: a train of more than 64 elements gets a coarser grid.
-const WORK: u32 = 64 * PUPIL_GRID * PUPIL_GRID;
+/// Steps of rays that the illumination at one place is worth: rays are followed in more than 64 steps on a coarser
+/// grid.
+const WORK: f64 = 64.0 * PUPIL_GRID * PUPIL_GRID;
 
-/// Cells a side for a train of so many elements.
-fn grid(elements: usize) -> u32 {
-    let rays = WORK / u32::try_from(elements.max(1)).unwrap_or(u32::MAX);
-    rays.isqrt().clamp(LEAST_GRID, PUPIL_GRID)
+/// Rays that a table of many places is worth, which share them.
+const MOST_RAYS: f64 = 40.0 * PUPIL_GRID * PUPIL_GRID;
+
+/// Cells a side for one of so many places.
+#[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+fn grid(at: &MonochromaticTrain, places: usize) -> u32 {
+    let rays = (WORK / at.steps_of_a_ray()).min(MOST_RAYS / places as f64);
+    rays.sqrt().clamp(LEAST_GRID, PUPIL_GRID) as u32
 }
+
+/// Rings around the axis of a round lens.
+const RINGS: u32 = 1024;
+
+/// Steps in which the edge between two of them is sought.
+const EDGE_BISECTIONS: u32 = 40;
 
 /// Fractions of the golden ratio and of the root of 2, whose multiples are even over 0 to 1, and those
 /// of their sum and difference, too, so that diagonals fare as well.
@@ -168,7 +179,7 @@ pub fn illumination(
     for &field in fields {
         let Some(image_y) = chief_height(train, at, field, sensor_z) else { continue };
         let film = DVec3::new(0.0, image_y, sensor_z);
-        let projected_solid_angle = projected_solid_angle(train, at, film);
+        let projected_solid_angle = solid_angle(train, at, film, fields.len());
         let relative = if on_axis > 0.0 { projected_solid_angle / on_axis } else { 0.0 };
         points.push(FieldIllumination { field, image_y, projected_solid_angle, relative });
     }
@@ -179,27 +190,77 @@ pub fn illumination(
 /// apertures and filters pass, for a sensor square to the axis.
 #[must_use]
 pub fn projected_solid_angle(train: &OpticalTrain, at: &MonochromaticTrain, film: DVec3) -> f64 {
+    solid_angle(train, at, film, 1)
+}
+
+/// The same for one of `places`, which share the rays that a table is worth.
+fn solid_angle(train: &OpticalTrain, at: &MonochromaticTrain, film: DVec3, places: usize) -> f64 {
     let Some(window) = Window::find(train, at, film) else { return 0.0 };
-    let grid = grid(train.elements().len());
-    let size = (window.max - window.min) / f64::from(grid);
-    let mut rays = LensRays::with_capacity(grid as usize);
+    if film.truncate() == DVec2::ZERO && train.is_rotationally_symmetric() {
+        let corner = window.min.abs().max(window.max.abs());
+        return solid_angle_of_rings(at, film, corner.max_element());
+    }
+    let grid = grid(at, places);
+    // Left and right of a place on the y axis a round lens passes the same.
+    let is_mirrored = film.x == 0.0 && train.is_rotationally_symmetric();
+    let (columns, times) = if is_mirrored { (grid.div_ceil(2), 2.0) } else { (grid, 1.0) };
+    let (mut from, mut to) = (window.min, window.max);
+    if is_mirrored {
+        (from.x, to.x) = (0.0, to.x.max(-from.x));
+    }
+    let size = (to - from) / DVec2::new(f64::from(columns), f64::from(grid));
+    let mut rays = LensRays::with_capacity(columns as usize);
     let mut sum = 0.0;
     for row in 0..grid {
         rays.clear();
-        for column in 0..grid {
+        for column in 0..columns {
             // Rows and columns are shifted against each other: on a straight grid the edge of a square
             // stop would lie in or out of a whole line of cells at once.
             let shift = |i: usize, line: u32| (SHIFTS[i] * (f64::from(line) + 0.5)).fract();
             let cell =
                 DVec2::new(f64::from(column) + shift(0, row), f64::from(row) + shift(1, column));
-            let slopes = window.min + cell * size;
+            let slopes = from + cell * size;
             let cos2 = 1.0 / (1.0 + slopes.length_squared());
             rays.push_weighted(film, towards_lens(slopes), cos2 * cos2);
         }
         at.trace(Side::Sensor, Clip::On, &mut rays);
         sum += rays.passed_throughput();
     }
-    sum * size.x * size.y
+    times * sum * size.x * size.y
+}
+
+/// The same from a place on the axis of a round lens, for slopes up to `steepest`: of rings, each with what a ray in its
+/// middle passes, whose borders are where rays begin or cease to pass.
+fn solid_angle_of_rings(at: &MonochromaticTrain, film: DVec3, steepest: f64) -> f64 {
+    let traced = |slopes: &[f64]| {
+        let mut rays = LensRays::with_capacity(slopes.len());
+        slopes.iter().for_each(|&slope| rays.push(film, towards_lens(DVec2::new(slope, 0.0))));
+        at.trace(Side::Sensor, Clip::On, &mut rays);
+        let passed = |i| (rays.status(i) == RayStatus::Exited).then(|| rays.throughput(i));
+        (0..slopes.len()).map(passed).collect::<Vec<Option<f64>>>()
+    };
+    let width = steepest / f64::from(RINGS);
+    let middles: Vec<f64> = (0..RINGS).map(|k| (f64::from(k) + 0.5) * width).collect();
+    let passed = traced(&middles);
+    // ∫ cos θ dΩ within a slope is π sin² θ.
+    let within = |slope: f64| std::f64::consts::PI * slope * slope / (1.0 + slope * slope);
+    let mut inner = 0.0;
+    let mut sum = 0.0;
+    for (k, own) in passed.iter().enumerate() {
+        let next = passed.get(k + 1).unwrap_or(own);
+        let mut outer = (k + 1) as f64 * width;
+        if own.is_some() != next.is_some() {
+            let mut between = [middles[k], middles[k + 1]];
+            for _ in 0..EDGE_BISECTIONS {
+                outer = 0.5 * (between[0] + between[1]);
+                let is_alike = traced(&[outer])[0].is_some() == own.is_some();
+                between[usize::from(!is_alike)] = outer;
+            }
+        }
+        sum += own.unwrap_or(0.0) * (within(outer) - within(inner));
+        inner = outer;
+    }
+    sum
 }
 
 /// The greatest distance from the axis on a sensor at `sensor_z` (mm) from which light can leave
@@ -250,8 +311,8 @@ const SPOT_GRID: u32 = 32;
 /// Where the rays of one field point meet the reference plane.
 ///
 /// Rays start on a grid of 32 × 32 cell centres in the square around the paraxial entrance pupil,
-/// of which those inside the circle count, all in the direction (0, sin field, cos field). Radii are
-/// from the centroid.
+/// of which those inside the circle count, all in the direction (0, sin field, cos field). Vignetting factors move
+/// them to what is left of the pupil. Radii are from the centroid.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Spot {
     /// The angle off the axis (degrees).
@@ -277,14 +338,23 @@ pub struct Spot {
     pub points: Vec<DVec2>,
 }
 
-/// The spot of the field angle `field` (degrees) on the plane at `reference_z` (mm).
+impl Spot {
+    /// The share of its rays that passed.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "counts of some hundred rays")]
+    pub fn passed(&self) -> f64 {
+        self.rays_passed as f64 / self.rays_launched.max(1) as f64
+    }
+}
+
+/// The spot of a field on the plane at `reference_z` (mm).
 ///
 /// `None` when the lens has no finite entrance pupil or no ray passes.
 #[must_use]
 pub fn spot(
     train: &OpticalTrain,
     at: &MonochromaticTrain,
-    field: f64,
+    field: &FieldSpec,
     reference_z: f64,
 ) -> Option<Spot> {
     let rays = beam(train, at, field)?;
@@ -315,7 +385,7 @@ pub fn spot(
     };
     let ((rms, geometric), (best_rms, best_geometric)) = (radii(0.0), radii(best_focus));
     Some(Spot {
-        field,
+        field: field.angle.0,
         rays_launched: rays.len(),
         rays_passed: hits.len(),
         centroid_y: centroid.y,
@@ -328,20 +398,21 @@ pub fn spot(
     })
 }
 
-/// The beam of a field angle, traced.
-fn beam(train: &OpticalTrain, at: &MonochromaticTrain, field: f64) -> Option<LensRays> {
+/// The beam of a field, traced.
+fn beam(train: &OpticalTrain, at: &MonochromaticTrain, field: &FieldSpec) -> Option<LensRays> {
     let pupil = train.paraxial(at.wavelength()).ok()?.entrance_pupil;
     let (z, radius) = (pupil.z?, 0.5 * pupil.diameter?);
-    let (sine, cosine) = field.to_radians().sin_cos();
+    let (sine, cosine) = field.angle.0.to_radians().sin_cos();
     let direction = DVec3::new(0.0, sine, cosine);
     let back = train.far_in_front(z) + radius;
-    let coordinate = |i: u32| (2.0 * (f64::from(i) + 0.5) / f64::from(SPOT_GRID) - 1.0) * radius;
+    let coordinate = |i: u32| 2.0 * (f64::from(i) + 0.5) / f64::from(SPOT_GRID) - 1.0;
     let mut rays = LensRays::with_capacity((SPOT_GRID * SPOT_GRID) as usize);
     for row in 0..SPOT_GRID {
         for column in 0..SPOT_GRID {
-            let (x, y) = (coordinate(column), coordinate(row));
-            if x * x + y * y <= radius * radius {
-                rays.push(DVec3::new(x, y, z) - direction * back, direction);
+            let place = DVec2::new(coordinate(column), coordinate(row));
+            if place.length_squared() <= 1.0 {
+                let place = field.vignetting.place(place) * radius;
+                rays.push(place.extend(z) - direction * back, direction);
             }
         }
     }

@@ -1,6 +1,6 @@
 //! What is behind an element of a lens file: a gradient of its glass, or an axis that breaks.
 
-use super::file::along;
+use super::file::{WHOLE_TURN, along};
 use super::folds::{self, Isometry};
 use super::{Element, LensError, LensFile};
 use crate::element::{
@@ -26,8 +26,11 @@ impl LensFile {
         }
         let tilt = mount.tilt.map(|angle| along(sense, angle.0));
         let decentre = mount.decentre.map(|length| length.0);
-        if !broken.rotation.0.is_finite() {
-            return Err("rotation must be finite".to_owned());
+        if broken.rotation.0.is_nan() || broken.rotation.0.abs() > WHOLE_TURN {
+            return Err(format!(
+                "rotation is {} degrees; an angle lies between -360 and 360",
+                broken.rotation.0
+            ));
         }
         let Some(to) = broken.return_to else { return Ok(broken.build(tilt, decentre)) };
         let bare = Mount { thickness: mount.thickness, ..Mount::default() };

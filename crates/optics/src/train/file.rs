@@ -11,7 +11,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Element, LensError, MOST_ELEMENTS, MonochromaticTrain, OpticalTrain, RayPath, Side,
+    Element, FieldSpec, LensError, MOST_ELEMENTS, MonochromaticTrain, OpticalTrain, RayPath, Side,
     remove_notes,
 };
 use crate::element::{
@@ -36,6 +36,15 @@ pub struct LensFile {
     /// absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wavelength: Option<Nanometres>,
+    /// The field points that it is looked at by `etendue lens`; shares of the field of view when absent.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub fields: Vec<FieldSpec>,
+    /// The wavelengths that it is looked at (nm), the main one first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub wavelengths: Vec<Nanometres>,
+    /// What each of those weighs; alike when absent.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub weights: Vec<f64>,
     /// How the sensor stands: tilted for Scheimpflug's rule, decentred for shift.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensor: Option<SensorMount>,
@@ -93,7 +102,9 @@ impl LensFile {
         if self.elements.len() > MOST_ELEMENTS {
             return Err(LensError::TooMany(self.elements.len()));
         }
-        let wavelength = self.wavelength.map_or(FRAUNHOFER_D, |nm| nm.0);
+        self.check_fields()?;
+        let main = self.wavelength.or(self.wavelengths.first().copied());
+        let wavelength = main.map_or(FRAUNHOFER_D, |nm| nm.0);
         if !(wavelength > 0.0 && wavelength.is_finite()) {
             return Err(LensError::Wavelength(wavelength));
         }
@@ -158,7 +169,7 @@ impl LensFile {
                 .and_then(|path| {
                     AgfCatalogue::open(&path).map_err(|error| format!("{name}: {error}"))
                 })
-                .map_err(|why| LensError::Catalogue { index, why })
+                .map_err(|why| LensError::Key { key: format!("glass_catalogs[{index}]"), why })
         };
         self.glass_catalogs.iter().enumerate().map(read).collect()
     }
@@ -209,6 +220,9 @@ fn place(
     if numbers.iter().any(|number| !number.is_finite()) {
         return Err("thickness, tilt and decentre must be finite".to_owned());
     }
+    if let Some(angle) = tilt.iter().find(|angle| angle.abs() > WHOLE_TURN) {
+        return Err(format!("tilt has {angle} degrees; an angle lies between -360 and 360"));
+    }
     Ok(Element { part, frame: Frame::placed(z, decentre, tilt) })
 }
 
@@ -228,6 +242,9 @@ fn behind(
         None => Ok(media[index].clone()),
     }
 }
+
+/// Angles beyond one turn (degrees) are slips: of great ones no digit is left of where they point.
+pub(super) const WHOLE_TURN: f64 = 360.0;
 
 /// The farthest that a ray may start (mm). A double's steps are a tenth of a millimetre there.
 const FARTHEST: f64 = 1e15;

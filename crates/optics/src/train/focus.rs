@@ -1,6 +1,6 @@
 //! Where the sensor goes.
 
-use super::{OpticalTrain, SensorMount};
+use super::{Element, OpticalTrain, Part, SensorMount};
 use crate::element::Frame;
 use crate::glass::GlassError;
 
@@ -67,6 +67,17 @@ pub enum FocusError {
         /// Where the virtual image is (mm).
         image: f64,
     },
+    /// The axis breaks behind the image.
+    #[error(
+        "the image is at z = {image} mm, in front of elements[{element}], a coordinate_break behind which the sensor \
+         would stand: break the axis nearer to the lens, or put the sensor where it is to be by the last thickness"
+    )]
+    Broken {
+        /// The last element.
+        element: usize,
+        /// Where the image is (mm).
+        image: f64,
+    },
     /// A glass without index.
     #[error(transparent)]
     Glass(#[from] GlassError),
@@ -104,9 +115,22 @@ impl OpticalTrain {
         let paraxial = self.paraxial(self.wavelength)?;
         let image = paraxial.image_z.ok_or(FocusError::Afocal)?;
         if image <= self.last_vertex() {
-            return Err(FocusError::Virtual { distance: f64::INFINITY, image });
+            return Err(self.no_image(f64::INFINITY, image));
         }
         Ok(image)
+    }
+
+    /// Why an image in front of the last vertex, at z (mm), of an object at a distance (m) is none for a sensor.
+    fn no_image(&self, distance: f64, image: f64) -> FocusError {
+        let is_break = |element: &Element| matches!(element.part, Part::CoordinateBreak(_));
+        let lens = self.elements.iter().rposition(|element| !is_break(element));
+        let is_real = lens.is_some_and(|i| image > self.elements[i].frame.vertex.z);
+        match (self.elements.len(), is_real) {
+            (count, true) if lens != Some(count - 1) => {
+                FocusError::Broken { element: count - 1, image }
+            }
+            _ => FocusError::Virtual { distance, image },
+        }
     }
 
     fn image_of(&self, distance: f64) -> Result<f64, FocusError> {
@@ -129,7 +153,7 @@ impl OpticalTrain {
             return Err(FocusError::AtFocalPoint { distance, least });
         }
         if image <= 0.0 {
-            return Err(FocusError::Virtual { distance, image: self.last_vertex() + image });
+            return Err(self.no_image(distance, self.last_vertex() + image));
         }
         Ok(self.last_vertex() + image)
     }

@@ -21,7 +21,9 @@
 pub mod aim;
 pub mod analysis;
 mod behind;
+pub mod differential;
 pub mod drawing;
+pub mod fields;
 pub mod file;
 pub mod focus;
 pub mod folds;
@@ -43,6 +45,8 @@ pub const MOST_ELEMENTS: usize = 1000;
 
 pub use crate::element::Part;
 pub use aim::ChiefRay;
+pub use differential::RayDifferential;
+pub use fields::{FieldSpec, VignettingSpec};
 pub use file::{GivenRay, LensFile, RayError, RaysFile, SensorMount, TracedRays};
 pub use focus::{Focus, FocusError};
 pub use folds::Isometry;
@@ -85,11 +89,11 @@ pub enum LensError {
         /// Why.
         source: GlassError,
     },
-    /// A catalogue of glasses that cannot be read.
-    #[error("glass_catalogs[{index}]: {why}")]
-    Catalogue {
-        /// Which, from 0.
-        index: usize,
+    /// A key of the whole lens: a catalogue of glasses that cannot be read, a field or wavelength that is none.
+    #[error("{key}: {why}")]
+    Key {
+        /// Which, with its place in a list from 0.
+        key: String,
         /// Why.
         why: String,
     },
@@ -318,7 +322,9 @@ impl OpticalTrain {
     pub fn with_f_number(self, f_number: f64) -> Result<Self, LensError> {
         let radius = self.stop_radius_at(f_number)?;
         self.check_opening(radius)?;
-        self.with_stop_radius(radius)
+        let stopped = self.with_stop_radius(radius)?;
+        stopped.check_obscuration()?;
+        Ok(stopped)
     }
 
     /// The stop's radius (mm) at a paraxial f-number.

@@ -155,6 +155,33 @@ impl OpticalTrain {
         Ok(())
     }
 
+    /// Refuses a stop that what stands in the middle of the beam covers.
+    pub(super) fn check_obscuration(&self) -> Result<(), LensError> {
+        /// Rays across the beam, in each direction.
+        const RAYS: u32 = 1024;
+        let radius = self.paraxial(self.wavelength).ok().and_then(|p| p.entrance_pupil.diameter);
+        let (Some(diameter), true, Ok(at)) = (radius, self.is_obscured(), self.at(self.wavelength))
+        else {
+            return Ok(());
+        };
+        let z = -self.far_in_front(0.0);
+        let passes = |i: u32, k: u32| {
+            // Between the arms of a spider, whichever way it is turned.
+            let turn = DVec2::from_angle(0.1 + std::f64::consts::TAU * f64::from(k) / 7.0);
+            let height = 0.5 * diameter * f64::from(i) / f64::from(RAYS);
+            let path = at.path(Side::Object, Clip::On, (turn * height).extend(z), DVec3::Z);
+            path.status == RayStatus::Exited
+        };
+        if (0..7).any(|k| (0..=RAYS).any(|i| passes(i, k))) {
+            return Ok(());
+        }
+        let why = format!(
+            "nothing passes a beam of {:.4} mm, whose middle is covered: open the lens wider",
+            diameter
+        );
+        Err(LensError::Stop { index: self.stop, why })
+    }
+
     /// A sentence on a stop that is open wider than any beam on the axis; `None` when the beam fills
     /// it.
     pub(super) fn unfilled_stop(&self) -> Option<String> {

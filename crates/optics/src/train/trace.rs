@@ -218,6 +218,15 @@ impl MonochromaticTrain {
         self.is_costly
     }
 
+    /// Steps in which a ray is followed: one an element, and those of graded media.
+    pub(crate) fn steps_of_a_ray(&self) -> f64 {
+        let of_medium = |step: &Step| {
+            let graded = step.graded.as_ref().and_then(|graded| graded.media[0].as_ref());
+            graded.map_or(0.0, GradedMedium::steps)
+        };
+        self.backward.iter().map(|step| 1.0 + of_medium(step)).sum()
+    }
+
     /// The index of the medium between the last element and the sensor.
     #[must_use]
     pub fn index_before_sensor(&self) -> f64 {
@@ -239,7 +248,7 @@ impl MonochromaticTrain {
         &self.forward
     }
 
-    fn steps(&self, from: Side) -> &[Step] {
+    pub(super) fn steps(&self, from: Side) -> &[Step] {
         match from {
             Side::Object => &self.forward,
             Side::Sensor => &self.backward,

@@ -23,8 +23,8 @@ fn elements(text: &str) -> Vec<Value> {
 fn a_triplet_is_read_with_its_system_and_its_glasses() {
     let lens = read(TRIPLET).unwrap();
     assert_eq!(lens.file.name, "Triplet of ours");
-    assert_eq!(lens.wavelengths, [587.56, 656.27, 486.13], "the reference first");
-    assert_eq!(lens.fields, [0.0, 7.0, 10.0]);
+    assert_eq!(lens.file.wavelengths_nm(), [587.56, 656.27, 486.13], "the reference first");
+    assert_eq!(lens.file.field_angles(), [0.0, 7.0, 10.0]);
     let elements = elements(TRIPLET);
     assert_eq!(elements.len(), 5);
     assert_eq!(elements[0]["glass"], "N-BK7");

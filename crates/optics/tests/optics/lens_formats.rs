@@ -173,7 +173,10 @@ fn a_table_of_photons_to_photos_is_read_with_its_configurations() {
     let format = LensFormat::PhotonsToPhotos;
     let lens = read(format, ZOOM);
     assert_eq!(lens.file.name, "Zoom of ours");
-    assert_eq!((lens.fields.as_slice(), lens.wavelengths[0]), (&[0.0, 14.0, 20.0][..], 587.56));
+    assert_eq!(
+        (lens.file.field_angles().as_slice(), lens.file.wavelengths_nm()[0]),
+        (&[0.0, 14.0, 20.0][..], 587.56)
+    );
     let all = elements(&lens);
     assert_eq!(all[0]["glass"], json!({"nd": 1.5, "vd": 64.2}));
     assert_eq!((&all[0]["semi_diameter"], &all[1]["thickness"]), (&json!(10.0), &json!(1.0)));
@@ -195,7 +198,7 @@ fn a_table_of_photons_to_photos_is_read_with_its_configurations() {
     let second = try_at(format, ZOOM, Some(2)).unwrap();
     assert_eq!(elements(&second)[1]["thickness"], 3.0);
     assert!((f_number(&second) - 5.0).abs() < 1e-9);
-    assert_eq!(second.fields, [0.0, 10.5, 15.0]);
+    assert_eq!(second.file.field_angles(), [0.0, 10.5, 15.0]);
     let error = try_at(format, ZOOM, Some(3)).unwrap_err();
     assert!(error.contains("no configuration 3: the file has 2"), "{error}");
     // A near object: the stop keeps the diameter of its row.
@@ -271,20 +274,26 @@ fn a_lens_of_oslo_is_read_with_its_system() {
         (lens.file.name.as_str(), lens.file.source.as_str()),
         ("Lens of ours", "an OSLO file")
     );
-    assert_eq!(lens.wavelengths, [587.56, 486.13, 656.27]);
+    assert_eq!(lens.file.wavelengths_nm(), [587.56, 486.13, 656.27]);
     let train = build(&lens);
     let pupil = train.paraxial(587.56).unwrap().entrance_pupil;
     assert!((pupil.diameter.unwrap() - 10.0).abs() < 1e-12, "EBR is a radius");
     // Shares of a field are shares of its tangent.
     let part = (0.7 * 10_f64.to_radians().tan()).atan().to_degrees();
-    assert_eq!(lens.fields, [0.0, part, (10_f64.to_radians().tan()).atan().to_degrees()]);
+    assert_eq!(
+        lens.file.field_angles(),
+        [0.0, part, (10_f64.to_radians().tan()).atan().to_degrees()]
+    );
     let all = elements(&lens);
     assert_eq!((&all[0]["glass"], &all[0]["curvature"]), (&json!("BK7"), &json!(0.02)));
     assert_eq!((&all[0]["stop"], &all[1]["semi_diameter"]), (&json!(true), &json!(8.0)));
     // Fields by the table behind the lens: y and then x.
     let table = "RST NEW\nF 1 0 0 0 0 0 -1 1 -1 1 1\nF 2 -0.5 0 0 0 0 -1 1 -1 1 1\nEND\n";
     let lens = read(LensFormat::Oslo, &oslo("FNO 5\nANG 10", FRONT, BACK, table));
-    assert_eq!(lens.fields, [0.0, -(0.5 * 10_f64.to_radians().tan()).atan().to_degrees()]);
+    assert_eq!(
+        lens.file.field_angles(),
+        [0.0, -(0.5 * 10_f64.to_radians().tan()).atan().to_degrees()]
+    );
     let train = build(&lens);
     assert!((train.paraxial(587.56).unwrap().f_number.unwrap() - 5.0).abs() < 1e-9);
     // Units of 10 mm.
@@ -507,7 +516,7 @@ fn a_lens_of_optiland_is_read_with_its_system() {
     let lens = read(LensFormat::Optiland, &optiland(FRONT_OF_OPTILAND, SYSTEM));
     assert_eq!((lens.file.name.as_str(), lens.file.source.as_str()), ("ours", "an optiland file"));
     assert_eq!(
-        (lens.fields.as_slice(), lens.wavelengths.as_slice()),
+        (lens.file.field_angles().as_slice(), lens.file.wavelengths_nm().as_slice()),
         (&[0.0, 7.0][..], &[550.0, 480.0][..])
     );
     let all = elements(&lens);

@@ -4,6 +4,7 @@ mod asphere_crossings;
 mod code_v;
 mod components;
 mod coordinate_breaks;
+mod every_kind;
 mod exit_pupil;
 mod gradients;
 mod lens_formats;

@@ -4,7 +4,7 @@ use etendue_optics::analysis::object::ObjectPoint;
 use etendue_optics::analysis::seidel::seidel;
 use etendue_optics::element::{Clip, LensRays, Ray, RayStatus};
 use etendue_optics::train::analysis::spot;
-use etendue_optics::train::{ExitPupil, Focus, OpticalTrain, Registers, Side};
+use etendue_optics::train::{ExitPupil, FieldSpec, Focus, OpticalTrain, Registers, Side};
 use glam::{DVec2, DVec3};
 
 use crate::{build, preset, try_build};
@@ -310,7 +310,8 @@ fn the_secondary_stops_what_its_area_is_of_the_light() {
     let ray = Ray::new(DVec3::new(0.0, 90.0, -900.0), DVec3::Z).unwrap();
     let end = narrow.at(550.0).unwrap().run(Side::Object, Clip::On, ray);
     assert_eq!(end.status, RayStatus::Vignetted { element: 0 });
-    let spot = spot(&train, &at, 0.0, train.sensor_z(Focus::AsWritten).unwrap()).unwrap();
+    let spot =
+        spot(&train, &at, &FieldSpec::at(0.0), train.sensor_z(Focus::AsWritten).unwrap()).unwrap();
     #[expect(clippy::cast_precision_loss, reason = "a thousand rays")]
     let share = spot.rays_passed as f64 / spot.rays_launched as f64;
     // 0.91 of the disk, by 32 x 32 cells: those that the rims cross are some 3 % of them.

@@ -7,7 +7,7 @@ use etendue_geometry::units::Millimetres;
 use etendue_optics::element::{Clip, ElementSpec, LensRays, PartSpec, RayStatus, SurfaceSpec};
 use etendue_optics::glass::GlassSpec;
 use etendue_optics::train::analysis::{colour_shifts, distortion, illumination, spot};
-use etendue_optics::train::{LensFile, MonochromaticTrain, OpticalTrain, Side};
+use etendue_optics::train::{FieldSpec, LensFile, MonochromaticTrain, OpticalTrain, Side};
 use glam::DVec3;
 use serde_json::Value;
 
@@ -232,7 +232,8 @@ fn spots_agree() {
         let at = system.at(587.56);
         for theirs in system.json["spots"].as_array().unwrap() {
             let field = number(&theirs["field_deg"]);
-            let ours = spot(&system.train, &at, field, system.reference_z()).unwrap();
+            let ours =
+                spot(&system.train, &at, &FieldSpec::at(field), system.reference_z()).unwrap();
             let what = format!("{} at {field}°", system.name);
             assert_eq!(ours.rays_launched, index(&theirs["rays_launched"]), "{what}");
             assert_eq!(ours.rays_passed, index(&theirs["rays_passed"]), "{what}");

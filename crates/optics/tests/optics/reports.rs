@@ -1,5 +1,7 @@
 //! What a report says of lenses that are closed, tilted, square, or asked about light they do not know.
 
+use std::f64::consts::PI;
+
 use etendue_optics::train::analysis::{distortion, projected_solid_angle};
 use etendue_optics::train::{Focus, Inquiry, LensReport, OpticalTrain};
 use glam::DVec3;
@@ -94,4 +96,21 @@ fn the_solid_angle_of_a_square_stop_is_that_of_a_square() {
         // Of 500 x 500 cells the rim cuts 2000, of which one in a few hundred is misjudged.
         assert!((found / exact - 1.0).abs() < 1e-4, "{rotation}: {found} {exact}");
     }
+}
+
+/// On the axis of a round lens: of a stop π sin² θ, and of a ring the difference of two.
+#[test]
+fn the_solid_angle_of_a_round_stop_and_of_a_ring_is_that_of_circles() {
+    let found = |aperture: &str| {
+        let train = build(&format!(
+            r#"{{"elements": [{{"type": "thin_lens", "focal_length": 50}}, {{"type": "aperture", {aperture}}}]}}"#
+        ));
+        projected_solid_angle(&train, &train.at(587.56).unwrap(), DVec3::new(0.0, 0.0, 50.0))
+    };
+    let of_circle = |radius: f64| PI * radius * radius / (radius * radius + 2500.0);
+    let circle = found(r#""shape": "circular", "radius": 8"#);
+    let ring = found(r#""shape": "annular", "radius": 8, "inner_radius": 3.1"#);
+    // Edges are bisected to the last digits.
+    assert!((circle / of_circle(8.0) - 1.0).abs() < 1e-9, "{circle}");
+    assert!((ring / (of_circle(8.0) - of_circle(3.1)) - 1.0).abs() < 1e-9, "{ring}");
 }

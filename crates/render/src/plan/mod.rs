@@ -177,7 +177,12 @@ impl Plan {
         let model = taken.as_ref().and_then(|taken| taken.camera.as_ref());
         let lit_by = model.map_or(&scene.camera, |model| &model.camera);
         let is_lit = lit_by.has_pupil() && passes.light;
-        let band_paths = BandPaths::of((scene, lit_by), &chosen.bands, stopping, is_lit);
+        // Measuring how bands part behind a lens takes longer than many a simpler model of it.
+        let is_open = scene.tolerance.is_some() && taken.is_none() && is_lit;
+        let band_paths = match is_open {
+            true => BandPaths::Apart("what is taken of the tolerance is not known yet".to_owned()),
+            false => BandPaths::of((scene, lit_by), &chosen.bands, stopping, is_lit),
+        };
         let apart = |camera: &Camera| camera.band_groups(&chosen.bands).len() as u64;
         let sampled = |yes, apart| if yes { u64::from(spec.typical()) * apart } else { 0 };
         let apart_in_light = if band_paths.are_shared() { 1 } else { apart(lit_by) };

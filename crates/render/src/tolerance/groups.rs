@@ -27,8 +27,9 @@ pub(super) fn fewest(
     tolerance: Tolerance,
 ) -> Result<Option<TakenCamera>, RenderError> {
     let most = plan.bands.count() / 2;
-    let can_pay = matches!(plan.band_paths, BandPaths::Apart(_)) && most >= 2;
-    let Some(two) = scene.camera.with_bands_grouped(2).filter(|_| can_pay) else {
+    let paths = || BandPaths::of((scene, &scene.camera), &plan.bands, plan.stopping, true);
+    let can_pay = || most >= 2 && matches!(paths(), BandPaths::Apart(_));
+    let Some(two) = scene.camera.with_bands_grouped(2).filter(|_| can_pay()) else {
         return Ok(None);
     };
     let view = FullView::new(scene, accel, &plan.bands, ALL_BANDS)?;

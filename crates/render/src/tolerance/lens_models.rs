@@ -5,12 +5,14 @@
 //! | `pinhole` | where its entrance pupil is, and the scale of the picture |
 //! | `opencv` | also its distortion, as [`OpencvFit`] fits it |
 //! | `falloff` | also how its light falls off from the axis |
-//! | `thin` | of the lens near its axis: focal length, f-number and the plane in focus, so blur |
+//! | `thin` | of the lens near its axis: focal length, f-number or the mask in its stop, and the plane in focus, so blur |
 //! | `thick` | also how far its pupils are from its principal planes |
 //! | `undispersed` | all of it, as at its design wavelength |
 //!
 //! `thin` and `thick` are the approximations of C. Kolb, D. Mitchell and P. Hanrahan, "A realistic camera model
 //! for computer graphics", 1995.
+
+use std::path::PathBuf;
 
 use etendue_camera::lens::PlacedSpec;
 use etendue_camera::lens::focused::View;
@@ -20,7 +22,7 @@ use etendue_camera::{
 };
 use etendue_geometry::Bounds;
 use etendue_geometry::units::{Micrometres, Millimetres};
-use etendue_optics::element::{ElementSpec, PartSpec};
+use etendue_optics::element::{ApertureSpec, ElementSpec, MaskSpec, Opening, PartSpec, Picture};
 use serde_json::{Value, json};
 
 /// Why a camera has no models.
@@ -40,6 +42,8 @@ pub struct LensModel {
     pub camera: Camera,
     /// The keys of a scene that take it.
     pub scene: Value,
+    /// Whether the pattern of a mask in the lens shows in what is out of focus, which this has not.
+    pub lacks_mask: bool,
 }
 
 /// Models, the simplest first.
@@ -68,10 +72,11 @@ pub(super) fn model(
     full: &Camera,
     spec: &CameraSpec,
 ) -> Result<LensModel, String> {
-    let camera = spec.build(|| Bounds::EMPTY, &|name: &str| Err(name.to_owned()));
+    // A mask in it names the file that was read.
+    let camera = spec.build(|| Bounds::EMPTY, &|name: &str| Ok(PathBuf::from(name)));
     let camera = full.seen_through(&camera.map_err(|error| error.to_string())?);
     let scene = serde_json::to_value(spec).map_err(|error| error.to_string())?;
-    Ok(LensModel { name, camera, scene: json!({ "camera": scene }) })
+    Ok(LensModel { name, camera, scene: json!({ "camera": scene }), lacks_mask: false })
 }
 
 /// The models of a camera's lens that keep what is known near its axis: pinhole, thin and thick lens.
@@ -89,6 +94,9 @@ pub fn near_axis(full: &Camera) -> Result<LensModels, NoModels> {
     };
     found.add("thin", full, lens(gauss.thin()));
     found.add("thick", full, lens(gauss.thick()));
+    let lacks_mask = gauss.mask.is_none() && masks(full).next().is_some();
+    let blurred = found.models.iter_mut().filter(|model| model.name != "pinhole");
+    blurred.for_each(|model| model.lacks_mask = lacks_mask);
     Ok(found)
 }
 
@@ -106,7 +114,28 @@ pub fn opencv(full: &Camera, tolerance: f64) -> Result<(LensModel, CameraSpec), 
 #[must_use]
 pub fn undispersed(full: &Camera) -> LensModel {
     let scene = json!({ "plan": { "dispersion": false } });
-    LensModel { name: "undispersed", camera: full.without_dispersion(), scene }
+    LensModel { name: "undispersed", camera: full.without_dispersion(), scene, lacks_mask: false }
+}
+
+/// The masks in a camera's lens, by the numbers of their elements.
+fn masks(full: &Camera) -> impl Iterator<Item = (usize, &Picture)> {
+    let train = full.lens().map(|lens| lens.focused().train());
+    let elements = train.into_iter().flat_map(|train| train.elements().iter().enumerate());
+    elements.filter_map(|(number, element)| match element.part.opening() {
+        Some(Opening::Image(picture)) => Some((number, picture)),
+        _ => None,
+    })
+}
+
+/// The mask of a camera's lens as it is seen in the entrance pupil, where it is alone, in the stop, and not seen
+/// upside down.
+fn mask_in_pupil(full: &Camera, magnification: Option<f64>) -> Option<MaskSpec> {
+    let mut all = masks(full);
+    let ((number, picture), None) = (all.next()?, all.next()) else { return None };
+    let is_stop = full.lens().is_some_and(|lens| lens.focused().train().stop() == number);
+    let scale = 1.0 / magnification.filter(|m| is_stop && *m > 0.0)?;
+    let [width, height] = picture.size.map(|side| Millimetres(scale * side));
+    Some(MaskSpec { file: picture.file.to_str()?.to_owned(), width, height: Some(height) })
 }
 
 /// Pixels of a picture for a slope of 1 near the axis; `None` of a camera without a lens, or with a
@@ -130,6 +159,8 @@ struct Gauss {
     /// Focal length and diameter of the entrance pupil (mm).
     focal: f64,
     pupil: f64,
+    /// The mask of the stop, as it is seen in the entrance pupil.
+    mask: Option<MaskSpec>,
     /// From the front principal plane back to the entrance pupil (mm).
     pupil_behind_front: f64,
     /// From the rear principal plane back to the exit pupil, and its diameter (mm).
@@ -163,6 +194,7 @@ impl Gauss {
             centre: k.centre,
             focal,
             pupil,
+            mask: mask_in_pupil(full, paraxial.stop_magnification),
             pupil_behind_front: z - front,
             exit: exit.map(|(z, diameter)| [z - rear, diameter]),
             focus: focused.object_distance(),
@@ -200,9 +232,24 @@ impl Gauss {
             Some([z, diameter]) if z >= 0.0 => (z, diameter),
             _ => return Err("its pupils are on the wrong sides of the principal planes"),
         };
-        let stop = ElementSpec::new(PartSpec::circular(0.5 * diameter), 0.0).as_stop();
+        // An image of the stop on the sensor's side of the focus would be upside down in the other one.
+        if self.mask.is_some() && at > self.focal {
+            return Err("its mask is seen upside down from one side");
+        }
+        let part = match self.mask_of(diameter) {
+            Some(mask) => PartSpec::Aperture(ApertureSpec::Image(mask)),
+            None => PartSpec::circular(0.5 * diameter),
+        };
+        let stop = ElementSpec::new(part, 0.0).as_stop();
         let stop = PlacedSpec { at: Millimetres(at), element: stop };
         self.lens(self.pupil_behind_front, vec![stop])
+    }
+
+    /// The mask in a pupil of so many mm.
+    fn mask_of(&self, diameter: f64) -> Option<MaskSpec> {
+        let MaskSpec { file, width, height } = self.mask.clone()?;
+        let scaled = |side: Millimetres| Millimetres(side.0 * diameter / self.pupil);
+        Some(MaskSpec { file, width: scaled(width), height: height.map(scaled) })
     }
 
     /// A thin lens whose entrance pupil lies `pupil` (mm) behind it, and what else is on its axis.
@@ -226,12 +273,13 @@ impl Gauss {
         let sensor_decentre = [self.centre[0] - middle[0], self.centre[1] - middle[1]];
         let sensor_decentre = sensor_decentre.map(|pixels| pixels * pitch);
         let is_alone = elements.is_empty();
+        let mask = self.mask.clone().filter(|_| is_alone).map(ApertureSpec::Image);
         Ok(ThinLensCameraSpec {
             diffraction: false,
             focal_length: Some(Millimetres(self.focal)),
-            aperture: None,
+            f_number: (is_alone && mask.is_none()).then_some(self.focal.abs() / self.pupil),
+            aperture: mask,
             elements,
-            f_number: is_alone.then_some(self.focal.abs() / self.pupil),
             focus_distance: None,
             sensor_distance: Some(Millimetres(image)),
             fov: None,

@@ -101,6 +101,7 @@ pub(super) fn values(
     let mut scene = scene.clone();
     scene.camera = camera.clone();
     scene.sensor = None;
+    scene.tolerance = None;
     scene.render.samples = SamplesSpec::Count(samples);
     scene.layers = vec![LayerSpec::Radiance];
     let outputs = Outputs { npy: true, ..Outputs::NONE };

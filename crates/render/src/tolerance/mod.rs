@@ -10,11 +10,11 @@ mod groups;
 pub mod lens_models;
 mod light;
 mod pixel_views;
+mod small_things;
 mod verify;
 
 use etendue_accel::Accel;
-use etendue_camera::{Camera, CameraSpec, FalloffSpec, LensCamera};
-use etendue_optics::element::Opening;
+use etendue_camera::{Camera, CameraSpec, FalloffSpec};
 use etendue_scene::Scene;
 use etendue_scene::file::ToleranceSpec;
 use etendue_spectrum::Bands;
@@ -47,8 +47,6 @@ pub struct Field {
     pub rays: u32,
     /// Bands, at most, that are looked at: the first, the last, and some in between.
     pub bands: usize,
-    /// Whether the pupil is measured at one wavelength alone.
-    pub rough: bool,
     /// Chief rays across the neighbourhood of a place, at most, by which its depths are found: one every two pixels
     /// where that is enough.
     pub across: u32,
@@ -56,13 +54,11 @@ pub struct Field {
 
 impl Field {
     /// What a user who compares models gets.
-    pub const FINE: Self =
-        Self { size: [9, 7], rays: 1024, bands: usize::MAX, rough: false, across: 256 };
+    pub const FINE: Self = Self { size: [9, 7], rays: 1024, bands: usize::MAX, across: 256 };
     /// What a render does before it begins.
-    pub const QUICK: Self = Self { size: [9, 7], rays: 256, bands: 3, rough: true, across: 64 };
+    pub const QUICK: Self = Self { size: [9, 7], rays: 256, bands: 3, across: 64 };
     /// What a choice is verified by: places in between, and more bands.
-    pub const BETWEEN: Self =
-        Self { size: [16, 12], rays: 256, bands: 5, rough: false, across: 64 };
+    pub const BETWEEN: Self = Self { size: [16, 12], rays: 256, bands: 5, across: 64 };
 }
 
 /// A place of the picture.
@@ -166,7 +162,7 @@ impl FullView {
             places.iter_mut().for_each(|place| place.depths.push(depth));
         }
         let chosen = some_of(bands.count(), field.bands);
-        let camera = open(&scene.camera, bands, field.rough)?;
+        let camera = open(&scene.camera, bands)?;
         let seen = seen((&camera, bands), &chosen, &places, field.rays);
         let scale = lens_models::scale(&scene.camera).unwrap_or(f64::NAN);
         let bands = bands.clone();
@@ -268,8 +264,8 @@ impl FullView {
         camera: &Camera,
         tolerance: Tolerance,
     ) -> Result<Finding, RenderError> {
-        let Field { rays, rough, .. } = self.field;
-        let camera = open(camera, &self.bands, rough)?;
+        let rays = self.field.rays;
+        let camera = open(camera, &self.bands)?;
         let own = seen((&camera, &self.bands), &self.chosen, &self.places, rays);
         Ok(self.compared(model, &own, tolerance))
     }
@@ -339,9 +335,8 @@ fn with_falloff(full: &Camera, spec: CameraSpec, falloff: FalloffSpec) -> Option
     lens_models::model("falloff", full, &CameraSpec::Pinhole(spec)).ok()
 }
 
-fn open(camera: &Camera, bands: &Bands, rough: bool) -> Result<Camera, RenderError> {
-    let opened = if rough { camera.opened_roughly(bands) } else { camera.opened(bands) };
-    opened.map_err(|error| RenderError::Camera(error.why))
+fn open(camera: &Camera, bands: &Bands) -> Result<Camera, RenderError> {
+    camera.opened(bands).map_err(|error| RenderError::Camera(error.why))
 }
 
 /// Of so many bands a few numbers: the first, the last, and even ones in between.
@@ -350,13 +345,6 @@ fn some_of(count: usize, most: usize) -> Vec<usize> {
         return (0..count).collect();
     }
     (0..most).map(|k| k * (count - 1) / (most - 1).max(1)).collect()
-}
-
-/// Whether the pattern of a mask in the lens shows in what is out of focus.
-#[must_use]
-pub fn has_mask(lens: &LensCamera) -> bool {
-    let elements = lens.focused().train().elements();
-    elements.iter().any(|element| matches!(element.part.opening(), Some(Opening::Image(_))))
 }
 
 /// What is taken of a scene's tolerance.
@@ -470,12 +458,8 @@ fn simplest(
             return Ok(None);
         }
     };
-    let is_masked = has_mask(lens);
-    for LensModel { name, camera, .. } in models {
-        // The root mean square of a blur says nothing of the pattern in it.
-        if is_masked && ["thin", "thick"].contains(&name) {
-            continue;
-        }
+    // The root mean square of a blur says nothing of the pattern in it.
+    for LensModel { name, camera, .. } in models.into_iter().filter(|model| !model.lacks_mask) {
         if view.chief_displacement(&camera) > tolerance.pixels {
             continue;
         }

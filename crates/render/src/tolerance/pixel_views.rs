@@ -7,6 +7,7 @@
 //! Beside it the depths of the scene where the camera looks.
 
 use super::Place;
+use super::small_things::Cells;
 use etendue_accel::Accel;
 use etendue_camera::{Camera, CameraRays, FilmSamples, Pose, Sampler};
 use etendue_geometry::glam::{DVec2, DVec3};
@@ -165,12 +166,12 @@ pub(super) fn seen(
 /// Chief rays across each cell of the field, at least.
 const ACROSS: u32 = 8;
 
-/// Pixels between them, where there may be so many: what is three pixels large meets one.
+/// Pixels between them, where there may be so many.
 const STEP: f64 = 2.0;
 
 /// Places of the picture, each with the depths (m) that its neighbourhood shows: the nearest, the middle one
 /// and the farthest; infinity where an environment's image is seen. A place whose neighbourhood shows nothing
-/// has none. `most_across` is how many chief rays are sent across a neighbourhood, at most.
+/// has none. Things that these rays may pass by are looked for by their boxes. `most_across` is how many chief rays are sent across a neighbourhood, at most.
 pub(super) fn places(
     scene: &Scene,
     accel: &dyn Accel,
@@ -192,7 +193,19 @@ pub(super) fn places(
             places.push(Place { column: at[0], row: at[1], depths });
         }
     }
+    let step = [width / f64::from(columns - 1), height / f64::from(rows - 1)];
+    let across = step.map(|side| side / f64::from(rays_across(side, most_across)));
+    let cells =
+        Cells { count: size.map(|count| count as usize), step, ray_step: across[0].max(across[1]) };
+    cells.look_for_small((&scene.geometry, accel), &scene.camera, &mut places);
     places
+}
+
+/// Even rays across a cell of so many pixels.
+fn rays_across(side: f64, most: u32) -> u32 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it saturates")]
+    let wanted = (side / STEP).ceil() as u32;
+    wanted.clamp(ACROSS, most.max(ACROSS))
 }
 
 /// The depths (m) in a cell of the picture of a middle and a size (pixels).
@@ -205,9 +218,7 @@ fn depths_in_cell(
     let picture = camera.resolution().map(f64::from);
     let (mut columns, mut rows) = (Vec::new(), Vec::new());
     // Chief rays through even places around the middle, as far as the picture goes.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it saturates")]
-    let [across, down] =
-        size.map(|side| ((side / STEP).ceil() as u32).clamp(ACROSS, most_across.max(ACROSS)));
+    let [across, down] = size.map(|side| rays_across(side, most_across));
     for y in 0..down {
         for x in 0..across {
             let share = |i: u32, count: u32| (f64::from(i) + 0.5) / f64::from(count) - 0.5;

@@ -56,16 +56,30 @@ pub struct ReadLens {
     pub focus: Focus,
     /// The camera that it is the lens of, of a scene.
     pub camera: Option<Camera>,
-    /// Field angles (degrees) that its file names.
-    pub fields: Vec<f64>,
-    /// Wavelengths (nm) that its file names, the main one first.
-    pub wavelengths: Vec<f64>,
-    /// What each of them weighs; empty where the file weighs none.
-    pub weights: Vec<f64>,
     /// What was changed, assumed or left out when it was imported, in sentences.
     pub notes: Vec<String>,
     /// Every file that it was read from.
     pub inputs: Vec<PathBuf>,
+}
+
+impl ReadLens {
+    /// Fields (degrees) that its file names.
+    #[must_use]
+    pub fn fields(&self) -> Vec<f64> {
+        self.file.as_ref().map(LensFile::field_angles).unwrap_or_default()
+    }
+
+    /// Wavelengths (nm) that its file names, the main one first.
+    #[must_use]
+    pub fn wavelengths(&self) -> Vec<f64> {
+        self.file.as_ref().map(LensFile::wavelengths_nm).unwrap_or_default()
+    }
+
+    /// What each of them weighs; empty where the file weighs none.
+    #[must_use]
+    pub fn weights(&self) -> &[f64] {
+        self.file.as_ref().map_or(&[], |file| &file.weights)
+    }
 }
 
 /// Reads the lens of a lens file (`.json`), of a file of another program ([`LensFormat`]), or that of the camera of a
@@ -129,9 +143,6 @@ pub fn read_lens_at(
         file: None,
         focus: if distance > 0.0 { Focus::Sensor(distance) } else { Focus::AsWritten },
         camera: Some(camera.clone()),
-        fields: Vec::new(),
-        wavelengths: Vec::new(),
-        weights: Vec::new(),
         notes: Vec::new(),
         inputs: inputs(path, &folder),
     })
@@ -204,9 +215,6 @@ fn build(
         file: Some(file),
         focus: Focus::AsWritten,
         camera: None,
-        fields: Vec::new(),
-        wavelengths: Vec::new(),
-        weights: Vec::new(),
         notes: Vec::new(),
         inputs: inputs(&written.path, &folder),
     })
@@ -236,23 +244,13 @@ fn import(
         SceneError::Refused(Refusal::new(format!("{}, {source}", path.display())))
     };
     let lens = ZemaxLens::read_as(format, &bytes, configuration, glasses);
-    let ZemaxLens { file, fields, wavelengths, weights, notes, .. } = lens.map_err(zemax)?;
+    let ZemaxLens { file, notes, .. } = lens.map_err(zemax)?;
     let train = file
         .build(&GlassesAlone(glasses))
         .map_err(|error| zemax(ZemaxError { line: 0, why: error.to_string() }))?;
     let focus = Focus::AsWritten;
     let inputs = vec![path.to_owned()];
-    Ok(ReadLens {
-        train,
-        file: Some(file),
-        focus,
-        camera: None,
-        fields,
-        wavelengths,
-        weights,
-        notes,
-        inputs,
-    })
+    Ok(ReadLens { train, file: Some(file), focus, camera: None, notes, inputs })
 }
 
 fn not_a_lens(error: SceneError) -> SceneError {
@@ -277,9 +275,7 @@ fn fault(written: &WrittenPlaces, error: &LensError) -> SceneError {
             let why = format!("{} is the stop already; mark one of them", element(first));
             written.fault(element(second).key("stop"), why)
         }
-        LensError::Catalogue { index, why } => {
-            written.fault(ScenePath::of("glass_catalogs").index(*index), why)
-        }
+        LensError::Key { key, why } => written.fault(key, why),
         LensError::Wavelength(_) => written.fault("wavelength", error.to_string()),
         _ => written.fault("", error.to_string()),
     }

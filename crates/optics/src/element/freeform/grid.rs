@@ -8,9 +8,9 @@ use etendue_geometry::units::Millimetres;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::real::Real;
 use crate::element::Resolve;
 use crate::element::aperture::Picture;
+use crate::element::real::Real;
 
 /// Heights by a grey picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -3,7 +3,6 @@
 //!
 //! | module | idea |
 //! |---|---|
-//! | `real` | numbers with derivatives, so that each sag and phase is written once |
 //! | `terms` | Zernike, Chebyshev and Q polynomials, height maps |
 //! | `grid` | pictures as smooth surfaces |
 //! | `phase` | gratings, kinoforms, phase masks |
@@ -24,7 +23,6 @@
 
 mod grid;
 mod phase;
-mod real;
 mod terms;
 
 use std::collections::BTreeMap;
@@ -36,12 +34,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use self::phase::Phase;
-use self::real::{Dual, Real};
 use self::terms::Term;
 use super::Resolve;
 use super::mirror::MirrorMount;
 use super::newton::Profile;
 use super::rays::Ray;
+use super::real::{Dual, Real};
 use super::refract::{Media, Root, meet_conic};
 use super::surface::{Surface, checked_semi_diameter, vertex_curvature};
 use crate::glass::GlassSpec;
@@ -360,7 +358,7 @@ impl Freeform {
     }
 
     /// The sag and its slopes along x and y.
-    fn sag_and_slopes(&self, place: [f64; 2]) -> (f64, [f64; 2]) {
+    fn sag_and_slopes<T: Real>(&self, place: [T; 2]) -> (T, [T; 2]) {
         let sag = self.height(Dual::place(place));
         (sag.v, sag.d)
     }
@@ -398,7 +396,7 @@ impl FreeformSurface {
 
 impl Profile for FreeformSurface {
     /// ∂z/∂x and ∂z/∂y.
-    type Slope = [f64; 2];
+    type Slope<T: Real> = [T; 2];
 
     fn begin(&self, ray: Ray) -> (Ray, f64) {
         let on_plane = || {
@@ -415,13 +413,13 @@ impl Profile for FreeformSurface {
             true => self.shape.base.flipped(),
             false => self.shape.base.clone(),
         };
-        let hit = meet_conic::<false>(&base, ray, Root::Near);
+        let hit = meet_conic::<false, f64>(&base, ray, Root::Near);
         if hit.t.is_finite() { (hit.ray, hit.t) } else { on_plane() }
     }
 
-    fn sag_and_slope(&self, at: Ray) -> (f64, [f64; 2]) {
+    fn sag_and_slope<T: Real>(&self, at: Ray<T>) -> (T, [T; 2]) {
         if self.shape.is_fresnel {
-            return (0.0, [0.0; 2]);
+            return (T::constant(0.0), [T::constant(0.0); 2]);
         }
         let [x, y, _] = at.position;
         self.shape.sag_and_slopes([x, y])
@@ -431,7 +429,7 @@ impl Profile for FreeformSurface {
         self.sag_and_slope(root).1
     }
 
-    fn along(&self, at: Ray, [along_x, along_y]: [f64; 2]) -> f64 {
+    fn along<T: Real>(&self, at: Ray<T>, [along_x, along_y]: [T; 2]) -> T {
         let [u, v, w] = at.direction;
         w - along_x * u - along_y * v
     }
@@ -440,20 +438,22 @@ impl Profile for FreeformSurface {
         self.shape.holds(place)
     }
 
-    fn refract(&self, media: Media, at: Ray, slope: [f64; 2]) -> (Ray, bool) {
+    fn refract<T: Real>(&self, media: Media, at: Ray<T>, slope: [T; 2]) -> (Ray<T>, bool) {
         let [x, y, _] = at.position;
         let [along_x, along_y] = match self.shape.is_fresnel {
             true => self.shape.sag_and_slopes([x, y]).1,
             false => slope,
         };
-        let normal = [-along_x, -along_y, 1.0];
-        let length2 = 1.0 + along_x * along_x + along_y * along_y;
-        let along: f64 = (0..3).map(|i| at.direction[i] * normal[i]).sum();
+        let (one, [u, v, w]) = (T::constant(1.0), at.direction);
+        let normal = [-along_x, -along_y, one];
+        let length2 = one + along_x * along_x + along_y * along_y;
+        let along = u * normal[0] + v * normal[1] + w;
         match &self.shape.phase {
             None => media.refract(at, normal, length2, along * along, along),
             Some(phase) => {
                 let gradient = phase.at(Dual::place([x, y])).d;
-                let kick = [self.kick * gradient[0], self.kick * gradient[1], 0.0];
+                let [kick_x, kick_y] = gradient.map(|along| along.times(self.kick));
+                let kick = [kick_x, kick_y, T::constant(0.0)];
                 media.diffract(at, normal, length2, along, kick)
             }
         }
@@ -480,7 +480,7 @@ impl Profile for FreeformSurface {
             (-PLACES..=PLACES).flat_map(|i| (-PLACES..=PLACES).map(move |j| [at(i), at(j)]));
         let sags = places.map(|[x, y]| {
             let ray = Ray { position: [x, y, 0.0], direction: [0.0, 0.0, 1.0] };
-            self.sag_and_slope(ray).0
+            self.sag_and_slope::<f64>(ray).0
         });
         let finite = sags.filter(|sag| sag.is_finite());
         finite.fold([0.0, 0.0], |[low, high]: [f64; 2], sag| [low.min(sag), high.max(sag)])

@@ -13,10 +13,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::grid::Grid;
-use super::real::Real;
 use super::terms::{pairs, polynomial};
 use crate::element::Resolve;
 use crate::element::aperture::Picture;
+use crate::element::real::Real;
 
 /// A phase as a lens file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -13,9 +13,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::grid::{Grid, HeightMapSpec};
-use super::real::{Real, power};
 use crate::analysis::zernike::ZernikeOrder;
 use crate::element::Resolve;
+use crate::element::real::{Real, power};
 
 /// The most of any list of coefficients.
 const MOST_TERMS: usize = 400;

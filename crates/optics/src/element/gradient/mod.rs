@@ -84,7 +84,7 @@ pub struct Gradient {
     /// Rays farther from the axis are stopped (mm).
     pub(crate) semi_diameter: f64,
     /// The length of a step (mm).
-    step: f64,
+    pub(crate) step: f64,
 }
 
 /// How the index goes.

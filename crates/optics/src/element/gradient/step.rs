@@ -28,6 +28,13 @@ pub(crate) struct GradedMedium {
     pub(crate) length: f64,
 }
 
+impl GradedMedium {
+    /// About how many steps a ray is followed in.
+    pub(crate) fn steps(&self) -> f64 {
+        (self.length.abs() / self.gap.gradient.step).ceil()
+    }
+}
+
 /// The media on both sides of an element, as light meets it, at least one of them a gradient.
 #[derive(Debug, Clone)]
 pub(crate) struct Graded {

@@ -15,8 +15,8 @@ use glam::DVec2;
 
 use super::LensReport;
 use crate::glass::GlassError;
-use crate::train::OpticalTrain;
 use crate::train::analysis::{FieldIllumination, Spot, illumination, spot};
+use crate::train::{FieldSpec, OpticalTrain};
 use etendue_chart::{Axis, Canvas, Chart, Series, TextAnchor, Theme, round_length, short};
 use layout::{bodies, drawn_fields, end_of, fan, heights, strokes};
 
@@ -142,7 +142,7 @@ fn boxes(train: &OpticalTrain, report: &LensReport) -> Result<Vec<SpotBox>, Glas
     }
     let of_field = |&field: &f64| SpotBox {
         field,
-        spots: lenses.iter().map(|at| spot(train, at, field, z)).collect(),
+        spots: lenses.iter().map(|at| spot(train, at, &FieldSpec::at(field), z)).collect(),
         main: report.spots.iter().find(|spot| spot.field == field).cloned(),
     };
     Ok(report.fields.iter().map(of_field).collect())

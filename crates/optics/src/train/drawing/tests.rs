@@ -89,7 +89,9 @@ fn a_box_of_spots_has_the_rms_of_all_its_wavelengths() {
     let z = report.sensor_z.unwrap();
     let points: Vec<glam::DVec2> = [486.13, 587.56, 656.27]
         .iter()
-        .filter_map(|&nm| crate::train::analysis::spot(&train, &train.at(nm).unwrap(), 0.0, z))
+        .filter_map(|&nm| {
+            crate::train::analysis::spot(&train, &train.at(nm).unwrap(), &FieldSpec::at(0.0), z)
+        })
         .flat_map(|spot| spot.points)
         .collect();
     // On the axis all centroids are the same.

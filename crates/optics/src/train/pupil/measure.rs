@@ -63,7 +63,12 @@ impl ExitPupil {
             for column in 0..=columns {
                 let film = self.film_point(self.fine_film(2 * column, 2 * row));
                 let previous = self.nodes.last().filter(|_| column > 0);
-                let node = frame_at(train, lenses, film, previous);
+                let mut node = frame_at(train, lenses, film, previous);
+                if self.layout == NodeLayout::Radial {
+                    // What passes from a place on the x axis of a round lens is the same on both sides of it.
+                    node.half.y += node.centre.y.abs();
+                    node.centre.y = 0.0;
+                }
                 self.nodes.push(node);
             }
         }
@@ -186,7 +191,7 @@ impl ExitPupil {
         &self,
         lenses: &[MonochromaticTrain],
         initial: f64,
-        measure: fn(&mut [f64; 2 * ANGLES], &MonochromaticTrain, DVec3, [DVec2; 2]),
+        measure: fn(&mut [f64; 2 * ANGLES], &MonochromaticTrain, DVec3, &Searched),
     ) -> Vec<[f64; 2 * ANGLES]> {
         let [columns, rows] = self.intervals();
         let columns = 2 * columns + 1;
@@ -195,8 +200,9 @@ impl ExitPupil {
             let mut radii = [initial; 2 * ANGLES];
             if let Some(frame) = self.frame(film) {
                 let at = self.film_point(film);
+                let searched = Searched { frame, is_round: self.is_radial() };
                 for lens in lenses {
-                    measure(&mut radii, lens, at, frame);
+                    measure(&mut radii, lens, at, &searched);
                 }
             }
             radii
@@ -392,8 +398,13 @@ fn frame_at(
 }
 
 /// Raises `radii` to the outermost passing ray of each angle from `film` in the frame.
-fn widen(radii: &mut [f64; 2 * ANGLES], lens: &MonochromaticTrain, film: DVec3, frame: [DVec2; 2]) {
-    for (radius, found) in radii.iter_mut().zip(limits(Limit::Outer, lens, film, frame)) {
+fn widen(
+    radii: &mut [f64; 2 * ANGLES],
+    lens: &MonochromaticTrain,
+    film: DVec3,
+    searched: &Searched,
+) {
+    for (radius, found) in radii.iter_mut().zip(limits(Limit::Outer, lens, film, searched)) {
         *radius = found.map_or(*radius, |found| radius.max(found));
     }
 }
@@ -403,12 +414,19 @@ fn narrow(
     radii: &mut [f64; 2 * ANGLES],
     lens: &MonochromaticTrain,
     film: DVec3,
-    frame: [DVec2; 2],
+    searched: &Searched,
 ) {
-    for (radius, found) in radii.iter_mut().zip(limits(Limit::Inner, lens, film, frame)) {
+    for (radius, found) in radii.iter_mut().zip(limits(Limit::Inner, lens, film, searched)) {
         // Where nothing passes at an angle, nothing is known.
         *radius = radius.min(found.unwrap_or(0.0));
     }
+}
+
+/// Where passing rays are looked for.
+struct Searched {
+    /// The middle and the half axes of slopes.
+    frame: [DVec2; 2],
+    is_round: bool,
 }
 
 /// Which of the passing rays of an angle is looked for.
@@ -426,14 +444,17 @@ fn limits(
     limit: Limit,
     lens: &MonochromaticTrain,
     film: DVec3,
-    [centre, half]: [DVec2; 2],
+    &Searched { frame: [centre, half], is_round }: &Searched,
 ) -> [Option<f64>; 2 * ANGLES] {
     // Costly trains are measured more coarsely: to 0.003 of the radius, which [`MARGIN`] covers.
     let (scanned, halvings) = if lens.is_costly() { (16, 5) } else { (32, 12) };
     // The frame's corners are √2 from its centre.
     const OUTERMOST: f64 = 1.6;
+    // Both sides of the x axis are alike there.
+    let is_mirrored = is_round && film.y == 0.0 && centre.y == 0.0;
+    let angles = if is_mirrored { ANGLES + 1 } else { 2 * ANGLES };
     let angle = |i: usize| DVec2::from_angle(0.5 * turn_of(i) * std::f64::consts::TAU) * half;
-    let directions: Vec<DVec2> = (0..2 * ANGLES).map(angle).collect();
+    let directions: Vec<DVec2> = (0..angles).map(angle).collect();
     let passes = |places: &[(usize, f64)]| -> Vec<bool> {
         let mut rays = LensRays::with_capacity(places.len());
         for &(i, radius) in places {
@@ -448,9 +469,8 @@ fn limits(
         Limit::Inner => (radius - by).max(0.0),
     };
     let mut width = OUTERMOST / f64::from(scanned);
-    let scan: Vec<(usize, f64)> = (0..2 * ANGLES)
-        .flat_map(|i| (0..scanned).map(move |s| (i, width * f64::from(s))))
-        .collect();
+    let scan: Vec<(usize, f64)> =
+        (0..angles).flat_map(|i| (0..scanned).map(move |s| (i, width * f64::from(s)))).collect();
     let mut last = [None; 2 * ANGLES];
     for (&(i, radius), passed) in scan.iter().zip(passes(&scan)) {
         if passed && (limit == Limit::Outer || last[i].is_none()) {
@@ -458,7 +478,7 @@ fn limits(
         }
     }
     let mut passing: Vec<(usize, f64)> =
-        (0..2 * ANGLES).filter_map(|i| last[i].map(|radius| (i, radius))).collect();
+        (0..angles).filter_map(|i| last[i].map(|radius| (i, radius))).collect();
     for _ in 0..halvings {
         width *= 0.5;
         let middles: Vec<(usize, f64)> =
@@ -472,6 +492,9 @@ fn limits(
     }
     for (i, radius) in passing {
         last[i] = Some(beyond(radius, width));
+    }
+    for i in angles..2 * ANGLES {
+        last[i] = last[2 * ANGLES - i];
     }
     last
 }

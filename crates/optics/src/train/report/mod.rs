@@ -12,7 +12,7 @@ use super::analysis::{
     FieldDistortion, FieldIllumination, Spot, colour_shifts, distortion, half_field, illumination,
     image_circle, spot,
 };
-use super::{Focus, MonochromaticTrain, OpticalTrain, Paraxial};
+use super::{FieldSpec, Focus, MonochromaticTrain, OpticalTrain, Paraxial, VignettingSpec};
 use crate::glass::{FRAUNHOFER_C, FRAUNHOFER_D, FRAUNHOFER_F, GlassError};
 
 /// Field angles of a lens whose image circle has no end (degrees).
@@ -32,6 +32,8 @@ pub struct Inquiry {
     pub wavelengths: Option<Vec<f64>>,
     /// Field angles (degrees); shares of the field of view when absent.
     pub fields: Option<Vec<f64>>,
+    /// Fields as the lens' file states them: those whose pupil vignetting makes smaller are looked at over that, too.
+    pub stated: Vec<FieldSpec>,
     /// Where the sensor stands.
     pub focus: Focus,
 }
@@ -82,6 +84,10 @@ pub struct LensReport {
     pub fields: Vec<f64>,
     /// Spots at those fields that light reaches.
     pub spots: Vec<Spot>,
+    /// Spots over what the file's vignetting factors leave of the pupil, at the fields that have such factors. Rims end
+    /// rays here as well.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub vignetted: Vec<VignettedSpot>,
     /// Distortion at those fields whose chief ray arrives.
     pub distortion: Vec<FieldDistortion>,
     /// Relative illumination at those fields whose chief ray arrives.
@@ -132,6 +138,18 @@ pub struct ElementRow {
     pub index: f64,
     /// How far from its axis it lets light pass (mm); `null` when unlimited.
     pub semi_diameter: Option<f64>,
+}
+
+/// A spot over what vignetting factors leave of a pupil.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct VignettedSpot {
+    /// The share of the whole pupil's area that the factors leave.
+    pub stated: f64,
+    /// The share of the whole pupil's rays that the rims let through.
+    pub passed: f64,
+    /// The spot.
+    #[serde(flatten)]
+    pub spot: Spot,
 }
 
 /// A wavelength against the design's.
@@ -194,21 +212,37 @@ impl LensReport {
             colour: colour(train, &wavelengths, &fields, sensor_z)?,
             fields,
             spots: Vec::new(),
+            vignetted: Vec::new(),
             distortion: Vec::new(),
             relative_illumination: Vec::new(),
             out_of_range: out_of_range(train, &wavelengths),
             notes,
         };
         if let Some(z) = sensor_z {
-            report.look_at_fields(train, &at, z);
+            report.look_at_fields(train, &at, (&inquiry.stated, z));
         }
         report.note_missing_spots();
         Ok(report)
     }
 
-    fn look_at_fields(&mut self, train: &OpticalTrain, at: &MonochromaticTrain, z: f64) {
+    fn look_at_fields(
+        &mut self,
+        train: &OpticalTrain,
+        at: &MonochromaticTrain,
+        (stated, z): (&[FieldSpec], f64),
+    ) {
         for &field in &self.fields {
-            self.spots.extend(spot(train, at, field, z));
+            let whole = spot(train, at, &FieldSpec::at(field), z);
+            let is_vignetted = |own: &&FieldSpec| {
+                own.angle.0 == field && own.vignetting != VignettingSpec::default()
+            };
+            if let Some(own) = stated.iter().find(is_vignetted) {
+                let passed = whole.as_ref().map_or(0.0, Spot::passed);
+                let stated = own.vignetting.area();
+                let spot = spot(train, at, own, z);
+                self.vignetted.extend(spot.map(|spot| VignettedSpot { stated, passed, spot }));
+            }
+            self.spots.extend(whole);
             self.distortion.extend(distortion(train, at, field, z));
         }
         self.relative_illumination = illumination(train, at, &self.fields, z);

@@ -131,11 +131,34 @@ impl LensReport {
                 of_spot(|s| 1e3 * s.geometric),
                 of_spot(|s| 1e3 * s.best_rms),
                 of_spot(|s| s.best_focus),
-                of_spot(|s| 100.0 * share(s.rays_passed, s.rays_launched)),
+                of_spot(|s| 100.0 * s.passed()),
                 number(light.map(|l| 100.0 * l.relative), |v| format!("{v:.2}")),
             ]);
         }
         writeln!(f, "\nOn the sensor, for points at infinity")?;
+        write!(f, "{table}")?;
+        self.write_vignetted(f)
+    }
+
+    fn write_vignetted(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        if self.vignetted.is_empty() {
+            return Ok(());
+        }
+        let mut table =
+            Table::new(&["field", "factors leave", "rims leave", "RMS spot", "largest"])
+                .with_units(&["deg", "%", "%", "um", "um"])
+                .indented(2);
+        for row in &self.vignetted {
+            let values = [
+                row.spot.field,
+                100.0 * row.stated,
+                100.0 * row.passed,
+                1e3 * row.spot.rms,
+                1e3 * row.spot.geometric,
+            ];
+            table.push(values.map(digits));
+        }
+        writeln!(f, "\nThe same over what the file's vignetting factors leave of the pupil")?;
         write!(f, "{table}")
     }
 
@@ -180,11 +203,6 @@ fn digits(value: f64) -> Cell {
 
 fn or_none(value: Option<f64>, show: impl Fn(f64) -> String) -> String {
     value.map_or(NONE.to_owned(), show)
-}
-
-#[expect(clippy::cast_precision_loss, reason = "counts of some hundred rays")]
-fn share(part: usize, whole: usize) -> f64 {
-    part as f64 / whole.max(1) as f64
 }
 
 #[cfg(test)]

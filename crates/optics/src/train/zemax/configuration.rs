@@ -19,7 +19,8 @@ use glam::{DMat3, DVec3};
 use super::ZemaxError;
 use super::sheet::{Aperture, SheetLine, ZemaxSheet};
 use crate::train::analysis::chief_height;
-use crate::train::{Focus, Isometry, OpticalTrain};
+use crate::train::{FieldSpec, Focus, Isometry, OpticalTrain, VignettingSpec};
+use etendue_geometry::units::Degrees;
 
 /// Thicknesses from here on are infinite, as OpticStudio has it.
 const INFINITE: f64 = 1e10;
@@ -173,8 +174,8 @@ pub(super) struct Fields {
     pub(super) y: Vec<f64>,
     /// What each of them weighs.
     pub(super) weights: Vec<f64>,
-    /// Lines and commands of vignetting factors that are not 0.
-    pub(super) vignetted: Vec<(usize, String)>,
+    /// What vignetting leaves of their pupils: VDX, VDY, VCX, VCY, VAN.
+    pub(super) vignetting: [Vec<f64>; 5],
 }
 
 impl Fields {
@@ -186,19 +187,19 @@ impl Fields {
         Ok(())
     }
 
-    /// The angles (degrees) of the chief rays of the fields, without those that repeat, and sentences
-    /// on fields that have none. `unit` is the file's length in millimetres; `object_z` is where the
+    /// The fields by the angles of their chief rays, without those that repeat, and sentences on fields that have
+    /// none. `unit` is the file's length in millimetres; `object_z` is where the
     /// object stands in lens coordinates (mm).
     pub(super) fn angles(
         &self,
         unit: f64,
         train: &OpticalTrain,
         object_z: Option<f64>,
-    ) -> (Vec<f64>, Vec<String>) {
+    ) -> (Vec<FieldSpec>, Vec<String>) {
         let affordable = MOST_WORK / train.elements().len().max(1);
         let most = affordable.clamp(FEWEST_FIELDS, MOST_FIELDS);
-        let (mut angles, mut notes): (Vec<f64>, Vec<String>) = (Vec::new(), Vec::new());
-        for [x, y] in self.points().take(most) {
+        let (mut fields, mut notes): (Vec<FieldSpec>, Vec<String>) = (Vec::new(), Vec::new());
+        for (i, [x, y]) in self.points().take(most).enumerate() {
             let height = unit * if x == 0.0 { y } else { x.hypot(y) };
             // FTYP: angles, heights of the object, or heights of the paraxial or real image.
             let found = match self.kind {
@@ -209,7 +210,11 @@ impl Fields {
                 kind => Err(format!("fields of kind {kind} are neither angles nor heights")),
             };
             match found {
-                Ok(angle) if angle.abs() < 180.0 && !angles.contains(&angle) => angles.push(angle),
+                Ok(angle) if angle.abs() < 180.0 => {
+                    if !fields.iter().any(|field| field.angle.0 == angle) {
+                        fields.push(self.field(i, angle, [x, y]));
+                    }
+                }
                 Ok(_) => {}
                 Err(why) if notes.contains(&why) => {}
                 Err(why) => notes.push(why),
@@ -221,7 +226,26 @@ impl Fields {
         if count > most {
             notes.push(format!("of {count} fields the first {most} are taken"));
         }
-        (angles, notes)
+        (fields, notes)
+    }
+
+    /// Field `i` at an angle (degrees), with its weight and what vignetting leaves of its pupil, turned as its point
+    /// is into the plane of y and z.
+    fn field(&self, i: usize, angle: f64, [x, y]: [f64; 2]) -> FieldSpec {
+        let weight = self.weights.get(i).copied().filter(|w| *w >= 0.0).unwrap_or(1.0);
+        let factors: [f64; 5] =
+            std::array::from_fn(|kind| self.vignetting[kind].get(i).copied().unwrap_or(0.0));
+        let [vdx, vdy, vcx, vcy, van] = factors;
+        let turned = if x == 0.0 { 0.0 } else { 90.0 - y.atan2(x).to_degrees() };
+        let vignetting = match factors == [0.0; 5] {
+            true => VignettingSpec::default(),
+            false => VignettingSpec {
+                decentre: [vdx, vdy],
+                compression: [vcx, vcy],
+                rotation: Degrees(van + turned),
+            },
+        };
+        FieldSpec { weight, vignetting, ..FieldSpec::at(angle) }
     }
 
     fn points(&self) -> impl Iterator<Item = [f64; 2]> + '_ {

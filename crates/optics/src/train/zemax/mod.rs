@@ -78,14 +78,8 @@ impl ZemaxError {
 /// A lens as another program's file has it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ZemaxLens {
-    /// The lens.
+    /// The lens, with its fields and wavelengths.
     pub file: LensFile,
-    /// Field angles (degrees).
-    pub fields: Vec<f64>,
-    /// Wavelengths (nm), the primary one first.
-    pub wavelengths: Vec<f64>,
-    /// What each of them weighs; empty where the file weighs none.
-    pub weights: Vec<f64>,
     /// What was changed, assumed or left out, in sentences.
     pub notes: Vec<String>,
     /// The effective focal length that the file states (mm).
@@ -186,19 +180,16 @@ impl ZemaxLens {
         file.sensor = (sensor != SensorMount::default()).then_some(sensor);
         let (wavelengths, weights) = sheet.wavelengths_nm();
         file.wavelength = wavelengths.first().copied().map(Nanometres);
+        file.wavelengths = wavelengths.into_iter().map(Nanometres).collect();
+        file.weights = weights;
         // What only the built train tells: the stop, field angles, and whether the focal length is
         // as stated.
         let train = open_stop(&mut file, (sheet, glasses), object_z, &mut notes)?;
         let (fields, left_out) = sheet.fields.angles(sheet.unit, &train, object_z);
         notes.extend(left_out);
-        let mut lens = Self {
-            fields,
-            file,
-            wavelengths,
-            weights,
-            notes,
-            stated_efl: sheet.stated_efl.map(|efl| efl * sheet.unit),
-        };
+        file.fields = fields;
+        let stated_efl = sheet.stated_efl.map(|efl| efl * sheet.unit);
+        let mut lens = Self { file, notes, stated_efl };
         lens.compare_focal_length(&train);
         lens.notes.extend(sheet.what_is_left_out());
         Ok(lens)
@@ -259,12 +250,24 @@ impl Importer<'_> {
                 let flat_in_air =
                     row.is_flat() && medium_is_air && row.glass.is_none() && !row.mirror;
                 let here = axes.unfolded(&way.space, way.sense);
-                for (opening, decentre) in row.sheets(unit) {
+                // A system's aperture makes the stop round, whatever else stands there.
+                let may_be_alone = flat_in_air && (!row.stop || self.sheet.aperture.is_none());
+                let alone = may_be_alone.then(|| row.opening_alone(unit)).flatten();
+                let is_alone = alone.is_some();
+                for (opening, decentre) in
+                    alone.map_or_else(|| row.sheets(unit), |sheet| vec![sheet])
+                {
                     check_turn(row, &here)?;
                     self.place_sheet(opening, decentre, &here, &mut way);
                     first_z = first_z.or(Some(here.placed().z));
                 }
-                if let Some(part) = self.part(row, flat_in_air)? {
+                if is_alone {
+                    self.elements
+                        .iter_mut()
+                        .last()
+                        .into_iter()
+                        .for_each(|e| e.mount.stop = row.stop);
+                } else if let Some(part) = self.part(row, flat_in_air)? {
                     if !row.is_round() {
                         check_turn(row, &here)?;
                     }

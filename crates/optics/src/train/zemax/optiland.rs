@@ -276,7 +276,11 @@ fn rim(aperture: &Value, row: &mut SheetRow) -> Result<(), String> {
         SheetOpening::Ellipse(half) | SheetOpening::Rectangle(half) => {
             half.iter().all(|half| *half > 0.0 && half.is_finite())
         }
-        SheetOpening::Disk(_) | SheetOpening::Spider(..) | SheetOpening::Circle(_) => true,
+        SheetOpening::Disk(_)
+        | SheetOpening::Spider(..)
+        | SheetOpening::OpaqueRectangle(_)
+        | SheetOpening::OpaqueEllipse(_)
+        | SheetOpening::Circle(_) => true,
     };
     match row.openings.iter().all(is_open) && row.aperture_decentre.iter().all(|at| at.is_finite())
     {

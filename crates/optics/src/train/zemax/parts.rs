@@ -26,10 +26,12 @@ impl Importer<'_> {
         }
         if flat_in_air {
             if !row.stop && !row.has_fixed_rim() {
-                self.notes.push(format!(
-                    "{}: a plane in air that does nothing is left out",
-                    self.sheet.place(row.line)
-                ));
+                if row.sheets(unit).is_empty() {
+                    self.notes.push(format!(
+                        "{}: a plane in air that does nothing is left out",
+                        self.sheet.place(row.line)
+                    ));
+                }
                 return Ok(None);
             }
             // Nothing limits a stop of unknown size yet; the system's aperture may.
@@ -186,6 +188,7 @@ impl SheetRow {
             | SurfaceShape::CoordinateBreak
             | SurfaceShape::Biconic
             | SurfaceShape::Freeform
+            | SurfaceShape::Tilted
             | SurfaceShape::Grating => {}
         }
         Ok(terms)
@@ -198,6 +201,7 @@ impl SheetRow {
             SurfaceShape::Toroidal
                 | SurfaceShape::Biconic
                 | SurfaceShape::Grating
+                | SurfaceShape::Tilted
                 | SurfaceShape::ZernikeStandard
                 | SurfaceShape::ZernikeFringe
         ) && self.freeform.as_ref().is_none_or(|spec| spec.sag.is_empty() && spec.phase.is_none())
@@ -254,6 +258,11 @@ impl SheetRow {
         let order = match self.shape {
             SurfaceShape::ZernikeStandard => ZernikeOrder::Noll,
             SurfaceShape::ZernikeFringe => ZernikeOrder::Fringe,
+            // The tangents of a plane's angles along x and y.
+            SurfaceShape::Tilted => {
+                let coefficients = vec![(1, 0, self.parameter(1)), (0, 1, self.parameter(2))];
+                return Ok(vec![SagSpec::Polynomial { radius: Millimetres(1.0), coefficients }]);
+            }
             SurfaceShape::Biconic => {
                 let why = format!(
                     "a biconic mirror has no counterpart here; write a toroid ({toroid}), or a glass"
@@ -313,6 +322,36 @@ impl SheetRow {
         }))
     }
 
+    /// The one aperture that a plane in air is, where it is one with an end of its own: a rectangle, an ellipse, a ring or
+    /// a spider in one.
+    pub(super) fn opening_alone(&self, unit: f64) -> Option<(ApertureSpec, [f64; 2])> {
+        let radius = self.clear_radius().map(|radius| Millimetres(radius * unit));
+        let inner_radius = Millimetres(self.inner * unit);
+        // The edge of a stop that has no other is its semi-diameter.
+        if self.stop && radius.is_none() && !self.has_corners() {
+            return None;
+        }
+        let is_ring = self.inner > 0.0 || radius.is_some();
+        let sheets = self.sheets(unit);
+        let spec = match &sheets[..] {
+            [(spec @ (ApertureSpec::Rectangular(shape) | ApertureSpec::Elliptical(shape)), _)]
+                if !shape.obscures && radius.is_none() =>
+            {
+                spec.clone()
+            }
+            [(ApertureSpec::Annular(_), _)] if self.inner > 0.0 => {
+                ApertureSpec::Annular(AnnularSpec { inner_radius, radius })
+            }
+            [(ApertureSpec::Spider(spider), _)] | [(ApertureSpec::Spider(spider), _), _]
+                if is_ring && self.aperture_decentre == [0.0; 2] =>
+            {
+                ApertureSpec::Spider(SpiderSpec { inner_radius, radius, ..spider.clone() })
+            }
+            _ => return None,
+        };
+        Some((spec, self.aperture_decentre.map(|value| value * unit)))
+    }
+
     /// Its apertures beside its rim, and where they stand across its axis (mm).
     pub(super) fn sheets(&self, unit: f64) -> Vec<(ApertureSpec, [f64; 2])> {
         let length = |value: f64| Millimetres(value * unit);
@@ -324,17 +363,20 @@ impl SheetRow {
         if let (Some(radius), true) = (self.clear_radius(), decentre != [0.0; 2]) {
             openings.push(SheetOpening::Circle(radius));
         }
-        let boxed = |half: [f64; 2]| BoxSpec {
+        let boxed = |half: [f64; 2], obscures: bool| BoxSpec {
             width: length(2.0 * half[0]),
             height: length(2.0 * half[1]),
             rotation: Degrees(0.0),
+            obscures,
         };
         let spec = |opening: SheetOpening| match opening {
             SheetOpening::Disk(radius) => {
                 ApertureSpec::Annular(AnnularSpec { inner_radius: length(radius), radius: None })
             }
-            SheetOpening::Rectangle(half) => ApertureSpec::Rectangular(boxed(half)),
-            SheetOpening::Ellipse(half) => ApertureSpec::Elliptical(boxed(half)),
+            SheetOpening::Rectangle(half) => ApertureSpec::Rectangular(boxed(half, false)),
+            SheetOpening::Ellipse(half) => ApertureSpec::Elliptical(boxed(half, false)),
+            SheetOpening::OpaqueRectangle(half) => ApertureSpec::Rectangular(boxed(half, true)),
+            SheetOpening::OpaqueEllipse(half) => ApertureSpec::Elliptical(boxed(half, true)),
             SheetOpening::Circle(radius) => {
                 ApertureSpec::Circular(CircularSpec { radius: length(radius) })
             }

@@ -37,6 +37,9 @@ pub(super) struct SheetRow {
     pub(super) clear: Option<f64>,
 }
 
+/// Radii from here on are no limit, as files write it (in any unit).
+const OPEN: f64 = 1e10;
+
 /// The types that have a counterpart here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum SurfaceShape {
@@ -54,6 +57,7 @@ pub(super) enum SurfaceShape {
     ZernikeStandard,
     ZernikeFringe,
     Fresnel,
+    Tilted,
     Freeform,
 }
 
@@ -68,7 +72,7 @@ impl SurfaceShape {
             Self::ExtendedAsphere => usize::MAX..=usize::MAX,
             Self::Paraxial => 1..=1,
             Self::CoordinateBreak => 1..=6,
-            Self::Biconic | Self::Grating => 1..=2,
+            Self::Biconic | Self::Grating | Self::Tilted => 1..=2,
             Self::Binary2 => 0..=8,
         }
     }
@@ -83,6 +87,10 @@ pub(super) enum SheetOpening {
     Rectangle([f64; 2]),
     /// By half its axes.
     Ellipse([f64; 2]),
+    /// A rectangle in the way, by half its sides.
+    OpaqueRectangle([f64; 2]),
+    /// An ellipse in the way, by half its axes.
+    OpaqueEllipse([f64; 2]),
     /// Width and number of arms.
     Spider(f64, u32),
     /// A circle that stands beside the axis, by its radius.
@@ -147,9 +155,30 @@ impl SheetRow {
                 self.semi_diameter = Some(length).filter(|length| *length > 0.0);
                 self.fixed = line.number_or(1, 0.0)? == 1.0;
             }
+            // The tab of a surface's tilts and decentres.
+            "SCBD" if line.rest.split_whitespace().any(|word| word.parse() != Ok(0.0)) => {
+                return Err(line.error(
+                    "the tilt or decentre of a surface by itself cannot be imported; write COORDBRK before and behind \
+                     it (in OpticStudio: Tilt/Decenter Elements)",
+                ));
+            }
+            _ => return self.read_aperture(line),
+        }
+        Ok(true)
+    }
+
+    /// Whether the line is one of an aperture's.
+    fn read_aperture(&mut self, line: &SheetLine<'_>) -> Result<bool, ZemaxError> {
+        match line.command {
+            // Without an end is how a file writes that there is none outside.
             "CLAP" | "FLAP" => {
+                let is_open = |i: usize| line.word(i).is_some_and(|word| word.starts_with("INF"));
+                if is_open(0) {
+                    return Ok(true);
+                }
                 self.inner = line.number(0)?;
-                self.clear = Some(line.number(1)?).filter(|length| *length > 0.0);
+                let clear = if is_open(1) { f64::INFINITY } else { line.number(1)? };
+                self.clear = Some(clear).filter(|length| *length > 0.0 && *length < OPEN);
                 if self.inner < 0.0 || self.clear.is_some_and(|clear| self.inner >= clear) {
                     return Err(
                         line.error("the inner radius must be from 0 on and below the outer one")
@@ -162,32 +191,38 @@ impl SheetRow {
             "OBSC" if line.number(0)? == 0.0 && line.number(1)? > 0.0 => {
                 self.openings.push(SheetOpening::Disk(line.number(1)?));
             }
-            "SQAP" | "ELAP" => {
+            "SQAP" | "ELAP" | "SQOB" | "ELOB" => {
                 let half = [line.number(0)?, line.number(1)?];
+                let obscures = line.command.ends_with("OB");
                 if half.iter().any(|half| *half <= 0.0) {
+                    // One in the way that covers nothing.
+                    if obscures && half.iter().all(|half| *half >= 0.0) {
+                        return Ok(true);
+                    }
                     return Err(line.error("both half widths must be positive"));
                 }
-                self.openings.push(match line.command {
-                    "SQAP" => SheetOpening::Rectangle(half),
-                    _ => SheetOpening::Ellipse(half),
+                self.openings.push(match (line.command.starts_with("SQ"), obscures) {
+                    (true, false) => SheetOpening::Rectangle(half),
+                    (false, false) => SheetOpening::Ellipse(half),
+                    (true, true) => SheetOpening::OpaqueRectangle(half),
+                    (false, true) => SheetOpening::OpaqueEllipse(half),
                 });
             }
             "SPID" => {
                 let arms = u32::try_from(line.index(1)?).unwrap_or(u32::MAX);
                 self.openings.push(SheetOpening::Spider(line.number(0)?, arms));
             }
-            "OBSC" | "SQOB" | "ELOB" => {
+            "OBSC" => {
                 return Err(line.error(
-                    "of what stands in the way of the light only round disks (OBSC 0 and a radius) and spiders (SPID) \
-                     can be imported; take the line out for the lens without it, and add its shadow to the lens file \
-                     that --save writes, as an `aperture` with a mask (\"shape\": \"image\")",
+                    "a ring in the way cannot be imported; write OBSC 0 and a radius, or take the line out and add the \
+                     ring to the lens file that --save writes, as an `aperture` with a mask (\"shape\": \"image\")",
                 ));
             }
-            "UDAP" => {
+            // Its points stand in a file of OpticStudio's own folder.
+            "UDAP" | "UDAD" | "USAP" | "USOB" => {
                 return Err(line.error(
-                    "an aperture by points of the user's cannot be imported; write CLAP 0 and the radius that the \
-                     light is to go by, SQAP or ELAP with half widths, or take the line out to go by the \
-                     semi-diameter",
+                    "an aperture by points of the user's cannot be imported; take the line out, and add the points to \
+                     the lens file that --save writes, as an `aperture` of \"shape\": \"outline\" with its `corners`",
                 ));
             }
             // The substrate of a mirror, of which every surface has one; a mirror is GLAS MIRROR.
@@ -238,7 +273,7 @@ impl SheetRow {
         self.clear
     }
 
-    fn has_corners(&self) -> bool {
+    pub(super) fn has_corners(&self) -> bool {
         let is_shape = |opening: &SheetOpening| {
             matches!(opening, SheetOpening::Rectangle(_) | SheetOpening::Ellipse(_))
         };
@@ -275,9 +310,10 @@ fn shape(line: &SheetLine<'_>) -> Result<SurfaceShape, ZemaxError> {
         Some("SZERNSAG") => Ok(SurfaceShape::ZernikeStandard),
         Some("FZERNSAG") => Ok(SurfaceShape::ZernikeFringe),
         Some("FRESNELS") => Ok(SurfaceShape::Fresnel),
+        Some("TILTSURF") => Ok(SurfaceShape::Tilted),
         other => Err(line.error(format!(
             "the surface type {} has no counterpart here; known: STANDARD, EVENASPH, XASPHERE, ODDASPHE, \
-             TOROIDAL, BICONICX, SZERNSAG, FZERNSAG, FRESNELS, DGRATING, BINARY_2, PARAXIAL, COORDBRK",
+             TOROIDAL, BICONICX, SZERNSAG, FZERNSAG, FRESNELS, TILTSURF, DGRATING, BINARY_2, PARAXIAL, COORDBRK",
             other.unwrap_or_default()
         ))),
     }

@@ -210,12 +210,17 @@ impl ZemaxSheet {
             }
             "WWGT" | "WWGN" => self.wavelength_weights = line.numbers()?,
             "FWGT" | "FWGN" => self.fields.weights = line.numbers()?,
-            "VDXN" | "VDYN" | "VCXN" | "VCYN" | "VANN" | "VDSZ" => {
-                // Slots of fields that are not in use stand there as well.
-                if line.numbers()?.iter().any(|factor| *factor != 0.0) {
-                    self.fields.vignetted.push((line.number, line.command.to_owned()));
+            "VDXN" => self.fields.vignetting[0] = line.numbers()?,
+            "VDYN" => self.fields.vignetting[1] = line.numbers()?,
+            "VCXN" | "VCYN" => {
+                // At 1 nothing is left of the pupil.
+                let factors = line.numbers()?;
+                if let Some(factor) = factors.iter().find(|factor| **factor >= 1.0) {
+                    return Err(line.error(format!("the factor {factor} must be below 1")));
                 }
+                self.fields.vignetting[if line.command == "VCXN" { 2 } else { 3 }] = factors;
             }
+            "VANN" => self.fields.vignetting[4] = line.numbers()?,
             "WAVL" | "WAVN" => self.wavelengths = line.numbers()?,
             "PWAV" | "PRIM" => self.primary = line.index(0)?,
             "FTYP" => self.fields.set_kind(line)?,
@@ -380,21 +385,6 @@ impl ZemaxSheet {
 
     pub(super) fn what_is_left_out(&self) -> Vec<String> {
         let mut notes = self.notes.clone();
-        if let [first, ..] = &self.fields.vignetted[..] {
-            let names: Vec<&str> =
-                self.fields.vignetted.iter().map(|(_, name)| name.as_str()).collect();
-            notes.push(format!(
-                "line {}: vignetting factors ({}) are left out: rays end at the rims of surfaces, and not at a smaller \
-                 pupil",
-                first.0,
-                names.join(", ")
-            ));
-        }
-        let used = self.fields.count.unwrap_or(self.fields.weights.len());
-        let weights = &self.fields.weights[..used.min(self.fields.weights.len())];
-        if weights.iter().any(|weight| Some(weight) != weights.first()) {
-            notes.push(format!("the weights of fields (FWGN), {weights:?}, are left out: nothing here takes a mean of fields"));
-        }
         notes.extend(self.unread_parameters());
         if self.configurations > 1 {
             notes.push(format!(

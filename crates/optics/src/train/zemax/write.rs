@@ -4,10 +4,11 @@ use std::fmt::Write;
 
 use crate::analysis::ZernikeOrder;
 use crate::element::{
-    ApertureSpec, ElementSpec, FreeformSpec, PartSpec, PatternSpec, PhaseSpec, SagSpec,
+    ApertureSpec, BoxSpec, ElementSpec, FreeformSpec, PartSpec, PatternSpec, PhaseSpec, SagSpec,
 };
 use crate::glass::{FRAUNHOFER_D, GlassSpec};
-use crate::train::LensFile;
+use crate::train::{FieldSpec, LensFile};
+use etendue_geometry::units::Millimetres;
 
 /// The lines of one surface.
 #[derive(Default)]
@@ -75,14 +76,13 @@ impl LensFile {
             }
             placed(element, row, &mut rows);
         }
-        let wavelength = self.wavelength.map_or(FRAUNHOFER_D, |nm| nm.0);
         let mut text = "VERS 140730 201 26155\nMODE SEQ\n".to_owned();
         // A title of one line.
         let name = self.name.replace(['\r', '\n'], " ");
         let _ = write!(
             text,
-            "NAME {name}\nUNIT MM X W X CM MR CPMM\nFLOA\nWAVM 1 {:e} 1\nPWAV 1\n",
-            wavelength * 1e-3
+            "NAME {name}\nUNIT MM X W X CM MR CPMM\nFLOA\n{}",
+            self.fields_and_wavelengths()
         );
         let makers = self.glass_makers();
         if !makers.is_empty() {
@@ -111,6 +111,41 @@ impl LensFile {
             }
         }
         Ok(text)
+    }
+
+    /// Lines on its fields and wavelengths.
+    fn fields_and_wavelengths(&self) -> String {
+        let main = self.wavelength.map_or(FRAUNHOFER_D, |nm| nm.0);
+        let wavelengths = match self.wavelengths_nm() {
+            none if none.is_empty() => vec![main],
+            all => all,
+        };
+        let mut text = String::new();
+        if !self.fields.is_empty() {
+            let (fields, used) = (self.fields.len(), wavelengths.len());
+            let _ = writeln!(text, "FTYP 0 0 {fields} {used} 0 0 0");
+            type Value = fn(&FieldSpec) -> f64;
+            let lists: [(&str, Value); 8] = [
+                ("XFLN", |_| 0.0),
+                ("YFLN", |field| field.angle.0),
+                ("FWGN", |field| field.weight),
+                ("VDXN", |field| field.vignetting.decentre[0]),
+                ("VDYN", |field| field.vignetting.decentre[1]),
+                ("VCXN", |field| field.vignetting.compression[0]),
+                ("VCYN", |field| field.vignetting.compression[1]),
+                ("VANN", |field| field.vignetting.rotation.0),
+            ];
+            for (command, value) in lists {
+                let values = self.fields.iter().map(|field| format!(" {:e}", value(field)));
+                let _ = writeln!(text, "{command}{}", values.collect::<String>());
+            }
+        }
+        for (i, nm) in wavelengths.iter().enumerate() {
+            let weight = self.weights.get(i).copied().unwrap_or(1.0);
+            let _ = writeln!(text, "WAVM {} {:e} {weight:e}", i + 1, nm * 1e-3);
+        }
+        text.push_str("PWAV 1\n");
+        text
     }
 
     /// The makers that its glasses name, in the order in which they do: where two have a glass of one name, that of
@@ -211,8 +246,8 @@ fn surface(element: &ElementSpec, before: Option<&GlassSpec>) -> Result<Row, Str
             row.push(format!("DIAM {radius:e} 1 0 0 1 \"\""));
         }
     };
-    let length = |length: Option<etendue_geometry::units::Millimetres>| length.map(|l| l.0);
-    let bend = |radius: Option<etendue_geometry::units::Millimetres>, curvature: Option<f64>| {
+    let length = |length: Option<Millimetres>| length.map(|l| l.0);
+    let bend = |radius: Option<Millimetres>, curvature: Option<f64>| {
         radius.map_or(curvature.unwrap_or(0.0), |radius| 1.0 / radius.0)
     };
     let mut row = match &element.part {
@@ -247,22 +282,12 @@ fn surface(element: &ElementSpec, before: Option<&GlassSpec>) -> Result<Row, Str
             rim(&mut row, length(spec.semi_diameter));
             row
         }
-        PartSpec::Aperture(ApertureSpec::Circular(spec)) => {
-            let mut row = Row::new("STANDARD");
-            row.curved(0.0, 0.0);
-            rim(&mut row, Some(spec.radius.0));
-            row
-        }
+        PartSpec::Aperture(spec) => opening(spec)?,
         PartSpec::Freeform(spec) => {
             let mut row = freeform(spec)?;
             row.curved(bend(spec.radius, spec.curvature), spec.conic);
             rim(&mut row, length(spec.semi_diameter));
             row
-        }
-        PartSpec::Aperture(_) => {
-            return Err("an aperture that is not circular is not written to Zemax files yet; \
-                        make it circular, or save it as .json"
-                .to_owned());
         }
         PartSpec::CoordinateBreak(_) => return none("this break"),
         PartSpec::Filter(_) => return none("a filter"),
@@ -282,6 +307,52 @@ fn surface(element: &ElementSpec, before: Option<&GlassSpec>) -> Result<Row, Str
         (true, _) => row.push("GLAS MIRROR 0 0 1.5 40 0 0 0 0 0 0".to_owned()),
         (false, None) => {}
         (false, Some(glass)) => row.push(format!("GLAS {}", named(glass)?)),
+    }
+    Ok(row)
+}
+
+/// A plane in air with an opening, or with what is in the way.
+fn opening(spec: &ApertureSpec) -> Result<Row, String> {
+    let mut row = Row::new("STANDARD");
+    row.curved(0.0, 0.0);
+    let turned = || {
+        Err("Zemax files have no counterpart for an aperture that is turned; leave rotation out, or save the lens as \
+             .json"
+            .to_owned())
+    };
+    let half_widths = |row: &mut Row, command: &str, spec: &BoxSpec| {
+        row.push(format!("{command} {:e} {:e} 0", 0.5 * spec.width.0, 0.5 * spec.height.0));
+    };
+    // Without an end, as OpticStudio has it.
+    let outer = |radius: Option<Millimetres>| radius.map_or(1e10, |radius| radius.0);
+    match spec {
+        ApertureSpec::Circular(spec) => row.push(format!("DIAM {:e} 1 0 0 1 \"\"", spec.radius.0)),
+        ApertureSpec::Rectangular(spec) | ApertureSpec::Elliptical(spec)
+            if spec.rotation.0 != 0.0 =>
+        {
+            return turned();
+        }
+        ApertureSpec::Rectangular(spec) => {
+            half_widths(&mut row, if spec.obscures { "SQOB" } else { "SQAP" }, spec);
+        }
+        ApertureSpec::Elliptical(spec) => {
+            half_widths(&mut row, if spec.obscures { "ELOB" } else { "ELAP" }, spec);
+        }
+        ApertureSpec::Annular(spec) => {
+            row.push(format!("CLAP {:e} {:e} 0", spec.inner_radius.0, outer(spec.radius)));
+        }
+        ApertureSpec::Spider(spec) => {
+            if spec.rotation.0 != 0.0 {
+                return turned();
+            }
+            row.push(format!("CLAP {:e} {:e} 0", spec.inner_radius.0, outer(spec.radius)));
+            row.push(format!("SPID {:e} {} 0", spec.width.0, spec.arms));
+        }
+        ApertureSpec::Polygon(_) | ApertureSpec::Image(_) | ApertureSpec::Outline(_) => {
+            return Err("Zemax files have no counterpart for an aperture with blades, a mask or corners; save the lens \
+                        as .json"
+                .to_owned());
+        }
     }
     Ok(row)
 }

@@ -137,7 +137,7 @@ fn a_single_surface_has_the_sums_of_the_book() {
 }
 
 #[test]
-fn foci_of_an_ideal_lens_lie_in_the_image_and_those_of_a_tilted_one_are_not_told() {
+fn foci_of_an_ideal_lens_lie_in_the_image_and_no_ray_from_behind_has_any() {
     let ideal = build(
         r#"{"elements": [{"type": "thin_lens", "focal_length": 50, "semi_diameter": 5, "thickness": 8},
         {"type": "thin_lens", "focal_length": 80}]}"#,
@@ -157,13 +157,41 @@ fn foci_of_an_ideal_lens_lie_in_the_image_and_those_of_a_tilted_one_are_not_told
     }
     let far = grid.iter().map(|p| p.ideal[0].hypot(p.ideal[1])).fold(0.0, f64::max);
     close(far, efl * 10.0_f64.to_radians().tan(), 1e-12, "corner");
-    let tilted = build(
-        r#"{"elements": [{"type": "surface", "radius": 50, "glass": {"n": 1.5}, "semi_diameter": 5, "tilt": [1, 0]}]}"#,
-    );
-    let at = tilted.at(550.0).unwrap();
-    assert_eq!(foci(&tilted, &at, ObjectPoint::field(0.0), 150.0).unwrap(), None);
     let wide = foci(&ideal, &ideal.at(550.0).unwrap(), ObjectPoint::field(120.0), image);
     assert!(matches!(wide, Err(AnalysisError::NoChiefRay { .. })), "{wide:?}");
+}
+
+/// Coddington's equations at a sphere that is turned by θ about its vertex: n'/s' = c (n' cos I' − n cos I) and
+/// n' cos² I'/t' = the same, along the refracted ray.
+#[test]
+fn foci_behind_a_tilted_sphere_and_a_biconic_are_those_of_coddington() {
+    let (radius, n) = (50.0_f64, 1.5_f64);
+    for degrees in [1.0_f64, 25.0] {
+        let tilted = build(&format!(
+            r#"{{"elements": [{{"type": "surface", "radius": {radius}, "glass": {{"n": {n}}}, "semi_diameter": 5,
+                "tilt": [{degrees}, 0]}}]}}"#
+        ));
+        let at = tilted.at(550.0).unwrap();
+        let foci = foci(&tilted, &at, ObjectPoint::field(0.0), 0.0).unwrap().unwrap();
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        let behind = (1.0 - (sine / n).powi(2)).sqrt();
+        let power = (n * behind - cosine) / radius;
+        let turned = degrees.to_radians() - (sine / n).asin();
+        close(foci.sagittal.unwrap(), n / power * turned.cos(), 1e-12, "sagittal");
+        close(
+            foci.tangential.unwrap(),
+            n * behind * behind / power * turned.cos(),
+            1e-12,
+            "tangential",
+        );
+    }
+    let biconic = build(
+        r#"{"elements": [{"type": "biconic", "radius": 50, "radius_x": -80, "glass": {"n": 1.5}, "semi_diameter": 5}]}"#,
+    );
+    let at = biconic.at(550.0).unwrap();
+    let foci = foci(&biconic, &at, ObjectPoint::field(0.0), 0.0).unwrap().unwrap();
+    close(foci.sagittal.unwrap(), -80.0 * 1.5 / 0.5, 1e-12, "along x");
+    close(foci.tangential.unwrap(), 50.0 * 1.5 / 0.5, 1e-12, "along y");
 }
 
 /// The lens with its stop moved to where a sum is said to be nothing has none of it, and all other sums as they

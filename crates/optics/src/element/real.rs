@@ -1,10 +1,11 @@
-//! Numbers that a sag or a phase is written in once: as they are, or with their derivatives.
+//! Numbers that sags, phases and what surfaces do to rays are written in once: as they are, or with their derivatives.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// What sags and phases are worked out in.
-pub(super) trait Real:
+/// What sags, phases and rays are worked out in.
+pub trait Real:
     Copy
+    + Default
     + Add<Output = Self>
     + Sub<Output = Self>
     + Mul<Output = Self>
@@ -17,50 +18,64 @@ pub(super) trait Real:
     fn value(self) -> f64;
     /// Its square root; where it is 0, without a derivative.
     fn root(self) -> Self;
+    /// It with the sign of another.
+    #[must_use]
+    fn signed_as(self, sign: Self) -> Self;
     /// `factor` times it.
     #[must_use]
+    #[inline(always)]
     fn times(self, factor: f64) -> Self {
         self * Self::constant(factor)
     }
     /// It and `more`.
     #[must_use]
+    #[inline(always)]
     fn plus(self, more: f64) -> Self {
         self + Self::constant(more)
     }
     /// It, or `least` where it is less.
     #[must_use]
+    #[inline(always)]
     fn at_least(self, least: f64) -> Self {
         if self.value() >= least { self } else { Self::constant(least) }
     }
 }
 
 impl Real for f64 {
+    #[inline(always)]
     fn constant(value: f64) -> Self {
         value
     }
 
+    #[inline(always)]
     fn value(self) -> f64 {
         self
     }
 
+    #[inline(always)]
     fn root(self) -> Self {
         self.sqrt()
+    }
+
+    #[inline(always)]
+    fn signed_as(self, sign: Self) -> Self {
+        self.copysign(sign)
     }
 }
 
 /// A number with its derivatives by x and y (W. K. Clifford's dual numbers, two of them). Of dual numbers it has the
 /// second derivatives.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Dual<T> {
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Dual<T> {
     /// The value.
-    pub(super) v: T,
+    pub(crate) v: T,
     /// The derivatives.
-    pub(super) d: [T; 2],
+    pub(crate) d: [T; 2],
 }
 
 impl<T: Real> Dual<T> {
     /// The coordinates themselves.
-    pub(super) fn place([x, y]: [T; 2]) -> [Self; 2] {
+    pub(crate) fn place([x, y]: [T; 2]) -> [Self; 2] {
         let (zero, one) = (T::constant(0.0), T::constant(1.0));
         [Self { v: x, d: [one, zero] }, Self { v: y, d: [zero, one] }]
     }
@@ -127,6 +142,11 @@ impl<T: Real> Real for Dual<T> {
         }
     }
 
+    fn signed_as(self, sign: Self) -> Self {
+        let is_turned = self.value().is_sign_negative() != sign.value().is_sign_negative();
+        if is_turned { -self } else { self }
+    }
+
     fn times(self, factor: f64) -> Self {
         Self { v: self.v.times(factor), d: self.d.map(|d| d.times(factor)) }
     }
@@ -137,7 +157,7 @@ impl<T: Real> Real for Dual<T> {
 }
 
 /// `number` to a whole power.
-pub(super) fn power<T: Real>(number: T, exponent: u32) -> T {
+pub(crate) fn power<T: Real>(number: T, exponent: u32) -> T {
     let (mut product, mut square, mut rest) = (T::constant(1.0), number, exponent);
     while rest > 0 {
         if rest % 2 == 1 {

@@ -1,0 +1,155 @@
+//! What a lens file says of how its lens is looked at: field points with what vignetting leaves of their pupils, and
+//! wavelengths with what they weigh.
+
+use glam::DVec2;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{LensError, LensFile};
+use crate::element::is_default;
+use etendue_geometry::units::Degrees;
+
+/// The most field points and wavelengths: each is looked at with many rays.
+const MOST_FIELDS: usize = 100;
+const MOST_WAVELENGTHS: usize = 24;
+
+/// A field point of a lens file.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FieldSpec {
+    /// The angle off the axis, in the plane of y and z (degrees).
+    pub angle: Degrees,
+    /// What it weighs among the fields; kept for other programs, since nothing here takes a mean of fields.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub weight: f64,
+    /// What vignetting leaves of its pupil, as a designer states it; all of it when absent.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub vignetting: VignettingSpec,
+}
+
+/// What vignetting leaves of a pupil: its unit circle is made smaller, moved, and then turned about its middle
+/// (`OpticStudio`'s vignetting factors VDX, VDY, VCX, VCY and VAN).
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct VignettingSpec {
+    /// How far it is moved by x and y (radii of the pupil).
+    #[serde(skip_serializing_if = "is_default")]
+    pub decentre: [f64; 2],
+    /// By which share it is made smaller along x and y, below 1.
+    #[serde(skip_serializing_if = "is_default")]
+    pub compression: [f64; 2],
+    /// How far it is turned from +x towards +y (degrees).
+    #[serde(skip_serializing_if = "is_default")]
+    pub rotation: Degrees,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
+}
+
+impl FieldSpec {
+    /// A field at an angle (degrees), of weight 1 and a whole pupil.
+    #[must_use]
+    pub fn at(angle: f64) -> Self {
+        Self { angle: Degrees(angle), weight: 1.0, vignetting: VignettingSpec::default() }
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let angle = self.angle.0;
+        if angle.is_nan() || angle.abs() >= 180.0 {
+            return Err(format!("angle is {angle} degrees; it must lie between -180 and 180"));
+        }
+        if !(self.weight >= 0.0 && self.weight.is_finite()) {
+            return Err(format!("weight is {}; it must be a number from 0 on", self.weight));
+        }
+        let VignettingSpec { decentre, compression, rotation } = self.vignetting;
+        let are_finite = decentre.iter().chain([&rotation.0]).all(|value| value.is_finite());
+        if !are_finite {
+            return Err("vignetting: decentre and rotation must be finite".to_owned());
+        }
+        match compression.iter().find(|share| !(share.is_finite() && **share < 1.0)) {
+            Some(share) => Err(format!(
+                "vignetting: compression has {share}; it must be below 1, where nothing of the pupil is left"
+            )),
+            None => Ok(()),
+        }
+    }
+}
+
+impl VignettingSpec {
+    /// Where a place of the whole unit circle lies in what is left.
+    #[must_use]
+    pub fn place(&self, whole: DVec2) -> DVec2 {
+        let left = DVec2::ONE - DVec2::from(self.compression);
+        DVec2::from_angle(self.rotation.0.to_radians())
+            .rotate(DVec2::from(self.decentre) + whole * left)
+    }
+
+    /// The share of the pupil's area that is left.
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        self.compression.iter().map(|share| 1.0 - share).product::<f64>().abs()
+    }
+}
+
+impl LensFile {
+    /// The angles of its fields (degrees).
+    #[must_use]
+    pub fn field_angles(&self) -> Vec<f64> {
+        self.fields.iter().map(|field| field.angle.0).collect()
+    }
+
+    /// Its wavelengths (nm), the main one first; none where it names none but that.
+    #[must_use]
+    pub fn wavelengths_nm(&self) -> Vec<f64> {
+        self.wavelengths.iter().map(|wavelength| wavelength.0).collect()
+    }
+
+    /// Refuses what its fields and wavelengths cannot be.
+    pub(super) fn check_fields(&self) -> Result<(), LensError> {
+        let error = |key: String, why: String| Err(LensError::Key { key, why });
+        let counts = [
+            ("fields", self.fields.len(), MOST_FIELDS),
+            ("wavelengths", self.wavelengths.len(), MOST_WAVELENGTHS),
+        ];
+        if let Some((key, count, most)) = counts.into_iter().find(|(_, count, most)| count > most) {
+            return error(key.to_owned(), format!("has {count}, and {most} are the most"));
+        }
+        for (i, field) in self.fields.iter().enumerate() {
+            field.check().or_else(|why| error(format!("fields[{i}]"), why))?;
+        }
+        for (i, nm) in self.wavelengths.iter().enumerate() {
+            if !(nm.0 > 0.0 && nm.0.is_finite()) {
+                let why = format!("{} nm is no wavelength; it must be positive", nm.0);
+                return error(format!("wavelengths[{i}]"), why);
+            }
+        }
+        if let (Some(main), Some(first)) = (self.wavelength, self.wavelengths.first())
+            && main != *first
+        {
+            let why = format!(
+                "{} nm is the first, and `wavelength` is {} nm: put that first, or leave it out",
+                first.0, main.0
+            );
+            return error("wavelengths".to_owned(), why);
+        }
+        if self.weights.is_empty() {
+            return Ok(());
+        }
+        let are_weights = self.weights.iter().all(|w| *w >= 0.0 && w.is_finite())
+            && self.weights.iter().any(|w| *w > 0.0);
+        if self.weights.len() != self.wavelengths.len() || !are_weights {
+            let why = format!(
+                "give one for each of the {} wavelengths, from 0 on and not all 0",
+                self.wavelengths.len()
+            );
+            return error("weights".to_owned(), why);
+        }
+        Ok(())
+    }
+}
