@@ -267,9 +267,9 @@ impl Part {
     #[must_use]
     pub fn sag(&self, [x, y]: [f64; 2]) -> Option<f64> {
         match self {
-            Self::Surface(surface) => surface.sag(x.hypot(y)),
+            Self::Surface(surface) => surface.sag((x * x + y * y).sqrt()),
             Self::Biconic(surface) => surface.sag([x, y]),
-            Self::Mirror(mirror) => mirror.surface.sag(x.hypot(y)),
+            Self::Mirror(mirror) => mirror.surface.sag((x * x + y * y).sqrt()),
             Self::Freeform(surface) => surface.sag([x, y]),
             Self::ThinLens(_)
             | Self::Aperture(_)

@@ -127,7 +127,7 @@ const PUPIL_GRID: f64 = 500.0;
 /// The same in the least, for the longest trains.
 const LEAST_GRID: f64 = 100.0;
 
-/// Steps of rays that the illumination at one place is worth: rays are followed in more than 64 steps on a coarser
+/// Rays times elements that the illumination at one place is worth: a train of more than 64 elements gets a coarser
 /// grid.
 const WORK: f64 = 64.0 * PUPIL_GRID * PUPIL_GRID;
 
@@ -137,7 +137,7 @@ const MOST_RAYS: f64 = 40.0 * PUPIL_GRID * PUPIL_GRID;
 /// Cells a side for one of so many places.
 #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn grid(at: &MonochromaticTrain, places: usize) -> u32 {
-    let rays = (WORK / at.steps_of_a_ray()).min(MOST_RAYS / places as f64);
+    let rays = (WORK / at.cost_of_a_ray()).min(MOST_RAYS / places as f64);
     rays.sqrt().clamp(LEAST_GRID, PUPIL_GRID) as u32
 }
 

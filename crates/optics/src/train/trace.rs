@@ -218,11 +218,12 @@ impl MonochromaticTrain {
         self.is_costly
     }
 
-    /// Steps in which a ray is followed: one an element, and those of graded media.
-    pub(crate) fn steps_of_a_ray(&self) -> f64 {
+    /// How long a ray takes, in elements: a step in a graded medium looks at the index thrice and at the surface, which
+    /// counts as two.
+    pub(crate) fn cost_of_a_ray(&self) -> f64 {
         let of_medium = |step: &Step| {
             let graded = step.graded.as_ref().and_then(|graded| graded.media[0].as_ref());
-            graded.map_or(0.0, GradedMedium::steps)
+            graded.map_or(0.0, |medium| 2.0 * medium.steps())
         };
         self.backward.iter().map(|step| 1.0 + of_medium(step)).sum()
     }

@@ -239,6 +239,12 @@ fn lenses_for_zemax_files() -> Vec<LensFile> {
     files
 }
 
+/// Whether the axis of a lens breaks: from a Zemax file its elements come back as placed in one frame, with the same rays
+/// (`coordinate_breaks`).
+fn has_break(file: &LensFile) -> bool {
+    file.elements.iter().any(|element| matches!(element.part, PartSpec::CoordinateBreak(_)))
+}
+
 /// Every lens that a Zemax file can hold, through one and back: the same surfaces to the last bit where nothing is tilted, and
 /// rays that leave alike.
 #[test]
@@ -248,6 +254,9 @@ fn lenses_come_back_from_zemax_files_as_they_went() {
     let (mut compared, mut refused) = (0, Vec::new());
     for file in &lenses_for_zemax_files() {
         let Ok(before) = file.build(&|name: &str| Err(name.to_owned())) else { continue };
+        if has_break(file) {
+            continue;
+        }
         if before.is_graded() {
             let why = file.to_zemax().unwrap_err();
             assert!(why.contains("elements[0]: a gradient has no counterpart"), "{why}");
@@ -389,6 +398,9 @@ fn lenses_of_scenes_come_back_exactly_or_are_refused_by_element() {
         }
         let name = path.display();
         let file = LensFile::from_json(&std::fs::read_to_string(&path).unwrap()).unwrap();
+        if has_break(&file) {
+            continue;
+        }
         let text = match file.to_zemax() {
             Ok(text) => text,
             Err(why) => {
