@@ -181,7 +181,9 @@ fn simpler_lenses_keep_the_mask_of_the_stop() {
     // pixels of 0.02 mm; distances are counted from the lens' middle, hence a tenth.
     let [pinhole, thick] = ["pinhole", "thick"].map(|name| model(&all, name));
     assert!((pinhole.centroid.value - 3.6).abs() < 0.36, "{pinhole:?}");
-    assert!(thick.centroid.value < 0.02 * pinhole.centroid.value, "{thick:?}");
+    // What is left are the lens' aberrations, by which blur differs as much; a mask upside down would be 7 pixels off, one
+    // a tenth too large 0.4.
+    assert!(thick.centroid.value < 0.2, "{thick:?}");
     assert!(thick.is_within, "{thick:?}");
     assert!(all.scenes.iter().any(|scene| scene.to_string().contains("mask.png")));
     // Elsewhere it is lost, and said to be.
