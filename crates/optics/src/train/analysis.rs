@@ -135,7 +135,12 @@ const WORK: f64 = 64.0 * PUPIL_GRID * PUPIL_GRID;
 const MOST_RAYS: f64 = 40.0 * PUPIL_GRID * PUPIL_GRID;
 
 /// Cells a side for one of so many places.
-#[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+#[expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "counts of rays and places"
+)]
 fn grid(at: &MonochromaticTrain, places: usize) -> u32 {
     let rays = (WORK / at.cost_of_a_ray()).min(MOST_RAYS / places as f64);
     rays.sqrt().clamp(LEAST_GRID, PUPIL_GRID) as u32
