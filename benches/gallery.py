@@ -5,7 +5,7 @@ a line between two comments for the times:
 
     <!-- picture: ../images/fig3.png = fig3/picture.png -->
     <!-- bands: ../images/gallery/bands.png = spectrum/views_spectrum.npy 1 4 8 11 -->
-    <!-- refocus: ../images/gallery/refocus.webp = refocus/reference.npy 3.2 2.4 -->
+    <!-- refocus: ../images/gallery/refocus.webp = refocus/views.npy -3.2 2.6 -->
     <!-- took: begin -->...<!-- took: end -->
     <!-- noise: begin -->...<!-- noise: end -->
 
@@ -35,6 +35,8 @@ OUT = "out/gallery"
 
 # Views of a light field have few pixels: each is shown as a square of so many.
 MAGNIFIED = 8
+# Pixels along a square of which noise is measured.
+SQUARE = 8
 # Pictures of an animation on its way from near to far.
 REFOCUSED = 16
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -223,6 +225,7 @@ def with_noise(etendue, part, commands):
         again = folder.replace(OUT, "out/gallery-again")
         took(etendue, command.replace(f"-o {folder}", f"-o {again}") + " --seed 1")
         found.append(noise(*(program.ROOT / name / "denoised.npy" for name in (folder, again))))
+        print(f"{folder}: {100 * found[-1]:.2f} %", file=sys.stderr)
     if not found:
         return part
     shares = ", ".join(f"{100 * share:.2f} %" for share in found)
@@ -230,12 +233,20 @@ def with_noise(etendue, part, commands):
 
 
 def noise(*paths):
-    """The standard deviation of a pixel's light, root mean square over the picture, as a share of full scale, from two
-    pictures that differ by their seeds; light above full scale is white, as it is shown."""
+    """The standard deviation of a pixel's light as a share of that light, the median of all squares of pixels that have any,
+    from two pictures that differ by their seeds: one difference says little of a pixel, those of a square do."""
     import numpy as np
 
-    first, second = (np.clip(np.load(path).astype(np.float64), 0, 1) for path in paths)
-    return float(np.sqrt(np.mean((first - second) ** 2) / 2))
+    first, second = (squares(np.load(path).astype(np.float64).mean(axis=-1)) for path in paths)
+    deviation = np.sqrt(np.mean((first - second) ** 2, axis=(1, 3)) / 2)
+    light = np.mean(first + second, axis=(1, 3)) / 2
+    return float(np.median(deviation[light > 0] / light[light > 0]))
+
+
+def squares(values):
+    """Rows and columns of a picture by squares of pixels, `[row][row in it][column][column in it]`; what is over is left out."""
+    down, across = (size // SQUARE for size in values.shape)
+    return values[: down * SQUARE, : across * SQUARE].reshape(down, SQUARE, across, SQUARE)
 
 
 def encoded(light):

@@ -44,7 +44,7 @@ windows() {
     rustup target add "$target"
     cargo-zigbuild zigbuild --target "$target" -p etendue-cli --no-default-features --locked
     program=target/$target/debug/etendue.exe
-    wine=$(command -v wine64 || command -v wine || find /usr/lib/wine -name wine64 2>/dev/null | head -n 1)
+    wine=$(command -v wine64 || command -v wine || { find /usr/lib/wine -name wine64 2>/dev/null || true; } | head -n 1)
     if [ -z "$wine" ]; then
         echo "not run: Wine is not installed (Debian: wine64)"
         return

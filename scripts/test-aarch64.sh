@@ -21,7 +21,7 @@ export CC_aarch64_unknown_linux_gnu=$compiler-gcc CXX_aarch64_unknown_linux_gnu=
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=$compiler-gcc
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64 -L /usr/$compiler"
 
-# As tests.sh: with nextest when it is installed, else with cargo's own runner. What tests start as programs of their own, the
+# As test.sh: with nextest when it is installed, else with cargo's own runner. What tests start as programs of their own, the
 # command among them, wants the kernel's binfmt_misc, so the command is run by hand below.
 packages=()
 for crate in files geometry image spectrum accel optics camera sensor tracer scene render; do packages+=(-p "etendue-$crate"); done

@@ -99,6 +99,16 @@ fn scene(more: &Value) -> Value {
     scene
 }
 
+/// A scene that is measured without light, for which no pupil is looked for: behind what has no symmetry that takes many
+/// seconds of a development build. The files of a lens are read all the same.
+fn unlit(mut scene: Value) -> Value {
+    let keys = scene.as_object_mut().unwrap();
+    keys.remove("tracer");
+    keys.remove("lights");
+    keys.insert("layers".to_owned(), json!(["depth"]));
+    scene
+}
+
 /// A camera whose lens has these elements before a lens, and more.
 fn through(element: &Value, more: &Value) -> Value {
     let mut lens = json!({"elements": [
@@ -218,7 +228,7 @@ fn inputs() -> Vec<Input> {
     let files = [curve[0], ("lens.json", &written)];
     add(curve_keys, scene(&camera(&json!("lens.json"))), &files, other());
     let mask_keys: &[&str] = &["ApertureSpec.file", "ElementSpec.file", "PlacedSpec.file"];
-    add(mask_keys, scene(&camera(&masked)), &mask, vec![longer(&grey)]);
+    add(mask_keys, unlit(scene(&camera(&masked))), &mask, vec![longer(&grey)]);
     let filtered = through(
         &json!({"type": "filter", "image": "mask.png", "width": 20, "curves": {"255": 0.5}, "thickness": 1}),
         &json!({}),
@@ -228,13 +238,13 @@ fn inputs() -> Vec<Input> {
     let spread =
         json!({"type": "height_map", "file": "mask.png", "width": 20, "height": 20, "depth": 0.01});
     let mapped = json!({"type": "freeform", "semi_diameter": 4, "thickness": 1, "sag": [spread]});
-    let mapped = scene(&camera(&through(&mapped, &json!({}))));
+    let mapped = unlit(scene(&camera(&through(&mapped, &json!({})))));
     add(&["SagSpec.file"], mapped, &mask, vec![longer(&grey)]);
     let pattern =
         json!({"type": "image", "file": "mask.png", "width": 20, "height": 20, "depth": 0.1});
     let phased = json!({"type": "freeform", "semi_diameter": 4, "thickness": 1,
         "phase": {"pattern": pattern, "order": 1}});
-    let phased = scene(&camera(&through(&phased, &json!({}))));
+    let phased = unlit(scene(&camera(&through(&phased, &json!({})))));
     add(&["PatternSpec.file"], phased, &mask, vec![longer(&grey)]);
     let own = through(
         &json!({"type": "surface", "radius": 90, "thickness": 2, "glass": "OWN-1", "semi_diameter": 4}),
