@@ -5,7 +5,11 @@
 set -euo pipefail
 NAME=window-states
 . "$(dirname "${BASH_SOURCE[0]}")/window-tests.sh"
-. "$(dirname "${BASH_SOURCE[0]}")/window-x11.sh"
+. "$PWD/scripts/window-x11.sh"
+
+# Files are named as a user names them, beside which the window was started: its pictures show no other folder.
+cp -r scenes/double-gauss.json scenes/lenses "$home/"
+cd "$home"
 
 # click X Y: the left button at a place of the window, and what follows from it drawn.
 click() {
@@ -21,9 +25,20 @@ hover() {
     until_so 60 is_idle || fail "the window never settles under the mouse"
 }
 
-# keep STATE: its screenshot.
-keep() {
+# shot STATE: its screenshot, as the window is now.
+shot() {
     import -window "$window" "$shots/state-$1.png"
+}
+
+# keep STATE: its screenshot, when nothing in it changes any more: panels take some frames to find their widths.
+keep() {
+    is_still() {
+        shot "$1"
+        sleep 1
+        import -window "$window" "$home/again.png"
+        [ "$(compare -metric AE "$shots/state-$1.png" "$home/again.png" null: 2>&1)" = 0 ]
+    }
+    until_so 60 is_still "$1" || fail "state $1 never stands still"
 }
 
 # differ STATE STATE: fails where the screenshots of two states are the same picture.
@@ -44,32 +59,35 @@ shows 'sensor.json*' || shows sensor.json || fail "the first start does not begi
 click 380 11
 click 380 56
 shows 'sensor.json*' || shows sensor.json || fail "the sensor's image is not shown"
+hover 40 240
+keep closed
 click 40 240
 keep sensor
 differ start sensor
+differ closed sensor
 close_window
 
 # A broken file: the message of the command line, with the place.
 printf '%s\n' '{' '  "etendue": 1,' '  "camera": { "type": "pinhole", "fov": 200 },' \
-    '  "objects": [{ "shape": "sphere" }]' '}' >"$home/broken.json"
-start 1 "$home/broken.json"
+    '  "objects": [{ "shape": "sphere" }]' '}' >broken.json
+start 1 broken.json
 # Errors alone are of this red.
 is_red() {
-    keep broken
+    shot broken
     [ "$(convert "$shots/state-broken.png" -fill black +opaque '#ff0000' -format '%[fx:mean*w*h]' info:)" != 0 ]
 }
 until_so 60 is_red || fail "a broken file is not told"
 close_window
 
 # A heavy file: what is done of it, and a way to leave it.
-echo '{"etendue": 1, "tracer": {"type": "facing"}, "objects": [{"shape": "blob", "triangles": 60000000}]}' \
-    >"$home/heavy.json"
-start 1 "$home/heavy.json"
+blob='{"shape": "blob", "triangles": 4000000}'
+echo '{"etendue": 1, "tracer": {"type": "facing"}, "objects": ['"$(printf "$blob, %.0s" {1..15})$blob"']}' >heavy.json
+start 1 heavy.json
 until_so 120 title_is "heavy.json (rendering) - etendue" || fail "a heavy file is not being read"
-# The bar stands in the middle, which is one colour otherwise.
+# The bar stands in the middle, and has come this far along it.
 has_bar() {
-    keep heavy
-    [ "$(convert "$shots/state-heavy.png" -crop 400x160+440+250 -format %k info:)" -gt 8 ]
+    shot heavy
+    [ "$(convert "$shots/state-heavy.png" -format '%[fx:p{560,302}.b > 0.3]' info:)" = 1 ]
 }
 until_so 180 has_bar || fail "what is done of a heavy file is not shown"
 xdotool mousemove 640 324 sleep 0.3 click 1
@@ -79,10 +97,9 @@ differ heavy left
 close_window
 
 # A picture with layers, and the menu of them.
-cp -r scenes/double-gauss.json scenes/lenses "$home/"
 jq ".camera.sensor.resolution = ${RESOLUTION:-[240,160]} | .render.samples = ${SAMPLES:-4}" \
-    <"$home/double-gauss.json" >"$home/lens.json"
-open 1 "$home/lens.json"
+    <double-gauss.json >lens.json
+open 1 lens.json
 keep whole
 click 380 11
 keep layers
@@ -101,7 +118,7 @@ is_changed() {
 until_so 60 is_changed || fail "nothing was removed"
 press ctrl+s
 is_saved() {
-    jq -e '.camera | has("sensor") | not' "$home/lens.json"
+    jq -e '.camera | has("sensor") | not' lens.json
 }
 until_so 60 is_saved || fail "the sensor is still there"
 close_window
