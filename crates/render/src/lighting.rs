@@ -89,6 +89,7 @@ pub(crate) fn settle(
         emitters: None,
         placed: &placed,
         precision: HitPrecision::Single,
+        plain: None,
     };
     let dark = dark_share(scene, tracer, stage, progress)?;
     if dark.share() <= DARK {

@@ -13,7 +13,7 @@ use etendue_spectrum::Bands;
 use etendue_tracer::layer::OtherFrame;
 use etendue_tracer::{
     Emitters, LayerSpec, LightingContext, Lights, Material, Pixel, PlacedSurfaces, RayStats, Rules,
-    SceneView, Spectral, Traits, View,
+    PlainScene, SceneView, Spectral, Traits, View,
 };
 
 use crate::adaptive::{Rule, SampleCounts};
@@ -227,16 +227,21 @@ pub fn trace(
     // What light passes ask of the scene.
     let emitters = lit.as_ref().and_then(|_| Emitters::of(&scene.geometry, &scene.materials));
     let placed = PlacedSurfaces::of(&scene.geometry, &scene.materials, &spectral);
+    let traits = Traits::of(&scene.geometry, &scene.materials, &placed);
+    let known = (&placed, traits);
+    let plain = lit.as_ref();
+    let plain = plain.and_then(|(_, lights)| PlainScene::of(accel, lights, known, &spectral));
     let light = lit.as_ref().map(|(rules, lights)| LightPass {
         stage: LightingContext {
             accel,
             scene: surroundings,
             lights,
             spectral: &spectral,
-            traits: Traits::of(&scene.geometry, &scene.materials, &placed),
+            traits,
             emitters: emitters.as_ref(),
             placed: &placed,
             precision: plan.light_precision,
+            plain: plain.as_ref(),
         },
         tracer: *rules,
         camera: &light_camera,

@@ -78,7 +78,7 @@ pub use spec::{LightMotionSpec, LightSpec, MaterialSpec};
 pub use spectral::Spectral;
 pub use texture::{Image, ImageSource, Texture, TextureUse};
 pub use tint::{Conductor, ConductorId, SceneCurve, Tint, TintSpectrum};
-pub use transport::{LightingContext, RayStats, Rules, Samples, Scratch, Traits};
+pub use transport::{LightingContext, PlainScene, RayStats, Rules, Samples, Scratch, Traits};
 
 /// Hits that are worked on side by side.
 pub(crate) const LANES: usize = 64;

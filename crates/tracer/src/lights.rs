@@ -10,7 +10,6 @@ use etendue_geometry::MISS;
 use etendue_geometry::glam::DVec3;
 use etendue_spectrum::{NoOverlap, Outside};
 
-pub(crate) use self::few::FewLamps;
 use crate::area_light::{self, AreaLight, AreaLightMotion, triangle_power};
 use crate::environment::EnvironmentMap;
 use crate::group::Groups;

@@ -16,23 +16,31 @@ pub struct PlacedSurfaces {
     all: Vec<Option<PlacedSurface>>,
     /// The boundaries of bodies that lie over one another.
     pub(crate) touching: Coplanar,
-    /// What is known of all where each is matte and of one colour, and what it is of none behind the last; empty
-    /// elsewhere.
+    /// What is known of all where light takes its steps in single precision, and what it is of none behind the last;
+    /// empty elsewhere.
     plain: Vec<PlainSurface>,
     /// The diagonal of the box around all (m).
     size: f64,
 }
 
-/// A matte surface of one colour, or one that only shines, in single precision.
+/// A surface of a plain scene in single precision: matte, a rough sheet of facets, or one that only shines.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct PlainSurface {
+    /// Where it is alike all over.
     pub(crate) color: [f32; 3],
     /// [`PlacedSurface::magnitudes`] (m).
     pub(crate) magnitudes: [f32; 3],
     pub(crate) is_there: bool,
     pub(crate) scatters: bool,
     pub(crate) shines: bool,
+    /// [`SurfaceKind::Sheet`].
+    pub(crate) is_sheet: bool,
+    /// Its colour, its shading normal or its facets have to be looked up at each hit.
+    pub(crate) varies: bool,
 }
+
+/// The least α of sheets of facets whose directions and densities single precision tells.
+const LEAST_ALPHA: f64 = 1e-6;
 
 impl PlainSurface {
     /// `None` of a surface of another kind.
@@ -40,22 +48,40 @@ impl PlainSurface {
     fn of(placed: &PlacedSurface, material: &Material) -> Option<Self> {
         let scatters = match placed.kind {
             SurfaceKind::Matte => true,
+            SurfaceKind::Sheet => is_rough_all_over(&material.scattering),
             SurfaceKind::Black => false,
-            SurfaceKind::Sheet | SurfaceKind::Smooth | SurfaceKind::Other => return None,
+            SurfaceKind::Smooth | SurfaceKind::Other => return None,
         };
+        let is_sheet = placed.kind == SurfaceKind::Sheet;
         let is_unlit = material.scattering == Scattering::Unlit;
-        if placed.has_alpha || placed.may_vanish() || is_unlit || (scatters && placed.is_tilted) {
+        if placed.has_alpha || placed.may_vanish() || is_unlit || (is_sheet && !scatters) {
             return None;
         }
-        let color = if scatters { placed.color?.color } else { [0.0; 3] };
+        let color = placed.color.map_or([0.0; 3], |tint| tint.color);
         Some(Self {
             color: color.map(|band| band as f32),
             magnitudes: placed.magnitudes.to_array().map(|size| size as f32),
             is_there: true,
             scatters,
             shines: placed.is_seen,
+            is_sheet,
+            varies: scatters && (is_sheet || placed.is_tilted || placed.color.is_none()),
         })
     }
+}
+
+/// Whether a sheet of facets is nowhere as smooth as a mirror.
+fn is_rough_all_over(scattering: &Scattering) -> bool {
+    let roughness = match scattering {
+        Scattering::Metal { roughness, .. } => *roughness,
+        Scattering::Gltf(surface) => surface.roughness_all_over().unwrap_or(0.0),
+        Scattering::Black
+        | Scattering::Unlit
+        | Scattering::Matte
+        | Scattering::Mirror
+        | Scattering::Dielectric(_) => 0.0,
+    };
+    roughness * roughness >= LEAST_ALPHA
 }
 
 /// As what hits are worked on, where a surface is wholly there.
@@ -182,7 +208,8 @@ impl PlacedSurfaces {
         Self { all, touching, plain, size }
     }
 
-    /// All in single precision and, behind the last, none: where all are matte and of one colour each.
+    /// All in single precision and, behind the last, none: where each is matte, a rough sheet of facets, or shines
+    /// alone.
     pub(crate) fn plain(&self) -> Option<&[PlainSurface]> {
         (!self.plain.is_empty()).then_some(&*self.plain)
     }

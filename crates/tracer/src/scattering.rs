@@ -263,4 +263,10 @@ impl GltfSurface {
         let is_covered = self.clearcoat > 0.0 || self.sheen_color != [0.0; 3];
         is_rough && !is_covered && self.anisotropy == 0.0 && self.transmission == 0.0
     }
+
+    /// Its roughness, where no texture changes that.
+    pub(crate) fn roughness_all_over(&self) -> Option<f64> {
+        let is_even = self.metallic_roughness.is_none() && self.glossiness_texture.is_none();
+        is_even.then_some(self.roughness)
+    }
 }

@@ -2,12 +2,13 @@
 
 use etendue_geometry::glam::DVec3;
 
+use crate::bsdf::sheets::Sheets;
 use crate::bsdf::{Bsdf, Coat, Layered, Model, Sheen, fresnel};
 use crate::reference::{SceneView, SurfacePoint};
 use crate::sampling::Frame;
 use crate::scattering::{GltfSurface, part};
 use crate::surface::SurfaceInteraction;
-use crate::{Conductor, Scattering, Spectral, Tint};
+use crate::{Conductor, ConductorId, Scattering, Spectral, Tint};
 
 /// The least α across a grain.
 const SMOOTHEST_GRAIN: f64 = 1e-3;
@@ -24,6 +25,20 @@ pub(crate) struct SheetSurface {
     pub(crate) f90: f64,
     /// The colour of its highlights.
     pub(crate) highlight: Tint,
+    /// It is [`Model::Metal`].
+    pub(crate) is_metal: bool,
+}
+
+impl SheetSurface {
+    /// Puts it among sheets that are worked on side by side, with the colour of its base.
+    #[inline(always)]
+    pub(crate) fn put<const N: usize>(&self, sheets: &mut Sheets<N>, lane: usize, base: &Tint) {
+        (sheets.alpha[lane], sheets.metallic[lane]) = (self.alpha, self.metallic);
+        (sheets.f0[lane], sheets.f90[lane]) = (self.f0, self.f90);
+        sheets.base_peak[lane] = base.peak();
+        sheets.f0_peak[lane] = (self.f0 * self.highlight.peak()).min(1.0);
+        sheets.is_metal[lane] = f64::from(u8::from(self.is_metal));
+    }
 }
 
 impl SurfaceInteraction<'_> {
@@ -34,6 +49,25 @@ impl SurfaceInteraction<'_> {
 }
 
 impl Scattering {
+    /// Its sheet of facets at a point, and the metal by whose measured index that reflects; `None` of what is none.
+    pub(crate) fn sheet(
+        &self,
+        point: &SurfacePoint<'_>,
+        scene: &SceneView<'_>,
+        spectral: &Spectral,
+    ) -> Option<(SheetSurface, Option<ConductorId>)> {
+        match self {
+            Self::Metal { roughness, named } => {
+                let (alpha, highlight) = (roughness * roughness, Tint::WHITE);
+                let (metallic, f0, f90) = (1.0, 0.0, 0.0);
+                let metal = SheetSurface { metallic, alpha, f0, f90, highlight, is_metal: true };
+                Some((metal, named.as_ref().map(Conductor::id)))
+            }
+            Self::Gltf(surface) => Some((surface.sheet(point, scene, spectral), None)),
+            Self::Black | Self::Matte | Self::Unlit | Self::Mirror | Self::Dielectric(_) => None,
+        }
+    }
+
     /// The model of it where it was interaction, for light of a wavelength (nm).
     fn bsdf(
         &self,
@@ -94,6 +128,7 @@ impl GltfSurface {
                     part(spectral, self.specular_color, self.specular_curve.as_ref());
                 Tint { color: std::array::from_fn(|k| (color[k] * tint[k]).min(most)), spectrum }
             },
+            is_metal: false,
         }
     }
 
@@ -108,7 +143,7 @@ impl GltfSurface {
             Some(image) => scene.texel(image, &interaction.point),
             None => [1.0; 4],
         };
-        let SheetSurface { metallic, alpha, f0, f90, highlight } =
+        let SheetSurface { metallic, alpha, f0, f90, highlight, .. } =
             self.sheet(&interaction.point, scene, spectral);
         let (geometric, shading) = interaction.normals(scene);
         let grain = self.grain(interaction, scene, shading);

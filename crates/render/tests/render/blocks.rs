@@ -4,14 +4,17 @@ use std::path::Path;
 use std::sync::Arc;
 
 use etendue_accel::{Accel, BuildOptions, BuildReport, Bvh};
+use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{HitBatch, RayBatch};
-use etendue_render::Plan;
 use etendue_render::output::Outputs;
+use etendue_render::{Images, Plan};
 use etendue_scene::Scene;
 use etendue_spectrum::{Bands, Grid};
 use etendue_tracer::material::{Alpha, NormalMap};
 use etendue_tracer::texture::Encoding;
-use etendue_tracer::{Scattering, TextureUse};
+use etendue_tracer::{
+    Lights, PlacedSurfaces, PlainScene, Scattering, SceneView, Spectral, TextureUse, Traits, View,
+};
 
 use crate::steps::{channels, load_in, prepare, trace};
 
@@ -205,38 +208,130 @@ fn blocks_and_batches_follow_the_same_paths() {
     }
 }
 
-/// Matte surfaces of one colour under few lamps are worked on in single precision as a whole, by blocks alone.
+/// A sky of 32 × 16 texels with a sun, as a Radiance file.
+fn save_sky(folder: &Path) {
+    let texel = |k: usize| match k {
+        170 => [240, 220, 180, 139],
+        _ => [60 + u8::try_from(k % 13).unwrap(), 90, 120, 128],
+    };
+    let head = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 16 +X 32\n";
+    let texels = (0..32 * 16).flat_map(texel);
+    std::fs::write(folder.join("sky.hdr"), head.iter().copied().chain(texels).collect::<Vec<_>>())
+        .unwrap();
+}
+
+/// Whether light takes its steps through a scene in single precision.
+fn is_plain(scene: &Scene, accel: &dyn Accel, images: &Images) -> bool {
+    let spectral = Spectral::of(&Bands::Rgb, &scene.materials);
+    let (geometry, materials) = (&scene.geometry, &scene.materials);
+    let view = View { origin: DVec3::ZERO, axes: DMat3::IDENTITY, pixel: None };
+    let seen = SceneView { geometry, materials, images: &images.decoded, view };
+    let lights = Lights::new(&scene.lights, None, (&seen, [0.0; 2]), &spectral).unwrap();
+    let placed = PlacedSurfaces::of(geometry, materials, &spectral);
+    let traits = Traits::of(geometry, materials, &placed);
+    PlainScene::of(accel, &lights, (&placed, traits), &spectral).is_some()
+}
+
+const ANOTHER: &str = r#", {"shape": "rectangle", "material": "sign", "width": 0.4, "height": 0.8,
+    "transform": {"rotate": [0, 1, 0, 40], "translate": [-1.2, 1.1, 0.4]}}"#;
+
+/// A room whose floor is of a material.
+fn plain_room(floor: &str, surfaces: [&str; 2], parts: [&str; 4]) -> String {
+    room_of(surfaces, parts)
+        .replace(r#""layers": ["direct", "indirect"],"#, "")
+        .replace(r#""material": "floor""#, &format!(r#""material": "{floor}""#))
+        .replace(
+            r#""red": {"#,
+            r#""white": {"type": "matte", "color": [0.8, 0.8, 0.7]},
+            "sign": {"type": "emissive", "radiance": [0.5, 2, 4], "two_sided": true},
+            "screen": {"type": "emissive", "radiance": {"image": "waves.png"}},
+            "tiles": {"type": "matte", "color": {"image": "waves.png"}},
+            "red": {"#,
+        )
+}
+
+/// Points enough for a tree.
+fn many_points() -> String {
+    let point = |k: u32| {
+        let [x, z] = [k % 4, k / 4].map(|k| f64::from(k) - 1.5);
+        let strength = 0.1 * f64::from(1 + k % 3);
+        format!(
+            r#"{{"type": "point", "at": [{x}, {}, {z}], "intensity": [{strength}, 0.2, 0.3]}}"#,
+            1.0 + 0.1 * f64::from(k)
+        )
+    };
+    (0..12).map(point).collect::<Vec<_>>().join(", ")
+}
+
+/// Opaque surfaces that are matte or rough sheets of facets are worked on in single precision as a whole, by blocks
+/// alone.
 #[test]
 fn plain_scenes_are_the_same_in_single_precision() {
-    const ANOTHER: &str = r#", {"shape": "rectangle", "material": "sign", "width": 0.4, "height": 0.8,
-        "transform": {"rotate": [0, 1, 0, 40], "translate": [-1.2, 1.1, 0.4]}}"#;
     let folder = tempfile::tempdir().unwrap();
     save_waves(folder.path());
+    save_sky(folder.path());
     let two = format!("{LAMP}{ANOTHER}");
     let path = |bounces: u32| format!(r#"{{"type": "path", "max_bounces": {bounces}}}"#);
     let direct = r#"{"type": "direct"}"#.to_owned();
     let points = r#"{"type": "point", "at": [1, 2, 1], "intensity": [1, 2, 3]},
         {"type": "point", "at": [-1.2, 0.3, 1.4], "intensity": [0.5, 0.4, 0.1]}"#;
-    for (name, tracer, lights, lamps) in [
-        ("direct", &direct, "", LAMP),
-        ("direct, two lamps", &direct, "", &two),
-        ("direct, points", &direct, points, ""),
-        ("one bounce", &path(1), "", LAMP),
-        ("three", &path(3), "", &two),
-        ("three, points", &path(3), points, ""),
+    let many = many_points();
+    let sky = r#"{"type": "environment", "radiance": [0.6, 0.7, 0.9]}"#;
+    let image = r#"{"type": "environment", "image": "sky.hdr"}"#;
+    let hidden = r#"{"type": "environment", "image": "sky.hdr", "visible": false}"#;
+    let all = format!("{POINTS}, {image}");
+    let screen = LAMP.replace("\"lamp\"", "\"screen\"");
+    // Enough triangles that shine that what shines is not asked by itself.
+    let lit = (0..6).map(|k| ANOTHER.replace("-1.2", &format!("-{}", 1.0 + 0.1 * f64::from(k))));
+    let lit = lit.collect::<String>();
+    let matte = ["red", "green"];
+    for (name, floor, surfaces, parts) in [
+        ("direct", "white", matte, [&*direct, "", LAMP, "box"]),
+        ("direct, two lamps", "white", matte, [&direct, "", &two, "box"]),
+        ("direct, points", "white", matte, [&direct, points, "", "box"]),
+        ("one bounce", "white", matte, [&path(1), "", LAMP, "box"]),
+        ("three", "white", matte, [&path(3), "", &two, "box"]),
+        ("three, points", "white", matte, [&path(3), points, "", "box"]),
         // Dim paths end by chance.
-        ("twelve", &path(12), points, &two),
+        ("twelve", "white", matte, [&path(12), points, &two, "box"]),
+        ("many points", "white", matte, [&direct, &many, "", "box"]),
+        ("many lamps", "white", matte, [&path(3), "", &lit, "box"]),
+        ("many of both", "white", matte, [&path(3), &many, &two, "box"]),
+        ("a screen", "white", matte, [&path(2), "", &screen, "box"]),
+        ("smooth normals", "white", matte, [&path(4), points, LAMP, "sphere"]),
+        ("a checker", "floor", matte, [&path(4), "", LAMP, "sphere"]),
+        ("tiles", "tiles", matte, [&path(4), "", LAMP, "box"]),
+        ("a sky", "white", matte, [&path(3), sky, "", "sphere"]),
+        ("a sky, direct", "white", matte, [&direct, sky, LAMP, "sphere"]),
+        ("an image", "white", matte, [&path(3), image, "", "sphere"]),
+        ("a hidden image", "floor", matte, [&path(3), hidden, &lit, "sphere"]),
+        ("an image, direct", "white", matte, [&direct, image, LAMP, "sphere"]),
+        ("all lights", "white", matte, [&path(4), &all, &two, "sphere"]),
+        ("metals", "white", ["copper", "gold"], [&path(5), image, LAMP, "sphere"]),
+        ("metals, direct", "white", ["gold", "copper"], [&direct, &many, LAMP, "box"]),
+        ("a sheet", "tiles", ["plastic", "gold"], [&path(5), &all, "", "sphere"]),
+        ("a printed sheet", "floor", ["gold", "printed"], [&path(8), sky, LAMP, "sphere"]),
     ] {
-        let text = room(tracer, lights, lamps, "box")
-            .replace(r#""layers": ["direct", "indirect"],"#, "")
-            .replace(
-                r#"{"type": "checker", "colors": [[0.8, 0.8, 0.7], [0.2, 0.3, 0.4]], "squares": 8}"#,
-                r#"{"type": "matte", "color": [0.8, 0.8, 0.7]},
-                "sign": {"type": "emissive", "radiance": [0.5, 2, 4], "two_sided": true}"#,
-            );
+        let scene = load_in(folder.path(), &plain_room(floor, surfaces, parts));
+        let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
+        let (accel, images) = prepare(&scene, &plan);
+        assert!(is_plain(&scene, &*accel, &images), "{name}");
+        assert!(compare(&format!("plain, {name}"), &scene, &plan, &[""]) > 0);
+    }
+}
+
+/// What is not plain is traced as other scenes are.
+#[test]
+fn scenes_of_glass_and_mirrors_are_not_plain() {
+    let folder = tempfile::tempdir().unwrap();
+    save_waves(folder.path());
+    let direct = r#"{"type": "direct"}"#;
+    for of_ball in ["mirror", "polished", "glass", "frosted", "smooth", "coated", "veil", "pane"] {
+        let text = plain_room("white", ["red", of_ball], [direct, POINTS, LAMP, "sphere"]);
         let scene = load_in(folder.path(), &text);
         let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
-        assert!(compare(&format!("plain, {name}"), &scene, &plan, &[""]) > 0);
+        let (accel, images) = prepare(&scene, &plan);
+        assert!(!is_plain(&scene, &*accel, &images), "{of_ball}");
     }
 }
 

@@ -1,22 +1,8 @@
-//! Scenes with few lights to choose from.
-
-use etendue_geometry::glam::DVec3;
+//! Scenes with few lights to choose from, and lights that are kept ready.
 
 use super::Lights;
 use crate::area_light::AreaLight;
-use crate::light::{Light, LightKind};
-
-/// Few lights: points first, then triangles.
-#[derive(Debug)]
-pub(crate) struct FewLamps<'a> {
-    /// m.
-    pub(crate) points: Vec<DVec3>,
-    pub(crate) triangles: &'a [Option<AreaLight>],
-    /// `[light][band]` of both.
-    pub(crate) bands: [&'a [f64]; 2],
-    /// The sum of the chances of all before each, and 1 at the end.
-    pub(crate) below: &'a [f64],
-}
+use crate::light::Light;
 
 impl Lights {
     /// What [`Self::pick`] picks by, where that is a short list: the sum of the chances of all lights before
@@ -27,25 +13,24 @@ impl Lights {
 
     /// All lights and their bands, if they are few triangles that are kept ready and shine alike all over.
     pub(crate) fn few_triangles(&self) -> Option<(&[Option<AreaLight>], &[f64])> {
-        let are_alone = self.lights.is_empty() && !self.triangles.is_empty();
-        let FewLamps { triangles, bands: [_, bands], .. } =
-            if are_alone { self.few_lamps() } else { None }?;
-        Some((triangles, bands))
+        self.few().filter(|_| self.lights.is_empty())?;
+        let triangles = self.ready_triangles().filter(|triangles| !triangles.is_empty())?;
+        let is_plain = |own: &Option<AreaLight>| own.as_ref().is_some_and(|own| own.is_plain);
+        triangles.iter().all(is_plain).then_some((triangles, &*self.area_light_bands))
     }
 
-    /// The lights of a scene that has few to choose from, all of them points that stand still or triangles that shine
-    /// alike all over and are kept ready.
-    pub(crate) fn few_lamps(&self) -> Option<FewLamps<'_>> {
-        let below = self.few()?;
-        let point = |light: &Light| match &light.kind {
-            LightKind::Point(at) => light.motion.is_none().then_some(*at),
-            _ => None,
-        };
-        let points = self.lights.iter().map(point).collect::<Option<Vec<_>>>()?;
-        let triangle = |own: &Option<AreaLight>| own.as_ref().is_some_and(|own| own.is_plain);
-        let are_ready = self.area_lights.len() == self.triangles.len();
-        let are_plain = are_ready && self.area_lights.iter().all(triangle);
-        let bands = [&*self.bands, &*self.area_light_bands];
-        are_plain.then_some(FewLamps { points, triangles: &self.area_lights, bands, below })
+    /// The emissive triangles, where they are kept ready.
+    pub(crate) fn ready_triangles(&self) -> Option<&[Option<AreaLight>]> {
+        (self.area_lights.len() == self.triangles.len()).then_some(&*self.area_lights)
+    }
+
+    /// What each of those gives off in `count` bands, of those that shine alike all over.
+    pub(crate) fn bands_of_triangles(&self, count: usize) -> impl Iterator<Item = &[f64]> {
+        self.area_light_bands.chunks(count)
+    }
+
+    /// The lights that are no triangles, which come first.
+    pub(crate) fn bare(&self) -> &[Light] {
+        &self.lights
     }
 }

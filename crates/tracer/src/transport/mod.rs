@@ -37,6 +37,7 @@ use etendue_geometry::{Geometry, HitPrecision, RayBatch};
 
 use self::patch::Patch;
 use self::paths::Workspace;
+pub use self::plain::PlainScene;
 use self::plain::PlainScratch;
 pub(crate) use self::plain::SIZES as PLAIN_SIZES;
 use self::rays::{Batch, Blocks};
@@ -69,6 +70,8 @@ pub struct LightingContext<'a> {
     pub placed: &'a PlacedSurfaces,
     /// How precisely its paths hit.
     pub precision: HitPrecision,
+    /// What is known beforehand of a scene whose paths take their steps in single precision.
+    pub plain: Option<&'a PlainScene>,
 }
 
 impl LightingContext<'_> {
@@ -269,8 +272,8 @@ fn trace_bands<const RGB: bool>(
         times: camera.rays.times(),
         tally: RayStats::default(),
     };
-    if let Some((surfaces, lights)) = tracing.plain() {
-        tracing.trace_plain(camera, (surfaces, &lights), (plain, blocks), out);
+    if let Some(scene) = tracing.plain() {
+        tracing.trace_plain(camera, scene, (plain, blocks), out);
         return tracing.tally;
     }
     match ctx.precision {

@@ -1,55 +1,30 @@
-//! Plain scenes: matte surfaces of one colour each under few lamps that stand still. All of a step is done on blocks
-//! of sixteen paths in single precision, whose numbers stay in registers between the hit and the rays that leave it.
+//! Plain scenes: opaque surfaces, matte or rough sheets of facets, in red, green and blue, that stand still. All of a
+//! step is done on blocks of sixteen paths in single precision, whose numbers stay in registers between the hit and the
+//! rays that leave it; what differs from hit to hit, as textures do, is looked up first where a block has any.
 //!
 //! The estimators, and the random numbers by use, are those of the other scenes ([`super::trace`]): pictures are the
 //! same up to the roundings of single precision. What is rare, such as the light of a lamp that is met, is done there.
 
+mod ask;
+mod columns;
 mod kernel;
 mod lamps;
+mod scene;
+mod surfaces;
 
 use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitPrecision, RayBlocks};
 
-use self::kernel::{Leaving, Numbers, leave_blocks};
-use self::lamps::Lights;
+use self::columns::{Columns, RayColumns};
+use self::kernel::{BlockScratch, Leaving, Numbers, Sphere, Stage, leave_blocks};
+pub use self::scene::PlainScene;
+pub(crate) use self::scene::SIZES;
 use super::paths::{DRAWS, Draw, Step, Way, Workspace};
 use super::rays::{Blocks, RayHit};
 use super::trace::Encounter;
-use super::{LightingContext, Parts, RaySamples, Tracing};
-use crate::area_light::AreaLight;
-use crate::light_sampler::Receiver;
-use crate::placed::PlainSurface;
-
-/// Single precision holds squares of lengths, and densities over areas, of scenes between these sizes (m).
-pub(crate) const SIZES: [f64; 2] = [1e-6, 1e9];
-
-/// The least area of a lamp over the square of the scene's size that it holds.
-const LEAST_AREA: f64 = 1e-12;
-
-/// What sixteen and more paths carry, a column a number; behind the last there is room for a block.
-#[derive(Debug, Default)]
-pub(super) struct Columns {
-    pub(super) len: usize,
-    pub(super) ray: Vec<u32>,
-    /// Density (1/sr) of the direction, unused of the camera's.
-    pub(super) pdf: Vec<f32>,
-    pub(super) throughput: [Vec<f32>; 3],
-}
-
-/// Rays that leave a block's hits, a column a number, with room for a block behind the last.
-#[derive(Debug, Default)]
-pub(super) struct RayColumns {
-    pub(super) len: usize,
-    pub(super) start: [Vec<f32>; 3],
-    pub(super) along: [Vec<f32>; 3],
-    pub(super) reach: Vec<f32>,
-    /// The block's lane that each leaves, counted from the first block.
-    pub(super) left: Vec<u32>,
-    /// The lamp that each is sent to.
-    pub(super) lamp: Vec<u32>,
-    pub(super) carried: Columns,
-}
+use super::{Parts, RaySamples, Tracing};
+use crate::footprint::Footprint;
 
 /// Memory of one thread, kept between batches.
 #[derive(Debug, Default)]
@@ -60,115 +35,49 @@ pub(super) struct PlainScratch {
     next: RayColumns,
     shadow_rays: RayBlocks,
     numbers: [[Vec<f32>; 2]; DRAWS as usize],
-    /// Hits on what shines.
+    /// Hits on what shines, and rays that hit nothing.
     seen: Vec<u32>,
-}
-
-impl Columns {
-    fn resize(&mut self, len: usize) {
-        let len = len.next_multiple_of(LANES) + LANES;
-        self.ray.resize(len, 0);
-        self.pdf.resize(len, 0.0);
-        self.throughput.iter_mut().for_each(|band| band.resize(len, 0.0));
-    }
-}
-
-impl RayColumns {
-    fn restart(&mut self, most: usize) {
-        self.len = 0;
-        self.carried.resize(most);
-        let len = self.carried.ray.len();
-        for axis in self.start.iter_mut().chain(&mut self.along) {
-            axis.resize(len, 0.0);
-        }
-        self.reach.resize(len, 0.0);
-        self.left.resize(len, 0);
-        self.lamp.resize(len, 0);
-    }
-
-    /// The rays as blocks, which are refilled.
-    fn pack(&self, blocks: &mut RayBlocks) {
-        blocks.refill(self.len, |block, start, count| {
-            let run = start..start + LANES;
-            for axis in 0..3 {
-                block.origin[axis].copy_from_slice(&self.start[axis][run.clone()]);
-                block.direction[axis].copy_from_slice(&self.along[axis][run.clone()]);
-            }
-            block.t_max[..count].copy_from_slice(&self.reach[start..start + count]);
-        });
-    }
+    missed: Vec<u32>,
+    block: BlockScratch,
 }
 
 impl<'a, const RGB: bool> Tracing<'a, RGB> {
-    /// The surfaces and lamps of a plain scene; `None` of any other.
-    pub(super) fn plain(&self) -> Option<(&'a [PlainSurface], Lights)> {
-        let &LightingContext { lights, placed, emitters, traits, .. } = self.ctx;
-        let is_taken = RGB
-            && self.ctx.precision == HitPrecision::Single
+    /// The scene, if it is plain and so are the rays.
+    pub(super) fn plain(&self) -> Option<&'a PlainScene> {
+        let is_taken = self.ctx.precision == HitPrecision::Single
             && self.parts == Parts::Whole
-            && self.times.is_empty()
-            && traits.is_matte
-            && !(traits.may_pass() || traits.has_media || traits.has_panes)
-            && emitters.is_some()
-            && !lights.has_environment();
-        let surfaces = placed.plain().filter(|_| is_taken)?;
-        let origin = self.ctx.accel.blocks()?.origin();
-        let least = LEAST_AREA * placed.size().powi(2);
-        let few = lights.few_lamps()?;
-        let fits = |own: &AreaLight| own.shape.area > least;
-        let near = |at: &DVec3| (*at - origin).length() < SIZES[1];
-        let are_taken = few.triangles.iter().flatten().all(fits) && few.points.iter().all(near);
-        are_taken.then(|| (surfaces, Lights::new(&few, origin)))
+            && self.times.is_empty();
+        self.ctx.plain.filter(|_| is_taken)
     }
 
     /// Traces the camera's rays through a plain scene.
     pub(super) fn trace_plain(
         &mut self,
         camera: &RaySamples<'_>,
-        (surfaces, lights): (&[PlainSurface], &Lights),
+        scene: &PlainScene,
         (plain, workspace): (&mut PlainScratch, &mut Workspace<Blocks>),
         out: &mut [f64],
     ) {
         let Some(accel) = self.ctx.accel.blocks() else { return };
         workspace.radiance.resize(self.count(), 0.0);
         accel.convert(camera.rays, &mut plain.rays);
-        start(camera, &mut plain.carried);
+        plain.carried.start(camera);
         let mut coherent = camera.rays.coherent;
+        // Last directions are followed to what they hit where what shines is not asked by itself.
+        let mut is_over = false;
         for number in 0..=self.rules.bounces {
-            let len = plain.rays.len();
-            if len == 0 {
+            if plain.rays.is_empty() {
                 break;
             }
             accel.closest_of_blocks(plain.rays.blocks_mut(), &[], coherent);
-            self.tally.rays += len as u64;
-            let is_scattered = number < self.rules.bounces;
-            let is_last = self.is_end_unless_specular(number);
-            plain.shadows.restart(len);
-            plain.next.restart(len);
-            plain.seen.clear();
-            // Nobody comes upon points.
-            let goes_on = !is_last || self.ctx.lights.is_hittable();
-            let roulette = !is_last && self.rules.roulette.is_some_and(|after| number + 1 >= after);
-            if is_scattered {
-                self.draw_plain(camera, number, [goes_on, roulette], plain);
-            }
-            let numbers = Numbers { is_scattered, goes_on, roulette, drawn: &plain.numbers };
-            let leaving = Leaving {
-                shadows: &mut plain.shadows,
-                next: &mut plain.next,
-                seen: &mut plain.seen,
-            };
-            let emitters = self.ctx.emitters.filter(|_| is_last);
-            let sphere = emitters.map(|emitters| emitters.sphere(lights.origin));
-            leave_blocks(
-                (surfaces, lights),
-                (plain.rays.blocks(), &plain.carried),
-                (numbers, sphere),
-                leaving,
-            );
-            self.meet_plain(number, plain, workspace, out);
-            self.light_plain(plain, lights, coherent, out);
-            if is_last {
+            self.tally.rays += plain.rays.len() as u64;
+            let is_scattered = !is_over && number < self.rules.bounces;
+            self.step_plain(camera, (scene, number, is_scattered), plain);
+            self.meet_plain(camera, number, plain, workspace, out);
+            self.meet_sky(camera, number, plain, workspace, out);
+            self.light_plain(plain, scene, coherent, out);
+            is_over = self.is_end_unless_specular(number);
+            if is_over && self.ctx.emitters.is_some() {
                 self.ask_emitters_plain(camera, number, plain, workspace, out);
                 break;
             }
@@ -179,37 +88,89 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         }
     }
 
+    /// Notes the rays that leave the hits of all paths, which surfaces have scattered so often.
+    fn step_plain(
+        &self,
+        camera: &RaySamples<'_>,
+        (scene, number, is_scattered): (&PlainScene, u32, bool),
+        plain: &mut PlainScratch,
+    ) {
+        let len = plain.rays.len();
+        plain.shadows.restart(len);
+        plain.next.restart(len);
+        plain.seen.clear();
+        plain.missed.clear();
+        let is_last = self.is_end_unless_specular(number);
+        // Nobody comes upon points.
+        let goes_on = !is_last || self.ctx.lights.is_hittable();
+        let roulette = !is_last && self.rules.roulette.is_some_and(|after| number + 1 >= after);
+        if is_scattered {
+            let has_choice = scene.has_sheets && goes_on;
+            self.draw_plain(camera, number, [has_choice, goes_on, roulette], plain);
+        }
+        let numbers = Numbers { is_scattered, goes_on, roulette, drawn: &plain.numbers };
+        let mut leaving = Leaving {
+            shadows: &mut plain.shadows,
+            next: &mut plain.next,
+            seen: &mut plain.seen,
+            missed: &mut plain.missed,
+        };
+        let stage = Stage {
+            ctx: self.ctx,
+            plain: scene,
+            camera: (number == 0).then_some(camera.rays),
+        };
+        leave_blocks(
+            &stage,
+            (plain.rays.blocks(), &plain.carried),
+            (&numbers, self.around_emitters(is_last, scene.origin)),
+            &mut leaving,
+            &mut plain.block,
+        );
+    }
+
+    /// What last directions have to meet to be followed; `None` where they may meet anything.
+    fn around_emitters(&self, is_last: bool, origin: DVec3) -> Option<Sphere> {
+        let asks = is_last && !self.ctx.lights.has_environment();
+        self.ctx.emitters.filter(|_| asks).map(|emitters| emitters.sphere(origin))
+    }
+
     /// Draws what a step needs for all lanes.
     fn draw_plain(
         &self,
         camera: &RaySamples<'_>,
         number: u32,
-        [goes_on, roulette]: [bool; 2],
+        [has_choice, goes_on, roulette]: [bool; 3],
         plain: &mut PlainScratch,
     ) {
         let rays = &plain.carried.ray[..plain.rays.len()];
         let padded = rays.len().next_multiple_of(LANES);
-        for (draw, needs) in
-            [(Draw::Light, true), (Draw::Direction, goes_on), (Draw::Chance, roulette)]
-        {
+        let needed = [
+            (Draw::Choice, has_choice),
+            (Draw::Light, true),
+            (Draw::Direction, goes_on),
+            (Draw::Chance, roulette),
+        ];
+        for (draw, needs) in needed {
+            let drawn = &mut plain.numbers[draw as usize];
             if needs {
-                let drawn = &mut plain.numbers[draw as usize];
                 let pair = number * DRAWS + draw as u32;
                 camera.samples.floats_of_pair(rays, pair, drawn);
-                drawn.iter_mut().for_each(|half| half.resize(padded, 0.5));
             }
+            drawn.iter_mut().for_each(|half| half.resize(padded, 0.5));
         }
     }
 
     /// Adds the light of lamps that paths met.
     fn meet_plain(
         &mut self,
+        camera: &RaySamples<'_>,
         number: u32,
         plain: &PlainScratch,
         workspace: &mut Workspace<Blocks>,
         out: &mut [f64],
     ) {
-        let Columns { ray, pdf, throughput, .. } = &plain.carried;
+        let Columns { ray, throughput, .. } = &plain.carried;
         for &i in &plain.seen {
             let i = i as usize;
             let (block, lane) = (&plain.rays.blocks()[i / LANES], i % LANES);
@@ -223,15 +184,21 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
                 normal: vector(&block.normal).normalize(),
                 time: 0.0,
             };
-            // Few lamps are chosen with the same chance for all points.
-            let receiver = Receiver { point: from, normal: DVec3::ZERO };
+            let way = way_of(&plain.carried, number, i);
+            let receiver = way.receiver(from);
             let encounter = Encounter { hit, ray: (from, vector(&block.direction)), receiver };
-            let way = match number {
-                0 => Way::CAMERA,
-                _ => Way { pdf: f64::from(pdf[i]), is_specular: false, ..Way::CAMERA },
+            let footprint = || {
+                let direction = camera.rays.direction(i);
+                let hit = from + encounter.ray.1 * encounter.hit.t;
+                let along = (hit - camera.rays.origin(i)).dot(direction);
+                let cone = self.ctx.scene.view.cone(direction)?.after(along);
+                Some(Footprint { direction, width: cone.width })
             };
+            let footprint = || if number == 0 { footprint() } else { None };
             let light = &mut workspace.radiance;
-            let Some(weight) = self.light_of_hit(&encounter, way, || None, light) else { continue };
+            let Some(weight) = self.light_of_hit(&encounter, way, footprint, light) else {
+                continue;
+            };
             for (light, band) in light.iter_mut().zip(throughput) {
                 *light *= f64::from(band[i]) * weight;
             }
@@ -239,11 +206,49 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         }
     }
 
-    /// Adds what lamps bring along shadow rays that nothing blocks.
+    /// Adds the light of the sky, which paths met that hit nothing.
+    fn meet_sky(
+        &mut self,
+        camera: &RaySamples<'_>,
+        number: u32,
+        plain: &PlainScratch,
+        workspace: &mut Workspace<Blocks>,
+        out: &mut [f64],
+    ) {
+        let lights = self.ctx.lights;
+        let is_seen = lights.sky.as_ref().is_some_and(|sky| sky.visible || number > 0);
+        if !is_seen || plain.missed.is_empty() {
+            return;
+        }
+        let Columns { ray, throughput, .. } = &plain.carried;
+        let origin = self.ctx.accel.blocks().map_or(DVec3::ZERO, |blocks| blocks.origin());
+        let wanted = plain.missed.iter().map(|&i| {
+            let i = i as usize;
+            // The camera's rays are not all traced: those that cannot hit anything are other ones in blocks.
+            if number == 0 {
+                return (None, camera.rays.direction(i));
+            }
+            let (block, lane) = (&plain.rays.blocks()[i / LANES], i % LANES);
+            let vector = |axes| etendue_geometry::block::vector(axes, lane);
+            let receiver = way_of(&plain.carried, number, i).receiver(origin + vector(&block.origin));
+            (Some(receiver), vector(&block.direction))
+        });
+        let Workspace { asked, radiance, .. } = workspace;
+        lights.environment(self.ctx.spectral, wanted, asked, radiance, |k, of_sky, light| {
+            let i = plain.missed[k] as usize;
+            let weight = way_of(&plain.carried, number, i).weight_against(of_sky);
+            for (light, band) in light.iter_mut().zip(throughput) {
+                *light *= f64::from(band[i]) * weight;
+            }
+            self.add(light, ray[i], out);
+        });
+    }
+
+    /// Adds what lights bring along shadow rays that nothing blocks.
     fn light_plain(
         &mut self,
         plain: &mut PlainScratch,
-        lights: &Lights,
+        scene: &PlainScene,
         coherent: bool,
         out: &mut [f64],
     ) {
@@ -260,7 +265,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
                     continue;
                 }
                 let i = first + lane;
-                let radiance = lights.radiance[shadows.lamp[i] as usize];
+                let radiance = scene.lamps.radiance[shadows.lamp[i] as usize];
                 let light = [
                     f64::from(red[i]) * radiance[0],
                     f64::from(green[i]) * radiance[1],
@@ -298,7 +303,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
                 pdf: f64::from(next.carried.pdf[i]),
                 is_specular: false,
                 is_last: true,
-                normal: [0.0; 3],
+                normal: next.carried.normal(i),
             });
             of_last
                 .throughput
@@ -309,15 +314,15 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
     }
 }
 
-/// The camera's rays as paths.
-fn start(camera: &RaySamples<'_>, carried: &mut Columns) {
-    let len = camera.rays.len();
-    carried.resize(len);
-    carried.len = len;
-    for (number, ray) in (0..).zip(&mut carried.ray) {
-        *ray = number;
-    }
-    for (k, band) in carried.throughput.iter_mut().enumerate() {
-        band.fill(if camera.bands.contains(&k) { 1.0 } else { 0.0 });
+/// How a path came to its direction, after so many surfaces.
+fn way_of(carried: &Columns, number: u32, i: usize) -> Way {
+    match number {
+        0 => Way::CAMERA,
+        _ => Way {
+            pdf: f64::from(carried.pdf[i]),
+            is_specular: false,
+            is_last: false,
+            normal: carried.normal(i),
+        },
     }
 }

@@ -9,7 +9,6 @@ use super::rays::Rays;
 use crate::bsdf::{Bsdf, Model};
 use crate::placed::PlacedSurface;
 use crate::reference::SurfacePoint;
-use crate::shading::SheetSurface;
 use crate::surface::SurfaceInteraction;
 use crate::{Conductor, LANES, Scattering, Tint};
 
@@ -82,35 +81,19 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let scene = &self.ctx.scene;
         let Some((_, surface_point)) = self.point_of(step, now, i) else { return false };
         let Some(material) = scene.material(&surface_point) else { return false };
-        let (surface, named, is_metal) = match &material.scattering {
-            Scattering::Metal { roughness, named } => {
-                let (alpha, highlight) = (roughness * roughness, Tint::WHITE);
-                let metal = SheetSurface { metallic: 1.0, alpha, f0: 0.0, f90: 0.0, highlight };
-                (metal, named.as_ref().map(Conductor::id), 1.0)
-            }
-            Scattering::Gltf(surface) => {
-                (surface.sheet(&surface_point, scene, self.ctx.spectral), None, 0.0)
-            }
-            Scattering::Black
-            | Scattering::Matte
-            | Scattering::Unlit
-            | Scattering::Mirror
-            | Scattering::Dielectric(_) => return false,
+        let Some((surface, named)) =
+            material.scattering.sheet(&surface_point, scene, self.ctx.spectral)
+        else {
+            return false;
         };
         if surface.alpha <= 0.0 {
             return false;
         }
         put(&mut patch.seen.magnitudes, lane, placed.magnitudes);
         self.look_up(patch, lane, placed, &surface_point);
-        let SheetSurface { metallic, alpha, f0, f90, highlight } = surface;
-        let sheets = &mut *patch.sheets;
-        (sheets.alpha[lane], sheets.metallic[lane]) = (alpha, metallic);
-        (sheets.f0[lane], sheets.f90[lane]) = (f0, f90);
-        sheets.base_peak[lane] = patch.colors[lane].peak();
-        sheets.f0_peak[lane] = (f0 * highlight.peak()).min(1.0);
-        sheets.is_metal[lane] = is_metal;
+        surface.put(&mut patch.sheets, lane, &patch.colors[lane]);
         patch.sheet_colors.resize(LANES, SheetColors::default());
-        patch.sheet_colors[lane] = SheetColors { highlight, deep: [0.0; 3], named };
+        patch.sheet_colors[lane] = SheetColors { highlight: surface.highlight, deep: [0.0; 3], named };
         true
     }
 

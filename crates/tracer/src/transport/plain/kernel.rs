@@ -4,19 +4,23 @@
 
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
 
-use etendue_geometry::RayBlock;
-use etendue_geometry::block::{Floats as Row, LANES};
+use etendue_geometry::block::{Floats as Row, LANES, vector};
 use etendue_geometry::glam::DVec3;
+use etendue_geometry::{RayBatch, RayBlock};
 
-use super::lamps::{Lights, place};
-use super::{Columns, RayColumns};
+use super::ask::ask;
+use super::columns::{Columns, RayColumns};
+use super::lamps::Asking;
+use super::scene::PlainScene;
+use super::surfaces::{PlainSheets, look_up};
+use crate::LightingContext;
 use crate::placed::PlainSurface;
 use crate::transport::paths::{DRAWS, Draw};
 use crate::transport::{kernels, patch};
 
 /// Roundings of a hit and of the rays that leave it: those of [`crate::spawn`] in single precision, and as many
 /// again of the point, of the normal and of the start, which are of single precision, too.
-const ROUNDINGS: f32 = 12.0 * f32::EPSILON;
+pub(super) const ROUNDINGS: f32 = 12.0 * f32::EPSILON;
 
 /// [`kernels::BACK`] and [`patch::BESIDE`], which single precision holds.
 #[expect(clippy::cast_possible_truncation, reason = "a power of two")]
@@ -25,6 +29,13 @@ const BACK: f32 = kernels::BACK as f32;
 const BESIDE: f32 = patch::BESIDE as f32;
 
 pub(super) const ZERO: Row = [0.0; LANES];
+
+/// The scene, and the camera's rays where they are the ones that hit.
+pub(super) struct Stage<'a> {
+    pub(super) ctx: &'a LightingContext<'a>,
+    pub(super) plain: &'a PlainScene,
+    pub(super) camera: Option<&'a RayBatch>,
+}
 
 /// What a step does, and its random numbers by use, a number a lane.
 pub(super) struct Numbers<'a> {
@@ -38,114 +49,194 @@ pub(super) struct Numbers<'a> {
 pub(super) struct Leaving<'a> {
     pub(super) shadows: &'a mut RayColumns,
     pub(super) next: &'a mut RayColumns,
+    /// Hits on what shines, and rays that hit nothing.
     pub(super) seen: &'a mut Vec<u32>,
+    pub(super) missed: &'a mut Vec<u32>,
+}
+
+/// Memory of a block, kept for the next.
+#[derive(Debug, Default)]
+pub(in crate::transport) struct BlockScratch {
+    pub(super) asking: Asking,
+    pub(super) sheets: Box<PlainSheets>,
 }
 
 /// A sphere around all that shines, relative to the blocks' origin: its centre and its radius (m).
 pub(super) type Sphere = ([f32; 3], f32);
 
-/// What is looked up for the hits of a block.
-struct Found {
-    color: [Row; 3],
-    magnitudes: [Row; 3],
-    scatters: [bool; LANES],
-}
-
 /// The hits of a block.
-struct Hits {
-    point: [Row; 3],
-    normal: [Row; 3],
-    error: Row,
-    back: [Row; 3],
+pub(super) struct Hits {
+    pub(super) color: [Row; 3],
+    pub(super) magnitudes: [Row; 3],
+    pub(super) scatters: [bool; LANES],
+    /// Those that have to be looked up one by one, and those on sheets of facets.
+    pub(super) varies: [bool; LANES],
+    pub(super) is_sheet: [bool; LANES],
+    pub(super) has_sheets: bool,
+    pub(super) point: [Row; 3],
+    /// Of the triangle and as light is scattered by, on the viewer's side (unit).
+    pub(super) normal: [Row; 3],
+    pub(super) shading: [Row; 3],
+    pub(super) error: Row,
+    pub(super) back: [Row; 3],
 }
 
-/// A step of all paths of some blocks: lists those that met what shines, and notes the rays that leave.
+impl Hits {
+    const NONE: Self = Self {
+        color: [ZERO; 3],
+        magnitudes: [ZERO; 3],
+        scatters: [false; LANES],
+        varies: [false; LANES],
+        is_sheet: [false; LANES],
+        has_sheets: false,
+        point: [ZERO; 3],
+        normal: [ZERO; 3],
+        shading: [ZERO; 3],
+        error: ZERO,
+        back: [ZERO; 3],
+    };
+}
+
+/// The paths of a block: the camera's rays, and what they carry.
+pub(super) struct Carried {
+    pub(super) ray: [u32; LANES],
+    pub(super) throughput: [Row; 3],
+}
+
+/// A step of all paths of some blocks: lists those that met what shines or nothing, and notes the rays that leave.
 #[multiversion::multiversion(targets = "simd")]
 pub(super) fn leave_blocks(
-    (surfaces, lights): (&[PlainSurface], &Lights),
-    (blocks, carried): (&[RayBlock], &Columns),
-    (numbers, sphere): (Numbers<'_>, Option<Sphere>),
-    Leaving { shadows, next, seen }: Leaving<'_>,
+    stage: &Stage<'_>,
+    (blocks, paths): (&[RayBlock], &Columns),
+    (numbers, sphere): (&Numbers<'_>, Option<Sphere>),
+    leaving: &mut Leaving<'_>,
+    scratch: &mut BlockScratch,
 ) {
-    let Some(last) = surfaces.len().checked_sub(1) else { return };
     for (number, block) in blocks.iter().enumerate() {
         let first = number * LANES;
-        let mut found = Found { color: [ZERO; 3], magnitudes: [ZERO; 3], scatters: [false; LANES] };
-        let mut any = false;
-        let numbers_of_lanes = lanes_from(first);
-        for lane in 0..LANES {
-            let surface = &surfaces[(block.placement[lane] as usize).min(last)];
-            for axis in 0..3 {
-                found.color[axis][lane] = surface.color[axis];
-                found.magnitudes[axis][lane] = surface.magnitudes[axis];
-            }
-            let is_hit = surface.is_there & (lane < carried.len.saturating_sub(first));
-            found.scatters[lane] = surface.scatters & is_hit;
-            any |= found.scatters[lane];
-            if surface.shines & is_hit {
-                seen.push(numbers_of_lanes[lane]);
-            }
-        }
+        let lanes = lanes_from(first);
+        let mut hits = Hits::NONE;
+        let count = paths.len.saturating_sub(first);
+        let [any, varies] = gather(&stage.plain.surfaces, (block, lanes, count), &mut hits, leaving);
         if !(any & numbers.is_scattered) {
             continue;
         }
-        let hits = measure(block, &found.magnitudes, lights.origin);
+        measure(block, stage.plain.origin, &mut hits);
+        if varies {
+            look_up(stage, (block, first), &mut hits, &mut scratch.sheets);
+        }
         let run = first..first + LANES;
         let row = |column: &[f32]| -> Row { column[run.clone()].try_into().unwrap_or(ZERO) };
-        let mut throughput = carried.throughput.each_ref().map(|band| row(band));
-        for band in 0..3 {
-            for i in 0..LANES {
-                throughput[band][i] *= found.color[band][i];
-            }
-        }
+        let carried = Carried {
+            ray: paths.ray[run.clone()].try_into().unwrap_or([0; LANES]),
+            throughput: paths.throughput.each_ref().map(|band| row(band)),
+        };
         let square = |draw: Draw| numbers.drawn[draw as usize].each_ref().map(|half| row(half));
-        let ray: [u32; LANES] = carried.ray[run.clone()].try_into().unwrap_or([0; LANES]);
-        let light = square(Draw::Light);
-        ask(lights, &hits, light, (&found.scatters, &throughput, &ray), shadows);
-        if !numbers.goes_on {
-            continue;
+        ask(stage, &hits, square(Draw::Light), &carried, (&mut *leaving.shadows, &mut *scratch));
+        if numbers.goes_on {
+            let [_, choices] = square(Draw::Choice);
+            let chances = numbers.roulette.then(|| square(Draw::Chance)[1]);
+            let drawn = (square(Draw::Direction), choices, chances);
+            let sheets = &mut scratch.sheets;
+            follow((&hits, lanes, carried), drawn, (stage, sphere.as_ref()), sheets, leaving.next);
         }
-        let direction = square(Draw::Direction);
-        let (start, along, pdf, mut goes) = scatter(&hits, direction);
+    }
+}
+
+/// What the surfaces of a block's hits are, of which so many lanes count; whether any scatters light, and whether any
+/// has to be looked up.
+#[inline(always)]
+fn gather(
+    surfaces: &[PlainSurface],
+    (block, lanes, count): (&RayBlock, [u32; LANES], usize),
+    hits: &mut Hits,
+    leaving: &mut Leaving<'_>,
+) -> [bool; 2] {
+    let Some(last) = surfaces.len().checked_sub(1) else { return [false; 2] };
+    let [mut any, mut varies] = [false; 2];
+    for lane in 0..LANES {
+        let surface = &surfaces[(block.placement[lane] as usize).min(last)];
+        for axis in 0..3 {
+            hits.color[axis][lane] = surface.color[axis];
+            hits.magnitudes[axis][lane] = surface.magnitudes[axis];
+        }
+        let counts = lane < count;
+        let is_hit = surface.is_there & counts;
+        hits.scatters[lane] = surface.scatters & is_hit;
+        hits.varies[lane] = surface.varies & is_hit;
+        hits.is_sheet[lane] = surface.is_sheet & is_hit;
+        any |= hits.scatters[lane];
+        varies |= hits.varies[lane];
+        hits.has_sheets |= hits.is_sheet[lane];
+        if surface.shines & is_hit {
+            leaving.seen.push(lanes[lane]);
+        }
+        if !surface.is_there & counts {
+            leaving.missed.push(lanes[lane]);
+        }
+    }
+    [any, varies]
+}
+
+/// Chooses directions, and notes the paths along those that carry something and do not end by chance.
+#[inline(always)]
+fn follow(
+    (hits, lanes, mut carried): (&Hits, [u32; LANES], Carried),
+    (squares, choices, chances): ([Row; 2], Row, Option<Row>),
+    (stage, sphere): (&Stage<'_>, Option<&Sphere>),
+    sheets: &mut PlainSheets,
+    next: &mut RayColumns,
+) {
+    let (start, mut along, mut pdf, mut goes) = scatter(hits, squares);
+    let throughput = &mut carried.throughput;
+    for band in 0..3 {
         for i in 0..LANES {
-            goes[i] &= found.scatters[i];
+            throughput[band][i] *= if hits.is_sheet[i] { 1.0 } else { hits.color[band][i] };
         }
-        let mut most = ZERO;
+    }
+    if hits.has_sheets {
+        sheets.scatter(hits, (&choices, squares), (&mut along, &mut pdf, &mut goes), throughput);
+    }
+    for i in 0..LANES {
+        goes[i] &= hits.scatters[i];
+    }
+    let mut most = ZERO;
+    for i in 0..LANES {
+        let [r, g, b] = [throughput[0][i], throughput[1][i], throughput[2][i]];
+        let larger = if g > r { g } else { r };
+        most[i] = if b > larger { b } else { larger };
+        goes[i] &= most[i] > 0.0;
+    }
+    if let Some(sphere) = sphere {
+        keep_those_that_may_meet(sphere, (&start, &along), &mut goes);
+    }
+    if let Some(chance) = chances {
         for i in 0..LANES {
-            let [r, g, b] = [throughput[0][i], throughput[1][i], throughput[2][i]];
-            let larger = if g > r { g } else { r };
-            most[i] = if b > larger { b } else { larger };
-            goes[i] &= most[i] > 0.0;
-        }
-        if let Some(sphere) = &sphere {
-            keep_those_that_may_meet(sphere, (&start, &along), &mut goes);
-        }
-        if numbers.roulette {
-            let [_, chance] = square(Draw::Chance);
-            for i in 0..LANES {
-                // Its root: where few paths come this far, ending them saves little and leaves noise.
-                let root = most[i].sqrt();
-                let survival = if root < 1.0 { root } else { 1.0 };
-                goes[i] &= chance[i] < survival;
-                let inverse = if survival > 0.0 { 1.0 / survival } else { 0.0 };
-                for band in 0..3 {
-                    throughput[band][i] *= inverse;
-                }
+            // Its root: where few paths come this far, ending them saves little and leaves noise.
+            let root = most[i].sqrt();
+            let survival = if root < 1.0 { root } else { 1.0 };
+            goes[i] &= chance[i] < survival;
+            let inverse = if survival > 0.0 { 1.0 / survival } else { 0.0 };
+            for band in 0..3 {
+                throughput[band][i] *= inverse;
             }
         }
-        let (picked, count) = compress(&goes);
-        let at = next.len;
-        for axis in 0..3 {
-            put(&mut next.start[axis], at, &start[axis], &picked);
-            put(&mut next.along[axis], at, &along[axis], &picked);
-            put(&mut next.carried.throughput[axis], at, &throughput[axis], &picked);
-        }
-        put(&mut next.carried.pdf, at, &pdf, &picked);
-        put(&mut next.carried.ray, at, &ray, &picked);
-        put(&mut next.reach, at, &[f32::INFINITY; LANES], &picked);
-        put(&mut next.left, at, &numbers_of_lanes, &picked);
-        next.len += count;
     }
+    let (picked, count) = compress(&goes);
+    let at = next.len;
+    for axis in 0..3 {
+        put(&mut next.start[axis], at, &start[axis], &picked);
+        put(&mut next.along[axis], at, &along[axis], &picked);
+        put(&mut next.carried.throughput[axis], at, &throughput[axis], &picked);
+        if stage.plain.has_receivers {
+            put(&mut next.carried.normal[axis], at, &hits.shading[axis], &picked);
+        }
+    }
+    put(&mut next.carried.pdf, at, &pdf, &picked);
+    put(&mut next.carried.ray, at, &carried.ray, &picked);
+    put(&mut next.reach, at, &[f32::INFINITY; LANES], &picked);
+    put(&mut next.left, at, &lanes, &picked);
+    next.len += count;
 }
 
 /// The numbers of a block's lanes, counted from the first block.
@@ -159,9 +250,9 @@ fn lanes_from(first: usize) -> [u32; LANES] {
     lanes
 }
 
-/// Points, their errors, and normals on the viewer's side, as [`super::super::kernels::measure`] has them.
+/// Points, their errors, and normals of triangles on the viewer's side, as [`super::super::kernels::measure`] has them.
 #[inline(always)]
-fn measure(block: &RayBlock, magnitudes: &[Row; 3], origin: DVec3) -> Hits {
+fn measure(block: &RayBlock, origin: DVec3, hits: &mut Hits) {
     let [x, y, z] = &block.normal;
     let [dx, dy, dz] = &block.direction;
     let mut normal = [ZERO; 3];
@@ -180,7 +271,7 @@ fn measure(block: &RayBlock, magnitudes: &[Row; 3], origin: DVec3) -> Hits {
         let (start, direction) = (&block.origin[axis], &block.direction[axis]);
         for i in 0..LANES {
             let here = start[i] + direction[i] * block.t_max[i];
-            let size = (here.abs() + start[i].abs()) + (magnitudes[axis][i] + offset[axis]);
+            let size = (here.abs() + start[i].abs()) + (hits.magnitudes[axis][i] + offset[axis]);
             point[axis][i] = here;
             error[i] += normal[axis][i].abs() * size;
             most[i] = if size > most[i] { size } else { most[i] };
@@ -198,93 +289,15 @@ fn measure(block: &RayBlock, magnitudes: &[Row; 3], origin: DVec3) -> Hits {
         back[1][i] = (normal[1][i] * across - dy[i]) * amount;
         back[2][i] = (normal[2][i] * across - dz[i]) * amount;
     }
-    Hits { point, normal, error, back }
-}
-
-/// Notes the rays to lamps, each with the share of the lamp's radiance that it brings, as
-/// [`super::super::kernels::aim`] and [`super::super::kernels::reflect`] have them.
-#[inline(always)]
-fn ask(
-    lights: &Lights,
-    hits: &Hits,
-    square: [Row; 2],
-    (scatters, throughput, ray): (&[bool; LANES], &[Row; 3], &[u32; LANES]),
-    shadows: &mut RayColumns,
-) {
-    let places = place(lights, &hits.point, square);
-    let (mut squared, mut facing, mut above, mut blur) = (ZERO, ZERO, ZERO, ZERO);
-    let offset = single(lights.origin).map(|axis| 2.0 * axis.abs());
-    for axis in 0..3 {
-        for i in 0..LANES {
-            let (here, way) = (hits.point[axis][i], places.way[axis][i]);
-            squared[i] += way * way;
-            facing[i] -= way * places.normal[axis][i];
-            above[i] += way * hits.normal[axis][i];
-            let size =
-                (here.abs() + (here + way).abs()) + (places.magnitudes[axis][i] + offset[axis]);
-            blur[i] += places.normal[axis][i].abs() * size;
-        }
-    }
-    let mut value = ZERO;
-    for i in 0..LANES {
-        let inverse = 1.0 / squared[i].sqrt();
-        let shown = facing[i] * inverse;
-        let is_point = places.is_point[i];
-        let shines = (shown > 0.0) | ((shown < 0.0) & places.two_sided[i]) | is_point;
-        let pdf = places.density[i] * squared[i] / if is_point { 1.0 } else { shown.abs() };
-        let reflected = above[i] * inverse * FRAC_1_PI;
-        // No direction comes upon a point by chance.
-        let ratio = if is_point { 0.0 } else { reflected / pdf };
-        let share = reflected / ((1.0 + ratio * ratio) * pdf);
-        value[i] = if shines & (reflected > 0.0) { share } else { 0.0 };
-        blur[i] *= if shown < 0.0 { -ROUNDINGS } else { ROUNDINGS };
-    }
-    let (mut start, mut along, mut length) = ([ZERO; 3], [ZERO; 3], ZERO);
-    for axis in 0..3 {
-        for i in 0..LANES {
-            let lifted = hits.normal[axis][i] * hits.error[i] + hits.back[axis][i];
-            let way = (places.way[axis][i] + places.normal[axis][i] * blur[i]) - lifted;
-            start[axis][i] = hits.point[axis][i] + lifted;
-            along[axis][i] = way;
-            length[i] += way * way;
-        }
-    }
-    let mut goes = [false; LANES];
-    for i in 0..LANES {
-        length[i] = length[i].sqrt();
-        // Any comparison with NaN is false.
-        goes[i] = scatters[i] & (value[i] > 0.0) & (value[i] < f32::INFINITY);
-    }
-    for axis in 0..3 {
-        for i in 0..LANES {
-            // Points that fall together see each other: a ray of no length meets nothing.
-            along[axis][i] /= if length[i] > 0.0 { length[i] } else { 1.0 };
-        }
-    }
-    let mut share = [ZERO; 3];
-    for band in 0..3 {
-        for i in 0..LANES {
-            share[band][i] = throughput[band][i] * value[i];
-        }
-    }
-    let (picked, count) = compress(&goes);
-    let at = shadows.len;
-    for axis in 0..3 {
-        put(&mut shadows.start[axis], at, &start[axis], &picked);
-        put(&mut shadows.along[axis], at, &along[axis], &picked);
-        put(&mut shadows.carried.throughput[axis], at, &share[axis], &picked);
-    }
-    put(&mut shadows.reach, at, &length, &picked);
-    put(&mut shadows.lamp, at, &places.lamp, &picked);
-    put(&mut shadows.carried.ray, at, ray, &picked);
-    shadows.len += count;
+    (hits.point, hits.error, hits.back) = (point, error, back);
+    (hits.normal, hits.shading) = (normal, normal);
 }
 
 /// Where rays start (m), their unit directions about the normals with density cos θ / π (1/sr), that density, and
 /// whether there is one, as [`super::super::kernels::scatter`] has them.
 #[inline(always)]
 fn scatter(hits: &Hits, [u, v]: [Row; 2]) -> ([Row; 3], [Row; 3], Row, [bool; LANES]) {
-    let [nx, ny, nz] = &hits.normal;
+    let [nx, ny, nz] = &hits.shading;
     let (mut along, mut start, mut pdf) = ([ZERO; 3], [ZERO; 3], ZERO);
     let mut goes = [false; LANES];
     let (mut a, mut b) = (ZERO, ZERO);
@@ -307,7 +320,8 @@ fn scatter(hits: &Hits, [u, v]: [Row; 2]) -> ([Row; 3], [Row; 3], Row, [bool; LA
         along[1][i] = dy * inverse;
         along[2][i] = dz * inverse;
         pdf[i] = c * FRAC_1_PI;
-        goes[i] = (dx * x + dy * y + dz * z > 0.0) & (c > 0.0);
+        let above = dx * hits.normal[0][i] + dy * hits.normal[1][i] + dz * hits.normal[2][i];
+        goes[i] = (above > 0.0) & (c > 0.0);
     }
     for axis in 0..3 {
         for i in 0..LANES {
@@ -361,7 +375,7 @@ fn keep_those_that_may_meet(
 /// The lanes of a mask in order, and how many there are: without a branch, as nothing tells beforehand which they
 /// are.
 #[inline(always)]
-fn compress(mask: &[bool; LANES]) -> ([u8; LANES], usize) {
+pub(super) fn compress(mask: &[bool; LANES]) -> ([u8; LANES], usize) {
     let (mut picked, mut count) = ([0; LANES], 0);
     for (lane, &is_in) in (0_u8..).zip(mask) {
         picked[count & (LANES - 1)] = lane;
@@ -372,11 +386,16 @@ fn compress(mask: &[bool; LANES]) -> ([u8; LANES], usize) {
 
 /// Puts the picked lanes of a row into a column, which has room for all lanes.
 #[inline(always)]
-fn put<T: Copy>(column: &mut [T], at: usize, row: &[T; LANES], picked: &[u8; LANES]) {
+pub(super) fn put<T: Copy>(column: &mut [T], at: usize, row: &[T; LANES], picked: &[u8; LANES]) {
     let to = &mut column[at..at + LANES];
     for (to, &lane) in to.iter_mut().zip(picked) {
         *to = row[usize::from(lane) & (LANES - 1)];
     }
+}
+
+/// The vector of a lane in double precision.
+pub(super) fn double(axes: &[Row; 3], lane: usize) -> DVec3 {
+    vector(axes, lane)
 }
 
 pub(super) fn single(v: DVec3) -> [f32; 3] {
