@@ -12,8 +12,8 @@ use etendue_sensor::Sensor;
 use etendue_spectrum::Bands;
 use etendue_tracer::layer::OtherFrame;
 use etendue_tracer::{
-    Emitters, LayerSpec, LightingContext, Lights, Material, Pixel, PlacedSurfaces, RayStats, Rules,
-    PlainScene, SceneView, Spectral, Traits, View,
+    Emitters, LayerSpec, LightingContext, Lights, Material, Pixel, PlacedSurfaces, PlainScene,
+    RayStats, Rules, SceneView, Spectral, Traits, View,
 };
 
 use crate::adaptive::{Rule, SampleCounts};

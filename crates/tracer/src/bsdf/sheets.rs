@@ -13,48 +13,51 @@ use super::metal::{mean_reflectance, multiple};
 use super::{Weights, fresnel};
 use crate::LANES;
 
+/// One number of each lane.
+type Row<const N: usize> = [f64; N];
+
 /// The sheets of the hits of a patch.
 #[derive(Debug)]
 pub(crate) struct Sheets<const N: usize = LANES> {
     /// The square of the roughness, above 0, and the share of metal.
-    pub(crate) alpha: [f64; N],
-    pub(crate) metallic: [f64; N],
+    pub(crate) alpha: Row<N>,
+    pub(crate) metallic: Row<N>,
     /// The dielectric's reflectance face on, before the highlights' colour, and at grazing incidence.
-    pub(crate) f0: [f64; N],
-    pub(crate) f90: [f64; N],
+    pub(crate) f0: Row<N>,
+    pub(crate) f90: Row<N>,
     /// The largest bands of the surface's colour, and of the dielectric's reflectance face on.
-    pub(crate) base_peak: [f64; N],
-    pub(crate) f0_peak: [f64; N],
+    pub(crate) base_peak: Row<N>,
+    pub(crate) f0_peak: Row<N>,
     /// 1 for [`super::Model::Metal`], which chooses by what its facets return of white light.
-    pub(crate) is_metal: [f64; N],
+    pub(crate) is_metal: Row<N>,
     /// The x and y axes of the shading frames, and the viewer in them.
-    axes: [[[f64; N]; 3]; 2],
-    wo: [[f64; N]; 3],
+    axes: [[Row<N>; 3]; 2],
+    wo: [Row<N>; 3],
     /// Rows of the table and the shares of the next.
     rows: [u32; N],
-    shares: [f64; N],
+    shares: Row<N>,
     /// What facets of reflectance 1, and the dielectric, return of light from the viewer; their means over
     /// directions; the mean of what facets of reflectance 1 lack.
-    facets: [f64; N],
-    dielectric: [f64; N],
-    pub(crate) mean: [f64; N],
-    dielectric_mean: [f64; N],
-    lacking: [f64; N],
+    facets: Row<N>,
+    dielectric: Row<N>,
+    pub(crate) mean: Row<N>,
+    dielectric_mean: Row<N>,
+    lacking: Row<N>,
     /// Chances of the facets and of the base.
-    sheet: [f64; N],
-    base: [f64; N],
+    sheet: Row<N>,
+    base: Row<N>,
     values: Values<N>,
 }
 
 /// Values times cosine, as [`Weights`], and densities.
 #[derive(Debug)]
 struct Values<const N: usize> {
-    white: [f64; N],
-    base: [f64; N],
-    highlight: [f64; N],
-    dip: [f64; N],
-    deep: [f64; N],
-    pdf: [f64; N],
+    white: Row<N>,
+    base: Row<N>,
+    highlight: Row<N>,
+    dip: Row<N>,
+    deep: Row<N>,
+    pdf: Row<N>,
 }
 
 impl<const N: usize> Default for Sheets<N> {
@@ -107,13 +110,13 @@ impl<const N: usize> Sheets<N> {
 
     /// The same of all lanes, in that order.
     #[inline(always)]
-    pub(crate) fn rows(&self) -> [&[f64; N]; 5] {
+    pub(crate) fn rows(&self) -> [&Row<N>; 5] {
         let Values { white, base, highlight, dip, deep, .. } = &self.values;
         [white, base, highlight, dip, deep]
     }
 
     /// As seen against `direction` (unit), with these shading normals on the viewer's side.
-    pub(crate) fn view(&mut self, shading: &[[f64; N]; 3], direction: &[[f64; N]; 3]) {
+    pub(crate) fn view(&mut self, shading: &[Row<N>; 3], direction: &[Row<N>; 3]) {
         view(self, &TABLE, shading, direction);
     }
 
@@ -122,9 +125,9 @@ impl<const N: usize> Sheets<N> {
     /// which is 0 where there is none, times the weights.
     pub(crate) fn reflect(
         &mut self,
-        [normal, shading]: [&[[f64; N]; 3]; 2],
-        (toward, pdf, is_delta): (&[[f64; N]; 3], &[f64; N], &[f64; N]),
-        share: &mut [f64; N],
+        [normal, shading]: [&[Row<N>; 3]; 2],
+        (toward, pdf, is_delta): (&[Row<N>; 3], &Row<N>, &Row<N>),
+        share: &mut Row<N>,
     ) {
         reflect(self, &TABLE, [normal, shading], (toward, pdf, is_delta), share);
     }
@@ -133,9 +136,9 @@ impl<const N: usize> Sheets<N> {
     /// `along`; their density to `pdf`, 0 where the light is lost, and value over density to the weights.
     pub(crate) fn scatter(
         &mut self,
-        [normal, shading]: [&[[f64; N]; 3]; 2],
-        (choices, squares): (&[f64; N], &[[f64; 2]; N]),
-        (along, pdf): (&mut [[f64; N]; 3], &mut [f64; N]),
+        [normal, shading]: [&[Row<N>; 3]; 2],
+        (choices, squares): (&Row<N>, &[[f64; 2]; N]),
+        (along, pdf): (&mut [Row<N>; 3], &mut Row<N>),
     ) {
         scatter(self, &TABLE, [normal, shading], (choices, squares), (along, pdf));
     }
@@ -154,7 +157,7 @@ fn place(x: f64, count: usize) -> (u32, f64) {
 
 /// A and B for the cosines of some directions.
 #[inline(always)]
-fn terms<const N: usize>(sheets: &Sheets<N>, table: &AlbedoTable, cosines: &[f64; N]) -> [[f64; N]; 2] {
+fn terms<const N: usize>(sheets: &Sheets<N>, table: &AlbedoTable, cosines: &Row<N>) -> [Row<N>; 2] {
     let (mut knots, mut parts) = ([0_u32; N], [0.0; N]);
     for i in 0..N {
         let mu = if cosines[i] > 0.0 { cosines[i] } else { 0.0 };
@@ -174,7 +177,12 @@ fn terms<const N: usize>(sheets: &Sheets<N>, table: &AlbedoTable, cosines: &[f64
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn view<const N: usize>(sheets: &mut Sheets<N>, table: &AlbedoTable, shading: &[[f64; N]; 3], direction: &[[f64; N]; 3]) {
+fn view<const N: usize>(
+    sheets: &mut Sheets<N>,
+    table: &AlbedoTable,
+    shading: &[Row<N>; 3],
+    direction: &[Row<N>; 3],
+) {
     for i in 0..N {
         let (x, y, z) = (shading[0][i], shading[1][i], shading[2][i]);
         // Duff et al., "Building an Orthonormal Basis, Revisited", 2017.
@@ -233,7 +241,7 @@ fn view<const N: usize>(sheets: &mut Sheets<N>, table: &AlbedoTable, shading: &[
 
 /// Values and densities for light from directions in the shading frames, above the surfaces.
 #[inline(always)]
-fn evaluate<const N: usize>(sheets: &mut Sheets<N>, table: &AlbedoTable, wi: &[[f64; N]; 3]) {
+fn evaluate<const N: usize>(sheets: &mut Sheets<N>, table: &AlbedoTable, wi: &[Row<N>; 3]) {
     let [a, b] = terms(sheets, table, &wi[2]);
     let Sheets { alpha, metallic, f0, f90, f0_peak, is_metal, wo, values, .. } = sheets;
     for i in 0..N {
@@ -275,14 +283,14 @@ fn evaluate<const N: usize>(sheets: &mut Sheets<N>, table: &AlbedoTable, wi: &[[
 fn reflect<const N: usize>(
     sheets: &mut Sheets<N>,
     table: &AlbedoTable,
-    [normal, shading]: [&[[f64; N]; 3]; 2],
-    (toward, pdf, is_delta): (&[[f64; N]; 3], &[f64; N], &[f64; N]),
-    share: &mut [f64; N],
+    [normal, shading]: [&[Row<N>; 3]; 2],
+    (toward, pdf, is_delta): (&[Row<N>; 3], &Row<N>, &Row<N>),
+    share: &mut Row<N>,
 ) {
     let mut wi = [[0.0; N]; 3];
     let mut above = [0.0; N];
     for i in 0..N {
-        let along = |axes: &[[f64; N]; 3]| {
+        let along = |axes: &[Row<N>; 3]| {
             toward[0][i] * axes[0][i] + toward[1][i] * axes[1][i] + toward[2][i] * axes[2][i]
         };
         wi[0][i] = along(&sheets.axes[0]);
@@ -306,9 +314,9 @@ fn reflect<const N: usize>(
 fn scatter<const N: usize>(
     sheets: &mut Sheets<N>,
     table: &AlbedoTable,
-    [normal, shading]: [&[[f64; N]; 3]; 2],
-    (choices, squares): (&[f64; N], &[[f64; 2]; N]),
-    (along, pdf): (&mut [[f64; N]; 3], &mut [f64; N]),
+    [normal, shading]: [&[Row<N>; 3]; 2],
+    (choices, squares): (&Row<N>, &[[f64; 2]; N]),
+    (along, pdf): (&mut [Row<N>; 3], &mut Row<N>),
 ) {
     let mut wi = [[0.0; N]; 3];
     for i in 0..N {
@@ -365,137 +373,4 @@ fn scatter<const N: usize>(
 }
 
 #[cfg(test)]
-mod tests {
-    use etendue_geometry::glam::DVec3;
-
-    use super::*;
-    use crate::Row;
-
-    const ZERO: Row = [0.0; LANES];
-    use crate::bsdf::{Bsdf, Coat, Layered, Model, Sheen};
-    use crate::sampling::{Frame, power_heuristic};
-
-    /// Unit vectors all over the upper half about z.
-    fn upward(k: usize, steps: [f64; 2]) -> DVec3 {
-        let [u, v] = steps.map(|step| (k as f64 * step).fract());
-        let z = 0.01 + 0.99 * u;
-        let (sin, cos) = (std::f64::consts::TAU * v).sin_cos();
-        DVec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
-    }
-
-    fn put(rows: &mut [Row; 3], lane: usize, v: DVec3) {
-        (rows[0][lane], rows[1][lane], rows[2][lane]) = v.into();
-    }
-
-    /// Surfaces of the lanes, one by one, with what sets them side by side: their shading and geometric normals, and
-    /// the directions that they are seen along.
-    fn laid_out(sheets: &mut Sheets) -> (Vec<Bsdf>, [[Row; 3]; 3]) {
-        let [mut shading, mut normal, mut direction] = [[ZERO; 3]; 3];
-        let surface = |k: usize| {
-            let share = |step: f64| (0.3 + k as f64 * step).fract();
-            let alpha = [1e-4, 0.01, 0.2, 0.7, 1.0][k % 5];
-            let base = [share(0.37), share(0.73), share(0.19)];
-            let is_metal = k.is_multiple_of(3);
-            let metallic = if is_metal { 1.0 } else { [0.0, 0.3, 1.0][k / 3 % 3] };
-            let (f0, f90) = if is_metal { (0.0, 0.0) } else { (0.04, [1.0, 0.6][k % 2]) };
-            let highlight = if is_metal { [1.0; 3] } else { [1.0, 2.0, 0.5] };
-            let layered = Layered {
-                metallic,
-                alpha,
-                along: alpha,
-                f0,
-                f90,
-                ior: 1.5,
-                transmission: 0.0,
-                sheen: Sheen::default(),
-                coat: Coat::default(),
-            };
-            let model = match is_metal {
-                true => Model::Metal { alpha, named: None },
-                false => Model::Layered(layered),
-            };
-            let z = shading_normal(k);
-            let wo = Frame::around(z).world(upward(k, [0.41, 0.29]));
-            let geometric = (z + 0.2 * wo).normalize();
-            put(&mut shading, k, z);
-            put(&mut normal, k, geometric);
-            put(&mut direction, k, -wo);
-            let peak = |c: [f64; 3]| c[0].max(c[1]).max(c[2]);
-            (sheets.alpha[k], sheets.metallic[k]) = (alpha, metallic);
-            (sheets.f0[k], sheets.f90[k]) = (f0, f90);
-            sheets.base_peak[k] = peak(base);
-            sheets.f0_peak[k] = (f0 * peak(highlight)).min(1.0);
-            sheets.is_metal[k] = if is_metal { 1.0 } else { 0.0 };
-            Bsdf::new(model, [geometric, z], wo, [base, highlight])
-        };
-        let surfaces = (0..LANES).map(surface).collect();
-        (surfaces, [shading, normal, direction])
-    }
-
-    fn shading_normal(k: usize) -> DVec3 {
-        upward(k, [0.618, 0.755]) * if k.is_multiple_of(2) { 1.0 } else { -1.0 }
-    }
-
-    /// Side by side as one by one: values, densities and directions, of metals and glTF's surfaces of all
-    /// roughnesses, for directions on both sides.
-    #[test]
-    fn side_by_side_as_one_by_one() {
-        let mut sheets = Sheets::<LANES>::default();
-        let (surfaces, [shading, normal, direction]) = laid_out(&mut sheets);
-        let (mut toward, pdf, mut is_delta) = ([ZERO; 3], [0.7; LANES], ZERO);
-        let (mut choices, mut squares) = (ZERO, [[0.0; 2]; LANES]);
-        for k in 0..LANES {
-            let share = |step: f64| (0.3 + k as f64 * step).fract();
-            let side = if k.is_multiple_of(7) { -1.0 } else { 1.0 };
-            let frame = Frame::around(shading_normal(k));
-            put(&mut toward, k, frame.world(upward(k, [0.57, 0.83])) * side);
-            is_delta[k] = if k.is_multiple_of(4) { 1.0 } else { 0.0 };
-            (choices[k], squares[k]) = (share(0.07), [share(0.53), share(0.21)]);
-        }
-        // Some hundred roundings, magnified by what is lacking of 1 in highlights of α 10⁻⁴.
-        let near = |a: f64, b: f64| (a - b).abs() <= 1e-7 * (a.abs() + b.abs() + 1e-9);
-        let alike = |a: Weights, b: Weights| {
-            near(a.white, b.white)
-                && near(a.base, b.base)
-                && near(a.highlight, b.highlight)
-                && near(a.dip, b.dip)
-                && near(a.deep, b.deep)
-        };
-        sheets.view(&shading, &direction);
-        let mut found = ZERO;
-        sheets.reflect([&normal, &shading], (&toward, &pdf, &is_delta), &mut found);
-        let mut lit = 0;
-        for (k, surface) in surfaces.iter().enumerate() {
-            let wi = DVec3::new(toward[0][k], toward[1][k], toward[2][k]);
-            let (weights, own) = surface.evaluate(wi);
-            let balance = if is_delta[k] > 0.0 { 1.0 } else { power_heuristic(pdf[k], own) };
-            let expected = if weights.is_zero() { 0.0 } else { balance / pdf[k] };
-            assert!(near(found[k], expected), "{k}: {} {expected}", found[k]);
-            if expected > 0.0 {
-                lit += 1;
-                assert!(
-                    alike(sheets.weights(k), weights),
-                    "{k}: {:?} {weights:?}",
-                    sheets.weights(k)
-                );
-                assert!(near(surface.mean_albedo(), sheets.mean[k]) || surface.deep == [0.0; 3]);
-            }
-        }
-        assert!((40..LANES).contains(&lit), "{lit}");
-        let (mut along, mut density) = ([ZERO; 3], ZERO);
-        sheets.scatter([&normal, &shading], (&choices, &squares), (&mut along, &mut density));
-        let mut sent = 0;
-        for (k, surface) in surfaces.iter().enumerate() {
-            let Some(sample) = surface.sample(choices[k], squares[k]) else {
-                assert_eq!(density[k], 0.0, "{k}");
-                continue;
-            };
-            sent += 1;
-            let direction = DVec3::new(along[0][k], along[1][k], along[2][k]);
-            assert!((direction - sample.direction).length() < 1e-12, "{k}");
-            assert!(near(density[k], sample.pdf), "{k}: {} {}", density[k], sample.pdf);
-            assert!(alike(sheets.weights(k), sample.weights), "{k}");
-        }
-        assert!(sent > 50, "{sent}");
-    }
-}
+mod tests;

@@ -115,11 +115,8 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             seen: &mut plain.seen,
             missed: &mut plain.missed,
         };
-        let stage = Stage {
-            ctx: self.ctx,
-            plain: scene,
-            camera: (number == 0).then_some(camera.rays),
-        };
+        let stage =
+            Stage { ctx: self.ctx, plain: scene, camera: (number == 0).then_some(camera.rays) };
         leave_blocks(
             &stage,
             (plain.rays.blocks(), &plain.carried),
@@ -230,7 +227,8 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             }
             let (block, lane) = (&plain.rays.blocks()[i / LANES], i % LANES);
             let vector = |axes| etendue_geometry::block::vector(axes, lane);
-            let receiver = way_of(&plain.carried, number, i).receiver(origin + vector(&block.origin));
+            let receiver =
+                way_of(&plain.carried, number, i).receiver(origin + vector(&block.origin));
             (Some(receiver), vector(&block.direction))
         });
         let Workspace { asked, radiance, .. } = workspace;

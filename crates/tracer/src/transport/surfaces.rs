@@ -93,7 +93,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         self.look_up(patch, lane, placed, &surface_point);
         surface.put(&mut patch.sheets, lane, &patch.colors[lane]);
         patch.sheet_colors.resize(LANES, SheetColors::default());
-        patch.sheet_colors[lane] = SheetColors { highlight: surface.highlight, deep: [0.0; 3], named };
+        patch.sheet_colors[lane] =
+            SheetColors { highlight: surface.highlight, deep: [0.0; 3], named };
         true
     }
 

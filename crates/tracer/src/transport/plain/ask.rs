@@ -6,9 +6,7 @@ use std::f32::consts::FRAC_1_PI;
 use etendue_geometry::block::{Floats as Row, LANES};
 
 use super::columns::RayColumns;
-use super::kernel::{
-    BlockScratch, Carried, Hits, ROUNDINGS, Stage, ZERO, compress, put, single,
-};
+use super::kernel::{BlockScratch, Carried, Hits, ROUNDINGS, Stage, ZERO, compress, put, single};
 use super::lamps::{Places, place};
 
 /// Rays from hits to the places that they ask.

@@ -117,7 +117,8 @@ pub(super) fn leave_blocks(
         let lanes = lanes_from(first);
         let mut hits = Hits::NONE;
         let count = paths.len.saturating_sub(first);
-        let [any, varies] = gather(&stage.plain.surfaces, (block, lanes, count), &mut hits, leaving);
+        let [any, varies] =
+            gather(&stage.plain.surfaces, (block, lanes, count), &mut hits, leaving);
         if !(any & numbers.is_scattered) {
             continue;
         }

@@ -180,7 +180,12 @@ impl Places {
 
 /// Chooses a light for each of sixteen hits that asks one, and a place on it.
 #[inline(always)]
-pub(super) fn place(stage: &Stage<'_>, hits: &Hits, square: [Row; 2], asking: &mut Asking) -> Places {
+pub(super) fn place(
+    stage: &Stage<'_>,
+    hits: &Hits,
+    square: [Row; 2],
+    asking: &mut Asking,
+) -> Places {
     match stage.plain.lamps.below.is_empty() {
         false => place_on_few(&stage.plain.lamps, &hits.point, square),
         true => choose(stage, hits, square, asking),

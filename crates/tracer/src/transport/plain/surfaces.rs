@@ -54,9 +54,9 @@ pub(super) fn look_up(
             let tilted = point.tilted_normal(scene, material, placed.turn.as_ref(), front);
             put(&mut hits.shading, lane, facing(tilted * side, front * side, -direction));
         }
-        let tint = placed.color.unwrap_or_else(|| {
-            scene.base_tint(stage.ctx.spectral, material, &point).0.clamped()
-        });
+        let tint = placed
+            .color
+            .unwrap_or_else(|| scene.base_tint(stage.ctx.spectral, material, &point).0.clamped());
         for band in 0..3 {
             hits.color[band][lane] = round(tint.color[band]);
         }
@@ -70,11 +70,7 @@ pub(super) fn look_up(
 }
 
 /// How much of a surface a camera's ray covers; `None` of others, which are scattered by chance.
-fn footprint(
-    stage: &Stage<'_>,
-    hits: &Hits,
-    (lane, ray): (usize, usize),
-) -> Option<Footprint> {
+fn footprint(stage: &Stage<'_>, hits: &Hits, (lane, ray): (usize, usize)) -> Option<Footprint> {
     let rays = stage.camera?;
     let direction = rays.direction(ray);
     let way = (stage.plain.origin + double(&hits.point, lane)) - rays.origin(ray);
