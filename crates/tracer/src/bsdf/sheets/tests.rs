@@ -3,12 +3,12 @@
 use etendue_geometry::glam::DVec3;
 
 use super::*;
+use crate::bsdf::{Bsdf, Coat, Layered, Model, Sheen};
+use crate::sampling::{Frame, power_heuristic};
 
 type Row = super::Row<LANES>;
 
 const ZERO: Row = [0.0; LANES];
-use crate::bsdf::{Bsdf, Coat, Layered, Model, Sheen};
-use crate::sampling::{Frame, power_heuristic};
 
 /// Unit vectors all over the upper half about z.
 fn upward(k: usize, steps: [f64; 2]) -> DVec3 {
