@@ -6,7 +6,7 @@ use std::f32::consts::FRAC_1_PI;
 use etendue_geometry::block::{Floats as Row, LANES};
 
 use super::columns::RayColumns;
-use super::kernel::{BlockScratch, Carried, Hits, ROUNDINGS, Stage, ZERO, compress, put, single};
+use super::kernel::{BlockScratch, Carried, Hits, ROUNDINGS, Stage, ZERO, compress, offset, put};
 use super::lamps::{Places, place};
 
 /// Rays from hits to the places that they ask.
@@ -73,7 +73,7 @@ pub(super) fn ask(
 #[inline(always)]
 fn aim(stage: &Stage<'_>, hits: &Hits, places: &Places) -> Aimed {
     let (mut squared, mut facing, mut blur) = (ZERO, ZERO, ZERO);
-    let offset = single(stage.plain.origin).map(|axis| 2.0 * axis.abs());
+    let offset = offset(stage.plain.origin);
     for axis in 0..3 {
         for i in 0..LANES {
             let (here, way) = (hits.point[axis][i], places.way[axis][i]);

@@ -53,7 +53,8 @@ impl Columns {
 
     /// The unit normal of the surface that path `i` left.
     pub(super) fn normal(&self, i: usize) -> [f32; 3] {
-        self.normal.each_ref().map(|axis| axis[i])
+        let [x, y, z] = &self.normal;
+        [x[i], y[i], z[i]]
     }
 }
 

@@ -126,14 +126,17 @@ pub(super) fn leave_blocks(
         if varies {
             look_up(stage, (block, first), &mut hits, &mut scratch.sheets);
         }
-        let run = first..first + LANES;
-        let row = |column: &[f32]| -> Row { column[run.clone()].try_into().unwrap_or(ZERO) };
-        let carried = Carried {
-            ray: paths.ray[run.clone()].try_into().unwrap_or([0; LANES]),
-            throughput: paths.throughput.each_ref().map(|band| row(band)),
+        let mut carried = Carried { ray: [0; LANES], throughput: [ZERO; 3] };
+        carried.ray.copy_from_slice(&paths.ray[first..first + LANES]);
+        for band in 0..3 {
+            carried.throughput[band] = row(&paths.throughput[band], first);
+        }
+        let square = |draw: Draw| {
+            let [first_of, second_of] = &numbers.drawn[draw as usize];
+            [row(first_of, first), row(second_of, first)]
         };
-        let square = |draw: Draw| numbers.drawn[draw as usize].each_ref().map(|half| row(half));
-        ask(stage, &hits, square(Draw::Light), &carried, (&mut *leaving.shadows, &mut *scratch));
+        let square_of_light = square(Draw::Light);
+        ask(stage, &hits, square_of_light, &carried, (&mut *leaving.shadows, &mut *scratch));
         if numbers.goes_on {
             let [_, choices] = square(Draw::Choice);
             let chances = numbers.roulette.then(|| square(Draw::Chance)[1]);
@@ -142,6 +145,14 @@ pub(super) fn leave_blocks(
             follow((&hits, lanes, carried), drawn, (stage, sphere.as_ref()), sheets, leaving.next);
         }
     }
+}
+
+/// A row of a column.
+#[inline(always)]
+fn row(column: &[f32], first: usize) -> Row {
+    let mut row = ZERO;
+    row.copy_from_slice(&column[first..first + LANES]);
+    row
 }
 
 /// What the surfaces of a block's hits are, of which so many lanes count; whether any scatters light, and whether any
@@ -266,8 +277,7 @@ fn measure(block: &RayBlock, origin: DVec3, hits: &mut Hits) {
         normal[2][i] = z[i] * scale;
     }
     let (mut point, mut error, mut most) = ([ZERO; 3], ZERO, ZERO);
-    // Blocks' coordinates are those of the world less their origin, whose roundings count as well.
-    let offset = single(origin).map(|axis| 2.0 * axis.abs());
+    let offset = offset(origin);
     for axis in 0..3 {
         let (start, direction) = (&block.origin[axis], &block.direction[axis]);
         for i in 0..LANES {
@@ -395,14 +405,25 @@ pub(super) fn put<T: Copy>(column: &mut [T], at: usize, row: &[T; LANES], picked
 }
 
 /// The vector of a lane in double precision.
+#[inline(always)]
 pub(super) fn double(axes: &[Row; 3], lane: usize) -> DVec3 {
     vector(axes, lane)
 }
 
+#[inline(always)]
 pub(super) fn single(v: DVec3) -> [f32; 3] {
-    v.to_array().map(round)
+    [round(v.x), round(v.y), round(v.z)]
 }
 
+/// What the blocks' origin adds to the size of coordinates (m): they are those of the world less it, whose roundings
+/// count as well.
+#[inline(always)]
+pub(super) fn offset(origin: DVec3) -> [f32; 3] {
+    let [x, y, z] = single(origin);
+    [2.0 * x.abs(), 2.0 * y.abs(), 2.0 * z.abs()]
+}
+
+#[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "rounding to single precision is the purpose")]
 pub(super) fn round(x: f64) -> f32 {
     x as f32

@@ -304,7 +304,12 @@ fn choose(
     }
     if others != [false; LANES] {
         let mut radiance = [0.0; 3];
+        let image = lights.sky.as_ref().filter(|sky| sky.map.is_some()).map(|sky| sky.index);
         for (lane, choice) in picked.filter(|&(lane, _)| others[lane]) {
+            if image == Some(choice.light) {
+                asked.push(lane, [choice.u, f64::from(v[lane])], choice.chance);
+                continue;
+            }
             let one = ((choice.light, choice.chance), [choice.u, f64::from(v[lane])]);
             let (scene, spectral) = (&stage.ctx.scene, stage.ctx.spectral);
             match lights.place(scene, spectral, (&choice.receiver, 0.0), one, &mut radiance) {

@@ -43,7 +43,8 @@ pub(super) fn look_up(
         let Some(placed) = stage.ctx.placed.get(number) else { continue };
         let Some(placement) = scene.geometry.placements.get(number as usize) else { continue };
         let corner = SurfacePoint::corner(scene.geometry, placement, block.triangle[lane] as usize);
-        let [u, v] = [block.u[lane], block.v[lane]].map(|w| f64::from(w).clamp(0.0, 1.0));
+        let u = f64::from(block.u[lane]).clamp(0.0, 1.0);
+        let v = f64::from(block.v[lane]).clamp(0.0, 1.0);
         let footprint = footprint(stage, hits, (lane, first + lane));
         let point = SurfacePoint { weights: [1.0 - u - v, u, v], footprint, ..corner };
         let Some(material) = scene.material(&point) else { continue };
@@ -126,10 +127,11 @@ impl PlainSheets {
         (value, color): (&mut Row, &mut [Row; 3]),
     ) {
         let normals = [&self.normal, &self.shading];
-        let pdf = pdf.map(f64::from);
-        let is_delta = is_delta.map(|is_delta| f64::from(u8::from(is_delta)));
-        let mut share = [0.0; LANES];
-        self.sheets.reflect(normals, (&doubles(toward), &pdf, &is_delta), &mut share);
+        let (pdf, mut delta, mut share) = (double_row(pdf), [0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            delta[i] = if is_delta[i] { 1.0 } else { 0.0 };
+        }
+        self.sheets.reflect(normals, (&doubles(toward), &pdf, &delta), &mut share);
         for i in 0..LANES {
             value[i] = if hits.is_sheet[i] { round(share[i]) } else { value[i] };
         }
@@ -151,10 +153,13 @@ impl PlainSheets {
         (along, pdf, goes): (&mut [Row; 3], &mut Row, &mut [bool; LANES]),
         throughput: &mut [Row; 3],
     ) {
-        let squares = std::array::from_fn(|i| [f64::from(u[i]), f64::from(v[i])]);
+        let mut squares = [[0.0; 2]; LANES];
+        for i in 0..LANES {
+            squares[i] = [f64::from(u[i]), f64::from(v[i])];
+        }
         let (mut own_along, mut own_pdf) = ([[0.0; LANES]; 3], [0.0; LANES]);
         let normals = [&self.normal, &self.shading];
-        let chosen = (&choices.map(f64::from), &squares);
+        let chosen = (&double_row(choices), &squares);
         self.sheets.scatter(normals, chosen, (&mut own_along, &mut own_pdf));
         for axis in 0..3 {
             for i in 0..LANES {
@@ -194,7 +199,17 @@ impl PlainSheets {
 
 #[inline(always)]
 fn doubles(rows: &[Row; 3]) -> [Doubles; 3] {
-    rows.map(|row| row.map(f64::from))
+    // Closures of `map` are not compiled for the processor's own instructions.
+    [double_row(&rows[0]), double_row(&rows[1]), double_row(&rows[2])]
+}
+
+#[inline(always)]
+fn double_row(row: &Row) -> Doubles {
+    let mut doubles = [0.0; LANES];
+    for i in 0..LANES {
+        doubles[i] = f64::from(row[i]);
+    }
+    doubles
 }
 
 fn put(rows: &mut [Row; 3], lane: usize, v: DVec3) {
