@@ -320,8 +320,8 @@ impl Profile for Surface {
 
     #[inline(always)]
     fn begin(&self, ray: Ray) -> (Ray, f64) {
-        let met = meet_conic::<false, f64>(self, ray, Root::Near);
-        (met.ray, met.t)
+        let crossing = meet_conic::<false, f64>(self, ray, Root::Near);
+        (crossing.ray, crossing.t)
     }
 
     #[inline(always)]

@@ -194,12 +194,15 @@ impl Lenslets {
         let place = self.place(form, [x, y], clip);
         let centre = [x - place.away[0], y - place.away[1]];
         let local = moved(ray, [-centre[0], -centre[1]]);
-        let met = face.at_near_root::<true, f64>(local, f64::INFINITY);
-        let same =
-            self.array.lattice.is_well_inside(form.0, met.ray.position[0], met.ray.position[1]);
-        let met = Refracted { hit: met.hit & same, ..moved(met, centre) };
+        let crossing = face.at_near_root::<true, f64>(local, f64::INFINITY);
+        let same = self.array.lattice.is_well_inside(
+            form.0,
+            crossing.ray.position[0],
+            crossing.ray.position[1],
+        );
+        let crossing = Refracted { hit: crossing.hit & same, ..moved(crossing, centre) };
         let on_face = place.open & place.clear;
-        Refracted { clear: place.clear, ..if on_face { met } else { gap(there, t) } }
+        Refracted { clear: place.clear, ..if on_face { crossing } else { gap(there, t) } }
     }
 
     /// A ray in the array's frame, exactly by the rule, and the type of lenslet that it meets.

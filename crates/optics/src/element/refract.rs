@@ -156,19 +156,20 @@ impl Refraction {
         clip2: f64,
         which: Root,
     ) -> Refracted<T> {
-        let met = meet_conic::<SPHERE, T>(&self.surface, ray, which);
-        let [x, y, z] = met.ray.position;
+        let crossing = meet_conic::<SPHERE, T>(&self.surface, ray, which);
+        let [x, y, z] = crossing.ray.position;
         let (c, k) = (self.surface.curvature, self.surface.conic);
         let r2 = x * x + y * y;
         let one = T::constant(1.0);
         let stretch = if SPHERE { 1.0 } else { 1.0 + k };
         let length2 = if SPHERE { one } else { one - r2.times(k * c * c) };
         let m = [x.times(-c), y.times(-c), one - z.times(stretch * c)];
-        let (out, through) = self.media.refract(met.ray, m, length2, met.along2, met.along);
+        let (out, through) =
+            self.media.refract(crossing.ray, m, length2, crossing.along2, crossing.along);
         let out = out.unit();
         // A ray that misses has a NaN for a root, which is not greater than anything.
-        let hit = is_ahead(met.t) & (m[2].value() >= 0.0);
-        Refracted { ray: out, t: met.t, hit, clear: r2.value() <= clip2, through }
+        let hit = is_ahead(crossing.t) & (m[2].value() >= 0.0);
+        Refracted { ray: out, t: crossing.t, hit, clear: r2.value() <= clip2, through }
     }
 
     /// A ray in the frame of any surface but an asphere, exactly by the rule.

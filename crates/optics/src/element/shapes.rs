@@ -289,15 +289,15 @@ impl Shape {
 
     /// Words on it.
     pub(super) fn words(&self) -> String {
-        let around = if self.around.is_some() { "around a " } else { "" };
+        let prefix = if self.around.is_some() { "around a " } else { "" };
         match &self.kind {
             ShapeKind::Rectangle([a, b]) => {
-                format!("{around}rectangle of {} x {} mm", 2.0 * a, 2.0 * b)
+                format!("{prefix}rectangle of {} x {} mm", 2.0 * a, 2.0 * b)
             }
             ShapeKind::Ellipse([a, b]) => {
-                format!("{around}ellipse of {} x {} mm", 2.0 * a, 2.0 * b)
+                format!("{prefix}ellipse of {} x {} mm", 2.0 * a, 2.0 * b)
             }
-            ShapeKind::Outline(corners) => format!("{around}outline of {} corners", corners.len()),
+            ShapeKind::Outline(corners) => format!("{prefix}outline of {} corners", corners.len()),
             ShapeKind::Ring { inner, arms, .. } if arms.is_empty() => {
                 format!("around a disk of radius {inner} mm")
             }

@@ -9,8 +9,8 @@ use super::{LensError, LensFile};
 use crate::element::is_default;
 use etendue_geometry::units::Degrees;
 
-/// The most field points and wavelengths: each is looked at with many rays.
-const MOST_FIELDS: usize = 100;
+/// The most field points and wavelengths; designs have a dozen, and each is looked at with many rays.
+pub(super) const MOST_FIELDS: usize = 100;
 const MOST_WAVELENGTHS: usize = 24;
 
 /// A field point of a lens file.

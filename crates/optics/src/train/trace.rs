@@ -15,7 +15,14 @@ use crate::element::{Action, Block, Clip, Fold, Frame, LensRays, Loss, Ray, RayS
 use crate::glass::GlassError;
 
 /// More elements than these make a train long: the largest zoom lenses have some fifty surfaces.
-const LONG: usize = 64;
+const LONG: f64 = 64.0;
+
+/// How long a ray takes from the element before to this one, in elements: a step in a graded medium looks at the index
+/// thrice and at the surface, which counts as two.
+fn cost(step: &Step) -> f64 {
+    let graded = step.graded.as_ref().and_then(|graded| graded.media[0].as_ref());
+    1.0 + graded.map_or(0.0, |medium| 2.0 * medium.steps())
+}
 
 /// Where rays come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -34,6 +41,8 @@ pub struct MonochromaticTrain {
     indices: Indices,
     forward: Vec<Step>,
     backward: Vec<Step>,
+    /// How long a ray takes, in elements.
+    cost_of_a_ray: f64,
     /// Whether rays take long to be traced through it.
     is_costly: bool,
 }
@@ -121,8 +130,9 @@ impl OpticalTrain {
             self.grade(&indices, steps, from);
         }
         backward.reverse();
-        let is_costly = forward.len() > LONG || forward.iter().any(Step::has_wall);
-        Ok(MonochromaticTrain { wavelength, indices, forward, backward, is_costly })
+        let cost_of_a_ray = forward.iter().map(cost).sum();
+        let is_costly = cost_of_a_ray > LONG || forward.iter().any(Step::has_wall);
+        Ok(MonochromaticTrain { wavelength, indices, forward, backward, cost_of_a_ray, is_costly })
     }
 
     /// Gives steps the gradients on their sides.
@@ -212,20 +222,15 @@ impl MonochromaticTrain {
         self.wavelength
     }
 
-    /// Whether it has more elements than lenses have that somebody built, or a surface as steep as none has:
-    /// rays take long to be traced through it.
+    /// Whether rays take long to be traced through it: it has more elements than lenses have that somebody built, a
+    /// surface as steep as none has, or a medium through which rays are followed in many steps.
     pub(crate) fn is_costly(&self) -> bool {
         self.is_costly
     }
 
-    /// How long a ray takes, in elements: a step in a graded medium looks at the index thrice and at the surface, which
-    /// counts as two.
+    /// How long a ray takes, in elements.
     pub(crate) fn cost_of_a_ray(&self) -> f64 {
-        let of_medium = |step: &Step| {
-            let graded = step.graded.as_ref().and_then(|graded| graded.media[0].as_ref());
-            graded.map_or(0.0, |medium| 2.0 * medium.steps())
-        };
-        self.backward.iter().map(|step| 1.0 + of_medium(step)).sum()
+        self.cost_of_a_ray
     }
 
     /// The index of the medium between the last element and the sensor.

@@ -244,6 +244,16 @@ fn a_ray_that_leaves_the_side_of_a_rod_is_stopped_there_by_its_element() {
         let off = at.path(Side::Object, Clip::Off, DVec3::ZERO, unit(DVec2::new(0.0, sine)));
         assert_eq!(off.status, RayStatus::Exited);
     }
+    // A ray that comes in beyond the side, through ends that are wider, is stopped there, though it is within after a step.
+    let short = rod(1.6, 3.0, json!({"type": "rod", "g": 0.3, "semi_diameter": 0.5}));
+    let at = short.at(D).unwrap();
+    for (side, z, sense) in [(Side::Object, 0.0, 1.0), (Side::Sensor, 3.0, -1.0)] {
+        for (height, stays) in [(0.499, true), (0.501, false)] {
+            let inwards = unit(DVec2::new(0.0, -0.15)) * DVec3::new(1.0, 1.0, sense);
+            let path = at.path(side, Clip::On, DVec3::new(0.0, height, z), inwards);
+            assert_eq!(path.status == RayStatus::Exited, stays, "{side:?} {height} {path:?}");
+        }
+    }
 }
 
 #[test]

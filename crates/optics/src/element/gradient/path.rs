@@ -92,6 +92,10 @@ impl Gradient {
         let backwards = above * onwards > 0.0;
         let h = self.step / base * if backwards { -1.0 } else { 1.0 };
         let side2 = if clipped { self.semi_diameter * self.semi_diameter } else { f64::INFINITY };
+        // Where the surface that it came through is wider than the medium.
+        if !backwards && start.place.truncate().length_squared() > side2 {
+            return Arrival::Side(start.place);
+        }
         // A ray that runs steeply takes more steps than the gap is long.
         let most = 20.0 * (reach + self.semi_diameter) / self.step + 100.0;
         let mut taken = 0.0;

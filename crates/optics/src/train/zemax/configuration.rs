@@ -19,6 +19,7 @@ use glam::{DMat3, DVec3};
 use super::ZemaxError;
 use super::sheet::{Aperture, SheetLine, ZemaxSheet};
 use crate::train::analysis::chief_height;
+use crate::train::fields::MOST_FIELDS;
 use crate::train::{FieldSpec, Focus, Isometry, OpticalTrain, VignettingSpec};
 use etendue_geometry::units::Degrees;
 
@@ -154,9 +155,6 @@ impl ZemaxSheet {
         Ok(())
     }
 }
-
-/// The most field points that are taken; designs have a dozen, and each is looked at with many rays.
-const MOST_FIELDS: usize = 100;
 
 /// Elements times fields that are taken in the most, and fields that are taken in any case.
 const MOST_WORK: usize = 10_000;
