@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Runs the tests that touch Embree against Embree 4, in a Debian 13 root below target/.
+# Runs the tests that touch Embree against Embree 4, in a Debian 13 root below target/. test-embree4.sh --library leaves
+# out those of the command, which calls the same library.
 #
 # The root is made once (a minute) and kept, and so is what cargo builds for it. All mounts live in a
 # mount namespace of their own: they end with the process, however it ends, and nobody else sees them.
@@ -54,6 +55,9 @@ why=$(in_namespace true 2>&1) || skip "this system lets not even root mount ($wh
 elsewhere=$(printf -- '--skip %s:: ' files gallery inputs lamps lens lens_pictures lens_reference light_fields memory models \
     openings_and_glasses shards stopping waves)
 
+parts="-p etendue-dependencies -p etendue-embree-sys -p etendue-accel -p etendue-stability -p etendue"
+[ "${1:-}" = --library ] || parts+=" -p etendue-cli"
+
 # Everything from here on is offline. The toolchain is entered directly: rustup stays outside. Checkout, cargo and toolchain
 # have the paths that they have outside, and what cargo has built there lies below an overlay: what does not ask which
 # Embree there is, is taken as it is, and what is built anew stays in target/trixie-debug.
@@ -76,7 +80,6 @@ in_namespace '
     exec chroot --userspec="$user" /mnt env -i HOME=/tmp LANG=C.UTF-8 PATH="$toolchain/bin:/usr/bin:/bin" \
         CARGO_HOME="$cargo" ${assets:+ETENDUE_ASSETS=/assets} \
         CARGO_INCREMENTAL="${CARGO_INCREMENTAL:-1}" CARGO_PROFILE_DEV_DEBUG="${CARGO_PROFILE_DEV_DEBUG:-line-tables-only}" \
-        sh -c "cd \"\$1\"; exec cargo test --offline --locked -p etendue-dependencies -p etendue-embree-sys -p etendue-accel \
-            -p etendue-stability -p etendue -p etendue-cli -- $6" sh "$checkout"
+        sh -c "cd \"\$1\"; exec cargo test --offline --locked $7 -- $6" sh "$checkout"
 ' "$PWD/$root" "$(realpath "${CARGO_HOME:-$HOME/.cargo}")" "$(rustc --print sysroot)" "${ETENDUE_ASSETS:-}" \
-    "$(id -u):$(id -g)" "$elsewhere"
+    "$(id -u):$(id -g)" "$elsewhere" "$parts"

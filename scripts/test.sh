@@ -57,7 +57,7 @@ fi
 EMBREE_DIR=/nonexistent run_tests "${without_embree[@]}"
 
 step "tests against Embree 4"
-scripts/test-embree4.sh
+scripts/test-embree4.sh --library
 
 step "Python package"
 PROFILE=dev scripts/python.sh
