@@ -1,4 +1,8 @@
-"""Scenes in which the plan could save much, each as it is and as somebody who knows the scene overrides it by hand."""
+"""Scenes in which the plan could save much, each as it is and as somebody who knows the scene overrides it by hand.
+
+Pictures are as large as users render at least: finding out what a lens does takes some tenths of a second whatever their
+size, which is all that there is to see in small ones.
+"""
 
 import json
 import struct
@@ -73,7 +77,8 @@ def cases(folder, scenes):
     image(folder / "large.png", 4096)
     image(folder / "little.png", 64)
     light = {"tracer": {"type": "path"}, "lights": SKY}
-    few, some = {"render": {"samples": 16}}, {"render": {"samples": 64}}
+    some = {"render": {"samples": 64}}
+    wide, through, bands = [640, 480], [480, 320], [240, 160]
 
     behind = {"file": "behind.ply", "material": "white", "transform": {"translate": [0, 0.5, 8]}}
     depth = scene({"type": "pinhole"}, [320, 240], [GROUND, BALL, behind], layers=["depth"])
@@ -81,27 +86,27 @@ def cases(folder, scenes):
            {"objects": [GROUND, BALL]}, {"plan": {"unseen": True}})
     small = {"file": "small.ply", "material": "white", "transform": {"translate": [0, 0.4, 0]}}
     coarse = small | {"file": "coarse.ply"}
-    tiny = scene({"type": "pinhole"}, [320, 240], [GROUND, small], **light, **few)
+    tiny = scene({"type": "pinhole"}, wide, [GROUND, small], **light, **some)
     yield "two million triangles within 10 × 10 pixels", False, tiny, {"objects": [GROUND, coarse]}, None
-    grey = scene(lens(THIRTY), [96, 64], **light, **few)
+    grey = scene(lens(THIRTY), [96, 64], **light, render={"samples": 256})
     yield "30 bands of a grey scene through a lens", False, grey, {"plan": {"dispersion": False}}, None
-    textured = scene({"type": "pinhole"}, [320, 240], [
+    textured = scene({"type": "pinhole"}, wide, [
         GROUND, {"shape": "rectangle", "width": 0.1, "height": 0.1, "material": "image", "transform": {"translate": [0, 0.3, 0]}}],
-        **light, **few)
+        **light, **some)
     textured["materials"] = {"white": WHITE, "image": {"type": "matte", "color": {"image": "large.png"}}}
     little = {"white": WHITE, "image": {"type": "matte", "color": {"image": "little.png"}}}
     yield "an image of 4096² on 20 × 20 pixels", False, textured, {"materials": little}, None
-    closed = scene(lens(f_number=16), [192, 128], **light, **few)
-    pinhole = scene({"type": "pinhole", "fov": 27}, [192, 128])["camera"]
+    closed = scene(lens(f_number=16), through, **light, **some)
+    pinhole = scene({"type": "pinhole", "fov": 27}, through)["camera"]
     yield "a lens at f/16, all in focus", False, closed, {"camera": pinhole}, None
-    even = scene(lens(lens="lenses/even.json"), [192, 128], **light, **few)
+    even = scene(lens(lens="lenses/even.json"), through, **light, **some)
     yield "glasses of a lens with vd 10⁶", False, even, {"plan": {"dispersion": False}}, None
     raw = {"type": "raw", "quantum_efficiency": [[400, 0.2], [550, 0.6], [700, 0.1]]}
-    yield ("a raw sensor with a curve, through a lens", False, scene(lens(raw), [192, 128], **light, **few),
+    yield ("a raw sensor with a curve, through a lens", False, scene(lens(raw), through, **light, **some),
            {"plan": {"dispersion": False}}, None)
     yield ("30 bands of a grey scene through a pinhole", True,
-           scene({"type": "pinhole", "sensor": THIRTY}, [192, 128], **light, **some),
-           {"camera": scene({"type": "pinhole"}, [192, 128])["camera"]}, None)
+           scene({"type": "pinhole", "sensor": THIRTY}, bands, **light, **some),
+           {"camera": scene({"type": "pinhole"}, bands)["camera"]}, None)
     room = scene({"type": "pinhole", "pose": {"from": [1.2, 0.1, 1.1], "look_at": [-1, -0.3, -1]}}, [192, 128], ROOM,
                  tracer={"type": "path"}, lights=[], **some)
     room["materials"] = {"grey": {"type": "matte", "color": [0.3] * 3}, "lamp": {"type": "emissive", "radiance": [5] * 3}}

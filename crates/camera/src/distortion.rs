@@ -198,16 +198,24 @@ impl Distortion {
         reaches.then(|| self.distort(direction))
     }
 
+    /// As [`Self::undistort`], of many: distorted tangents, which stand in the first two arrays, become unit directions,
+    /// and zero where nothing is seen.
+    pub(crate) fn undistort_all(&self, [x, y, z]: [&mut [f64]; 3]) {
+        if let DistortionSpec::BrownConrady(model) = &self.spec {
+            undistort_rows(model, self.limit, [x, y, z]);
+            return;
+        }
+        for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
+            [*x, *y, *z] = self.undistort([*x, *y]).unwrap_or_default();
+        }
+    }
+
     /// The unit direction (x right, y down, z forward) that is seen at distorted tangents; `None`
     /// where nothing is.
     #[must_use]
     pub fn undistort(&self, seen: [f64; 2]) -> Option<[f64; 3]> {
         match &self.spec {
-            DistortionSpec::BrownConrady(model) => {
-                let [x, y] = model.invert(seen, self.limit)?;
-                let shorten = 1.0 / (x * x + y * y + 1.0).sqrt();
-                Some([x * shorten, y * shorten, shorten])
-            }
+            DistortionSpec::BrownConrady(model) => model.invert(seen, self.limit).map(direction),
             DistortionSpec::Fisheye(model) => {
                 let radius = seen[0].hypot(seen[1]);
                 if radius == 0.0 {
@@ -220,6 +228,36 @@ impl Distortion {
     }
 }
 
+/// The unit direction through tangents.
+#[inline(always)]
+fn direction([x, y]: [f64; 2]) -> [f64; 3] {
+    let shorten = 1.0 / (x * x + y * y + 1.0).sqrt();
+    [x * shorten, y * shorten, shorten]
+}
+
+/// Places that are inverted side by side.
+const LANES: usize = 8;
+
+/// What [`Distortion::undistort`] says of each place, to the bit; zero where nothing is seen.
+#[multiversion::multiversion(targets = "simd")]
+fn undistort_rows(model: &BrownConrady, limit: f64, [x, y, z]: [&mut [f64]; 3]) {
+    let alone = |seen| model.invert(seen, limit).map(direction).unwrap_or_default();
+    let ((x, rest_x), (y, rest_y)) = (x.as_chunks_mut::<LANES>(), y.as_chunks_mut::<LANES>());
+    let (z, rest_z) = z.as_chunks_mut::<LANES>();
+    for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
+        let (places, arrived) = model.invert_lanes([*x, *y]);
+        for i in 0..LANES {
+            let place @ [a, b] = [places[0][i], places[1][i]];
+            // What Newton's method does not find at once is followed from the axis.
+            let found = arrived[i] && a.hypot(b) <= limit;
+            [x[i], y[i], z[i]] = if found { direction(place) } else { alone([x[i], y[i]]) };
+        }
+    }
+    for ((x, y), z) in rest_x.iter_mut().zip(rest_y).zip(rest_z) {
+        [*x, *y, *z] = alone([*x, *y]);
+    }
+}
+
 /// A map's value, and its derivatives by rows.
 type Mapped = ([f64; 2], [[f64; 2]; 2]);
 
@@ -227,7 +265,11 @@ impl BrownConrady {
     /// Residuals below this, relative to 1 + the target's size, are rounding.
     const RESIDUAL: f64 = 4e-15;
 
+    /// Steps of Newton's method after which it is given up.
+    const MOST_STEPS: u32 = 30;
+
     /// Distorted tangents, and their derivatives by x and y.
+    #[inline(always)]
     fn distort(&self, [x, y]: [f64; 2]) -> Mapped {
         let r2 = x * x + y * y;
         let top = 1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3));
@@ -264,12 +306,50 @@ impl BrownConrady {
         (seen, by)
     }
 
+    /// Where Newton's method starts for a place: one step of the fixed point is near enough for the distortion of most
+    /// lenses.
+    #[inline(always)]
+    fn guess(&self, seen: [f64; 2]) -> [f64; 2] {
+        let (once, _) = self.distort(seen);
+        [2.0 * seen[0] - once[0], 2.0 * seen[1] - once[1]]
+    }
+
+    /// [`Self::newton`] from [`Self::guess`] for several places side by side, by the same steps: where it comes to, and
+    /// whether it arrives.
+    #[inline(always)]
+    fn invert_lanes(&self, seen: [[f64; LANES]; 2]) -> ([[f64; LANES]; 2], [bool; LANES]) {
+        let (mut at, mut enough) = ([[0.0; LANES]; 2], [0.0; LANES]);
+        let [mut arrived, mut ended] = [[false; LANES]; 2];
+        for i in 0..LANES {
+            [at[0][i], at[1][i]] = self.guess([seen[0][i], seen[1][i]]);
+            enough[i] = Self::RESIDUAL * (1.0 + seen[0][i].abs() + seen[1][i].abs());
+        }
+        for _ in 0..Self::MOST_STEPS {
+            for i in 0..LANES {
+                let [x, y] = [at[0][i], at[1][i]];
+                let (there, by) = self.distort([x, y]);
+                let (dx, dy) = (seen[0][i] - there[0], seen[1][i] - there[1]);
+                let area = by[0][0] * by[1][1] - by[0][1] * by[1][0];
+                let goes_on = (area > 0.0) & !ended[i];
+                let off = if dx.abs() > dy.abs() { dx.abs() } else { dy.abs() };
+                arrived[i] |= goes_on & (off <= enough[i]);
+                ended[i] = !goes_on | arrived[i];
+                at[0][i] = if ended[i] { x } else { x + (by[1][1] * dx - by[0][1] * dy) / area };
+                at[1][i] = if ended[i] { y } else { y + (by[0][0] * dy - by[1][0] * dx) / area };
+            }
+            if ended == [true; LANES] {
+                break;
+            }
+        }
+        (at, arrived)
+    }
+
     /// Newton's method from `start`; `None` when it does not arrive, or arrives behind a fold,
     /// where the map turns the picture over.
     fn newton(&self, seen: [f64; 2], start: [f64; 2]) -> Option<[f64; 2]> {
         let [mut x, mut y] = start;
         let enough = Self::RESIDUAL * (1.0 + seen[0].abs() + seen[1].abs());
-        for _ in 0..30 {
+        for _ in 0..Self::MOST_STEPS {
             let (at, by) = self.distort([x, y]);
             let (dx, dy) = (seen[0] - at[0], seen[1] - at[1]);
             let area = by[0][0] * by[1][1] - by[0][1] * by[1][0];
@@ -294,9 +374,9 @@ impl BrownConrady {
         const LONGEST: f64 = 1.0 / 16.0;
         const SHORTEST: f64 = 1.0 / 65_536.0;
         /// Steps after which a way that goes on in the shortest ones is given up as a fold.
-        const MOST_STEPS: u32 = 4096;
+        const MOST_PARTS: u32 = 4096;
         let (mut at, mut done, mut step) = ([0.0; 2], 0.0, LONGEST);
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MOST_PARTS {
             if done >= 1.0 {
                 return Ok(at);
             }
@@ -323,10 +403,7 @@ impl BrownConrady {
     /// The undistorted tangents seen at `seen`. `limit` is the largest tangent in the picture.
     fn invert(&self, seen: [f64; 2], limit: f64) -> Option<[f64; 2]> {
         let inside = |p: &[f64; 2]| p[0].hypot(p[1]) <= limit;
-        // One step of the fixed point is near enough for the distortion of most lenses.
-        let (once, _) = self.distort(seen);
-        let start = [2.0 * seen[0] - once[0], 2.0 * seen[1] - once[1]];
-        self.newton(seen, start).filter(inside).or_else(|| self.track(seen).ok())
+        self.newton(seen, self.guess(seen)).filter(inside).or_else(|| self.track(seen).ok())
     }
 }
 
@@ -406,6 +483,35 @@ mod tests {
 
     fn fisheye() -> DistortionSpec {
         DistortionSpec::Fisheye(Fisheye { k1: 0.05, k2: -0.012, k3: 0.003, k4: -0.0005 })
+    }
+
+    /// Many places at once, of every remainder beside whole blocks, and those where nothing is seen or Newton's method
+    /// goes astray: what each gives alone, to the bit.
+    #[test]
+    fn many_places_give_what_each_gives_alone() {
+        let strong = DistortionSpec::BrownConrady(BrownConrady { k1: -0.4, ..Default::default() });
+        let steep = DistortionSpec::BrownConrady(BrownConrady { k1: 8.0, ..Default::default() });
+        let zero = DistortionSpec::BrownConrady(BrownConrady::default());
+        let corner = |x: f64| [[x, 0.75 * x]].into_iter();
+        for (spec, widest) in
+            [(rational(), 0.6), (strong, 0.45), (steep, 3.0), (zero, 1.0), (fisheye(), 2.0)]
+        {
+            let model = spec.build(corner(widest)).unwrap();
+            for count in [0, 1, 7, 8, 9, 64, 421] {
+                let share = |i: usize, step: f64| (2.4 * (i as f64 * step).fract() - 1.2) * widest;
+                let seen: Vec<[f64; 2]> = (0..count)
+                    .map(|i| [share(i, 0.618_034), share(i, 0.414_214)])
+                    .map(|place| if place[0] > 1.19 * widest { [f64::NAN, 0.0] } else { place })
+                    .collect();
+                let [mut x, mut y] = [0, 1].map(|k| seen.iter().map(|p| p[k]).collect::<Vec<_>>());
+                let mut z = vec![f64::NAN; count];
+                model.undistort_all([&mut x, &mut y, &mut z]);
+                for (i, &place) in seen.iter().enumerate() {
+                    let alone = model.undistort(place).unwrap_or_default();
+                    assert_eq!([x[i], y[i], z[i]], alone, "{spec:?} at {place:?} of {count}");
+                }
+            }
+        }
     }
 
     /// Pixels of `POINTS` by OpenCV 5.0's `projectPoints` and `fisheye.projectPoints`.

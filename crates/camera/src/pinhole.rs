@@ -193,16 +193,16 @@ impl Pinhole {
     }
 
     fn aim_distorted(&self, distortion: &Distortion, pose: &Pose, rays: &mut RayBatch) {
-        let RaysMut { directions, t_max, .. } = rays.arrays_mut();
+        let RaysMut { directions: [dx, dy, dz], t_max, .. } = rays.arrays_mut();
+        for (x, y) in dx.iter_mut().zip(dy.iter_mut()) {
+            [*x, *y] = self.intrinsics.tangents(*x, *y);
+        }
+        distortion.undistort_all([dx, dy, dz]);
         for i in 0..t_max.len() {
-            let seen = self.intrinsics.tangents(directions[0][i], directions[1][i]);
-            let (direction, sees) = match distortion.undistort(seen) {
-                Some([x, y, z]) => (pose.right() * x - pose.up() * y + pose.forward() * z, true),
-                None => (pose.forward(), false),
-            };
-            for axis in 0..3 {
-                directions[axis][i] = direction[axis];
-            }
+            let [x, y, z] = [dx[i], dy[i], dz[i]];
+            let sees = [x, y, z] != [0.0; 3];
+            let turned = pose.right() * x - pose.up() * y + pose.forward() * z;
+            [dx[i], dy[i], dz[i]] = if sees { turned } else { pose.forward() }.to_array();
             if !sees {
                 // Nothing lies before a negative distance: the ray hits nothing.
                 t_max[i] = -1.0;
