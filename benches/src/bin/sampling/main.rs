@@ -88,7 +88,7 @@ impl Effort {
     fn of(quick: bool, pairs: u64) -> Self {
         match quick {
             false => Self { counts: &COUNTS, charted: &CHARTED, most: MOST, pairs },
-            true => Self { counts: &COUNTS[..9], charted: &SHOWN, most: MOST / 4, pairs },
+            true => Self { counts: &COUNTS[..9], charted: &SHOWN, most: MOST, pairs },
         }
     }
 }
