@@ -81,7 +81,7 @@ def cases(folder, scenes):
     wide, through, bands = [640, 480], [480, 320], [240, 160]
 
     behind = {"file": "behind.ply", "material": "white", "transform": {"translate": [0, 0.5, 8]}}
-    depth = scene({"type": "pinhole"}, [320, 240], [GROUND, BALL, behind], layers=["depth"])
+    depth = scene({"type": "pinhole"}, [1280, 960], [GROUND, BALL, behind], layers=["depth"])
     yield ("a million triangles behind the camera, depth", True, depth,
            {"objects": [GROUND, BALL]}, {"plan": {"unseen": True}})
     small = {"file": "small.ply", "material": "white", "transform": {"translate": [0, 0.4, 0]}}
