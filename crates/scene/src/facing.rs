@@ -30,8 +30,8 @@ const INSIDE: f64 = 0.1;
 
 /// What a camera without a pose has to frame, and from where.
 pub(crate) fn subject<'a>(vertices: &'a WorldVertices<'a>) -> Subject<'a> {
-    let geometry = vertices.0;
-    let subject = Subject { points: Some(vertices), ..Subject::from(scene::tight(geometry)) };
+    let geometry = vertices.geometry;
+    let subject = Subject { points: Some(vertices), ..Subject::from(scene::tight(*vertices)) };
     let bounds = subject.bounds;
     let is_box = !bounds.is_empty() && (bounds.max - bounds.min).is_finite();
     if !is_box || bounds.diagonal() == 0.0 || geometry.triangles() > MOST_TRIANGLES {
@@ -41,12 +41,12 @@ pub(crate) fn subject<'a>(vertices: &'a WorldVertices<'a>) -> Subject<'a> {
     if usual.backs() <= MOST_BACKS {
         return subject;
     }
-    Subject { viewpoint: viewpoint(geometry, &subject), ..subject }
+    Subject { viewpoint: viewpoint(vertices, &subject), ..subject }
 }
 
 /// From where to look at something that turns its back to the usual view.
-fn viewpoint(geometry: &Geometry, subject: &Subject<'_>) -> Viewpoint {
-    let bounds = subject.bounds;
+fn viewpoint(vertices: &WorldVertices<'_>, subject: &Subject<'_>) -> Viewpoint {
+    let (geometry, bounds) = (vertices.geometry, subject.bounds);
     if let Some(axis) = subject.flat_axis() {
         // Land is seen from above, whichever way its triangles face.
         return match axis {
@@ -56,6 +56,9 @@ fn viewpoint(geometry: &Geometry, subject: &Subject<'_>) -> Viewpoint {
     }
     let mut is_closed = true;
     for side in [DVec3::Z, DVec3::NEG_Z, DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y] {
+        if !(vertices.go_on)() {
+            return Viewpoint::Usual;
+        }
         let view = Subject { viewpoint: Viewpoint::Side(side), ..*subject }.view();
         let seen = CoarseCounts::of(geometry, bounds, &view);
         if seen.backs() < 1.0 - MOSTLY && (side.y == 0.0 || seen.is_full() && is_low(bounds)) {
@@ -226,7 +229,7 @@ mod tests {
     use super::*;
 
     fn viewpoint_of(geometry: &Geometry) -> Viewpoint {
-        subject(&WorldVertices(geometry)).viewpoint
+        subject(&geometry.into()).viewpoint
     }
 
     /// The corner of a box of these half-sides whose number's bits are x, y and z.
@@ -294,7 +297,7 @@ mod tests {
     #[test]
     fn a_closed_room_is_seen_from_within() {
         let geometry = room(&[], true);
-        let vertices = WorldVertices(&geometry);
+        let vertices = WorldVertices::from(&geometry);
         let subject = subject(&vertices);
         let Viewpoint::Within(place) = subject.viewpoint else { panic!("{subject:?}") };
         let (low, high) = (subject.bounds.min, subject.bounds.max);
@@ -327,7 +330,7 @@ mod tests {
         for height in [2.0, 5.0] {
             for leaves in [6, 40] {
                 let geometry = palm(height, leaves);
-                let vertices = WorldVertices(&geometry);
+                let vertices = WorldVertices::from(&geometry);
                 let up = subject(&vertices).view().forward().y.abs();
                 assert!(up < 0.7, "{leaves} leaves at {height}: looked at along {up}");
             }

@@ -172,6 +172,9 @@ impl SceneFile {
         let imports: Vec<Result<Import, SceneError>> = origins
             .par_iter()
             .map(|origin| {
+                if !goes_on(origin, done.load(Ordering::Relaxed)) {
+                    return Err(SceneError::Stopped);
+                }
                 let at = ScenePath::of("objects").index(origin.user);
                 let known = origin.kind.kept();
                 let manner = ImportManner { play: origin.kind.play(), ..manner.clone() };

@@ -13,6 +13,7 @@ use crate::cache::Cache;
 use crate::file::{AccuracySpec, PlanSpec, RenderSpec, ToleranceSpec, TracerSpec};
 use crate::identity::{Copies, Ingredients, SceneNode};
 use crate::import::{Note, Strictness};
+use crate::shape::GoOn;
 use crate::{CameraOrigin, SceneCamera, SceneError, SceneHash};
 use etendue_camera::{Camera, SupportFunction};
 use etendue_files::Opener;
@@ -183,7 +184,7 @@ impl std::fmt::Debug for LoadOptions<'_> {
 /// How far loading is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LoadProgress<'a> {
-    /// The model or shape that has just been loaded.
+    /// The model or shape that is being loaded or has just been; `camera` while one without a pose is placed.
     pub name: &'a str,
     /// How many are.
     pub done: usize,
@@ -196,7 +197,8 @@ pub struct LoadProgress<'a> {
 /// A placement whose loose box (around the eight corners of its mesh's own) lies inside the tight
 /// box found so far cannot widen it and is not visited. Those that reach farthest go first, so of a
 /// forest of instances only the trees at its edges are looked at.
-pub(crate) fn tight(geometry: &Geometry) -> Bounds {
+pub(crate) fn tight(vertices: WorldVertices<'_>) -> Bounds {
+    let geometry = vertices.geometry;
     let placements = &geometry.placements;
     let all: Vec<(Bounds, &Placement)> = placements
         .par_iter()
@@ -208,7 +210,7 @@ pub(crate) fn tight(geometry: &Geometry) -> Bounds {
         let least = all.iter().min_by(|(a, _), (b, _)| a.min[axis].total_cmp(&b.min[axis]));
         let most = all.iter().max_by(|(a, _), (b, _)| a.max[axis].total_cmp(&b.max[axis]));
         for (_, placement) in least.into_iter().chain(most) {
-            bounds = bounds.union(exact(geometry, placement));
+            bounds = bounds.union(exact(vertices, placement));
         }
     }
     let beyond = |around: &Bounds, bounds: &Bounds| {
@@ -220,19 +222,31 @@ pub(crate) fn tight(geometry: &Geometry) -> Bounds {
     open.sort_by(|(a, ..), (b, ..)| b.total_cmp(a));
     for (_, around, placement) in open {
         if beyond(around, &bounds) > 0.0 {
-            bounds = bounds.union(exact(geometry, placement));
+            bounds = bounds.union(exact(vertices, placement));
         }
     }
     bounds
 }
 
 /// The vertices of all triangles in world space, as a camera that frames them asks.
-pub(crate) struct WorldVertices<'a>(pub(crate) &'a Geometry);
+#[derive(Clone, Copy)]
+pub(crate) struct WorldVertices<'a> {
+    pub(crate) geometry: &'a Geometry,
+    /// Once it says no, what is left is passed over, and what was found means nothing.
+    pub(crate) go_on: GoOn<'a>,
+}
+
+impl<'a> From<&'a Geometry> for WorldVertices<'a> {
+    /// To the end.
+    fn from(geometry: &'a Geometry) -> Self {
+        Self { geometry, go_on: &|| true }
+    }
+}
 
 impl SupportFunction for WorldVertices<'_> {
     /// Visits the placements that may reach farthest first, and no other once their boxes do not.
     fn support(&self, origin: DVec3, directions: &[DVec3]) -> Vec<f64> {
-        let geometry = self.0;
+        let geometry = self.geometry;
         let mut most = vec![f64::NEG_INFINITY; directions.len()];
         let boxes: Vec<Vec<f64>> = geometry
             .placements
@@ -252,7 +266,7 @@ impl SupportFunction for WorldVertices<'_> {
         let rest = (0..boxes.len()).filter(|index| !first.contains(index));
         for index in first.iter().copied().chain(rest) {
             if beyond(&boxes[index], &most) {
-                let found = farthest(geometry, &geometry.placements[index], origin, directions);
+                let found = farthest(*self, &geometry.placements[index], origin, directions);
                 most.iter_mut().zip(found).for_each(|(most, found)| *most = most.max(found));
             }
         }
@@ -262,15 +276,15 @@ impl SupportFunction for WorldVertices<'_> {
 
 /// The support function of one placement's triangles.
 fn farthest(
-    geometry: &Geometry,
+    vertices: WorldVertices<'_>,
     placement: &Placement,
     origin: DVec3,
     directions: &[DVec3],
 ) -> Vec<f64> {
     const CHUNK: usize = 1 << 15;
-    let mesh = geometry.mesh_of(placement);
+    let mesh = vertices.geometry.mesh_of(placement);
     let none = || vec![f64::NEG_INFINITY; directions.len()];
-    let chunks = corners_with_area(mesh, placement, CHUNK).map(|corners| {
+    let chunks = corners_with_area(mesh, placement, CHUNK, vertices.go_on).map(|corners| {
         let mut most = none();
         for corner in corners {
             let local = mesh.positions.get(corner as usize);
@@ -292,23 +306,24 @@ fn corners_with_area<'a>(
     mesh: &'a Mesh,
     placement: &'a Placement,
     chunk: usize,
+    go_on: GoOn<'a>,
 ) -> impl ParallelIterator<Item = impl Iterator<Item = u32> + 'a> + 'a {
     let test = AreaTest::under(mesh, &placement.world_from_mesh.linear);
     let keeps_all = test.keeps_all();
     mesh.triangles.par_chunks(chunk).enumerate().map(move |(number, triangles)| {
-        let kept = triangles.iter().enumerate();
+        let kept = if go_on() { triangles } else { &[] }.iter().enumerate();
         let kept = kept.filter(move |(k, _)| keeps_all || test.keeps(number * chunk + k));
         kept.flat_map(|(_, triangle)| *triangle)
     })
 }
 
-fn exact(geometry: &Geometry, placement: &Placement) -> Bounds {
+fn exact(vertices: WorldVertices<'_>, placement: &Placement) -> Bounds {
     const CHUNK: usize = 1 << 16;
-    let mesh = geometry.mesh_of(placement);
+    let mesh = vertices.geometry.mesh_of(placement);
     if placement.world_from_mesh.is_identity() {
         return mesh.bounds;
     }
-    let boxes = corners_with_area(mesh, placement, CHUNK).map(|corners| {
+    let boxes = corners_with_area(mesh, placement, CHUNK, vertices.go_on).map(|corners| {
         let mut bounds = Bounds::EMPTY;
         for corner in corners {
             bounds.include(placement.world_from_mesh.point(mesh.positions.get(corner as usize)));
@@ -359,13 +374,13 @@ mod tests {
                 }
             }
         }
-        let found = WorldVertices(&geometry).support(origin, &directions);
+        let found = WorldVertices::from(&geometry).support(origin, &directions);
         for (found, expected) in found.iter().zip(expected) {
             // A few roundings of numbers near 10.
             assert!((found - expected).abs() < 1e-13, "{found} {expected}");
         }
         assert_eq!(
-            WorldVertices(&Geometry::default()).support(origin, &[DVec3::X]),
+            WorldVertices::from(&Geometry::default()).support(origin, &[DVec3::X]),
             [f64::NEG_INFINITY]
         );
     }
@@ -374,10 +389,13 @@ mod tests {
     fn passing_over_placements_changes_nothing() {
         for count in [0, 1, 2, 500] {
             let geometry = needles(count);
-            assert_eq!(tight(&geometry), geometry.bounds(), "{count} placements");
+            assert_eq!(tight((&geometry).into()), geometry.bounds(), "{count} placements");
         }
         let geometry = needles(500);
         let loose = geometry.loose_bounds();
-        assert!(loose.diagonal() > tight(&geometry).diagonal(), "the test can tell them apart");
+        assert!(
+            loose.diagonal() > tight((&geometry).into()).diagonal(),
+            "the test can tell them apart"
+        );
     }
 }

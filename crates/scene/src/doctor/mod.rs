@@ -169,7 +169,7 @@ impl Diagnosis {
     #[must_use]
     pub fn of(scene: &Scene, kind: FileKind) -> Self {
         let geometry = &*scene.geometry;
-        let around = scene::tight(geometry);
+        let around = scene::tight(geometry.into());
         let coplanar = Coplanar::of(geometry).pairs(geometry);
         let is_extension = |note: &&Note| note.kind == NoteKind::Extension;
         let models: Vec<&Path> = scene.stats.files.iter().map(|(path, _)| path.as_path()).collect();

@@ -5,12 +5,13 @@
 use std::cell::{Cell, RefCell};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::cache::{self, KeptCamera};
 use crate::error::not_found;
 use crate::file::{SamplesSpec, SceneFile, ScenePath};
 use crate::import::{CameraProjection, ImportedCamera, Note, NoteKind, Strictness};
-use crate::scene::{LoadOptions, WorldVertices};
+use crate::scene::{LoadOptions, LoadProgress, WorldVertices};
 use crate::{Cache, SceneError, facing};
 use etendue_camera::{Camera, CameraError, CameraSpec, Pose};
 use etendue_files::InputFolder;
@@ -126,10 +127,21 @@ impl SceneFile {
             None => (own, CameraOrigin::Framed),
         };
         // Without a pose it frames what is there.
-        let vertices = WorldVertices(geometry);
-        let camera = spec
-            .build(|| facing::subject(&vertices), files)
-            .map_err(|error| self.camera_fault(&error))?;
+        let stopped = AtomicBool::new(false);
+        let go_on = || {
+            let step = LoadProgress { name: "camera", done: 1, total: 1 };
+            if options.progress.is_some_and(|progress| !progress(step)) {
+                stopped.store(true, Ordering::Relaxed);
+            }
+            !stopped.load(Ordering::Relaxed)
+        };
+        let vertices = WorldVertices { geometry, go_on: &go_on };
+        let built = spec.build(|| facing::subject(&vertices), files);
+        // A place that was found in part is none, nor is what may be wrong with it.
+        if stopped.load(Ordering::Relaxed) {
+            return Err(SceneError::Stopped);
+        }
+        let camera = built.map_err(|error| self.camera_fault(&error))?;
         Ok((self.with_its_dispersion(camera), origin))
     }
 

@@ -69,7 +69,7 @@ impl Globe {
         go_on: GoOn<'_>,
     ) -> Option<Mesh> {
         let cuts = self.cut_edges();
-        let triangles = self.triangles(&cuts, wanted.uvs);
+        let triangles = self.triangles(&cuts, wanted.uvs, go_on)?;
         // Places first; normals and texture coordinates where they are wanted.
         let places = Places { globe: self, cuts: &cuts, seam: wanted.uvs, go_on };
         let (floats, bounds) = places.positions(relief)?;
@@ -164,8 +164,8 @@ impl Globe {
         edges
     }
 
-    /// All triangles. `seam`: the easternmost vertex of each ring is one of its own.
-    fn triangles(&self, cuts: &[Cut], seam: bool) -> Vec<[u32; 3]> {
+    /// All triangles; `None` when it was stopped. `seam`: the easternmost vertex of each ring is one of its own.
+    fn triangles(&self, cuts: &[Cut], seam: bool, go_on: GoOn<'_>) -> Option<Vec<[u32; 3]>> {
         let whole = 8 * (self.n as usize).pow(2);
         let mut triangles = vec![[0; 3]; whole + 2 * cuts.len()];
         let mut rows: Vec<(GlobeRow, &mut [[u32; 3]])> = Vec::with_capacity(2 * self.n as usize);
@@ -175,7 +175,10 @@ impl Globe {
             rows.push((row, own));
             rest = behind;
         }
-        rows.into_par_iter().for_each(|(row, own)| self.fill_row(row, seam, own));
+        rows.into_par_iter().try_for_each(|(row, own)| {
+            self.fill_row(row, seam, own);
+            go_on().then_some(())
+        })?;
         for (e, cut) in (0_u32..).zip(cuts) {
             let per_quadrant = 2 * cut.row.m as usize + 1;
             let up = self.row_start(cut.row.index)
@@ -195,7 +198,7 @@ impl Globe {
             [triangles[up], triangles[behind]] = first;
             [triangles[up + 1], triangles[behind + 1]] = second;
         }
-        triangles
+        Some(triangles)
     }
 
     /// The triangles of one row, quadrant by quadrant from west to east.
@@ -392,22 +395,21 @@ fn vertices<const N: usize>(floats: Vec<f32>, count: usize) -> Vertices<N> {
 }
 
 /// A disk of `radius` in the plane z = 0, facing +Z: the northern half of a globe, looked at from
-/// above and pressed flat, rings at even distances. The next 4 n² triangles.
-pub(super) fn disk(radius: f64, triangles: u64, wanted: Wanted) -> Mesh {
+/// above and pressed flat, rings at even distances. The next 4 n² triangles; `None` once `go_on` says no.
+pub(super) fn disk(radius: f64, triangles: u64, wanted: Wanted, go_on: GoOn<'_>) -> Option<Mesh> {
     let n = triangles.div_ceil(4).isqrt().max(1);
     let n = if 4 * n * n < triangles { n + 1 } else { n };
     let globe = Globe { n: u32::try_from(n).unwrap_or(u32::from(u16::MAX)), cuts: 0 };
     let count = globe.ring_start(globe.n) + globe.ring_size(globe.n) as usize;
     let mut walk = GlobeWalk::at(&globe, 0);
     // The place as a fraction of the radius along x and y, y up.
-    let places: Vec<[f64; 2]> = (0..count)
-        .map(|_| {
-            let place = walk.next_place();
-            let (y, x) = sin_cos_turns(place.east);
-            [x * 2.0 * place.south, y * 2.0 * place.south]
-        })
-        .collect();
-    let mut flat = globe.triangles(&[], false);
+    let places = (0..count).map(|number| {
+        let place = walk.next_place();
+        let (y, x) = sin_cos_turns(place.east);
+        (number % CHUNK > 0 || go_on()).then_some([x * 2.0 * place.south, y * 2.0 * place.south])
+    });
+    let places: Vec<[f64; 2]> = places.collect::<Option<_>>()?;
+    let mut flat = globe.triangles(&[], false, go_on)?;
     flat.truncate(4 * (globe.n as usize).pow(2));
     let single = |value: f64| glam::DVec2::new(value, 0.0).as_vec2().x;
     let positions: Vec<[f32; 3]> =
@@ -422,5 +424,5 @@ pub(super) fn disk(radius: f64, triangles: u64, wanted: Wanted) -> Mesh {
             places.iter().map(|&[x, y]| [single(0.5 + 0.5 * x), single(0.5 - 0.5 * y)]).collect();
         mesh.uvs = vec![Vertices::from_arrays(&uvs)];
     }
-    mesh
+    Some(mesh)
 }

@@ -168,7 +168,7 @@ impl ShapeSpec {
             }
             Self::Disk { radius, triangles } => {
                 let radius = positive("radius", radius)?;
-                Some(globe::disk(radius, in_range(triangles)?, wanted))
+                globe::disk(radius, in_range(triangles)?, wanted, go_on)
             }
             Self::Blob { radius, triangles, seed, amplitude } => {
                 let radius = positive("radius", radius)?;
@@ -295,13 +295,19 @@ mod tests {
 
     #[test]
     fn making_can_be_stopped() {
-        let asked = AtomicUsize::new(0);
-        let stop = || asked.fetch_add(1, Ordering::Relaxed) < 5;
-        let made = blob(1_000_000, 1).build_while(Wanted::EVERYTHING, &stop);
-        assert!(matches!(made, Ok(None)), "{made:?}");
-        // There are 123 tasks; those that other threads have begun are ended.
-        let asked = asked.into_inner();
-        assert!((6..100).contains(&asked), "{asked}");
+        // Of a blob's triangles there are 706 tasks, one a row, and 123 of its vertices; of a disk's vertices 124, one
+        // after another, and 1000 of the rows. Those that other threads have begun are ended.
+        let disk = ShapeSpec::Disk { radius: Metres(1.0), triangles: 1_000_000 };
+        for (shape, before) in [(blob(1_000_000, 1), [5, 720]), (disk, [5, 140])] {
+            for before in before {
+                let asked = AtomicUsize::new(0);
+                let stop = || asked.fetch_add(1, Ordering::Relaxed) < before;
+                let made = shape.build_while(Wanted::EVERYTHING, &stop);
+                assert!(matches!(made, Ok(None)), "{made:?}");
+                let asked = asked.into_inner() - before;
+                assert!((1..95).contains(&asked), "{asked}");
+            }
+        }
         assert!(matches!(blob(64, 1).build_while(Wanted::EVERYTHING, &|| true), Ok(Some(_))));
     }
 

@@ -471,8 +471,27 @@ fn loading_tells_how_far_it_is_and_can_be_stopped() {
     file.load(Wanted::NOTHING, &options).unwrap();
     let mut told = told.lock().unwrap().clone();
     told.sort_unstable();
-    assert_eq!(told, [(1, 2), (2, 2)]);
+    told.dedup();
+    // Before each object and behind it, and while the camera that has no pose is placed.
+    assert_eq!(told, [(0, 2), (1, 1), (1, 2), (2, 2)]);
     let options = LoadOptions { progress: Some(&|_| false), ..LoadOptions::default() };
+    let error = file.load(Wanted::NOTHING, &options).unwrap_err();
+    assert!(matches!(error, etendue_scene::SceneError::Stopped), "{error}");
+}
+
+#[test]
+fn placing_a_camera_before_many_triangles_can_be_stopped() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.json");
+    let blob = r#"{"shape": "blob", "triangles": 500000}"#;
+    fs::write(&path, format!(r#"{{"etendue": 1, "objects": [{blob}, {blob}]}}"#)).unwrap();
+    let file = SceneFile::read(&path, &[]).unwrap();
+    let asked = std::sync::atomic::AtomicUsize::new(0);
+    // It says no once: what asks again must not go on.
+    let stop = |step: etendue_scene::LoadProgress<'_>| {
+        step.name != "camera" || asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed) != 3
+    };
+    let options = LoadOptions { progress: Some(&stop), ..LoadOptions::default() };
     let error = file.load(Wanted::NOTHING, &options).unwrap_err();
     assert!(matches!(error, etendue_scene::SceneError::Stopped), "{error}");
 }
