@@ -1,5 +1,9 @@
+use std::sync::Arc;
+
 use super::*;
-use crate::element::newton::cross;
+use crate::element::newton::{Profile, cross};
+use crate::element::rays::Ray;
+use crate::element::refract::Media;
 
 fn read(json: &str) -> Result<Freeform, String> {
     let spec = serde_json::from_str::<FreeformSpec>(json).map_err(|e| e.to_string())?;
@@ -144,6 +148,25 @@ fn rays_meet_the_surface_and_a_fresnel_lens_bends_as_its_facets() {
     let bent = facet - (facet.sin() / 1.5).asin();
     assert_eq!(crossing.ray.position, [0.0, 6.0, 0.0]);
     assert!((crossing.ray.direction[1] + bent.sin()).abs() < 1e-15);
+}
+
+#[test]
+fn what_lies_in_a_plane_says_so_exactly() {
+    let ray = Ray::new([1.0, -2.0, -5.0].into(), [0.6, 0.0, 0.8].into()).unwrap();
+    for (json, is_in_a_plane) in [
+        (r#"{"phase": {"pattern": {"type": "grating", "period": 0.05}, "order": 1}}"#, true),
+        (r#"{"radius": 40, "conic": -1, "fresnel": true}"#, true),
+        (r#"{"rotation_radius": 30}"#, false),
+        (r#"{"aspheric": {"4": 1e-6}}"#, false),
+        (r#"{"sag": [{"type": "zernike", "radius": 12, "coefficients": {"7": 0.1}}]}"#, false),
+    ] {
+        let surface = FreeformSurface::new(Arc::new(read(json).unwrap()), 1.0, 550.0);
+        let found = [surface.sag_bounds(ray, [0.0, 9.0]), surface.along_bounds(ray, [0.0, 9.0])];
+        assert_eq!(found == [[0.0, 0.0], [0.8, 0.8]], is_in_a_plane, "{json}");
+        assert_eq!(surface.sag_range(5.0) == [0.0, 0.0], is_in_a_plane, "{json}");
+        let at = Ray { position: [3.0, -4.0, 0.0], direction: ray.direction };
+        assert_eq!(surface.sag_and_slope(at) == (0.0, [0.0; 2]), is_in_a_plane, "{json}");
+    }
 }
 
 #[test]
