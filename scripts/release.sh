@@ -34,7 +34,8 @@ crates() {
     if [ -n "${NO_VERIFY:-}" ]; then
         cargo package "${arguments[@]}" --no-verify
     else
-        cargo publish "${arguments[@]}" --dry-run
+        # All are built in one folder, so that what they take from elsewhere is compiled once.
+        CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target} cargo publish "${arguments[@]}" --dry-run
     fi
     # What is in each, and that nobody else's terms are missing.
     local packed names file

@@ -234,7 +234,7 @@ fn inputs() -> Vec<Input> {
         &json!({}),
     );
     let filter_keys: &[&str] = &["ElementSpec.image", "PlacedSpec.image"];
-    add(filter_keys, scene(&camera(&filtered)), &mask, vec![longer(&grey)]);
+    add(filter_keys, unlit(scene(&camera(&filtered))), &mask, vec![longer(&grey)]);
     let spread =
         json!({"type": "height_map", "file": "mask.png", "width": 20, "height": 20, "depth": 0.01});
     let mapped = json!({"type": "freeform", "semi_diameter": 4, "thickness": 1, "sag": [spread]});
