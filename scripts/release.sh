@@ -31,12 +31,10 @@ crates() {
     rm -f target/package/*.crate
     # Tools of this checkout, and the core of the wheel, are no crates for others.
     for private in benches dependencies fuzz stability python; do arguments+=(--exclude "etendue-$private"); done
-    if [ -n "${NO_VERIFY:-}" ]; then
-        cargo package "${arguments[@]}" --no-verify
-    else
-        # All are built in one folder, so that what they take from elsewhere is compiled once.
-        CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target} cargo publish "${arguments[@]}" --dry-run
-    fi
+    # All are built in one folder, so that what they take from elsewhere is compiled once.
+    [ -n "${NO_VERIFY:-}" ] || CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target} cargo publish "${arguments[@]}" --dry-run
+    # Publishing leaves no packages to look into.
+    cargo package "${arguments[@]}" --no-verify
     # What is in each, and that nobody else's terms are missing.
     local packed names file
     for packed in target/package/*.crate; do
