@@ -75,7 +75,6 @@ IMAGES=target/light-field-images scripts/light-fields.sh --samples 32 --quiet
 
 step "window"
 scripts/test-window.sh
-scripts/window-states.sh
 scripts/test-wayland.sh
 
 step "Open Image Denoise, for the tests that denoise"
