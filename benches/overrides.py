@@ -1,7 +1,7 @@
 """Scenes in which the plan could save much, each as it is and as somebody who knows the scene overrides it by hand.
 
-Pictures are as large as users render at least: finding out what a lens does takes some tenths of a second whatever their
-size, which is all that there is to see in small ones.
+Pictures are as large as users render: finding out what a lens does takes as long whatever their size, which is most of
+what there is to see in small ones.
 """
 
 import json

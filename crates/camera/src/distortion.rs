@@ -10,9 +10,12 @@
 //! OpenCV, *Camera Calibration and 3D Reconstruction* (rational and thin-prism terms included) and
 //! its *Fisheye camera model* (Kannala and Brandt, "A generic camera model", 2006).
 
+mod brown_conrady;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use self::brown_conrady::BrownConrady;
 use crate::CameraError;
 
 /// Distortion as the scene file writes it; coefficients that are absent are 0.
@@ -23,37 +26,6 @@ pub enum DistortionSpec {
     BrownConrady(BrownConrady),
     /// OpenCV's fisheye model.
     Fisheye(Fisheye),
-}
-
-/// Radial (rational), tangential and thin-prism distortion. OpenCV's vector is
-/// (k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4).
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct BrownConrady {
-    /// Radial, r² of the numerator.
-    pub k1: f64,
-    /// Radial, r⁴ of the numerator.
-    pub k2: f64,
-    /// Tangential.
-    pub p1: f64,
-    /// Tangential.
-    pub p2: f64,
-    /// Radial, r⁶ of the numerator.
-    pub k3: f64,
-    /// Radial, r² of the denominator.
-    pub k4: f64,
-    /// Radial, r⁴ of the denominator.
-    pub k5: f64,
-    /// Radial, r⁶ of the denominator.
-    pub k6: f64,
-    /// Thin prism, r² along x.
-    pub s1: f64,
-    /// Thin prism, r⁴ along x.
-    pub s2: f64,
-    /// Thin prism, r² along y.
-    pub s3: f64,
-    /// Thin prism, r⁴ along y.
-    pub s4: f64,
 }
 
 /// The angle from the axis θ is seen at the radius θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸).
@@ -202,7 +174,7 @@ impl Distortion {
     /// and zero where nothing is seen.
     pub(crate) fn undistort_all(&self, [x, y, z]: [&mut [f64]; 3]) {
         if let DistortionSpec::BrownConrady(model) = &self.spec {
-            undistort_rows(model, self.limit, [x, y, z]);
+            brown_conrady::undistort_all(model, self.limit, [x, y, z]);
             return;
         }
         for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
@@ -215,7 +187,7 @@ impl Distortion {
     #[must_use]
     pub fn undistort(&self, seen: [f64; 2]) -> Option<[f64; 3]> {
         match &self.spec {
-            DistortionSpec::BrownConrady(model) => model.invert(seen, self.limit).map(direction),
+            DistortionSpec::BrownConrady(model) => model.undistort(seen, self.limit),
             DistortionSpec::Fisheye(model) => {
                 let radius = seen[0].hypot(seen[1]);
                 if radius == 0.0 {
@@ -225,185 +197,6 @@ impl Distortion {
                 Some([seen[0] / radius * sin, seen[1] / radius * sin, cos])
             }
         }
-    }
-}
-
-/// The unit direction through tangents.
-#[inline(always)]
-fn direction([x, y]: [f64; 2]) -> [f64; 3] {
-    let shorten = 1.0 / (x * x + y * y + 1.0).sqrt();
-    [x * shorten, y * shorten, shorten]
-}
-
-/// Places that are inverted side by side.
-const LANES: usize = 8;
-
-/// What [`Distortion::undistort`] says of each place, to the bit; zero where nothing is seen.
-#[multiversion::multiversion(targets = "simd")]
-fn undistort_rows(model: &BrownConrady, limit: f64, [x, y, z]: [&mut [f64]; 3]) {
-    let alone = |seen| model.invert(seen, limit).map(direction).unwrap_or_default();
-    let ((x, rest_x), (y, rest_y)) = (x.as_chunks_mut::<LANES>(), y.as_chunks_mut::<LANES>());
-    let (z, rest_z) = z.as_chunks_mut::<LANES>();
-    for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
-        let (places, arrived) = model.invert_lanes([*x, *y]);
-        for i in 0..LANES {
-            let place @ [a, b] = [places[0][i], places[1][i]];
-            // What Newton's method does not find at once is followed from the axis.
-            let found = arrived[i] && a.hypot(b) <= limit;
-            [x[i], y[i], z[i]] = if found { direction(place) } else { alone([x[i], y[i]]) };
-        }
-    }
-    for ((x, y), z) in rest_x.iter_mut().zip(rest_y).zip(rest_z) {
-        [*x, *y, *z] = alone([*x, *y]);
-    }
-}
-
-/// A map's value, and its derivatives by rows.
-type Mapped = ([f64; 2], [[f64; 2]; 2]);
-
-impl BrownConrady {
-    /// Residuals below this, relative to 1 + the target's size, are rounding.
-    const RESIDUAL: f64 = 4e-15;
-
-    /// Steps of Newton's method after which it is given up.
-    const MOST_STEPS: u32 = 30;
-
-    /// Distorted tangents, and their derivatives by x and y.
-    #[inline(always)]
-    fn distort(&self, [x, y]: [f64; 2]) -> Mapped {
-        let r2 = x * x + y * y;
-        let top = 1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3));
-        let bottom = 1.0 + r2 * (self.k4 + r2 * (self.k5 + r2 * self.k6));
-        // The radial factor, the prisms, and their derivatives by r².
-        let top_by_r2 = self.k1 + r2 * (2.0 * self.k2 + r2 * 3.0 * self.k3);
-        let bottom_by_r2 = self.k4 + r2 * (2.0 * self.k5 + r2 * 3.0 * self.k6);
-        let radial = top / bottom;
-        let radial_by_r2 = (top_by_r2 - radial * bottom_by_r2) / bottom;
-        let prism = [r2 * (self.s1 + r2 * self.s2), r2 * (self.s3 + r2 * self.s4)];
-        let prism_by_r2 = [self.s1 + 2.0 * r2 * self.s2, self.s3 + 2.0 * r2 * self.s4];
-        // With the tangential terms, and the derivatives by x and y.
-        let (p1, p2) = (self.p1, self.p2);
-        let seen = [
-            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x) + prism[0],
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y + prism[1],
-        ];
-        let by = [
-            [
-                radial
-                    + 2.0 * x * (x * radial_by_r2 + prism_by_r2[0])
-                    + 2.0 * p1 * y
-                    + 6.0 * p2 * x,
-                2.0 * y * (x * radial_by_r2 + prism_by_r2[0]) + 2.0 * p1 * x + 2.0 * p2 * y,
-            ],
-            [
-                2.0 * x * (y * radial_by_r2 + prism_by_r2[1]) + 2.0 * p1 * x + 2.0 * p2 * y,
-                radial
-                    + 2.0 * y * (y * radial_by_r2 + prism_by_r2[1])
-                    + 6.0 * p1 * y
-                    + 2.0 * p2 * x,
-            ],
-        ];
-        (seen, by)
-    }
-
-    /// Where Newton's method starts for a place: one step of the fixed point is near enough for the distortion of most
-    /// lenses.
-    #[inline(always)]
-    fn guess(&self, seen: [f64; 2]) -> [f64; 2] {
-        let (once, _) = self.distort(seen);
-        [2.0 * seen[0] - once[0], 2.0 * seen[1] - once[1]]
-    }
-
-    /// [`Self::newton`] from [`Self::guess`] for several places side by side, by the same steps: where it comes to, and
-    /// whether it arrives.
-    #[inline(always)]
-    fn invert_lanes(&self, seen: [[f64; LANES]; 2]) -> ([[f64; LANES]; 2], [bool; LANES]) {
-        let (mut at, mut enough) = ([[0.0; LANES]; 2], [0.0; LANES]);
-        let [mut arrived, mut ended] = [[false; LANES]; 2];
-        for i in 0..LANES {
-            [at[0][i], at[1][i]] = self.guess([seen[0][i], seen[1][i]]);
-            enough[i] = Self::RESIDUAL * (1.0 + seen[0][i].abs() + seen[1][i].abs());
-        }
-        for _ in 0..Self::MOST_STEPS {
-            for i in 0..LANES {
-                let [x, y] = [at[0][i], at[1][i]];
-                let (there, by) = self.distort([x, y]);
-                let (dx, dy) = (seen[0][i] - there[0], seen[1][i] - there[1]);
-                let area = by[0][0] * by[1][1] - by[0][1] * by[1][0];
-                let goes_on = (area > 0.0) & !ended[i];
-                let off = if dx.abs() > dy.abs() { dx.abs() } else { dy.abs() };
-                arrived[i] |= goes_on & (off <= enough[i]);
-                ended[i] = !goes_on | arrived[i];
-                at[0][i] = if ended[i] { x } else { x + (by[1][1] * dx - by[0][1] * dy) / area };
-                at[1][i] = if ended[i] { y } else { y + (by[0][0] * dy - by[1][0] * dx) / area };
-            }
-            if ended == [true; LANES] {
-                break;
-            }
-        }
-        (at, arrived)
-    }
-
-    /// Newton's method from `start`; `None` when it does not arrive, or arrives behind a fold,
-    /// where the map turns the picture over.
-    fn newton(&self, seen: [f64; 2], start: [f64; 2]) -> Option<[f64; 2]> {
-        let [mut x, mut y] = start;
-        let enough = Self::RESIDUAL * (1.0 + seen[0].abs() + seen[1].abs());
-        for _ in 0..Self::MOST_STEPS {
-            let (at, by) = self.distort([x, y]);
-            let (dx, dy) = (seen[0] - at[0], seen[1] - at[1]);
-            let area = by[0][0] * by[1][1] - by[0][1] * by[1][0];
-            // A zero denominator gives NaN, which ends the search too.
-            if area.is_nan() || area <= 0.0 {
-                return None;
-            }
-            if dx.abs().max(dy.abs()) <= enough {
-                return Some([x, y]);
-            }
-            x += (by[1][1] * dx - by[0][1] * dy) / area;
-            y += (by[0][0] * dy - by[1][0] * dx) / area;
-        }
-        None
-    }
-
-    /// The undistorted tangents seen at `seen`, followed from the axis outwards so that they lie on
-    /// the picture's own side of every fold. The error is the tangent at which the model folds.
-    fn track(&self, seen: [f64; 2]) -> Result<[f64; 2], f64> {
-        // Shares of the way; a step that fails is halved until it is plain that it is no step but
-        // a fold, and steps grow again where they arrive: what is steep at the axis only is left in a few.
-        const LONGEST: f64 = 1.0 / 16.0;
-        const SHORTEST: f64 = 1.0 / 65_536.0;
-        /// Steps after which a way that goes on in the shortest ones is given up as a fold.
-        const MOST_PARTS: u32 = 4096;
-        let (mut at, mut done, mut step) = ([0.0; 2], 0.0, LONGEST);
-        for _ in 0..MOST_PARTS {
-            if done >= 1.0 {
-                return Ok(at);
-            }
-            let next = f64::min(done + step, 1.0);
-            // On in the same direction; near the axis all these maps are the identity.
-            let start =
-                if done == 0.0 { seen.map(|x| x * next) } else { at.map(|x| x * next / done) };
-            let reach = start[0].hypot(start[1]).max(1e-3);
-            let found = self.newton([seen[0] * next, seen[1] * next], start);
-            // A solution far from where the last step pointed lies on another sheet.
-            match found.filter(|p| (p[0] - start[0]).hypot(p[1] - start[1]) < 0.25 * reach) {
-                Some(found) => {
-                    at = found;
-                    done = next;
-                    step = f64::min(2.0 * step, LONGEST);
-                }
-                None if step > SHORTEST => step *= 0.5,
-                None => break,
-            }
-        }
-        if done >= 1.0 { Ok(at) } else { Err(at[0].hypot(at[1])) }
-    }
-
-    /// The undistorted tangents seen at `seen`. `limit` is the largest tangent in the picture.
-    fn invert(&self, seen: [f64; 2], limit: f64) -> Option<[f64; 2]> {
-        let inside = |p: &[f64; 2]| p[0].hypot(p[1]) <= limit;
-        self.newton(seen, self.guess(seen)).filter(inside).or_else(|| self.track(seen).ok())
     }
 }
 

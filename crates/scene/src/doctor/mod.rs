@@ -169,7 +169,7 @@ impl Diagnosis {
     #[must_use]
     pub fn of(scene: &Scene, kind: FileKind) -> Self {
         let geometry = &*scene.geometry;
-        let around = scene::tight(geometry.into());
+        let bounds = scene::tight(geometry.into());
         let coplanar = Coplanar::of(geometry).pairs(geometry);
         let is_extension = |note: &&Note| note.kind == NoteKind::Extension;
         let models: Vec<&Path> = scene.stats.files.iter().map(|(path, _)| path.as_path()).collect();
@@ -179,9 +179,9 @@ impl Diagnosis {
             triangles_unique: geometry.triangles_unique(),
             meshes: geometry.meshes.len(),
             placements: geometry.placements.len(),
-            bounds: (!around.is_empty())
-                .then(|| BoxExtent { min: around.min.to_array(), max: around.max.to_array() }),
-            units: units(&around, kind, &scene.path),
+            bounds: (!bounds.is_empty())
+                .then(|| BoxExtent { min: bounds.min.to_array(), max: bounds.max.to_array() }),
+            units: units(&bounds, kind, &scene.path),
             objects: objects(scene),
             instances: scene.instance_names(),
             nodes: scene.node_names(),
@@ -193,7 +193,7 @@ impl Diagnosis {
                 coplanar: coplanar.len() as u64,
                 out_of_range: 0,
             },
-            precision: StepSizes::of(geometry, around),
+            precision: StepSizes::of(geometry, bounds),
             camera: scene.camera.opencv(),
             camera_origin: match &scene.camera_origin {
                 CameraOrigin::Scene => "the scene file".to_owned(),
@@ -273,13 +273,13 @@ fn objects(scene: &Scene) -> Vec<ObjectReport> {
 }
 
 /// Scenes between a millimetre and a kilometre are taken to be in metres.
-fn units(around: &etendue_geometry::Bounds, kind: FileKind, path: &Path) -> Units {
+fn units(bounds: &etendue_geometry::Bounds, kind: FileKind, path: &Path) -> Units {
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
     let assumed = match (kind, &*ending) {
         (FileKind::Model, "obj" | "ply") => "metres are assumed, the format names no unit",
         _ => "metres",
     };
-    let longest = if around.is_empty() { 1.0 } else { (around.max - around.min).max_element() };
+    let longest = if bounds.is_empty() { 1.0 } else { (bounds.max - bounds.min).max_element() };
     let remark = if longest > 1e3 {
         format!(
             "{assumed}; {longest:.4} m is large: if the file is in millimetres, give its object \
