@@ -8,6 +8,7 @@ use etendue_scene::file::{AccelName, LightPrecision};
 use etendue_tracer::spawn::roundings;
 
 use crate::gaps::{CrossedSurfaces, Gap, crossed_surfaces};
+use crate::tolerance::hidden_offset;
 
 /// The accelerators that this program was built with, the best first.
 #[must_use]
@@ -53,7 +54,9 @@ pub(crate) fn light_precision(scene: &Scene, samples: u32) -> (HitPrecision, Str
         _ => String::new(),
     };
     let words = |than: &str| format!("f32 misplaces rays by up to {offset:.1e} m{far}, {than}");
-    if offset > scene.accuracy.path_offset_of_edge * edge {
+    let is_fine = offset > scene.accuracy.path_offset_of_edge * edge;
+    let hidden = hidden_offset(scene).filter(|hidden| is_fine && offset <= *hidden);
+    if is_fine && hidden.is_none() {
         let why = words(&format!("too much for triangles with edges of {edge:.1e} m"));
         return (HitPrecision::Double, why);
     }
@@ -81,7 +84,11 @@ pub(crate) fn light_precision(scene: &Scene, samples: u32) -> (HitPrecision, Str
     let cleared = crossed.cleared.map_or_else(String::new, |distance| {
         format!("; where light goes through, surfaces are over {distance:.1e} m apart")
     });
-    let than = format!("less of the smallest thing, {least:.1e} m, than noise hides{cleared}");
+    let hidden = hidden.map_or_else(String::new, |hidden| {
+        format!(" and than the {hidden:.1e} m that the tolerance hides of edges of {edge:.1e} m")
+    });
+    let than =
+        format!("less of the smallest thing, {least:.1e} m, than noise hides{hidden}{cleared}");
     (HitPrecision::Single, words(&than))
 }
 

@@ -28,6 +28,9 @@ const WORTH: usize = 20_000;
 /// The share of the displacement allowed that detail may take before a lens, which a model may displace by the rest.
 const SHARE: f64 = 0.25;
 
+/// What f32 may take of that.
+const SHARE_OF_ROUNDING: f64 = 1.0 / 64.0;
+
 /// The share of the light allowed by which the area of a mesh may change.
 const SHARE_OF_LIGHT: f64 = 0.5;
 
@@ -62,8 +65,7 @@ pub fn coarser(scene: &Scene) -> Option<(Geometry, TakenDetail)> {
     if scene.geometry.meshes.iter().all(|mesh| mesh.triangles.len() < WORTH) || !is_plain(scene) {
         return None;
     }
-    let share = if scene.camera.lens().is_some() { SHARE } else { 1.0 };
-    let displacement = share * tolerance.displacement.0;
+    let displacement = (1.0 - SHARE_OF_ROUNDING) * share(scene) * tolerance.displacement.0;
     // How far (m) corners may move.
     let reach = displacement * pixel_extent(scene, nearest(scene)?)?;
     let light = SHARE_OF_LIGHT * tolerance.light.0;
@@ -85,6 +87,18 @@ pub fn coarser(scene: &Scene) -> Option<(Geometry, TakenDetail)> {
     }
     taken.triangles[1] = geometry.triangles_unique();
     (taken.meshes > 0).then_some((geometry, taken))
+}
+
+/// How far off surfaces (m) rays may start under the tolerance of `scene`; `None` of a scene without one, and where
+/// something tells more of a surface than the camera sees.
+pub(crate) fn hidden_offset(scene: &Scene) -> Option<f64> {
+    let pixels = scene.tolerance.filter(|_| is_plain(scene))?.displacement.0;
+    Some(SHARE_OF_ROUNDING * share(scene) * pixels * pixel_extent(scene, nearest(scene)?)?)
+}
+
+/// The share of the displacement allowed that is for what surfaces have of detail, and for rounding.
+fn share(scene: &Scene) -> f64 {
+    if scene.camera.lens().is_some() { SHARE } else { 1.0 }
 }
 
 /// Whether nothing of the scene tells more of a mesh than the camera sees, but for the mesh itself.

@@ -26,6 +26,7 @@ use self::pixel_views::{Line, PlaceView, chief_rays, places, seen};
 use crate::{Images, Plan, RenderError, Watch};
 
 pub use self::coarse_images::coarse_images;
+pub(crate) use self::detail::hidden_offset;
 pub use self::detail::{TakenDetail, coarser, with_meshes};
 pub use self::verify::{Verified, verify};
 

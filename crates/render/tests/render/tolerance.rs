@@ -3,11 +3,13 @@
 
 use std::path::Path;
 
+#[cfg(feature = "embree")]
+use etendue_geometry::HitPrecision;
 use etendue_render::expose::SPECTRUM;
 use etendue_render::output::Outputs;
 use etendue_render::tolerance::{Taken, TakenBounces, choose, coarser, lens_models, with_meshes};
 use etendue_render::{BandPaths, Plan};
-use etendue_report::DecisionKind;
+use etendue_report::{Decision, DecisionKind};
 use etendue_scene::Scene;
 use etendue_scene::file::SamplesSpec;
 use serde_json::{Value, json};
@@ -185,13 +187,16 @@ fn fine_ball(tolerance: &Value, changes: &[(&str, Value)]) -> Scene {
     let mut scene = json!({
         "camera": { "type": "pinhole", "fov": 40, "sensor": { "resolution": [72, 48] },
             "pose": { "from": [0, 0, 2.4], "look_at": [0, 0, 0] } },
-        "tracer": { "type": "path", "max_bounces": 3 }, "tolerance": tolerance,
+        "tracer": { "type": "path", "max_bounces": 3 },
         "lights": [{ "type": "directional", "direction": [-1, -1, -1], "irradiance": [3, 3, 3] },
             { "type": "environment", "radiance": [0.3, 0.3, 0.3] }],
         "materials": { "white": { "type": "matte", "color": [0.7, 0.7, 0.7] } },
         "objects": [{ "shape": "sphere", "radius": 0.3, "triangles": 400_000, "material": "white" }],
         "render": { "samples": 16 },
     });
+    if !tolerance.is_null() {
+        scene["tolerance"] = tolerance.clone();
+    }
     for (pointer, value) in changes {
         let (parent, key) = pointer.rsplit_once('/').unwrap();
         match scene.pointer_mut(parent).unwrap() {
@@ -225,6 +230,42 @@ fn meshes_have_the_detail_that_the_nearest_view_tells() {
     let (own, all) = lit(blocks(&with_meshes(&scene, geometry), None));
     let found = difference(&own, &all);
     assert!(found > 0.02, "{found}");
+}
+
+#[test]
+#[cfg(feature = "embree")]
+fn triangles_finer_than_the_tolerance_tells_apart_do_not_ask_for_f64() {
+    // A ball whose edges are of a millimetre, on a ground so large that f32 misplaces rays by a quarter of that.
+    let ground = json!({ "shape": "box", "size": [120, 1, 120], "material": "white",
+        "transform": { "translate": [0, -1, 0] } });
+    let planned = |tolerance: &Value, more: &[(&str, Value)]| {
+        let scene = fine_ball(tolerance, &[&[("/objects/1", ground.clone())], more].concat());
+        let plan = Plan::taking(&scene, Outputs::ALL, None);
+        let is_of_light = |row: &&Decision| row.kind == DecisionKind::LightPaths;
+        let why = plan.decisions.iter().find(is_of_light).unwrap().reason.clone();
+        (plan.light_precision, why)
+    };
+    let tolerance = allowed("4 px", "2 %");
+    let (precision, why) = planned(&tolerance, &[]);
+    assert_eq!(precision, HitPrecision::Single, "{why}");
+    assert!(why.contains("that the tolerance hides"), "{why}");
+    let lamp = json!({ "type": "point", "at": [0, 1, 0], "intensity": [1, 1, 1] });
+    for (what, (precision, why)) in [
+        ("no tolerance", planned(&Value::Null, &[])),
+        ("a narrow one", planned(&allowed("0.4 px", "2 %"), &[])),
+        ("a lamp nearby throws large shadows", planned(&tolerance, &[("/lights/2", lamp)])),
+    ] {
+        assert_eq!(precision, HitPrecision::Double, "{what}: {why}");
+        assert!(why.contains("too much for triangles"), "{what}: {why}");
+    }
+    // The samples are the same, and so is the light.
+    let light = |precision: &str| {
+        let asked = json!({ "light_precision": precision });
+        let changes = [("/objects/1", ground.clone()), ("/plan", asked)];
+        blocks(&fine_ball(&tolerance, &changes), None)
+    };
+    let found = difference(&light("auto"), &light("double"));
+    assert!(found > 0.0 && found < 0.02, "{found}");
 }
 
 #[test]
