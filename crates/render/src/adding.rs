@@ -14,7 +14,7 @@ use crate::watch::{Stopped, Watcher};
 /// The samples of a pixel, by its place in rows from the top: from those that it has to those that it is to have.
 pub(crate) type Wanted<'a> = &'a (dyn Fn(usize) -> Range<u32> + Sync);
 
-/// Writes the means of a pixel of a strip.
+/// Writes the means of a pixel of a strip; of one band those of all, where all are alike.
 pub(crate) fn put(strip: &mut Strip<'_>, index: usize, sums: &[Sum], bands: usize, samples: u32) {
     for (layer, sums) in strip.layers.iter_mut().zip(sums.chunks(bands)) {
         if let (Taken::PictureShare, &[part, all, _]) = (layer.taken, sums) {
@@ -23,7 +23,7 @@ pub(crate) fn put(strip: &mut Strip<'_>, index: usize, sums: &[Sum], bands: usiz
             layer.planes[0].put(index, share);
             continue;
         }
-        for (plane, sum) in layer.planes.iter_mut().zip(sums) {
+        for (plane, sum) in layer.planes.iter_mut().zip(sums.iter().cycle()) {
             PlaneRows::put(plane, index, sum.total() / f64::from(samples));
         }
     }

@@ -105,7 +105,7 @@ fn bytes_of_sums(plan: &Plan) -> u64 {
 /// Values of a pixel that are averaged over samples.
 fn averaged(plan: &Plan) -> u64 {
     let values = |layer: &LayerSpec| match layer.is_light() {
-        true => plan.bands.count() as u64,
+        true => plan.values_of_light() as u64,
         false => 3,
     };
     plan.layers.iter().filter(|layer| layer.is_averaged()).map(values).sum()

@@ -21,7 +21,7 @@ pub(crate) struct LightPass<'a> {
     pub(crate) tracer: Rules,
     /// The camera, opened for these bands.
     pub(crate) camera: &'a Camera,
-    /// How many bands there are on the film: as many as are traced, or all of them like the one that is.
+    /// How many bands are added up: as many as are traced, or as many as land by themselves, all like the one that is.
     pub(crate) count: usize,
     /// The bands that the camera sends separate ways.
     pub(crate) groups: Vec<BandGroup>,

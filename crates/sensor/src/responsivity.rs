@@ -23,20 +23,24 @@ impl Responsivity {
         if clean { InvalidValues::default() } else { InvalidValues::of(values) }
     }
 
+    /// Of the bands that are worth anything there: a band's own filter sees few others.
     fn many_bands(&self, values: &[f32], start: usize, mean: &mut [f64]) -> bool {
-        let mut clean = true;
-        let phases = self.electrons.chunks_exact(self.bands);
-        let skipped = start % phases.len();
+        let seen = |worth: &[f64]| {
+            let first = worth.iter().position(|&worth| worth != 0.0).unwrap_or(0);
+            first..worth.iter().rposition(|&worth| worth != 0.0).map_or(first, |last| last + 1)
+        };
+        let phases: Vec<_> =
+            self.electrons.chunks_exact(self.bands).map(|p| (p, seen(p))).collect();
         let pixels = values.chunks_exact(self.bands);
-        for ((pixel, worth), mean) in pixels.zip(phases.cycle().skip(skipped)).zip(mean) {
+        let phases_of_pixels = phases.iter().cycle().skip(start % phases.len());
+        for ((pixel, (worth, seen)), mean) in pixels.zip(phases_of_pixels).zip(mean) {
             let mut sum = 0.0;
-            for (&value, worth) in pixel.iter().zip(worth) {
-                clean &= is_light(value);
+            for (&value, worth) in pixel[seen.clone()].iter().zip(&worth[seen.clone()]) {
                 sum += light(value) * worth;
             }
             *mean = sum;
         }
-        clean
+        are_light(values)
     }
 }
 
@@ -67,6 +71,15 @@ fn bands_of<const N: usize>(
         }
         *mean = sum;
         phase = if phase + 1 == phases.len() { 0 } else { phase + 1 };
+    }
+    clean
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn are_light(values: &[f32]) -> bool {
+    let mut clean = true;
+    for &value in values {
+        clean &= is_light(value);
     }
     clean
 }

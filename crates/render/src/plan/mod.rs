@@ -145,6 +145,14 @@ fn sample_passes(
 }
 
 impl Plan {
+    /// How many numbers of light are kept of each sample: one where all bands are alike and land in one place.
+    ///
+    /// What is asked of the two halves of a pixel's samples is asked band by band.
+    pub(crate) fn values_of_light(&self) -> usize {
+        let is_one = self.alike && !self.band_paths.are_shared() && !self.stopping.is_adaptive();
+        if is_one { 1 } else { self.bands.count() }
+    }
+
     /// The plan for `scene`, written as `outputs`.
     #[must_use]
     pub fn new(scene: &Scene, outputs: Outputs) -> Self {
