@@ -54,6 +54,7 @@ pub use embree::limit;
 pub use embree::{Version, version as embree_version};
 pub use exact::Exact;
 pub use moving::{Build, build_moving};
+pub use parts::check_scale;
 
 /// Answers nearest-hit and visibility queries about one scene. Built once, then only read.
 pub trait Accel: Send + Sync + fmt::Debug {

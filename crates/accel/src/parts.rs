@@ -39,8 +39,12 @@ pub(crate) struct Layout {
 /// tell its parts from one another.
 const LENGTHS: [f64; 2] = [1e-12, 1e12];
 
-/// Refuses a scene whose longest side is none of [`LENGTHS`].
-pub(crate) fn check_scale(bounds: Bounds) -> Result<(), BuildError> {
+/// Refuses a scene within these bounds (m) that no accelerator tells the parts of.
+///
+/// # Errors
+///
+/// When its longest side is none of [`LENGTHS`].
+pub fn check_scale(bounds: Bounds) -> Result<(), BuildError> {
     let extent = if bounds.is_empty() { 0.0 } else { (bounds.max - bounds.min).max_element() };
     let [least, most] = LENGTHS;
     if extent == 0.0 || (least..=most).contains(&extent) {

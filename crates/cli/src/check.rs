@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use etendue::{Calibration, Prospect, TimeForecast, read_glasses};
 use etendue_render::output::Outputs;
-use etendue_render::{Images, Plan};
+use etendue_render::{Images, Plan, check_extent};
 use etendue_report::Span;
 use etendue_scene::doctor::{Diagnosis, Finding};
 use etendue_scene::file::SceneFile;
@@ -30,6 +30,8 @@ pub(crate) fn run(arguments: &CheckArguments) -> Result<(), Fault> {
     let load = start.elapsed().as_secs_f64();
     let frames = file.frames(&loading.opener, || Ok(Start::of(&scene)))?;
     let plan = Plan::new(&scene, Outputs::ALL);
+    check_extent(&scene, &plan)
+        .map_err(|why| Fault::refused(format!("{}: {why}", options.scene.display())))?;
     let prospect = Prospect { scene: &scene, plan: &plan, outputs: Outputs::ALL, load };
     let time = TimeForecast::new(&prospect, &Calibration::of_this_machine()?);
     let mut diagnosis = Diagnosis { memory: plan.memory, ..Diagnosis::of(&scene, file.kind()) };

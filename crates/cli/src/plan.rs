@@ -2,6 +2,7 @@
 
 use etendue::{Calibration, Options, Session, TimeForecast};
 use etendue_bench::tolerance::{self, Tolerance};
+use etendue_render::check_extent;
 use etendue_report::{Decision, DecisionKind, DecisionValue, Tabled};
 
 use crate::arguments::{PlanArguments, SceneArguments};
@@ -23,7 +24,10 @@ pub(crate) fn run(arguments: &PlanArguments) -> Result<(), Fault> {
         say(&verified(&mut session, &progress)?);
     }
     let machine = Calibration::of_this_machine()?;
-    let time = TimeForecast::new(&session.prospect(&progress)?, &machine);
+    let prospect = session.prospect(&progress)?;
+    check_extent(prospect.scene, prospect.plan)
+        .map_err(|why| Fault::refused(format!("{}: {why}", arguments.scene.scene.display())))?;
+    let time = TimeForecast::new(&prospect, &machine);
     plan.decisions.push(time.decision());
     plan.decisions.extend(frames.map(|frames| {
         let because =

@@ -243,6 +243,12 @@ impl Header {
         let (kept, axis) = self.axis(&mut notes).map_err(DecodeError::Cube)?;
         let scale = self.scale().map_err(DecodeError::Cube)?;
         let ignored = self.one("data ignore value").map_err(DecodeError::Cube)?;
+        // The file's numbers are those of f32 that are nearest to what the header writes.
+        #[expect(clippy::cast_possible_truncation, reason = "that is what is meant")]
+        let ignored = match self.number {
+            Number::F32 => ignored.map(|number| f64::from(number as f32)),
+            _ => ignored,
+        };
         let mut values = room::<f32>(columns * rows * kept.len())?;
         let mut missing = 0_usize;
         for row in 0..rows {
@@ -503,6 +509,14 @@ mod tests {
             fwhm = {100, 100}\nz plot titles = {Wavelength (nm), Radiance (W/(m^2 sr nm))}\n";
         let cube = decode(&(HEADER.to_owned() + more), &data).unwrap();
         assert_eq!(cube.values[..2], [1.0, 3.5]);
+        // A number that f32 rounds, in the place of the first.
+        for missing in ["1e20", "0.1", "-1e-5", "3.4028235e38"] {
+            let mut data = data.clone();
+            data[..4].copy_from_slice(&missing.parse::<f32>().unwrap().to_le_bytes());
+            let header = format!("{HEADER}data ignore value = {missing}\n");
+            let cube = decode(&header, &data).unwrap();
+            assert!(cube.values[0].is_nan() && cube.values[1].is_finite(), "{missing}");
+        }
         assert!(cube.values[2].is_nan() && cube.values[3] == 33.5, "{:?}", cube.values);
         assert_eq!(cube.axis.edges(), [400.0, 500.0, 600.0]);
         assert_eq!(cube.unit.as_deref(), Some("W/(m^2 sr nm)"));

@@ -237,3 +237,36 @@ pub(crate) fn radiance_bytes(mut file: impl BufRead) -> Option<u64> {
     let file = Cursor::new(&b"#?RADIANCE\n"[..]).chain(file);
     Some(bytes_of(&HdrDecoder::new(file).ok()?))
 }
+/// Whether a file is a JPEG that ends before its picture does: segments are gone through by their lengths, and the data
+/// behind them to the next marker (ITU-T T.81, B.1.1). Of other files, and of what is no segment, the decoder says more.
+pub(crate) fn is_cut_jpeg(bytes: &[u8]) -> bool {
+    const SCAN: u8 = 0xda;
+    const END: u8 = 0xd9;
+    let Some(mut rest) = bytes.strip_prefix(b"\xff\xd8") else { return false };
+    loop {
+        // Fill bytes may stand before a marker.
+        let (marker, after) = match rest {
+            [0xff, 0xff, ..] => {
+                rest = &rest[1..];
+                continue;
+            }
+            [0xff, marker, after @ ..] => (*marker, after),
+            [] | [0xff] => return true,
+            _ => return false,
+        };
+        if marker == END {
+            return false;
+        }
+        let [high, low, ..] = after else { return true };
+        let length = usize::from(u16::from_be_bytes([*high, *low]));
+        let Some(behind) = after.get(length..) else { return true };
+        // Within a scan 0xff stands for itself with 0 behind it, and restarts are part of the data.
+        let is_marker = |pair: &[u8]| pair[0] == 0xff && !matches!(pair[1], 0 | 0xff | 0xd0..=0xd7);
+        let data = match marker {
+            SCAN => behind.windows(2).position(is_marker),
+            _ => Some(0),
+        };
+        let Some(data) = data else { return true };
+        rest = &behind[data..];
+    }
+}

@@ -155,6 +155,9 @@ pub enum DecodeError {
     /// The decoder of EXR files says so.
     #[error(transparent)]
     OpenExr(#[from] exr::error::Error),
+    /// It is a JPEG file without an end, of which the decoder makes up the rest.
+    #[error("it is cut off: a JPEG ends with a marker of its own, which is not there")]
+    Cut,
     /// The decoder gave up with a panic.
     #[error("its decoder failed: the file is damaged, or of a kind that it does not know")]
     Panic,
@@ -278,6 +281,9 @@ fn decode_unguarded(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeError>
     }
     if bytes.starts_with(formats::RADIANCE_SIGNATURE) {
         return formats::decode_radiance(bytes, limits);
+    }
+    if formats::is_cut_jpeg(bytes) {
+        return Err(DecodeError::Cut);
     }
     let mut reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()

@@ -80,6 +80,26 @@ fn exr_files_of_one_channel_are_grey_and_halves_are_packed() {
 }
 
 #[test]
+fn a_jpeg_without_its_end_is_refused() {
+    let texels: Vec<u8> = (0..64 * 64 * 3).map(|k| u8::try_from(k * 7 % 251).unwrap()).collect();
+    let mut whole = Vec::new();
+    image::codecs::jpeg::JpegEncoder::new(&mut whole)
+        .write_image(&texels, 64, 64, ExtendedColorType::Rgb8)
+        .unwrap();
+    assert!(decode(&whole, Limits::default()).is_ok());
+    // What cameras append, and a thumbnail with an end of its own in a segment before.
+    assert!(decode(&[&whole[..], b"more"].concat(), Limits::default()).is_ok());
+    let thumbnail = [&whole[..2], b"\xff\xe1\x00\x06\xff\xd8\xff\xd9", &whole[2..]].concat();
+    assert!(decode(&thumbnail, Limits::default()).is_ok());
+    for whole in [whole, thumbnail] {
+        for length in [whole.len() - 2, whole.len() - 1, whole.len() / 2, 300] {
+            let cut = decode(&whole[..length], Limits::default());
+            assert!(matches!(cut, Err(DecodeError::Cut)), "{length}: {cut:?}");
+        }
+    }
+}
+
+#[test]
 fn sizes_are_judged_before_anything_is_decoded() {
     // A header alone: were it decoded, the error would be another.
     let header = |side: u32| {

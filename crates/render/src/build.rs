@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use etendue_accel::{Accel, BuildError, BuildOptions, build_moving};
+use etendue_accel::{Accel, BuildError, BuildOptions, build_moving, check_scale};
 use etendue_geometry::Geometry;
 use etendue_scene::Scene;
 use etendue_scene::file::AccelName;
@@ -15,6 +15,19 @@ use crate::precision::accelerators;
 fn options_for(scene: &Scene, plan: &Plan, options: &BuildOptions) -> BuildOptions {
     let exposure = scene.camera.exposure_span();
     BuildOptions { quality: plan.quality, refine: plan.refine, exposure, ..options.clone() }
+}
+
+/// Refuses a scene of which no structure can be built, before anything is.
+///
+/// # Errors
+///
+/// When it is too large or too small without what no ray of the picture can meet.
+pub fn check_extent(scene: &Scene, plan: &Plan) -> Result<(), RenderError> {
+    let bounds = match &plan.unseen {
+        Some(unseen) => unseen.left_out_of(&scene.geometry).loose_bounds(),
+        None => scene.geometry.loose_bounds(),
+    };
+    Ok(check_scale(bounds)?)
 }
 
 /// Builds `scene`'s acceleration structure with the backend that it names, or else the best.

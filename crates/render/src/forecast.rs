@@ -39,7 +39,7 @@ pub(crate) fn forecast(scene: &Scene, plan: &Plan, outputs: Outputs) -> MemoryFo
     let is_gone_over = plan.passes.len() > 1;
     let look = if is_gone_over && outputs.png { picture + woven + PNG } else { 0 };
     let png = if outputs.png { PNG } else { 0 };
-    let denoised = if plan.denoised { denoise::BYTES } else { 0 };
+    let denoised = if plan.outputs.denoised { denoise::BYTES } else { 0 };
     let told_apart = annotations::bytes_a_pixel(outputs);
     let sensor = scene.sensor.as_ref().filter(|_| scene.picture.is_some());
     let sensor = sensor.map_or(0, |sensor| bytes_of_sensor(scene, sensor, plan));

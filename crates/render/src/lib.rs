@@ -58,7 +58,7 @@ mod watch;
 
 pub use adaptive::SampleCounts;
 pub use band_paths::BandPaths;
-pub use build::{build, build_without, rebuild};
+pub use build::{build, build_without, check_extent, rebuild};
 pub use checkpoint::Checkpoint;
 pub use error::RenderError;
 pub use film::{NoMemory, Precision};

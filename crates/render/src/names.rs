@@ -4,7 +4,7 @@ use etendue_scene::Scene;
 use etendue_tracer::LayerSpec;
 use serde_json::Value;
 
-use crate::output::{Picture, exr, has_mask};
+use crate::output::{Outputs, Picture, exr, has_mask};
 
 /// A table of names for each layer of ids among those of `scene`.
 pub(crate) fn tables(scene: &Scene) -> Vec<(String, Value)> {
@@ -25,10 +25,10 @@ pub(crate) fn tables(scene: &Scene) -> Vec<(String, Value)> {
     tables
 }
 
-/// Where a file cannot hold the numbers of ids as it usually does.
-pub(crate) fn notes(picture: &Picture) -> Vec<String> {
+/// Where a file that is asked for cannot hold the numbers of ids as it usually does.
+pub(crate) fn notes(picture: &Picture, outputs: Outputs) -> Vec<String> {
     let mut notes = Vec::new();
-    for name in exr::beyond_floats(picture) {
+    for name in exr::beyond_floats(picture).into_iter().filter(|_| outputs.exr) {
         notes.push(format!(
             "{name}: its numbers pass 16777216, the last that 32-bit floats hold exactly, so the EXR \
              has it as 32-bit integers, which OpenImageIO reads as shares of 2^32 unless it is asked \
@@ -37,12 +37,19 @@ pub(crate) fn notes(picture: &Picture) -> Vec<String> {
     }
     for layer in picture.layers() {
         let largest = layer.channels.first().map_or(0, |c| c.values.largest_integer());
-        if has_mask(&layer.name) && largest > u16::MAX.into() {
-            notes.push(format!(
-                "{}: its numbers reach {largest}, more than a 16-bit PNG holds, so there is no mask; \
-                 take the NPY or the EXR",
-                layer.name
-            ));
+        let files = [
+            (outputs.png, u16::MAX.into(), "a 16-bit PNG holds, so there is no mask"),
+            (outputs.indexed, u8::MAX.into(), "a palette has colours, so there is no indexed PNG"),
+        ];
+        for (_, _, lacks) in
+            files.into_iter().filter(|&(is_wanted, most, _)| is_wanted && largest > most)
+        {
+            let name = &layer.name;
+            if has_mask(name) {
+                notes.push(format!(
+                    "{name}: its numbers reach {largest}, more than {lacks}; take the NPY or the EXR"
+                ));
+            }
         }
     }
     notes

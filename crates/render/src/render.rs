@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use etendue_accel::Accel;
-use etendue_camera::{BandGroup, Camera, LensCamera, PixelExtent};
+use etendue_camera::{Camera, LensCamera, PixelExtent};
 use etendue_optics::element::StatusCounts;
 use etendue_scene::Scene;
 use etendue_scene::file::{LightRow, SETS};
@@ -240,10 +240,7 @@ pub fn trace(
         },
         tracer: *rules,
         camera: &light_camera,
-        groups: match plan.values_of_light() {
-            1 => vec![BandGroup { bands: 0..1, wavelength: None }],
-            _ => light_camera.band_groups(&plan.bands),
-        },
+        groups: plan.groups_of_light(&light_camera),
         count: plan.values_of_light(),
         rows: shared.map(|shared| shared.rows),
         layers: plan.layers.iter().copied().filter(|layer| layer.is_light()).collect(),
@@ -372,7 +369,7 @@ pub fn finish(
     {
         notes.extend(lighting::verdict(scene, accel, camera, &picture));
     }
-    notes.extend(names::notes(&picture));
+    notes.extend(names::notes(&picture, plan.outputs));
     let rays = chief_rays + light.rays + light.shadow_rays;
     Ok(Rendered {
         picture,

@@ -135,6 +135,13 @@ fn scenes_beyond_what_accelerators_tell_apart_are_refused_by_all() {
             assert!(output.status.success(), "{accel}, {scale}: {}", text(&output.stderr));
         }
     }
+    // Looking at a scene says what rendering it would.
+    for command in ["check", "plan"] {
+        let output = scaled("1e25").run(&[command, "scene.json"]);
+        assert_eq!(output.status.code(), Some(2), "{command}");
+        let said = text(&output.stderr);
+        assert!(said.contains("scene.json") && said.contains("accelerators hold"), "{said}");
+    }
     // A point far away is nothing to tell apart.
     let bench = Bench::new();
     bench.write("far.obj", b"v 0 1e38 0\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 1 1\nf 2 3 4\n");

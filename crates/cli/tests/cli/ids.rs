@@ -134,6 +134,23 @@ fn masks_are_the_numbers_in_sixteen_bits() {
     assert!(!bench.path("out/id_primitive.png").exists(), "triangles are no masks");
 }
 
+/// A palette has 256 colours: a file that cannot be is told, and no other that was not asked for.
+#[test]
+fn numbers_that_no_file_holds_are_told_for_the_files_that_are_wanted() {
+    let copies: Vec<Value> =
+        (0..300).map(|i| json!({"translate": [0.01 * f64::from(i), 0, 0]})).collect();
+    let scene = json!({ "etendue": 1, "layers": ["ids"], "camera": {"type": "pinhole", "sensor": {"resolution": [64, 8]}},
+        "objects": [{"shape": "box", "size": [0.01, 1, 0.01], "instances": copies}] });
+    let bench = Bench::with_scene(&scene.to_string());
+    for (outputs, is_told) in [("indexed", true), ("png", false), ("npy", false)] {
+        let output = bench.run(&["render", "scene.json", "-o", outputs, "--outputs", outputs]);
+        let said = text(&output.stderr);
+        assert!(output.status.success(), "{said}");
+        assert_eq!(said.contains("more than a palette has colours"), is_told, "{outputs}: {said}");
+        assert!(!said.contains("16-bit PNG"), "{outputs}: {said}");
+    }
+}
+
 /// Blender groups the channels of a file by all but the last part of their names, which it takes for
 /// one letter: `Id.object` and `Id.node` would be one pass of two channels X, which it drops.
 #[test]

@@ -136,6 +136,22 @@ fn a_series_has_the_files_that_its_manifest_names() {
     assert!(descriptor.contains("n 12 32 24"), "{descriptor}");
 }
 
+/// What is set of a scene's sensor would make a scene of it, whose sensor has nothing else.
+#[test]
+fn paths_of_a_scene_are_refused_of_a_sensor() {
+    let bench = Bench::new();
+    bench.write("sensor.json", with(&json!({})).as_bytes());
+    for name in ["imx183", "sensor.json"] {
+        for (key, own) in [("camera.sensor.exposure", "exposure=1"), ("camera.fov", "KEY=1")] {
+            let output = bench.run(&["sensor", name, "--set", &format!("{key}=1")]);
+            let message = text(&output.stderr);
+            assert_eq!(output.status.code(), Some(2), "{name} {key}: {message}");
+            let says = [key, "not a scene", own];
+            assert!(says.iter().all(|words| message.contains(words)), "{name}: {message}");
+        }
+    }
+}
+
 #[test]
 fn what_is_no_sensor_is_refused_by_file_path_and_remedy() {
     for (keys, words) in [

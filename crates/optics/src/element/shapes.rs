@@ -287,6 +287,16 @@ impl Shape {
         self.around.is_some() || matches!(&self.kind, ShapeKind::Ring { inner, .. } if *inner > 0.0)
     }
 
+    /// The radius up to which light passes around what is in the way (mm), infinite when unlimited; `None` where nothing
+    /// is in the way.
+    #[must_use]
+    pub fn radius_around(&self) -> Option<f64> {
+        match self.kind {
+            ShapeKind::Ring { outer, .. } => Some(outer),
+            ShapeKind::Rectangle(_) | ShapeKind::Ellipse(_) | ShapeKind::Outline(_) => self.around,
+        }
+    }
+
     /// Words on it.
     pub(super) fn words(&self) -> String {
         let prefix = if self.around.is_some() { "around a " } else { "" };

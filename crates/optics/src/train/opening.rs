@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::aim::towards_lens;
 use super::pupil::without_dimming;
 use super::{Focus, LensError, MonochromaticTrain, OpticalTrain, Part, Side};
-use crate::element::{Clip, Ray, RayStatus};
+use crate::element::{Clip, Opening, Ray, RayStatus};
 
 /// Directions across the axis in which a lens without rotational symmetry is looked at.
 const AZIMUTHS: u32 = 16;
@@ -57,6 +57,15 @@ impl OpticalTrain {
         let paraxial = self.paraxial(self.wavelength).ok()?;
         let (efl, magnification) = (paraxial.efl?, paraxial.stop_magnification?);
         let mut open = without_dimming(self).without_arrays();
+        // What stands in a beam is no rim that ends it.
+        for element in &mut open.elements {
+            if let Part::Aperture(opening) = &element.part
+                && let Opening::Shaped(shape) = &**opening
+                && let Some(radius) = shape.radius_around()
+            {
+                element.part = Part::Aperture(Opening::Circle { radius }.into());
+            }
+        }
         if matches!(self.elements[self.stop].part, Part::Aperture(_)) {
             open.elements[self.stop].part.set_clear_radius(f64::INFINITY).ok()?;
         }

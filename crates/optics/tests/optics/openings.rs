@@ -76,6 +76,31 @@ fn a_rim_in_front_limits_the_beam_exactly() {
     assert!(train.with_f_number(5.0).is_ok());
 }
 
+/// Off the axis a ray may end at what stands there, and wider ones pass beside it: no beam is ended, however it is
+/// turned, and closing the lens down is no opening.
+#[test]
+fn what_stands_in_a_beam_is_no_rim_that_ends_it() {
+    for shape in [
+        r#""shape": "outline", "corners": [[-1, 2], [1, 2], [0, 4]], "obscures": true"#,
+        r#""shape": "rectangular", "width": 1, "height": 1, "obscures": true, "decentre": [2, 1]"#,
+        r#""shape": "elliptical", "width": 2, "height": 1, "obscures": true, "decentre": [0, -3]"#,
+        r#""shape": "annular", "inner_radius": 1, "decentre": [3, 0]"#,
+        r#""shape": "spider", "arms": 3, "width": 0.5"#,
+    ] {
+        let train = build(&format!(
+            r#"{{"elements": [
+            {{"type": "aperture", "shape": "circular", "radius": 6.25, "thickness": 1, "stop": true}},
+            {{"type": "aperture", {shape}, "thickness": 1}},
+            {{"type": "thin_lens", "focal_length": 50, "semi_diameter": 10}}]}}"#
+        ));
+        let widest = train.widest_opening().unwrap();
+        assert_eq!(widest.element, 2, "{shape}");
+        assert!((widest.f_number - 2.5).abs() < 1e-6, "{shape}: {widest:?}");
+        assert!(!train.notes().iter().any(|note| note.contains("on paper")), "{shape}");
+        assert!(train.with_f_number(8.0).is_ok(), "{shape}");
+    }
+}
+
 #[test]
 fn irises_open_masks_do_not_limit_and_unlimited_lenses_have_no_widest() {
     let iris = build(

@@ -8,7 +8,7 @@ mod words;
 use std::ops::Range;
 
 use etendue_accel::Quality;
-use etendue_camera::Camera;
+use etendue_camera::{BandGroup, Camera};
 use etendue_geometry::{Detail, HitPrecision};
 use etendue_report::Decision;
 use etendue_scene::file::BuildQuality;
@@ -88,8 +88,8 @@ pub struct Plan {
     pub precision: Precision,
     /// How precisely paths of light hit.
     pub light_precision: HitPrecision,
-    /// Whether the picture is denoised.
-    pub denoised: bool,
+    /// What is written.
+    pub outputs: Outputs,
     /// What the numbers are that the picture's light is kept in.
     pub bands: Bands,
     /// What it will take, by counts and headers alone: within 1.5 of the peak of the example scenes.
@@ -151,6 +151,14 @@ impl Plan {
     pub(crate) fn values_of_light(&self) -> usize {
         let is_one = self.alike && !self.band_paths.are_shared() && !self.stopping.is_adaptive();
         if is_one { 1 } else { self.bands.count() }
+    }
+
+    /// The bands of those numbers that `camera` sends separate ways.
+    pub(crate) fn groups_of_light(&self, camera: &Camera) -> Vec<BandGroup> {
+        match self.values_of_light() {
+            1 => vec![BandGroup { bands: 0..1, wavelength: None }],
+            _ => camera.band_groups(&self.bands),
+        }
     }
 
     /// The plan for `scene`, written as `outputs`.
@@ -233,7 +241,7 @@ impl Plan {
             refine: scene.plan.refine != Some(false),
             precision,
             light_precision,
-            denoised: outputs.denoised,
+            outputs,
             bands: chosen.bands.clone(),
             memory: MemoryForecast::default(),
             taken,
@@ -262,7 +270,7 @@ impl Plan {
             false => layer.row().names_in_files(),
         };
         let spectrum = expose::has_spectrum(scene).then(|| expose::SPECTRUM.to_owned());
-        let denoised = self.denoised.then(|| DENOISED.to_owned());
+        let denoised = self.outputs.denoised.then(|| DENOISED.to_owned());
         self.layers.iter().flat_map(names).chain(spectrum).chain(denoised).collect()
     }
 }

@@ -305,7 +305,7 @@ impl Plan {
         let because = "--denoise: by Open Image Denoise, which is guided by the layers MeanAlbedo and \
                        MeanNormal; the picture and the sensor's images keep their noise";
         let choice = "a layer beside the picture";
-        self.denoised.then(|| Decision::new(Kind::Denoising, choice, because))
+        self.outputs.denoised.then(|| Decision::new(Kind::Denoising, choice, because))
     }
 
     /// How wavelengths and the pupil of the camera's lens are sampled.
@@ -334,7 +334,7 @@ impl Plan {
         };
         [
             Decision::new(Kind::RaysOfBands, rays, because_apart)
-                .forced(scene.plan.dispersion.is_some()),
+                .forced(scene.plan.dispersion.is_some() && disperses),
             Decision::new(Kind::Pupil, DecisionValue::Switch(is_on), because),
         ]
     }

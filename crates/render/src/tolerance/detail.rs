@@ -29,7 +29,7 @@ const WORTH: usize = 20_000;
 const SHARE: f64 = 0.25;
 
 /// What f32 may take of that.
-const SHARE_OF_ROUNDING: f64 = 1.0 / 16.0;
+const SHARE_OF_ROUNDING: f64 = 1.0 / 8.0;
 
 /// The share of the light allowed by which the area of a mesh may change.
 const SHARE_OF_LIGHT: f64 = 0.5;

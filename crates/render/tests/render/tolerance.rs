@@ -191,7 +191,7 @@ fn fine_ball(tolerance: &Value, changes: &[(&str, Value)]) -> Scene {
         "lights": [{ "type": "directional", "direction": [-1, -1, -1], "irradiance": [3, 3, 3] },
             { "type": "environment", "radiance": [0.3, 0.3, 0.3] }],
         "materials": { "white": { "type": "matte", "color": [0.7, 0.7, 0.7] } },
-        "objects": [{ "shape": "sphere", "radius": 0.3, "triangles": 500_000, "material": "white" }],
+        "objects": [{ "shape": "sphere", "radius": 0.3, "triangles": 600_000, "material": "white" }],
         "render": { "samples": 16 },
     });
     if !tolerance.is_null() {
@@ -223,7 +223,7 @@ fn meshes_have_the_detail_that_the_nearest_view_tells() {
     assert!(found < 0.02, "{found}");
     // Cells of several pixels change the area by more than half of 2 %, and where that is allowed the same comparison
     // tells it.
-    let wide = |light: &str| coarser(&fine_ball(&allowed("9 px", light), &[]));
+    let wide = |light: &str| coarser(&fine_ball(&allowed("10 px", light), &[]));
     assert!(wide("2 %").is_none());
     let (geometry, detail) = wide("60 %").expect("a coarser ball");
     assert!(detail.light > 0.01, "{detail:?}");
@@ -252,7 +252,7 @@ fn triangles_finer_than_the_tolerance_tells_apart_do_not_ask_for_f64() {
     let lamp = json!({ "type": "point", "at": [0, 1, 0], "intensity": [1, 1, 1] });
     for (what, (precision, why)) in [
         ("no tolerance", planned(&Value::Null, &[])),
-        ("a narrow one", planned(&allowed("0.4 px", "2 %"), &[])),
+        ("a narrow one", planned(&allowed("0.04 px", "2 %"), &[])),
         ("a lamp nearby throws large shadows", planned(&tolerance, &[("/lights/2", lamp)])),
     ] {
         assert_eq!(precision, HitPrecision::Double, "{what}: {why}");

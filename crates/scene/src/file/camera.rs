@@ -15,6 +15,7 @@ use etendue_camera::curve_files::{self, LONGEST_TABLE};
 use etendue_files::{InputFolder, Opener};
 use etendue_image::Samples;
 use etendue_optics::train::remove_notes;
+use etendue_report::Refusal;
 use etendue_sensor::{DefectMap, ListedDefect, Model, Sensor, SensorError, SensorSpec};
 use etendue_spectrum::CurveFault;
 
@@ -259,9 +260,18 @@ impl SensorFile {
         overrides: &[(String, String)],
     ) -> Result<Self, SceneError> {
         written.read_camera(&mut value)?;
+        let in_scene = value.get("etendue").is_some() || value.get("camera").is_some();
+        // What is set does not make a scene of a sensor.
+        let of_scene =
+            overrides.iter().find(|(key, _)| key == "camera" || key.starts_with("camera."));
+        if let (false, Some((key, text))) = (in_scene, of_scene) {
+            let own = key.strip_prefix("camera.sensor.").unwrap_or("KEY");
+            let refusal = Refusal::new("this is a sensor, not a scene that has one");
+            let refusal = refusal.hint(format!("write `{own}={text}`"));
+            return Err(refusal.at(format_args!("--set {key}={text}")).into());
+        }
         written.set(&mut value, overrides)?;
         remove_notes(&mut value);
-        let in_scene = value.get("etendue").is_some() || value.get("camera").is_some();
         let place = if in_scene { place_in_scene() } else { ScenePath::default() };
         let resolution = place.key("resolution");
         spec::read_resolution(&mut value, &resolution)

@@ -166,6 +166,9 @@ impl LensReport {
         let moved = |row: &super::ColourRow| {
             row.paraxial.efl != self.paraxial.efl || row.paraxial.bfl != self.paraxial.bfl
         };
+        if let [one] = &*self.colour {
+            return writeln!(f, "\nColour: of {} nm alone", significant(one.wavelength));
+        }
         if !self.colour.iter().any(moved) {
             return writeln!(f, "\nColour: all wavelengths run alike");
         }
