@@ -92,7 +92,8 @@ fn planes(still: &Still, arguments: &EdgeArguments) -> Result<Vec<(String, Vec<f
     let layers = still.layers();
     let found = layers.iter().find(|layer| layer.name == arguments.layer);
     let Some(layer) = found.or(layers.first().filter(|_| arguments.layer.is_empty())) else {
-        let names: Vec<&str> = layers.iter().map(|layer| &*layer.name).collect();
+        let name = |name: &str| if name.is_empty() { "the picture" } else { name }.to_owned();
+        let names: Vec<String> = layers.iter().map(|layer| name(&layer.name)).collect();
         return Err(format!("--layer {}: it has {}", arguments.layer, names.join(", ")));
     };
     let channels = layer.channels.iter().map(|channel| {

@@ -284,8 +284,10 @@ impl FilmFile {
         let Some((name, here)) = differs else { return Ok(()) };
         let said = own.iter().find(|entry| entry.0 == *name);
         let said = said.map_or("not said", |(_, value)| value.as_str());
-        Err(self
-            .error(format!("is of another render: its {name} is {said}, and here it is {here}")))
+        Err(self.error(format!(
+            "is of another render: its {name} is {said}, and here it is {here}\nhint: render it anew of this scene, \
+             or take the scene that it is of"
+        )))
     }
 
     pub(crate) fn counts(&self) -> RayCounts {

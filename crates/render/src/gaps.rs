@@ -213,9 +213,10 @@ fn probe(scene: &Scene, near: &[Near<'_>], probes: &mut [Probe]) {
         share.clamp(DVec3::ZERO, DVec3::splat(f64::from(CELLS - 1))).as_uvec3()
     };
     let number = |cell: UVec3| ((cell.x * CELLS + cell.y) * CELLS + cell.z) as usize;
-    let mut grid: Vec<Vec<u32>> = vec![Vec::new(); CELLS.pow(3) as usize];
+    // With each its place, by which nearly all are left out.
+    let mut grid: Vec<Vec<(DVec3, u32)>> = vec![Vec::new(); CELLS.pow(3) as usize];
     for (i, probe) in (0..).zip(probes.iter()) {
-        grid[number(cell(probe.point))].push(i);
+        grid[number(cell(probe.point))].push((probe.point, i));
     }
     for near in near {
         for triangle in 0..scene.geometry.mesh_of(near.placement).triangles.len() {
@@ -229,7 +230,12 @@ fn probe(scene: &Scene, near: &[Near<'_>], probes: &mut [Probe]) {
             for x in from.x..=to.x {
                 for y in from.y..=to.y {
                     for z in from.z..=to.z {
-                        for &i in &grid[number(UVec3::new(x, y, z))] {
+                        for &(point, i) in &grid[number(UVec3::new(x, y, z))] {
+                            let is_within =
+                                point.cmpge(grown.min).all() & point.cmple(grown.max).all();
+                            if !is_within {
+                                continue;
+                            }
                             hold(&mut probes[i as usize], near, triangle, corners, scene);
                         }
                     }

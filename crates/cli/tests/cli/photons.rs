@@ -233,7 +233,7 @@ fn what_saturates_is_white_and_says_which_key_mends_it() {
     let output = bench.run(&["render", "scene.json", "-o", "out"]);
     let said = text(&output.stderr);
     assert!(output.status.success(), "{said}");
-    for word in ["every pixel is saturated", "265 DN", "sensor.exposure"] {
+    for word in ["every pixel is saturated", "265 DN", "the sensor's `exposure`"] {
         assert!(said.contains(word), "{word} in {said}");
     }
     assert_eq!(bench.json("out/sensor.json")["saturation_level_dn"], 265.0);
@@ -245,7 +245,10 @@ fn what_saturates_is_white_and_says_which_key_mends_it() {
     assert!(bytes.iter().all(|&byte| byte >= 252), "{bytes:?}");
     let dim = json!({ "exposure": 1e-9, "noise": "poisson" });
     let said = text(&shining(&json!("a"), &dim).run(&["render", "scene.json", "-o", "o"]).stderr);
-    assert!(said.contains("every pixel is black") && said.contains("sensor.exposure"), "{said}");
+    assert!(
+        said.contains("every pixel is black") && said.contains("the sensor's `exposure`"),
+        "{said}"
+    );
     let fine = shining(&json!("a"), &json!({ "noise": "poisson" }));
     let said = text(&fine.run(&["render", "scene.json", "-o", "o"]).stderr);
     assert!(!said.contains("every pixel"), "{said}");

@@ -99,7 +99,7 @@ impl WhiteSurroundings {
             true => Ok(wanted / brightest),
             false => Err(self.refused(&format!(
                 "camera.sensor: no light brings it to {level} of saturation at {} s: the dark signal alone is {dark:.0} e⁻ \
-                 of {:.0}; set sensor.exposure lower",
+                 of {:.0}; set the sensor's `exposure` lower",
                 shot.exposure,
                 sensor.saturation()
             ))),

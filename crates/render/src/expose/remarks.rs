@@ -8,6 +8,9 @@ use crate::losses::{CLIPPED, Losses};
 /// saturation: of 10⁸ pixels less than one is further off by chance.
 const SIGMAS: f64 = 6.0;
 
+/// The shortest exposure that a sensor takes (s).
+const SHORTEST: f64 = 1e-12;
+
 /// Sentences on an image much of which is saturated, or black where light falls.
 pub(super) fn on(sensor: &Sensor, film: Film<'_>, image: &RawImage, shot: Exposure) -> Vec<String> {
     let gain = sensor.system_gain();
@@ -49,8 +52,7 @@ fn less(sensor: &Sensor, film: Film<'_>, shot: Exposure) -> String {
     let dark = sensor.dark_current() * shot.exposure;
     if dark >= 0.5 * sensor.saturation() {
         return format!(
-            "the dark signal alone is {dark:.0} e⁻ of {:.0}; set sensor.exposure or sensor.temperature \
-             lower",
+            "the dark signal alone is {dark:.0} e⁻ of {:.0}; set the sensor's `exposure` or `temperature` lower",
             sensor.saturation()
         );
     }
@@ -63,8 +65,13 @@ fn less(sensor: &Sensor, film: Film<'_>, shot: Exposure) -> String {
         Radiometry::Physical => {
             let bright = sensor.electrons_of_brightest(film, shot.exposure, CLIPPED);
             let time = shot.exposure * 0.5 * sensor.saturation() / bright;
+            // No sensor is exposed for less.
+            if time < SHORTEST {
+                return "no exposure is as short; use a smaller pupil, or make the lights weaker"
+                    .to_owned();
+            }
             format!(
-                "set sensor.exposure to {} s, at which nine pixels of ten have less than half of that, or \
+                "set the sensor's `exposure` to {} s, at which nine pixels of ten have less than half of that, or \
                  use a smaller pupil",
                 short(time)
             )
@@ -87,8 +94,8 @@ fn more(sensor: &Sensor, film: Film<'_>, shot: Exposure) -> String {
         Radiometry::Physical => {
             let time = shot.exposure * 0.5 * sensor.saturation() / mean;
             format!(
-                "light makes {} e⁻ a pixel; set sensor.exposure to {} s for half of saturation, or make \
-                 the lights stronger",
+                "light makes {} e⁻ a pixel; set the sensor's `exposure` to {} s for half of saturation, or \
+                 make the lights stronger",
                 short(mean),
                 short(time)
             )

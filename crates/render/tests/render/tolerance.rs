@@ -9,7 +9,9 @@ use etendue_render::expose::SPECTRUM;
 use etendue_render::output::Outputs;
 use etendue_render::tolerance::{Taken, TakenBounces, choose, coarser, lens_models, with_meshes};
 use etendue_render::{BandPaths, Plan};
-use etendue_report::{Decision, DecisionKind};
+#[cfg(feature = "embree")]
+use etendue_report::Decision;
+use etendue_report::DecisionKind;
 use etendue_scene::Scene;
 use etendue_scene::file::SamplesSpec;
 use serde_json::{Value, json};
