@@ -43,7 +43,7 @@ const LENGTHS: [f64; 2] = [1e-12, 1e12];
 ///
 /// # Errors
 ///
-/// When its longest side is none of [`LENGTHS`].
+/// When its longest side is shorter than 1e-12 m or longer than 1e12 m.
 pub fn check_scale(bounds: Bounds) -> Result<(), BuildError> {
     let extent = if bounds.is_empty() { 0.0 } else { (bounds.max - bounds.min).max_element() };
     let [least, most] = LENGTHS;
