@@ -98,7 +98,7 @@ impl FewTriangles {
                 few.double.triangles.push(FewTriangle {
                     edges: edges.map(|(edge, _)| edge),
                     lengths: edges.map(|(_, length)| length),
-                    normal: normal.normalize().to_array(),
+                    normal: normal.to_array(),
                     corner: wide[0].to_array(),
                 });
                 few.named.push(Named {
@@ -189,7 +189,8 @@ impl FewTriangles {
     #[inline(always)]
     fn note<F: Number>(&self, block: &mut RayBlock, nearest: &Nearest<F>) {
         block.clear_hits();
-        nearest.put(block);
+        [block.t_max, block.u, block.v] =
+            [&nearest.t, &nearest.u, &nearest.v].map(|row| row.map(F::single));
         for (lane, &number) in nearest.number.iter().enumerate() {
             let Some(hit) = self.named.get(number as usize) else { continue };
             (block.placement[lane], block.triangle[lane]) = (hit.placement, hit.triangle);

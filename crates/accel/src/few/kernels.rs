@@ -59,7 +59,7 @@ pub(super) struct FewTriangle<F> {
     pub(super) edges: [usize; 3],
     /// Their lengths, with the sign with which each is one of its own.
     pub(super) lengths: [F; 3],
-    /// Unit normal on the front where the corners run counter-clockwise.
+    /// Normal on the front where the corners run counter-clockwise, as long as twice the area.
     pub(super) normal: [F; 3],
     /// A corner.
     pub(super) corner: [F; 3],
@@ -99,15 +99,11 @@ impl Shapes<f64> {
     }
 }
 
-/// What of a block's rays is nearest so far, as fractions, whose divisions take longer than all else and are done once
-/// for a block in the end.
+/// What of a block's rays is nearest so far.
 pub(super) struct Nearest<F> {
-    /// The distance: height of the plane over the ray's start, and what the ray rises in a metre, positive.
-    height: Row<F>,
-    rise: Row<F>,
-    /// The weights of the second and third corner, and of all.
-    weights: [Row<F>; 2],
-    total: Row<F>,
+    pub(super) t: Row<F>,
+    pub(super) u: Row<F>,
+    pub(super) v: Row<F>,
     /// Number of the triangle in the list, or [`MISS`].
     pub(super) number: [u32; LANES],
 }
@@ -115,30 +111,8 @@ pub(super) struct Nearest<F> {
 impl<F: Number> Nearest<F> {
     #[inline(always)]
     pub(super) fn of(block: &RayBlock) -> Self {
-        let [zero, one] = [0.0, 1.0].map(|x: f32| [F::from(x); LANES]);
-        let height = block.t_max.map(F::from);
-        Self { height, rise: one, weights: [zero; 2], total: one, number: [MISS; LANES] }
-    }
-
-    /// Makes numbers of the fractions.
-    #[inline(always)]
-    fn divide(&mut self) {
-        let one = F::from(1.0);
-        for i in 0..LANES {
-            self.height[i] = self.height[i] / self.rise[i];
-            let over = one / self.total[i];
-            self.weights[0][i] = self.weights[0][i] * over;
-            self.weights[1][i] = self.weights[1][i] * over;
-        }
-        (self.rise, self.total) = ([one; LANES], [one; LANES]);
-    }
-
-    /// Writes to a block how far its rays go (m), and the weights of where they end: of what has been divided.
-    #[inline(always)]
-    pub(super) fn put(&self, block: &mut RayBlock) {
-        let [second, third] = &self.weights;
-        [block.t_max, block.u, block.v] =
-            [&self.height, second, third].map(|row| row.map(F::single));
+        let zero = [F::default(); LANES];
+        Self { t: block.t_max.map(F::from), u: zero, v: zero, number: [MISS; LANES] }
     }
 }
 
@@ -269,21 +243,17 @@ impl<F: Number> FewTriangle<F> {
         (any != 0).then_some(Passing { weights, total, is_inside })
     }
 
-    /// The heights of the triangle's plane over the starts of a block's rays (m), and what the rays rise towards it in
-    /// a metre, which is not negative: the distance is one over the other.
+    /// The distances along the rays of a block to the triangle's plane (m).
     #[inline(always)]
-    fn distances(&self, lines: &BlockLines<F>) -> [Row<F>; 2] {
+    fn distances(&self, lines: &BlockLines<F>) -> Row<F> {
         let ([x, y, z], [dx, dy, dz]) = (&lines.origin, &lines.direction);
         let ([nx, ny, nz], [cx, cy, cz]) = (self.normal, self.corner);
-        let zero = F::default();
-        let (mut height, mut rise) = ([zero; LANES], [zero; LANES]);
+        let mut t = [F::default(); LANES];
         for i in 0..LANES {
-            let over = (cx - x[i]) * nx + (cy - y[i]) * ny + (cz - z[i]) * nz;
-            let along = dx[i] * nx + dy[i] * ny + dz[i] * nz;
-            height[i] = if along < zero { zero - over } else { over };
-            rise[i] = higher(along, zero - along);
+            let height = (cx - x[i]) * nx + (cy - y[i]) * ny + (cz - z[i]) * nz;
+            t[i] = height * (F::from(1.0) / (dx[i] * nx + dy[i] * ny + dz[i] * nz));
         }
-        [height, rise]
+        t
     }
 }
 
@@ -306,18 +276,15 @@ fn closest<F: Number>(
         pass(&shapes.edges[edges.clone()], &lines, &mut sides[edges], &mut least);
         for (number, triangle) in (run.first..).zip(&shapes.triangles[run.triangles.clone()]) {
             let Some(passing) = triangle.passed(sides) else { continue };
-            let [height, rise] = triangle.distances(&lines);
-            let ([second, third], total) = (&mut nearest.weights, &mut nearest.total);
+            let t = triangle.distances(&lines);
             for i in 0..LANES {
-                let is_nearer = height[i] * nearest.rise[i] <= nearest.height[i] * rise[i];
+                let over = F::from(1.0) / passing.total[i];
+                let is_between = (t[i] > t_min[i]) & (t[i] <= nearest.t[i]);
                 // A ray in the triangle's plane meets it nowhere.
-                let is_between = (height[i] > t_min[i] * rise[i]) & (rise[i] > F::default());
-                let counts = passing.is_inside[i] & is_between & is_nearer;
-                nearest.height[i] = if counts { height[i] } else { nearest.height[i] };
-                nearest.rise[i] = if counts { rise[i] } else { nearest.rise[i] };
-                second[i] = if counts { passing.weights[1][i] } else { second[i] };
-                third[i] = if counts { passing.weights[2][i] } else { third[i] };
-                total[i] = if counts { passing.total[i] } else { total[i] };
+                let counts = passing.is_inside[i] & is_between & (t[i] <= F::LARGEST);
+                nearest.t[i] = if counts { t[i] } else { nearest.t[i] };
+                nearest.u[i] = if counts { passing.weights[1][i] * over } else { nearest.u[i] };
+                nearest.v[i] = if counts { passing.weights[2][i] * over } else { nearest.v[i] };
                 nearest.number[i] = if counts { number } else { nearest.number[i] };
             }
         }
@@ -345,11 +312,10 @@ fn occluded<F: Number>(
         pass(&shapes.edges[edges.clone()], &lines, &mut sides[edges], &mut least);
         for triangle in &shapes.triangles[run.triangles.clone()] {
             let Some(passing) = triangle.passed(sides) else { continue };
-            let [height, rise] = triangle.distances(&lines);
+            let t = triangle.distances(&lines);
             for i in 0..LANES {
-                let is_between =
-                    (height[i] > t_min[i] * rise[i]) & (height[i] <= t_max[i] * rise[i]);
-                let counts = passing.is_inside[i] & is_between & (rise[i] > F::default());
+                let is_between = (t[i] > t_min[i]) & (t[i] <= t_max[i]);
+                let counts = passing.is_inside[i] & is_between & (t[i] <= F::LARGEST);
                 blocked[i] |= u32::from(counts);
             }
         }
@@ -366,7 +332,6 @@ pub(super) fn closest_in_single(
     nearest: &mut Nearest<f32>,
 ) -> bool {
     let least = closest((few, &few.single), block, sides, nearest);
-    nearest.divide();
     is_doubtful(few, block, &least)
 }
 
@@ -378,7 +343,6 @@ pub(super) fn closest_in_double(
     nearest: &mut Nearest<f64>,
 ) {
     closest((few, &few.double), block, sides, nearest);
-    nearest.divide();
 }
 
 /// Marks rays with anything between their ends; whether single precision left any in doubt.
