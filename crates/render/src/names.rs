@@ -36,20 +36,21 @@ pub(crate) fn notes(picture: &Picture, outputs: Outputs) -> Vec<String> {
         ));
     }
     for layer in picture.layers() {
+        let name = &layer.name;
+        if !has_mask(name) {
+            continue;
+        }
         let largest = layer.channels.first().map_or(0, |c| c.values.largest_integer());
-        let files = [
-            (outputs.png, u16::MAX.into(), "a 16-bit PNG holds, so there is no mask"),
-            (outputs.indexed, u8::MAX.into(), "a palette has colours, so there is no indexed PNG"),
-        ];
-        for (_, _, lacks) in
-            files.into_iter().filter(|&(is_wanted, most, _)| is_wanted && largest > most)
-        {
-            let name = &layer.name;
-            if has_mask(name) {
-                notes.push(format!(
-                    "{name}: its numbers reach {largest}, more than {lacks}; take the NPY or the EXR"
-                ));
-            }
+        let mut note = |lacks: &str| {
+            notes.push(format!(
+                "{name}: its numbers reach {largest}, more than {lacks}; take the NPY or the EXR"
+            ));
+        };
+        if outputs.png && largest > u16::MAX.into() {
+            note("a 16-bit PNG holds, so there is no mask");
+        }
+        if outputs.indexed && largest > u8::MAX.into() {
+            note("a palette has colours, so there is no indexed PNG");
         }
     }
     notes

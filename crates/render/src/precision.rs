@@ -54,9 +54,10 @@ pub(crate) fn light_precision(scene: &Scene, samples: u32) -> (HitPrecision, Str
         _ => String::new(),
     };
     let words = |than: &str| format!("f32 misplaces rays by up to {offset:.1e} m{far}, {than}");
-    let is_fine = offset > scene.accuracy.path_offset_of_edge * edge;
-    let hidden = hidden_offset(scene).filter(|hidden| is_fine && offset <= *hidden);
-    if is_fine && hidden.is_none() {
+    let is_too_fine = offset > scene.accuracy.path_offset_of_edge * edge;
+    let hidden = if is_too_fine { hidden_offset(scene) } else { None };
+    let hidden = hidden.filter(|hidden| offset <= *hidden);
+    if is_too_fine && hidden.is_none() {
         let why = words(&format!("too much for triangles with edges of {edge:.1e} m"));
         return (HitPrecision::Double, why);
     }

@@ -77,6 +77,7 @@ pub use packed::Packing;
 pub use philox::mixed_seed;
 pub use preset::{Model, Preset};
 pub use sensor::Sensor;
+pub use settings::EXPOSURES;
 pub use spec::{
     ChannelSet, ChannelSpec, Channels, IsoSetting, NoiseModel, Radiometry, SensorKind, SensorSpec,
 };

@@ -2,12 +2,9 @@
 
 use crate::film::Film;
 use crate::philox::mixed_seed;
-use crate::settings::{Readout, at_its_iso};
+use crate::settings::{EXPOSURES, Readout, at_its_iso};
 use crate::spec::SensorSpec;
 use crate::{AutoExposure, SecondReadout, Sensor, SensorError};
-
-/// The shortest and the longest exposure that is metered (s).
-const TIMES: [f64; 2] = [1e-12, 1e9];
 
 impl Sensor {
     /// The sensor of the second number alone; `None` of sensors that have one. Of a dual gain it sees the very electrons of
@@ -68,7 +65,7 @@ impl Sensor {
         let AutoExposure { percentile, target, .. } = self.spec().auto_exposure?;
         let rate = self.electrons_of_brightest(film, 1.0, 1.0 - percentile / 100.0);
         let time = target * self.saturation() / (rate + self.dark_current());
-        (rate > 0.0).then(|| time.clamp(TIMES[0], TIMES[1]))
+        (rate > 0.0).then(|| time.clamp(EXPOSURES[0], EXPOSURES[1]))
     }
 
     /// The same sensor with this exposure time alone (s).

@@ -15,6 +15,9 @@ const ROOM: f64 = 293.15;
 /// The most pixels along a side: what image formats can hold.
 const LONGEST_SIDE: u32 = 65_535;
 
+/// The shortest and the longest exposure (s).
+pub const EXPOSURES: [f64; 2] = [1e-12, 1e9];
+
 /// Noise beyond this is a slip (e⁻), and would leave f64 no room.
 const MOST_ELECTRONS: f64 = 1e9;
 
@@ -257,10 +260,10 @@ impl SensorSettings {
     fn check_exposures(&self, spec: &SensorSpec) -> Result<(), SensorError> {
         let demand = "seconds, above 0 (1e-12 to 1e9)";
         if let Some(exposure) = spec.exposure {
-            within("exposure", exposure.0, [1e-12, 1e9], demand)?;
+            within("exposure", exposure.0, EXPOSURES, demand)?;
         }
         for &exposure in &self.exposures {
-            within("exposures", exposure, [1e-12, 1e9], demand)?;
+            within("exposures", exposure, EXPOSURES, demand)?;
         }
         SensorError::unless(
             !self.exposures.is_empty(),

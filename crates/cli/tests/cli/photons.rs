@@ -249,6 +249,15 @@ fn what_saturates_is_white_and_says_which_key_mends_it() {
         said.contains("every pixel is black") && said.contains("the sensor's `exposure`"),
         "{said}"
     );
+    // No exposure that a sensor refuses is recommended.
+    for (radiance, says) in
+        [("1e15", "no exposure is as short"), ("1e-20", "no exposure is as long")]
+    {
+        let light = format!("materials.lamp.radiance=[{radiance},{radiance},{radiance}]");
+        let bench = shining(&json!("a"), &json!({ "noise": "poisson" }));
+        let said = text(&bench.run(&["render", "scene.json", "-o", "o", "--set", &light]).stderr);
+        assert!(said.contains(says), "{radiance}: {said}");
+    }
     let fine = shining(&json!("a"), &json!({ "noise": "poisson" }));
     let said = text(&fine.run(&["render", "scene.json", "-o", "o"]).stderr);
     assert!(!said.contains("every pixel"), "{said}");

@@ -1,15 +1,12 @@
 //! What a user should know of an exposure: how much of it is saturated or black, and what would mend it.
 
-use etendue_sensor::{Exposure, Film, Radiometry, RawImage, Sensor};
+use etendue_sensor::{EXPOSURES, Exposure, Film, Radiometry, RawImage, Sensor};
 
 use crate::losses::{CLIPPED, Losses};
 
 /// Standard deviations of the dark noise within which a pixel tells nothing from black or from
 /// saturation: of 10⁸ pixels less than one is further off by chance.
 const SIGMAS: f64 = 6.0;
-
-/// The shortest exposure that a sensor takes (s).
-const SHORTEST: f64 = 1e-12;
 
 /// Sentences on an image much of which is saturated, or black where light falls.
 pub(super) fn on(sensor: &Sensor, film: Film<'_>, image: &RawImage, shot: Exposure) -> Vec<String> {
@@ -65,8 +62,7 @@ fn less(sensor: &Sensor, film: Film<'_>, shot: Exposure) -> String {
         Radiometry::Physical => {
             let bright = sensor.electrons_of_brightest(film, shot.exposure, CLIPPED);
             let time = shot.exposure * 0.5 * sensor.saturation() / bright;
-            // No sensor is exposed for less.
-            if time < SHORTEST {
+            if time < EXPOSURES[0] {
                 return "no exposure is as short; use a smaller pupil, or make the lights weaker"
                     .to_owned();
             }
@@ -93,6 +89,10 @@ fn more(sensor: &Sensor, film: Film<'_>, shot: Exposure) -> String {
         ),
         Radiometry::Physical => {
             let time = shot.exposure * 0.5 * sensor.saturation() / mean;
+            if time > EXPOSURES[1] {
+                return "no exposure is as long; use a wider pupil, or make the lights stronger"
+                    .to_owned();
+            }
             format!(
                 "light makes {} e⁻ a pixel; set the sensor's `exposure` to {} s for half of saturation, or \
                  make the lights stronger",

@@ -251,11 +251,11 @@ fn triangles_finer_than_the_tolerance_tells_apart_do_not_ask_for_f64() {
     let (precision, why) = planned(&tolerance, &[]);
     assert_eq!(precision, HitPrecision::Single, "{why}");
     assert!(why.contains("that the tolerance hides"), "{why}");
-    let lamp = json!({ "type": "point", "at": [0, 1, 0], "intensity": [1, 1, 1] });
+    let point_light = json!({ "type": "point", "at": [0, 1, 0], "intensity": [1, 1, 1] });
     for (what, (precision, why)) in [
         ("no tolerance", planned(&Value::Null, &[])),
         ("a narrow one", planned(&allowed("0.04 px", "2 %"), &[])),
-        ("a lamp nearby throws large shadows", planned(&tolerance, &[("/lights/2", lamp)])),
+        ("a lamp nearby throws large shadows", planned(&tolerance, &[("/lights/2", point_light)])),
     ] {
         assert_eq!(precision, HitPrecision::Double, "{what}: {why}");
         assert!(why.contains("too much for triangles"), "{what}: {why}");
