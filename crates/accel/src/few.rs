@@ -1,16 +1,16 @@
-//! Scenes of few triangles: each ray against each of their edges, sixteen rays at a time. Below some dozens of
+//! Scenes of few triangles: each ray against each of their faces, sixteen rays at a time. Below some dozens of
 //! triangles that takes less time than going down a tree. Runs of triangles whose box no ray of a block meets are
 //! left out.
 //!
-//! A ray passes an edge on the side that the sign of their Plücker product tells. Triangles that share an edge
-//! share its sign, whatever rounding did to it, so no ray slips between them along the edge (R. Jones, "Intersecting
-//! a ray and a triangle with Plücker coordinates", Ray Tracing News 13.1, 2000; K. Shoemake, "Plücker coordinate
-//! tutorial", Ray Tracing News 11.1, 1998). Where several edges meet, signs may contradict each other.
-//!
-//! Rays are those of single precision, and so is what they meet, as in Embree. Where a ray passes an edge so near
-//! that single precision cannot tell the side, its block is worked out again in double precision.
+//! Rays are those of single precision, and so is what they meet, as in Embree. Where a ray meets a face's plane so
+//! near a side that single precision cannot tell whether it is inside, it is traced again in double precision. There a
+//! ray passes an edge on the side that the sign of their Plücker product tells. Triangles that
+//! share an edge share its sign, whatever rounding did to it, so no ray slips between them along the edge (R. Jones,
+//! "Intersecting a ray and a triangle with Plücker coordinates", Ray Tracing News 13.1, 2000; K. Shoemake, "Plücker
+//! coordinate tutorial", Ray Tracing News 11.1, 1998). Where several edges meet, signs may contradict each other.
 
-mod kernels;
+mod edges;
+mod faces;
 
 use std::ops::Range;
 
@@ -18,10 +18,8 @@ use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Geometry, MISS, RayBatch, RayBlock, RayBlocks, is_degenerate};
 
-use self::kernels::{
-    FewTriangle, Nearest, Number, PluckerEdge, Row, Shapes, closest_in_double, closest_in_single,
-    occluded_in_double, occluded_in_single,
-};
+use self::edges::{FewTriangle, PluckerEdge};
+use self::faces::{Face, NearestFace, Occlusion};
 use crate::single::{F32Frame, Rays32, round};
 
 /// Scenes of more triangles are traced by trees.
@@ -39,12 +37,11 @@ struct Named {
 /// The most triangles of a run: those of a box.
 const RUN: usize = 12;
 
-/// Triangles that follow each other in the list, with the edges that they have among them and their box.
+/// Faces of triangles that follow each other in the list, and their box.
 #[derive(Debug)]
 struct Run {
-    edges: Range<usize>,
-    triangles: Range<usize>,
-    /// Number of the first triangle.
+    faces: Range<usize>,
+    /// Number of the first face.
     first: u32,
     /// From and to, in the frame, and a little beyond.
     bounds: [[f32; 3]; 2],
@@ -54,9 +51,10 @@ struct Run {
 #[derive(Debug)]
 pub(crate) struct FewTriangles {
     frame: F32Frame,
-    single: Shapes<f32>,
-    double: Shapes<f64>,
+    edges: Vec<PluckerEdge>,
+    triangles: Vec<FewTriangle>,
     named: Vec<Named>,
+    faces: Vec<Face>,
     runs: Vec<Run>,
     /// The largest distance of a corner from the frame's origin (m).
     radius: f32,
@@ -70,14 +68,15 @@ impl FewTriangles {
         }
         let mut few = Self {
             frame: F32Frame::of(geometry.loose_bounds()),
-            single: Shapes::default(),
-            double: Shapes::default(),
+            edges: Vec::new(),
+            triangles: Vec::new(),
             named: Vec::new(),
+            faces: Vec::new(),
             runs: Vec::new(),
             radius: 0.0,
         };
         let mut ends: Vec<[[f64; 3]; 2]> = Vec::new();
-        let mut bounds = Bounds::EMPTY;
+        let mut corners: Vec<[DVec3; 3]> = Vec::new();
         for (number, placement) in (0_u32..).zip(&geometry.placements) {
             let mesh = geometry.mesh_of(placement);
             let place = &placement.world_from_mesh;
@@ -89,45 +88,34 @@ impl FewTriangles {
                 if is_degenerate(wide) || normal.length_squared() == 0.0 {
                     continue;
                 }
-                let first = match few.runs.last() {
-                    Some(run) if run.triangles.len() < RUN => run.edges.start,
-                    _ => few.begin_run(&mut bounds),
-                };
-                let edges = [0, 1, 2]
-                    .map(|k| few.edge([wide[(k + 1) % 3], wide[(k + 2) % 3]], &mut ends, first));
-                few.double.triangles.push(FewTriangle {
+                let edges =
+                    [0, 1, 2].map(|k| few.edge([wide[(k + 1) % 3], wide[(k + 2) % 3]], &mut ends));
+                few.triangles.push(FewTriangle {
                     edges: edges.map(|(edge, _)| edge),
                     lengths: edges.map(|(_, length)| length),
-                    normal: normal.to_array(),
-                    corner: wide[0].to_array(),
+                    normal,
+                    corner: wide[0],
                 });
                 few.named.push(Named {
                     front: (normal * place.handedness()).to_array().map(round),
                     placement: number,
                     triangle: u32::try_from(triangle).unwrap_or(MISS),
                 });
-                wide.iter().for_each(|&corner| bounds.include(corner));
-                few.end_run(bounds);
+                corners.push(wide);
             }
         }
-        few.single = few.double.rounded();
+        few.join(&corners);
         Some(few)
     }
 
-    /// The number of the edge between two corners, found among those from `first` on or appended, and its length,
-    /// negative where it runs the other way.
-    fn edge(
-        &mut self,
-        [from, to]: [DVec3; 2],
-        ends: &mut Vec<[[f64; 3]; 2]>,
-        first: usize,
-    ) -> (usize, f64) {
+    /// The number of the edge between two corners, found or appended, and its length, negative where it runs the
+    /// other way.
+    fn edge(&mut self, [from, to]: [DVec3; 2], ends: &mut Vec<[[f64; 3]; 2]>) -> (usize, f64) {
         let [a, b] = [from.to_array(), to.to_array()];
         let is_own = |ends: &[[f64; 3]; 2]| *ends == [a, b] || *ends == [b, a];
-        let found = ends[first..].iter().position(is_own).map(|k| first + k);
-        let at = found.unwrap_or_else(|| {
+        let at = ends.iter().position(is_own).unwrap_or_else(|| {
             ends.push([a, b]);
-            self.double.edges.push(PluckerEdge::between(from, to));
+            self.edges.push(PluckerEdge::between(from, to));
             ends.len() - 1
         });
         self.radius = self.radius.max(round(from.length()));
@@ -135,29 +123,40 @@ impl FewTriangles {
         (at, if ends[at] == [a, b] { length } else { -length })
     }
 
-    /// Begins a run behind all others; the number of its first edge.
-    fn begin_run(&mut self, bounds: &mut Bounds) -> usize {
-        let (edge, triangle) = (self.double.edges.len(), self.double.triangles.len());
-        *bounds = Bounds::EMPTY;
-        self.runs.push(Run {
-            edges: edge..edge,
-            triangles: triangle..triangle,
-            first: u32::try_from(triangle).unwrap_or(MISS),
-            bounds: [[0.0; 3]; 2],
+    /// Makes faces and runs of the triangles, of which these are the corners.
+    fn join(&mut self, corners: &[[DVec3; 3]]) {
+        let is_together = |a: &Named, b: &Named| a.placement == b.placement;
+        let ends = self.named.chunk_by(is_together).scan(0, |end, own| {
+            *end += own.len();
+            Some(*end)
         });
-        edge
-    }
-
-    /// Sets the last run to what has been added since it began, within these bounds.
-    fn end_run(&mut self, bounds: Bounds) {
-        let Some(run) = self.runs.last_mut() else { return };
-        let Shapes { edges, triangles } = &self.double;
-        (run.edges.end, run.triangles.end) = (edges.len(), triangles.len());
-        // Some roundings of the largest coordinate.
-        let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
-        let beyond = DVec3::splat(largest * 4.0 * f64::from(f32::EPSILON));
-        run.bounds =
-            [bounds.min - beyond, bounds.max + beyond].map(|corner| corner.to_array().map(round));
+        let (mut number, mut held, mut bounds) = (0, RUN, Bounds::EMPTY);
+        for end in ends {
+            while let Some(face) = Face::first_of(&corners[number..end], number, self.radius) {
+                let count = face.triangles.len();
+                if held + count > RUN {
+                    (held, bounds) = (0, Bounds::EMPTY);
+                    let start = self.faces.len();
+                    self.runs.push(Run {
+                        faces: start..start,
+                        first: u32::try_from(start).unwrap_or(MISS),
+                        bounds: [[0.0; 3]; 2],
+                    });
+                }
+                let own = &corners[number..number + count];
+                own.iter().flatten().for_each(|&corner| bounds.include(corner));
+                // Some roundings of the largest coordinate.
+                let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
+                let beyond = DVec3::splat(largest * 4.0 * f64::from(f32::EPSILON));
+                let around = [bounds.min - beyond, bounds.max + beyond];
+                if let Some(run) = self.runs.last_mut() {
+                    run.faces.end += 1;
+                    run.bounds = around.map(|corner| corner.to_array().map(round));
+                }
+                self.faces.push(face);
+                (number, held) = (number + count, held + count);
+            }
+        }
     }
 
     /// What origins of blocks are relative to (m, world).
@@ -172,60 +171,49 @@ impl FewTriangles {
 
     /// The closest hits of blocks, as [`BlockAccel`](crate::BlockAccel) has them; of triangles in one place the last.
     pub(crate) fn closest_of_blocks(&self, blocks: &mut [RayBlock]) {
-        let mut sides = Sides::of(self);
+        let mut nearest = NearestFace::NONE;
         for block in blocks {
-            let mut nearest = Nearest::of(block);
-            if closest_in_single(self, block, &mut sides.single, &mut nearest) {
-                let mut exact = Nearest::of(block);
-                closest_in_double(self, block, &mut sides.double, &mut exact);
-                self.note(block, &exact);
-            } else {
-                self.note(block, &nearest);
+            block.clear_hits();
+            faces::closest(self, block, &mut nearest);
+            for lane in 0..LANES {
+                if nearest.doubts[lane] != 0 {
+                    if let Some(hit) = edges::closest(self, block, lane) {
+                        let own = (hit.number, round(hit.t), hit.weights.map(round));
+                        self.note(block, lane, own);
+                    }
+                } else if let Some(face) = self.faces.get(nearest.face[lane] as usize) {
+                    let [x, y] = &nearest.place;
+                    let (number, weights) = face.at([x[lane], y[lane]]);
+                    self.note(block, lane, (number, nearest.t[lane], weights));
+                }
             }
         }
     }
 
-    /// Tells a block what its rays hit.
+    /// Tells a block what a ray hit: the triangle's number in the list, its distance (m) and weights.
     #[inline(always)]
-    fn note<F: Number>(&self, block: &mut RayBlock, nearest: &Nearest<F>) {
-        block.clear_hits();
-        [block.t_max, block.u, block.v] =
-            [&nearest.t, &nearest.u, &nearest.v].map(|row| row.map(F::single));
-        for (lane, &number) in nearest.number.iter().enumerate() {
-            let Some(hit) = self.named.get(number as usize) else { continue };
-            (block.placement[lane], block.triangle[lane]) = (hit.placement, hit.triangle);
-            for axis in 0..3 {
-                block.normal[axis][lane] = hit.front[axis];
-            }
+    fn note(&self, block: &mut RayBlock, lane: usize, (number, t, [u, v]): (usize, f32, [f32; 2])) {
+        let Some(hit) = self.named.get(number) else { return };
+        (block.t_max[lane], block.u[lane], block.v[lane]) = (t, u, v);
+        (block.placement[lane], block.triangle[lane]) = (hit.placement, hit.triangle);
+        for axis in 0..3 {
+            block.normal[axis][lane] = hit.front[axis];
         }
     }
 
     /// Whether anything is between the ends of rays of blocks.
     pub(crate) fn occluded_of_blocks(&self, blocks: &mut [RayBlock]) {
-        let mut sides = Sides::of(self);
+        let mut occlusion = Occlusion::default();
         for block in blocks {
-            let mut blocked = [0; LANES];
-            if occluded_in_single(self, block, &mut sides.single, &mut blocked) {
-                blocked = [0; LANES];
-                occluded_in_double(self, block, &mut sides.double, &mut blocked);
-            }
-            for (t_max, &blocked) in block.t_max.iter_mut().zip(&blocked) {
-                *t_max = if blocked != 0 { f32::NEG_INFINITY } else { *t_max };
+            faces::occluded(self, block, &mut occlusion);
+            for lane in 0..LANES {
+                let is_blocked = match occlusion.doubts[lane] {
+                    0 => occlusion.blocked[lane] != 0,
+                    _ => edges::is_occluded(self, block, lane),
+                };
+                block.t_max[lane] = if is_blocked { f32::NEG_INFINITY } else { block.t_max[lane] };
             }
         }
-    }
-}
-
-/// Room for the sides on which a block's rays pass all edges, in both precisions.
-struct Sides {
-    single: Vec<Row<f32>>,
-    double: Vec<Row<f64>>,
-}
-
-impl Sides {
-    fn of(few: &FewTriangles) -> Self {
-        let count = few.double.edges.len();
-        Self { single: vec![[0.0; LANES]; count], double: vec![[0.0; LANES]; count] }
     }
 }
 
@@ -282,6 +270,26 @@ mod tests {
         mesh(&corners, triangles)
     }
 
+    /// A frustum, whose faces are quadrilaterals of two triangles that begin at any of their corners.
+    fn frustum() -> Mesh {
+        let at = |k: u32| {
+            let [x, y, z] =
+                [k & 1, k >> 1 & 1, k >> 2].map(|side| if side == 0 { -1.0 } else { 1.0 });
+            let narrow = if y > 0.0 { 0.5 } else { 1.0 };
+            [narrow * x, y, narrow * z]
+        };
+        let corners: Vec<[f32; 3]> = (0..8).map(at).collect();
+        let faces =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let halves = |(k, [a, b, c, d]): (usize, [u32; 4])| {
+            let mut halves = [[a, b, c], [a, c, d]];
+            halves[0].rotate_left(k % 3);
+            halves[1].rotate_left((k + 1) % 3);
+            halves
+        };
+        mesh(&corners, faces.into_iter().enumerate().flat_map(halves).collect())
+    }
+
     /// Loose triangles, a mirrored copy of them, and a closed body about all, at a place.
     fn scene(far: f64) -> Arc<Geometry> {
         let corners: Vec<[f32; 3]> = (0..48)
@@ -305,12 +313,33 @@ mod tests {
         Arc::new(geometry)
     }
 
+    /// A frustum and a mirrored one in an icosahedron, at a place.
+    fn quadrilaterals(far: f64) -> Arc<Geometry> {
+        let at = |shift: f64| DVec3::splat(far + shift);
+        let small = Transform::new(DMat3::from_rotation_y(0.4) * 0.3, at(-0.4));
+        let mut geometry = Geometry::alone(frustum(), small);
+        let mirror = DMat3::from_diagonal(DVec3::new(-0.3, 0.3, 0.2));
+        let placement = geometry.placements[0].clone();
+        geometry.placements.push(Placement {
+            world_from_mesh: Transform::new(mirror, at(0.3)),
+            ..placement.clone()
+        });
+        geometry.meshes.push(icosahedron());
+        geometry.placements.push(Placement {
+            mesh: 1,
+            world_from_mesh: Transform::new(DMat3::IDENTITY, at(0.0)),
+            ..placement
+        });
+        Arc::new(geometry)
+    }
+
     #[test]
     fn hits_are_those_of_the_reference() {
-        for far in [0.0, 1e4] {
-            let geometry = scene(far);
+        let cases = [0.0, 1e4].map(|far| [(far, scene(far), 52), (far, quadrilaterals(far), 32)]);
+        for (far, geometry, count) in cases.into_iter().flatten() {
             let few = FewTriangles::of(&geometry).unwrap();
-            assert!(few.double.edges.len() < 3 * few.named.len(), "edges are shared");
+            assert_eq!(few.faces.len(), count);
+            assert!(few.edges.len() < 3 * few.named.len(), "edges are shared");
             let exact = Exact::build(Arc::clone(&geometry), &BuildOptions::default()).unwrap();
             let mut rays = RayBatch::default();
             for k in 0..4096 {
@@ -366,12 +395,18 @@ mod tests {
     /// From within, aimed at the edges of a closed body and beside its corners.
     #[test]
     fn no_ray_slips_through_an_edge() {
-        let geometry = Geometry::alone(icosahedron(), Transform::IDENTITY);
+        for body in [icosahedron(), frustum()] {
+            no_ray_slips_through_an_edge_of(body);
+        }
+    }
+
+    fn no_ray_slips_through_an_edge_of(body: Mesh) {
+        let geometry = Geometry::alone(body, Transform::IDENTITY);
         let few = FewTriangles::of(&geometry).unwrap();
         let mut rays = RayBatch::default();
         let body = &geometry.meshes[0];
         for k in 0..100_000_u32 {
-            let start = DVec3::from([0.377, 0.913, 0.151].map(|step| 0.7 * spread(k, step)));
+            let start = DVec3::from([0.377, 0.913, 0.151].map(|step| 0.45 * spread(k, step)));
             let [a, b, _] = body.corners(k as usize % body.triangles.len());
             // To 10⁻⁶ of its length from the corners, where all edges are near.
             let near = 10.0_f64.powf(-6.0 * (f64::from(k) * 0.731).fract());
@@ -388,6 +423,26 @@ mod tests {
         assert_eq!(missed.filter(|&placement| placement == MISS).count(), 0);
         let whole = |block: &RayBlock| (0..LANES).all(|lane| block.is_blocked(lane));
         assert!(shadows.blocks().iter().all(whole));
+    }
+
+    /// What is bent along the diagonal, not convex, wound the other way, or of two placements is no face.
+    #[test]
+    fn faces_are_flat_and_convex() {
+        let base = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let faces = |last: [f32; 3], second: [u32; 3]| {
+            let corners = [base[0], base[1], base[2], last];
+            let own = mesh(&corners, vec![[0, 1, 2], second]);
+            FewTriangles::of(&Geometry::alone(own, Transform::IDENTITY)).unwrap().faces.len()
+        };
+        assert_eq!(faces([0.9, 0.8, 0.0], [3, 2, 1]), 1);
+        assert_eq!(faces([0.9, 0.8, 1e-5], [3, 2, 1]), 2, "bent");
+        assert_eq!(faces([3.0, -0.5, 0.0], [3, 2, 1]), 2, "not convex");
+        assert_eq!(faces([0.9, 0.8, 0.0], [3, 1, 2]), 2, "wound the other way");
+        let half = |triangle| mesh(&[base[0], base[1], base[2], [1.0, 1.0, 0.0]], vec![triangle]);
+        let mut geometry = Geometry::alone(half([0, 1, 2]), Transform::IDENTITY);
+        geometry.meshes.push(half([3, 2, 1]));
+        geometry.placements.push(Placement { mesh: 1, ..geometry.placements[0].clone() });
+        assert_eq!(FewTriangles::of(&geometry).unwrap().faces.len(), 2, "of two placements");
     }
 
     #[test]

@@ -50,7 +50,7 @@ pub use opencv_fit::OpencvFit;
 pub use pinhole::{Orthographic, OrthographicSpec, Pinhole, PinholeSpec};
 pub use pixel_block::PixelBlock;
 pub use pose::{Convention, Maps, Pose, PoseSpec};
-pub use sampler::{PixelSamples, Sampler, floats_of_pair, squares_of_pair};
+pub use sampler::{PixelSamples, SampleKeys, Sampler, squares_of_pair};
 pub use samples::{CameraRays, FilmSamples};
 pub use shutter::{Readout, Shutter, ShutterKind, ShutterSpec, TruthAt};
 

@@ -105,23 +105,23 @@ impl PixelSamples {
         }
     }
 
-    /// Which point of which dimensions a pair is. The places in the pixel and in the pupil (the pairs 0 and 1) say
-    /// together what a sample sees, and are the first dimensions of one set. Each other pair is a set for itself:
-    /// later dimensions of one set are not nearly as even in pairs (of 64 points, the fifth and sixth leave half
-    /// of 8 × 8 cells empty). Sets have 2¹⁶ points, and start over, scrambled anew.
+    /// Which point of which dimensions a pair is.
     #[inline]
     fn sobol_key(&self, index: u32, pair: u32, sequence: &mut Sequence) -> (SobolKey, usize) {
         if self.sampler == Sampler::BlueNoise {
             return (self.blue_noise_key(index, pair, sequence), 0);
         }
-        let (first, apart) = match pair {
-            0 | 1 => (2 * pair as usize, 0),
-            _ => (0, pair),
-        };
+        let (first, shift) = set_of_pair(pair);
+        (self.key_of_set(index, shift), first)
+    }
+
+    /// Which point of a set a sample is. Sets have 2¹⁶ points, and start over, scrambled anew.
+    #[inline]
+    fn key_of_set(&self, index: u32, shift: u32) -> SobolKey {
         let again = (index >> 16).wrapping_mul(0x85eb_ca6b);
         #[expect(clippy::cast_possible_truncation, reason = "the low half is the seed")]
-        let seed = (self.seed as u32).wrapping_add(apart.wrapping_mul(0x9e37_79b9));
-        (SobolKey { index: index & 0xffff, seed: seed.wrapping_add(again) }, first)
+        let seed = (self.seed as u32).wrapping_add(again);
+        SobolKey { index: index & 0xffff, seed }.shifted(shift)
     }
 
     /// Which point of the picture's sequence a sample is. The scrambling of indices ([`sobol`]) puts the halves
@@ -165,21 +165,66 @@ pub fn squares_of_pair(
     sobol::points(&keys, dimensions, out);
 }
 
-/// [`squares_of_pair`] in single precision, the numbers below 1, in two columns.
-pub fn floats_of_pair(
-    samples: impl Iterator<Item = (PixelSamples, u32)> + Clone,
-    pair: u32,
-    out: &mut [Vec<f32>; 2],
-) {
-    let SobolKeys { keys, dimensions, is_sobol } = SobolKeys::of(samples.clone(), pair);
-    out.iter_mut().for_each(|column| column.resize(keys.len(), 0.0));
-    let [first, second] = out;
-    if is_sobol {
-        sobol::floats(&keys, dimensions, [first, second]);
-        return;
+/// Samples of which numbers are drawn again and again: what is the same for all pairs of dimensions is worked out once.
+#[derive(Debug, Default)]
+pub struct SampleKeys {
+    samples: Vec<(PixelSamples, u32)>,
+    /// Those of the first pair, where all are of [`Sampler::Sobol`]; else empty.
+    keys: Vec<SobolKey>,
+}
+
+impl SampleKeys {
+    /// Makes them those of `samples`, which are a pixel's samples and an index.
+    pub fn refill(&mut self, samples: impl Iterator<Item = (PixelSamples, u32)>) {
+        let Self { samples: all, keys } = self;
+        all.clear();
+        all.extend(samples);
+        keys.clear();
+        if all.iter().all(|(pixel, _)| pixel.sampler == Sampler::Sobol) {
+            keys.extend(all.iter().map(|&(pixel, index)| pixel.key_of_set(index, 0)));
+        }
     }
-    for (((pixel, index), x), y) in samples.zip(first).zip(second) {
-        [*x, *y] = pixel.square(index, pair).map(sobol::float);
+
+    /// [`PixelSamples::square`] of one pair of dimensions for each of some samples, by their numbers: `out` is
+    /// refilled.
+    pub fn squares_of_pair(&self, picked: &[u32], pair: u32, out: &mut Vec<[f64; 2]>) {
+        if self.keys.is_empty() {
+            let samples = picked.iter().map(|&number| self.samples[number as usize]);
+            squares_of_pair(samples, pair, out);
+            return;
+        }
+        let (first, shift) = set_of_pair(pair);
+        let key = |&number: &u32| self.keys[number as usize].shifted(shift);
+        let keys: Vec<SobolKey> = picked.iter().map(key).collect();
+        out.resize(keys.len(), [0.0; 2]);
+        sobol::points(&keys, first, out);
+    }
+
+    /// The same in single precision, the numbers below 1, in two columns.
+    pub fn floats_of_pair(&self, picked: &[u32], pair: u32, out: &mut [Vec<f32>; 2]) {
+        out.iter_mut().for_each(|column| column.resize(picked.len(), 0.0));
+        let [x, y] = out;
+        if self.keys.is_empty() {
+            let mut squares = Vec::new();
+            self.squares_of_pair(picked, pair, &mut squares);
+            for ((square, x), y) in squares.into_iter().zip(x).zip(y) {
+                [*x, *y] = square.map(sobol::float);
+            }
+            return;
+        }
+        let (first, shift) = set_of_pair(pair);
+        sobol::floats((&self.keys, shift), picked, first, [x, y]);
+    }
+}
+
+/// The first dimension of a pair in its set, and what is added to the scramblings of the first set. The places in the
+/// pixel and in the pupil (the pairs 0 and 1) say together what a sample sees, and are the first dimensions of one set.
+/// Each other pair is a set for itself: later dimensions of one set are not nearly as even in pairs (of 64 points, the
+/// fifth and sixth leave half of 8 × 8 cells empty).
+fn set_of_pair(pair: u32) -> (usize, u32) {
+    match pair {
+        0 | 1 => (2 * pair as usize, 0),
+        _ => (0, pair.wrapping_mul(0x9e37_79b9)),
     }
 }
 
@@ -345,13 +390,20 @@ mod tests {
         for sampler in ALL {
             let pixel = |i: u32| sampler.pixel(5, i % 7, i / 7, 80_000);
             let samples = (0..200).map(|i| (pixel(i), i * 381));
-            let mut out = Vec::new();
+            let [mut out, mut own] = [Vec::new(), Vec::new()];
             let mut floats = [Vec::new(), Vec::new()];
+            let mut keys = SampleKeys::default();
+            keys.refill(samples.clone());
+            let picked: Vec<u32> = (0..200).rev().step_by(3).collect();
             for pair in [0, 3, 200] {
                 squares_of_pair(samples.clone(), pair, &mut out);
                 let one_by_one = samples.clone().map(|(pixel, i)| pixel.square(i, pair));
                 assert_eq!(out, one_by_one.collect::<Vec<_>>(), "{sampler:?} pair {pair}");
-                floats_of_pair(samples.clone(), pair, &mut floats);
+                keys.squares_of_pair(&picked, pair, &mut own);
+                out = picked.iter().map(|&number| out[number as usize]).collect();
+                assert_eq!(out, own, "{sampler:?} pair {pair}");
+                keys.floats_of_pair(&picked, pair, &mut floats);
+                assert_eq!(floats[0].len(), picked.len());
                 let [x, y] = floats.each_ref().map(|column| column.iter().copied().map(f64::from));
                 for ((a, b), own) in x.zip(y).zip(&out) {
                     // 24 bits of each.

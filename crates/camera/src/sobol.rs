@@ -44,15 +44,24 @@ pub(crate) struct SobolKey {
     pub(crate) seed: u32,
 }
 
+impl SobolKey {
+    /// The same sample of another scrambling.
+    #[inline(always)]
+    pub(crate) fn shifted(self, shift: u32) -> Self {
+        Self { seed: self.seed.wrapping_add(shift), ..self }
+    }
+}
+
 /// The point of each of `keys` in dimensions `first` and `first + 1`; `first` is 0 or 2.
 /// `out` is as long as `keys`.
 pub(crate) fn points(keys: &[SobolKey], first: usize, out: &mut [[f64; 2]]) {
     scrambled(keys, first, &DIRECTIONS, out);
 }
 
-/// The same points to 24 bits, in two columns as long as `keys`.
-pub(crate) fn floats(keys: &[SobolKey], first: usize, out: [&mut [f32]; 2]) {
-    scrambled_floats(keys, first, &DIRECTIONS, out);
+/// The points of those of `keys` that are picked, of scramblings shifted by so much, to 24 bits in two columns as long
+/// as `picked`.
+pub(crate) fn floats(keys: (&[SobolKey], u32), picked: &[u32], first: usize, out: [&mut [f32]; 2]) {
+    scrambled_floats(keys, picked, first, &DIRECTIONS, out);
 }
 
 /// The first 24 bits of a number below 1.
@@ -91,14 +100,17 @@ fn scrambled(
 
 #[multiversion::multiversion(targets = "simd")]
 fn scrambled_floats(
-    keys: &[SobolKey],
+    (keys, shift): (&[SobolKey], u32),
+    picked: &[u32],
     first: usize,
     directions: &[[u32; BITS]; DIMENSIONS],
     [x, y]: [&mut [f32]; 2],
 ) {
-    for ((keys, x), y) in keys.chunks(LANES).zip(x.chunks_mut(LANES)).zip(y.chunks_mut(LANES)) {
-        let mut lanes = [keys[0]; LANES];
-        lanes[..keys.len()].copy_from_slice(keys);
+    for ((picked, x), y) in picked.chunks(LANES).zip(x.chunks_mut(LANES)).zip(y.chunks_mut(LANES)) {
+        let mut lanes = [SobolKey::default(); LANES];
+        for (lane, &number) in lanes.iter_mut().zip(picked) {
+            *lane = keys[number as usize].shifted(shift);
+        }
         let [across, up] = numbers_of(&lanes, first, directions);
         let (mut a, mut b) = ([0.0; LANES], [0.0; LANES]);
         for i in 0..LANES {
@@ -118,13 +130,25 @@ fn numbers_of(
     first: usize,
     directions: &[[u32; BITS]; DIMENSIONS],
 ) -> [[u32; LANES]; 2] {
-    let [index, seeds] = [keys.map(|key| key.index), keys.map(|key| key.seed)];
+    let (index, seeds) = apart(keys);
     let seed = seeds[0];
     let numbers = match seeds.iter().fold(0, |others, other| others | (other ^ seed)) {
         0 => upper_bits(index, |_| seed, first, directions),
         _ => upper_bits(index, |i| seeds[i], first, directions),
     };
-    numbers.map(|(number, _)| number)
+    let [(across, _), (up, _)] = numbers;
+    [across, up]
+}
+
+/// The samples and the scramblings of some keys. (What maps arrays is a function of its own, compiled without wide
+/// registers.)
+#[inline(always)]
+fn apart(keys: &[SobolKey; LANES]) -> ([u32; LANES], [u32; LANES]) {
+    let (mut index, mut seeds) = ([0; LANES], [0; LANES]);
+    for i in 0..LANES {
+        (index[i], seeds[i]) = (keys[i].index, keys[i].seed);
+    }
+    (index, seeds)
 }
 
 /// Where all are of one scrambling, as nearly always, what goes into it is hashed once.
@@ -134,7 +158,7 @@ fn chunk(
     first: usize,
     directions: &[[u32; BITS]; DIMENSIONS],
 ) -> [[f64; 2]; LANES] {
-    let [index, seeds] = [keys.map(|key| key.index), keys.map(|key| key.seed)];
+    let (index, seeds) = apart(keys);
     let seed = seeds[0];
     match seeds.iter().fold(0, |others, other| others | (other ^ seed)) {
         0 => side_by_side(index, |_| seed, first, directions),
@@ -173,7 +197,11 @@ fn upper_bits<const N: usize>(
         let mut number = [0; N];
         match first + k {
             0 => number = index,
-            1 => number = index.map(second_reversed),
+            1 => {
+                for i in 0..N {
+                    number[i] = second_reversed(index[i]);
+                }
+            }
             dimension => {
                 for (bit, &direction) in directions[dimension].iter().enumerate() {
                     for (number, &index) in number.iter_mut().zip(&index) {

@@ -177,7 +177,7 @@ impl Averaged for LightPass<'_> {
 
     fn trace(&self, bands: &Range<usize>, memory: &mut Memory) {
         let Memory { rays, film, numbers, scratch, values, light_in_parts, traffic, .. } = memory;
-        numbers.of_ray.clone_from(&rays.sample);
+        numbers.set_rays(&rays.sample);
         let lights = self.stage.lights;
         let parts = match self.layers.len() > 1 || lights.are_modulated() {
             true => Parts::Groups(lights.parts().len()),

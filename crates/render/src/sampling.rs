@@ -4,8 +4,7 @@
 use std::ops::Range;
 
 use etendue_camera::{
-    BandGroup, BandLandings, Camera, CameraRays, FilmSamples, PixelSamples, Sampler,
-    floats_of_pair, squares_of_pair,
+    BandGroup, BandLandings, Camera, CameraRays, FilmSamples, PixelSamples, SampleKeys, Sampler,
 };
 use etendue_geometry::HitBatch;
 use etendue_tracer::layer::Columns;
@@ -162,17 +161,26 @@ pub(crate) struct SampleNumbers {
     pub(crate) samples: Vec<(PixelSamples, u32)>,
     /// The sample of each ray.
     pub(crate) of_ray: Vec<u32>,
+    /// By ray.
+    keys: SampleKeys,
+}
+
+impl SampleNumbers {
+    /// Makes the rays those of so many samples of the film, by their numbers.
+    pub(crate) fn set_rays(&mut self, of_ray: &[u32]) {
+        self.of_ray.clear();
+        self.of_ray.extend_from_slice(of_ray);
+        self.keys.refill(self.of_ray.iter().map(|&sample| self.samples[sample as usize]));
+    }
 }
 
 impl Samples for SampleNumbers {
     fn squares_of_pair(&self, rays: &[u32], pair: u32, out: &mut Vec<[f64; 2]>) {
-        let samples = rays.iter().map(|&ray| self.samples[self.of_ray[ray as usize] as usize]);
-        squares_of_pair(samples, CAMERA_PAIRS + pair, out);
+        self.keys.squares_of_pair(rays, CAMERA_PAIRS + pair, out);
     }
 
     fn floats_of_pair(&self, rays: &[u32], pair: u32, out: &mut [Vec<f32>; 2]) {
-        let samples = rays.iter().map(|&ray| self.samples[self.of_ray[ray as usize] as usize]);
-        floats_of_pair(samples, CAMERA_PAIRS + pair, out);
+        self.keys.floats_of_pair(rays, CAMERA_PAIRS + pair, out);
     }
 }
 

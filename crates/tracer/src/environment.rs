@@ -142,7 +142,8 @@ impl EnvironmentMap {
         let mut colors = [[0.0; 3]; LANES];
         for k in 0..3 {
             for i in 0..LANES {
-                let corners = [0, 1, 2, 3].map(|corner: usize| f64::from(taken[corner][k][i]));
+                let [a, b, c, d] = [taken[0][k][i], taken[1][k][i], taken[2][k][i], taken[3][k][i]];
+                let corners = [f64::from(a), f64::from(b), f64::from(c), f64::from(d)];
                 colors[i][k] = between(corners, [about.across[i], about.down[i]]);
             }
         }

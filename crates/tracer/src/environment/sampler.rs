@@ -37,16 +37,16 @@ impl Cells {
     fn corners(&self, [x, y]: [usize; 2]) -> [[f64; 2]; 2] {
         let [columns, rows] = self.size;
         let next = if x + 1 == columns { 0 } else { x + 1 };
-        [y.saturating_sub(1), y.min(rows - 1)].map(|row| {
-            let row = &self.bright[row * columns..(row + 1) * columns];
-            [f64::from(row[x]), f64::from(row[next])]
-        })
+        let (above, below) = (y.saturating_sub(1) * columns, y.min(rows - 1) * columns);
+        let at = |k: usize| f64::from(self.bright[k]);
+        [[at(above + x), at(above + next)], [at(below + x), at(below + next)]]
     }
 
     /// Where a row of patches begins and ends, in rows of cells.
     #[inline]
     fn ends(&self, row: usize) -> [f64; 2] {
-        [row as f64 - 0.5, row as f64 + 0.5].map(|v| v.clamp(0.0, self.size[1] as f64))
+        let within = |v: f64| v.clamp(0.0, self.size[1] as f64);
+        [within(row as f64 - 0.5), within(row as f64 + 0.5)]
     }
 }
 
@@ -148,7 +148,7 @@ impl MapSampler {
         }
         let (mut places, mut density) = ([[0.0; LANES]; 2], [0.0; LANES]);
         for i in 0..LANES {
-            let [a, b, c, d] = [0, 1, 2, 3].map(|corner: usize| corners[corner][i]);
+            let (a, b, c, d) = (corners[0][i], corners[1][i], corners[2][i], corners[3][i]);
             let [across, down] = patches[i].rest;
             let down = linear_place(down, [a + b, c + d]);
             let [left, right] = [a + (c - a) * down, b + (d - b) * down];
@@ -182,7 +182,8 @@ impl MapSampler {
         }
         let mut pdf = [0.0; N];
         for i in 0..N {
-            let corners = [0, 1, 2, 3].map(|corner: usize| f64::from(corners[corner][i]));
+            let [a, b, c, d] = [corners[0][i], corners[1][i], corners[2][i], corners[3][i]];
+            let corners = [f64::from(a), f64::from(b), f64::from(c), f64::from(d)];
             let bright = between(corners, [about.across[i], about.down[i]]);
             pdf[i] = over_the_sphere(bright * scale[i], sines[i]);
         }

@@ -36,7 +36,7 @@ use etendue_geometry::MISS;
 use etendue_geometry::glam::DVec3;
 
 pub(crate) use self::cluster::Cluster;
-use self::node::{Branch, Extent, Node, Viewer, WIDTH};
+use self::node::{Branch, Extent, Node, View, Viewer, WIDTH};
 use self::split::split;
 use crate::light_sampler::Receiver;
 use crate::sampling::ONE_BELOW;
@@ -91,26 +91,47 @@ impl Walker {
     pub(crate) fn new(number: usize) -> Self {
         Self { number, at: END, ..Self::default() }
     }
+
+    /// Goes to one of a node's branches by what it has of them; whether it goes on from there.
+    #[inline(always)]
+    fn step(&mut self, node: &Node, view: &View) -> bool {
+        let Some((lane, rest, share)) = view.pick(self.u) else {
+            (self.chance, self.at) = (0.0, END);
+            return false;
+        };
+        (self.u, self.chance) = (rest, self.chance * share);
+        self.branch = node.branches[lane];
+        let is_end = node.is_end(lane, view.squared[lane]);
+        self.at = if is_end { END } else { self.branch.node as usize };
+        !is_end
+    }
 }
 
 /// Brings all walkers down, step by step: a step of one does not wait for that of another.
 #[multiversion::multiversion(targets = "simd")]
 fn descend(nodes: &[Node], walkers: &mut [Walker]) {
+    let (pairs, rest) = walkers.as_chunks_mut::<2>();
     let mut is_under_way = true;
     while is_under_way {
         is_under_way = false;
-        for walker in walkers.iter_mut() {
-            let Some(node) = nodes.get(walker.at) else { continue };
-            let view = node.view(&walker.viewer);
-            let Some((lane, rest, share)) = view.pick(walker.u) else {
-                (walker.chance, walker.at) = (0.0, END);
-                continue;
-            };
-            (walker.u, walker.chance) = (rest, walker.chance * share);
-            walker.branch = node.branches[lane];
-            let is_end = node.is_end(lane, view.squared[lane]);
-            walker.at = if is_end { END } else { walker.branch.node as usize };
-            is_under_way |= !is_end;
+        for [a, b] in &mut *pairs {
+            let (first, second) = (nodes.get(a.at), nodes.get(b.at));
+            // One that has come to its end is taken along.
+            let Some(any) = first.or(second) else { continue };
+            let views =
+                Node::views([first.unwrap_or(any), second.unwrap_or(any)], [&a.viewer, &b.viewer]);
+            if let Some(node) = first {
+                is_under_way |= a.step(node, &views[0]);
+            }
+            if let Some(node) = second {
+                is_under_way |= b.step(node, &views[1]);
+            }
+        }
+        for walker in &mut *rest {
+            if let Some(node) = nodes.get(walker.at) {
+                let view = node.view(&walker.viewer);
+                is_under_way |= walker.step(node, &view);
+            }
         }
     }
 }

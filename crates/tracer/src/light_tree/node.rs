@@ -12,6 +12,9 @@ use crate::sampling::ONE_BELOW;
 /// Branches of a node.
 pub(super) const WIDTH: usize = 8;
 
+/// Branches of two nodes.
+const TWICE: usize = 2 * WIDTH;
+
 /// Squared distance over squared radius from which on a branch's lights are as good as in one place.
 const FAR: f32 = 256.0;
 
@@ -74,8 +77,8 @@ pub(super) struct Extent {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Viewer {
     pub(super) point: [f32; 3],
+    /// Zero of one that gets light from both sides.
     pub(super) normal: [f32; 3],
-    pub(super) is_one_sided: bool,
 }
 
 impl Default for Extent {
@@ -101,7 +104,6 @@ impl Extent {
         Viewer {
             point: self.local(receiver.point).to_array(),
             normal: receiver.normal.as_vec3().to_array(),
-            is_one_sided: receiver.is_one_sided(),
         }
     }
 }
@@ -184,16 +186,75 @@ impl Node {
     /// What the viewer has of each branch: what the branch may send, to a factor, and the squared distance.
     #[inline(always)]
     pub(super) fn view(&self, viewer: &Viewer) -> View {
-        let normal = viewer.normal.map(|x| [x; WIDTH]);
-        let normal = viewer.is_one_sided.then_some(&normal);
-        let (sent, squared) = self.clusters.sent(&viewer.point.map(|x| [x; WIDTH]), normal);
-        View { importance: sent.map(f64::from), squared }
+        let [view, _] = Self::views([self; 2], [viewer; 2]);
+        view
+    }
+
+    /// The same of two nodes by a viewer each, side by side: so many numbers as fill a register.
+    #[inline(always)]
+    pub(super) fn views([a, b]: [&Self; 2], [from, to]: [&Viewer; 2]) -> [View; 2] {
+        let points = spread([&from.point, &to.point]);
+        let normals = spread([&from.normal, &to.normal]);
+        let both = Clusters::beside(&a.clusters, &b.clusters);
+        let (sent, squared) = both.sent(&points, Some(&normals));
+        let mut views = [View::default(), View::default()];
+        for k in 0..WIDTH {
+            views[0].importance[k] = f64::from(sent[k]);
+            views[1].importance[k] = f64::from(sent[WIDTH + k]);
+            views[0].squared[k] = squared[k];
+            views[1].squared[k] = squared[WIDTH + k];
+        }
+        views
+    }
+}
+
+/// A number of each of two points or nodes, many times.
+#[inline(always)]
+fn spread([a, b]: [&[f32; 3]; 2]) -> [[f32; TWICE]; 3] {
+    let mut all = [[0.0; TWICE]; 3];
+    for axis in 0..3 {
+        for k in 0..WIDTH {
+            all[axis][k] = a[axis];
+            all[axis][WIDTH + k] = b[axis];
+        }
+    }
+    all
+}
+
+/// The numbers of one node's branches and of another's.
+#[inline(always)]
+fn twice(a: &[f32; WIDTH], b: &[f32; WIDTH]) -> [f32; TWICE] {
+    let mut both = [0.0; TWICE];
+    both[..WIDTH].copy_from_slice(a);
+    both[WIDTH..].copy_from_slice(b);
+    both
+}
+
+impl Clusters<TWICE> {
+    /// The branches of two nodes. (What maps arrays is a function of its own, compiled without wide registers.)
+    #[inline(always)]
+    fn beside(a: &Clusters<WIDTH>, b: &Clusters<WIDTH>) -> Self {
+        let (mut centre, mut axis) = ([[0.0; TWICE]; 3], [[0.0; TWICE]; 3]);
+        for k in 0..3 {
+            centre[k] = twice(&a.centre[k], &b.centre[k]);
+            axis[k] = twice(&a.axis[k], &b.axis[k]);
+        }
+        Self {
+            centre,
+            radius: twice(&a.radius, &b.radius),
+            axis,
+            cone: [twice(&a.cone[0], &b.cone[0]), twice(&a.cone[1], &b.cone[1])],
+            cos_reach: twice(&a.cos_reach, &b.cos_reach),
+            intensity: twice(&a.intensity, &b.intensity),
+            within: twice(&a.within, &b.within),
+            is_isotropic: a.is_isotropic && b.is_isotropic,
+        }
     }
 }
 
 impl<const N: usize> Clusters<N> {
     /// What each may send to a point, to a factor, and the squared distance; the normals of the points are asked where
-    /// they get light from one side alone.
+    /// they get light from one side alone, and are zero where they do not.
     ///
     /// All is worked out for all of them, and from local arrays: else compilers do it one by one.
     #[inline(always)]
@@ -245,13 +306,20 @@ impl<const N: usize> Clusters<N> {
         for k in 0..N {
             sent[k] = if squared[k] <= radius[k] * radius[k] { within[k] } else { sent[k] };
         }
-        if normals.is_some() {
+        if let Some(normals) = normals {
+            let mut length = [0.0; N];
+            for axis in normals {
+                for k in 0..N {
+                    length[k] += axis[k] * axis[k];
+                }
+            }
             // The most that the cosine is under which the point gets the light.
             for k in 0..N {
                 let cosine = cosine(above[k] * inverse[k]);
                 let [cosine, _] = less([cosine, other(cosine)], [ball[0][k], ball[1][k]]);
                 let facing = if cosine > ROOM { cosine } else { ROOM };
                 let facing = if cosine > -ROOM { facing } else { 0.0 };
+                let facing = if length[k] > 0.0 { facing } else { 1.0 };
                 let is_within = squared[k] <= radius[k] * radius[k];
                 sent[k] *= if is_within { 1.0 } else { facing };
             }
@@ -283,7 +351,7 @@ fn less([cos_a, sin_a]: [f32; 2], [cos_b, sin_b]: [f32; 2]) -> [f32; 2] {
 }
 
 /// What a point has of each branch of a node.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct View {
     /// What the branch may send, to a factor.
     pub(super) importance: [f64; WIDTH],

@@ -3,11 +3,13 @@
 #![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
+use std::hint::select_unpredictable;
 
 use etendue_geometry::RayBlock;
 use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::glam::DVec3;
 
+use super::compress::{Compress, Instructions};
 use super::lamps::{Lights, place};
 use super::{Columns, RayColumns};
 use crate::placed::PlainSurface;
@@ -23,6 +25,10 @@ const ROUNDINGS: f32 = 12.0 * f32::EPSILON;
 const BACK: f32 = kernels::BACK as f32;
 #[expect(clippy::cast_possible_truncation, reason = "a power of two")]
 const BESIDE: f32 = patch::BESIDE as f32;
+
+/// Bits that are all set in lanes of which something holds, and 0 in the others: rows of `bool` are worked out one by
+/// one.
+pub(super) type Mask = [u32; LANES];
 
 pub(super) const ZERO: Row = [0.0; LANES];
 
@@ -48,7 +54,7 @@ pub(super) type Sphere = ([f32; 3], f32);
 struct Found {
     color: [Row; 3],
     magnitudes: [Row; 3],
-    scatters: [bool; LANES],
+    scatters: Mask,
 }
 
 /// The hits of a block.
@@ -68,9 +74,12 @@ pub(super) fn leave_blocks(
     Leaving { shadows, next, seen }: Leaving<'_>,
 ) {
     let Some(last) = surfaces.len().checked_sub(1) else { return };
+    // Blocks' coordinates are those of the world less their origin, whose roundings count as well.
+    let offset = single(lights.origin).map(|axis| 2.0 * axis.abs());
+    let instructions = Instructions::of_machine();
     for (number, block) in blocks.iter().enumerate() {
         let first = number * LANES;
-        let mut found = Found { color: [ZERO; 3], magnitudes: [ZERO; 3], scatters: [false; LANES] };
+        let mut found = Found { color: [ZERO; 3], magnitudes: [ZERO; 3], scatters: [0; LANES] };
         let mut any = false;
         let numbers_of_lanes = lanes_from(first);
         for lane in 0..LANES {
@@ -80,8 +89,9 @@ pub(super) fn leave_blocks(
                 found.magnitudes[axis][lane] = surface.magnitudes[axis];
             }
             let is_hit = surface.is_there & (lane < carried.len.saturating_sub(first));
-            found.scatters[lane] = surface.scatters & is_hit;
-            any |= found.scatters[lane];
+            let scatters = surface.scatters & is_hit;
+            found.scatters[lane] = mask(scatters);
+            any |= scatters;
             if surface.shines & is_hit {
                 seen.push(numbers_of_lanes[lane]);
             }
@@ -89,19 +99,25 @@ pub(super) fn leave_blocks(
         if !(any & numbers.is_scattered) {
             continue;
         }
-        let hits = measure(block, &found.magnitudes, lights.origin);
+        let hits = measure(block, &found.magnitudes, offset);
         let run = first..first + LANES;
         let row = |column: &[f32]| -> Row { column[run.clone()].try_into().unwrap_or(ZERO) };
-        let mut throughput = carried.throughput.each_ref().map(|band| row(band));
+        // (What maps arrays is a function of its own, compiled without wide registers.)
+        let [red, green, blue] = &carried.throughput;
+        let mut throughput = [row(red), row(green), row(blue)];
         for band in 0..3 {
             for i in 0..LANES {
                 throughput[band][i] *= found.color[band][i];
             }
         }
-        let square = |draw: Draw| numbers.drawn[draw as usize].each_ref().map(|half| row(half));
+        let square = |draw: Draw| {
+            let [first, second] = &numbers.drawn[draw as usize];
+            [row(first), row(second)]
+        };
         let ray: [u32; LANES] = carried.ray[run.clone()].try_into().unwrap_or([0; LANES]);
         let light = square(Draw::Light);
-        ask(lights, &hits, light, (&found.scatters, &throughput, &ray), shadows);
+        let asking = (&found.scatters, &throughput, &ray);
+        ask((lights, offset), &hits, light, asking, (instructions, shadows));
         if !numbers.goes_on {
             continue;
         }
@@ -115,7 +131,7 @@ pub(super) fn leave_blocks(
             let [r, g, b] = [throughput[0][i], throughput[1][i], throughput[2][i]];
             let larger = if g > r { g } else { r };
             most[i] = if b > larger { b } else { larger };
-            goes[i] &= most[i] > 0.0;
+            goes[i] &= mask(most[i] > 0.0);
         }
         if let Some(sphere) = &sphere {
             keep_those_that_may_meet(sphere, (&start, &along), &mut goes);
@@ -126,26 +142,30 @@ pub(super) fn leave_blocks(
                 // Its root: where few paths come this far, ending them saves little and leaves noise.
                 let root = most[i].sqrt();
                 let survival = if root < 1.0 { root } else { 1.0 };
-                goes[i] &= chance[i] < survival;
+                goes[i] &= mask(chance[i] < survival);
                 let inverse = if survival > 0.0 { 1.0 / survival } else { 0.0 };
                 for band in 0..3 {
                     throughput[band][i] *= inverse;
                 }
             }
         }
-        let (picked, count) = compress(&goes);
-        let at = next.len;
+        let (going, at) = (Compress::new(&goes, instructions), next.len);
         for axis in 0..3 {
-            put(&mut next.start[axis], at, &start[axis], &picked);
-            put(&mut next.along[axis], at, &along[axis], &picked);
-            put(&mut next.carried.throughput[axis], at, &throughput[axis], &picked);
+            going.put(&start[axis], &mut next.start[axis], at);
+            going.put(&along[axis], &mut next.along[axis], at);
+            going.put(&throughput[axis], &mut next.carried.throughput[axis], at);
         }
-        put(&mut next.carried.pdf, at, &pdf, &picked);
-        put(&mut next.carried.ray, at, &ray, &picked);
-        put(&mut next.reach, at, &[f32::INFINITY; LANES], &picked);
-        put(&mut next.left, at, &numbers_of_lanes, &picked);
-        next.len += count;
+        going.put(&pdf, &mut next.carried.pdf, at);
+        going.put(&ray, &mut next.carried.ray, at);
+        going.put(&[f32::INFINITY; LANES], &mut next.reach, at);
+        going.put(&numbers_of_lanes, &mut next.left, at);
+        next.len += going.count;
     }
+}
+
+#[inline(always)]
+fn mask(holds: bool) -> u32 {
+    select_unpredictable(holds, u32::MAX, 0)
 }
 
 /// The numbers of a block's lanes, counted from the first block.
@@ -161,7 +181,7 @@ fn lanes_from(first: usize) -> [u32; LANES] {
 
 /// Points, their errors, and normals on the viewer's side, as [`super::super::kernels::measure`] has them.
 #[inline(always)]
-fn measure(block: &RayBlock, magnitudes: &[Row; 3], origin: DVec3) -> Hits {
+fn measure(block: &RayBlock, magnitudes: &[Row; 3], offset: [f32; 3]) -> Hits {
     let [x, y, z] = &block.normal;
     let [dx, dy, dz] = &block.direction;
     let mut normal = [ZERO; 3];
@@ -174,8 +194,6 @@ fn measure(block: &RayBlock, magnitudes: &[Row; 3], origin: DVec3) -> Hits {
         normal[2][i] = z[i] * scale;
     }
     let (mut point, mut error, mut most) = ([ZERO; 3], ZERO, ZERO);
-    // Blocks' coordinates are those of the world less their origin, whose roundings count as well.
-    let offset = single(origin).map(|axis| 2.0 * axis.abs());
     for axis in 0..3 {
         let (start, direction) = (&block.origin[axis], &block.direction[axis]);
         for i in 0..LANES {
@@ -205,15 +223,14 @@ fn measure(block: &RayBlock, magnitudes: &[Row; 3], origin: DVec3) -> Hits {
 /// [`super::super::kernels::aim`] and [`super::super::kernels::reflect`] have them.
 #[inline(always)]
 fn ask(
-    lights: &Lights,
+    (lights, offset): (&Lights, [f32; 3]),
     hits: &Hits,
     square: [Row; 2],
-    (scatters, throughput, ray): (&[bool; LANES], &[Row; 3], &[u32; LANES]),
-    shadows: &mut RayColumns,
+    (scatters, throughput, ray): (&Mask, &[Row; 3], &[u32; LANES]),
+    (instructions, shadows): (Instructions, &mut RayColumns),
 ) {
     let places = place(lights, &hits.point, square);
     let (mut squared, mut facing, mut above, mut blur) = (ZERO, ZERO, ZERO, ZERO);
-    let offset = single(lights.origin).map(|axis| 2.0 * axis.abs());
     for axis in 0..3 {
         for i in 0..LANES {
             let (here, way) = (hits.point[axis][i], places.way[axis][i]);
@@ -229,14 +246,15 @@ fn ask(
     for i in 0..LANES {
         let inverse = 1.0 / squared[i].sqrt();
         let shown = facing[i] * inverse;
-        let is_point = places.is_point[i];
-        let shines = (shown > 0.0) | ((shown < 0.0) & places.two_sided[i]) | is_point;
-        let pdf = places.density[i] * squared[i] / if is_point { 1.0 } else { shown.abs() };
+        let is_point = places.is_point[i] > 0.0;
+        let shines = (shown > 0.0) | ((shown < 0.0) & (places.two_sided[i] > 0.0)) | is_point;
+        let slope = select_unpredictable(is_point, 1.0, shown.abs());
+        let pdf = places.density[i] * squared[i] / slope;
         let reflected = above[i] * inverse * FRAC_1_PI;
         // No direction comes upon a point by chance.
-        let ratio = if is_point { 0.0 } else { reflected / pdf };
+        let ratio = select_unpredictable(is_point, 0.0, reflected / pdf);
         let share = reflected / ((1.0 + ratio * ratio) * pdf);
-        value[i] = if shines & (reflected > 0.0) { share } else { 0.0 };
+        value[i] = select_unpredictable(shines & (reflected > 0.0), share, 0.0);
         blur[i] *= if shown < 0.0 { -ROUNDINGS } else { ROUNDINGS };
     }
     let (mut start, mut along, mut length) = ([ZERO; 3], [ZERO; 3], ZERO);
@@ -249,11 +267,11 @@ fn ask(
             length[i] += way * way;
         }
     }
-    let mut goes = [false; LANES];
+    let mut goes = [0; LANES];
     for i in 0..LANES {
         length[i] = length[i].sqrt();
         // Any comparison with NaN is false.
-        goes[i] = scatters[i] & (value[i] > 0.0) & (value[i] < f32::INFINITY);
+        goes[i] = scatters[i] & mask((value[i] > 0.0) & (value[i] <= f32::MAX));
     }
     for axis in 0..3 {
         for i in 0..LANES {
@@ -267,26 +285,25 @@ fn ask(
             share[band][i] = throughput[band][i] * value[i];
         }
     }
-    let (picked, count) = compress(&goes);
-    let at = shadows.len;
+    let (going, at) = (Compress::new(&goes, instructions), shadows.len);
     for axis in 0..3 {
-        put(&mut shadows.start[axis], at, &start[axis], &picked);
-        put(&mut shadows.along[axis], at, &along[axis], &picked);
-        put(&mut shadows.carried.throughput[axis], at, &share[axis], &picked);
+        going.put(&start[axis], &mut shadows.start[axis], at);
+        going.put(&along[axis], &mut shadows.along[axis], at);
+        going.put(&share[axis], &mut shadows.carried.throughput[axis], at);
     }
-    put(&mut shadows.reach, at, &length, &picked);
-    put(&mut shadows.lamp, at, &places.lamp, &picked);
-    put(&mut shadows.carried.ray, at, ray, &picked);
-    shadows.len += count;
+    going.put(&length, &mut shadows.reach, at);
+    going.put(&places.lamp, &mut shadows.lamp, at);
+    going.put(ray, &mut shadows.carried.ray, at);
+    shadows.len += going.count;
 }
 
 /// Where rays start (m), their unit directions about the normals with density cos θ / π (1/sr), that density, and
 /// whether there is one, as [`super::super::kernels::scatter`] has them.
 #[inline(always)]
-fn scatter(hits: &Hits, [u, v]: [Row; 2]) -> ([Row; 3], [Row; 3], Row, [bool; LANES]) {
+fn scatter(hits: &Hits, [u, v]: [Row; 2]) -> ([Row; 3], [Row; 3], Row, Mask) {
     let [nx, ny, nz] = &hits.normal;
     let (mut along, mut start, mut pdf) = ([ZERO; 3], [ZERO; 3], ZERO);
-    let mut goes = [false; LANES];
+    let mut goes = [0; LANES];
     let (mut a, mut b) = (ZERO, ZERO);
     for i in 0..LANES {
         [a[i], b[i]] = disk_point([u[i], v[i]]);
@@ -307,7 +324,7 @@ fn scatter(hits: &Hits, [u, v]: [Row; 2]) -> ([Row; 3], [Row; 3], Row, [bool; LA
         along[1][i] = dy * inverse;
         along[2][i] = dz * inverse;
         pdf[i] = c * FRAC_1_PI;
-        goes[i] = (dx * x + dy * y + dz * z > 0.0) & (c > 0.0);
+        goes[i] = mask((dx * x + dy * y + dz * z > 0.0) & (c > 0.0));
     }
     for axis in 0..3 {
         for i in 0..LANES {
@@ -323,7 +340,7 @@ fn scatter(hits: &Hits, [u, v]: [Row; 2]) -> ([Row; 3], [Row; 3], Row, [bool; LA
 fn disk_point([u, v]: [f32; 2]) -> [f32; 2] {
     let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
     let flat = a.abs() > b.abs();
-    let (radius, other) = if flat { (a, b) } else { (b, a) };
+    let (radius, other) = (select_unpredictable(flat, a, b), select_unpredictable(flat, b, a));
     let ratio = if radius == 0.0 { 0.0 } else { other / radius };
     // Taylor's series as far as π/4: what is left out is below 4 · 10⁻⁹.
     let angle = FRAC_PI_4 * ratio;
@@ -331,7 +348,8 @@ fn disk_point([u, v]: [f32; 2]) -> [f32; 2] {
     let sine = 1.0 + x * (-1.0 / 6.0 + x * (1.0 / 120.0 + x * (-1.0 / 5_040.0 + x / 362_880.0)));
     let cosine = -0.5 + x * (1.0 / 24.0 + x * (-1.0 / 720.0 + x / 40_320.0));
     let (sine, cosine) = (angle * sine, 1.0 + x * cosine);
-    if flat { [radius * cosine, radius * sine] } else { [radius * sine, radius * cosine] }
+    let (near, far) = (radius * cosine, radius * sine);
+    [select_unpredictable(flat, near, far), select_unpredictable(flat, far, near)]
 }
 
 /// Leaves out rays that meet nothing of a sphere for sure.
@@ -339,7 +357,7 @@ fn disk_point([u, v]: [f32; 2]) -> [f32; 2] {
 fn keep_those_that_may_meet(
     (centre, radius): &Sphere,
     (start, along): (&[Row; 3], &[Row; 3]),
-    goes: &mut [bool; LANES],
+    goes: &mut Mask,
 ) {
     let (mut foot, mut squared) = (ZERO, ZERO);
     for axis in 0..3 {
@@ -354,28 +372,8 @@ fn keep_those_that_may_meet(
         let is_ahead = (foot[i] >= 0.0) | (squared[i] <= within);
         // Roundings of what is subtracted.
         let slack = ROUNDINGS * squared[i];
-        goes[i] &= (*radius >= 0.0) & is_ahead & (squared[i] - foot[i] * foot[i] <= within + slack);
-    }
-}
-
-/// The lanes of a mask in order, and how many there are: without a branch, as nothing tells beforehand which they
-/// are.
-#[inline(always)]
-fn compress(mask: &[bool; LANES]) -> ([u8; LANES], usize) {
-    let (mut picked, mut count) = ([0; LANES], 0);
-    for (lane, &is_in) in (0_u8..).zip(mask) {
-        picked[count & (LANES - 1)] = lane;
-        count += usize::from(is_in);
-    }
-    (picked, count)
-}
-
-/// Puts the picked lanes of a row into a column, which has room for all lanes.
-#[inline(always)]
-fn put<T: Copy>(column: &mut [T], at: usize, row: &[T; LANES], picked: &[u8; LANES]) {
-    let to = &mut column[at..at + LANES];
-    for (to, &lane) in to.iter_mut().zip(picked) {
-        *to = row[usize::from(lane) & (LANES - 1)];
+        let is_near = squared[i] - foot[i] * foot[i] <= within + slack;
+        goes[i] &= mask((*radius >= 0.0) & is_ahead & is_near);
     }
 }
 

@@ -1,6 +1,8 @@
 //! The lamps of a plain scene in single precision, and places that are chosen on them.
 #![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
+use std::hint::select_unpredictable;
+
 use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::glam::DVec3;
 
@@ -20,13 +22,14 @@ struct Lamp {
     magnitudes: [f32; 3],
     /// m²; 1 of a point, whose density is that of its choice.
     area: f32,
-    two_sided: bool,
-    is_point: bool,
+    /// 1 where it holds.
+    two_sided: f32,
+    is_point: f32,
 }
 
 impl Lamp {
     fn point(at: DVec3, origin: DVec3) -> Self {
-        Self { corner: single(at - origin), area: 1.0, is_point: true, ..Self::default() }
+        Self { corner: single(at - origin), area: 1.0, is_point: 1.0, ..Self::default() }
     }
 
     fn triangle(own: &AreaLight, origin: DVec3) -> Self {
@@ -37,8 +40,8 @@ impl Lamp {
             normal: single(own.shape.normal),
             magnitudes: single(own.magnitudes),
             area: round(own.shape.area),
-            two_sided: own.two_sided,
-            is_point: false,
+            two_sided: f32::from(u8::from(own.two_sided)),
+            is_point: 0.0,
         }
     }
 }
@@ -69,7 +72,7 @@ impl Lights {
     }
 }
 
-/// Places on lamps, one for each of sixteen points.
+/// Places on lamps, one for each of sixteen points. What holds is above 0.
 pub(super) struct Places {
     /// From the point (m).
     pub(super) way: [Row; 3],
@@ -78,8 +81,8 @@ pub(super) struct Places {
     pub(super) magnitudes: [Row; 3],
     /// Of the place (1/m²).
     pub(super) density: Row,
-    pub(super) two_sided: [bool; LANES],
-    pub(super) is_point: [bool; LANES],
+    pub(super) two_sided: Row,
+    pub(super) is_point: Row,
     pub(super) lamp: [u32; LANES],
 }
 
@@ -91,8 +94,8 @@ pub(super) fn place(lights: &Lights, points: &[Row; 3], [mut u, v]: [Row; 2]) ->
         normal: [ZERO; 3],
         magnitudes: [ZERO; 3],
         density: ZERO,
-        two_sided: [false; LANES],
-        is_point: [false; LANES],
+        two_sided: ZERO,
+        is_point: ZERO,
         lamp: [0; LANES],
     };
     let below = &*lights.below;
@@ -100,11 +103,12 @@ pub(super) fn place(lights: &Lights, points: &[Row; 3], [mut u, v]: [Row; 2]) ->
     if lights.lamps.len() > 1 {
         let (mut start, mut end) = (ZERO, [1.0; LANES]);
         for (number, of_lamp) in (0_u32..).zip(below.windows(2)) {
+            let (from, to) = (of_lamp[0], of_lamp[1]);
             for i in 0..LANES {
-                let is_in = (of_lamp[0] <= u[i]) & (of_lamp[0] < of_lamp[1]);
-                start[i] = if is_in { of_lamp[0] } else { start[i] };
-                end[i] = if is_in { of_lamp[1] } else { end[i] };
-                places.lamp[i] = if is_in { number } else { places.lamp[i] };
+                let is_in = (from <= u[i]) & (from < to);
+                start[i] = select_unpredictable(is_in, from, start[i]);
+                end[i] = select_unpredictable(is_in, to, end[i]);
+                places.lamp[i] = select_unpredictable(is_in, number, places.lamp[i]);
             }
         }
         for i in 0..LANES {
@@ -124,21 +128,24 @@ pub(super) fn place(lights: &Lights, points: &[Row; 3], [mut u, v]: [Row; 2]) ->
         for axis in 0..3 {
             let (corner, normal) = (lamp.corner[axis], lamp.normal[axis]);
             let (along, across) = (lamp.edges[0][axis], lamp.edges[1][axis]);
+            let magnitude = lamp.magnitudes[axis];
+            let (way, normals) = (&mut places.way[axis], &mut places.normal[axis]);
+            let magnitudes = &mut places.magnitudes[axis];
             for i in 0..LANES {
                 let is_own = places.lamp[i] == number;
                 let there = (corner - points[axis][i]) + (along * second[i] + across * third[i]);
-                places.way[axis][i] = if is_own { there } else { places.way[axis][i] };
-                places.normal[axis][i] = if is_own { normal } else { places.normal[axis][i] };
-                let magnitudes = &mut places.magnitudes[axis][i];
-                *magnitudes = if is_own { lamp.magnitudes[axis] } else { *magnitudes };
+                way[i] = select_unpredictable(is_own, there, way[i]);
+                normals[i] = select_unpredictable(is_own, normal, normals[i]);
+                magnitudes[i] = select_unpredictable(is_own, magnitude, magnitudes[i]);
             }
         }
-        let inverse = 1.0 / lamp.area;
+        let (inverse, two_sided, is_point) = (1.0 / lamp.area, lamp.two_sided, lamp.is_point);
         for i in 0..LANES {
             let is_own = places.lamp[i] == number;
-            places.density[i] = if is_own { chance[i] * inverse } else { places.density[i] };
-            places.two_sided[i] = if is_own { lamp.two_sided } else { places.two_sided[i] };
-            places.is_point[i] = if is_own { lamp.is_point } else { places.is_point[i] };
+            let density = &mut places.density[i];
+            *density = select_unpredictable(is_own, chance[i] * inverse, *density);
+            places.two_sided[i] = select_unpredictable(is_own, two_sided, places.two_sided[i]);
+            places.is_point[i] = select_unpredictable(is_own, is_point, places.is_point[i]);
         }
     }
     places

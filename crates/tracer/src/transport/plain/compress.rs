@@ -1,0 +1,124 @@
+//! Lanes of a mask put side by side.
+
+use etendue_geometry::block::LANES;
+
+use super::kernel::Mask;
+
+/// The lanes of a mask, in order, which go side by side.
+pub(super) struct Compress {
+    /// The lanes, and 0 behind the last.
+    lanes: [u8; LANES],
+    pub(super) count: usize,
+    #[cfg(target_arch = "x86_64")]
+    by_register: Option<(pulp::x86::V4, u16)>,
+}
+
+/// What has an instruction of AVX-512 that does so.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Instructions {
+    #[cfg(target_arch = "x86_64")]
+    simd: Option<pulp::x86::V4>,
+}
+
+impl Instructions {
+    /// Those of this machine.
+    pub(super) fn of_machine() -> Self {
+        Self {
+            #[cfg(target_arch = "x86_64")]
+            simd: pulp::x86::V4::try_new(),
+        }
+    }
+}
+
+impl Compress {
+    /// Without a branch, as nothing tells beforehand which they are.
+    #[inline(always)]
+    pub(super) fn new(mask: &Mask, instructions: Instructions) -> Self {
+        let Instructions {
+            #[cfg(target_arch = "x86_64")]
+            simd,
+        } = instructions;
+        #[cfg(target_arch = "x86_64")]
+        if let Some(simd) = simd {
+            let register = pulp::cast(*mask);
+            let bits = simd.avx512f._mm512_test_epi32_mask(register, register);
+            let by_register = Some((simd, bits));
+            return Self { lanes: [0; LANES], count: bits.count_ones() as usize, by_register };
+        }
+        let (mut lanes, mut count) = ([0; LANES], 0);
+        for (lane, &is_in) in (0_u8..).zip(mask) {
+            lanes[count & (LANES - 1)] = lane;
+            count += usize::from(is_in != 0);
+        }
+        Self {
+            lanes,
+            count,
+            #[cfg(target_arch = "x86_64")]
+            by_register: None,
+        }
+    }
+
+    /// Puts the lanes of a row into a column, which has room for all.
+    #[inline(always)]
+    pub(super) fn put<T: Word>(&self, row: &[T; LANES], column: &mut [T], at: usize) {
+        let Some(to) = column[at..].first_chunk_mut::<LANES>() else { return };
+        #[cfg(target_arch = "x86_64")]
+        if let Some((simd, bits)) = self.by_register {
+            *to = T::compress(simd, bits, *row);
+            return;
+        }
+        for (to, &lane) in to.iter_mut().zip(&self.lanes) {
+            *to = row[usize::from(lane) & (LANES - 1)];
+        }
+    }
+}
+
+/// A number of 32 bits.
+pub(super) trait Word: Copy {
+    /// The lanes of a mask side by side, and 0 behind them.
+    #[cfg(target_arch = "x86_64")]
+    fn compress(simd: pulp::x86::V4, bits: u16, row: [Self; LANES]) -> [Self; LANES];
+}
+
+impl Word for f32 {
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn compress(simd: pulp::x86::V4, bits: u16, row: [Self; LANES]) -> [Self; LANES] {
+        pulp::cast(simd.avx512f._mm512_maskz_compress_ps(bits, pulp::cast(row)))
+    }
+}
+
+impl Word for u32 {
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn compress(simd: pulp::x86::V4, bits: u16, row: [Self; LANES]) -> [Self; LANES] {
+        pulp::cast(simd.avx512f._mm512_maskz_compress_epi32(bits, pulp::cast(row)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lanes_come_side_by_side_by_instruction_and_without() {
+        let row: [u32; LANES] = std::array::from_fn(|lane| 100 + u32::try_from(lane).unwrap());
+        for mask in [0_u32, 1, 0x8000, 0xffff, 0x5a5a, 0x0ff0, 0x1234] {
+            let mask: Mask = std::array::from_fn(|lane| (mask >> lane & 1) * u32::MAX);
+            let is_in = |(&own, is_in): (&u32, u32)| (is_in != 0).then_some(own);
+            let wanted: Vec<u32> = row.iter().zip(mask).filter_map(is_in).collect();
+            let none = Instructions {
+                #[cfg(target_arch = "x86_64")]
+                simd: None,
+            };
+            for instructions in [Instructions::of_machine(), none] {
+                let compress = Compress::new(&mask, instructions);
+                let mut column = [7_u32; 3 + LANES];
+                compress.put(&row, &mut column, 3);
+                assert_eq!(compress.count, wanted.len());
+                assert_eq!(column[3..3 + compress.count], wanted[..]);
+                assert_eq!(column[..3], [7; 3]);
+            }
+        }
+    }
+}
