@@ -228,13 +228,16 @@ fn side_by_side<const N: usize>(
     first: usize,
     directions: &[[u32; BITS]; DIMENSIONS],
 ) -> [[f64; 2]; N] {
-    let mut out = [[0.0; 2]; N];
-    for (k, (high, scrambles)) in upper_bits(keys, seed, first, directions).into_iter().enumerate()
-    {
+    let mut rows = [[0.0; N]; 2];
+    for (row, (high, scrambles)) in rows.iter_mut().zip(upper_bits(keys, seed, first, directions)) {
         for i in 0..N {
             let low = hash(high[i] ^ scrambles[i]) >> 11;
-            out[i][k] = (f64::from(high[i]) + f64::from(low) / TWO_TO_21) / TWO_TO_32;
+            row[i] = (f64::from(high[i]) + f64::from(low) / TWO_TO_21) / TWO_TO_32;
         }
+    }
+    let mut out = [[0.0; 2]; N];
+    for i in 0..N {
+        out[i] = [rows[0][i], rows[1][i]];
     }
     out
 }

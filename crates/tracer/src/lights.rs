@@ -188,6 +188,17 @@ impl Lights {
         Some((area_light, &self.area_light_bands[number * count..(number + 1) * count]))
     }
 
+    /// Where light `index` is (m) and its bands, if it is a point that shines alike to all sides and stands still.
+    #[inline(always)]
+    pub(crate) fn plain_point(&self, index: usize, count: usize) -> Option<(DVec3, &[f64])> {
+        match self.lights.get(index)? {
+            &Light { kind: LightKind::Point(at), motion: None, .. } => {
+                Some((at, self.bands_of(index, count)))
+            }
+            _ => None,
+        }
+    }
+
     /// The number among all lights of a triangle that shines.
     #[inline]
     pub(crate) fn index_of(&self, [placement, triangle]: [u32; 2]) -> Option<usize> {

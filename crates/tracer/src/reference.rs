@@ -399,11 +399,14 @@ impl<'a> SurfacePoint<'a> {
 
     /// Values at the three corners, weighted.
     fn mix<const N: usize>(&self, values: &Vertices<N>) -> [f64; N] {
-        let corners = self.mesh.triangles[self.triangle].map(|c| values.get(c as usize));
-        std::array::from_fn(|k| {
-            let [a, b, c] = corners.map(|corner| f64::from(corner[k]));
-            self.weights[0] * a + self.weights[1] * b + self.weights[2] * c
-        })
+        let [a, b, c] = self.mesh.triangles[self.triangle];
+        let (a, b, c) = (values.get(a as usize), values.get(b as usize), values.get(c as usize));
+        let [of_a, of_b, of_c] = self.weights;
+        let mut mixed = [0.0; N];
+        for k in 0..N {
+            mixed[k] = of_a * f64::from(a[k]) + of_b * f64::from(b[k]) + of_c * f64::from(c[k]);
+        }
+        mixed
     }
 
     /// Texture coordinates of a set; (0, 0) when the mesh has no such set.

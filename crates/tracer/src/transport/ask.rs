@@ -69,6 +69,11 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 targets.set_triangle(lane, area_light, weights, chance);
                 continue;
             }
+            if let Some((point, bands)) = lights.plain_point(index, count) {
+                radiance.copy_from_slice(bands);
+                targets.set_point(lane, picks.index[lane], point, chance);
+                continue;
+            }
             let one = ((index, chance), [squares[0][lane], squares[1][lane]]);
             let receiver = seen.receiver(lane, bsdfs.get(lane));
             let ray = workspace.now.carried.ray[i] as usize;

@@ -250,6 +250,21 @@ impl Targets {
         self.two_sided[lane] = f64::from(u8::from(triangle.two_sided));
     }
 
+    /// Sets what a lane aims at: the light of that number, a point (m) that was chosen with this chance.
+    #[inline(always)]
+    pub(super) fn set_point(&mut self, lane: usize, light: u32, point: DVec3, chance: f64) {
+        self.id[lane] = [MISS; 2];
+        self.light[lane] = light;
+        let [first, rest @ ..] = &mut self.place;
+        put(first, lane, point);
+        rest.iter_mut().for_each(|part| put(part, lane, DVec3::ZERO));
+        put(&mut self.normal, lane, DVec3::ZERO);
+        put(&mut self.magnitudes, lane, DVec3::ZERO);
+        self.density[lane] = chance;
+        (self.is_far[lane], self.is_delta[lane], self.is_triangle[lane]) = (0.0, 1.0, 0.0);
+        self.two_sided[lane] = 0.0;
+    }
+
     /// Sets what a lane aims at: a unit direction of this density (1/sr) to a light of that number; nothing where
     /// the density is 0.
     #[inline(always)]
