@@ -24,6 +24,10 @@ const MOST_IMPORTANCE: f32 = 1e30;
 /// Points are looked at no farther out than so many extents of all lights: squares and their inverses stay numbers.
 const FARTHEST: f64 = 1e6;
 
+/// Share of the largest cosine that any light of a branch may have, in what is taken for all of them; the rest is that
+/// of the branch's centre. None is asked less often than by this share of its bound.
+const SHARE_OF_MOST: f32 = 0.125;
+
 /// What rounding may take from a cosine in single precision, with room.
 const ROOM: f32 = 1e-5;
 
@@ -299,7 +303,7 @@ impl<const N: usize> Clusters<N> {
                 let angle = less([cosine, other(cosine)], [cone[0][k], cone[1][k]]);
                 let [cosine, _] = less(angle, [ball[0][k], ball[1][k]]);
                 // A light at the very end of its reach is met by a bound with room for rounding.
-                let facing = if cosine > ROOM { cosine } else { ROOM };
+                let facing = between(if cosine > ROOM { cosine } else { ROOM }, angle[0]);
                 sent[k] = if cosine + ROOM > reach[k] { sent[k] * facing } else { 0.0 };
             }
         }
@@ -315,9 +319,9 @@ impl<const N: usize> Clusters<N> {
             }
             // The most that the cosine is under which the point gets the light.
             for k in 0..N {
-                let cosine = cosine(above[k] * inverse[k]);
-                let [cosine, _] = less([cosine, other(cosine)], [ball[0][k], ball[1][k]]);
-                let facing = if cosine > ROOM { cosine } else { ROOM };
+                let own = cosine(above[k] * inverse[k]);
+                let [cosine, _] = less([own, other(own)], [ball[0][k], ball[1][k]]);
+                let facing = between(if cosine > ROOM { cosine } else { ROOM }, own);
                 let facing = if cosine > -ROOM { facing } else { 0.0 };
                 let facing = if length[k] > 0.0 { facing } else { 1.0 };
                 let is_within = squared[k] <= radius[k] * radius[k];
@@ -326,6 +330,15 @@ impl<const N: usize> Clusters<N> {
         }
         (sent, squared)
     }
+}
+
+/// What is taken for a cosine of which the most is known and what it is at the centre: nearer to the mean over the
+/// lights than either.
+#[inline(always)]
+fn between(most: f32, at_centre: f32) -> f32 {
+    let centre = if at_centre > 0.0 { at_centre } else { 0.0 };
+    let centre = if centre < most { centre } else { most };
+    SHARE_OF_MOST * most + (1.0 - SHARE_OF_MOST) * centre
 }
 
 /// A cosine that rounding may have put beyond 1.
