@@ -378,9 +378,10 @@ def goals(results):
     """Which goals are met."""
     lines = ["## Goals", "", "Times faster than Mitsuba with the sampler that is its best at the job, at the same "
              "samples, and at one error: that of the calmest pixels and that of the median pixel, of which the lesser "
-             "counts.", "",
-             "| job | at the same samples | goal | | at one noise | at one median | goal | |",
-             "|---|---|---|---|---|---|---|---|"]
+             "counts. *At most* is what it would be if nothing but the accelerator in its robust mode took time: where "
+             "that is below the goal, nothing but a faster accelerator reaches it.", "",
+             "| job | at the same samples | at most | goal | | at one noise | at one median | goal | |",
+             "|---|---|---|---|---|---|---|---|---|"]
     middle = lambda result, title: statistics.median(result["seconds"][title])
     verdict = lambda value, goal: "met" if value >= goal else "**missed**"
     for job, (same, error) in GOALS.items():
@@ -390,7 +391,8 @@ def goals(results):
             continue
         time = min(middle(result, t) / middle(result, "etendue") for t in titles)
         costs = [min(cost(result, t, which) for t in titles) for which in range(2)]
-        lines.append(f"| {job} | {time:.2f} | ≥ {same} | {verdict(time, same)} "
+        most = min(middle(result, t) for t in titles) / result["bound"]["robust"]
+        lines.append(f"| {job} | {time:.2f} | {most:.2f} | ≥ {same} | {verdict(time, same)} "
                      f"| {known(costs[0])} | {known(costs[1])} | ≥ {error} | {verdict(min(costs), error)} |")
     straight = results.get("Cornell box, path of 5 bounces")
     for job, manner in [(LENS, "each band by its own index"), (SHARED, "all bands as at the design wavelength")]:
