@@ -105,6 +105,8 @@ def main():
     parser.add_argument("--binary", help="the command to measure; that of the release build when absent")
     arguments = parser.parse_args()
     program.enter("decision-peers", ["numpy"])
+    # Before the page is changed, which would count as a change of what was measured.
+    machine = section.machine()
     etendue = arguments.binary or program.built("etendue")
     lines = ["| decided | scene | overruled by | as planned (s) | overruled (s) | overruled takes | pictures differ by |",
              "|---|---|---|---|---|---|---|"]
@@ -124,12 +126,12 @@ def main():
                          f"{section.spread(times[1], 2)} | {ratio:.2f} times as long | "
                          f"{difference(pictures[0], pictures[1]):.1e} |")
             print(lines[-1], flush=True)
-    text = (f"{section.machine()}; {os.cpu_count()} processors; medians of {arguments.rounds} turns, with the least and "
+    text = (f"{machine}; {os.cpu_count()} processors; medians of {arguments.rounds} turns, with the least and "
             "the greatest; of everything from the scene's text to the files.")
     section.put(arguments.output, "decisions", text + "\n\n" + "\n".join(lines))
     with tempfile.TemporaryDirectory() as folder:
         table = overridden(etendue, arguments.rounds, Path(folder))
-    text = (f"{section.machine()}; {os.cpu_count()} processors; processor time of the whole program, medians of "
+    text = (f"{machine}; {os.cpu_count()} processors; processor time of the whole program, medians of "
             f"{arguments.rounds} turns; the tolerance is {overrides.TOLERANCE}.")
     section.put(arguments.output, "overrides", text + "\n\n" + table)
 
