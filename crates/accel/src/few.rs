@@ -148,10 +148,10 @@ impl FewTriangles {
                 // Some roundings of the largest coordinate.
                 let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
                 let beyond = DVec3::splat(largest * 4.0 * f64::from(f32::EPSILON));
-                let around = [bounds.min - beyond, bounds.max + beyond];
+                let grown = [bounds.min - beyond, bounds.max + beyond];
                 if let Some(run) = self.runs.last_mut() {
                     run.faces.end += 1;
-                    run.bounds = around.map(|corner| corner.to_array().map(round));
+                    run.bounds = grown.map(|corner| corner.to_array().map(round));
                 }
                 self.faces.push(face);
                 (number, held) = (number + count, held + count);
@@ -395,23 +395,27 @@ mod tests {
     /// From within, aimed at the edges of a closed body and beside its corners.
     #[test]
     fn no_ray_slips_through_an_edge() {
-        for body in [icosahedron(), frustum()] {
-            no_ray_slips_through_an_edge_of(body);
+        // As long as scenes may be.
+        for scale in [1e-12, 1.0, 0.5e12] {
+            no_ray_slips_through_an_edge_of(icosahedron(), scale, 0.7);
+            no_ray_slips_through_an_edge_of(frustum(), scale, 0.45);
         }
     }
 
-    fn no_ray_slips_through_an_edge_of(body: Mesh) {
-        let geometry = Geometry::alone(body, Transform::IDENTITY);
+    /// From so far about the middle, in units of the mesh, which is scaled.
+    fn no_ray_slips_through_an_edge_of(body: Mesh, scale: f64, inside: f64) {
+        let place = Transform::new(DMat3::from_diagonal(DVec3::splat(scale)), DVec3::ZERO);
+        let geometry = Geometry::alone(body, place);
         let few = FewTriangles::of(&geometry).unwrap();
         let mut rays = RayBatch::default();
         let body = &geometry.meshes[0];
         for k in 0..100_000_u32 {
-            let start = DVec3::from([0.377, 0.913, 0.151].map(|step| 0.45 * spread(k, step)));
+            let start = DVec3::from([0.377, 0.913, 0.151].map(|step| inside * spread(k, step)));
             let [a, b, _] = body.corners(k as usize % body.triangles.len());
             // To 10⁻⁶ of its length from the corners, where all edges are near.
             let near = 10.0_f64.powf(-6.0 * (f64::from(k) * 0.731).fract());
             let target = a + (b - a) * (0.5 * near);
-            rays.push(start, (target - start).normalize());
+            rays.push(start * scale, (target - start).normalize());
         }
         rays.precision = HitPrecision::Single;
         let mut blocks = RayBlocks::default();

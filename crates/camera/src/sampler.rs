@@ -168,27 +168,28 @@ pub fn squares_of_pair(
 /// Samples of which numbers are drawn again and again: what is the same for all pairs of dimensions is worked out once.
 #[derive(Debug, Default)]
 pub struct SampleKeys {
-    samples: Vec<(PixelSamples, u32)>,
-    /// Those of the first pair, where all are of [`Sampler::Sobol`]; else empty.
+    /// Those of the first pair, where all are of [`Sampler::Sobol`].
     keys: Vec<SobolKey>,
+    /// The samples, where they are not.
+    samples: Vec<(PixelSamples, u32)>,
 }
 
 impl SampleKeys {
     /// Makes them those of `samples`, which are a pixel's samples and an index.
-    pub fn refill(&mut self, samples: impl Iterator<Item = (PixelSamples, u32)>) {
-        let Self { samples: all, keys } = self;
-        all.clear();
-        all.extend(samples);
-        keys.clear();
-        if all.iter().all(|(pixel, _)| pixel.sampler == Sampler::Sobol) {
-            keys.extend(all.iter().map(|&(pixel, index)| pixel.key_of_set(index, 0)));
+    pub fn refill(&mut self, samples: impl Iterator<Item = (PixelSamples, u32)> + Clone) {
+        self.keys.clear();
+        self.samples.clear();
+        if samples.clone().all(|(pixel, _)| pixel.sampler == Sampler::Sobol) {
+            self.keys.extend(samples.map(|(pixel, index)| pixel.key_of_set(index, 0)));
+        } else {
+            self.samples.extend(samples);
         }
     }
 
     /// [`PixelSamples::square`] of one pair of dimensions for each of some samples, by their numbers: `out` is
     /// refilled.
     pub fn squares_of_pair(&self, picked: &[u32], pair: u32, out: &mut Vec<[f64; 2]>) {
-        if self.keys.is_empty() {
+        if !self.samples.is_empty() {
             let samples = picked.iter().map(|&number| self.samples[number as usize]);
             squares_of_pair(samples, pair, out);
             return;
@@ -204,7 +205,7 @@ impl SampleKeys {
     pub fn floats_of_pair(&self, picked: &[u32], pair: u32, out: &mut [Vec<f32>; 2]) {
         out.iter_mut().for_each(|column| column.resize(picked.len(), 0.0));
         let [x, y] = out;
-        if self.keys.is_empty() {
+        if !self.samples.is_empty() {
             let mut squares = Vec::new();
             self.squares_of_pair(picked, pair, &mut squares);
             for ((square, x), y) in squares.into_iter().zip(x).zip(y) {

@@ -33,6 +33,23 @@ pub(super) struct FewTriangle {
     pub(super) corner: DVec3,
 }
 
+/// The ray of a lane.
+struct Line {
+    origin: DVec3,
+    direction: DVec3,
+    moment: DVec3,
+    t_min: f64,
+    t_max: f64,
+}
+
+impl Line {
+    fn of(block: &RayBlock, lane: usize) -> Self {
+        let (origin, direction) = (vector(&block.origin, lane), vector(&block.direction, lane));
+        let [t_min, t_max] = [block.t_min[lane], block.t_max[lane]].map(f64::from);
+        Self { origin, direction, moment: origin.cross(direction), t_min, t_max }
+    }
+}
+
 /// A hit on a triangle of the list: its number, distance (m), and weights of the second and third corners.
 pub(super) struct Hit {
     pub(super) number: usize,
@@ -40,43 +57,40 @@ pub(super) struct Hit {
     pub(super) weights: [f64; 2],
 }
 
-/// The hits of the ray of a lane with triangles in turn, each no farther than those before where `is_closest`.
-fn hits(few: &FewTriangles, block: &RayBlock, lane: usize, is_closest: bool) -> Option<Hit> {
-    let (origin, direction) = (vector(&block.origin, lane), vector(&block.direction, lane));
-    let moment = origin.cross(direction);
-    let [t_min, mut t_max] = [&block.t_min, &block.t_max].map(|limits| f64::from(limits[lane]));
-    let mut nearest = None;
-    for (number, triangle) in few.triangles.iter().enumerate() {
-        let mut sides = triangle.lengths;
-        for (side, &edge) in sides.iter_mut().zip(&triangle.edges) {
+impl FewTriangle {
+    /// The distance (m) and weights with which a line meets it between its ends.
+    fn hit(&self, edges: &[PluckerEdge], line: &Line) -> Option<(f64, [f64; 2])> {
+        let mut sides = self.lengths;
+        for (side, &edge) in sides.iter_mut().zip(&self.edges) {
             // The distance of the lines times the sine of their angle (m): the same of both triangles of an edge.
-            let PluckerEdge { along, moment: of_edge } = &few.edges[edge];
-            *side *= direction.dot(*of_edge) + moment.dot(*along);
+            let PluckerEdge { along, moment } = &edges[edge];
+            *side *= line.direction.dot(*moment) + line.moment.dot(*along);
         }
         if !(sides.iter().all(|&side| side >= 0.0) || sides.iter().all(|&side| side <= 0.0)) {
-            continue;
+            return None;
         }
-        let height = (triangle.corner - origin).dot(triangle.normal);
-        let t = height / direction.dot(triangle.normal);
-        // A ray in the triangle's plane meets it nowhere.
-        if t > t_min && t <= t_max && t <= f64::MAX {
-            let over = 1.0 / (sides[0] + sides[1] + sides[2]);
-            nearest = Some(Hit { number, t, weights: [sides[1] * over, sides[2] * over] });
-            if !is_closest {
-                break;
-            }
-            t_max = t;
-        }
+        let height = (self.corner - line.origin).dot(self.normal);
+        let t = height / line.direction.dot(self.normal);
+        let over = 1.0 / (sides[0] + sides[1] + sides[2]);
+        // A line in the triangle's plane meets it nowhere.
+        let is_between = t > line.t_min && t <= line.t_max && t <= f64::MAX;
+        is_between.then(|| (t, [sides[1] * over, sides[2] * over]))
     }
-    nearest
 }
 
 /// The closest hit of the ray of a lane; of those in one place the last.
 pub(super) fn closest(few: &FewTriangles, block: &RayBlock, lane: usize) -> Option<Hit> {
-    hits(few, block, lane, true)
+    let (mut line, mut nearest) = (Line::of(block, lane), None);
+    for (number, triangle) in few.triangles.iter().enumerate() {
+        let Some((t, weights)) = triangle.hit(&few.edges, &line) else { continue };
+        nearest = Some(Hit { number, t, weights });
+        line.t_max = t;
+    }
+    nearest
 }
 
 /// Whether anything is between the ends of the ray of a lane.
 pub(super) fn is_occluded(few: &FewTriangles, block: &RayBlock, lane: usize) -> bool {
-    hits(few, block, lane, false).is_some()
+    let line = Line::of(block, lane);
+    few.triangles.iter().any(|triangle| triangle.hit(&few.edges, &line).is_some())
 }

@@ -2,7 +2,7 @@
 //! triangles in one plane often are, and triangles alone.
 //!
 //! The plane is met first, then the place in it is held against each side. Where roundings leave it open on which
-//! side of an outline a ray passes, the block is in doubt, and [`super::kernels`] decide in double precision.
+//! side of an outline a ray passes, it is in doubt, and [`super::edges`] decide in double precision.
 #![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
 use std::hint::select_unpredictable;
@@ -98,7 +98,7 @@ impl Face {
             axes: [axis(plane.x), axis(plane.y)],
             sides: [1, 2, 3].map(side),
             diagonal: diagonal.unwrap_or([1.0, 0.0, 0.0]),
-            weights: [own, other.unwrap_or(own)].map(|own| plane.weights(normal, own)),
+            weights: [own, quad.and(other).unwrap_or(own)].map(|own| plane.weights(normal, own)),
             triangles: first..first + if quad.is_some() { 2 } else { 1 },
         })
     }

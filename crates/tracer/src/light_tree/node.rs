@@ -25,7 +25,7 @@ const MOST_IMPORTANCE: f32 = 1e30;
 const FARTHEST: f64 = 1e6;
 
 /// Share of the largest cosine that any light of a branch may have, in what is taken for all of them; the rest is that
-/// of the branch's centre. None is asked less often than by this share of its bound.
+/// of the branch's centre. What can bring light keeps this share of each of its two bounds.
 const SHARE_OF_MOST: f32 = 0.125;
 
 /// What rounding may take from a cosine in single precision, with room.
@@ -199,7 +199,7 @@ impl Node {
     pub(super) fn views([a, b]: [&Self; 2], [from, to]: [&Viewer; 2]) -> [View; 2] {
         let points = spread([&from.point, &to.point]);
         let normals = spread([&from.normal, &to.normal]);
-        let both = Clusters::beside(&a.clusters, &b.clusters);
+        let both = Clusters::of_two(&a.clusters, &b.clusters);
         let (sent, squared) = both.sent(&points, Some(&normals));
         let mut views = [View::default(), View::default()];
         for k in 0..WIDTH {
@@ -237,7 +237,7 @@ fn twice(a: &[f32; WIDTH], b: &[f32; WIDTH]) -> [f32; TWICE] {
 impl Clusters<TWICE> {
     /// The branches of two nodes. (What maps arrays is a function of its own, compiled without wide registers.)
     #[inline(always)]
-    fn beside(a: &Clusters<WIDTH>, b: &Clusters<WIDTH>) -> Self {
+    fn of_two(a: &Clusters<WIDTH>, b: &Clusters<WIDTH>) -> Self {
         let (mut centre, mut axis) = ([[0.0; TWICE]; 3], [[0.0; TWICE]; 3]);
         for k in 0..3 {
             centre[k] = twice(&a.centre[k], &b.centre[k]);
@@ -303,7 +303,7 @@ impl<const N: usize> Clusters<N> {
                 let angle = less([cosine, other(cosine)], [cone[0][k], cone[1][k]]);
                 let [cosine, _] = less(angle, [ball[0][k], ball[1][k]]);
                 // A light at the very end of its reach is met by a bound with room for rounding.
-                let facing = between(if cosine > ROOM { cosine } else { ROOM }, angle[0]);
+                let facing = typical_cosine(if cosine > ROOM { cosine } else { ROOM }, angle[0]);
                 sent[k] = if cosine + ROOM > reach[k] { sent[k] * facing } else { 0.0 };
             }
         }
@@ -321,7 +321,7 @@ impl<const N: usize> Clusters<N> {
             for k in 0..N {
                 let own = cosine(above[k] * inverse[k]);
                 let [cosine, _] = less([own, other(own)], [ball[0][k], ball[1][k]]);
-                let facing = between(if cosine > ROOM { cosine } else { ROOM }, own);
+                let facing = typical_cosine(if cosine > ROOM { cosine } else { ROOM }, own);
                 let facing = if cosine > -ROOM { facing } else { 0.0 };
                 let facing = if length[k] > 0.0 { facing } else { 1.0 };
                 let is_within = squared[k] <= radius[k] * radius[k];
@@ -335,7 +335,7 @@ impl<const N: usize> Clusters<N> {
 /// What is taken for a cosine of which the most is known and what it is at the centre: nearer to the mean over the
 /// lights than either.
 #[inline(always)]
-fn between(most: f32, at_centre: f32) -> f32 {
+fn typical_cosine(most: f32, at_centre: f32) -> f32 {
     let centre = if at_centre > 0.0 { at_centre } else { 0.0 };
     let centre = if centre < most { centre } else { most };
     SHARE_OF_MOST * most + (1.0 - SHARE_OF_MOST) * centre

@@ -4,7 +4,7 @@
 //! The estimators, and the random numbers by use, are those of the other scenes ([`super::trace`]): pictures are the
 //! same up to the roundings of single precision. What is rare, such as the light of a lamp that is met, is done there.
 
-mod compress;
+mod compaction;
 mod kernel;
 mod lamps;
 

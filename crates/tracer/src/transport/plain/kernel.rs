@@ -9,7 +9,7 @@ use etendue_geometry::RayBlock;
 use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::glam::DVec3;
 
-use super::compress::{Compress, Instructions};
+use super::compaction::{Compaction, Instructions};
 use super::lamps::{Lights, place};
 use super::{Columns, RayColumns};
 use crate::placed::PlainSurface;
@@ -149,7 +149,7 @@ pub(super) fn leave_blocks(
                 }
             }
         }
-        let (going, at) = (Compress::new(&goes, instructions), next.len);
+        let (going, at) = (Compaction::new(&goes, instructions), next.len);
         for axis in 0..3 {
             going.put(&start[axis], &mut next.start[axis], at);
             going.put(&along[axis], &mut next.along[axis], at);
@@ -285,7 +285,7 @@ fn ask(
             share[band][i] = throughput[band][i] * value[i];
         }
     }
-    let (going, at) = (Compress::new(&goes, instructions), shadows.len);
+    let (going, at) = (Compaction::new(&goes, instructions), shadows.len);
     for axis in 0..3 {
         going.put(&start[axis], &mut shadows.start[axis], at);
         going.put(&along[axis], &mut shadows.along[axis], at);

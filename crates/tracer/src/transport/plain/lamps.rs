@@ -72,7 +72,7 @@ impl Lights {
     }
 }
 
-/// Places on lamps, one for each of sixteen points. What holds is above 0.
+/// Places on lamps, one for each of sixteen points. Flags are 1 where they hold, else 0.
 pub(super) struct Places {
     /// From the point (m).
     pub(super) way: [Row; 3],

@@ -5,7 +5,7 @@ use etendue_geometry::block::LANES;
 use super::kernel::Mask;
 
 /// The lanes of a mask, in order, which go side by side.
-pub(super) struct Compress {
+pub(super) struct Compaction {
     /// The lanes, and 0 behind the last.
     lanes: [u8; LANES],
     pub(super) count: usize,
@@ -30,7 +30,7 @@ impl Instructions {
     }
 }
 
-impl Compress {
+impl Compaction {
     /// Without a branch, as nothing tells beforehand which they are.
     #[inline(always)]
     pub(super) fn new(mask: &Mask, instructions: Instructions) -> Self {
@@ -61,10 +61,10 @@ impl Compress {
     /// Puts the lanes of a row into a column, which has room for all.
     #[inline(always)]
     pub(super) fn put<T: Word>(&self, row: &[T; LANES], column: &mut [T], at: usize) {
-        let Some(to) = column[at..].first_chunk_mut::<LANES>() else { return };
+        let to = &mut column[at..at + LANES];
         #[cfg(target_arch = "x86_64")]
         if let Some((simd, bits)) = self.by_register {
-            *to = T::compress(simd, bits, *row);
+            to.copy_from_slice(&T::compress(simd, bits, *row));
             return;
         }
         for (to, &lane) in to.iter_mut().zip(&self.lanes) {
@@ -112,11 +112,11 @@ mod tests {
                 simd: None,
             };
             for instructions in [Instructions::of_machine(), none] {
-                let compress = Compress::new(&mask, instructions);
+                let compaction = Compaction::new(&mask, instructions);
                 let mut column = [7_u32; 3 + LANES];
-                compress.put(&row, &mut column, 3);
-                assert_eq!(compress.count, wanted.len());
-                assert_eq!(column[3..3 + compress.count], wanted[..]);
+                compaction.put(&row, &mut column, 3);
+                assert_eq!(compaction.count, wanted.len());
+                assert_eq!(column[3..3 + compaction.count], wanted[..]);
                 assert_eq!(column[..3], [7; 3]);
             }
         }
