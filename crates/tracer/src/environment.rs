@@ -129,25 +129,17 @@ impl EnvironmentMap {
         self.interpolated(&self.texels, at)
     }
 
-    /// Radiance of each of some lanes.
+    /// The texels of these numbers.
     #[inline(always)]
-    fn radiance_of_lanes(&self, about: &Corners) -> [Color; LANES] {
-        let mut taken = [[[0.0_f32; LANES]; 3]; 4];
-        for (taken, numbers) in taken.iter_mut().zip(&about.numbers) {
-            for i in 0..LANES {
+    fn texels_at<const N: usize>(&self, numbers: &[[u32; N]; 4]) -> CornerTexels<N> {
+        let mut taken = [[[0.0_f32; N]; 3]; 4];
+        for (taken, numbers) in taken.iter_mut().zip(numbers) {
+            for i in 0..N {
                 let texel = self.texels[numbers[i] as usize];
                 (taken[0][i], taken[1][i], taken[2][i]) = (texel[0], texel[1], texel[2]);
             }
         }
-        let mut colors = [[0.0; 3]; LANES];
-        for k in 0..3 {
-            for i in 0..LANES {
-                let [a, b, c, d] = [taken[0][k][i], taken[1][k][i], taken[2][k][i], taken[3][k][i]];
-                let corners = [f64::from(a), f64::from(b), f64::from(c), f64::from(d)];
-                colors[i][k] = between(corners, [about.across[i], about.down[i]]);
-            }
-        }
-        colors
+        CornerTexels(taken)
     }
 
     /// Radiance at a [`place`] and the wavelengths of a clear sky; 0 of a map that has colours alone.
@@ -177,6 +169,44 @@ impl EnvironmentMap {
         let at = [about.across[0], about.down[0]];
         std::array::from_fn(|k| between(corners.map(|texel| f64::from(texel[k])), at))
     }
+}
+
+/// The texels about each of some places, by corner and colour.
+struct CornerTexels<const N: usize>([[[f32; N]; 3]; 4]);
+
+impl<const N: usize> CornerTexels<N> {
+    /// How bright each is.
+    #[inline(always)]
+    fn bright(&self) -> [[f64; N]; 4] {
+        let mut bright = [[0.0; N]; 4];
+        for (bright, [r, g, b]) in bright.iter_mut().zip(&self.0) {
+            for i in 0..N {
+                bright[i] = mean([r[i].into(), g[i].into(), b[i].into()]);
+            }
+        }
+        bright
+    }
+
+    /// The colours of places that are so far, across and down, from the first.
+    #[inline(always)]
+    fn between(&self, [across, down]: [&[f64; N]; 2]) -> [Color; N] {
+        let mut colors = [[0.0; 3]; N];
+        for k in 0..3 {
+            for i in 0..N {
+                let [a, b, c, d] =
+                    [self.0[0][k][i], self.0[1][k][i], self.0[2][k][i], self.0[3][k][i]];
+                let corners = [f64::from(a), f64::from(b), f64::from(c), f64::from(d)];
+                colors[i][k] = between(corners, [across[i], down[i]]);
+            }
+        }
+        colors
+    }
+}
+
+/// The mean of three colours.
+#[inline(always)]
+fn mean([r, g, b]: Color) -> f64 {
+    (r + g + b) / 3.0
 }
 
 /// Places worked on side by side.
@@ -226,6 +256,12 @@ impl<const N: usize> Corners<N> {
             numbers[3][i] = below + right;
         }
         Self { numbers, across, down, row }
+    }
+
+    /// How far the places are from the first cell, across and down.
+    #[inline(always)]
+    fn within(&self) -> [&[f64; N]; 2] {
+        [&self.across, &self.down]
     }
 }
 
@@ -277,14 +313,14 @@ mod tests {
         for k in 0..n * n {
             let square = [((k % n) as f64 + 0.5) / n as f64, ((k / n) as f64 + 0.5) / n as f64];
             let d = crate::sampling::sphere_direction(square);
-            integral += sampler.pdf(d) * 4.0 * PI / (n * n) as f64;
+            integral += sampler.pdf(&map, d) * 4.0 * PI / (n * n) as f64;
             mean += map.radiance(d)[0] / (n * n) as f64;
         }
         // A bright texel is 16 × 16 points wide here: its edges are met to one in sixteen of 1 − ε.
         assert!((integral - 1.0).abs() < 0.02, "{integral}");
         assert!((sampler.mean / mean - 1.0).abs() < 0.02, "{} {mean}", sampler.mean);
         let bright = direction([20.5 / 64.0, 10.5 / 32.0]);
-        assert!(sampler.pdf(bright) > 50.0 * sampler.pdf(DVec3::X));
+        assert!(sampler.pdf(&map, bright) > 50.0 * sampler.pdf(&map, DVec3::X));
     }
 
     /// A map of 64 by 32 texels that differ, one of them a sun.
@@ -307,7 +343,7 @@ mod tests {
         for ((&d, &[u, _]), &pdf) in
             chosen.directions.iter().zip(&chosen.places).zip(&chosen.densities)
         {
-            assert!((sampler.pdf(d) / pdf - 1.0).abs() < 1e-9);
+            assert!((sampler.pdf(&map, d) / pdf - 1.0).abs() < 1e-9);
             sum += u / pdf / (2.0 * PI * PI) / f64::from(n * n);
         }
         // The integral of u sin πv over the square is 1/π. Most places are in the sun; the others are some 300 by
@@ -341,8 +377,28 @@ mod tests {
     #[test]
     fn lanes_are_lookups_one_by_one() {
         let small = EnvironmentMap::new([1, 2], vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
-        for map in [sunny(), small] {
-            let sampler = MapSampler::new(&map);
+        let texel = |k: u16| [1.0, 2.0, f32::from(k % 97)];
+        // Of more columns than there are cells, and of a table of its own.
+        let wide = EnvironmentMap::new([4096, 4], (0..4 * 4096).map(texel).collect());
+        let bright = |map: &EnvironmentMap| {
+            MapSampler::by_brightness(map.size(), map.texels.iter().map(|texel| texel[2].into()))
+        };
+        let maps =
+            [(sunny(), None), (sunny(), Some(bright(&sunny()))), (small, None), (wide, None)];
+        for (map, sampler) in maps {
+            let sampler = sampler.unwrap_or_else(|| MapSampler::new(&map));
+            let at = |k: u32, n: u32| (f64::from(k) + 0.5) / f64::from(n);
+            let squares: Vec<_> = (0..500).map(|k| [at(k, 500), at(k % 23, 23)]).collect();
+            let mut chosen = OnMap::default();
+            sampler.sample(&map, &squares, &mut chosen);
+            for (k, &d) in chosen.directions.iter().enumerate() {
+                // Directions are as good as f64, and so is where they are between texels.
+                let [pdf, expected] = [chosen.densities[k], sampler.pdf(&map, d)];
+                assert!((pdf / expected - 1.0).abs() < 1e-9, "{d}: {pdf} {expected}");
+                for (color, expected) in chosen.colors[k].iter().zip(map.radiance(d)) {
+                    assert!((color - expected).abs() < 1e-9 * expected, "{d}: {color} {expected}");
+                }
+            }
             let mut asked = OnMap::default();
             let axes = [DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z, DVec3::X];
             let seam = [1e-17, -1e-17, 0.0, -0.0].map(|x| DVec3::new(x, 0.0, 1.0));
@@ -353,7 +409,7 @@ mod tests {
             for (k, &d) in asked.directions.iter().enumerate() {
                 assert_eq!(asked.places[k], place(d));
                 assert_eq!(asked.colors[k], map.radiance(d), "{d}");
-                assert_eq!(asked.densities[k], sampler.pdf(d), "{d}");
+                assert_eq!(asked.densities[k], sampler.pdf(&map, d), "{d}");
             }
         }
     }

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use etendue_geometry::glam::DVec3;
 
-use super::{CELLS, Corners, EnvironmentMap, LANES, between, place};
+use super::{CELLS, Corners, EnvironmentMap, LANES, between, mean, place};
 use crate::sampling::{GridCell, GridDistribution, ONE_BELOW, linear_place};
 use crate::{Color, angles};
 
@@ -27,19 +27,20 @@ fn blurred(bright: &[f64], [columns, rows]: [usize; 2]) -> Vec<f64> {
 struct Cells {
     /// Columns and rows.
     size: [usize; 2],
-    /// The mean over the colours or bands of each.
+    /// The mean over the colours or bands of each. Empty where the texels of a map of colours are the cells: what they
+    /// shine is read in any case, and memory is what a map takes its time for.
     bright: Vec<f32>,
 }
 
 impl Cells {
-    /// The brightness at the corners of a patch between the middles of cells: left and right above, and below.
+    /// The cells at the corners of a patch between the middles of four: left and right above, and below.
     #[inline]
-    fn corners(&self, [x, y]: [usize; 2]) -> [[f64; 2]; 2] {
+    fn about(&self, [x, y]: [usize; 2]) -> [u32; 4] {
         let [columns, rows] = self.size;
         let next = if x + 1 == columns { 0 } else { x + 1 };
         let (above, below) = (y.saturating_sub(1) * columns, y.min(rows - 1) * columns);
-        let at = |k: usize| f64::from(self.bright[k]);
-        [[at(above + x), at(above + next)], [at(below + x), at(below + next)]]
+        #[expect(clippy::cast_possible_truncation, reason = "maps have fewer texels")]
+        [above + x, above + next, below + x, below + next].map(|cell| cell as u32)
     }
 
     /// Where a row of patches begins and ends, in rows of cells.
@@ -69,8 +70,12 @@ impl MapSampler {
     /// For `map`, by the mean of its three colours.
     #[must_use]
     pub fn new(map: &EnvironmentMap) -> Self {
-        let bright = map.texels.iter().map(|texel| f64::from(texel[0] + texel[1] + texel[2]) / 3.0);
-        Self::by_brightness(map.size(), bright)
+        let bright = map.texels.iter().map(|texel| mean(texel.map(f64::from)));
+        let mut sampler = Self::by_brightness(map.size(), bright);
+        if sampler.cells.size == map.size() {
+            sampler.cells.bright = Vec::new();
+        }
+        sampler
     }
 
     /// For a map of so many columns and rows by how bright each of its texels is, row by row from the top.
@@ -104,7 +109,7 @@ impl MapSampler {
         for (y, sine) in sines.iter().enumerate() {
             let [start, end] = cells.ends(y);
             for x in 0..columns {
-                let sum: f64 = cells.corners([x, y]).as_flattened().iter().sum();
+                let sum: f64 = cells.about([x, y]).iter().map(|&k| bright[k as usize]).sum();
                 weights.push(0.25 * sum * sine * (end - start));
             }
         }
@@ -132,21 +137,42 @@ impl MapSampler {
         }
     }
 
-    /// Places in the patches that were chosen, and their density over the unit square.
+    /// Whether the cells are the texels of a map of colours.
+    fn is_of_texels(&self) -> bool {
+        self.cells.bright.is_empty()
+    }
+
+    /// How bright cells of the table are.
     #[inline(always)]
-    fn places_in(&self, patches: &[GridCell; LANES]) -> ([Row; 2], Row) {
+    fn bright_at<const N: usize>(&self, numbers: &[[u32; N]; 4]) -> [[f64; N]; 4] {
+        let mut bright = [[0.0; N]; 4];
+        for corner in 0..4 {
+            for i in 0..N {
+                bright[corner][i] = self.cells.bright[numbers[corner][i] as usize].into();
+            }
+        }
+        bright
+    }
+
+    /// Places in the patches that were chosen, of which the corners shine so, how far they are from the first of
+    /// these, and their density over the unit square.
+    #[inline(always)]
+    fn places_in(
+        &self,
+        patches: &[GridCell; LANES],
+        corners: &[Row; 4],
+    ) -> ([Row; 2], [Row; 2], Row) {
         let [columns, rows] = self.cells.size.map(|cells| cells as f64);
         // What there is in memory of each.
-        let (mut corners, mut scale) = ([[0.0; LANES]; 4], [0.0; LANES]);
+        let mut scale = [0.0; LANES];
         let [mut start, mut end, mut x] = [[0.0; LANES]; 3];
         for (i, patch) in patches.iter().enumerate() {
-            let [[a, b], [c, d]] = self.cells.corners(patch.at);
-            (corners[0][i], corners[1][i], corners[2][i], corners[3][i]) = (a, b, c, d);
             scale[i] = self.scale[patch.at[1]];
             [start[i], end[i]] = self.cells.ends(patch.at[1]);
             x[i] = patch.at[0] as f64;
         }
-        let (mut places, mut density) = ([[0.0; LANES]; 2], [0.0; LANES]);
+        let (mut places, mut inside, mut density) =
+            ([[0.0; LANES]; 2], [[0.0; LANES]; 2], [0.0; LANES]);
         for i in 0..LANES {
             let (a, b, c, d) = (corners[0][i], corners[1][i], corners[2][i], corners[3][i]);
             let [across, down] = patches[i].rest;
@@ -154,38 +180,59 @@ impl MapSampler {
             let [left, right] = [a + (c - a) * down, b + (d - b) * down];
             let across = linear_place(across, [left, right]);
             density[i] = (left + (right - left) * across) * scale[i];
+            (inside[0][i], inside[1][i]) = (across, down);
             let u = (x[i] + 0.5 + across) / columns;
             places[0][i] = if u < 1.0 { u } else { u - 1.0 };
             places[1][i] = ((start[i] + down * (end[i] - start[i])) / rows).min(ONE_BELOW);
         }
-        (places, density)
+        (places, inside, density)
     }
 
-    /// The density (1/sr) of a unit direction.
+    /// The density (1/sr) of a unit direction on `map`.
     #[must_use]
-    pub fn pdf(&self, d: DVec3) -> f64 {
-        let [u, v] = place(d);
-        let about = Corners::of([[u], [v]], self.cells.size);
-        let [pdf] = self.pdf_about(&about, [(d.x * d.x + d.z * d.z).sqrt()]);
+    pub fn pdf(&self, map: &EnvironmentMap, d: DVec3) -> f64 {
+        let places = place(d).map(|at| [at]);
+        let sines = [(d.x * d.x + d.z * d.z).sqrt()];
+        let about = Corners::of(places, map.size());
+        let colors = map.texels_at(&about.numbers).between(about.within());
+        let [pdf] = self.pdf_of(&places, sines, &about, &colors);
         pdf
     }
 
-    /// Densities (1/sr) of places about which the cells are known, with the sines of their polar angles.
+    /// Densities (1/sr) of places with the sines of their polar angles, about which the texels are known, and the colours
+    /// there.
     #[inline(always)]
-    fn pdf_about<const N: usize>(&self, about: &Corners<N>, sines: [f64; N]) -> [f64; N] {
-        let (mut corners, mut scale) = ([[0.0_f32; N]; 4], [0.0; N]);
-        for i in 0..N {
-            for corner in 0..4 {
-                corners[corner][i] = self.cells.bright[about.numbers[corner][i] as usize];
-            }
-            scale[i] = self.scale[about.row[i] as usize];
-        }
+    fn pdf_of<const N: usize>(
+        &self,
+        places: &[[f64; N]; 2],
+        sines: [f64; N],
+        about: &Corners<N>,
+        colors: &[Color; N],
+    ) -> [f64; N] {
         let mut pdf = [0.0; N];
+        let rows = match self.is_of_texels() {
+            true => {
+                for i in 0..N {
+                    pdf[i] = mean(colors[i]);
+                }
+                about.row
+            }
+            false => {
+                let about = Corners::of(*places, self.cells.size);
+                let bright = self.bright_at(&about.numbers);
+                for i in 0..N {
+                    let corners = [bright[0][i], bright[1][i], bright[2][i], bright[3][i]];
+                    pdf[i] = between(corners, [about.across[i], about.down[i]]);
+                }
+                about.row
+            }
+        };
+        let mut scale = [0.0; N];
         for i in 0..N {
-            let [a, b, c, d] = [corners[0][i], corners[1][i], corners[2][i], corners[3][i]];
-            let corners = [f64::from(a), f64::from(b), f64::from(c), f64::from(d)];
-            let bright = between(corners, [about.across[i], about.down[i]]);
-            pdf[i] = over_the_sphere(bright * scale[i], sines[i]);
+            scale[i] = self.scale[rows[i] as usize];
+        }
+        for i in 0..N {
+            pdf[i] = over_the_sphere(pdf[i] * scale[i], sines[i]);
         }
         pdf
     }
@@ -224,9 +271,23 @@ fn chosen(sampler: &MapSampler, map: &EnvironmentMap, out: &mut OnMap) {
         let count = LANES.min(out.directions.len() - start);
         let mut patches = [GridCell::default(); LANES];
         patches[..count].copy_from_slice(&out.cells[start..start + count]);
-        let (places, over_square) = sampler.places_in(&patches);
+        let mut numbers = [[0; LANES]; 4];
+        for (i, patch) in patches.iter().enumerate() {
+            let about = sampler.cells.about(patch.at);
+            for corner in 0..4 {
+                numbers[corner][i] = about[corner];
+            }
+        }
+        let (places, over_square, colors) = if sampler.is_of_texels() {
+            let texels = map.texels_at(&numbers);
+            let (places, [across, down], density) = sampler.places_in(&patches, &texels.bright());
+            (places, density, texels.between([&across, &down]))
+        } else {
+            let (places, _, density) = sampler.places_in(&patches, &sampler.bright_at(&numbers));
+            let about = Corners::of(places, map.size());
+            (places, density, map.texels_at(&about.numbers).between(about.within()))
+        };
         let ([x, y, z], sines) = angles::directions(&places);
-        let colors = map.radiance_of_lanes(&Corners::of(places, map.size()));
         for i in 0..count {
             out.directions[start + i] = DVec3::new(x[i], y[i], z[i]);
             out.places[start + i] = [places[0][i], places[1][i]];
@@ -252,11 +313,8 @@ fn looked_up(sampler: &MapSampler, map: &EnvironmentMap, asked: &mut OnMap) {
         }
         let places = angles::places(&directions);
         let about = Corners::of(places, map.size());
-        let colors = map.radiance_of_lanes(&about);
-        let pdf = match map.size() == sampler.cells.size {
-            true => sampler.pdf_about(&about, sines),
-            false => sampler.pdf_about(&Corners::of(places, sampler.cells.size), sines),
-        };
+        let colors = map.texels_at(&about.numbers).between(about.within());
+        let pdf = sampler.pdf_of(&places, sines, &about, &colors);
         for i in 0..count {
             asked.places[start + i] = [places[0][i], places[1][i]];
         }
