@@ -193,13 +193,17 @@ impl Session {
         &self.cache
     }
 
-    /// The frames of the scene, in order; `None` when its file has no `frames` and is one picture.
+    /// The frames of the scene, in order; `None` when its file has no `frames` and is one picture. They are worked out
+    /// once, until a value is [`set`](Self::set) or the file is read again ([`Self::reload`]).
     ///
     /// # Errors
     ///
     /// When they make no sense, or a trajectory's file is missing or broken; and as [`Self::scene`], for a
     /// path that begins where the scene's camera stands.
-    pub fn frames(&mut self, progress: &Progress) -> Result<Option<Vec<Frame>>, Error> {
+    pub fn frames(&mut self, progress: &Progress) -> Result<Option<Arc<[Frame]>>, Error> {
+        if let Some(frames) = &self.frames {
+            return Ok(Some(Arc::clone(frames)));
+        }
         self.leave_frame();
         // Of a path the camera's own place is wanted, which may depend on the models.
         if let Some(FramesSpec::Path(_)) = self.file.spec.frames {
@@ -226,7 +230,8 @@ impl Session {
                 )));
             }
         }
-        self.frames = Some(Arc::from(&*frames));
+        let frames: Arc<[Frame]> = frames.into();
+        self.frames = Some(Arc::clone(&frames));
         self.frame_notes = notes.iter().map(in_words).collect();
         self.frame_notes.iter().for_each(|note| progress.note(note));
         Ok(Some(frames))

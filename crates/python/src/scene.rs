@@ -1,6 +1,7 @@
 //! Scenes and their pictures.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use etendue::{Error, MeshAttributes, Options, Outputs, Progress, Reach, Strictness};
 use etendue_files::Transaction;
@@ -33,12 +34,12 @@ type GivenAtVertices<'py> = (
 #[pyclass]
 pub struct Session {
     session: etendue::Session,
-    frames: Vec<etendue::Frame>,
+    frames: Arc<[etendue::Frame]>,
 }
 
 impl Session {
     fn of(session: etendue::Session) -> Self {
-        Self { session, frames: Vec::new() }
+        Self { session, frames: Arc::default() }
     }
 
     /// The session that `begin` makes of a scene's JSON.

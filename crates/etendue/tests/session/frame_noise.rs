@@ -2,6 +2,7 @@
 //! is rendered.
 
 use std::fs;
+use std::sync::Arc;
 
 use etendue::{Frame, Progress, Rendering, Session};
 use serde_json::{Value, json};
@@ -166,4 +167,24 @@ fn a_frame_has_its_own_bits_whenever_and_however_it_is_rendered() {
     many.set("render.frame", 2).unwrap();
     let error = many.frames(&Progress::none()).unwrap_err();
     assert!(error.is_refused() && error.to_string().contains("render.frame: each of"), "{error}");
+}
+
+/// A data set is asked for its frames once for each of them.
+#[test]
+fn frames_are_worked_out_once_until_a_value_is_set() {
+    let orbit = json!({"type": "orbit", "count": 3, "angle": 90});
+    let (_folder, mut session) = session(scene("direct", 8, &orbit));
+    let mut frames = || session.frames(&Progress::none()).unwrap().unwrap();
+    let first = frames();
+    assert!(Arc::ptr_eq(&first, &frames()));
+    // Neither is it worked out anew, nor does the scene leave the frame, while one is shown.
+    session.show(&first[1]).unwrap();
+    let pose = |session: &mut Session| *session.scene(&Progress::none()).unwrap().camera.pose();
+    let place = pose(&mut session);
+    assert!(Arc::ptr_eq(&first, &session.frames(&Progress::none()).unwrap().unwrap()));
+    assert_eq!(pose(&mut session), place);
+    session.set("frames.count", 5).unwrap();
+    assert_eq!(session.frames(&Progress::none()).unwrap().unwrap().len(), 5);
+    session.reload().unwrap();
+    assert!(!Arc::ptr_eq(&first, &session.frames(&Progress::none()).unwrap().unwrap()));
 }

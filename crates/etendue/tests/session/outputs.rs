@@ -51,7 +51,7 @@ fn render_frames(
     let frames = session.frames(&none)?.unwrap();
     session.check_outputs(&frames)?;
     let mut dataset = Dataset::default();
-    for frame in &frames {
+    for frame in frames.iter() {
         session.show(frame)?;
         session.check_place(&out.join(pattern.folder(frame.number)), &[], &none)?;
         let rendering = session.render(&none)?;
