@@ -27,7 +27,7 @@ import etendue
 assert not etendue.has_embree
 accel = etendue.Accel([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
 assert accel.closest([[0.25, 0.25, 1]], [[0, 0, -1]]).t[0] == 1
-scene = etendue.Scene(objects=[{"shape": "sphere"}], layers=["depth"], camera={"sensor": {"resolution": [8, 6]}})
+scene = etendue.Scene(objects=[{"shape": "sphere"}], layers=["depth"], camera={"type": "pinhole", "sensor": {"resolution": [8, 6]}})
 print(scene.render()["depth"].min(), accel)
 PYTHON
 )

@@ -21,17 +21,8 @@ export CC_aarch64_unknown_linux_gnu=$compiler-gcc CXX_aarch64_unknown_linux_gnu=
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=$compiler-gcc
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64 -L /usr/$compiler"
 
-# As test.sh: with nextest when it is installed, else with cargo's own runner. What tests start as programs of their own, the
-# command among them, wants the kernel's binfmt_misc, so the command is run by hand below.
-packages=()
-for crate in files geometry image spectrum accel optics camera sensor tracer scene render; do packages+=(-p "etendue-$crate"); done
-arguments=(--target $target --locked --no-default-features "${packages[@]}")
-if cargo nextest --version >/dev/null 2>&1; then
-    cargo nextest run "${arguments[@]}" --no-fail-fast "$@"
-else
-    cargo test --lib --tests "${arguments[@]}" "$@"
-fi
-
+# What tests start as programs of their own, the command among them, wants the kernel's binfmt_misc, so the command is run by
+# hand; and before the tests, which are slow under QEMU.
 cargo build --target $target --locked --no-default-features -p etendue-cli
 there=(qemu-aarch64 -L "/usr/$compiler" "target/$target/debug/etendue")
 out=out/aarch64
@@ -41,3 +32,13 @@ rm -rf "$out"
 "${ETENDUE:-target/debug/etendue}" render scenes/cube.json -o "$out/here" --accel bvh -q
 cmp "$out/here/distance.npy" "$out/there/distance.npy"
 echo "Distances of scenes/cube.json are the same to the bit on both."
+
+# As test.sh: with nextest when it is installed, else with cargo's own runner.
+packages=()
+for crate in files geometry image spectrum accel optics camera sensor tracer scene render; do packages+=(-p "etendue-$crate"); done
+arguments=(--target $target --locked --no-default-features "${packages[@]}")
+if cargo nextest --version >/dev/null 2>&1; then
+    cargo nextest run "${arguments[@]}" --no-fail-fast "$@"
+else
+    cargo test --lib --tests "${arguments[@]}" "$@"
+fi
