@@ -26,6 +26,7 @@ import time
 import zlib
 from array import array
 from ast import literal_eval
+from pathlib import Path
 
 import program
 import section
@@ -185,17 +186,23 @@ def refocus(source, near, far, *, target):
     white = np.percentile(views[count // 2, count // 2], 99.5)
     frames = []
     for step in steps:
-        total = 0.0
-        for down in range(count):
-            for across in range(count):
-                by = [step * (down - (count - 1) / 2), step * (across - (count - 1) / 2)]
-                total = total + moved(views[down, across], by)
-        light = np.clip(total / count**2 / white, 0, 1)
+        light = np.clip(focused(views, step) / white, 0, 1)
         code = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
         frames.append(Image.fromarray(np.rint(255 * code).astype(np.uint8)))
     frames += frames[-2:0:-1]
     frames[0].save(PAGE.parent / target, save_all=True, append_images=frames[1:], duration=90, loop=0, quality=75,
                    method=6)
+
+
+def focused(views, step):
+    """The mean of all views, each moved by `step` pixels for each view that it is from the middle one."""
+    count = views.shape[0]
+    total = 0.0
+    for down in range(count):
+        for across in range(count):
+            by = [step * (down - (count - 1) / 2), step * (across - (count - 1) / 2)]
+            total = total + moved(views[down, across], by)
+    return total / count**2
 
 
 def moved(view, by):
@@ -215,16 +222,28 @@ def moved(view, by):
 
 
 def with_noise(etendue, part, commands):
-    """The section with the noise of its denoised pictures: of each two renders with different seeds."""
+    """The section with the noise of its denoised pictures, and of a light field focused half way: of each two renders with
+    different seeds."""
+    import numpy as np
+
+    refocused = [source.split() for _, source in comments(part, "refocus")]
     found = []
     for command in commands:
         words = command.split()
-        if "--denoise" not in words:
+        if "--denoise" not in words and not refocused:
             continue
         folder = words[words.index("-o") + 1]
         again = folder.replace(OUT, "out/gallery-again")
         took(etendue, command.replace(f"-o {folder}", f"-o {again}") + " --seed 1")
-        found.append(noise(*(program.ROOT / name / "denoised.npy" for name in (folder, again))))
+        folders = [program.ROOT / name for name in (folder, again)]
+        if refocused:
+            (source, *ends) = refocused[0]
+            step = sum(map(float, ends)) / 2
+            views = (np.load(place / Path(source).name, mmap_mode="r") for place in folders)
+            pictures = [focused(of_one, step) for of_one in views]
+        else:
+            pictures = [np.load(place / "denoised.npy") for place in folders]
+        found.append(noise(*pictures))
         print(f"{folder}: {100 * found[-1]:.2f} %", file=sys.stderr)
     if not found:
         return part
@@ -232,12 +251,12 @@ def with_noise(etendue, part, commands):
     return re.sub(r"(?s)(<!-- noise: begin -->).*?(<!-- noise: end -->)", rf"\1Noise: {shares}.\2", part)
 
 
-def noise(*paths):
+def noise(*pictures):
     """The standard deviation of a pixel's light as a share of that light, the median of all squares of pixels that have any,
     from two pictures that differ by their seeds: one difference says little of a pixel, those of a square do."""
     import numpy as np
 
-    first, second = (squares(np.load(path).astype(np.float64).mean(axis=-1)) for path in paths)
+    first, second = (squares(picture.astype(np.float64).mean(axis=-1)) for picture in pictures)
     deviation = np.sqrt(np.mean((first - second) ** 2, axis=(1, 3)) / 2)
     light = np.mean(first + second, axis=(1, 3)) / 2
     return float(np.median(deviation[light > 0] / light[light > 0]))
