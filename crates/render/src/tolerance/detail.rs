@@ -10,17 +10,24 @@
 //! is seen. What is coarser than that, folds and fur, tells itself by its area: a mesh whose triangles lose or gain more
 //! of theirs than half of the light allowed stays as it is.
 //!
+//! What is placed farther off, as most trees of a forest are, is coarser by as much, in steps of two, where its shadow is
+//! as far: see [`octaves`].
+//!
 //! It is not done where something could show the mesh larger than the camera sees it, or where its corners carry more
 //! than their places: see [`coarser`].
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
 use etendue_geometry::glam::{DMat3, DVec3};
-use etendue_geometry::{Bounds, Geometry, Mesh, Positions, RayBatch, Transform, Vertices};
+use etendue_geometry::{
+    Bounds, Geometry, Mesh, Placement, Positions, RayBatch, Transform, Vertices,
+};
 use etendue_scene::Scene;
 use etendue_tracer::material::Alpha;
-use etendue_tracer::{LayerSpec, LightKind, Material, Scattering, TextureScope};
+use etendue_tracer::{
+    EnvironmentImage, LayerSpec, Light, LightKind, Material, Scattering, TextureScope,
+};
 
 /// Meshes of fewer triangles are built and traced as soon as they are looked at.
 const WORTH: usize = 20_000;
@@ -36,6 +43,9 @@ const SHARE_OF_LIGHT: f64 = 0.5;
 
 /// Roughness of a glTF surface from which on no other surface is seen in it.
 const ROUGH: f64 = 0.3;
+
+/// The most factors of two by which what is far is coarser.
+const MOST_OCTAVES: u32 = 16;
 
 /// Columns and rows of places where the extent of a pixel is taken, the corners among them.
 const PLACES: u32 = 5;
@@ -67,26 +77,104 @@ pub fn coarser(scene: &Scene) -> Option<(Geometry, TakenDetail)> {
     }
     let displacement = (1.0 - SHARE_OF_ROUNDING) * share(scene) * tolerance.displacement.0;
     // How far (m) corners may move.
-    let reach = displacement * pixel_extent(scene, nearest(scene)?)?;
+    let nearest = nearest(scene)?;
+    let reach = displacement * pixel_extent(scene, nearest)?;
     let light = SHARE_OF_LIGHT * tolerance.light.0;
     let before = scene.geometry.triangles_unique();
     let mut taken = TakenDetail { triangles: [before; 2], meshes: 0, displacement, light: 0.0 };
+    let octaves = octaves(scene, nearest);
     let mut geometry = Geometry::clone(&scene.geometry);
-    for (number, mesh) in geometry.meshes.iter_mut().enumerate() {
+    for (number, mesh) in scene.geometry.meshes.iter().enumerate() {
         let Some(stretch) = stretch_of(scene, number) else { continue };
-        let side = reach / (3f64.sqrt() * stretch);
-        let Some(less) = clustered(mesh, side) else { continue };
-        let [own, others] = [&*mesh, &less].map(area);
-        let change = (others - own).abs() / own;
-        // What is not a number is no small change.
-        if change <= light {
+        let placed = scene.geometry.placements.iter().zip(&octaves).enumerate();
+        let placed = placed.filter(|(_, (placement, _))| placement.mesh as usize == number);
+        let placed: Vec<(usize, u32)> = placed.map(|(i, (_, octave))| (i, *octave)).collect();
+        let wanted: BTreeSet<u32> = placed.iter().map(|(_, octave)| *octave).collect();
+        let own = area(mesh);
+        let before = geometry.meshes.len();
+        for octave in wanted {
+            let side = reach * f64::from(octave).exp2() / (3f64.sqrt() * stretch);
+            let Some(less) = clustered(mesh, side) else { continue };
+            let change = (area(&less) - own).abs() / own;
+            // What is not a number is no small change.
+            if change <= light {
+                taken.light = taken.light.max(change);
+                #[expect(clippy::cast_possible_truncation, reason = "there are few")]
+                let last = geometry.meshes.len() as u32;
+                geometry.meshes.push(less);
+                let farther = placed.iter().filter(|(_, own)| *own >= octave);
+                farther.for_each(|&(i, _)| geometry.placements[i].mesh = last);
+            }
+        }
+        if geometry.meshes.len() > before {
             taken.meshes += 1;
-            taken.light = taken.light.max(change);
-            *mesh = less;
+            give_place_of(number, &mut geometry);
         }
     }
     taken.triangles[1] = geometry.triangles_unique();
     (taken.meshes > 0).then_some((geometry, taken))
+}
+
+/// Puts the last mesh in the place of mesh `number`, where nothing places that any more.
+#[expect(clippy::cast_possible_truncation, reason = "placements count meshes in 32 bits")]
+fn give_place_of(number: usize, geometry: &mut Geometry) {
+    if geometry.placements.iter().any(|placement| placement.mesh as usize == number) {
+        return;
+    }
+    let last = geometry.meshes.len() - 1;
+    geometry.meshes.swap_remove(number);
+    for placement in &mut geometry.placements {
+        if placement.mesh as usize == last {
+            placement.mesh = number as u32;
+        }
+    }
+}
+
+/// By how many factors of two farther than `nearest` (m) the camera sees each placement and all shadows of it: those of
+/// light that comes from one side go on without an end. 0 where light comes from an image of all directions, which may
+/// have a sun in it, or moves.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+fn octaves(scene: &Scene, nearest: f64) -> Vec<u32> {
+    let placements = &scene.geometry.placements;
+    let is_known = |light: &Light| {
+        let image = EnvironmentImage::of(light);
+        light.motion.is_none() && matches!(image, None | Some(EnvironmentImage::Constant))
+    };
+    if !scene.lights.iter().all(is_known) {
+        return vec![0; placements.len()];
+    }
+    let eye = scene.camera.pose().position;
+    let octave = |placement: &Placement| {
+        let bounds = scene.geometry.loose_bounds_of(placement);
+        let own = (eye.clamp(bounds.min, bounds.max) - eye).length();
+        let shadow = |light: &Light| match light.kind {
+            LightKind::Directional { along, cos_radius } => {
+                Some(shadow_distance(eye, &bounds, along, cos_radius))
+            }
+            _ => None,
+        };
+        let distance = scene.lights.iter().filter_map(shadow).fold(own, f64::min);
+        // What is no number, of shadows about the camera, is 0.
+        (distance / nearest).log2().clamp(0.0, f64::from(MOST_OCTAVES)) as u32
+    };
+    placements.iter().map(octave).collect()
+}
+
+/// The distance (m) from a place to the shadow of a box, of light that goes `along` (unit) from a disk with this cosine of
+/// its radius, or to the ball about that box; below 0 within it.
+fn shadow_distance(from: DVec3, bounds: &Bounds, along: DVec3, cos_radius: f64) -> f64 {
+    let (centre, radius) = (bounds.centre(), 0.5 * (bounds.max - bounds.min).length());
+    // The shadow's ball grows by this much a metre.
+    let growth = (1.0 - cos_radius * cos_radius).max(0.0).sqrt() / cos_radius;
+    if !(0.0..1.0).contains(&growth) {
+        return 0.0;
+    }
+    let there = from - centre;
+    let middle = there.dot(along);
+    let aside = (there - middle * along).length();
+    // Where √(aside² + (s - middle)²) - growth · s is least.
+    let s = (middle + aside * growth / (1.0 - growth * growth).sqrt()).max(0.0);
+    (there - s * along).length() - radius - growth * s
 }
 
 /// How far off surfaces (m) rays may start under the tolerance of `scene`; `None` of a scene without one, and where

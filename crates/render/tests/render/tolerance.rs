@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use etendue_geometry::Geometry;
 #[cfg(feature = "embree")]
 use etendue_geometry::HitPrecision;
 use etendue_render::expose::SPECTRUM;
@@ -268,6 +269,47 @@ fn triangles_finer_than_the_tolerance_tells_apart_do_not_ask_for_f64() {
     };
     let found = difference(&light("auto"), &light("double"));
     assert!(found > 0.0 && found < 0.02, "{found}");
+}
+
+/// The same ball once more, 9.6 m behind: as wide as 3 pixels, and as coarse as its distance asks for, unless its shadow
+/// falls near the camera.
+#[test]
+fn copies_have_the_detail_of_their_own_distance() {
+    let copies = || ("/objects/0/instances", json!([{}, { "translate": [0, 0, -9.6] }]));
+    let tolerance = allowed("0.5 px", "2 %");
+    let triangles = |geometry: &Geometry, copy: usize| {
+        geometry.mesh_of(&geometry.placements[copy]).triangles.len()
+    };
+    let alone = coarser(&fine_ball(&tolerance, &[])).expect("a coarser ball").0;
+    let near = triangles(&alone, 0);
+    let scene = fine_ball(&tolerance, &[copies()]);
+    let (geometry, detail) = coarser(&scene).expect("coarser balls");
+    assert_eq!(triangles(&geometry, 0), near);
+    // Cells four times as wide.
+    assert!(triangles(&geometry, 1) < near / 10, "{} {near}", triangles(&geometry, 1));
+    assert_eq!((detail.meshes, geometry.meshes.len()), (1, 2));
+    assert_eq!(detail.triangles[1], geometry.triangles_unique());
+    let all = blocks(&scene, None);
+    let own = blocks(&with_meshes(&scene, geometry), None);
+    let lit: (Vec<f64>, Vec<f64>) =
+        own.into_iter().zip(all).filter(|(_, full)| *full > 0.0).unzip();
+    let found = difference(&lit.0, &lit.1);
+    assert!(found < 0.02, "{found}");
+    // The sun shines from behind, at the camera; or what shines is an image, which may have a sun.
+    let sun = |direction: [f64; 3]| json!({ "type": "directional", "direction": direction, "irradiance": [3, 3, 3] });
+    let others = [("/lights/0", sun([0.0, 0.0, 1.0])), ("/lights", Value::Null)];
+    for light in others {
+        let scene = fine_ball(&tolerance, &[copies(), light.clone()]);
+        let (geometry, _) = coarser(&scene).expect("coarser balls");
+        assert_eq!([0, 1].map(|copy| triangles(&geometry, copy)), [near; 2], "{light:?}");
+        assert_eq!(geometry.meshes.len(), 1);
+    }
+    // Far from all others, and of one copy: the mesh itself is as coarse.
+    let objects = json!({ "shape": "box", "size": [0.1, 0.1, 0.1], "material": "white", "transform": { "translate": [0.5, 0, 0] } });
+    let place = ("/objects/0/transform", json!({ "translate": [0, 0, -9.6] }));
+    let scene = fine_ball(&tolerance, &[place, ("/objects/1", objects)]);
+    let (geometry, _) = coarser(&scene).expect("a coarser ball");
+    assert!(triangles(&geometry, 0) < near / 10 && geometry.meshes.len() == 2);
 }
 
 #[test]
