@@ -44,8 +44,9 @@ const SHARE_OF_LIGHT: f64 = 0.5;
 /// Roughness of a glTF surface from which on no other surface is seen in it.
 const ROUGH: f64 = 0.3;
 
-/// The most factors of two by which what is far is coarser.
-const MOST_OCTAVES: u32 = 16;
+/// The most factors of two by which what is far is coarser: each is one more look at the mesh, and saves a quarter of what the
+/// one before did.
+const MOST_OCTAVES: u32 = 6;
 
 /// Columns and rows of places where the extent of a pixel is taken, the corners among them.
 const PLACES: u32 = 5;
