@@ -189,6 +189,7 @@ impl<const N: usize> CornerTexels<N> {
 
     /// The colours of places that are so far, across and down, from the first.
     #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "a colour is an index into many arrays")]
     fn between(&self, [across, down]: [&[f64; N]; 2]) -> [Color; N] {
         let mut colors = [[0.0; 3]; N];
         for k in 0..3 {
