@@ -184,23 +184,18 @@ fn noise_table(
          the nearest two, and marked. `oracle`: what could be saved there at best, by somebody who knows how the variance of \
          every block falls and gives each the fewest samples, {FEWEST} at least, with which 99 in 100 are as good; `of the \
          oracle`: the samples taken over those. `of two sequences`: the same, by an oracle whose pixels have two sequences of half \
-         as many samples each, as here, where their difference tells the variance: two are noisier than one that is twice as long, \
-         which no rule can save.\n\n| scene | exposure | samples a pixel | variance, of the sensor's | as even | as good | as good everywhere | oracle | of the oracle | of two sequences |\n\
+         as many samples each, as here, where their difference tells the variance: what two cost or \
+         save beside one that is twice as long, no rule can change.\n\n| scene | exposure | samples a pixel | variance, of the sensor's | as even | as good | as good everywhere | oracle | of the oracle | of two sequences |\n\
          |---|---|---|---|---|---|---|---|---|---|\n",
         effort.counts[0],
         effort.counts[effort.counts.len() - 1]
     );
     let mut saved = Vec::new();
     let mut factors = Vec::new();
-    let mut beside: [Vec<f64>; 2] = Default::default();
+    let mut of_oracles: [Vec<f64>; 2] = Default::default();
     for ((name, study), uniform) in names.iter().zip(studies).zip(uniform) {
         let mut line = Vec::new();
-        let of_two = |n: &u32| {
-            let samples =
-                json!({ "until": "sensor-noise", "fraction": FRACTION, "min": n, "max": n });
-            PicturePairs::of(study, samples, effort.pairs)
-        };
-        let of_two: Vec<PicturePairs> = effort.counts.iter().map(of_two).collect();
+        let of_two = of_two_sequences(effort, study);
         for &exposure in effort.charted {
             let samples =
                 json!({ "until": "sensor-noise", "fraction": FRACTION, "max": effort.most });
@@ -223,7 +218,7 @@ fn noise_table(
                 });
                 factors.push([even, good, most].map(|samples| samples / taken.mean_samples));
                 let ratios = [oracle, of_two].map(|samples| taken.mean_samples / samples);
-                beside.iter_mut().zip(ratios).for_each(|(all, ratio)| all.push(ratio));
+                of_oracles.iter_mut().zip(ratios).for_each(|(all, ratio)| all.push(ratio));
                 let [of_oracle, of_two] = ratios;
                 let _ = writeln!(
                     text,
@@ -247,7 +242,9 @@ fn noise_table(
             "\nMedian, {words}: one number for all takes **{middle:.1} times the samples** (goal: 4).\n"
         );
     }
-    for (mut all, words) in beside.into_iter().zip(["the oracle", "the oracle of two sequences"]) {
+    for (mut all, words) in
+        of_oracles.into_iter().zip(["the oracle", "the oracle of two sequences"])
+    {
         let _ = write!(
             text,
             "\nMedian, of {words}: **{:.2} times its samples** (goal: 1.5).\n",
@@ -255,6 +252,15 @@ fn noise_table(
         );
     }
     NoiseTable { text, saved }
+}
+
+/// Pictures of each number of samples whose pixels have two sequences of half as many, as where samples stop.
+fn of_two_sequences(effort: &Effort, study: &Study) -> Vec<PicturePairs> {
+    let of = |n: &u32| {
+        let samples = json!({ "until": "sensor-noise", "fraction": FRACTION, "min": n, "max": n });
+        PicturePairs::of(study, samples, effort.pairs)
+    };
+    effort.counts.iter().map(of).collect()
 }
 
 fn median(all: &mut [f64]) -> f64 {

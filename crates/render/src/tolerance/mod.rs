@@ -4,6 +4,7 @@
 //! Nothing is approximated unless a scene has the key `tolerance`: [`choose`] then says what is taken of it,
 //! [`crate::Plan::taking`] plans with that, and [`verify`] renders a small part with everything.
 
+mod clusters;
 mod coarse_images;
 mod detail;
 mod groups;

@@ -71,17 +71,19 @@ impl MapSampler {
     #[must_use]
     pub fn new(map: &EnvironmentMap) -> Self {
         let bright = map.texels.iter().map(|texel| mean(texel.map(f64::from)));
-        let mut sampler = Self::by_brightness(map.size(), bright);
-        if sampler.cells.size == map.size() {
-            sampler.cells.bright = Vec::new();
-        }
-        sampler
+        Self::of_texels(map.size(), bright, true)
     }
 
     /// For a map of so many columns and rows by how bright each of its texels is, row by row from the top.
-    pub(crate) fn by_brightness(
+    pub(crate) fn by_brightness(size: [usize; 2], texels: impl Iterator<Item = f64>) -> Self {
+        Self::of_texels(size, texels, false)
+    }
+
+    /// The same; whether it is the mean of the colours that the map itself has.
+    fn of_texels(
         [width, height]: [usize; 2],
         texels: impl Iterator<Item = f64>,
+        are_colors: bool,
     ) -> Self {
         let size = [width.clamp(1, CELLS[0]), height.clamp(1, CELLS[1])];
         let [columns, rows] = size;
@@ -102,7 +104,13 @@ impl MapSampler {
             bright = blurred(&bright, size);
         }
         #[expect(clippy::cast_possible_truncation, reason = "brightness is kept as f32")]
-        let cells = Cells { size, bright: bright.iter().map(|&b| b as f32).collect() };
+        let kept: Vec<f32> = match are_colors && size == [width, height] {
+            true => Vec::new(),
+            false => bright.iter().map(|&b| b as f32).collect(),
+        };
+        // Patches are as probable as what is kept has it: where that is 0, none is chosen.
+        bright.iter_mut().zip(&kept).for_each(|(bright, kept)| *bright = f64::from(*kept));
+        let cells = Cells { size, bright: kept };
         let sines: Vec<f64> =
             (0..=rows).map(|row| sine(0.5 * cells.ends(row).iter().sum::<f64>())).collect();
         let mut weights = Vec::with_capacity(columns * (rows + 1));
@@ -188,9 +196,12 @@ impl MapSampler {
         (places, inside, density)
     }
 
-    /// The density (1/sr) of a unit direction on `map`.
+    /// The density (1/sr) of a unit direction on `map`, which this is of.
     #[must_use]
     pub fn pdf(&self, map: &EnvironmentMap, d: DVec3) -> f64 {
+        if map.texels.is_empty() {
+            return 0.0;
+        }
         let places = place(d).map(|at| [at]);
         let sines = [(d.x * d.x + d.z * d.z).sqrt()];
         let about = Corners::of(places, map.size());
