@@ -38,7 +38,7 @@ impl Plan {
         });
         let detail = taken.detail.map(|TakenDetail { triangles: [all, left], displacement, light, .. }| {
             format!(
-                "{left} of {all} triangles, of which places are displaced by {displacement:.3} px at most and areas \
+                "{left} of {all} placed triangles, of which places are displaced by {displacement:.3} px at most and areas \
                  differ by {:.2} %",
                 100.0 * light
             )

@@ -50,7 +50,8 @@ const PLACES: u32 = 5;
 /// What detail was left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TakenDetail {
-    /// Triangles of the scene, each stored one once, and those that are left.
+    /// Triangles of the scene, as often as they are placed, and those that are left: of a mesh whose copies stand near and
+    /// far several versions are stored.
     pub triangles: [u64; 2],
     /// Meshes that are coarser.
     pub meshes: usize,
@@ -77,8 +78,8 @@ pub fn coarser(scene: &Scene) -> Option<(Geometry, TakenDetail)> {
     let nearest = nearest(scene)?;
     let reach = displacement * pixel_extent(scene, nearest)?;
     let light = SHARE_OF_LIGHT * tolerance.light.0;
-    let before = scene.geometry.triangles_unique();
-    let mut taken = TakenDetail { triangles: [before; 2], meshes: 0, displacement, light: 0.0 };
+    let all = scene.geometry.triangles();
+    let mut taken = TakenDetail { triangles: [all; 2], meshes: 0, displacement, light: 0.0 };
     let octaves = octaves(scene, nearest);
     let mut geometry = Geometry::clone(&scene.geometry);
     for (number, mesh) in scene.geometry.meshes.iter().enumerate() {
@@ -108,7 +109,7 @@ pub fn coarser(scene: &Scene) -> Option<(Geometry, TakenDetail)> {
             give_place_of(number, &mut geometry);
         }
     }
-    taken.triangles[1] = geometry.triangles_unique();
+    taken.triangles[1] = geometry.triangles();
     (taken.meshes > 0).then_some((geometry, taken))
 }
 

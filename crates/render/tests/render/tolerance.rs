@@ -288,7 +288,8 @@ fn copies_have_the_detail_of_their_own_distance() {
     // Cells four times as wide.
     assert!(triangles(&geometry, 1) < near / 10, "{} {near}", triangles(&geometry, 1));
     assert_eq!((detail.meshes, geometry.meshes.len()), (1, 2));
-    assert_eq!(detail.triangles[1], geometry.triangles_unique());
+    // As placed: the nearest copy alone may need all, and versions for the others stand beside it.
+    assert_eq!(detail.triangles, [scene.geometry.triangles(), geometry.triangles()]);
     let all = blocks(&scene, None);
     let own = blocks(&with_meshes(&scene, geometry), None);
     let lit: (Vec<f64>, Vec<f64>) =
