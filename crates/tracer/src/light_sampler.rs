@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 use etendue_geometry::Bounds;
 use etendue_geometry::glam::DVec3;
 
-use crate::light_tree::{self, Choice, Cluster, LightTree, Walker};
+use crate::light_tree::{self, Choice, Choices, Cluster, LightTree};
 use crate::sampling::{DiscreteDistribution, ONE_BELOW};
 
 /// The least chance of a light near by, and of one far away, where there are both.
@@ -61,22 +61,6 @@ impl Candidate {
     /// A light that has a place, with its power (W).
     pub(crate) fn near(power: f64, cluster: Cluster) -> Self {
         Self::Near { power, cluster }
-    }
-}
-
-/// Lights that are chosen for some points together. Memory is kept.
-#[derive(Debug, Default)]
-pub(crate) struct Choices {
-    pub(crate) all: Vec<Choice>,
-    /// Those that go down the tree, and the chance with which each of all does.
-    walkers: Vec<Walker>,
-    shares: Vec<f64>,
-}
-
-impl Choices {
-    /// Appends one for a point, by `u` in 0..1.
-    pub(crate) fn push(&mut self, receiver: Receiver, u: f64) {
-        self.all.push(Choice { receiver, u, light: 0, chance: 0.0 });
     }
 }
 
@@ -144,48 +128,51 @@ impl LightSampler {
         if near > 0.0 { share } else { 0.0 }
     }
 
-    /// Chooses a light for each of some points.
-    pub(crate) fn pick(&self, choices: &mut Choices) {
-        let Choices { all, walkers, shares } = choices;
-        let Some(tree) = &self.tree else {
-            all.iter_mut().for_each(|choice| self.pick_other(choice));
-            return;
-        };
-        walkers.clear();
-        shares.clear();
-        if self.others.is_empty() {
-            shares.resize(all.len(), 1.0);
-        } else {
-            tree.importance_to(all, shares);
-            shares.iter_mut().for_each(|near| *near = self.share(*near));
-        }
-        for ((number, choice), &share) in all.iter_mut().enumerate().zip(&*shares) {
-            if choice.u < share {
-                choice.u /= share;
-                walkers.push(Walker::new(number));
-            } else {
-                choice.u = ((choice.u - share) / (1.0 - share)).min(ONE_BELOW);
-                self.pick_other(choice);
-                choice.chance *= 1.0 - share;
-            }
-        }
-        tree.pick(all, walkers);
-        for walker in &*walkers {
-            all[walker.number].chance *= shares[walker.number];
-        }
+    /// Makes ready for so many points that choose a light each.
+    pub(crate) fn restart(&self, choices: &mut Choices, most: usize) {
+        choices.restart(self.tree.as_ref(), most);
     }
 
+    /// Chooses a light for each of some points.
+    pub(crate) fn pick(&self, choices: &mut Choices) {
+        let Some(tree) = &self.tree else {
+            for number in 0..choices.len() {
+                self.pick_other(choices, number, (choices.get(number).u, 1.0));
+            }
+            return;
+        };
+        if self.others.is_empty() {
+            for number in 0..choices.len() {
+                choices.leave_to_tree(number, 1.0, choices.get(number).u);
+            }
+        } else {
+            tree.sum_importance(choices);
+            for number in 0..choices.len() {
+                let (share, u) = (self.share(choices.importance(number)), choices.get(number).u);
+                if u < share {
+                    choices.leave_to_tree(number, share, u / share);
+                } else {
+                    let rest = ((u - share) / (1.0 - share)).min(ONE_BELOW);
+                    self.pick_other(choices, number, (rest, 1.0 - share));
+                }
+            }
+        }
+        tree.pick(choices);
+    }
+
+    /// Makes a choice by a number in 0..1 among the lights that are in no tree, of which this is the chance.
     #[inline(always)]
-    fn pick_other(&self, choice: &mut Choice) {
-        (choice.light, choice.chance) = match self.others.len() {
-            0 => (0, 0.0),
-            1 => (0, 1.0),
+    fn pick_other(&self, choices: &mut Choices, number: usize, (u, share): (f64, f64)) {
+        let (light, rest, chance) = match self.others.len() {
+            0 => (0, u, 0.0),
+            1 => (0, u, 1.0),
             _ => {
-                let (light, rest) = self.others.pick(choice.u);
-                choice.u = rest;
-                (light, self.others.probability(light))
+                let (light, rest) = self.others.pick(u);
+                (light, rest, self.others.probability(light))
             }
         };
+        let light = u32::try_from(light).unwrap_or(u32::MAX);
+        choices.set(number, Choice { light, u: rest, chance: share * chance });
     }
 
     /// The chance with which [`Self::pick`] picks light `index` for a point.
@@ -238,9 +225,10 @@ mod tests {
 
     fn one(sampler: &LightSampler, from: Receiver, u: f64) -> Choice {
         let mut choices = Choices::default();
-        choices.push(from, u);
+        sampler.restart(&mut choices, 1);
+        choices.push(&from, u);
         sampler.pick(&mut choices);
-        choices.all[0]
+        choices.get(0)
     }
 
     fn scene() -> Bounds {
@@ -264,8 +252,8 @@ mod tests {
                 let u = (f64::from(k) + 0.5) / f64::from(n);
                 let Choice { light, u, chance, .. } = one(&sampler, from, u);
                 assert!((0.0..1.0).contains(&u));
-                assert!((chance - sampler.chance(&from, light)).abs() < 1e-12);
-                counts[light] += 1;
+                assert!((chance - sampler.chance(&from, light as usize)).abs() < 1e-12);
+                counts[light as usize] += 1;
             }
             let chances = [0, 1, 2, 3, 4].map(|k| sampler.chance(&from, k));
             assert!((chances[1] - share).abs() < 1e-12, "{height}: {chances:?}");

@@ -1,7 +1,7 @@
 //! The lights of a scene: what each gives off, and a place on one that is chosen for a point.
 
 mod environment;
-mod few;
+mod lamps;
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -10,12 +10,13 @@ use etendue_geometry::MISS;
 use etendue_geometry::glam::DVec3;
 use etendue_spectrum::{NoOverlap, Outside};
 
-pub(crate) use self::few::FewLamps;
+pub(crate) use self::lamps::{Lamp, LampBounds};
 use crate::area_light::{self, AreaLight, AreaLightMotion, triangle_power};
 use crate::environment::EnvironmentMap;
 use crate::group::Groups;
 use crate::light::{EnvironmentImage, Light, LightKind, irradiance, power, spot_falloff};
-use crate::light_sampler::{Candidate, Choices, LightSampler, Receiver};
+use crate::light_sampler::{Candidate, LightSampler, Receiver};
+use crate::light_tree::Choices;
 use crate::material::Alpha;
 use crate::reference::{SceneView, SurfacePoint, squares_at};
 use crate::sampling::{Frame, cone_direction, triangle_point};
@@ -42,6 +43,8 @@ pub struct Lights {
     /// and what those that shine alike all over give off in all bands.
     area_lights: Vec<Option<AreaLight>>,
     area_light_bands: Vec<f64>,
+    /// Bounds of all, if each is a lamp.
+    lamps: Option<LampBounds>,
     groups: Groups,
 }
 
@@ -165,10 +168,17 @@ impl Lights {
             sampler,
             area_lights,
             area_light_bands,
+            lamps: None,
             groups,
         };
         all.prepare_area_lights(scene, spectral);
+        all.lamps = all.bound_lamps();
         Ok(all)
+    }
+
+    /// Makes ready for so many points that choose a light each.
+    pub(crate) fn restart(&self, choices: &mut Choices, most: usize) {
+        self.sampler.restart(choices, most);
     }
 
     /// Chooses a light for each of some points.
@@ -191,12 +201,7 @@ impl Lights {
     /// Where light `index` is (m) and its bands, if it is a point that shines alike to all sides and stands still.
     #[inline(always)]
     pub(crate) fn plain_point(&self, index: usize, count: usize) -> Option<(DVec3, &[f64])> {
-        match self.lights.get(index)? {
-            &Light { kind: LightKind::Point(at), motion: None, .. } => {
-                Some((at, self.bands_of(index, count)))
-            }
-            _ => None,
-        }
+        Some((lamps::standing_point(self.lights.get(index)?)?, self.bands_of(index, count)))
     }
 
     /// The number among all lights of a triangle that shines.
@@ -271,12 +276,6 @@ impl Lights {
     #[must_use]
     pub fn has_environment(&self) -> bool {
         self.sky.is_some()
-    }
-
-    /// How many emissive triangles there are.
-    #[must_use]
-    pub fn emissive_triangles(&self) -> usize {
-        self.triangles.len()
     }
 
     /// What of their light can be told apart, by the numbers of [`crate::transport::Parts::Groups`]: the lights of

@@ -416,9 +416,6 @@ pub(super) fn disk(radius: f64, triangles: u64, wanted: Wanted, go_on: GoOn<'_>)
         places.iter().map(|&[x, y]| [single(x * radius), single(y * radius), 0.0]).collect();
     let positions = Positions::F32(Vertices::from_arrays(&positions));
     let mut mesh = Mesh::new("disk", positions, flat.into());
-    if wanted.normals {
-        mesh.normals = Some(Vertices::from_arrays(&vec![[0.0, 0.0, 1.0]; count]));
-    }
     if wanted.uvs {
         let uvs: Vec<[f32; 2]> =
             places.iter().map(|&[x, y]| [single(0.5 + 0.5 * x), single(0.5 - 0.5 * y)]).collect();

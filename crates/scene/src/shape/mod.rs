@@ -125,18 +125,19 @@ impl ShapeSpec {
 
     /// How many triangles it is asked to have, and the bytes of memory that they take.
     pub(crate) fn cost(&self, wanted: Wanted) -> (u64, u64) {
-        let triangles = match *self {
-            Self::Rectangle { .. } | Self::Box { .. } => 12,
-            Self::Sphere { triangles, .. }
-            | Self::Disk { triangles, .. }
-            | Self::Blob { triangles, .. } => triangles,
+        let (triangles, is_flat) = match *self {
+            Self::Rectangle { .. } | Self::Box { .. } => (12, true),
+            Self::Disk { triangles, .. } => (triangles, true),
+            Self::Sphere { triangles, .. } | Self::Blob { triangles, .. } => (triangles, false),
         };
         // Three indices a triangle, and a vertex for every other one (Euler's formula).
-        let vertex = 12 + if wanted.normals { 12 } else { 0 } + if wanted.uvs { 8 } else { 0 };
+        let normals = if wanted.normals && !is_flat { 12 } else { 0 };
+        let vertex = 12 + normals + if wanted.uvs { 8 } else { 0 };
         (triangles, triangles.saturating_mul(12 + vertex / 2))
     }
 
-    /// Makes the mesh, with normals and texture coordinates where `wanted`.
+    /// Makes the mesh, with normals and texture coordinates where `wanted`. Flat shapes have no normals but those of
+    /// their triangles.
     ///
     /// # Errors
     ///
@@ -247,10 +248,6 @@ fn mesh(name: &str, faces: &[Face], wanted: Wanted) -> Mesh {
         first_corners.flat_map(|i| [[i, i + 1, i + 2], [i, i + 2, i + 3]]).collect();
     let positions = Positions::F32(Vertices::from_arrays(&positions));
     let mut mesh = Mesh::new(name, positions, triangles.into());
-    if wanted.normals {
-        let normals = per_corner(&|face, _| face.right.cross(face.up).normalize());
-        mesh.normals = Some(Vertices::from_arrays(&normals));
-    }
     if wanted.uvs {
         let corner_uvs = [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]];
         mesh.uvs = vec![Vertices::from_arrays(&corner_uvs.repeat(faces.len()))];
@@ -403,12 +400,15 @@ mod tests {
         let size = [Metres(1.0), Metres(2.0), Metres(3.0)];
         let mesh = ShapeSpec::Box { size }.build(Wanted::EVERYTHING).unwrap();
         assert_eq!((mesh.triangles.len(), volume(&mesh)), (12, 6.0));
-        let normals = mesh.normals.as_ref().unwrap();
-        for (i, triangle) in mesh.triangles.iter().enumerate() {
+        for i in 0..mesh.triangles.len() {
             let [a, b, c] = mesh.corners(i);
-            let normal = DVec3::from(normals.get(triangle[0] as usize).map(f64::from));
-            assert_eq!((b - a).cross(c - a).normalize(), normal);
+            let normal = (b - a).cross(c - a).normalize();
+            // The face whose plane it is in: an axis, outwards.
+            let half = DVec3::new(0.5, 1.0, 1.5);
+            assert_eq!(normal.abs().max_element(), 1.0);
+            assert_eq!(normal.dot(a), (normal * half).abs().max_element());
         }
+        assert!(mesh.normals.is_none(), "light would be scattered about what the triangles tell");
 
         let disk = ShapeSpec::Disk { radius: Metres(2.0), triangles: 4_096 };
         let mesh = disk.build(Wanted::EVERYTHING).unwrap();

@@ -30,6 +30,7 @@
 //! time.
 
 mod cluster;
+mod descent;
 mod node;
 mod split;
 #[cfg(test)]
@@ -39,7 +40,9 @@ use etendue_geometry::MISS;
 use etendue_geometry::glam::DVec3;
 
 pub(crate) use self::cluster::Cluster;
-use self::node::{Branch, Extent, Node, View, Viewer, WIDTH};
+pub(crate) use self::descent::{Choice, Choices};
+use self::descent::{descend, descend_together, is_any_far};
+use self::node::{Branch, Extent, LANES, Node, Viewer, WIDTH};
 use self::split::split;
 use crate::light_sampler::Receiver;
 use crate::sampling::ONE_BELOW;
@@ -54,90 +57,12 @@ pub(crate) const MOST: usize = 1 << 16;
 /// this and the logarithm of that number.
 const DEEP: u32 = 12;
 
-/// The node whose one branch has all lights.
+/// The node whose one branch has all lights, and the one that parts them.
 const ALL: usize = 0;
+const FIRST: usize = 1;
 
 /// Half-angle (radians) of a cone within which lights shine the same way.
 const ALIKE: f64 = 0.3;
-
-/// A light that is asked for.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Choice {
-    pub(crate) receiver: Receiver,
-    /// By which it is chosen, in 0..1; then what is left of that.
-    pub(crate) u: f64,
-    /// Its number.
-    pub(crate) light: usize,
-    /// With which it is chosen; 0 where none shines.
-    pub(crate) chance: f64,
-}
-
-/// A choice on its way down the tree.
-#[derive(Debug, Default)]
-pub(crate) struct Walker {
-    /// Which of the choices it is.
-    pub(crate) number: usize,
-    viewer: Viewer,
-    /// The node that it is at; [`END`] once it has a branch of which a light is chosen by intensity, or none.
-    at: usize,
-    u: f64,
-    /// That of the branch.
-    chance: f64,
-    branch: Branch,
-}
-
-/// No node.
-const END: usize = usize::MAX;
-
-impl Walker {
-    /// Of the choice of that number; where it begins is set by the tree.
-    pub(crate) fn new(number: usize) -> Self {
-        Self { number, at: END, ..Self::default() }
-    }
-
-    /// Goes to one of a node's branches by what it has of them; whether it goes on from there.
-    #[inline(always)]
-    fn step(&mut self, node: &Node, view: &View) -> bool {
-        let Some((lane, rest, share)) = view.pick(self.u) else {
-            (self.chance, self.at) = (0.0, END);
-            return false;
-        };
-        (self.u, self.chance) = (rest, self.chance * share);
-        self.branch = node.branches[lane];
-        let is_end = node.is_end(lane, view.squared[lane]);
-        self.at = if is_end { END } else { self.branch.node as usize };
-        !is_end
-    }
-}
-
-/// Brings all walkers down, step by step: a step of one does not wait for that of another.
-#[multiversion::multiversion(targets = "simd")]
-fn descend(nodes: &[Node], walkers: &mut [Walker]) {
-    let (pairs, rest) = walkers.as_chunks_mut::<2>();
-    let mut is_under_way = true;
-    while is_under_way {
-        is_under_way = false;
-        for [a, b] in &mut *pairs {
-            let (first, second) = (nodes.get(a.at), nodes.get(b.at));
-            // One that has come to its end is taken along.
-            let Some(any) = first.or(second) else { continue };
-            let views =
-                Node::views([first.unwrap_or(any), second.unwrap_or(any)], [&a.viewer, &b.viewer]);
-            if let Some(node) = first {
-                is_under_way |= a.step(node, &views[0]);
-            }
-            if let Some(node) = second {
-                is_under_way |= b.step(node, &views[1]);
-            }
-        }
-        for walker in &mut *rest {
-            if let Some(node) = nodes.get(walker.at) {
-                let view = node.view(&walker.viewer);
-                is_under_way |= walker.step(node, &view);
-            }
-        }
-    }
-}
 
 /// The branch with a light at a place of the tree's order that [`descend`] may come to from a node, and its chance.
 #[multiversion::multiversion(targets = "simd")]
@@ -157,16 +82,13 @@ fn descend_to(nodes: &[Node], mut at: usize, viewer: &Viewer, place: u32) -> Opt
     }
 }
 
-/// Points asked side by side.
-const LANES: usize = 16;
-
 /// What all lights of a tree may send to each point that chooses one and faces them all (W/m²).
 #[multiversion::multiversion(targets = "simd")]
-fn importance_to(tree: &LightTree, choices: &[Choice], importance: &mut Vec<f64>) {
-    for some in choices.chunks(LANES) {
-        let mut points = [DVec3::ZERO; LANES];
-        points.iter_mut().zip(some).for_each(|(point, choice)| *point = choice.receiver.point);
-        importance.extend_from_slice(&tree.importances(points)[..some.len()]);
+fn sum_importance(tree: &LightTree, choices: &mut Choices) {
+    choices.importance.clear();
+    for first in (0..choices.len()).step_by(LANES) {
+        let (points, count) = choices.points(first);
+        choices.importance.extend_from_slice(&tree.importances(&points)[..count]);
     }
 }
 
@@ -248,38 +170,56 @@ impl LightTree {
         usize::from(self.nodes.first().is_some_and(goes_on))
     }
 
-    /// Makes those of `choices` that have walkers.
-    pub(crate) fn pick(&self, choices: &mut [Choice], walkers: &mut [Walker]) {
-        for walker in walkers.iter_mut() {
-            let Choice { receiver, u, .. } = &choices[walker.number];
-            let viewer = self.extent.viewer(receiver);
-            (walker.at, walker.u, walker.chance) = (self.start(&viewer), *u, 1.0);
-            if walker.at == ALL {
-                let shines = self.sent(&viewer) > 0.0;
-                (walker.at, walker.chance) = (END, f64::from(u8::from(shines)));
-                walker.branch = self.nodes.first().map_or_else(Branch::default, |n| n.branches[0]);
-            }
-            walker.viewer = viewer;
+    /// Makes those choices that were left to it.
+    pub(crate) fn pick(&self, choices: &mut Choices) {
+        let Some(whole) = self.nodes.first() else { return };
+        let mut order = std::mem::take(&mut choices.descent.order);
+        if is_any_far(whole, choices) {
+            order.retain(|&number| {
+                let number = number as usize;
+                let viewer = choices.viewer(number);
+                let goes_on = self.start(&viewer) != ALL;
+                if !goes_on {
+                    match self.sent(&viewer) > 0.0 {
+                        true => self.settle(choices, number, &whole.branches[0]),
+                        false => choices.chance[number] = 0.0,
+                    }
+                }
+                goes_on
+            });
         }
-        descend(&self.nodes, walkers);
-        for walker in walkers.iter() {
-            let choice = &mut choices[walker.number];
-            (choice.chance, choice.u) = (walker.chance, walker.u);
-            if walker.chance == 0.0 {
-                continue;
-            }
-            let [begin, end] = walker.branch.lights.map(|k| k as usize);
-            if end - begin == 1 {
-                choice.light = self.order[begin] as usize;
-                continue;
-            }
-            let place = self.below[begin] + walker.u * (self.below[end] - self.below[begin]);
-            let k = begin + self.below[begin + 1..end].partition_point(|&sum| sum <= place);
-            let rest = (place - self.below[k]) / (self.below[k + 1] - self.below[k]);
-            choice.light = self.order[k] as usize;
-            choice.u = rest.clamp(0.0, ONE_BELOW);
-            choice.chance *= self.share(k, [begin, end]);
+        choices.descent.nodes.clear();
+        choices.descent.walkers.clear();
+        if !order.is_empty() {
+            choices.descent.nodes.push((FIRST, 0..order.len()));
         }
+        choices.descent.order = order;
+        descend_together(self, choices);
+        let mut walkers = std::mem::take(&mut choices.descent.walkers);
+        descend(&self.nodes, &mut walkers);
+        for walker in &walkers {
+            (choices.chance[walker.number], choices.u[walker.number]) = (walker.chance, walker.u);
+            if walker.chance > 0.0 {
+                self.settle(choices, walker.number, &walker.branch);
+            }
+        }
+        choices.descent.walkers = walkers;
+    }
+
+    /// Chooses one of a branch's lights by their intensity.
+    #[inline(always)]
+    fn settle(&self, choices: &mut Choices, number: usize, branch: &Branch) {
+        let [begin, end] = branch.lights.map(|k| k as usize);
+        if end - begin == 1 {
+            choices.light[number] = self.order[begin];
+            return;
+        }
+        let place = self.below[begin] + choices.u[number] * (self.below[end] - self.below[begin]);
+        let k = begin + self.below[begin + 1..end].partition_point(|&sum| sum <= place);
+        let rest = (place - self.below[k]) / (self.below[k + 1] - self.below[k]);
+        choices.light[number] = self.order[k];
+        choices.u[number] = rest.clamp(0.0, ONE_BELOW);
+        choices.chance[number] *= self.share(k, [begin, end]);
     }
 
     /// The share of the `k`-th light in the intensity of those of a branch.
@@ -294,33 +234,26 @@ impl LightTree {
     /// What all lights may send to a point that faces them, in units of the tree.
     fn sent(&self, viewer: &Viewer) -> f64 {
         let Some(whole) = self.nodes.first() else { return 0.0 };
-        let ([sent], _) = whole.clusters.first::<1>().sent(&viewer.point.map(|x| [x]), None);
+        let ([sent], _) = whole.clusters.spread::<1>(0).sent(&viewer.point.map(|x| [x]), None);
         f64::from(sent)
     }
 
     /// What its lights may send to a point (m) that faces them all (W/m²).
     pub(crate) fn importance(&self, from: DVec3) -> f64 {
-        let [importance] = self.importances([from]);
+        let [importance] = self.importances(&self.extent.local(from).to_array().map(|x| [x]));
         importance
     }
 
-    /// Appends the same of the points of some choices.
-    pub(crate) fn importance_to(&self, choices: &[Choice], importance: &mut Vec<f64>) {
-        importance_to(self, choices, importance);
+    /// The same of all choices.
+    pub(crate) fn sum_importance(&self, choices: &mut Choices) {
+        sum_importance(self, choices);
     }
 
-    /// The same of some points.
+    /// The same of some points, as the tree sees them.
     #[inline(always)]
-    fn importances<const N: usize>(&self, from: [DVec3; N]) -> [f64; N] {
+    fn importances<const N: usize>(&self, points: &[[f32; N]; 3]) -> [f64; N] {
         let Some(whole) = self.nodes.first() else { return [0.0; N] };
-        let mut points = [[0.0; N]; 3];
-        for (k, from) in from.into_iter().enumerate() {
-            let local = self.extent.local(from);
-            for axis in 0..3 {
-                points[axis][k] = local[axis];
-            }
-        }
-        let (sent, _) = whole.clusters.first::<N>().sent(&points, None);
+        let (sent, _) = whole.clusters.spread::<N>(0).sent(points, None);
         let Extent { scale, intensity, .. } = self.extent;
         let most = f64::MAX.sqrt();
         sent.map(|sent| (f64::from(sent) * intensity * scale * scale).min(most))

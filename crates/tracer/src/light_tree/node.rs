@@ -1,4 +1,4 @@
-//! What a point has of the lights of a node: eight branches side by side, in single precision.
+//! What points have of the lights of a node, in single precision: of eight branches side by side, or many of one.
 
 use std::f64::consts::PI;
 
@@ -11,6 +11,9 @@ use crate::sampling::ONE_BELOW;
 
 /// Branches of a node.
 pub(super) const WIDTH: usize = 8;
+
+/// Points at one node that are worked on side by side.
+pub(super) const LANES: usize = 16;
 
 /// Branches of two nodes.
 const TWICE: usize = 2 * WIDTH;
@@ -34,14 +37,14 @@ const ROOM: f32 = 1e-5;
 /// Clusters of lights, as they are asked side by side; what is not there has no intensity.
 #[derive(Debug, Clone)]
 pub(super) struct Clusters<const N: usize> {
-    centre: [[f32; N]; 3],
+    pub(super) centre: [[f32; N]; 3],
     /// Half the diagonal.
     radius: [f32; N],
     axis: [[f32; N]; 3],
     /// Cosine and sine of the cone.
     cone: [[f32; N]; 2],
     pub(super) cos_reach: [f32; N],
-    intensity: [f32; N],
+    pub(super) intensity: [f32; N],
     /// What it may send to points between its lights.
     within: [f32; N],
     /// All shine to all sides.
@@ -52,6 +55,8 @@ pub(super) struct Clusters<const N: usize> {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Node {
     pub(super) clusters: Clusters<WIDTH>,
+    /// Squared distances from which on a light of each is chosen by intensity.
+    pub(super) limits: [f32; WIDTH],
     pub(super) branches: [Branch; WIDTH],
 }
 
@@ -99,8 +104,7 @@ impl Extent {
     }
 
     pub(super) fn local(&self, point: DVec3) -> Vec3 {
-        let limit = DVec3::splat(FARTHEST);
-        ((point - self.centre) * self.scale).clamp(-limit, limit).as_vec3()
+        ((point - self.centre) * self.scale).to_array().map(local).into()
     }
 
     #[inline(always)]
@@ -112,6 +116,13 @@ impl Extent {
     }
 }
 
+/// A coordinate of a point, in extents of all lights.
+#[inline(always)]
+pub(super) fn local(x: f64) -> f32 {
+    single(x.clamp(-FARTHEST, FARTHEST))
+}
+
+#[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "rounding to single precision is the purpose")]
 fn single(x: f64) -> f32 {
     x as f32
@@ -150,17 +161,20 @@ impl Clusters<WIDTH> {
         self.is_isotropic = cluster.cone >= PI && (lane == 0 || self.is_isotropic);
     }
 
-    /// The first of them, many times.
+    /// One of them, many times.
     #[inline(always)]
-    pub(super) fn first<const N: usize>(&self) -> Clusters<N> {
+    pub(super) fn spread<const N: usize>(&self, k: usize) -> Clusters<N> {
+        let [x, y, z] = &self.centre;
+        let [along_x, along_y, along_z] = &self.axis;
+        let [cosine, sine] = &self.cone;
         Clusters {
-            centre: self.centre.map(|lanes| [lanes[0]; N]),
-            radius: [self.radius[0]; N],
-            axis: self.axis.map(|lanes| [lanes[0]; N]),
-            cone: self.cone.map(|lanes| [lanes[0]; N]),
-            cos_reach: [self.cos_reach[0]; N],
-            intensity: [self.intensity[0]; N],
-            within: [self.within[0]; N],
+            centre: [[x[k]; N], [y[k]; N], [z[k]; N]],
+            radius: [self.radius[k]; N],
+            axis: [[along_x[k]; N], [along_y[k]; N], [along_z[k]; N]],
+            cone: [[cosine[k]; N], [sine[k]; N]],
+            cos_reach: [self.cos_reach[k]; N],
+            intensity: [self.intensity[k]; N],
+            within: [self.within[k]; N],
             is_isotropic: self.is_isotropic,
         }
     }
@@ -170,6 +184,13 @@ impl Node {
     pub(super) fn set(&mut self, lane: usize, extent: &Extent, cluster: &Cluster, branch: Branch) {
         self.clusters.set(lane, extent, cluster);
         self.branches[lane] = branch;
+        let radius = self.clusters.radius[lane];
+        self.limits[lane] = match branch {
+            // At any distance.
+            Branch { node: MISS, .. } => -1.0,
+            Branch { alike: true, .. } => FAR * radius * radius,
+            Branch { .. } => f32::INFINITY,
+        };
     }
 
     /// The squared distance to the centre of a branch.
@@ -182,9 +203,7 @@ impl Node {
     /// Whether one of the lights of a branch at this squared distance is chosen by intensity.
     #[inline(always)]
     pub(super) fn is_end(&self, lane: usize, squared: f32) -> bool {
-        let Branch { node, alike, .. } = self.branches[lane];
-        let radius = self.clusters.radius[lane];
-        node == MISS || (alike && squared > FAR * radius * radius)
+        squared > self.limits[lane]
     }
 
     /// What the viewer has of each branch: what the branch may send, to a factor, and the squared distance.
@@ -376,11 +395,11 @@ impl View {
     /// The sums of what the branches up to each send.
     #[inline(always)]
     pub(super) fn sums(&self) -> [f64; WIDTH] {
-        let [a, b, c, d, e, f, g, h] = self.importance;
-        // By halves: three steps one after the other in place of seven.
-        let (ab, ef) = (a + b, e + f);
-        let (abcd, efgh) = (ab + (c + d), ef + (g + h));
-        [a, ab, ab + c, abcd, abcd + e, abcd + ef, abcd + (ef + g), abcd + efgh]
+        let mut sum = 0.0;
+        self.importance.map(|own| {
+            sum += own;
+            sum
+        })
     }
 
     /// A branch by `u` in 0..1, what is left of `u`, and its share; `None` where none sends anything.
@@ -399,8 +418,7 @@ impl View {
         let before = if lane == 0 { 0.0 } else { sums[lane - 1] };
         let own = self.importance[lane];
         let rest = ((place - before) / own).clamp(0.0, ONE_BELOW);
-        // Sums by halves may be out of order by their last bit.
-        (own > 0.0).then_some((lane, rest, own / sums[WIDTH - 1]))
+        Some((lane, rest, own / sums[WIDTH - 1]))
     }
 
     /// The share of a branch.

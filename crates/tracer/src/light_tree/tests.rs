@@ -12,9 +12,20 @@ fn receiver(point: DVec3, is_one_sided: bool) -> Receiver {
 }
 
 fn pick(tree: &LightTree, receiver: Receiver, u: f64) -> Choice {
-    let mut choices = [Choice { receiver, u, light: 0, chance: 0.0 }];
-    tree.pick(&mut choices, &mut [Walker::new(0)]);
-    choices[0]
+    pick_all(tree, &[(receiver, u)])[0]
+}
+
+fn pick_all(tree: &LightTree, asking: &[(Receiver, f64)]) -> Vec<Choice> {
+    let mut choices = Choices::default();
+    choices.restart(Some(tree), asking.len());
+    for (receiver, u) in asking {
+        choices.push(receiver, *u);
+    }
+    for (number, (_, u)) in asking.iter().enumerate() {
+        choices.leave_to_tree(number, 1.0, *u);
+    }
+    tree.pick(&mut choices);
+    (0..asking.len()).map(|number| choices.get(number)).collect()
 }
 
 /// xorshift*: Vigna 2016.
@@ -72,6 +83,7 @@ fn picks_have_the_chances_that_are_stated() {
             if chance == 0.0 {
                 continue;
             }
+            let light = light as usize;
             assert!((chance / chances[light] - 1.0).abs() < 1e-9);
             assert!((0.0..1.0).contains(&u));
             counts[light] += 1.0 / f64::from(steps);
@@ -79,6 +91,36 @@ fn picks_have_the_chances_that_are_stated() {
         for (count, chance) in counts.iter().zip(&chances) {
             // A regular grid meets an interval to within one step.
             assert!((count - chance).abs() <= 1.001 / f64::from(steps), "{count} {chance}");
+        }
+    }
+}
+
+/// What is chosen for a point does not depend, to the bit, on how many others choose with it: whether it goes down in a
+/// lane or by itself.
+#[test]
+fn choices_are_the_same_alone_and_among_others() {
+    let mut random = random();
+    for count in [5, 9, 100, 2000] {
+        let tree = LightTree::new(lights(count, &mut random), count as usize);
+        let asking: Vec<_> = (0..1000)
+            .map(|k| {
+                let from = DVec3::from([random(), random(), random()].map(|x| 3.0 * x - 1.5));
+                // Some are so far away that one light is as good as another.
+                let from = if k % 50 == 0 { 1e4 * from } else { from };
+                (receiver(from, k % 2 == 1), random())
+            })
+            .collect();
+        // Where nothing shines, what is left of the number is of no use.
+        let bits = |choice: Choice| match choice.chance > 0.0 {
+            true => Some((choice.light, choice.u.to_bits(), choice.chance.to_bits())),
+            false => None,
+        };
+        let alone: Vec<_> =
+            asking.iter().map(|(receiver, u)| bits(pick(&tree, *receiver, *u))).collect();
+        for at_once in [2, 7, 37, 1000] {
+            let together = asking.chunks(at_once).flat_map(|some| pick_all(&tree, some));
+            let differ = together.map(bits).zip(&alone).filter(|(own, other)| own != *other);
+            assert_eq!(differ.count(), 0, "{count} by {at_once}");
         }
     }
 }

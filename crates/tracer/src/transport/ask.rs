@@ -27,13 +27,14 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         } else {
             // What scatters light of single directions asks none.
             let asks = |lane: &&usize| bsdfs.get(**lane).is_none_or(|bsdf| !bsdf.is_delta());
-            choices.all.clear();
+            lights.restart(choices, LANES);
             for &lane in workspace.picked.iter().filter(asks) {
-                choices.push(seen.receiver(lane, bsdfs.get(lane)), picks.square[0][lane]);
+                choices.push(&seen.receiver(lane, bsdfs.get(lane)), picks.square[0][lane]);
             }
             lights.pick(choices);
-            for (&lane, choice) in workspace.picked.iter().filter(asks).zip(&choices.all) {
-                picks.index[lane] = u32::try_from(choice.light).unwrap_or(u32::MAX);
+            for (number, &lane) in workspace.picked.iter().filter(asks).enumerate() {
+                let choice = choices.get(number);
+                picks.index[lane] = choice.light;
                 // What is left of the number that chose the light chooses the place: both stay even.
                 (picks.square[0][lane], picks.chance[lane]) = (choice.u, choice.chance);
             }

@@ -1,5 +1,6 @@
-//! Plain scenes: matte surfaces of one colour each under few lamps that stand still. All of a step is done on blocks
-//! of sixteen paths in single precision, whose numbers stay in registers between the hit and the rays that leave it.
+//! Plain scenes: matte surfaces of one colour each under lamps that stand still, few or many. All of a step is done on
+//! blocks of sixteen paths in single precision, whose numbers stay in registers between the hit and the rays that leave
+//! it.
 //!
 //! The estimators, and the random numbers by use, are those of the other scenes ([`super::trace`]): pictures are the
 //! same up to the roundings of single precision. What is rare, such as the light of a lamp that is met, is done there.
@@ -12,14 +13,15 @@ use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitPrecision, RayBlocks};
 
-use self::kernel::{Leaving, Numbers, leave_blocks};
+use self::kernel::{Leaving, Numbers, ask_for_lamps, leave_blocks};
 use self::lamps::Lights;
 use super::paths::{DRAWS, Draw, Step, Way, Workspace};
 use super::rays::{Blocks, RayHit};
 use super::trace::Encounter;
 use super::{LightingContext, Parts, RaySamples, Tracing};
-use crate::area_light::AreaLight;
 use crate::light_sampler::Receiver;
+use crate::light_tree::Choices;
+use crate::lights::LampBounds;
 use crate::placed::PlainSurface;
 
 /// Single precision holds squares of lengths, and densities over areas, of scenes between these sizes (m).
@@ -36,6 +38,8 @@ pub(super) struct Columns {
     /// Density (1/sr) of the direction, unused of the camera's.
     pub(super) pdf: Vec<f32>,
     pub(super) throughput: [Vec<f32>; 3],
+    /// The normal of the surface that each left, where there are many lamps; unused of the camera's.
+    pub(super) normal: [Vec<f32>; 3],
 }
 
 /// Rays that leave a block's hits, a column a number, with room for a block behind the last.
@@ -61,8 +65,20 @@ pub(super) struct PlainScratch {
     next: RayColumns,
     shadow_rays: RayBlocks,
     numbers: [[Vec<f32>; 2]; DRAWS as usize],
+    chosen: ChosenLamps,
     /// Hits on what shines.
     seen: Vec<u32>,
+}
+
+/// Lamps that are chosen by where paths are: for points side by side, and by lane.
+#[derive(Debug, Default)]
+struct ChosenLamps {
+    choices: Choices,
+    /// The lane of each choice.
+    asking: Vec<u32>,
+    lamp: Vec<u32>,
+    /// 0 where none was chosen.
+    chance: Vec<f32>,
 }
 
 impl Columns {
@@ -70,7 +86,7 @@ impl Columns {
         let len = len.next_multiple_of(LANES) + LANES;
         self.ray.resize(len, 0);
         self.pdf.resize(len, 0.0);
-        self.throughput.iter_mut().for_each(|band| band.resize(len, 0.0));
+        self.throughput.iter_mut().chain(&mut self.normal).for_each(|row| row.resize(len, 0.0));
     }
 }
 
@@ -102,31 +118,29 @@ impl RayColumns {
 
 impl<'a, const RGB: bool> Tracing<'a, RGB> {
     /// The surfaces and lamps of a plain scene; `None` of any other.
-    pub(super) fn plain(&self) -> Option<(&'a [PlainSurface], Lights)> {
-        let &LightingContext { lights, placed, emitters, traits, .. } = self.ctx;
+    pub(super) fn plain(&self) -> Option<(&'a [PlainSurface], Lights<'a>)> {
+        let &LightingContext { lights, placed, traits, .. } = self.ctx;
         let is_taken = RGB
             && self.ctx.precision == HitPrecision::Single
             && self.parts == Parts::Whole
             && self.times.is_empty()
             && traits.is_matte
             && !(traits.may_pass() || traits.has_media || traits.has_panes)
-            && emitters.is_some()
             && !lights.has_environment();
         let surfaces = placed.plain().filter(|_| is_taken)?;
         let origin = self.ctx.accel.blocks()?.origin();
+        let LampBounds { least_area, farthest } = lights.lamps()?;
         let least = LEAST_AREA * placed.size().powi(2);
-        let few = lights.few_lamps()?;
-        let fits = |own: &AreaLight| own.shape.area > least;
-        let near = |at: &DVec3| (*at - origin).length() < SIZES[1];
-        let are_taken = few.triangles.iter().flatten().all(fits) && few.points.iter().all(near);
-        are_taken.then(|| (surfaces, Lights::new(&few, origin)))
+        let are_near = 2.0 * (farthest + origin.abs().max_element()) < SIZES[1];
+        let are_taken = least_area > least && are_near && !lights.is_dark();
+        are_taken.then(|| (surfaces, Lights::new(lights, origin)))
     }
 
     /// Traces the camera's rays through a plain scene.
     pub(super) fn trace_plain(
         &mut self,
         camera: &RaySamples<'_>,
-        (surfaces, lights): (&[PlainSurface], &Lights),
+        (surfaces, lights): (&[PlainSurface], &Lights<'_>),
         (plain, workspace): (&mut PlainScratch, &mut Workspace<Blocks>),
         out: &mut [f64],
     ) {
@@ -135,6 +149,8 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         accel.convert(camera.rays, &mut plain.rays);
         start(camera, &mut plain.carried);
         let mut coherent = camera.rays.coherent;
+        let emitters = self.ctx.emitters.map(|emitters| emitters.sphere(lights.origin));
+        let mut is_scattered = true;
         for number in 0..=self.rules.bounces {
             let len = plain.rays.len();
             if len == 0 {
@@ -142,7 +158,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             }
             accel.closest_of_blocks(plain.rays.blocks_mut(), &[], coherent);
             self.tally.rays += len as u64;
-            let is_scattered = number < self.rules.bounces;
+            is_scattered &= number < self.rules.bounces;
             let is_last = self.is_end_unless_specular(number);
             plain.shadows.restart(len);
             plain.next.restart(len);
@@ -152,15 +168,20 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             let roulette = !is_last && self.rules.roulette.is_some_and(|after| number + 1 >= after);
             if is_scattered {
                 self.draw_plain(camera, number, [goes_on, roulette], plain);
+                if lights.are_many() {
+                    self.choose_lamps((surfaces, lights), plain);
+                }
             }
-            let numbers = Numbers { is_scattered, goes_on, roulette, drawn: &plain.numbers };
+            let ChosenLamps { lamp, chance, .. } = &plain.chosen;
+            let chosen = lights.are_many().then_some((&**lamp, &**chance));
+            let numbers =
+                Numbers { is_scattered, goes_on, roulette, drawn: &plain.numbers, chosen };
             let leaving = Leaving {
                 shadows: &mut plain.shadows,
                 next: &mut plain.next,
                 seen: &mut plain.seen,
             };
-            let emitters = self.ctx.emitters.filter(|_| is_last);
-            let sphere = emitters.map(|emitters| emitters.sphere(lights.origin));
+            let sphere = emitters.filter(|_| is_last);
             leave_blocks(
                 (surfaces, lights),
                 (plain.rays.blocks(), &plain.carried),
@@ -169,10 +190,12 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             );
             self.meet_plain(number, plain, workspace, out);
             self.light_plain(plain, lights, coherent, out);
-            if is_last {
+            if is_last && emitters.is_some() {
                 self.ask_emitters_plain(camera, number, plain, workspace, out);
                 break;
             }
+            // Where much of the scene shines, last directions are followed as the others are.
+            is_scattered &= !is_last;
             plain.next.pack(&mut plain.rays);
             std::mem::swap(&mut plain.carried, &mut plain.next.carried);
             plain.carried.len = plain.next.len;
@@ -202,6 +225,37 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         }
     }
 
+    /// Chooses one of many lamps for each path that is scattered.
+    fn choose_lamps(
+        &self,
+        (surfaces, lights): (&[PlainSurface], &Lights<'_>),
+        plain: &mut PlainScratch,
+    ) {
+        let PlainScratch { rays, carried, numbers, chosen, .. } = plain;
+        let ChosenLamps { choices, asking, lamp, chance } = chosen;
+        let [first, _] = &mut numbers[Draw::Light as usize];
+        let room = first.len() + LANES;
+        self.ctx.lights.restart(choices, room);
+        asking.resize(room, 0);
+        ask_for_lamps(
+            (surfaces, lights.origin),
+            (rays.blocks(), carried),
+            first,
+            (choices, asking),
+        );
+        self.ctx.lights.pick(choices);
+        lamp.clear();
+        lamp.resize(room, 0);
+        chance.clear();
+        chance.resize(room, 0.0);
+        for (number, &lane) in asking[..choices.len()].iter().enumerate() {
+            let (lane, choice) = (lane as usize, choices.get(number));
+            (lamp[lane], chance[lane]) = (choice.light, kernel::round(choice.chance));
+            // What is left of the number that chose the lamp chooses the place: both stay even.
+            first[lane] = super::below_one(choice.u);
+        }
+    }
+
     /// Adds the light of lamps that paths met.
     fn meet_plain(
         &mut self,
@@ -210,7 +264,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         workspace: &mut Workspace<Blocks>,
         out: &mut [f64],
     ) {
-        let Columns { ray, pdf, throughput, .. } = &plain.carried;
+        let Columns { ray, pdf, throughput, normal, .. } = &plain.carried;
         for &i in &plain.seen {
             let i = i as usize;
             let (block, lane) = (&plain.rays.blocks()[i / LANES], i % LANES);
@@ -225,7 +279,8 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
                 time: 0.0,
             };
             // Few lamps are chosen with the same chance for all points.
-            let receiver = Receiver { point: from, normal: DVec3::ZERO };
+            let own = normal.each_ref().map(|axis| f64::from(axis[i]));
+            let receiver = Receiver { point: from, normal: own.into() };
             let encounter = Encounter { hit, ray: (from, vector(&block.direction)), receiver };
             let way = match number {
                 0 => Way::CAMERA,
@@ -244,7 +299,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
     fn light_plain(
         &mut self,
         plain: &mut PlainScratch,
-        lights: &Lights,
+        lights: &Lights<'_>,
         coherent: bool,
         out: &mut [f64],
     ) {
@@ -261,7 +316,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
                     continue;
                 }
                 let i = first + lane;
-                let radiance = lights.radiance[shadows.lamp[i] as usize];
+                let radiance = lights.radiance(shadows.lamp[i]);
                 let light = [
                     f64::from(red[i]) * radiance[0],
                     f64::from(green[i]) * radiance[1],
@@ -299,7 +354,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
                 pdf: f64::from(next.carried.pdf[i]),
                 is_specular: false,
                 is_last: true,
-                normal: [0.0; 3],
+                normal: next.carried.normal.each_ref().map(|axis| axis[i]),
             });
             of_last
                 .throughput

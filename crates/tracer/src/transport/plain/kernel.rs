@@ -10,8 +10,9 @@ use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::glam::DVec3;
 
 use super::compaction::{Compaction, Instructions};
-use super::lamps::{Lights, place};
+use super::lamps::{Lights, Places, place, place_on_chosen};
 use super::{Columns, RayColumns};
+use crate::light_tree::Choices;
 use crate::placed::PlainSurface;
 use crate::transport::paths::{DRAWS, Draw};
 use crate::transport::{kernels, patch};
@@ -38,6 +39,9 @@ pub(super) struct Numbers<'a> {
     pub(super) goes_on: bool,
     pub(super) roulette: bool,
     pub(super) drawn: &'a [[Vec<f32>; 2]; DRAWS as usize],
+    /// The lamps that lanes chose, and with which chances, where they are many; what is left of the number that chose
+    /// each is drawn.
+    pub(super) chosen: Option<(&'a [u32], &'a [f32])>,
 }
 
 /// Where rays go that leave hits.
@@ -65,10 +69,39 @@ struct Hits {
     back: [Row; 3],
 }
 
+/// The points of some blocks, where surfaces scatter light, that choose among many lamps by a number a lane; their lanes
+/// go to `asking`, which has room for all.
+#[multiversion::multiversion(targets = "simd")]
+pub(super) fn ask_for_lamps(
+    (surfaces, origin): (&[PlainSurface], DVec3),
+    (blocks, carried): (&[RayBlock], &Columns),
+    numbers: &[f32],
+    (choices, asking): (&mut Choices, &mut [u32]),
+) {
+    let Some(last) = surfaces.len().checked_sub(1) else { return };
+    let instructions = Instructions::of_machine();
+    for (number, block) in blocks.iter().enumerate() {
+        let first = number * LANES;
+        let mut scatters = [0; LANES];
+        for lane in 0..LANES {
+            let surface = &surfaces[(block.placement[lane] as usize).min(last)];
+            scatters[lane] = mask(surface.scatters & (lane < carried.len.saturating_sub(first)));
+        }
+        let own: &Row = numbers[first..first + LANES].try_into().unwrap_or(&ZERO);
+        let hits = measure(block, &[ZERO; 3], [0.0; 3]);
+        let (wanted, at) = (Compaction::new(&scatters, instructions), choices.len());
+        wanted.put(&lanes_from(first), asking, at);
+        choices.push_some((&hits.point, origin), &hits.normal, own, |row, to| {
+            wanted.put(row, to, 0);
+            wanted.count
+        });
+    }
+}
+
 /// A step of all paths of some blocks: lists those that met what shines, and notes the rays that leave.
 #[multiversion::multiversion(targets = "simd")]
 pub(super) fn leave_blocks(
-    (surfaces, lights): (&[PlainSurface], &Lights),
+    (surfaces, lights): (&[PlainSurface], &Lights<'_>),
     (blocks, carried): (&[RayBlock], &Columns),
     (numbers, sphere): (Numbers<'_>, Option<Sphere>),
     Leaving { shadows, next, seen }: Leaving<'_>,
@@ -116,8 +149,15 @@ pub(super) fn leave_blocks(
         };
         let ray: [u32; LANES] = carried.ray[run.clone()].try_into().unwrap_or([0; LANES]);
         let light = square(Draw::Light);
+        let places = match numbers.chosen {
+            None => place(lights, &hits.point, light),
+            Some((lamps, chances)) => {
+                let own: &[u32; LANES] = lamps[run.clone()].try_into().unwrap_or(&[0; LANES]);
+                place_on_chosen(lights, &hits.point, &light, (own, &row(chances)))
+            }
+        };
         let asking = (&found.scatters, &throughput, &ray);
-        ask((lights, offset), &hits, light, asking, (instructions, shadows));
+        ask((&places, offset), &hits, asking, (instructions, shadows));
         if !numbers.goes_on {
             continue;
         }
@@ -154,6 +194,11 @@ pub(super) fn leave_blocks(
             going.put(&start[axis], &mut next.start[axis], at);
             going.put(&along[axis], &mut next.along[axis], at);
             going.put(&throughput[axis], &mut next.carried.throughput[axis], at);
+        }
+        if numbers.chosen.is_some() {
+            for axis in 0..3 {
+                going.put(&hits.normal[axis], &mut next.carried.normal[axis], at);
+            }
         }
         going.put(&pdf, &mut next.carried.pdf, at);
         going.put(&ray, &mut next.carried.ray, at);
@@ -223,13 +268,11 @@ fn measure(block: &RayBlock, magnitudes: &[Row; 3], offset: [f32; 3]) -> Hits {
 /// [`super::super::kernels::aim`] and [`super::super::kernels::reflect`] have them.
 #[inline(always)]
 fn ask(
-    (lights, offset): (&Lights, [f32; 3]),
+    (places, offset): (&Places, [f32; 3]),
     hits: &Hits,
-    square: [Row; 2],
     (scatters, throughput, ray): (&Mask, &[Row; 3], &[u32; LANES]),
     (instructions, shadows): (Instructions, &mut RayColumns),
 ) {
-    let places = place(lights, &hits.point, square);
     let (mut squared, mut facing, mut above, mut blur) = (ZERO, ZERO, ZERO, ZERO);
     for axis in 0..3 {
         for i in 0..LANES {

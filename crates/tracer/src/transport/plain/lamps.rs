@@ -8,7 +8,7 @@ use etendue_geometry::glam::DVec3;
 
 use super::kernel::{ZERO, round, single};
 use crate::area_light::AreaLight;
-use crate::lights::FewLamps;
+use crate::lights;
 
 /// The largest number below 1.
 const ONE_BELOW: f32 = 1.0 - f32::EPSILON / 2.0;
@@ -48,29 +48,49 @@ impl Lamp {
 
 /// The lamps of a plain scene.
 #[derive(Debug)]
-pub(in crate::transport) struct Lights {
-    lamps: Vec<Lamp>,
-    /// The sum of the chances of all before each, and 1 at the end.
+pub(in crate::transport) struct Lights<'a> {
+    all: &'a lights::Lights,
+    /// All of them, and the sum of the chances of all before each with 1 at the end, where they are few and alike from
+    /// everywhere; else each point chooses among all ([`lights::Lights::pick`]).
+    few: Vec<Lamp>,
     below: Vec<f32>,
-    /// Radiance of triangles, intensity of points.
-    pub(super) radiance: Vec<[f64; 3]>,
     /// What blocks' coordinates are relative to (m).
     pub(super) origin: DVec3,
 }
 
-impl Lights {
-    pub(super) fn new(few: &FewLamps<'_>, origin: DVec3) -> Self {
-        let points = few.points.iter().map(|&at| Lamp::point(at, origin));
-        let triangles = few.triangles.iter().flatten().map(|own| Lamp::triangle(own, origin));
-        let radiance = few.bands.iter().flat_map(|bands| bands.as_chunks().0).copied();
-        Self {
-            lamps: points.chain(triangles).collect(),
-            below: few.below.iter().map(|&sum| round(sum)).collect(),
-            radiance: radiance.collect(),
-            origin,
+impl<'a> Lights<'a> {
+    pub(super) fn new(all: &'a lights::Lights, origin: DVec3) -> Self {
+        let mut own = Self { all, few: Vec::new(), below: Vec::new(), origin };
+        if let Some(below) = all.few() {
+            own.few = (0..all.count()).map(|number| own.lamp(number)).collect();
+            own.below = below.iter().map(|&sum| round(sum)).collect();
+        }
+        own
+    }
+
+    /// Whether each point chooses among all by where it is.
+    pub(super) fn are_many(&self) -> bool {
+        self.few.is_empty()
+    }
+
+    #[inline(always)]
+    fn lamp(&self, number: usize) -> Lamp {
+        match self.all.lamp(number) {
+            Some(lights::Lamp::Point(at)) => Lamp::point(at, self.origin),
+            Some(lights::Lamp::Triangle(own)) => Lamp::triangle(own, self.origin),
+            None => Lamp::default(),
         }
     }
+
+    /// Radiance of a triangle, intensity of a point.
+    #[inline(always)]
+    pub(super) fn radiance(&self, lamp: u32) -> &[f64] {
+        self.all.lamp_bands(lamp as usize, 3)
+    }
 }
+
+/// The lamps that sixteen points chose, and with which chances.
+pub(super) type Chosen<'a> = (&'a [u32; LANES], &'a Row);
 
 /// Places on lamps, one for each of sixteen points. Flags are 1 where they hold, else 0.
 pub(super) struct Places {
@@ -86,21 +106,75 @@ pub(super) struct Places {
     pub(super) lamp: [u32; LANES],
 }
 
-/// Chooses a lamp for each of sixteen points, and a place on it.
+impl Places {
+    fn nowhere() -> Self {
+        Self {
+            way: [ZERO; 3],
+            normal: [ZERO; 3],
+            magnitudes: [ZERO; 3],
+            density: ZERO,
+            two_sided: ZERO,
+            is_point: ZERO,
+            lamp: [0; LANES],
+        }
+    }
+}
+
+/// Places on the lamps that sixteen points chose, by what was left of the numbers that chose them and others.
 #[inline(always)]
-pub(super) fn place(lights: &Lights, points: &[Row; 3], [mut u, v]: [Row; 2]) -> Places {
-    let mut places = Places {
-        way: [ZERO; 3],
-        normal: [ZERO; 3],
-        magnitudes: [ZERO; 3],
-        density: ZERO,
-        two_sided: ZERO,
-        is_point: ZERO,
-        lamp: [0; LANES],
-    };
+pub(super) fn place_on_chosen(
+    lights: &Lights<'_>,
+    points: &[Row; 3],
+    square: &[Row; 2],
+    (lamps, chance): Chosen<'_>,
+) -> Places {
+    let mut places = Places { lamp: *lamps, ..Places::nowhere() };
+    // What there is in memory of each.
+    let (mut corner, mut edges, mut area) = ([ZERO; 3], [[ZERO; 3]; 2], ZERO);
+    for i in 0..LANES {
+        let lamp = lights.lamp(lamps[i] as usize);
+        for axis in 0..3 {
+            corner[axis][i] = lamp.corner[axis];
+            edges[0][axis][i] = lamp.edges[0][axis];
+            edges[1][axis][i] = lamp.edges[1][axis];
+            places.normal[axis][i] = lamp.normal[axis];
+            places.magnitudes[axis][i] = lamp.magnitudes[axis];
+        }
+        (area[i], places.two_sided[i]) = (lamp.area, lamp.two_sided);
+        places.is_point[i] = lamp.is_point;
+    }
+    let [second, third] = corner_weights(square);
+    for axis in 0..3 {
+        for i in 0..LANES {
+            let across = edges[0][axis][i] * second[i] + edges[1][axis][i] * third[i];
+            places.way[axis][i] = (corner[axis][i] - points[axis][i]) + across;
+        }
+    }
+    for i in 0..LANES {
+        places.density[i] = chance[i] / area[i];
+    }
+    places
+}
+
+/// Weights of the second and third corner by squares, uniform over triangles.
+#[inline(always)]
+fn corner_weights([u, v]: &[Row; 2]) -> [Row; 2] {
+    let (mut second, mut third) = (ZERO, ZERO);
+    for i in 0..LANES {
+        let root = u[i].sqrt();
+        second[i] = root * (1.0 - v[i]);
+        third[i] = v[i] * root;
+    }
+    [second, third]
+}
+
+/// Chooses one of few lamps for each of sixteen points, and a place on it.
+#[inline(always)]
+pub(super) fn place(lights: &Lights<'_>, points: &[Row; 3], [mut u, v]: [Row; 2]) -> Places {
+    let mut places = Places::nowhere();
     let below = &*lights.below;
     let mut chance = [1.0; LANES];
-    if lights.lamps.len() > 1 {
+    if lights.few.len() > 1 {
         let (mut start, mut end) = (ZERO, [1.0; LANES]);
         for (number, of_lamp) in (0_u32..).zip(below.windows(2)) {
             let (from, to) = (of_lamp[0], of_lamp[1]);
@@ -118,13 +192,8 @@ pub(super) fn place(lights: &Lights, points: &[Row; 3], [mut u, v]: [Row; 2]) ->
             u[i] = if rest < ONE_BELOW { rest } else { ONE_BELOW };
         }
     }
-    let (mut second, mut third) = (ZERO, ZERO);
-    for i in 0..LANES {
-        let root = u[i].sqrt();
-        second[i] = root * (1.0 - v[i]);
-        third[i] = v[i] * root;
-    }
-    for (number, lamp) in (0_u32..).zip(&lights.lamps) {
+    let [second, third] = corner_weights(&[u, v]);
+    for (number, lamp) in (0_u32..).zip(&lights.few) {
         for axis in 0..3 {
             let (corner, normal) = (lamp.corner[axis], lamp.normal[axis]);
             let (along, across) = (lamp.edges[0][axis], lamp.edges[1][axis]);

@@ -1,0 +1,96 @@
+//! Scenes whose lights are all lamps: points that stand still, and triangles that shine alike all over.
+
+use etendue_geometry::glam::DVec3;
+
+use super::Lights;
+use crate::area_light::AreaLight;
+use crate::light::{Light, LightKind};
+
+/// Bounds of all lamps.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LampBounds {
+    /// The least area of a triangle (m²); infinite without any.
+    pub(crate) least_area: f64,
+    /// The largest absolute coordinate of a point (m).
+    pub(crate) farthest: f64,
+}
+
+/// A lamp.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Lamp<'a> {
+    /// m.
+    Point(DVec3),
+    Triangle(&'a AreaLight),
+}
+
+impl Lights {
+    /// What [`Self::pick`] picks by, where that is a short list: the sum of the chances of all lights before
+    /// each, and 1 at the end.
+    pub(crate) fn few(&self) -> Option<&[f64]> {
+        self.sampler.few()
+    }
+
+    /// All lights and their bands, if they are few triangles that are kept ready and shine alike all over.
+    pub(crate) fn few_triangles(&self) -> Option<(&[Option<AreaLight>], &[f64])> {
+        let are_triangles = self.lights.is_empty() && self.lamps.is_some();
+        let are_taken = are_triangles && self.few().is_some() && !self.triangles.is_empty();
+        are_taken.then_some((&*self.area_lights, &*self.area_light_bands))
+    }
+
+    /// Bounds of the lights, if all are lamps that are kept ready.
+    pub(crate) fn lamps(&self) -> Option<LampBounds> {
+        self.lamps
+    }
+
+    /// How many lights there are.
+    pub(crate) fn count(&self) -> usize {
+        self.lights.len() + self.triangles.len()
+    }
+
+    /// A light that is a lamp, by its number.
+    #[inline(always)]
+    pub(crate) fn lamp(&self, number: usize) -> Option<Lamp<'_>> {
+        match self.lights.get(number) {
+            Some(light) => standing_point(light).map(Lamp::Point),
+            None => {
+                let own = self.area_lights.get(number - self.lights.len())?.as_ref();
+                own.filter(|own| own.is_plain).map(Lamp::Triangle)
+            }
+        }
+    }
+
+    /// What a lamp gives off in each band: the intensity of a point, the radiance of a triangle.
+    #[inline(always)]
+    pub(crate) fn lamp_bands(&self, number: usize, count: usize) -> &[f64] {
+        match number.checked_sub(self.lights.len()) {
+            Some(own) => &self.area_light_bands[own * count..(own + 1) * count],
+            None => self.bands_of(number, count),
+        }
+    }
+
+    /// Bounds of all lights once triangles are kept ready; `None` if one is no lamp.
+    pub(super) fn bound_lamps(&self) -> Option<LampBounds> {
+        if self.area_lights.len() != self.triangles.len() {
+            return None;
+        }
+        let mut bounds = LampBounds { least_area: f64::INFINITY, farthest: 0.0 };
+        for number in 0..self.count() {
+            match self.lamp(number)? {
+                Lamp::Point(at) => bounds.farthest = bounds.farthest.max(at.abs().max_element()),
+                Lamp::Triangle(own) => {
+                    bounds.least_area = bounds.least_area.min(own.shape.area);
+                }
+            }
+        }
+        Some(bounds)
+    }
+}
+
+/// Where a light is (m), if it is a point that shines alike to all sides and stands still.
+#[inline(always)]
+pub(super) fn standing_point(light: &Light) -> Option<DVec3> {
+    match light {
+        Light { kind: LightKind::Point(at), motion: None, .. } => Some(*at),
+        _ => None,
+    }
+}
