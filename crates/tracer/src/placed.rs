@@ -2,7 +2,7 @@
 //! hit.
 
 use etendue_geometry::glam::{DMat3, DVec3};
-use etendue_geometry::{Coplanar, Geometry};
+use etendue_geometry::{Coplanar, Geometry, Mesh, Placement};
 
 use crate::bodies::{Body, bodies};
 use crate::scattering::Absorption;
@@ -19,6 +19,7 @@ pub struct PlacedSurfaces {
     /// What is known of all where each is matte and of one colour, and what it is of none behind the last; empty
     /// elsewhere.
     plain: Vec<PlainSurface>,
+    are_tilted: bool,
     /// The diagonal of the box around all (m).
     size: f64,
 }
@@ -32,21 +33,34 @@ pub(crate) struct PlainSurface {
     pub(crate) is_there: bool,
     pub(crate) scatters: bool,
     pub(crate) shines: bool,
+    /// It scatters light about normals of its mesh's corners, which this carries into the world, row by row.
+    pub(crate) turn: Option<[[f32; 3]; 3]>,
 }
 
 impl PlainSurface {
     /// `None` of a surface of another kind.
     #[expect(clippy::cast_possible_truncation, reason = "single precision is the purpose")]
-    fn of(placed: &PlacedSurface, material: &Material) -> Option<Self> {
+    fn of(
+        placed: &PlacedSurface,
+        material: &Material,
+        (placement, mesh): (&Placement, &Mesh),
+    ) -> Option<Self> {
         let scatters = match placed.kind {
             SurfaceKind::Matte => true,
             SurfaceKind::Black => false,
             SurfaceKind::Sheet | SurfaceKind::Smooth | SurfaceKind::Other => return None,
         };
         let is_unlit = material.scattering == Scattering::Unlit;
-        if placed.has_alpha || placed.may_vanish() || is_unlit || (scatters && placed.is_tilted) {
+        if placed.has_alpha || placed.may_vanish() || is_unlit {
             return None;
         }
+        let is_tilted = scatters && placed.is_tilted;
+        let moves = placement.motion.is_some() || mesh.steps.is_some();
+        if is_tilted && (moves || material.normal_map.is_some()) {
+            return None;
+        }
+        let rows = || placed.turn.unwrap_or(DMat3::IDENTITY).transpose().to_cols_array_2d();
+        let turn = is_tilted.then(|| rows().map(|row| row.map(|x| x as f32)));
         let color = if scatters { placed.color?.color } else { [0.0; 3] };
         Some(Self {
             color: color.map(|band| band as f32),
@@ -54,6 +68,7 @@ impl PlainSurface {
             is_there: true,
             scatters,
             shines: placed.is_seen,
+            turn,
         })
     }
 }
@@ -138,7 +153,7 @@ impl PlacedSurfaces {
     #[must_use]
     pub fn of(geometry: &Geometry, materials: &[Material], spectral: &Spectral) -> Self {
         let bodies = bodies(geometry, materials);
-        let surface = |(placement, body): (&etendue_geometry::Placement, Option<Body>)| {
+        let surface = |(placement, body): (&Placement, Option<Body>)| {
             let material = materials.get(placement.material as usize)?;
             let mesh = geometry.mesh_of(placement);
             let place = &placement.world_from_mesh;
@@ -170,8 +185,9 @@ impl PlacedSurfaces {
         let size = bounds.diagonal();
         let [least, most] = crate::transport::PLAIN_SIZES;
         let fits = size >= least && size + bounds.centre().length() <= most && spectral.is_rgb();
-        let row = |(placed, placement): (&Option<PlacedSurface>, &etendue_geometry::Placement)| {
-            PlainSurface::of(placed.as_ref()?, materials.get(placement.material as usize)?)
+        let row = |(placed, placement): (&Option<PlacedSurface>, &Placement)| {
+            let material = materials.get(placement.material as usize)?;
+            PlainSurface::of(placed.as_ref()?, material, (placement, geometry.mesh_of(placement)))
         };
         let rows = all.iter().zip(&geometry.placements).map(row);
         let plain: Option<Vec<_>> = if fits { rows.collect() } else { None };
@@ -179,12 +195,18 @@ impl PlacedSurfaces {
         if !plain.is_empty() {
             plain.push(PlainSurface::default());
         }
-        Self { all, touching, plain, size }
+        let are_tilted = plain.iter().any(|surface| surface.turn.is_some());
+        Self { all, touching, plain, are_tilted, size }
     }
 
     /// All in single precision and, behind the last, none: where all are matte and of one colour each.
     pub(crate) fn plain(&self) -> Option<&[PlainSurface]> {
         (!self.plain.is_empty()).then_some(&*self.plain)
+    }
+
+    /// Tests whether any of these scatters light about normals of its mesh's corners.
+    pub(crate) fn are_tilted(&self) -> bool {
+        self.are_tilted
     }
 
     /// The diagonal of the box around all (m).

@@ -123,18 +123,19 @@ impl SurfacePoint<'_> {
     }
 }
 
+/// How far above the surface the mirrored direction is raised before it is brought back to unit length, as a share of the
+/// viewer's elevation: enough to stay above it in rounding.
+pub(crate) const LEAST_ELEVATION: f64 = 0.05;
+
 /// A shading normal as light is scattered by: the geometric one where the viewer would see its back,
 /// and bent until it mirrors the viewer along the surface where it would mirror them into it, as a
 /// tilted mirror would be black there (Keller et al., "The Iray Light Transport Simulation and
 /// Rendering System", 2017, appendix A.3). All unit; `geometric` faces the viewer.
 #[inline(always)]
 pub(crate) fn facing(normal: DVec3, geometric: DVec3, wo: DVec3) -> DVec3 {
-    /// How far above the surface the mirrored direction is raised before it is brought back to unit
-    /// length, as a share of the viewer's elevation: enough to stay above it in rounding.
-    const LEAST: f64 = 0.05;
     let cosine = normal.dot(wo);
     let mirrored = 2.0 * cosine * normal - wo;
-    let lacking = LEAST * geometric.dot(wo) - geometric.dot(mirrored);
+    let lacking = LEAST_ELEVATION * geometric.dot(wo) - geometric.dot(mirrored);
     let slope = normal.dot(geometric);
     let raised = mirrored + normal * (lacking / slope);
     let half = wo + raised * (1.0 / raised.length());

@@ -248,13 +248,20 @@ fn plain_scenes_are_the_same_in_single_precision() {
         ("direct, two lamps", &direct, "", &two),
         ("direct, points", &direct, points, ""),
         ("one bounce", &path(1), "", LAMP),
+        // Light is scattered about the normals of its corners.
+        ("direct, a sphere", &direct, "", LAMP),
+        ("four, points and a sphere", &path(4), points, LAMP),
         ("three", &path(3), "", &two),
         ("three, points", &path(3), points, ""),
         // Dim paths end by chance.
         ("twelve", &path(12), points, &two),
     ] {
         // Boxes share a mesh, of which a structure for many triangles has instances.
-        let ball = if lamps == blob { r#"blob", "triangles": 200, "name": "ball"# } else { "box" };
+        let ball = match () {
+            () if lamps == blob => r#"blob", "triangles": 200, "name": "ball"#,
+            () if name.ends_with("sphere") => "sphere",
+            () => "box",
+        };
         let text = room(tracer, lights, lamps, ball)
             .replace(r#""layers": ["direct", "indirect"],"#, "")
             .replace(

@@ -1,6 +1,6 @@
-//! Plain scenes: matte surfaces of one colour each under lamps that stand still, few or many. All of a step is done on
-//! blocks of sixteen paths in single precision, whose numbers stay in registers between the hit and the rays that leave
-//! it.
+//! Plain scenes: matte surfaces of one colour each, flat or smooth, under lamps that stand still, few or many. All of a
+//! step is done on blocks of sixteen paths in single precision, whose numbers stay in registers between the hit and the
+//! rays that leave it.
 //!
 //! The estimators, and the random numbers by use, are those of the other scenes ([`super::trace`]): pictures are the
 //! same up to the roundings of single precision. What is rare, such as the light of a lamp that is met, is done there.
@@ -8,6 +8,7 @@
 mod compaction;
 mod kernel;
 mod lamps;
+mod surfaces;
 
 use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
@@ -15,6 +16,7 @@ use etendue_geometry::{HitPrecision, RayBlocks};
 
 use self::kernel::{Leaving, Numbers, ask_for_lamps, leave_blocks};
 use self::lamps::Lights;
+use self::surfaces::Surfaces;
 use super::paths::{DRAWS, Draw, Step, Way, Workspace};
 use super::rays::{Blocks, RayHit};
 use super::trace::Encounter;
@@ -22,7 +24,6 @@ use super::{LightingContext, Parts, RaySamples, Tracing};
 use crate::light_sampler::Receiver;
 use crate::light_tree::Choices;
 use crate::lights::LampBounds;
-use crate::placed::PlainSurface;
 
 /// Single precision holds squares of lengths, and densities over areas, of scenes between these sizes (m).
 pub(crate) const SIZES: [f64; 2] = [1e-6, 1e9];
@@ -118,8 +119,8 @@ impl RayColumns {
 
 impl<'a, const RGB: bool> Tracing<'a, RGB> {
     /// The surfaces and lamps of a plain scene; `None` of any other.
-    pub(super) fn plain(&self) -> Option<(&'a [PlainSurface], Lights<'a>)> {
-        let &LightingContext { lights, placed, traits, .. } = self.ctx;
+    pub(super) fn plain(&self) -> Option<(Surfaces<'a>, Lights<'a>)> {
+        let &LightingContext { lights, placed, traits, scene, .. } = self.ctx;
         let is_taken = RGB
             && self.ctx.precision == HitPrecision::Single
             && self.parts == Parts::Whole
@@ -127,7 +128,8 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             && traits.is_matte
             && !(traits.may_pass() || traits.has_media || traits.has_panes)
             && !lights.has_environment();
-        let surfaces = placed.plain().filter(|_| is_taken)?;
+        let all = placed.plain().filter(|_| is_taken)?;
+        let surfaces = Surfaces { all, geometry: scene.geometry, are_tilted: placed.are_tilted() };
         let origin = self.ctx.accel.blocks()?.origin();
         let LampBounds { least_area, farthest } = lights.lamps()?;
         let least = LEAST_AREA * placed.size().powi(2);
@@ -140,7 +142,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
     pub(super) fn trace_plain(
         &mut self,
         camera: &RaySamples<'_>,
-        (surfaces, lights): (&[PlainSurface], &Lights<'_>),
+        (surfaces, lights): (Surfaces<'_>, &Lights<'_>),
         (plain, workspace): (&mut PlainScratch, &mut Workspace<Blocks>),
         out: &mut [f64],
     ) {
@@ -182,7 +184,9 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
                 seen: &mut plain.seen,
             };
             let sphere = emitters.filter(|_| is_last);
-            leave_blocks(
+            let leave =
+                if surfaces.are_tilted { leave_blocks::<true> } else { leave_blocks::<false> };
+            leave(
                 (surfaces, lights),
                 (plain.rays.blocks(), &plain.carried),
                 (numbers, sphere),
@@ -228,7 +232,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
     /// Chooses one of many lamps for each path that is scattered.
     fn choose_lamps(
         &self,
-        (surfaces, lights): (&[PlainSurface], &Lights<'_>),
+        (surfaces, lights): (Surfaces<'_>, &Lights<'_>),
         plain: &mut PlainScratch,
     ) {
         let PlainScratch { rays, carried, numbers, chosen, .. } = plain;
@@ -237,12 +241,8 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         let room = first.len() + LANES;
         self.ctx.lights.restart(choices, room);
         asking.resize(room, 0);
-        ask_for_lamps(
-            (surfaces, lights.origin),
-            (rays.blocks(), carried),
-            first,
-            (choices, asking),
-        );
+        let ask = if surfaces.are_tilted { ask_for_lamps::<true> } else { ask_for_lamps::<false> };
+        ask((surfaces, lights.origin), (rays.blocks(), carried), first, (choices, asking));
         self.ctx.lights.pick(choices);
         lamp.clear();
         lamp.resize(room, 0);

@@ -11,9 +11,9 @@ use etendue_geometry::glam::DVec3;
 
 use super::compaction::{Compaction, Instructions};
 use super::lamps::{Lights, Places, place, place_on_chosen};
+use super::surfaces::{Found, Surfaces, bend};
 use super::{Columns, RayColumns};
 use crate::light_tree::Choices;
-use crate::placed::PlainSurface;
 use crate::transport::paths::{DRAWS, Draw};
 use crate::transport::{kernels, patch};
 
@@ -54,44 +54,43 @@ pub(super) struct Leaving<'a> {
 /// A sphere around all that shines, relative to the blocks' origin: its centre and its radius (m).
 pub(super) type Sphere = ([f32; 3], f32);
 
-/// What is looked up for the hits of a block.
-struct Found {
-    color: [Row; 3],
-    magnitudes: [Row; 3],
-    scatters: Mask,
-}
-
 /// The hits of a block.
 struct Hits {
     point: [Row; 3],
     normal: [Row; 3],
+    /// The normals of meshes that light is scattered about, on the viewer's side, where there are any.
+    bent: [Row; 3],
     error: Row,
     back: [Row; 3],
+}
+
+impl Hits {
+    /// The normals that light is scattered about.
+    #[inline(always)]
+    fn shading<const TILTED: bool>(&self) -> &[Row; 3] {
+        if TILTED { &self.bent } else { &self.normal }
+    }
 }
 
 /// The points of some blocks, where surfaces scatter light, that choose among many lamps by a number a lane; their lanes
 /// go to `asking`, which has room for all.
 #[multiversion::multiversion(targets = "simd")]
-pub(super) fn ask_for_lamps(
-    (surfaces, origin): (&[PlainSurface], DVec3),
+pub(super) fn ask_for_lamps<const TILTED: bool>(
+    (surfaces, origin): (Surfaces<'_>, DVec3),
     (blocks, carried): (&[RayBlock], &Columns),
     numbers: &[f32],
     (choices, asking): (&mut Choices, &mut [u32]),
 ) {
-    let Some(last) = surfaces.len().checked_sub(1) else { return };
     let instructions = Instructions::of_machine();
     for (number, block) in blocks.iter().enumerate() {
         let first = number * LANES;
-        let mut scatters = [0; LANES];
-        for lane in 0..LANES {
-            let surface = &surfaces[(block.placement[lane] as usize).min(last)];
-            scatters[lane] = mask(surface.scatters & (lane < carried.len.saturating_sub(first)));
-        }
+        let count = carried.len.saturating_sub(first);
+        let found = Found::of::<TILTED>(surfaces, (block, count), |_| ());
         let own: &Row = numbers[first..first + LANES].try_into().unwrap_or(&ZERO);
-        let hits = measure(block, &[ZERO; 3], [0.0; 3]);
-        let (wanted, at) = (Compaction::new(&scatters, instructions), choices.len());
+        let hits = measure(block, &found, [0.0; 3]);
+        let (wanted, at) = (Compaction::new(&found.scatters, instructions), choices.len());
         wanted.put(&lanes_from(first), asking, at);
-        choices.push_some((&hits.point, origin), &hits.normal, own, |row, to| {
+        choices.push_some((&hits.point, origin), hits.shading::<TILTED>(), own, |row, to| {
             wanted.put(row, to, 0);
             wanted.count
         });
@@ -100,39 +99,25 @@ pub(super) fn ask_for_lamps(
 
 /// A step of all paths of some blocks: lists those that met what shines, and notes the rays that leave.
 #[multiversion::multiversion(targets = "simd")]
-pub(super) fn leave_blocks(
-    (surfaces, lights): (&[PlainSurface], &Lights<'_>),
+pub(super) fn leave_blocks<const TILTED: bool>(
+    (surfaces, lights): (Surfaces<'_>, &Lights<'_>),
     (blocks, carried): (&[RayBlock], &Columns),
     (numbers, sphere): (Numbers<'_>, Option<Sphere>),
     Leaving { shadows, next, seen }: Leaving<'_>,
 ) {
-    let Some(last) = surfaces.len().checked_sub(1) else { return };
     // Blocks' coordinates are those of the world less their origin, whose roundings count as well.
     let offset = single(lights.origin).map(|axis| 2.0 * axis.abs());
     let instructions = Instructions::of_machine();
     for (number, block) in blocks.iter().enumerate() {
         let first = number * LANES;
-        let mut found = Found { color: [ZERO; 3], magnitudes: [ZERO; 3], scatters: [0; LANES] };
-        let mut any = false;
+        let count = carried.len.saturating_sub(first);
         let numbers_of_lanes = lanes_from(first);
-        for lane in 0..LANES {
-            let surface = &surfaces[(block.placement[lane] as usize).min(last)];
-            for axis in 0..3 {
-                found.color[axis][lane] = surface.color[axis];
-                found.magnitudes[axis][lane] = surface.magnitudes[axis];
-            }
-            let is_hit = surface.is_there & (lane < carried.len.saturating_sub(first));
-            let scatters = surface.scatters & is_hit;
-            found.scatters[lane] = mask(scatters);
-            any |= scatters;
-            if surface.shines & is_hit {
-                seen.push(numbers_of_lanes[lane]);
-            }
-        }
-        if !(any & numbers.is_scattered) {
+        let meets = |lane: usize| seen.push(numbers_of_lanes[lane]);
+        let found = Found::of::<TILTED>(surfaces, (block, count), meets);
+        if !numbers.is_scattered || found.scatters == [0; LANES] {
             continue;
         }
-        let hits = measure(block, &found.magnitudes, offset);
+        let hits = measure(block, &found, offset);
         let run = first..first + LANES;
         let row = |column: &[f32]| -> Row { column[run.clone()].try_into().unwrap_or(ZERO) };
         // (What maps arrays is a function of its own, compiled without wide registers.)
@@ -157,12 +142,12 @@ pub(super) fn leave_blocks(
             }
         };
         let asking = (&found.scatters, &throughput, &ray);
-        ask((&places, offset), &hits, asking, (instructions, shadows));
+        ask::<TILTED>((&places, offset), &hits, asking, (instructions, shadows));
         if !numbers.goes_on {
             continue;
         }
         let direction = square(Draw::Direction);
-        let (start, along, pdf, mut goes) = scatter(&hits, direction);
+        let (start, along, pdf, mut goes) = scatter::<TILTED>(&hits, direction);
         for i in 0..LANES {
             goes[i] &= found.scatters[i];
         }
@@ -197,7 +182,7 @@ pub(super) fn leave_blocks(
         }
         if numbers.chosen.is_some() {
             for axis in 0..3 {
-                going.put(&hits.normal[axis], &mut next.carried.normal[axis], at);
+                going.put(&hits.shading::<TILTED>()[axis], &mut next.carried.normal[axis], at);
             }
         }
         going.put(&pdf, &mut next.carried.pdf, at);
@@ -209,7 +194,7 @@ pub(super) fn leave_blocks(
 }
 
 #[inline(always)]
-fn mask(holds: bool) -> u32 {
+pub(super) fn mask(holds: bool) -> u32 {
     select_unpredictable(holds, u32::MAX, 0)
 }
 
@@ -226,7 +211,8 @@ fn lanes_from(first: usize) -> [u32; LANES] {
 
 /// Points, their errors, and normals on the viewer's side, as [`super::super::kernels::measure`] has them.
 #[inline(always)]
-fn measure(block: &RayBlock, magnitudes: &[Row; 3], offset: [f32; 3]) -> Hits {
+fn measure(block: &RayBlock, found: &Found, offset: [f32; 3]) -> Hits {
+    let magnitudes = &found.magnitudes;
     let [x, y, z] = &block.normal;
     let [dx, dy, dz] = &block.direction;
     let mut normal = [ZERO; 3];
@@ -261,25 +247,33 @@ fn measure(block: &RayBlock, magnitudes: &[Row; 3], offset: [f32; 3]) -> Hits {
         back[1][i] = (normal[1][i] * across - dy[i]) * amount;
         back[2][i] = (normal[2][i] * across - dz[i]) * amount;
     }
-    Hits { point, normal, error, back }
+    let bent = match &found.tilted {
+        None => normal,
+        Some(tilted) => bend(tilted, &normal, &block.direction),
+    };
+    Hits { point, normal, bent, error, back }
 }
 
 /// Notes the rays to lamps, each with the share of the lamp's radiance that it brings, as
 /// [`super::super::kernels::aim`] and [`super::super::kernels::reflect`] have them.
 #[inline(always)]
-fn ask(
+fn ask<const TILTED: bool>(
     (places, offset): (&Places, [f32; 3]),
     hits: &Hits,
     (scatters, throughput, ray): (&Mask, &[Row; 3], &[u32; LANES]),
     (instructions, shadows): (Instructions, &mut RayColumns),
 ) {
     let (mut squared, mut facing, mut above, mut blur) = (ZERO, ZERO, ZERO, ZERO);
+    let mut turned = ZERO;
     for axis in 0..3 {
         for i in 0..LANES {
             let (here, way) = (hits.point[axis][i], places.way[axis][i]);
             squared[i] += way * way;
             facing[i] -= way * places.normal[axis][i];
             above[i] += way * hits.normal[axis][i];
+            if TILTED {
+                turned[i] += way * hits.bent[axis][i];
+            }
             let size =
                 (here.abs() + (here + way).abs()) + (places.magnitudes[axis][i] + offset[axis]);
             blur[i] += places.normal[axis][i].abs() * size;
@@ -293,11 +287,12 @@ fn ask(
         let shines = (shown > 0.0) | ((shown < 0.0) & (places.two_sided[i] > 0.0)) | is_point;
         let slope = select_unpredictable(is_point, 1.0, shown.abs());
         let pdf = places.density[i] * squared[i] / slope;
-        let reflected = above[i] * inverse * FRAC_1_PI;
+        let cosine = if TILTED { turned[i] } else { above[i] };
+        let reflected = cosine * inverse * FRAC_1_PI;
         // No direction comes upon a point by chance.
         let ratio = select_unpredictable(is_point, 0.0, reflected / pdf);
         let share = reflected / ((1.0 + ratio * ratio) * pdf);
-        value[i] = select_unpredictable(shines & (reflected > 0.0), share, 0.0);
+        value[i] = select_unpredictable(shines & (reflected > 0.0) & (above[i] > 0.0), share, 0.0);
         blur[i] *= if shown < 0.0 { -ROUNDINGS } else { ROUNDINGS };
     }
     let (mut start, mut along, mut length) = ([ZERO; 3], [ZERO; 3], ZERO);
@@ -340,11 +335,11 @@ fn ask(
     shadows.len += going.count;
 }
 
-/// Where rays start (m), their unit directions about the normals with density cos θ / π (1/sr), that density, and
+/// Where rays start (m), their unit directions about the shading normals with density cos θ / π (1/sr), that density, and
 /// whether there is one, as [`super::super::kernels::scatter`] has them.
 #[inline(always)]
-fn scatter(hits: &Hits, [u, v]: [Row; 2]) -> ([Row; 3], [Row; 3], Row, Mask) {
-    let [nx, ny, nz] = &hits.normal;
+fn scatter<const TILTED: bool>(hits: &Hits, [u, v]: [Row; 2]) -> ([Row; 3], [Row; 3], Row, Mask) {
+    let ([nx, ny, nz], [gx, gy, gz]) = (hits.shading::<TILTED>(), &hits.normal);
     let (mut along, mut start, mut pdf) = ([ZERO; 3], [ZERO; 3], ZERO);
     let mut goes = [0; LANES];
     let (mut a, mut b) = (ZERO, ZERO);
@@ -367,7 +362,7 @@ fn scatter(hits: &Hits, [u, v]: [Row; 2]) -> ([Row; 3], [Row; 3], Row, Mask) {
         along[1][i] = dy * inverse;
         along[2][i] = dz * inverse;
         pdf[i] = c * FRAC_1_PI;
-        goes[i] = mask((dx * x + dy * y + dz * z > 0.0) & (c > 0.0));
+        goes[i] = mask((dx * gx[i] + dy * gy[i] + dz * gz[i] > 0.0) & (c > 0.0));
     }
     for axis in 0..3 {
         for i in 0..LANES {

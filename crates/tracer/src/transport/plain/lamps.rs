@@ -53,6 +53,7 @@ pub(in crate::transport) struct Lights<'a> {
     /// All of them, and the sum of the chances of all before each with 1 at the end, where they are few and alike from
     /// everywhere; else each point chooses among all ([`lights::Lights::pick`]).
     few: Vec<Lamp>,
+    few_bands: Vec<[f64; 3]>,
     below: Vec<f32>,
     /// What blocks' coordinates are relative to (m).
     pub(super) origin: DVec3,
@@ -60,9 +61,11 @@ pub(in crate::transport) struct Lights<'a> {
 
 impl<'a> Lights<'a> {
     pub(super) fn new(all: &'a lights::Lights, origin: DVec3) -> Self {
-        let mut own = Self { all, few: Vec::new(), below: Vec::new(), origin };
+        let (few, few_bands) = (Vec::new(), Vec::new());
+        let mut own = Self { all, few, few_bands, below: Vec::new(), origin };
         if let Some(below) = all.few() {
             own.few = (0..all.count()).map(|number| own.lamp(number)).collect();
+            own.few_bands = (0..all.count()).map(|number| own.bands_of(number)).collect();
             own.below = below.iter().map(|&sum| round(sum)).collect();
         }
         own
@@ -84,8 +87,14 @@ impl<'a> Lights<'a> {
 
     /// Radiance of a triangle, intensity of a point.
     #[inline(always)]
-    pub(super) fn radiance(&self, lamp: u32) -> &[f64] {
-        self.all.lamp_bands(lamp as usize, 3)
+    pub(super) fn radiance(&self, lamp: u32) -> [f64; 3] {
+        let kept = self.few_bands.get(lamp as usize).copied();
+        kept.unwrap_or_else(|| self.bands_of(lamp as usize))
+    }
+
+    #[inline(always)]
+    fn bands_of(&self, number: usize) -> [f64; 3] {
+        self.all.lamp_bands(number, 3).try_into().unwrap_or_default()
     }
 }
 
