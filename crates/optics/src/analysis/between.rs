@@ -39,13 +39,14 @@ pub struct FieldsBetween {
     fields: Vec<PupilField>,
 }
 
-/// What the fields are of.
+/// Inputs of pupil fields: the lens, the nearnesses of the object (1/mm), and the point of the
+/// image that the fields are about.
 #[derive(Clone, Copy)]
 #[allow(missing_debug_implementations, reason = "holds a function")]
 pub struct FieldSource<'a> {
     /// The lens.
     pub train: &'a OpticalTrain,
-    /// The same at each of the wavelengths.
+    /// The lens at each of the wavelengths.
     pub lenses: &'a [MonochromaticTrain],
     /// Nearnesses (1/mm), ascending.
     pub nearness: &'a [f64],
@@ -152,7 +153,8 @@ impl FieldsBetween {
     }
 }
 
-/// How far from the sphere's centre rays land, at most, in wavelengths times the f-number.
+/// Greatest distance of the landing points from the reference sphere's centre, in wavelengths times
+/// the f-number.
 #[must_use]
 pub fn landing_reach(field: &PupilField) -> f64 {
     let open = field.lit().filter(|&i| field.clear[i] > 0.5);

@@ -32,7 +32,7 @@ const FINE: f64 = 1.0 / 3.0;
 /// On cells of more λN, all light lands where rays do.
 const COARSE: f64 = 4.0;
 
-/// Where cells lie: how a step to the right and one down in the picture run on the image plane.
+/// Cell grid on the image plane: how a step to the right and one down in the picture run there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CellGrid {
     /// A cell's side (mm).
@@ -75,8 +75,8 @@ impl CellSpread {
         self.shares[y * (last + 1) + x]
     }
 
-    /// How much of the light another one has elsewhere, twice: Σ |difference|, which no difference of their
-    /// transfer functions exceeds.
+    /// Sum of the absolute differences of the two spreads' shares: twice the share of light that
+    /// `other` has elsewhere. No difference of their transfer functions exceeds it.
     #[must_use]
     pub fn difference(&self, other: &Self) -> f64 {
         let half = self.half.max(other.half);

@@ -50,7 +50,7 @@ pub use transfer::Transfer;
 pub use wavefront::{ReferenceSphere, Wavefront};
 pub use zernike::{ZernikeFit, ZernikeOrder};
 
-/// Why a lens cannot be analysed in waves.
+/// Error of a lens that cannot be analysed in waves.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AnalysisError {
@@ -100,7 +100,7 @@ pub enum AnalysisError {
     Object {
         /// The option or key that asks for it.
         key: &'static str,
-        /// Why there is none.
+        /// Reason, as a sentence.
         why: String,
     },
     /// An array of lenslets.

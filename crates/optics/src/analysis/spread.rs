@@ -32,7 +32,7 @@ pub struct PointSpread {
     pub pitch: f64,
     /// Irradiance (1/mm²); the sphere's centre is point (`size`/2, `size`/2).
     pub values: Vec<f64>,
-    /// What the same pupil would have in the centre without aberrations (1/mm²).
+    /// Value at the centre for the same pupil without aberrations (1/mm²).
     pub perfect: f64,
 }
 

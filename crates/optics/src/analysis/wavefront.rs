@@ -102,15 +102,15 @@ pub enum Reference {
 /// A wavefront on its reference sphere.
 #[derive(Debug, Clone)]
 pub struct Wavefront {
-    /// Where it comes from.
+    /// Object point that emits the light.
     pub object: ObjectPoint,
-    /// What it is compared with.
+    /// Reference sphere of the wavefront errors.
     pub sphere: ReferenceSphere,
     /// The field on the sphere.
     pub pupil: PupilField,
 }
 
-/// How many cells a pupil gets.
+/// Number of cells across a pupil.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Cells {
     /// As many as the wavefront needs, at least 192 a side.
@@ -189,7 +189,8 @@ impl Wavefront {
         Ok(Self { object, sphere, pupil })
     }
 
-    /// The same about the point of least root mean square.
+    /// Moves the centre of the reference sphere to the point of least root-mean-square wavefront
+    /// error.
     ///
     /// # Errors
     ///

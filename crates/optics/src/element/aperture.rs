@@ -148,7 +148,7 @@ impl Opening {
         Self::Polygon { radius, normals, apothem: radius * (0.5 * step).cos() }
     }
 
-    /// The same with another radius (mm); `None` for a mask.
+    /// Returns the opening with another radius (mm); `None` for a mask.
     #[must_use]
     pub fn with_radius(&self, radius: f64) -> Option<Self> {
         match self {
@@ -203,7 +203,7 @@ impl Opening {
         }
     }
 
-    /// Whether a turn about the axis changes nothing.
+    /// True if a turn about the axis changes nothing.
     #[must_use]
     pub fn is_round(&self) -> bool {
         match self {
@@ -213,7 +213,7 @@ impl Opening {
         }
     }
 
-    /// Whether its middle is closed by a disk.
+    /// True if a disk closes the middle.
     #[must_use]
     pub fn is_obscured(&self) -> bool {
         matches!(self, Self::Shaped(shape) if shape.is_obscured())

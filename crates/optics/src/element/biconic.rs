@@ -98,13 +98,13 @@ impl Biconic {
         limit.sqrt().recip()
     }
 
-    /// The same as light that runs against the axis meets it.
+    /// Returns the surface as seen by light that runs against the axis.
     #[must_use]
     pub fn flipped(&self) -> Self {
         Self { curvature: self.curvature.map(|c| -c), ..*self }
     }
 
-    /// Whether a turn about its axis changes nothing.
+    /// True if a turn about its axis changes nothing.
     #[must_use]
     pub fn is_round(&self) -> bool {
         self.curvature[0] == self.curvature[1] && self.conic[0] == self.conic[1]

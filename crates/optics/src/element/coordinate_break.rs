@@ -39,7 +39,7 @@ pub struct CoordinateBreakSpec {
 pub struct CoordinateBreak {
     /// From the frame behind it to that before it.
     pub(crate) turn: DMat3,
-    /// Where the origin behind it lies (mm).
+    /// Origin of the coordinates behind the break (mm).
     pub(crate) shift: DVec3,
 }
 

@@ -1,5 +1,5 @@
-//! What glass takes from light: reflection at its surfaces, with and without a coating, and
-//! absorption on the way.
+//! Losses of light in glass: reflection at its surfaces, with and without a coating, and absorption
+//! on the way.
 //!
 //! Fresnel's equations for unpolarised light (M. Born and E. Wolf, *Principles of Optics*, 7th ed.,
 //! §1.5.2, eqs. 20-21) and the reflectance of a single homogeneous film (§1.6.4, eq. 57). What is
@@ -74,7 +74,7 @@ pub struct Coating {
 }
 
 impl LossesSpec {
-    /// Whether nothing is lost.
+    /// True if no losses are modelled.
     #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::default()
@@ -351,13 +351,14 @@ impl FilterSpec {
 }
 
 impl Filter {
-    /// Whether every place has the same curve.
+    /// True if the whole filter has one curve.
     #[must_use]
     pub fn is_uniform(&self) -> bool {
         self.map.is_none()
     }
 
-    /// Which of the curves is at `x`, `y` (mm); `None` beside the picture, where it is opaque.
+    /// Index of the transmission curve at `x`, `y` (mm); `None` beside the picture, where it is
+    /// opaque.
     #[must_use]
     pub fn curve_at(&self, x: f64, y: f64) -> Option<usize> {
         match &self.map {

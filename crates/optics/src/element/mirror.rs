@@ -72,16 +72,16 @@ pub struct MirrorSpec {
 pub struct Mirror {
     /// Its shape and clear aperture.
     pub surface: Surface,
-    /// What it does but for its shape.
+    /// Properties of the mirror apart from its shape.
     pub mount: MirrorMount,
 }
 
-/// What a mirror does but for its shape.
+/// Properties of a mirror apart from its shape.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MirrorMount {
     /// The radius of the hole in its middle (mm); 0 without.
     pub hole: f64,
-    /// Whether its tilt folds the axis.
+    /// True if the mirror's tilt folds the axis.
     pub folds_axis: bool,
     /// The share of light that it reflects; all of it when there is none.
     pub reflectance: Option<Curve>,

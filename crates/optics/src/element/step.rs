@@ -23,7 +23,7 @@ use super::rays::{Block, LANES, PENDING, Ray, RayStatus};
 use super::refract::{Media, Refracted, Refraction, each_lane};
 use super::thin_lens::at_thin_lens;
 
-/// Whether clear apertures stop rays.
+/// Clipping of rays by clear apertures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Clip {
     /// Semi-diameters, apertures and opaque parts of filters end a ray.

@@ -156,7 +156,7 @@ impl Surface {
         Self { curvature, conic: 0.0, aspheric: Vec::new(), semi_diameter: f64::INFINITY }
     }
 
-    /// The same as light that runs against the axis meets it.
+    /// Returns the surface as seen by light that runs against the axis.
     #[must_use]
     pub fn flipped(&self) -> Self {
         Self {
@@ -166,7 +166,7 @@ impl Surface {
         }
     }
 
-    /// Whether the surface is flat.
+    /// True if the surface is flat.
     #[must_use]
     pub fn is_plane(&self) -> bool {
         self.curvature == 0.0 && self.aspheric.is_empty()

@@ -17,7 +17,7 @@ use super::{Glass, extinction_of};
 /// The longest catalogue that is read (bytes); the longest of a maker has a fifth of a megabyte.
 const LONGEST: u64 = 64 << 20;
 
-/// Why a file is no catalogue.
+/// Error of a file that cannot be read as a glass catalogue.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AgfError {
     /// It cannot be read at all.
@@ -26,9 +26,9 @@ pub enum AgfError {
     /// One of its lines makes no sense.
     #[error("line {line}: {why}")]
     Line {
-        /// Which, from 1.
+        /// Line number, from 1.
         line: usize,
-        /// What is wrong there.
+        /// Description of the error.
         why: String,
     },
 }

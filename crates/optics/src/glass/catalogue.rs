@@ -115,7 +115,7 @@ impl Entry {
         self.line.split('\t').nth(i).unwrap_or_default()
     }
 
-    /// Who makes it; `MISC` for a substance.
+    /// Maker of the glass; `MISC` for a substance.
     #[must_use]
     pub fn maker(self) -> &'static str {
         match self.column(1) {

@@ -1,4 +1,4 @@
-//! What a lens does to a picture, measured with real rays.
+//! Effects of a lens on the picture, measured with real rays.
 //!
 //! Chromatic shifts against the design wavelength.
 //!

@@ -1,4 +1,4 @@
-//! What is behind an element of a lens file: a gradient of its glass, or an axis that breaks.
+//! Properties behind an element of a lens file: a gradient of its glass, or an axis that breaks.
 
 use super::file::{WHOLE_TURN, along};
 use super::folds::{self, Isometry};

@@ -16,13 +16,13 @@ use crate::glass::GlassError;
 /// A ray behind the lens with its path.
 #[derive(Debug, Clone, Copy)]
 pub struct PathEnd {
-    /// What became of it.
+    /// Outcome of the ray.
     pub status: RayStatus,
-    /// Where it left the last surface (mm), and how it goes on.
+    /// Ray that goes on from the point where it left the last surface (mm).
     pub ray: Ray,
     /// The optical path from its start to there (mm).
     pub length: f64,
-    /// What apertures and filters pass of it.
+    /// Share of the ray's light that apertures and filters pass.
     pub throughput: f64,
 }
 
@@ -35,7 +35,7 @@ enum Meeting {
     At(DVec3),
 }
 
-/// What thin lenses add to the paths of one beam; empty of a train without any.
+/// Phases that thin lenses add to the paths of one beam; empty of a train without any.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ThinLensPhases {
     /// Element, where the chief ray meets it, and the points before and behind.

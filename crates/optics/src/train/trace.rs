@@ -50,10 +50,10 @@ pub struct MonochromaticTrain {
 /// One ray's way through a lens.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RayPath {
-    /// What became of it.
+    /// Outcome of the ray.
     pub status: RayStatus,
-    /// Where it met each element that it reached (mm), in the order in which it met them. The last
-    /// one is where it was vignetted or totally reflected, if it was.
+    /// Points where the ray met each element that it reached (mm), in the order in which it met
+    /// them. The last one is that at which it was vignetted or totally reflected, if it was.
     pub points: Vec<DVec3>,
     /// Its direction behind the last element; `None` unless it left.
     pub direction: Option<DVec3>,
@@ -169,7 +169,7 @@ impl OpticalTrain {
         }
     }
 
-    /// Whether the index of a medium changes from place to place.
+    /// True if the index of a medium varies in space.
     #[must_use]
     pub fn is_graded(&self) -> bool {
         self.media.iter().any(|medium| medium.gradient.is_some())
@@ -388,7 +388,7 @@ pub struct End {
     pub status: RayStatus,
     /// The ray as it leaves, or where it ended (mm).
     pub ray: Ray,
-    /// What apertures and filters pass of it.
+    /// Share of the ray's light that apertures and filters pass.
     pub throughput: f64,
 }
 
@@ -400,7 +400,7 @@ pub enum Registers {
     Widest,
     /// Four lanes of f64 (AVX2).
     FourLanes,
-    /// What the program was compiled for, without a look at the processor.
+    /// Registers that the program was compiled for, without a look at the processor.
     Baseline,
 }
 

@@ -1,4 +1,5 @@
-//! What is added to a base: polynomials in x and y, of Zernike's, Chebyshev's and Forbes' kinds, and height maps.
+//! Terms added to a base surface: polynomials in x and y, of Zernike's, Chebyshev's and Forbes'
+//! kinds, and height maps.
 //!
 //! # Sources
 //!

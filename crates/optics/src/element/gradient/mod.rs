@@ -99,7 +99,7 @@ enum Law {
 /// A gradient in the gap behind an element.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GradedGap {
-    /// What the index is.
+    /// Gradient of the index.
     pub(crate) gradient: Arc<Gradient>,
     /// z in the gradient at the element's vertex (mm).
     pub(crate) offset: f64,

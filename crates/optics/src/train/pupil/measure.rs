@@ -346,7 +346,7 @@ pub(super) struct Stray {
     radius: f64,
 }
 
-/// How far from the axis there is light, up to `limit` (mm), and a little more.
+/// Greatest distance from the axis at which light arrives, up to `limit` (mm), with a small margin.
 pub fn lit_radius(train: &OpticalTrain, lenses: &[MonochromaticTrain], z: f64, limit: f64) -> f64 {
     let lit = |r: f64| {
         let film = DVec3::new(r, 0.0, z);

@@ -1,4 +1,5 @@
-//! Where a point of the sensor lies between the nodes of a measured pupil, and values between them.
+//! Interpolation between the nodes of a measured pupil: the place of a sensor point among them, and
+//! values there.
 
 use glam::DVec2;
 

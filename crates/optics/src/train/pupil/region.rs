@@ -1,4 +1,4 @@
-//! What is aimed at of one lenslet: points of it, evenly.
+//! Aiming region of one lenslet: points of it, evenly.
 
 use glam::DVec2;
 

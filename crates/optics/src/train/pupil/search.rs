@@ -1,5 +1,5 @@
-//! Which directions from a point of the sensor leave the lens: the rectangle of slopes that holds
-//! them all, found by grids of rays.
+//! Search for the directions from a point of the sensor that leave the lens: the rectangle of
+//! slopes that holds them all, found by grids of rays.
 
 use glam::{DVec2, DVec3};
 

@@ -75,7 +75,7 @@ impl LensFormat {
         }
     }
 
-    /// Whether files of it may hold several configurations.
+    /// True if files of the format may hold several configurations.
     #[must_use]
     pub const fn has_configurations(self) -> bool {
         match self {

@@ -1,4 +1,4 @@
-//! What OSLO's statements say of one surface, and the row that it becomes.
+//! OSLO statements of one surface, and the row that they become.
 //!
 //! # Sources
 //!
