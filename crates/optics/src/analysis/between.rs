@@ -24,8 +24,8 @@ pub const FARTHEST_WAVES: f64 = 60.0;
 /// Wavelengths times the f-number of the image that a grid has to hold beside where rays land.
 const BESIDE: f64 = 42.0;
 
-/// How far a wavefront may be from the polynomial that stands for it (waves): a picture's irradiance changes by a
-/// few thousandths of its peak per hundredth of a wave.
+/// Greatest difference of a wavefront from the polynomial that stands for it (waves): a picture's
+/// irradiance changes by a few thousandths of its peak per hundredth of a wave.
 const SMOOTH: f64 = 2e-3;
 
 /// Fields at all of some wavelengths and nearnesses.

@@ -20,7 +20,8 @@ use super::between::{FARTHEST_WAVES, airy_unit, landing_reach};
 use super::pupil::PupilField;
 use super::spread::{amplitudes, norm, quick_length, sinc};
 
-/// How far beyond the rays' landings light is added up as waves (wavelengths times the f-number).
+/// Margin beyond the rays' landings within which light is added up as waves (wavelengths times the
+/// f-number).
 const REACH: f64 = 40.0;
 
 /// The ring that holds what goes farther ends at this many times that distance.
@@ -183,7 +184,7 @@ impl CellSpread {
     }
 }
 
-/// What of its irradiance a cell gets, times its area.
+/// Sampling of the irradiance within a cell, before it is multiplied by the cell's area.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum CellLight {
     /// That in its middle.

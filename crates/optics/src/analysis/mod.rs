@@ -155,7 +155,8 @@ pub enum AnalysisError {
 }
 
 impl AnalysisError {
-    /// Whether another field may do without it: no light arrives, or too rough.
+    /// True if the error is one of this field alone, so that others can do without it: no light
+    /// arrives, or too rough.
     fn is_of_the_field(&self) -> bool {
         matches!(self, Self::Dark { .. } | Self::NoChiefRay { .. } | Self::TooRough { .. })
     }

@@ -69,8 +69,8 @@ impl ReferenceSphere {
         Ok(Self { centre: centre.into(), radius, index: at.index_before_sensor() })
     }
 
-    /// Where a ray meets it: the optical direction cosines of the way from there to the centre, and
-    /// the optical path to there from where the ray left the lens (mm).
+    /// Intersection of a ray with the sphere: the optical direction cosines of the way from there
+    /// to the centre, and the optical path to there from where the ray left the lens (mm).
     pub(crate) fn meet(&self, end: &PathEnd) -> Option<(DVec2, f64)> {
         let (from, direction) = (DVec3::from(end.ray.position), DVec3::from(end.ray.direction));
         let way = from - DVec3::from(self.centre);

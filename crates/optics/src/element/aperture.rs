@@ -220,13 +220,14 @@ impl Opening {
     }
 }
 
-/// Whether a place (mm) lies inside of a circle.
+/// Tests whether a point (mm) lies inside a circle about the axis.
 #[inline(always)]
 pub(super) fn in_circle(radius: f64, x: f64, y: f64) -> bool {
     x * x + y * y <= radius * radius
 }
 
-/// Whether a place (mm) lies inside of a regular polygon; without branches, so that loops vectorise.
+/// Tests whether a point (mm) lies inside a regular polygon; without branches, so that loops
+/// vectorise.
 #[inline(always)]
 pub(super) fn in_polygon(normals: &[[f64; 2]], apothem: f64, x: f64, y: f64) -> bool {
     let beyond = |n: &[f64; 2]| x * n[0] + y * n[1] - apothem;

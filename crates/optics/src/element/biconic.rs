@@ -144,7 +144,7 @@ impl Biconic {
 }
 
 impl Biconic {
-    /// What no slope is above within a squared distance from the axis (mm²).
+    /// Upper bound of the slope within a squared distance from the axis (mm²).
     pub(super) fn steepest(&self, square: f64) -> f64 {
         let [a, b] = self.limits();
         let root = (1.0 - a.max(b).max(0.0) * square).max(0.0).sqrt();
@@ -284,7 +284,8 @@ fn square([low, high]: [f64; 2]) -> [f64; 2] {
 const WALL: f64 = 3.0;
 
 impl Surface {
-    /// Whether an asphere is a wall somewhere within its clear aperture, at which rays take long to be traced.
+    /// True if an asphere has a wall somewhere within its clear aperture, at which rays take long
+    /// to be traced.
     pub(super) fn has_wall(&self) -> bool {
         let reach = self.semi_diameter.min(self.extent().into_iter().fold(f64::INFINITY, f64::min));
         let slope = |i: u32| {
@@ -294,8 +295,8 @@ impl Surface {
         !self.aspheric.is_empty() && (1..64).any(|i| slope(i).abs() > WALL)
     }
 
-    /// What no sag is below and what none is above between two squared distances from the axis (mm²), the
-    /// nearer first (mm).
+    /// Lower and upper bounds of the sag (mm) between two squared distances from the axis (mm²),
+    /// the nearer first.
     ///
     /// Each term rises or falls all the way: those that rise are least at the nearer place, those that fall at
     /// the farther one.

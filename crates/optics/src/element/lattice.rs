@@ -61,7 +61,7 @@ impl Lattice {
         self.cell_of(self.grid, x, y)
     }
 
-    /// The same with a packing that the compiler knows.
+    /// Variant of [`Self::cell`] with a packing that the compiler knows.
     #[inline(always)]
     pub(crate) fn cell_of(&self, grid: Grid, x: f64, y: f64) -> LatticeCell {
         let [c, s] = self.turn;
@@ -88,7 +88,7 @@ impl Lattice {
         LatticeCell { index, local, away }
     }
 
-    /// Whether a point (mm from a cell's centre, in the array's own axes) is of this cell, whatever
+    /// True if a point (mm from a cell's centre, in the array's own axes) is of this cell, whatever
     /// rounding does: some that are, 10⁻⁹ of the pitch within its border, are not told.
     #[inline(always)]
     pub(crate) fn is_well_inside(&self, grid: Grid, x: f64, y: f64) -> bool {

@@ -103,7 +103,7 @@ impl LossesSpec {
     }
 }
 
-/// What one element takes from light that arrives on one side of it.
+/// Losses of light at one element, for light that arrives on one of its sides.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Loss {
     /// Indices before and behind the surface, as the light goes.
@@ -179,7 +179,7 @@ impl Loss {
         (-self.absorption * length).exp()
     }
 
-    /// The same between other indices.
+    /// Returns the losses between other indices.
     pub(crate) fn between(&self, indices: [f64; 2]) -> Self {
         Self { indices, ..self.clone() }
     }
@@ -197,8 +197,8 @@ impl Loss {
         share
     }
 
-    /// What is not let through, or of a mirror what is not reflected, from the directions alone: n' d' − n d is along the
-    /// normal.
+    /// Share of light not let through, or by a mirror not reflected, computed from the directions
+    /// alone: n' d' − n d is along the normal.
     fn lost(&self, before: [f64; 3], after: [f64; 3]) -> f64 {
         let [n, m] = self.indices;
         let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -286,7 +286,7 @@ pub struct Filter {
     pub semi_diameter: f64,
     /// The curves of the filter.
     pub curves: Vec<Curve>,
-    /// Which curve is where; the first one everywhere when there is none.
+    /// Map of the curves by place; the first curve everywhere when there is none.
     map: Option<CurveMap>,
 }
 

@@ -149,7 +149,7 @@ pub struct MicrolensArray {
     pub types: Vec<Lenslet>,
     /// The filter of each type; none when empty.
     pub curves: Vec<Curve>,
-    /// Which type stands where; i − j modulo the number of types when empty.
+    /// Lenslet types by cell; i − j modulo the number of types when empty.
     pattern: Vec<Vec<u32>>,
 }
 
@@ -366,7 +366,7 @@ impl MicrolensArray {
         self.is_open_as(self.shape, local)
     }
 
-    /// The same with a shape that the compiler knows.
+    /// Variant of [`Self::is_open`] with a shape that the compiler knows.
     #[inline(always)]
     pub(crate) fn is_open_as(&self, shape: LensletShape, [u, v]: [f64; 2]) -> bool {
         // Within a rounding of the cell's own edge: there are no gaps between full cells.

@@ -205,7 +205,7 @@ impl Fold {
         (reflection, self.vertex - reflection * self.vertex)
     }
 
-    /// Whether a place of the mirror (mm) is in its hole.
+    /// True if a point of the mirror (mm) is in its hole.
     #[inline(always)]
     fn is_hole(&self, [x, y, z]: [f64; 3]) -> bool {
         let (x, y, z) = (x - self.vertex.x, y - self.vertex.y, z - self.vertex.z);
@@ -280,7 +280,7 @@ pub(crate) struct Shadow {
 }
 
 impl Shadow {
-    /// Whether a ray in the mirror's frame meets it.
+    /// True if the mirror stops a ray, given in the mirror's frame.
     #[inline(always)]
     pub(super) fn stops(&self, ray: Ray) -> bool {
         let Ray { position: [x, y, z], direction: [u, v, w] } = ray;

@@ -416,7 +416,7 @@ impl Part {
         is_blazed || self.mirror().is_some_and(|mirror| mirror.coating.is_some())
     }
 
-    /// The same with what `change` makes of a mirror.
+    /// Returns the part with its mirror, if it has one, altered by `change`.
     pub(crate) fn with_mirror(&self, change: impl Fn(&mut MirrorMount)) -> Self {
         let mut part = self.clone();
         match &mut part {

@@ -204,7 +204,7 @@ impl Block {
         lanes.fold(true, |all, (&code, &throughput)| all & (code == EXITED) & (throughput > 0.0))
     }
 
-    /// Whether every ray has ended.
+    /// True if every ray has ended.
     #[inline(always)]
     pub(crate) fn is_over(&self) -> bool {
         self.outcome.iter().fold(true, |all, &code| all & (code != EXITED))

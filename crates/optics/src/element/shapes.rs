@@ -190,7 +190,8 @@ impl SpiderSpec {
     }
 }
 
-/// Whether a place lies inside of an outline, by the crossings of a line from there to afar along x.
+/// Tests whether a point lies inside an outline, by the crossings of a line from there to afar
+/// along x.
 fn is_in_outline(corners: &[[f64; 2]], x: f64, y: f64) -> bool {
     let mut before = corners[corners.len() - 1];
     let mut is_inside = false;

@@ -235,11 +235,11 @@ fn decode(bytes: &[u8]) -> String {
     }
 }
 
-/// How many names an error offers.
+/// Number of names that an error offers.
 const OFFERED: usize = 3;
 
-/// What makers put before the name of a kind: Schott's leadless (N-) and moulded glasses (P-), Ohara's
-/// (S-, L-), Hoya's (E-, M-), CDGM's (H-, D-), Hikari's (J-, E-, Q-), Sumita's (K-).
+/// Prefixes that makers put before the name of a kind: Schott's leadless (N-) and moulded glasses
+/// (P-), Ohara's (S-, L-), Hoya's (E-, M-), CDGM's (H-, D-), Hikari's (J-, E-, Q-), Sumita's (K-).
 const PREFIXES: [&str; 11] = ["", "N-", "P-", "S-", "L-", "E-", "M-", "H-", "D-", "J-", "K-"];
 
 /// The names that are meant most likely by one that is not known, best first: the same kind of an

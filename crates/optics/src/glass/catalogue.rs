@@ -129,7 +129,7 @@ impl Entry {
         is(&self.maker()) || (self.is_substance() && SUBSTANCES.iter().any(is))
     }
 
-    /// Whether nobody in particular makes it.
+    /// True if the entry is a substance, which has no particular maker.
     fn is_substance(self) -> bool {
         self.column(1) == "-"
     }

@@ -120,7 +120,8 @@ impl OpticalTrain {
         Ok(image)
     }
 
-    /// Why an image in front of the last vertex, at z (mm), of an object at a distance (m) is none for a sensor.
+    /// Reason why an image in front of the last vertex, at z (mm), of an object at a distance (m)
+    /// is none for a sensor.
     fn no_image(&self, distance: f64, image: f64) -> FocusError {
         let is_break = |element: &Element| matches!(element.part, Part::CoordinateBreak(_));
         let lens = self.elements.iter().rposition(|element| !is_break(element));

@@ -15,7 +15,7 @@ use glam::{DMat3, DVec3};
 use super::{Element, OpticalTrain};
 use crate::element::{CoordinateBreak, Fold, Frame, Part, Shadow};
 
-/// How near (mm) two vertices count as one.
+/// Distance (mm) within which two vertices count as one.
 const SAME_PLACE: f64 = 1e-6;
 
 /// A turn, with or without a reflection, and a shift.
@@ -79,7 +79,7 @@ impl Isometry {
         Self { turn: self.turn * inner.turn, shift: self.place(inner.shift) }
     }
 
-    /// What takes it back.
+    /// Returns the inverse.
     #[must_use]
     pub(crate) fn inverse(&self) -> Self {
         let turn = self.turn.transpose();
@@ -213,7 +213,8 @@ impl OpticalTrain {
 }
 
 impl Element {
-    /// What it stops of light that is meant for others; `None` without a rim.
+    /// Shadow of the element: what it stops of light that is meant for others; `None` without a
+    /// rim.
     fn shadow(&self) -> Option<Shadow> {
         let mount = self.part.mirror()?;
         let radius = self.clear_radius();

@@ -38,12 +38,13 @@ pub struct BehindLenslets {
     pub rear_z: f64,
     /// Shift of the arrays across the axis (mm).
     pub decentre: DVec2,
-    /// Whether something between the rearmost array and the sensor bends light (flat glass).
+    /// True if something between the rearmost array and the sensor refracts light (flat glass).
     covered: bool,
     /// From the plane of the rearmost array to z (mm), reduced: thickness over index, and index, of
     /// each medium behind it.
     behind: Vec<[f64; 3]>,
-    /// What each type of lenslet does on the way from the rearmost array to the lens before.
+    /// Paraxial effect of each type of lenslet, on the way from the rearmost array to the lens
+    /// before.
     kinds: Vec<ParaxialLenslet>,
     /// The index before the lenslets.
     index: f64,

@@ -460,7 +460,8 @@ impl OpticalTrain {
         named.chain(others).collect()
     }
 
-    /// Where (mm from the axis) element `i` and the next cut through each other, if they do.
+    /// Distance from the axis (mm) at which element `i` and the next cut through each other, if
+    /// they do.
     fn crossing(&self, i: usize) -> Option<f64> {
         let pair = self.elements.get(i..i + 2)?;
         let [a, b] = [&pair[0].part, &pair[1].part];

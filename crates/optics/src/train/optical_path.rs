@@ -26,7 +26,7 @@ pub struct PathEnd {
     pub throughput: f64,
 }
 
-/// Where the rays of a beam meet, on one side of a thin lens.
+/// Meeting point of the rays of a beam, on one side of a thin lens.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Meeting {
     /// They are parallel.
@@ -93,7 +93,7 @@ impl ThinLensPhases {
         Ok(Self { lenses })
     }
 
-    /// What the thin lens `element` adds at a place (mm), over the index.
+    /// Path that the thin lens `element` adds at a place (mm), over the index.
     fn at(&self, element: usize, place: DVec3) -> f64 {
         let Some((_, chief, [before, behind])) = self.lenses.iter().find(|l| l.0 == element) else {
             return 0.0;

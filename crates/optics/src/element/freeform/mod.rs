@@ -263,7 +263,8 @@ impl Freeform {
             && self.phase.as_ref().is_none_or(Phase::is_round)
     }
 
-    /// Whether rays meet it in a plane: it has no sag, or that of the grooves of a Fresnel surface.
+    /// True if rays meet the surface in a plane: it has no sag, or that of the grooves of a Fresnel
+    /// surface.
     fn is_in_a_plane(&self) -> bool {
         let has_sag = self.base.curvature != 0.0
             || self.rotation.is_some_and(|rotation| rotation != 0.0)

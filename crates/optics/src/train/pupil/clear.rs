@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::element::{LossesSpec, Opening};
 use crate::train::{OpticalTrain, Part};
 
-/// The same lens with masks clear: the bound goes around their whole rectangle.
+/// Returns the lens with its masks clear: the bound goes around their whole rectangle.
 pub(super) fn without_masks(train: &OpticalTrain) -> OpticalTrain {
     let mut train = train.clone();
     for element in &mut train.elements {

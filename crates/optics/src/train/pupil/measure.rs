@@ -20,11 +20,11 @@ const MARGIN: f64 = 0.004;
 /// root, faster than straight lines.
 const FADING_MARGIN: f64 = 0.2;
 
-/// How much of a bend in the frames from node to node is added to the margin, and the bend that
-/// comes from the search grid's cells alone.
+/// Share of the frames' bend from node to node that is added to the margin, and the bend that comes
+/// from the search grid's cells alone.
 const BEND: [f64; 2] = [0.4, 0.1];
 
-/// How far outside of the bound the closing check looks, as a share of the radius.
+/// Margin outside of the bound that the closing check looks at, as a share of the radius.
 const CHECKED: f64 = 0.35;
 
 /// Random rays of a round of the closing check.
@@ -422,14 +422,14 @@ fn narrow(
     }
 }
 
-/// Where passing rays are looked for.
+/// Directions among which passing rays are looked for.
 struct Searched {
     /// The middle and the half axes of slopes.
     frame: [DVec2; 2],
     is_round: bool,
 }
 
-/// Which of the passing rays of an angle is looked for.
+/// Extreme that is looked for among the passing rays of an angle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Limit {
     /// That of the greatest radius.

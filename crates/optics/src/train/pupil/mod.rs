@@ -135,11 +135,11 @@ pub struct ExitPupil {
     /// The lenslets through which light comes; there are no nodes then.
     lenslets: Option<Box<LensletPupil>>,
     index2: f64,
-    /// How far from the sensor's centre the nodes of a radial layout reach (mm).
+    /// Distance from the sensor's centre to the outermost node of a radial layout (mm).
     radius: f64,
 }
 
-/// How nodes lie on the sensor.
+/// Layout of the nodes on the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum NodeLayout {
     /// On a radius, for all directions across the sensor.

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-/// What is aimed at of one lenslet, or of what is between them.
+/// Region that is aimed at: of one lenslet, or of what is between them.
 #[derive(Debug, Clone)]
 pub(super) enum Region {
     /// All of an opening that is a polygon.

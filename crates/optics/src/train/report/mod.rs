@@ -313,7 +313,7 @@ fn farthest(train: &OpticalTrain, sensor_z: f64) -> f64 {
     4.0 * (behind + train.last_vertex().abs() + train.lateral_scale())
 }
 
-/// What is not stated for the design wavelength, or for another one.
+/// Notes on glasses whose index is not stated for the design wavelength, or for another one.
 fn out_of_range(train: &OpticalTrain, wavelengths: &[f64]) -> Vec<String> {
     train.outside_of_range(&[&[train.wavelength()], wavelengths].concat())
 }
