@@ -168,7 +168,7 @@ pub fn airy_unit(field: &PupilField) -> f64 {
     field.wavelength * 1e-6 / (2.0 * field.circle().1)
 }
 
-/// What each node counts for in the polynomial through all, at a place.
+/// Lagrange weights of the nodes at a place: the factor of each node in the polynomial through all.
 fn lagrange(nodes: &[f64], at: f64) -> Vec<f64> {
     let weight = |k: usize| {
         let others = (0..nodes.len()).filter(|&other| other != k);
@@ -177,7 +177,7 @@ fn lagrange(nodes: &[f64], at: f64) -> Vec<f64> {
     (0..nodes.len()).map(weight).collect()
 }
 
-/// Which node is nearest to a place.
+/// Index of the node nearest to a place.
 fn closest(nodes: &[f64], at: f64) -> usize {
     let by_distance =
         |a: &usize, b: &usize| (nodes[*a] - at).abs().total_cmp(&(nodes[*b] - at).abs());

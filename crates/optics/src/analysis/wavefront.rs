@@ -228,7 +228,7 @@ impl Wavefront {
     }
 }
 
-/// Where a beam's chief ray meets the plane at `z` (mm).
+/// Point where a beam's chief ray meets the plane at `z` (mm).
 pub(crate) fn chief_point(beam: &Beam<'_>, z: f64) -> DVec3 {
     let ray = beam.chief_end.ray;
     let (from, direction) = (DVec3::from(ray.position), DVec3::from(ray.direction));

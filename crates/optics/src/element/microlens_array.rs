@@ -444,7 +444,7 @@ impl MicrolensArray {
     }
 }
 
-/// How far a shape of half a width of 1 reaches in a direction.
+/// Radius, in a direction, of a shape whose half width is 1.
 fn cell_radius(shape: LensletShape, [x, y]: [f64; 2]) -> f64 {
     let (a, b) = (0.5 * x, 0.75_f64.sqrt() * y);
     match shape {

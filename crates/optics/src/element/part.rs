@@ -468,8 +468,8 @@ impl Part {
         }
     }
 
-    /// What it does to light of a wavelength (nm) from the object, and to light traced from the sensor. `transmission`
-    /// is what passes of a filter's curve.
+    /// Actions on light of a wavelength (nm) from the object, and on light traced from the sensor.
+    /// `transmission` gives the share that a filter's curve passes.
     pub(crate) fn actions(
         &self,
         before: f64,

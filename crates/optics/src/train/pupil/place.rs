@@ -45,7 +45,7 @@ impl ExitPupil {
     }
 }
 
-/// Which nodes a point of the sensor lies between, and how it is turned against them.
+/// Nodes around a point of the sensor with their weights, and the turn of the point against them.
 pub(super) struct NodePlace {
     /// The direction on the sensor that is the nodes' +x.
     pub(super) axis: DVec2,
