@@ -1,4 +1,4 @@
-//! What is kept from one load of a scene to the next, so that a change costs no more than it touches.
+//! Cache kept from one load of a scene to the next, so that a change costs no more than it touches.
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::{self, Read};

@@ -25,7 +25,8 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     )
 }
 
-/// The same, on one line: ends of lines and tabs are spelled out, too. For names inside a message.
+/// Escapes `text` as [`printable`] does, onto one line: ends of lines and tabs are spelled out,
+/// too. For names inside a message.
 #[must_use]
 pub fn one_line(text: &str) -> Cow<'_, str> {
     escaped(text, is_command, |c, out| match c {

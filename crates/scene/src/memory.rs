@@ -1,5 +1,5 @@
-//! How much memory a scene may take, and one account of what it will: whatever grows with a file is
-//! spoken for here before it is made.
+//! Memory limit of a scene, and one account of the memory it will take: whatever grows with a file
+//! is spoken for here before it is made.
 
 use std::fmt;
 use std::fs;
@@ -14,11 +14,11 @@ use rayon::prelude::*;
 pub struct Limit {
     /// Bytes.
     pub bytes: u64,
-    /// Who says so.
+    /// Origin of the limit.
     pub source: LimitSource,
 }
 
-/// Who limits memory.
+/// Origin of a memory limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LimitSource {
     /// The user.
@@ -96,15 +96,15 @@ fn group_has_free(root: &Path) -> Option<u64> {
     folder.ancestors().take_while(|folder| folder.starts_with(&top)).filter_map(free).min()
 }
 
-/// What `ulimit -v` leaves to this process (bytes); `None` without such a limit, or where the system does
-/// not tell.
+/// Address space that `ulimit -v` leaves to this process (bytes); `None` without such a limit, or
+/// where the system does not tell.
 #[must_use]
 pub fn addresses() -> Option<u64> {
     addresses_left(Path::new("/"))
 }
 
-/// Whether the system gives so many bytes in one piece now. A library that is about to take them, or a
-/// growing list, would end the process otherwise.
+/// Tests whether the system gives so many bytes in one piece now. A library that is about to take
+/// them, or a growing list, would end the process otherwise.
 #[must_use]
 pub fn has_room(bytes: u64) -> bool {
     let bytes = usize::try_from(bytes).unwrap_or(usize::MAX);
@@ -153,13 +153,13 @@ impl Budget {
         Self { limit: Limit::of(given), taken: AtomicU64::new(0) }
     }
 
-    /// Whether the limit is the user's: then what is held already counts, too.
+    /// True if the limit is the user's: then what is held already counts, too.
     #[must_use]
     pub fn is_given(&self) -> bool {
         self.limit.is_some_and(|limit| limit.source == LimitSource::Given)
     }
 
-    /// What is left under the limit (bytes).
+    /// Memory left under the limit (bytes).
     #[must_use]
     pub fn left(&self) -> u64 {
         let limit = self.limit.map_or(u64::MAX, |limit| limit.bytes);
@@ -198,9 +198,9 @@ impl Budget {
     beside(*before)
 )]
 pub struct TooMuch {
-    /// What was to be taken (bytes).
+    /// Size of the allocation that was refused (bytes).
     pub bytes: u64,
-    /// What was spoken for before (bytes).
+    /// Memory spoken for before (bytes).
     pub before: u64,
     /// The limit.
     pub limit: Limit,

@@ -35,7 +35,7 @@ const ROOTS: [&str; 4] = ["camera", "lights", "objects", "materials"];
 pub struct Slot {
     /// The scene as it is then.
     pub file: SceneFile,
-    /// What each pixel takes of its light.
+    /// Share of its light that each pixel takes at this moment; all of it when absent.
     pub pixels: Option<PixelShares>,
     /// Which of the scene's `serial` it is of.
     number: usize,

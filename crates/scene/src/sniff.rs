@@ -1,4 +1,4 @@
-//! What a file is by its first bytes, for those that are not what their name says.
+//! Detection of a file's kind by its first bytes, for those that are not what their name says.
 
 /// What files of other kinds start with. Sources: the formats' own specifications; Gary Kessler's
 /// table of file signatures.

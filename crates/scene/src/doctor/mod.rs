@@ -164,8 +164,9 @@ pub fn check(
 }
 
 impl Diagnosis {
-    /// What there is to tell of a scene that was loaded with [`Wanted::EVERYTHING`] from a file of this
-    /// kind. Its forecast of memory is [`MemoryForecast::of`], and its frames are not counted.
+    /// Collects what there is to tell of a scene that was loaded with [`Wanted::EVERYTHING`] from a
+    /// file of this kind. Its forecast of memory is [`MemoryForecast::of`], and its frames are not
+    /// counted.
     #[must_use]
     pub fn of(scene: &Scene, kind: FileKind) -> Self {
         let geometry = &*scene.geometry;

@@ -79,7 +79,7 @@ pub struct SceneFile {
     kind: FileKind,
     /// All values with the settings applied.
     value: Value,
-    /// What the file says; of the sensor the camera's part.
+    /// Content of the file; of the sensor the camera's part.
     pub spec: SceneSpec,
     /// The camera's sensor, when the file says more of it than its grid of pixels.
     pub sensor: Option<Sensor>,
@@ -101,7 +101,7 @@ struct WrittenPlaces {
     frame: Option<usize>,
 }
 
-/// What kind of file stands for the scene.
+/// Kind of file that stands for the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileKind {
     /// A JSON scene.
@@ -265,7 +265,7 @@ impl SceneFile {
         self
     }
 
-    /// Whether the scene stands in no file.
+    /// True if the scene is in no file.
     #[must_use]
     pub fn is_in_memory(&self) -> bool {
         self.written.document.is_none() && self.path().ends_with(IN_MEMORY)
@@ -308,7 +308,7 @@ impl SceneFile {
         self.written.folder()
     }
 
-    /// Whether it is a JSON scene or a model.
+    /// Kind of the file: a JSON scene or a model.
     #[must_use]
     pub fn kind(&self) -> FileKind {
         self.kind
@@ -416,7 +416,7 @@ fn layers_of(photodiodes: Photodiodes) -> &'static [LayerSpec] {
     }
 }
 
-/// Where a value was written.
+/// Place where a value was written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Origin {
     /// In the file's text.

@@ -17,9 +17,9 @@ const CHUNK: usize = 1 << 14;
 /// A mesh as a file has it, before anything is known of it.
 #[derive(Debug)]
 pub(super) struct MeshCandidate {
-    /// What the file calls it.
+    /// Name of the mesh in the file.
     pub name: String,
-    /// Where it is in the file, for messages.
+    /// Place of the mesh in the file, for messages.
     pub place: String,
     pub positions: Positions,
     pub triangles: Buffer<[u32; 3]>,

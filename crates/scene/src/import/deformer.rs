@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::single;
 
-/// How a mesh changes its shape, in s from the moment that is shown.
+/// Deformation of a mesh over time, in s from the moment that is shown.
 #[derive(Debug)]
 pub struct Deformer {
     /// As the file has them (m).
@@ -26,7 +26,7 @@ pub struct Deformer {
 pub(super) struct Morph {
     /// The first number is its weight.
     pub weight: Track,
-    /// What is added at weight 1 (m).
+    /// Offsets of the points at weight 1 (m).
     pub points: Option<Vertices<3>>,
     pub normals: Option<Vertices<3>>,
 }

@@ -1,4 +1,5 @@
-//! Why a model could not be read: refusals that name the file, the place in it, and what to do.
+//! Errors of models that cannot be read: refusals that name the file, the place in it, and what to
+//! do.
 //!
 //! What an import has to say without refusing the file.
 

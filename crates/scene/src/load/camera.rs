@@ -306,7 +306,7 @@ pub struct SceneCamera {
     pub spec: CameraSpec,
 }
 
-/// Where the camera of a scene came from.
+/// Origin of a scene's camera.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CameraOrigin {
     /// The scene file gives a camera and its pose.

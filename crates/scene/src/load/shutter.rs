@@ -1,4 +1,5 @@
-//! When a scene's picture is taken: the frame's time, the shutter, and the camera's motion in the frame's clock.
+//! Time of a scene's picture: the frame's time, the shutter, and the camera's motion in the frame's
+//! clock.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

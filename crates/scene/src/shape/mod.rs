@@ -103,7 +103,7 @@ fn default_amplitude() -> f64 {
 pub struct ShapeError {
     /// The key.
     pub key: &'static str,
-    /// What is wrong, and what would do.
+    /// Description of the error, and of what is valid.
     pub reason: String,
 }
 

@@ -1,4 +1,4 @@
-//! Which of several things a value is meant to be, and the message when it is none.
+//! Choice among several kinds that a value may be, and the message when it is none.
 
 use serde_json::{Map, Value};
 

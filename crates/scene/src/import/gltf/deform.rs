@@ -27,11 +27,11 @@ const WEIGHTS_OFF: f64 = 2e-3;
 pub(super) struct PrimitiveCorners {
     pub positions: Positions,
     pub normals: Option<Vertices<3>>,
-    /// Whether a skin placed them in the model's frame, and its node no longer does.
+    /// True if a skin placed the corners in the model's frame, and its node no longer does.
     pub skinned: bool,
-    /// Whether the skin turned the triangles inside out.
+    /// True if the skin turned the triangles inside out.
     pub mirrored: bool,
-    /// How they go on from there, where they do.
+    /// Deformation from that moment on, where there is one.
     pub deformer: Option<Deformer>,
 }
 

@@ -1,4 +1,4 @@
-//! What becomes of each extension: done, left out with a note, or refused with the command that
+//! Treatment of each extension: done, left out with a note, or refused with the command that
 //! converts the file.
 
 use std::path::Path;

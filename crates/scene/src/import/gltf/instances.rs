@@ -1,4 +1,5 @@
-//! Where the meshes of the scene's nodes stand. `EXT_mesh_gpu_instancing`: a node's mesh at many places.
+//! Placements of the meshes of the scene's nodes. `EXT_mesh_gpu_instancing`: a node's mesh at many
+//! places.
 
 use serde_json::Value;
 

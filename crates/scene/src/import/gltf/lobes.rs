@@ -1,4 +1,4 @@
-//! What lies over a metallic-roughness surface or shapes its highlights: sheen and anisotropy.
+//! Layers over a metallic-roughness surface, and shapes of its highlights: sheen and anisotropy.
 //!
 //! `KHR_materials_pbrSpecularGlossiness`: a diffuse colour beside a reflectance of any colour.
 //!

@@ -26,7 +26,7 @@ pub(super) struct Loaded {
     pub mesh: u32,
     /// Index into the import's materials.
     pub material: u32,
-    /// Whether it stands in the model's frame already.
+    /// True if the primitive stands in the model's frame already.
     pub skinned: bool,
 }
 

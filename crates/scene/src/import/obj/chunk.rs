@@ -48,13 +48,13 @@ pub(super) struct Chunk {
     pub colors: Vec<[f32; 3]>,
     pub uvs: Vec<[f32; 2]>,
     pub normals: Vec<[f32; 3]>,
-    /// How many of each kind are defined here, read or not.
+    /// Number of definitions of each kind here, read or not.
     pub defined: [usize; KINDS],
     /// The corners of all faces, by kind; empty for a kind that no face of this piece names.
     pub corners: [Vec<u32>; KINDS],
     /// Corners that count backwards: kind, corner, and index relative to the piece's first.
     pub relative: Vec<(usize, usize, i64)>,
-    /// Where faces with other than three corners are.
+    /// Faces with other than three corners.
     pub polygons: Vec<Polygon>,
     /// Statements, with the number of corners read before each.
     pub statements: Vec<(usize, FaceStatement)>,
@@ -64,7 +64,7 @@ pub(super) struct Chunk {
     pub free_form: u64,
     /// Faces of fewer than three corners.
     pub too_small: u64,
-    /// Where the first line begins that no statement of OBJ begins like, and how it begins.
+    /// Position of the first line that no statement of OBJ begins like, and how it begins.
     pub foreign: Option<(usize, String)>,
     /// Some line is one of OBJ.
     pub is_obj: bool,

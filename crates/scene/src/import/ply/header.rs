@@ -51,7 +51,7 @@ pub(super) struct RowElement {
 pub(super) struct Header {
     pub format: Format,
     pub elements: Vec<RowElement>,
-    /// Where the data starts (bytes).
+    /// Offset at which the data starts (bytes).
     pub data: usize,
 }
 
