@@ -1,4 +1,4 @@
-//! Whether the light of a scene is the same in all bands, so that one of them is traced for all.
+//! Detection of scenes whose light is the same in all bands, so that one of them is traced for all.
 //!
 //! Grey surfaces and lights of equal energy have the same numbers in every band: the rows of red, green and blue that
 //! make a band of a colour add up to 1 ([`etendue_spectrum::Bands::from_rgb`]). What is traced in one band is then what

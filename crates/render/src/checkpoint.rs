@@ -1,5 +1,5 @@
-//! What there is of a render, kept on disk on the way: after an interruption it goes on from there. And what there
-//! is in shares of its samples.
+//! Checkpoints: what there is of a render, kept on disk on the way: after an interruption it goes
+//! on from there. And what there is in shares of its samples.
 
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
@@ -16,7 +16,7 @@ use crate::shard::Shard;
 use crate::sum::Sum;
 use crate::tile::RayCounts;
 
-/// Where what a render has so far is kept, and how often.
+/// Place and interval of the checkpoints of a render.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Checkpoint {
     /// The file.

@@ -10,7 +10,7 @@ use etendue_tracer::layer::{self, Kept, Look, Taken};
 
 use crate::output::{Channel, Layer, Values};
 
-/// How finely data layers are kept.
+/// Precision of data layers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Precision {
     /// 32 bits, as an EXR stores them.
@@ -50,7 +50,7 @@ pub(crate) fn bytes_of_plane(spec: LayerSpec, precision: Precision) -> u64 {
     Size(*bytes)
 )]
 pub struct NoMemory {
-    /// What could not be had (bytes).
+    /// Size of the allocation that failed (bytes).
     pub bytes: u64,
 }
 

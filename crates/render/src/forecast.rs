@@ -1,4 +1,4 @@
-//! How much memory a render will take, from counts and headers alone.
+//! Forecast of a render's memory, from counts and headers alone.
 
 use etendue_image::MOST_BYTES;
 use etendue_scene::file::SETS;

@@ -28,7 +28,7 @@ pub struct Images {
     origins: Vec<Option<ImageOrigin>>,
     /// What the environment was read from, its file as it was, and whether it has spectra.
     sky: Option<(EnvironmentImage, Option<Stamp>, bool)>,
-    /// What could not be decoded, in words.
+    /// Descriptions of the images that could not be decoded.
     pub faults: Vec<String>,
 }
 
@@ -95,8 +95,8 @@ impl Images {
         Some((Arc::clone(self.decoded.get(i)?.as_ref()?), known.clone()))
     }
 
-    /// What is wrong with the first image of `scene` that cannot be decoded, whether a layer looks at
-    /// it or not.
+    /// Description of the error of the first image of `scene` that cannot be decoded, whether a
+    /// layer looks at it or not.
     #[must_use]
     pub fn first_fault(scene: &Scene) -> Option<String> {
         let limits = Limits::default();
@@ -155,7 +155,7 @@ impl Images {
         Ok(())
     }
 
-    /// How many are decoded in fewer texels than their files have.
+    /// Number of images decoded in fewer texels than their files have.
     #[must_use]
     pub fn coarser(&self, scene: &Scene) -> usize {
         let all = scene.textures.iter().zip(&self.decoded).zip(&self.origins);

@@ -1,5 +1,4 @@
-//! Whether light reaches what the camera sees: before a render by a small picture, after it by the
-//! picture itself.
+//! Check that light reaches what the camera sees: before a render by a small picture, after it by the picture itself.
 
 use std::sync::Arc;
 

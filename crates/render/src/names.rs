@@ -1,4 +1,4 @@
-//! What the numbers of id layers name, for every header.
+//! Names that the numbers of id layers stand for, for every header.
 
 use etendue_scene::Scene;
 use etendue_tracer::LayerSpec;

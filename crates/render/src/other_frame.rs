@@ -58,7 +58,7 @@ impl<'a> FollowedFrame<'a> {
         Self { step, camera: &other.camera, geometry, accel, motions }
     }
 
-    /// Whether there is something that cannot be followed, because its mesh is another one there.
+    /// True if there is something that cannot be followed, because its mesh is another one there.
     #[must_use]
     pub fn loses_some(&self) -> bool {
         self.motions.as_ref().is_some_and(|motions| motions.iter().any(|one| one.0 == Motion::Gone))

@@ -1,5 +1,5 @@
-//! How precisely paths of light hit: in f32 where what that misplaces is lost in the picture's noise and
-//! under its smallest things, in f64 where it is not.
+//! Precision of the hits of light paths: in f32 where what that misplaces is lost in the picture's
+//! noise and under its smallest things, in f64 where it is not.
 
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, HitPrecision, RayBatch};

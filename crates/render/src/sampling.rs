@@ -1,5 +1,5 @@
-//! How pixels are sampled: in which passes, by which random numbers, what is averaged, and the memory that a thread
-//! needs for it.
+//! Sampling of pixels: in which passes, by which random numbers, what is averaged, and the memory
+//! that a thread needs for it.
 
 use std::ops::Range;
 

@@ -53,13 +53,13 @@ impl Shard {
         Self { index: strips, count: strips + 1, by: ShardBy::Rows }
     }
 
-    /// The same share of what `by` says.
+    /// Returns the share with what it divides replaced by `by`.
     #[must_use]
     pub fn by(self, by: ShardBy) -> Self {
         Self { by, ..self }
     }
 
-    /// Whether samples are dealt out, and not rows.
+    /// True if samples are dealt out rather than rows.
     #[must_use]
     pub fn is_of_samples(self) -> bool {
         self.by == ShardBy::Samples
@@ -87,7 +87,7 @@ impl Shard {
         self.index < self.count
     }
 
-    /// How many shares there are.
+    /// Number of shares.
     #[must_use]
     pub fn count(self) -> u32 {
         self.count
@@ -98,7 +98,7 @@ impl Shard {
         self.is_of_samples() || strip % self.count as usize == self.index as usize
     }
 
-    /// How many of `height` rows are.
+    /// Number of rows, of `height`, that belong to the share.
     #[must_use]
     pub fn rows(self, height: u32) -> u32 {
         let strips = 0..height.div_ceil(TILE);

@@ -1,4 +1,4 @@
-//! How many samples the pixels of a picture got, and what a user should know of them.
+//! Sample counts of a picture's pixels, and what a user should know of them.
 
 /// The share of pixels that may be so without a word.
 const FEW: f64 = 0.01;
@@ -100,7 +100,7 @@ impl SampleCounts {
         [sum / self.pixels.max(1) as f64, if sum > 0.0 { error } else { 0.0 }]
     }
 
-    /// Whether a few pixels bring so much of the picture's variance that nobody can tell how large it is.
+    /// True if a few pixels bring so much of the picture's variance that nobody can tell how large it is.
     #[must_use]
     pub fn is_unjudged(&self) -> bool {
         let [mean, error] = self.variance();
@@ -114,8 +114,7 @@ impl SampleCounts {
         format!("{} to {}, {:.1} in the mean", self.least, self.most, self.mean())
     }
 
-    /// What a user should know of pixels that were given up, or stopped too early, and of a picture that cannot be
-    /// judged.
+    /// Notes for the user on pixels that were given up, or stopped too early, and of a picture that cannot be judged.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         self.of_pixels().into_iter().chain(self.of_rare_light()).collect()

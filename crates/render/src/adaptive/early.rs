@@ -1,4 +1,4 @@
-//! Which blocks stopped too early, by their own samples, which had no part in deciding how many they are.
+//! Detection of blocks that stopped too early, by their own samples, which had no part in deciding how many they are.
 //!
 //! The variances that a block's pixels tell of themselves have the right mean, but a block where no rare flash fell
 //! tells too little, and one where it fell too much. Their own mean, of one sample, is therefore drawn towards that of

@@ -1,4 +1,4 @@
-//! What the chief rays of pixels meet, by which pixels are alike.
+//! Guide of pixels by what their chief rays meet, by which pixels are alike.
 //!
 //! The variance of a pixel's samples goes with what it shows: a plain wall, an edge, a ball of glass. Colour, normal and
 //! distance of what its chief ray meets, and how much they change from pixel to pixel, tell which pixels may know each

@@ -1,4 +1,4 @@
-//! When the error of a block's samples is small enough.
+//! Rule of when the error of a block's samples is small enough.
 
 use super::sampled::Sampled;
 use crate::Plan;

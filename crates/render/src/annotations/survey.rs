@@ -1,4 +1,4 @@
-//! Which copy each chief ray hits, and what each would cover if nothing were before it.
+//! Survey of which copy each chief ray hits, and what each would cover if nothing were before it.
 
 use std::ops::Range;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Whether waves would show in a picture, in words.
+//! Notes, in words, on whether waves would show in a picture.
 
 use etendue_camera::LensCamera;
 use etendue_geometry::glam::DVec3;

@@ -14,11 +14,11 @@ use crate::output::{Channel, Layer, Look, Picture, Values};
 /// Light in spectral bands, as a sensor is given it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BandFilm {
-    /// What the bands are.
+    /// Bands of the film.
     pub bands: Bands,
     /// `[row][column][band]`.
     pub values: Vec<f32>,
-    /// The same of the light that came through parts of the pupil, where it is told apart.
+    /// Light of the parts of the pupil, layer by layer as above, where it is told apart.
     pub parts: Vec<(LayerSpec, Vec<f32>)>,
 }
 
@@ -219,7 +219,7 @@ pub(crate) fn three_planes(layer: &Layer) -> Option<[&[f32]; 3]> {
     }
 }
 
-/// What the layer of a hyperspectral cube is called.
+/// Name of the layer of a hyperspectral cube.
 pub const SPECTRUM: &str = "Spectrum";
 
 /// Whether the picture has a hyperspectral cube.

@@ -1,4 +1,4 @@
-//! What light is multiplied by on its way to the sensor: the curves that bands have to tell apart.
+//! Factors on the light on its way to the sensor: the curves that bands have to tell apart.
 
 use std::f64::consts::PI;
 use std::sync::Arc;

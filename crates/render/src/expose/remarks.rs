@@ -1,4 +1,4 @@
-//! What a user should know of an exposure: how much of it is saturated or black, and what would mend it.
+//! Notes for the user on an exposure: how much of it is saturated or black, and what would mend it.
 
 use etendue_sensor::{EXPOSURES, Exposure, Film, Radiometry, RawImage, Sensor};
 

@@ -1,5 +1,4 @@
-//! Where views are sampled: the middles of the lenslets' images, and those of each band behind glass that
-//! disperses.
+//! Sampling places of views: the middles of the lenslets' images, and those of each band behind glass that disperses.
 
 use etendue_camera::{CameraError, LensCamera, LightField};
 use etendue_spectrum::Bands;

@@ -1,4 +1,4 @@
-//! Which views a raw picture holds: as many about the middle one as are those of an ideal lens.
+//! Choice of the views that a raw picture holds: as many about the middle one as are those of an ideal lens.
 
 use etendue_camera::{Camera, CameraError, LensCamera, LightField, Projection, ViewGrid};
 use etendue_scene::file::AccuracySpec;

@@ -1,6 +1,6 @@
-//! What the pixels of views see, by rays: of the camera itself, as its raw picture is sampled, and of the ideal
-//! lens that its views are held against. Light that the lenslets and the main lens lose, places that their
-//! aberrations move, and how far both are spread.
+//! Response of the pixels of views, by rays: of the camera itself, as its raw picture is sampled,
+//! and of the ideal lens that its views are held against. Light that the lenslets and the main lens
+//! lose, places that their aberrations move, and how far both are spread.
 //!
 //! Both are asked for waves of [`PERIOD`] columns about a mean of 0.5: of a wave e^(iκx) a pixel shows
 //! the mean of e^(iκx) over its rays. What is different is the error of the view.

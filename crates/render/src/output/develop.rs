@@ -17,21 +17,21 @@ use super::look::{Channels, Shown, srgb, unit};
 use super::{Layer, Picture, Values, png::Bits};
 use crate::film::NoMemory;
 
-/// How a PNG shows the picture's light.
+/// Settings of how a PNG shows the picture's light.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Development {
     /// Light is multiplied by 2 to this power first.
     pub stops: f64,
-    /// Whether the picture's own light decided it.
+    /// True if the picture's own light decided `stops`.
     pub is_automatic: bool,
-    /// What brings light above full scale into range.
+    /// Tone mapping, which brings light above full scale into range.
     pub tone_map: ToneMap,
-    /// Whether the background is transparent.
+    /// True if the background is transparent.
     pub alpha: bool,
 }
 
 impl Development {
-    /// What `spec` asks for, of a picture with these layers, whose own goes without a name.
+    /// Development that `spec` asks for, of a picture with these layers, whose own goes without a name.
     #[must_use]
     pub fn new(spec: &RenderSpec, picture: &Picture) -> Self {
         let (stops, is_automatic) = match spec.exposure {

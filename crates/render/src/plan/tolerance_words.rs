@@ -1,4 +1,4 @@
-//! What is taken of a scene's tolerance, in words.
+//! Notes, in words, on what is taken of a scene's tolerance.
 
 use etendue_report::{Decision, DecisionKind as Kind};
 use etendue_scene::Scene;

@@ -28,8 +28,8 @@ pub struct Unseen {
 }
 
 impl Unseen {
-    /// What of `geometry` the chief rays of `camera` cannot meet; `None` where that is nothing, or where it would
-    /// cost more to find than to build.
+    /// Finds the parts of `geometry` that the chief rays of `camera` cannot meet; `None` where that
+    /// is nothing, or where it would cost more to find than to build.
     #[must_use]
     pub fn of(geometry: &Geometry, camera: &Camera) -> Option<Self> {
         let [width, height] = camera.resolution();
@@ -69,19 +69,19 @@ impl Unseen {
         (placements > 0).then(|| Self { is_unseen: is_unseen.into(), placements, triangles })
     }
 
-    /// How many placements they are.
+    /// Number of placements.
     #[must_use]
     pub fn placements(&self) -> usize {
         self.placements
     }
 
-    /// How many triangles are not built for it, each stored one once.
+    /// Number of triangles that are not built, each stored one once.
     #[must_use]
     pub fn triangles(&self) -> u64 {
         self.triangles
     }
 
-    /// Whether nothing of this is missing in what was built without `other`.
+    /// True if nothing of this is missing in what was built without `other`.
     #[must_use]
     pub fn is_served_without(&self, other: &Self) -> bool {
         self.is_unseen.len() == other.is_unseen.len()

@@ -37,8 +37,8 @@ const SAFE_COSINE: f64 = 0.9;
 /// Columns and rows of places at which rays' angles are taken, the corners among them.
 const PLACES: u32 = 5;
 
-/// How coarse each image of `scene` may be; `None` of those that are to be whole, as all are of a scene without a
-/// tolerance.
+/// Permitted coarseness of each image of `scene`; `None` of those that are to be whole, as all are
+/// of a scene without a tolerance.
 #[must_use]
 pub fn coarse_images(scene: &Scene, plan: &Plan) -> Vec<Option<Coarseness>> {
     let mut coarse = vec![None; scene.textures.len()];

@@ -47,7 +47,7 @@ const MOST_OCTAVES: u32 = 6;
 /// Columns and rows of places where the extent of a pixel is taken, the corners among them.
 const PLACES: u32 = 5;
 
-/// What detail was left out.
+/// Detail that was left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TakenDetail {
     /// Triangles of the scene, as often as they are placed, and those that are left: of a mesh whose copies stand near and
@@ -55,7 +55,7 @@ pub struct TakenDetail {
     pub triangles: [u64; 2],
     /// Meshes that are coarser.
     pub meshes: usize,
-    /// How far a place of the picture is displaced at most (pixels).
+    /// Greatest displacement of a place of the picture (pixels).
     pub displacement: f64,
     /// By which share the area of a mesh differs, at most.
     pub light: f64,

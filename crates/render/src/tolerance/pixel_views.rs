@@ -1,4 +1,4 @@
-//! What a camera sees from places of its picture: where their rays run, in pixels, at any depth.
+//! Views of a camera from places of its picture: where their rays run, in pixels, at any depth.
 //!
 //! A ray is a straight line, so where it meets the plane at the depth z is, in tangents from the entrance
 //! pupil, a + b/z: its slope, and its offset in the pupil's plane over the depth. The mean and the variance
