@@ -34,12 +34,12 @@ impl SupportFunction for Bounds {
     }
 }
 
-/// What a camera that was given no place has to frame.
+/// Subject to be framed by a camera that was given no place.
 #[derive(Clone, Copy)]
 pub struct Subject<'a> {
     /// The tight box around all of it (m).
     pub bounds: Bounds,
-    /// Where it is best looked at from.
+    /// Viewpoint from which it is best looked at.
     pub viewpoint: Viewpoint,
     /// Its points; the corners of the box when absent.
     pub points: Option<&'a dyn SupportFunction>,
@@ -55,7 +55,7 @@ impl fmt::Debug for Subject<'_> {
     }
 }
 
-/// Where something is looked at from.
+/// Viewpoint on something.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Viewpoint {
     /// From the front right above; face on when it is flat.

@@ -23,7 +23,7 @@ pub enum PixelOrigin {
 }
 
 impl PixelOrigin {
-    /// What to add to a coordinate counted from here, to have it counted from the corner (pixels).
+    /// Offset from a coordinate counted from here to one counted from the corner (pixels).
     #[must_use]
     pub fn to_corner(self) -> f64 {
         match self {

@@ -150,7 +150,7 @@ impl Pinhole {
         self.falloff.map_or(1.0, |falloff| falloff.at(square_of(&self.intrinsics, place)))
     }
 
-    /// What the file counted the principal point from; the centre when it gave a field of view.
+    /// Origin from which the file counted the principal point; the centre when it gave a field of view.
     #[must_use]
     pub fn pixel_origin(&self) -> PixelOrigin {
         self.pixel_origin

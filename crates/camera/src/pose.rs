@@ -1,4 +1,4 @@
-//! Where a camera stands and which way it looks.
+//! Pose of a camera: where it stands, and which way it looks.
 
 use glam::{DMat3, DMat4, DQuat, DVec3};
 use schemars::JsonSchema;
@@ -142,7 +142,7 @@ impl Pose {
         -self.rotation.z_axis
     }
 
-    /// Whether all numbers are finite.
+    /// True if all numbers are finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.rotation.is_finite() && self.position.is_finite()

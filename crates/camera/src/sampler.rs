@@ -54,8 +54,8 @@ impl Sampler {
 }
 
 impl Sampler {
-    /// How many samples make up the set that `count` of them are taken from; `None` of a sequence. The first
-    /// samples of a larger count are those of a smaller one where both are of one set, or of a sequence.
+    /// Size of the set that `count` samples are taken from; `None` of a sequence. The first samples
+    /// of a larger count are those of a smaller one where both are of one set, or of a sequence.
     #[must_use]
     pub fn set_size(self, count: u32) -> Option<u32> {
         match self {
@@ -201,7 +201,7 @@ impl SampleKeys {
         sobol::points(&keys, first, out);
     }
 
-    /// The same in single precision, the numbers below 1, in two columns.
+    /// Numbers of a pair of dimensions in single precision, below 1, in two columns.
     pub fn floats_of_pair(&self, picked: &[u32], pair: u32, out: &mut [Vec<f32>; 2]) {
         out.iter_mut().for_each(|column| column.resize(picked.len(), 0.0));
         let [x, y] = out;

@@ -61,23 +61,23 @@ const FARTHEST: f64 = 32.0;
 /// What the measured parting of places is multiplied by: what may be greater in between.
 const SAFETY: f64 = 1.25;
 
-/// How bands share rays, as measured.
+/// Sharing of rays among bands, as measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SharedPaths {
     /// Wavelengths that each ray is traced at.
     pub traced: usize,
-    /// How far places that are interpolated are from those that are traced, at most (pixels).
+    /// Greatest distance between places that are interpolated and those that are traced (pixels).
     pub error: f64,
-    /// How many rows of pixels from where a ray starts its light lands, at most.
+    /// Greatest number of rows of pixels between where a ray starts and where its light lands.
     pub rows: u32,
 }
 
-/// Where the light of each band lands that comes along rays which all bands share, `[ray][band]`.
+/// Landing points of the light of each band that comes along rays which all bands share, `[ray][band]`.
 #[derive(Debug, Clone, Default)]
 pub struct BandLandings {
     /// The pixel, counted row by row; [`Self::NOWHERE`] where the band's light does not arrive.
     pub pixel: Vec<u32>,
-    /// What the ray's radiance in the band counts in the mean over the samples of that pixel.
+    /// Weight of the ray's radiance in the band in the mean over the samples of that pixel.
     pub weight: Vec<f64>,
     /// Of each ray where it leaves the lens (mm), its direction, its weight before the lens, and its node.
     points: Vec<DVec3>,
@@ -97,7 +97,7 @@ impl BandLandings {
 }
 
 impl LensCamera {
-    /// How the rays of `bands` are shared, or why each has rays of its own.
+    /// Measures how the rays of `bands` are shared.
     ///
     /// # Errors
     ///
@@ -106,7 +106,7 @@ impl LensCamera {
         self.band_paths(bands).map(|paths| self.shared(&paths))
     }
 
-    /// The same as the camera was opened for; `None` where bands have rays of their own.
+    /// Sharing of rays for which the camera was opened; `None` where bands have rays of their own.
     #[must_use]
     pub fn opened_paths(&self) -> Option<SharedPaths> {
         let paths = self.opened.as_ref()?.paths.as_ref()?;

@@ -219,14 +219,14 @@ impl LensletChiefs {
         Some(-direction.truncate() / direction.z)
     }
 
-    /// Where the chief ray of the lens before through a lenslet's middle meets the sensor (mm across the
-    /// axis): the middle of the image that the lenslet makes of the opening.
+    /// Point where the chief ray of the lens before through a lenslet's middle meets the sensor (mm
+    /// across the axis): the middle of the image that the lenslet makes of the opening.
     #[must_use]
     pub fn image_centre(&self, cell: [f64; 2]) -> Option<DVec2> {
         self.view.image_centre(cell, self.sensor_z, |at| self.chief_slopes(at))
     }
 
-    /// The same to about a millionth of the way from pupil to array.
+    /// Variant of [`Self::image_centre`] that is accurate to about a millionth of the way from pupil to array.
     #[must_use]
     pub fn image_centre_nearly(&self, cell: [f64; 2]) -> Option<DVec2> {
         self.view.image_centre(cell, self.sensor_z, |at| self.table.nearly(at))

@@ -27,7 +27,7 @@ pub struct Focused {
     origin: f64,
 }
 
-/// What the lens does near its axis.
+/// Paraxial view of the lens.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum View {
     /// Chief rays meet in the entrance pupil.
@@ -36,7 +36,7 @@ pub enum View {
     Parallel {
         /// A pixel's side on the object (m).
         metres_per_pixel: f64,
-        /// Where the axis meets the sensor (pixels from the corner).
+        /// Point where the axis meets the sensor (pixels from the corner).
         centre: [f64; 2],
     },
 }
@@ -186,7 +186,7 @@ impl Focused {
         &self.paraxial
     }
 
-    /// What the lens does near its axis.
+    /// Paraxial view of the lens.
     #[must_use]
     pub fn view(&self) -> View {
         self.view
@@ -210,8 +210,7 @@ impl Focused {
         self.film.turn
     }
 
-    /// Where a point of the sensor's plane (mm across the axis) is in the picture (pixels from the
-    /// corner).
+    /// Maps a point of the sensor's plane (mm across the axis) to the picture (pixels from the corner).
     #[must_use]
     pub fn pixel_of(&self, at: DVec2) -> [f64; 2] {
         let film = &self.film;

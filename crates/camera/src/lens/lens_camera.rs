@@ -51,9 +51,9 @@ pub struct LensCamera {
     pub(super) solid_angle: f64,
     pub(super) opened: Option<Arc<Opened>>,
     pub(super) traced_at: TracedAt,
-    /// How light is spread on the sensor.
+    /// Spreading of light on the sensor.
     pub(super) spread: SpreadBy,
-    /// How nearly bands that share rays are where their own would be.
+    /// Limits of the distance between shared rays of bands and rays of their own.
     pub(super) sharing: SharingLimits,
 }
 
@@ -240,8 +240,8 @@ impl LensCamera {
             && (self.dims_wavelengths_apart() || self.focused.train().is_dispersive())
     }
 
-    /// Which of `bands` need rays of their own: each, or each group, where the lens tells wavelengths apart and there
-    /// are several, else none.
+    /// Groups of `bands` that need rays of their own: each, or each group, where the lens tells
+    /// wavelengths apart and there are several, else none.
     #[must_use]
     pub fn band_groups(&self, bands: &Bands) -> Vec<BandGroup> {
         let count = bands.count();
@@ -322,8 +322,7 @@ impl LensCamera {
         }
     }
 
-    /// Whether the exit pupil is known in closed form: a round opening with nothing behind it that
-    /// bends rays.
+    /// True if the exit pupil is known in closed form: a round opening with nothing behind it that bends rays.
     #[must_use]
     pub fn has_round_pupil(&self) -> bool {
         let film = self.focused.film();
@@ -331,13 +330,13 @@ impl LensCamera {
         Disk::of(&train, &film.frame, film.half_size()).is_some()
     }
 
-    /// Whether rays of a sample run at a wavelength that is drawn.
+    /// True if the rays of a sample run at a wavelength that is drawn.
     pub fn draws_wavelengths(&self) -> bool {
         let groups = self.opened.iter().flat_map(|opened| &opened.groups);
         groups.into_iter().any(|group| group.lenses.len() > 1)
     }
 
-    /// How many wavelengths the rays of each of [`Self::band_groups`] are drawn from, at most.
+    /// Greatest number of wavelengths that the rays of one of [`Self::band_groups`] are drawn from.
     #[must_use]
     pub fn wavelengths_a_group(&self, bands: &Bands) -> usize {
         let groups = self.band_groups(bands).into_iter();
@@ -436,7 +435,7 @@ impl LensCamera {
         curves.filter(|curve| curve.as_flat().is_none()).cloned().collect()
     }
 
-    /// What is odd about the lens, and what of it is not known at the wavelengths of `bands`.
+    /// Notes on oddities of the lens, and on what of it is not known at the wavelengths of `bands`.
     #[must_use]
     pub fn out_of_range(&self, bands: &Bands) -> Vec<String> {
         let groups = self.band_groups(bands).into_iter();
