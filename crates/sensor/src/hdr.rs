@@ -44,7 +44,7 @@ pub struct HdrImage {
     pub rate: Vec<f32>,
     /// Their standard deviations (e⁻/s); +inf of those pixels.
     pub sigma: Vec<f32>,
-    /// How many numbers are of such pixels.
+    /// Count of numbers of such pixels.
     pub saturated: u64,
 }
 

@@ -35,7 +35,7 @@ const ROUNDS: usize = 12;
 /// Of saturation: what is expected to be brighter is left out.
 const NEARLY_SATURATED: f64 = 0.9;
 
-/// Why a photograph cannot be matched. The message says what to do.
+/// Error of a photograph that cannot be matched. The message says what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MatchError {
@@ -61,9 +61,9 @@ pub enum MatchError {
         share: f64,
         /// DN
         level: f64,
-        /// Which end.
+        /// End of the scale that is clipped.
         end: &'static str,
-        /// What to do.
+        /// Remedy of the error.
         remedy: &'static str,
     },
     /// Numbers that do not go with the light.

@@ -28,7 +28,7 @@ const CCD_DSNU: Fact<f64> = Fact::assumed(1.0);
 const DOUBLING: Fact<f64> = Fact::assumed(7.0);
 
 impl Model {
-    /// What is known of it.
+    /// Data of the sensor.
     #[must_use]
     pub fn preset(self) -> &'static Preset {
         &PRESETS[self as usize]

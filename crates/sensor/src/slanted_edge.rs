@@ -75,7 +75,7 @@ pub struct SlantedEdge {
     pub mtf50: Option<f64>,
 }
 
-/// Why a region has no edge that tells anything.
+/// Error of a region without an edge that tells anything.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EdgeError {
@@ -399,8 +399,8 @@ impl SlantedEdge {
         cosines.hypot(sines) / sum.abs() / taken.abs().max(0.1)
     }
 
-    /// What square pixels without gaps take at a frequency (cycles a pixel) across the edge: what the
-    /// modulation is to be divided by for that of the lens alone.
+    /// Modulation of square pixels without gaps at a frequency (cycles a pixel) across the edge:
+    /// what the modulation is to be divided by for that of the lens alone.
     #[must_use]
     pub fn modulation_of_pixels(&self, frequency: f64) -> f64 {
         let turn = self.angle.to_radians();

@@ -16,13 +16,13 @@ const MOST_LENGTHS: usize = 32;
 /// A curve that light may be multiplied by, beside lights, filters and colours.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Factor {
-    /// What is left of light, 0 to 1; held beyond its ends.
+    /// Share of the light that is left, 0 to 1; held beyond its ends.
     pub curve: Curve,
-    /// How often.
+    /// Number of times that light meets the factor.
     pub times: Times,
 }
 
-/// How often light is multiplied by a curve.
+/// Number of times that light is multiplied by a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Times {
     /// Once to so many times: what surfaces reflect one after the other.
