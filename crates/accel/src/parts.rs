@@ -1,4 +1,4 @@
-//! What a tree is built over, and how a ray gets there.
+//! Parts that a tree is built over, and the way of a ray into them.
 //!
 //! A *part* is a set of triangles in one frame: a mesh in its own frame, shared by all its
 //! placements, or several placements *baked* into a frame that is parallel to the world's. An

@@ -1,4 +1,4 @@
-//! Which of single precision's answers deserve a second look, and what decides then.
+//! Re-check of single precision's answers: which deserve a second look, and what decides then.
 //!
 //! Rays are turned aside before they are rounded (`NUDGE` of [`crate::single`]), so that vertices are
 //! never aimed at exactly, and single precision takes the wrong neighbour when a ray passes within about 10⁻⁶ of

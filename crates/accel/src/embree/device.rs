@@ -186,14 +186,14 @@ fn check_isa(isa: &str) -> Result<&str, BuildError> {
     }
 }
 
-/// What Embree there is.
+/// Version of Embree.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Version {
     /// `3.13.5`
     pub version: String,
     /// The widest instruction set its kernels use here.
     pub isa: &'static str,
-    /// What runs its tasks.
+    /// Tasking system, which runs its tasks.
     pub tasks: &'static str,
 }
 

@@ -1,4 +1,4 @@
-//! Where a node is split: bins of centroids, and the cheapest border between them.
+//! Split of a node: bins of centroids, and the cheapest border between them.
 //!
 //! Boxes around many things and around their centroids.
 //!
