@@ -206,7 +206,7 @@ fn locate(a: DVec3, b: DVec3, c: DVec3, d: DVec3, front: bool) -> Hit {
     if is_delicate { locate_carefully([a, b, c], d, front) } else { Hit { t, u, v, front } }
 }
 
-/// What the plain formula says, and whether the careful one has to take over.
+/// Result of the plain formula, and whether the careful one has to take over.
 struct PlainResult {
     t: f64,
     u: f64,

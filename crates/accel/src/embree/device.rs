@@ -10,7 +10,7 @@ use embree4_sys as sys;
 
 use crate::{BuildError, BuildOptions};
 
-/// What Embree's callbacks write to while a device lives.
+/// State that Embree's callbacks write to while a device lives.
 #[derive(Default)]
 struct DeviceWatch {
     /// The first error since it was last taken.

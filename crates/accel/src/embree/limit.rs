@@ -31,7 +31,7 @@ pub enum LimitError {
     Motion(String),
 }
 
-/// What Embree holds by its own count.
+/// Bytes that Embree holds by its own count.
 #[derive(Debug, Default)]
 struct Bytes {
     now: AtomicI64,

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::{CHUNK, Node, Ref, WIDE_NODE};
 use etendue_geometry::glam::Vec4;
 
-/// Where bins begin.
+/// Grid of bins: their start and scale.
 pub(super) struct BinGrid {
     start: Vec4,
     /// Bins per length; 0 along an axis without extent.
