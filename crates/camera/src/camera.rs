@@ -365,7 +365,7 @@ impl Camera {
         self.carry_chief(rows, rays);
     }
 
-    /// The same of a camera that stands in the frame's pose.
+    /// Sets up the rays of a camera that stands in the frame's pose.
     fn rays_at(&self, columns: &[f64], rows: &[f64], rays: &mut RayBatch) {
         let len = columns.len().min(rows.len());
         rays.reset(len);

@@ -39,7 +39,7 @@ pub enum CameraSpec {
     LightFieldReference(LightFieldSpec),
 }
 
-/// The same expression for every kind of camera.
+/// Evaluates an expression for every kind of camera.
 macro_rules! for_each_kind {
     ($camera:expr, $spec:ident => $value:expr) => {
         match $camera {

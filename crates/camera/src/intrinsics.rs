@@ -64,7 +64,7 @@ pub struct Intrinsics {
 }
 
 impl Intrinsics {
-    /// The same on pixels `factor` times as large.
+    /// Returns the intrinsics on pixels `factor` times as large.
     pub(crate) fn coarser(&self, factor: f64) -> Self {
         let [focal, centre] = [self.focal, self.centre].map(|pair| pair.map(|x| x / factor));
         Self { focal, centre, skew: self.skew / factor }

@@ -156,7 +156,7 @@ impl Pinhole {
         self.pixel_origin
     }
 
-    /// The same on pixels `factor` times as large.
+    /// Returns the camera on pixels `factor` times as large.
     pub(crate) fn coarser(&self, factor: f64) -> Self {
         Self { intrinsics: self.intrinsics.coarser(factor), ..self.clone() }
     }
@@ -297,7 +297,7 @@ impl Orthographic {
         self.pixel
     }
 
-    /// The same on pixels `factor` times as large.
+    /// Returns the camera on pixels `factor` times as large.
     pub(crate) fn coarser(&self, factor: f64) -> Self {
         Self { pixel: self.pixel * factor, centre: self.centre.map(|c| c / factor) }
     }

@@ -6,8 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::CameraError;
 
-/// How far a given rotation may be from orthonormal: the entries of matrices printed with five
-/// digits are.
+/// Tolerance of a given rotation's distance from orthonormal: the entries of matrices printed with five digits are.
 const ROTATION_TOLERANCE: f64 = 1e-4;
 
 /// The axes of a camera's own frame. Both are right-handed with +X to the right.

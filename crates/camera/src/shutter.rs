@@ -285,18 +285,18 @@ impl Shutter {
         self.truth_at
     }
 
-    /// The same, of which data layers see another moment.
+    /// Returns the shutter with data layers that see another moment.
     pub(crate) fn with_truth_at(&self, truth_at: TruthAt) -> Self {
         Self { truth_at, ..self.clone() }
     }
 
-    /// The same for rows of the picture `factor` times as high.
+    /// Returns the shutter for rows of the picture `factor` times as high.
     pub(crate) fn coarser(&self, factor: f64) -> Self {
         Self { coarse: self.coarse * factor, ..self.clone() }
     }
 
-    /// How many rows were read out before a row of the picture, whose number may be a place between rows: 0.5 is the
-    /// middle of the first.
+    /// Number of rows read out before a row of the picture, whose number may be a place between
+    /// rows: 0.5 is the middle of the first.
     fn rows_before(&self, place: f64) -> f64 {
         let last = f64::from(self.rows) - 1.0;
         let row = place * self.coarse - 0.5;

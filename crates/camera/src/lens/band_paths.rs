@@ -58,7 +58,7 @@ const FEWEST: usize = 32;
 /// kept from other threads.
 const FARTHEST: f64 = 32.0;
 
-/// What the measured parting of places is multiplied by: what may be greater in between.
+/// Factor on the measured parting of places, which may be greater in between.
 const SAFETY: f64 = 1.25;
 
 /// Sharing of rays among bands, as measured.
@@ -119,7 +119,7 @@ impl LensCamera {
         SharedPaths { traced: paths.nodes.len(), error: paths.error, rows }
     }
 
-    /// Why rays of different bands differ by more than where they land, if they do.
+    /// Reason why rays of different bands differ by more than where they land, if they do.
     fn parted(&self) -> Option<&'static str> {
         if matches!(self.traced_at, TracedAt::Grouped(_)) {
             return Some("groups of bands run each its own way");
@@ -252,7 +252,7 @@ impl LensCamera {
         left.map(|i| (rays.position(i), rays.direction(i))).collect()
     }
 
-    /// Where rays of the scene land at the wavelength of a lens.
+    /// Landing points of rays of the scene at the wavelength of a lens.
     fn landings(&self, lens: &MonochromaticTrain, rays: &[(DVec3, DVec3)], lead: f64) -> Landed {
         let mut back = LensRays::with_capacity(rays.len());
         for &(point, direction) in rays {
@@ -344,7 +344,7 @@ impl LensCamera {
         }
     }
 
-    /// Where each band's light of each ray lands, and what it counts.
+    /// Computes where each band's light of each ray lands, and its weight.
     fn land(
         &self,
         (paths, resolution): (&BandPaths, [u32; 2]),
@@ -435,13 +435,13 @@ impl BandLandings {
     }
 }
 
-/// Where rays landed (pixels), and the share of each that passed; `None` for those that ended.
+/// Landing points of rays (pixels), and the share of each that passed; `None` for those that ended.
 struct Landed {
     places: Vec<Option<(DVec2, f64)>>,
     pitch: f64,
 }
 
-/// How far the places of a ray part in rows or columns, at most (mm).
+/// Greatest distance in rows or columns by which the places of a ray part (mm).
 fn parting(landed: &[Landed]) -> f64 {
     let Some(first) = landed.first() else { return 0.0 };
     let part = |ray: usize| {
@@ -455,7 +455,7 @@ fn parting(landed: &[Landed]) -> f64 {
     (0..first.places.len()).map(part).fold(0.0, f64::max) * first.pitch
 }
 
-/// How far interpolated places (pixels) and shares are from those found, at most.
+/// Greatest error of interpolated places (pixels) and shares against those found.
 fn error_of(weights: &[f64; MOST_NODES], nodes: &[Landed], found: &Landed) -> [f64; 2] {
     let mut errors = [0.0_f64; 2];
     for (ray, found) in found.places.iter().enumerate() {

@@ -62,8 +62,8 @@ impl FilmGrid {
         DVec2::new((column - self.centre.x) * scale, -(row - self.centre.y) * scale)
     }
 
-    /// Where a ray from the lens (mm, in lens coordinates) meets the sensor's plane, in the picture (pixels
-    /// from the corner): the inverse of [`Self::place`]. Not finite for a ray along the plane.
+    /// Projects a ray from the lens (mm, in lens coordinates) onto the sensor's plane, as a place in the picture
+    /// (pixels from the corner): the inverse of [`Self::place`]. Not finite for a ray along the plane.
     #[inline]
     pub(crate) fn pixel(&self, position: DVec3, direction: DVec3) -> [f64; 2] {
         let Frame { vertex, rotation } = self.frame;
@@ -77,7 +77,7 @@ impl FilmGrid {
         ]
     }
 
-    /// Where the axis meets the sensor, were it not tilted (pixels from the corner).
+    /// Point where the axis meets the sensor, were it not tilted (pixels from the corner).
     fn principal_point(&self) -> [f64; 2] {
         let scale = self.turn * self.pitch;
         let DVec3 { x, y, .. } = self.frame.vertex;
@@ -160,7 +160,7 @@ impl Focused {
         Ok(Self { train, paraxial, film, view, object_distance, origin })
     }
 
-    /// The same on pixels `factor` times as large.
+    /// Returns the setup on pixels `factor` times as large.
     pub(crate) fn coarser(&self, factor: f64) -> Self {
         let pitch = self.film.pitch * factor;
         let film = FilmGrid { pitch, centre: self.film.centre / factor, ..self.film };
@@ -268,7 +268,7 @@ fn stopped(train: OpticalTrain, setup: &Setup<'_>) -> Result<OpticalTrain, Camer
     }
 }
 
-/// How the camera mounts its sensor; `None` when it leaves that to the lens file.
+/// Mounting of the sensor by the camera; `None` when it leaves that to the lens file.
 fn mount(setup: &Setup<'_>) -> Result<Option<SensorMount>, CameraError> {
     let Setup { sensor_tilt: tilt, sensor_decentre: decentre, .. } = *setup;
     let mount = SensorMount { tilt, decentre };

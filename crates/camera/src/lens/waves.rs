@@ -32,12 +32,12 @@ impl LensCamera {
         self.spread == SpreadBy::Waves
     }
 
-    /// Whether samples are rays of the whole pupil.
+    /// True if samples are rays of the whole pupil.
     pub(crate) fn has_spread_rays(&self) -> bool {
         self.spread != SpreadBy::Nothing
     }
 
-    /// The same whose light is spread as waves are.
+    /// Returns the camera with its light spread as waves are.
     ///
     /// # Errors
     ///
@@ -59,7 +59,7 @@ impl LensCamera {
         Ok(self.spread_by(SpreadBy::Waves))
     }
 
-    /// The same by rays.
+    /// Returns the camera with its light spread by rays.
     pub(crate) fn without_diffraction(&self) -> Self {
         match self.spread {
             SpreadBy::Waves => self.clone().spread_by(SpreadBy::Rays),
@@ -67,7 +67,7 @@ impl LensCamera {
         }
     }
 
-    /// The same along chief rays, on pixels a `finer`-th as large.
+    /// Returns the camera along chief rays, on pixels a `finer`-th as large.
     pub(crate) fn along_chief_rays(&self, finer: f64) -> Self {
         let mut lens = self.coarser(1.0 / finer).spread_by(SpreadBy::Nothing);
         lens.opened = None;

@@ -323,8 +323,8 @@ fn most_views(diameter: f64, step: f64) -> u32 {
 }
 
 impl LensletChiefs {
-    /// Why pixels `pixel` (mm) wide at one offset behind the lenslets do not see the same part of the
-    /// opening through all of each lenslet, in images of which `alone` pixels are free of their neighbours.
+    /// Reason why pixels `pixel` (mm) wide at one offset behind the lenslets do not see the same part of the opening
+    /// through all of each lenslet, in images of which `alone` pixels are free of their neighbours.
     fn no_views(&self, pixel: f64, alone: f64) -> Option<String> {
         if alone < LEAST_IMAGE {
             return Some(format!(

@@ -45,7 +45,7 @@ pub struct ViewGrid {
     coarse: f64,
 }
 
-/// What of the entrance pupil is open.
+/// Opening of the stop, as part of the entrance pupil.
 #[derive(Debug, Clone, PartialEq)]
 struct Stop {
     opening: Arc<Opening>,
@@ -110,7 +110,7 @@ impl ViewGrid {
         Self { views: 1, ..self.clone() }
     }
 
-    /// The same on pixels `factor` times as large.
+    /// Returns the grid on pixels `factor` times as large.
     pub(crate) fn coarser(&self, factor: f64) -> Self {
         Self { coarse: self.coarse * factor, ..self.clone() }
     }
@@ -229,7 +229,7 @@ impl ViewGrid {
         centre + DVec2::from(self.array.lattice.turned(step))
     }
 
-    /// What of a ray's light arrives on the array.
+    /// Share of a ray's light that arrives on the array.
     fn weight(&self, a: DVec2, u: DVec2) -> f64 {
         // On the pupil mm right and mm up are the lens' own x and y.
         let at_stop = u * self.stop.magnification;
