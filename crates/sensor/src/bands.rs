@@ -134,7 +134,7 @@ impl Sensor {
     }
 }
 
-/// Where the sensor sees and some light shines (nm).
+/// Range in which the sensor sees and some light shines (nm).
 fn lit_range(sensor: Option<[f64; 2]>, light: &Illumination) -> Result<[f64; 2], SensorError> {
     let Some(sensor) = sensor else {
         let why = "the sensor sees nothing at any wavelength";
@@ -157,7 +157,7 @@ struct Trial {
     filter: Option<usize>,
     product: Product,
     exact: RunningSums,
-    /// What an error is a part of.
+    /// Scale that an error is a part of.
     scale: f64,
 }
 
@@ -180,7 +180,7 @@ struct BandTable {
     /// Of the mean light by each channel.
     channels: Vec<RunningSums>,
     trials: Vec<Trial>,
-    /// Whether all products are among them.
+    /// True if all products are among them.
     complete: bool,
     sensitivity: Curve,
     mean_light: Curve,
@@ -369,7 +369,7 @@ impl BandTable {
         cells
     }
 
-    /// What a sensor loses in bands that are not bands.
+    /// Greatest error of a sensor's counts in bands that are no bands of wavelengths, in shares of each trial's scale.
     fn error_of(
         &self,
         response: &Response,

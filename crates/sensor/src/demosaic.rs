@@ -197,7 +197,7 @@ impl Sensor {
         rows.into_iter().map(|row| row.map(|value| value / most)).collect()
     }
 
-    /// Whether its channels are X, Y and Z.
+    /// True if its channels are X, Y and Z.
     fn is_colorimeter(&self) -> bool {
         matches!(self.spec().channels, Some(Channels::Set(ChannelSet::Cie1931)))
     }

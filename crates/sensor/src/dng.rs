@@ -310,7 +310,7 @@ impl Sensor {
         white.map(|part| rational(if most > 0.0 { (part / most).max(1e-4) } else { 1.0 }))
     }
 
-    /// What channels red, green and blue have, by the number of each.
+    /// Values of the channels red, green and blue, by the number of each.
     fn of_rgb<T: Default>(&self, of: impl Fn(usize) -> T) -> [T; 3] {
         let names: Vec<&str> = self.channels().collect();
         ["R", "G", "B"].map(|name| {

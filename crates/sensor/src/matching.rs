@@ -135,7 +135,7 @@ pub struct Photograph<'a> {
     pub white: Option<f64>,
 }
 
-/// What is fitted.
+/// Parameters that are fitted.
 struct Fit {
     /// Of no light, and DN an electron of the simulation in each channel.
     line: Vec<f64>,
@@ -214,7 +214,7 @@ impl Sensor {
         Ok(self.rows_of_electrons(film, exposure, |_| 0.0).flatten().collect())
     }
 
-    /// What the sensor's own numbers say.
+    /// Fit by the sensor's own numbers.
     fn first_fit(&self, exposure: f64) -> Fit {
         let gain = self.system_gain();
         let dark = gain * self.dark_noise(exposure).hypot(self.non_uniformity()[1]);

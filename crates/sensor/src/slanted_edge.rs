@@ -225,7 +225,7 @@ impl Lines {
         Ok(fit.with_spread(&spread))
     }
 
-    /// Where the edge crosses each line: (line, place).
+    /// Crossings of the edge with each line: (line, place).
     fn centroids(&self, about: Option<Edge>, width: f64) -> Result<Vec<(f64, f64)>, EdgeError> {
         let mut found = Vec::new();
         for (&line, values) in self.lines.iter().zip(&self.values) {
@@ -321,7 +321,7 @@ fn straight(places: &[(f64, f64)]) -> Edge {
     Edge { start: x - slope * y, slope }
 }
 
-/// Where an edge lies.
+/// Position of an edge.
 struct EdgeFit {
     edge: Edge,
     is_upright: bool,
