@@ -48,7 +48,7 @@ pub enum SceneError {
     Stopped,
 }
 
-/// How the reason begins that names a file which is not there.
+/// Beginning of the reason that names a file which is not there.
 pub(crate) const NO_SUCH_FILE: &str = "no such file";
 
 impl SceneError {
@@ -103,7 +103,7 @@ pub(crate) fn similar_name(file: &Path) -> Option<String> {
     nearest(wrong, names.iter().map(String::as_str)).map(str::to_owned)
 }
 
-/// Why a file that a scene names is not opened, with the most similar name when it is missing.
+/// Message on a file that a scene names and that is not opened, with the most similar name when it is missing.
 pub(crate) fn not_found(error: FindError) -> String {
     let near = match &error {
         FindError::Missing { path, .. } => similar_name(path),

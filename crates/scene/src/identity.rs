@@ -33,7 +33,7 @@ impl fmt::Display for SceneHash {
     }
 }
 
-/// What a scene was made of.
+/// Ingredients that a scene was made of.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Ingredients {
     /// The scene's JSON with sorted keys and no blanks.

@@ -43,8 +43,8 @@ impl Limit {
         }
     }
 
-    /// What a Linux system whose files begin at `root` has free: the least of free memory, of what the
-    /// control group allows, and of the addresses left to this process.
+    /// Free memory of a Linux system whose files begin at `root`: the least of free memory, of what
+    /// the control group allows, and of the addresses left to this process.
     fn free(root: &Path) -> Option<Self> {
         let of = |bytes: Option<u64>, source| bytes.map(|bytes| Self { bytes, source });
         [
@@ -78,7 +78,7 @@ fn kilobytes(file: &Path, name: &str) -> Option<u64> {
     line.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(1024)
 }
 
-/// What the control groups (version 2) of this process leave; files that can be dropped count as free.
+/// Memory that the control groups (version 2) of this process leave; files that can be dropped count as free.
 fn group_has_free(root: &Path) -> Option<u64> {
     let text = fs::read_to_string(root.join("proc/self/cgroup")).ok()?;
     let own = text.lines().find_map(|line| line.strip_prefix("0::/"))?;
@@ -112,7 +112,7 @@ pub fn has_room(bytes: u64) -> bool {
     bytes < SMALL || Vec::<u8>::new().try_reserve_exact(bytes).is_ok()
 }
 
-/// What is not asked for (bytes): the library keeps as much as this in hand of its own accord.
+/// Size (bytes) below which memory is not asked for: the library keeps as much as this in hand of its own accord.
 const SMALL: usize = 1 << 17;
 
 /// Bytes that JSON of these bytes takes once it is read: a value for each comma, and a table of keys for

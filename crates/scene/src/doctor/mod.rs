@@ -218,7 +218,7 @@ impl Diagnosis {
     }
 }
 
-/// What lies in one plane with something else.
+/// Findings on what lies in one plane with something else.
 fn in_one_plane(scene: &Scene, pairs: &[([u32; 2], usize)]) -> Vec<Finding> {
     /// The most pairs that are named.
     const NAMED: usize = 8;

@@ -333,7 +333,7 @@ pub enum Scale {
     PerAxis([f64; 3]),
 }
 
-/// What is wrong with a transform: the key and the reason.
+/// Fault of a transform: the key and the reason.
 pub(crate) type TransformFault = (&'static str, String);
 
 impl TransformSpec {

@@ -148,7 +148,7 @@ impl SamplesSpec {
     }
 }
 
-/// What makes no sense of `render.samples` in the scene `value`, and its path.
+/// Fault of `render.samples` in the scene `value`, with its path.
 pub(super) fn fault(
     render: &RenderSpec,
     layers: &[&str],

@@ -203,8 +203,7 @@ pub enum BuildQuality {
 }
 
 impl PlanSpec {
-    /// What contradicts something else of these, or the accelerator that the scene names: the key, and
-    /// why.
+    /// Contradiction with something else of these, or the accelerator that the scene names: the key, and why.
     pub(super) fn contradiction(&self, accel: Option<AccelName>) -> Option<(&'static str, String)> {
         let of_f64 = match accel {
             Some(AccelName::Bvh) => Some("`bvh`"),

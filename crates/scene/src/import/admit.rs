@@ -83,7 +83,7 @@ pub(super) fn admit(
     Ok(Admitted { mesh, dropped: survey.broken, notes: gate.notes })
 }
 
-/// What one look at all triangles tells.
+/// Result of one look at all triangles.
 #[derive(Clone, Copy)]
 struct Survey {
     bounds: Bounds,
@@ -235,7 +235,7 @@ pub(crate) fn bounds_of(positions: &Positions, triangles: &[[u32; 3]]) -> Bounds
     triangles.par_chunks(CHUNK).map(of_chunk).reduce(|| Bounds::EMPTY, Bounds::union)
 }
 
-/// How many of `triangles`, whose indices exist, have no area.
+/// Number of `triangles`, whose indices exist, that have no area.
 pub(crate) fn count_degenerate(positions: &Positions, triangles: &[[u32; 3]]) -> u64 {
     let of_chunk = |chunk: &[[u32; 3]]| {
         let corners = chunk.iter().map(|t| t.map(|corner| positions.get(corner as usize)));

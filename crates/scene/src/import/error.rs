@@ -89,7 +89,7 @@ impl Note {
         Self { kind, subject: subject.into(), message: message.into(), count: 1 }
     }
 
-    /// The same, `count` times.
+    /// Returns the note counted `count` times.
     pub(super) fn counted(mut self, count: u64) -> Self {
         self.count = count;
         self

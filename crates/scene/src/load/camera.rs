@@ -153,8 +153,8 @@ impl SceneFile {
         }
     }
 
-    /// What is odd about the camera's lens. Glasses and filters that are not known at a wavelength
-    /// that is traced are an error when strict.
+    /// Notes on oddities of the camera's lens. Glasses and filters that are not known at a
+    /// wavelength that is traced are an error when strict.
     pub(super) fn lens_notes(
         &self,
         camera: &Camera,

@@ -123,7 +123,7 @@ impl ShapeSpec {
         }
     }
 
-    /// How many triangles it is asked to have, and the bytes of memory that they take.
+    /// Number of triangles that the shape is asked to have, and the bytes of memory that they take.
     pub(crate) fn cost(&self, wanted: Wanted) -> (u64, u64) {
         let triangles = match *self {
             Self::Rectangle { .. } | Self::Box { .. } => 12,

@@ -1,4 +1,4 @@
-//! What the documents say in JSON is understood, and what they link to is there.
+//! Tests that the documents' JSON is understood, and that what they link to is there.
 
 use std::collections::BTreeSet;
 use std::fs;

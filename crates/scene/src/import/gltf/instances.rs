@@ -56,12 +56,12 @@ pub(super) fn place(
 
 const NAME: &str = "EXT_mesh_gpu_instancing";
 
-/// Whether `node` says so.
+/// True if `node` has the extension.
 fn has(node: &GltfNode) -> bool {
     node.extensions.contains_key(NAME)
 }
 
-/// Where the instances of `node` stand in its frame: one at the node itself without the extension.
+/// Placements of the instances of `node` in its frame: one at the node itself without the extension.
 fn transforms(
     reader: &GltfReader<'_>,
     node: &GltfNode,

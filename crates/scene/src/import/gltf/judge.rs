@@ -26,7 +26,7 @@ impl Judge<'_> {
         Ok(())
     }
 
-    /// What messages call a key of the material.
+    /// Name of a key of the material in messages.
     pub(super) fn place(&self, key: &str) -> String {
         format!("material \"{}\".{key}", self.subject)
     }

@@ -166,7 +166,7 @@ fn note_no_triangles(notes: &mut Vec<Note>) {
     error::push(notes, Note::new(NoteKind::Unsupported, "primitives", message));
 }
 
-/// What messages call a primitive.
+/// Name of a primitive in messages.
 fn place(reader: &GltfReader<'_>, mesh: usize, number: usize) -> String {
     let name = reader.document.root.meshes[mesh].name.as_deref().unwrap_or_default();
     if name.is_empty() {
