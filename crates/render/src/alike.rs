@@ -9,7 +9,7 @@ use etendue_tracer::{
     Color, EnvironmentImage, Ior, LayerSpec, Light, LightKind, Material, Paint, Scattering,
 };
 
-/// Whether nothing of `scene` tells bands apart. Images and models' colours at corners are not looked through.
+/// True if nothing of `scene` tells bands apart. Images and models' colours at corners are not looked through.
 pub(crate) fn are_alike(scene: &Scene) -> bool {
     // The studio is found to be needed when the scene is rendered.
     let is_known = !scene.studio_if_dark && scene.slots == 0 && !scene.render.alpha;

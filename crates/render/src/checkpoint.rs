@@ -57,7 +57,7 @@ impl<'a> Keeper<'a> {
         Self { checkpoint, identity, shard, samples, resolution, files, start, state }
     }
 
-    /// Why the last checkpoint could not be written, if it could not.
+    /// Reason why the last checkpoint could not be written, if it could not.
     pub(crate) fn fault(&self) -> Option<String> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).fault.clone()
     }

@@ -106,7 +106,7 @@ enum FilmSection<'a> {
     Sums(&'a [Sum]),
 }
 
-/// The same, to be filled.
+/// Section of a film, to be filled.
 pub(crate) enum SectionMut<'a> {
     Plane(&'a mut Values),
     Sums(&'a mut [Sum]),
@@ -226,7 +226,7 @@ pub struct FilmError {
 }
 
 impl FilmError {
-    /// The same with what to do about it.
+    /// Returns the error with what to do about it.
     pub(crate) fn with_remedy(self, remedy: &str) -> Self {
         Self { why: format!("{}; {remedy}", self.why), ..self }
     }
@@ -239,7 +239,7 @@ pub struct FilmFile {
     /// Header of the file.
     pub header: FilmHeader,
     bytes: Vec<u8>,
-    /// Where the numbers begin.
+    /// Offset of the numbers.
     start: usize,
 }
 

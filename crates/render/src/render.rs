@@ -385,7 +385,7 @@ pub fn finish(
     })
 }
 
-/// What the film holds as a picture, and its light in bands of its own.
+/// Finishes the film as a picture, and its light in bands of its own.
 fn finished(
     scene: &Scene,
     plan: &Plan,

@@ -65,7 +65,7 @@ impl Shard {
         self.by == ShardBy::Samples
     }
 
-    /// Whether it has the layers that are not sampled.
+    /// True if the share has the layers that are not sampled.
     pub(crate) fn has_data(self) -> bool {
         !self.is_of_samples() || self.index == 0
     }
@@ -82,7 +82,7 @@ impl Shard {
         range
     }
 
-    /// Whether there is such a share: one that was read from a file may be none.
+    /// True if there is such a share: one that was read from a file may be none.
     pub(crate) fn is_sound(self) -> bool {
         self.index < self.count
     }
@@ -93,7 +93,7 @@ impl Shard {
         self.count
     }
 
-    /// Whether a strip of rows is of this share.
+    /// True if a strip of rows is of this share.
     pub(crate) fn owns(self, strip: usize) -> bool {
         self.is_of_samples() || strip % self.count as usize == self.index as usize
     }

@@ -20,7 +20,7 @@ pub enum Stopping {
 }
 
 impl Stopping {
-    /// What is held to for `scene`, and why it is not what the scene asks for.
+    /// Rule that is held to for `scene`, and the reason why it is not what the scene asks for.
     pub(crate) fn of(scene: &Scene) -> (Self, Option<String>) {
         match scene.render.samples {
             SamplesSpec::Count(_) => (Self::Count, None),

@@ -7,13 +7,13 @@ const FEW: f64 = 0.01;
 /// of thirty pixels that carry all of it.
 const UNJUDGED: f64 = 0.15;
 
-/// How many times the error of as many even pixels it is then, at least: easy and hard parts differ by about two.
+/// Least ratio of that error to the error of as many even pixels: easy and hard parts differ by about two.
 const UNEVEN: f64 = 3.0;
 
 /// The least mean variance, as a share of what is allowed, of which it matters how well it is known.
 const MATTERS: f64 = 0.1;
 
-/// What a unit of variance, and of its square, is counted as: whole numbers add up to the same in any order.
+/// Unit in which variance, and its square, is counted: whole numbers add up to the same in any order.
 const UNIT: f64 = 1000.0;
 
 /// The largest variance of a pixel that is counted, as a share of what is allowed.
@@ -170,7 +170,8 @@ mod tests {
         variances.map(|v| SampleCounts::of_pixel(16, v)).reduce(SampleCounts::and).unwrap()
     }
 
-    /// What a few pixels bring is known to the root of their number; what all bring by one square each, to √(2/n).
+    /// A picture of few flashes cannot be judged: what a few pixels bring is known to the root of
+    /// their number; what all bring by one square each, to √(2/n).
     #[test]
     fn a_picture_of_few_flashes_cannot_be_judged() {
         let flashes = |every: usize| {

@@ -11,13 +11,13 @@ const TOO_MUCH: f64 = 2.0;
 /// Blocks to each side that are taken to be like one.
 const BESIDE: usize = 8;
 
-/// What the pixels of a block tell of themselves.
+/// Variance that the pixels of a block tell of themselves.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct OwnVariance {
     /// The mean of their variances of one sample, as a share of what is allowed, and the variance of that mean.
     mean: f64,
     spread: f64,
-    /// What that is multiplied by for the mean of their variances of all samples.
+    /// Factor on that for the mean of their variances of all samples.
     of_all: f64,
     pixels: usize,
 }
@@ -40,8 +40,7 @@ impl OwnVariance {
     }
 }
 
-/// What is to be thought of a block: its variance as a share of what is allowed, and the probability that it stopped
-/// too early.
+/// Judgement of a block: its variance as a share of what is allowed, and the probability that it stopped too early.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Judgement {
     pub(super) variance: f64,

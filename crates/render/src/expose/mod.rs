@@ -82,7 +82,7 @@ impl From<WriteError> for ExposeError {
     }
 }
 
-/// What the sensor will do, and why.
+/// Decision of what the sensor will do, with the reason.
 pub(crate) fn explain_sensor(scene: &Scene) -> Option<Decision> {
     let sensor = scene.sensor.as_ref()?;
     if scene.picture.is_none() {
@@ -207,7 +207,7 @@ impl SensorLight {
         Ok(Ok(light.metered_by_itself()))
     }
 
-    /// The same at the exposure that its own light asks for, where that is metered.
+    /// Sets the exposure that its own light asks for, where that is metered.
     pub(super) fn metered_by_itself(mut self) -> Self {
         if self.sensor.spec().auto_exposure.is_none() {
             return self;
@@ -333,7 +333,7 @@ impl SensorLight {
         Film { values: &self.film.values }
     }
 
-    /// What the files of a photodiode are called, of which the light is a layer.
+    /// File name of a photodiode whose light is a layer.
     fn part_name(&self, layer: LayerSpec) -> &'static str {
         let own = photodiodes(&self.sensor).iter().find(|(known, _)| *known == layer);
         own.map_or("", |(_, name)| name)
@@ -488,7 +488,7 @@ fn digits(shots: usize) -> usize {
     }
 }
 
-/// What a film has that is no light, if anything.
+/// Note on what a film has that is no light, if anything.
 fn in_words(invalid: InvalidValues) -> Option<String> {
     let InvalidValues { negative, not_finite } = invalid;
     invalid.any().then(|| {

@@ -114,9 +114,9 @@ pub fn pupil_solid_angle(f_number: f64, magnification: f64) -> f64 {
 struct Powers {
     watt: i32,
     steradian: i32,
-    /// Whether there is one area below the line.
+    /// True if there is one area below the line.
     area: bool,
-    /// Whether there is one length of a wavelength below the line.
+    /// True if there is one length of a wavelength below the line.
     wavelength: bool,
     /// To W, m², sr and nm; 0 is none yet.
     factor: f64,

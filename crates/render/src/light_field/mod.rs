@@ -224,7 +224,7 @@ fn by_layer(
     Ok([colors, spectrum])
 }
 
-/// Why a hexagonal array leaves no folder of the benchmark.
+/// Note on a hexagonal array, which leaves no folder of the benchmark.
 const HEXAGONAL: &str = "hci is not written: the benchmark's pictures have square pixels, and the views of a \
                          hexagonal array have rows 0.866 columns apart, every other one moved by half a column";
 
@@ -267,7 +267,7 @@ fn central_depth(
     Ok(values.map_or_else(Vec::new, |values| (0..values.len()).map(|i| values.at(i)).collect()))
 }
 
-/// Where the set goes.
+/// Writer of the set, with its destination.
 struct SetWriter<'a> {
     files: &'a Transaction,
     folder: &'a Path,

@@ -41,7 +41,7 @@ impl Development {
         Self { stops, is_automatic, tone_map: spec.tone_map, alpha: spec.alpha }
     }
 
-    /// What it does, for `layers.json`.
+    /// Description of the development for `layers.json`.
     pub(super) fn in_json(&self) -> Value {
         json!({
             "exposure": self.stops,
@@ -52,7 +52,7 @@ impl Development {
         })
     }
 
-    /// What it does, in words.
+    /// Description of the development in words.
     fn in_words(&self) -> String {
         let Self { stops, is_automatic, tone_map, alpha } = *self;
         let by = if is_automatic { ", chosen by the picture's light" } else { "" };
@@ -79,7 +79,7 @@ impl Development {
         }
     }
 
-    /// Whether a channel of this light is beyond what the PNG can show.
+    /// True if a channel of this light is beyond what the PNG can show.
     pub(crate) fn clips(&self, rgb: [f64; 3]) -> bool {
         match self.tone_map {
             // What is 1 but for noise or rounding is not lost.

@@ -153,7 +153,7 @@ impl OutputError {
         WriteError::io(path, source).into()
     }
 
-    /// What `path`'s format cannot hold.
+    /// Error of what `path`'s format cannot hold.
     pub(crate) fn format(path: &Path, message: impl ToString) -> Self {
         Self::Format { path: path.to_owned(), message: message.to_string() }
     }

@@ -199,7 +199,7 @@ impl LayerFile {
     }
 }
 
-/// Whether a layer's numbers are worth a mask: names of things, and not the numbers of triangles.
+/// True if a layer's numbers are worth a mask: names of things, and not the numbers of triangles.
 pub(crate) fn has_mask(layer: &str) -> bool {
     layer == "MaterialId" || layer.starts_with("Id.") && layer != "Id.primitive"
 }

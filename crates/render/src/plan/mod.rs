@@ -144,7 +144,7 @@ fn sample_passes(
 }
 
 impl Plan {
-    /// How many numbers of light are kept of each sample: one where all bands are alike and land in one place.
+    /// Number of values of light that are kept of each sample: one where all bands are alike and land in one place.
     ///
     /// What is asked of the two halves of a pixel's samples is asked band by band.
     pub(crate) fn values_of_light(&self) -> usize {
@@ -288,7 +288,7 @@ fn forced_quality(scene: &Scene) -> Option<Quality> {
     })
 }
 
-/// What no ray can meet, where all are chief rays whose hits do not depend on how the structure was built.
+/// Finds what no ray can meet, where all are chief rays whose hits do not depend on how the structure was built.
 fn unseen(scene: &Scene, passes: Passes) -> Option<Unseen> {
     let is_alone = passes.centre && !passes.mean && !passes.light;
     // Layers that compare frames look from the other frame's camera, too.
@@ -300,7 +300,7 @@ fn unseen(scene: &Scene, passes: Passes) -> Option<Unseen> {
         .flatten()
 }
 
-/// Which rays have to be traced.
+/// Rays that have to be traced.
 #[derive(Debug, Clone, Copy)]
 struct Passes {
     /// Chief rays.

@@ -7,7 +7,7 @@ use super::Plan;
 use crate::tolerance::{TakenBounces, TakenCamera, TakenDetail};
 
 impl Plan {
-    /// What is taken of the scene's tolerance.
+    /// Decision of what is taken of the scene's tolerance.
     pub(super) fn explain_tolerance(&self, scene: &Scene) -> Option<Decision> {
         let tolerance = scene.tolerance?;
         let choice =

@@ -148,13 +148,13 @@ pub fn scale(camera: &Camera) -> Option<f64> {
     }
 }
 
-/// What is known of a lens near its axis.
+/// Data of a lens near its axis.
 struct Gauss {
     pose: PoseSpec,
     resolution: [u32; 2],
     /// Focal length of the picture (pixels).
     scale: f64,
-    /// Where the axis meets the sensor (pixels from the corner).
+    /// Point where the axis meets the sensor (pixels from the corner).
     centre: [f64; 2],
     /// Focal length and diameter of the entrance pupil (mm).
     focal: f64,

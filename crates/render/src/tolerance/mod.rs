@@ -242,8 +242,8 @@ impl FullView {
         self.scale * self.seen.iter().zip(&self.places).map(of_place).fold(0.0, f64::max)
     }
 
-    /// How far the chief rays of `camera` are from its own, at most (pixels): what is cheap to find of a model, of
-    /// which no more needs to be known when this is too far.
+    /// Greatest distance of the chief rays of `camera` from the view's own (pixels): what is cheap
+    /// to find of a model, of which no more needs to be known when this is too far.
     fn chief_displacement(&self, camera: &Camera) -> f64 {
         let own = chief_rays(camera, &self.places);
         let places = own.iter().zip(&self.seen).zip(&self.places);
@@ -322,7 +322,7 @@ impl FullView {
     }
 }
 
-/// Which models are made.
+/// Choice of the models that are made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Sought {
     All,

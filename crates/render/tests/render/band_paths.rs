@@ -18,7 +18,7 @@ use crate::steps::{channels, load_json, mean, prepare, rendered};
 const COLUMNS: usize = 96;
 const ROWS: usize = 80;
 
-/// What `camera` sees of a sky and of a lamp before it, each pixel by so many samples.
+/// Scene of a sky and of a lamp before it, as `camera` sees it, each pixel by so many samples.
 fn scene(mut camera: Value, lamp: bool, samples: u32, more: &Value) -> Scene {
     camera["pose"] = json!({ "from": [0, 0, 4], "look_at": [0, 0, 0] });
     camera["sensor"] = json!({ "resolution": [COLUMNS, ROWS] });

@@ -167,7 +167,7 @@ fn screen(accel: &str, shutter: &Value, motion: &Value) -> Scene {
     load_json(std::path::Path::new("."), scene)
 }
 
-/// How many pixels of each row, from the top, are white.
+/// Number of white pixels in each row, from the top.
 fn white(scene: &Scene) -> Vec<f64> {
     let picture = picture(scene);
     let red = &layer(&picture, "")[..COLUMNS * 16];

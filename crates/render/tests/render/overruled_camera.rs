@@ -1,4 +1,4 @@
-//! What the plan leaves out of a camera and of what a hit is asked for, against the fuller model, which the
+//! Parts of a camera and of a hit that the plan leaves out, against the fuller model, which the
 //! test forces: the same to the bit, or within the error that the decision allows.
 
 use std::path::Path;

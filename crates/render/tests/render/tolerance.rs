@@ -1,5 +1,5 @@
-//! What is taken of a tolerance against everything: the picture differs by no more than was allowed, and by more where
-//! the tolerance is not kept.
+//! Verification of what is taken of a tolerance, against everything: the picture differs by no more
+//! than was allowed, and by more where the tolerance is not kept.
 
 use std::path::Path;
 
@@ -384,7 +384,7 @@ fn parted_colours(pixels: &str) -> Scene {
     load_json(tempfile::tempdir().unwrap().path(), scene)
 }
 
-/// Where the middle of the light of each band lies (pixels).
+/// Centre of the light of each band (pixels).
 fn middles(scene: &Scene, taken: Option<Taken>) -> Vec<[f64; 2]> {
     let plan = Plan::taking(scene, Outputs::ALL, taken);
     let (accel, images) = prepare(scene, &plan);

@@ -1,4 +1,4 @@
-//! What no picture may do: show what is no number, light where none can be, or the scale of its scene.
+//! Tests of what no picture may do: show what is no number, light where none can be, or the scale of its scene.
 
 use etendue_render::output::{Outputs, Values};
 use etendue_render::{Plan, render};
