@@ -1,4 +1,4 @@
-//! What moves and what changes its shape while the shutter is open, in a session that goes on.
+//! Motion and deformation while the shutter is open, in a session that goes on.
 
 use std::fs;
 use std::path::Path;

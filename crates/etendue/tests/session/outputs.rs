@@ -29,7 +29,7 @@ fn opened(folder: &Path, scene: Value, outputs: Outputs) -> Session {
     Session::from_json_with(folder, scene, Options { outputs, ..Options::default() }).unwrap()
 }
 
-/// Whether files of this kind show the layer; `None` for kinds of whole pictures.
+/// True if files of this kind show the layer; `None` for kinds of whole pictures.
 fn shows(kind: &str, layer: &str) -> Option<bool> {
     let of: &[&str] = match kind {
         "tum" => &["depth"],
