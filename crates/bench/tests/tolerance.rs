@@ -1,4 +1,4 @@
-//! What models of a lens miss, where a closed form tells it.
+//! Differences of models of a lens, where a closed form tells it.
 #![allow(clippy::disallowed_methods, reason = "tests set their stage by hand")]
 
 use std::path::Path;
