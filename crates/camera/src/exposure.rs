@@ -49,7 +49,7 @@ impl Camera {
         self.time.as_deref()?.motion.as_ref()
     }
 
-    /// Returns the camera in a scene of which something moves while its shutter is open, or nothing.
+    /// Sets whether something of the scene moves while the shutter is open.
     #[must_use]
     pub fn among_moving_things(mut self, things_move: bool) -> Self {
         if let Some(time) = &mut self.time {
@@ -58,7 +58,7 @@ impl Camera {
         self
     }
 
-    /// Returns the camera in a scene of which some light changes with time, or none.
+    /// Sets whether some light of the scene changes with time.
     #[must_use]
     pub fn under_changing_lights(mut self, lights_change: bool) -> Self {
         if let Some(time) = &mut self.time {

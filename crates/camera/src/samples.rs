@@ -24,8 +24,8 @@ pub struct FilmSamples {
     pub times: Vec<f64>,
     /// Weight of each sample by the time for which its row is open; empty when all rows are open all the time.
     pub open_shares: Vec<f64>,
-    /// Index of the group among the camera's [`band_groups`](crate::Camera::band_groups), for the
-    /// bands that it was opened for, the rays are for.
+    /// Index of the rays' group among the camera's [`band_groups`](crate::Camera::band_groups) for the
+    /// bands that the camera was opened for.
     pub group: usize,
 }
 

@@ -222,7 +222,7 @@ fn place_of(full_name: &str) -> (&str, &str) {
     }
 }
 
-/// Layer and channel of a channel of a spectral image, named as this program names its bands.
+/// Layer and channel name of a channel of a spectral image, named as this program names its bands.
 fn spectral_place(full_name: &str) -> Option<(&'static str, String)> {
     let (component, nm) = cube::spectral_channel(full_name)?;
     let layer = match component {

@@ -12,7 +12,7 @@ use glam::DVec3;
 use crate::batch::PlacedTriangle;
 use crate::{Bounds, Geometry, Placement};
 
-/// Greatest distance (units of 2⁻²³ of the largest coordinate) two planes are taken for one that
+/// Greatest distance (units of 2⁻²³ of the largest coordinate) at which two planes are taken for one that
 /// single precision cannot tell apart.
 const APART: f64 = 4.0 * f32::EPSILON as f64;
 

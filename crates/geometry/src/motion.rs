@@ -262,7 +262,7 @@ impl Motion {
     }
 
     /// True if directions of the body change between two times of `exposure` (s, first and last):
-    /// if it turns or is stretched, rather than moving without a turn.
+    /// if it turns or is stretched, rather than only moves along.
     #[must_use]
     pub fn turns_within(&self, [open, close]: [f64; 2]) -> bool {
         let overlaps = |a: &Key, b: &Key| a.time < close && b.time > open;

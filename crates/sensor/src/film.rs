@@ -67,7 +67,7 @@ pub struct InvalidValues {
 }
 
 impl InvalidValues {
-    /// True if there are any.
+    /// True if there are any such values.
     #[must_use]
     pub fn any(self) -> bool {
         self.negative + self.not_finite > 0

@@ -228,8 +228,9 @@ impl<'a> WaveLens<'a> {
 }
 
 impl Camera {
-    /// Irradiance at places of the picture (pixels from the corner) for a radiance of 1 all over, by rays of a camera
-    /// that was [opened](Self::opened), in one of its groups of bands: the mean weight of rays over the pupil.
+    /// Relative illumination at places of the picture (pixels from the corner) for a radiance of 1 all over,
+    /// by rays of a camera that was [opened](Self::opened), in one of its groups of bands: the mean weight of rays
+    /// over the pupil.
     #[must_use]
     pub fn illumination(&self, places: &[[f64; 2]], group: usize) -> Vec<f64> {
         let mut rays = CameraRays::default();

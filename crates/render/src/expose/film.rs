@@ -18,7 +18,7 @@ pub struct BandFilm {
     pub bands: Bands,
     /// `[row][column][band]`.
     pub values: Vec<f32>,
-    /// Light of the parts of the pupil, layer by layer as above, where it is told apart.
+    /// Values, likewise, of the light that came through parts of the pupil, where it is told apart.
     pub parts: Vec<(LayerSpec, Vec<f32>)>,
 }
 

@@ -35,7 +35,7 @@ pub struct ObjectSpec {
     pub transform: TransformSpec,
     /// Placements of its copies before `transform` moves them all; one, unmoved, when absent.
     pub instances: Option<InstancesSpec>,
-    /// Motion while the shutter is open, with all copies; it stands still when absent.
+    /// Motion of the object, with all its copies, while the shutter is open; it stands still when absent.
     pub motion: Option<ObjectMotionSpec>,
 }
 
