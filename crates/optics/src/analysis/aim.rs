@@ -104,7 +104,7 @@ fn basis(at: DVec2) -> [[f64; TERMS]; 3] {
 }
 
 impl Outline {
-    /// What `line` makes of the polynomial of one coordinate of the beam, by powers of shares, and its degree.
+    /// Evaluates `line` on the polynomial of one coordinate of the beam, by powers of shares, and its degree.
     pub(super) fn along<T>(&self, axis: usize, line: impl Fn(&[f64], usize) -> T) -> T {
         line(&self.coefficients[axis], DEGREE)
     }

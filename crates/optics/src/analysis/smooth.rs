@@ -282,7 +282,7 @@ mod tests {
         }
     }
 
-    /// What no polynomial is near enough to is left to rays.
+    /// No polynomial is good enough for any tolerance: what none is near enough to is left to rays.
     #[test]
     fn no_polynomial_is_good_enough_for_any_tolerance() {
         assert_eq!(both(&lens(-1.0), 1e-14).1, None);

@@ -267,13 +267,13 @@ fn add(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0] + b[0], a[1] + b[1]]
 }
 
-/// The same of a product.
+/// Least and greatest value of a product of two intervals.
 fn product(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     let ends = [a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1]];
     ends.into_iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], e| [l.min(e), h.max(e)])
 }
 
-/// The same of a square.
+/// Least and greatest value of the square of an interval.
 fn square([low, high]: [f64; 2]) -> [f64; 2] {
     let most = low.abs().max(high.abs()).powi(2);
     let least = if low <= 0.0 && high >= 0.0 { 0.0 } else { low.abs().min(high.abs()).powi(2) };

@@ -246,7 +246,7 @@ impl Fold {
         }
     }
 
-    /// The same of one ray, that came as `ray`.
+    /// Unfolds one ray, that came as `ray`.
     pub(super) fn unfold_one(
         &self,
         ray: Ray,
@@ -275,7 +275,7 @@ impl Fold {
 pub(crate) struct Shadow {
     /// Depth (mm) and squared radius (mm²) of the mirror's rim.
     pub(crate) rim: [f64; 2],
-    /// The same of its hole's.
+    /// Depth (mm) and squared radius (mm²) of the hole's rim.
     pub(crate) hole: [f64; 2],
 }
 

@@ -340,7 +340,7 @@ mod tests {
         }
     }
 
-    /// The same of resonances, λ² = 1/4.
+    /// Formulas of resonances give what they say, at λ² = 1/4.
     #[test]
     fn the_formulas_of_resonances_give_what_they_say() {
         let l2 = 0.25_f64;

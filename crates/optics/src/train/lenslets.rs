@@ -55,7 +55,7 @@ pub struct BehindLenslets {
 struct ParaxialLenslet {
     /// On height and reduced slope, from before the rearmost array to in front of the first element.
     all: Abcd,
-    /// The same to the other arrays, whose openings the light has to pass.
+    /// Matrices to the other arrays, whose openings the light has to pass.
     to_arrays: Vec<(Abcd, Arc<MicrolensArray>)>,
 }
 

@@ -36,7 +36,7 @@ const ASPHERES: [Shape; 3] = [
     asphere(0.02, 0.0, Some(9.0), &[0.0, 4e-3, -9e-5, 5e-7]),
 ];
 
-/// The same without a clear aperture, up to their domain, and the first with one that has no end.
+/// Shapes without a clear aperture, up to their domain, and the first with one that has no end.
 const UNLIMITED: [Shape; 4] = [
     asphere(0.05, 0.0, None, &[0.0, -1.5e-3]),
     asphere(0.05, -1.0, None, &[0.0, -1.5e-3]),

@@ -42,7 +42,7 @@ pub struct LensletPupil {
     table: OutlineTable,
     /// The opening of a lenslet around its centre, in the array's axes (mm).
     opening: Vec<DVec2>,
-    /// The same of the other arrays, by kind and array.
+    /// Openings of a lenslet of the other arrays, by kind and array.
     others: Vec<Vec<DVec2>>,
     /// Gaps between openings that let light by, in pieces around the centre of a cell.
     gaps: Vec<Vec<DVec2>>,

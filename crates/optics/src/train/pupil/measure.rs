@@ -16,8 +16,8 @@ use crate::train::{MonochromaticTrain, OpticalTrain, Side};
 /// Added to every radius, as a share of it: what rays measured on a grid may be short of.
 const MARGIN: f64 = 0.004;
 
-/// The same beside nodes in the dark: at the edge of the image circle the pupil closes as a square
-/// root, faster than straight lines.
+/// Margin beside nodes in the dark, likewise a share of the radius: at the edge of the image circle
+/// the pupil closes as a square root, faster than straight lines.
 const FADING_MARGIN: f64 = 0.2;
 
 /// Share of the frames' bend from node to node that is added to the margin, and the bend that comes
