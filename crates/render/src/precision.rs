@@ -194,7 +194,7 @@ mod tests {
         held_to(&json!({}), camera, (size, place, samples), plan)
     }
 
-    /// The same, held to other numbers, by a camera 4 m away.
+    /// Chosen precision of a scene held to other numbers, seen by a camera 4 m away.
     fn held_to(
         accuracy: &serde_json::Value,
         mut camera: serde_json::Value,

@@ -192,7 +192,7 @@ fn decoded_views_are_those_of_an_ideal_lens() {
     }
 }
 
-/// What is written has 40 dB of an ideal lens' views, whatever the lenslets are; and nothing is written where a
+/// Views that are written have 40 dB of an ideal lens' views, whatever the lenslets are; and nothing is written where a
 /// note says why. Waves stand in front of the focus, at a disparity of 0.13.
 fn views_are_those_of_an_ideal_lens_or_none(cases: &[(String, Option<bool>)], samples: [u32; 2]) {
     for (microlenses, written) in cases {
@@ -393,8 +393,8 @@ fn patches_of_thick_lenslets_and_behind_a_real_lens_do_so_too() {
     }
 }
 
-/// What there is instead of a refocused picture: patches that leave gaps, images that are too narrow, and a plane that
-/// the lenslets stand in.
+/// Patches that make no refocused picture: patches that leave gaps, images that are too narrow, and
+/// a plane that the lenslets stand in.
 #[test]
 fn patches_that_leave_gaps_make_no_picture() {
     for (microlenses, more) in [

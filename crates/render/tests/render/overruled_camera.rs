@@ -90,8 +90,8 @@ fn a_pinhole_without_a_pupil_is_a_closed_lens() {
     assert!(off > 0.0 && off < 0.012, "{off}");
 }
 
-/// Where no glass parts them, the bands share rays. A glass that parts them by 10⁻⁷ of its index gives each
-/// its own, and the same picture: the samples are the same, and so is all but a few edges.
+/// Bands share rays where no glass parts them. A glass that parts them by 10⁻⁷ of its index gives
+/// each its own, and the same picture: the samples are the same, and so is all but a few edges.
 #[test]
 fn bands_share_rays_where_nothing_parts_them() {
     let lens = |glass: Value| {

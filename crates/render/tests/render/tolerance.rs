@@ -271,8 +271,8 @@ fn triangles_finer_than_the_tolerance_tells_apart_do_not_ask_for_f64() {
     assert!(found > 0.0 && found < 0.02, "{found}");
 }
 
-/// The same ball once more, 9.6 m behind: as wide as 3 pixels, and as coarse as its distance asks for, unless its shadow
-/// falls near the camera.
+/// The ball has a copy 9.6 m behind: as wide as 3 pixels, and as coarse as its distance asks for,
+/// unless its shadow falls near the camera.
 #[test]
 fn copies_have_the_detail_of_their_own_distance() {
     let copies = || ("/objects/0/instances", json!([{}, { "translate": [0, 0, -9.6] }]));

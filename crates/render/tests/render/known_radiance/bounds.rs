@@ -64,8 +64,8 @@ fn no_light_leaks_into_a_closed_box() {
     }
 }
 
-/// The same scene in millimetres, metres and kilometres, and moved by 10⁶ m, gives the same picture:
-/// hits differ by roundings, so a random choice or an edge may fall the other way in a few pixels.
+/// A scene in millimetres, metres and kilometres, and moved by 10⁶ m, gives the same picture: hits
+/// differ by roundings, so a random choice or an edge may fall the other way in a few pixels.
 #[test]
 fn neither_scale_nor_place_changes_the_picture() {
     let at = |scale: f64, far: f64| {
