@@ -64,7 +64,7 @@ fn render_frames(
     Ok(serde_json::from_slice(&index).unwrap())
 }
 
-/// What the last frame lacks, as flow to the next, is no reason to refuse it.
+/// A layer that the last frame lacks, as flow to the next, is no reason to refuse it.
 #[test]
 fn every_kind_of_file_of_every_layer_is_had_over_frames() {
     let folder = tempfile::tempdir().unwrap();
