@@ -67,8 +67,8 @@ struct PartTree {
     tree: WideTree,
     /// Whose triangles these are.
     owner: TriangleOwner,
-    /// How the meshes' own coordinates follow from those in the leaves, when they do to the bit:
-    /// then a hit needs nothing but the leaf.
+    /// Map from the coordinates in the leaves to the meshes' own, when it holds to the bit: then a
+    /// hit needs nothing but the leaf.
     units: Option<LeafUnits>,
 }
 

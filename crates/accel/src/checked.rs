@@ -37,7 +37,7 @@ pub struct Embree {
     corrected: AtomicU64,
 }
 
-/// What a thread needs while it works on a batch; kept between batches.
+/// Scratch memory of a thread while it works on a batch; kept between batches.
 #[derive(Default)]
 struct BatchScratch {
     rays: Rays32,
@@ -126,7 +126,7 @@ impl Embree {
         self.scene.packet_width()
     }
 
-    /// Whether answers are looked at a second time.
+    /// True if answers are looked at a second time.
     fn checks(&self) -> bool {
         self.robust && self.refine
     }
@@ -148,7 +148,7 @@ impl Embree {
         }
     }
 
-    /// Whether the rays are to be decided in f64 where they start: those of surfaces.
+    /// True if the rays are to be decided in f64 where they start: those of surfaces.
     fn start_on_surfaces(rays: &RayBatch) -> bool {
         let set_off = || !rays.coherent && rays.t_min().iter().any(|&t_min| t_min > 0.0);
         rays.from_surface || set_off()
@@ -353,7 +353,7 @@ impl Embree {
     }
 }
 
-/// What single precision found, as hits: all but their placements and triangles.
+/// Writes what single precision found as hits: all but their placements and triangles.
 #[multiversion::multiversion(targets = "simd")]
 fn widen(found: &FoundHits, advance: &[f64], hits: &mut HitBatch) {
     let n = hits.t.len();

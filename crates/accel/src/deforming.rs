@@ -142,7 +142,7 @@ fn boxes(mesh: &Mesh, nodes: &[Node], triangles: &[u32], time: f64) -> Vec<[[f32
     boxes
 }
 
-/// Where the ray meets a triangle.
+/// Intersects the ray with a triangle.
 fn test(query: &Query, triangle: &Triangle) -> Option<Hit> {
     query.test(&PlacementView::new(&Transform::IDENTITY), triangle.corners)
 }

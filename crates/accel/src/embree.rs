@@ -158,8 +158,8 @@ pub(crate) struct Scene {
     has_instances: bool,
     /// Built in Embree's compact mode.
     is_compact: bool,
-    /// What brings the normal that Embree gives of each placement into the world; `None` where that is
-    /// true of all as they are.
+    /// Rotations that bring the normal that Embree gives of each placement into the world; `None`
+    /// where that is true of all as they are.
     turns: Option<Vec<DMat3>>,
     /// Bytes of vertices that had to be copied.
     pub(crate) copied_bytes: u64,

@@ -225,7 +225,7 @@ impl Boxes {
         Ok(Self::refitted(tree, |[i, _]| bounds(i)))
     }
 
-    /// The same tree, with boxes from the leaves up.
+    /// Builds the boxes of a tree from the leaves up.
     pub(crate) fn refitted(tree: Tree, bounds: impl Fn([u32; 2]) -> Bounds + Sync) -> Self {
         let items: Vec<[u32; 2]> = tree.refs.par_iter().map(|r| [r.first, r.second]).collect();
         drop(tree.refs);

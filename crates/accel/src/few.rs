@@ -25,7 +25,7 @@ use crate::single::{F32Frame, Rays32, round};
 /// Scenes of more triangles are traced by trees.
 const MOST_TRIANGLES: usize = 64;
 
-/// Which triangle of the scene one is.
+/// Identity of a triangle in the scene.
 #[derive(Debug, Clone, Copy)]
 struct Named {
     /// Its normal as hits tell it: of the placement's front.
@@ -159,7 +159,7 @@ impl FewTriangles {
         }
     }
 
-    /// What origins of blocks are relative to (m, world).
+    /// Reference point of the origins of blocks (m, world).
     pub(crate) fn origin(&self) -> DVec3 {
         self.frame.origin
     }
@@ -201,7 +201,7 @@ impl FewTriangles {
         }
     }
 
-    /// Whether anything is between the ends of rays of blocks.
+    /// Tests whether anything is between the ends of the rays of blocks.
     pub(crate) fn occluded_of_blocks(&self, blocks: &mut [RayBlock]) {
         let mut occlusion = Occlusion::default();
         for block in blocks {
@@ -429,7 +429,8 @@ mod tests {
         assert!(shadows.blocks().iter().all(whole));
     }
 
-    /// What is bent along the diagonal, not convex, wound the other way, or of two placements is no face.
+    /// Faces are flat and convex: two triangles are no face that are bent along the diagonal, not
+    /// convex, wound the other way, or of two placements.
     #[test]
     fn faces_are_flat_and_convex() {
         let base = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];

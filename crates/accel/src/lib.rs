@@ -65,7 +65,7 @@ pub trait Accel: Send + Sync + fmt::Debug {
     /// in the last place (f64) of the largest of the distance and the coordinates of the ray's origin.
     fn closest(&self, rays: &RayBatch, hits: &mut HitBatch);
 
-    /// Whether anything lies between each ray's `t_min` and `t_max`. `blocked` is resized.
+    /// Tests whether anything lies between each ray's `t_min` and `t_max`. `blocked` is resized.
     fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>);
 
     /// This structure as one that traces rays in blocks; `None` where it does not, or not in this scene.
@@ -83,10 +83,10 @@ pub trait Accel: Send + Sync + fmt::Debug {
         None
     }
 
-    /// How the build went.
+    /// Report of the build.
     fn report(&self) -> BuildReport;
 
-    /// What re-validation has done since the build.
+    /// Counts of what re-validation has done since the build.
     fn counts(&self) -> Counts {
         Counts::default()
     }
@@ -95,7 +95,7 @@ pub trait Accel: Send + Sync + fmt::Debug {
 /// Hits of single precision for rays in blocks: as [`Accel`] finds them for batches of
 /// [`HitPrecision::Single`](etendue_geometry::HitPrecision), without arrays on the way.
 pub trait BlockAccel: Send + Sync + fmt::Debug {
-    /// What origins of blocks are relative to (m, world).
+    /// Reference point of the origins of blocks (m, world).
     fn origin(&self) -> DVec3;
 
     /// The rays of a batch as blocks, which are refilled. A ray from afar starts nearer to the scene.
@@ -106,16 +106,16 @@ pub trait BlockAccel: Send + Sync + fmt::Debug {
     /// `times` (s from the frame's time) are those of the rays, block by block; all are at 0 where there are none.
     fn closest_of_blocks(&self, blocks: &mut [RayBlock], times: &[f64], coherent: bool);
 
-    /// Whether anything is between the ends of each ray ([`RayBlock::is_blocked`]).
+    /// Tests whether anything is between the ends of each ray ([`RayBlock::is_blocked`]).
     fn occluded_of_blocks(&self, blocks: &mut [RayBlock], times: &[f64], coherent: bool);
 
-    /// Whether what rays hit depends on their times.
+    /// True if what rays hit depends on their times.
     fn has_times(&self) -> bool {
         false
     }
 }
 
-/// How a structure was built.
+/// Report of how a structure was built.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BuildReport {
     /// The backend with its mode, e.g. `embree 3.13.5 robust`.
@@ -130,7 +130,7 @@ pub struct BuildReport {
     pub copied_bytes: u64,
 }
 
-/// How often the f64 check of a fast backend's hits had something to do.
+/// Counts of the f64 check of a fast backend's hits.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Rays looked at a second time.
@@ -139,7 +139,7 @@ pub struct Counts {
     pub corrected: u64,
 }
 
-/// How much time a build may spend to make traversal faster.
+/// Quality of a build: the time spent to make traversal faster.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Quality {
     /// Morton order: the quickest to build.
@@ -151,7 +151,7 @@ pub enum Quality {
     High,
 }
 
-/// What a build is told.
+/// Options of a build.
 #[derive(Clone)]
 pub struct BuildOptions {
     /// Worker threads of the build; 0 means all that the process may use.
@@ -205,7 +205,7 @@ impl fmt::Debug for BuildOptions {
     }
 }
 
-/// Why a structure could not be built.
+/// Error of a structure that could not be built.
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum BuildError {
@@ -237,7 +237,7 @@ pub enum BuildError {
     TooLarge {
         /// The mesh's name.
         mesh: String,
-        /// What there is too much of, with its number.
+        /// Quantity that is too large, with its number.
         what: String,
         /// The backend that was building.
         backend: &'static str,
@@ -263,7 +263,7 @@ pub enum BuildError {
     /// The library below reported an error.
     #[error("{call}: {message}")]
     Library {
-        /// What was called.
+        /// Function that was called.
         call: &'static str,
         /// The library's own message.
         message: String,

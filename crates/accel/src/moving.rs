@@ -72,7 +72,7 @@ struct Body {
     placement: u32,
     shape: usize,
     motion: Arc<Motion>,
-    /// Where it is while the shutter is open (m, world).
+    /// Bounds of the body while the shutter is open (m, world).
     swept: Bounds,
     /// The box of its mesh, in its frame (m).
     local: Bounds,
@@ -281,7 +281,7 @@ fn over(bodies: &[Body], options: &BuildOptions) -> Result<Boxes, BuildError> {
     Ok(Boxes::refitted(tree, |[i, _]| bodies[i as usize].swept))
 }
 
-/// Whether a ray meets a box at distances (m) within `limits`, rounding in favour of yes.
+/// Tests whether a ray meets a box at distances (m) within `limits`, rounding in favour of yes.
 fn meets(bounds: Bounds, origin: DVec3, direction: DVec3, limits: [f64; 2]) -> bool {
     span(bounds, origin, direction, limits).is_some()
 }
@@ -311,7 +311,7 @@ fn span(
     (near <= far + ONE_PLACE * (size + far.abs())).then_some([near, far])
 }
 
-/// What a ray hit of a body, in the world.
+/// Hit of a ray on a body, in the world.
 struct BodyHit {
     t: f64,
     triangle: u32,
@@ -320,7 +320,7 @@ struct BodyHit {
     normal: DVec3,
 }
 
-/// How far ray `i` looks, which hit what `hits` say: as far as what is in the same place.
+/// Distance up to which ray `i`, whose hit is in `hits`, looks: as far as what is in the same place.
 fn reach(rays: &RayBatch, hits: &HitBatch, i: usize, one_place: f64) -> f64 {
     let t = hits.t[i].min(rays.t_max()[i]);
     let t = t + one_place * t.abs().max(rays.origin(i).abs().max_element());
@@ -339,7 +339,7 @@ impl Moving {
         }
     }
 
-    /// The same of one body, for the rays `near` it.
+    /// Finds the closest hits on one body, for the rays `near` it.
     fn closest_of_body(
         &self,
         (body, near): (&Body, &[[u32; 2]]),
@@ -410,7 +410,7 @@ impl Moving {
         }
     }
 
-    /// The same of one body, for the rays `near` it.
+    /// Tests for occlusion by one body, for the rays `near` it.
     fn occluded_by_body(
         &self,
         (body, near): (&Body, &[[u32; 2]]),

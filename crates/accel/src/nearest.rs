@@ -61,7 +61,7 @@ impl Query {
     }
 }
 
-/// What the exact test says of a ray and a triangle.
+/// Verdict of the exact test on a ray and a triangle.
 #[cfg(feature = "embree")]
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Verdict {
@@ -149,7 +149,7 @@ impl Nearest {
         }
     }
 
-    /// Whether a triangle as near goes before it, as anything does before a miss.
+    /// True if a triangle as near goes before it, as anything does before a miss.
     #[inline(always)]
     fn is_before(&self, placement: u32, number: u32) -> bool {
         self.placement == MISS
@@ -214,8 +214,8 @@ const ONE_PLACE: f64 = 64.0 * f64::EPSILON;
 /// its place: some of its roundings.
 const BESIDE: f64 = 16.0 * f32::EPSILON as f64;
 
-/// What [`crate::Accel`]'s rule puts in the place of a hit at `t` (m) on `own`, where other triangles of its plane are;
-/// `None` where it stays. Of `ends`, which the ray leaves or ends on, none counts.
+/// Hit that [`crate::Accel`]'s rule puts in the place of a hit at `t` (m) on `own`, where other triangles of its plane
+/// are; `None` where it stays. Of `ends`, which the ray leaves or ends on, none counts.
 fn later(
     coplanar: &Coplanar,
     geometry: &Geometry,
@@ -278,7 +278,7 @@ pub(crate) fn settle(
     }
 }
 
-/// The same of the rays of blocks, which start from `origin` (m).
+/// Settles the hits of blocks of rays, which start from `origin` (m).
 pub(crate) fn settle_blocks(
     coplanar: &Coplanar,
     geometry: &Geometry,

@@ -1,4 +1,4 @@
-//! What a tree is built over, and how a ray gets there.
+//! Parts that a tree is built over, and the way of a ray into them.
 //!
 //! A *part* is a set of triangles in one frame: a mesh in its own frame, shared by all its
 //! placements, or several placements *baked* into a frame that is parallel to the world's. An
@@ -29,7 +29,7 @@ pub(crate) use self::part::{Blas, Members, MeshTriangles};
 pub(crate) struct Layout {
     pub(crate) parts: Vec<Blas>,
     pub(crate) instances: Vec<Instance>,
-    /// Where the whole scene lies, parallel to the world.
+    /// Box of the whole scene, parallel to the world, as an instance.
     pub(crate) world: Instance,
     pub(crate) world_frame: Frame,
 }
@@ -53,7 +53,7 @@ pub fn check_scale(bounds: Bounds) -> Result<(), BuildError> {
     Err(BuildError::Scale { extent, least, most })
 }
 
-/// What is baked.
+/// Choice of what is baked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Baking {
     /// Meshes used once that are not too fine for the scene's single precision, in one part.
@@ -187,7 +187,7 @@ fn baked_reach(geometry: &Geometry, placement: &Placement, frame: Frame) -> f64 
     (norm(&transform.linear) * local + offset) * frame.scale
 }
 
-/// Whether a placed mesh's typical triangle is large against what f32 resolves in `frame`.
+/// True if a placed mesh's typical triangle is large against what f32 resolves in `frame`.
 fn is_coarse(geometry: &Geometry, placement: &Placement, frame: Frame) -> bool {
     let triangles = geometry.mesh_of(placement).triangles.len() as f64;
     let size = geometry.loose_bounds_of(placement).diagonal() / triangles.sqrt();

@@ -1,4 +1,4 @@
-//! Which of single precision's answers deserve a second look, and what decides then.
+//! Re-check of single precision's answers: which deserve a second look, and what decides then.
 //!
 //! Rays are turned aside before they are rounded (`NUDGE` of [`crate::single`]), so that vertices are
 //! never aimed at exactly, and single precision takes the wrong neighbour when a ray passes within about 10⁻⁶ of
@@ -133,8 +133,8 @@ pub(crate) fn minority_sides(hits: &HitBatch, front: &[bool], suspects: &mut Vec
     }
 }
 
-/// What rounding may misplace a start by, per sum of its coordinates: half a unit in the last place of
-/// each, and half as much again for the triangle's.
+/// Rounding error by which a start may be misplaced, per sum of its coordinates: half a unit in the
+/// last place of each, and half as much again for the triangle's.
 const ROUNDING: f64 = 0.75 * F32_EPSILON;
 
 /// Times `s` from all edges.
@@ -143,7 +143,7 @@ const INSIDE: f64 = 5.0;
 /// The least cos θ of rays that are started so.
 const FLATTEST: f64 = 0.25;
 
-/// What a batch's rays leave.
+/// Triangles that a batch's rays leave.
 #[derive(Debug, Default)]
 pub(crate) struct EndTriangles {
     placement: Vec<u32>,
@@ -151,8 +151,8 @@ pub(crate) struct EndTriangles {
     clear: Clear,
 }
 
-/// How far from its start each ray of a chunk is clear of the triangle; infinite where it is not known
-/// to meet nothing else before.
+/// Distance from its start at which each ray of a chunk is clear of the triangle; infinite where it
+/// is not known to meet nothing else before.
 #[derive(Debug)]
 struct Clear(Lane);
 

@@ -28,7 +28,7 @@ const ODD_AXES: [[f64; 3]; 2] = [[0.48, 0.6, 0.64], [-0.64, 0.48, -0.6]];
 /// Rays that start farther from the box than this many half-diagonals are started nearer.
 const FAR: f64 = 1.5;
 
-/// How far rays are turned aside on purpose, in units in the last place.
+/// Amount by which rays are turned aside on purpose, in units in the last place.
 ///
 /// A ray aimed exactly at a vertex slips between its triangles in single precision about once in a
 /// hundred times, even in Embree's robust mode: the signs of the edge functions around the vertex are
@@ -38,8 +38,8 @@ const FAR: f64 = 1.5;
 /// and a little across, for rays that pass the centre.
 const NUDGE: f64 = 3.0 * F32_EPSILON;
 
-/// How far single precision may misplace a ray sideways at any distance: the nudge, and as much again
-/// for roundings of the ray and of what it meets.
+/// Sideways error of a ray in single precision at any distance: the nudge, and as much again for
+/// roundings of the ray and of what it meets.
 const BLUR: f64 = 2.0 * NUDGE;
 
 /// From 1 to the next f32.
@@ -53,8 +53,8 @@ const SLOPE: f64 = 32.0;
 /// not tell where they pass.
 const MOST_RADII: f64 = 1e12;
 
-/// How much larger than the scene's box the sphere is that a ray must meet to be traced: f64's
-/// rounding in telling so, at distances of up to 10¹² radii.
+/// Margin of the sphere around the scene's box that a ray must meet to be traced: f64's rounding in
+/// telling so, at distances of up to 10¹² radii.
 const SPHERE_SLACK: f64 = 1e-3;
 
 impl F32Frame {
@@ -83,8 +83,8 @@ impl F32Frame {
         Self { origin, centre: centre - origin, radius, half }
     }
 
-    /// Whether ray `i`'s line may meet the scene's box: separating axes along the cross products of
-    /// the line with the box's axes. Safe rather than tight.
+    /// True if ray `i`'s line may meet the scene's box, by separating axes along the cross products
+    /// of the line with the box's axes. Safe rather than tight.
     pub(crate) fn may_meet(&self, rays: &RayBatch, i: usize) -> bool {
         let d = rays.direction(i);
         let moment = (self.centre - (rays.origin(i) - self.origin)).cross(d).abs();
@@ -103,8 +103,8 @@ pub(crate) struct Rays32 {
     /// may be off.
     pub(crate) t_near: Vec<f32>,
     pub(crate) t_far: Vec<f32>,
-    /// How far (m) each ray was moved ahead of its true origin. Rays that start within the scene are
-    /// moved back a little, so that what they start on lies ahead of them whichever way it rounds.
+    /// Distance (m) by which each ray was moved ahead of its true origin. Rays that start within the scene are moved
+    /// back a little, so that what they start on lies ahead of them whichever way it rounds.
     pub(crate) advance: Vec<f64>,
 }
 
@@ -126,13 +126,13 @@ impl Rays32 {
         SLOPE * self.blur(i, t)
     }
 
-    /// How far (m, likewise) ray `i` may meet anything in `frame`.
+    /// Distance (m, likewise) within which ray `i` may meet anything in `frame`.
     pub(crate) fn reach(&self, i: usize, frame: &F32Frame) -> f64 {
         let [x, y, z] = self.origin.each_ref().map(|axis| f64::from(axis[i]));
         frame.centre.distance(DVec3::new(x, y, z)) + frame.radius
     }
 
-    /// Whether ray `i` is sound and ends behind the scene's beginning.
+    /// True if ray `i` is sound and ends behind the scene's beginning.
     pub(crate) fn can_hit(&self, i: usize) -> bool {
         self.t_far[i] > 0.0
     }

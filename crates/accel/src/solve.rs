@@ -40,7 +40,7 @@ pub(crate) type Lane = [f64; LANES];
 /// The triangles of one chunk of rays as seen from the rays' origins, and what comes of them.
 #[derive(Debug)]
 pub(crate) struct ChunkTriangles {
-    /// Which corners each triangle has.
+    /// Corner indices of each triangle.
     indices: [[u32; 3]; LANES],
     /// The corners `[corner][axis]` in their mesh, as most meshes have them, and in f64.
     narrow: [[[f32; LANES]; 3]; 3],
@@ -49,13 +49,13 @@ pub(crate) struct ChunkTriangles {
     pub(crate) e1: [Lane; 3],
     pub(crate) e2: [Lane; 3],
     pub(crate) d: [Lane; 3],
-    /// What `a` was summed from, for its rounding error.
+    /// Sum of the magnitudes that `a` was summed from, for its rounding error.
     magnitude: Lane,
     handedness: Lane,
     t: Lane,
     u: Lane,
     v: Lane,
-    /// How far `u`, `v` or `1 − u − v` is below zero beyond its rounding error; ≤ 0 is valid.
+    /// Excess of `u`, `v` or `1 − u − v` below zero beyond its rounding error; ≤ 0 is valid.
     excess: Lane,
     /// Positive when the ray comes from the triangle's front.
     front: Lane,
@@ -85,16 +85,16 @@ impl Default for ChunkTriangles {
     }
 }
 
-/// What solving says of each ray's hit, beside the hit itself.
+/// Result of solving for each ray's hit, beside the hit itself.
 #[derive(Debug, Default)]
 pub(crate) struct Solved {
     /// The ray meets its triangle within `t_min..=t_max`; true for misses.
     pub(crate) valid: Vec<bool>,
     /// It meets the triangle's front; false for misses.
     pub(crate) front: Vec<bool>,
-    /// Whether all are valid.
+    /// True if all are valid.
     pub(crate) all_valid: bool,
-    /// Whether triangles are met from both sides.
+    /// True if triangles are met from both sides.
     pub(crate) both_sides: bool,
 }
 
@@ -125,7 +125,7 @@ pub(crate) fn solve(
     solved.both_sides = sides == [true; 2];
 }
 
-/// How many values at the beginning are `wanted`.
+/// Number of values at the beginning that are `wanted`.
 fn leading(values: &[u32], wanted: impl Fn(&u32) -> bool) -> usize {
     values.iter().position(|value| !wanted(value)).unwrap_or(values.len())
 }
@@ -285,7 +285,7 @@ fn turn(linear: &DMat3, vectors: &mut [Lane; 3], start: usize, end: usize) {
     }
 }
 
-/// Where each ray meets its triangle's plane, and whether that is inside of the triangle.
+/// Intersects each ray with its triangle's plane, and tests whether the point is inside of the triangle.
 #[multiversion::multiversion(targets = "simd")]
 fn measure(lanes: &mut ChunkTriangles, want_normal: bool) {
     let ChunkTriangles { a, e1, e2, d, magnitude, handedness, t, u, v, excess, front, n, .. } =
@@ -316,7 +316,7 @@ fn measure(lanes: &mut ChunkTriangles, want_normal: bool) {
     }
 }
 
-/// What one chunk says of all its hits.
+/// Summary of one chunk's hits.
 struct ChunkSides {
     all_valid: bool,
     front: bool,

@@ -54,7 +54,7 @@ impl Node {
         (self.count > 0).then(|| self.link as usize..(self.link + self.count) as usize)
     }
 
-    /// How many places after an inner node its right child stands.
+    /// Number of places from an inner node to its right child.
     pub(crate) fn right(&self) -> usize {
         self.link as usize
     }
@@ -69,7 +69,7 @@ fn glam3(v: [f32; 3]) -> etendue_geometry::glam::Vec3 {
     v.into()
 }
 
-/// How splitting ends.
+/// Limits at which splitting ends.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LeafSize {
     /// The most refs of a leaf.

@@ -33,7 +33,7 @@ use robust::{Coord3D, orient3d};
 
 use crate::triangle::{Vector, at, cross_plane, dot, minus};
 
-/// Where a ray meets a triangle.
+/// Intersection of a ray with a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
     /// Distance in lengths of the direction (m for a unit vector). Negative behind the origin.
@@ -42,7 +42,7 @@ pub struct Hit {
     pub u: f64,
     /// Barycentric weight of the third corner (0..=1 − `u`).
     pub v: f64,
-    /// Whether the ray meets the side from which the corners run counter-clockwise.
+    /// True if the ray meets the side from which the corners run counter-clockwise.
     pub front: bool,
 }
 
@@ -60,7 +60,7 @@ const UNDERFLOW: f64 = 1e-290;
 /// formula for the distance loses digits and the careful one takes over.
 const SLIM: f64 = 1e-2;
 
-/// Where the line from the origin along `d` meets the triangle with corners `a`, `b`, `c`, all
+/// Intersects the line from the origin along `d` with the triangle of corners `a`, `b`, `c`, all
 /// seen from the ray's origin; `None` when it passes by, or the triangle has no area, or a number
 /// is not finite. The caller compares `t` with its own limits.
 ///
@@ -91,11 +91,10 @@ pub fn intersect(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> Option<Hit> {
     Some(locate(a, b, c, d, front))
 }
 
-/// How surely the line from the origin along `d` passes inside the triangle: the least of the
-/// three edge determinants over the error that plain f64 may make in it. Positive inside and
-/// negative outside; between −1 and 1 rounding decides, so a hit that single precision reports
-/// there deserves [`intersect`]'s exact second look, and so do the triangles around it. Each unit
-/// is about 10⁻¹⁵ of the corners' distance.
+/// Margin by which the line from the origin along `d` passes inside the triangle: the least of the three edge
+/// determinants over the error that plain f64 may make in it. Positive inside and negative outside; between −1 and 1
+/// rounding decides, so a hit that single precision reports there deserves [`intersect`]'s exact second look, and so do
+/// the triangles around it. Each unit is about 10⁻¹⁵ of the corners' distance.
 ///
 /// −∞ when a number is not finite, and 0 for a triangle without area.
 #[must_use]
@@ -207,7 +206,7 @@ fn locate(a: DVec3, b: DVec3, c: DVec3, d: DVec3, front: bool) -> Hit {
     if is_delicate { locate_carefully([a, b, c], d, front) } else { Hit { t, u, v, front } }
 }
 
-/// What the plain formula says, and whether the careful one has to take over.
+/// Result of the plain formula, and whether the careful one has to take over.
 struct PlainResult {
     t: f64,
     u: f64,

@@ -1,4 +1,4 @@
-//! What every backend promises, asked of each: the answers of `exact`, whatever the scene.
+//! Contract of every backend, tested on each: the answers of `exact`, whatever the scene.
 
 #![expect(clippy::cast_possible_truncation, reason = "meshes and batches here are small")]
 
@@ -49,7 +49,7 @@ fn closest(accel: &dyn Accel, rays: &RayBatch) -> HitBatch {
     hits
 }
 
-/// What the exact test says without any tree.
+/// Hits by the exact test without any tree.
 fn brute_force(geometry: &Geometry, rays: &RayBatch) -> Vec<(f64, u32, u32)> {
     let nearest = |i: usize| {
         let mut best = (f64::INFINITY, MISS, MISS);
@@ -72,7 +72,7 @@ fn brute_force(geometry: &Geometry, rays: &RayBatch) -> Vec<(f64, u32, u32)> {
     (0..rays.len()).map(nearest).collect()
 }
 
-/// What is left out for single precision's sake.
+/// Exemptions of what is left out for single precision's sake.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Found {
     /// By everyone.
@@ -139,9 +139,9 @@ fn assert_agreement(geometry: &Arc<Geometry>, rays: &RayBatch, what: &str, found
     }
 }
 
-/// Whether ray `i` hits its triangle so close to an open edge, or to one behind which the mesh turns
-/// away, that single precision may see what is behind: within 2·10⁻⁶ of the scene's and the ray's size,
-/// which is what rays are nudged by and what f32 may be off by.
+/// True if ray `i` hits its triangle so close to an open edge, or to one behind which the mesh
+/// turns away, that single precision may see what is behind: within 2·10⁻⁶ of the scene's and the
+/// ray's size, which is what rays are nudged by and what f32 may be off by.
 fn is_at_edge(geometry: &Geometry, rays: &RayBatch, truth: &HitBatch, i: usize) -> bool {
     let placement = &geometry.placements[truth.placement[i] as usize];
     let mesh = geometry.mesh_of(placement);

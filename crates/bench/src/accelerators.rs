@@ -103,10 +103,10 @@ fn embree(_: Arc<Geometry>, _: &BuildOptions) -> Result<Box<dyn Accel>, BuildErr
     Err(BuildError::Library { call: "Embree", message })
 }
 
-/// How much is measured.
+/// Extent of the measurement.
 #[derive(Debug, Clone)]
 pub struct Effort {
-    /// What takes part.
+    /// Methods that take part.
     pub methods: Vec<Method>,
     /// Rays a batch.
     pub widths: Vec<usize>,
@@ -199,7 +199,7 @@ pub fn measure(
     Ok(entries.iter().flat_map(|entry| entry.findings(effort, rays.len())).collect())
 }
 
-/// What the reference hits.
+/// Hits of the reference.
 fn reference(geometry: &Arc<Geometry>, rays: &Rays, effort: &Effort) -> Result<Hits, BenchError> {
     let exact = Exact::build(Arc::clone(geometry), &effort.build_options())?;
     Ok(trace(&exact, &rays.batches(RENDER_WIDTH)))

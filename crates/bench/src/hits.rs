@@ -9,7 +9,7 @@ use etendue_camera::{Camera, PixelBlock, Sampler};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Detail, HitBatch, RayBatch};
 
-/// What a batch of rays hit, one entry a batch.
+/// Hits of the batches of rays, one entry a batch.
 pub type Hits = Vec<HitBatch>;
 
 /// The closest hits of all `batches` with their normals, on the threads of the current pool.
@@ -158,8 +158,8 @@ fn degrees(a: DVec3, b: DVec3) -> f64 {
 /// Side of a tile (pixels): what a render traces at a time.
 const TILE: u32 = 16;
 
-/// How far off their surface rays start, as a share of the largest coordinate: some two hundred
-/// roundings of f64.
+/// Distance off their surface at which rays start, as a share of the largest coordinate: some two
+/// hundred roundings of f64.
 const CLEAR: f64 = 2e-14;
 
 /// Rays in the order in which a render traces them: tile by tile, and inside a tile along a Z-order
@@ -238,7 +238,7 @@ impl Rays {
         self.0.len()
     }
 
-    /// Whether there is no ray.
+    /// True if there are no rays.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()

@@ -34,7 +34,7 @@ use etendue_render::tolerance::lens_models::NoModels;
 /// Told the share done (0..=1) now and then; answering `false` stops.
 pub type Progress<'a> = &'a dyn Fn(f64) -> bool;
 
-/// Why nothing was measured.
+/// Error of a benchmark that measured nothing.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BenchError {
@@ -44,7 +44,7 @@ pub enum BenchError {
     /// Threads could not be had.
     #[error("{threads} threads: {why}\nhint: ask for fewer with --threads")]
     Threads {
-        /// How many were asked for.
+        /// Number of threads that were asked for.
         threads: usize,
         /// The system's word.
         why: String,

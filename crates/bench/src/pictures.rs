@@ -25,7 +25,7 @@ pub struct Studio<'a> {
     images: Images,
 }
 
-/// How samples are spread.
+/// Sampling of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sampling {
     /// Rays a pixel.
@@ -165,7 +165,7 @@ fn values(picture: &Picture) -> Vec<f64> {
     channels.flat_map(|channel| (0..channel.values.len()).map(|i| channel.values.at(i))).collect()
 }
 
-/// Whether the picture of a scene is the mean of samples.
+/// True if the picture of a scene is the mean of samples.
 #[must_use]
 pub fn is_sampled(layer: LayerSpec) -> bool {
     layer == LayerSpec::Radiance || layer.is_averaged()

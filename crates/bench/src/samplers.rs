@@ -10,7 +10,7 @@ use crate::pictures::{Sampling, Studio, mean, mean_square};
 use crate::timing::{Series, TimeSpread, order};
 use crate::{BenchError, Progress};
 
-/// How much is measured.
+/// Extent of the measurement.
 #[derive(Debug, Clone)]
 pub struct Effort {
     /// Samples a pixel.
@@ -19,7 +19,7 @@ pub struct Effort {
     pub converged: u32,
     /// Times that everything is rendered, each with other samples (at least 1).
     pub rounds: usize,
-    /// What all of it may take (s): pixels are made larger until it does.
+    /// Time that all of it may take (s): pixels are made larger until it does.
     pub seconds: f64,
 }
 
@@ -127,7 +127,7 @@ pub fn measure(
     Ok(Samplers { resolution: camera.resolution(), converged, findings })
 }
 
-/// How a contestant's picture is made: its camera, its point set, and the precision of hits.
+/// Settings of a contestant's picture: its camera, its point set, and the precision of hits.
 pub(crate) type Way<'a> = (&'a Camera, (Sampler, LightPrecision));
 
 /// Renders all entries in turn, round after round, to `all` samples a pixel with those of the converged

@@ -75,7 +75,7 @@ fn kilobytes(file: &str, field: &str) -> u64 {
     line.split_whitespace().next().and_then(|number| number.parse().ok()).unwrap_or(0)
 }
 
-/// What this process holds (bytes); zeros where the system does not tell.
+/// Memory that this process holds (bytes); zeros where the system does not tell.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ProcessMemory {
     /// Its own.
@@ -102,7 +102,7 @@ pub fn wall<T>(work: impl FnOnce() -> T) -> (f64, T) {
     (start.elapsed().as_secs_f64(), made)
 }
 
-/// What one contestant took, round by round (s).
+/// Times of one contestant, round by round (s).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Series(pub Vec<f64>);
 
@@ -125,7 +125,7 @@ impl Series {
         self.0.iter().copied().fold(0.0, f64::max)
     }
 
-    /// How many times as fast as `other` this is: the median over the rounds.
+    /// Speed relative to `other`: the median over the rounds.
     #[must_use]
     pub fn speed_against(&self, other: &Self) -> f64 {
         median(self.0.iter().zip(&other.0).map(|(own, other)| other / own).collect())

@@ -1,4 +1,4 @@
-//! What models of a lens miss, where a closed form tells it.
+//! Differences of models of a lens, where a closed form tells it.
 #![allow(clippy::disallowed_methods, reason = "tests set their stage by hand")]
 
 use std::path::Path;
@@ -17,7 +17,7 @@ fn compared(camera: &Value, tolerance: Tolerance) -> Result<Comparison, BenchErr
     compared_with(camera, tolerance, None)
 }
 
-/// The same with a thing before it.
+/// Comparison of a camera's models, with a thing before it.
 fn compared_with(
     camera: &Value,
     tolerance: Tolerance,
@@ -27,7 +27,7 @@ fn compared_with(
     compared_in(&scenes, camera, tolerance, thing)
 }
 
-/// The same of a scene in a folder.
+/// Comparison of a camera's models, with scenes in a folder.
 fn compared_in(
     folder: &Path,
     camera: &Value,

@@ -25,7 +25,7 @@ pub struct Camera {
     pub(crate) time: Option<Arc<CameraTime>>,
 }
 
-/// How a camera's rays run in its own frame.
+/// Projection of a camera: how its rays run in its own frame.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Projection {
     /// Through one point.
@@ -38,7 +38,7 @@ pub enum Projection {
     Views(Arc<ViewGrid>),
 }
 
-/// What a pixel covers of the scene.
+/// Extent of a pixel in the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PixelExtent {
     /// A side per distance along the axis, at its middle.
@@ -77,8 +77,8 @@ impl Camera {
         self.light_field.as_deref()
     }
 
-    /// Why a light-field camera's picture holds no views; `None` of other cameras, of an ideal one, and
-    /// where it does.
+    /// Reason why a light-field camera's picture holds no views; `None` of other cameras, of an
+    /// ideal one, and where it does.
     #[must_use]
     pub fn no_views(&self) -> Option<&str> {
         self.lens()?;
@@ -98,7 +98,7 @@ impl Camera {
         Ok(self.looking(grid))
     }
 
-    /// The same light-field camera with other views.
+    /// Returns the light-field camera with other views.
     #[must_use]
     pub fn with_light_field(&self, light_field: LightField) -> Self {
         Self { light_field: Some(Arc::new(light_field)), ..self.clone() }
@@ -119,7 +119,7 @@ impl Camera {
         Self { sensor, projection, ..self.clone() }
     }
 
-    /// Whether rays are spread over a pupil.
+    /// True if rays are spread over a pupil.
     #[must_use]
     pub fn has_pupil(&self) -> bool {
         match &self.projection {
@@ -151,7 +151,7 @@ impl Camera {
         }
     }
 
-    /// What a pixel covers of the scene; `None` where the camera bends directions by more than a
+    /// Extent of a pixel in the scene; `None` where the camera bends directions by more than a
     /// little (OpenCV's fisheye model).
     ///
     /// With a lens it is what the paraxial camera says: the cone from any point of the pupil over a
@@ -186,8 +186,8 @@ impl Camera {
         }
     }
 
-    /// Which of `bands` have to be traced apart: all in one group unless the lens tells wavelengths
-    /// apart and there are several bands.
+    /// Groups of `bands` that have to be traced apart: all in one group unless the lens tells
+    /// wavelengths apart and there are several bands.
     #[must_use]
     pub fn band_groups(&self, bands: &Bands) -> Vec<BandGroup> {
         match &self.projection {
@@ -198,8 +198,8 @@ impl Camera {
         }
     }
 
-    /// The same with rays of its lens that run as at the design wavelength in all bands: colours are neither
-    /// displaced nor blurred by it.
+    /// Returns the camera with rays of its lens that run as at the design wavelength in all bands:
+    /// colours are neither displaced nor blurred by it.
     #[must_use]
     pub fn without_dispersion(&self) -> Self {
         let projection = match &self.projection {
@@ -211,21 +211,21 @@ impl Camera {
         Self { projection, ..self.clone() }
     }
 
-    /// The same with rays of its lens that run together in `count` groups of neighbouring bands, at most; `None` where
-    /// there is no lens that bends each its own way, or one that also dims each by its own share.
+    /// Returns the camera with rays of its lens that run together in `count` groups of neighbouring bands, at most;
+    /// `None` where there is no lens that bends each its own way, or one that also dims each by its own share.
     #[must_use]
     pub fn with_bands_grouped(&self, count: usize) -> Option<Self> {
         let lens = self.lens()?.with_bands_grouped(count)?;
         Some(Self { projection: Projection::Lens(Arc::new(lens)), ..self.clone() })
     }
 
-    /// The same with bands that share rays of its lens within `limits`.
+    /// Returns the camera with bands that share rays of its lens within `limits`.
     #[must_use]
     pub fn sharing_within(&self, limits: SharingLimits) -> Self {
         self.with_lens(|lens| lens.sharing_within(limits))
     }
 
-    /// The same camera, in its place and with its pixels, shutter and motion, whose rays run as those of `other`.
+    /// Returns the camera, in its place and with its pixels, shutter and motion, whose rays run as those of `other`.
     #[must_use]
     pub fn seen_through(&self, other: &Self) -> Self {
         Self { projection: other.projection.clone(), ..self.clone() }
@@ -250,7 +250,7 @@ impl Camera {
         Ok(Self { projection, ..self.clone() })
     }
 
-    /// The same as [`opened`](Self::opened) with the filters of lens and lenslets clear.
+    /// Opens the camera as [`opened`](Self::opened) does, with the filters of lens and lenslets clear.
     ///
     /// # Errors
     ///
@@ -263,8 +263,8 @@ impl Camera {
         Ok(opened)
     }
 
-    /// The same view on pixels `factor` times as large, by rays alone. Columns and rows that do not fill a pixel are
-    /// left out on the right and below, and at least one is left.
+    /// Returns the view on pixels `factor` times as large, by rays alone. Columns and rows that do
+    /// not fill a pixel are left out on the right and below, and at least one is left.
     #[must_use]
     pub fn coarser(&self, factor: u32) -> Self {
         let factor = factor.max(1);
@@ -287,20 +287,20 @@ impl Camera {
         Self { pose: self.pose, sensor, projection, light_field: self.light_field.clone(), time }
     }
 
-    /// Whether light of its pictures is to be spread as waves are.
+    /// True if the light of its pictures is to be spread as waves are.
     #[must_use]
     pub fn diffracts(&self) -> bool {
         self.lens().is_some_and(LensCamera::diffracts)
     }
 
-    /// The same whose light is spread by rays alone.
+    /// Returns the camera with light spread by rays alone.
     #[must_use]
     pub fn without_diffraction(&self) -> Self {
         self.with_lens(LensCamera::without_diffraction)
     }
 
-    /// The same through chief rays alone, with `finer` times as many columns and rows: what its lens
-    /// shows before light is spread, at an illumination of 1 all over.
+    /// Returns the camera with chief rays alone, and `finer` times as many columns and rows: what
+    /// its lens shows before light is spread, at an illumination of 1 all over.
     #[must_use]
     pub fn along_chief_rays(&self, finer: u32) -> Self {
         let finer = finer.max(1);
@@ -332,7 +332,7 @@ impl Camera {
         &self.pose
     }
 
-    /// How the rays run.
+    /// Projection of the camera's rays.
     #[must_use]
     pub fn projection(&self) -> &Projection {
         &self.projection
@@ -365,7 +365,7 @@ impl Camera {
         self.carry_chief(rows, rays);
     }
 
-    /// The same of a camera that stands in the frame's pose.
+    /// Sets up the rays of a camera that stands in the frame's pose.
     fn rays_at(&self, columns: &[f64], rows: &[f64], rays: &mut RayBatch) {
         let len = columns.len().min(rows.len());
         rays.reset(len);

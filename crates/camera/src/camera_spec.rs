@@ -39,7 +39,7 @@ pub enum CameraSpec {
     LightFieldReference(LightFieldSpec),
 }
 
-/// The same expression for every kind of camera.
+/// Evaluates an expression for every kind of camera.
 macro_rules! for_each_kind {
     ($camera:expr, $spec:ident => $value:expr) => {
         match $camera {
@@ -106,30 +106,30 @@ impl CameraSpec {
         }
     }
 
-    /// Whether the file says where the camera stands.
+    /// True if the file gives the camera's pose.
     #[must_use]
     pub fn has_pose(&self) -> bool {
         for_each_kind!(self, spec => spec.pose.is_some()) || self.moves_through_poses()
     }
 
-    /// When rows are open, as the file says.
+    /// Shutter, which says when rows are open, if the file gives one.
     #[must_use]
     pub fn shutter(&self) -> Option<&ShutterSpec> {
         for_each_kind!(self, spec => spec.shutter.as_ref())
     }
 
-    /// The same, to be changed.
+    /// Shutter of the specification, to be changed.
     pub fn shutter_mut(&mut self) -> &mut Option<ShutterSpec> {
         for_each_kind!(self, spec => &mut spec.shutter)
     }
 
-    /// How the camera moves, as the file says.
+    /// Motion of the camera, if the file gives one.
     #[must_use]
     pub fn motion(&self) -> Option<&CameraMotionSpec> {
         for_each_kind!(self, spec => spec.motion.as_ref())
     }
 
-    /// The same, to be changed.
+    /// Motion of the specification, to be changed.
     pub fn motion_mut(&mut self) -> &mut Option<CameraMotionSpec> {
         for_each_kind!(self, spec => &mut spec.motion)
     }

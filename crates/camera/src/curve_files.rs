@@ -59,7 +59,7 @@ fn below_key(at: &str, CurveFault { key, why }: CurveFault) -> CurveFault {
     CurveFault { key: format!("{at}{dot}{key}"), why }
 }
 
-/// Whether a value is a curve in a file, and no lens or image.
+/// True if a value is a curve in a file, and no lens or image.
 fn is_curve_file(members: &Map<String, Value>) -> bool {
     let is_table = |file: &str| {
         let ending = Path::new(file).extension().map(|e| e.to_ascii_lowercase());

@@ -141,7 +141,7 @@ impl Distortion {
         &self.spec
     }
 
-    /// Where the direction (x right, y down, z forward) is seen, as distorted tangents.
+    /// Projects the direction (x right, y down, z forward) to distorted tangents.
     #[must_use]
     pub fn distort(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
         match &self.spec {

@@ -14,18 +14,18 @@ const STEPS: usize = 60;
 /// Moments (s) so near that they are the same.
 const SAME_MOMENT: f64 = 1e-15;
 
-/// When a camera's rows are open, and how it moves.
+/// Shutter and motion of a camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraTime {
     /// The shutter.
     pub shutter: Shutter,
     /// The camera's motion, where it moves while the shutter is open.
     pub motion: Option<Trajectory>,
-    /// The same, whether it moves then or not.
+    /// Trajectory of the camera, whether it moves while the shutter is open or not.
     pub trajectory: Option<Trajectory>,
-    /// Whether anything of the scene moves while the shutter is open.
+    /// True if anything of the scene moves while the shutter is open.
     pub things_move: bool,
-    /// Whether some light changes with time.
+    /// True if some light changes with time.
     pub lights_change: bool,
 }
 
@@ -49,7 +49,7 @@ impl Camera {
         self.time.as_deref()?.motion.as_ref()
     }
 
-    /// The same camera in a scene of which something moves while its shutter is open, or nothing.
+    /// Sets whether something of the scene moves while the shutter is open.
     #[must_use]
     pub fn among_moving_things(mut self, things_move: bool) -> Self {
         if let Some(time) = &mut self.time {
@@ -58,7 +58,7 @@ impl Camera {
         self
     }
 
-    /// The same camera in a scene of which some light changes with time, or none.
+    /// Sets whether some light of the scene changes with time.
     #[must_use]
     pub fn under_changing_lights(mut self, lights_change: bool) -> Self {
         if let Some(time) = &mut self.time {
@@ -67,7 +67,8 @@ impl Camera {
         self
     }
 
-    /// The same camera, in the same pose of the frame, of which data layers see another moment of each row's exposure.
+    /// Returns the camera, in the same pose of the frame, with data layers that see another moment
+    /// of each row's exposure.
     #[must_use]
     pub fn with_truth_at(mut self, truth_at: TruthAt) -> Self {
         if let Some(time) = &mut self.time {
@@ -77,31 +78,31 @@ impl Camera {
         self
     }
 
-    /// Whether some light of the scene changes with time.
+    /// True if some light of the scene changes with time.
     #[must_use]
     pub fn lights_change(&self) -> bool {
         self.time.as_deref().is_some_and(|time| time.lights_change)
     }
 
-    /// When the first row opens and the last one closes (s); no time without a shutter.
+    /// Times at which the first row opens and the last one closes (s); no time without a shutter.
     #[must_use]
     pub fn exposure_span(&self) -> [f64; 2] {
         self.shutter().map_or([0.0; 2], Shutter::whole_span)
     }
 
-    /// Whether rays have times: the camera or something in the scene moves while the shutter is open.
+    /// True if rays have times: the camera or something in the scene moves while the shutter is open.
     #[must_use]
     pub fn is_timed(&self) -> bool {
         self.time.as_deref().is_some_and(|time| time.motion.is_some() || time.things_move)
     }
 
-    /// Whether pixels of different rows see different moments.
+    /// True if pixels of different rows see different moments.
     #[must_use]
     pub fn rows_differ(&self) -> bool {
         self.is_timed() && self.shutter().is_some_and(Shutter::rows_differ)
     }
 
-    /// Whether pixels of different rows get light of different moments.
+    /// True if pixels of different rows get light of different moments.
     #[must_use]
     pub fn light_of_rows_differs(&self) -> bool {
         let changes = self.is_timed() || self.lights_change();
@@ -114,7 +115,7 @@ impl Camera {
         self.motion().map_or(*self.pose(), |motion| motion.at(time))
     }
 
-    /// How the camera stands and moves at a time of the frame's clock (s), whether its shutter is open or not.
+    /// Pose and motion of the camera at a time of the frame's clock (s), whether its shutter is open or not.
     #[must_use]
     pub fn kinematics(&self, time: f64) -> Kinematics {
         match self.time.as_deref().and_then(|time| time.trajectory.as_ref()) {

@@ -1,4 +1,4 @@
-//! How the light of a pinhole falls off from its axis, as calibrations of lenses describe it.
+//! Falloff of the light of a pinhole from its axis, as calibrations of lenses describe it.
 //!
 //! # Source
 //!

@@ -34,12 +34,12 @@ impl SupportFunction for Bounds {
     }
 }
 
-/// What a camera that was given no place has to frame.
+/// Subject to be framed by a camera that was given no place.
 #[derive(Clone, Copy)]
 pub struct Subject<'a> {
     /// The tight box around all of it (m).
     pub bounds: Bounds,
-    /// Where it is best looked at from.
+    /// Viewpoint from which it is best looked at.
     pub viewpoint: Viewpoint,
     /// Its points; the corners of the box when absent.
     pub points: Option<&'a dyn SupportFunction>,
@@ -55,7 +55,7 @@ impl fmt::Debug for Subject<'_> {
     }
 }
 
-/// Where something is looked at from.
+/// Viewpoint on something.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Viewpoint {
     /// From the front right above; face on when it is flat.
@@ -99,7 +99,7 @@ impl Subject<'_> {
     }
 }
 
-/// How far a picture reaches to each side of the axis: tangents for a perspective picture.
+/// Extent of a picture to each side of the axis: tangents for a perspective picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FieldExtent {
     pub(crate) left: f64,
@@ -109,9 +109,8 @@ pub(crate) struct FieldExtent {
 }
 
 impl FieldExtent {
-    /// What a picture of `size` (pixels) reaches to: the least of what is seen at the middles and
-    /// corners of each edge, by `tangents` of a place (right, down), and `widest`. The middles are
-    /// across from `centre`.
+    /// Extent of a picture of `size` (pixels): the least of what is seen at the middles and corners of each edge, by
+    /// `tangents` of a place (right, down), and `widest`. The middles are across from `centre`.
     pub(crate) fn of_picture(
         [width, height]: [f64; 2],
         centre: [f64; 2],
@@ -131,8 +130,8 @@ impl FieldExtent {
         }
     }
 
-    /// The same picture without its margin; `None` when an edge is on the wrong side of the axis
-    /// by so much that nothing is left.
+    /// Returns the extent without the picture's margin; `None` when an edge is on the wrong side of
+    /// the axis by so much that nothing is left.
     fn inside_margin(self) -> Option<Self> {
         let (x, y) = ((self.left + self.right) * MARGIN, (self.down + self.up) * MARGIN);
         let inner = Self {
@@ -162,7 +161,7 @@ fn usual(bounds: Bounds) -> (DVec3, DVec3) {
     (towards, upright(towards))
 }
 
-/// Which way is up in a view from where `towards` points.
+/// Upward direction in a view from where `towards` points.
 fn upright(towards: DVec3) -> DVec3 {
     if towards.x == 0.0 && towards.z == 0.0 { DVec3::NEG_Z } else { DVec3::Y }
 }
@@ -224,15 +223,14 @@ impl Touch {
         (self.far[0] + self.far[1]) / (self.low + self.high)
     }
 
-    /// Where across the camera then stands; between the two planes when it is farther off.
+    /// Position of the camera across the axis at a distance; between the two planes when it is farther off.
     fn across(&self, distance: f64) -> f64 {
         let [high, low] = self.far;
         0.5 * ((high - distance * self.high) - (low - distance * self.low))
     }
 }
 
-/// Where across a camera at `distance` stands so that the margins on both sides are the same share of
-/// the picture.
+/// Position across of a camera at `distance` at which the margins on both sides are the same share of the picture.
 fn even(distance: f64, [low, high]: [f64; 2], touch: &dyn Fn(&[[f64; 2]]) -> Vec<Touch>) -> f64 {
     /// Margins that are tried at once; two rounds leave 1/128 of the picture, within which where the
     /// planes touch is nearly linear.

@@ -23,7 +23,7 @@ pub enum PixelOrigin {
 }
 
 impl PixelOrigin {
-    /// What to add to a coordinate counted from here, to have it counted from the corner (pixels).
+    /// Offset from a coordinate counted from here to one counted from the corner (pixels).
     #[must_use]
     pub fn to_corner(self) -> f64 {
         match self {
@@ -64,7 +64,7 @@ pub struct Intrinsics {
 }
 
 impl Intrinsics {
-    /// The same on pixels `factor` times as large.
+    /// Returns the intrinsics on pixels `factor` times as large.
     pub(crate) fn coarser(&self, factor: f64) -> Self {
         let [focal, centre] = [self.focal, self.centre].map(|pair| pair.map(|x| x / factor));
         Self { focal, centre, skew: self.skew / factor }

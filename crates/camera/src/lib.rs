@@ -60,7 +60,7 @@ pub use shutter::{Readout, Shutter, ShutterKind, ShutterSpec, TruthAt};
 pub struct CameraError {
     /// The key inside the camera, with dots and indices (`sensor.resolution`, `pose.up`).
     pub at: String,
-    /// What is wrong and what would do.
+    /// Description of the error, and of what is valid.
     pub why: String,
 }
 

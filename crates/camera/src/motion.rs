@@ -85,7 +85,7 @@ pub struct PoseKey {
     turn: DVec3,
 }
 
-/// How a camera moves at a moment, in the world.
+/// Pose, velocities and acceleration of a camera at a moment, in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kinematics {
     /// Its pose.
@@ -112,9 +112,9 @@ impl Kinematics {
         convention.ours_from_theirs() * (self.pose.rotation.transpose() * vector)
     }
 
-    /// What an inertial unit reads that is fixed to the camera at `at` (m, from its origin), with axes of the camera in
-    /// a convention: the angular velocity (rad/s), and the specific force (m/s²): the acceleration without that of
-    /// what falls (`gravity`, m/s², in the world).
+    /// Reading of an inertial unit that is fixed to the camera at `at` (m, from its origin), with
+    /// axes of the camera in a convention: the angular velocity (rad/s), and the specific force
+    /// (m/s²): the acceleration without that of what falls (`gravity`, m/s², in the world).
     ///
     /// At `at` the acceleration is a + ω × (ω × r): ways turn at constant speed, so that ω has no derivative but at poses.
     #[must_use]
@@ -127,7 +127,7 @@ impl Kinematics {
 }
 
 impl CameraMotionSpec {
-    /// The same with times that count from `time` (s) on: from the scene's clock to a frame's.
+    /// Returns the motion with times that count from `time` (s) on: from the scene's clock to a frame's.
     #[must_use]
     pub fn from_time(&self, time: f64) -> Self {
         let mut moved = self.clone();
@@ -276,7 +276,7 @@ impl Trajectory {
         self.kinematics(time).pose
     }
 
-    /// When the camera begins to move and when it stops (s).
+    /// Times at which the camera begins to move and stops (s).
     #[must_use]
     pub fn span(&self) -> [f64; 2] {
         match self {
@@ -285,7 +285,7 @@ impl Trajectory {
         }
     }
 
-    /// Whether the camera stands still between two times (s).
+    /// True if the camera stands still between two times (s).
     #[must_use]
     pub fn is_still(&self, [from, to]: [f64; 2]) -> bool {
         match self {

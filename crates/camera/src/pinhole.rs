@@ -150,13 +150,13 @@ impl Pinhole {
         self.falloff.map_or(1.0, |falloff| falloff.at(square_of(&self.intrinsics, place)))
     }
 
-    /// What the file counted the principal point from; the centre when it gave a field of view.
+    /// Origin from which the file counted the principal point; the centre when it gave a field of view.
     #[must_use]
     pub fn pixel_origin(&self) -> PixelOrigin {
         self.pixel_origin
     }
 
-    /// The same on pixels `factor` times as large.
+    /// Returns the camera on pixels `factor` times as large.
     pub(crate) fn coarser(&self, factor: f64) -> Self {
         Self { intrinsics: self.intrinsics.coarser(factor), ..self.clone() }
     }
@@ -297,7 +297,7 @@ impl Orthographic {
         self.pixel
     }
 
-    /// The same on pixels `factor` times as large.
+    /// Returns the camera on pixels `factor` times as large.
     pub(crate) fn coarser(&self, factor: f64) -> Self {
         Self { pixel: self.pixel * factor, centre: self.centre.map(|c| c / factor) }
     }

@@ -1,4 +1,4 @@
-//! Where a camera stands and which way it looks.
+//! Pose of a camera: where it stands, and which way it looks.
 
 use glam::{DMat3, DMat4, DQuat, DVec3};
 use schemars::JsonSchema;
@@ -6,8 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::CameraError;
 
-/// How far a given rotation may be from orthonormal: the entries of matrices printed with five
-/// digits are.
+/// Tolerance of a given rotation's distance from orthonormal: the entries of matrices printed with five digits are.
 const ROTATION_TOLERANCE: f64 = 1e-4;
 
 /// The axes of a camera's own frame. Both are right-handed with +X to the right.
@@ -142,7 +141,7 @@ impl Pose {
         -self.rotation.z_axis
     }
 
-    /// Whether all numbers are finite.
+    /// True if all numbers are finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.rotation.is_finite() && self.position.is_finite()

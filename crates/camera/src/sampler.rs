@@ -36,7 +36,7 @@ pub struct PixelSamples {
     sampler: Sampler,
     seed: u64,
     count: u32,
-    /// Where the pixel is along a Z-order curve.
+    /// Position of the pixel along a Z-order curve.
     place: u32,
 }
 
@@ -54,8 +54,8 @@ impl Sampler {
 }
 
 impl Sampler {
-    /// How many samples make up the set that `count` of them are taken from; `None` of a sequence. The first
-    /// samples of a larger count are those of a smaller one where both are of one set, or of a sequence.
+    /// Size of the set that `count` samples are taken from; `None` of a sequence. The first samples
+    /// of a larger count are those of a smaller one where both are of one set, or of a sequence.
     #[must_use]
     pub fn set_size(self, count: u32) -> Option<u32> {
         match self {
@@ -65,7 +65,7 @@ impl Sampler {
         }
     }
 
-    /// Whether points are those of [`sobol`].
+    /// True if points are those of [`sobol`].
     fn is_sobol(self) -> bool {
         matches!(self, Self::Sobol | Self::BlueNoise)
     }
@@ -105,7 +105,7 @@ impl PixelSamples {
         }
     }
 
-    /// Which point of which dimensions a pair is.
+    /// Key of a pair's point, and its first dimension.
     #[inline]
     fn sobol_key(&self, index: u32, pair: u32, sequence: &mut Sequence) -> (SobolKey, usize) {
         if self.sampler == Sampler::BlueNoise {
@@ -115,7 +115,7 @@ impl PixelSamples {
         (self.key_of_set(index, shift), first)
     }
 
-    /// Which point of a set a sample is. Sets have 2¹⁶ points, and start over, scrambled anew.
+    /// Key of a sample's point in a set. Sets have 2¹⁶ points, and start over, scrambled anew.
     #[inline]
     fn key_of_set(&self, index: u32, shift: u32) -> SobolKey {
         let again = (index >> 16).wrapping_mul(0x85eb_ca6b);
@@ -124,9 +124,9 @@ impl PixelSamples {
         SobolKey { index: index & 0xffff, seed }.shifted(shift)
     }
 
-    /// Which point of the picture's sequence a sample is. The scrambling of indices ([`sobol`]) puts the halves
-    /// of each square of the Z-order curve, and then each half's, in an order of the pair's own. What is
-    /// beyond 2³² points, of large pictures or many samples, is a sequence for itself.
+    /// Key of a sample's point in the picture's sequence. The scrambling of indices ([`sobol`]) puts the halves of each
+    /// square of the Z-order curve, and then each half's, in an order of the pair's own. What is beyond 2³² points, of
+    /// large pictures or many samples, is a sequence for itself.
     #[inline]
     fn blue_noise_key(&self, index: u32, pair: u32, sequence: &mut Sequence) -> SobolKey {
         let own = u64::from(self.place) * u64::from(self.count.next_power_of_two());
@@ -201,7 +201,7 @@ impl SampleKeys {
         sobol::points(&keys, first, out);
     }
 
-    /// The same in single precision, the numbers below 1, in two columns.
+    /// Numbers of a pair of dimensions in single precision, below 1, in two columns.
     pub fn floats_of_pair(&self, picked: &[u32], pair: u32, out: &mut [Vec<f32>; 2]) {
         out.iter_mut().for_each(|column| column.resize(picked.len(), 0.0));
         let [x, y] = out;
@@ -234,7 +234,7 @@ struct SobolKeys {
     keys: Vec<SobolKey>,
     /// The first of the pair.
     dimensions: usize,
-    /// Whether all of them are of samplers that have such points.
+    /// True if all of them are of samplers that have such points.
     is_sobol: bool,
 }
 
@@ -298,7 +298,7 @@ fn unit(bits: u64) -> f64 {
     (bits >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// Where `i` goes in a permutation of 0..`n` chosen by `key` (Kensler, "Correlated multi-jittered
+/// Image of `i` in a permutation of 0..`n` chosen by `key` (Kensler, "Correlated multi-jittered
 /// sampling", 2013: a hash that is a bijection of the next power of two, walked until it lands).
 fn permute(i: u32, n: u32, key: u64) -> u32 {
     let mask = n.next_power_of_two() - 1;

@@ -4,8 +4,8 @@ use etendue_geometry::RayBatch;
 
 use etendue_optics::element::{LensRays, StatusCounts};
 
-/// Where a batch of samples lies: on the film, in the pupil, and at which wavelength. The arrays have
-/// one entry a sample.
+/// Batch of samples: their places on the film and in the pupil, and their wavelengths. The arrays
+/// have one entry a sample.
 #[derive(Debug, Clone, Default)]
 pub struct FilmSamples {
     /// Columns (pixels) from the outer corner of the top left pixel, whose centre is (0.5, 0.5).
@@ -22,10 +22,10 @@ pub struct FilmSamples {
     pub leading: Vec<f64>,
     /// Times of the frame's clock (s); empty as long as nothing moves.
     pub times: Vec<f64>,
-    /// What each counts by the time for which its row is open; empty when all rows are open all the time.
+    /// Weight of each sample by the time for which its row is open; empty when all rows are open all the time.
     pub open_shares: Vec<f64>,
-    /// Which of the camera's [`band_groups`](crate::Camera::band_groups), for the bands that it was
-    /// opened for, the rays are for.
+    /// Index of the rays' group among the camera's [`band_groups`](crate::Camera::band_groups) for the
+    /// bands that the camera was opened for.
     pub group: usize,
 }
 
@@ -35,16 +35,16 @@ pub struct FilmSamples {
 pub struct CameraRays {
     /// The rays.
     pub rays: RayBatch,
-    /// What the radiance of each ray counts in the mean over its pixel's samples: relative to a pixel
+    /// Weight of the radiance of each ray in the mean over its pixel's samples: relative to a pixel
     /// that sees through an unvignetted pupil on the axis.
     pub weight: Vec<f64>,
     /// The sample of each ray.
     pub sample: Vec<u32>,
-    /// What became of the rays inside the lens, over all batches since it was last emptied.
+    /// Counts of rays by their outcome inside the lens, over all batches since it was last emptied.
     pub statuses: StatusCounts,
     /// The rays while they are in the lens.
     pub(crate) in_lens: LensRays,
-    /// Where the samples lie on the sensor (mm), one array an axis, and in the unit square.
+    /// Places of the samples on the sensor (mm), one array an axis, and in the unit square.
     pub(crate) places: [Vec<f64>; 2],
     pub(crate) squares: Vec<[f64; 2]>,
     /// The samples by the wavelength that they are traced at.
@@ -58,7 +58,7 @@ impl FilmSamples {
         self.columns.len()
     }
 
-    /// Whether there is no sample.
+    /// True if there are no samples.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.columns.is_empty()

@@ -1,4 +1,4 @@
-//! When each row of the sensor is open to light: global and rolling shutters, codes within an exposure.
+//! Shutters: when each row of the sensor is open to light. Global and rolling shutters, codes within an exposure.
 //!
 //! Times are seconds in the frame's clock, whose 0 is the moment at which the shutter opens: that of the first row
 //! that is read out, where rows open one after another.
@@ -82,7 +82,7 @@ pub enum TruthAt {
     Close,
 }
 
-/// When each row is open.
+/// Shutter: when each row is open.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shutter {
     kind: ShutterKind,
@@ -255,7 +255,7 @@ fn coded(code: &str, chip: Option<Seconds>, exposure: f64) -> Result<Vec<[f64; 2
 }
 
 impl Shutter {
-    /// How long the first row is open (s).
+    /// Exposure time of the first row (s).
     #[must_use]
     pub fn exposure(&self) -> f64 {
         self.exposure
@@ -267,13 +267,13 @@ impl Shutter {
         self.line_time
     }
 
-    /// Which rows are open when.
+    /// Kind of the shutter: which rows are open when.
     #[must_use]
     pub fn kind(&self) -> ShutterKind {
         self.kind
     }
 
-    /// Which way rows are read out.
+    /// Direction in which rows are read out.
     #[must_use]
     pub fn readout(&self) -> Readout {
         self.readout
@@ -285,18 +285,18 @@ impl Shutter {
         self.truth_at
     }
 
-    /// The same, of which data layers see another moment.
+    /// Returns the shutter with data layers that see another moment.
     pub(crate) fn with_truth_at(&self, truth_at: TruthAt) -> Self {
         Self { truth_at, ..self.clone() }
     }
 
-    /// The same for rows of the picture `factor` times as high.
+    /// Returns the shutter for rows of the picture `factor` times as high.
     pub(crate) fn coarser(&self, factor: f64) -> Self {
         Self { coarse: self.coarse * factor, ..self.clone() }
     }
 
-    /// How many rows were read out before a row of the picture, whose number may be a place between rows: 0.5 is the
-    /// middle of the first.
+    /// Number of rows read out before a row of the picture, whose number may be a place between
+    /// rows: 0.5 is the middle of the first.
     fn rows_before(&self, place: f64) -> f64 {
         let last = f64::from(self.rows) - 1.0;
         let row = place * self.coarse - 0.5;
@@ -306,7 +306,7 @@ impl Shutter {
         }
     }
 
-    /// When the row at a place (rows from the top edge) opens and closes (s).
+    /// Times at which the row at a place (rows from the top edge) opens and closes (s).
     #[must_use]
     pub fn span(&self, place: f64) -> [f64; 2] {
         let lag = self.rows_before(place) * self.line_time;
@@ -317,7 +317,7 @@ impl Shutter {
         }
     }
 
-    /// When the first row opens and the last one closes (s).
+    /// Times at which the first row opens and the last one closes (s).
     #[must_use]
     pub fn whole_span(&self) -> [f64; 2] {
         let edge = 0.5 / self.coarse;
@@ -382,14 +382,14 @@ impl Shutter {
         }
     }
 
-    /// Whether rows get all of the light of the exposure, each the same.
+    /// True if all rows get all of the light of the exposure.
     #[must_use]
     pub fn is_fully_open(&self) -> bool {
         let has_longer = self.kind == ShutterKind::GlobalReset && self.line_time > 0.0;
         self.exposure <= 0.0 || self.open.is_empty() && !has_longer
     }
 
-    /// Whether rows are seen at different moments.
+    /// True if rows are seen at different moments.
     #[must_use]
     pub fn rows_differ(&self) -> bool {
         self.kind != ShutterKind::Global && self.line_time > 0.0

@@ -38,14 +38,14 @@ static DIRECTIONS: LazyLock<[[u32; BITS]; DIMENSIONS]> = LazyLock::new(|| {
 /// A sample of a scrambled set.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct SobolKey {
-    /// Which sample, below 2¹⁶.
+    /// Index of the sample, below 2¹⁶.
     pub(crate) index: u32,
-    /// Which scrambling.
+    /// Seed of the scrambling.
     pub(crate) seed: u32,
 }
 
 impl SobolKey {
-    /// The same sample of another scrambling.
+    /// Returns the key of the sample in another scrambling.
     #[inline(always)]
     pub(crate) fn shifted(self, shift: u32) -> Self {
         Self { seed: self.seed.wrapping_add(shift), ..self }
@@ -151,7 +151,7 @@ fn apart(keys: &[SobolKey; LANES]) -> ([u32; LANES], [u32; LANES]) {
     (index, seeds)
 }
 
-/// Where all are of one scrambling, as nearly always, what goes into it is hashed once.
+/// Evaluates a chunk of keys: where all are of one scrambling, as nearly always, what goes into it is hashed once.
 #[inline(always)]
 fn chunk(
     keys: &[SobolKey; LANES],
@@ -332,8 +332,8 @@ mod tests {
         assert!((mean - 0.25).abs() < 4.0 * 0.2205 / 128.0, "{mean}");
     }
 
-    /// What a table of 2²⁴ entries leaves of a number is as even as the number: all 29 bits behind the
-    /// 24th are set as often as not.
+    /// The last bits are random: what a table of 2²⁴ entries leaves of a number is as even as the
+    /// number: all 29 bits behind the 24th are set as often as not.
     #[test]
     fn the_last_bits_are_random() {
         let count = 1 << 16;

@@ -16,9 +16,9 @@ pub(crate) struct AxisScale {
     /// The ends: values on a linear axis, else powers of ten.
     ends: [f64; 2],
     linear: bool,
-    /// Where they are.
+    /// Positions of the ends (pixels).
     pixels: [f64; 2],
-    /// Where zeros are, when they have a place of their own.
+    /// Position of zeros, when they have a place of their own.
     zero: Option<f64>,
 }
 
@@ -47,7 +47,7 @@ impl AxisScale {
         Self { ends, linear: false, pixels: [start, to], zero }
     }
 
-    /// Where `value` is; `None` where it has no place.
+    /// Position of `value`; `None` where it has no place.
     pub(crate) fn at(&self, value: f64) -> Option<f64> {
         if value == 0.0 && !self.linear {
             return self.zero;
@@ -59,12 +59,12 @@ impl AxisScale {
         share.is_finite().then_some(from + share * (to - from))
     }
 
-    /// Where zeros are, if anything is there.
+    /// Position of zeros, if anything is there.
     pub(crate) fn zero(&self) -> Option<f64> {
         self.zero
     }
 
-    /// Where the place of zeros ends.
+    /// Position where the place of zeros ends.
     pub(crate) fn start(&self) -> f64 {
         self.pixels[0]
     }
@@ -216,14 +216,14 @@ pub fn front(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
 /// An axis, logarithmic unless it is said to be linear.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Axis {
-    /// What is measured, with its unit.
+    /// Quantity on the axis, with its unit.
     pub label: String,
-    /// What a value of exactly zero is called. With it, zeros have a place of their own below all
-    /// other values; without it, they are left out.
+    /// Name of a value of exactly zero. With it, zeros have a place of their own below all other
+    /// values; without it, they are left out.
     pub zero: Option<String>,
-    /// Whether it ends where the values do, and not at the next power of ten.
+    /// True if the axis ends where the values do, and not at the next power of ten.
     pub fits: bool,
-    /// Whether it is linear, from 0 on.
+    /// True if the axis is linear, from 0 on.
     pub linear: bool,
 }
 
@@ -240,13 +240,13 @@ impl Axis {
         Self { linear: true, ..Self::new(label) }
     }
 
-    /// The same, ending where the values do.
+    /// Returns the axis ending where the values do.
     #[must_use]
     pub fn fitted(self) -> Self {
         Self { fits: true, ..self }
     }
 
-    /// The same with a place for zeros, called `name`.
+    /// Returns the axis with a place for zeros, called `name`.
     #[must_use]
     pub fn with_zero(self, name: impl Into<String>) -> Self {
         Self { zero: Some(name.into()), ..self }

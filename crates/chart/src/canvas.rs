@@ -131,7 +131,7 @@ pub(crate) fn document([width, height]: [f64; 2], theme: Theme) -> Document {
 /// Colours that the style has.
 pub(crate) const COLOURS: usize = 8;
 
-/// Where a text stands against its place.
+/// Alignment of a text with its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TextAnchor {
     /// It begins there.
@@ -215,7 +215,7 @@ pub enum Theme {
     Light,
 }
 
-/// How a line is drawn.
+/// Stroke of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Stroke {
     /// Through.

@@ -17,13 +17,13 @@ pub const GREY: usize = 7;
 pub struct Chart {
     /// The first line.
     pub title: String,
-    /// What else has to be said, one line each.
+    /// Further notes, one line each.
     pub notes: Vec<String>,
     /// Across, and upwards.
     pub axes: [Axis; 2],
     /// Whatever is measured.
     pub series: Vec<Series>,
-    /// Whether to draw the Pareto front: small values are good on both axes.
+    /// True if the Pareto front is drawn: small values are good on both axes.
     pub front: bool,
 }
 
@@ -35,13 +35,13 @@ pub struct Series {
     /// The points. Those that are not finite are left out, and those that a logarithmic axis has no
     /// place for.
     pub points: Vec<Point>,
-    /// Whether a line joins them, in their order.
+    /// True if a line joins the points, in their order.
     pub joined: bool,
-    /// How that line is drawn.
+    /// Stroke of that line.
     pub stroke: Stroke,
-    /// Which of the colours; series of one number look alike.
+    /// Index of the colour; series of one number look alike.
     pub colour: usize,
-    /// Whether the points count for the Pareto front.
+    /// True if the points count for the Pareto front.
     pub contends: bool,
 }
 
@@ -50,11 +50,11 @@ pub struct Series {
 pub struct Point {
     /// Its values.
     pub at: [f64; 2],
-    /// How it is drawn.
+    /// Mark by which the point is drawn.
     pub mark: Mark,
 }
 
-/// How a point is drawn.
+/// Mark of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mark {
     /// A disk, beside which the name may stand.

@@ -1,4 +1,4 @@
-//! Where names go: beside a point of their series, on nothing else.
+//! Placement of names: beside a point of their series, on nothing else.
 
 /// A rectangle: left, top, right, bottom (pixels).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,7 +35,7 @@ impl LabelArea {
     }
 }
 
-/// What a name would rather not cover: marks and lines.
+/// Obstacle that a name would rather not cover: marks and lines.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Obstacle {
     pub(crate) area: LabelArea,
@@ -46,7 +46,7 @@ pub(crate) struct Obstacle {
 /// A name that has found its place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PlacedName {
-    /// What the letters cover.
+    /// Area that the letters cover.
     pub(crate) area: LabelArea,
     /// A line from the name to its point, where that is not near.
     pub(crate) leader: Option<[[f64; 2]; 2]>,

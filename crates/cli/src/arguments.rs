@@ -1,4 +1,4 @@
-//! What can be asked for on the command line.
+//! Arguments of the command line.
 
 mod parse;
 mod tools;
@@ -104,7 +104,7 @@ pub(crate) enum Command {
     },
 }
 
-/// What was asked for.
+/// Parses the command line.
 pub(crate) fn parse() -> Cli {
     // A number below zero is a value, which the option's own check refuses in its own words.
     let takes_value = |arg: &clap::Arg| !arg.is_positional() && arg.get_action().takes_values();
@@ -452,12 +452,12 @@ pub(crate) struct SensorArguments {
 }
 
 impl SceneArguments {
-    /// Where the scene's files may be.
+    /// Permission of where the scene's files may be.
     pub(crate) fn reach(&self) -> Reach {
         if self.allow_outside { Reach::Anywhere } else { Reach::OwnFolder }
     }
 
-    /// How the scene is to be loaded.
+    /// Options by which the scene is to be loaded.
     pub(crate) fn load_options(&self) -> LoadOptions<'_> {
         LoadOptions {
             strictness: if self.strict { Strictness::Strict } else { Strictness::Tolerant },

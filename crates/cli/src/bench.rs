@@ -101,13 +101,13 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Whether a part is measured: those that are named, or all where no target is.
+/// True if a part is measured: those that are named, or all where no target is.
 fn wants(arguments: &BenchArguments, part: PartArgument) -> bool {
     let all = arguments.only.is_empty() && arguments.target.is_none();
     all || arguments.only.contains(&part)
 }
 
-/// What is traced.
+/// Description of what is traced.
 fn about(scene: &Scene) -> Vec<String> {
     let geometry = &scene.geometry;
     let [width, height] = scene.camera.resolution();

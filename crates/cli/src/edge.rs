@@ -14,7 +14,7 @@ use crate::arguments::EdgeArguments;
 use crate::fault::{Fault, print_json, print_text};
 use crate::progress::say;
 
-/// What is drawn, and the table beside it.
+/// File of the drawing, and of the table beside it.
 const DRAWING: &str = "edge.svg";
 const TABLE: &str = "edge.csv";
 

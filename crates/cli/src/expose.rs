@@ -73,7 +73,7 @@ pub(crate) fn run(arguments: &ExposeArguments) -> Result<(), Fault> {
     print_text(&lines.join("\n"))
 }
 
-/// What is written of a sensor's images, by its list of names.
+/// Kinds of file of a sensor's images, by a list of names.
 pub(crate) fn sensor_outputs(names: &str) -> Result<Outputs, Fault> {
     let outputs = Outputs::from_list(names)
         .map_err(|message| Fault::refused(format!("--outputs: {message}")))?;

@@ -16,7 +16,7 @@ use etendue_sensor::emva::EmvaError;
 use crate::progress::say;
 use crate::stop::STOPPED;
 
-/// Why a command failed.
+/// Error of a command that failed.
 #[derive(Debug)]
 pub(crate) enum Fault {
     /// The input was refused: exit code 2.
@@ -58,7 +58,7 @@ impl From<etendue::Error> for Fault {
     }
 }
 
-/// What the library tells of its errors holds for those of its parts.
+/// Converts errors of the library's parts as the library does.
 macro_rules! as_the_library {
     ($($error:ty),*) => {$(
         impl From<$error> for Fault {

@@ -127,7 +127,7 @@ fn report(lens: &ReadLens, arguments: &LensArguments, to: &Transaction) -> Resul
     }
 }
 
-/// What a lens is drawn into.
+/// Files that a lens is drawn into.
 const DRAWINGS: [&str; 3] = ["layout.svg", "spots.svg", "illumination.svg"];
 
 /// Draws a lens; each file appears when it is complete.

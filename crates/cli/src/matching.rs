@@ -20,7 +20,7 @@ use crate::fault::{Fault, print_json, print_text};
 use crate::progress::{Phases, say};
 use crate::stop;
 
-/// What is written.
+/// Files that are written.
 const FILES: [&str; 4] = ["match.json", "residuals.npy", "residuals.png", "residuals.svg"];
 
 /// Standard deviations that are black and white in the picture of residuals.
@@ -146,7 +146,7 @@ fn write(
     Ok(())
 }
 
-/// How often residuals are how large, beside the normal distribution.
+/// Histogram of the residuals, beside the normal distribution.
 fn histogram(residuals: &[f32]) -> String {
     const BINS: usize = 48;
     let width = 2.0 * f64::from(SHOWN) / BINS as f64;

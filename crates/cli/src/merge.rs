@@ -36,7 +36,7 @@ pub(crate) fn render_shard(
     checkpoint.map_or(Ok(()), render::remove)
 }
 
-/// How this command was called, for `etendue merge`.
+/// Call of this command, for `etendue merge`.
 fn origin() -> Result<Value, Fault> {
     let folder = std::env::current_dir()
         .map_err(|error| Fault::failed(format!("the current folder cannot be told: {error}")))?;

@@ -94,7 +94,7 @@ fn pitch(lens: &ReadLens, arguments: &LensArguments, resolution: [u32; 2]) -> Re
     })
 }
 
-/// How far from the axis (mm) the chief ray of the widest field meets the sensor.
+/// Distance from the axis (mm) at which the chief ray of the widest field meets the sensor.
 fn height(train: &OpticalTrain, sensor_z: f64) -> Option<f64> {
     let at = train.at(train.wavelength()).ok()?;
     chief_height(train, &at, WIDEST, sensor_z).map(f64::abs)

@@ -22,7 +22,7 @@ fn shown() -> Option<ProgressBar> {
     SHOWN.lock().unwrap_or_else(PoisonError::into_inner).clone()
 }
 
-/// How long the tracing will take (s), as far as somebody has said.
+/// Expected time of the tracing (s), as far as somebody has said.
 static EXPECTED: Mutex<Option<f64>> = Mutex::new(None);
 
 /// The share that is done from which on the work itself tells how long it takes.
@@ -33,8 +33,8 @@ pub(crate) fn expect(seconds: f64) {
     *EXPECTED.lock().unwrap_or_else(PoisonError::into_inner) = Some(seconds);
 }
 
-/// What remains (s) of work that is done to a `share`, for which `elapsed` (s) were taken and `expected`
-/// foreseen; `None` while nothing is known.
+/// Remaining time (s) of work that is done to a `share`, for which `elapsed` (s) were taken and
+/// `expected` foreseen; `None` while nothing is known.
 fn remaining(share: f64, elapsed: f64, expected: Option<f64>) -> Option<f64> {
     match expected {
         Some(expected) if share < TELLING => Some((expected - elapsed).max(0.0)),

@@ -20,7 +20,7 @@ use crate::fault::Fault;
 use crate::progress::say;
 use crate::waves;
 
-/// What is written.
+/// Files that are written.
 pub(crate) const FILES: [&str; 3] = ["psf.npy", "psf.exr", "psf.json"];
 
 /// Cells across the finest detail, where nothing is said.

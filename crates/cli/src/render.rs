@@ -60,7 +60,7 @@ pub(crate) fn options(arguments: &SceneArguments) -> Options {
     }
 }
 
-/// What a small part with everything says of what was taken of the scene's tolerance.
+/// Verifies what was taken of the scene's tolerance by a small part with everything.
 pub(crate) fn verified(session: &mut Session, progress: &Progress) -> Result<String, Fault> {
     match session.verify(progress)? {
         Some(verified) => Ok(format!("note: {verified}")),
@@ -218,7 +218,7 @@ pub(crate) fn refuse_result(arguments: &RenderArguments, results: &[PathBuf]) ->
     }
 }
 
-/// What a stop left of the picture, in words; `None` when it is complete.
+/// Description of what a stop left of the picture; `None` when it is complete.
 pub(crate) fn heed_stop(rendering: &Rendering, discards: bool) -> Result<Option<String>, Fault> {
     stop::saves(false);
     let Some(partial) = rendering.partial() else { return Ok(None) };
@@ -234,15 +234,15 @@ pub(crate) fn heed_stop(rendering: &Rendering, discards: bool) -> Result<Option<
 struct Watching {
     keeps: bool,
     to: Transaction,
-    /// Where the picture so far is shown; nowhere when no PNG is wanted. It goes when this does, and
-    /// so does that of a run that was killed.
+    /// File in which the picture so far is shown; nowhere when no PNG is wanted. It goes when this
+    /// does, and so does that of a run that was killed.
     place: Option<(PathBuf, Temporary)>,
     start: Instant,
-    /// How long it took to write it last, and when that was done.
+    /// Time that it took to write it last, and when that was done.
     shown: Mutex<Option<(Duration, Instant)>>,
 }
 
-/// What there is of a render, to go on from.
+/// File of what there is of a render, to go on from.
 const CHECKPOINT: &str = "checkpoint.film";
 
 /// The picture so far.
@@ -266,7 +266,7 @@ impl Watching {
         }
     }
 
-    /// Whether a picture of so many pixels is worth its writing now.
+    /// True if a picture of so many pixels is worth its writing now.
     fn is_due(&self, last: Option<(Duration, Instant)>, share: f64) -> bool {
         let left = self.start.elapsed().as_secs_f64() * (1.0 / share.max(1e-9) - 1.0);
         match last {

@@ -1,4 +1,4 @@
-//! Whether there is room for the program itself where the shell limits its addresses (`ulimit -v`).
+//! Room for the program itself where the shell limits its addresses (`ulimit -v`).
 //!
 //! What a scene takes is forecast and refused by name. Stacks of threads, and the lists of a few bytes
 //! that are everywhere, are not: without room for them a library ends the process.
@@ -12,11 +12,11 @@ use crate::fault::Fault;
 /// with one such arena for all, a limit holds what is used.
 const ARENAS: (&str, &str) = ("MALLOC_ARENA_MAX", "1");
 
-/// What the program itself takes beside its threads (bytes): Embree's device and what measures this machine
+/// Memory that the program itself takes beside its threads (bytes): Embree's device and what measures this machine
 /// among it. With less, whether a library ends the process is a matter of which thread asks first.
 const ITSELF: u64 = 200 << 20;
 
-/// What each thread takes (bytes): a stack of ours, one of Embree's, and their small lists.
+/// Memory that each thread takes (bytes): a stack of ours, one of Embree's, and their small lists.
 const THREAD: u64 = 8 << 20;
 
 /// Refuses to work on so many threads (all, for 0) where the shell leaves too few addresses. Under such a
@@ -40,7 +40,7 @@ pub(crate) fn secure(threads: usize) -> Result<(), Fault> {
     )))
 }
 
-/// The same command once more, in this process. Returns where that cannot be had, and then goes on.
+/// Runs the command once more, in this process. Returns where that cannot be had, and then goes on.
 #[cfg(unix)]
 fn restart() {
     use std::os::unix::process::CommandExt;

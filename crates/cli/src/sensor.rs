@@ -96,7 +96,7 @@ fn word(origin: Origin) -> &'static str {
     }
 }
 
-/// How origins are marked in the list.
+/// Mark of an origin in the list.
 fn mark(origin: Origin) -> &'static str {
     match origin {
         Origin::Published => "p",
@@ -185,7 +185,7 @@ fn curves(arguments: &SensorArguments, inputs: &[PathBuf], file: &SensorFile) ->
     print_text(&(heading + &found.curves.table()))
 }
 
-/// What the curves are written into.
+/// Files that the curves are written into.
 const CURVES: [&str; 2] = ["curves.svg", "curves.json"];
 
 /// The names of all files of a series.

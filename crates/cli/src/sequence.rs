@@ -174,7 +174,7 @@ fn chosen<'f>(frames: &'f [Frame], range: &Range<usize>) -> Result<&'f [Frame], 
     })
 }
 
-/// Where what there is of a frame is kept, beside the folders of the frames.
+/// File that keeps what there is of a frame, beside the folders of the frames.
 fn checkpoint_of(frame: &Frame) -> String {
     format!("frame-{:06}.checkpoint.film", frame.number)
 }

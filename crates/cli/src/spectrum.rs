@@ -18,7 +18,7 @@ use crate::progress::say;
 /// The longest file that is read (bytes).
 const LONGEST: u64 = 1 << 26;
 
-/// What the curves are drawn into.
+/// File that the curves are drawn into.
 const DRAWING: &str = "spectrum.svg";
 
 pub(crate) fn run(arguments: &SpectrumArguments) -> Result<(), Fault> {

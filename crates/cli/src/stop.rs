@@ -29,10 +29,10 @@ static SAVES: AtomicBool = AtomicBool::new(false);
 /// A folder that was made for the results.
 static NEW_FOLDER: Mutex<Option<PathBuf>> = Mutex::new(None);
 
-/// How long the work may take to answer: what it has begun, it may end, within what feels immediate.
+/// Time that the work may take to answer: what it has begun, it may end, within what feels immediate.
 const PATIENCE: Duration = Duration::from_millis(200);
 
-/// What is said of work that left nothing.
+/// Message on work that left nothing.
 pub(crate) const STOPPED: &str = "stopped; no unfinished file was left";
 
 /// Takes over Ctrl-C and the termination signals for the rest of the process, whose end is said by `say`. A
@@ -102,7 +102,7 @@ fn end(say: fn(&str)) -> ! {
     exit(1)
 }
 
-/// Whether the work should stop.
+/// True if the work should stop.
 pub(crate) fn asked() -> bool {
     REQUESTS.load(Ordering::Relaxed) > 0 && !HEEDED.load(Ordering::Relaxed)
 }

@@ -17,7 +17,7 @@ use crate::arguments::LensArguments;
 use crate::fault::Fault;
 use crate::progress::say;
 
-/// What a lens in waves may be written into.
+/// Files that a lens in waves may be written into.
 pub(crate) const FILES: [&str; 14] = [
     "mtf.svg",
     "through-focus.svg",
@@ -49,7 +49,7 @@ pub(crate) struct With<'a> {
     pub(crate) waves: &'a WaveReport,
 }
 
-/// Whether waves are asked for, by themselves or by what only they obey.
+/// True if waves are asked for, by themselves or by what only they obey.
 pub(crate) fn are_asked(arguments: &LensArguments) -> bool {
     arguments.waves || arguments.report.is_some() || premise(arguments).is_some()
 }

@@ -1,4 +1,4 @@
-//! What is to be set to make one scene out of another.
+//! Settings that make one scene out of another.
 
 use etendue_scene::ScenePath;
 use serde_json::{Map, Value};

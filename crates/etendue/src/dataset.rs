@@ -22,10 +22,10 @@ use serde_json::{Map, Value, json};
 
 use crate::{Error, FramePattern, rendering};
 
-/// What lists them.
+/// File that lists the frames.
 const INDEX: &str = "index.json";
 
-/// What nerfstudio reads.
+/// File that nerfstudio reads.
 const TRANSFORMS: &str = "transforms.json";
 
 /// COLMAP's text model: its folder and files.
@@ -48,7 +48,7 @@ struct Entry {
     rig: Option<RigCamera>,
     time: Option<f64>,
     folder: Option<String>,
-    /// What it is called where it has no picture.
+    /// Name of the frame where it has no picture.
     name: String,
     camera: CameraFile,
     world_from_camera: [[f64; 4]; 4],
@@ -59,7 +59,7 @@ struct Entry {
     scene_hash: String,
     seed: u64,
     samples: SamplesSpec,
-    /// What annotates it, and its depth as BOP has it.
+    /// File that annotates the frame, and its depth as BOP has it.
     annotations: [String; 2],
 }
 
@@ -158,7 +158,7 @@ impl Dataset {
         Ok(annotations::write_sets(&shots, &self.models, (to, folder), outputs)?)
     }
 
-    /// What a user should know of what the formats of others have no place for.
+    /// Notes for the user on what the formats of others have no place for.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let why = self.timing().err();
@@ -172,9 +172,9 @@ impl Dataset {
         why.map(note).into_iter().filter(|_| self.entries.iter().all(Entry::has_k)).collect()
     }
 
-    /// How all frames are exposed, as `transforms.json` for moving cameras has it (Seiskari et al., "Gaussian Splatting on
-    /// the Move", 2024): a row y of h is taken (y / h - 1/2) times the readout after the frame's pose. `None` where no camera
-    /// moves, and why not where the format has no place for it.
+    /// Timing of all frames' exposures, as `transforms.json` for moving cameras has it (Seiskari et al., "Gaussian
+    /// Splatting on the Move", 2024): a row y of h is taken (y / h - 1/2) times the readout after the frame's pose.
+    /// `None` where no camera moves, and why not where the format has no place for it.
     fn timing(&self) -> Result<Option<Timing>, &'static str> {
         if self.entries.iter().all(|entry| entry.velocities().is_none()) {
             return Ok(None);
@@ -375,7 +375,7 @@ fn layer_files(
 /// By rows.
 type Matrix = [[f64; 4]; 4];
 
-/// How a picture is exposed (s).
+/// Timing of a picture's exposure (s).
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Timing {
     exposure: f64,

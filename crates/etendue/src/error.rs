@@ -1,4 +1,4 @@
-//! Why something could not be done.
+//! Errors of the library.
 
 use std::io;
 
@@ -38,8 +38,8 @@ impl From<WriteError> for Error {
     }
 }
 
-/// Why a scene could not be opened, changed, rendered or written. The message is a sentence that names
-/// the file, the place in it and the remedy, as on the command line.
+/// Error of a scene that could not be opened, changed, rendered or written. The message is a
+/// sentence that names the file, the place in it and the remedy, as on the command line.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -55,7 +55,7 @@ pub enum Error {
     /// The sensor's images.
     #[error(transparent)]
     Expose(#[from] ExposeError),
-    /// What a light-field camera leaves.
+    /// The files of a light-field camera.
     #[error(transparent)]
     LightField(LightFieldError),
     /// A place for results that cannot be written to, known before any work.
@@ -67,14 +67,14 @@ pub enum Error {
 }
 
 impl Error {
-    /// What the command line says of it: the sentence, behind it those of its causes that it does not quote, and the
-    /// remedy on a line of its own.
+    /// Message as the command line prints it: the sentence, behind it those of its causes that it
+    /// does not quote, and the remedy on a line of its own.
     #[must_use]
     pub fn message(&self) -> String {
         Refusal::of(self).to_string()
     }
 
-    /// Whether it is no fault: the caller asked to stop.
+    /// True if it is no fault: the caller asked to stop.
     #[must_use]
     pub fn is_stopped(&self) -> bool {
         matches!(
@@ -88,8 +88,8 @@ impl Error {
         )
     }
 
-    /// Whether the caller can mend it by another scene, setting or place. What is left are stops, full
-    /// disks and faults of this program.
+    /// True if the caller can mend it by another scene, setting or place. What is left are stops,
+    /// full disks and faults of this program.
     #[must_use]
     pub fn is_refused(&self) -> bool {
         match self {

@@ -43,7 +43,7 @@ impl ExposedImage {
         &self.light
     }
 
-    /// What a user should know.
+    /// Notes for the user.
     pub fn notes(&self) -> impl Iterator<Item = &str> {
         self.notes.iter().chain(self.light.notes()).map(String::as_str)
     }

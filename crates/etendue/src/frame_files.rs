@@ -1,4 +1,4 @@
-//! Where the files of frames go, and which frames are complete.
+//! Places of the files of frames, and which frames are complete.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -64,8 +64,8 @@ impl FramePattern {
         Ok(Self { text: text.to_owned(), folder: folder.map(str::to_owned) })
     }
 
-    /// Where frame `number` has `file`, which is a layer's name with its ending, as seen from the folder of
-    /// all frames.
+    /// Path of `file`, which is a layer's name with its ending, of frame `number`, as seen from the
+    /// folder of all frames.
     #[must_use]
     pub fn place(&self, number: usize, file: &str) -> String {
         let (layer, ending) = file.split_once('.').unwrap_or((file, ""));
@@ -86,7 +86,7 @@ impl FramePattern {
         self.folder.as_ref().map(|folder| numbered(folder, number))
     }
 
-    /// Whether something of frame `number` may be in `out`.
+    /// True if something of frame `number` may be in `out`.
     #[must_use]
     pub fn is_begun(&self, out: &Path, number: usize) -> bool {
         match &self.folder {
@@ -95,8 +95,8 @@ impl FramePattern {
         }
     }
 
-    /// Whether `out` holds a frame whose headers have these fingerprints, as it was written, with `files`
-    /// among its own.
+    /// True if `out` holds a frame whose headers have these fingerprints, as it was written, with
+    /// `files` among its own.
     #[must_use]
     pub fn is_complete(
         &self,
@@ -232,10 +232,10 @@ impl FramePattern {
     }
 }
 
-/// What lists the files of a frame, where they lie among those of others.
+/// File that lists the files of a frame, where they lie among those of others.
 const RECORD: &str = "frames/{frame}.json";
 
-/// Whether a place that lists files is a record, and no folder.
+/// True if a place that lists files is a record, and no folder.
 pub(crate) fn is_record(place: &Path) -> bool {
     place.extension().is_some_and(|ending| ending == "json")
 }
@@ -268,8 +268,8 @@ fn read_record(path: &Path) -> Option<Record> {
     serde_json::from_slice(&fs::read(path).ok()?).ok()
 }
 
-/// Whether `folder` has a complete picture of the scene with these fingerprints, `files` among its files,
-/// and all as they were written.
+/// True if `folder` has a complete picture of the scene with these fingerprints, `files` among its
+/// files, and all as they were written.
 fn is_rendered(folder: &Path, fingerprints: &[(String, String)], files: &[String]) -> bool {
     let Some((header, found)) = complete_picture(folder) else { return false };
     // What its noise was taken out of is another picture.
@@ -281,7 +281,7 @@ fn is_rendered(folder: &Path, fingerprints: &[(String, String)], files: &[String
         && Ledger::open(folder, "render").is_whole()
 }
 
-/// Whether a header has these fingerprints among its entries.
+/// True if a header has these fingerprints among its entries.
 fn is_of(header: &Value, fingerprints: &[(String, String)]) -> bool {
     let is_same = |(key, print): &(String, String)| {
         header.get(key).and_then(Value::as_str) == Some(print.as_str())

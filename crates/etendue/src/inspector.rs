@@ -1,4 +1,4 @@
-//! What the camera sees at one place of its picture.
+//! Inspection of what the camera sees at one place of its picture.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ pub struct Inspector {
     decisions: Arc<[Decision]>,
 }
 
-/// What the chief ray of a place of the picture hits.
+/// Hit of the chief ray of a place of the picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Probe {
     /// Along the ray, from the camera's origin (m): the layer `distance`.
@@ -61,14 +61,14 @@ impl Inspector {
         &self.scene
     }
 
-    /// What the plan decides for it, and why.
+    /// Decisions of the plan, with their reasons.
     #[must_use]
     pub fn decisions(&self) -> &[Decision] {
         &self.decisions
     }
 
-    /// Where the camera stands, to be moved about what `probe` hit; without one, about what stands in the
-    /// middle of the picture, or else about the middle of the scene.
+    /// Viewpoint of the camera, to be moved about what `probe` hit; without one, about what stands
+    /// in the middle of the picture, or else about the middle of the scene.
     #[must_use]
     pub fn viewpoint(&self, probe: Option<&Probe>) -> Viewpoint {
         let camera = &self.scene.camera;
@@ -80,7 +80,7 @@ impl Inspector {
         Viewpoint::of(camera, distance)
     }
 
-    /// How much of the world the picture of a camera with parallel rays is high (m); `None` for others.
+    /// Height in the world of the picture of a camera with parallel rays (m); `None` for others.
     #[must_use]
     pub fn picture_height(&self) -> Option<f64> {
         let camera = &self.scene.camera;
@@ -96,8 +96,8 @@ impl Inspector {
         (bounds.centre() - pose.position).dot(pose.forward())
     }
 
-    /// What is seen at column and row coordinates `place` (pixels from the picture's corner; the first
-    /// pixel's centre is at 0.5). `None` for the background, and where the camera sees nothing.
+    /// Looks up what is seen at column and row coordinates `place` (pixels from the picture's corner; the first pixel's
+    /// centre is at 0.5). `None` for the background, and where the camera sees nothing.
     #[must_use]
     pub fn probe(&self, [column, row]: [f64; 2]) -> Option<Probe> {
         let mut rays = RayBatch::default();

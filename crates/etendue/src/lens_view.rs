@@ -16,14 +16,14 @@ const BOARD_DISTANCE: f64 = 40.0;
 /// Squares of the board over the height of the picture.
 const BOARD_SQUARES: f64 = 8.0;
 
-/// What is known of a camera's lens.
+/// Data of a camera's lens.
 #[derive(Debug, Clone)]
 pub struct LensView {
     /// Its figures: first-order data, spots, distortion, illumination.
     pub report: LensReport,
     /// The lens cut along its axis.
     pub section: Section,
-    /// What its curves in waves are of.
+    /// Lens and its planes, for the curves in waves.
     pub(crate) in_focus: InFocus,
 }
 

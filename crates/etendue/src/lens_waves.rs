@@ -1,4 +1,4 @@
-//! What a camera's lens does in waves, for curves: fans and modulation at a few fields of the plane in focus.
+//! Wave analysis of a camera's lens, for curves: fans and modulation at a few fields of the plane in focus.
 
 use etendue_geometry::glam::DVec3;
 use etendue_optics::analysis::colours::wavefronts;

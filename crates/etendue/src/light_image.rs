@@ -38,10 +38,10 @@ pub struct LightImage {
     notes: Vec<String>,
 }
 
-/// How a picture of light is exposed.
+/// Options of exposing a sensor to a picture of light.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ExposeOptions {
-    /// What its values are; `None` where the file says so.
+    /// Unit of the picture's values; `None` where the file says so.
     pub unit: Option<LightUnit>,
     /// The f-number of the lens, which makes irradiance of radiance: E = π L / (1 + 4 N² (1 + m)²). `None` where the
     /// file has the pupil of a render's camera.
@@ -52,14 +52,14 @@ pub struct ExposeOptions {
     pub seed: Option<u64>,
     /// The number of the frame, from 0: others have noise of their own.
     pub frame: u32,
-    /// How much memory may be taken in all (bytes); `None` for what the system has free.
+    /// Memory that may be taken in all (bytes); `None` for what the system has free.
     pub memory: Option<u64>,
 }
 
 /// The program itself, its libraries, and buffers of files that are written (bytes).
 const BESIDE: u64 = 16 << 20;
 
-/// What a file says beside its values.
+/// Data of a file beside its values.
 #[derive(Debug, Default)]
 struct Sidecar {
     unit: Option<String>,
@@ -85,7 +85,7 @@ impl Sidecar {
         }
     }
 
-    /// What `layers.json` beside the array at `path` says of it.
+    /// Reads what `layers.json` beside the array at `path` says of it.
     fn of_array(path: &Path) -> Option<(Self, PathBuf)> {
         let json = path.with_file_name("layers.json");
         let bytes = etendue_files::read(&json, 1 << 28).ok()?;
@@ -377,7 +377,7 @@ impl LightImage {
         self.picture.size
     }
 
-    /// What each pixel has.
+    /// Light of each pixel.
     #[must_use]
     pub fn light(&self) -> &PixelLight {
         &self.picture.light
@@ -389,7 +389,7 @@ impl LightImage {
         self.unit.as_deref()
     }
 
-    /// What a user should know.
+    /// Notes for the user.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes

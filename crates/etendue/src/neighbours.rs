@@ -113,7 +113,7 @@ impl Neighbour {
         Some(FollowedFrame::new(self.step, scene, &self.scene, self.accel.as_deref()?))
     }
 
-    /// What tells, in the header of files, which frame it was.
+    /// Entry in the header of files that tells which frame it was.
     pub(crate) fn header(&self) -> Result<(String, String), Error> {
         let way = if self.step.count() > 0 { "on" } else { "back" };
         let along = match self.step.along() {

@@ -1,4 +1,4 @@
-//! How a scene is opened.
+//! Options of opening a scene.
 
 use std::path::PathBuf;
 
@@ -6,14 +6,14 @@ use etendue_files::Reach;
 use etendue_render::output::Outputs;
 use etendue_scene::Strictness;
 
-/// How a scene is opened and built.
+/// Options of opening and building a scene.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// Settings of the scene's values, as pairs of a path and JSON: (`camera.fov`, `30`).
     pub settings: Vec<(String, String)>,
-    /// What becomes of defects in the data.
+    /// Treatment of defects in the data.
     pub strictness: Strictness,
-    /// Whether files outside of the scene's folder may be read.
+    /// Permission to read files outside of the scene's folder.
     pub reach: Reach,
     /// Catalogues of glasses in Zemax' AGF format, looked through before the built-in one, the last first. They
     /// are inputs like what the scene names.
@@ -24,17 +24,17 @@ pub struct Options {
     pub camera: Option<String>,
     /// The most memory that may be taken (bytes); `None` for what the system has free.
     pub memory_limit: Option<u64>,
-    /// Whether models are read into memory instead of being used where their files are mapped: for files that
-    /// other programs change meanwhile.
+    /// True if models are read into memory instead of being used where their files are mapped: for
+    /// files that other programs change meanwhile.
     pub copy: bool,
-    /// What is to be written of the pictures: without NPY data layers are kept in single precision.
+    /// Kinds of file to be written of the pictures: without NPY data layers are kept in single precision.
     pub outputs: Outputs,
-    /// Whether the structure is watertight (see [`etendue_accel::BuildOptions::robust`]).
+    /// True if the structure is watertight (see [`etendue_accel::BuildOptions::robust`]).
     pub robust: bool,
     /// One of Embree's instruction sets (see [`etendue_accel::BuildOptions::isa`]).
     pub isa: Option<String>,
-    /// Whether memory for the picture and the structure is spoken for when the scene is loaded, so that a
-    /// render that would not fit is refused before any work is done.
+    /// True if memory for the picture and the structure is spoken for when the scene is loaded, so
+    /// that a render that would not fit is refused before any work is done.
     pub to_render: bool,
 }
 

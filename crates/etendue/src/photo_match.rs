@@ -19,7 +19,7 @@ pub struct RawPhoto {
     pub size: [usize; 2],
     /// DN, `[row][column]`.
     pub numbers: Vec<u16>,
-    /// Where it saturates (DN), where its file says it.
+    /// White level: the number at which it saturates (DN), where its file says it.
     pub white: Option<f64>,
     /// Exposure time (s), where its file says it.
     pub exposure: Option<f64>,
@@ -53,10 +53,10 @@ impl RawPhoto {
     }
 }
 
-/// What a photograph says of a scene.
+/// Result of matching a scene to a photograph.
 #[derive(Debug, Clone)]
 pub struct PhotoMatch {
-    /// What was fitted.
+    /// Parameters that were fitted.
     pub matched: Matched,
     /// Exposure of the simulation (s).
     pub exposure: f64,

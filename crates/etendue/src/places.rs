@@ -1,4 +1,4 @@
-//! Where results go: made, and checked against the inputs, before any work is done.
+//! Destinations of results: made, and checked against the inputs, before any work is done.
 
 use std::fs;
 use std::path::{Path, PathBuf};

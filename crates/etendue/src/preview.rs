@@ -13,7 +13,7 @@ use etendue_sensor::RawImage;
 
 use crate::{Error, Progress, Rendering, Session};
 
-/// How rough a preview is.
+/// Roughness of a preview.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Roughness {
     /// Pixels along the side of one of the preview's; 1 is the picture's own size.
@@ -72,7 +72,7 @@ impl Preview {
         self.picture.layers()
     }
 
-    /// What a user should know.
+    /// Notes for the user.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes
@@ -108,9 +108,9 @@ impl Preview {
         Ok(self.raw.get_or_init(|| raw).as_ref())
     }
 
-    /// What is measured at column and row coordinates `place` of the picture at its own size (pixels): names
-    /// and values with their units. Digital numbers, and the mean electrons that they stand for where the
-    /// sensor has a gain, of each channel; then every layer's channels.
+    /// Reads the values at column and row coordinates `place` of the picture at its own size
+    /// (pixels): names and values with their units. Digital numbers, and the mean electrons that
+    /// they stand for where the sensor has a gain, of each channel; then every layer's channels.
     ///
     /// # Errors
     ///
@@ -202,7 +202,7 @@ impl Session {
     }
 }
 
-/// What a layer has at pixel `i`: its name, and its values with their unit.
+/// Reading of a layer at pixel `i`: its name, and its values with their unit.
 pub(crate) fn layer_reading(layer: &Layer, i: usize) -> (String, String) {
     let values = layer.channels.iter().map(|channel| format!("{:.4}", channel.values.at(i)));
     let unit = layer.meaning.iter().find(|(key, _)| key == "unit");

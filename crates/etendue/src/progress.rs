@@ -1,4 +1,4 @@
-//! How far work is, who is told, and how it is stopped.
+//! Progress of work: its observer, and how it is stopped.
 
 use std::fmt;
 use std::sync::Arc;
@@ -102,7 +102,7 @@ impl Progress {
         self.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Whether [`Self::cancel`] was called.
+    /// True if [`Self::cancel`] was called.
     #[must_use]
     pub fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)

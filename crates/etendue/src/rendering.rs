@@ -44,7 +44,7 @@ pub struct Rendering {
     fingerprints: Vec<(String, String)>,
 }
 
-/// Whether a picture stands by itself.
+/// Part of the results that a picture is: whole by itself, or a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Part {
     /// It does, and its sets are of it alone.
@@ -53,14 +53,14 @@ enum Part {
     Frame,
 }
 
-/// What was written.
+/// Files that were written.
 #[derive(Debug, Clone, Default)]
 pub struct Written {
     /// The files, in the order in which they were written.
     pub files: Vec<PathBuf>,
-    /// What a user should know of them.
+    /// Notes for the user on the files.
     pub notes: Vec<String>,
-    /// How long it took.
+    /// Duration of the writing.
     pub time: Duration,
 }
 
@@ -78,9 +78,9 @@ impl Rendering {
         Ok(Self { scene, picture, light, idle_notes, report, traced, fingerprints })
     }
 
-    /// The same with the picture's noise taken out: beside the picture, which stays as it is, stands the
-    /// layer `Denoised`, and `picture.png` shows it. What the sensor makes of the light keeps its noise. The
-    /// layers `MeanAlbedo` and `MeanNormal`, where there are both, keep edges and patterns sharp.
+    /// Returns the rendering with the picture's noise taken out: beside the picture, which stays as it is, stands the
+    /// layer `Denoised`, and `picture.png` shows it. What the sensor makes of the light keeps its noise. The layers
+    /// `MeanAlbedo` and `MeanNormal`, where there are both, keep edges and patterns sharp.
     ///
     /// # Errors
     ///
@@ -106,7 +106,8 @@ impl Rendering {
         &self.scene
     }
 
-    /// What tells, in the headers of files, which scene is shown, and which other frames it is compared with.
+    /// Fingerprints that tell, in the headers of files, which scene is shown, and which other
+    /// frames it is compared with.
     #[must_use]
     pub fn fingerprints(&self) -> &[(String, String)] {
         &self.fingerprints
@@ -161,13 +162,13 @@ impl Rendering {
             .map_err(expose::ExposeError::from)?)
     }
 
-    /// What the render did and cost. Its files and the time to write them are not in it.
+    /// Report of what the render did and cost. Its files and the time to write them are not in it.
     #[must_use]
     pub fn report(&self) -> &Report {
         &self.report
     }
 
-    /// What a user should know.
+    /// Notes for the user.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.report.notes
@@ -285,7 +286,7 @@ impl Rendering {
         report
     }
 
-    /// What a light-field camera leaves beside its picture; nothing of others.
+    /// Writes what a light-field camera leaves beside its picture; nothing of others.
     fn write_light_field(
         &self,
         to: (&Transaction, &Path),
@@ -298,7 +299,7 @@ impl Rendering {
         Ok(light_field::write(rendering, &self.picture, to, outputs, &goes_on)?)
     }
 
-    /// What tells the scene's copies apart, and names by their shares of pixels.
+    /// Writes what tells the scene's copies apart, and names by their shares of pixels.
     fn write_annotations(
         &self,
         (to, folder): (&Transaction, &Path),

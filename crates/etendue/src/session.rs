@@ -50,7 +50,7 @@ pub struct Session {
     shown: Option<(usize, SceneFile)>,
     /// All frames, where layers compare them.
     frames: Option<Arc<[Frame]>>,
-    /// What a user should know of the file that the frames come from.
+    /// Notes for the user on the file that the frames come from.
     frame_notes: Vec<String>,
     options: Options,
     /// The user's catalogues of glasses.
@@ -61,13 +61,13 @@ pub struct Session {
     loaded: Option<LoadedScene>,
     structures: Structures,
     images: Arc<Images>,
-    /// What was set since it was opened.
+    /// Settings since the session was opened.
     settings: Vec<(String, String)>,
-    /// What was done since the last render.
+    /// Seconds of what was done since the last render.
     seconds: Seconds,
-    /// Where what there is of a render is kept.
+    /// Checkpoint in which what there is of a render is kept.
     checkpoint: Option<Checkpoint>,
-    /// What takes the noise out of pictures, once it was asked for.
+    /// Denoiser of pictures, once it was asked for.
     denoiser: Option<Denoiser>,
     /// The exposure that was metered on the first frame (s), which all frames have.
     metered: Option<f64>,
@@ -85,13 +85,13 @@ struct LoadedScene {
     accel: Option<Arc<dyn Accel>>,
     /// Other frames that it is compared with.
     neighbours: Vec<Neighbour>,
-    /// Whether images are those of this scene, and how much of them there is.
+    /// State of the images of this scene: whether they are decoded, and how much of them.
     decoded: Decoded,
-    /// What is rendered in its place, once that was looked for.
+    /// Coarser scene that is rendered in its place, once that was looked for.
     coarse: Option<CoarseScene>,
 }
 
-/// What there is of a scene's images.
+/// State of a scene's images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Decoded {
     /// Nothing yet.
@@ -179,7 +179,7 @@ impl Session {
         self.shown.as_ref().map_or(&self.file, |(_, shown)| shown)
     }
 
-    /// Where files that the scene names may be.
+    /// Permission of where files that the scene names may be.
     pub(crate) fn reach(&self) -> etendue_files::Reach {
         self.options.reach
     }
@@ -274,7 +274,7 @@ impl Session {
         self.loaded = None;
     }
 
-    /// Whether `out` holds all files of frame `number`, named by `pattern`, as the scene is now.
+    /// True if `out` holds all files of frame `number`, named by `pattern`, as the scene is now.
     ///
     /// # Errors
     ///
@@ -295,7 +295,7 @@ impl Session {
         Ok(pattern.is_complete(out, number, &prints, &files))
     }
 
-    /// What is known of the next render before it is begun; the scene is read when it is not.
+    /// Prospect of the next render before it is begun; the scene is read when it is not.
     ///
     /// # Errors
     ///
@@ -318,8 +318,8 @@ impl Session {
         Ok(&self.loaded()?.scene)
     }
 
-    /// What a render will do, and why. Of a scene with a tolerance, what is taken of it is found, which takes the
-    /// structure and the images.
+    /// Plan of a render: what it will do, and why. Of a scene with a tolerance, what is taken of it
+    /// is found, which takes the structure and the images.
     ///
     /// # Errors
     ///
@@ -430,7 +430,7 @@ impl Session {
     }
 }
 
-/// What frames of a path set, and nothing else.
+/// Path of the setting that frames of a path make, and nothing else.
 const POSE: &str = "camera.pose";
 
 /// Refuses files that none of `layers` is written as, nor the light of the `scene`'s sensor.

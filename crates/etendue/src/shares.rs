@@ -26,12 +26,12 @@ impl Shares {
         Ok(Self { files: paths.into_iter().map(read).collect::<Result<_, _>>()? })
     }
 
-    /// Whether they are of the samples, and not of the rows.
+    /// True if they are of the samples, and not of the rows.
     pub(crate) fn are_of_samples(&self) -> bool {
         self.files.iter().any(|file| file.header.shard.is_of_samples())
     }
 
-    /// What was given to the first share as its origin.
+    /// Origin that was given to the first share.
     #[must_use]
     pub fn origin(&self) -> Option<&Value> {
         self.files.first().map(|file| &file.header.origin)

@@ -39,7 +39,7 @@ pub struct Still {
 }
 
 impl Still {
-    /// Whether a file's name says that it is an image.
+    /// True if a file's name ends like that of an image.
     #[must_use]
     pub fn is_named(path: &Path) -> bool {
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
@@ -180,7 +180,7 @@ impl Still {
         Some(channels.map(|(k, channel)| (channel.name.clone(), values(k))).collect())
     }
 
-    /// What a user should know.
+    /// Notes for the user.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes
@@ -195,8 +195,8 @@ impl Still {
         Ok(Screen::of_layer(&self.picture, layer)?)
     }
 
-    /// What the file has at column and row coordinates `place` (pixels): names and values with their units;
-    /// of integers the numbers themselves beside their linear light. Empty outside of the picture.
+    /// Reads the file's values at column and row coordinates `place` (pixels): names and values with their units; of
+    /// integers the numbers themselves beside their linear light. Empty outside of the picture.
     #[must_use]
     pub fn reading(&self, place: [f64; 2]) -> Vec<(String, String)> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below 0 is 0")]
@@ -222,7 +222,7 @@ fn place_of(full_name: &str) -> (&str, &str) {
     }
 }
 
-/// The same of a channel of a spectral image, named as this program names its bands.
+/// Layer and channel name of a channel of a spectral image, named as this program names its bands.
 fn spectral_place(full_name: &str) -> Option<(&'static str, String)> {
     let (component, nm) = cube::spectral_channel(full_name)?;
     let layer = match component {

@@ -25,22 +25,22 @@ struct Built {
     accel: Arc<dyn Accel>,
     geometry: Arc<Geometry>,
     name: Option<AccelName>,
-    /// Whether its hits are solved again in f64.
+    /// True if its hits are solved again in f64.
     refine: bool,
     /// Between which times (s) what moves is in it.
     exposure: [f64; 2],
     /// Nothing of it is of one before.
     is_new: bool,
-    /// What was left out of it.
+    /// Parts that were left out of it.
     unseen: Option<Unseen>,
 }
 
-/// Whether a picture depends on how the structure was built.
+/// True if a picture depends on how the structure was built.
 fn wants_new(plan: &Plan) -> bool {
     plan.light_precision == HitPrecision::Single && plan.layers.iter().any(|l| l.is_averaged())
 }
 
-/// Whether a structure without `lacks` answers rays that cannot meet what is `unseen`.
+/// True if a structure without `lacks` answers rays that cannot meet what is `unseen`.
 fn serves(lacks: Option<&Unseen>, unseen: Option<&Unseen>) -> bool {
     match (lacks, unseen) {
         (None, _) => true,
@@ -50,7 +50,7 @@ fn serves(lacks: Option<&Unseen>, unseen: Option<&Unseen>) -> bool {
 }
 
 impl Structures {
-    /// Whether `accel` has all of the surfaces of its scene.
+    /// True if `accel` has all of the surfaces of its scene.
     pub(crate) fn is_whole(&self, accel: &Arc<dyn Accel>) -> bool {
         let is_own = |built: &&Built| Arc::ptr_eq(&built.accel, accel);
         self.built.iter().find(is_own).is_none_or(|built| built.unseen.is_none())

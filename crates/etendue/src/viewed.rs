@@ -1,4 +1,4 @@
-//! What a file is that somebody wants to look at.
+//! Kinds of file that somebody wants to look at.
 
 use std::path::Path;
 

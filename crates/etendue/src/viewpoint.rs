@@ -1,4 +1,4 @@
-//! Where a camera stands and what it looks at, moved as by hand.
+//! Viewpoint: where a camera stands and what it looks at, moved as by hand.
 
 use etendue_camera::{Camera, Projection};
 use etendue_geometry::glam::{DQuat, DVec3};

@@ -1,4 +1,4 @@
-//! What is said of a picture: in the headers of its files, and in notes.
+//! Words on a picture: in the headers of its files, and in notes.
 
 use etendue_render::Rendered;
 use etendue_render::expose::{self, LightUnit};
@@ -14,7 +14,7 @@ use crate::neighbours::Neighbour;
 pub(crate) const NOT_FOLLOWED: &str = "some meshes are others in the frame that layers compare this one with; their \
                             points are not followed (+inf)";
 
-/// What stands in the header of every file.
+/// Entries in the header of every file.
 pub(crate) fn header(scene: &Scene, fingerprints: &[(String, String)]) -> Vec<(String, String)> {
     let more = [
         ("seed", scene.render.seed.to_string()),
@@ -37,7 +37,7 @@ pub(crate) const PUPIL: &str = "pupil_solid_angle";
 /// From one pixel's centre to the next (µm).
 pub(crate) const PITCH: &str = "pixel_pitch";
 
-/// What another sensor needs of the picture to be exposed to it.
+/// Header entries that another sensor needs to be exposed to the picture.
 fn light(scene: &Scene) -> Vec<(String, String)> {
     let Some(sensor) = &scene.sensor else { return Vec::new() };
     let mut entries = vec![(NOISE_SEED.to_owned(), expose::noise_seed(scene).to_string())];
@@ -50,7 +50,7 @@ fn light(scene: &Scene) -> Vec<(String, String)> {
     entries
 }
 
-/// What tells whether files show the same scene, compared with the same other frames.
+/// Fingerprints that tell whether files show the same scene, compared with the same other frames.
 pub(crate) fn fingerprints(
     scene: &Scene,
     neighbours: &[Neighbour],

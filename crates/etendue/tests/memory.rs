@@ -1,4 +1,4 @@
-//! What renders leave behind: a test program of its own, because memory is the process's.
+//! Memory that renders leave behind: a test program of its own, because memory is the process's.
 
 use etendue::{Progress, Session};
 use serde_json::json;

@@ -1,4 +1,4 @@
-//! What a window asks of the library: previews, places, scenes that are saved.
+//! Parts of the library that a window uses: previews, places, scenes that are saved.
 #![allow(clippy::disallowed_methods, reason = "tests set their stage by hand")]
 
 use std::fs;

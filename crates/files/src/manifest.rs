@@ -99,13 +99,13 @@ impl Ledger {
         }
     }
 
-    /// Where the files are.
+    /// Folder of the files.
     #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// Whether all files that the command wrote are as it wrote them.
+    /// True if all files that the command wrote are as it wrote them.
     #[must_use]
     pub fn is_whole(&self) -> bool {
         let is_there = |(name, print): (&String, &Print)| {
@@ -114,7 +114,7 @@ impl Ledger {
         self.old.iter().all(is_there)
     }
 
-    /// Whether no command has anything in the folder.
+    /// True if no command has anything in the folder.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         let own = self.old.is_empty() && self.new.is_empty();
@@ -212,7 +212,7 @@ impl Ledger {
     }
 }
 
-/// Whether a name stays in its folder, or below it.
+/// True if a name stays in its folder, or below it.
 fn is_plain(name: &str) -> bool {
     let mut parts = Path::new(name).components().peekable();
     parts.peek().is_some() && parts.all(|part| matches!(part, Component::Normal(_)))

@@ -46,7 +46,7 @@ impl MappedFile {
         Ok(Self { path: path.to_owned(), contents: Contents::Copied(bytes) })
     }
 
-    /// Where the file is.
+    /// Path of the file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path

@@ -14,7 +14,7 @@ use std::time::SystemTime;
 /// The longest path that Linux takes (bytes).
 const LONGEST_PATH: usize = 4096;
 
-/// Whether a scene may read files outside its own folder.
+/// Permission of a scene to read files outside its own folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Reach {
     /// No: also not through links.
@@ -24,8 +24,8 @@ pub enum Reach {
     Anywhere,
 }
 
-/// Where files may be read, and a record of those that were found, which must not be written over. A clone
-/// has the same record.
+/// Opener of files: where they may be read, and a record of those that were found, which must not
+/// be written over. A clone has the same record.
 #[derive(Debug, Clone, Default)]
 pub struct Opener {
     reach: Reach,
@@ -39,7 +39,7 @@ impl Opener {
         Self { reach, found: Arc::default() }
     }
 
-    /// Whether scenes may read files outside their folders.
+    /// Permission of scenes to read files outside their folders.
     #[must_use]
     pub fn reach(&self) -> Reach {
         self.reach
@@ -89,7 +89,7 @@ pub struct FoundFile {
     pub real: PathBuf,
 }
 
-/// Why a file that a scene names is not opened; the message goes on after the place that names it.
+/// Error of a file that a scene names and that is not opened; the message goes on after the place that names it.
 #[derive(Debug, thiserror::Error)]
 pub enum FindError {
     /// There is none.
@@ -97,7 +97,7 @@ pub enum FindError {
     Missing {
         /// The name as it is written.
         written: String,
-        /// Where it was looked for.
+        /// Path where it was looked for.
         path: PathBuf,
     },
     /// It may not be read, or is no file.
@@ -112,7 +112,7 @@ impl InputFolder {
         (self.opener.reach == Reach::OwnFolder).then_some(self.real.as_path())
     }
 
-    /// Where `written` leads, to be opened and, with links followed, to be compared.
+    /// Finds the file that `written` names, to be opened and, with links followed, to be compared.
     ///
     /// # Errors
     ///
@@ -161,7 +161,7 @@ impl InputFolder {
         ))
     }
 
-    /// Where files may be read, and what was found.
+    /// Opener: where files may be read, and what was found.
     #[must_use]
     pub fn opener(&self) -> &Opener {
         &self.opener
@@ -177,8 +177,8 @@ impl InputFolder {
     }
 }
 
-/// Whether `path` stays inside `root`, which has no links: by its text, and with the links of as much
-/// of it as exists. What exists outside does not change the answer.
+/// Tests whether `path` stays inside `root`, which has no links: by its text, and with the links of
+/// as much of it as exists. What exists outside does not change the answer.
 #[must_use]
 pub fn is_inside(root: &Path, path: &Path) -> bool {
     // No file has such a name, wherever it is; taking it apart would be all that it costs.
@@ -190,7 +190,7 @@ pub fn is_inside(root: &Path, path: &Path) -> bool {
     real.starts_with(root) && without_dots(&real.join(missing)).starts_with(root)
 }
 
-/// Where `path` leads, with the links of as much of it as exists.
+/// Resolves `path`, with the links of as much of it as exists.
 #[must_use]
 pub fn real_place(path: &Path) -> PathBuf {
     match existing(path) {
@@ -227,7 +227,7 @@ enum Leaving {
     Upwards,
 }
 
-/// Whether a path climbs above where it starts, judged by its text.
+/// Tests whether a path climbs above where it starts, judged by its text.
 fn leaves(path: &Path) -> Option<Leaving> {
     let mut depth = 0_i64;
     for component in path.components() {
@@ -252,7 +252,7 @@ pub struct Stamp {
     /// Device and number there.
     #[cfg(unix)]
     node: [u64; 2],
-    /// When it was made, where the system numbers no files.
+    /// Time of its creation, where the system numbers no files.
     #[cfg(not(unix))]
     created: Option<SystemTime>,
 }
@@ -333,7 +333,7 @@ fn require_regular(metadata: &Metadata) -> io::Result<()> {
     Err(io::Error::other(reason))
 }
 
-/// What it is instead of a regular file, as a sentence says it.
+/// Kind of something that is not a regular file, as a sentence says it.
 fn kind(metadata: &Metadata) -> &'static str {
     if metadata.is_dir() {
         return "a folder";

@@ -106,7 +106,7 @@ pub struct PartFile<'t> {
     transaction: &'t Transaction,
 }
 
-/// Where the content of a file is until it is complete.
+/// Place of a file's content until it is complete.
 #[derive(Debug)]
 enum Content {
     /// Beside its place, to be renamed.
@@ -257,12 +257,12 @@ fn open_beside(target: &Path) -> io::Result<NamedTempFile> {
 pub(crate) enum Special {
     /// A device, a pipe or a socket.
     Device,
-    /// What this process writes to as its standard output or error.
+    /// Standard output or error of this process.
     Stream(File),
 }
 
 impl Special {
-    /// What `target` is when it is no regular file to be replaced.
+    /// Returns what `target` is when it is no regular file to be replaced.
     pub(crate) fn of(target: &Path) -> Option<Self> {
         let found = fs::metadata(target).ok()?;
         match own_stream(&found) {

@@ -20,7 +20,7 @@ const MOST_OPEN: usize = 200;
 /// [`at_once`](Self::at_once), each when it is complete; those that have none when this is dropped are gone.
 #[derive(Debug, Default)]
 pub struct Transaction {
-    /// What must not be written over.
+    /// Files that must not be written over.
     inputs: BTreeSet<PathBuf>,
     /// Complete files do not wait for the others.
     is_at_once: bool,
@@ -57,7 +57,7 @@ impl Transaction {
         Self { is_at_once: true, ..Self::default() }
     }
 
-    /// The same, which refuses to write over any of `inputs`.
+    /// Returns the transaction, which then refuses to write over any of `inputs`.
     #[must_use]
     pub fn keeping<'p>(mut self, inputs: impl IntoIterator<Item = &'p PathBuf>) -> Self {
         self.inputs.extend(inputs.into_iter().cloned());
@@ -169,11 +169,11 @@ impl Transaction {
     }
 }
 
-/// What two names of one file share, links followed: device and inode.
+/// Identity that two names of one file share, links followed: device and inode.
 #[cfg(unix)]
 type FileIdentity = (u64, u64);
 
-/// What two names of one file share: its place without links.
+/// Identity that two names of one file share: its place without links.
 #[cfg(not(unix))]
 type FileIdentity = PathBuf;
 
@@ -188,7 +188,7 @@ fn identity(path: &Path) -> Option<FileIdentity> {
     fs::canonicalize(path).ok()
 }
 
-/// Why a file was not written. What stood under its name before still does.
+/// Error of a file that was not written. What stood under its name before still does.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteError {
@@ -199,7 +199,7 @@ pub enum WriteError {
         path: PathBuf,
         /// The system's answer.
         source: io::Error,
-        /// What to do about it.
+        /// Remedy.
         remedy: &'static str,
     },
     /// The file is an input.

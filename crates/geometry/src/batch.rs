@@ -28,11 +28,11 @@ pub struct RayBatch {
     /// The rays start on surfaces, outside by no more than a hit's own error: near their ends only
     /// f64 can tell what counts. `false` for rays that start in the open.
     pub from_surface: bool,
-    /// How precisely its hits are wanted.
+    /// Precision of the hits.
     pub precision: HitPrecision,
 }
 
-/// How precisely hits are wanted.
+/// Precision of hits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum HitPrecision {
     /// To f64, decided by the exact test at edges and where rays start: for data.
@@ -90,7 +90,7 @@ impl RayBatch {
         self.t_min.len()
     }
 
-    /// Whether there is no ray.
+    /// True if there are no rays.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.t_min.is_empty()
@@ -128,13 +128,13 @@ impl RayBatch {
         (!self.endpoint_triangles.is_empty()).then_some(&*self.endpoint_triangles)
     }
 
-    /// When each ray is (s from the frame's time); empty when all are at 0.
+    /// Time of each ray (s from the frame's time); empty when all are at 0.
     #[must_use]
     pub fn times(&self) -> &[f64] {
         &self.times
     }
 
-    /// When ray `i` is (s from the frame's time).
+    /// Time of ray `i` (s from the frame's time).
     #[must_use]
     #[inline]
     pub fn time(&self, i: usize) -> f64 {
@@ -336,7 +336,7 @@ impl RayBatch {
     }
 }
 
-/// How much of a hit is worked out. What nobody asks for costs nothing.
+/// Detail to which a hit is worked out. What nobody asks for costs nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum Detail {
     /// Distance, placement and triangle; `u`, `v` and `normal` stay empty.
@@ -346,10 +346,10 @@ pub enum Detail {
     Surface,
 }
 
-/// What a batch of rays hit: entry `i` belongs to ray `i`.
+/// Hits of a batch of rays: entry `i` belongs to ray `i`.
 #[derive(Debug, Clone, Default)]
 pub struct HitBatch {
-    /// What the accelerator has to fill in.
+    /// Detail that the accelerator has to fill in.
     pub detail: Detail,
     /// Distance along the ray (m), `+inf` for a miss.
     pub t: Vec<f64>,
@@ -364,7 +364,7 @@ pub struct HitBatch {
     /// Unit geometric normal in world space on the triangle's front (0 on a miss), one array an
     /// axis. It does not face the ray: the sign of its product with the direction tells the side.
     pub normal: [Vec<f64>; 3],
-    /// When the rays are, where something moves; else empty.
+    /// Times of the rays, where something moves; else empty.
     times: Vec<f64>,
 }
 
@@ -407,7 +407,7 @@ impl HitBatch {
         self.times.extend_from_slice(times);
     }
 
-    /// When ray `i` is (s from the frame's time), as far as that counts: 0 where nothing moves.
+    /// Time of ray `i` (s from the frame's time), as far as that counts: 0 where nothing moves.
     #[must_use]
     #[inline]
     pub fn time(&self, i: usize) -> f64 {
@@ -432,13 +432,13 @@ impl HitBatch {
         self.t.len()
     }
 
-    /// Whether the batch is empty.
+    /// True if the batch is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
     }
 
-    /// Whether ray `i` hit something.
+    /// True if ray `i` hit something.
     #[must_use]
     pub fn is_hit(&self, i: usize) -> bool {
         self.placement[i] != MISS

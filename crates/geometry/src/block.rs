@@ -100,7 +100,7 @@ impl RayBlock {
         (self.triangle[lane], self.placement[lane]) = (other.triangle[of], other.placement[of]);
     }
 
-    /// Whether anything is between the ends of a ray, once occlusion was asked for.
+    /// True if anything is between the ends of a ray, once occlusion was asked for.
     #[must_use]
     #[inline]
     pub fn is_blocked(&self, lane: usize) -> bool {
@@ -121,13 +121,13 @@ impl RayBlocks {
         self.len = 0;
     }
 
-    /// How many rays there are.
+    /// Number of rays.
     #[must_use]
     pub fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether there is none.
+    /// True if there are no rays.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len == 0

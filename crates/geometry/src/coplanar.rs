@@ -12,8 +12,8 @@ use glam::DVec3;
 use crate::batch::PlacedTriangle;
 use crate::{Bounds, Geometry, Placement};
 
-/// How far apart (units of 2⁻²³ of the largest coordinate) two planes are taken for one that single precision cannot
-/// tell apart.
+/// Greatest distance (units of 2⁻²³ of the largest coordinate) at which two planes are taken for one that
+/// single precision cannot tell apart.
 const APART: f64 = 4.0 * f32::EPSILON as f64;
 
 /// The least share of the shorter edge that two triangles must overlap by: neighbours that share an edge do not.
@@ -33,7 +33,7 @@ const MOST_VISITS: usize = 1 << 23;
 #[derive(Debug, Clone, Default)]
 pub struct Coplanar {
     others: BTreeMap<PlacedTriangle, Overlapping>,
-    /// Whether any triangle of a placement has others over it.
+    /// True if any triangle of a placement has others over it.
     has_others: Vec<bool>,
     /// The last placement of the same mesh in the very same place, by placement; empty where no two are.
     last: Vec<u32>,
@@ -219,7 +219,7 @@ impl Coplanar {
         }
     }
 
-    /// Whether there are none.
+    /// True if there are none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.others.is_empty() && self.last.is_empty()
@@ -231,7 +231,7 @@ impl Coplanar {
         self.last.get(placement as usize).copied().unwrap_or(placement)
     }
 
-    /// Whether any triangle of a placement has others over it.
+    /// True if any triangle of a placement has others over it.
     #[must_use]
     #[inline]
     pub fn has_others(&self, placement: u32) -> bool {
@@ -365,7 +365,7 @@ fn key([a, b, c]: [DVec3; 3], centre: DVec3) -> Option<f64> {
     key.is_finite().then_some(key)
 }
 
-/// Whether two triangles lie in one plane, within `apart` (m), and over one another by more than an edge.
+/// True if two triangles lie in one plane, within `apart` (m), and over one another by more than an edge.
 fn overlap(one: [DVec3; 3], other: [DVec3; 3], apart: f64) -> bool {
     let normal_of = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).normalize_or_zero();
     let (normal, second) = (normal_of(one), normal_of(other));

@@ -21,7 +21,7 @@ pub enum Interpolation {
 
 /// Points by their number, each with its time (s).
 pub trait Points {
-    /// How many there are: two or more.
+    /// Number of points: two or more.
     fn count(&self) -> usize;
     /// The time of a point (s), after that of the one before it.
     fn time(&self, i: usize) -> f64;
@@ -69,7 +69,7 @@ pub fn slopes(points: &impl Points, i: usize, interpolation: Interpolation) -> [
 /// A way from one point to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Way {
-    /// How long it takes (s).
+    /// Duration (s).
     pub length: f64,
     /// From its start to its end (m).
     pub across: DVec3,

@@ -15,7 +15,7 @@ const STEPS: u32 = 64;
 /// A rotation's cubic that comes as near to no rotation at all has no direction.
 const LEAST: f64 = 1e-3;
 
-/// What is between two keys of a track.
+/// Interpolation between two keys of a track.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Between {
     /// The value of the first.
@@ -29,7 +29,7 @@ pub enum Between {
 /// Values at times: vectors, whose fourth number is 0, or quaternions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Track {
-    /// What is between two keys.
+    /// Interpolation between two keys.
     pub between: Between,
     /// Times (s), growing; one at least.
     pub times: Vec<f64>,
@@ -173,7 +173,7 @@ impl Track {
         self.ways(times).map(of_way).fold(0.0, f64::max)
     }
 
-    /// Whether the value changes between some times (s).
+    /// True if the value changes between two times (s).
     #[must_use]
     pub fn moves_within(&self, times: [f64; 2]) -> bool {
         self.ways(times).any(|i| {
@@ -189,7 +189,7 @@ impl Track {
 }
 
 impl Joint {
-    /// Why it cannot be told where it is at all times: what is wrong, in words.
+    /// Fault that keeps the joint's place from being known at all times, in words.
     #[must_use]
     pub fn fault(&self) -> Option<&'static str> {
         let rotation = &self.rotation;
@@ -206,7 +206,7 @@ impl Joint {
             .then_some("its scale passes through 0")
     }
 
-    /// Where it is at a time (s), in its parent's frame.
+    /// Transform at a time (s), to its parent's frame.
     #[must_use]
     pub fn at(&self, time: f64) -> Transform {
         let [translation, scale]: [DVec3; 2] =
@@ -241,7 +241,7 @@ impl Link {
         size_of::<Self>() + joint + keys
     }
 
-    /// What moves it; nothing of a frame that stands still.
+    /// Tracks that move the frame; none of a frame that stands still.
     pub fn tracks(&self) -> impl Iterator<Item = &Track> {
         let joint = match self {
             Self::Fixed(_) => None,
@@ -256,7 +256,7 @@ impl Link {
         tracks.filter(|track| track.times.len() > 1).flat_map(|track| track.times.iter().copied())
     }
 
-    /// Whether it moves between some times (s).
+    /// True if the link moves between two times (s).
     #[must_use]
     pub fn moves_within(&self, times: [f64; 2]) -> bool {
         match self {
@@ -265,7 +265,7 @@ impl Link {
         }
     }
 
-    /// Whether directions in it change between some times (s).
+    /// True if directions in the link change between two times (s).
     pub(crate) fn turns_within(&self, times: [f64; 2]) -> bool {
         match self {
             Self::Fixed(_) => false,

@@ -49,7 +49,7 @@ impl<const N: usize> Vertices<N> {
         self.count
     }
 
-    /// Whether there is no vertex.
+    /// True if there are no vertices.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.count == 0
@@ -63,7 +63,7 @@ impl<const N: usize> Vertices<N> {
         std::array::from_fn(|k| self.floats[start + k])
     }
 
-    /// Whether both are the same values in the same place.
+    /// True if both are the same values in the same place.
     #[must_use]
     pub fn is_same(&self, other: &Self) -> bool {
         self.floats.is_same(&other.floats)
@@ -82,7 +82,7 @@ impl<const N: usize> Vertices<N> {
         self.stride
     }
 
-    /// Whether 16 bytes can be read at the last vertex, as Embree does.
+    /// True if 16 bytes can be read at the last vertex, as Embree does.
     #[must_use]
     pub fn is_padded(&self) -> bool {
         self.count == 0 || self.floats.len() >= (self.count - 1) * self.stride + 4
@@ -108,7 +108,7 @@ impl Positions {
         }
     }
 
-    /// Whether there is no corner.
+    /// True if there are no corners.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -132,7 +132,7 @@ impl Positions {
 /// positions, and every position that a triangle uses is finite: loaders see to both.
 #[derive(Debug, Clone)]
 pub struct Mesh {
-    /// What the file calls it, for messages.
+    /// Name of the mesh in the file, for messages.
     pub name: String,
     /// Corners (m).
     pub positions: Positions,
@@ -147,7 +147,7 @@ pub struct Mesh {
     /// The box of all triangles that have an area (m): what is a point or a line is not drawn, and sets no
     /// frame.
     pub bounds: Bounds,
-    /// How many triangles are points or lines ([`is_degenerate`]): accelerators leave them out.
+    /// Number of triangles that are points or lines ([`is_degenerate`]): accelerators leave them out.
     pub degenerate: u64,
     /// Its shapes while the shutter is open; `None` where it has one, that of `positions`.
     pub steps: Option<Arc<Steps>>,
@@ -217,7 +217,7 @@ impl Mesh {
         Ok(Self::new(name, positions, triangles.to_vec().into()))
     }
 
-    /// Whether corners and triangles are those of `other`, in the same place in memory.
+    /// True if corners and triangles are those of `other`, in the same place in memory.
     #[must_use]
     pub fn has_surface_of(&self, other: &Self) -> bool {
         let positions = match (&self.positions, &other.positions) {
@@ -235,7 +235,7 @@ impl Mesh {
         positions && steps && self.triangles.is_same(&other.triangles)
     }
 
-    /// Whether all values are those of `other`, in the same place in memory.
+    /// True if all values are those of `other`, in the same place in memory.
     #[must_use]
     pub fn is_same(&self, other: &Self) -> bool {
         fn same<const N: usize>(own: Option<&Vertices<N>>, other: Option<&Vertices<N>>) -> bool {
@@ -337,13 +337,13 @@ impl<T: AnyBitPattern> Buffer<T> {
         Some(Self { owner: Storage::Mapped { file: Arc::clone(file), offset, len } })
     }
 
-    /// Whether both are the same values in the same place.
+    /// True if both are the same values in the same place.
     #[must_use]
     pub fn is_same(&self, other: &Self) -> bool {
         self.as_ptr() == other.as_ptr() && self.len() == other.len()
     }
 
-    /// Whether the values are part of a mapped file.
+    /// True if the values are part of a mapped file.
     #[must_use]
     pub fn is_mapped(&self) -> bool {
         matches!(self.owner, Storage::Mapped { .. })

@@ -10,7 +10,7 @@ use crate::hermite::{self, Interpolation, Points, Way, turned};
 use crate::joint::Link;
 use crate::{Bounds, Transform};
 
-/// How a body moves: times are in s from the frame's time.
+/// Motion of a body: times are in s from the frame's time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Motion {
     keys: Vec<Key>,
@@ -18,7 +18,7 @@ pub struct Motion {
     steady: Option<Steady>,
     /// Frames that move in each other, the outermost first.
     links: Vec<Link>,
-    /// What is applied first.
+    /// Transform that is applied first.
     inner: Transform,
 }
 
@@ -27,7 +27,7 @@ pub struct Motion {
 struct Key {
     time: f64,
     translation: DVec3,
-    /// What rounding took from the translation (m).
+    /// Rounding error of the translation (m): what rounding took from it.
     low: DVec3,
     rotation: DQuat,
     scale: DVec3,
@@ -69,7 +69,7 @@ impl Steady {
     }
 }
 
-/// Why keys or a steady motion make no motion.
+/// Error of keys or a steady motion that make no motion.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MotionError {
     /// No key, or not one time for each transform.
@@ -90,7 +90,7 @@ pub enum MotionError {
         "time {index} ({time} s) is not after the one before it; sort the times and leave out equal ones"
     )]
     Order {
-        /// Which time, counted from 0.
+        /// Index of the time, counted from 0.
         index: usize,
         /// That time (s).
         time: f64,
@@ -165,7 +165,7 @@ impl Motion {
         Self::default().with_steady(steady)
     }
 
-    /// The same motion of a body that moves steadily in the frame that is moved.
+    /// Returns the motion of a body that moves steadily in the frame that is moved.
     ///
     /// # Errors
     ///
@@ -233,7 +233,7 @@ impl Motion {
         joined.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])
     }
 
-    /// Whether anything differs at two times of `exposure` (s, first and last).
+    /// True if anything differs at two times of `exposure` (s, first and last).
     #[must_use]
     pub fn moves_within(&self, [open, close]: [f64; 2]) -> bool {
         let overlaps = |a: &Key, b: &Key| a.time < close && b.time > open;
@@ -261,8 +261,8 @@ impl Motion {
         inner * links * self.keys.iter().map(Key::stretch).reduce(f64::max).unwrap_or(1.0)
     }
 
-    /// Whether directions of the body change between two times of `exposure` (s, first and last): whether it turns or is
-    /// stretched, and does not go alone.
+    /// True if directions of the body change between two times of `exposure` (s, first and last):
+    /// if it turns or is stretched, rather than only moves along.
     #[must_use]
     pub fn turns_within(&self, [open, close]: [f64; 2]) -> bool {
         let overlaps = |a: &Key, b: &Key| a.time < close && b.time > open;
@@ -360,7 +360,7 @@ impl Motion {
     }
 }
 
-/// Where a body is while it moves, step by step.
+/// Sweep of a body: its places while it moves, step by step.
 #[derive(Debug, Clone)]
 pub struct Sweep {
     /// Places, and how far any point is from there at most until half of the way to the next one (m).

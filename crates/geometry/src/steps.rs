@@ -15,7 +15,7 @@ pub struct Steps {
     bounds: Bounds,
 }
 
-/// Why shapes make no steps.
+/// Error of shapes that make no steps.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StepsError {
     /// No time, or not one list of corners, and of normals if any, for each.
@@ -101,7 +101,7 @@ impl Steps {
         &self.times
     }
 
-    /// Where a time (s) lies among the steps.
+    /// Place of a time (s) among the steps.
     #[must_use]
     #[inline]
     pub fn moment(&self, time: f64) -> Moment {

@@ -14,7 +14,7 @@ pub struct Transform {
     pub linear: DMat3,
     /// Translation (m), rounded to f64.
     pub translation: DVec3,
-    /// What rounding took from the translation (m).
+    /// Rounding error of the translation (m): what rounding took from it.
     pub translation_low: DVec3,
 }
 
@@ -47,14 +47,14 @@ impl Transform {
         }
     }
 
-    /// Where `point` goes (m).
+    /// Maps `point` (m).
     #[must_use]
     pub fn point(&self, point: DVec3) -> DVec3 {
         self.point_from(point, DVec3::ZERO)
     }
 
-    /// Where `point` goes as seen from `origin` (m): `self(point) − origin`, without the loss of
-    /// forming `self(point)` first.
+    /// Maps `point`, as seen from `origin` (m): `self(point) − origin`, without the loss of forming
+    /// `self(point)` first.
     #[must_use]
     pub fn point_from(&self, point: DVec3, origin: DVec3) -> DVec3 {
         self.linear * point + self.offset_from(origin)
@@ -72,13 +72,13 @@ impl Transform {
         if self.linear.determinant() < 0.0 { -1.0 } else { 1.0 }
     }
 
-    /// Whether the map changes nothing at all.
+    /// True if the map changes nothing at all.
     #[must_use]
     pub fn is_identity(&self) -> bool {
         *self == Self::IDENTITY
     }
 
-    /// Whether all numbers are finite.
+    /// True if all numbers are finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.linear.is_finite() && self.translation.is_finite() && self.translation_low.is_finite()

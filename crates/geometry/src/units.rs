@@ -11,7 +11,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Error as _, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// What kind of quantity a string with a unit gives.
+/// Dimension of a quantity that a string with a unit gives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dimension {
     /// From nanometres to kilometres, inches and feet.
@@ -57,7 +57,7 @@ const TIMES: &[Unit] = &[
     ("min", 60.0, 1.0),
 ];
 
-/// Why a string is not a quantity.
+/// Error of a string that is not a quantity.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum QuantityError {

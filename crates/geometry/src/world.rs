@@ -26,8 +26,8 @@ pub struct Placement {
     pub material: u32,
     /// From the mesh's frame to the world (m), at the frame's time.
     pub world_from_mesh: Transform,
-    /// The same at other times; `None` for what stands still. A mesh that changes its shape has one where it is placed,
-    /// also where that goes nowhere.
+    /// Motion of the placement at other times; `None` for what stands still. A mesh that changes
+    /// its shape has one where it is placed, also where that goes nowhere.
     pub motion: Option<Arc<Motion>>,
 }
 
@@ -65,8 +65,7 @@ impl Geometry {
         Self { meshes: vec![mesh], placements: vec![Placement::of(0, world_from_mesh)] }
     }
 
-    /// Whether a ray meets the same triangles in the same places as in `other`, whose meshes are the same
-    /// in memory.
+    /// True if a ray meets the same triangles in the same places as in `other`, whose meshes are the same in memory.
     #[must_use]
     pub fn has_surfaces_of(&self, other: &Self) -> bool {
         let stands = |p: &Placement| (p.mesh, p.world_from_mesh);
@@ -77,7 +76,7 @@ impl Geometry {
             && self.placements.iter().map(moves).eq(other.placements.iter().map(moves))
     }
 
-    /// Whether all is as in `other`, whose meshes are the same in memory.
+    /// True if all is as in `other`, whose meshes are the same in memory.
     #[must_use]
     pub fn is_same(&self, other: &Self) -> bool {
         self.meshes.len() == other.meshes.len()
@@ -103,7 +102,7 @@ impl Geometry {
         &self.meshes[placement.mesh as usize]
     }
 
-    /// Whether any placement has a motion, as all have whose mesh changes its shape.
+    /// True if any placement has a motion, as all have whose mesh changes its shape.
     #[must_use]
     pub fn moves(&self) -> bool {
         self.placements.iter().any(|placement| placement.motion.is_some())
@@ -120,7 +119,7 @@ impl Geometry {
         })
     }
 
-    /// How often each mesh is placed.
+    /// Number of placements of each mesh.
     #[must_use]
     pub fn uses(&self) -> Vec<u32> {
         let mut uses = vec![0; self.meshes.len()];
@@ -138,8 +137,8 @@ impl Geometry {
         boxes.fold(Bounds::EMPTY, Bounds::union)
     }
 
-    /// The same box with all places of what moves between the times of `exposure` (s from the frame's time, first and
-    /// last).
+    /// Box as [`Self::loose_bounds`], with all places of what moves between the times of `exposure`
+    /// (s from the frame's time, first and last).
     #[must_use]
     pub fn loose_bounds_within(&self, exposure: [f64; 2]) -> Bounds {
         let swept = |(i, motion): (usize, &Arc<Motion>)| {
@@ -148,7 +147,7 @@ impl Geometry {
         self.moving_within(exposure).map(swept).fold(self.loose_bounds(), Bounds::union)
     }
 
-    /// The same box around one placement (m); empty where nothing has an area.
+    /// Loose box around one placement (m); empty where nothing has an area.
     #[must_use]
     pub fn loose_bounds_of(&self, placement: &Placement) -> Bounds {
         let mut bounds = Bounds::EMPTY;
@@ -183,7 +182,7 @@ impl Geometry {
     }
 }
 
-/// Whether a triangle is a point or a line.
+/// True if a triangle is a point or a line.
 ///
 /// Decided without rounding from the differences of its corners, so that no needle, however thin, is
 /// taken for a line: products are compared by their rounded value and by what rounding took from it
@@ -195,7 +194,7 @@ pub fn is_degenerate([a, b, c]: [DVec3; 3]) -> bool {
     e.cross(f) == DVec3::ZERO && are_parallel(e, f)
 }
 
-/// Whether two vectors are parallel, or one of them 0.
+/// True if two vectors are parallel, or one of them is 0.
 #[cold]
 fn are_parallel(e: DVec3, f: DVec3) -> bool {
     let (Some(e), Some(f)) = (near_one(e), near_one(f)) else { return true };
@@ -206,7 +205,7 @@ fn are_parallel(e: DVec3, f: DVec3) -> bool {
     is_same(e.x, f.y, e.y, f.x) && is_same(e.y, f.z, e.z, f.y) && is_same(e.z, f.x, e.x, f.z)
 }
 
-/// The same direction by a power of two, its largest component about 1; `None` for 0.
+/// Scales a vector by a power of two so that its largest component is about 1; `None` for 0.
 fn near_one(v: DVec3) -> Option<DVec3> {
     let size = v.abs().max_element();
     if size == 0.0 {
@@ -238,13 +237,13 @@ impl<'a> AreaTest<'a> {
         Self { mesh, linear: (linear.determinant() == 0.0).then_some(linear) }
     }
 
-    /// Whether all triangles are known to have an area, without a look at each.
+    /// True if all triangles are known to have an area, without a look at each.
     #[must_use]
     pub fn keeps_all(&self) -> bool {
         self.linear.is_none() && self.mesh.degenerate == 0
     }
 
-    /// Whether triangle `i` has an area.
+    /// True if triangle `i` has an area.
     #[must_use]
     #[inline]
     pub fn keeps(&self, i: usize) -> bool {
@@ -257,8 +256,7 @@ impl<'a> AreaTest<'a> {
 }
 
 impl Placement {
-    /// Whether the placement leaves anything an area: not when it scales two of three axes to 0, as
-    /// files hide objects.
+    /// True if the placement leaves anything an area: not when it scales two of three axes to 0, as files hide objects.
     #[must_use]
     pub fn has_extent(&self) -> bool {
         let [x, y, z] = {
@@ -270,7 +268,7 @@ impl Placement {
 }
 
 impl Geometry {
-    /// Whether any triangle of `placement` has an area where it stands.
+    /// True if any triangle of `placement` has an area where it stands.
     #[must_use]
     pub fn has_area(&self, placement: &Placement) -> bool {
         let mesh = self.mesh_of(placement);
@@ -308,7 +306,7 @@ impl Bounds {
         bounds
     }
 
-    /// Whether the box holds no point.
+    /// True if the box holds no point.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()

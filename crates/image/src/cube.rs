@@ -19,7 +19,7 @@ const WAVELENGTHS: [f64; 2] = [1.0, 1e6];
 /// Numbers below this are micrometres, where nobody says what they are.
 const SHORTEST_NM: f64 = 100.0;
 
-/// What the numbers of a cube are.
+/// Quantity of a cube's numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// Light, or what the file does not say.
@@ -33,17 +33,17 @@ pub enum Quantity {
 pub struct Cube {
     /// Columns and rows.
     pub size: [usize; 2],
-    /// Where the bands are.
+    /// Axis of the bands.
     pub axis: BandAxis,
     /// `[row][column][band]`, row 0 at the top.
     pub values: Vec<f32>,
-    /// What they are.
+    /// Quantity of the numbers.
     pub quantity: Quantity,
     /// Their unit as the file has it.
     pub unit: Option<String>,
     /// Other entries of the file's header.
     pub texts: BTreeMap<String, String>,
-    /// What a user should know.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
@@ -226,7 +226,7 @@ pub fn in_nanometres(mut numbers: Vec<f64>, unit: Option<&str>) -> Result<Vec<f6
     Ok(numbers)
 }
 
-/// What a channel of a spectral EXR file holds.
+/// Content of a channel of a spectral EXR file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Component {
     /// Emission, by its Stokes component: 0 is the light itself.
@@ -290,7 +290,7 @@ pub fn emission_channel(nm: f64) -> String {
     format!("S0.{text}nm")
 }
 
-/// Whether an EXR file has spectral channels.
+/// True if an EXR file has spectral channels.
 #[must_use]
 pub fn is_spectral(channels: &ExrChannels) -> bool {
     channels.planes.iter().any(|(name, _)| {
@@ -308,7 +308,8 @@ impl Cube {
         Self::of_channels(channels, |_| true)
     }
 
-    /// What an EXR file reflects or lets pass, whatever light it has beside it. `None` where it has no such channels.
+    /// Reads what an EXR file reflects or lets pass, whatever light it has beside it. `None` where
+    /// it has no such channels.
     ///
     /// # Errors
     ///

@@ -15,9 +15,9 @@ pub struct RawDng {
     pub size: [usize; 2],
     /// `[row][column]` (DN).
     pub numbers: Vec<u16>,
-    /// What no light reads as (DN), where the file says it.
+    /// Black level: the number without light (DN), where the file says it.
     pub black: Option<f64>,
-    /// Where it saturates (DN), where the file says it.
+    /// White level: the number at which it saturates (DN), where the file says it.
     pub white: Option<f64>,
     /// Exposure time (s), where the file says it.
     pub exposure: Option<f64>,
@@ -32,7 +32,7 @@ const MOST_ENTRIES: usize = 4096;
 /// Values of an entry.
 const MOST_VALUES: usize = 1 << 22;
 
-/// Whether the bytes begin as a TIFF does.
+/// True if the bytes begin as a TIFF does.
 #[must_use]
 pub fn is_tiff(bytes: &[u8]) -> bool {
     bytes.starts_with(b"II*\0") || bytes.starts_with(b"MM\0*")

@@ -22,13 +22,13 @@ pub const MOST_HEADER_BYTES: u64 = 1 << 24;
 const DATA_ENDINGS: [&str; 10] =
     ["img", "dat", "raw", "bsq", "bil", "bip", "bin", "IMG", "DAT", "RAW"];
 
-/// Whether `bytes` begin as a header does.
+/// True if `bytes` begin as a header does.
 #[must_use]
 pub fn is_header(bytes: &[u8]) -> bool {
     bytes.starts_with(b"ENVI") && bytes.get(4).is_none_or(u8::is_ascii_whitespace)
 }
 
-/// Whether a file's name says that it holds the numbers of a cube.
+/// True if a file's name says that it holds the numbers of a cube.
 #[must_use]
 pub fn is_data(path: &Path) -> bool {
     path.extension().is_some_and(|ending| DATA_ENDINGS.iter().any(|known| *known == ending))
@@ -133,7 +133,7 @@ impl Number {
     }
 }
 
-/// What a header says.
+/// Content of a header.
 #[derive(Debug, Clone)]
 pub struct Header {
     /// Columns and rows.
@@ -291,7 +291,7 @@ impl Header {
         self.number.read(bytes)
     }
 
-    /// Which bands are read, and where they are.
+    /// Indices of the bands that are read, and their wavelengths.
     fn axis(&self, notes: &mut Vec<String>) -> Result<(Vec<usize>, BandAxis), String> {
         let numbers = self.list("wavelength")?.ok_or(
             "does not say at which wavelengths its bands are: add `wavelength = {…}` and \
@@ -371,7 +371,7 @@ impl Header {
     }
 }
 
-/// What numbers are multiplied by, and what is added to them, a band each.
+/// Factors on the numbers and offsets added to them, a band each.
 struct Scale {
     /// The number of a reflectance of 1.
     white: Option<f64>,

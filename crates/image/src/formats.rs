@@ -19,10 +19,10 @@ use crate::{
 // The prelude below has another.
 use std::result::Result;
 
-/// What every EXR file begins with.
+/// Signature that every EXR file begins with.
 pub(crate) const EXR_SIGNATURE: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 
-/// Where the texels of a layer go in its display window.
+/// Placement of a layer's texels in its display window.
 #[derive(Debug, Clone, Copy)]
 struct DisplayWindow {
     size: [usize; 2],
@@ -66,8 +66,8 @@ pub(crate) fn decode_exr(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeE
     grey(bytes, header, &name, limits)
 }
 
-/// Whether the blocks that a file is divided into are in proportion to it: a tile may be larger than its image,
-/// and the decoder takes its memory before it reads it.
+/// Checks that the blocks that a file is divided into are in proportion to it: a tile may be larger
+/// than its image, and the decoder takes its memory before it reads it.
 fn judge_blocks(about: &MetaData, limits: Limits) -> Result<(), DecodeError> {
     let limits = Limits { bytes: MOST_BYTES, ..limits };
     for header in about.headers.iter().filter(|header| !header.deep) {
@@ -196,7 +196,7 @@ pub(crate) fn exr_channels(bytes: &[u8], limits: Limits) -> Result<ExrChannels, 
     Ok(ExrChannels { size, planes: planes.collect(), texts: texts.collect() })
 }
 
-/// What every Radiance file begins with; a program's name follows, `RADIANCE` or `RGBE` mostly.
+/// Signature that every Radiance file begins with; a program's name follows, `RADIANCE` or `RGBE` mostly.
 pub(crate) const RADIANCE_SIGNATURE: &[u8] = b"#?";
 
 /// Bytes of the line with the program's name.
@@ -237,8 +237,9 @@ pub(crate) fn radiance_bytes(mut file: impl BufRead) -> Option<u64> {
     let file = Cursor::new(&b"#?RADIANCE\n"[..]).chain(file);
     Some(bytes_of(&HdrDecoder::new(file).ok()?))
 }
-/// Whether a file is a JPEG that ends before its picture does: segments are gone through by their lengths, and the data
-/// behind them to the next marker (ITU-T T.81, B.1.1). Of other files, and of what is no segment, the decoder says more.
+/// True if a file is a JPEG that ends before its picture does: segments are gone through by their
+/// lengths, and the data behind them to the next marker (ITU-T T.81, B.1.1). Of other files, and of
+/// what is no segment, the decoder says more.
 pub(crate) fn is_cut_jpeg(bytes: &[u8]) -> bool {
     const SCAN: u8 = 0xda;
     const END: u8 = 0xd9;

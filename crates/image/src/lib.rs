@@ -57,13 +57,13 @@ impl Limits {
         Self { bytes: memory.unwrap_or(MOST_BYTES).min(MOST_BYTES), ..Self::default() }
     }
 
-    /// The same for an image that may be as coarse: it is decoded in linear light, in as few texels.
+    /// Returns the limits for an image that may be as coarse: it is decoded in linear light, in as few texels.
     #[must_use]
     pub fn coarse(self, coarse: Option<Coarseness>) -> Self {
         Self { coarse, ..self }
     }
 
-    /// The same, and no more than is in proportion to the `file`'s bytes.
+    /// Returns the limits, with no more than is in proportion to the `file`'s bytes.
     fn of(self, file: &[u8]) -> Self {
         Self { file: file.len() as u64, ..self }
     }
@@ -87,7 +87,7 @@ impl Limits {
     }
 }
 
-/// Why an image could not be decoded.
+/// Error of an image that could not be decoded.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DecodeError {
@@ -230,7 +230,7 @@ pub struct ExrChannels {
     pub texts: BTreeMap<String, String>,
 }
 
-/// Whether `bytes` begin as an EXR file does.
+/// True if `bytes` begin as an EXR file does.
 #[must_use]
 pub fn is_exr(bytes: &[u8]) -> bool {
     bytes.starts_with(formats::EXR_SIGNATURE)

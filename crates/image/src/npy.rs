@@ -160,7 +160,7 @@ fn number(descr: &str) -> Result<(Number, ByteOrder), String> {
     }
 }
 
-/// What the header says.
+/// Content of the header.
 #[derive(Debug, PartialEq)]
 struct NpyHeader<'a> {
     kind: &'a str,

@@ -57,7 +57,7 @@ impl Raster {
         self.size[0] * self.size[1]
     }
 
-    /// Whether there is no texel.
+    /// True if there are no texels.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -75,7 +75,7 @@ impl Raster {
         self.samples
     }
 
-    /// Whether the values are linear light without an upper end.
+    /// True if the values are linear light without an upper end.
     #[must_use]
     pub fn is_float(&self) -> bool {
         match self.samples {
@@ -160,7 +160,7 @@ impl Raster {
         dropped
     }
 
-    /// The same in half precision, where it holds every value as it is.
+    /// Converts the raster to half precision, where it holds every value as it is.
     #[must_use]
     pub fn packed(self) -> Self {
         let Samples::F32(values) = &self.samples else { return self };

@@ -9,17 +9,17 @@ use std::io::Cursor;
 use crate::raster::linear_of_bytes;
 use crate::{DecodeError, Limits, Raster, Samples, room};
 
-/// How coarse an image may be.
+/// Permitted coarseness of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coarseness {
     /// The least width over which it is averaged whenever it is looked up, as a share of its shorter side.
     pub footprint: f64,
-    /// Whether integers are colours by the sRGB curve; else they are shares of full scale.
+    /// True if integers are colours by the sRGB curve; else they are shares of full scale.
     pub is_srgb: bool,
 }
 
 impl Coarseness {
-    /// How often both sides may be halved, so that no texel is wider than what is averaged over.
+    /// Number of times that both sides may be halved, so that no texel is wider than what is averaged over.
     #[must_use]
     pub fn halvings(&self, size: [usize; 2]) -> u32 {
         let [width, height] = size;

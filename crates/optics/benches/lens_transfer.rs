@@ -10,7 +10,7 @@ use etendue_optics::train::{
 };
 use glam::{DVec2, DVec3};
 
-/// How a batch is taken through.
+/// Tracing of a batch of rays through a train.
 type Way = fn(&MonochromaticTrain, &mut LensRays);
 
 /// A tile's worth of rays.
@@ -56,7 +56,7 @@ fn spheres(are_mirrors: bool) -> OpticalTrain {
     lens(&format!(r#"{{"elements": [{}]}}"#, elements.join(", ")))
 }
 
-/// What a mirror costs beside a surface, and a gradient beside both.
+/// Cost of a mirror beside a surface, and of a gradient beside both.
 fn mirrors(criterion: &mut Criterion) {
     let rod = include_str!("../../../scenes/lenses/selfoc-relay.json");
     let mut group = criterion.benchmark_group("ten_spheres");

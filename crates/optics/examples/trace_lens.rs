@@ -17,7 +17,7 @@ use rustix::time::{ClockId, clock_gettime};
 /// A tile's worth of rays.
 const RAYS: u32 = 512;
 
-/// How often a round takes them through.
+/// Number of passes of the rays through the lens in a round.
 const TIMES: u32 = 1000;
 
 /// Radius of the beam (mm): inside of the double Gauss' entrance pupil at f/2.

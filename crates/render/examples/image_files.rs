@@ -1,4 +1,4 @@
-//! What writing images costs: time and size of each format, beside the crate `exr`'s own writer.
+//! Benchmark of writing images: time and size of each format, beside the crate `exr`'s own writer.
 //!
 //! ```text
 //! cargo run --release -p etendue-render --example image_files -- [SIDE]

@@ -33,17 +33,17 @@ pub(crate) fn put(strip: &mut Strip<'_>, index: usize, sums: &[Sum], bands: usiz
 pub(crate) struct Window<'a> {
     /// The topmost row.
     pub(crate) first: u32,
-    /// How many rows from where it starts light lands, at most.
+    /// Greatest number of rows from where light starts to where it lands.
     pub(crate) rows: u32,
     pub(crate) sums: &'a mut [Sum],
 }
 
-/// Which samples are added.
+/// Selection of the samples that are added.
 #[derive(Clone, Copy)]
 pub(crate) enum Work<'a> {
     /// These of every pixel.
     Pass(&'a Range<u32>),
-    /// What each pixel wants, half of it of each set.
+    /// Samples that each pixel wants, half of them of each set.
     Wanted(Wanted<'a>),
 }
 

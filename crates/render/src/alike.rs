@@ -1,4 +1,4 @@
-//! Whether the light of a scene is the same in all bands, so that one of them is traced for all.
+//! Detection of scenes whose light is the same in all bands, so that one of them is traced for all.
 //!
 //! Grey surfaces and lights of equal energy have the same numbers in every band: the rows of red, green and blue that
 //! make a band of a colour add up to 1 ([`etendue_spectrum::Bands::from_rgb`]). What is traced in one band is then what
@@ -9,7 +9,7 @@ use etendue_tracer::{
     Color, EnvironmentImage, Ior, LayerSpec, Light, LightKind, Material, Paint, Scattering,
 };
 
-/// Whether nothing of `scene` tells bands apart. Images and models' colours at corners are not looked through.
+/// True if nothing of `scene` tells bands apart. Images and models' colours at corners are not looked through.
 pub(crate) fn are_alike(scene: &Scene) -> bool {
     // The studio is found to be needed when the scene is rendered.
     let is_known = !scene.studio_if_dark && scene.slots == 0 && !scene.render.alpha;

@@ -1,5 +1,5 @@
-//! Whether the bands of a picture's light share the paths of the scene behind a lens that sends each its own
-//! way: what it is decided by, and in words.
+//! Decision whether the bands of a picture's light share the paths of the scene behind a lens that
+//! sends each its own way: how it is made, and in words.
 
 use etendue_camera::{Camera, SharedPaths};
 use etendue_report::{Decision, DecisionKind, Size};
@@ -16,7 +16,7 @@ const FEW_BANDS: usize = 8;
 /// The most memory that the sums of bands may take which share paths: they are kept for the whole film.
 const MOST_BYTES_OF_SUMS: u64 = 2 << 30;
 
-/// How the bands of a picture's light go through the camera's lens.
+/// Paths of a picture's bands of light through the camera's lens.
 #[derive(Debug, Clone, PartialEq)]
 pub enum BandPaths {
     /// All alike: no lens tells them apart.
@@ -73,7 +73,7 @@ impl BandPaths {
         lens.shared_paths(bands).map_or_else(Self::Apart, Self::Shared)
     }
 
-    /// Whether the scene is traced once for all bands of a lens that tells them apart.
+    /// True if the scene is traced once for all bands of a lens that tells them apart.
     #[must_use]
     pub fn are_shared(&self) -> bool {
         matches!(self, Self::Shared(_))

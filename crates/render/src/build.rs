@@ -11,7 +11,7 @@ use crate::error::RenderError;
 use crate::plan::{Plan, Unseen};
 use crate::precision::accelerators;
 
-/// What a build of the structure over `scene` is told.
+/// Options of a build of the structure over `scene`.
 fn options_for(scene: &Scene, plan: &Plan, options: &BuildOptions) -> BuildOptions {
     let exposure = scene.camera.exposure_span();
     BuildOptions { quality: plan.quality, refine: plan.refine, exposure, ..options.clone() }

@@ -1,5 +1,5 @@
-//! What there is of a render, kept on disk on the way: after an interruption it goes on from there. And what there
-//! is in shares of its samples.
+//! Checkpoints: what there is of a render, kept on disk on the way: after an interruption it goes
+//! on from there. And what there is in shares of its samples.
 
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
@@ -16,7 +16,7 @@ use crate::shard::Shard;
 use crate::sum::Sum;
 use crate::tile::RayCounts;
 
-/// Where what a render has so far is kept, and how often.
+/// Place and interval of the checkpoints of a render.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Checkpoint {
     /// The file.
@@ -57,7 +57,7 @@ impl<'a> Keeper<'a> {
         Self { checkpoint, identity, shard, samples, resolution, files, start, state }
     }
 
-    /// Why the last checkpoint could not be written, if it could not.
+    /// Reason why the last checkpoint could not be written, if it could not.
     pub(crate) fn fault(&self) -> Option<String> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).fault.clone()
     }

@@ -16,7 +16,7 @@ use crate::output::{Channel, Layer, Look, Picture, Values};
 /// itself, and of what comes back.
 pub(crate) const BYTES: u64 = 48;
 
-/// What tells, in headers of files, that a picture was denoised.
+/// Entry of files' headers that says that a picture was denoised.
 #[must_use]
 pub fn fingerprint() -> (String, String) {
     ("denoised".to_owned(), format!("picture.png shows the layer {DENOISED}"))

@@ -1,4 +1,4 @@
-//! Why a render comes to nothing.
+//! Errors of renders.
 
 use etendue_accel::BuildError;
 use etendue_oidn::OidnError;
@@ -9,7 +9,7 @@ use crate::film_file::FilmError;
 use crate::output::PictureError;
 use crate::watch::Stopped;
 
-/// Why a render came to nothing.
+/// Error of a render.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
@@ -42,7 +42,7 @@ pub enum RenderError {
     Dark {
         /// The element nearest to the object at which rays ended.
         element: usize,
-        /// Which share of the rays ended where.
+        /// Shares of the rays by where they ended.
         losses: Vec<String>,
     },
     /// The system has less memory than the film takes.
@@ -60,13 +60,13 @@ pub enum RenderError {
     /// The environment is no image that can be read, or an image of the scene is too large.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// What there is of samples that go on until an error is reached is not kept on the way.
+    /// A checkpoint of samples that go on until an error is reached: those are not kept on the way.
     #[error(
         "--checkpoint: samples that go on until an error is reached are not kept on the way\nhint: give \
          `render.samples` a number, or divide the render by --shard"
     )]
     Checkpoint,
-    /// Which samples are taken is judged from all before them.
+    /// A share of samples that go on until an error is reached: each is chosen by all before it.
     #[error(
         "--shard-by samples: samples that go on until an error is reached are not known beforehand\nhint: give \
          `render.samples` a number, or divide the rows, by --shard alone"

@@ -10,7 +10,7 @@ use etendue_tracer::layer::{self, Kept, Look, Taken};
 
 use crate::output::{Channel, Layer, Values};
 
-/// How finely data layers are kept.
+/// Precision of data layers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Precision {
     /// 32 bits, as an EXR stores them.
@@ -19,7 +19,7 @@ pub enum Precision {
     Double,
 }
 
-/// What the values of a plane are while it is filled.
+/// Number type of a plane's values while it is filled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum PlaneKind {
     F32,
@@ -50,11 +50,11 @@ pub(crate) fn bytes_of_plane(spec: LayerSpec, precision: Precision) -> u64 {
     Size(*bytes)
 )]
 pub struct NoMemory {
-    /// What could not be had (bytes).
+    /// Size of the allocation that failed (bytes).
     pub bytes: u64,
 }
 
-/// Whether there is memory for so many bytes now: for a library that would abort without.
+/// Checks that there is memory for so many bytes now: for a library that would abort without.
 pub(crate) fn check_room(bytes: usize) -> Result<(), NoMemory> {
     let bytes = bytes as u64;
     if has_room(bytes) { Ok(()) } else { Err(NoMemory { bytes }) }
@@ -177,7 +177,7 @@ impl FilmLayer {
         self.planes.iter().enumerate().map(move |(k, plane)| (format!("{title} {k}"), plane))
     }
 
-    /// The same, to be filled.
+    /// Planes of the layer with their names, to be filled.
     pub(crate) fn named_planes_mut(&mut self) -> impl Iterator<Item = (String, &mut Values)> {
         let title = self.row.name.clone();
         self.planes.iter_mut().enumerate().map(move |(k, plane)| (format!("{title} {k}"), plane))

@@ -1,4 +1,4 @@
-//! What is filled of a film as a file: a share of a render, or what there is of one on its way.
+//! File of what is filled of a film: a share of a render, or what there is of one on its way.
 //!
 //! A line of magic, the length of a header (u64), the header (JSON), numbers, and the XXH3 of all before
 //! it (u64); everything little-endian. The header says which render it is of, which share of its rows and
@@ -26,8 +26,8 @@ use etendue_files::Transaction;
 
 const MAGIC: &[u8] = b"etendue film 1\n";
 
-/// Which render a film is of, by name and value, what tells most first: what two films must agree in to be
-/// parts of one picture.
+/// Identity of the render that a film belongs to, as names and values, what tells most first: what
+/// two films must agree in to be parts of one picture.
 pub type Identity = Vec<(String, String)>;
 
 /// What became of rays, as a file has it.
@@ -106,7 +106,7 @@ enum FilmSection<'a> {
     Sums(&'a [Sum]),
 }
 
-/// The same, to be filled.
+/// Section of a film, to be filled.
 pub(crate) enum SectionMut<'a> {
     Plane(&'a mut Values),
     Sums(&'a mut [Sum]),
@@ -226,20 +226,20 @@ pub struct FilmError {
 }
 
 impl FilmError {
-    /// The same with what to do about it.
+    /// Returns the error with what to do about it.
     pub(crate) fn with_remedy(self, remedy: &str) -> Self {
         Self { why: format!("{}; {remedy}", self.why), ..self }
     }
 }
 
-/// What is filled of a film, read from a file.
+/// Filled part of a film, read from a file.
 #[derive(Debug)]
 pub struct FilmFile {
     pub(crate) path: PathBuf,
-    /// What it says of itself.
+    /// Header of the file.
     pub header: FilmHeader,
     bytes: Vec<u8>,
-    /// Where the numbers begin.
+    /// Offset of the numbers.
     start: usize,
 }
 

@@ -1,4 +1,4 @@
-//! How much memory a render will take, from counts and headers alone.
+//! Forecast of a render's memory, from counts and headers alone.
 
 use etendue_image::MOST_BYTES;
 use etendue_scene::file::SETS;
@@ -24,7 +24,7 @@ const ENVIRONMENT: f64 = 2.7;
 /// Bytes that the pixels of a PNG take while they are packed.
 const PNG: u64 = 6;
 
-/// What rendering `scene` as planned will take, written as `outputs`.
+/// Forecasts the memory that rendering `scene` as planned will take, written as `outputs`.
 pub(crate) fn forecast(scene: &Scene, plan: &Plan, outputs: Outputs) -> MemoryForecast {
     let [width, height] = scene.camera.resolution().map(u64::from);
     let pixels = width.saturating_mul(height);

@@ -31,13 +31,13 @@ const MOST_BOXES: usize = 1024;
 pub(crate) struct Gap {
     /// m.
     pub(crate) distance: f64,
-    /// How far (m) f32 moves the start of a ray there.
+    /// Distance (m) by which f32 moves the start of a ray there.
     pub(crate) offset: f64,
     /// The placements of the surfaces on both sides; twice the same of a body or wall.
     pub(crate) between: [usize; 2],
 }
 
-/// How far f32 moves rays where light crosses surfaces.
+/// Surfaces that light crosses where f32 moves rays.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct CrossedSurfaces {
     /// The thinnest place that is too thin for f32.
@@ -50,13 +50,13 @@ pub(crate) struct CrossedSurfaces {
     pub(crate) cleared: Option<f64>,
 }
 
-/// Whether light goes through a surface.
+/// True if light goes through a surface.
 fn lets_pass(material: &Material) -> bool {
     let is_body = matches!(material.scattering, Scattering::Dielectric(_));
     is_body || material.is_pane() || matches!(material.alpha, Alpha::Blend { .. })
 }
 
-/// How far rays start off surfaces in f32, by where those are.
+/// Distances by which rays start off surfaces in f32, by where those are.
 struct Offsets {
     /// The farthest that a ray comes from (m from the world's origin).
     farthest: f64,
@@ -73,7 +73,7 @@ impl Offsets {
 struct Probe {
     point: DVec3,
     normal: DVec3,
-    /// How far it looks, and how near is the same place (m).
+    /// Distance up to which it looks, and the distance within which it is the same place (m).
     reach: f64,
     least: f64,
     area: f64,
@@ -89,8 +89,8 @@ struct Near<'a> {
     is_crossed: bool,
 }
 
-/// What is thin among the surfaces that light crosses; rays come from no farther than `farthest` (m) from the
-/// world's origin.
+/// Finds what is thin among the surfaces that light crosses; rays come from no farther than
+/// `farthest` (m) from the world's origin.
 pub(crate) fn crossed_surfaces(scene: &Scene, farthest: f64) -> CrossedSurfaces {
     let offsets = Offsets { farthest };
     let geometry = &scene.geometry;

@@ -24,11 +24,11 @@ pub struct Images {
     pub decoded: Vec<Option<Arc<Image>>>,
     /// The image of the environment.
     pub environment: Option<Arc<EnvironmentMap>>,
-    /// What each texture was decoded from, and what is wrong with it.
+    /// Origin of each texture, and its fault.
     origins: Vec<Option<ImageOrigin>>,
-    /// What the environment was read from, its file as it was, and whether it has spectra.
+    /// Origin of the environment, its file as it was, and whether it has spectra.
     sky: Option<(EnvironmentImage, Option<Stamp>, bool)>,
-    /// What could not be decoded, in words.
+    /// Descriptions of the images that could not be decoded.
     pub faults: Vec<String>,
 }
 
@@ -95,8 +95,8 @@ impl Images {
         Some((Arc::clone(self.decoded.get(i)?.as_ref()?), known.clone()))
     }
 
-    /// What is wrong with the first image of `scene` that cannot be decoded, whether a layer looks at
-    /// it or not.
+    /// Description of the error of the first image of `scene` that cannot be decoded, whether a
+    /// layer looks at it or not.
     #[must_use]
     pub fn first_fault(scene: &Scene) -> Option<String> {
         let limits = Limits::default();
@@ -155,7 +155,7 @@ impl Images {
         Ok(())
     }
 
-    /// How many are decoded in fewer texels than their files have.
+    /// Number of images decoded in fewer texels than their files have.
     #[must_use]
     pub fn coarser(&self, scene: &Scene) -> usize {
         let all = scene.textures.iter().zip(&self.decoded).zip(&self.origins);
@@ -189,7 +189,7 @@ impl Images {
 /// The encodings in which an image is averaged over footprints.
 type Encodings = [Option<Encoding>; 2];
 
-/// Which of the scene's images the plan's materials look at.
+/// Encodings of the scene's images that the plan's materials look at.
 pub(crate) fn wanted_images(scene: &Scene, plan: &Plan) -> Vec<Option<Encodings>> {
     let mut wanted = vec![None; scene.textures.len()];
     let Some(scope) = plan.images else { return wanted };
@@ -216,7 +216,7 @@ pub(crate) fn wanted_images(scene: &Scene, plan: &Plan) -> Vec<Option<Encodings>
     wanted
 }
 
-/// What an image was decoded from, and what is wrong with it.
+/// Origin of an image, and its fault.
 #[derive(Debug, Clone)]
 struct ImageOrigin {
     source: ImageSource,
@@ -224,9 +224,9 @@ struct ImageOrigin {
     stamp: Option<Stamp>,
     wrap: [Wrap; 2],
     filter: Filter,
-    /// How it is filtered by footprint.
+    /// Encodings in which it is filtered by footprint.
     encodings: Encodings,
-    /// How coarse it may be.
+    /// Coarseness that it may have.
     coarse: Option<Coarseness>,
     fault: Option<String>,
 }

@@ -1,5 +1,4 @@
-//! Whether light reaches what the camera sees: before a render by a small picture, after it by the
-//! picture itself.
+//! Check that light reaches what the camera sees: before a render by a small picture, after it by the picture itself.
 
 use std::sync::Arc;
 
@@ -52,7 +51,7 @@ pub(crate) struct Lighting {
     pub(crate) lights: Vec<Light>,
     /// The image of the environment.
     pub(crate) map: Option<Arc<EnvironmentMap>>,
-    /// What a user should know.
+    /// Note for the user.
     pub(crate) note: Option<String>,
 }
 
@@ -104,7 +103,7 @@ pub(crate) fn settle(
     Ok(lighting)
 }
 
-/// How much of what the camera sees is black under the lights of `stage`.
+/// Share of what the camera sees that is black under the lights of `stage`.
 fn dark_share(
     scene: &Scene,
     tracer: Rules,
@@ -166,7 +165,7 @@ fn dark_share(
     Ok(Losses::count(seen.map(|i| luminance(rgb(i)) < BLACK)))
 }
 
-/// What is wrong with the light of a finished picture as its PNG shows it, and which key mends it.
+/// Notes on what is wrong with the light of a finished picture as its PNG shows it, and on the key that mends it.
 pub(crate) fn verdict(
     scene: &Scene,
     accel: &dyn Accel,
@@ -212,7 +211,7 @@ pub(crate) fn verdict(
     told
 }
 
-/// What the previews of layers of colour beside the picture clip at `seen` pixels.
+/// Notes on what the previews of layers of colour beside the picture clip at `seen` pixels.
 fn clipped_previews(picture: &Picture, seen: &[usize]) -> Vec<String> {
     let beside = picture.layers().iter().filter(|layer| {
         let is_shown =

@@ -1,5 +1,5 @@
-//! How much of what a camera sees a file loses, clipped or black: counted and told by one rule, whatever the
-//! file.
+//! Losses of a file: how much of what a camera sees it clips or shows black, counted and told by
+//! one rule, whatever the file.
 
 use std::fmt;
 
@@ -9,7 +9,7 @@ pub const CLIPPED: f64 = 0.1;
 /// Black is told from this share of what is there.
 pub const BLACK: f64 = 0.3;
 
-/// How many of the things that are there a file loses.
+/// Number of things that a file loses, of those that are there.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Losses {
     /// Those that it loses.
@@ -35,13 +35,13 @@ impl Losses {
         self.lost as f64 / self.of.max(1) as f64
     }
 
-    /// Whether so many are clipped that it is told.
+    /// True if so many are clipped that the user is told.
     #[must_use]
     pub fn is_clipped(self) -> bool {
         self.share() > CLIPPED
     }
 
-    /// Whether so many are black that it is told.
+    /// True if so many are black that the user is told.
     #[must_use]
     pub fn is_black(self) -> bool {
         self.of > 0 && self.share() >= BLACK

@@ -1,4 +1,4 @@
-//! What the numbers of id layers name, for every header.
+//! Names that the numbers of id layers stand for, for every header.
 
 use etendue_scene::Scene;
 use etendue_tracer::LayerSpec;
@@ -25,7 +25,7 @@ pub(crate) fn tables(scene: &Scene) -> Vec<(String, Value)> {
     tables
 }
 
-/// Where a file that is asked for cannot hold the numbers of ids as it usually does.
+/// Notes on files that are asked for and cannot hold the numbers of ids as they usually do.
 pub(crate) fn notes(picture: &Picture, outputs: Outputs) -> Vec<String> {
     let mut notes = Vec::new();
     for name in exr::beyond_floats(picture).into_iter().filter(|_| outputs.exr) {

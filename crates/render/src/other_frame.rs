@@ -10,7 +10,7 @@ use etendue_geometry::{Detail, Geometry, HitBatch, MISS, Placement, RayBatch};
 use etendue_scene::Scene;
 use etendue_tracer::layer::{FrameStep, OtherFrame, Seen, Sight};
 
-/// What is nearer than a point by less than this share of its distance does not hide it: the point was
+/// Share of a point's distance within which something nearer does not hide it: the point was
 /// interpolated and its ray aimed with roundings of 10⁻¹⁵, which grazing surfaces stretch.
 const SAME_DEPTH: f64 = 1e-9;
 
@@ -27,11 +27,11 @@ pub struct FollowedFrame<'a> {
     camera: &'a Camera,
     geometry: &'a Geometry,
     accel: &'a dyn Accel,
-    /// What became of each placement of this frame, and its number there; `None` when all stand still.
+    /// Motion of each placement of this frame, and its number there; `None` when all stand still.
     motions: Option<Vec<(Motion, u32)>>,
 }
 
-/// What became of a placement on the way to the other frame.
+/// Motion of a placement on the way to the other frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Motion {
     Still,
@@ -58,13 +58,13 @@ impl<'a> FollowedFrame<'a> {
         Self { step, camera: &other.camera, geometry, accel, motions }
     }
 
-    /// Whether there is something that cannot be followed, because its mesh is another one there.
+    /// True if there is something that cannot be followed, because its mesh is another one there.
     #[must_use]
     pub fn loses_some(&self) -> bool {
         self.motions.as_ref().is_some_and(|motions| motions.iter().any(|one| one.0 == Motion::Gone))
     }
 
-    /// What becomes of a placement of this frame, and its number in the other one.
+    /// Motion of a placement of this frame, and its number in the other one.
     fn motion(&self, number: u32) -> (Motion, u32) {
         self.motions.as_ref().map_or((Motion::Still, number), |motions| motions[number as usize])
     }
@@ -120,7 +120,7 @@ impl<'a> FollowedFrame<'a> {
     }
 }
 
-/// What a placement is called whatever else is in the scene: its object, and which copy of it, which node
+/// Name of a placement, whatever else is in the scene: its object, and which copy of it, which node
 /// of that and which mesh of that it is.
 type Name = [u32; 4];
 

@@ -97,7 +97,7 @@ impl Job<'_> {
         Ok(passed.unwrap_or(all))
     }
 
-    /// Who judges the samples by a rule.
+    /// Judge of the samples by a rule.
     fn adaptive<'a>(
         &self,
         rule: &'a Rule,

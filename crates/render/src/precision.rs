@@ -1,5 +1,5 @@
-//! How precisely paths of light hit: in f32 where what that misplaces is lost in the picture's noise and
-//! under its smallest things, in f64 where it is not.
+//! Precision of the hits of light paths: in f32 where what that misplaces is lost in the picture's
+//! noise and under its smallest things, in f64 where it is not.
 
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, HitPrecision, RayBatch};
@@ -93,7 +93,7 @@ pub(crate) fn light_precision(scene: &Scene, samples: u32) -> (HitPrecision, Str
     (HitPrecision::Single, words(&than))
 }
 
-/// Why f32 does not do for what light goes through; `None` where it does.
+/// Reason why f32 does not do for what light goes through; `None` where it does.
 fn too_thin(scene: &Scene, crossed: &CrossedSurfaces) -> Option<String> {
     let name = |placement: usize| {
         let placement = &scene.geometry.placements[placement];
@@ -126,8 +126,8 @@ fn too_thin(scene: &Scene, crossed: &CrossedSurfaces) -> Option<String> {
     ))
 }
 
-/// How far (m) rays start off surfaces in f32, at most: what tracing reckons for a hit at the edge of the
-/// scene's `bounds` (m), seen from a camera so far from the world's origin (m).
+/// Greatest distance (m) by which rays start off surfaces in f32: what tracing reckons for a hit at
+/// the edge of the scene's `bounds` (m), seen from a camera so far from the world's origin (m).
 fn offset(bounds: Bounds, camera: f64) -> f64 {
     if bounds.is_empty() {
         return 0.0;
@@ -142,8 +142,8 @@ fn reach(bounds: Bounds) -> f64 {
     if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).length() }
 }
 
-/// How far from the world's origin the camera is (m), the least and the most of when its shutter opens and closes: of what
-/// moves along a line, the most of all.
+/// Least and greatest distance of the camera from the world's origin (m) when its shutter opens and
+/// closes: of what moves along a line, the most of all.
 fn camera_reach(scene: &Scene) -> [f64; 2] {
     let [open, close] = scene.camera.exposure_span();
     let away = |time: f64| scene.camera.pose_at(time).position.length();
@@ -151,8 +151,8 @@ fn camera_reach(scene: &Scene) -> [f64; 2] {
     [first.min(last), first.max(last)]
 }
 
-/// How far apart (m) the chief rays of two pixels in the middle of the picture are at `distance` (m) from the
-/// camera; `None` where they have none.
+/// Distance (m) between the chief rays of two pixels in the middle of the picture at `distance` (m)
+/// from the camera; `None` where they have none.
 fn pixel_width(scene: &Scene, distance: f64) -> Option<f64> {
     let mut rays = RayBatch::default();
     let [column, row] = scene.camera.resolution().map(|pixels| f64::from(pixels) / 2.0);
@@ -194,7 +194,7 @@ mod tests {
         held_to(&json!({}), camera, (size, place, samples), plan)
     }
 
-    /// The same, held to other numbers, by a camera 4 m away.
+    /// Chosen precision of a scene held to other numbers, seen by a camera 4 m away.
     fn held_to(
         accuracy: &serde_json::Value,
         mut camera: serde_json::Value,

@@ -14,18 +14,19 @@ use crate::sampling::{Averaged, Memory};
 /// fills packets, and few enough that its arrays stay in the cache.
 const BATCH: u32 = 1024;
 
-/// What tracing light needs; nothing of it changes on the way.
+/// Inputs of tracing light; nothing of them changes on the way.
 #[derive(Debug)]
 pub(crate) struct LightPass<'a> {
     pub(crate) stage: LightingContext<'a>,
     pub(crate) tracer: Rules,
     /// The camera, opened for these bands.
     pub(crate) camera: &'a Camera,
-    /// How many bands are added up: as many as are traced, or as many as land by themselves, all like the one that is.
+    /// Number of bands that are added up: as many as are traced, or as many as land by themselves,
+    /// all like the one that is.
     pub(crate) count: usize,
     /// The bands that the camera sends separate ways.
     pub(crate) groups: Vec<BandGroup>,
-    /// Where the bands share rays all the same: how many rows from its own each lands, at most.
+    /// Greatest number of rows from its own that each band's light lands, where the bands share rays all the same.
     pub(crate) rows: Option<u32>,
     /// The picture, and the parts of its light that have layers of their own.
     pub(crate) layers: Vec<LayerSpec>,
@@ -90,7 +91,7 @@ impl LightPass<'_> {
         }
     }
 
-    /// Where a ray crosses the entrance pupil's plane, to the right of its middle and above it (m).
+    /// Point where a ray crosses the entrance pupil's plane, to the right of its middle and above it (m).
     fn place_in_pupil(&self, rays: &RayBatch, ray: usize) -> [f64; 2] {
         let pose = self.camera.pose();
         let from = rays.origin(ray) - pose.position;
@@ -140,7 +141,7 @@ fn repeat_each(values: &mut Vec<f64>, count: usize) {
     }
 }
 
-/// Whether a layer counts light of a group: that which one surface scattered at most, and the rest.
+/// Tests whether a layer counts light of a group: that which one surface scattered at most, and the rest.
 fn counts(layer: LayerSpec, group: LightGroup) -> [bool; 2] {
     match layer {
         LayerSpec::Direct => [true, false],

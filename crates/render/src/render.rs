@@ -47,23 +47,23 @@ pub struct Rendered {
     /// Samples that every pixel was to have: more than it has when the render was stopped. Then the
     /// picture's header says so, by the entry `partial`.
     pub samples_wanted: u32,
-    /// How many samples the pixels have, where they got them until an error was reached.
+    /// Number of samples of each pixel, where they got them until an error was reached.
     pub sample_counts: Option<SampleCounts>,
     /// The light of the picture in bands other than red, green and blue, where it was traced so.
     pub band_film: Option<expose::BandFilm>,
     /// Rays traced, to lights included.
     pub rays: u64,
-    /// What became of the rays inside the camera's lens; all 0 without one.
+    /// Counts of rays by their outcome inside the camera's lens; all 0 without one.
     pub statuses: StatusCounts,
-    /// What of it was light's.
+    /// Statistics of the rays that were light's.
     pub light: RayStats,
     /// Wall time of the tracing alone.
     pub trace_time: Duration,
-    /// What a user should know of the picture.
+    /// Notes on the picture for the user.
     pub notes: Vec<String>,
 }
 
-/// What was made ready for a frame.
+/// Data made ready for a frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Prepared<'a> {
     /// The structure over the scene's geometry.
@@ -74,16 +74,16 @@ pub struct Prepared<'a> {
     pub others: &'a [FollowedFrame<'a>],
 }
 
-/// What of a render is wanted, and where it is kept on the way.
+/// Scope of a render: which part of it is wanted, and where it is kept on the way.
 #[derive(Debug, Clone, Default)]
 pub struct Course<'a> {
     /// The share of the picture's rows, or of its samples; all of it when absent.
     pub shard: Option<Shard>,
     /// Shares of the samples, which are put together instead of being traced.
     pub shares: &'a [FilmFile],
-    /// Where what there is so far is kept, and found again.
+    /// Checkpoint: where what there is so far is kept, and found again.
     pub checkpoint: Option<Checkpoint>,
-    /// Which render it is: what other shares, and what was kept, must be of.
+    /// Identity of the render, which other shares, and what was kept, must have too.
     pub identity: Identity,
 }
 
@@ -316,13 +316,13 @@ impl Film {
         }
     }
 
-    /// Whether it has all samples that were wanted: a film of a render that was stopped has not.
+    /// True if the film has all samples that were wanted: a film of a render that was stopped has not.
     #[must_use]
     pub fn is_complete(&self) -> bool {
         self.passed.is_complete
     }
 
-    /// What a user should know of it.
+    /// Notes on the film for the user.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes
@@ -385,7 +385,7 @@ pub fn finish(
     })
 }
 
-/// What the film holds as a picture, and its light in bands of its own.
+/// Finishes the film as a picture, and its light in bands of its own.
 fn finished(
     scene: &Scene,
     plan: &Plan,
@@ -460,8 +460,8 @@ fn so_far(
     Ok(picture.developed(development))
 }
 
-/// How many samples make up the set that those of the picture are taken from; `None` where the first of them
-/// are the same however many follow, so that a render may go on from fewer.
+/// Size of the set of samples that those of the picture are taken from; `None` where the first of
+/// them are the same however many follow, so that a render may go on from fewer.
 #[must_use]
 pub fn sample_set(scene: &Scene, plan: &Plan) -> Option<u32> {
     // Patterns are looked up over what a sample covers, which is less where there are more of them.

@@ -151,7 +151,7 @@ impl<'a> Averaging<'a> {
         &self.sums
     }
 
-    /// The same, to be filled.
+    /// Sums of the samples, to be filled.
     pub(crate) fn sums_mut(&mut self) -> &mut [Sum] {
         &mut self.sums
     }

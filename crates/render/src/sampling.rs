@@ -1,5 +1,5 @@
-//! How pixels are sampled: in which passes, by which random numbers, what is averaged, and the memory that a thread
-//! needs for it.
+//! Sampling of pixels: in which passes, by which random numbers, what is averaged, and the memory
+//! that a thread needs for it.
 
 use std::ops::Range;
 
@@ -20,7 +20,7 @@ const FIRST_PASS: u32 = 4;
 /// The most samples of a pass.
 const LONGEST_PASS: u32 = 1024;
 
-/// The same where what a render has so far is kept on disk after passes.
+/// Longest pass where what a render has so far is kept on disk after passes.
 const LONGEST_KEPT_PASS: u32 = 16;
 
 /// A pass is no longer than this share of all: what a stopped render loses.
@@ -61,7 +61,7 @@ fn up_to(samples: u32, longest: u32) -> Vec<Range<u32>> {
     passes
 }
 
-/// How pixels are sampled.
+/// Settings of how pixels are sampled.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sampling {
     /// Rays a pixel of coloured layers.
@@ -77,7 +77,7 @@ pub(crate) struct Sampling {
     pub(crate) diffusion: f64,
 }
 
-/// What the seed of the second set's sequence differs by.
+/// Difference of the seed of the second set's sequence.
 const SECOND_SET: u64 = 0xD1B5_4A32_D192_ED03;
 
 /// Samples of a pixel, side by side.
@@ -110,18 +110,17 @@ impl Sampling {
     }
 }
 
-/// What is averaged over the samples of a pixel: colours of surfaces, or light.
+/// Quantity averaged over the samples of a pixel: colours of surfaces, or light.
 pub(crate) trait Averaged: Sync {
     /// The camera, opened for these bands.
     fn camera(&self) -> &Camera;
     /// The bands that the camera sends separate ways.
     fn groups(&self) -> &[BandGroup];
-    /// Where the groups share rays, whose light lands beside the pixel that it starts from: how many rows from
-    /// it, at most.
+    /// Greatest number of rows that light lands from the pixel that it starts from, where the groups share rays.
     fn shared_rows(&self) -> Option<u32> {
         None
     }
-    /// Whether it is light, of which a row gets as much as its shutter lets through.
+    /// True if it is light, of which a row gets as much as its shutter lets through.
     fn is_light(&self) -> bool;
     /// Layers, and the bands of each.
     fn shape(&self) -> [usize; 2];
@@ -134,7 +133,7 @@ pub(crate) trait Averaged: Sync {
 /// One thread's memory for it.
 #[derive(Debug, Default)]
 pub(crate) struct Memory {
-    /// What the samples of the batch are sampled by, and the sample of each ray.
+    /// Numbers by which the samples of the batch are sampled, and the sample of each ray.
     pub(crate) numbers: SampleNumbers,
     pub(crate) rays: CameraRays,
     pub(crate) values: Vec<f64>,
@@ -145,7 +144,7 @@ pub(crate) struct Memory {
     pub(crate) scratch: Scratch,
     pub(crate) traffic: RayCounts,
     pub(crate) landings: BandLandings,
-    /// Where the samples of the batch lie.
+    /// Places of the samples of the batch.
     pub(crate) film: FilmSamples,
     /// `[pixel of the tile][set][layer][band]`.
     pub(crate) sums: Vec<Sum>,

@@ -53,19 +53,19 @@ impl Shard {
         Self { index: strips, count: strips + 1, by: ShardBy::Rows }
     }
 
-    /// The same share of what `by` says.
+    /// Returns the share with what it divides replaced by `by`.
     #[must_use]
     pub fn by(self, by: ShardBy) -> Self {
         Self { by, ..self }
     }
 
-    /// Whether samples are dealt out, and not rows.
+    /// True if samples are dealt out rather than rows.
     #[must_use]
     pub fn is_of_samples(self) -> bool {
         self.by == ShardBy::Samples
     }
 
-    /// Whether it has the layers that are not sampled.
+    /// True if the share has the layers that are not sampled.
     pub(crate) fn has_data(self) -> bool {
         !self.is_of_samples() || self.index == 0
     }
@@ -82,23 +82,23 @@ impl Shard {
         range
     }
 
-    /// Whether there is such a share: one that was read from a file may be none.
+    /// True if there is such a share: one that was read from a file may be none.
     pub(crate) fn is_sound(self) -> bool {
         self.index < self.count
     }
 
-    /// How many shares there are.
+    /// Number of shares.
     #[must_use]
     pub fn count(self) -> u32 {
         self.count
     }
 
-    /// Whether a strip of rows is of this share.
+    /// True if a strip of rows is of this share.
     pub(crate) fn owns(self, strip: usize) -> bool {
         self.is_of_samples() || strip % self.count as usize == self.index as usize
     }
 
-    /// How many of `height` rows are.
+    /// Number of rows, of `height`, that belong to the share.
     #[must_use]
     pub fn rows(self, height: u32) -> u32 {
         let strips = 0..height.div_ceil(TILE);

@@ -53,7 +53,7 @@ impl Sparkles {
         other.brightest.iter().for_each(|&over| self.note(over));
     }
 
-    /// What a user should know of them.
+    /// Note for the user on the sparkles.
     pub(crate) fn note_in_words(&self) -> Option<String> {
         let share = self.brightest.iter().sum::<f64>() / self.total;
         let count = self.brightest.len();

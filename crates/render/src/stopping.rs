@@ -1,4 +1,4 @@
-//! When the samples of a pixel are enough: what the scene asks for, as far as it can be had.
+//! Stopping rule of a pixel's samples: what the scene asks for, as far as it can be had.
 
 use std::time::Duration;
 
@@ -6,21 +6,21 @@ use etendue_scene::Scene;
 use etendue_scene::file::SamplesSpec;
 use etendue_sensor::NoiseModel;
 
-/// When the samples of a pixel are enough.
+/// Stopping rule of a pixel's samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stopping {
-    /// When they are as many as were asked for.
+    /// The number of samples that was asked for.
     Count,
-    /// When the variance of their mean is less than this share of the sensor's own at that signal.
+    /// The variance of their mean falls below this share of the sensor's own at that signal.
     SensorNoise(f64),
-    /// When the standard deviation of their mean is less than this share of it.
+    /// The standard deviation of their mean falls below this share of it.
     RelativeError(f64),
-    /// When they took so long.
+    /// The time that the samples take reaches this limit.
     Time(Duration),
 }
 
 impl Stopping {
-    /// What is held to for `scene`, and why it is not what the scene asks for.
+    /// Rule that is held to for `scene`, and the reason why it is not what the scene asks for.
     pub(crate) fn of(scene: &Scene) -> (Self, Option<String>) {
         match scene.render.samples {
             SamplesSpec::Count(_) => (Self::Count, None),
@@ -46,13 +46,13 @@ impl Stopping {
         }
     }
 
-    /// Whether pixels get different numbers of samples.
+    /// True if pixels get different numbers of samples.
     #[must_use]
     pub fn is_adaptive(self) -> bool {
         matches!(self, Self::SensorNoise(_) | Self::RelativeError(_))
     }
 
-    /// How long samples are taken, where that is what ends them.
+    /// Time limit of the samples, where that is what ends them.
     #[must_use]
     pub fn time(self) -> Option<Duration> {
         match self {

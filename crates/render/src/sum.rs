@@ -57,7 +57,7 @@ pub(crate) fn add_run(sums: &mut [Sum], values: &[f64], weights: &[f64]) {
     }
 }
 
-/// The same of a number of sums that is known, which stay in registers.
+/// Adds a run to a known number of sums, which stay in registers.
 fn add_run_of<const N: usize>(sums: &mut [Sum], values: &[f64], weights: &[f64]) {
     let Some(sums) = sums.first_chunk_mut::<N>() else { return };
     let mut own = *sums;

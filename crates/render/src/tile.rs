@@ -10,14 +10,14 @@ use crate::sparkles::Sparkles;
 /// Side of a tile (pixels): its rays are one batch.
 pub(crate) const TILE: u32 = 16;
 
-/// What was traced.
+/// Counts of what was traced.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct RayCounts {
     /// Rays of the camera for layers without light.
     pub(crate) chief_rays: u64,
     /// Rays of the radiance pass.
     pub(crate) light: RayStats,
-    /// What became of rays inside the camera's lens.
+    /// Counts of rays by their outcome inside the camera's lens.
     pub(crate) statuses: StatusCounts,
     /// Light that a handful of samples carries.
     pub(crate) sparkles: Sparkles,
@@ -64,7 +64,7 @@ impl Tile {
             .filter(move |&(x, y)| x < self.width && y < self.height)
     }
 
-    /// Where a pixel of the tile stands in the rows of its strip.
+    /// Index of a pixel of the tile in the rows of its strip.
     pub(crate) fn index(self, x: u32, y: u32, width: u32) -> usize {
         y as usize * width as usize + (self.left + x) as usize
     }

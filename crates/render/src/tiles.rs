@@ -32,7 +32,7 @@ const BATCH: u32 = TILE * TILE;
 pub(crate) type ToPicture<'a> =
     dyn Fn(&[&FilmLayer], u32) -> Result<Picture, PictureError> + Sync + 'a;
 
-/// What rendering needs; nothing of it changes on the way.
+/// Inputs of rendering; nothing of them changes on the way.
 pub(crate) struct Job<'a> {
     pub(crate) accel: &'a dyn Accel,
     pub(crate) camera: &'a Camera,
@@ -45,25 +45,25 @@ pub(crate) struct Job<'a> {
     /// Of hits whose colours are averaged.
     pub(crate) precision: HitPrecision,
     pub(crate) sampling: Sampling,
-    /// Which samples are taken of every pixel before the next are taken of any.
+    /// Ranges of samples, each taken of every pixel before the next is taken of any.
     pub(crate) passes: &'a [Range<u32>],
-    /// What fills [`LayerSpec::Radiance`] and the parts of it.
+    /// Pass that fills [`LayerSpec::Radiance`] and the parts of it.
     pub(crate) light: Option<LightPass<'a>>,
     /// The picture as it is on the film.
     pub(crate) picture: &'a ToPicture<'a>,
-    /// What samples are to reach, where pixels get different numbers of them.
+    /// Rule that the samples are to satisfy, where pixels get different numbers of them.
     pub(crate) rule: Option<Rule>,
-    /// How long samples are taken.
+    /// Time limit of the samples.
     pub(crate) time: Option<Duration>,
-    /// Which layer is the picture, by whose error samples are judged.
+    /// Layer of the picture, by whose error samples are judged.
     pub(crate) judged: Option<LayerSpec>,
     /// Shares of the samples, which are put together instead of being traced.
     pub(crate) shares: &'a [FilmFile],
-    /// Who keeps it on disk.
+    /// Keeper of the render on disk.
     pub(crate) keeper: Option<Keeper<'a>>,
 }
 
-/// What of a job was done.
+/// Part of a job that was done.
 #[derive(Debug)]
 pub(crate) struct Done {
     pub(crate) traffic: RayCounts,
@@ -74,14 +74,14 @@ pub(crate) struct Done {
     pub(crate) centres: Vec<LayerSpec>,
 }
 
-/// What the passes left.
+/// Samples taken in the passes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SamplesTaken {
     /// Samples that every pixel has.
     pub(crate) samples: u32,
-    /// Whether that is all that was wanted.
+    /// True if that is all that was wanted.
     pub(crate) is_complete: bool,
-    /// How many samples the pixels have, where that differs.
+    /// Number of samples of each pixel, where that differs.
     pub(crate) counts: Option<SampleCounts>,
 }
 
@@ -144,8 +144,8 @@ impl Job<'_> {
         Ok(Done { traffic, passed, sums, centres })
     }
 
-    /// What there is already, in shares or on disk, put onto the film: how many samples every pixel has, and
-    /// what was traced for them.
+    /// Puts what there is already, in shares or on disk, onto the film; returns how many samples
+    /// every pixel has, and what was traced for them.
     fn found(
         &self,
         centres: &mut [&mut FilmLayer],
@@ -180,7 +180,7 @@ impl Job<'_> {
         pixels * (u64::from(chief) + sampled as u64 * u64::from(samples))
     }
 
-    /// Whether a layer without light is a mean over samples.
+    /// True if a layer without light is a mean over samples.
     fn is_averaged(&self, layer: LayerSpec) -> bool {
         let many = self.sampling.samples > 1 || self.camera.has_pupil();
         let lit = self.light.is_some() && layer.row().taken.with_picture();
@@ -244,7 +244,7 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// What the chief ray of each pixel meets, in rows from the top: by which pixels are alike.
+    /// Hits of the chief ray of each pixel, in rows from the top: by which pixels are alike.
     pub(crate) fn chief_hits(&self) -> Result<Vec<ChiefHit>, NoMemory> {
         let [width, height] = self.camera.resolution();
         let mut all = filled(ChiefHit::default(), width as usize * height as usize)?;
@@ -274,7 +274,7 @@ impl Job<'_> {
         Ok(all)
     }
 
-    /// What layers are filled from.
+    /// Data that layers are filled from.
     fn seen<'b>(&'b self, traced: Traced<'b>) -> Seen<'b> {
         let light = self.light.as_ref().map(|pass| pass.stage);
         Seen { scene: self.surroundings, traced, light, places: [&[]; 2], others: self.others }

@@ -1,4 +1,4 @@
-//! Who watches a render: told how far it is, shown the picture so far, asked whether to go on.
+//! Observer of a render: told how far it is, shown the picture so far, asked whether to go on.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 

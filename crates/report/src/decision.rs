@@ -25,7 +25,7 @@ pub enum DecisionKind {
     Shutter,
     /// Denoising of the picture.
     Denoising,
-    /// What the picture may be off by, and what is taken of it.
+    /// Tolerance of the picture's errors, and what is taken of it.
     Tolerance,
     /// Rays of each band's own.
     RaysOfBands,
@@ -220,19 +220,19 @@ impl Decision {
         Self { kind, value, reason, saving: None, key, is_forced: false }
     }
 
-    /// The same, made by the scene's key where `is_forced`.
+    /// Marks the decision as made by the scene's key where `is_forced`.
     #[must_use]
     pub fn forced(self, is_forced: bool) -> Self {
         Self { is_forced, ..self }
     }
 
-    /// The same with another key.
+    /// Returns the decision with another key.
     #[must_use]
     pub fn by_key(self, key: &'static str) -> Self {
         Self { key: Some(key), ..self }
     }
 
-    /// The same with what it saves.
+    /// Returns the decision with what it saves.
     #[must_use]
     pub fn saving(self, saving: Option<Saving>) -> Self {
         Self { saving, ..self }

@@ -1,6 +1,6 @@
 use std::fmt;
 
-/// Why something is not done: where, why, and what would do.
+/// Reason why something is not done: where, why, and what would do.
 ///
 /// Written as `place: why`, with the remedy on a line of its own below it:
 ///
@@ -17,7 +17,7 @@ use std::fmt;
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Refusal(Box<Words>);
 
-/// What it is made of, in a box: results that hardly ever are refusals stay small.
+/// Words of a refusal, in a box: results that hardly ever are refusals stay small.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 struct Words {
     place: String,
@@ -25,7 +25,7 @@ struct Words {
     remedy: Option<String>,
 }
 
-/// What stands before a remedy.
+/// Separator before a remedy.
 const HINT: &str = "\nhint: ";
 
 impl Refusal {
@@ -40,7 +40,7 @@ impl Refusal {
         Self(Box::new(Words { place: String::new(), why, remedy }))
     }
 
-    /// What an error says, and behind it what those of its causes say that it does not quote.
+    /// Makes a refusal of an error: its message, and behind it those of its causes that it does not quote.
     #[must_use]
     pub fn of(error: &dyn std::error::Error) -> Self {
         let mut refusal = Self::new(error.to_string());
@@ -58,7 +58,7 @@ impl Refusal {
         refusal
     }
 
-    /// The same at a place, which stands before those that it has: a file, a line, a key.
+    /// Adds a place, which stands before those that it has: a file, a line, a key.
     #[must_use]
     pub fn at(mut self, place: impl fmt::Display) -> Self {
         let inner = std::mem::replace(&mut self.0.place, place.to_string());
@@ -70,14 +70,14 @@ impl Refusal {
         self
     }
 
-    /// The same with more words behind those that say why.
+    /// Adds more words behind those that say why.
     #[must_use]
     pub fn and(mut self, words: &str) -> Self {
         self.0.why.push_str(words);
         self
     }
 
-    /// The same with a remedy, below those that it has.
+    /// Adds a remedy, below those that it has.
     #[must_use]
     pub fn hint(mut self, remedy: impl Into<String>) -> Self {
         let remedy = remedy.into();
@@ -88,19 +88,19 @@ impl Refusal {
         self
     }
 
-    /// Where; empty where that is not known.
+    /// Place of the fault; empty where that is not known.
     #[must_use]
     pub fn place(&self) -> &str {
         &self.0.place
     }
 
-    /// Why.
+    /// Reason.
     #[must_use]
     pub fn why(&self) -> &str {
         &self.0.why
     }
 
-    /// What would do.
+    /// Remedy, if one is known.
     #[must_use]
     pub fn remedy(&self) -> Option<&str> {
         self.0.remedy.as_deref()

@@ -76,13 +76,13 @@ impl Table {
         table
     }
 
-    /// The same with a unit below each title.
+    /// Returns the table with a unit below each title.
     #[must_use]
     pub fn with_units(self, units: &[&str]) -> Self {
         Self { units: units.iter().map(|&unit| unit.to_owned()).collect(), ..self }
     }
 
-    /// The same, whose lines begin with so many blanks in a terminal.
+    /// Returns the table with lines that begin with so many blanks in a terminal.
     #[must_use]
     pub fn indented(self, indent: usize) -> Self {
         Self { indent, ..self }

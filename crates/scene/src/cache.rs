@@ -1,4 +1,4 @@
-//! What is kept from one load of a scene to the next, so that a change costs no more than it touches.
+//! Cache kept from one load of a scene to the next, so that a change costs no more than it touches.
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::{self, Read};
@@ -32,7 +32,7 @@ struct Given {
     digest: u128,
 }
 
-/// Where a model comes from.
+/// Source of a model.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum ModelOrigin {
     /// A file, by its path.
@@ -41,7 +41,7 @@ pub(crate) enum ModelOrigin {
     Shape(String),
 }
 
-/// How a model was read.
+/// Settings by which a model was read.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ImportManner {
     pub(crate) wanted: Wanted,
@@ -78,7 +78,7 @@ pub(crate) fn stamps<'p>(files: impl IntoIterator<Item = &'p PathBuf>) -> Vec<(P
     files.into_iter().filter_map(|path| Some((path.clone(), Stamp::of(path)?))).collect()
 }
 
-/// Whether all files are as they were.
+/// Tests whether all files are as they were.
 pub(crate) fn are_current(files: &[(PathBuf, Stamp)]) -> bool {
     files.iter().all(|(path, stamp)| Stamp::of(path) == Some(*stamp))
 }

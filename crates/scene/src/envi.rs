@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use etendue_files::MappedFile;
 use etendue_image::{Cube, Limits, envi};
 
-/// Why there is no cube: of which file it is said, and a sentence that goes on after its name.
+/// Error of a cube that cannot be read: its file, and a sentence that goes on after the file's
+/// name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EnviFault {
     /// The file.
     pub path: PathBuf,
-    /// Why.
+    /// Description of the error.
     pub why: String,
 }
 

@@ -1,4 +1,4 @@
-//! Why there is no scene.
+//! Errors of scenes that cannot be read or loaded.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,8 @@ use etendue_report::Refusal;
 use crate::file::{Origin, ScenePath};
 use crate::words::nearest;
 
-/// Why a scene cannot be read or loaded. The message names the file and the place in it, and ends in a remedy.
+/// Error of a scene that cannot be read or loaded. The message names the file and the place in it,
+/// and ends in a remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
@@ -24,7 +25,7 @@ pub enum SceneError {
     NotAScene {
         /// The file.
         file: PathBuf,
-        /// What it is instead.
+        /// Reason, which says what the file is instead.
         reason: String,
     },
     /// A value that the format does not allow.
@@ -34,9 +35,9 @@ pub enum SceneError {
         file: PathBuf,
         /// The place of the value in the file.
         path: ScenePath,
-        /// Where it was written.
+        /// Place where the value was written.
         place: Origin,
-        /// What is wrong and what would do.
+        /// Description of the error, and of what is valid.
         why: Refusal,
     },
     /// Something else.
@@ -47,11 +48,11 @@ pub enum SceneError {
     Stopped,
 }
 
-/// How the reason begins that names a file which is not there.
+/// Beginning of the reason that names a file which is not there.
 pub(crate) const NO_SUCH_FILE: &str = "no such file";
 
 impl SceneError {
-    /// Whether it is for a file that is not there: the scene, or one that the scene names.
+    /// True if the error is a file that is missing: the scene, or one that the scene names.
     #[must_use]
     pub fn is_missing_file(&self) -> bool {
         match self {
@@ -102,7 +103,7 @@ pub(crate) fn similar_name(file: &Path) -> Option<String> {
     nearest(wrong, names.iter().map(String::as_str)).map(str::to_owned)
 }
 
-/// Why a file that a scene names is not opened, with the most similar name when it is missing.
+/// Message on a file that a scene names and that is not opened, with the most similar name when it is missing.
 pub(crate) fn not_found(error: FindError) -> String {
     let near = match &error {
         FindError::Missing { path, .. } => similar_name(path),

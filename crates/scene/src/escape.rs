@@ -7,7 +7,7 @@
 use std::borrow::Cow;
 use std::fmt::Write;
 
-/// Whether a character is a command rather than a sign.
+/// Tests whether a character is a command rather than a sign.
 fn is_command(c: char) -> bool {
     let turns = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}'
         | '\u{2066}'..='\u{2069}');
@@ -25,7 +25,8 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     )
 }
 
-/// The same, on one line: ends of lines and tabs are spelled out, too. For names inside a message.
+/// Escapes `text` as [`printable`] does, onto one line: ends of lines and tabs are spelled out,
+/// too. For names inside a message.
 #[must_use]
 pub fn one_line(text: &str) -> Cow<'_, str> {
     escaped(text, is_command, |c, out| match c {

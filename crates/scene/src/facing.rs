@@ -24,11 +24,10 @@ const MOSTLY: f64 = 0.9;
 /// take seconds.
 const MOST_TRIANGLES: u64 = 10_000_000;
 
-/// How deep below the sides of the box something is that stands inside of a room, as a share of the
-/// box.
+/// Depth below the sides of the box from which something counts as inside of a room, as a share of the box.
 const INSIDE: f64 = 0.1;
 
-/// What a camera without a pose has to frame, and from where.
+/// Subject that a camera without a pose has to frame, and its viewpoint.
 pub(crate) fn subject<'a>(vertices: &'a WorldVertices<'a>) -> Subject<'a> {
     let geometry = vertices.geometry;
     let subject = Subject { points: Some(vertices), ..Subject::from(scene::tight(*vertices)) };
@@ -72,15 +71,15 @@ fn viewpoint(vertices: &WorldVertices<'_>, subject: &Subject<'_>) -> Viewpoint {
     Viewpoint::Usual
 }
 
-/// Whether something is no higher than it is wide or deep: only then is it looked at from above or
-/// below, into a room without a ceiling. Trees and towers are seen from the side, though their leaves
-/// and roofs show their fronts to the sky.
+/// True if something is no higher than it is wide or deep: only then is it looked at from above or
+/// below, into a room without a ceiling. Trees and towers are seen from the side, though their
+/// leaves and roofs show their fronts to the sky.
 fn is_low(bounds: Bounds) -> bool {
     let size = bounds.max - bounds.min;
     size.y <= size.x.max(size.z)
 }
 
-/// What a coarse parallel picture shows.
+/// Counts of what a coarse parallel picture shows.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct CoarseCounts {
     fronts: u32,
@@ -111,7 +110,7 @@ impl CoarseCounts {
         f64::from(self.backs) / f64::from(self.fronts + self.backs).max(1.0)
     }
 
-    /// Whether nothing of the box's outline is seen through.
+    /// True if nothing of the box's outline is seen through.
     fn is_full(self) -> bool {
         f64::from(self.nothing) < (1.0 - MOSTLY) * f64::from(self.fronts + self.backs)
     }
@@ -180,7 +179,7 @@ impl Coarse {
     }
 }
 
-/// Whether some triangle stands clear of the sides of the box.
+/// True if some triangle stands clear of the sides of the box.
 fn has_something_inside(geometry: &Geometry, bounds: Bounds) -> bool {
     let margin = (bounds.max - bounds.min) * INSIDE;
     let (low, high) = (bounds.min + margin, bounds.max - margin);

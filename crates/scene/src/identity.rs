@@ -33,7 +33,7 @@ impl fmt::Display for SceneHash {
     }
 }
 
-/// What a scene was made of.
+/// Ingredients that a scene was made of.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Ingredients {
     /// The scene's JSON with sorted keys and no blanks.
@@ -176,7 +176,7 @@ pub struct SceneNode {
 pub struct Copies {
     /// Index of the first.
     pub first: u32,
-    /// How many they are, at least 1.
+    /// Number of copies, at least 1.
     pub count: u32,
     /// The name of what is copied.
     pub name: String,

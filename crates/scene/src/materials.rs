@@ -109,7 +109,7 @@ struct Named<'a> {
     wanted: Wanted,
     textures: &'a mut Vec<Texture>,
     files: &'a mut Vec<PathBuf>,
-    /// How many curves surfaces have so far.
+    /// Number of curves that surfaces have so far.
     curves: &'a mut u32,
 }
 

@@ -1,5 +1,5 @@
-//! How much memory a scene may take, and one account of what it will: whatever grows with a file is
-//! spoken for here before it is made.
+//! Memory limit of a scene, and one account of the memory it will take: whatever grows with a file
+//! is spoken for here before it is made.
 
 use std::fmt;
 use std::fs;
@@ -14,11 +14,11 @@ use rayon::prelude::*;
 pub struct Limit {
     /// Bytes.
     pub bytes: u64,
-    /// Who says so.
+    /// Origin of the limit.
     pub source: LimitSource,
 }
 
-/// Who limits memory.
+/// Origin of a memory limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LimitSource {
     /// The user.
@@ -43,8 +43,8 @@ impl Limit {
         }
     }
 
-    /// What a Linux system whose files begin at `root` has free: the least of free memory, of what the
-    /// control group allows, and of the addresses left to this process.
+    /// Free memory of a Linux system whose files begin at `root`: the least of free memory, of what
+    /// the control group allows, and of the addresses left to this process.
     fn free(root: &Path) -> Option<Self> {
         let of = |bytes: Option<u64>, source| bytes.map(|bytes| Self { bytes, source });
         [
@@ -78,7 +78,7 @@ fn kilobytes(file: &Path, name: &str) -> Option<u64> {
     line.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(1024)
 }
 
-/// What the control groups (version 2) of this process leave; files that can be dropped count as free.
+/// Memory that the control groups (version 2) of this process leave; files that can be dropped count as free.
 fn group_has_free(root: &Path) -> Option<u64> {
     let text = fs::read_to_string(root.join("proc/self/cgroup")).ok()?;
     let own = text.lines().find_map(|line| line.strip_prefix("0::/"))?;
@@ -96,15 +96,15 @@ fn group_has_free(root: &Path) -> Option<u64> {
     folder.ancestors().take_while(|folder| folder.starts_with(&top)).filter_map(free).min()
 }
 
-/// What `ulimit -v` leaves to this process (bytes); `None` without such a limit, or where the system does
-/// not tell.
+/// Address space that `ulimit -v` leaves to this process (bytes); `None` without such a limit, or
+/// where the system does not tell.
 #[must_use]
 pub fn addresses() -> Option<u64> {
     addresses_left(Path::new("/"))
 }
 
-/// Whether the system gives so many bytes in one piece now. A library that is about to take them, or a
-/// growing list, would end the process otherwise.
+/// Tests whether the system gives so many bytes in one piece now. A library that is about to take
+/// them, or a growing list, would end the process otherwise.
 #[must_use]
 pub fn has_room(bytes: u64) -> bool {
     let bytes = usize::try_from(bytes).unwrap_or(usize::MAX);
@@ -112,7 +112,7 @@ pub fn has_room(bytes: u64) -> bool {
     bytes < SMALL || Vec::<u8>::new().try_reserve_exact(bytes).is_ok()
 }
 
-/// What is not asked for (bytes): the library keeps as much as this in hand of its own accord.
+/// Size (bytes) below which memory is not asked for: the library keeps as much as this in hand of its own accord.
 const SMALL: usize = 1 << 17;
 
 /// Bytes that JSON of these bytes takes once it is read: a value for each comma, and a table of keys for
@@ -153,13 +153,13 @@ impl Budget {
         Self { limit: Limit::of(given), taken: AtomicU64::new(0) }
     }
 
-    /// Whether the limit is the user's: then what is held already counts, too.
+    /// True if the limit is the user's: then what is held already counts, too.
     #[must_use]
     pub fn is_given(&self) -> bool {
         self.limit.is_some_and(|limit| limit.source == LimitSource::Given)
     }
 
-    /// What is left under the limit (bytes).
+    /// Memory left under the limit (bytes).
     #[must_use]
     pub fn left(&self) -> u64 {
         let limit = self.limit.map_or(u64::MAX, |limit| limit.bytes);
@@ -198,9 +198,9 @@ impl Budget {
     beside(*before)
 )]
 pub struct TooMuch {
-    /// What was to be taken (bytes).
+    /// Size of the allocation that was refused (bytes).
     pub bytes: u64,
-    /// What was spoken for before (bytes).
+    /// Memory spoken for before (bytes).
     pub before: u64,
     /// The limit.
     pub limit: Limit,

@@ -26,9 +26,9 @@ use etendue_tracer::{Light, Material, Texture, TextureScope};
 pub(crate) struct Object {
     pub(crate) title: String,
     pub(crate) origin: usize,
-    /// Where each of its copies stands at the frame's time.
+    /// Placement of each of its copies at the frame's time.
     pub(crate) world_from_object: Vec<Transform>,
-    /// How each of its copies moves; empty where it stands still.
+    /// Motion of each of its copies; empty where it stands still.
     pub(crate) motions: Vec<Motion>,
     /// The scene's material that replaces the model's.
     pub(crate) material: Option<u32>,
@@ -36,7 +36,7 @@ pub(crate) struct Object {
     pub(crate) overrides: BTreeMap<String, u32>,
 }
 
-/// Where the contents of one import went.
+/// Destination of the contents of one import.
 struct Home {
     placements: Vec<ImportedPlacement>,
     cameras: Vec<import::ImportedCamera>,
@@ -49,7 +49,7 @@ struct Home {
 #[derive(Default)]
 pub(crate) struct Parts {
     pub(crate) geometry: Geometry,
-    /// How meshes change their shapes, by their indices.
+    /// Deformations of meshes, by their indices.
     pub(crate) deformers: BTreeMap<u32, Arc<Deformer>>,
     pub(crate) register: Register,
     pub(crate) materials: Vec<Material>,
@@ -65,7 +65,7 @@ pub(crate) struct Parts {
 }
 
 impl Parts {
-    /// What the scene file itself declares, before any model is added.
+    /// Starts with what the scene file itself declares, before any model is added.
     pub(crate) fn new(
         materials: Vec<Material>,
         textures: Vec<Texture>,
@@ -199,7 +199,7 @@ impl Parts {
     }
 }
 
-/// How a placement of a copy that stands at `copy` moves, where it or the copy does.
+/// Motion of a placement of a copy that stands at `copy`, where it or the copy does.
 fn moved(own: Option<&Motion>, copy: &Transform, placement: &ImportedPlacement) -> Option<Motion> {
     let motion = match own {
         Some(motion) => motion.clone(),
@@ -219,7 +219,7 @@ struct PlacementNumbers<'a> {
     /// The object's index; of a model split into its nodes, that of the first.
     first_object: u32,
     split_nodes: bool,
-    /// How many instances a node's own list makes of it.
+    /// Number of instances that a node's own list makes of it.
     instances: HashMap<u32, u32>,
     nodes: HashMap<u32, PlacedNode>,
     /// Index of the first copy of the whole object.
@@ -292,7 +292,7 @@ impl<'a> PlacementNumbers<'a> {
 /// The copies of an object.
 #[derive(Debug)]
 pub(crate) struct Instances {
-    /// Where each stands, before the object's own transform.
+    /// Placement of each, before the object's own transform.
     pub(crate) transforms: Vec<Transform>,
     /// The file that says so.
     pub(crate) file: Option<PathBuf>,

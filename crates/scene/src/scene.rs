@@ -30,7 +30,7 @@ pub struct Scene {
     pub path: PathBuf,
     /// Meshes and where they stand.
     pub geometry: Arc<Geometry>,
-    /// What each object is called; placements point here.
+    /// Names of the objects; placements point here.
     pub objects: Vec<String>,
     /// The nodes of models, object by object; placements point here.
     pub nodes: Vec<SceneNode>,
@@ -42,17 +42,17 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// Lights of the scene and of its models, beside emissive surfaces.
     pub lights: Vec<Light>,
-    /// Whether the studio is to light the scene where its own emitters and lamps do not, which shows
-    /// when it is rendered: the scene names no lights.
+    /// True if the scene names no lights, so that the studio is to light it where its own emitters
+    /// and lamps do not, which shows when it is rendered.
     pub studio_if_dark: bool,
-    /// What the picture shows, when the scene says so.
+    /// Tracer of the picture, when the scene names one.
     pub tracer: Option<TracerSpec>,
     /// The camera.
     pub camera: Camera,
     /// The camera's sensor, of the camera's resolution; `None` when it is ideal: then the picture is
     /// all there is.
     pub sensor: Option<Sensor>,
-    /// Where the camera came from.
+    /// Origin of the camera.
     pub camera_origin: CameraOrigin,
     /// Cameras that came with the models.
     pub cameras: Vec<SceneCamera>,
@@ -62,24 +62,24 @@ pub struct Scene {
     pub slots: usize,
     /// All layers to render, each once: the picture first.
     pub layers: Vec<LayerSpec>,
-    /// How to render.
+    /// Settings of the render.
     pub render: RenderSpec,
-    /// What the plan is told instead of deciding it.
+    /// Settings that override decisions of the plan.
     pub plan: PlanSpec,
     /// Numbers that trade accuracy for speed.
     pub accuracy: AccuracySpec,
-    /// What the picture may be off by; nothing when absent.
+    /// Tolerance of the picture's errors; an exact picture when absent.
     pub tolerance: Option<ToleranceSpec>,
-    /// What was dropped, ignored or missing on the way.
+    /// Notes on what was dropped, ignored or missing on the way.
     pub notes: Vec<Note>,
-    /// What loading cost.
+    /// Statistics of loading.
     pub stats: LoadStats,
     /// Every file that the scene is made of, whether it was read or only named: the scene file,
     /// models with their buffers and material files, images, lenses, masks and arrays.
     pub inputs: Vec<PathBuf>,
-    /// Whether models were read into memory.
+    /// True if models were read into memory.
     pub(crate) is_copy: bool,
-    /// When loading began.
+    /// Time at which loading began.
     pub(crate) since: SystemTime,
     pub(crate) ingredients: Ingredients,
 }
@@ -129,7 +129,7 @@ impl Scene {
     }
 }
 
-/// What loading a scene found and cost.
+/// Statistics of loading a scene.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct LoadStats {
     /// Files that were opened, with their sizes in bytes.
@@ -142,10 +142,10 @@ pub struct LoadStats {
     pub dropped: u64,
 }
 
-/// How to load.
+/// Options of loading a scene.
 #[derive(Clone, Default)]
 pub struct LoadOptions<'a> {
-    /// What becomes of defects in the data.
+    /// Treatment of defects in the data.
     pub strictness: Strictness,
     /// Opens what the scene names, where it may be, and records it.
     pub opener: Opener,
@@ -162,7 +162,7 @@ pub struct LoadOptions<'a> {
     pub to_render: bool,
     /// Read models into memory instead of using them where their files are mapped.
     pub copy: bool,
-    /// What earlier loads left, and models that are in no file.
+    /// Cache of earlier loads, and of models that are in no file.
     pub cache: Option<&'a Cache>,
     /// Told now and then how far loading is; answering `false` stops it.
     pub progress: Option<&'a (dyn Fn(LoadProgress<'_>) -> bool + Sync)>,
@@ -181,12 +181,12 @@ impl std::fmt::Debug for LoadOptions<'_> {
     }
 }
 
-/// How far loading is.
+/// Progress of loading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LoadProgress<'a> {
     /// The model or shape that is being loaded or has just been; `camera` while one without a pose is placed.
     pub name: &'a str,
-    /// How many are.
+    /// Number of models and shapes that are loaded.
     pub done: usize,
     /// Of how many.
     pub total: usize,

@@ -27,7 +27,7 @@ const MOST_VALUES: usize = 1 << 20;
 /// By how much of an exposure slots may be longer, in rounding of their times.
 const ROUNDING: f64 = 1e-9;
 
-/// What slots may set.
+/// Top-level keys that slots may set.
 const ROOTS: [&str; 4] = ["camera", "lights", "objects", "materials"];
 
 /// A part of an exposure.
@@ -35,9 +35,9 @@ const ROOTS: [&str; 4] = ["camera", "lights", "objects", "materials"];
 pub struct Slot {
     /// The scene as it is then.
     pub file: SceneFile,
-    /// What each pixel takes of its light.
+    /// Share of its light that each pixel takes at this moment; all of it when absent.
     pub pixels: Option<PixelShares>,
-    /// Which of the scene's `serial` it is of.
+    /// Index of the slot in the scene's `serial`.
     number: usize,
     /// The files that are named for it.
     pub(crate) files: Vec<PathBuf>,
@@ -93,7 +93,7 @@ impl SceneFile {
         Ok(all)
     }
 
-    /// What is set for each of the frames that a slot is divided among: nothing for one in one piece.
+    /// Settings of each of the frames that a slot is divided among: none for one in one piece.
     fn frames_of(
         &self,
         opener: &Opener,
@@ -178,7 +178,7 @@ impl SceneFile {
         Ok(shutter)
     }
 
-    /// When each slot starts and ends (s from its row's opening).
+    /// Times at which each slot starts and ends (s from its row's opening).
     fn spans(&self, shutter: &Shutter) -> Result<Vec<[f64; 2]>, SceneError> {
         let slots = &self.spec.serial;
         let exposure = shutter.exposure();
@@ -318,7 +318,7 @@ fn place_of(number: usize) -> ScenePath {
     ScenePath::of("serial").index(number)
 }
 
-/// Why a slot may not set what is at a path.
+/// Reason why a slot may not set what is at a path.
 fn not_of_a_slot(path: &str) -> Option<&'static str> {
     let path = ScenePath::of(path);
     if !path.root().is_some_and(|root| ROOTS.contains(&root)) {

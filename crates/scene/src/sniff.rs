@@ -1,7 +1,7 @@
-//! What a file is by its first bytes, for those that are not what their name says.
+//! Detection of a file's kind by its first bytes, for those that are not what their name says.
 
-/// What files of other kinds start with. Sources: the formats' own specifications; Gary Kessler's
-/// table of file signatures.
+/// Signatures with which files of other kinds start. Sources: the formats' own specifications; Gary
+/// Kessler's table of file signatures.
 const STARTS: [(&[u8], &str); 26] = [
     (b"\x89PNG\r\n\x1a\n", "a PNG image"),
     (b"\xff\xd8\xff", "a JPEG image"),
@@ -31,10 +31,10 @@ const STARTS: [(&[u8], &str); 26] = [
     (b"\x7fELF", "a program"),
 ];
 
-/// How far zeros are looked at (bytes).
+/// Number of bytes that are searched for zeros.
 const LOOKED_AT: usize = 4096;
 
-/// What `bytes` are the start of; `None` for what might be text of any kind, or is not known.
+/// Kind of file that `bytes` are the start of; `None` for what might be text of any kind, or is not known.
 pub(crate) fn what_it_is(bytes: &[u8]) -> Option<&'static str> {
     if let Some((_, what)) = STARTS.iter().find(|(start, _)| bytes.starts_with(start)) {
         return Some(what);

@@ -1,5 +1,4 @@
-//! How long does it take to expose a frame of 20 megapixels, exactly and with the normal
-//! approximation?
+//! Benchmark of the time to expose a frame of 20 megapixels, exactly and with the normal approximation.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use etendue_sensor::{Exposure, Film, NoiseModel, Sensor};

@@ -1,4 +1,4 @@
-//! Where the normal approximation of the Poisson distribution fails: charts into the file that is
+//! Failures of the normal approximation of the Poisson distribution: charts into the file that is
 //! named, a table to standard output.
 //!
 //! ```sh

@@ -1,4 +1,4 @@
-//! Where the normal approximation of the Poisson distribution fails.
+//! Failures of the normal approximation of the Poisson distribution.
 //!
 //! A pixel of mean μ electrons and read noise σ gives Poisson(μ) + N(0, σ²); the approximation gives
 //! N(μ, μ + σ²). Mean and variance agree, everything else does not: at few electrons the true

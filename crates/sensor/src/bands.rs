@@ -42,15 +42,15 @@ const DIM: f64 = 0.003;
 /// The part of an error that bodies may show after the ways that are tried: it is largest between two of them.
 const BETWEEN: f64 = 0.94;
 
-/// What the bands of a render have to tell apart.
+/// Spectra and filters that the bands of a render have to tell apart.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Illumination {
     /// Spectra of the lights, to any factor; none for equal energy.
     pub spectra: Vec<Curve>,
     /// Curves of filters in front of the sensor, each of which may be what light passes.
     pub filters: Vec<Curve>,
-    /// How many coloured factors light meets on its way to the sensor: its own colour and those of
-    /// surfaces; more than three count as three.
+    /// Number of coloured factors that light meets on its way to the sensor: its own colour and
+    /// those of surfaces; more than three count as three.
     pub colored: usize,
     /// Other curves that light may be multiplied by on its way.
     pub factors: Vec<Factor>,
@@ -64,7 +64,7 @@ pub struct BandChoice {
     /// The worst relative error of any channel's electrons under any light and colour; `None` where
     /// nobody counts photons, or nobody worked it out.
     pub error: Option<f64>,
-    /// Whether all products of the light's curves were tried, or there are too many.
+    /// True if all products of the light's curves were tried; false if there are too many.
     pub complete: bool,
 }
 
@@ -134,7 +134,7 @@ impl Sensor {
     }
 }
 
-/// Where the sensor sees and some light shines (nm).
+/// Range in which the sensor sees and some light shines (nm).
 fn lit_range(sensor: Option<[f64; 2]>, light: &Illumination) -> Result<[f64; 2], SensorError> {
     let Some(sensor) = sensor else {
         let why = "the sensor sees nothing at any wavelength";
@@ -157,7 +157,7 @@ struct Trial {
     filter: Option<usize>,
     product: Product,
     exact: RunningSums,
-    /// What an error is a part of.
+    /// Scale that an error is a part of.
     scale: f64,
 }
 
@@ -180,7 +180,7 @@ struct BandTable {
     /// Of the mean light by each channel.
     channels: Vec<RunningSums>,
     trials: Vec<Trial>,
-    /// Whether all products are among them.
+    /// True if all products are among them.
     complete: bool,
     sensitivity: Curve,
     mean_light: Curve,
@@ -369,7 +369,7 @@ impl BandTable {
         cells
     }
 
-    /// What a sensor loses in bands that are not bands.
+    /// Greatest error of a sensor's counts in bands that are no bands of wavelengths, in shares of each trial's scale.
     fn error_of(
         &self,
         response: &Response,

@@ -169,7 +169,7 @@ pub(crate) fn moments(
 }
 
 impl Chain {
-    /// What is wrong with a pixel, by its number in 0..1 that says so.
+    /// Defect of a pixel, by its number in 0..1 that decides it.
     #[inline(always)]
     fn defect(&self, chance: f64) -> Option<Defect> {
         let [hot, _] = self.hot;
@@ -181,7 +181,7 @@ impl Chain {
         }
     }
 
-    /// What is wrong with the pixel of a column of a site.
+    /// Defect of the pixel of a column of a site.
     pub(crate) fn defect_at(&self, site: Site, column: u32) -> Option<Defect> {
         let place = BlockPlace { site, column };
         let [.., word] = self.pattern.words(place.fixed(0, Stage::Pattern));
@@ -224,7 +224,7 @@ fn second_deviates(key: &PhiloxKey, place: BlockPlace, normals: &mut BlockValues
     }
 }
 
-/// What a stuck pixel holds more than any other (e⁻).
+/// Charge of a stuck pixel, more than any other's (e⁻).
 const STUCK: f64 = 1e18;
 
 /// PRNU, DSNU, the dark signal with DCNU, and defective pixels: the same in every frame of a sensor.
@@ -358,7 +358,7 @@ fn shot_noise(
     *mean = electrons;
 }
 
-/// Whether a condition holds somewhere, without a branch a pixel.
+/// Tests whether a condition holds somewhere, without a branch a pixel.
 #[inline(always)]
 fn any(values: &[f64; GROUP], condition: impl Fn(f64) -> bool) -> bool {
     values.iter().fold(false, |any, &value| any | condition(value))

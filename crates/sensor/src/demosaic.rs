@@ -28,7 +28,7 @@ pub struct Mosaic<'a> {
     pub height: usize,
     /// `[row][column]`, as many as there are pixels.
     pub values: &'a [f32],
-    /// Which filter is where.
+    /// Pattern of the filters.
     pub pattern: &'a CfaSpec,
 }
 
@@ -121,8 +121,8 @@ fn mirrored(i: isize, len: usize) -> usize {
 }
 
 impl Sensor {
-    /// What every channel makes of white light, the most sensitive being 1: of equal energy, and of a colorimeter that
-    /// of sRGB, which is daylight (D65).
+    /// Response of every channel to white light, the most sensitive being 1: of equal energy, and
+    /// of a colorimeter that of sRGB, which is daylight (D65).
     #[must_use]
     pub fn white_response(&self) -> Vec<f64> {
         let all: Vec<f64> = match self.is_colorimeter() {
@@ -136,7 +136,7 @@ impl Sensor {
         all.into_iter().map(|value| value / most).collect()
     }
 
-    /// What every channel makes of a white surface in light that has these values in the sensor's
+    /// Response of every channel to a white surface in light that has these values in the sensor's
     /// [bands](Self::bands), the most being 1; as [`Self::white_response`] where no channel sees it.
     #[must_use]
     pub fn white_under(&self, light: &[f64]) -> Vec<f64> {
@@ -197,7 +197,7 @@ impl Sensor {
         rows.into_iter().map(|row| row.map(|value| value / most)).collect()
     }
 
-    /// Whether its channels are X, Y and Z.
+    /// True if its channels are X, Y and Z.
     fn is_colorimeter(&self) -> bool {
         matches!(self.spec().channels, Some(Channels::Set(ChannelSet::Cie1931)))
     }

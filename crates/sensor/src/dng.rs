@@ -17,7 +17,7 @@ use tiff::tags::{Tag, Type};
 use crate::response::{Filter, filters};
 use crate::{RawImage, Sensor};
 
-/// Why there is no DNG.
+/// Error of a DNG that cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DngError {
@@ -29,19 +29,19 @@ pub enum DngError {
     Write(#[from] tiff::TiffError),
 }
 
-/// What a DNG says beside the numbers.
+/// Details of a DNG beside the numbers.
 #[derive(Debug, Clone, Copy)]
 pub struct DngDetails<'a> {
-    /// What the file calls the camera.
+    /// Name of the camera in the file.
     pub model: &'a str,
-    /// What each of [`Sensor::channels`] makes of a white surface in the scene's light, to any factor
-    /// ([`Sensor::white_under`], or [`Sensor::white_response`] for equal energy).
+    /// Response of each of [`Sensor::channels`] to a white surface in the scene's light, to any
+    /// factor ([`Sensor::white_under`], or [`Sensor::white_response`] for equal energy).
     pub white: &'a [f64],
     /// s
     pub exposure: f64,
     /// Of the lens, if anybody knows.
     pub f_number: Option<f64>,
-    /// What brings the lens' shading back to even, if it is known.
+    /// Gain map that brings the lens' shading back to even, if it is known.
     pub shading: Option<&'a GainMap>,
 }
 
@@ -310,7 +310,7 @@ impl Sensor {
         white.map(|part| rational(if most > 0.0 { (part / most).max(1e-4) } else { 1.0 }))
     }
 
-    /// What channels red, green and blue have, by the number of each.
+    /// Values of the channels red, green and blue, by the number of each.
     fn of_rgb<T: Default>(&self, of: impl Fn(usize) -> T) -> [T; 3] {
         let names: Vec<&str> = self.channels().collect();
         ["R", "G", "B"].map(|name| {

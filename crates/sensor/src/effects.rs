@@ -268,7 +268,7 @@ fn ascending(points: &[[f64; 2]], last: f64) -> Result<(), [f64; 2]> {
     Ok(())
 }
 
-/// What of a full well is read of what it collected, near saturation: shares of the full well.
+/// Non-linearity near saturation: the charge that is read of what was collected, in shares of the full well.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Nonlinearity {
     /// `[collected, read]`, from `[0, 0]` to 1 collected.
@@ -330,7 +330,7 @@ impl Nonlinearity {
     }
 }
 
-/// What of these parts a sensor has, checked.
+/// Effects that a sensor has of those in this module, checked.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Effects {
     pub(crate) nonlinearity: Option<Nonlinearity>,

@@ -35,13 +35,13 @@ use etendue_spectrum::Bands;
 /// Frames of each kind at half saturation.
 const SPATIAL: u32 = 16;
 
-/// What the descriptor of the reference implementation is called.
+/// File name of the reference implementation's descriptor.
 pub const DESCRIPTOR: &str = "emva1288.txt";
 
-/// What the manifest is called.
+/// File name of the manifest.
 pub const MANIFEST: &str = "manifest.json";
 
-/// How a series is taken.
+/// Options of a series.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// Wavelength of the light (nm).
@@ -92,7 +92,7 @@ pub struct SeriesStep {
     pub dark: Vec<String>,
 }
 
-/// Why there is no series.
+/// Error of a series that cannot be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EmvaError {
@@ -110,7 +110,7 @@ pub enum EmvaError {
 /// Exposure times, photons and file names of a series, before any image is made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// What will be written.
+    /// Manifest of what will be written.
     pub manifest: Manifest,
     /// Columns and rows of the images.
     pub size: [u32; 2],
@@ -166,7 +166,7 @@ impl Series {
         Ok(Self { manifest, size: light.size(), nanoseconds: times })
     }
 
-    /// How many images there are.
+    /// Number of images.
     #[must_use]
     pub fn len(&self) -> usize {
         self.pictures().len()

@@ -1,10 +1,10 @@
-//! Why a sensor is refused.
+//! Errors of sensors that are refused.
 
 use std::fmt;
 
 use etendue_spectrum::CurveError;
 
-/// Why a sensor is refused, or cannot do what is asked.
+/// Error of a sensor that is refused, or cannot do what is asked.
 ///
 /// Its message is `sensor.KEY: reason`, or the reason alone; [`Self::at`] and [`Self::why`] give the
 /// two apart, for those who know where in a file the sensor stands.
@@ -13,32 +13,32 @@ use etendue_spectrum::CurveError;
 pub enum SensorError {
     /// A number that its meaning does not allow.
     Value {
-        /// Which key.
+        /// Name of the key.
         key: &'static str,
-        /// What it is.
+        /// Value that was given.
         value: f64,
-        /// What it must be.
+        /// Description of valid values.
         demand: &'static str,
     },
     /// A key that is needed here and absent.
     Missing {
-        /// Which key.
+        /// Name of the key.
         key: &'static str,
-        /// What needs it.
+        /// Reason: what needs the key.
         why: &'static str,
     },
     /// A key that means nothing here.
     Misplaced {
-        /// Which key.
+        /// Name of the key.
         key: &'static str,
-        /// Why.
+        /// Reason.
         why: &'static str,
     },
     /// A curve that is none, or leaves its bounds.
     Curve {
-        /// Which key.
+        /// Name of the key.
         key: String,
-        /// What is wrong.
+        /// Fault of the curve.
         fault: CurveError,
     },
     /// The full well holds less than the converter can tell from nothing.
@@ -59,9 +59,9 @@ pub enum SensorError {
     Pattern(String),
     /// A channel of a multispectral sensor that cannot be called so.
     Channel {
-        /// Which, counted from 0.
+        /// Index of the channel, counted from 0.
         index: usize,
-        /// What is wrong with its name.
+        /// Description of the error in its name.
         why: &'static str,
     },
     /// A letter of the colour filter array without a curve.
@@ -71,18 +71,18 @@ pub enum SensorError {
     },
     /// A channel that sees nothing of the spectral bands.
     Blind {
-        /// Which key holds the curve.
+        /// Name of the key that holds the curve.
         key: &'static str,
-        /// Which channel.
+        /// Name of the channel.
         channel: String,
         /// The range of the bands (nm).
         bands: [f64; 2],
     },
     /// Light of which the sensor sees nothing.
     Dark {
-        /// Where the sensor sees (nm).
+        /// Range in which the sensor sees (nm).
         sensor: [f64; 2],
-        /// Where the lights shine (nm).
+        /// Range in which the lights shine (nm).
         light: [f64; 2],
     },
     /// A quantum efficiency of nothing at the wavelength of a characterisation.
@@ -92,7 +92,7 @@ pub enum SensorError {
     },
     /// A film that is not this sensor's.
     Film {
-        /// How many values it has.
+        /// Number of values of the film.
         film: usize,
         /// Columns.
         width: usize,
@@ -103,7 +103,7 @@ pub enum SensorError {
     },
     /// A series that is too short to be characterised, or too long.
     Steps {
-        /// How many were asked for.
+        /// Number of steps that were asked for.
         steps: usize,
     },
 }
@@ -138,7 +138,7 @@ impl SensorError {
         }
     }
 
-    /// What is wrong and what would do, without the key.
+    /// Description of the error, and of what is valid, without the key.
     #[must_use]
     pub fn why(&self) -> String {
         match self {

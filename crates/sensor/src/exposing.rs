@@ -20,9 +20,9 @@ pub(crate) struct Exposing<'a> {
     film: Film<'a>,
     frame: u32,
     chain: Chain,
-    /// What bands are worth are multiplied by this: T in physical mode.
+    /// Factor on the worth of bands: T in physical mode.
     factor: f64,
-    /// What each column adds (e⁻), in this frame and in all; empty when nothing.
+    /// Offset of each column (e⁻), in this frame and in all; empty when nothing.
     columns: Vec<f64>,
     fixed_columns: Vec<f64>,
     /// Mean photo-electrons of all pixels, `[channel][row][column]`, where those of a column are not each for itself;
@@ -80,7 +80,7 @@ impl<'a> Exposing<'a> {
         (0..self.sensor.depth()).map(of_channel).collect()
     }
 
-    /// What each column adds (e⁻); empty when nothing.
+    /// Offset of each column (e⁻); empty when nothing.
     fn offsets_of_columns(&self, lasting: Lasting) -> Vec<f64> {
         let s = &self.sensor.settings;
         let sigma = match lasting {
@@ -206,7 +206,7 @@ impl<'a> Exposing<'a> {
         mixed.collect()
     }
 
-    /// What bands are worth along a row: by the filters' turns, or in one channel of the image.
+    /// Worth of bands along a row: by the filters' turns, or in one channel of the image.
     fn responsivity(&self, row: usize, channel: usize) -> Responsivity {
         let response = &self.sensor.response;
         let channels = match &response.pattern {
@@ -223,7 +223,7 @@ impl<'a> Exposing<'a> {
         Site { row: row as u32, channel: channel as u16, frame: self.frame }
     }
 
-    /// What the row adds (e⁻).
+    /// Offset of the row (e⁻).
     fn row_offset(&self, row: usize, lasting: Lasting) -> f64 {
         let s = &self.sensor.settings;
         let sigma = match lasting {
@@ -249,7 +249,7 @@ impl Lasting {
     const ALL: [Self; 2] = [Self::OneFrame, Self::Always];
 }
 
-/// What rows and columns add to the pixels of a block from column `start` on.
+/// Offsets of rows and columns for the pixels of a block from column `start` on.
 fn with_columns(of_row: f64, columns: &[f64], start: usize) -> BlockValues {
     let mut offset = [of_row; BLOCK];
     for (offset, column) in offset.iter_mut().zip(columns.iter().skip(start)) {

@@ -1,4 +1,4 @@
-//! What a sensor is given, and what it gives back.
+//! Film: the light that a sensor is given, and the numbers that it gives back.
 //!
 //! What a sensor's own noise hides: its temporal variance at a signal, beside which an error of the light
 //! is small or is not.
@@ -25,7 +25,7 @@ pub struct Exposure {
     pub frame: u32,
 }
 
-/// What the converter gave: digital numbers as they are, nothing scaled or subtracted.
+/// Numbers of the converter, as they are: nothing scaled or subtracted.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RawImage {
     /// Columns.
@@ -36,7 +36,7 @@ pub struct RawImage {
     pub depth: usize,
     /// `[row][column][channel]` (DN).
     pub values: Vec<u16>,
-    /// What of the film was no light.
+    /// Counts of values of the film that were no light.
     pub invalid: InvalidValues,
 }
 
@@ -53,7 +53,7 @@ pub struct Moments {
     pub mean: Vec<f32>,
     /// `[row][column][channel]` (DN²).
     pub variance: Vec<f32>,
-    /// What of the film was no light.
+    /// Counts of values of the film that were no light.
     pub invalid: InvalidValues,
 }
 
@@ -67,7 +67,7 @@ pub struct InvalidValues {
 }
 
 impl InvalidValues {
-    /// Whether there are any.
+    /// True if there are any such values.
     #[must_use]
     pub fn any(self) -> bool {
         self.negative + self.not_finite > 0

@@ -44,11 +44,11 @@ pub struct HdrImage {
     pub rate: Vec<f32>,
     /// Their standard deviations (e⁻/s); +inf of those pixels.
     pub sigma: Vec<f32>,
-    /// How many numbers are of such pixels.
+    /// Count of numbers of such pixels.
     pub saturated: u64,
 }
 
-/// What is known of a pixel before numbers are weighed.
+/// Knowledge of a pixel before numbers are weighed.
 #[derive(Debug, Clone, Copy)]
 struct Pilot {
     /// Numbers that count, the least exposed first; 0 of a pixel that is saturated in that.
@@ -61,7 +61,7 @@ struct Pilot {
 struct Reading<'a> {
     sensor: &'a Sensor,
     shot: Exposure,
-    /// Which reading, by its place among all, has the same electrons.
+    /// Index of another reading of the same electrons.
     twin: Option<usize>,
 }
 
@@ -190,7 +190,7 @@ impl Reading<'_> {
         (electrons + self.of_read_out(electrons)) / self.exposed().powi(2)
     }
 
-    /// What it counts for, where so many electrons a second are freed, with a twin that counts, or alone.
+    /// Weight of the reading, where so many electrons a second are freed, with a twin that counts, or alone.
     fn weight(&self, rate: f64, twin: Option<&Reading<'_>>) -> f64 {
         let Some(twin) = twin else { return 1.0 / self.variance_of_rate(rate) };
         let electrons = self.electrons(rate);

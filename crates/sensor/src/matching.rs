@@ -35,7 +35,7 @@ const ROUNDS: usize = 12;
 /// Of saturation: what is expected to be brighter is left out.
 const NEARLY_SATURATED: f64 = 0.9;
 
-/// Why a photograph cannot be matched. The message says what to do.
+/// Error of a photograph that cannot be matched. The message says what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MatchError {
@@ -61,9 +61,9 @@ pub enum MatchError {
         share: f64,
         /// DN
         level: f64,
-        /// Which end.
+        /// End of the scale that is clipped.
         end: &'static str,
-        /// What to do.
+        /// Remedy of the error.
         remedy: &'static str,
     },
     /// Numbers that do not go with the light.
@@ -135,7 +135,7 @@ pub struct Photograph<'a> {
     pub white: Option<f64>,
 }
 
-/// What is fitted.
+/// Parameters that are fitted.
 struct Fit {
     /// Of no light, and DN an electron of the simulation in each channel.
     line: Vec<f64>,
@@ -214,7 +214,7 @@ impl Sensor {
         Ok(self.rows_of_electrons(film, exposure, |_| 0.0).flatten().collect())
     }
 
-    /// What the sensor's own numbers say.
+    /// Fit by the sensor's own numbers.
     fn first_fit(&self, exposure: f64) -> Fit {
         let gain = self.system_gain();
         let dark = gain * self.dark_noise(exposure).hypot(self.non_uniformity()[1]);

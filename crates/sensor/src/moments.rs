@@ -41,7 +41,7 @@ pub(crate) struct PixelLaw<'a> {
     pub(crate) mean: f64,
     /// C (e⁻), +inf for none.
     pub(crate) full_well: f64,
-    /// What is read near saturation, as shares of the well.
+    /// Non-linearity of what is read near saturation, as shares of the well.
     pub(crate) curve: Option<&'a Nonlinearity>,
     /// The pixel's own offset (e⁻).
     pub(crate) offset: f64,
@@ -264,7 +264,7 @@ fn given(level: f64, sigma: f64, white: f64, pivot: f64) -> [f64; 2] {
     if sigma >= WIDE { wide(level, sigma, white, pivot) } else { steps(level, sigma, white, pivot) }
 }
 
-/// The same as a sum over the steps of the converter: `Q − pivot` counts the steps passed above the
+/// Moments as a sum over the steps of the converter: `Q − pivot` counts the steps passed above the
 /// pivot less those missed below, `(Q − pivot)²` the odd numbers of them.
 fn steps(level: f64, sigma: f64, white: f64, pivot: f64) -> [f64; 2] {
     let first = (level - REACH * sigma - 0.5).floor().clamp(0.0, white);
@@ -282,7 +282,7 @@ fn steps(level: f64, sigma: f64, white: f64, pivot: f64) -> [f64; 2] {
     [mean, square]
 }
 
-/// The same for steps that are narrow to the normal distribution: the clipped variable's own moments
+/// Moments for steps that are narrow to the normal distribution: the clipped variable's own moments
 /// and the ends' terms of Euler and Maclaurin's formula for midpoints, to the third derivative.
 fn wide(level: f64, sigma: f64, white: f64, pivot: f64) -> [f64; 2] {
     let [mean, variance] = clipped([level, sigma * sigma], 0.0, white);
@@ -315,7 +315,7 @@ fn series_length(sigma: f64) -> Option<u32> {
     (most <= 60.0).then_some(most as u32)
 }
 
-/// What rounding takes away: saw(X) = X − round(X).
+/// Moments of what rounding takes away: saw(X) = X − round(X).
 struct Sawtooth {
     /// E[saw].
     mean: f64,

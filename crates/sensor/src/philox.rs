@@ -11,7 +11,7 @@
 /// Multipliers of a round.
 const MULTIPLIER: [u64; 2] = [0xD251_1F53, 0xCD9E_8D57];
 
-/// What the key grows by from round to round.
+/// Increment of the key from round to round.
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 
 const ROUNDS: usize = 10;
@@ -80,7 +80,7 @@ pub fn mixed_seed(seed: u64, identity: &[u8]) -> u64 {
     mixed
 }
 
-/// What a random number is for. Two stages never share a counter.
+/// Use of a random number. Two stages never share a counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
 pub(crate) enum Stage {
@@ -94,7 +94,7 @@ pub(crate) enum Stage {
     Column = 4,
     /// PRNU, DSNU and what is wrong with the pixel.
     Pattern = 5,
-    /// How hot.
+    /// Strength of a hot pixel.
     HotPixel = 6,
     /// Keys of other sequences. It is no pixel's: stages of pixels stand in the highest bits.
     PhiloxKey = 7,
@@ -105,7 +105,7 @@ pub(crate) enum Stage {
 /// Channels that a counter has room for.
 pub(crate) const MOST_CHANNELS: usize = 4096;
 
-/// Where on the sensor, when and what for: the counter without the column.
+/// Site of a random number: where on the sensor, when and what for. The counter without the column.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Site {
     pub(crate) row: u32,

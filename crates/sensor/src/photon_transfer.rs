@@ -19,7 +19,7 @@ use crate::film::{Exposure, RawImage};
 use crate::{NoiseModel, Sensor, SensorError};
 use etendue_chart::{Axis, Chart, GREY, Series, Stroke, Theme, side_by_side};
 
-/// How curves are taken.
+/// Options of taking curves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// Wavelength of the light (nm); `None`: where the quantum efficiency is greatest.

@@ -116,7 +116,7 @@ pub(crate) struct OpenPixel {
     pub(crate) column: u32,
 }
 
-/// How many open pixels are finished side by side.
+/// Number of open pixels that are finished side by side.
 pub(crate) const FINISHED_TOGETHER: usize = 8;
 
 /// The deviates of open pixels.

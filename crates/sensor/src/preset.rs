@@ -79,7 +79,7 @@ pub enum Origin {
 pub struct Fact<T> {
     /// The figure.
     pub value: T,
-    /// Where it comes from.
+    /// Origin of the fact.
     pub origin: Origin,
 }
 
@@ -125,7 +125,7 @@ pub enum KnownCurve {
     Kaf50100,
 }
 
-/// What is known of a sensor. Dark current is in e⁻/s at `dark_current_temperature` (K).
+/// Data of a sensor. Dark current is in e⁻/s at `dark_current_temperature` (K).
 #[derive(Debug)]
 pub struct Preset {
     /// As its maker writes it.
@@ -144,7 +144,7 @@ pub struct Preset {
     pub read_noise: Fact<f64>,
     /// `μ_I` (e⁻/s).
     pub dark_current: Fact<f64>,
-    /// Where it was measured (K).
+    /// Temperature at which it was measured (K).
     pub dark_current_temperature: Fact<f64>,
     /// Warming that doubles it (K).
     pub dark_current_doubling: Fact<f64>,
@@ -158,7 +158,7 @@ pub struct Preset {
     pub dsnu: Fact<f64>,
     /// η.
     pub quantum_efficiency: Fact<Efficiency>,
-    /// Who says so, and what was made of it.
+    /// Sources of the data, and what was made of them.
     pub sources: &'static str,
 }
 

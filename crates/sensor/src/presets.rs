@@ -13,14 +13,13 @@ const UNCOOLED: Fact<f64> = Fact::assumed(1.0);
 /// temperature.
 const COOLED: Fact<f64> = Fact::assumed(253.15);
 
-/// What sensitivities and offsets of CMOS sensors differ by, in order of magnitude: 0.3 to 0.4 % in
-/// Sony's sensor of the A9 (J. Kasson 2017), 0.54 % in Sony's IMX363 (Lyu et al. 2021,
-/// arXiv:2105.04106).
+/// Relative spread of the sensitivities and offsets of CMOS sensors, in order of magnitude: 0.3 to 0.4 % in Sony's
+/// sensor of the A9 (J. Kasson 2017), 0.54 % in Sony's IMX363 (Lyu et al. 2021, arXiv:2105.04106).
 const CMOS_PRNU: Fact<f64> = Fact::assumed(0.005);
 const CMOS_DSNU: Fact<f64> = Fact::assumed(1.0);
 
-/// The same of CCDs, whose larger pixels are as even, and whose single amplifier adds no offsets of
-/// its own: what is left is dark current that differs.
+/// Relative spread, likewise, of CCDs, whose larger pixels are as even, and whose single amplifier
+/// adds no offsets of its own: what is left is dark current that differs.
 const CCD_PRNU: Fact<f64> = Fact::assumed(0.01);
 const CCD_DSNU: Fact<f64> = Fact::assumed(1.0);
 
@@ -28,7 +27,7 @@ const CCD_DSNU: Fact<f64> = Fact::assumed(1.0);
 const DOUBLING: Fact<f64> = Fact::assumed(7.0);
 
 impl Model {
-    /// What is known of it.
+    /// Data of the sensor.
     #[must_use]
     pub fn preset(self) -> &'static Preset {
         &PRESETS[self as usize]

@@ -31,11 +31,11 @@ pub(crate) struct Channel {
     /// Mean photo-electrons a unit of each band makes: a second in physical mode, in digital mode
     /// all that there are.
     pub(crate) electrons: Vec<f64>,
-    /// The same of light that is red, green or blue, as the render's colours are, in no bands.
+    /// Electrons, likewise, of light that is red, green or blue, as the render's colours are, in no bands.
     pub(crate) primaries: [f64; 3],
 }
 
-/// What the sensor makes of light.
+/// Response of the sensor to light.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Response {
     pub(crate) bands: Bands,
@@ -44,7 +44,7 @@ pub(crate) struct Response {
     pub(crate) pattern: Option<Vec<Vec<usize>>>,
 }
 
-/// What stands between the light and the silicon.
+/// Filter between the light and the silicon.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Filter {
     Clear,
@@ -87,7 +87,7 @@ impl Filter {
     }
 }
 
-/// Where a curve is not 0 (nm); its whole range when it is 0 everywhere.
+/// Range in which a curve is not 0 (nm); its whole range when it is 0 everywhere.
 fn extent(curve: &Curve) -> [f64; 2] {
     let samples = curve.samples();
     let first = samples.iter().position(|sample| sample[1] > 0.0);
@@ -163,7 +163,7 @@ impl Response {
     }
 }
 
-/// Whether no band of the render lies across an edge of the sensor's own, which are divided without a gap.
+/// True if no band of the render lies across an edge of the sensor's own, which are divided without a gap.
 fn divides(bands: &Bands, edges: &Grid) -> bool {
     let Some(grid) = bands.grid() else { return false };
     let near = |edge: &f64| grid.edges().iter().any(|own| (own - edge).abs() <= 1e-9 * edge);
@@ -341,13 +341,14 @@ fn channel(
     Ok(Channel { name, electrons, primaries })
 }
 
-/// What red, green and blue make, from what bands make.
+/// Electrons that red, green and blue make, from those that bands make.
 fn in_bands(bands: &Bands, electrons: &[f64]) -> [f64; 3] {
     let rows = bands.from_rgb();
     std::array::from_fn(|k| rows.iter().zip(electrons).map(|(row, e)| row[k] * e).sum())
 }
 
-/// The same from the curves, over a range of wavelengths (nm), beyond which there is no light.
+/// Electrons that red, green and blue make, from the curves, over a range of wavelengths (nm),
+/// beyond which there is no light.
 fn of_primaries(filter: &Filter, efficiency: &Curve, [from, to]: [f64; 2]) -> [f64; 3] {
     let nm = Curve::sampled(vec![[from, from], [to, to]]).unwrap_or(Curve::ONE);
     std::array::from_fn(|k| {

@@ -2,7 +2,7 @@
 
 use crate::film::InvalidValues;
 
-/// What bands are worth along a row: `[phase][band]`, the phases taking turns from column to column.
+/// Worth of bands along a row: `[phase][band]`, the phases taking turns from column to column.
 #[derive(Debug, Clone)]
 pub(crate) struct Responsivity {
     pub(crate) bands: usize,

@@ -68,7 +68,7 @@ impl Sensor {
         (rate > 0.0).then(|| time.clamp(EXPOSURES[0], EXPOSURES[1]))
     }
 
-    /// The same sensor with this exposure time alone (s).
+    /// Returns the sensor with this exposure time alone (s).
     #[must_use]
     pub fn at_exposure(mut self, exposure: f64) -> Self {
         self.settings.exposures = vec![exposure];

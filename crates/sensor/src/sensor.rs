@@ -39,7 +39,7 @@ impl Sensor {
         Ok(sensor)
     }
 
-    /// What it was made of.
+    /// Specification that the sensor was made of.
     #[must_use]
     pub fn spec(&self) -> &SensorSpec {
         &self.spec
@@ -51,14 +51,14 @@ impl Sensor {
         self.settings.resolution
     }
 
-    /// The same sensor with other columns and rows. The fixed pattern keeps its pixels.
+    /// Returns the sensor with other columns and rows. The fixed pattern keeps its pixels.
     #[must_use]
     pub fn with_resolution(mut self, resolution: [u32; 2]) -> Self {
         self.settings.resolution = resolution.map(|side| side.max(1));
         self
     }
 
-    /// The same sensor, as its file says, with pixels of another size (µm).
+    /// Returns the sensor, as its file specifies it, with pixels of another size (µm).
     ///
     /// # Errors
     ///
@@ -67,8 +67,8 @@ impl Sensor {
         Self::new(&SensorSpec { pixel_pitch: Some(Micrometres(pitch)), ..self.spec.clone() })
     }
 
-    /// The same sensor for a render in other bands than it asks for: in three, say, where nothing in
-    /// the scene has a spectrum of its own.
+    /// Returns the sensor for a render in other bands than it asks for: in three, say, where
+    /// nothing in the scene has a spectrum of its own.
     ///
     /// # Errors
     ///
@@ -90,13 +90,13 @@ impl Sensor {
         &self.response.bands
     }
 
-    /// What the film's values mean.
+    /// Radiometry: what the film's values mean.
     #[must_use]
     pub fn radiometry(&self) -> Radiometry {
         self.settings.radiometry
     }
 
-    /// How electrons are drawn.
+    /// Noise model by which electrons are drawn.
     #[must_use]
     pub fn noise(&self) -> NoiseModel {
         self.settings.noise
@@ -119,7 +119,7 @@ impl Sensor {
         self.cfa.as_ref()
     }
 
-    /// Which channel a pixel of a raw sensor has, an index into [`Self::channels`].
+    /// Channel of a pixel of a raw sensor, an index into [`Self::channels`].
     #[must_use]
     pub fn channel_at(&self, row: usize, column: usize) -> usize {
         let Some(pattern) = &self.response.pattern else { return 0 };
@@ -172,7 +172,7 @@ impl Sensor {
         self.settings.full_well.min(converter)
     }
 
-    /// What no light reads as (DN).
+    /// Black level: the number of a pixel without light (DN).
     #[must_use]
     pub fn black_level(&self) -> f64 {
         self.settings.black
@@ -288,20 +288,20 @@ impl Sensor {
         [self.settings.prnu, self.settings.dsnu]
     }
 
-    /// What a user should know: keys that have no effect, values that look like a slip.
+    /// Notes for the user: keys that have no effect, values that look like a slip.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.settings.notes
     }
 
-    /// What the scene asks for: every frame of every exposure, numbered through.
+    /// Exposures that the scene asks for: every frame of every exposure, numbered through.
     pub fn shots(&self) -> impl Iterator<Item = Exposure> + '_ {
         let exposures = self.settings.exposures.iter();
         let each = exposures.flat_map(|&exposure| (0..self.settings.frames).map(move |_| exposure));
         each.zip(0..).map(|(exposure, frame)| Exposure { exposure, frame })
     }
 
-    /// The same sensor drawing its electrons another way.
+    /// Returns the sensor with another noise model for its electrons.
     #[must_use]
     pub fn with_noise(mut self, noise: NoiseModel) -> Self {
         self.settings.noise = noise;

@@ -24,7 +24,7 @@ const MOST_ELECTRONS: f64 = 1e9;
 /// Dark currents beyond this are, too (e⁻/s).
 const MOST_CURRENT: f64 = 1e15;
 
-/// Which read-out of a pixel's electrons: the noise of each is its own.
+/// Read-out of a pixel's electrons: the noise of each is its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Readout {
     First,
@@ -37,7 +37,7 @@ pub(crate) struct SensorSettings {
     pub(crate) resolution: [u32; 2],
     pub(crate) pixel_pitch: f64,
     pub(crate) efficiency: Curve,
-    /// Whether anybody said how many electrons there are.
+    /// True if the number of electrons was specified.
     pub(crate) counts: bool,
     /// 1 DN/e⁻ when nobody counts electrons.
     pub(crate) gain: f64,
@@ -71,10 +71,10 @@ pub(crate) struct SensorSettings {
     pub(crate) radiometry: Radiometry,
     /// Sensitivity beside that of the first read-out's photodiode, which is 1.
     pub(crate) sensitivity: f64,
-    /// Which read-out of the electrons it is.
+    /// Read-out of the electrons that this is.
     pub(crate) readout: Readout,
     pub(crate) effects: Arc<Effects>,
-    /// What a user should know.
+    /// Notes for the user.
     pub(crate) notes: Vec<String>,
 }
 
@@ -84,12 +84,12 @@ impl SensorSettings {
         f64::from((1u32 << self.bit_depth) - 1)
     }
 
-    /// Where a pixel saturates (DN): its well, or the converter.
+    /// Saturation level of a pixel (DN): its well, or the converter.
     pub(crate) fn saturation_level(&self) -> f64 {
         (self.gain * self.read_of(self.full_well) + self.black).round_ties_even().min(self.white())
     }
 
-    /// What is read of so many electrons (e⁻), which the well holds.
+    /// Charge that is read of so many electrons (e⁻), which the well holds.
     pub(crate) fn read_of(&self, electrons: f64) -> f64 {
         match &self.effects.nonlinearity {
             Some(curve) => self.full_well * curve.read(electrons / self.full_well),

@@ -75,7 +75,7 @@ pub struct SlantedEdge {
     pub mtf50: Option<f64>,
 }
 
-/// Why a region has no edge that tells anything.
+/// Error of a region without an edge that tells anything.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EdgeError {
@@ -225,7 +225,7 @@ impl Lines {
         Ok(fit.with_spread(&spread))
     }
 
-    /// Where the edge crosses each line: (line, place).
+    /// Crossings of the edge with each line: (line, place).
     fn centroids(&self, about: Option<Edge>, width: f64) -> Result<Vec<(f64, f64)>, EdgeError> {
         let mut found = Vec::new();
         for (&line, values) in self.lines.iter().zip(&self.values) {
@@ -321,7 +321,7 @@ fn straight(places: &[(f64, f64)]) -> Edge {
     Edge { start: x - slope * y, slope }
 }
 
-/// Where an edge lies.
+/// Position of an edge.
 struct EdgeFit {
     edge: Edge,
     is_upright: bool,
@@ -399,8 +399,8 @@ impl SlantedEdge {
         cosines.hypot(sines) / sum.abs() / taken.abs().max(0.1)
     }
 
-    /// What square pixels without gaps take at a frequency (cycles a pixel) across the edge: what the
-    /// modulation is to be divided by for that of the lens alone.
+    /// Modulation of square pixels without gaps at a frequency (cycles a pixel) across the edge:
+    /// what the modulation is to be divided by for that of the lens alone.
     #[must_use]
     pub fn modulation_of_pixels(&self, frequency: f64) -> f64 {
         let turn = self.angle.to_radians();

@@ -181,7 +181,7 @@ pub struct SensorSpec {
 }
 
 impl SensorSpec {
-    /// Whether it asks for images of its own, that is for more than a grid of pixels.
+    /// True if the sensor asks for images of its own, that is for more than a grid of pixels.
     #[must_use]
     pub fn exposes(&self) -> bool {
         let grid =

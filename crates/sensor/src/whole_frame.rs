@@ -1,4 +1,4 @@
-//! What of a pixel's charge depends on all of its column: smear and blooming.
+//! Effects on a pixel's charge that depend on all of its column: smear and blooming.
 //!
 //! *Smear*: while the rows of a picture are shifted out, light goes on falling, so that every pixel gets a share of the
 //! light of its column. Data sheets state the signal of smear as a share of that of an even area a tenth of the picture

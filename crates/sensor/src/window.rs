@@ -2,7 +2,7 @@
 
 use crate::{RawImage, Sensor, SensorError};
 
-/// What of an image is read out.
+/// Part of an image that is read out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window {
     /// Left column, top row, width and height (pixels); all of it when absent.
@@ -18,8 +18,8 @@ impl Default for Window {
 }
 
 impl Sensor {
-    /// What of an image a window reads, the region first: numbers of pixels behind the same filter are averaged and
-    /// rounded, halves to even, so that a mosaic stays the mosaic that it is.
+    /// Reads a window of an image, the region first: numbers of pixels behind the same filter are
+    /// averaged and rounded, halves to even, so that a mosaic stays the mosaic that it is.
     ///
     /// # Errors
     ///

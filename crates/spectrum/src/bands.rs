@@ -28,7 +28,7 @@ pub enum Bands {
     Weighted(Arc<WeightedBands>),
 }
 
-/// What a curve is taken for where it is not known.
+/// Value of a curve where it is not known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outside {
     /// Nothing: an emission, a quantum efficiency.

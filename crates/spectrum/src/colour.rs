@@ -19,7 +19,7 @@ pub static OBSERVER: LazyLock<[Curve; 3]> = LazyLock::new(|| {
     })
 });
 
-/// The same every nanometre: what measured and narrow spectra are weighted by.
+/// Colour matching functions at every nanometre, by which measured and narrow spectra are weighted.
 pub static FINE_OBSERVER: LazyLock<[Curve; 3]> = LazyLock::new(|| {
     std::array::from_fn(|k| {
         let row = |(i, row): (usize, &[f64; 3])| [cie_fine::START + i as f64, row[k]];

@@ -32,7 +32,7 @@ enum CurveShape {
     Sampled(Vec<[f64; 2]>),
 }
 
-/// Why numbers do not make a curve.
+/// Error of numbers that make no curve.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CurveError {
@@ -45,7 +45,7 @@ pub enum CurveError {
          number alone if it holds everywhere, or at least two samples"
     )]
     Single {
-        /// Where the sample is (nm).
+        /// Wavelength of the sample (nm).
         wavelength: f64,
     },
     /// Wavelengths do not ascend.
@@ -54,7 +54,7 @@ pub enum CurveError {
          samples by wavelength and give each wavelength once"
     )]
     Unsorted {
-        /// Which sample, counted from 0.
+        /// Index of the sample, counted from 0.
         index: usize,
         /// Its wavelength (nm).
         wavelength: f64,
@@ -67,7 +67,7 @@ pub enum CurveError {
          finite number of nanometres and the value a finite number"
     )]
     NotFinite {
-        /// Which sample, counted from 0.
+        /// Index of the sample, counted from 0.
         index: usize,
         /// Its wavelength (nm).
         wavelength: f64,
@@ -88,7 +88,7 @@ pub enum CurveError {
     /// A value outside of the bounds that its meaning sets.
     #[error("the curve is {value} at {}: it must lie in {low}..={high}", place(*wavelength))]
     OutOfBounds {
-        /// Where (nm; `None` for a number that holds everywhere).
+        /// Wavelength of the value (nm; `None` for a number that holds everywhere).
         wavelength: Option<f64>,
         /// The value there.
         value: f64,
@@ -102,7 +102,7 @@ pub enum CurveError {
 /// Wavelengths up to here are micrometres: nothing that a lens or a sensor is for lies below 20 nm.
 const MICROMETRES: f64 = 20.0;
 
-/// Where a value stands.
+/// Place of a value, for messages.
 fn place(wavelength: Option<f64>) -> String {
     match wavelength {
         Some(nm) => format!("{nm} nm"),
@@ -111,7 +111,7 @@ fn place(wavelength: Option<f64>) -> String {
 }
 
 impl Curve {
-    /// The same value at every wavelength.
+    /// Makes a curve of one value at every wavelength.
     ///
     /// # Errors
     ///
@@ -253,7 +253,7 @@ impl Curve {
         }
     }
 
-    /// Where the curve is greatest (nm): the first such sample; `None` for a flat one.
+    /// Wavelength of the greatest value (nm): the first such sample; `None` for a flat one.
     #[must_use]
     pub fn peak(&self) -> Option<f64> {
         let mut peak: Option<[f64; 2]> = None;

@@ -51,7 +51,7 @@ pub struct Grid {
 /// More bands than this are refused: a render would not fit into memory.
 pub const MAX_BANDS: usize = 4096;
 
-/// Why numbers do not make a grid.
+/// Error of numbers that make no grid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GridError {
@@ -67,9 +67,9 @@ pub enum GridError {
     /// An edge that is not a wavelength, or not after the one before it.
     #[error("edge {index} of the bands is {edge} nm: edges must be positive, finite and ascending")]
     Edge {
-        /// Which edge, counted from 0.
+        /// Index of the edge, counted from 0.
         index: usize,
-        /// What was given (nm).
+        /// Value that was given (nm).
         edge: f64,
     },
 }

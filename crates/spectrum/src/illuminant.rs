@@ -77,7 +77,7 @@ pub enum Illuminant {
     BlackBody(f64),
 }
 
-/// Why an illuminant cannot be had.
+/// Error of an illuminant that cannot be had.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IlluminantError {

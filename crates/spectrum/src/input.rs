@@ -96,7 +96,7 @@ pub struct LineSpec {
     pub scale: f64,
 }
 
-/// What is wrong with a curve, and where below its own place.
+/// Fault of a curve, and its place below the curve's own.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CurveFault {
     /// The key.

@@ -51,7 +51,7 @@ impl Metal {
         }
     }
 
-    /// What a smooth surface reflects of unpolarised light at the cosine of incidence `cosine`
+    /// Reflectance of a smooth surface for unpolarised light at the cosine of incidence `cosine`
     /// (0..=1), by wavelength (nm).
     #[must_use]
     pub fn reflectance(self, cosine: f64) -> Curve {
@@ -60,7 +60,7 @@ impl Metal {
     }
 }
 
-/// What a smooth surface whose n and k are curves reflects at the cosine of incidence `cosine`, by wavelength: where
+/// Reflectance of a smooth surface whose n and k are curves, at the cosine of incidence `cosine`, by wavelength: where
 /// either has a point, and between its points every 5 nm, for it is no straight line of theirs.
 ///
 /// # Errors
@@ -85,8 +85,8 @@ pub fn reflectance_of([n, k]: [&Curve; 2], cosine: f64) -> Result<Curve, crate::
     Curve::sampled(knots.into_iter().map(at).collect())
 }
 
-/// What a smooth surface of index `n + i k` reflects of unpolarised light at the cosine of incidence
-/// `cosine` (0..=1).
+/// Reflectance of a smooth surface of index `n + i k` for unpolarised light at the cosine of
+/// incidence `cosine` (0..=1).
 #[must_use]
 pub fn reflectance([n, k]: [f64; 2], cosine: f64) -> f64 {
     let c2 = cosine * cosine;

@@ -1,4 +1,4 @@
-//! What a curve is to the eye, as a colour and as photons.
+//! Summary of a curve to the eye, as a colour and as photons.
 //!
 //! # Sources
 //!
@@ -68,7 +68,7 @@ impl Summary {
     }
 }
 
-/// Where a chromaticity is in the uniform chromaticity scale of 1960.
+/// Chromaticity in the uniform chromaticity scale of 1960.
 fn uv([x, y]: [f64; 2]) -> [f64; 2] {
     let scale = -2.0 * x + 12.0 * y + 3.0;
     [4.0 * x / scale, 6.0 * y / scale]

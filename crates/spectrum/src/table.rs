@@ -60,7 +60,7 @@ impl Table {
         }
     }
 
-    /// What the columns of values are called: the header's words, or their numbers from 1.
+    /// Names of the columns of values: the header's words, or their numbers from 1.
     #[must_use]
     pub fn titles(&self) -> Vec<String> {
         let count = self.rows[0].len() - 1;

@@ -68,7 +68,7 @@ impl WeightedBands {
         Curve::trusted(knots.map(|nm| [nm, self.light.held(nm) / seen]).collect())
     }
 
-    /// What counts at a wavelength (nm) of the light that a sensor sees, to a factor.
+    /// Weight of a wavelength (nm) in the light that a sensor sees, to a factor.
     pub(crate) fn weight(&self, nm: f64) -> f64 {
         self.sensitivity.at(nm).unwrap_or(0.0) * self.light.at(nm).unwrap_or(0.0)
     }
@@ -103,8 +103,8 @@ pub struct Spread {
     /// In ascending order (nm), each the mean of an equal share of the band's light behind the
     /// filters. So their own mean is that of the light.
     pub wavelengths: Vec<f64>,
-    /// What passes all filters one behind the other, over the product of what passes each of them
-    /// alone: 1 for fewer than two, 0 for two that pass different light.
+    /// Share of light that passes all filters one behind the other, over the product of what passes
+    /// each of them alone: 1 for fewer than two, 0 for two that pass different light.
     pub overlap: f64,
 }
 

@@ -49,7 +49,7 @@ pub(crate) struct App {
     /// The user has stopped what there was to do since the last wish.
     pub(crate) is_stopped: bool,
     pub(crate) asking: Option<(Asking, String)>,
-    /// What there is to choose from, while a path is asked for.
+    /// Entries to choose from, while a path is asked for.
     pub(crate) listing: Listing,
     /// The window's title.
     pub(crate) titled: String,
@@ -366,12 +366,12 @@ impl App {
         }
     }
 
-    /// Whether the picture is that of the scene as it is now, as fine as it gets.
+    /// True if the picture is that of the scene as it is now, as fine as it gets.
     pub(crate) fn is_settled(&self) -> bool {
         self.picture.as_ref().is_some_and(|p| p.is_final && p.number == self.number)
     }
 
-    /// What it is at, for those who wait.
+    /// Description of what it is at, for those who wait.
     #[cfg(test)]
     pub(crate) fn state(&self) -> String {
         let picture = self.picture.as_ref().map(|p| (p.number, p.factor, p.is_final));
@@ -380,12 +380,12 @@ impl App {
         format!("wish {number}, accepted {accepted:?}, picture {picture:?}, {busy:?}, {error:?}")
     }
 
-    /// Whether the renderer has not reached the last wish.
+    /// True if the renderer has not reached the last wish.
     pub(crate) fn is_behind(&self) -> bool {
         self.accepted.as_ref().is_none_or(|(number, _)| *number < self.number)
     }
 
-    /// Where the camera stands, as the picture shows it or as it was asked for since.
+    /// Viewpoint of the camera, as the picture shows it or as it was asked for since.
     pub(crate) fn viewpoint(&self) -> Option<Viewpoint> {
         let inspector = self.inspector.as_ref()?;
         Some(inspector.viewpoint(self.asked.as_ref().and_then(|asked| asked.probe.as_ref())))

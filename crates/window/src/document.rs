@@ -43,7 +43,7 @@ pub(crate) struct Document {
     /// That file is a scene, and no model or lens that a scene was made for.
     pub(crate) is_scene: bool,
     value: Arc<Value>,
-    /// What the file says.
+    /// Values of the file.
     saved: Arc<Value>,
     past: Vec<Arc<Value>>,
     future: Vec<Arc<Value>>,
@@ -57,7 +57,7 @@ impl Document {
         Self { path, is_scene, value, saved, past: Vec::new(), future: Vec::new(), last: None }
     }
 
-    /// Where it is saved when nobody says where: in its own file, or in a new one beside that.
+    /// File in which it is saved when nobody says where: in its own file, or in a new one beside that.
     pub(crate) fn own_file(&self) -> PathBuf {
         match self.is_scene {
             true => self.path.clone(),
@@ -136,7 +136,7 @@ impl Document {
         self.last = None;
     }
 
-    /// What the file says now; `value` is that with the edits that were not saved.
+    /// Takes up what the file says now; `value` is that with the edits that were not saved.
     pub(crate) fn take_up(&mut self, saved: Arc<Value>, value: Arc<Value>) {
         if self.value != value {
             self.remember();
@@ -174,7 +174,7 @@ fn apply(value: &mut Value, edit: &Edit) {
     }
 }
 
-/// What the window shows.
+/// View that the window shows.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) enum View {
     /// The picture, as `picture.png` shows it.

@@ -23,7 +23,7 @@ use crate::form::marked;
 use crate::panels;
 use crate::state::Tool;
 
-/// How long anything may take before a test gives up.
+/// Time that anything may take before a test gives up.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A window of 1200 by 800 points that nobody sees.

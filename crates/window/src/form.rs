@@ -63,7 +63,7 @@ impl Form {
         schema
     }
 
-    /// What a schema says of objects, where the name of a file that holds one would do as well.
+    /// Schema of objects, where the name of a file that holds one would do as well.
     fn of_objects<'a>(&'a self, schema: &'a Value) -> &'a Value {
         let choices = schema["anyOf"].as_array();
         let mut others = choices.into_iter().flatten().filter(|one| one["type"] != "string");
@@ -346,7 +346,7 @@ pub(crate) fn mark(ctx: &egui::Context, name: &str, place: egui::Rect) {
     ctx.data_mut(|data| data.insert_temp(egui::Id::new(("mark", name)), place));
 }
 
-/// Where a widget is.
+/// Rectangle of a widget.
 #[cfg(test)]
 pub(crate) fn marked(ctx: &egui::Context, name: &str) -> Option<egui::Rect> {
     ctx.data(|data| data.get_temp(egui::Id::new(("mark", name))))

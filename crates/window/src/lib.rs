@@ -30,7 +30,7 @@ use winit::event_loop::EventLoopBuilder;
 /// The window's first size (points).
 const SIZE: [f32; 2] = [1360.0, 860.0];
 
-/// Why there is no window.
+/// Error of a window that cannot be opened.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WindowError {

@@ -1,5 +1,5 @@
-//! What the window holds besides the scene: the picture that is shown and the hand on it, the pixel that was asked,
-//! what is being asked for, and the folder that is listed.
+//! State of the window besides the scene: the picture that is shown and the hand on it, the pixel
+//! that was asked, what is being asked for, and the folder that is listed.
 
 use std::path::{MAIN_SEPARATOR, PathBuf};
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use etendue::{Preview, Probe, Screen, Viewpoint};
 
 use crate::form::mark;
 
-/// What a click on the picture does.
+/// Tool: the action of a click on the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Tool {
     /// Asks the pixel.
@@ -29,12 +29,12 @@ pub(crate) struct ShownPicture {
     pub(crate) layer: String,
     pub(crate) layers: Vec<String>,
     pub(crate) is_final: bool,
-    /// What it was made of.
+    /// Preview that it was made of.
     pub(crate) preview: Option<Arc<Preview>>,
     pub(crate) texture: egui::TextureHandle,
 }
 
-/// What was asked of a pixel.
+/// Query of a pixel: what was asked of it.
 #[derive(Debug, Clone)]
 pub(crate) struct PixelQuery {
     /// Column and row coordinates (pixels from the picture's corner).
@@ -50,12 +50,12 @@ pub(crate) enum Asking {
     Render,
 }
 
-/// How the picture is shown, and the hand on it.
+/// Canvas on which the picture is shown, and the hand on it.
 #[derive(Default)]
 pub(crate) struct PictureCanvas {
     /// Points per pixel of the screen's fit; 1 shows all of the picture.
     pub(crate) zoom: Option<f32>,
-    /// How far the picture's middle is from the canvas' (points).
+    /// Shift of the picture's middle from the canvas' (points).
     pub(crate) shift: Vec2,
     /// The camera in the hand, and when it was moved last (s).
     pub(crate) hand: Option<(Viewpoint, f64)>,
@@ -63,7 +63,7 @@ pub(crate) struct PictureCanvas {
     pub(crate) flying: Vec<Key>,
     /// The left half shows this picture, for comparison.
     pub(crate) before: Option<egui::TextureHandle>,
-    /// Where the two meet, as a share of the width.
+    /// Position where the two meet, as a share of the width.
     pub(crate) split: f32,
 }
 
@@ -73,7 +73,7 @@ impl PictureCanvas {
         self.hand = None;
     }
 
-    /// Where the picture of this many columns and rows lies.
+    /// Rectangle of the picture of this many columns and rows.
     pub(crate) fn place(&self, canvas: Rect, size: [f32; 2]) -> Rect {
         let fit = (canvas.width() / size[0]).min(canvas.height() / size[1]);
         let size = Vec2::from(size) * fit * self.zoom.unwrap_or(1.0);
@@ -150,7 +150,7 @@ impl Listing {
     }
 }
 
-/// What is asked for.
+/// Kinds of path that are asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kinds {
     /// A file that is there, whose name has what was written of it.

@@ -18,10 +18,10 @@ use serde_json::Value;
 use crate::document::View;
 use studio::PreviewRenderer;
 
-/// How often files are looked at for changes when there is nothing else to do.
+/// Interval at which files are looked at for changes when there is nothing else to do.
 const WATCH: Duration = Duration::from_secs(1);
 
-/// What is to be seen.
+/// Wish of what is to be seen.
 #[derive(Debug, Clone)]
 pub(crate) struct Wish {
     /// Numbers rise; answers carry them.
@@ -47,7 +47,7 @@ pub(crate) enum Task {
     Render(PathBuf, Arc<Value>, Option<usize>),
 }
 
-/// What a scene was made for.
+/// Kind of file that a scene was made for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Scene,
@@ -57,7 +57,7 @@ pub(crate) enum Kind {
     Lens,
 }
 
-/// What the thread tells.
+/// News that the thread tells.
 #[derive(Debug)]
 pub(crate) enum News {
     /// A file was opened: what it is, and the values of its scene.
@@ -72,7 +72,7 @@ pub(crate) enum News {
     Refused(u64, String),
     /// A picture, rough or fine.
     Shown(Box<Shown>),
-    /// What is being done, and the share of it that is done.
+    /// Work that is being done, and the share of it that is done.
     Busy(&'static str, f64),
     /// Nothing is being done.
     Idle,
@@ -96,7 +96,7 @@ pub(crate) struct Shown {
     pub(crate) layer: String,
     /// All layers that there are.
     pub(crate) layers: Vec<String>,
-    /// What it was made of; none for a picture between two passes.
+    /// Preview that it was made of; none for a picture between two passes.
     pub(crate) preview: Option<Arc<Preview>>,
     /// Samples that its pixels have, and are to have, where that is known.
     pub(crate) samples: Option<[u32; 2]>,
@@ -104,7 +104,7 @@ pub(crate) struct Shown {
     pub(crate) is_final: bool,
 }
 
-/// What the two threads share.
+/// State that the two threads share.
 #[derive(Debug, Default)]
 struct Desk {
     tasks: VecDeque<Task>,

@@ -37,7 +37,7 @@ impl Iterator for SetBits {
     }
 }
 
-/// What [`NarrowRay`](super::ray::NarrowRay) is for one ray.
+/// Bundle of rays in a frame, each as a [`NarrowRay`](super::ray::NarrowRay).
 pub(super) struct FrameRays {
     origin: [[f32; PACKET]; 3],
     direction: [[f32; PACKET]; 3],
@@ -321,7 +321,7 @@ impl<A: Arithmetic> EachRay<A> {
         }
     }
 
-    /// Which rays meet the box before `far`.
+    /// Mask of the rays that meet the box before `far`.
     #[inline(always)]
     pub(super) fn meet(&self, l: A, [lo, hi]: [[f32; 3]; 2], far: A::F) -> u32 {
         let (mut enter, mut leave) = (self.near, far);

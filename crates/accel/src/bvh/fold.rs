@@ -68,7 +68,7 @@ pub(super) fn fold(tree: &Tree, leaf: &impl WriteLeaf) -> Option<WideTree> {
 #[derive(Default)]
 struct Piece {
     cells: Vec<Cell>,
-    /// Where its nodes begin.
+    /// Positions in `cells` at which its nodes begin.
     nodes: Vec<usize>,
     place: usize,
 }
@@ -204,9 +204,9 @@ impl<'a, L: WriteLeaf> Fold<'a, L> {
 pub(super) struct Triangles<'a> {
     pub(super) part: &'a Blas,
     pub(super) geometry: &'a Geometry,
-    /// Where all triangles come from; `None` where placements have to be told apart.
+    /// Source of all triangles; `None` where placements have to be told apart.
     pub(super) only: Option<MeshTriangles<'a>>,
-    /// How the mesh's coordinates would follow from the leaves', and whether they all do.
+    /// Map from the leaves' coordinates to the mesh's, and whether it holds for all.
     pub(super) units: LeafUnits,
     pub(super) is_exact: AtomicBool,
 }

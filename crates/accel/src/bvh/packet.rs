@@ -31,7 +31,7 @@ pub(super) struct Packet<'a, S> {
     origin: [&'a [f64; PACKET]; 3],
     direction: [&'a [f64; PACKET]; 3],
     t_min: &'a [f64; PACKET],
-    /// How far each looks.
+    /// Distance up to which each ray looks.
     t_max: [f64; PACKET],
     sinks: [S; PACKET],
     /// A bit for every ray that may still hit something.

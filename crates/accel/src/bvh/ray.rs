@@ -19,21 +19,20 @@ use crate::parts::{Instance, LocalRay};
 pub(super) struct NarrowRay {
     pub(super) origin: Vec3,
     pub(super) direction: Vec3,
-    /// What no coordinate of the ray, against a box or a triangle near it, is off by.
+    /// Bound on the error of a coordinate of the ray, against a box or a triangle near it.
     pub(super) error: f32,
-    /// Where the ray begins to count (τ).
+    /// Distance at which the ray begins to count (τ).
     pub(super) near: f32,
     /// Frame lengths per world distance.
     length: f64,
-    /// How far the origin was moved along the ray.
+    /// Distance by which the origin was moved along the ray.
     skipped: f64,
 }
 
-/// What no plane of a box, against a ray that begins within `origin` of the frame's origin along each
-/// axis, is off by along its axis: with ε = 2⁻²⁴ and planes within 1, the plane is rounded (ε), the
-/// origin is (ε · `origin`), and so are its product with the reciprocal and the sum with this error
-/// (twice that); the direction, its reciprocal and the last sum are relative to their distance
-/// (3 ε (1 + `origin`)). Then there is what f64 did before.
+/// Bound on the error of a plane of a box, against a ray that begins within `origin` of the frame's origin along each
+/// axis, is off by along its axis: with ε = 2⁻²⁴ and planes within 1, the plane is rounded (ε), the origin is (ε ·
+/// `origin`), and so are its product with the reciprocal and the sum with this error (twice that); the direction, its
+/// reciprocal and the last sum are relative to their distance (3 ε (1 + `origin`)). Then there is what f64 did before.
 #[inline(always)]
 pub(super) fn box_error(origin: f32, pad: f32) -> f32 {
     (f32::EPSILON / 2.0 * (7.0 * origin + 5.0) + 2.0 * pad).min(MOST_ERROR)
@@ -45,7 +44,7 @@ pub(super) fn box_error(origin: f32, pad: f32) -> f32 {
 /// rounding of its own products. That is 20 for s = 1, where the box's error is 5 or more.
 pub(super) const TRIANGLE_ERROR: f32 = 4.0;
 
-/// The same for shears by up to 2.1.
+/// Error bound, likewise, for shears by up to 2.1.
 pub(super) const SKEW_TRIANGLE_ERROR: f32 = 7.0;
 
 /// Farther from the frame's origin than this, the ray is moved closer before it is rounded. All
@@ -196,7 +195,7 @@ pub(super) struct TriangleTest<L: Arithmetic> {
     pub(super) axes: [usize; 3],
     pub(super) origin: [L::F; 3],
     pub(super) shear: [L::F; 3],
-    /// What a distance, or an edge's determinant per length, is off by at most.
+    /// Bound on the error of a distance, or of an edge's determinant per length.
     pub(super) error: L::F,
     pub(super) near: L::F,
 }
@@ -217,7 +216,7 @@ impl<L: Lanes> TriangleTest<L> {
         }
     }
 
-    /// Which of the `n` triangles of a leaf the ray may hit before `far`.
+    /// Mask of the `n` triangles of a leaf that the ray may hit before `far`.
     #[inline(always)]
     pub(super) fn maybe(&self, l: L, numbers: &LeafNumbers, n: usize, far: f32) -> u32 {
         let a = self.shear(l, self.runs(l, numbers, 0, n));
@@ -238,8 +237,8 @@ impl<L: Lanes> TriangleTest<L> {
 }
 
 impl<L: Arithmetic> TriangleTest<L> {
-    /// What some rays (this test being that of a different ray in each lane) make of triangle `i` of
-    /// a leaf before `far`.
+    /// Tests some rays (this test being that of a different ray in each lane) against triangle `i`
+    /// of a leaf before `far`.
     #[inline(always)]
     pub(super) fn look(&self, l: L, runs: &Runs<'_>, i: usize, far: L::F) -> TriangleLook<L> {
         let [a, b, c] = runs.corners;
@@ -281,7 +280,7 @@ impl<L: Arithmetic> TriangleTest<L> {
     }
 }
 
-/// What single precision can tell about rays and a triangle.
+/// Result of single precision's test of rays and a triangle.
 #[derive(Clone, Copy)]
 pub(super) struct TriangleLook<L: Arithmetic> {
     /// The lanes that f64 might call a hit within the limits.
@@ -310,7 +309,7 @@ fn run<L: Lanes>(l: L, numbers: &LeafNumbers, start: usize) -> L::F {
     }
 }
 
-/// Which of the boxes around the `n` triangles of a leaf the rays of a box test meet before `far`.
+/// Mask of the `n` triangles of a leaf whose boxes the rays of a box test meet before `far`.
 #[inline(always)]
 pub(super) fn meet_triangles<L: Lanes>(
     l: L,

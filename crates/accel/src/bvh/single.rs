@@ -11,9 +11,9 @@ use crate::nearest::{Nearest, Query, Triangle};
 use crate::parts::Instance;
 use crate::watertight;
 
-/// What becomes of the hits of one ray.
+/// Receiver of the hits of one ray.
 pub(super) trait Sink {
-    /// Whether one hit is as good as another.
+    /// True if one hit is as good as another.
     const ANY_WILL_DO: bool;
 
     fn new(t_max: f64) -> Self;
@@ -37,7 +37,7 @@ impl Sink for Nearest {
     }
 }
 
-/// Whether there is any hit.
+/// Receiver that records whether there is any hit.
 pub(super) struct AnyHit {
     pub(super) found: bool,
 }
@@ -74,7 +74,7 @@ pub(super) struct Search<'a, L, S> {
     pub(super) lanes: L,
     pub(super) bvh: &'a Bvh,
     pub(super) query: &'a Query,
-    /// How far to look.
+    /// Distance up to which to look.
     pub(super) t_max: f64,
     pub(super) sink: &'a mut S,
     pub(super) stack: &'a mut Stack,

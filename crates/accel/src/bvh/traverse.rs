@@ -34,7 +34,7 @@ fn child(entry: u64) -> Child {
     Child(entry as u32)
 }
 
-/// Which of the eight boxes of a node the ray meets before `far`, and where.
+/// Mask of the eight boxes of a node that the ray meets before `far`, and the distances.
 #[inline(always)]
 pub(super) fn meet<L: Lanes>(
     lanes: L,
@@ -55,22 +55,22 @@ pub(super) fn meet<L: Lanes>(
     (l.le(enter, leave), enter)
 }
 
-/// Where the ray passes the eight near planes across `axis`, or before.
+/// Distances at which the ray passes the eight near planes across `axis`, or before.
 #[inline(always)]
 fn near<L: Lanes>(l: L, node: &WideNode, test: &BoxTest<L>, axis: usize) -> L::F {
     let plane = l.load(&node[2 * axis + (test.backwards[axis] & 1)].0);
     l.mul_sub(plane, test.inverse_near[axis], test.near_offset[axis])
 }
 
-/// Where the ray passes the eight far planes across `axis`, or behind.
+/// Distances at which the ray passes the eight far planes across `axis`, or behind.
 #[inline(always)]
 fn end<L: Lanes>(l: L, node: &WideNode, test: &BoxTest<L>, axis: usize) -> L::F {
     let plane = l.load(&node[2 * axis + (!test.backwards[axis] & 1)].0);
     l.mul_sub(plane, test.inverse_far[axis], test.far_offset[axis])
 }
 
-/// What is done at a leaf. (A trait and no closure, because only what is marked so is inlined, and
-/// only what is inlined may use the lanes.)
+/// Visitor of leaves. (A trait and no closure, because only what is marked so is inlined, and only
+/// what is inlined may use the lanes.)
 pub(super) trait Leaves {
     /// Looks into `leaf`; answers how far to look from there on, or `None` to end.
     fn see(&mut self, leaf: Child, far: f32) -> Option<f32>;

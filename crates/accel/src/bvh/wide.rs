@@ -30,7 +30,7 @@ pub(super) const NO_CHILDREN: WideNode = {
     [lower, upper, lower, upper, lower, upper, Cell([0.0; 8])]
 };
 
-/// Where a node or a leaf begins, and how many things a leaf holds: 32 bits.
+/// Position of a node or a leaf, and the number of things in a leaf: 32 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Child(pub(super) u32);
 
@@ -75,7 +75,7 @@ pub(super) struct WideTree {
     pub(super) hi: [f32; 3],
 }
 
-/// What a leaf says of an instance.
+/// Number of values that a leaf holds of an instance.
 pub(super) const INSTANCE_NUMBERS: usize = 7;
 
 /// Cells that may be read from the first of any leaf: more than eight lanes from the last run of
@@ -118,7 +118,7 @@ impl WideTree {
     }
 }
 
-/// How a leaf's coordinates relate to the mesh's: `p / scale + origin`, exactly.
+/// Units of a leaf's coordinates against the mesh's: `p / scale + origin`, exactly.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LeafUnits {
     origin: DVec3,
@@ -154,7 +154,7 @@ pub(super) enum Arena {
     Empty,
     /// Mapped memory, which begins on a page.
     Mapped(MmapMut),
-    /// Where mapping failed.
+    /// Memory on the heap, where mapping failed.
     Heap(Vec<Cell>),
 }
 

@@ -10,7 +10,7 @@ use embree4_sys as sys;
 
 use crate::{BuildError, BuildOptions};
 
-/// What Embree's callbacks write to while a device lives.
+/// State that Embree's callbacks write to while a device lives.
 #[derive(Default)]
 struct DeviceWatch {
     /// The first error since it was last taken.
@@ -186,14 +186,14 @@ fn check_isa(isa: &str) -> Result<&str, BuildError> {
     }
 }
 
-/// What Embree there is.
+/// Version of Embree.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Version {
     /// `3.13.5`
     pub version: String,
     /// The widest instruction set its kernels use here.
     pub isa: &'static str,
-    /// What runs its tasks.
+    /// Tasking system, which runs its tasks.
     pub tasks: &'static str,
 }
 

@@ -102,7 +102,7 @@ impl LaneHit<'_> {
     }
 }
 
-/// What the exact test says of a ray and a triangle.
+/// Verdict of the exact test on a ray and a triangle.
 fn verdict(geometry: &Geometry, query: &Query, triangle: &Triangle) -> Verdict {
     let placement = &geometry.placements[triangle.placement as usize];
     query.judge(&PlacementView::new(&placement.world_from_mesh), triangle.corners)
@@ -131,7 +131,7 @@ impl<'a> ExactFilter<'a> {
         Self { context: sys::RTCRayQueryContext::default(), geometry, rays, rays32, doubtful }
     }
 
-    /// Whether a hit is certainly behind the ray's nearest distance that counts.
+    /// True if a hit is certainly behind the ray's nearest distance that counts.
     fn is_clear(&self, hit: &LaneHit<'_>) -> bool {
         let i = hit.id();
         let near = f64::from(self.rays32.t_near[i]);
@@ -195,9 +195,9 @@ pub(crate) struct NearestSearch<'a> {
     geometry: &'a Geometry,
     query: Query,
     pub(crate) nearest: Nearest,
-    /// How far the bundle's rays were moved ahead (m).
+    /// Distance by which the bundle's rays were moved ahead (m).
     advance: f64,
-    /// How far the bundle looks, from there: behind the nearest by what single precision may be off.
+    /// Distance up to which the bundle looks, from there: behind the nearest by what single precision may be off.
     limit: f32,
     slack: f64,
     /// A bit for each ray of the bundle that met a triangle which the ray itself passes by.

@@ -17,7 +17,7 @@ use crate::Quality;
 /// Rays in a packet. Where the processor has no packets of 16, Embree splits them itself.
 pub const WIDTH: usize = 16;
 
-/// Why a bare scene could not be made.
+/// Error of a bare scene that could not be made.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LimitError {
     /// Embree reported an error.
@@ -31,7 +31,7 @@ pub enum LimitError {
     Motion(String),
 }
 
-/// What Embree holds by its own count.
+/// Bytes that Embree holds by its own count.
 #[derive(Debug, Default)]
 struct Bytes {
     now: AtomicI64,
@@ -60,7 +60,7 @@ impl fmt::Debug for BareScene {
     }
 }
 
-/// How a bare scene is built.
+/// Options of building a bare scene.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Mode {
     /// Time against traversal speed.
@@ -326,7 +326,7 @@ impl Packet {
         Self(packet)
     }
 
-    /// How many of the rays hit something.
+    /// Number of the rays that hit something.
     #[must_use]
     pub fn hits(&self) -> usize {
         self.0.hit.geomID.iter().filter(|&&id| id != sys::RTC_INVALID_GEOMETRY_ID).count()
@@ -365,7 +365,7 @@ impl Single {
         Self(query)
     }
 
-    /// Whether the ray hit something.
+    /// True if the ray hit something.
     #[must_use]
     pub fn is_hit(&self) -> bool {
         self.0.hit.geomID != sys::RTC_INVALID_GEOMETRY_ID

@@ -220,10 +220,9 @@ impl Drop for EmbreeGeometry {
     }
 }
 
-/// Which triangles Embree is to see, `None` for all: those that `test` finds an area in, and that
-/// single precision has not `moved` into a point, which no ray of Embree hits. Debian 12's Embree
-/// ends the process when trees of several meshes meet in a box without extent
-/// (`heuristic_openmerge_array.h`, at low quality).
+/// Mask of the triangles that Embree is to see, `None` for all: those that `test` finds an area in, and that single
+/// precision has not `moved` into a point, which no ray of Embree hits. Debian 12's Embree ends the process when trees
+/// of several meshes meet in a box without extent (`heuristic_openmerge_array.h`, at low quality).
 fn sift(mesh: &Mesh, test: AreaTest<'_>, moved: &[[f32; 3]]) -> Option<Vec<bool>> {
     if test.keeps_all() && moved.is_empty() {
         return None;
@@ -251,7 +250,7 @@ fn check_size(name: &str, triangles: usize, corners: usize) -> Result<(), BuildE
     Err(BuildError::TooLarge { mesh: name.to_owned(), what, backend: "Embree", limit })
 }
 
-/// What becomes of a placement.
+/// Treatment of a placement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum InstanceKind {
     /// Nothing to see, or another stands in the same place.
@@ -262,7 +261,7 @@ pub(super) enum InstanceKind {
     Instance,
 }
 
-/// What becomes of each placement, and which meshes get a scene of their own.
+/// Treatment of each placement, and the meshes that get a scene of their own.
 pub(super) struct Instanced {
     pub(super) placements: Vec<InstanceKind>,
     pub(super) meshes: Vec<bool>,
@@ -315,8 +314,8 @@ impl Instanced {
     }
 }
 
-/// How many steps of single precision the box of a mesh is long where `transform` places it, seen from
-/// `origin`, on the axis on which it is most.
+/// Number of steps of single precision that the box of a mesh is long where `transform` places it,
+/// seen from `origin`, on the axis on which it is most.
 fn steps_of_f32(bounds: Bounds, transform: &Transform, origin: DVec3) -> f64 {
     let l = &transform.linear;
     let size = bounds.max - bounds.min;
@@ -338,7 +337,7 @@ fn bits_of(transform: &Transform) -> [u64; 15] {
     bits
 }
 
-/// Whether single precision can invert `linear`.
+/// Tests whether single precision can invert `linear`.
 fn is_sound(linear: &DMat3) -> bool {
     let norm = |m: &DMat3| {
         let squares = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length_squared);

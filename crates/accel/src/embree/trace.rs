@@ -10,7 +10,7 @@ use super::Scene;
 use super::filter::{self, ExactFilter, NearestSearch};
 use crate::single::Rays32;
 
-/// Whether a [`RayBlock`] is a packet of the installed Embree as it stands: same rows, and room for all of them.
+/// True if a [`RayBlock`] is a packet of the installed Embree as it stands: same rows, and room for all of them.
 const BLOCKS_ARE_PACKETS: bool = size_of::<sys::RTCRayHit16>() <= size_of::<RayBlock>()
     && align_of::<sys::RTCRayHit16>() <= align_of::<RayBlock>()
     && offset_of!(sys::RTCRayHit16, ray) == 0
@@ -29,7 +29,7 @@ const BLOCKS_ARE_PACKETS: bool = size_of::<sys::RTCRayHit16>() <= size_of::<RayB
     && offset_of!(sys::RTCRayHit16, hit.geomID) == offset_of!(RayBlock, placement)
     && offset_of!(sys::RTCRayHit16, hit.instID) == offset_of!(RayBlock, instance);
 
-/// What single precision found for a batch of rays.
+/// Hits that single precision found for a batch of rays.
 #[derive(Debug, Default)]
 pub(crate) struct FoundHits {
     /// Placement of each hit, or [`MISS`].
@@ -38,7 +38,7 @@ pub(crate) struct FoundHits {
     pub(crate) triangle: Vec<u32>,
     /// Single-precision distance from the moved origin.
     pub(crate) t: Vec<f32>,
-    /// Whether the rest is wanted, too.
+    /// True if the rest is wanted, too.
     pub(crate) has_surface: bool,
     /// Barycentric weights of the second and the third corner.
     pub(crate) weights: [Vec<f32>; 2],
@@ -105,7 +105,7 @@ impl Scene {
         found.has_surface = false;
     }
 
-    /// Whether rays in blocks can be traced: where blocks are packets, and packets come back.
+    /// True if rays in blocks can be traced: where blocks are packets, and packets come back.
     pub(crate) fn takes_blocks(&self) -> bool {
         BLOCKS_ARE_PACKETS && !self.has_instances && !self.is_compact
     }
@@ -172,12 +172,12 @@ impl Scene {
         }
     }
 
-    /// Whether anything lies between each ray's ends, in single precision.
+    /// Tests whether anything lies between each ray's ends, in single precision.
     pub(crate) fn occluded(&self, rays: &Rays32, coherent: bool, blocked: &mut [bool]) {
         self.occlude(rays, coherent, &mut occluded_arguments(coherent), blocked);
     }
 
-    /// Whether anything lies between each ray's ends by the exact test.
+    /// Tests whether anything lies between each ray's ends by the exact test.
     pub(crate) fn occluded_exactly(
         &self,
         rays: &Rays32,
@@ -311,15 +311,15 @@ fn prefetch<T>(place: &T) {
     let _ = place;
 }
 
-/// Whether Embree is told to keep packets together.
+/// True if Embree is told to keep packets together.
 fn is_coherent(flags: sys::RTCRayQueryFlags) -> bool {
     flags.0 & sys::RTC_RAY_QUERY_FLAG_COHERENT.0 != 0
 }
 
-/// Whether rays spread by more than a few degrees, as those to lamps on all sides do. Embree follows a
-/// packet by the frustum around it, and where that is wide, occlusion takes longer than one by one: a
-/// hundred times as long for rays aimed at all corners of a mesh (`corners_and_edges_occlusion` of the
-/// stability suite). Told that they are not coherent, it follows each ray of the packet by itself.
+/// True if rays spread by more than a few degrees, as those to lamps on all sides do. Embree follows a packet by the
+/// frustum around it, and where that is wide, occlusion takes longer than one by one: a hundred times as long for rays
+/// aimed at all corners of a mesh (`corners_and_edges_occlusion` of the stability suite). Told that they are not
+/// coherent, it follows each ray of the packet by itself.
 fn run_apart(rays: &Rays32, start: usize, count: usize) -> bool {
     rays.direction.iter().any(|axis| {
         let directions = &axis[start..start + count];
@@ -332,7 +332,7 @@ fn run_apart(rays: &Rays32, start: usize, count: usize) -> bool {
 /// The widest range of a component of directions that run together.
 const MOST_SPREAD: f32 = 0.25;
 
-/// The same as [`run_apart`] of the lanes of a block that are live.
+/// True if the live lanes of a block spread as in [`run_apart`].
 fn spread_out(direction: &[[f32; LANES]; 3], is_live: impl Fn(usize) -> bool) -> bool {
     direction.iter().any(|axis| {
         let pick = |lane: usize, other: f32| if is_live(lane) { axis[lane] } else { other };

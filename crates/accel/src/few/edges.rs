@@ -89,7 +89,7 @@ pub(super) fn closest(few: &FewTriangles, block: &RayBlock, lane: usize) -> Opti
     nearest
 }
 
-/// Whether anything is between the ends of the ray of a lane.
+/// Tests whether anything is between the ends of the ray of a lane.
 pub(super) fn is_occluded(few: &FewTriangles, block: &RayBlock, lane: usize) -> bool {
     let line = Line::of(block, lane);
     few.triangles.iter().any(|triangle| triangle.hit(&few.edges, &line).is_some())

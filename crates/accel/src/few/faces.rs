@@ -20,8 +20,8 @@ use crate::single::round;
 /// half a unit.
 const PLACE_ROUNDINGS: f32 = 8.0 * f32::EPSILON;
 
-/// The same over the cosine of incidence: of the distance along the ray, and of quadrilaterals that are not quite
-/// flat.
+/// Roundings, likewise, over the cosine of incidence: of the distance along the ray, and of
+/// quadrilaterals that are not quite flat.
 const DISTANCE_ROUNDINGS: f32 = 6.0 * f32::EPSILON;
 
 /// A number that goes linearly with a place in a face's plane: at its origin, and along x and y.
@@ -149,7 +149,7 @@ impl NearestFace {
         Self { t: [0.0; LANES], face: [MISS; LANES], place: [[0.0; LANES]; 2], doubts: [0; LANES] };
 }
 
-/// Which rays of a block have anything between their ends.
+/// Occlusion of the rays of a block.
 #[derive(Default)]
 pub(super) struct Occlusion {
     /// 1 of rays that have.
@@ -158,7 +158,7 @@ pub(super) struct Occlusion {
     pub(super) doubts: [u32; LANES],
 }
 
-/// What is worked out once of a block's rays.
+/// Values computed once for a block's rays.
 struct Lines {
     /// Farthest distances that count (m), finite.
     t_max: Floats,
@@ -186,18 +186,18 @@ impl Lines {
     }
 }
 
-/// Where a block's rays cross a face's plane.
+/// Crossing of a block's rays with a face's plane.
 struct Crossing {
     /// Distances (m); infinity of rays that do not cross it between their ends.
     t: Floats,
     place: [Floats; 2],
     /// Distance from the nearest side (m), inside above 0.
     least: Floats,
-    /// What roundings leave open of it (m).
+    /// Uncertainty of that distance by roundings (m).
     blur: Floats,
 }
 
-/// Where rays cross a face's plane; `None` where none does between its ends, which are finite.
+/// Intersects rays with a face's plane; `None` where none does between its ends, which are finite.
 #[inline(always)]
 fn cross(
     face: &Face,
@@ -254,11 +254,11 @@ impl Crossing {
     }
 }
 
-/// What three roundings may do to the distance of a box, as a share of it, with room.
+/// Bound on what three roundings may do to the distance of a box, as a share of it, with a margin.
 const SLACK: f32 = 1e-6;
 
-/// Whether any ray of a block meets a box. Where a ray runs in the plane of a side, what is not a number parts
-/// nothing: the box is a little larger than what is in it.
+/// Tests whether any ray of a block meets a box. Where a ray runs in the plane of a side, what is
+/// not a number parts nothing: the box is a little larger than what is in it.
 #[inline(always)]
 fn reaches([from, to]: [[f32; 3]; 2], block: &RayBlock, inverse: &[Floats; 3]) -> bool {
     let (mut enter, mut exit) = (block.t_min, block.t_max);
@@ -305,7 +305,7 @@ pub(super) fn closest(few: &FewTriangles, block: &RayBlock, nearest: &mut Neares
     *nearest = NearestFace { t, face: hit, place, doubts };
 }
 
-/// Which rays of a block have anything between their ends.
+/// Finds the rays of a block that have anything between their ends.
 #[multiversion::multiversion(targets = "simd")]
 pub(super) fn occluded(few: &FewTriangles, block: &RayBlock, occlusion: &mut Occlusion) {
     let lines = Lines::of(block, few.radius);

@@ -28,7 +28,7 @@ pub(crate) struct Instance {
 pub(crate) struct LocalRay {
     pub(crate) origin: DVec3,
     pub(crate) direction: DVec3,
-    /// How far f64 rounding may have moved the ray against any triangle near it, along an axis.
+    /// Distance by which f64 rounding may have moved the ray against any triangle near it, along an axis.
     pub(crate) pad: f64,
 }
 
@@ -104,7 +104,7 @@ impl Instance {
         })
     }
 
-    /// The same place for the part of that number.
+    /// Returns the instance for the part of that number.
     pub(super) fn of(self, part: u32) -> Self {
         Self { part, ..self }
     }

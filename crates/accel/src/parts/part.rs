@@ -74,7 +74,7 @@ impl Blas {
         }
     }
 
-    /// Where the triangles of one of this part's meshes are.
+    /// Triangles of one of this part's meshes.
     pub(crate) fn source<'a>(&self, geometry: &'a Geometry, placement: u32) -> MeshTriangles<'a> {
         let (mesh, transform) = match &self.members {
             Members::Mesh(mesh) => (*mesh, None),
@@ -96,7 +96,7 @@ impl Blas {
         }
     }
 
-    /// Whether all corners go into this part's frame without being turned or stretched.
+    /// True if all corners go into this part's frame without being turned or stretched.
     pub(crate) fn is_unturned(&self, geometry: &Geometry) -> bool {
         match &self.members {
             Members::Mesh(_) => true,

@@ -1,4 +1,4 @@
-//! Where a node is split: bins of centroids, and the cheapest border between them.
+//! Split of a node: bins of centroids, and the cheapest border between them.
 //!
 //! Boxes around many things and around their centroids.
 //!
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::{CHUNK, Node, Ref, WIDE_NODE};
 use etendue_geometry::glam::Vec4;
 
-/// Where bins begin.
+/// Grid of bins: their start and scale.
 pub(super) struct BinGrid {
     start: Vec4,
     /// Bins per length; 0 along an axis without extent.

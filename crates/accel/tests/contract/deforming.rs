@@ -37,7 +37,8 @@ fn carried(mesh: u32, motion: Motion) -> Placement {
     Placement { motion: Some(Arc::new(motion)), ..placed(mesh, place) }
 }
 
-/// Where it stands, turned and mirrored; one that spins while it deforms; among others that stand still or move.
+/// Scene of a deforming mesh as it stands, turned and mirrored; one that spins while it deforms;
+/// among others that stand still or move.
 fn scene() -> Arc<Geometry> {
     let mut random = Random(15);
     let mut pose = |scale: [f64; 3]| {

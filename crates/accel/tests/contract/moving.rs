@@ -409,7 +409,7 @@ fn rays_in_blocks_meet_bodies_at_their_times() {
     assert!(met * 200 <= count, "{met} of {count} rays differ");
 }
 
-/// What one more copy that moves takes, of the structure and of the scene: some hundred bytes, whatever its mesh has.
+/// One more copy that moves takes some hundred bytes, of the structure and of the scene, whatever its mesh has.
 #[test]
 fn a_copy_that_moves_takes_some_hundred_bytes() {
     let copies = |count: u32| {

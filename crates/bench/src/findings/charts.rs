@@ -6,7 +6,7 @@ use crate::samplers::{Converged, Samplers};
 use crate::target::{AS_IT_IS, Target};
 use etendue_chart::{Axis, Chart, GREY, Mark, Point, Series, Stroke};
 
-/// What stands on a chart's axes for one finding.
+/// Quantity on a chart's axes for one finding.
 type Measure = fn(&Finding) -> Option<f64>;
 
 pub(super) fn accelerators(findings: &[Finding]) -> Vec<(&'static str, Chart)> {
@@ -133,7 +133,7 @@ fn width(findings: &[Finding]) -> usize {
     widths().max().unwrap_or(RENDER_WIDTH)
 }
 
-/// What stands on a chart of one finding: its name, samples, seconds and relative error.
+/// Row of a chart for one finding: its name, samples, seconds and relative error.
 type ChartRow = (&'static str, u32, f64, f64);
 
 pub(super) fn samplers(found: &Samplers) -> Vec<(&'static str, Chart)> {
@@ -227,7 +227,7 @@ struct Pictures<'a> {
     rows: &'a [ChartRow],
     resolution: [u32; 2],
     converged: &'a Converged,
-    /// What they are compared with.
+    /// Name of what they are compared with.
     of: &'static str,
 }
 

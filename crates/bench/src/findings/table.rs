@@ -72,7 +72,7 @@ pub(super) fn cameras(found: &Cameras) -> Table {
     Table::of_rows(found.findings.iter().map(row).collect())
 }
 
-/// When each contender reaches the target.
+/// Table of when each contender reaches the target.
 pub(super) fn contenders(found: &Target) -> Table {
     let row = |own: &crate::target::Foretold| {
         let samples = own.samples.map_or_else(Cell::none, |samples| Cell::count(samples.into()));
@@ -87,7 +87,7 @@ pub(super) fn contenders(found: &Target) -> Table {
     Table::of_rows(found.contenders.iter().map(row).collect())
 }
 
-/// What some of them give in one time.
+/// Table of what some of them give in one time.
 pub(super) fn equal_time(found: &Target) -> Table {
     let row = |own: &crate::target::EqualTime| {
         let shown = |value: f64, text: String| Cell::number(value, text);

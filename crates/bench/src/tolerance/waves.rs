@@ -1,5 +1,5 @@
-//! What waves make of a lens' picture beside rays: the modulation of a quarter of a cycle a pixel at the middle, a
-//! side and a corner, at the nearest and the farthest depth there.
+//! Effect of waves on a lens' picture beside rays: the modulation of a quarter of a cycle a pixel
+//! at the middle, a side and a corner, at the nearest and the farthest depth there.
 
 use etendue_camera::{Camera, WaveLens};
 use etendue_optics::analysis::Transfer;

@@ -105,7 +105,7 @@ fn of_waves(finding: &WaveFinding) -> Vec<(&'static str, Cell)> {
     ]
 }
 
-/// Where the greatest differences of a model are.
+/// Description of where the greatest differences of a model are.
 fn where_it_misses(finding: &Finding) -> String {
     let place = |name: &str, worst: &Worst| {
         let [column, row] = worst.at;

@@ -44,7 +44,7 @@ fn direction([x, y]: [f64; 2]) -> [f64; 3] {
 /// Places that are inverted side by side.
 const LANES: usize = 8;
 
-/// What [`BrownConrady::undistort`] says of each place; zero where nothing is seen.
+/// Undistorts each place as [`BrownConrady::undistort`]; zero where nothing is seen.
 #[multiversion::multiversion(targets = "simd")]
 pub(super) fn undistort_all(model: &BrownConrady, limit: f64, [x, y, z]: [&mut [f64]; 3]) {
     let ((x, rest_x), (y, rest_y)) = (x.as_chunks_mut::<LANES>(), y.as_chunks_mut::<LANES>());

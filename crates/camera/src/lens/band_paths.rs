@@ -58,26 +58,26 @@ const FEWEST: usize = 32;
 /// kept from other threads.
 const FARTHEST: f64 = 32.0;
 
-/// What the measured parting of places is multiplied by: what may be greater in between.
+/// Factor on the measured parting of places, which may be greater in between.
 const SAFETY: f64 = 1.25;
 
-/// How bands share rays, as measured.
+/// Sharing of rays among bands, as measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SharedPaths {
     /// Wavelengths that each ray is traced at.
     pub traced: usize,
-    /// How far places that are interpolated are from those that are traced, at most (pixels).
+    /// Greatest distance between places that are interpolated and those that are traced (pixels).
     pub error: f64,
-    /// How many rows of pixels from where a ray starts its light lands, at most.
+    /// Greatest number of rows of pixels between where a ray starts and where its light lands.
     pub rows: u32,
 }
 
-/// Where the light of each band lands that comes along rays which all bands share, `[ray][band]`.
+/// Landing points of the light of each band that comes along rays which all bands share, `[ray][band]`.
 #[derive(Debug, Clone, Default)]
 pub struct BandLandings {
     /// The pixel, counted row by row; [`Self::NOWHERE`] where the band's light does not arrive.
     pub pixel: Vec<u32>,
-    /// What the ray's radiance in the band counts in the mean over the samples of that pixel.
+    /// Weight of the ray's radiance in the band in the mean over the samples of that pixel.
     pub weight: Vec<f64>,
     /// Of each ray where it leaves the lens (mm), its direction, its weight before the lens, and its node.
     points: Vec<DVec3>,
@@ -97,7 +97,7 @@ impl BandLandings {
 }
 
 impl LensCamera {
-    /// How the rays of `bands` are shared, or why each has rays of its own.
+    /// Measures how the rays of `bands` are shared.
     ///
     /// # Errors
     ///
@@ -106,7 +106,7 @@ impl LensCamera {
         self.band_paths(bands).map(|paths| self.shared(&paths))
     }
 
-    /// The same as the camera was opened for; `None` where bands have rays of their own.
+    /// Sharing of rays for which the camera was opened; `None` where bands have rays of their own.
     #[must_use]
     pub fn opened_paths(&self) -> Option<SharedPaths> {
         let paths = self.opened.as_ref()?.paths.as_ref()?;
@@ -119,7 +119,7 @@ impl LensCamera {
         SharedPaths { traced: paths.nodes.len(), error: paths.error, rows }
     }
 
-    /// Why rays of different bands differ by more than where they land, if they do.
+    /// Reason why rays of different bands differ by more than where they land, if they do.
     fn parted(&self) -> Option<&'static str> {
         if matches!(self.traced_at, TracedAt::Grouped(_)) {
             return Some("groups of bands run each its own way");
@@ -252,7 +252,7 @@ impl LensCamera {
         left.map(|i| (rays.position(i), rays.direction(i))).collect()
     }
 
-    /// Where rays of the scene land at the wavelength of a lens.
+    /// Landing points of rays of the scene at the wavelength of a lens.
     fn landings(&self, lens: &MonochromaticTrain, rays: &[(DVec3, DVec3)], lead: f64) -> Landed {
         let mut back = LensRays::with_capacity(rays.len());
         for &(point, direction) in rays {
@@ -344,7 +344,7 @@ impl LensCamera {
         }
     }
 
-    /// Where each band's light of each ray lands, and what it counts.
+    /// Computes where each band's light of each ray lands, and its weight.
     fn land(
         &self,
         (paths, resolution): (&BandPaths, [u32; 2]),
@@ -435,13 +435,13 @@ impl BandLandings {
     }
 }
 
-/// Where rays landed (pixels), and the share of each that passed; `None` for those that ended.
+/// Landing points of rays (pixels), and the share of each that passed; `None` for those that ended.
 struct Landed {
     places: Vec<Option<(DVec2, f64)>>,
     pitch: f64,
 }
 
-/// How far the places of a ray part in rows or columns, at most (mm).
+/// Greatest distance in rows or columns by which the places of a ray part (mm).
 fn parting(landed: &[Landed]) -> f64 {
     let Some(first) = landed.first() else { return 0.0 };
     let part = |ray: usize| {
@@ -455,7 +455,7 @@ fn parting(landed: &[Landed]) -> f64 {
     (0..first.places.len()).map(part).fold(0.0, f64::max) * first.pitch
 }
 
-/// How far interpolated places (pixels) and shares are from those found, at most.
+/// Greatest error of interpolated places (pixels) and shares against those found.
 fn error_of(weights: &[f64; MOST_NODES], nodes: &[Landed], found: &Landed) -> [f64; 2] {
     let mut errors = [0.0_f64; 2];
     for (ray, found) in found.places.iter().enumerate() {

@@ -68,8 +68,8 @@ impl ChiefTable {
         Some(slopes.extend(-1.0).normalize())
     }
 
-    /// The same without solving for it, of a lens with rotational symmetry: the line through nodes is right
-    /// to a millionth of the way to the stop. Of others as [`Self::direction`].
+    /// Variant of [`Self::direction`] that does not solve for it, for a lens with rotational symmetry: the line through
+    /// nodes is right to a millionth of the way to the stop. Of others as [`Self::direction`].
     pub(crate) fn direction_nearly(
         &self,
         lens: (&OpticalTrain, &Frame),
@@ -192,7 +192,7 @@ impl LensletChiefs {
         Ok(Some(Self { view, sensor_z: focused.sensor_z(), plane, table, main }))
     }
 
-    /// The same as light of a wavelength (nm) has it, of a lens that stands where it is.
+    /// Chief rays of light of a wavelength (nm), through a lens that stands where it is.
     pub(crate) fn at(focused: &Focused, wavelength: f64) -> Result<Option<Self>, CameraError> {
         let fault =
             |error: etendue_optics::train::LensError| CameraError::new("lens", error.to_string());
@@ -219,14 +219,14 @@ impl LensletChiefs {
         Some(-direction.truncate() / direction.z)
     }
 
-    /// Where the chief ray of the lens before through a lenslet's middle meets the sensor (mm across the
-    /// axis): the middle of the image that the lenslet makes of the opening.
+    /// Point where the chief ray of the lens before through a lenslet's middle meets the sensor (mm
+    /// across the axis): the middle of the image that the lenslet makes of the opening.
     #[must_use]
     pub fn image_centre(&self, cell: [f64; 2]) -> Option<DVec2> {
         self.view.image_centre(cell, self.sensor_z, |at| self.chief_slopes(at))
     }
 
-    /// The same to about a millionth of the way from pupil to array.
+    /// Variant of [`Self::image_centre`] that is accurate to about a millionth of the way from pupil to array.
     #[must_use]
     pub fn image_centre_nearly(&self, cell: [f64; 2]) -> Option<DVec2> {
         self.view.image_centre(cell, self.sensor_z, |at| self.table.nearly(at))
@@ -267,17 +267,17 @@ impl LensletChiefs {
 /// Directions from the sensor's centre in which its edge is looked for.
 const DIRECTIONS: usize = 32;
 
-/// How far beyond the sensor's border the edge is looked for, in its distances: a line from an edge
-/// on the sensor to one far outside of it cuts nothing off.
+/// Reach of the search for the edge beyond the sensor's border, in its distances: a line from an
+/// edge on the sensor to one far outside of it cuts nothing off.
 const BEYOND: f64 = 2.0;
 
-/// How near to the edge of the light a search comes, as a share of its distance.
+/// Precision of the search for the edge of the light, as a share of its distance.
 const CLOSE: f64 = 5e-3;
 
-/// How far from the sensor's centre light arrives (mm).
+/// Distance from the sensor's centre within which light arrives (mm).
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum ImageCircle {
-    /// The same in all directions.
+    /// One radius in all directions.
     Circle(f64),
     /// By direction, evenly over a full turn from +x; straight lines join them.
     Outline(Vec<LightReach>),
@@ -285,12 +285,12 @@ pub(crate) enum ImageCircle {
     Unknown,
 }
 
-/// How far light arrives in one direction.
+/// Reach of the light in one direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LightReach {
     /// To its edge, or as far as was looked (mm).
     distance: f64,
-    /// Whether it is dark behind.
+    /// True if it is dark behind.
     ends: bool,
 }
 
@@ -326,7 +326,7 @@ impl ImageCircle {
         Self::Outline((0..DIRECTIONS).map(edge).collect())
     }
 
-    /// Whether light arrives at a place on the sensor (mm from its centre).
+    /// Tests whether light arrives at a place on the sensor (mm from its centre).
     pub(crate) fn contains(&self, film: DVec2) -> bool {
         match self {
             Self::Circle(radius) => film.length() <= *radius,

@@ -27,7 +27,7 @@ pub struct Focused {
     origin: f64,
 }
 
-/// What the lens does near its axis.
+/// Paraxial view of the lens.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum View {
     /// Chief rays meet in the entrance pupil.
@@ -36,7 +36,7 @@ pub enum View {
     Parallel {
         /// A pixel's side on the object (m).
         metres_per_pixel: f64,
-        /// Where the axis meets the sensor (pixels from the corner).
+        /// Point where the axis meets the sensor (pixels from the corner).
         centre: [f64; 2],
     },
 }
@@ -62,8 +62,8 @@ impl FilmGrid {
         DVec2::new((column - self.centre.x) * scale, -(row - self.centre.y) * scale)
     }
 
-    /// Where a ray from the lens (mm, in lens coordinates) meets the sensor's plane, in the picture (pixels
-    /// from the corner): the inverse of [`Self::place`]. Not finite for a ray along the plane.
+    /// Projects a ray from the lens (mm, in lens coordinates) onto the sensor's plane, as a place in the picture
+    /// (pixels from the corner): the inverse of [`Self::place`]. Not finite for a ray along the plane.
     #[inline]
     pub(crate) fn pixel(&self, position: DVec3, direction: DVec3) -> [f64; 2] {
         let Frame { vertex, rotation } = self.frame;
@@ -77,7 +77,7 @@ impl FilmGrid {
         ]
     }
 
-    /// Where the axis meets the sensor, were it not tilted (pixels from the corner).
+    /// Point where the axis meets the sensor, were it not tilted (pixels from the corner).
     fn principal_point(&self) -> [f64; 2] {
         let scale = self.turn * self.pitch;
         let DVec3 { x, y, .. } = self.frame.vertex;
@@ -160,7 +160,7 @@ impl Focused {
         Ok(Self { train, paraxial, film, view, object_distance, origin })
     }
 
-    /// The same on pixels `factor` times as large.
+    /// Returns the setup on pixels `factor` times as large.
     pub(crate) fn coarser(&self, factor: f64) -> Self {
         let pitch = self.film.pitch * factor;
         let film = FilmGrid { pitch, centre: self.film.centre / factor, ..self.film };
@@ -186,7 +186,7 @@ impl Focused {
         &self.paraxial
     }
 
-    /// What the lens does near its axis.
+    /// Paraxial view of the lens.
     #[must_use]
     pub fn view(&self) -> View {
         self.view
@@ -210,8 +210,7 @@ impl Focused {
         self.film.turn
     }
 
-    /// Where a point of the sensor's plane (mm across the axis) is in the picture (pixels from the
-    /// corner).
+    /// Maps a point of the sensor's plane (mm across the axis) to the picture (pixels from the corner).
     #[must_use]
     pub fn pixel_of(&self, at: DVec2) -> [f64; 2] {
         let film = &self.film;
@@ -269,7 +268,7 @@ fn stopped(train: OpticalTrain, setup: &Setup<'_>) -> Result<OpticalTrain, Camer
     }
 }
 
-/// How the camera mounts its sensor; `None` when it leaves that to the lens file.
+/// Mounting of the sensor by the camera; `None` when it leaves that to the lens file.
 fn mount(setup: &Setup<'_>) -> Result<Option<SensorMount>, CameraError> {
     let Setup { sensor_tilt: tilt, sensor_decentre: decentre, .. } = *setup;
     let mount = SensorMount { tilt, decentre };

@@ -45,15 +45,15 @@ pub struct LensCamera {
     chief: ChiefTable,
     /// The lenslets that the sensor looks through.
     lenslets: Option<LensletChiefs>,
-    /// Where on the sensor light arrives.
+    /// Region of the sensor where light arrives.
     lit: ImageCircle,
     /// Projected solid angle of the unvignetted pupil seen from the axis (sr).
     pub(super) solid_angle: f64,
     pub(super) opened: Option<Arc<Opened>>,
     pub(super) traced_at: TracedAt,
-    /// How light is spread on the sensor.
+    /// Spreading of light on the sensor.
     pub(super) spread: SpreadBy,
-    /// How nearly bands that share rays are where their own would be.
+    /// Limits of the distance between shared rays of bands and rays of their own.
     pub(super) sharing: SharingLimits,
 }
 
@@ -146,7 +146,7 @@ impl LensCamera {
         &self.design
     }
 
-    /// The same on pixels `factor` times as large: what was measured of the pupil holds for them too.
+    /// Returns the camera on pixels `factor` times as large: what was measured of the pupil holds for them too.
     pub(crate) fn coarser(&self, factor: f64) -> Self {
         Self { focused: self.focused.coarser(factor), ..self.clone() }
     }
@@ -187,29 +187,29 @@ impl LensCamera {
         self.solid_angle
     }
 
-    /// The same with rays that run as at the design wavelength in all bands. What coloured filters pass stays
-    /// each band's own.
+    /// Returns the camera with rays that run as at the design wavelength in all bands. What
+    /// coloured filters pass stays each band's own.
     pub(crate) fn without_dispersion(&self) -> Self {
         self.running_at(TracedAt::Design)
     }
 
-    /// The same with rays that run at other wavelengths.
+    /// Returns the camera with rays that run at other wavelengths.
     pub(super) fn running_at(&self, traced_at: TracedAt) -> Self {
         Self { traced_at, opened: None, ..self.clone() }
     }
 
-    /// The same whose bands share rays within other limits.
+    /// Returns the camera with bands that share rays within other limits.
     pub(crate) fn sharing_within(&self, sharing: SharingLimits) -> Self {
         let opened = self.opened.clone().filter(|_| sharing == self.sharing);
         Self { sharing, opened, ..self.clone() }
     }
 
-    /// The same whose light is spread another way.
+    /// Returns the camera with its light spread another way.
     pub(super) fn spread_by(self, spread: SpreadBy) -> Self {
         Self { spread, ..self }
     }
 
-    /// Whether rays of other wavelengths run differently, or lose another share on the way.
+    /// True if rays of other wavelengths run differently, or lose another share on the way.
     fn tells_wavelengths_apart(&self) -> bool {
         if self.spread == SpreadBy::Nothing {
             return false;
@@ -219,12 +219,12 @@ impl LensCamera {
         curves.any(|curve| curve.as_flat().is_none()) || self.runs_apart()
     }
 
-    /// Whether rays of other wavelengths run their own way.
+    /// True if rays of other wavelengths run their own way.
     pub(super) fn parts_wavelengths(&self) -> bool {
         self.traced_at != TracedAt::Design && self.focused.train().is_dispersive()
     }
 
-    /// Whether coatings or glass lose another share of each wavelength.
+    /// True if coatings or glass lose another share of each wavelength.
     pub(super) fn dims_wavelengths_apart(&self) -> bool {
         let train = self.focused.train();
         let losses = train.losses();
@@ -234,14 +234,14 @@ impl LensCamera {
         coated || (losses.absorption && train.media().iter().any(|g| g.absorption(550.0).is_some()))
     }
 
-    /// Whether glass, or what it loses, makes another lens of each wavelength.
+    /// True if glass, or what it loses, makes another lens of each wavelength.
     pub(super) fn runs_apart(&self) -> bool {
         self.traced_at != TracedAt::Design
             && (self.dims_wavelengths_apart() || self.focused.train().is_dispersive())
     }
 
-    /// Which of `bands` need rays of their own: each, or each group, where the lens tells wavelengths apart and there
-    /// are several, else none.
+    /// Groups of `bands` that need rays of their own: each, or each group, where the lens tells
+    /// wavelengths apart and there are several, else none.
     #[must_use]
     pub fn band_groups(&self, bands: &Bands) -> Vec<BandGroup> {
         let count = bands.count();
@@ -255,8 +255,7 @@ impl LensCamera {
         (0..count).map(group).collect()
     }
 
-    /// The same camera with its exit pupil measured for `bands`, which takes a moment when it is not
-    /// yet.
+    /// Opens the camera for `bands`: measures its exit pupil, which takes a moment when it is not yet measured.
     pub(crate) fn opened(&self, bands: &Bands) -> Result<Self, CameraError> {
         if self.opened.as_ref().is_some_and(|opened| opened.bands == *bands) {
             return Ok(self.clone());
@@ -266,7 +265,7 @@ impl LensCamera {
         Ok(Self { opened: Some(Arc::new(opened)), ..self.clone() })
     }
 
-    /// The same with filters clear.
+    /// Opens the camera with its filters clear.
     pub(crate) fn opened_clear(&self, bands: &Bands) -> Result<Self, CameraError> {
         let clear = without_filters(self.focused.train());
         Ok(Self { opened: Some(Arc::new(self.open(bands, &clear)?)), ..self.clone() })
@@ -322,8 +321,7 @@ impl LensCamera {
         }
     }
 
-    /// Whether the exit pupil is known in closed form: a round opening with nothing behind it that
-    /// bends rays.
+    /// True if the exit pupil is known in closed form: a round opening with nothing behind it that bends rays.
     #[must_use]
     pub fn has_round_pupil(&self) -> bool {
         let film = self.focused.film();
@@ -331,13 +329,13 @@ impl LensCamera {
         Disk::of(&train, &film.frame, film.half_size()).is_some()
     }
 
-    /// Whether rays of a sample run at a wavelength that is drawn.
+    /// True if the rays of a sample run at a wavelength that is drawn.
     pub fn draws_wavelengths(&self) -> bool {
         let groups = self.opened.iter().flat_map(|opened| &opened.groups);
         groups.into_iter().any(|group| group.lenses.len() > 1)
     }
 
-    /// How many wavelengths the rays of each of [`Self::band_groups`] are drawn from, at most.
+    /// Greatest number of wavelengths that the rays of one of [`Self::band_groups`] are drawn from.
     #[must_use]
     pub fn wavelengths_a_group(&self, bands: &Bands) -> usize {
         let groups = self.band_groups(bands).into_iter();
@@ -436,7 +434,7 @@ impl LensCamera {
         curves.filter(|curve| curve.as_flat().is_none()).cloned().collect()
     }
 
-    /// What is odd about the lens, and what of it is not known at the wavelengths of `bands`.
+    /// Notes on oddities of the lens, and on what of it is not known at the wavelengths of `bands`.
     #[must_use]
     pub fn out_of_range(&self, bands: &Bands) -> Vec<String> {
         let groups = self.band_groups(bands).into_iter();

@@ -22,13 +22,13 @@ impl SharingLimits {
 /// A wavelength between nodes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Interpolation {
-    /// What each node counts.
+    /// Weight of each node.
     pub(super) weights: [f64; MOST_NODES],
-    /// What filters pass.
+    /// Transmission of the filters.
     pub(super) filters: f64,
 }
 
-/// What places are polynomials in.
+/// Variable in which places are polynomials.
 pub(super) struct Variable<'a> {
     train: &'a OpticalTrain,
 }
@@ -76,7 +76,7 @@ impl<'a> Variable<'a> {
         (0..count).map(node).collect()
     }
 
-    /// What each node counts at a wavelength (nm): Lagrange's polynomials.
+    /// Weight of each node at a wavelength (nm): Lagrange's polynomials.
     pub(super) fn weights(&self, nodes: &[f64], nm: f64) -> [f64; MOST_NODES] {
         let x = self.at(nm);
         let at: Vec<f64> = nodes.iter().map(|&node| self.at(node)).collect();

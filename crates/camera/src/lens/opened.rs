@@ -14,7 +14,7 @@ pub(super) struct Opened {
     /// In the order of [`LensCamera::band_groups`].
     pub(super) groups: Vec<OpenedGroup>,
     pub(super) pupil: ExitPupil,
-    /// How all bands share a ray; `None` where they do not.
+    /// Paths by which all bands share a ray; `None` where they do not.
     pub(super) paths: Option<BandPaths>,
 }
 
@@ -25,24 +25,24 @@ pub(super) struct OpenedGroup {
     pub(super) lenses: Vec<MonochromaticTrain>,
 }
 
-/// How bands share rays.
+/// Paths by which bands share rays.
 #[derive(Debug)]
 pub(super) struct BandPaths {
     /// The lens at its leading wavelengths, with filters clear.
     pub(super) nodes: Vec<MonochromaticTrain>,
     /// By band and by wavelength that it is drawn from.
     pub(super) bands: Vec<Vec<Interpolation>>,
-    /// Whether glass takes light.
+    /// True if glass takes light.
     pub(super) has_losses: bool,
     /// From where a ray leaves the lens to where one starts that comes back (mm).
     pub(super) lead: f64,
-    /// How far places of a ray part, at most: rows of pixels and their size (mm).
+    /// Greatest distance by which places of a ray part: rows of pixels and their size (mm).
     pub(super) reach: f64,
     pub(super) error: f64,
 }
 
 impl OpenedGroup {
-    /// Which lens serves a place of the spectrum in 0..1.
+    /// Index of the lens for a place of the spectrum in 0..1.
     pub(super) fn lens_at(&self, u: f64) -> usize {
         place_of(u, self.lenses.len())
     }
@@ -83,7 +83,7 @@ pub(super) fn through_filters(
     wavelengths.iter().map(lens).collect()
 }
 
-/// What filters that are the same all over pass together of a band at each of its wavelengths.
+/// Transmission of a band, at each of its wavelengths, by all filters together that are the same all over.
 pub(super) fn filtered(
     train: &OpticalTrain,
     bands: &Bands,
@@ -96,7 +96,7 @@ pub(super) fn filtered(
     wavelengths.iter().map(|&nm| all().map(|curve| passes(curve, nm)).product()).collect()
 }
 
-/// What a curve of a filter passes of a band at one of its wavelengths (nm): see [`through_filters`].
+/// Transmission of a filter's curve for a band at one of its wavelengths (nm): see [`through_filters`].
 fn passed(
     bands: &Bands,
     (band, wavelengths, overlap): (usize, &[f64], f64),

@@ -66,7 +66,7 @@ impl LensSource {
     }
 }
 
-/// What a lens file names: its own paths start at its own folder.
+/// Resources of a lens file: its own paths start at its own folder.
 struct LensFolder<'a> {
     folder: &'a Path,
     scene: Resolve<'a>,
@@ -158,7 +158,7 @@ impl JsonSchema for PlacedSpec {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FocusDistance(pub f64);
 
-/// How files write an object at infinity.
+/// Words for an object at infinity in files.
 const INFINITY: [&str; 2] = ["infinity", "inf"];
 
 impl Serialize for FocusDistance {
@@ -194,7 +194,7 @@ impl JsonSchema for FocusDistance {
     }
 }
 
-/// What the cameras with a lens have in common.
+/// Setup that the cameras with a lens have in common.
 #[derive(Debug, Clone)]
 pub(crate) struct Setup<'a> {
     pub(crate) f_number: Option<f64>,

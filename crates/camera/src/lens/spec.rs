@@ -15,7 +15,7 @@ use etendue_optics::element::{
 use etendue_optics::glass::GlassSpec;
 use etendue_optics::train::{Focus, LensFile, OpticalTrain};
 
-/// How far (mm) parts on the axis reach behind the lens' last vertex at z = `rear`.
+/// Distance (mm) by which parts on the axis reach behind the lens' last vertex at z = `rear`.
 fn reach_behind(elements: &[PlacedSpec], rear: f64) -> f64 {
     elements.iter().map(|placed| placed.at.0 - rear).fold(0.0, f64::max)
 }
@@ -75,7 +75,7 @@ macro_rules! camera_with_a_lens {
         }
 
         impl $name {
-            /// What it has in common with the others.
+            /// Setup that the camera has in common with the others.
             pub(crate) fn setup(&self) -> Result<Setup<'_>, CameraError> {
                 let focus = match (self.focus_distance, self.sensor_distance) {
                     (Some(_), Some(_)) => {

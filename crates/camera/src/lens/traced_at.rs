@@ -17,9 +17,9 @@ pub(super) enum TracedAt {
 }
 
 impl LensCamera {
-    /// The same whose neighbouring bands run together in `count` groups, at most, which are even in 1/λ²: the index of
-    /// glass moves nearly in proportion to it. `None` where bands differ by more than where they run: where filters,
-    /// coatings or glass dim each by its own share.
+    /// Returns the camera with neighbouring bands that run together in `count` groups, at most, which are even in 1/λ²:
+    /// the index of glass moves nearly in proportion to it. `None` where bands differ by more than where they run:
+    /// where filters, coatings or glass dim each by its own share.
     pub(crate) fn with_bands_grouped(&self, count: usize) -> Option<Self> {
         let train = self.focused.train();
         let has_filters = !self.filter_curves().is_empty();

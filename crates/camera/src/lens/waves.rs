@@ -1,5 +1,5 @@
-//! How light is spread on the sensor as waves: fields of the pupil by place of the picture, depth and
-//! wavelength; and what of the light arrives there, which is the same as by rays.
+//! Spreading of light on the sensor as waves: fields of the pupil by place of the picture, depth
+//! and wavelength; and what of the light arrives there, which is the same as by rays.
 
 use etendue_optics::analysis::between::{FieldSource, FieldsBetween};
 use etendue_optics::analysis::{AnalysisError, ObjectPoint};
@@ -26,18 +26,18 @@ const FAR: f64 = 1e-5;
 const PUPIL: u32 = 64;
 
 impl LensCamera {
-    /// Whether light of pictures is to be spread as waves are.
+    /// True if the light of pictures is to be spread as waves are.
     #[must_use]
     pub fn diffracts(&self) -> bool {
         self.spread == SpreadBy::Waves
     }
 
-    /// Whether samples are rays of the whole pupil.
+    /// True if samples are rays of the whole pupil.
     pub(crate) fn has_spread_rays(&self) -> bool {
         self.spread != SpreadBy::Nothing
     }
 
-    /// The same whose light is spread as waves are.
+    /// Returns the camera with its light spread as waves are.
     ///
     /// # Errors
     ///
@@ -59,7 +59,7 @@ impl LensCamera {
         Ok(self.spread_by(SpreadBy::Waves))
     }
 
-    /// The same by rays.
+    /// Returns the camera with its light spread by rays.
     pub(crate) fn without_diffraction(&self) -> Self {
         match self.spread {
             SpreadBy::Waves => self.clone().spread_by(SpreadBy::Rays),
@@ -67,7 +67,7 @@ impl LensCamera {
         }
     }
 
-    /// The same along chief rays, on pixels a `finer`-th as large.
+    /// Returns the camera along chief rays, on pixels a `finer`-th as large.
     pub(crate) fn along_chief_rays(&self, finer: f64) -> Self {
         let mut lens = self.coarser(1.0 / finer).spread_by(SpreadBy::Nothing);
         lens.opened = None;
@@ -82,15 +82,15 @@ impl LensCamera {
         0.5e-6 * wavelength / numerical_aperture
     }
 
-    /// Whether it has no aberrations, and how many wavelengths its fields are traced at, at most.
+    /// True if the lens has no aberrations, and the greatest number of wavelengths that its fields are traced at.
     #[must_use]
     pub fn waves_to_trace(&self) -> (bool, usize) {
         let train = self.focused.train();
         (is_ideal(train), if self.parts_wavelengths() { NODES } else { 1 })
     }
 
-    /// Whether what arrives in a picture of so many columns and rows is the same on both sides of its middle,
-    /// but for being seen in a mirror: the lens is round, and the picture's middle is on its axis.
+    /// True if what arrives in a picture of so many columns and rows is the same on both sides of its middle, but for
+    /// being seen in a mirror: the lens is round, and the picture's middle is on its axis.
     #[must_use]
     pub fn is_mirrored(&self, resolution: [u32; 2]) -> bool {
         let film = self.focused.film();
@@ -208,7 +208,7 @@ impl<'a> WaveLens<'a> {
         })
     }
 
-    /// Whether it has no aberrations: nothing but ideal lenses, openings and filters.
+    /// True if the lens has no aberrations: nothing but ideal lenses, openings and filters.
     #[must_use]
     pub fn is_ideal(&self) -> bool {
         is_ideal(&self.train)
@@ -228,9 +228,9 @@ impl<'a> WaveLens<'a> {
 }
 
 impl Camera {
-    /// What arrives at places of the picture (pixels from the corner) of a radiance of 1 all over, by
-    /// rays of a camera that was [opened](Self::opened), in one of its groups of bands: the mean weight
-    /// of rays over the pupil.
+    /// Relative illumination at places of the picture (pixels from the corner) for a radiance of 1 all over,
+    /// by rays of a camera that was [opened](Self::opened), in one of its groups of bands: the mean weight of rays
+    /// over the pupil.
     #[must_use]
     pub fn illumination(&self, places: &[[f64; 2]], group: usize) -> Vec<f64> {
         let mut rays = CameraRays::default();

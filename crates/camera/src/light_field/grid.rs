@@ -28,7 +28,7 @@ const MOST_BLUR: f64 = 1.0;
 /// Rows and columns of lenslets, as the picture has them: row 0 at the top, column 0 on the left.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LensletGrid {
-    /// How lenslets are packed. In a hexagonal grid odd rows stand half a lenslet further right.
+    /// Packing of the lenslets. In a hexagonal grid odd rows stand half a lenslet further right.
     pub grid: Grid,
     /// Rows.
     pub rows: u32,
@@ -58,11 +58,11 @@ pub struct LightField {
     pub image_pitch: f64,
     /// The diameter of a lenslet's image of the main lens' opening (pixels), were it round.
     pub image_diameter: f64,
-    /// How the rows of the picture are turned (radians): from right towards down.
+    /// Rotation of the rows of the picture (radians), from right towards down.
     pub rotation: f64,
     /// The distance that a refocused picture is asked for (m), from the entrance pupil.
     pub refocus: Option<f64>,
-    /// Why pixels at one offset behind the lenslets are no views, where they are none.
+    /// Reason why pixels at one offset behind the lenslets are no views, where they are none.
     pub no_views: Option<String>,
 }
 
@@ -291,13 +291,13 @@ impl LightField {
         Self { views, pupil_share, ..self.clone() }
     }
 
-    /// Where the sensor has the middle of a lenslet's image (pixels from the corner).
+    /// Centre of a lenslet's image on the sensor (pixels from the corner).
     #[must_use]
     pub fn centre(&self, lens: &LensCamera, row: u32, col: u32) -> Option<[f64; 2]> {
         self.centre_by(lens, lens.lenslets()?, row, col)
     }
 
-    /// The same by lenslets of their own, as light of another wavelength has them.
+    /// Centre of the image as by [`Self::centre`], with lenslets of their own, as light of another wavelength has them.
     #[must_use]
     pub fn centre_by(
         &self,
@@ -323,8 +323,8 @@ fn most_views(diameter: f64, step: f64) -> u32 {
 }
 
 impl LensletChiefs {
-    /// Why pixels `pixel` (mm) wide at one offset behind the lenslets do not see the same part of the
-    /// opening through all of each lenslet, in images of which `alone` pixels are free of their neighbours.
+    /// Reason why pixels `pixel` (mm) wide at one offset behind the lenslets do not see the same part of the opening
+    /// through all of each lenslet, in images of which `alone` pixels are free of their neighbours.
     fn no_views(&self, pixel: f64, alone: f64) -> Option<String> {
         if alone < LEAST_IMAGE {
             return Some(format!(

@@ -45,7 +45,7 @@ pub struct ViewGrid {
     coarse: f64,
 }
 
-/// What of the entrance pupil is open.
+/// Opening of the stop, as part of the entrance pupil.
 #[derive(Debug, Clone, PartialEq)]
 struct Stop {
     opening: Arc<Opening>,
@@ -110,7 +110,7 @@ impl ViewGrid {
         Self { views: 1, ..self.clone() }
     }
 
-    /// The same on pixels `factor` times as large.
+    /// Returns the grid on pixels `factor` times as large.
     pub(crate) fn coarser(&self, factor: f64) -> Self {
         Self { coarse: self.coarse * factor, ..self.clone() }
     }
@@ -133,7 +133,7 @@ impl ViewGrid {
         self.views
     }
 
-    /// How far the viewpoint moves from view to view (m).
+    /// Distance of the viewpoint from one view to the next (m).
     #[must_use]
     pub fn baseline(&self) -> f64 {
         1e-3 * self.baseline[0]
@@ -158,19 +158,19 @@ impl ViewGrid {
         (self.axes[0] * view.x + self.axes[1] * view.y) * self.baseline[0]
     }
 
-    /// How far a row of a view is from the next (columns): 1, and √¾ in a hexagonal grid.
+    /// Distance from a row of a view to the next (columns): 1, and √¾ in a hexagonal grid.
     #[must_use]
     pub fn row_height(&self) -> f64 {
         self.grid.row_height()
     }
 
-    /// How lenslets are packed: how the pixels of a view are.
+    /// Packing of the lenslets, which is that of the pixels of a view.
     #[must_use]
     pub fn packing(&self) -> Grid {
         self.grid.grid
     }
 
-    /// How the rows of views are turned against the camera (radians): from right towards down.
+    /// Rotation of the rows of views against the camera (radians), from right towards down.
     #[must_use]
     pub fn rotation(&self) -> f64 {
         -self.axes[0].to_angle()
@@ -229,7 +229,7 @@ impl ViewGrid {
         centre + DVec2::from(self.array.lattice.turned(step))
     }
 
-    /// What of a ray's light arrives on the array.
+    /// Share of a ray's light that arrives on the array.
     fn weight(&self, a: DVec2, u: DVec2) -> f64 {
         // On the pupil mm right and mm up are the lens' own x and y.
         let at_stop = u * self.stop.magnification;

@@ -215,7 +215,7 @@ fn build(camera: &Camera, model: &OpencvModel) -> Result<Distortion, CameraError
     .ok_or_else(|| CameraError::new("lens", "the fit has no distortion"))
 }
 
-/// How far (pixels) a chief ray, at a distance (m), is seen from its own place.
+/// Residual (pixels) of a chief ray, at a distance (m): how far it is seen from its own place.
 fn residual(
     sight: &PixelSight,
     distance: f64,
@@ -232,7 +232,8 @@ fn worst(sights: &[PixelSight], distance: f64, intrinsics: &Intrinsics, built: &
     off.map(|off| if off.is_nan() { f64::INFINITY } else { off }).fold(0.0, f64::max)
 }
 
-/// How far from the principal point a place lies (pixels), and a ray from the axis (degrees).
+/// Field of a sight: the distance of its place from the principal point (pixels), and the angle of
+/// its ray to the axis (degrees).
 fn field(sight: &PixelSight, distance: f64, centre: [f64; 2]) -> [f64; 2] {
     let direction = sight.at(distance);
     let radius = (sight.pixel[0] - centre[0]).hypot(sight.pixel[1] - centre[1]);
@@ -281,7 +282,7 @@ fn residuals(
     }
 }
 
-/// Where the fit stays within a tolerance (pixels).
+/// Region in which the fit stays within a tolerance (pixels).
 fn holds(
     sights: &[PixelSight],
     distance: f64,

@@ -40,8 +40,8 @@ pub(super) fn standard(
     Some((intrinsics, DistortionSpec::BrownConrady(model)))
 }
 
-/// How far the column and the row of a point are from `pixel`, and their derivatives by fx, fy, cx, cy,
-/// k1, k2, p1, p2, k3.
+/// Residuals of the column and the row of a point against `pixel`, and their derivatives by fx, fy,
+/// cx, cy, k1, k2, p1, p2, k3.
 fn standard_rows(at: &[f64; 9], [x, y]: [f64; 2], pixel: [f64; 2]) -> [ResidualRow<9>; 2] {
     let [fx, fy, cx, cy, k1, k2, p1, p2, k3] = *at;
     let r2 = x * x + y * y;
@@ -101,7 +101,7 @@ const MOST_STEPS: usize = 50;
 /// Steps that change the sum of squares by less than this share have arrived.
 const ENOUGH: f64 = 1e-14;
 
-/// How far off a model is at one place (pixels), and the derivatives of that by its parameters.
+/// Residual of a model at one place (pixels), and its derivatives by the model's parameters.
 pub(super) type ResidualRow<const N: usize> = (f64, [f64; N]);
 
 /// The parameters from `start` on at which the squares of all `rows` have the least sum; `None` when
@@ -203,7 +203,7 @@ impl PixelSight {
         }
     }
 
-    /// How far the ray passes from the entrance pupil's middle (m).
+    /// Distance at which the ray passes the entrance pupil's middle (m).
     pub(super) fn wander(&self) -> f64 {
         self.origin.length()
     }

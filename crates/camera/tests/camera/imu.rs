@@ -1,4 +1,4 @@
-//! What an inertial unit reads, against closed forms and against differences of the trajectory.
+//! Readings of an inertial unit, against closed forms and against differences of the trajectory.
 
 use etendue_camera::{CameraMotionSpec, Convention, Pose, Trajectory};
 use glam::{DMat3, DQuat, DVec3};

@@ -29,7 +29,7 @@ fn ray(camera: &Camera, [column, row]: [f64; 2]) -> Option<(DVec3, DVec3)> {
     (rays.t_max()[0] > 0.0).then(|| (rays.origin(0), rays.direction(0)))
 }
 
-/// Where a ray is at z (m).
+/// Point of a ray at z (m).
 fn at(z: f64, (origin, direction): (DVec3, DVec3)) -> DVec3 {
     origin + direction * ((z - origin.z) / direction.z)
 }
@@ -302,7 +302,7 @@ fn the_centroid_of_a_white_image_is_the_lenslets_centre() {
     }
 }
 
-/// What an error says, or that there is none.
+/// Text of an error, or a note that there is none.
 fn refused(camera: Result<Camera, String>) -> String {
     camera.err().unwrap_or_else(|| "it is accepted".to_owned())
 }

@@ -28,7 +28,7 @@ fn lens(file: &str, more: &str) -> Camera {
     ))
 }
 
-/// Where (m) the ray of a place of the picture is at a distance from the camera.
+/// Point (m) on the ray of a place of the picture at a distance from the camera.
 fn point(camera: &Camera, [column, row]: [f64; 2], distance: f64) -> Option<DVec3> {
     let mut rays = RayBatch::default();
     camera.rays_through(&[column], &[row], &mut rays);

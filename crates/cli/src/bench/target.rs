@@ -14,7 +14,7 @@ use crate::fault::Fault;
 use crate::progress::Phases;
 use crate::{render, stop};
 
-/// How long all renders may take (s), and in a quick run.
+/// Time limit of all renders (s), and in a quick run.
 const SECONDS: [f64; 2] = [600.0, 50.0];
 
 /// Surfaces to which light is followed, where the scene follows it farther.
@@ -49,8 +49,8 @@ pub(super) fn race(
     measure((axes, &in_full), effort, &mut program, &|share| progress(share))
 }
 
-/// What makes a scene have no layers of sampling, which there are of samples that stop by themselves alone; nothing
-/// where it has none.
+/// Settings that remove a scene's layers of sampling, which there are of samples that stop by
+/// themselves alone; nothing where it has none.
 fn without_sampling(scene: &Scene) -> Vec<(String, String)> {
     let is_own = |layer: &&LayerSpec| Some(**layer) != scene.picture;
     let own: Vec<&LayerSpec> = scene.layers.iter().filter(is_own).collect();
@@ -95,8 +95,8 @@ fn whole_run(
     Ok(WholeRun { stages, values, shape })
 }
 
-/// What the sensor records in the mean in its first exposure, above its black level (DN), as `[row][column][channel]`;
-/// of a scene without a sensor the light, clipped at full scale.
+/// Mean of what the sensor records in its first exposure, above its black level (DN), as
+/// `[row][column][channel]`; of a scene without a sensor the light, clipped at full scale.
 fn recorded(rendering: &Rendering) -> Result<(Vec<f64>, [usize; 3]), etendue::Error> {
     if let Some(light) = rendering.sensor_light()
         && let Some(shot) = light.sensor().shots().next()
@@ -113,7 +113,7 @@ fn recorded(rendering: &Rendering) -> Result<(Vec<f64>, [usize; 3]), etendue::Er
     Ok(((0..width * height).flat_map(of_pixel).collect(), [width, height, channels.len()]))
 }
 
-/// What stands for the output `--denoise` among settings.
+/// Name that stands for the output `--denoise` among settings.
 const DENOISE: &str = "--denoise";
 
 /// Shares of a number's default that it is swept over by itself.
@@ -167,7 +167,7 @@ fn by_itself(key: &str) -> Result<Vec<String>, Fault> {
     Ok(values)
 }
 
-/// What can be changed of a scene: lists of which each change excludes the others.
+/// Changes that can be made to a scene: lists of which each change excludes the others.
 pub(super) fn axes(scene: &Scene) -> Vec<Vec<Change>> {
     let change = |name: &str, path: &str, value: &str| Change {
         name: name.to_owned(),

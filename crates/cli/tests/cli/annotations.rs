@@ -1,5 +1,5 @@
-//! What tells the copies of objects apart: COCO's and BOP's sets and Cryptomatte, against closed forms and by others'
-//! readers.
+//! Sets that tell the copies of objects apart: COCO's and BOP's sets and Cryptomatte, against
+//! closed forms and by others' readers.
 
 use std::path::Path;
 use std::process::Command;
@@ -342,7 +342,7 @@ fn what_a_lens_blurs_has_shares_of_the_pixels_around_its_edge() {
     }
 }
 
-/// What pycocotools, cryptomatte-api and a reader of BOP's folder make of the sets.
+/// Others' readers read the sets: pycocotools, cryptomatte-api and a reader of BOP's folder.
 #[test]
 fn others_read_the_sets() {
     let packages = ["numpy", "pycocotools==2.0.11", "cryptomatte-api==1.0.0", "imageio", "pypng"];

@@ -180,7 +180,7 @@ fn lamps_of_cubes_light_what_is_around_them() {
     }
 }
 
-/// How much beyond its ends a curve or a cube is held, in the report of a render.
+/// The report of a render tells how much a curve or a cube is held beyond its ends.
 #[test]
 fn what_ends_inside_the_sensor_s_range_is_told() {
     let bench = Bench::new();

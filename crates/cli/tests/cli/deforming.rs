@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::run::{Bench, read_npy, text};
 
-/// How long the animations last (s).
+/// Duration of the animations (s).
 const LENGTH: f64 = 0.01;
 
 /// A model put together: its numbers are in a file beside it.
@@ -276,7 +276,7 @@ fn slots_and_flow_follow_shapes() {
     assert!(counted > 1000, "{counted} pixels");
 }
 
-/// What makes too many steps says so, by the mesh and with what to do.
+/// Too many steps are refused by their mesh, with what to do.
 #[test]
 fn too_many_steps_are_refused_by_their_mesh() {
     let scene = scene(&json!({ "exposure": LENGTH }), &json!({}));

@@ -197,7 +197,7 @@ fn what_has_no_noise_of_light_is_refused() {
     }
 }
 
-/// What moves is denoised by colours and normals that are averaged over the exposure, as its light is.
+/// A moving scene is denoised by colours and normals that are averaged over the exposure, as its light is.
 #[test]
 fn what_moves_keeps_its_light() {
     let mut bench = room(&json!({}));

@@ -420,7 +420,7 @@ fn faulty() -> Bench {
     bench
 }
 
-/// What is refused: the picture, the sensor, more arguments, and two parts of the message.
+/// Refusal: the picture, the sensor, more arguments, and two parts of the message.
 type Refusal<'a> = (&'a str, &'a str, &'a [&'a str], [&'a str; 2]);
 
 /// Asserts that each is refused with exit code 2 and its words, and that nothing is left behind.

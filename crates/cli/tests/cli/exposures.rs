@@ -1,4 +1,4 @@
-//! What a scene's sensor makes of a render.
+//! Sensor's images of a render.
 
 use serde_json::{Value, json};
 

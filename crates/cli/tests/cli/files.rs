@@ -28,7 +28,7 @@ fn refused(bench: &Bench, arguments: &[&str], words: &[&str]) {
     }
 }
 
-/// What `check --json` tells.
+/// Output of `check --json`.
 fn checked(bench: &Bench, file: &str) -> serde_json::Value {
     let output = run(bench, &["check", file, "--json"]);
     assert!(output.status.success(), "{file}: {}", text(&output.stderr));

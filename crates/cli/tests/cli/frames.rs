@@ -62,7 +62,7 @@ fn each_frame_is_the_picture_of_its_settings() {
     assert_eq!(index["frames"][2]["folder"], "frames/000002");
 }
 
-/// What examines a scene examines its frames: it counts them, and refuses what a render would.
+/// Commands that examine a scene examine its frames: they count them, and refuse what a render would.
 #[test]
 fn check_and_plan_know_of_frames() {
     let bench = Bench::with_scene(&scene(&json!([{"camera.fov": 30}, {"camera.fov": 40}])));

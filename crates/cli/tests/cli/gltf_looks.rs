@@ -1,5 +1,4 @@
-//! What a glTF model's material and lights look like: a square that fills the picture, and values that a
-//! closed form gives.
+//! Looks of a glTF model's material and lights: a square that fills the picture, and values that a closed form gives.
 
 use std::f64::consts::PI;
 
@@ -258,7 +257,7 @@ fn emission_is_its_factor_times_its_strength() {
     assert_shows(&stage(&lamp, &used, &json!({"lights": []})), [4.0, 2.0, 1.0], "lamp");
 }
 
-/// What alpha leaves out shows what is behind: a wall of radiance 1 behind a black square.
+/// Alpha that leaves a surface out shows what is behind: a wall of radiance 1 behind a black square.
 #[test]
 fn alpha_cuts_or_thins() {
     let black = |mode: &str, alpha: f64, more: Value| {

@@ -1,4 +1,4 @@
-//! What a glTF model's textures look like, on a square that fills the picture.
+//! Looks of a glTF model's textures, on a square that fills the picture.
 
 use serde_json::{Value, json};
 

@@ -1,4 +1,4 @@
-//! What people and editors write beside the format.
+//! Additions that people and editors write beside the format.
 
 use crate::run::{Bench, text};
 

@@ -54,8 +54,9 @@ fn over_the_disk(offset: f64, power: i32) -> f64 {
     (0..cells).map(|i| (0..cells).map(|k| cell(i, k)).sum::<f64>()).sum()
 }
 
-/// What docs/explanation/paper.md says of the exponent in Eq. (1) of Nürnberg et al. 2019: behind a wide pupil the
-/// picture is ∫ L cosθ dΩ = ∫ L cos⁴θ dA/d², and neither cos⁴ of the chief ray nor ∫ L cos⁴θ dΩ = ∫ L cos⁷θ dA/d².
+/// A wide pupil has the exponent that docs/explanation/paper.md gives for Eq. (1) of Nürnberg et
+/// al. 2019: behind a wide pupil the picture is ∫ L cosθ dΩ = ∫ L cos⁴θ dA/d², and neither cos⁴ of
+/// the chief ray nor ∫ L cos⁴θ dΩ = ∫ L cos⁷θ dA/d².
 #[test]
 fn a_wide_pupil_gives_the_cosine_over_its_solid_angle() {
     let bench = wall(
@@ -215,8 +216,8 @@ fn a_lens_that_passes_nothing_is_refused_with_what_blocks() {
     }
 }
 
-/// What mirrors reflect, and the share of light that an order of diffraction has, dims a picture as a filter does: by as much,
-/// out of the lens that loses none.
+/// Mirrors and orders of diffraction dim a picture as a filter does, by what they reflect and by
+/// their share of the light: by as much, out of the lens that loses none.
 #[test]
 fn mirrors_and_orders_dim_pictures_as_filters_do() {
     let mean = |elements: &Value| {

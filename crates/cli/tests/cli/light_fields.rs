@@ -21,7 +21,7 @@ fn scene() -> Value {
     })
 }
 
-/// What `etendue render` says of the scene with a value of its own, which it refuses.
+/// Message of `etendue render` on the scene with a value of its own, which it refuses.
 fn refused(path: &str, value: &str) -> String {
     let bench = Bench::with_scene(&scene().to_string());
     let setting = format!("{path}={value}");
@@ -52,7 +52,7 @@ fn cameras_that_have_no_light_field_are_refused_with_a_way_out() {
     }
 }
 
-/// What each kind of camera leaves, which is what Python and the window show: all have a raw picture, a white one and
+/// Files of each kind of camera, which is what Python and the window show: all have a raw picture, a white one and
 /// centres; views, their reference, depth and disparity those that have views; `hci/` those of square pixels.
 #[test]
 fn each_kind_of_light_field_leaves_what_it_has() {

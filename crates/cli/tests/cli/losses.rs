@@ -1,4 +1,4 @@
-//! What files clip, saturate or show black is told, from the shares on that the limits page names.
+//! Losses of files: what they clip, saturate or show black is told, from the shares on that the limits page names.
 
 use serde_json::{Value, json};
 

@@ -1,5 +1,5 @@
-//! What would not fit into memory is refused in a sentence before work starts, and no small file makes
-//! much appear.
+//! Scenes that would not fit into memory are refused in a sentence before work starts, and no small
+//! file makes much appear.
 
 use std::process::{Command, Output};
 
@@ -132,7 +132,7 @@ fn models_that_change_while_they_are_rendered_are_named() {
     assert!(notes.contains("a.obj changed while it was rendered"), "{notes}");
 }
 
-/// What was read before anything was traced may change: no note, and the same picture.
+/// Models that were read before anything was traced may change: no note, and the same picture.
 #[test]
 fn copies_of_models_may_change_while_they_are_rendered() {
     let bench = Bench::with_scene(

@@ -1,5 +1,5 @@
-//! What is wrong with a file, in words that who wrote it knows: no types of Rust, no bytes of
-//! another format, who refers to what is not there, and what is allowed instead.
+//! Messages on what is wrong with a file, in words that who wrote it knows: no types of Rust, no
+//! bytes of another format, who refers to what is not there, and what is allowed instead.
 
 use std::fmt::Write;
 

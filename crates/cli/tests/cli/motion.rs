@@ -121,7 +121,7 @@ fn samples_that_stop_see_what_moves() {
     assert!((stopped / even - 1.0).abs() < 4e-3, "{stopped}, not {even}");
 }
 
-/// What is kept of a moving scene on the way is gone on from after a kill.
+/// A moving scene that is kept on the way goes on after a kill.
 #[test]
 fn what_moves_goes_on_after_kills() {
     let bench = scene(&json!(600));

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::deforming::Model;
 use crate::run::{Bench, text};
 
-/// How long the animation lasts (s), and the exposure.
+/// Duration of the animation (s), and the exposure.
 const LENGTH: f64 = 0.5;
 
 /// A model of one light, whose node is moved by `output` within that time below one that stands still.
@@ -52,7 +52,7 @@ fn mean(bench: &Bench) -> f64 {
     picture.iter().sum::<f64>() / picture.len() as f64
 }
 
-/// What a light gives while it moves, over what it gives while it stands in the moment that is shown.
+/// Share of a light's output while it moves, of that while it stands in the moment that is shown.
 fn share(light: &Value, path: &str, output: impl Fn(&mut Model) -> usize) -> f64 {
     let [moving, still] = [true, false].map(|plays| {
         let bench = scene(plays, &json!({}));
@@ -62,7 +62,7 @@ fn share(light: &Value, path: &str, output: impl Fn(&mut Model) -> usize) -> f64
     moving / still
 }
 
-/// What is off in 65 536 samples whose times are spread evenly in each pixel.
+/// Error of 65 536 samples whose times are spread evenly in each pixel.
 const NOISE: f64 = 3e-3;
 
 /// The mean of the light of a point 1 m above the dot, and 0.25 m beside it, that goes from there to x = 2 m, over that at

@@ -1,4 +1,4 @@
-//! What is already there: inputs, files of an earlier run, files of others, and folders that fail.
+//! Files that are already there: inputs, files of an earlier run, files of others, and folders that fail.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -2,7 +2,7 @@
 
 use crate::run::{Bench, text};
 
-/// What a matte floor shows under a smooth tinted pane, by each tracer of light.
+/// Floor's radiance under a smooth tinted pane, by each tracer of light.
 fn under_a_pane(lights: &str, more: &str) -> Vec<f64> {
     let seen = |tracer: &str| {
         let bench = Bench::with_scene(&format!(
@@ -41,7 +41,7 @@ fn suns_and_points_shine_through_smooth_panes() {
     assert!((halves[0] / known - 1.0).abs() < 1e-6, "{halves:?}");
 }
 
-/// What stays dark is told: a sun before glass that bends, and a lamp without area.
+/// Lights that stay dark are told: a sun before glass that bends, and a lamp without area.
 #[test]
 fn light_that_finds_no_way_is_told() {
     let bench = Bench::with_scene(

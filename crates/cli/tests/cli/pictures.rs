@@ -1,4 +1,4 @@
-//! How a picture's light becomes a PNG, and which light there is when nobody names any.
+//! Conversion of a picture's light to a PNG, and the light when nobody names any.
 
 use serde_json::{Value, json};
 

@@ -1,4 +1,4 @@
-//! What names in files do to the terminal: nothing.
+//! Names in files do nothing to the terminal.
 
 use crate::run::{Bench, text};
 

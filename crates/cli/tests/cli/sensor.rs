@@ -136,7 +136,8 @@ fn a_series_has_the_files_that_its_manifest_names() {
     assert!(descriptor.contains("n 12 32 24"), "{descriptor}");
 }
 
-/// What is set of a scene's sensor would make a scene of it, whose sensor has nothing else.
+/// Settings of a scene are refused of a sensor: what is set of a scene's sensor would make a scene
+/// of it, whose sensor has nothing else.
 #[test]
 fn paths_of_a_scene_are_refused_of_a_sensor() {
     let bench = Bench::new();

@@ -44,7 +44,7 @@ fn slots() -> Value {
     ])
 }
 
-/// When each of the slots lasts: the third for what the others leave, from within the second on.
+/// Times of each of the slots: the third for what the others leave, from within the second on.
 const SPANS: [[f64; 2]; 3] = [[0.0, 0.002], [0.002, 0.007], [0.006, 0.011]];
 
 fn rendered(scene: &Value, more: &[&str]) -> Bench {

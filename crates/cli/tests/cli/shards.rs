@@ -78,7 +78,7 @@ fn share(bench: &Bench, number: u32, count: u32, more: &[&str]) -> String {
     format!("shares/shard-{number}-of-{count}.film")
 }
 
-/// What a merge that must be refused says.
+/// Message of a merge that must be refused.
 fn refused(bench: &Bench, shares: &[&str]) -> String {
     let output = bench.run(&[&["merge", "merged"], shares].concat());
     assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::run::{Bench, text};
 
-/// What a render can leave.
+/// Kinds of output that a render can leave.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Picture,

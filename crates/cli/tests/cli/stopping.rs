@@ -56,7 +56,7 @@ impl Running {
         }
     }
 
-    /// What it leaves: exit status, standard output and standard error.
+    /// End of the process: exit status, standard output and standard error.
     fn end(mut self) -> (ExitStatus, String, String) {
         let start = Instant::now();
         while self.0.try_wait().expect("a child").is_none() {

@@ -4,7 +4,7 @@ use std::fs;
 
 use crate::generated::root;
 
-/// What stands in backticks.
+/// Words in backticks.
 fn code(cell: &str) -> Vec<&str> {
     cell.split('`').skip(1).step_by(2).collect()
 }

@@ -1,4 +1,4 @@
-//! Where a camera without a pose stands, and which way is up.
+//! Default pose of a camera that has none, and which way is up.
 
 use serde_json::Value;
 

@@ -10,7 +10,7 @@ use super::CalibrationOptions;
 /// The share of the picture's width or height that the board fills, whichever is reached first.
 const FILLED: f64 = 0.5;
 
-/// How far boards are tilted (degrees).
+/// Tilt of boards (degrees).
 const TILT: f64 = 25.0;
 
 /// Places of boards, as shares of the way from the middle of the picture to where they would reach its edge.
@@ -171,7 +171,7 @@ fn by_rows(matrix: DMat3) -> [[f64; 3]; 3] {
     [rows.x_axis.into(), rows.y_axis.into(), rows.z_axis.into()]
 }
 
-/// Where the camera is focused (m); a metre where everything is sharp.
+/// Distance at which the camera is focused (m); a metre where everything is sharp.
 fn focus_of(camera: &Camera) -> Result<f64, String> {
     let Some(lens) = camera.lens() else { return Ok(1.0) };
     let distance = lens.focused().object_distance();

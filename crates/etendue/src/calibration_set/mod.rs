@@ -25,7 +25,7 @@ use surroundings::WhiteSurroundings;
 /// Points of the gain map of a DNG, along columns and rows.
 const SHADING: [u32; 2] = [17, 13];
 
-/// What a set holds.
+/// Options of a calibration set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationOptions {
     /// Frames of the darks, flats and white images (1 to 1000), and of each pose of the board.
@@ -38,9 +38,9 @@ pub struct CalibrationOptions {
     pub squares: [u32; 2],
     /// A side of a square (m); what lets the board fill about a half of the picture when absent.
     pub square: Option<f64>,
-    /// How far the board is (m); where the lens is focused when absent.
+    /// Distance of the board (m); that at which the lens is focused when absent.
     pub distance: Option<f64>,
-    /// What of the chip is read out.
+    /// Part of the chip that is read out.
     pub window: Window,
     /// Also the numbers as bytes of a packed format.
     pub packed: Option<Packing>,

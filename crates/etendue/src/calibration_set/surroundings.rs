@@ -86,7 +86,7 @@ impl WhiteSurroundings {
         light.ok_or_else(|| self.refused("camera.sensor: exposes nothing"))
     }
 
-    /// What `white` is multiplied by to reach a share of saturation.
+    /// Factor by which `white` reaches a share of saturation.
     pub(super) fn factor(
         &self,
         white: &SensorLight,

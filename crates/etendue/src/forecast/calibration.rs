@@ -1,4 +1,4 @@
-//! What this machine takes for a triangle, a ray, a pixel of a file.
+//! Calibration: the time that this machine takes for a triangle, a ray, a pixel of a file.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -21,7 +21,7 @@ const COPIES: u32 = 10_000;
 /// Columns and rows of the pictures.
 const RESOLUTION: [u32; 2] = [256, 192];
 
-/// How often files are written: the fastest counts, which nothing else has disturbed.
+/// Number of times that files are written: the fastest counts, which nothing else has disturbed.
 const TIMES: usize = 3;
 
 /// The rates of a machine: seconds for each.
@@ -72,7 +72,7 @@ impl Calibration {
         }
     }
 
-    /// Whether every rate is a time.
+    /// True if every rate is a time.
     pub(super) fn is_sound(&self) -> bool {
         let Self { build, placed_copy, ray, exr, npy, png, together, raw, rgb, noise } = *self;
         let all = [placed_copy, ray, exr, npy, png, raw, rgb].into_iter().chain(build).chain(noise);

@@ -1,4 +1,4 @@
-//! Where a machine keeps its calibration: a small file in the user's cache folder.
+//! Place of a machine's calibration: a small file in the user's cache folder.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -75,7 +75,7 @@ fn keep(path: &Path, rates: Calibration) -> Result<(), Error> {
     Ok(Transaction::at_once().write(path, |file| writeln!(file, "{json}"))?)
 }
 
-/// What is kept; nothing when it cannot be read.
+/// Reads the rates that are kept; nothing when it cannot be read.
 fn read(path: &Path) -> KeptRates {
     let is_small =
         std::fs::metadata(path).is_ok_and(|file| file.is_file() && file.len() <= MOST_BYTES);
@@ -91,7 +91,8 @@ fn place() -> Option<PathBuf> {
     Some(cache.join(FILE))
 }
 
-/// What rates depend on: the processor, the threads, and this program with the accelerator that it has.
+/// Identity of the machine, on which rates depend: the processor, the threads, and this program
+/// with the accelerator that it has.
 fn machine() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let line = text.lines().find(|line| line.starts_with("model name"));

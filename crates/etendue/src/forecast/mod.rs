@@ -1,4 +1,4 @@
-//! How long a render will take, by stage, before it is begun.
+//! Forecast of the time of a render, by stage, before it is begun.
 //!
 //! Counts of the plan times what this machine takes for each of them, which a short [`Calibration`] has
 //! measured and the machine keeps. What rays cost in this very scene no count tells: where its structure is
@@ -56,7 +56,7 @@ pub struct TimeForecast {
     pub is_piloted: bool,
 }
 
-/// What is known of a scene before it is rendered.
+/// Prospect of a render: what is known of a scene before it is rendered.
 #[derive(Debug, Clone, Copy)]
 pub struct Prospect<'a> {
     /// The loaded scene.
@@ -65,7 +65,7 @@ pub struct Prospect<'a> {
     pub plan: &'a Plan,
     /// The files that are wanted.
     pub outputs: Outputs,
-    /// What loading took (s).
+    /// Duration of loading (s).
     pub load: f64,
 }
 

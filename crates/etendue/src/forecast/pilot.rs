@@ -34,15 +34,15 @@ const ADAPTIVE: f64 = 3_000.0;
 /// Pixels of a white image that are traced, about: in whole rows, as there are more samples at the rims of lenslets.
 const WHITE_PIXELS: u32 = 18_000;
 
-/// How often each is traced: the fastest counts, which nothing else has disturbed.
+/// Number of times that each is traced: the fastest counts, which nothing else has disturbed.
 const TIMES: usize = 3;
 
-/// What parts of a picture are traced by.
+/// Tracing of parts of a picture, for the forecast.
 pub(super) struct Pilot<'a> {
     pub(super) scene: &'a Scene,
     pub(super) accel: &'a dyn Accel,
     pub(super) images: &'a Images,
-    /// When they have taken too long: a forecast is worth no wait.
+    /// Time after which they have taken too long: a forecast is worth no wait.
     pub(super) until: Instant,
 }
 
@@ -156,7 +156,7 @@ fn threads() -> u32 {
     u32::try_from(rayon::current_num_threads()).unwrap_or(u32::MAX)
 }
 
-/// The same view on about so many pixels.
+/// Returns the view on about so many pixels.
 fn coarser(camera: &Camera, few: f64) -> Camera {
     let factor = (pixels(camera) / few).sqrt().round().max(1.0);
     #[expect(

@@ -1,4 +1,4 @@
-//! What a sensor makes of a picture of light: its unit, its factor, and the sensor that fits it.
+//! Response of a sensor to a picture of light: its unit, its factor, and the sensor that fits it.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use super::{ExposeOptions, LightImage, fits, refused};
 use crate::{Error, ExposedImage};
 
 impl LightImage {
-    /// What `sensor` makes of the picture: its pixels are the picture's.
+    /// Exposes `sensor` to the picture: its pixels are the picture's.
     ///
     /// # Errors
     ///

@@ -1,5 +1,5 @@
-//! What is rendered in the place of a scene with a tolerance: the same with coarser meshes, where these are within it.
-//! All else that a session is asked of its scene is answered by the scene's own meshes.
+//! Coarser scene that is rendered in the place of one with a tolerance: the same with coarser meshes, where these are
+//! within it. All else that a session is asked of its scene is answered by the scene's own meshes.
 
 use std::sync::Arc;
 
@@ -17,9 +17,9 @@ pub(super) struct CoarseScene {
     scene: Arc<Scene>,
     plan: Plan,
     accel: Option<Arc<dyn Accel>>,
-    /// What was left out; nothing where the scene has to be rendered as it is.
+    /// Detail that was left out; nothing where the scene has to be rendered as it is.
     detail: Option<TakenDetail>,
-    /// Whether the coarser one is the session's now.
+    /// True if the coarser one is the session's now.
     is_in_place: bool,
 }
 
@@ -73,7 +73,7 @@ impl Session {
 }
 
 impl LoadedScene {
-    /// What is left out of its meshes.
+    /// Detail that is left out of its meshes.
     pub(super) fn detail(&self) -> Option<TakenDetail> {
         self.coarse.as_ref().filter(|coarse| coarse.is_in_place)?.detail
     }

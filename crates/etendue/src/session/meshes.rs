@@ -4,7 +4,7 @@ use etendue_geometry::{Mesh, Vertices};
 
 use crate::{Error, Session};
 
-/// What is known at the vertices of a mesh of arrays: one entry each, or nothing.
+/// Attributes of the vertices of a mesh of arrays: one entry each, or nothing.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct MeshAttributes<'a> {
     /// Texture coordinates; v runs down, as glTF has it.
@@ -51,8 +51,8 @@ impl Session {
         Ok(())
     }
 
-    /// Whether pictures of light lose their noise from now on, as [`crate::Options::outputs`] says it of a session
-    /// that is opened.
+    /// Sets whether pictures of light lose their noise from now on, as [`crate::Options::outputs`]
+    /// says it of a session that is opened.
     pub fn set_denoised(&mut self, denoised: bool) {
         if self.options.outputs.denoised != denoised {
             self.options.outputs.denoised = denoised;

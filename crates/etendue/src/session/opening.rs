@@ -1,4 +1,4 @@
-//! How a session begins: from a file, from values, and again from its file.
+//! Opening of a session: from a file, from values, and again from its file.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -123,7 +123,7 @@ impl Session {
     }
 }
 
-/// What opens all that a scene names, with what the caller has read for it.
+/// Opener of all that a scene names, with what the caller has read for it.
 fn opener_of(options: &Options) -> Opener {
     let opener = Opener::new(options.reach);
     opener.record(options.inputs.iter().chain(&options.glass_catalogs).cloned());

@@ -1,4 +1,4 @@
-//! What a render needs: the scene, the frames that it is compared with, the structures over them, and images.
+//! Preparation of a render: the scene, the frames that it is compared with, the structures over them, and images.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -27,7 +27,7 @@ impl Session {
         Ok((Arc::clone(scene), accel, Arc::clone(&self.images)))
     }
 
-    /// What is to be written of the pictures.
+    /// Kinds of file to be written of the pictures.
     pub(crate) fn outputs(&self) -> Outputs {
         self.options.outputs
     }
@@ -47,7 +47,7 @@ impl Session {
         Ok(())
     }
 
-    /// The same, but that a scene of which a coarser one is rendered stays so.
+    /// Loads the scene, but leaves a scene of which a coarser one is rendered as it is.
     pub(super) fn load_as_rendered(&mut self, progress: &Progress) -> Result<(), Error> {
         if self.loaded.is_some() {
             return Ok(());
@@ -134,8 +134,8 @@ impl Session {
         self.build_for(false, progress)
     }
 
-    /// The same for the rays of the picture alone: what they cannot meet may be left out, and what is finer than the
-    /// scene's tolerance. Of several frames each sees something else, and all have one structure.
+    /// Builds the structure for the rays of the picture alone: what they cannot meet may be left out, and what is finer
+    /// than the scene's tolerance. Of several frames each sees something else, and all have one structure.
     pub(super) fn build_for_picture(&mut self, progress: &Progress) -> Result<(), Error> {
         let is_single = self.file.spec.frames.is_none();
         self.build_for(is_single, progress)
@@ -191,8 +191,8 @@ impl Session {
         self.decode_as(Decoded::Whole, progress)
     }
 
-    /// The same for the rays of the picture alone: in fewer texels where the scene's tolerance allows. Of several frames
-    /// each would tell others apart, and all have the whole images.
+    /// Decodes the images for the rays of the picture alone: in fewer texels where the scene's tolerance allows. Of
+    /// several frames each would tell others apart, and all have the whole images.
     pub(super) fn decode_for_picture(&mut self, progress: &Progress) -> Result<(), Error> {
         let is_single = self.file.spec.frames.is_none();
         let has_tolerance = self.loaded()?.scene.tolerance.is_some();

@@ -84,7 +84,7 @@ impl Session {
         self.checkpoint = checkpoint;
     }
 
-    /// When a render began, and what was prepared before it: a part of its time, too.
+    /// Start of a render, and the time of what was prepared before it: a part of its time, too.
     fn clock(&self) -> (Instant, f64) {
         (Instant::now(), self.seconds.load + self.seconds.build + self.seconds.decode)
     }
@@ -120,14 +120,14 @@ impl Session {
         Ok(film)
     }
 
-    /// What films must agree in to be of one picture.
+    /// Identity that films must agree in to be of one picture.
     fn identity(&self, scene: &Scene, plan: &Plan) -> Result<Identity, Error> {
         let prints = fingerprints(scene, &self.loaded()?.neighbours)?;
         self.identity_by(scene, plan, (plan.samples.to_string(), prints))
     }
 
-    /// What a film must agree in for a render to go on from it: where more samples follow the same ones, any
-    /// number of them.
+    /// Identity that a film must agree in for a render to go on from it: where more samples follow
+    /// the same ones, any number of them.
     fn kept_identity(&self, scene: &Scene, plan: &Plan) -> Result<Identity, Error> {
         let neighbours = &self.loaded()?.neighbours;
         if !neighbours.is_empty() {
@@ -214,8 +214,8 @@ impl Session {
         }
     }
 
-    /// What the frames of a sequence have of the exposure that `auto_exposure` metered on the first of them (s), for one that
-    /// does not render that.
+    /// Sets the exposure that `auto_exposure` metered on the first frame of a sequence (s), for a
+    /// session that does not render that frame.
     pub fn set_metered_exposure(&mut self, exposure: f64) {
         self.metered = Some(exposure);
     }

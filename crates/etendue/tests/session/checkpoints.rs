@@ -1,4 +1,4 @@
-//! What a checkpoint is worth to a render with more samples: all of it where the first samples stay the same.
+//! Worth of a checkpoint to a render with more samples: all of it where the first samples stay the same.
 
 use std::path::Path;
 use std::time::Duration;

@@ -101,7 +101,7 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
     product(a, ma, b, mb) / spread
 }
 
-/// What is promised of any two frames: four standard errors of as many pixels as are compared.
+/// Promise on any two frames: four standard errors of as many pixels as are compared.
 const FOUR_ERRORS: f64 = 0.01;
 
 #[test]

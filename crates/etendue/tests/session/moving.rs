@@ -1,4 +1,4 @@
-//! What moves and what changes its shape while the shutter is open, in a session that goes on.
+//! Motion and deformation while the shutter is open, in a session that goes on.
 
 use std::fs;
 use std::path::Path;
@@ -115,7 +115,7 @@ fn shapes_and_structures_stay_as_long_as_nothing_of_them_changes() {
     assert!(after.0 != before.0 && after.1 != before.1, "a shorter exposure has other steps");
 }
 
-/// What a window shows of a scene that moves is the picture.
+/// The finest preview of a scene that moves is the picture.
 #[test]
 fn the_finest_preview_of_what_moves_is_the_render() {
     let folder = tempfile::tempdir().unwrap();

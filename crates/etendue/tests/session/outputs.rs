@@ -29,7 +29,7 @@ fn opened(folder: &Path, scene: Value, outputs: Outputs) -> Session {
     Session::from_json_with(folder, scene, Options { outputs, ..Options::default() }).unwrap()
 }
 
-/// Whether files of this kind show the layer; `None` for kinds of whole pictures.
+/// True if files of this kind show the layer; `None` for kinds of whole pictures.
 fn shows(kind: &str, layer: &str) -> Option<bool> {
     let of: &[&str] = match kind {
         "tum" => &["depth"],
@@ -64,7 +64,7 @@ fn render_frames(
     Ok(serde_json::from_slice(&index).unwrap())
 }
 
-/// What the last frame lacks, as flow to the next, is no reason to refuse it.
+/// A layer that the last frame lacks, as flow to the next, is no reason to refuse it.
 #[test]
 fn every_kind_of_file_of_every_layer_is_had_over_frames() {
     let folder = tempfile::tempdir().unwrap();

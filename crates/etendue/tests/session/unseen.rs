@@ -18,7 +18,7 @@ fn session(folder: &std::path::Path) -> Session {
     Session::open(&path).unwrap()
 }
 
-/// Whether a ray from the camera backwards meets the ball that stands there, by its number.
+/// True if a ray from the camera backwards meets the ball that stands there, by its number.
 fn behind(session: &mut Session) -> bool {
     let (_, accel) = session.scene_and_accel(&Progress::none()).unwrap();
     let mut rays = RayBatch::default();

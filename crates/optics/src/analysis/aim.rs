@@ -26,7 +26,7 @@ const SAMPLES: u32 = 56;
 /// Steps of Newton's method.
 const STEPS: u32 = 6;
 
-/// How near its cell's middle a ray passes (shares of the pupil's half).
+/// Tolerance of a ray's aim at the middle of its cell (shares of the pupil's half).
 const ON_TARGET: f64 = 1e-7;
 
 /// Places across a cell at the pupil's edge.
@@ -43,7 +43,7 @@ pub(crate) struct Outline {
     pub(crate) half: f64,
     /// From places about the middle, in shares of `half`, to coordinates of the beam.
     coefficients: [Vec<f64>; 2],
-    /// What it was found by.
+    /// Rays by which the outline was found.
     pub(super) rays: Vec<FirstRay>,
 }
 
@@ -56,7 +56,7 @@ pub(super) struct FirstRay {
     pub(super) from_middle: DVec2,
     /// The path of the chief ray less its own (mm).
     pub(super) ahead: f64,
-    /// Whether light passes.
+    /// True if light passes.
     pub(super) is_lit: bool,
 }
 
@@ -104,7 +104,7 @@ fn basis(at: DVec2) -> [[f64; TERMS]; 3] {
 }
 
 impl Outline {
-    /// What `line` makes of the polynomial of one coordinate of the beam, by powers of shares, and its degree.
+    /// Evaluates `line` on the polynomial of one coordinate of the beam, by powers of shares, and its degree.
     pub(super) fn along<T>(&self, axis: usize, line: impl Fn(&[f64], usize) -> T) -> T {
         line(&self.coefficients[axis], DEGREE)
     }
@@ -120,7 +120,7 @@ impl Outline {
     }
 }
 
-/// What of the sphere a beam lights.
+/// Finds the part of the sphere that a beam lights.
 pub(crate) fn outline(beam: &Beam<'_>, sphere: &ReferenceSphere) -> Result<Outline, AnalysisError> {
     let no_sphere = AnalysisError::NoSphere { z: sphere.centre[2] };
     let (middle, rest) = sphere.meet(&beam.chief_end).ok_or(no_sphere.clone())?;
@@ -288,7 +288,8 @@ fn neighbours(i: usize, cells: usize) -> Vec<usize> {
     near(row).flat_map(|row| near(column).map(move |column| row * cells + column)).collect()
 }
 
-/// What passes of a cell, the mean of its root, and the middle of that from the cell's own (in cells).
+/// Mean transmission of a cell, the mean of its root, and the middle of that from the cell's own
+/// (in cells).
 pub(super) fn cell(beam: &Beam<'_>, middle: DVec2, turn: DMat2) -> ([f64; 2], DVec2) {
     let offset = |k: u32| (f64::from(k) + 0.5) / f64::from(FINE) - 0.5;
     let at = |k: u32| DVec2::new(offset(k % FINE), offset(k / FINE));

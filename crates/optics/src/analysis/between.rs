@@ -24,8 +24,8 @@ pub const FARTHEST_WAVES: f64 = 60.0;
 /// Wavelengths times the f-number of the image that a grid has to hold beside where rays land.
 const BESIDE: f64 = 42.0;
 
-/// How far a wavefront may be from the polynomial that stands for it (waves): a picture's irradiance changes by a
-/// few thousandths of its peak per hundredth of a wave.
+/// Greatest difference of a wavefront from the polynomial that stands for it (waves): a picture's
+/// irradiance changes by a few thousandths of its peak per hundredth of a wave.
 const SMOOTH: f64 = 2e-3;
 
 /// Fields at all of some wavelengths and nearnesses.
@@ -39,13 +39,14 @@ pub struct FieldsBetween {
     fields: Vec<PupilField>,
 }
 
-/// What the fields are of.
+/// Inputs of pupil fields: the lens, the nearnesses of the object (1/mm), and the point of the
+/// image that the fields are about.
 #[derive(Clone, Copy)]
 #[allow(missing_debug_implementations, reason = "holds a function")]
 pub struct FieldSource<'a> {
     /// The lens.
     pub train: &'a OpticalTrain,
-    /// The same at each of the wavelengths.
+    /// The lens at each of the wavelengths.
     pub lenses: &'a [MonochromaticTrain],
     /// Nearnesses (1/mm), ascending.
     pub nearness: &'a [f64],
@@ -152,7 +153,8 @@ impl FieldsBetween {
     }
 }
 
-/// How far from the sphere's centre rays land, at most, in wavelengths times the f-number.
+/// Greatest distance of the landing points from the reference sphere's centre, in wavelengths times
+/// the f-number.
 #[must_use]
 pub fn landing_reach(field: &PupilField) -> f64 {
     let open = field.lit().filter(|&i| field.clear[i] > 0.5);
@@ -166,7 +168,7 @@ pub fn airy_unit(field: &PupilField) -> f64 {
     field.wavelength * 1e-6 / (2.0 * field.circle().1)
 }
 
-/// What each node counts for in the polynomial through all, at a place.
+/// Lagrange weights of the nodes at a place: the factor of each node in the polynomial through all.
 fn lagrange(nodes: &[f64], at: f64) -> Vec<f64> {
     let weight = |k: usize| {
         let others = (0..nodes.len()).filter(|&other| other != k);
@@ -175,7 +177,7 @@ fn lagrange(nodes: &[f64], at: f64) -> Vec<f64> {
     (0..nodes.len()).map(weight).collect()
 }
 
-/// Which node is nearest to a place.
+/// Index of the node nearest to a place.
 fn closest(nodes: &[f64], at: f64) -> usize {
     let by_distance =
         |a: &usize, b: &usize| (nodes[*a] - at).abs().total_cmp(&(nodes[*b] - at).abs());

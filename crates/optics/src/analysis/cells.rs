@@ -20,7 +20,8 @@ use super::between::{FARTHEST_WAVES, airy_unit, landing_reach};
 use super::pupil::PupilField;
 use super::spread::{amplitudes, norm, quick_length, sinc};
 
-/// How far beyond the rays' landings light is added up as waves (wavelengths times the f-number).
+/// Margin beyond the rays' landings within which light is added up as waves (wavelengths times the
+/// f-number).
 const REACH: f64 = 40.0;
 
 /// The ring that holds what goes farther ends at this many times that distance.
@@ -32,7 +33,7 @@ const FINE: f64 = 1.0 / 3.0;
 /// On cells of more λN, all light lands where rays do.
 const COARSE: f64 = 4.0;
 
-/// Where cells lie: how a step to the right and one down in the picture run on the image plane.
+/// Cell grid on the image plane: how a step to the right and one down in the picture run there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CellGrid {
     /// A cell's side (mm).
@@ -75,8 +76,8 @@ impl CellSpread {
         self.shares[y * (last + 1) + x]
     }
 
-    /// How much of the light another one has elsewhere, twice: Σ |difference|, which no difference of their
-    /// transfer functions exceeds.
+    /// Sum of the absolute differences of the two spreads' shares: twice the share of light that
+    /// `other` has elsewhere. No difference of their transfer functions exceeds it.
     #[must_use]
     pub fn difference(&self, other: &Self) -> f64 {
         let half = self.half.max(other.half);
@@ -183,7 +184,7 @@ impl CellSpread {
     }
 }
 
-/// What of its irradiance a cell gets, times its area.
+/// Sampling of the irradiance within a cell, before it is multiplied by the cell's area.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum CellLight {
     /// That in its middle.

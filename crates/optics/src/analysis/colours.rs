@@ -14,7 +14,8 @@ use crate::train::{MonochromaticTrain, OpticalTrain};
 /// Cells a side of the grid that says how many are needed.
 const COARSE: usize = 64;
 
-/// How far a wavefront may be from the polynomial that stands for it (waves): less than what tables show.
+/// Greatest difference of a wavefront from the polynomial that stands for it (waves): less than
+/// what tables show.
 const SMOOTH: f64 = 2e-5;
 
 /// The wavefronts of a point at each of the wavelengths of `lenses`, all about the place where the

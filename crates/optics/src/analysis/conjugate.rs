@@ -1,5 +1,5 @@
-//! Where the object is, and what follows from it: by its distance, by the magnification, or by the
-//! numerical aperture of its light.
+//! Position of the object, and what follows from it: by its distance, by the magnification, or by
+//! the numerical aperture of its light.
 
 use glam::DVec3;
 use schemars::JsonSchema;
@@ -9,7 +9,7 @@ use super::AnalysisError;
 use super::object::ObjectPoint;
 use crate::train::{Focus, FocusError, OpticalTrain};
 
-/// Where the object is.
+/// Position of the object.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Conjugate {
     /// At infinity.
@@ -17,7 +17,7 @@ pub enum Conjugate {
     Infinity,
     /// In a plane this far in front of the first vertex (mm).
     Distance(f64),
-    /// Where the image is this many times as large, negative when it stands on its head.
+    /// Object where the image is this many times as large, negative when it is inverted.
     Magnification(f64),
 }
 

@@ -53,7 +53,7 @@ pub struct Fans {
 /// Rays on either side of the chief ray.
 const HALF: i32 = 32;
 
-/// How far beyond the paraxial pupil a fan is looked for: the pupil of a wide field is larger.
+/// Reach of the search for a fan, in paraxial pupils: the pupil of a wide field is larger.
 const BEYOND: f64 = 1.5;
 
 /// The fans of an object point about where its chief ray meets the plane at `image_z` (mm), or about
@@ -117,8 +117,8 @@ pub fn fans(
     })
 }
 
-/// Where a paraxial ray at the rim of the entrance pupil crosses the stop (mm, negative on the other side of
-/// the axis); `None` where the pupil has no size.
+/// Radius at which a paraxial ray at the rim of the entrance pupil crosses the stop (mm, negative
+/// on the other side of the axis); `None` where the pupil has no size.
 fn stop_radius(
     train: &OpticalTrain,
     at: &MonochromaticTrain,

@@ -50,7 +50,7 @@ pub use transfer::Transfer;
 pub use wavefront::{ReferenceSphere, Wavefront};
 pub use zernike::{ZernikeFit, ZernikeOrder};
 
-/// Why a lens cannot be analysed in waves.
+/// Error of a lens that cannot be analysed in waves.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AnalysisError {
@@ -100,7 +100,7 @@ pub enum AnalysisError {
     Object {
         /// The option or key that asks for it.
         key: &'static str,
-        /// Why there is none.
+        /// Reason, as a sentence.
         why: String,
     },
     /// An array of lenslets.
@@ -155,7 +155,8 @@ pub enum AnalysisError {
 }
 
 impl AnalysisError {
-    /// Whether another field may do without it: no light arrives, or too rough.
+    /// True if the error is one of this field alone, so that others can do without it: no light
+    /// arrives, or too rough.
     fn is_of_the_field(&self) -> bool {
         matches!(self, Self::Dark { .. } | Self::NoChiefRay { .. } | Self::TooRough { .. })
     }

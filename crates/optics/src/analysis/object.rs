@@ -67,7 +67,7 @@ impl ObjectPoint {
     }
 }
 
-/// How rays of a point are begun.
+/// Start of the rays of an object point.
 #[derive(Debug, Clone, Copy)]
 struct Launch {
     origin: DVec3,
@@ -192,7 +192,8 @@ impl<'a> Beam<'a> {
         Some(self.at.run_with_path(clip, self.launch.ray(place)?, &self.phases))
     }
 
-    /// Where the ray crosses an element, in its own frame and whether rims stop it or not (mm).
+    /// Crossing of the ray with an element, in the element's own frame (mm), whether rims stop it
+    /// there or not.
     pub(crate) fn crossing(&self, element: usize, place: DVec2) -> Option<DVec2> {
         self.at.crossing(Side::Object, element, self.launch.ray(place)?).map(DVec2::from)
     }
@@ -202,7 +203,7 @@ impl<'a> Beam<'a> {
         self.run(Clip::Off, place).filter(|end| end.status == RayStatus::Exited)
     }
 
-    /// What the lens passes of the ray (0..=1).
+    /// Share of the ray's light that the lens passes (0..=1).
     pub(crate) fn throughput(&self, place: DVec2) -> f64 {
         match self.run(Clip::On, place) {
             Some(end) if end.status == RayStatus::Exited => end.throughput,
@@ -210,7 +211,7 @@ impl<'a> Beam<'a> {
         }
     }
 
-    /// What the lens passes of each ray: as [`Self::throughput`], in batches.
+    /// Share of each ray's light that the lens passes: as [`Self::throughput`], in batches.
     pub(crate) fn throughputs(&self, places: &[DVec2]) -> Vec<f64> {
         /// Rays of a batch, which stay in the second-level cache.
         const BATCH: usize = 1024;

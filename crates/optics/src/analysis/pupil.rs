@@ -24,7 +24,7 @@ pub struct PupilField {
     pub index: f64,
     /// The chief ray's slopes dx/dz and dy/dz behind the lens.
     pub chief_slopes: DVec2,
-    /// What passes of the light of each cell (0..=1).
+    /// Transmission of each cell (0..=1).
     pub clear: Vec<f64>,
     /// From the middle of each cell to the middle of its clear part (optical direction cosines).
     pub lean: Vec<DVec2>,
@@ -32,9 +32,9 @@ pub struct PupilField {
     pub amplitude: Vec<f64>,
     /// Power of each cell.
     pub power: Vec<f64>,
-    /// How far the wavefront is ahead of the sphere (waves), positive where its path is shorter.
+    /// Lead of the wavefront over the sphere (waves), positive where its path is shorter.
     pub waves: Vec<f64>,
-    /// Where the ray of each cell meets the image plane, from the sphere's centre (mm).
+    /// Point where the ray of each cell meets the image plane, from the sphere's centre (mm).
     pub landing: Vec<DVec2>,
     /// Its slopes dx/dz and dy/dz.
     pub slopes: Vec<DVec2>,

@@ -25,8 +25,8 @@ const DARK: f64 = 0.05;
 /// Every so many-th ray is left out to check.
 const CHECKED: usize = 4;
 
-/// How far a ray's place may be from that of its cell (shares of the beam's width): a rim is as sharp as a
-/// tenth of a cell, which is a thousandth of it.
+/// Greatest distance of a ray's place from that of its cell (shares of the beam's width): a rim is
+/// as sharp as a tenth of a cell, which is a thousandth of it.
 const ON_PLACE: f64 = 5e-4;
 
 /// Beyond this share of the outline's half nothing is lit.
@@ -138,7 +138,7 @@ impl Smooth {
     }
 }
 
-/// Whether the outline's polynomial has the places of its rays.
+/// True if the outline's polynomial reproduces the places of its rays.
 fn has_places(outline: &Outline) -> bool {
     let lit = || outline.rays.iter().filter(|ray| ray.is_lit);
     let Some(first) = lit().next() else { return false };
@@ -206,7 +206,7 @@ pub(crate) fn field(
     (pupil.total_power() > 0.0).then_some(pupil)
 }
 
-/// What passes of each cell, and its power.
+/// Computes the transmission and the power of each cell.
 fn lit(pupil: &mut PupilField, beam: &Beam<'_>, places: &[DVec2], turns: &[DMat2]) {
     let cells = pupil.cells;
     let passed = beam.throughputs(places);
@@ -282,7 +282,7 @@ mod tests {
         }
     }
 
-    /// What no polynomial is near enough to is left to rays.
+    /// No polynomial is good enough for any tolerance: what none is near enough to is left to rays.
     #[test]
     fn no_polynomial_is_good_enough_for_any_tolerance() {
         assert_eq!(both(&lens(-1.0), 1e-14).1, None);

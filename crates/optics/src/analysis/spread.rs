@@ -32,7 +32,7 @@ pub struct PointSpread {
     pub pitch: f64,
     /// Irradiance (1/mm²); the sphere's centre is point (`size`/2, `size`/2).
     pub values: Vec<f64>,
-    /// What the same pupil would have in the centre without aberrations (1/mm²).
+    /// Value at the centre for the same pupil without aberrations (1/mm²).
     pub perfect: f64,
 }
 
@@ -160,7 +160,7 @@ pub(super) fn amplitudes(field: &PupilField) -> Vec<Complex64> {
     amplitudes
 }
 
-/// What makes |Σ a|² an irradiance of a power of 1 (1/mm²).
+/// Factor that makes |Σ a|² the irradiance of a power of 1 (1/mm²).
 pub(super) fn norm(field: &PupilField) -> f64 {
     let step = field.step / (field.wavelength * 1e-6);
     step * step / field.total_power()
@@ -287,7 +287,7 @@ pub fn strehl(fields: &WeightedFields) -> (DVec2, f64) {
     strehl_of(fields, &PointSpread::by_fft(fields, 1))
 }
 
-/// The same where the point spread function is there already.
+/// Strehl ratio and its place, as [`strehl`], from a point spread function that is there already.
 pub(super) fn strehl_of(fields: &WeightedFields, spread: &PointSpread) -> (DVec2, f64) {
     /// The search ends this small a share of a point's distance from the last place.
     const HALVINGS: u32 = 10;

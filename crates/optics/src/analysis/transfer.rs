@@ -190,7 +190,7 @@ fn smoothed_cone(x: i64, y: i64) -> f64 {
     sum / weight
 }
 
-/// The same less a twelfth of its second differences.
+/// Smoothed cone less a twelfth of its second differences.
 fn sharpened_cone(x: i64, y: i64) -> f64 {
     let own = smoothed_cone(x, y);
     let neighbours = smoothed_cone(x + 1, y)

@@ -69,8 +69,8 @@ impl ReferenceSphere {
         Ok(Self { centre: centre.into(), radius, index: at.index_before_sensor() })
     }
 
-    /// Where a ray meets it: the optical direction cosines of the way from there to the centre, and
-    /// the optical path to there from where the ray left the lens (mm).
+    /// Intersection of a ray with the sphere: the optical direction cosines of the way from there
+    /// to the centre, and the optical path to there from where the ray left the lens (mm).
     pub(crate) fn meet(&self, end: &PathEnd) -> Option<(DVec2, f64)> {
         let (from, direction) = (DVec3::from(end.ray.position), DVec3::from(end.ray.direction));
         let way = from - DVec3::from(self.centre);
@@ -102,15 +102,15 @@ pub enum Reference {
 /// A wavefront on its reference sphere.
 #[derive(Debug, Clone)]
 pub struct Wavefront {
-    /// Where it comes from.
+    /// Object point that emits the light.
     pub object: ObjectPoint,
-    /// What it is compared with.
+    /// Reference sphere of the wavefront errors.
     pub sphere: ReferenceSphere,
     /// The field on the sphere.
     pub pupil: PupilField,
 }
 
-/// How many cells a pupil gets.
+/// Number of cells across a pupil.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Cells {
     /// As many as the wavefront needs, at least 192 a side.
@@ -189,7 +189,8 @@ impl Wavefront {
         Ok(Self { object, sphere, pupil })
     }
 
-    /// The same about the point of least root mean square.
+    /// Moves the centre of the reference sphere to the point of least root-mean-square wavefront
+    /// error.
     ///
     /// # Errors
     ///
@@ -227,7 +228,7 @@ impl Wavefront {
     }
 }
 
-/// Where a beam's chief ray meets the plane at `z` (mm).
+/// Point where a beam's chief ray meets the plane at `z` (mm).
 pub(crate) fn chief_point(beam: &Beam<'_>, z: f64) -> DVec3 {
     let ray = beam.chief_end.ray;
     let (from, direction) = (DVec3::from(ray.position), DVec3::from(ray.direction));

@@ -85,7 +85,7 @@ impl ZernikeOrder {
         terms
     }
 
-    /// What a term is multiplied by in this norm.
+    /// Factor of a term's coefficient in this norm.
     #[must_use]
     pub fn scale(self, term: ZernikeTerm) -> f64 {
         match self {

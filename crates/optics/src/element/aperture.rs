@@ -148,7 +148,7 @@ impl Opening {
         Self::Polygon { radius, normals, apothem: radius * (0.5 * step).cos() }
     }
 
-    /// The same with another radius (mm); `None` for a mask.
+    /// Returns the opening with another radius (mm); `None` for a mask.
     #[must_use]
     pub fn with_radius(&self, radius: f64) -> Option<Self> {
         match self {
@@ -203,7 +203,7 @@ impl Opening {
         }
     }
 
-    /// Whether a turn about the axis changes nothing.
+    /// True if a turn about the axis changes nothing.
     #[must_use]
     pub fn is_round(&self) -> bool {
         match self {
@@ -213,20 +213,21 @@ impl Opening {
         }
     }
 
-    /// Whether its middle is closed by a disk.
+    /// True if a disk closes the middle.
     #[must_use]
     pub fn is_obscured(&self) -> bool {
         matches!(self, Self::Shaped(shape) if shape.is_obscured())
     }
 }
 
-/// Whether a place (mm) lies inside of a circle.
+/// Tests whether a point (mm) lies inside a circle about the axis.
 #[inline(always)]
 pub(super) fn in_circle(radius: f64, x: f64, y: f64) -> bool {
     x * x + y * y <= radius * radius
 }
 
-/// Whether a place (mm) lies inside of a regular polygon; without branches, so that loops vectorise.
+/// Tests whether a point (mm) lies inside a regular polygon; without branches, so that loops
+/// vectorise.
 #[inline(always)]
 pub(super) fn in_polygon(normals: &[[f64; 2]], apothem: f64, x: f64, y: f64) -> bool {
     let beyond = |n: &[f64; 2]| x * n[0] + y * n[1] - apothem;

@@ -98,13 +98,13 @@ impl Biconic {
         limit.sqrt().recip()
     }
 
-    /// The same as light that runs against the axis meets it.
+    /// Returns the surface as seen by light that runs against the axis.
     #[must_use]
     pub fn flipped(&self) -> Self {
         Self { curvature: self.curvature.map(|c| -c), ..*self }
     }
 
-    /// Whether a turn about its axis changes nothing.
+    /// True if a turn about its axis changes nothing.
     #[must_use]
     pub fn is_round(&self) -> bool {
         self.curvature[0] == self.curvature[1] && self.conic[0] == self.conic[1]
@@ -144,7 +144,7 @@ impl Biconic {
 }
 
 impl Biconic {
-    /// What no slope is above within a squared distance from the axis (mm²).
+    /// Upper bound of the slope within a squared distance from the axis (mm²).
     pub(super) fn steepest(&self, square: f64) -> f64 {
         let [a, b] = self.limits();
         let root = (1.0 - a.max(b).max(0.0) * square).max(0.0).sqrt();
@@ -267,13 +267,13 @@ fn add(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0] + b[0], a[1] + b[1]]
 }
 
-/// The same of a product.
+/// Least and greatest value of a product of two intervals.
 fn product(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     let ends = [a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1]];
     ends.into_iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], e| [l.min(e), h.max(e)])
 }
 
-/// The same of a square.
+/// Least and greatest value of the square of an interval.
 fn square([low, high]: [f64; 2]) -> [f64; 2] {
     let most = low.abs().max(high.abs()).powi(2);
     let least = if low <= 0.0 && high >= 0.0 { 0.0 } else { low.abs().min(high.abs()).powi(2) };
@@ -284,7 +284,8 @@ fn square([low, high]: [f64; 2]) -> [f64; 2] {
 const WALL: f64 = 3.0;
 
 impl Surface {
-    /// Whether an asphere is a wall somewhere within its clear aperture, at which rays take long to be traced.
+    /// True if an asphere has a wall somewhere within its clear aperture, at which rays take long
+    /// to be traced.
     pub(super) fn has_wall(&self) -> bool {
         let reach = self.semi_diameter.min(self.extent().into_iter().fold(f64::INFINITY, f64::min));
         let slope = |i: u32| {
@@ -294,8 +295,8 @@ impl Surface {
         !self.aspheric.is_empty() && (1..64).any(|i| slope(i).abs() > WALL)
     }
 
-    /// What no sag is below and what none is above between two squared distances from the axis (mm²), the
-    /// nearer first (mm).
+    /// Lower and upper bounds of the sag (mm) between two squared distances from the axis (mm²),
+    /// the nearer first.
     ///
     /// Each term rises or falls all the way: those that rise are least at the nearer place, those that fall at
     /// the farther one.

@@ -124,7 +124,7 @@ impl MirrorCoating {
 }
 
 impl Stack {
-    /// The same as light from the glass meets it.
+    /// Returns the stack as light from the glass meets it.
     pub(crate) fn reversed(&self) -> Self {
         Self { layers: self.layers.iter().rev().copied().collect() }
     }

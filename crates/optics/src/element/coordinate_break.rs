@@ -39,7 +39,7 @@ pub struct CoordinateBreakSpec {
 pub struct CoordinateBreak {
     /// From the frame behind it to that before it.
     pub(crate) turn: DMat3,
-    /// Where the origin behind it lies (mm).
+    /// Origin of the coordinates behind the break (mm).
     pub(crate) shift: DVec3,
 }
 
@@ -97,7 +97,7 @@ impl CoordinateBreak {
         }
     }
 
-    /// The same of one ray, and where it crosses the plane before the break.
+    /// Crossing of one ray with the break, and its point on the plane before the break.
     pub(super) fn renewed_one(&self, ray: Ray) -> Traversal {
         let t = -ray.position[2] / ray.direction[2];
         let point = Some(ray.advanced(t).position).filter(|p| p.iter().all(|x| x.is_finite()));

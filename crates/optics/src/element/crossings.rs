@@ -23,10 +23,12 @@ use super::surface::Surface;
 /// Rings about the axis whose slopes are bounded one by one.
 const RINGS: u32 = 64;
 
-/// How often a part of a ray is halved. After so many halves no part of a lens is longer than a micrometre.
+/// Number of times that a part of a ray is halved. After so many halves no part of a lens is longer
+/// than a micrometre.
 const HALVINGS: u32 = 20;
 
-/// How steep a surface is by the distance from its axis, as the rays that cross it but once.
+/// Slopes of a surface by the distance from its axis, as bounds on the rays that cross it only
+/// once.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Slopes {
     /// Up to each of some distances from the axis, the squared cosine from which on no ray crosses twice from
@@ -83,14 +85,14 @@ impl Slopes {
         Self { least, density }
     }
 
-    /// Whether no ray crosses the surface twice from front to back.
+    /// True if no ray crosses the surface twice from front to back.
     #[inline(always)]
     pub(super) fn are_convex(&self) -> bool {
         self.least.is_empty()
     }
 
-    /// Whether the slopes between a ray's start and a root forbid another crossing before it, or one within the
-    /// clear aperture where the root is outside of that.
+    /// True if the slopes between a ray's start and a root forbid another crossing before it, or
+    /// one within the clear aperture where the root is outside of that.
     #[inline]
     pub(super) fn forbid_another(&self, start: Ray, root: Ray) -> bool {
         let square = |ray: Ray| ray.position[0].powi(2) + ray.position[1].powi(2);
@@ -101,7 +103,7 @@ impl Slopes {
         self.least.get(ring).is_none_or(|least| start.direction[2].powi(2) >= *least)
     }
 
-    /// Whether no ray of this direction crosses the surface twice.
+    /// True if no ray of this direction crosses the surface twice.
     fn forbid_two(&self, ray: Ray) -> bool {
         self.least.last().is_none_or(|least| ray.direction[2].powi(2) >= *least)
     }
@@ -119,7 +121,7 @@ pub(super) fn cross_first<P: Profile>(
     cross_first_after(surface, (media, slopes), ray, clip2, newton)
 }
 
-/// The same, where Newton's method has found `newton`.
+/// Crosses the surface where Newton's method has found `newton`.
 pub(super) fn cross_first_after<P: Profile>(
     surface: &P,
     (media, slopes): (Media, &Slopes),
@@ -163,7 +165,7 @@ pub(super) fn cross_first_after<P: Profile>(
     Refracted { ray, t: 0.0, hit: true, clear: x * x + y * y <= clip2, through }
 }
 
-/// How far a ray's place is behind a surface (mm).
+/// Distance of a ray's place behind a surface (mm), along the axis.
 fn behind<P: Profile>(surface: &P, ray: Ray, t: f64) -> f64 {
     let at = ray.advanced(t);
     at.position[2] - surface.sag_and_slope(at).0
@@ -186,7 +188,7 @@ fn part_near<P: Profile>(surface: &P, ray: Ray, start: f64) -> Option<[f64; 2]> 
     (from < to && to - from < f64::INFINITY).then_some([from, to])
 }
 
-/// Where a ray crosses a surface from front to back.
+/// Crossing of a surface by a ray, from front to back.
 struct Crossing {
     /// A part of the ray in which it crosses nowhere else.
     part: [f64; 2],

@@ -1,4 +1,5 @@
-//! What an element does to a ray in any number: with dual numbers the derivatives of where it goes by where it came from.
+//! Derivatives of a ray's path through an element, computed with dual numbers: how where it leaves
+//! depends on where it came from.
 //!
 //! The surface, and which of its crossings it is, are found as for every ray; the kernels are the same.
 

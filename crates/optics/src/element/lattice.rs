@@ -26,7 +26,7 @@ pub enum Grid {
 /// A grid in the plane of its array (mm).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lattice {
-    /// How lenslets are packed.
+    /// Packing of the lenslets.
     pub grid: Grid,
     /// From a lenslet's centre to its next neighbour's.
     pub pitch: f64,
@@ -36,11 +36,11 @@ pub struct Lattice {
     pub offset: [f64; 2],
 }
 
-/// Where a point lies in its cell.
+/// Cell of the lattice that holds a point, and the point's place in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LatticeCell {
-    /// Which: steps along the rows, and rows. In a hexagonal grid a row begins half a pitch further
-    /// than the one before.
+    /// Index of the cell: steps along the rows, and rows. In a hexagonal grid a row begins half a
+    /// pitch further than the one before.
     pub index: [f64; 2],
     /// From the cell's centre to the point, along the rows and across them (mm).
     pub local: [f64; 2],
@@ -61,7 +61,7 @@ impl Lattice {
         self.cell_of(self.grid, x, y)
     }
 
-    /// The same with a packing that the compiler knows.
+    /// Variant of [`Self::cell`] with a packing that the compiler knows.
     #[inline(always)]
     pub(crate) fn cell_of(&self, grid: Grid, x: f64, y: f64) -> LatticeCell {
         let [c, s] = self.turn;
@@ -88,7 +88,7 @@ impl Lattice {
         LatticeCell { index, local, away }
     }
 
-    /// Whether a point (mm from a cell's centre, in the array's own axes) is of this cell, whatever
+    /// True if a point (mm from a cell's centre, in the array's own axes) is of this cell, whatever
     /// rounding does: some that are, 10⁻⁹ of the pitch within its border, are not told.
     #[inline(always)]
     pub(crate) fn is_well_inside(&self, grid: Grid, x: f64, y: f64) -> bool {

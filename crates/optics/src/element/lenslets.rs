@@ -25,7 +25,7 @@ pub(crate) struct Lenslets {
     pub(crate) transmissions: Vec<f64>,
 }
 
-/// What each type of lenslet does, in the order of the types.
+/// Optical model of each type of lenslet, in the order of the types.
 #[derive(Debug, Clone)]
 enum Kinds {
     /// Thin lenses of these powers (1/mm).
@@ -36,7 +36,7 @@ enum Kinds {
 
 /// A point of the array's plane.
 struct PlanePoint {
-    /// Which cell.
+    /// Index of the cell.
     index: [f64; 2],
     /// From the lenslet's centre (mm).
     away: [f64; 2],
@@ -280,7 +280,7 @@ fn to_plane(ray: Ray) -> (Ray, f64) {
     (there, t)
 }
 
-/// What is moved across the axis.
+/// Geometry that can be shifted across the axis.
 trait Across {
     fn across(self, by: [f64; 2]) -> Self;
 }

@@ -1,5 +1,5 @@
-//! What glass takes from light: reflection at its surfaces, with and without a coating, and
-//! absorption on the way.
+//! Losses of light in glass: reflection at its surfaces, with and without a coating, and absorption
+//! on the way.
 //!
 //! Fresnel's equations for unpolarised light (M. Born and E. Wolf, *Principles of Optics*, 7th ed.,
 //! §1.5.2, eqs. 20-21) and the reflectance of a single homogeneous film (§1.6.4, eq. 57). What is
@@ -74,7 +74,7 @@ pub struct Coating {
 }
 
 impl LossesSpec {
-    /// Whether nothing is lost.
+    /// True if no losses are modelled.
     #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::default()
@@ -103,7 +103,7 @@ impl LossesSpec {
     }
 }
 
-/// What one element takes from light that arrives on one side of it.
+/// Losses of light at one element, for light that arrives on one of its sides.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Loss {
     /// Indices before and behind the surface, as the light goes.
@@ -179,7 +179,7 @@ impl Loss {
         (-self.absorption * length).exp()
     }
 
-    /// The same between other indices.
+    /// Returns the losses between other indices.
     pub(crate) fn between(&self, indices: [f64; 2]) -> Self {
         Self { indices, ..self.clone() }
     }
@@ -197,8 +197,8 @@ impl Loss {
         share
     }
 
-    /// What is not let through, or of a mirror what is not reflected, from the directions alone: n' d' − n d is along the
-    /// normal.
+    /// Share of light not let through, or by a mirror not reflected, computed from the directions
+    /// alone: n' d' − n d is along the normal.
     fn lost(&self, before: [f64; 3], after: [f64; 3]) -> f64 {
         let [n, m] = self.indices;
         let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -286,7 +286,7 @@ pub struct Filter {
     pub semi_diameter: f64,
     /// The curves of the filter.
     pub curves: Vec<Curve>,
-    /// Which curve is where; the first one everywhere when there is none.
+    /// Map of the curves by place; the first curve everywhere when there is none.
     map: Option<CurveMap>,
 }
 
@@ -351,13 +351,14 @@ impl FilterSpec {
 }
 
 impl Filter {
-    /// Whether every place has the same curve.
+    /// True if the whole filter has one curve.
     #[must_use]
     pub fn is_uniform(&self) -> bool {
         self.map.is_none()
     }
 
-    /// Which of the curves is at `x`, `y` (mm); `None` beside the picture, where it is opaque.
+    /// Index of the transmission curve at `x`, `y` (mm); `None` beside the picture, where it is
+    /// opaque.
     #[must_use]
     pub fn curve_at(&self, x: f64, y: f64) -> Option<usize> {
         match &self.map {

@@ -123,7 +123,7 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
-/// What a lenslet does to light.
+/// Optical model of a lenslet.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Lenslet {
     /// A thin lens of this power (1/mm).
@@ -143,13 +143,13 @@ pub struct MicrolensArray {
     pub shape: LensletShape,
     /// Half the width of an opening, from flat to flat.
     pub reach: f64,
-    /// What is between openings.
+    /// Treatment of light between the openings.
     pub gaps: Gaps,
     /// The types of lenslets.
     pub types: Vec<Lenslet>,
     /// The filter of each type; none when empty.
     pub curves: Vec<Curve>,
-    /// Which type stands where; i − j modulo the number of types when empty.
+    /// Lenslet types by cell; i − j modulo the number of types when empty.
     pattern: Vec<Vec<u32>>,
 }
 
@@ -208,7 +208,7 @@ impl MicrolensArraySpec {
         })
     }
 
-    /// Whether its lenslets are faces between two media, and no thin lenses.
+    /// True if the lenslets are faces between two media rather than thin lenses.
     #[must_use]
     pub fn has_faces(&self) -> bool {
         self.radius.is_some() || self.types.iter().any(|one| one.radius.is_some())
@@ -331,7 +331,7 @@ impl MicrolensArray {
         self.half_size[0].hypot(self.half_size[1])
     }
 
-    /// Which type stands in a cell.
+    /// Index of the lenslet type in cell `[i, j]`.
     #[must_use]
     pub fn type_at(&self, [i, j]: [f64; 2]) -> usize {
         if self.types.len() == 1 {
@@ -353,20 +353,20 @@ impl MicrolensArray {
         }
     }
 
-    /// Whether a point is within the array's border (mm).
+    /// True if a point (mm) is within the array's border.
     #[inline(always)]
     #[must_use]
     pub fn is_inside(&self, x: f64, y: f64) -> bool {
         (x.abs() <= self.half_size[0]) & (y.abs() <= self.half_size[1])
     }
 
-    /// Whether a point of a cell is in its lenslet's opening, by its place along and across the rows.
+    /// True if a point of a cell, given along and across the rows, is in its lenslet's opening.
     #[must_use]
     pub fn is_open(&self, local: [f64; 2]) -> bool {
         self.is_open_as(self.shape, local)
     }
 
-    /// The same with a shape that the compiler knows.
+    /// Variant of [`Self::is_open`] with a shape that the compiler knows.
     #[inline(always)]
     pub(crate) fn is_open_as(&self, shape: LensletShape, [u, v]: [f64; 2]) -> bool {
         // Within a rounding of the cell's own edge: there are no gaps between full cells.
@@ -399,8 +399,9 @@ impl MicrolensArray {
         if same { opening } else { clipped(&opening, &self.lattice.cell_corners()) }
     }
 
-    /// What of a cell is between its opening and its border, around its centre, along and across the rows
-    /// (mm): convex pieces, which beside openings that are no part of the border hold a little more.
+    /// Area of a cell between its opening and its border, around its centre, along and across the
+    /// rows (mm): convex pieces, which beside openings that are no part of the border hold a little
+    /// more.
     #[must_use]
     pub fn gap_pieces(&self) -> Vec<[[f64; 2]; 4]> {
         // All corners of squares and hexagons lie at multiples of 15°.
@@ -423,7 +424,7 @@ impl MicrolensArray {
             .collect()
     }
 
-    /// The same as light that runs against the axis meets it.
+    /// Returns the array as seen by light that runs against the axis.
     #[must_use]
     pub fn flipped(&self) -> Self {
         let types = self.types.iter().map(|lenslet| match lenslet {
@@ -433,7 +434,7 @@ impl MicrolensArray {
         Self { types: types.collect(), ..self.clone() }
     }
 
-    /// The same array with nothing dimmed.
+    /// Returns the array without its filters, so that it dims nothing.
     #[must_use]
     pub fn without_filters(self: &Arc<Self>) -> Arc<Self> {
         if self.curves.is_empty() {
@@ -443,7 +444,7 @@ impl MicrolensArray {
     }
 }
 
-/// How far a shape of half a width of 1 reaches in a direction.
+/// Radius, in a direction, of a shape whose half width is 1.
 fn cell_radius(shape: LensletShape, [x, y]: [f64; 2]) -> f64 {
     let (a, b) = (0.5 * x, 0.75_f64.sqrt() * y);
     match shape {

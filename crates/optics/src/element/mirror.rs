@@ -72,16 +72,16 @@ pub struct MirrorSpec {
 pub struct Mirror {
     /// Its shape and clear aperture.
     pub surface: Surface,
-    /// What it does but for its shape.
+    /// Properties of the mirror apart from its shape.
     pub mount: MirrorMount,
 }
 
-/// What a mirror does but for its shape.
+/// Properties of a mirror apart from its shape.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MirrorMount {
     /// The radius of the hole in its middle (mm); 0 without.
     pub hole: f64,
-    /// Whether its tilt folds the axis.
+    /// True if the mirror's tilt folds the axis.
     pub folds_axis: bool,
     /// The share of light that it reflects; all of it when there is none.
     pub reflectance: Option<Curve>,
@@ -205,7 +205,7 @@ impl Fold {
         (reflection, self.vertex - reflection * self.vertex)
     }
 
-    /// Whether a place of the mirror (mm) is in its hole.
+    /// True if a point of the mirror (mm) is in its hole.
     #[inline(always)]
     fn is_hole(&self, [x, y, z]: [f64; 3]) -> bool {
         let (x, y, z) = (x - self.vertex.x, y - self.vertex.y, z - self.vertex.z);
@@ -246,7 +246,7 @@ impl Fold {
         }
     }
 
-    /// The same of one ray, that came as `ray`.
+    /// Unfolds one ray, that came as `ray`.
     pub(super) fn unfold_one(
         &self,
         ray: Ray,
@@ -275,12 +275,12 @@ impl Fold {
 pub(crate) struct Shadow {
     /// Depth (mm) and squared radius (mm²) of the mirror's rim.
     pub(crate) rim: [f64; 2],
-    /// The same of its hole's.
+    /// Depth (mm) and squared radius (mm²) of the hole's rim.
     pub(crate) hole: [f64; 2],
 }
 
 impl Shadow {
-    /// Whether a ray in the mirror's frame meets it.
+    /// True if the mirror stops a ray, given in the mirror's frame.
     #[inline(always)]
     pub(super) fn stops(&self, ray: Ray) -> bool {
         let Ray { position: [x, y, z], direction: [u, v, w] } = ray;

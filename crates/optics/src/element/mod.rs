@@ -117,7 +117,7 @@ impl ElementSpec {
         Self { part, mount }
     }
 
-    /// The same as the aperture stop.
+    /// Marks the element as the aperture stop.
     #[must_use]
     pub fn as_stop(mut self) -> Self {
         self.mount.stop = true;
@@ -234,7 +234,7 @@ impl Frame {
         }
     }
 
-    /// Whether the element is centred on the axis and square to it.
+    /// True if the element is centred on the axis and square to it.
     #[must_use]
     pub fn is_axial(&self) -> bool {
         self.rotation == DMat3::IDENTITY && self.vertex.x == 0.0 && self.vertex.y == 0.0
@@ -262,7 +262,7 @@ impl Frame {
 /// The files that a lens names, and catalogues of glasses that its user adds. A function from a file's name to
 /// its path stands for files alone.
 pub trait LensResources {
-    /// Where a file is that the lens names.
+    /// Path of a file that the lens names.
     ///
     /// # Errors
     ///
@@ -295,7 +295,7 @@ impl LensResources for GlassesAlone<'_> {
     }
 }
 
-/// How lenses that are built get at what is outside of their text.
+/// Access of lenses that are being built to files and other resources outside of their text.
 pub type Resolve<'a> = &'a dyn LensResources;
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use super::refract::{Media, Refracted, TOUCH, each_numbered_lane};
 const SETTLED: f64 = 1e-10;
 const MOST_STEPS: usize = 20;
 
-/// How many pieces of a ray are looked at for a change of sign.
+/// Number of pieces of a ray that are searched for a change of sign.
 const PIECES: u32 = 256;
 
 /// A surface in its own frame (mm), as the search for its crossing with a ray asks for it.
@@ -31,7 +31,7 @@ pub(super) trait Profile {
     /// the edge, which keeps an iteration going and is refused in the end.
     fn sag_and_slope<T: Real>(&self, at: Ray<T>) -> (T, Self::Slope<T>);
 
-    /// The same at `N` places at once, to the same bits.
+    /// Sags and slopes at `N` places at once, with the same bits as one by one.
     #[inline(always)]
     fn sags_and_slopes<const N: usize>(
         &self,
@@ -51,7 +51,7 @@ pub(super) trait Profile {
     /// dF/dt at the ray's place.
     fn along<T: Real>(&self, at: Ray<T>, slope: Self::Slope<T>) -> T;
 
-    /// Whether the surface exists at a place.
+    /// Tests whether the surface exists at a place (mm).
     fn exists(&self, place: [f64; 2]) -> bool;
 
     /// The ray as it goes on from its place on the surface, and whether it does.
@@ -64,13 +64,13 @@ pub(super) trait Profile {
     /// Half the clear diameter (mm); infinite where it is not limited.
     fn clear_radius(&self) -> f64;
 
-    /// What no sag is below and what none is above up to `reach` from the axis (mm).
+    /// Lower and upper bounds of the sag up to `reach` from the axis (mm).
     fn sag_range(&self, reach: f64) -> [f64; 2];
 
-    /// What no sag is below and what none is above along a part of a ray (mm).
+    /// Lower and upper bounds of the sag along a part of a ray (mm).
     fn sag_bounds(&self, ray: Ray, part: [f64; 2]) -> [f64; 2];
 
-    /// What dF/dt is at least and at most along a part of a ray.
+    /// Lower and upper bounds of dF/dt along a part of a ray.
     fn along_bounds(&self, ray: Ray, part: [f64; 2]) -> [f64; 2];
 }
 
@@ -246,7 +246,7 @@ impl<const N: usize, P: Profile> Newton<N, P> {
         moving == 0
     }
 
-    /// What became of a ray; no hit where [`search`] has to look again.
+    /// Refracts a ray at its root; no hit where [`search`] has to look again.
     #[inline(always)]
     fn refracted(&self, surface: &P, media: Media, clip2: f64, lane: usize) -> Refracted {
         let root = self.ray(lane);
@@ -280,7 +280,8 @@ fn search<P: Profile>(surface: &P, ray: Ray, clip2: f64) -> Option<Ray> {
     surface.exists([x, y]).then_some(root)
 }
 
-/// Whether the ray is on one side of the surface all along a part of it, as its bounds have it.
+/// True if the bounds of the sag show that the ray is on one side of the surface all along a part
+/// of it.
 pub(super) fn keeps_off<P: Profile>(surface: &P, ray: Ray, part @ [from, to]: [f64; 2]) -> bool {
     let (z, w) = (ray.position[2], ray.direction[2]);
     let [low, high] = surface.sag_bounds(ray, part);
@@ -320,8 +321,8 @@ fn near_surface<P: Profile>(surface: &P, ray: Ray, clip2: f64) -> Option<[f64; 2
     (range[0] < range[1] && range[0].is_finite() && range[1].is_finite()).then_some(range)
 }
 
-/// How far from the axis a ray's crossing is looked for, up to `limit` (mm); `foot` is where the ray is next to
-/// the vertex.
+/// Distance from the axis up to which a ray's crossing is looked for, at most `limit` (mm); `foot`
+/// is where the ray is next to the vertex.
 pub(super) fn reach_around<P: Profile>(surface: &P, foot: Ray, limit: f64) -> f64 {
     let height = foot.position[0].hypot(foot.position[1]);
     let [end, own] = surface.extent();
@@ -388,7 +389,7 @@ fn first_change(
         .or_else(|| first_change([middle, last], place, at, has_none))
 }
 
-/// Where a t² + 2b t + c ≤ 0.
+/// Solves a t² + 2b t + c ≤ 0 for the interval of t between its roots.
 pub(super) fn interval(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
     if a <= 0.0 {
         return (c <= 0.0).then_some([f64::NEG_INFINITY, f64::INFINITY]);

@@ -46,7 +46,7 @@ pub enum PartSpec {
     CoordinateBreak(CoordinateBreakSpec),
 }
 
-/// What an element is, ready to be traced.
+/// Kind of an element with its data, ready to be traced.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Part {
     /// A refracting surface between the media before and behind it.
@@ -69,7 +69,7 @@ pub enum Part {
     CoordinateBreak(CoordinateBreak),
 }
 
-/// How drawings show a part.
+/// Drawing symbol of a part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Symbol {
     /// By its section: a boundary between media.
@@ -108,8 +108,8 @@ impl PartSpec {
         Self::Surface(SurfaceSpec { radius, glass, semi_diameter, ..SurfaceSpec::default() })
     }
 
-    /// What follows it on the sensor's side: `None` for a sheet, which changes no medium, and
-    /// `Some(None)` for air.
+    /// Medium behind the part, on the sensor's side: `None` for a sheet, which changes no medium,
+    /// and `Some(None)` for air.
     #[must_use]
     pub fn medium_behind(&self) -> Option<Option<&GlassSpec>> {
         match self {
@@ -163,7 +163,7 @@ impl Part {
         }
     }
 
-    /// How far from its axis it lets light pass (mm); infinite when unlimited.
+    /// Radius around its axis within which the part passes light (mm); infinite when unlimited.
     #[must_use]
     pub fn clear_radius(&self) -> f64 {
         match self {
@@ -202,7 +202,7 @@ impl Part {
         Ok(())
     }
 
-    /// Whether it aberrates nothing.
+    /// True if the part has no aberrations.
     #[must_use]
     pub fn is_ideal(&self) -> bool {
         match self {
@@ -216,7 +216,7 @@ impl Part {
         }
     }
 
-    /// Whether it is a plane at which nothing but the media bends light.
+    /// True if the part is a plane at which only the change of media bends light.
     #[must_use]
     pub fn is_plane(&self) -> bool {
         match self {
@@ -320,7 +320,7 @@ impl Part {
         }
     }
 
-    /// How drawings show it.
+    /// Drawing symbol of the part.
     #[must_use]
     pub fn symbol(&self) -> Symbol {
         match self {
@@ -334,7 +334,7 @@ impl Part {
         }
     }
 
-    /// Whether a turn about its axis changes nothing.
+    /// True if a turn about its axis changes nothing.
     #[must_use]
     pub fn is_round(&self) -> bool {
         match self {
@@ -409,14 +409,14 @@ impl Part {
         }
     }
 
-    /// Whether coatings of mirrors or orders of diffraction take light, by angle or wavelength.
+    /// True if a mirror's coating or an order of diffraction loses light, by angle or wavelength.
     #[must_use]
     pub fn is_coated_or_blazed(&self) -> bool {
         let is_blazed = matches!(self, Self::Freeform(surface) if surface.is_blazed());
         is_blazed || self.mirror().is_some_and(|mirror| mirror.coating.is_some())
     }
 
-    /// The same with what `change` makes of a mirror.
+    /// Returns the part with its mirror, if it has one, altered by `change`.
     pub(crate) fn with_mirror(&self, change: impl Fn(&mut MirrorMount)) -> Self {
         let mut part = self.clone();
         match &mut part {
@@ -449,7 +449,8 @@ impl Part {
         }
     }
 
-    /// The same as light that runs against the axis meets it: behind an odd number of mirrors.
+    /// Returns the part as seen by light that runs against the axis, as it does behind an odd
+    /// number of mirrors.
     #[must_use]
     pub fn flipped(self) -> Self {
         match self {
@@ -467,8 +468,8 @@ impl Part {
         }
     }
 
-    /// What it does to light of a wavelength (nm) from the object, and to light traced from the sensor. `transmission`
-    /// is what passes of a filter's curve.
+    /// Actions on light of a wavelength (nm) from the object, and on light traced from the sensor.
+    /// `transmission` gives the share that a filter's curve passes.
     pub(crate) fn actions(
         &self,
         before: f64,

@@ -9,24 +9,24 @@ use super::real::Real;
 /// the last.
 pub const LANES: usize = 32;
 
-/// What became of a ray. Elements count from 0 on the object side.
+/// Outcome of a ray. Elements count from 0 on the object side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RayStatus {
     /// It left the train.
     Exited,
     /// It does not meet the element, or its image by a thin lens is not in front of it.
     Missed {
-        /// Which.
+        /// Index of the element.
         element: usize,
     },
     /// It met the element's surface from the denser side at too small an angle.
     TotalInternalReflection {
-        /// Which.
+        /// Index of the element.
         element: usize,
     },
     /// It met the element where it is opaque: outside its clear aperture.
     Vignetted {
-        /// Which.
+        /// Index of the element.
         element: usize,
     },
 }
@@ -71,7 +71,7 @@ impl RayStatus {
     }
 }
 
-/// How many rays ended in which way.
+/// Counts of rays by their outcome.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct StatusCounts {
     /// Rays that left the train.
@@ -154,7 +154,7 @@ impl StatusCounts {
         [&self.missed, &self.reflected, &self.vignetted].into_iter().filter_map(|c| lost(c)).min()
     }
 
-    /// What was lost where, as `vignetted at element 3: 12 %`, the greatest loss first.
+    /// Losses by cause and element, as `vignetted at element 3: 12 %`, the greatest loss first.
     #[must_use]
     pub fn losses(&self) -> Vec<String> {
         let ways = [
@@ -193,18 +193,18 @@ pub struct Block {
 }
 
 impl Block {
-    /// Whether a ray left and carries something.
+    /// True if the ray in `lane` left the train with a throughput above 0.
     pub fn is_bright_at(&self, lane: usize) -> bool {
         self.outcome[lane] == EXITED && self.throughput[lane] > 0.0
     }
 
-    /// Whether the first `count` rays all do.
+    /// True if each of the first `count` rays left the train with a throughput above 0.
     pub fn is_bright(&self, count: usize) -> bool {
         let lanes = self.outcome[..count].iter().zip(&self.throughput[..count]);
         lanes.fold(true, |all, (&code, &throughput)| all & (code == EXITED) & (throughput > 0.0))
     }
 
-    /// Whether every ray has ended.
+    /// True if every ray has ended.
     #[inline(always)]
     pub(crate) fn is_over(&self) -> bool {
         self.outcome.iter().fold(true, |all, &code| all & (code != EXITED))
@@ -333,7 +333,7 @@ impl LensRays {
         self.len
     }
 
-    /// Whether there is no ray.
+    /// True if there are no rays.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len == 0
@@ -387,25 +387,25 @@ impl LensRays {
         (&self.blocks[start / LANES], LANES.min(self.len - start))
     }
 
-    /// Where ray `i` is (mm): at the last refracting element that it reached.
+    /// Position of ray `i` (mm), at the last refracting element that it reached.
     #[must_use]
     pub fn position(&self, i: usize) -> DVec3 {
         at_lane(&self.blocks[i / LANES].position, i % LANES).into()
     }
 
-    /// Where ray `i` goes: a unit vector.
+    /// Direction of ray `i`, a unit vector.
     #[must_use]
     pub fn direction(&self, i: usize) -> DVec3 {
         at_lane(&self.blocks[i / LANES].direction, i % LANES).into()
     }
 
-    /// Which share of its radiance ray `i` keeps, times the weight that it was given.
+    /// Share of its radiance that ray `i` keeps, times the weight that it was given.
     #[must_use]
     pub fn throughput(&self, i: usize) -> f64 {
         self.blocks[i / LANES].throughput[i % LANES]
     }
 
-    /// What became of ray `i`; [`RayStatus::Exited`] as long as nothing ended it.
+    /// Outcome of ray `i`; [`RayStatus::Exited`] as long as nothing ended it.
     #[must_use]
     pub fn status(&self, i: usize) -> RayStatus {
         RayStatus::from_code(self.blocks[i / LANES].outcome[i % LANES])
@@ -424,7 +424,7 @@ impl LensRays {
             + 0.0
     }
 
-    /// How many rays left.
+    /// Number of rays that left the train.
     #[must_use]
     pub fn exited(&self) -> usize {
         self.blocks.iter().flat_map(|b| b.outcome).filter(|&code| code == EXITED).count()

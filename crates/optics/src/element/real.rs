@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// What sags, phases and rays are worked out in.
+/// Number type of the computation of sags, phases and rays.
 pub trait Real:
     Copy
     + Default

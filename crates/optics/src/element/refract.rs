@@ -32,7 +32,7 @@ pub(crate) const TOUCH: f64 = 1e-9;
 pub(crate) struct Refraction {
     pub(crate) surface: Surface,
     pub(crate) media: Media,
-    /// What tells which rays cross an asphere but once.
+    /// Slopes that tell which rays cross an asphere only once.
     pub(super) slopes: Slopes,
 }
 
@@ -45,12 +45,12 @@ pub(crate) struct Media {
     rest: f64,
 }
 
-/// What a ray does at a surface.
+/// Outcome of a ray at a surface.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Refracted<T = f64> {
-    /// Where it meets the surface, and how it goes on.
+    /// Ray that goes on from the point where it meets the surface.
     pub(crate) ray: Ray<T>,
-    /// How far it went (mm).
+    /// Distance travelled (mm).
     pub(crate) t: T,
     /// It meets the surface.
     pub(crate) hit: bool,
@@ -60,7 +60,7 @@ pub(crate) struct Refracted<T = f64> {
     pub(crate) through: bool,
 }
 
-/// Which root of the quadratic.
+/// Choice between the two roots of the quadratic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Root {
     /// C/q.
@@ -208,20 +208,21 @@ impl Refraction {
     }
 }
 
-/// Whether a place so far on (mm) is ahead of a ray; a root that is no number is not.
+/// True if a place at distance `t` along the ray (mm) is ahead of it; a root that is no number is
+/// not.
 #[inline(always)]
 pub(super) fn is_ahead<T: Real>(t: T) -> bool {
     (t.value() > -TOUCH) & (t.value() < f64::INFINITY)
 }
 
-/// Whether a ray's place is within a clear aperture, by the square of its radius (mm²).
+/// True if a ray's place is within a clear aperture, by the square of its radius (mm²).
 #[inline(always)]
 pub(super) fn is_within<T: Real>(there: Ray<T>, clip2: f64) -> bool {
     let [x, y, _] = there.position;
     (x * x + y * y).value() <= clip2
 }
 
-/// Where a ray meets a conic.
+/// Intersection of a ray with a conic.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Intersection<T = f64> {
     /// The ray, moved there.
@@ -276,7 +277,7 @@ pub(crate) fn meet_conic<const SPHERE: bool, T: Real>(
     Intersection { ray: moved.advanced(t), t: foot + t, along2, along }
 }
 
-/// Whether the far root comes after the near one, or lies on the other sheet; without a division.
+/// True if the far root comes after the near one, or lies on the other sheet; without a division.
 #[inline(always)]
 fn rival_is_elsewhere<const SPHERE: bool, T: Real>(s: &Surface, ray: Ray<T>) -> bool {
     let Quadratic { moved, a, q, .. } = quadratic::<SPHERE, T>(s, ray);

@@ -190,7 +190,8 @@ impl SpiderSpec {
     }
 }
 
-/// Whether a place lies inside of an outline, by the crossings of a line from there to afar along x.
+/// Tests whether a point lies inside an outline, by the crossings of a line from there to afar
+/// along x.
 fn is_in_outline(corners: &[[f64; 2]], x: f64, y: f64) -> bool {
     let mut before = corners[corners.len() - 1];
     let mut is_inside = false;
@@ -231,7 +232,7 @@ impl ShapeKind {
 }
 
 impl Shape {
-    /// Whether a place (mm) is open.
+    /// True if the point `x`, `y` (mm) is open.
     #[must_use]
     pub fn is_open(&self, x: f64, y: f64) -> bool {
         let [c, s] = self.turn;
@@ -248,8 +249,8 @@ impl Shape {
         self.around.unwrap_or_else(|| self.kind.radius())
     }
 
-    /// The same in another size, by the circle around it (mm). A ring whose opening is not limited keeps its disk, and
-    /// so does what is in the way.
+    /// Returns the shape scaled so that `radius` (mm) is that of the circle around it. A ring whose
+    /// opening is not limited keeps its disk, and so does what is in the way.
     #[must_use]
     pub fn with_radius(&self, radius: f64) -> Self {
         if self.around.is_some() {
@@ -275,13 +276,13 @@ impl Shape {
         Self { kind, turn: self.turn, around: None }
     }
 
-    /// Whether a turn about the axis changes nothing.
+    /// True if a turn about the axis changes nothing.
     #[must_use]
     pub fn is_round(&self) -> bool {
         matches!(&self.kind, ShapeKind::Ring { arms, .. } if arms.is_empty())
     }
 
-    /// Whether something stands in the middle of what is open.
+    /// True if something blocks the middle of the opening.
     #[must_use]
     pub fn is_obscured(&self) -> bool {
         self.around.is_some() || matches!(&self.kind, ShapeKind::Ring { inner, .. } if *inner > 0.0)

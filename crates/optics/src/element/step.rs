@@ -23,7 +23,7 @@ use super::rays::{Block, LANES, PENDING, Ray, RayStatus};
 use super::refract::{Media, Refracted, Refraction, each_lane};
 use super::thin_lens::at_thin_lens;
 
-/// Whether clear apertures stop rays.
+/// Clipping of rays by clear apertures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Clip {
     /// Semi-diameters, apertures and opaque parts of filters end a ray.
@@ -41,15 +41,15 @@ pub(crate) struct Step {
     pub(crate) frame: Frame,
     pub(crate) axial: bool,
     pub(crate) action: Action,
-    /// What is lost here, when losses are asked for.
+    /// Losses of light at the step, when they are asked for.
     pub(crate) loss: Option<Loss>,
-    /// How light goes on behind a mirror.
+    /// Direction of the light behind a mirror.
     pub(crate) fold: Option<Fold>,
     /// Gradients before or behind it.
     pub(crate) graded: Option<Arc<Graded>>,
 }
 
-/// What an element does.
+/// Action of an element on a ray.
 #[derive(Debug, Clone)]
 pub(crate) enum Action {
     Plane(Refraction),
@@ -84,7 +84,7 @@ pub(crate) enum Action {
 }
 
 impl Action {
-    /// Whether it moves rays to itself; sheets only look at them.
+    /// True if the action moves rays to the element; sheets only look at them.
     pub(crate) fn moves(&self) -> bool {
         !matches!(self, Self::Opening(_) | Self::Filter { .. } | Self::Shadow(_) | Self::Turn(_))
     }
@@ -104,20 +104,20 @@ impl Action {
     }
 }
 
-/// What became of a single ray at an element.
+/// Outcome of a single ray at an element.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Traversal {
     pub(crate) status: RayStatus,
     /// The ray as it goes on; as it came unless [`RayStatus::Exited`].
     pub(crate) ray: Ray,
-    /// Where it met the element, in lens coordinates; `None` when it missed.
+    /// Point where the ray met the element, in lens coordinates; `None` when it missed.
     pub(crate) point: Option<[f64; 3]>,
     /// The share of light that goes on.
     pub(crate) transmission: f64,
 }
 
 impl Traversal {
-    /// The same along the axis by `z` (mm).
+    /// Shifts the traversal along the axis by `z` (mm).
     #[inline(always)]
     fn raised(mut self, z: f64) -> Self {
         self.ray.position[2] += z;
@@ -351,7 +351,7 @@ impl Step {
         }
     }
 
-    /// Whether rays take long to be traced at it: an asphere with a wall.
+    /// True if rays take long to be traced through the element: an asphere with a wall.
     pub(crate) fn has_wall(&self) -> bool {
         matches!(&self.action, Action::Asphere(refraction) if refraction.surface.has_wall())
     }
@@ -381,7 +381,7 @@ impl Step {
         block.outcome[lane] = traversal.status.code();
     }
 
-    /// Whether the element moves rays to itself; sheets only look at them.
+    /// True if the element moves rays to itself; sheets only look at them.
     pub(crate) fn moves(&self) -> bool {
         self.action.moves()
     }
@@ -409,7 +409,7 @@ impl Step {
         surface.added_path([local.x, local.y])
     }
 
-    /// Whether it stands for a mirror on the way to another element.
+    /// True if the step stands for a mirror on the way to another element.
     pub(crate) fn is_shadow(&self) -> bool {
         matches!(self.action, Action::Shadow(_))
     }

@@ -156,7 +156,7 @@ impl Surface {
         Self { curvature, conic: 0.0, aspheric: Vec::new(), semi_diameter: f64::INFINITY }
     }
 
-    /// The same as light that runs against the axis meets it.
+    /// Returns the surface as seen by light that runs against the axis.
     #[must_use]
     pub fn flipped(&self) -> Self {
         Self {
@@ -166,7 +166,7 @@ impl Surface {
         }
     }
 
-    /// Whether the surface is flat.
+    /// True if the surface is flat.
     #[must_use]
     pub fn is_plane(&self) -> bool {
         self.curvature == 0.0 && self.aspheric.is_empty()
@@ -213,14 +213,15 @@ impl Surface {
         self.curvature * u / (1.0 + self.conic_root(u))
     }
 
-    /// What (∂z/∂x)/x is not below and not above between two squared distances from the axis (mm²), the nearer
-    /// first (1/mm).
+    /// Lower and upper bounds of (∂z/∂x)/x between two squared distances from the axis (mm²), the
+    /// nearer first (1/mm).
     pub(super) fn slope_bounds(&self, squares: [f64; 2]) -> [f64; 2] {
         let conic = |root: f64| self.curvature / root.max(1e-12);
         self.derivative_bounds(squares, conic, |power| power)
     }
 
-    /// The same of the second derivative of the sag by the distance from the axis (1/mm).
+    /// Lower and upper bounds of the second derivative of the sag by the distance from the axis
+    /// (1/mm).
     pub(super) fn bend_bounds(&self, squares: [f64; 2]) -> [f64; 2] {
         let conic = |root: f64| self.curvature / root.max(1e-12).powi(3);
         self.derivative_bounds(squares, conic, |power| power * (power - 1.0))

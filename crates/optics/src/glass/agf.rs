@@ -17,7 +17,7 @@ use super::{Glass, extinction_of};
 /// The longest catalogue that is read (bytes); the longest of a maker has a fifth of a megabyte.
 const LONGEST: u64 = 64 << 20;
 
-/// Why a file is no catalogue.
+/// Error of a file that cannot be read as a glass catalogue.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AgfError {
     /// It cannot be read at all.
@@ -26,9 +26,9 @@ pub enum AgfError {
     /// One of its lines makes no sense.
     #[error("line {line}: {why}")]
     Line {
-        /// Which, from 1.
+        /// Line number, from 1.
         line: usize,
-        /// What is wrong there.
+        /// Description of the error.
         why: String,
     },
 }
@@ -235,11 +235,11 @@ fn decode(bytes: &[u8]) -> String {
     }
 }
 
-/// How many names an error offers.
+/// Number of names that an error offers.
 const OFFERED: usize = 3;
 
-/// What makers put before the name of a kind: Schott's leadless (N-) and moulded glasses (P-), Ohara's
-/// (S-, L-), Hoya's (E-, M-), CDGM's (H-, D-), Hikari's (J-, E-, Q-), Sumita's (K-).
+/// Prefixes that makers put before the name of a kind: Schott's leadless (N-) and moulded glasses
+/// (P-), Ohara's (S-, L-), Hoya's (E-, M-), CDGM's (H-, D-), Hikari's (J-, E-, Q-), Sumita's (K-).
 const PREFIXES: [&str; 11] = ["", "N-", "P-", "S-", "L-", "E-", "M-", "H-", "D-", "J-", "K-"];
 
 /// The names that are meant most likely by one that is not known, best first: the same kind of an
@@ -340,7 +340,7 @@ mod tests {
         }
     }
 
-    /// The same of resonances, λ² = 1/4.
+    /// Formulas of resonances give what they say, at λ² = 1/4.
     #[test]
     fn the_formulas_of_resonances_give_what_they_say() {
         let l2 = 0.25_f64;

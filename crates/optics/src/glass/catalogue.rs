@@ -115,7 +115,7 @@ impl Entry {
         self.line.split('\t').nth(i).unwrap_or_default()
     }
 
-    /// Who makes it; `MISC` for a substance.
+    /// Maker of the glass; `MISC` for a substance.
     #[must_use]
     pub fn maker(self) -> &'static str {
         match self.column(1) {
@@ -129,7 +129,7 @@ impl Entry {
         is(&self.maker()) || (self.is_substance() && SUBSTANCES.iter().any(is))
     }
 
-    /// Whether nobody in particular makes it.
+    /// True if the entry is a substance, which has no particular maker.
     fn is_substance(self) -> bool {
         self.column(1) == "-"
     }

@@ -23,7 +23,7 @@ const BUCHDAHL_ZERO: f64 = 0.574;
 /// A dispersion formula; wavelengths inside it are in micrometres.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Dispersion {
-    /// The same index everywhere.
+    /// Constant index at all wavelengths.
     Constant(f64),
     /// `[b, c]`: n² = 1 + Σ b λ²/(λ² − c).
     Sellmeier(Vec<[f64; 2]>),
@@ -92,7 +92,7 @@ impl Dispersion {
         (n > 0.0 && n.is_finite() && wavelength > 0.0).then_some(n)
     }
 
-    /// Whether the index depends on the wavelength.
+    /// True if the index depends on the wavelength.
     #[must_use]
     pub fn varies(&self) -> bool {
         match self {

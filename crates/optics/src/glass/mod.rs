@@ -18,7 +18,7 @@ pub use agf::{AgfCatalogue, AgfError};
 pub use catalogue::{Entry, Makers, catalogue};
 pub use dispersion::{Dispersion, FRAUNHOFER_C, FRAUNHOFER_D, FRAUNHOFER_F};
 
-/// Why there is no index.
+/// Error of a glass whose index cannot be found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GlassError {
@@ -33,9 +33,9 @@ pub enum GlassError {
     /// Inline numbers that describe no glass.
     #[error("{law} glass: {why}")]
     Inline {
-        /// Which way of writing.
+        /// Name of the dispersion law.
         law: &'static str,
-        /// What is wrong with it.
+        /// Description of the error.
         why: &'static str,
     },
     /// The formula gives no index at this wavelength.
@@ -92,21 +92,21 @@ pub struct Glass {
     pub name: String,
     /// The wavelengths for which the formula is stated (nm); 0 to infinity when it has no limits.
     pub range: [f64; 2],
-    /// Where the numbers come from, empty for inline ones.
+    /// Source of the numbers, empty for inline ones.
     pub source: String,
-    /// Who makes it; `None` for substances and inline numbers.
+    /// Maker of the glass; `None` for substances and inline numbers.
     pub maker: Option<String>,
     /// Other makers whose glass of the same name is not meant.
     pub namesakes: Vec<String>,
     dispersion: Dispersion,
     /// `[nm, k]`: extinction coefficients in ascending order of wavelength.
     extinction: Vec<[f64; 2]>,
-    /// How the index changes from place to place behind an element of a lens.
+    /// Gradient of the index behind an element of a lens, if there is one.
     pub(crate) gradient: Option<crate::element::GradedGap>,
 }
 
 impl Glass {
-    /// What surrounds lenses: index 1 at every wavelength.
+    /// Air, which surrounds lenses: index 1 at every wavelength.
     #[must_use]
     pub fn air() -> Self {
         Self::inline("air", Dispersion::Constant(1.0))
@@ -137,7 +137,7 @@ impl Glass {
             .ok_or_else(|| GlassError::NoIndex { name: self.name.clone(), wavelength })
     }
 
-    /// Whether the formula is stated for `wavelength` (nm).
+    /// True if the formula is stated for `wavelength` (nm).
     #[must_use]
     pub fn covers(&self, wavelength: f64) -> bool {
         wavelength >= self.range[0] && wavelength <= self.range[1]
@@ -146,14 +146,14 @@ impl Glass {
     /// The wavelengths for which a glass of one maker or another is stated (nm).
     pub const RANGE_OF_ALL: [f64; 2] = [240.0, 14_000.0];
 
-    /// Whether there are wavelengths for which it is not stated, which may be [known](Self::range). Numbers
-    /// that a lens file gives do not say; air needs not.
+    /// True if the range in which the formula is valid is [known](Self::range). Numbers of a lens
+    /// file come without one; air needs none.
     #[must_use]
     pub fn states_range(&self) -> bool {
         self.range != [0.0, f64::INFINITY] || self.dispersion == Dispersion::Constant(1.0)
     }
 
-    /// Whether the index depends on the wavelength.
+    /// True if the index depends on the wavelength.
     #[must_use]
     pub fn is_dispersive(&self) -> bool {
         self.dispersion.varies()

@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 use super::{MonochromaticTrain, OpticalTrain, Side};
 use crate::element::Ray;
 
-/// How near the stop's centre a chief ray passes (mm).
+/// Tolerance of a chief ray's distance from the stop's centre (mm).
 const ON_TARGET: f64 = 1e-9;
 
 /// A ray of the object's side that passes the stop's centre.
@@ -92,7 +92,7 @@ impl OpticalTrain {
         solve(|slopes| self.on_stop(at, film, slopes), start, 1.0)
     }
 
-    /// Where a ray from the sensor crosses the stop (mm).
+    /// Point where a ray from the sensor crosses the stop (mm).
     fn on_stop(&self, at: &MonochromaticTrain, film: DVec3, slopes: DVec2) -> Option<DVec2> {
         let ray = Ray::new(film, towards_lens(slopes))?;
         at.crossing(Side::Sensor, self.stop, ray).map(DVec2::from)

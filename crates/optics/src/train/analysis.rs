@@ -1,4 +1,4 @@
-//! What a lens does to a picture, measured with real rays.
+//! Effects of a lens on the picture, measured with real rays.
 //!
 //! Chromatic shifts against the design wavelength.
 //!
@@ -124,7 +124,7 @@ pub fn chief_height(
 /// Cells a side over the rectangle of passing directions.
 const PUPIL_GRID: f64 = 500.0;
 
-/// The same in the least, for the longest trains.
+/// Least number of cells a side, for the longest trains.
 const LEAST_GRID: f64 = 100.0;
 
 /// Rays times elements that the illumination at one place is worth: a train of more than 64 elements gets a coarser
@@ -198,7 +198,7 @@ pub fn projected_solid_angle(train: &OpticalTrain, at: &MonochromaticTrain, film
     solid_angle(train, at, film, 1)
 }
 
-/// The same for one of `places`, which share the rays that a table is worth.
+/// Projected solid angle, for one of `places`, which share the rays that a table is worth.
 fn solid_angle(train: &OpticalTrain, at: &MonochromaticTrain, film: DVec3, places: usize) -> f64 {
     let Some(window) = Window::find(train, at, film) else { return 0.0 };
     if film.truncate() == DVec2::ZERO && train.is_rotationally_symmetric() {
@@ -234,8 +234,8 @@ fn solid_angle(train: &OpticalTrain, at: &MonochromaticTrain, film: DVec3, place
     times * sum * size.x * size.y
 }
 
-/// The same from a place on the axis of a round lens, for slopes up to `steepest`: of rings, each with what a ray in its
-/// middle passes, whose borders are where rays begin or cease to pass.
+/// Projected solid angle from a place on the axis of a round lens, for slopes up to `steepest`: of rings, each with
+/// what a ray in its middle passes, whose borders are where rays begin or cease to pass.
 fn solid_angle_of_rings(at: &MonochromaticTrain, film: DVec3, steepest: f64) -> f64 {
     let traced = |slopes: &[f64]| {
         let mut rays = LensRays::with_capacity(slopes.len());

@@ -1,4 +1,4 @@
-//! What is behind an element of a lens file: a gradient of its glass, or an axis that breaks.
+//! Properties behind an element of a lens file: a gradient of its glass, or an axis that breaks.
 
 use super::file::{WHOLE_TURN, along};
 use super::folds::{self, Isometry};
@@ -10,7 +10,7 @@ use crate::element::{
 use crate::glass::Glass;
 
 impl LensFile {
-    /// How the axis runs behind a break at z (mm) of the way of light.
+    /// Axis behind a break at z (mm), in the direction of the light.
     pub(super) fn axis_behind(
         &self,
         index: usize,

@@ -11,8 +11,8 @@ use crate::element::real::Dual;
 pub struct RayDifferential {
     /// Its place (mm) and unit direction.
     pub ray: [DVec3; 2],
-    /// How much its place and its direction change, each by one unit of what changes them. A direction changes square
-    /// to itself.
+    /// Change of place and of direction by one unit of each of the two parameters. A change of
+    /// direction is square to the direction itself.
     pub changes: [[DVec3; 2]; 2],
 }
 

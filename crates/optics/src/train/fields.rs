@@ -1,5 +1,5 @@
-//! What a lens file says of how its lens is looked at: field points with what vignetting leaves of their pupils, and
-//! wavelengths with what they weigh.
+//! Field points and wavelengths of a lens file: field points with the part of the pupil that
+//! vignetting leaves, wavelengths with their weights.
 
 use glam::DVec2;
 use schemars::JsonSchema;
@@ -82,7 +82,7 @@ impl FieldSpec {
 }
 
 impl VignettingSpec {
-    /// Where a place of the whole unit circle lies in what is left.
+    /// Maps a point of the whole unit circle to the pupil that vignetting leaves.
     #[must_use]
     pub fn place(&self, whole: DVec2) -> DVec2 {
         let left = DVec2::ONE - DVec2::from(self.compression);

@@ -317,11 +317,11 @@ pub enum StatusName {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("rays[{index}].{key}: {why}")]
 pub struct RayError {
-    /// Which ray, from 0.
+    /// Index of the ray, from 0.
     pub index: usize,
     /// Its key.
     pub key: &'static str,
-    /// What is wrong with it, and what would do.
+    /// Description of the error, and of what is valid.
     pub why: String,
 }
 

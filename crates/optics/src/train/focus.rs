@@ -1,10 +1,10 @@
-//! Where the sensor goes.
+//! Placement of the sensor: focusing.
 
 use super::{Element, OpticalTrain, Part, SensorMount};
 use crate::element::Frame;
 use crate::glass::GlassError;
 
-/// How a lens is focused.
+/// Focus setting of a lens.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Focus {
     /// The sensor stands where the file puts it, by the last element's thickness; at the image of
@@ -19,14 +19,14 @@ pub enum Focus {
     Sensor(f64),
 }
 
-/// Why there is no place for the sensor.
+/// Error of a lens that gives no place for the sensor.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FocusError {
     /// A distance that is none.
     #[error("the {what} is {value}; it must be a positive number")]
     NotPositive {
-        /// Which.
+        /// Name of the quantity.
         what: &'static str,
         /// Its value.
         value: f64,
@@ -42,7 +42,7 @@ pub enum FocusError {
     Inside {
         /// The distance asked for (m).
         distance: f64,
-        /// How far behind the first vertex the entrance pupil is (mm).
+        /// Depth of the entrance pupil behind the first vertex (mm).
         depth: f64,
     },
     /// At the front focal point, or so near it that the image is farther than any camera.
@@ -64,7 +64,7 @@ pub enum FocusError {
     Virtual {
         /// The distance asked for (m); infinite for infinity.
         distance: f64,
-        /// Where the virtual image is (mm).
+        /// Position of the virtual image (mm).
         image: f64,
     },
     /// The axis breaks behind the image.
@@ -75,7 +75,7 @@ pub enum FocusError {
     Broken {
         /// The last element.
         element: usize,
-        /// Where the image is (mm).
+        /// Position of the image (mm).
         image: f64,
     },
     /// A glass without index.
@@ -120,7 +120,8 @@ impl OpticalTrain {
         Ok(image)
     }
 
-    /// Why an image in front of the last vertex, at z (mm), of an object at a distance (m) is none for a sensor.
+    /// Reason why an image in front of the last vertex, at z (mm), of an object at a distance (m)
+    /// is none for a sensor.
     fn no_image(&self, distance: f64, image: f64) -> FocusError {
         let is_break = |element: &Element| matches!(element.part, Part::CoordinateBreak(_));
         let lens = self.elements.iter().rposition(|element| !is_break(element));

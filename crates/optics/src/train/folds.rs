@@ -15,7 +15,7 @@ use glam::{DMat3, DVec3};
 use super::{Element, OpticalTrain};
 use crate::element::{CoordinateBreak, Fold, Frame, Part, Shadow};
 
-/// How near (mm) two vertices count as one.
+/// Distance (mm) within which two vertices count as one.
 const SAME_PLACE: f64 = 1e-6;
 
 /// A turn, with or without a reflection, and a shift.
@@ -26,7 +26,7 @@ pub struct Isometry {
 }
 
 impl Isometry {
-    /// What changes nothing.
+    /// Identity.
     pub const ONE: Self = Self { turn: DMat3::IDENTITY, shift: DVec3::ZERO };
 
     /// The reflection in the plane through `point` (mm) with the unit normal `normal`.
@@ -55,19 +55,19 @@ impl Isometry {
         Self { turn: DMat3::IDENTITY, shift: DVec3::new(0.0, 0.0, z) }
     }
 
-    /// Where it takes a place (mm).
+    /// Transforms a position (mm).
     #[must_use]
     pub fn place(&self, place: DVec3) -> DVec3 {
         self.turn * place + self.shift
     }
 
-    /// Where it takes a direction.
+    /// Transforms a direction.
     #[must_use]
     pub fn direction(&self, direction: DVec3) -> DVec3 {
         self.turn * direction
     }
 
-    /// Where it takes a frame; the rotation is one with a reflection where it has one.
+    /// Transforms a frame; the rotation is one with a reflection where it has one.
     #[must_use]
     pub fn frame(&self, frame: &Frame) -> Frame {
         Frame { vertex: self.place(frame.vertex), rotation: self.turn * frame.rotation }
@@ -79,7 +79,7 @@ impl Isometry {
         Self { turn: self.turn * inner.turn, shift: self.place(inner.shift) }
     }
 
-    /// What takes it back.
+    /// Returns the inverse.
     #[must_use]
     pub(crate) fn inverse(&self) -> Self {
         let turn = self.turn.transpose();
@@ -104,14 +104,14 @@ pub(crate) struct Obstruction {
 }
 
 impl OpticalTrain {
-    /// Whether it has mirrors, so that it is traced in unfolded coordinates.
+    /// True if the train has mirrors, so that it is traced in unfolded coordinates.
     #[must_use]
     pub fn is_folded(&self) -> bool {
         self.elements.iter().any(|element| element.part.mirror().is_some())
     }
 
-    /// Whether something may stand in the middle of its light: a mirror in its own way or with a hole, or an aperture
-    /// with a disk.
+    /// True if something may block the middle of the beam: a mirror in its own way or with a hole,
+    /// or an aperture with a disk.
     #[must_use]
     pub fn is_obscured(&self) -> bool {
         self.is_folded()
@@ -213,7 +213,8 @@ impl OpticalTrain {
 }
 
 impl Element {
-    /// What it stops of light that is meant for others; `None` without a rim.
+    /// Shadow of the element: what it stops of light that is meant for others; `None` without a
+    /// rim.
     fn shadow(&self) -> Option<Shadow> {
         let mount = self.part.mirror()?;
         let radius = self.clear_radius();

@@ -36,14 +36,15 @@ pub struct BehindLenslets {
     pub front_z: f64,
     /// z of the rearmost array (mm).
     pub rear_z: f64,
-    /// Where the arrays are moved across the axis (mm).
+    /// Shift of the arrays across the axis (mm).
     pub decentre: DVec2,
-    /// Whether something between the rearmost array and the sensor bends light (flat glass).
+    /// True if something between the rearmost array and the sensor refracts light (flat glass).
     covered: bool,
     /// From the plane of the rearmost array to z (mm), reduced: thickness over index, and index, of
     /// each medium behind it.
     behind: Vec<[f64; 3]>,
-    /// What each type of lenslet does on the way from the rearmost array to the lens before.
+    /// Paraxial effect of each type of lenslet, on the way from the rearmost array to the lens
+    /// before.
     kinds: Vec<ParaxialLenslet>,
     /// The index before the lenslets.
     index: f64,
@@ -54,11 +55,11 @@ pub struct BehindLenslets {
 struct ParaxialLenslet {
     /// On height and reduced slope, from before the rearmost array to in front of the first element.
     all: Abcd,
-    /// The same to the other arrays, whose openings the light has to pass.
+    /// Matrices to the other arrays, whose openings the light has to pass.
     to_arrays: Vec<(Abcd, Arc<MicrolensArray>)>,
 }
 
-/// How a place on the sensor sees the lens through a type of lenslet.
+/// View of the lens from a place on the sensor through one type of lenslet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sight {
     /// The reduced distance from the sensor to the rearmost array, over the index before the sensor
@@ -90,7 +91,7 @@ impl OpticalTrain {
         self.elements.iter().position(|e| matches!(e.part, Part::MicrolensArray(_)))
     }
 
-    /// The same lens with arrays that bend nothing: openings, or flat surfaces of their size.
+    /// Returns the lens with arrays that do not refract: openings, or flat surfaces of their size.
     #[must_use]
     pub fn without_arrays(&self) -> Self {
         let mut train = self.clone();
@@ -108,7 +109,7 @@ impl OpticalTrain {
         train
     }
 
-    /// The same lens with another one `gap` (mm) behind its last vertex, and the sensor where that one has
+    /// Appends another lens `gap` (mm) behind the last vertex; the sensor stands where `rear` has
     /// it.
     #[must_use]
     pub fn followed_by(mut self, rear: &Self, gap: f64) -> Self {
@@ -123,7 +124,7 @@ impl OpticalTrain {
         self
     }
 
-    /// The same lens with the sensor `distance` (mm) behind its last vertex.
+    /// Returns the lens with the sensor `distance` (mm) behind its last vertex.
     #[must_use]
     pub fn with_end(mut self, distance: f64) -> Self {
         self.end = self.last_vertex() + distance;
@@ -233,9 +234,9 @@ impl OpticalTrain {
         ParaxialLenslet { all, to_arrays }
     }
 
-    /// The same lens with its lenslets, and all behind them, moved along the axis so that they see sharp
-    /// what is `distance` (m) in front of the entrance pupil; infinite for infinity. A lens without
-    /// lenslets behind it stays as it is.
+    /// Returns the lens with its lenslets, and all behind them, moved along the axis until objects
+    /// at `distance` (m) in front of the entrance pupil are sharp; infinite for infinity. A lens
+    /// without lenslets behind it stays as it is.
     ///
     /// # Errors
     ///
@@ -258,13 +259,13 @@ impl OpticalTrain {
 }
 
 impl BehindLenslets {
-    /// How the sensor's plane at z (mm) sees through a type of lenslet.
+    /// View through lenslet type `kind` from a sensor plane at `z` (mm).
     #[must_use]
     pub fn sight(&self, kind: usize, z: f64) -> Sight {
         self.sight_by(&self.kinds[kind].all, z)
     }
 
-    /// How it sees where there is no lenslet.
+    /// View from a sensor plane at `z` (mm) past the lenslets, where there is none.
     #[must_use]
     pub fn sight_past(&self, z: f64) -> Sight {
         self.sight_by(&Abcd { a: 1.0, b: self.rear_z - self.front_z, c: 0.0, d: 1.0 }, z)
@@ -375,7 +376,7 @@ impl BehindLenslets {
             .map(move |(to, array)| (self.sight_by(to, z).height, array))
     }
 
-    /// How far in front of the first element the front principal plane of the lenslets is (mm).
+    /// Distance of the lenslets' front principal plane in front of the first element (mm).
     #[must_use]
     pub fn principal_distance(&self, kind: usize) -> f64 {
         let all = &self.kinds[kind].all;
@@ -396,9 +397,9 @@ impl BehindLenslets {
         }
     }
 
-    /// Where the sensor has to stand (mm behind the last vertex) so that the first type of lenslets images
-    /// onto it what is `picture` (mm) in front of their front principal plane; infinitely far for 0, at
-    /// which they stand in the picture themselves.
+    /// Sensor distance (mm behind the last vertex) at which the first type of lenslets images onto
+    /// the sensor what is `picture` (mm) in front of their front principal plane; infinitely far
+    /// for 0, at which they stand in the picture themselves.
     #[must_use]
     pub fn sensor_distance(&self, picture: f64) -> f64 {
         let all = &self.kinds[0].all;
@@ -441,9 +442,9 @@ impl BehindLenslets {
         self.array.lattice.cell(at.x, at.y).index
     }
 
-    /// Where the middle of the image that a lenslet makes of the opening before it stands on the sensor
-    /// (mm across the axis), with `chief` the slopes of the chief ray of the lens before at a point of
-    /// the array.
+    /// Centre, on the sensor, of the image that a lenslet makes of the opening before it (mm across
+    /// the axis); `chief` gives the slopes of the chief ray of the lens before at a point of the
+    /// array.
     pub fn image_centre(
         &self,
         cell: [f64; 2],

@@ -58,7 +58,7 @@ pub use report::{Inquiry, LensReport, NOTES, ReportError, remove_notes};
 pub use trace::{MonochromaticTrain, RayPath, Registers, Side};
 pub use zemax::{LensFormat, ZemaxError, ZemaxLens};
 
-/// Why a lens file makes no lens.
+/// Error of a lens file that cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LensError {
@@ -76,9 +76,9 @@ pub enum LensError {
     /// A part that cannot be made.
     #[error("elements[{index}]: {why}")]
     Element {
-        /// Which, from 0 on the object side.
+        /// Index of the element, from 0 on the object side.
         index: usize,
-        /// What is wrong with it.
+        /// Description of the error.
         why: String,
     },
     /// A glass that is not known.
@@ -86,15 +86,15 @@ pub enum LensError {
     Glass {
         /// The surface in front of it.
         index: usize,
-        /// Why.
+        /// Cause of the error.
         source: GlassError,
     },
     /// A key of the whole lens: a catalogue of glasses that cannot be read, a field or wavelength that is none.
     #[error("{key}: {why}")]
     Key {
-        /// Which, with its place in a list from 0.
+        /// Name of the key, with its place in a list from 0.
         key: String,
-        /// Why.
+        /// Description of the error.
         why: String,
     },
     /// Two elements marked as the stop.
@@ -111,9 +111,9 @@ pub enum LensError {
     /// A stop whose size cannot be set.
     #[error("elements[{index}] is the stop and its opening cannot be set: {why}")]
     Stop {
-        /// Which.
+        /// Index of the element.
         index: usize,
-        /// Why.
+        /// Description of the error.
         why: String,
     },
 }
@@ -121,9 +121,9 @@ pub enum LensError {
 /// A part at its place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Element {
-    /// What it is.
+    /// Kind of the element, with its data.
     pub part: Part,
-    /// Where it stands, in lens coordinates (mm).
+    /// Position and rotation in lens coordinates (mm).
     pub frame: Frame,
 }
 
@@ -145,13 +145,13 @@ pub struct OpticalTrain {
 }
 
 impl OpticalTrain {
-    /// What the lens is called; empty when the file does not say.
+    /// Name of the lens; empty when the file does not give one.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Where the numbers come from; empty when the file does not say.
+    /// Source of the numbers; empty when the file does not give one.
     #[must_use]
     pub fn source(&self) -> &str {
         &self.source
@@ -181,8 +181,8 @@ impl OpticalTrain {
         self.wavelength
     }
 
-    /// What is odd about the lens, in sentences: glasses with namesakes, elements that cross, parts
-    /// that the paraxial analysis leaves out.
+    /// Notes on oddities of the lens, as sentences: glasses with namesakes, elements that cross,
+    /// parts that the paraxial analysis leaves out.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes
@@ -194,21 +194,22 @@ impl OpticalTrain {
         self.elements.last().map_or(0.0, |e| e.frame.vertex.z)
     }
 
-    /// Whether a turn about the axis changes nothing: everything centred, untilted and round.
+    /// True if a turn about the axis changes nothing: everything centred, untilted and round.
     #[must_use]
     pub fn is_rotationally_symmetric(&self) -> bool {
         self.sensor == SensorMount::default() && self.elements.iter().all(Element::is_symmetric)
     }
 
-    /// Whether nothing in it aberrates: thin lenses and sheets, centred and square to the axis.
+    /// True if nothing in the train has aberrations: thing in it aberrates: thin lenses and sheets,
+    /// centred and square to the axis.
     #[must_use]
     pub fn is_ideal(&self) -> bool {
         let is_ideal = |e: &Element| e.frame.is_axial() && e.part.is_ideal();
         self.sensor.tilt == SensorMount::default().tilt && self.elements.iter().all(is_ideal)
     }
 
-    /// The same with an ideal lens behind it, at whose focal length (mm) the sensor stands: angles become
-    /// lengths, and images at infinity are near.
+    /// Returns the lens with an ideal lens behind it, at whose focal length (mm) the sensor stands:
+    /// angles become lengths, and images at infinity are near.
     #[must_use]
     pub fn with_eyepiece(mut self, focal_length: f64) -> Self {
         let z = self.last_vertex();
@@ -220,13 +221,13 @@ impl OpticalTrain {
         self
     }
 
-    /// What its glass takes from light.
+    /// Losses of light in the glass and at its surfaces.
     #[must_use]
     pub fn losses(&self) -> &LossesSpec {
         &self.losses
     }
 
-    /// Whether rays of different wavelengths run differently.
+    /// True if rays of different wavelengths take different paths.
     #[must_use]
     pub fn is_dispersive(&self) -> bool {
         let diffracts =
@@ -296,8 +297,7 @@ impl OpticalTrain {
         self.elements[self.stop].clear_radius()
     }
 
-    /// The same lens with the stop opened or closed to `radius` (mm). An iris stays the polygon
-    /// that it is.
+    /// Opens or closes the stop to `radius` (mm). An iris stays the polygon that it is.
     ///
     /// # Errors
     ///
@@ -312,8 +312,8 @@ impl OpticalTrain {
         Ok(self)
     }
 
-    /// The same lens with the stop set so that the paraxial f-number at the design wavelength is
-    /// `f_number`: focal length over the entrance pupil's diameter.
+    /// Sets the stop so that the paraxial f-number at the design wavelength is `f_number`: focal
+    /// length over the entrance pupil's diameter.
     ///
     /// # Errors
     ///
@@ -345,7 +345,7 @@ impl OpticalTrain {
         Ok(radius)
     }
 
-    /// The same lens analysed, focused and its stop set at another wavelength (nm).
+    /// Sets the design wavelength (nm), at which the lens is analysed, focused and its stop set.
     ///
     /// # Errors
     ///
@@ -358,14 +358,14 @@ impl OpticalTrain {
         Ok(self)
     }
 
-    /// The same lens with what its glass takes from light.
+    /// Sets the losses of light in the glass and at its surfaces.
     #[must_use]
     pub fn with_losses(mut self, losses: LossesSpec) -> Self {
         self.losses = losses;
         self
     }
 
-    /// The same lens with its sensor mounted in another way, if one is given.
+    /// Replaces the mounting of the sensor, if one is given.
     #[must_use]
     pub fn with_sensor(mut self, mount: Option<SensorMount>) -> Self {
         self.sensor = mount.unwrap_or(self.sensor);
@@ -460,7 +460,8 @@ impl OpticalTrain {
         named.chain(others).collect()
     }
 
-    /// Where (mm from the axis) element `i` and the next cut through each other, if they do.
+    /// Distance from the axis (mm) at which element `i` and the next cut through each other, if
+    /// they do.
     fn crossing(&self, i: usize) -> Option<f64> {
         let pair = self.elements.get(i..i + 2)?;
         let [a, b] = [&pair[0].part, &pair[1].part];
@@ -479,7 +480,7 @@ impl OpticalTrain {
 }
 
 impl Element {
-    /// How far from its axis the element lets light pass (mm); infinite when unlimited.
+    /// Radius around its axis within which the element passes light (mm); infinite when unlimited.
     #[must_use]
     pub fn clear_radius(&self) -> f64 {
         self.part.clear_radius()

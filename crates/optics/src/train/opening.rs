@@ -13,12 +13,12 @@ const AZIMUTHS: u32 = 16;
 /// Rays among which a beam's edge is looked for before it is bisected.
 const RAYS: u32 = 128;
 
-/// How much wider than the lens an f-number may be (share): f-numbers are written with two or three
-/// digits, and half a percent changes the light by one.
+/// Excess (share) of a stated f-number's beam over the lens that is tolerated: f-numbers are
+/// written with two or three digits, and half a percent changes the light by one.
 const NOMINAL: f64 = 5e-3;
 
-/// How much wider than the beam a stop may be written and still count as filled: two percent of the
-/// light, as rims are often written as wide as the beam, to three digits.
+/// Ratio of a stop's stated width to the beam's up to which the stop still counts as filled: two
+/// percent of the light, as rims are often written as wide as the beam, to three digits.
 const FILLED: f64 = 1.01;
 
 /// The widest beam from infinity on the axis that passes a lens when its stop is open.
@@ -32,7 +32,7 @@ pub struct WidestOpening {
     pub element: usize,
 }
 
-/// Where a beam ends.
+/// Edge of a beam.
 #[derive(Debug, Clone, Copy)]
 enum RimEdge {
     /// Not before the last ray that was looked at.
@@ -41,7 +41,7 @@ enum RimEdge {
     At {
         /// From the stop's centre (mm).
         stop_radius: f64,
-        /// What ends the next ray.
+        /// Element that ends the next ray.
         element: usize,
     },
 }
@@ -78,9 +78,9 @@ impl OpticalTrain {
         f_number.is_finite().then_some(WidestOpening { f_number, stop_radius, element })
     }
 
-    /// How far from the stop's centre the outermost ray of the axial beam passes in one direction
-    /// (mm), and which element ends the next one: of the beam from infinity and of that which the
-    /// image's middle on the sensor gathers, the narrower.
+    /// Distance from the stop's centre at which the outermost ray of the axial beam passes in one
+    /// direction (mm), and the element that ends the next one: of the beam from infinity and of
+    /// that which the image's middle on the sensor gathers, the narrower.
     fn edge_of_axial_beam(&self, azimuth: DVec2) -> Option<(f64, usize)> {
         let at = self.at(self.wavelength).ok()?;
         let z = -self.far_in_front(0.0);

@@ -16,17 +16,17 @@ use crate::glass::GlassError;
 /// A ray behind the lens with its path.
 #[derive(Debug, Clone, Copy)]
 pub struct PathEnd {
-    /// What became of it.
+    /// Outcome of the ray.
     pub status: RayStatus,
-    /// Where it left the last surface (mm), and how it goes on.
+    /// Ray that goes on from the point where it left the last surface (mm).
     pub ray: Ray,
     /// The optical path from its start to there (mm).
     pub length: f64,
-    /// What apertures and filters pass of it.
+    /// Share of the ray's light that apertures and filters pass.
     pub throughput: f64,
 }
 
-/// Where the rays of a beam meet, on one side of a thin lens.
+/// Meeting point of the rays of a beam, on one side of a thin lens.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Meeting {
     /// They are parallel.
@@ -35,7 +35,7 @@ enum Meeting {
     At(DVec3),
 }
 
-/// What thin lenses add to the paths of one beam; empty of a train without any.
+/// Phases that thin lenses add to the paths of one beam; empty of a train without any.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ThinLensPhases {
     /// Element, where the chief ray meets it, and the points before and behind.
@@ -93,7 +93,7 @@ impl ThinLensPhases {
         Ok(Self { lenses })
     }
 
-    /// What the thin lens `element` adds at a place (mm), over the index.
+    /// Path that the thin lens `element` adds at a place (mm), over the index.
     fn at(&self, element: usize, place: DVec3) -> f64 {
         let Some((_, chief, [before, behind])) = self.lenses.iter().find(|l| l.0 == element) else {
             return 0.0;

@@ -98,7 +98,7 @@ impl Abcd {
         self.b - self.a * pupil
     }
 
-    /// How far in front of the first vertex lies what is in focus (mm), air in front.
+    /// Distance of the object plane in focus in front of the first vertex (mm), air in front.
     #[must_use]
     pub fn conjugate(&self) -> f64 {
         let distance = -self.b / self.a;

@@ -17,8 +17,8 @@ use crate::glass::GlassError;
 /// More elements than these make a train long: the largest zoom lenses have some fifty surfaces.
 const LONG: f64 = 64.0;
 
-/// How long a ray takes from the element before to this one, in elements: a step in a graded medium looks at the index
-/// thrice and at the surface, which counts as two.
+/// Cost of a ray's way from the element before to this one, in elements: a step in a graded medium
+/// looks at the index thrice and at the surface, which counts as two.
 fn cost(step: &Step) -> f64 {
     let graded = step.graded.as_ref().and_then(|graded| graded.media[0].as_ref());
     1.0 + graded.map_or(0.0, |medium| 2.0 * medium.steps())
@@ -41,19 +41,19 @@ pub struct MonochromaticTrain {
     indices: Indices,
     forward: Vec<Step>,
     backward: Vec<Step>,
-    /// How long a ray takes, in elements.
+    /// Cost of tracing a ray, in elements.
     cost_of_a_ray: f64,
-    /// Whether rays take long to be traced through it.
+    /// True if rays take long to be traced through the train.
     is_costly: bool,
 }
 
 /// One ray's way through a lens.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RayPath {
-    /// What became of it.
+    /// Outcome of the ray.
     pub status: RayStatus,
-    /// Where it met each element that it reached (mm), in the order in which it met them. The last
-    /// one is where it was vignetted or totally reflected, if it was.
+    /// Points where the ray met each element that it reached (mm), in the order in which it met
+    /// them. The last one is that at which it was vignetted or totally reflected, if it was.
     pub points: Vec<DVec3>,
     /// Its direction behind the last element; `None` unless it left.
     pub direction: Option<DVec3>,
@@ -169,7 +169,7 @@ impl OpticalTrain {
         }
     }
 
-    /// Whether the index of a medium changes from place to place.
+    /// True if the index of a medium varies in space.
     #[must_use]
     pub fn is_graded(&self) -> bool {
         self.media.iter().any(|medium| medium.gradient.is_some())
@@ -222,13 +222,14 @@ impl MonochromaticTrain {
         self.wavelength
     }
 
-    /// Whether rays take long to be traced through it: it has more elements than lenses have that somebody built, a
-    /// surface as steep as none has, or a medium through which rays are followed in many steps.
+    /// True if rays take long to be traced through the train: it has more elements than lenses have
+    /// that somebody built, a surface as steep as none has, or a medium through which rays are
+    /// followed in many steps.
     pub(crate) fn is_costly(&self) -> bool {
         self.is_costly
     }
 
-    /// How long a ray takes, in elements.
+    /// Cost of tracing a ray, in elements.
     pub(crate) fn cost_of_a_ray(&self) -> f64 {
         self.cost_of_a_ray
     }
@@ -362,8 +363,8 @@ impl MonochromaticTrain {
         end
     }
 
-    /// Where a ray crosses an element, in the element's own frame and without any clipping; `None`
-    /// when it does not get there.
+    /// Point where a ray crosses an element, in the element's own frame and without any clipping;
+    /// `None` when it does not get there.
     pub(crate) fn crossing(&self, from: Side, element: usize, mut ray: Ray) -> Option<[f64; 2]> {
         for step in self.steps(from) {
             let traversal = step.run_one(ray, Clip::Off);
@@ -388,7 +389,7 @@ pub struct End {
     pub status: RayStatus,
     /// The ray as it leaves, or where it ended (mm).
     pub ray: Ray,
-    /// What apertures and filters pass of it.
+    /// Share of the ray's light that apertures and filters pass.
     pub throughput: f64,
 }
 
@@ -400,7 +401,7 @@ pub enum Registers {
     Widest,
     /// Four lanes of f64 (AVX2).
     FourLanes,
-    /// What the program was compiled for, without a look at the processor.
+    /// Registers that the program was compiled for, without a look at the processor.
     Baseline,
 }
 

@@ -36,7 +36,7 @@ const ASPHERES: [Shape; 3] = [
     asphere(0.02, 0.0, Some(9.0), &[0.0, 4e-3, -9e-5, 5e-7]),
 ];
 
-/// The same without a clear aperture, up to their domain, and the first with one that has no end.
+/// Shapes without a clear aperture, up to their domain, and the first with one that has no end.
 const UNLIMITED: [Shape; 4] = [
     asphere(0.05, 0.0, None, &[0.0, -1.5e-3]),
     asphere(0.05, -1.0, None, &[0.0, -1.5e-3]),
@@ -82,16 +82,17 @@ impl Shape {
         format!(r#"{{"elements": [{{{shape}, {rim}"thickness": 5, "glass": {{"n": 1.5}}}}]}}"#)
     }
 
-    /// How far from the axis a ray may cross it: up to its rim, and where it has none up to four times the ray's
-    /// distance from the vertex beyond the greatest diameter of curvature, as it is documented.
+    /// Distance from the axis within which a ray may cross the shape: up to its rim, and where it
+    /// has none up to four times the ray's distance from the vertex beyond the greatest diameter of
+    /// curvature, as it is documented.
     fn reach(&self, start: DVec3, direction: DVec3) -> f64 {
         let height = start.cross(direction).length();
         let diameter = self.curvature.iter().map(|c| (2.0 / c).abs()).fold(0.0, f64::max);
         self.semi_diameter.unwrap_or(4.0 * height + diameter)
     }
 
-    /// Where the ray crosses from front to back within its reach, and how often it crosses there at all: by
-    /// the sign of z − sag at 20 000 places of 80 mm.
+    /// First crossing of the ray from front to back within its reach, and the number of crossings
+    /// there at all: by the sign of z − sag at 20 000 places of 80 mm.
     fn crossings(&self, start: DVec3, direction: DVec3) -> (Option<f64>, usize) {
         let reach = self.reach(start, direction);
         let behind = |t: f64| {

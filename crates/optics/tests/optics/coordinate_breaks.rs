@@ -27,7 +27,7 @@ fn rays() -> Vec<Ray> {
         .to_vec()
 }
 
-/// How far two rays are apart: places (mm) and directions.
+/// Difference of two rays: places (mm) and directions.
 fn apart(a: Ray, b: Ray) -> f64 {
     let of = |a: [f64; 3], b: [f64; 3]| (DVec3::from(a) - DVec3::from(b)).length();
     of(a.position, b.position).max(of(a.direction, b.direction))

@@ -43,7 +43,7 @@ fn tags(schema: &Value, found: &mut BTreeSet<String>) {
     }
 }
 
-/// The same of a file.
+/// Collects the tags that a file uses.
 fn used(file: &Value, found: &mut BTreeSet<String>) {
     match file {
         Value::Object(members) => {

@@ -25,8 +25,9 @@ fn rod(n: f64, length: f64, gradient: Value) -> OpticalTrain {
     .unwrap()
 }
 
-/// What a rod of n² = n₀² (1 − g² r²) does to a ray that comes through air to its front at z = 0: place and transverse optical
-/// direction at its end, and the optical path in it.
+/// Closed form of the path of a ray through a rod of n² = n₀² (1 − g² r²), reached through air to
+/// its front at z = 0: place and transverse optical direction at its end, and the optical path in
+/// it.
 fn closed_form(n0: f64, g: f64, length: f64, place: DVec2, across: DVec2) -> (DVec2, DVec2, f64) {
     let square = n0 * n0 * (1.0 - g * g * place.length_squared());
     let t = length / (square - across.length_squared()).sqrt();

@@ -1,4 +1,5 @@
-//! What lens files mean at their limits, and what is no lens. (Where tracing fails: the stability suite.)
+//! Tests of lens files at their limits, and of what is no lens. (Where tracing fails: the stability
+//! suite.)
 
 use etendue_optics::element::{Clip, LensRays, RayStatus};
 use etendue_optics::train::{Focus, FocusError, OpticalTrain, Side};

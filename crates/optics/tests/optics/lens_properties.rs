@@ -1,4 +1,5 @@
-//! What holds for any ray through a lens. (For any lens, with any ray: the stability suite.)
+//! Properties that hold for any ray through a lens. (For any lens, with any ray: the stability
+//! suite.)
 
 use etendue_optics::element::Clip;
 use etendue_optics::train::{LensFile, Side};

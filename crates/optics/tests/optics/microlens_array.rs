@@ -26,7 +26,8 @@ fn fault(keys: &str) -> String {
     file.build(&|name: &str| Err(name.to_owned())).unwrap_err().to_string()
 }
 
-/// Where a ray through (x, y) of the array's plane is 3 mm behind it, coming with slopes (0.01, −0.02).
+/// Point, 3 mm behind the array, of a ray through (x, y) of the array's plane with slopes (0.01,
+/// −0.02).
 fn behind(train: &OpticalTrain, x: f64, y: f64) -> Result<DVec2, RayStatus> {
     let slopes = DVec3::new(0.01, -0.02, 1.0);
     let start = DVec3::new(x, y, 0.0) - 5.0 * slopes;

@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 
 use crate::{build, preset, try_build};
 
-/// How far from `target` (mm, in unfolded coordinates) a ray from the object's side passes it.
+/// Distance at which a ray from the object's side passes `target` (mm, in unfolded coordinates).
 fn miss(train: &OpticalTrain, from: DVec3, towards: DVec3, target: DVec3) -> f64 {
     let at = train.at(550.0).unwrap();
     let end = at.run(Side::Object, Clip::Off, Ray::new(from, towards).unwrap());

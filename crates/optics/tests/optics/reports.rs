@@ -1,4 +1,5 @@
-//! What a report says of lenses that are closed, tilted, square, or asked about light they do not know.
+//! Tests of reports on lenses that are closed, tilted, square, or asked about light they do not
+//! know.
 
 use std::f64::consts::PI;
 

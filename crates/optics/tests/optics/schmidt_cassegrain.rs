@@ -16,7 +16,7 @@ const BEHIND: f64 = 150.0;
 /// The plate's index.
 const INDEX: f64 = 1.5168;
 
-/// Where a ray from infinity at height `h` (mm) crosses the sensor.
+/// Height at which a ray from infinity at height `h` (mm) crosses the sensor.
 fn landing(train: &OpticalTrain, h: f64) -> f64 {
     let at = train.at(train.wavelength()).unwrap();
     let z = train.sensor_z(Focus::AsWritten).unwrap();

@@ -75,7 +75,7 @@ fn glasses_without_published_data_are_read_from_a_catalogue() {
     }
 }
 
-/// What a file that is cut behind one of its surfaces would be: another lens.
+/// A file that is cut behind one of its surfaces would be another lens.
 #[test]
 fn files_that_are_cut_short_are_refused_wherever_they_are_cut() {
     let whole = file("", "", GLASS);

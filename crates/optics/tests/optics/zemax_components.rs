@@ -239,8 +239,8 @@ fn lenses_for_zemax_files() -> Vec<LensFile> {
     files
 }
 
-/// Whether the axis of a lens breaks: from a Zemax file its elements come back as placed in one frame, with the same rays
-/// (`coordinate_breaks`).
+/// True if the axis of a lens breaks: from a Zemax file its elements come back as placed in one
+/// frame, with the same rays (`coordinate_breaks`).
 fn has_break(file: &LensFile) -> bool {
     file.elements.iter().any(|element| matches!(element.part, PartSpec::CoordinateBreak(_)))
 }

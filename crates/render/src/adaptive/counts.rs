@@ -1,4 +1,4 @@
-//! How many samples the pixels of a picture got, and what a user should know of them.
+//! Sample counts of a picture's pixels, and what a user should know of them.
 
 /// The share of pixels that may be so without a word.
 const FEW: f64 = 0.01;
@@ -7,13 +7,13 @@ const FEW: f64 = 0.01;
 /// of thirty pixels that carry all of it.
 const UNJUDGED: f64 = 0.15;
 
-/// How many times the error of as many even pixels it is then, at least: easy and hard parts differ by about two.
+/// Least ratio of that error to the error of as many even pixels: easy and hard parts differ by about two.
 const UNEVEN: f64 = 3.0;
 
 /// The least mean variance, as a share of what is allowed, of which it matters how well it is known.
 const MATTERS: f64 = 0.1;
 
-/// What a unit of variance, and of its square, is counted as: whole numbers add up to the same in any order.
+/// Unit in which variance, and its square, is counted: whole numbers add up to the same in any order.
 const UNIT: f64 = 1000.0;
 
 /// The largest variance of a pixel that is counted, as a share of what is allowed.
@@ -100,7 +100,7 @@ impl SampleCounts {
         [sum / self.pixels.max(1) as f64, if sum > 0.0 { error } else { 0.0 }]
     }
 
-    /// Whether a few pixels bring so much of the picture's variance that nobody can tell how large it is.
+    /// True if a few pixels bring so much of the picture's variance that nobody can tell how large it is.
     #[must_use]
     pub fn is_unjudged(&self) -> bool {
         let [mean, error] = self.variance();
@@ -114,8 +114,7 @@ impl SampleCounts {
         format!("{} to {}, {:.1} in the mean", self.least, self.most, self.mean())
     }
 
-    /// What a user should know of pixels that were given up, or stopped too early, and of a picture that cannot be
-    /// judged.
+    /// Notes for the user on pixels that were given up, or stopped too early, and of a picture that cannot be judged.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         self.of_pixels().into_iter().chain(self.of_rare_light()).collect()
@@ -171,7 +170,8 @@ mod tests {
         variances.map(|v| SampleCounts::of_pixel(16, v)).reduce(SampleCounts::and).unwrap()
     }
 
-    /// What a few pixels bring is known to the root of their number; what all bring by one square each, to √(2/n).
+    /// A picture of few flashes cannot be judged: what a few pixels bring is known to the root of
+    /// their number; what all bring by one square each, to √(2/n).
     #[test]
     fn a_picture_of_few_flashes_cannot_be_judged() {
         let flashes = |every: usize| {

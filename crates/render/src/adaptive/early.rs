@@ -1,4 +1,4 @@
-//! Which blocks stopped too early, by their own samples, which had no part in deciding how many they are.
+//! Detection of blocks that stopped too early, by their own samples, which had no part in deciding how many they are.
 //!
 //! The variances that a block's pixels tell of themselves have the right mean, but a block where no rare flash fell
 //! tells too little, and one where it fell too much. Their own mean, of one sample, is therefore drawn towards that of
@@ -11,13 +11,13 @@ const TOO_MUCH: f64 = 2.0;
 /// Blocks to each side that are taken to be like one.
 const BESIDE: usize = 8;
 
-/// What the pixels of a block tell of themselves.
+/// Variance that the pixels of a block tell of themselves.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct OwnVariance {
     /// The mean of their variances of one sample, as a share of what is allowed, and the variance of that mean.
     mean: f64,
     spread: f64,
-    /// What that is multiplied by for the mean of their variances of all samples.
+    /// Factor on that for the mean of their variances of all samples.
     of_all: f64,
     pixels: usize,
 }
@@ -40,8 +40,7 @@ impl OwnVariance {
     }
 }
 
-/// What is to be thought of a block: its variance as a share of what is allowed, and the probability that it stopped
-/// too early.
+/// Judgement of a block: its variance as a share of what is allowed, and the probability that it stopped too early.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Judgement {
     pub(super) variance: f64,

@@ -1,4 +1,4 @@
-//! What the chief rays of pixels meet, by which pixels are alike.
+//! Guide of pixels by what their chief rays meet, by which pixels are alike.
 //!
 //! The variance of a pixel's samples goes with what it shows: a plain wall, an edge, a ball of glass. Colour, normal and
 //! distance of what its chief ray meets, and how much they change from pixel to pixel, tell which pixels may know each
@@ -12,11 +12,11 @@ const SCALES: [f32; 3] = [0.1, 0.3, 0.2];
 /// Numbers of a guide.
 pub(super) const FEATURES: usize = 8;
 
-/// What a chief ray meets: base colour, geometric normal, and the logarithm of its distance; nothing for a miss.
+/// Hit of a chief ray: base colour, geometric normal, and the logarithm of its distance; nothing for a miss.
 pub(crate) type ChiefHit = [f32; 7];
 
-/// What tells which pixels are alike: colour, normal, and the steps of colour, and of normal or distance, to the pixels
-/// beside, each in units of what makes half a difference.
+/// Features that tell which pixels are alike: colour, normal, and the steps of colour, and of
+/// normal or distance, to the pixels beside, each in units of what makes half a difference.
 pub(super) type Guide = [f32; FEATURES];
 
 /// The guides of the rows of a strip, of `width` columns.
@@ -52,7 +52,7 @@ pub(super) fn guides(hits: &[ChiefHit], width: usize) -> Vec<Guide> {
     (0..hits.len()).map(guide).collect()
 }
 
-/// How much alike two pixels are, 1 at most.
+/// Likeness of two pixels, 1 at most.
 #[inline]
 pub(super) fn likeness(a: &Guide, b: &Guide) -> f32 {
     let square: f32 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();

@@ -53,10 +53,10 @@ pub(crate) struct Adaptive<'a> {
     /// Samples that each pixel has, in rows from the top, and is to have.
     have: Vec<u32>,
     demands: Vec<Demand>,
-    /// What is known of each pixel, and by what it is like others.
+    /// Evidence of each pixel, and the features by which it is like others.
     evidence: Vec<Evidence>,
     guides: Vec<Guide>,
-    /// Which part of what is averaged is judged, and its first value of a pixel.
+    /// Index of the part of what is averaged that is judged, and of its first value of a pixel.
     judged: (usize, usize),
 }
 
@@ -96,7 +96,7 @@ impl<'a> Adaptive<'a> {
         self.have[pixel]..self.demands[pixel].next
     }
 
-    /// Whether any pixel wants more.
+    /// True if any pixel wants more.
     pub(crate) fn goes_on(&self) -> bool {
         self.have.iter().zip(&self.demands).any(|(have, demand)| demand.next > *have)
     }
@@ -148,7 +148,7 @@ impl<'a> Adaptive<'a> {
         self.demands.iter().zip(&self.have).map(lacks).sum()
     }
 
-    /// How many samples the pixels got.
+    /// Counts of the samples that the pixels got.
     pub(crate) fn counts(&self) -> Option<SampleCounts> {
         let width = self.resolution[0] as usize;
         let a_strip = width * TILE as usize;

@@ -1,4 +1,4 @@
-//! When the error of a block's samples is small enough.
+//! Rule of when the error of a block's samples is small enough.
 
 use super::sampled::Sampled;
 use crate::Plan;
@@ -6,7 +6,7 @@ use crate::expose::NoiseOfPixels;
 use crate::stopping::Stopping;
 use etendue_scene::Scene;
 
-/// When samples are enough.
+/// Rule of when samples are enough.
 pub(crate) struct Rule {
     /// Not before there are so many of each pixel.
     pub(crate) least: u32,
@@ -15,7 +15,7 @@ pub(crate) struct Rule {
     allowed: Allowed,
 }
 
-/// What the error of samples is held against.
+/// Reference of the error of samples.
 enum Allowed {
     /// The noise of the sensor, of which the variance of the samples' mean may be this share.
     SensorNoise(Box<NoiseOfPixels>, f64),
@@ -23,7 +23,7 @@ enum Allowed {
     RelativeError(f64),
 }
 
-/// What the samples of a pixel tell.
+/// Noise that the samples of a pixel tell.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PixelNoise {
     /// The variance of their mean: as a share of what the sensor's noise allows, or of light.
@@ -53,7 +53,7 @@ impl Rule {
         Self { least: 4, sigmas, allowed: Allowed::RelativeError(share) }
     }
 
-    /// What the two sets of a pixel's samples tell, `a_set` being in each.
+    /// Noise that the two sets of a pixel's samples tell, `a_set` being the number in each.
     pub(super) fn noise(
         &self,
         Sampled { pixel, sets: [a, b] }: &Sampled<'_>,

@@ -11,7 +11,7 @@ const BLOCK: usize = 8;
 /// Pixels to each side that are asked how large the variance is.
 const REACH: usize = 5;
 
-/// How much a pixel that is unlike all others asks each of them.
+/// Weight that a pixel that is unlike all others gives each of them.
 const LEAST: f32 = 1e-6;
 
 /// The colours of the chessboard.
@@ -31,14 +31,14 @@ const STEP: u32 = 8;
 /// Steps in which the number of samples is sought.
 const BISECTIONS: usize = 24;
 
-/// What is known of a pixel.
+/// Evidence of a pixel.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Evidence {
     /// The sum of the variances of one sample that it told after each round, and of their weights: the squares of its
     /// numbers of samples.
     sum: f64,
     weight: f64,
-    /// What its samples tell now, of the mean of all.
+    /// Variance of the mean of all its samples that they tell now.
     variance: f64,
     light: f64,
 }
@@ -120,7 +120,7 @@ impl Window {
     }
 }
 
-/// What the pixels around tell of one half of a block.
+/// Estimates of one half of a block by the pixels around.
 struct HalfOfBlock {
     /// Its pixels, and the variance of one sample of each.
     pixels: Vec<usize>,
@@ -173,7 +173,8 @@ impl StripOfPixels<'_> {
         }
     }
 
-    /// What the pixels of the other colour tell of those of one in a block: `variances` is that of one sample of each.
+    /// Estimates of the pixels of one colour in a block, by those of the other: `variances` is that
+    /// of one sample of each.
     fn half(&self, place: [usize; 2], half: usize, variances: &[f64]) -> HalfOfBlock {
         let pixels: Vec<usize> =
             self.pixels(place).filter(|&index| self.half_of(index) == half).collect();
@@ -263,7 +264,8 @@ impl StripOfPixels<'_> {
         }
     }
 
-    /// How many samples the pixels got, in a strip whose first row is `top`, of at most `most`; `None` of none.
+    /// Counts of the samples that the pixels got, in a strip whose first row is `top`, of at most
+    /// `most`; `None` of none.
     pub(super) fn counts(
         &self,
         rule: &Rule,
@@ -301,7 +303,7 @@ impl StripOfPixels<'_> {
         Some(SampleCounts { over, ..counts })
     }
 
-    /// What became of the pixels of a block.
+    /// Counts the outcome of the pixels of a block.
     fn counted(
         &self,
         rule: &Rule,
@@ -337,7 +339,7 @@ impl StripOfPixels<'_> {
     }
 }
 
-/// What became of the pixels of a block.
+/// Outcome of the pixels of a block.
 struct CountedBlock {
     /// Those that were not given up.
     done: usize,

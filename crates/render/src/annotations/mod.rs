@@ -50,7 +50,7 @@ pub const BOP: &str = "bop";
 /// The most copies whose whole silhouettes are traced: each takes a structure of its own.
 const MOST_SILHOUETTES: usize = 10_000;
 
-/// Why there are no annotations.
+/// Error of annotations that could not be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum AnnotationError {
@@ -161,7 +161,7 @@ pub(crate) fn bytes_a_pixel(outputs: Outputs) -> u64 {
     survey.max(mattes)
 }
 
-/// Why `scene` has no such annotations, with the remedy; `None` where it has what `outputs` ask for.
+/// Reason why `scene` has no such annotations, with the remedy; `None` where it has what `outputs` ask for.
 #[must_use]
 pub fn refusal(scene: &Scene, outputs: Outputs) -> Option<String> {
     let kind = match outputs {

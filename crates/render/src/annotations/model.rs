@@ -17,7 +17,7 @@ use crate::output::OutputError;
 /// Millimetres a metre.
 pub(super) const MM: f64 = 1000.0;
 
-/// How much longer than what was found the diameter may be, as a share.
+/// Greatest excess of the diameter over what was found, as a share.
 const DIAMETER_TOLERANCE: f64 = 1e-6;
 
 /// Points that are compared one by one.
@@ -29,7 +29,7 @@ pub struct Models {
     models: BTreeMap<String, Model>,
 }
 
-/// What a model is made from.
+/// Geometry that a model is made from.
 #[derive(Debug, Clone)]
 struct Model {
     geometry: Arc<Geometry>,
@@ -70,7 +70,7 @@ impl Models {
     }
 }
 
-/// When data layers see the middle row (s from the frame's time).
+/// Time at which data layers see the middle row (s from the frame's time).
 pub(super) fn truth_time(scene: &Scene) -> f64 {
     let [_, rows] = scene.camera.resolution();
     scene.camera.truth_time(0.5 * f64::from(rows))

@@ -1,4 +1,4 @@
-//! Where a copy stands and how it is turned: the rigid part of its placement.
+//! Rigid part of a copy's placement: where it stands and how it is turned.
 //!
 //! A placement's linear part A is a rotation R after a symmetric stretch (the polar decomposition), which Newton's
 //! iteration X ← (X + X⁻ᵀ) / 2 finds (N. J. Higham, "Computing the polar decomposition — with applications", 1986). The

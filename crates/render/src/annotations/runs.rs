@@ -89,7 +89,7 @@ impl Mask {
         runs
     }
 
-    /// How many pixels it has.
+    /// Number of pixels of the mask.
     #[must_use]
     pub fn area(&self) -> u32 {
         self.runs().iter().map(|[start, end]| end - start).sum()

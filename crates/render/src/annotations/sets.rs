@@ -20,7 +20,7 @@ const SCENE: &str = "train/000000";
 /// Folders below it.
 const FOLDERS: [&str; 4] = ["rgb", "depth", "mask", "mask_visib"];
 
-/// Where an image comes from.
+/// Source of an image.
 #[derive(Debug, Clone)]
 pub enum Source<'a> {
     /// A file that was written.

@@ -1,4 +1,4 @@
-//! Which copy each chief ray hits, and what each would cover if nothing were before it.
+//! Survey of which copy each chief ray hits, and what each would cover if nothing were before it.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -26,7 +26,7 @@ const DEPTH_STEP: f64 = 0.1;
 /// bytes of a file.
 pub(super) const BYTES_A_PIXEL: u64 = 2 * (4 + 8 + 4) + 2 + 2;
 
-/// Which copy each pixel sees, and how far away, down the columns.
+/// Copy that each pixel sees, and its depth, down the columns.
 struct CopiesByPixel {
     /// Index of the copy, or [`MISS`].
     copy: Vec<u32>,
@@ -143,7 +143,7 @@ fn aim(scene: &Scene, x: i64, rows: Range<i64>, rays: &mut RayBatch) {
     scene.camera.rays_through(&columns, &rows, rays);
 }
 
-/// What the copy of these placements would cover if nothing were before it.
+/// Silhouette that the copy of these placements would have if nothing were before it.
 fn silhouette(
     scene: &Scene,
     plan: &Plan,

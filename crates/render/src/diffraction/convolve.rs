@@ -15,7 +15,7 @@ use super::spreads::Spreads;
 use etendue_optics::analysis::CellSpread;
 use etendue_optics::analysis::spread::quick_length;
 
-/// Where less than this share of a spread is known, nothing is.
+/// Share of a spread that has to be known, as otherwise nothing is.
 const KNOWN: f64 = 1e-6;
 
 /// The scene along chief rays on cells of pixels.
@@ -30,7 +30,7 @@ pub(crate) struct CellPicture {
     pub(crate) depths: Vec<f32>,
 }
 
-/// What is spread of one layer: its light, where it is, and where it could be seen.
+/// Planes of one layer that are spread: its light, where it is, and where it could be seen.
 struct Planes {
     light: Vec<Vec<f64>>,
     /// Of the rearmost, which nothing shines through, it is not asked.

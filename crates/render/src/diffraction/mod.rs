@@ -52,7 +52,7 @@ pub(crate) struct SpreadLight {
     pub(crate) notes: Vec<String>,
 }
 
-/// Whether the plan's picture is of light that is spread as waves are.
+/// True if the plan's picture is of light that is spread as waves are.
 fn is_wanted(scene: &Scene, plan: &Plan) -> bool {
     scene.camera.diffracts() && plan.layers.contains(&LayerSpec::Radiance)
 }
@@ -126,7 +126,7 @@ impl Watch for Part<'_> {
     fn look(&self, _so_far: &SoFar<'_>) {}
 }
 
-/// How many cells a pixel has a side.
+/// Number of cells of a pixel a side.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 3")]
 fn cells_a_pixel(pitch: f64, finest: f64) -> u32 {
     let cells = (CELLS_OF_DETAIL * pitch / finest - 1e-9).ceil();
@@ -221,7 +221,7 @@ fn cell_picture(
     Ok((CellPicture { size, cells: cells as usize, light, depths }, lit, film))
 }
 
-/// What of light arrives: a grid over the picture that is interpolated in.
+/// Illumination: the light that arrives, on a grid over the picture that is interpolated in.
 #[derive(Debug, Clone)]
 pub(crate) struct Illumination {
     values: Vec<f64>,
@@ -232,7 +232,7 @@ pub(crate) struct Illumination {
 const PLACES: u32 = 25;
 
 impl Illumination {
-    /// What arrives at a place of the picture (pixels from the corner).
+    /// Illumination at a place of the picture (pixels from the corner).
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the grid")]
     pub(crate) fn at(&self, [column, row]: [f64; 2]) -> f64 {
         let last = f64::from(PLACES - 1);
@@ -249,7 +249,7 @@ impl Illumination {
     }
 }
 
-/// What arrives of each band; where halves of the picture are alike, of one quarter.
+/// Computes the illumination of each band; where halves of the picture are alike, of one quarter.
 fn illumination(
     opened: &Camera,
     plan: &Plan,

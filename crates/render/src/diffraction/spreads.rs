@@ -18,7 +18,7 @@ const WAVELENGTHS: usize = 3;
 /// Waves of defocus that one depth may stand for.
 const ONE_DEPTH: f64 = 0.02;
 
-/// How far towards the middle a dark node looks each time.
+/// Factor by which a dark node looks towards the middle each time.
 const INWARDS: f64 = 0.88;
 
 /// Spreads that differ by less than this share of the light are one: their modulation differs by less.
@@ -34,7 +34,7 @@ const TILES: usize = 16;
 pub(crate) struct Spreads {
     /// Nodes a side.
     pub(crate) side: usize,
-    /// Whether all of them have one spread: they are tiles then, which share no light.
+    /// True if all of them have one spread: they are tiles then, which share no light.
     pub(crate) is_uniform: bool,
     /// Those of the nodes that others are seen in a mirror from, and of those that stand for themselves.
     fields: Vec<Option<FieldsBetween>>,
@@ -159,8 +159,8 @@ impl Spreads {
         [self.side / 2 * (self.side + 1), 0, last, last * self.side, last * (self.side + 1)]
     }
 
-    /// Whether the spreads in the corners are hardly others than that in the middle: in the first, the middle and the
-    /// last band, of the rearmost and the foremost layer.
+    /// True if the spreads in the corners are hardly others than that in the middle: in the first,
+    /// the middle and the last band, of the rearmost and the foremost layer.
     fn are_alike(&self) -> bool {
         let [middle, corners @ ..] = self.ends();
         let bands = self.bands.len();
@@ -184,7 +184,7 @@ impl Spreads {
         })
     }
 
-    /// The same with the middle's spread for all of the picture.
+    /// Replaces the spreads by the middle's for all of the picture.
     fn joined(mut self) -> Self {
         let fields = self.fields.swap_remove(self.own[self.ends()[0]].0);
         self.fields = vec![fields];

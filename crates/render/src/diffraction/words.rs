@@ -1,4 +1,4 @@
-//! Whether waves would show in a picture, in words.
+//! Notes, in words, on whether waves would show in a picture.
 
 use etendue_camera::LensCamera;
 use etendue_geometry::glam::DVec3;
@@ -17,7 +17,7 @@ const AIRY: f64 = 2.44;
 /// Discs of fewer pixels do not show.
 const SHOWS: f64 = 1.0;
 
-/// Whether light is spread as waves are, and whether that matters; of pictures of light behind a lens.
+/// Decision whether light is spread as waves are, with whether that matters; of pictures of light behind a lens.
 pub(crate) fn decision(scene: &Scene, plan: &Plan) -> Option<Decision> {
     let lens = scene.camera.lens().filter(|lens| lens.lenslets().is_none())?;
     if !plan.layers.contains(&LayerSpec::Radiance) {

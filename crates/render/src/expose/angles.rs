@@ -1,4 +1,4 @@
-//! What of the light pixels see by the angle of its chief ray.
+//! Share of the light that pixels see by the angle of its chief ray.
 
 use etendue_camera::Camera;
 use etendue_geometry::RayBatch;

@@ -25,7 +25,7 @@ pub(crate) fn bands(scene: &Scene) -> BandChoice {
     }
 }
 
-/// How many bands there are, and why.
+/// Number of bands, and the reason.
 pub(crate) fn explain_bands(scene: &Scene, chosen: &BandChoice) -> (String, String) {
     let choice = match &chosen.bands {
         Bands::Grey => "1".to_owned(),
@@ -50,7 +50,7 @@ pub(crate) fn explain_bands(scene: &Scene, chosen: &BandChoice) -> (String, Stri
     (choice, because)
 }
 
-/// What bands lose, in words.
+/// Loss by the bands, in words.
 fn in_words(error: f64, chosen: &BandChoice, scene: &Scene) -> String {
     let percent = 100.0 * error;
     let beyond = match beyond_visible(&chosen.bands) {
@@ -133,7 +133,7 @@ fn upsampled(scene: &Scene) -> Option<String> {
     ))
 }
 
-/// What materials and glasses do not know of the wavelengths that are rendered.
+/// Notes on what materials and glasses do not know of the wavelengths that are rendered.
 pub(super) fn unknown(scene: &Scene, bands: &Bands) -> Vec<String> {
     let mut notes = Vec::new();
     if let Some([from, to]) = beyond_visible(bands) {

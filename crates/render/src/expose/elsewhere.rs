@@ -13,7 +13,7 @@ use crate::forecast::bytes_exposed;
 pub struct PictureLight {
     /// Columns and rows.
     pub size: [usize; 2],
-    /// What each pixel has.
+    /// Light of each pixel.
     pub light: PixelLight,
 }
 

@@ -32,7 +32,7 @@ pub(super) fn name(digits: usize, stem: &str, number: u32, ending: &str) -> Stri
 /// Writes one exposure after the other.
 pub(super) struct ExposureWriter<'a> {
     pub(super) sensor: &'a Sensor,
-    /// What its second read-out is, where it has one.
+    /// Sensor of its second read-out, where it has one.
     pub(super) second: Option<Sensor>,
     pub(super) light: &'a SensorLight,
     pub(super) files: &'a Transaction,
@@ -353,7 +353,7 @@ pub(super) const HDR_NAMES: [(&str, &str); 2] = [
     ("raw_hdr_sigma.npy", "their standard deviation"),
 ];
 
-/// What the files of a second read-out are called.
+/// File name of a second read-out.
 pub(super) const SECOND: &str = "raw_second";
 
 /// Names of the files of expected value and variance.

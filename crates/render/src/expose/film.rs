@@ -14,11 +14,11 @@ use crate::output::{Channel, Layer, Look, Picture, Values};
 /// Light in spectral bands, as a sensor is given it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BandFilm {
-    /// What the bands are.
+    /// Bands of the film.
     pub bands: Bands,
     /// `[row][column][band]`.
     pub values: Vec<f32>,
-    /// The same of the light that came through parts of the pupil, where it is told apart.
+    /// Values, likewise, of the light that came through parts of the pupil, where it is told apart.
     pub parts: Vec<(LayerSpec, Vec<f32>)>,
 }
 
@@ -96,8 +96,8 @@ impl BandFilm {
         Ok([plane(0)?, plane(1)?, plane(2)?])
     }
 
-    /// What falls on the sensor: in physical mode the light of a lens camera is radiance
-    /// (W·m⁻²·sr⁻¹·nm⁻¹), and the projected solid angle of its pupil makes irradiance
+    /// Film of the irradiance on the sensor: in physical mode the light of a lens camera is
+    /// radiance (W·m⁻²·sr⁻¹·nm⁻¹), and the projected solid angle of its pupil makes irradiance
     /// (W·m⁻²·nm⁻¹) of it. Cameras without an aperture give irradiance as it is.
     #[must_use]
     pub(super) fn on_sensor(self, scene: &Scene, sensor: &Sensor) -> Self {
@@ -140,7 +140,7 @@ impl BandFilm {
         self
     }
 
-    /// The same with the parts of the light of a picture in red, green and blue, where a sensor asks for them.
+    /// Adds the parts of the light of a picture in red, green and blue, where a sensor asks for them.
     ///
     /// # Errors
     ///
@@ -160,7 +160,7 @@ impl BandFilm {
         Ok(self)
     }
 
-    /// The same whose light is the sum of its parts, to the bit, where it has some.
+    /// Replaces the light by the sum of its parts, to the bit, where it has some.
     #[must_use]
     pub(super) fn summed(mut self) -> Self {
         let Some(((_, first), others)) = self.parts.split_first() else { return self };
@@ -195,7 +195,7 @@ impl BandFilm {
     }
 }
 
-/// What falls on the sensor, of a unit of the picture's light.
+/// Factor from a unit of the picture's light to what falls on the sensor.
 pub(super) fn light_factor(scene: &Scene, sensor: &Sensor) -> f64 {
     match sensor.radiometry() {
         Radiometry::Physical => scene.camera.pupil_solid_angle().unwrap_or(1.0),
@@ -219,10 +219,10 @@ pub(crate) fn three_planes(layer: &Layer) -> Option<[&[f32]; 3]> {
     }
 }
 
-/// What the layer of a hyperspectral cube is called.
+/// Name of the layer of a hyperspectral cube.
 pub const SPECTRUM: &str = "Spectrum";
 
-/// Whether the picture has a hyperspectral cube.
+/// True if the picture has a hyperspectral cube.
 pub(crate) fn has_spectrum(scene: &Scene) -> bool {
     scene.sensor.as_ref().is_some_and(|sensor| {
         sensor.spec().kind == SensorKind::Multispectral && sensor.bands().grid().is_some()

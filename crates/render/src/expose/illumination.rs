@@ -1,4 +1,4 @@
-//! What light is multiplied by on its way to the sensor: the curves that bands have to tell apart.
+//! Factors on the light on its way to the sensor: the curves that bands have to tell apart.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -154,8 +154,8 @@ pub(super) fn light(scene: &Scene, bands: &Bands) -> Vec<f64> {
     sum
 }
 
-/// What a material multiplies light by that is no mixture of red, green and blue: what its body leaves of it,
-/// what a measured metal reflects, and curves, up to `most` times one after the other.
+/// Factors on light by a material that are no mixtures of red, green and blue: what its body leaves
+/// of it, what a measured metal reflects, and curves, up to `most` times one after the other.
 fn factors(material: &Material, most: u8) -> Vec<Factor> {
     let mut factors = Vec::new();
     let absorption = material.absorption();
@@ -191,7 +191,8 @@ fn factors(material: &Material, most: u8) -> Vec<Factor> {
     factors
 }
 
-/// How often light may be scattered on its way, and 2 at most: what is darker than two surfaces leave counts little.
+/// Greatest number of times that light is taken to be scattered on its way, 2 at most: what is
+/// darker than two surfaces leave counts little.
 fn most_scattered(scene: &Scene) -> u8 {
     let light = scene.tracer.and_then(|tracer| tracer.row().light);
     let bounces = light.map_or(1, |light| light.rules.bounces);
@@ -218,8 +219,8 @@ impl Colours {
         self.mirroring |= surface.is_some() || material.scattering.shows_others();
     }
 
-    /// How many of them may follow one another on a path of the scene's tracer. A body is entered and left,
-    /// so that what passes it is coloured twice.
+    /// Number of them that may follow one another on a path of the scene's tracer. A body is
+    /// entered and left, so that what passes it is coloured twice.
     fn in_turn(&self, scene: &Scene) -> usize {
         let Some(light) = scene.tracer.and_then(|tracer| tracer.row().light) else { return 0 };
         let bounces = light.rules.bounces as usize;

@@ -1,5 +1,5 @@
-//! What the camera's sensor makes of the light: the film is rendered once and exposed as often as
-//! the scene says. Raw numbers, previews, moments and a sidecar go out as files.
+//! Exposures of the camera's sensor: the film is rendered once and exposed as often as the scene
+//! says. Raw numbers, previews, moments and a sidecar go out as files.
 //!
 //! | file | what it is |
 //! |---|---|
@@ -55,7 +55,7 @@ use crate::output::{OutputError, Outputs, Picture, PictureError, sidecar};
 use files::{ExposureWriter, Sidecar};
 use film::colors;
 
-/// Why an exposure came to nothing.
+/// Error of an exposure.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExposeError {
@@ -82,7 +82,7 @@ impl From<WriteError> for ExposeError {
     }
 }
 
-/// What the sensor will do, and why.
+/// Decision of what the sensor will do, with the reason.
 pub(crate) fn explain_sensor(scene: &Scene) -> Option<Decision> {
     let sensor = scene.sensor.as_ref()?;
     if scene.picture.is_none() {
@@ -119,12 +119,12 @@ fn name(sensor: &Sensor) -> String {
     }
 }
 
-/// What was written.
+/// Files that were written.
 #[derive(Debug, Default)]
 pub struct Exposed {
     /// The files, in the order they were written.
     pub files: Vec<PathBuf>,
-    /// What a user should know.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
@@ -135,7 +135,7 @@ pub struct SensorLight {
     film: BandFilm,
     /// Of the scene's samples, and of temporal noise.
     seeds: [u64; 2],
-    /// What each channel makes of a white surface in the scene's light, the most being 1.
+    /// Response of each channel to a white surface in the scene's light, the most being 1.
     pub(super) white: Vec<f64>,
     header: Vec<(String, String)>,
     notes: Vec<String>,
@@ -207,7 +207,7 @@ impl SensorLight {
         Ok(Ok(light.metered_by_itself()))
     }
 
-    /// The same at the exposure that its own light asks for, where that is metered.
+    /// Sets the exposure that its own light asks for, where that is metered.
     pub(super) fn metered_by_itself(mut self) -> Self {
         if self.sensor.spec().auto_exposure.is_none() {
             return self;
@@ -224,7 +224,7 @@ impl SensorLight {
         }
     }
 
-    /// The same at an exposure that was metered elsewhere (s), such as on the first frame of a sequence.
+    /// Replaces the exposure time by one that was metered elsewhere (s), such as on the first frame of a sequence.
     #[must_use]
     pub fn at_exposure(mut self, time: f64) -> Self {
         self.sensor = self.sensor.at_exposure(time);
@@ -232,7 +232,7 @@ impl SensorLight {
         self
     }
 
-    /// The same light times a factor; 0 of a sensor in the dark.
+    /// Multiplies the light by a factor; 0 of a sensor in the dark.
     #[must_use]
     pub fn scaled(mut self, factor: f64) -> Self {
         self.film = self.film.times(factor).summed();
@@ -272,7 +272,7 @@ impl SensorLight {
         self.sensor.electrons_of_brightest(self.film(), exposure, 1e-3)
     }
 
-    /// What each channel makes of a white surface in the scene's light, the most being 1.
+    /// Response of each channel to a white surface in the scene's light, the most being 1.
     #[must_use]
     pub fn white(&self) -> &[f64] {
         &self.white
@@ -296,7 +296,7 @@ impl SensorLight {
         &self.sensor
     }
 
-    /// What a user should know of the light.
+    /// Notes on the light for the user.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes
@@ -320,7 +320,7 @@ impl SensorLight {
         sensor.expose(self.film(), exposure, self.seeds[1])
     }
 
-    /// What the sensor records in the mean over frames, and its variance, in one exposure.
+    /// Mean over frames of what the sensor records, and its variance, in one exposure.
     ///
     /// # Errors
     ///
@@ -333,7 +333,7 @@ impl SensorLight {
         Film { values: &self.film.values }
     }
 
-    /// What the files of a photodiode are called, of which the light is a layer.
+    /// File name of a photodiode whose light is a layer.
     fn part_name(&self, layer: LayerSpec) -> &'static str {
         let own = photodiodes(&self.sensor).iter().find(|(known, _)| *known == layer);
         own.map_or("", |(_, name)| name)
@@ -488,7 +488,7 @@ fn digits(shots: usize) -> usize {
     }
 }
 
-/// What a film has that is no light, if anything.
+/// Note on what a film has that is no light, if anything.
 fn in_words(invalid: InvalidValues) -> Option<String> {
     let InvalidValues { negative, not_finite } = invalid;
     invalid.any().then(|| {

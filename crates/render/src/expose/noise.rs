@@ -20,7 +20,7 @@ pub(crate) struct NoiseOfPixels {
     exposures: Vec<ExposureResponse>,
 }
 
-/// What the sensor makes of light in one of its exposure times.
+/// Response of the sensor to light in one of its exposure times.
 struct ExposureResponse {
     /// Seconds.
     exposure: f64,

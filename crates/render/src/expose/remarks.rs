@@ -1,4 +1,4 @@
-//! What a user should know of an exposure: how much of it is saturated or black, and what would mend it.
+//! Notes for the user on an exposure: how much of it is saturated or black, and what would mend it.
 
 use etendue_sensor::{EXPOSURES, Exposure, Film, Radiometry, RawImage, Sensor};
 
@@ -44,7 +44,7 @@ pub(super) fn on(sensor: &Sensor, film: Film<'_>, image: &RawImage, shot: Exposu
     saturated.into_iter().chain(black).collect()
 }
 
-/// How to get less than saturation.
+/// Advice on how to get less than saturation.
 fn less(sensor: &Sensor, film: Film<'_>, shot: Exposure) -> String {
     let dark = sensor.dark_current() * shot.exposure;
     if dark >= 0.5 * sensor.saturation() {
@@ -75,7 +75,7 @@ fn less(sensor: &Sensor, film: Film<'_>, shot: Exposure) -> String {
     }
 }
 
-/// How to see something.
+/// Advice on how to see something.
 fn more(sensor: &Sensor, film: Film<'_>, shot: Exposure) -> String {
     let mean = sensor.mean_electrons(film, shot.exposure);
     if mean <= 0.0 {

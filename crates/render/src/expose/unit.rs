@@ -6,7 +6,7 @@ use std::fmt;
 use etendue_scene::Scene;
 use etendue_sensor::Radiometry;
 
-/// What the values of a picture are.
+/// Unit of a picture's values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LightUnit {
     /// Intensities, of which 1 is full scale: for sensors of `digital` radiometry.
@@ -27,7 +27,7 @@ const IRRADIANCE: &str = "W.m^-2.nm^-1";
 /// them, mean radiance a nanometre.
 const LAYOUT_WORD: &str = "W.m^-2.sr^-1";
 
-/// How a unit may be given.
+/// Known ways to write a unit.
 pub const KNOWN_UNITS: &str = "1 (1 is full scale), W/m2/sr/nm (spectral radiance) or W/m2/nm (spectral irradiance on the \
                                sensor), with mW, uW, cm2, um and the like";
 
@@ -114,9 +114,9 @@ pub fn pupil_solid_angle(f_number: f64, magnification: f64) -> f64 {
 struct Powers {
     watt: i32,
     steradian: i32,
-    /// Whether there is one area below the line.
+    /// True if there is one area below the line.
     area: bool,
-    /// Whether there is one length of a wavelength below the line.
+    /// True if there is one length of a wavelength below the line.
     wavelength: bool,
     /// To W, m², sr and nm; 0 is none yet.
     factor: f64,

@@ -1,5 +1,4 @@
-//! Where views are sampled: the middles of the lenslets' images, and those of each band behind glass that
-//! disperses.
+//! Sampling places of views: the middles of the lenslets' images, and those of each band behind glass that disperses.
 
 use etendue_camera::{CameraError, LensCamera, LightField};
 use etendue_spectrum::Bands;
@@ -15,7 +14,7 @@ pub(super) struct Centres {
     design: Places,
     /// Empty where glass does not tell wavelengths apart.
     by_band: Vec<Places>,
-    /// How far those of a band are from those of the design wavelength at most (pixels).
+    /// Greatest distance of a band's centres from those of the design wavelength (pixels).
     apart: f64,
     /// From how far apart (pixels) on each band is sampled at its own. By itself 0.02: a disparity of 0.2 moves the
     /// waves of views by 0.004 columns over it, which is an error of 60 dB.
@@ -55,12 +54,12 @@ impl Centres {
         &self.by_band
     }
 
-    /// How far those of a band are from those of the design wavelength at most (pixels).
+    /// Greatest distance of a band's centres from those of the design wavelength (pixels).
     pub(super) fn apart(&self) -> f64 {
         self.apart
     }
 
-    /// Whether bands are sampled each at its own centres.
+    /// True if bands are sampled each at its own centres.
     pub(super) fn are_apart(&self) -> bool {
         self.apart > self.most
     }

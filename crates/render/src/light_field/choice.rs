@@ -1,4 +1,4 @@
-//! Which views a raw picture holds: as many about the middle one as are those of an ideal lens.
+//! Choice of the views that a raw picture holds: as many about the middle one as are those of an ideal lens.
 
 use etendue_camera::{Camera, CameraError, LensCamera, LightField, Projection, ViewGrid};
 use etendue_scene::file::AccuracySpec;
@@ -15,9 +15,9 @@ pub(super) struct ChosenViews {
     /// The ideal lens that they are held against.
     pub(super) reference: Camera,
     pub(super) grid: Arc<ViewGrid>,
-    /// What they see; `None` where there is no raw picture, or no view.
+    /// Response of the views; `None` where there is no raw picture, or no view.
     pub(super) response: Option<ViewResponse>,
-    /// Why there are no views, where there are none.
+    /// Reason why there are no views, where there are none.
     pub(super) no_views: Option<String>,
 }
 
@@ -94,7 +94,7 @@ const OFF: f64 = 0.005;
 const BENT: f64 = 0.04;
 
 impl ChosenViews {
-    /// What a user should know of the views of `camera`.
+    /// Notes for the user on the views of `camera`.
     pub(super) fn notes(&self, camera: &Camera) -> Vec<String> {
         let Some(response) = &self.response else { return Vec::new() };
         let mut notes = Vec::new();
@@ -122,7 +122,7 @@ impl ChosenViews {
     }
 }
 
-/// Whether a filter, which is the same for all lenslets, makes the light of colours unlike.
+/// True if a filter, which is the same for all lenslets, makes the light of colours unlike.
 fn is_coloured(lens: &LensCamera) -> bool {
     let elements = lens.focused().train().elements();
     elements.iter().flat_map(|of| of.part.curves()).any(|curve| curve.as_flat().is_none())

@@ -1,5 +1,4 @@
-//! What the light of a view is multiplied with to be that of an ideal lens: a parabola over its rows and
-//! columns.
+//! Gain of a view, which makes its light that of an ideal lens: a parabola over its rows and columns.
 
 /// Powers of column and row, from −1 to 1 over a view, in the order of the factors.
 const POWERS: [[i32; 2]; 6] = [[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]];

@@ -16,7 +16,7 @@ use super::{LightFieldError, by_layer, planes, white};
 use crate::RenderError;
 use crate::output::{Development, Picture};
 
-/// What a light-field camera's picture holds: views, or of a focused camera what its lenslets see of a plane.
+/// Views of a light-field camera's picture, or, of a focused camera, what its lenslets see of a plane.
 #[derive(Debug, Clone)]
 pub struct LightFieldViews {
     source: Source,
@@ -35,7 +35,7 @@ const FARTHEST: f64 = 5.0;
 const STEP: f64 = 1.02;
 
 impl LightFieldViews {
-    /// What `picture` of `scene` holds; `None` of other cameras, of those that have neither
+    /// Decodes what `picture` of `scene` holds; `None` of other cameras, of those that have neither
     /// [views](etendue_camera::Camera::no_views) nor patches without gaps, and without a picture.
     ///
     /// # Errors

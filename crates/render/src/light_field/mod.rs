@@ -1,6 +1,6 @@
-//! What a light-field camera leaves beside its picture: a white image, where the lenslets' images lie,
-//! the views decoded from the picture, the views of an ideal lens, depth and disparity of the middle one,
-//! and all of it in the layout of the HCI 4D light-field benchmark.
+//! Files that a light-field camera leaves beside its picture: a white image, where the lenslets'
+//! images lie, the views decoded from the picture, the views of an ideal lens, depth and disparity
+//! of the middle one, and all of it in the layout of the HCI 4D light-field benchmark.
 //!
 //! | module | idea |
 //! |---|---|
@@ -55,7 +55,7 @@ pub(crate) use patches::refocused_bytes;
 use views::Views;
 pub use white::white_rows;
 
-/// Why the set is not complete.
+/// Error of a light-field set that is not complete.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LightFieldError {
@@ -79,12 +79,12 @@ impl From<PictureError> for LightFieldError {
     }
 }
 
-/// What was written.
+/// Files that were written.
 #[derive(Debug, Default)]
 pub struct LightFieldSet {
     /// The files, in the order they were written.
     pub files: Vec<PathBuf>,
-    /// What a user should know.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
@@ -224,7 +224,7 @@ fn by_layer(
     Ok([colors, spectrum])
 }
 
-/// Why a hexagonal array leaves no folder of the benchmark.
+/// Note on a hexagonal array, which leaves no folder of the benchmark.
 const HEXAGONAL: &str = "hci is not written: the benchmark's pictures have square pixels, and the views of a \
                          hexagonal array have rows 0.866 columns apart, every other one moved by half a column";
 
@@ -267,7 +267,7 @@ fn central_depth(
     Ok(values.map_or_else(Vec::new, |values| (0..values.len()).map(|i| values.at(i)).collect()))
 }
 
-/// Where the set goes.
+/// Writer of the set, with its destination.
 struct SetWriter<'a> {
     files: &'a Transaction,
     folder: &'a Path,

@@ -28,7 +28,7 @@ const RIM: f64 = 1.75;
 /// others are sharper: waves of 7 pixels lose 3.3 % of their amplitude by it.
 const MOST_BLUR: f64 = 1.0;
 
-/// How a picture is put together.
+/// Layout by which a picture is put together.
 #[derive(Debug, Clone)]
 pub(super) struct Patches {
     pub(super) facts: PatchFacts,
@@ -42,7 +42,7 @@ pub(super) struct Patches {
 struct PatchLenslet {
     middle: DVec2,
     image: DVec2,
-    /// Whether it sees the plane as sharp as any does.
+    /// True if it sees the plane as sharp as any does.
     is_sharp: bool,
 }
 
@@ -193,7 +193,7 @@ impl Patches {
         Ok(patches)
     }
 
-    /// What a user should know.
+    /// Note for the user.
     pub(super) fn note(&self) -> Option<String> {
         let blur = self.facts.blur_px;
         (blur > MOST_BLUR).then(|| {
@@ -329,14 +329,14 @@ pub(crate) fn refocused_bytes(lens: &LensCamera, light_field: &LightField) -> u6
     EACH.saturating_mul(pixels)
 }
 
-/// How many times larger than in a plane things are on the sensor, both at z (mm), and the other way round.
+/// Magnification from a plane to the sensor, both at z (mm), with the image the other way round.
 fn magnification(view: &BehindLenslets, sensor_z: f64, plane: f64) -> f64 {
     let principal = view.principal_distance(0);
     let [slope, _] = view.sight(0, sensor_z).central(principal);
     1.0 / (slope * (view.front_z - principal - plane))
 }
 
-/// How far a point of the rim of the exit pupil is spread on the sensor at z (mm) by a type of lenslet (mm).
+/// Spread of a point of the rim of the exit pupil on the sensor at z (mm), by a type of lenslet (mm).
 fn spread(view: &BehindLenslets, kind: usize, sensor_z: f64) -> f64 {
     let sight = view.sight(kind, sensor_z);
     let [over_array, over_sensor] = match view.exit_pupil_z() {

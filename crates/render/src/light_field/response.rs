@@ -1,6 +1,6 @@
-//! What the pixels of views see, by rays: of the camera itself, as its raw picture is sampled, and of the ideal
-//! lens that its views are held against. Light that the lenslets and the main lens lose, places that their
-//! aberrations move, and how far both are spread.
+//! Response of the pixels of views, by rays: of the camera itself, as its raw picture is sampled,
+//! and of the ideal lens that its views are held against. Light that the lenslets and the main lens
+//! lose, places that their aberrations move, and how far both are spread.
 //!
 //! Both are asked for waves of [`PERIOD`] columns about a mean of 0.5: of a wave e^(iκx) a pixel shows
 //! the mean of e^(iκx) over its rays. What is different is the error of the view.
@@ -22,8 +22,8 @@ const NODES: u32 = 5;
 /// Rays a pixel in each of two sets: its light is right to a thousandth where nothing cuts it.
 const RAYS: u32 = 256;
 
-/// The same through cubic convolution, some of whose rays count less than nothing: the light of one is right to a
-/// percent, and the squares of errors in the mean over 25 lenslets to 47 dB. Colours share them.
+/// Rays of a pixel through cubic convolution, in each of two sets, some of which count less than nothing: the light of
+/// one is right to a percent, and the squares of errors in the mean over 25 lenslets to 47 dB. Colours share them.
 const CUBIC_RAYS: u32 = 1024;
 
 /// Sets of rays. Their errors have nothing to do with each other, so that the product of what both say of an
@@ -48,9 +48,9 @@ const WAVES: usize = 2 * DISPARITIES.len();
 
 type Complex = [f64; 2];
 
-/// What a pixel sees: its light, the means of the viewpoints (views, along the rows) and of the places in the
-/// plane of disparity 0 (columns) that its rays come from, and what both sets of rays say of waves in each colour
-/// that is looked at.
+/// View of a pixel: its light, the means of the viewpoints (views, along the rows) and of the
+/// places in the plane of disparity 0 (columns) that its rays come from, and what both sets of rays
+/// say of waves in each colour that is looked at.
 #[derive(Debug, Clone, Default)]
 pub(super) struct PixelView {
     light: f64,
@@ -66,7 +66,7 @@ struct Waves {
     waves: [[Complex; 2]; DISPARITIES.len()],
 }
 
-/// Where a pixel gets its value from.
+/// Source of a pixel's value.
 #[derive(Debug, Clone, Copy)]
 enum Sampling {
     /// A pixel whose corner is here.
@@ -75,7 +75,7 @@ enum Sampling {
     Cubic([f64; 2]),
 }
 
-/// What the views of a raw picture see.
+/// Rays of the views of a raw picture.
 #[derive(Debug, Clone)]
 pub(super) struct ViewRays {
     /// Rows and columns of the nodes.
@@ -85,7 +85,7 @@ pub(super) struct ViewRays {
     seen: Vec<Vec<PixelView>>,
 }
 
-/// How a camera's views differ from an ideal lens'.
+/// Response of a camera's views, against an ideal lens'.
 #[derive(Debug, Clone)]
 pub(super) struct ViewResponse {
     /// Of each view: what its light is multiplied with to be that of the ideal lens.
@@ -93,7 +93,7 @@ pub(super) struct ViewResponse {
     /// Of each view: its waves against the ideal ones (dB).
     psnr: Vec<f64>,
     views: u32,
-    /// How far (columns) views stand from the ideal ones at most in the mean, by the main lens' distortion.
+    /// Greatest mean distance (columns) of views from the ideal ones, by the main lens' distortion.
     pub(super) distortion: f64,
 }
 
@@ -131,7 +131,7 @@ impl ViewRays {
         })
     }
 
-    /// The same of an ideal lens with so many `views` a side.
+    /// Traces the rays of an ideal lens with so many `views` a side.
     pub(super) fn of_reference(reference: &Camera, views: u32, unit: &ViewGrid) -> Self {
         let [cols, rows] = unit.view_resolution();
         Self::traced(views, unit, |number, [across, down], [row, col]| {
@@ -165,8 +165,8 @@ impl ViewRays {
             .map(move |k| &self.seen[((k / views + first) * n + k % views + first) as usize])
     }
 
-    /// How far apart the viewpoints of the middle `views` a side are, over what they are by the paraxial
-    /// lens: by least squares over the field.
+    /// Ratio of the distance between viewpoints of the middle `views` a side to that of the
+    /// paraxial lens: by least squares over the field.
     pub(super) fn pupil_share(&self, views: u32) -> f64 {
         let middle = 0.5 * (f64::from(views) - 1.0);
         let mut sums = [0.0; 2];
@@ -249,7 +249,7 @@ fn errors(ours: &PixelView, ideal: &PixelView, gain: f64, bent: [f64; 2]) -> [f6
     })
 }
 
-/// The same in one colour.
+/// Errors in one colour.
 fn errors_of(
     ours: &[Waves; SETS.len()],
     ideal: &[Waves; SETS.len()],
@@ -301,12 +301,12 @@ struct Asked {
     group: usize,
     /// In each set.
     count: u32,
-    /// What makes them those of one pixel alone, and of one colour.
+    /// Numbers that make the samples those of one pixel alone, and of one colour.
     number: [u32; 2],
     first_set: usize,
 }
 
-/// What a pixel of a camera sees, by rays of its own.
+/// View of a pixel of a camera, by rays of its own.
 fn seen(camera: &Camera, asked: &Asked, sampling: Sampling, unit: &ViewGrid) -> PixelView {
     let Asked { group, count: count_of_set, number, first_set } = *asked;
     let mut film = FilmSamples { group, ..FilmSamples::default() };
@@ -365,7 +365,7 @@ fn seen(camera: &Camera, asked: &Asked, sampling: Sampling, unit: &ViewGrid) -> 
     seen
 }
 
-/// Where a ray crosses the entrance pupil (views) and the plane of disparity 0 (columns), right and up.
+/// Points where a ray crosses the entrance pupil (views) and the plane of disparity 0 (columns), right and up.
 fn crossing(pose: &Pose, rays: &CameraRays, i: usize, unit: &ViewGrid) -> ([f64; 2], [f64; 2]) {
     let back = pose.rotation.transpose();
     let origin = back * (rays.rays.origin(i) - pose.position);

@@ -152,7 +152,7 @@ impl Views {
     }
 }
 
-/// What pictures of views are.
+/// Description of pictures of views.
 const VIEWS: &str = "views of a light field";
 
 /// A picture of three colours, and what it is.
@@ -176,7 +176,7 @@ pub(super) fn sampled(plane: &[f32], size: [usize; 2], at: [f64; 2]) -> f32 {
     sampled_rows(plane, size, at, 0.0)
 }
 
-/// The same with odd rows that begin `odd` pixels further right.
+/// Samples a plane with odd rows that begin `odd` pixels further right.
 fn sampled_rows(plane: &[f32], [width, height]: [usize; 2], [x, y]: [f64; 2], odd: f64) -> f32 {
     let split = |at: f64| {
         let low = (at - 0.5).floor();

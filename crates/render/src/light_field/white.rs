@@ -13,11 +13,11 @@ use crate::output::{Channel, Layer, Look, Picture, Values};
 /// Samples a pixel: few where all of them get through alike, more at the rims of images.
 const SAMPLES: [u32; 2] = [16, 64];
 
-/// How much the weights of a pixel may differ to be alike: cos⁴ takes half within a lenslet's light at f/1.
-/// Sixteen stratified samples of what changes so evenly have its mean to a percent.
+/// Greatest difference of the weights of a pixel, as a share of the largest, at which they are alike: cos⁴ takes half
+/// within a lenslet's light at f/1. Sixteen stratified samples of what changes so evenly have its mean to a percent.
 const ALIKE: f64 = 0.6;
 
-/// What a picture of radiance 1 everywhere is to a camera that is opened for red, green and blue.
+/// Picture of radiance 1 everywhere, by a camera that is opened for red, green and blue.
 pub(super) fn picture(camera: &Camera, spec: &RenderSpec) -> Result<Picture, LightFieldError> {
     let [width, height] = camera.resolution();
     let rows = white_rows(camera, spec, &(0..height).collect::<Vec<u32>>());

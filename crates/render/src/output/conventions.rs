@@ -23,7 +23,7 @@ pub const KITTI_DEPTH: f64 = 256.0;
 /// Numbers a pixel in KITTI's flow, of which 0 stands at 2¹⁵.
 pub const KITTI_FLOW: f64 = 64.0;
 
-/// What `.flo` files have where nothing is known: anything above 10⁹.
+/// Value of unknown pixels in `.flo` files: anything above 10⁹.
 const UNKNOWN: f32 = 1e10;
 
 /// The layer as 16-bit PNG of `factor` a unit.
@@ -72,14 +72,14 @@ fn scaled(layer: &Layer, factor: f64, unit: &str) -> Result<Shown, NoMemory> {
     Ok(Shown { channels: Channels::Grey, bits: Bits::Sixteen, bytes, note })
 }
 
-/// How many of the layer's hits become 0 in 16 bits of `factor` a unit.
+/// Number of the layer's hits that become 0 in 16 bits of `factor` a unit.
 pub(super) fn lost_by_scaling(layer: &Layer, factor: f64) -> Losses {
     let plane = &layer.channels[0].values;
     let hits = (0..plane.len()).map(|i| plane.at(i)).filter(|value| value.is_finite());
     Losses::count(hits.map(|value| sixteen_bits(value * factor) == 0))
 }
 
-/// How many of the layer's hits KITTI's flow has as unknown.
+/// Number of the layer's hits that KITTI's flow has as unknown.
 pub(super) fn lost_by_flow(layer: &Layer) -> Losses {
     let [x, y] = [0, 1].map(|k| &layer.channels[k].values);
     let hits = (0..x.len()).map(|i| [x.at(i), y.at(i)]).filter(|[u, v]| (u + v).is_finite());

@@ -17,21 +17,21 @@ use super::look::{Channels, Shown, srgb, unit};
 use super::{Layer, Picture, Values, png::Bits};
 use crate::film::NoMemory;
 
-/// How a PNG shows the picture's light.
+/// Settings of how a PNG shows the picture's light.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Development {
     /// Light is multiplied by 2 to this power first.
     pub stops: f64,
-    /// Whether the picture's own light decided it.
+    /// True if the picture's own light decided `stops`.
     pub is_automatic: bool,
-    /// What brings light above full scale into range.
+    /// Tone mapping, which brings light above full scale into range.
     pub tone_map: ToneMap,
-    /// Whether the background is transparent.
+    /// True if the background is transparent.
     pub alpha: bool,
 }
 
 impl Development {
-    /// What `spec` asks for, of a picture with these layers, whose own goes without a name.
+    /// Development that `spec` asks for, of a picture with these layers, whose own goes without a name.
     #[must_use]
     pub fn new(spec: &RenderSpec, picture: &Picture) -> Self {
         let (stops, is_automatic) = match spec.exposure {
@@ -41,7 +41,7 @@ impl Development {
         Self { stops, is_automatic, tone_map: spec.tone_map, alpha: spec.alpha }
     }
 
-    /// What it does, for `layers.json`.
+    /// Description of the development for `layers.json`.
     pub(super) fn in_json(&self) -> Value {
         json!({
             "exposure": self.stops,
@@ -52,7 +52,7 @@ impl Development {
         })
     }
 
-    /// What it does, in words.
+    /// Description of the development in words.
     fn in_words(&self) -> String {
         let Self { stops, is_automatic, tone_map, alpha } = *self;
         let by = if is_automatic { ", chosen by the picture's light" } else { "" };
@@ -79,7 +79,7 @@ impl Development {
         }
     }
 
-    /// Whether a channel of this light is beyond what the PNG can show.
+    /// True if a channel of this light is beyond what the PNG can show.
     pub(crate) fn clips(&self, rgb: [f64; 3]) -> bool {
         match self.tone_map {
             // What is 1 but for noise or rounding is not lost.

@@ -1,4 +1,4 @@
-//! What can go wrong between a render and its files.
+//! Errors between a render and its files.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use etendue_files::WriteError;
 
 use crate::film::NoMemory;
 
-/// Why layers do not make a picture.
+/// Error of layers that do not make a picture.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PictureError {
@@ -98,7 +98,7 @@ pub enum PictureError {
     },
 }
 
-/// Why a file was not written. What stood under its name before still does.
+/// Error of a file that was not written. What stood under its name before still does.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OutputError {
@@ -113,7 +113,7 @@ pub enum OutputError {
     Format {
         /// The file.
         path: PathBuf,
-        /// What it cannot hold.
+        /// Reason, which says what the format cannot hold.
         message: String,
     },
     /// A finite number that would become infinite, and so a miss, in 32 bits.
@@ -153,7 +153,7 @@ impl OutputError {
         WriteError::io(path, source).into()
     }
 
-    /// What `path`'s format cannot hold.
+    /// Error of what `path`'s format cannot hold.
     pub(crate) fn format(path: &Path, message: impl ToString) -> Self {
         Self::Format { path: path.to_owned(), message: message.to_string() }
     }

@@ -39,7 +39,7 @@ use super::{OutputError, Picture, Values};
 use crate::expose::SPECTRUM;
 use etendue_files::{SOFTWARE, Transaction};
 
-/// How the pixels are packed. Both keep every bit.
+/// Packing of the pixels. Both keep every bit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Compression {
     /// As they are: the quickest to write, four bytes a value.
@@ -50,10 +50,10 @@ pub enum Compression {
     Zip,
 }
 
-/// How a file is written.
+/// Options of writing a file.
 #[derive(Clone, Copy, Default)]
 pub struct Options<'a> {
-    /// How the pixels are packed.
+    /// Packing of the pixels.
     pub compression: Compression,
     /// Told the share done (0..=1) now and then; answering `false` stops, and leaves no file.
     pub progress: Option<&'a dyn Fn(f64) -> bool>,

@@ -30,7 +30,7 @@ pub enum LayerFile {
     Flo,
     /// Numbers of things as indices of a palette.
     Indexed,
-    /// What the numbers of an ENVI cube are.
+    /// Header of an ENVI cube, which says what its numbers are.
     EnviHeader,
     /// The numbers of an ENVI cube.
     EnviNumbers,
@@ -59,7 +59,7 @@ impl LayerFile {
         all.into_iter().filter_map(|(wanted, file)| wanted.then_some(file))
     }
 
-    /// What of `outputs` none of `layers` is written as: the word for it, and the layers that are.
+    /// Kind of file among `outputs` that none of `layers` is written as: the word for it, and the layers that are.
     #[must_use]
     pub fn without_layer(outputs: Outputs, layers: &[String]) -> Option<[&'static str; 2]> {
         let none = Outputs::NONE;
@@ -94,7 +94,7 @@ impl LayerFile {
         format!("{}.{ending}", stem(layer))
     }
 
-    /// Whether it is written whatever the layer holds: numbers may be too large for masks.
+    /// True if the file is written whatever the layer holds: numbers may be too large for masks.
     #[must_use]
     pub fn is_certain(self) -> bool {
         match self {
@@ -199,7 +199,7 @@ impl LayerFile {
     }
 }
 
-/// Whether a layer's numbers are worth a mask: names of things, and not the numbers of triangles.
+/// True if a layer's numbers are worth a mask: names of things, and not the numbers of triangles.
 pub(crate) fn has_mask(layer: &str) -> bool {
     layer == "MaterialId" || layer.starts_with("Id.") && layer != "Id.primitive"
 }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::{Layer, Values};
 use crate::film::{NoMemory, filled};
 
-/// What `layer` lacks to be shown as it looks, if anything.
+/// Reason why `layer` cannot be shown as it looks, if there is one.
 pub(super) fn lacks(layer: &Layer) -> Option<&'static str> {
     let channels = layer.channels.len();
     let (fits, needs) = match layer.look {
@@ -49,11 +49,11 @@ pub(super) struct Shown {
     pub(super) channels: Channels,
     pub(super) bits: Bits,
     pub(super) bytes: Vec<u8>,
-    /// How to read it.
+    /// Explanation of how to read it.
     pub(super) note: String,
 }
 
-/// What a pixel of a preview is made of.
+/// Channels of a preview's pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Channels {
     Grey,

@@ -1,4 +1,4 @@
-//! Which kinds of file a render leaves.
+//! Kinds of file that a render leaves.
 
 /// The kinds of file to write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,9 +21,9 @@ pub struct Outputs {
     pub indexed: bool,
     /// Light in bands as an ENVI cube.
     pub envi: bool,
-    /// What each copy of an object covers, in COCO's file: see [`crate::annotations`].
+    /// Masks of what each copy of an object covers, in COCO's file: see [`crate::annotations`].
     pub coco: bool,
-    /// The same with poses, models and masks in BOP's folder.
+    /// Masks of the copies with poses, models and masks in BOP's folder.
     pub bop: bool,
     /// Names by their shares of each pixel, as Cryptomatte.
     pub cryptomatte: bool,
@@ -53,7 +53,7 @@ impl Outputs {
     /// All but what only single benchmarks read.
     pub const ALL: Self = Self { exr: true, png: true, npy: true, dng: true, ..Self::NONE };
 
-    /// Whether the scene's copies are told apart in files of their own.
+    /// True if the scene's copies are told apart in files of their own.
     #[must_use]
     pub fn annotates(self) -> bool {
         self.coco || self.bop

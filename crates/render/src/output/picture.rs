@@ -18,7 +18,7 @@ use crate::expose::SPECTRUM;
 pub enum Values {
     /// Measured or computed values.
     F32(Vec<f32>),
-    /// The same with nothing rounded off. An EXR rounds them to f32, an NPY keeps them.
+    /// Values with nothing rounded off. An EXR rounds them to f32, an NPY keeps them.
     F64(Vec<f64>),
     /// Digital numbers of a sensor.
     U16(Vec<u16>),
@@ -38,7 +38,7 @@ impl Values {
         }
     }
 
-    /// Whether there is no value.
+    /// True if there are no values.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -172,11 +172,11 @@ pub struct Layer {
     /// The name before the dot of `Depth.Z`; empty for the picture itself, whose `R G B` stand at
     /// the root of an EXR. Dots inside it make groups.
     pub name: String,
-    /// How a preview shows it.
+    /// Look of the layer in a preview.
     pub look: Look,
     /// Its planes, in the order that an NPY gives them.
     pub channels: Vec<Channel>,
-    /// What its numbers mean: `definition`, `unit`, `frame`, `miss` …
+    /// Meaning of the numbers: `definition`, `unit`, `frame`, `miss` …
     pub meaning: Vec<(String, String)>,
 }
 
@@ -209,7 +209,7 @@ impl Layer {
         self.channels.first().map_or("", |channel| channel.values.type_name())
     }
 
-    /// What the layer is called where it needs a name: the picture goes by its channels, `RGB`.
+    /// Title of the layer where it needs a name: the picture goes by its channels, `RGB`.
     #[must_use]
     pub fn title(&self) -> String {
         if self.name.is_empty() {
@@ -265,14 +265,14 @@ impl Picture {
         Ok(Self { width, height, layers, header, names, png })
     }
 
-    /// The same with tables of what the numbers of layers name, by the layers' names.
+    /// Returns the picture with tables of what the numbers of layers name, by the layers' names.
     #[must_use]
     pub fn with_names(mut self, names: Vec<(String, Value)>) -> Self {
         self.names = names;
         self
     }
 
-    /// What the numbers of the layer called `name` stand for, if a table says so.
+    /// Table of what the numbers of the layer called `name` stand for, if there is one.
     #[must_use]
     pub fn names(&self, name: &str) -> Option<&Value> {
         self.names.iter().find(|(layer, _)| layer == name).map(|(_, table)| table)
@@ -283,14 +283,14 @@ impl Picture {
         &self.names
     }
 
-    /// The same, its picture to be shown in this way where it is a PNG.
+    /// Returns the picture with another development for PNGs of it.
     #[must_use]
     pub fn developed(mut self, png: Development) -> Self {
         self.png = png;
         self
     }
 
-    /// How a PNG of the picture shows its light.
+    /// Development of the picture's light in a PNG.
     #[must_use]
     pub fn development(&self) -> &Development {
         &self.png
@@ -328,7 +328,7 @@ impl Picture {
         })
     }
 
-    /// What holds for all layers: scene hash, seed …
+    /// Header entries that hold for all layers: scene hash, seed …
     #[must_use]
     pub fn header(&self) -> &[(String, String)] {
         &self.header

@@ -108,7 +108,7 @@ fn encode(part: &mut PartFile<'_>, info: Info<'_>, bytes: &[u8]) -> Result<(), E
     writer.finish()
 }
 
-/// What stands in the file beside the pixels.
+/// Texts of the file beside the pixels.
 fn texts(picture: &Picture, layer: &Layer, shown: &Shown) -> Vec<ITXtChunk> {
     let comment = match layer.look {
         Look::Counts { .. } => "data",

@@ -14,9 +14,9 @@ pub struct Screen {
     pub size: [usize; 2],
     /// Red, green, blue and alpha of each pixel, rows from the top.
     pub rgba: Vec<u8>,
-    /// How to read the colours.
+    /// Explanation of how to read the colours.
     pub note: String,
-    /// What the colours of a layer of distances mean.
+    /// Scale of the colours of a layer of distances.
     pub scale: Option<DistanceScale>,
 }
 
@@ -30,7 +30,7 @@ pub struct DistanceScale {
 }
 
 impl DistanceScale {
-    /// Where on the scale `distance` (m) is: 0 at the far end, 1 at the near one.
+    /// Position of `distance` (m) on the scale: 0 at the far end, 1 at the near one.
     #[must_use]
     pub fn share(&self, distance: f64) -> f64 {
         let nearness = |d: f64| if self.near > 0.0 { d.recip() } else { -d };
@@ -148,8 +148,7 @@ impl Screen {
         Self { size: [image.width, image.height], rgba, note, scale: None }
     }
 
-    /// How many pixels have each of the 256 values of red, green and blue; transparent ones are left
-    /// out.
+    /// Number of pixels with each of the 256 values of red, green and blue; transparent ones are left out.
     #[must_use]
     pub fn histogram(&self) -> [[u32; 256]; 3] {
         let mut counts = [[0; 256]; 3];

@@ -75,7 +75,7 @@ pub fn write(files: &Transaction, path: &Path, picture: &Picture) -> Result<(), 
     write_json(files, path, &description)
 }
 
-/// What `picture.png` shows, and how.
+/// Description of what `picture.png` shows, and how.
 fn picture_png(picture: &Picture) -> Value {
     let mut png = picture.development().in_json();
     if let Some(layer) = picture.layer(DENOISED) {

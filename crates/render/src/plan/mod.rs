@@ -32,7 +32,7 @@ use crate::samples::{self, BYTES_OF_SUM};
 use crate::stopping::Stopping;
 use crate::tolerance::Taken;
 
-/// What of the models has to be read for `layers`: decided before they are opened.
+/// Attributes of the models that have to be read for `layers`: decided before they are opened.
 #[must_use]
 pub fn wanted(layers: &[LayerSpec]) -> Wanted {
     let needs = needs(layers);
@@ -50,51 +50,50 @@ fn needs(layers: &[LayerSpec]) -> Needs {
     layers.iter().fold(Needs::default(), |needs, layer| needs.union(layer.needs()))
 }
 
-/// What is done for a scene, and why.
+/// Plan of a render: what is done for a scene, and why.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// The layers to fill, the picture first.
     pub layers: Vec<LayerSpec>,
-    /// How much of each hit is worked out.
+    /// Detail to which each hit is worked out.
     pub detail: Detail,
-    /// Which images of materials are decoded; none for `None`.
+    /// Images of materials that are decoded; none for `None`.
     pub images: Option<TextureScope>,
-    /// Whether images are averaged over the footprint of a sample.
+    /// True if images are averaged over the footprint of a sample.
     pub footprint: bool,
     /// Samples a pixel for coloured layers, at most.
     pub samples: u32,
-    /// When they are enough.
+    /// Stopping rule of the samples.
     pub stopping: Stopping,
-    /// Why that is not what the scene asks for, where it is not.
+    /// Reason why that is not what the scene asks for, where it is not.
     pub not_as_asked: Option<String>,
-    /// Which of these are taken of every pixel before the next are taken of any. The picture does
-    /// not depend on it.
+    /// Ranges of samples, each taken of every pixel before the next is taken of any. The picture does not depend on it.
     pub passes: Vec<Range<u32>>,
-    /// Whether rays are spread over a pupil.
+    /// True if rays are spread over a pupil.
     pub pupil: bool,
-    /// How the bands of light go through the camera's lens.
+    /// Paths of the bands of light through the camera's lens.
     pub band_paths: BandPaths,
-    /// Whether the light of the scene is the same in all bands, of which one is traced for all.
+    /// True if the light of the scene is the same in all bands, of which one is traced for all.
     pub alike: bool,
     /// Rays in all.
     pub rays: u64,
     /// Build time against traversal speed.
     pub quality: Quality,
-    /// What no ray can meet, and need not be built.
+    /// Parts of the scene that no ray can meet, and that need not be built.
     pub unseen: Option<Unseen>,
-    /// Whether hits are solved again in f64.
+    /// True if hits are solved again in f64.
     pub refine: bool,
-    /// How finely data layers are kept.
+    /// Precision of data layers.
     pub precision: Precision,
-    /// How precisely paths of light hit.
+    /// Precision of the hits of light paths.
     pub light_precision: HitPrecision,
-    /// What is written.
+    /// Kinds of file that are written.
     pub outputs: Outputs,
-    /// What the numbers are that the picture's light is kept in.
+    /// Bands of the picture's light: what its numbers are.
     pub bands: Bands,
-    /// What it will take, by counts and headers alone: within 1.5 of the peak of the example scenes.
+    /// Forecast of the memory, by counts and headers alone: within 1.5 of the peak of the example scenes.
     pub memory: MemoryForecast,
-    /// What is taken of the scene's tolerance.
+    /// Part of the scene's tolerance that is used.
     pub taken: Option<Taken>,
     /// The decisions, with their reasons.
     pub decisions: Vec<Decision>,
@@ -145,7 +144,7 @@ fn sample_passes(
 }
 
 impl Plan {
-    /// How many numbers of light are kept of each sample: one where all bands are alike and land in one place.
+    /// Number of values of light that are kept of each sample: one where all bands are alike and land in one place.
     ///
     /// What is asked of the two halves of a pixel's samples is asked band by band.
     pub(crate) fn values_of_light(&self) -> usize {
@@ -167,7 +166,7 @@ impl Plan {
         Self::taking(scene, outputs, None)
     }
 
-    /// The same with what is `taken` of the scene's tolerance ([`crate::tolerance::choose`]).
+    /// Plans the scene with what is `taken` of the scene's tolerance ([`crate::tolerance::choose`]).
     #[must_use]
     pub fn taking(scene: &Scene, outputs: Outputs, taken: Option<Taken>) -> Self {
         Self::of(scene, outputs, expose::bands(scene), taken)
@@ -289,7 +288,7 @@ fn forced_quality(scene: &Scene) -> Option<Quality> {
     })
 }
 
-/// What no ray can meet, where all are chief rays whose hits do not depend on how the structure was built.
+/// Finds what no ray can meet, where all are chief rays whose hits do not depend on how the structure was built.
 fn unseen(scene: &Scene, passes: Passes) -> Option<Unseen> {
     let is_alone = passes.centre && !passes.mean && !passes.light;
     // Layers that compare frames look from the other frame's camera, too.
@@ -301,7 +300,7 @@ fn unseen(scene: &Scene, passes: Passes) -> Option<Unseen> {
         .flatten()
 }
 
-/// Which rays have to be traced.
+/// Rays that have to be traced.
 #[derive(Debug, Clone, Copy)]
 struct Passes {
     /// Chief rays.

@@ -1,4 +1,4 @@
-//! What is taken of a scene's tolerance, in words.
+//! Notes, in words, on what is taken of a scene's tolerance.
 
 use etendue_report::{Decision, DecisionKind as Kind};
 use etendue_scene::Scene;
@@ -7,7 +7,7 @@ use super::Plan;
 use crate::tolerance::{TakenBounces, TakenCamera, TakenDetail};
 
 impl Plan {
-    /// What is taken of the scene's tolerance.
+    /// Decision of what is taken of the scene's tolerance.
     pub(super) fn explain_tolerance(&self, scene: &Scene) -> Option<Decision> {
         let tolerance = scene.tolerance?;
         let choice =

@@ -12,8 +12,8 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Geometry, Mesh, Placement, Positions, RayBatch, Vertices};
 use rayon::prelude::*;
 
-/// How far from a plane a box has to be to lie behind it, as a share of how far it and the origins are: what rounding
-/// to f32 may move.
+/// Least distance of a box from a plane to lie behind it, as a share of the distance of it and of
+/// the origins: what rounding to f32 may move.
 const MARGIN: f64 = 1e-6;
 
 /// Columns and rows of the rays by which it is judged whether it pays to take all.
@@ -28,8 +28,8 @@ pub struct Unseen {
 }
 
 impl Unseen {
-    /// What of `geometry` the chief rays of `camera` cannot meet; `None` where that is nothing, or where it would
-    /// cost more to find than to build.
+    /// Finds the parts of `geometry` that the chief rays of `camera` cannot meet; `None` where that
+    /// is nothing, or where it would cost more to find than to build.
     #[must_use]
     pub fn of(geometry: &Geometry, camera: &Camera) -> Option<Self> {
         let [width, height] = camera.resolution();
@@ -69,19 +69,19 @@ impl Unseen {
         (placements > 0).then(|| Self { is_unseen: is_unseen.into(), placements, triangles })
     }
 
-    /// How many placements they are.
+    /// Number of placements.
     #[must_use]
     pub fn placements(&self) -> usize {
         self.placements
     }
 
-    /// How many triangles are not built for it, each stored one once.
+    /// Number of triangles that are not built, each stored one once.
     #[must_use]
     pub fn triangles(&self) -> u64 {
         self.triangles
     }
 
-    /// Whether nothing of this is missing in what was built without `other`.
+    /// True if nothing of this is missing in what was built without `other`.
     #[must_use]
     pub fn is_served_without(&self, other: &Self) -> bool {
         self.is_unseen.len() == other.is_unseen.len()
@@ -101,7 +101,7 @@ impl Unseen {
     }
 }
 
-/// Whether slopes are linear in columns and rows, so that those of the outermost pixels bound all.
+/// True if slopes are linear in columns and rows, so that those of the outermost pixels bound all.
 fn is_linear(camera: &Camera) -> bool {
     let is_plain = |distortion: Option<&Distortion>| distortion.is_none();
     !camera.is_timed()
@@ -174,7 +174,7 @@ impl Hull {
         self
     }
 
-    /// Whether no ray meets a box of the world.
+    /// True if no ray meets a box of the world.
     ///
     /// A ray from z = o passes z ≥ o at x ≤ ox + m (z − o), m its slope. Of all origins that is at most
     /// max ox + M (z − o), where o is the least for a greatest slope M ≥ 0 and the greatest for M < 0; linear

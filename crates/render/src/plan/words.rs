@@ -19,7 +19,7 @@ use crate::film::Precision;
 use crate::tolerance::TakenBounces;
 use crate::{diffraction, expose, samples};
 
-/// What decisions are made by, beside the plan.
+/// Grounds of decisions, beside the plan.
 pub(super) struct Grounds<'a> {
     pub(super) scene: &'a Scene,
     pub(super) bands: &'a BandChoice,
@@ -27,11 +27,11 @@ pub(super) struct Grounds<'a> {
     pub(super) passes: Passes,
     /// Triangles, each stored one once.
     pub(super) triangles: u64,
-    /// Why light hits as precisely as it does.
+    /// Reason for the precision of light's hits.
     pub(super) why_precision: String,
 }
 
-/// Whether samples have times.
+/// Decision whether samples have times.
 fn explain_shutter(scene: &Scene) -> Option<Decision> {
     let shutter = scene.camera.shutter()?;
     let placed = &scene.geometry.placements;
@@ -123,7 +123,7 @@ impl Plan {
         decisions
     }
 
-    /// What the rays are for.
+    /// Description of the rays' purpose.
     fn explain_rays(&self, passes: Passes) -> String {
         let seen = match (passes.centre, passes.mean) {
             (true, true) => Some(format!(
@@ -149,7 +149,7 @@ impl Plan {
         parts.join("; ")
     }
 
-    /// How often the film is gone over.
+    /// Decision of how often the film is gone over.
     fn explain_passes(&self) -> Decision {
         let because = match &self.passes[..] {
             [first, ..] if self.stopping.is_adaptive() => format!(
@@ -193,7 +193,7 @@ impl Plan {
         Decision::new(Kind::BuildQuality, quality_name(self.quality), because).forced(is_forced)
     }
 
-    /// What is not built, because nothing looks at it.
+    /// Decision of what is not built, because nothing looks at it.
     fn explain_unseen(&self, scene: &Scene, triangles: u64) -> Option<Decision> {
         let is_forced = scene.plan.unseen.is_some();
         let Some(unseen) = &self.unseen else {
@@ -219,7 +219,7 @@ impl Plan {
         Some(Decision::new(Kind::Geometry, choice, because).forced(is_forced).saving(saving))
     }
 
-    /// What is read of materials, and how images are looked up.
+    /// Decisions of what is read of materials, and how images are looked up.
     fn explain_textures(&self, scene: &Scene, needs: Needs) -> Vec<Decision> {
         let n = scene.textures.len();
         // Whether materials are looked at, and their images with them.
@@ -261,7 +261,7 @@ impl Plan {
         std::iter::once(read).chain(filter).collect()
     }
 
-    /// How exactly data and light are traced and kept.
+    /// Decisions of how exactly data and light are traced and kept.
     fn explain_precision(&self, grounds: &Grounds<'_>) -> impl Iterator<Item = Decision> {
         let Grounds { scene, needs, .. } = *grounds;
         let because = match self.refine {
@@ -300,7 +300,7 @@ impl Plan {
         [refined, data].into_iter().chain(light)
     }
 
-    /// What becomes of the picture's noise, where something does.
+    /// Decision of what becomes of the picture's noise, where something does.
     fn explain_denoising(&self) -> Option<Decision> {
         let because = "--denoise: by Open Image Denoise, which is guided by the layers MeanAlbedo and \
                        MeanNormal; the picture and the sensor's images keep their noise";
@@ -308,7 +308,7 @@ impl Plan {
         self.outputs.denoised.then(|| Decision::new(Kind::Denoising, choice, because))
     }
 
-    /// How wavelengths and the pupil of the camera's lens are sampled.
+    /// Decisions of how wavelengths and the pupil of the camera's lens are sampled.
     fn explain_lens(&self, scene: &Scene) -> [Decision; 2] {
         let camera = self.light_camera(scene);
         let lens = camera.lens();
@@ -340,7 +340,7 @@ impl Plan {
     }
 }
 
-/// What is worked out of surfaces.
+/// Decisions of what is worked out of surfaces.
 fn explain_surfaces(needs: Needs) -> [Decision; 2] {
     let surface = match needs.surface {
         true => "a layer needs normals or barycentric coordinates",
@@ -365,7 +365,7 @@ fn quality_name(quality: Quality) -> &'static str {
 }
 
 impl Plan {
-    /// How far light is followed.
+    /// Decision of how far light is followed.
     fn explain_bounces(&self, scene: &Scene, needs: Needs) -> Decision {
         let own = explain_bounces(scene, needs);
         let fewer = self.taken.as_ref().and_then(|taken| taken.bounces);
@@ -382,7 +382,7 @@ impl Plan {
     }
 }
 
-/// How far light is followed, by the tracer.
+/// Decision of how far light is followed, by the tracer.
 fn explain_bounces(scene: &Scene, needs: Needs) -> Decision {
     match scene.tracer.filter(|_| needs.light).map(TracerSpec::row) {
         Some(TracerRow { name, light: Some(light), .. }) => {
@@ -396,7 +396,7 @@ fn explain_bounces(scene: &Scene, needs: Needs) -> Decision {
     }
 }
 
-/// Where light comes from.
+/// Decision of where light comes from.
 fn explain_lights(scene: &Scene) -> Decision {
     let shines = |placement: &&Placement| {
         let material = scene.materials.get(placement.material as usize);
@@ -418,7 +418,7 @@ fn explain_lights(scene: &Scene) -> Decision {
     Decision::new(Kind::Lights, count, words + more)
 }
 
-/// Why wavelengths are traced together or apart, `each` of them a band.
+/// Reason why wavelengths are traced together or apart, `each` of them a band.
 fn wavelengths(apart: bool, pupil: bool, each: usize) -> String {
     match (apart, pupil, each) {
         (false, ..) => "no glass or filter of a lens tells them apart".to_owned(),
@@ -431,7 +431,7 @@ fn wavelengths(apart: bool, pupil: bool, each: usize) -> String {
     }
 }
 
-/// Whether rays are spread over a pupil, and why.
+/// Choice whether rays are spread over a pupil, with the reason.
 fn pupil(lens: Option<&LensCamera>, spread: bool, samples: u32) -> (bool, String) {
     let Some(lens) = lens else {
         return (false, "the camera has no aperture: every ray is a chief ray".to_owned());

@@ -152,8 +152,8 @@ impl Clusters {
         self.of_corner[corner as usize].0
     }
 
-    /// Where the coarser triangles, of these cells and corners, end, the place of a cell is the mean of those of its
-    /// corners on the border of the mesh.
+    /// Moves each cell at the end of the coarser triangles, of these cells and corners, to the mean
+    /// of the places of its corners on the border of the mesh.
     fn keep_borders(&mut self, mesh: &Mesh, of_corner: &[u32], triangles: &[[[u32; 3]; 2]]) {
         let mut is_border = vec![false; self.places.len()];
         let coarse = edges_of_one(triangles.iter().flat_map(|[cells, _]| edges(*cells)));

@@ -31,14 +31,14 @@ const WORTH: u64 = 3 << 20;
 /// Triangles that are looked at, at most.
 const MOST_TRIANGLES: usize = 2_000_000;
 
-/// What of a cosine to the camera's axis is counted on: rays through a pupil lie beside the chief ray.
+/// Share of a cosine to the camera's axis that is counted on: rays through a pupil lie beside the chief ray.
 const SAFE_COSINE: f64 = 0.9;
 
 /// Columns and rows of places at which rays' angles are taken, the corners among them.
 const PLACES: u32 = 5;
 
-/// How coarse each image of `scene` may be; `None` of those that are to be whole, as all are of a scene without a
-/// tolerance.
+/// Permitted coarseness of each image of `scene`; `None` of those that are to be whole, as all are
+/// of a scene without a tolerance.
 #[must_use]
 pub fn coarse_images(scene: &Scene, plan: &Plan) -> Vec<Option<Coarseness>> {
     let mut coarse = vec![None; scene.textures.len()];
@@ -65,7 +65,7 @@ pub fn coarse_images(scene: &Scene, plan: &Plan) -> Vec<Option<Coarseness>> {
     coarse
 }
 
-/// Whether nothing but light is rendered, of one still camera.
+/// True if nothing but light is rendered, of one still camera.
 fn shows_light_alone(scene: &Scene) -> bool {
     let is_light = |layer: &LayerSpec| layer.is_light() || layer.is_of_sampling();
     scene.layers.contains(&LayerSpec::Radiance)

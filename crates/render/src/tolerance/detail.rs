@@ -31,7 +31,7 @@ const WORTH: usize = 20_000;
 /// The share of the displacement allowed that detail may take before a lens, which a model may displace by the rest.
 const SHARE: f64 = 0.25;
 
-/// What f32 may take of that.
+/// Share of that which f32 may take.
 const SHARE_OF_ROUNDING: f64 = 1.0 / 8.0;
 
 /// The share of the light allowed by which the area of a mesh may change.
@@ -47,7 +47,7 @@ const MOST_OCTAVES: u32 = 6;
 /// Columns and rows of places where the extent of a pixel is taken, the corners among them.
 const PLACES: u32 = 5;
 
-/// What detail was left out.
+/// Detail that was left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TakenDetail {
     /// Triangles of the scene, as often as they are placed, and those that are left: of a mesh whose copies stand near and
@@ -55,7 +55,7 @@ pub struct TakenDetail {
     pub triangles: [u64; 2],
     /// Meshes that are coarser.
     pub meshes: usize,
-    /// How far a place of the picture is displaced at most (pixels).
+    /// Greatest displacement of a place of the picture (pixels).
     pub displacement: f64,
     /// By which share the area of a mesh differs, at most.
     pub light: f64,
@@ -175,8 +175,8 @@ fn shadow_distance(from: DVec3, bounds: &Bounds, along: DVec3, cos_radius: f64) 
     (there - s * along).length() - radius - growth * s
 }
 
-/// How far off surfaces (m) rays may start under the tolerance of `scene`; `None` of a scene without one, and where
-/// something tells more of a surface than the camera sees.
+/// Distance off surfaces (m) at which rays may start under the tolerance of `scene`; `None` of a
+/// scene without one, and where something tells more of a surface than the camera sees.
 pub(crate) fn hidden_offset(scene: &Scene) -> Option<f64> {
     let pixels = scene.tolerance.filter(|_| is_plain(scene))?.displacement.0;
     Some(SHARE_OF_ROUNDING * share(scene) * pixels * pixel_extent(scene, nearest(scene)?)?)
@@ -187,7 +187,7 @@ fn share(scene: &Scene) -> f64 {
     if scene.camera.lens().is_some() { SHARE } else { 1.0 }
 }
 
-/// Whether nothing of the scene tells more of a mesh than the camera sees, but for the mesh itself.
+/// True if nothing of the scene tells more of a mesh than the camera sees, but for the mesh itself.
 fn is_plain(scene: &Scene) -> bool {
     let is_light = |layer: &LayerSpec| layer.is_light() || layer.is_of_sampling();
     let is_far = |kind: &LightKind| match kind {
@@ -214,7 +214,7 @@ fn is_plain(scene: &Scene) -> bool {
             .all(|(material, _)| shows_nothing_else(material) && material.emission.is_none())
 }
 
-/// Whether no other surface is seen in a material, mirrored or through it.
+/// True if no other surface is seen in a material, mirrored or through it.
 fn shows_nothing_else(material: &Material) -> bool {
     match &material.scattering {
         Scattering::Black | Scattering::Matte | Scattering::Unlit => true,
@@ -240,7 +240,7 @@ fn nearest(scene: &Scene) -> Option<f64> {
     boxes.map(distance).reduce(f64::min).filter(|distance| *distance > 0.0)
 }
 
-/// What the narrowest pixel covers at `distance` (m) from the camera.
+/// Extent of the narrowest pixel at `distance` (m) from the camera.
 fn pixel_extent(scene: &Scene, distance: f64) -> Option<f64> {
     let [width, height] = scene.camera.resolution().map(f64::from);
     let at = |i: u32, side: f64| f64::from(i) / f64::from(PLACES - 1) * (side - 1.0).max(0.0);
@@ -258,7 +258,7 @@ fn pixel_extent(scene: &Scene, distance: f64) -> Option<f64> {
     extents.reduce(f64::min).filter(|extent| *extent > 0.0 && extent.is_finite())
 }
 
-/// How much longer any line of a mesh is where it is placed, at most; `None` of a mesh that stays as it is.
+/// Greatest factor by which a line of a mesh is longer where it is placed; `None` of a mesh that stays as it is.
 fn stretch_of(scene: &Scene, number: usize) -> Option<f64> {
     let geometry = &scene.geometry;
     let mesh = &geometry.meshes[number];

@@ -15,7 +15,7 @@ const ALL_BANDS: Field = Field { bands: usize::MAX, rays: 64, ..Field::QUICK };
 /// The name of the model.
 pub(super) const NAME: &str = "grouped";
 
-/// How many numbers of groups are tried.
+/// Number of group counts that are tried.
 const TRIES: usize = 6;
 
 /// The camera of `scene` with its bands in as few groups as stay within the tolerance; `None` where the scene is traced

@@ -25,7 +25,7 @@ use etendue_geometry::units::{Micrometres, Millimetres};
 use etendue_optics::element::{ApertureSpec, ElementSpec, MaskSpec, Opening, PartSpec, Picture};
 use serde_json::{Value, json};
 
-/// Why a camera has no models.
+/// Reason why a camera has no models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("there are no models of the camera's lens: {0}")]
 pub struct NoModels(
@@ -42,7 +42,7 @@ pub struct LensModel {
     pub camera: Camera,
     /// The keys of a scene that take it.
     pub scene: Value,
-    /// Whether the pattern of a mask in the lens shows in what is out of focus, which this has not.
+    /// True if the pattern of a mask in the lens shows in what is out of focus, which this model lacks.
     pub lacks_mask: bool,
 }
 
@@ -51,7 +51,7 @@ pub struct LensModel {
 pub struct LensModels {
     /// Those that there are.
     pub models: Vec<LensModel>,
-    /// What is missing for which reason, in sentences.
+    /// Notes on missing models and the reasons, in sentences.
     pub notes: Vec<String>,
 }
 
@@ -148,13 +148,13 @@ pub fn scale(camera: &Camera) -> Option<f64> {
     }
 }
 
-/// What is known of a lens near its axis.
+/// Data of a lens near its axis.
 struct Gauss {
     pose: PoseSpec,
     resolution: [u32; 2],
     /// Focal length of the picture (pixels).
     scale: f64,
-    /// Where the axis meets the sensor (pixels from the corner).
+    /// Point where the axis meets the sensor (pixels from the corner).
     centre: [f64; 2],
     /// Focal length and diameter of the entrance pupil (mm).
     focal: f64,

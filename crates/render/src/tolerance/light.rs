@@ -28,7 +28,7 @@ const FEWER: u64 = 128;
 /// The numbers of surfaces among which the fewest are looked for.
 const STEPS: [u32; 11] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24];
 
-/// What the share of nine blocks together is multiplied by: single ones among them have more.
+/// Factor on the share of nine blocks together: single ones among them have more.
 const SAFETY: f64 = 2.0;
 
 /// The share of blocks that are to be within the tolerance.

@@ -40,7 +40,7 @@ pub struct Tolerance {
     pub light: Option<f64>,
 }
 
-/// How finely models are compared.
+/// Fineness of the comparison of models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Field {
     /// Columns and rows of places, the picture's corners among them.
@@ -55,11 +55,11 @@ pub struct Field {
 }
 
 impl Field {
-    /// What a user who compares models gets.
+    /// For a user who compares models.
     pub const FINE: Self = Self { size: [9, 7], rays: 1024, bands: usize::MAX, across: 256 };
-    /// What a render does before it begins.
+    /// For the choice that a render makes before it begins.
     pub const QUICK: Self = Self { size: [9, 7], rays: 256, bands: 3, across: 64 };
-    /// What a choice is verified by: places in between, and more bands.
+    /// For the verification of a choice: places in between, and more bands.
     pub const BETWEEN: Self = Self { size: [16, 12], rays: 256, bands: 5, across: 64 };
 }
 
@@ -127,7 +127,7 @@ impl Worst {
     }
 }
 
-/// What pixels see through all of a camera's lens, which its models are compared with.
+/// View through all of a camera's lens, which its models are compared with.
 #[derive(Debug, Clone)]
 pub struct FullView {
     camera: Camera,
@@ -139,7 +139,7 @@ pub struct FullView {
     /// Places of the picture that are compared.
     pub places: Vec<Place>,
     seen: Vec<PlaceView>,
-    /// What a user should know of it, in sentences.
+    /// Notes on the view for the user, in sentences.
     pub notes: Vec<String>,
 }
 
@@ -242,8 +242,8 @@ impl FullView {
         self.scale * self.seen.iter().zip(&self.places).map(of_place).fold(0.0, f64::max)
     }
 
-    /// How far the chief rays of `camera` are from its own, at most (pixels): what is cheap to find of a model, of
-    /// which no more needs to be known when this is too far.
+    /// Greatest distance of the chief rays of `camera` from the view's own (pixels): what is cheap
+    /// to find of a model, of which no more needs to be known when this is too far.
     fn chief_displacement(&self, camera: &Camera) -> f64 {
         let own = chief_rays(camera, &self.places);
         let places = own.iter().zip(&self.seen).zip(&self.places);
@@ -255,7 +255,7 @@ impl FullView {
         self.scale * places.map(of_place).fold(0.0, f64::max)
     }
 
-    /// What `camera` misses of it.
+    /// Compares `camera` with the view: what it misses.
     ///
     /// # Errors
     ///
@@ -322,7 +322,7 @@ impl FullView {
     }
 }
 
-/// Which models are made.
+/// Choice of the models that are made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Sought {
     All,
@@ -349,20 +349,20 @@ fn some_of(count: usize, most: usize) -> Vec<usize> {
     (0..most).map(|k| k * (count - 1) / (most - 1).max(1)).collect()
 }
 
-/// What is taken of a scene's tolerance.
+/// Part of a scene's tolerance that is used.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Taken {
     /// The tolerance.
     pub tolerance: ToleranceSpec,
     /// The camera that light is sampled by, in the place of the scene's.
     pub camera: Option<TakenCamera>,
-    /// How far light is followed, less than the scene's tracer does.
+    /// Number of surfaces to which light is followed, less than the scene's tracer does.
     pub bounces: Option<TakenBounces>,
-    /// What is left out of its meshes.
+    /// Detail that is left out of the scene's meshes.
     pub detail: Option<TakenDetail>,
-    /// How many of its images are decoded in as few texels as the nearest view can tell apart.
+    /// Number of the scene's images decoded in as few texels as the nearest view can tell apart.
     pub images: usize,
-    /// Why not more is, in sentences.
+    /// Reasons why not more is used, in sentences.
     pub notes: Vec<String>,
 }
 
@@ -378,14 +378,14 @@ impl Taken {
 pub struct TakenCamera {
     /// The camera.
     pub camera: Camera,
-    /// What it misses.
+    /// Deviation of the camera from the scene's.
     pub finding: Finding,
 }
 
 /// Fewer surfaces to which light is followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TakenBounces {
-    /// How many.
+    /// Number of surfaces to which light is followed.
     pub bounces: u32,
     /// The share of light that the others bring, in 99 % of blocks of 8 × 8 pixels.
     pub share: f64,
@@ -395,9 +395,9 @@ pub struct TakenBounces {
 /// some 10⁵.
 const WORTH: u64 = 200_000;
 
-/// What of the tolerance of `scene` is taken: beside what was left out of its meshes ([`coarser`]), which are those of
-/// `scene` now, the simplest camera model within what this leaves, and of the light that is left then the fewest
-/// surfaces. Says nothing of a scene without a tolerance.
+/// Chooses what of the tolerance of `scene` is used: beside what was left out of its meshes ([`coarser`]), which are
+/// those of `scene` now, the simplest camera model within what this leaves, and of the light that is left then the
+/// fewest surfaces. Says nothing of a scene without a tolerance.
 ///
 /// # Errors
 ///

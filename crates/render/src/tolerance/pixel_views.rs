@@ -1,4 +1,4 @@
-//! What a camera sees from places of its picture: where their rays run, in pixels, at any depth.
+//! Views of a camera from places of its picture: where their rays run, in pixels, at any depth.
 //!
 //! A ray is a straight line, so where it meets the plane at the depth z is, in tangents from the entrance
 //! pupil, a + b/z: its slope, and its offset in the pupil's plane over the depth. The mean and the variance
@@ -17,7 +17,7 @@ use etendue_spectrum::Bands;
 use etendue_tracer::LightKind;
 use etendue_tracer::light::EnvironmentImage;
 
-/// What is seen from one place.
+/// View from one place.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct PlaceView {
     /// The chief ray; `None` where the camera sees nothing.
@@ -36,7 +36,7 @@ pub(super) struct Line {
 /// The rays of a band that arrive.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct BandRays {
-    /// What the picture has for a radiance of 1.
+    /// Light of the picture for a radiance of 1.
     pub(super) light: f64,
     /// Their mean.
     middle: Line,
@@ -45,7 +45,7 @@ pub(super) struct BandRays {
 }
 
 impl Line {
-    /// Where it runs at a depth whose inverse (1/m) is given, in tangents.
+    /// Point of the line at a depth whose inverse (1/m) is given, in tangents.
     pub(super) fn at(&self, nearness: f64) -> DVec2 {
         self.slope + self.offset * nearness
     }
@@ -119,8 +119,8 @@ pub(super) fn chief_rays(camera: &Camera, places: &[Place]) -> Vec<Option<Line>>
     (0..places.len()).map(line).collect()
 }
 
-/// What `camera`, opened for `bands`, sees from each of `places` in the bands that are `chosen`, by `rays` of each
-/// band or group of bands; by one where it has no pupil.
+/// View of `camera`, opened for `bands`, from each of `places` in the bands that are `chosen`, by
+/// `rays` of each band or group of bands; by one where it has no pupil.
 pub(super) fn seen(
     (camera, bands): (&Camera, &Bands),
     chosen: &[usize],

@@ -35,7 +35,7 @@ struct Target {
 
 /// Places of the picture in even columns and rows.
 pub(super) struct Cells {
-    /// How many columns and rows of them.
+    /// Number of columns and rows of cells.
     pub(super) count: [usize; 2],
     /// From one to the next (pixels).
     pub(super) step: [f64; 2],
@@ -137,8 +137,8 @@ impl Cells {
         }
     }
 
-    /// What is to be aimed at of a placement in a box; `None` where even rays meet it, where it is not seen, or where its
-    /// depths lie within those that are known.
+    /// Target to be aimed at of a placement in a box; `None` where even rays meet it, where it is
+    /// not seen, or where its depths lie within those that are known.
     fn target(&self, eye: &Eye<'_>, places: &[Place], bounds: &Bounds) -> Option<Target> {
         if bounds.is_empty() {
             return None;

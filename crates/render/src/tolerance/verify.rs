@@ -1,5 +1,5 @@
-//! What was taken of a tolerance against everything: places of the picture between those that were looked at, and a
-//! small picture both ways.
+//! Verification of what was taken of a tolerance: places of the picture between those that were
+//! looked at, and a small picture both ways.
 
 use std::fmt;
 
@@ -33,7 +33,7 @@ pub struct Verified {
 }
 
 impl Verified {
-    /// Whether both are as allowed, of light but for its noise.
+    /// True if both deviations are within what is allowed, the light's but for its noise.
     #[must_use]
     pub fn is_within(&self) -> bool {
         let [displacement, most] = self.displacement;

@@ -237,8 +237,8 @@ fn samples_stop_at_the_noise_of_the_sensor() {
     assert!(sum / count < 1.3 * fraction, "{}", sum / count);
 }
 
-/// The same picture to the bit on one thread and on three, and in shares put together; the shares' notes
-/// and counts are the whole's, too.
+/// Threads and shares make one picture, the same to the bit on one thread and on three, and in
+/// shares put together; the shares' notes and counts are the whole's, too.
 #[test]
 fn threads_and_shares_make_one_picture() {
     let samples = json!({ "until": "sensor-noise", "fraction": 0.3, "min": 16, "max": 64 });
@@ -306,7 +306,7 @@ fn a_time_gives_the_picture_of_some_number_of_samples() {
     assert_eq!(few.samples, 6);
 }
 
-/// What cannot be kept or divided is refused by name.
+/// Checkpoints and shares that cannot be kept or divided are refused by name.
 #[test]
 fn checkpoints_of_such_samples_and_shares_of_a_time_are_refused() {
     let refused = |samples: &Value, course: Course<'_>| {

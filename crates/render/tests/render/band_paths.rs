@@ -18,7 +18,7 @@ use crate::steps::{channels, load_json, mean, prepare, rendered};
 const COLUMNS: usize = 96;
 const ROWS: usize = 80;
 
-/// What `camera` sees of a sky and of a lamp before it, each pixel by so many samples.
+/// Scene of a sky and of a lamp before it, as `camera` sees it, each pixel by so many samples.
 fn scene(mut camera: Value, lamp: bool, samples: u32, more: &Value) -> Scene {
     camera["pose"] = json!({ "from": [0, 0, 4], "look_at": [0, 0, 0] });
     camera["sensor"] = json!({ "resolution": [COLUMNS, ROWS] });
@@ -131,8 +131,8 @@ fn a_flat_field_keeps_its_energy_and_its_vignetting_by_band() {
     }
 }
 
-/// The same in all of the example lenses that disperse, also where light comes from beside them, as a fisheye's,
-/// of whose rays many end: the means of both ways are known to less than 10⁻³ there.
+/// Example lenses that disperse keep their energy, also where light comes from beside them, as a
+/// fisheye's, of whose rays many end: the means of both ways are known to less than 10⁻³ there.
 #[test]
 fn example_lenses_keep_their_energy() {
     for (name, height) in [
@@ -186,9 +186,9 @@ fn rms(a: &[f64], b: &[f64]) -> f64 {
     (square / a.len() as f64).sqrt()
 }
 
-/// The same picture to the bit on one thread and on three, in one pass and in several, gone on with after a stop,
-/// and in shares of its rows and of its samples put together. Light lands on the rows of other shares here, and strips of other
-/// threads.
+/// Threads, passes and shares make one picture, the same to the bit on one thread and on three, in
+/// one pass and in several, gone on with after a stop, and in shares of its rows and of its samples
+/// put together. Light lands on the rows of other shares here, and strips of other threads.
 #[test]
 fn threads_passes_and_shares_make_one_picture() {
     let scene = scene(singlet(), true, 12, &json!({ "layers": ["direct", "indirect"] }));
@@ -244,7 +244,7 @@ fn threads_passes_and_shares_make_one_picture() {
     }
 }
 
-/// What the plan says: bands share paths unless something parts them, and then it says what.
+/// The plan says how bands travel: bands share paths unless something parts them, and then it says what.
 #[test]
 fn the_plan_says_how_bands_travel() {
     let how = |camera: Value, more: &Value| {

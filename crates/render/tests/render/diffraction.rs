@@ -234,7 +234,7 @@ fn a_round_lens_spreads_light_as_in_a_mirror_beyond_its_axis() {
     }
 }
 
-/// What waves cannot be spread over is refused by name.
+/// A scene that waves cannot be spread over is refused by name.
 #[test]
 fn what_goes_with_no_diffraction_is_refused() {
     let scene = load(&lamp(3.45, 8.0, 1.0, 4));

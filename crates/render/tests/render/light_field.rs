@@ -1,4 +1,4 @@
-//! What a light-field camera leaves, read back: the views decoded from its raw picture are those of an
+//! Files of a light-field camera, read back: the views decoded from its raw picture are those of an
 //! ideal lens, and things stand in them where the formula says.
 
 use std::f64::consts::TAU;
@@ -136,7 +136,7 @@ fn view(shape: &[usize], values: &[f64], across: usize, down: usize) -> Vec<Vec<
     (0..rows).map(row).collect()
 }
 
-/// How far the waves of one view are moved to the right against those of another (columns): by the phase of
+/// Shift of the waves of one view to the right against those of another (columns): by the phase of
 /// their period of 7 columns, in a Hann window.
 fn shift(from: &[Vec<f64>], to: &[Vec<f64>]) -> f64 {
     let wave = |row: &[f64]| {
@@ -192,7 +192,7 @@ fn decoded_views_are_those_of_an_ideal_lens() {
     }
 }
 
-/// What is written has 40 dB of an ideal lens' views, whatever the lenslets are; and nothing is written where a
+/// Views that are written have 40 dB of an ideal lens' views, whatever the lenslets are; and nothing is written where a
 /// note says why. Waves stand in front of the focus, at a disparity of 0.13.
 fn views_are_those_of_an_ideal_lens_or_none(cases: &[(String, Option<bool>)], samples: [u32; 2]) {
     for (microlenses, written) in cases {
@@ -393,8 +393,8 @@ fn patches_of_thick_lenslets_and_behind_a_real_lens_do_so_too() {
     }
 }
 
-/// What there is instead of a refocused picture: patches that leave gaps, images that are too narrow, and a plane that
-/// the lenslets stand in.
+/// Patches that make no refocused picture: patches that leave gaps, images that are too narrow, and
+/// a plane that the lenslets stand in.
 #[test]
 fn patches_that_leave_gaps_make_no_picture() {
     for (microlenses, more) in [
@@ -611,8 +611,8 @@ fn a_reference_camera_leaves_its_views_alone() {
     assert!(!folder.path().join("reference.npy").exists());
 }
 
-/// How far plain centroids of the white picture, over circles as wide as the images are apart, are from the
-/// places of `key` (pixels): the worst of those within `within` (pixels) of the picture's middle column.
+/// Distance of plain centroids of the white picture, over circles as wide as the images are apart, from the places of
+/// `key` (pixels): the worst of those within `within` (pixels) of the picture's middle column.
 fn worst_centroid(folder: &Path, geometry: &serde_json::Value, key: &str, within: f64) -> f64 {
     let (shape, white) = array(&folder.join("white.npy"));
     let width = shape[1];

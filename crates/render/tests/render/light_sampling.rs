@@ -1,4 +1,4 @@
-//! How lights are chosen: what would sparkle by chance alone does not.
+//! Choice of lights: what would sparkle by chance alone does not.
 
 use std::f64::consts::PI;
 use std::path::Path;

@@ -176,7 +176,7 @@ fn lights_change_each_by_itself() {
     }
 }
 
-/// Where something moves, rays have random times: the same banding, within the noise and without bias.
+/// Rays have random times where something moves: the same banding, within the noise and without bias.
 #[test]
 fn rays_with_times_have_the_same_mean() {
     let (line, exposure, frequency) = (1e-3, 4e-3, 120.0);

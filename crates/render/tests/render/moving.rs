@@ -167,7 +167,7 @@ fn screen(accel: &str, shutter: &Value, motion: &Value) -> Scene {
     load_json(std::path::Path::new("."), scene)
 }
 
-/// How many pixels of each row, from the top, are white.
+/// Number of white pixels in each row, from the top.
 fn white(scene: &Scene) -> Vec<f64> {
     let picture = picture(scene);
     let red = &layer(&picture, "")[..COLUMNS * 16];
@@ -262,8 +262,8 @@ fn objects_that_stand_still_change_no_bit() {
     assert_eq!(layer(&picture(&still), ""), layer(&picture(&without), ""));
 }
 
-/// What flies so far while the shutter is open that f32 cannot tell its triangles apart is hit in f64, and the plan says
-/// why; so is what a camera sees that flies so far. At a millionth of the speed f32 does.
+/// Objects and cameras that fly so far while the shutter is open that f32 cannot tell triangles
+/// apart are hit in f64, and the plan says why. At a millionth of the speed f32 does.
 #[test]
 fn speeds_that_outrun_single_precision_take_double() {
     let planned = |object: bool, speed: f64| {

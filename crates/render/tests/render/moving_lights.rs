@@ -36,7 +36,7 @@ fn scene(lights: Value, objects: Value, more: &Value) -> Scene {
     load_json(std::path::Path::new("."), scene)
 }
 
-/// What a dot of it shows, and the standard error of that.
+/// Light of a dot of it, and the standard error of that.
 fn lit(scene: &Scene) -> [f64; 2] {
     let picture = picture(scene);
     let red = &layer(&picture, "")[..PIXELS];
@@ -169,7 +169,7 @@ impl Flying {
 /// see are 1/√(0.001 · 65 536), 12 %, off.
 const ASKED: f64 = 0.01;
 
-/// What is found, due to 4 standard errors and what the triangles' f32 and 2000 moments make.
+/// Checks what is found against what is due, to 4 standard errors and what the triangles' f32 and 2000 moments make.
 fn holds([found, error]: [f64; 2], due: f64, name: &str) {
     assert!((found - due).abs() < 4.0 * error + 2e-4 * due, "{name}: {found} ± {error}, not {due}");
     assert!(error < ASKED * due, "{name}: {error} of {due}: it is not asked");

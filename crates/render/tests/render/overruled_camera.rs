@@ -1,4 +1,4 @@
-//! What the plan leaves out of a camera and of what a hit is asked for, against the fuller model, which the
+//! Parts of a camera and of a hit that the plan leaves out, against the fuller model, which the
 //! test forces: the same to the bit, or within the error that the decision allows.
 
 use std::path::Path;
@@ -90,8 +90,8 @@ fn a_pinhole_without_a_pupil_is_a_closed_lens() {
     assert!(off > 0.0 && off < 0.012, "{off}");
 }
 
-/// Where no glass parts them, the bands share rays. A glass that parts them by 10⁻⁷ of its index gives each
-/// its own, and the same picture: the samples are the same, and so is all but a few edges.
+/// Bands share rays where no glass parts them. A glass that parts them by 10⁻⁷ of its index gives
+/// each its own, and the same picture: the samples are the same, and so is all but a few edges.
 #[test]
 fn bands_share_rays_where_nothing_parts_them() {
     let lens = |glass: Value| {

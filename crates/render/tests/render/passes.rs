@@ -142,7 +142,7 @@ fn a_picture_without_a_whole_pass_is_none() {
     }
 }
 
-/// What passes cost: the least of many times, in turns, against one pass. Prints and asserts nothing:
+/// Cost of passes: the least of many times, in turns, against one pass. Prints and asserts nothing:
 /// `cargo nextest run -p etendue-render --run-ignored only --no-capture what_passes_cost`.
 #[test]
 #[ignore = "a measurement"]

@@ -1,5 +1,5 @@
-//! What is written is read by programs that share no code with ours: OpenEXR's own Python module
-//! and `exrheader`, numpy, and xxhash. Each test says so and passes when its reader is not there.
+//! Files read by programs that share no code with ours: OpenEXR's own Python module and
+//! `exrheader`, numpy, and xxhash. Each test says so and passes when its reader is not there.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};

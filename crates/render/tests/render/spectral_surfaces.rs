@@ -31,8 +31,8 @@ fn wall(material: &Value) -> Value {
     })
 }
 
-/// What a curve does in a band is what a grey of its mean there does. A sheen leaves the coat below what the brightest of
-/// its curve does not take (`KHR_materials_sheen`), and so all bands have the coat of the grey of its greatest value.
+/// A curve acts in a band as a grey of its mean there does. A sheen leaves the coat below what the brightest of its
+/// curve does not take (`KHR_materials_sheen`), and so all bands have the coat of the grey of its greatest value.
 #[test]
 fn sheen_and_highlights_have_their_curves_in_every_band() {
     let folder = tempfile::tempdir().unwrap();

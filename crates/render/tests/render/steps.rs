@@ -48,7 +48,7 @@ pub(crate) fn glow() -> Emission {
     }
 }
 
-/// What rays meet: the structure, and images without a fault.
+/// Prepares what rays meet: the structure, and images without a fault.
 pub(crate) fn prepare(scene: &Scene, plan: &Plan) -> (Box<dyn Accel>, Images) {
     let accel = build(scene, plan, &BuildOptions::default()).unwrap();
     let images = Images::decode(scene, plan, None).unwrap();
@@ -81,7 +81,7 @@ pub(crate) fn channels(picture: &Picture, layer: &str) -> Vec<Vec<f64>> {
     values.map(|values| (0..values.len()).map(|i| values.at(i)).collect()).collect()
 }
 
-/// The same one after the other.
+/// Values of a layer's channels, one after the other.
 pub(crate) fn layer(picture: &Picture, name: &str) -> Vec<f64> {
     channels(picture, name).concat()
 }

@@ -1,5 +1,5 @@
-//! What is taken of a tolerance against everything: the picture differs by no more than was allowed, and by more where
-//! the tolerance is not kept.
+//! Verification of what is taken of a tolerance, against everything: the picture differs by no more
+//! than was allowed, and by more where the tolerance is not kept.
 
 use std::path::Path;
 
@@ -271,8 +271,8 @@ fn triangles_finer_than_the_tolerance_tells_apart_do_not_ask_for_f64() {
     assert!(found > 0.0 && found < 0.02, "{found}");
 }
 
-/// The same ball once more, 9.6 m behind: as wide as 3 pixels, and as coarse as its distance asks for, unless its shadow
-/// falls near the camera.
+/// The ball has a copy 9.6 m behind: as wide as 3 pixels, and as coarse as its distance asks for,
+/// unless its shadow falls near the camera.
 #[test]
 fn copies_have_the_detail_of_their_own_distance() {
     let copies = || ("/objects/0/instances", json!([{}, { "translate": [0, 0, -9.6] }]));
@@ -384,7 +384,7 @@ fn parted_colours(pixels: &str) -> Scene {
     load_json(tempfile::tempdir().unwrap().path(), scene)
 }
 
-/// Where the middle of the light of each band lies (pixels).
+/// Centre of the light of each band (pixels).
 fn middles(scene: &Scene, taken: Option<Taken>) -> Vec<[f64; 2]> {
     let plan = Plan::taking(scene, Outputs::ALL, taken);
     let (accel, images) = prepare(scene, &plan);

@@ -1,4 +1,4 @@
-//! What no chief ray can meet is left out of the structure, and the layers keep their bits.
+//! Parts that no chief ray can meet are left out of the structure, and the layers keep their bits.
 
 use etendue_accel::BuildOptions;
 use etendue_render::output::Outputs;

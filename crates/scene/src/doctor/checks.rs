@@ -124,8 +124,7 @@ pub(super) fn naming_part(bytes: &[u8]) -> &[u8] {
     }
 }
 
-/// How many nodes of the glTF file at `path` carry a light (`KHR_lights_punctual`); 0 for any
-/// other file.
+/// Number of nodes of the glTF file at `path` that carry a light (`KHR_lights_punctual`); 0 for any other file.
 pub(super) fn count_lights(path: &Path) -> u64 {
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     if !["gltf", "glb"].iter().any(|known| ending.eq_ignore_ascii_case(known)) {
@@ -138,7 +137,7 @@ pub(super) fn count_lights(path: &Path) -> u64 {
     nodes.into_iter().flatten().filter(has_light).count() as u64
 }
 
-/// How many triangles of `mesh` have the same three corners, in any order, as an earlier one.
+/// Number of triangles of `mesh` that have the same three corners, in any order, as an earlier one.
 /// Corners are the same when their coordinates are, whatever their indices.
 pub(super) fn count_duplicates(mesh: &Mesh) -> u64 {
     let same_as = representatives(&mesh.positions);

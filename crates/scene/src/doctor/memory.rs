@@ -1,4 +1,4 @@
-//! What a render will need, from counts alone.
+//! Forecast of a render's memory, from counts alone.
 
 use etendue_geometry::Coplanar;
 use etendue_report::{Decision, DecisionKind, DecisionValue, Size, listed};
@@ -62,7 +62,8 @@ pub struct MemoryForecast {
 }
 
 impl MemoryForecast {
-    /// What is known without a plan of the render: geometry, structure, and planes of layers.
+    /// Forecasts what is known without a plan of the render: geometry, structure, and planes of
+    /// layers.
     #[must_use]
     pub fn of(scene: &Scene) -> Self {
         let geometry: u64 = scene.geometry.meshes.iter().map(|mesh| mesh.heap_bytes() as u64).sum();
@@ -96,7 +97,7 @@ impl MemoryForecast {
         self
     }
 
-    /// What a render takes beyond what the program holds when the scene is loaded.
+    /// Memory that a render takes beyond what the program holds when the scene is loaded (bytes).
     #[must_use]
     pub fn to_come(&self) -> u64 {
         self.total - self.program - self.geometry

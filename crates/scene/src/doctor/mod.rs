@@ -164,8 +164,9 @@ pub fn check(
 }
 
 impl Diagnosis {
-    /// What there is to tell of a scene that was loaded with [`Wanted::EVERYTHING`] from a file of this
-    /// kind. Its forecast of memory is [`MemoryForecast::of`], and its frames are not counted.
+    /// Collects what there is to tell of a scene that was loaded with [`Wanted::EVERYTHING`] from a
+    /// file of this kind. Its forecast of memory is [`MemoryForecast::of`], and its frames are not
+    /// counted.
     #[must_use]
     pub fn of(scene: &Scene, kind: FileKind) -> Self {
         let geometry = &*scene.geometry;
@@ -217,7 +218,7 @@ impl Diagnosis {
     }
 }
 
-/// What lies in one plane with something else.
+/// Findings on what lies in one plane with something else.
 fn in_one_plane(scene: &Scene, pairs: &[([u32; 2], usize)]) -> Vec<Finding> {
     /// The most pairs that are named.
     const NAMED: usize = 8;

@@ -145,7 +145,7 @@ accuracy_settings! {
 }
 
 impl AccuracySpec {
-    /// Whether the scene says nothing of it.
+    /// True if the scene says nothing of it.
     pub(super) fn is_default(&self) -> bool {
         *self == Self::default()
     }
@@ -172,7 +172,7 @@ impl AccuracySpec {
         SharingLimits { places: self.band_place_error, shares: self.band_share_error }
     }
 
-    /// What contradicts what the plan is told, or bands that the sensor is given (`has_bands`): the path, and why.
+    /// Contradiction with what the plan is told, or bands that the sensor is given (`has_bands`): the path, and why.
     pub(super) fn contradiction(
         &self,
         plan: &PlanSpec,

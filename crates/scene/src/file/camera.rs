@@ -188,7 +188,7 @@ pub(super) fn place_in_scene() -> ScenePath {
 /// its own.
 #[derive(Debug, Clone)]
 pub struct SensorFile {
-    /// What was written.
+    /// Sensor as it was written.
     pub spec: SensorSpec,
     /// The sensor of it.
     pub sensor: Sensor,

@@ -16,12 +16,12 @@ use crate::words::{kind_of, nearest, suggest};
 use etendue_geometry::units::Dimension;
 use etendue_optics::train::NOTES;
 
-/// What is wrong, and where.
+/// Problem with a value, and its place.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Problem {
     /// The value.
     pub(crate) path: ScenePath,
-    /// What is wrong, what was expected.
+    /// Description of the error, and of what was expected.
     pub(crate) reason: String,
     /// The key at the end of the path is none that is known there.
     is_unknown_key: bool,
@@ -199,7 +199,7 @@ impl<'a> Checker<'a> {
         format!("the key `{key}` is missing{about}{allowed}")
     }
 
-    /// Whether `value` is of a kind that `schema` takes at all.
+    /// True if `value` is of a kind that `schema` takes at all.
     fn may_be(&self, schema: &'a Value, value: &Value) -> bool {
         let kinds = self.kinds(schema);
         kinds.is_empty() || kinds.iter().any(|kind| is_kind(kind, value))
@@ -269,8 +269,8 @@ fn show(value: &Value) -> String {
 const LISTED: usize = 40;
 
 impl<'a> Checker<'a> {
-    /// What would do where `schema` rules: ``1``, `an array of 3 numbers`, ``one of `a`, `b` ``;
-    /// `None` for what takes too many words.
+    /// Words for what is valid where `schema` rules: ``1``, `an array of 3 numbers`, ``one of `a`,
+    /// `b` ``; `None` for what takes too many words.
     fn allowed(&self, schema: &'a Value) -> Option<String> {
         let schema = self.resolve(schema);
         if let Some(word) = schema.get("const") {
@@ -295,7 +295,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// What several branches allow together.
+    /// Words for what several branches allow together.
     fn allowed_by_any(&self, branches: &'a [Value]) -> Option<String> {
         let branches: Vec<&Value> = branches.iter().map(|b| self.resolve(b)).collect();
         let is_null = |branch: &&&Value| kinds_of(branch).as_deref() == Some(&["null"]);

@@ -15,7 +15,7 @@ pub struct Place {
     pub column: usize,
 }
 
-/// Why a text is no JSON document for us.
+/// Fault of a text that is no JSON document for us.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct JsonFault {
     pub(crate) place: Place,
@@ -61,12 +61,12 @@ impl Document {
         }
     }
 
-    /// Where the value at `path`, or the nearest that holds it, stands in the text; `None` for the whole.
+    /// Place in the text of the value at `path`, or of the nearest that holds it; `None` for the whole.
     pub(crate) fn near(&self, path: &ScenePath) -> Option<Place> {
         path.holders().find_map(|path| self.place(&path))
     }
 
-    /// Where the value at `path` stands in the text; `None` for the whole.
+    /// Place in the text of the value at `path`; `None` for the whole.
     pub(crate) fn place(&self, path: &ScenePath) -> Option<Place> {
         if path.steps().is_empty() {
             return None;
@@ -135,13 +135,13 @@ struct Reader<'a> {
     levels: usize,
 }
 
-/// What cannot be there: its byte, and why.
+/// Fault in a text: its byte, and the reason.
 struct Wrong {
     at: usize,
     reason: String,
 }
 
-/// What should stand where a value does.
+/// Message where a value is missing.
 const A_VALUE: &str =
     "a value should stand here: a string in quotes, a number, true, false, null, [ or {";
 
@@ -389,7 +389,7 @@ mod tests {
         assert!(shown.ends_with('^'));
     }
 
-    /// Whether `text` is read as `serde_json` reads it: the independent reference.
+    /// Checks that `text` is read as `serde_json` reads it: the independent reference.
     fn check_against_serde(text: &str) {
         match (serde_json::from_str::<Value>(text), Document::parse(text.to_owned())) {
             (Ok(theirs), Ok((_, ours))) => assert_eq!(ours, theirs, "{text}"),

@@ -52,11 +52,11 @@ pub struct ReadLens {
     pub train: OpticalTrain,
     /// The lens file that it is, or would be; `None` for a scene's.
     pub file: Option<LensFile>,
-    /// Where a scene has its sensor; as written in other files.
+    /// Focus setting: where a scene has its sensor; as written in other files.
     pub focus: Focus,
     /// The camera that it is the lens of, of a scene.
     pub camera: Option<Camera>,
-    /// What was changed, assumed or left out when it was imported, in sentences.
+    /// Notes on what was changed, assumed or left out when it was imported, as sentences.
     pub notes: Vec<String>,
     /// Every file that it was read from.
     pub inputs: Vec<PathBuf>,
@@ -75,7 +75,7 @@ impl ReadLens {
         self.file.as_ref().map(LensFile::wavelengths_nm).unwrap_or_default()
     }
 
-    /// What each of them weighs; empty where the file weighs none.
+    /// Weights of the wavelengths; empty where the file weighs none.
     #[must_use]
     pub fn weights(&self) -> &[f64] {
         self.file.as_ref().map_or(&[], |file| &file.weights)
@@ -148,8 +148,8 @@ pub fn read_lens_at(
     })
 }
 
-/// Whether the file at `path` is a lens by itself: one of another program by its name or content, or JSON that has
-/// elements and nothing of a scene.
+/// Tests whether the file at `path` is a lens by itself: one of another program by its name or
+/// content, or JSON that has elements and nothing of a scene.
 #[must_use]
 pub fn is_lens(path: &Path) -> bool {
     let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));

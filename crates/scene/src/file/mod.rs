@@ -65,7 +65,7 @@ const MODELS: [&str; 4] = ["gltf", "glb", "obj", "ply"];
 /// The keys of a scene that no lens file has.
 const SCENE_KEYS: [&str; 3] = ["etendue", "camera", "objects"];
 
-/// What messages call a scene that stands in no file.
+/// Name, in messages, of a scene that stands in no file.
 const IN_MEMORY: &str = "scene in memory";
 
 /// The longest text that is read as a scene (bytes): scenes name their meshes, they do not hold
@@ -79,13 +79,13 @@ pub struct SceneFile {
     kind: FileKind,
     /// All values with the settings applied.
     value: Value,
-    /// What the file says; of the sensor the camera's part.
+    /// Content of the file; of the sensor the camera's part.
     pub spec: SceneSpec,
     /// The camera's sensor, when the file says more of it than its grid of pixels.
     pub sensor: Option<Sensor>,
 }
 
-/// Where the values of a file were written, to say where something is wrong.
+/// Places where the values of a file were written, to say where something is wrong.
 #[derive(Debug, Clone)]
 struct WrittenPlaces {
     path: PathBuf,
@@ -95,13 +95,13 @@ struct WrittenPlaces {
     opener: Opener,
     /// That file, once it is read.
     camera: Option<CameraDocument>,
-    /// Which paths the command line set, and how it was written there.
+    /// Paths that the command line set, and how each was written there.
     settings: BTreeMap<ScenePath, String>,
     /// Of which frame they are; none for the command line's.
     frame: Option<usize>,
 }
 
-/// What kind of file stands for the scene.
+/// Kind of file that stands for the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileKind {
     /// A JSON scene.
@@ -244,7 +244,7 @@ impl SceneFile {
         }
     }
 
-    /// Whether the sensor's bands are given as they are to be taken.
+    /// True if the sensor's bands are given as they are to be taken.
     fn has_given_bands(&self) -> bool {
         let spec = self.sensor.as_ref().map(Sensor::spec);
         spec.is_some_and(|spec| spec.bands.is_some() && spec.kind != SensorKind::Multispectral)
@@ -259,13 +259,13 @@ impl SceneFile {
         Self::of(self.written.clone(), self.kind, value, &[])
     }
 
-    /// The same, whose further settings are those of a frame.
+    /// Returns the file with its further settings counted as those of a frame.
     pub(crate) fn of_frame(mut self, number: usize) -> Self {
         self.written.frame = Some(number);
         self
     }
 
-    /// Whether the scene stands in no file.
+    /// True if the scene is in no file.
     #[must_use]
     pub fn is_in_memory(&self) -> bool {
         self.written.document.is_none() && self.path().ends_with(IN_MEMORY)
@@ -282,7 +282,7 @@ impl SceneFile {
         Ok((spec, sensor))
     }
 
-    /// What was probably meant by the value at `path`, when that belongs elsewhere.
+    /// Hint on what was probably meant by the value at `path`, when that belongs elsewhere.
     fn hint(&self, path: &ScenePath) -> Option<String> {
         let tracer = self.value.get("tracer").filter(|_| path.root() == Some("tracer"))?;
         let word = tracer.get("type").unwrap_or(tracer).as_str()?;
@@ -308,7 +308,7 @@ impl SceneFile {
         self.written.folder()
     }
 
-    /// Whether it is a JSON scene or a model.
+    /// Kind of the file: a JSON scene or a model.
     #[must_use]
     pub fn kind(&self) -> FileKind {
         self.kind
@@ -386,7 +386,7 @@ impl WrittenPlaces {
         SceneError::Invalid { file, path, place, why: why.into() }
     }
 
-    /// Where the value at `path`, or the nearest that holds it, was written.
+    /// Place where the value at `path`, or the nearest that holds it, was written.
     fn place(&self, path: &ScenePath) -> Origin {
         // A setting replaces all that the text has below it.
         if let Some(setting) = path.holders().find_map(|path| self.settings.get(&path)) {
@@ -416,7 +416,7 @@ fn layers_of(photodiodes: Photodiodes) -> &'static [LayerSpec] {
     }
 }
 
-/// Where a value was written.
+/// Place where a value was written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Origin {
     /// In the file's text.

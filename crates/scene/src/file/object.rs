@@ -18,24 +18,24 @@ use crate::shape::ShapeSpec;
 /// One entry of `objects`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObjectSpec {
-    /// Where its triangles come from.
+    /// Source of the object's triangles.
     pub source: Source,
-    /// What the rest of the file and the outputs call it.
+    /// Name of the object in the rest of the file and in the outputs.
     pub name: Option<String>,
     /// The name of a material, which replaces those of the model.
     pub material: Option<String>,
     /// For materials of the model by name, the name of the material that replaces each; they go
     /// before [`Self::material`].
     pub materials: BTreeMap<String, String>,
-    /// Which axis of the model's file points up; the scene's word when absent.
+    /// Axis of the model's file that points up; that of the scene when absent.
     pub up: Option<Up>,
     /// The moment of a glTF file's animation that is shown; at rest when absent.
     pub animation: Option<AnimationSpec>,
-    /// Where it stands.
+    /// Placement of the object.
     pub transform: TransformSpec,
-    /// Where copies of it stand before `transform` moves them all; one, unmoved, when absent.
+    /// Placements of its copies before `transform` moves them all; one, unmoved, when absent.
     pub instances: Option<InstancesSpec>,
-    /// How it moves while the shutter is open, with all copies; it stands still when absent.
+    /// Motion of the object, with all its copies, while the shutter is open; it stands still when absent.
     pub motion: Option<ObjectMotionSpec>,
 }
 
@@ -171,7 +171,7 @@ pub enum InstancesSpec {
     List(Vec<TransformSpec>),
 }
 
-/// Where an object's triangles come from.
+/// Source of an object's triangles.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Source {
     /// A glTF, OBJ or PLY file, as the scene writes its path.
@@ -221,7 +221,7 @@ struct WrittenModel {
 }
 
 impl ObjectSpec {
-    /// What to call the object: its name, else its file's or shape's.
+    /// Title of the object: its name, else its file's or shape's.
     #[must_use]
     pub fn title(&self) -> String {
         match (&self.name, &self.source) {
@@ -333,7 +333,7 @@ pub enum Scale {
     PerAxis([f64; 3]),
 }
 
-/// What is wrong with a transform: the key and the reason.
+/// Fault of a transform: the key and the reason.
 pub(crate) type TransformFault = (&'static str, String);
 
 impl TransformSpec {

@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::document::Document;
 use super::path::{MOST_STEPS, ScenePath};
 
-/// Why a setting cannot be applied.
+/// Error of a setting that cannot be applied.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OverrideError {
@@ -43,7 +43,7 @@ pub enum OverrideError {
     /// JSON that no scene file may hold.
     #[error("{reason}")]
     Refused {
-        /// Why.
+        /// Description of the error.
         reason: String,
     },
     /// A value on the way that has nothing inside.
@@ -51,7 +51,7 @@ pub enum OverrideError {
     Leaf {
         /// The value's path.
         parent: String,
-        /// What it is.
+        /// Kind of the value found there.
         found: &'static str,
         /// The step asked for.
         step: String,

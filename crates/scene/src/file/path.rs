@@ -46,7 +46,7 @@ impl ScenePath {
         Self(pointer.split('/').skip(1).map(key).collect())
     }
 
-    /// The same place as a JSON pointer (RFC 6901).
+    /// Returns the place as a JSON pointer (RFC 6901).
     #[must_use]
     pub fn pointer(&self) -> String {
         self.0.iter().fold(String::new(), |pointer, step| match step {
@@ -82,7 +82,7 @@ impl ScenePath {
         (0..=self.0.len()).rev().map(|count| Self(self.0[..count].to_vec()))
     }
 
-    /// The same place, counted from `holder`; `None` where it is not in there.
+    /// Returns the place relative to `holder`; `None` where it is not in there.
     #[must_use]
     pub fn inside(&self, holder: &Self) -> Option<Self> {
         self.0.strip_prefix(&*holder.0).map(|rest| Self(rest.to_vec()))
@@ -103,7 +103,7 @@ impl ScenePath {
         &self.0
     }
 
-    /// What holds the place, and the last step; `None` for the top.
+    /// Splits the place into what holds it and the last step; `None` for the top.
     #[must_use]
     pub fn split_last(&self) -> Option<(Self, &PathStep)> {
         let (last, holder) = self.0.split_last()?;

@@ -1,4 +1,4 @@
-//! How many samples a pixel gets: a number, or what they are to reach.
+//! Samples per pixel: a number, or what they are to reach.
 
 use etendue_camera::sampler::Sampler;
 use etendue_geometry::units::Seconds;
@@ -140,14 +140,15 @@ impl SamplesSpec {
         u32::try_from(product.isqrt()).unwrap_or(u32::MAX).max(1)
     }
 
-    /// Whether pixels get samples until their error is small enough, and so different numbers of them.
+    /// True if pixels get samples until their error is small enough, and so different numbers of
+    /// them.
     #[must_use]
     pub fn is_adaptive(self) -> bool {
         matches!(self, Self::SensorNoise(_) | Self::RelativeError(_))
     }
 }
 
-/// What makes no sense of `render.samples` in the scene `value`, and its path.
+/// Fault of `render.samples` in the scene `value`, with its path.
 pub(super) fn fault(
     render: &RenderSpec,
     layers: &[&str],

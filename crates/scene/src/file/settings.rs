@@ -1,4 +1,4 @@
-//! What is made of a scene: the picture, and how it is rendered.
+//! Settings of a scene's picture, and of how it is rendered.
 
 use etendue_camera::sampler::Sampler;
 use etendue_geometry::units::Seconds;
@@ -49,23 +49,23 @@ pub struct TracerRow {
     pub name: &'static str,
     /// The layer that holds the picture.
     pub layer: LayerSpec,
-    /// How it traces light, if it does.
+    /// Light transport of the tracer; `None` where it traces no light.
     pub light: Option<LightRow>,
 }
 
-/// How a tracer of light goes about it.
+/// Light transport of a tracer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LightRow {
-    /// Where its paths end.
+    /// Rules of where paths end.
     pub rules: Rules,
-    /// How far it follows light, in words.
+    /// Reach of light that is followed, in words.
     pub reach: String,
-    /// Which light it shows, in words.
+    /// Light that the picture shows, in words.
     pub shows: &'static str,
 }
 
 impl TracerSpec {
-    /// What there is to know of it. A picture without light is a layer that is filled for itself.
+    /// Description of the tracer. A picture without light is a layer that is filled for itself.
     #[must_use]
     pub fn row(self) -> TracerRow {
         let seen = |name, layer| TracerRow { name, layer, light: None };
@@ -203,8 +203,7 @@ pub enum BuildQuality {
 }
 
 impl PlanSpec {
-    /// What contradicts something else of these, or the accelerator that the scene names: the key, and
-    /// why.
+    /// Contradiction with something else of these, or the accelerator that the scene names: the key, and why.
     pub(super) fn contradiction(&self, accel: Option<AccelName>) -> Option<(&'static str, String)> {
         let of_f64 = match accel {
             Some(AccelName::Bvh) => Some("`bvh`"),
@@ -288,7 +287,7 @@ pub enum ToneMap {
 }
 
 impl RenderSpec {
-    /// When the frame is taken (s, in the scene's clock); 0 where nothing says so.
+    /// Time of the frame (s, in the scene's clock); 0 where nothing says so.
     #[must_use]
     pub fn time(&self) -> f64 {
         match (self.time, self.rate) {
@@ -353,7 +352,7 @@ pub enum AccelName {
 }
 
 impl AccelName {
-    /// What scenes and commands call each, and what it is.
+    /// Names of all accelerators in scenes and commands, each with a description.
     pub const ALL: [(Self, [&str; 2]); 3] = [
         (Self::Embree, ["embree", "Intel's Embree"]),
         (Self::Bvh, ["bvh", "Pure Rust"]),

@@ -124,7 +124,7 @@ impl SceneSpec {
         groups.into_iter().map(|group| LayerSpec::LightGroup { group }).collect()
     }
 
-    /// What is wrong with the layers: their place, and why.
+    /// Fault of the layers: their place, and why.
     pub(super) fn layer_fault(&self) -> Option<(String, String)> {
         if self.picture() == Some(LayerSpec::Radiance) {
             return None;
@@ -280,7 +280,7 @@ pub fn scene_schema() -> Value {
     schema
 }
 
-/// The same, made once.
+/// Schema of scenes, made once.
 pub(crate) static SCENE: LazyLock<Value> = LazyLock::new(scene_schema);
 
 /// The schema of a scene's `sensor`, made once.

@@ -140,7 +140,7 @@ impl JsonSchema for ShareSpec {
 }
 
 impl ToleranceSpec {
-    /// What contradicts it: the path, and why.
+    /// Contradiction with the tolerance: the path, and why.
     pub(super) fn contradiction(
         plan: &PlanSpec,
         has_slots: bool,

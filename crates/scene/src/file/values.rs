@@ -109,7 +109,7 @@ impl<'de, E: de::Error> Deserializer<'de> for Node<'de, E> {
     }
 }
 
-/// Why a value is none of a type, in words for who wrote the JSON: without the names of Rust's types.
+/// Reason why a value is none of a type, in words for who wrote the JSON: without the names of Rust's types.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Reason(String);
 

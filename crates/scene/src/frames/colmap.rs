@@ -22,7 +22,7 @@ pub(super) use self::{
 /// An image that was reconstructed.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ColmapImage {
-    /// Where it stands in its file, as sentences go on: `in line 3`.
+    /// Place of the image in its file, as sentences go on: `in line 3`.
     place: String,
     /// World to camera, the real part first.
     quaternion: [f64; 4],
@@ -115,7 +115,7 @@ pub(in crate::frames) fn cameras_in_binary(bytes: &[u8]) -> Result<Cameras, Stri
     }
 }
 
-/// What is still to be read.
+/// Cursor over bytes that are still to be read.
 struct ByteCursor<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -190,7 +190,7 @@ struct ColmapModel {
     bend: Bend,
 }
 
-/// What a model does beside a pinhole.
+/// Distortion of a model beside a pinhole.
 #[derive(Debug, Clone, Copy)]
 enum Bend {
     Nothing,
@@ -260,7 +260,7 @@ impl ColmapModel {
         found.ok_or_else(|| unknown(&format!("model {number}")))
     }
 
-    /// How many parameters it has.
+    /// Number of parameters.
     fn count(self) -> usize {
         let coefficients = match self.bend {
             Bend::Nothing => 0,
@@ -302,7 +302,7 @@ fn unknown(what: &str) -> String {
     )
 }
 
-/// How far from 1 the length of an image's quaternion may be. COLMAP writes all digits.
+/// Tolerance of the length of an image's quaternion from 1. COLMAP writes all digits.
 const UNIT: f64 = 1e-3;
 
 /// `IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME`, each followed by a line of points
@@ -339,14 +339,14 @@ pub(in crate::frames) fn images_in_text(text: &str) -> Result<Vec<ColmapImage>, 
     Ok(images)
 }
 
-/// Whether a line may be one of points.
+/// True if a line may be one of points.
 fn are_points(words: &[&str]) -> bool {
     let is_number = |word: &str| word.parse::<f64>().is_ok();
     let is_point = |p: &[&str]| is_number(p[0]) && is_number(p[1]) && p[2].parse::<i128>().is_ok();
     words.len().is_multiple_of(3) && words.chunks(3).all(is_point)
 }
 
-/// Whether a line may be one of an image.
+/// True if a line may be one of an image.
 fn may_be_image(words: &[&str]) -> bool {
     image(words, 0).is_ok_and(|image| {
         let length: f64 = image.quaternion.iter().map(|q| q * q).sum::<f64>().sqrt();

@@ -28,16 +28,16 @@ const MOST_FRAMES: usize = 100_000;
 pub struct Frame {
     /// Its number, from 0.
     pub number: usize,
-    /// When it was taken (s), where the scene says.
+    /// Time of the frame (s), where the scene says.
     pub time: Option<f64>,
-    /// What is set for it: paths of the scene and values.
+    /// Settings of the frame: paths of the scene and values.
     pub settings: Vec<(String, Value)>,
-    /// Which camera of a rig it is, where there is one.
+    /// Camera of a rig that takes the frame, where there is one.
     pub rig: Option<RigCamera>,
 }
 
 impl Frame {
-    /// Whether it sets some of the scene's keys `roots`, or what is inside of them.
+    /// True if the frame sets some of the scene's keys `roots`, or what is inside of them.
     #[must_use]
     pub fn sets(&self, roots: &[&str]) -> bool {
         let is_in =
@@ -53,9 +53,9 @@ pub struct RigCamera {
     pub moment: usize,
     /// The number of the camera, from 0.
     pub camera: usize,
-    /// How many cameras the rig has. The frame's number is `moment × count + camera`.
+    /// Number of cameras of the rig. The frame's number is `moment × count + camera`.
     pub count: usize,
-    /// What the scene calls the camera.
+    /// Name of the camera in the scene.
     pub name: Option<String>,
 }
 
@@ -64,11 +64,11 @@ pub struct RigCamera {
 pub struct Frames {
     /// One a picture.
     pub frames: Vec<Frame>,
-    /// What a user should know of the file that they come from.
+    /// Notes on the file that the frames come from.
     pub notes: Vec<Note>,
 }
 
-/// What paths of the camera start from.
+/// Starting values of the camera's paths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Start {
     /// The scene's own camera.

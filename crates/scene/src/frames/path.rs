@@ -98,7 +98,7 @@ pub(super) fn spec_of(pose: &Pose) -> PoseSpec {
 /// Frames a second where the scene does not say.
 const RATE: f64 = 24.0;
 
-/// What a last moment may lie beyond the end, as a share of a frame: times are written in decimals.
+/// Tolerance of a last moment beyond the end, as a share of a frame: times are written in decimals.
 const ROUNDING: f64 = 1e-6;
 
 /// A frame for each moment of an animation; the error has the key that is wrong.
@@ -202,7 +202,7 @@ pub(super) fn cameras(
     Ok(cameras.iter().enumerate().map(frame).collect())
 }
 
-/// Where a scene lists the cameras.
+/// Place in a scene that lists the cameras.
 const CAMERAS: &str = "frames.cameras";
 
 /// The most cameras of a rig.
@@ -260,7 +260,7 @@ pub(super) fn rig_frames(
     Ok(frames)
 }
 
-/// Where a camera is in its rig.
+/// Pose of a camera in its rig.
 fn place(camera: &RigCameraSpec) -> Result<Pose, (&'static str, String)> {
     let RigCameraSpec { at, pose, settings, .. } = camera;
     if let Some(path) = settings.keys().find(|path| path.starts_with("camera.pose")) {
@@ -294,7 +294,7 @@ fn place(camera: &RigCameraSpec) -> Result<Pose, (&'static str, String)> {
     }
 }
 
-/// Where the rig stands at a moment.
+/// Pose of the rig at a moment.
 fn pose_at(file: &SceneFile, moment: &Frame, start: &Pose) -> Result<Pose, String> {
     let moves = |(path, _): &&(String, _)| path == "camera" || path.starts_with("camera.pose");
     let value = match moment.settings.iter().rev().find(moves) {

@@ -25,9 +25,9 @@ pub(super) struct TrajectorySource<'a> {
     pub(super) folder: &'a InputFolder,
     /// The file, as the scene writes it.
     pub(super) file: &'a str,
-    /// What it is; told by its name when absent.
+    /// Format of the file; told by its name when absent.
     pub(super) format: Option<TrajectoryFormat>,
-    /// How the poses of formats map that do not say it themselves.
+    /// Axes of the poses in formats that do not say it themselves.
     pub(super) axes: (Maps, Convention),
     /// The scene's own pixels.
     pub(super) picture: ScenePicture,
@@ -140,7 +140,7 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, Vec<&str>)> {
     lines.filter(|(_, words): &(_, Vec<&str>)| !words.first().is_none_or(|w| w.starts_with('#')))
 }
 
-/// Whether the first line that says something has as many words as KITTI's.
+/// True if the first line that says something has as many words as KITTI's.
 pub(super) fn are_kittis(text: &str) -> bool {
     lines(text).next().is_some_and(|(_, words)| words.len() == KITTI_WORDS)
 }

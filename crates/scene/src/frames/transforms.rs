@@ -17,7 +17,7 @@ use etendue_camera::{Convention, Maps, PoseSpec};
 pub(super) struct ScenePicture {
     /// Columns and rows.
     pub(super) resolution: [u32; 2],
-    /// Whether the scene says so, or it is a default.
+    /// True if the scene gives it, false if it is a default.
     pub(super) is_given: bool,
 }
 
@@ -76,7 +76,7 @@ const REFUSED: [&str; 19] = [
 /// Keys that mean nothing without a focal length.
 const OF_LENS: [&str; 9] = ["cx", "cy", "k1", "k2", "k3", "k4", "p1", "p2", "distortion_params"];
 
-/// Where two keys may disagree on a focal length: files are written with four digits and more.
+/// Tolerance of two keys that state the same focal length: files are written with four digits and more.
 const SAME_FOCAL: f64 = 1e-3;
 
 type Notes = Vec<(NoteKind, String)>;
@@ -107,7 +107,7 @@ fn is_known(key: &str) -> bool {
     READ.contains(&key) || PICTURES.contains(&key) || REFUSED.contains(&key)
 }
 
-/// What is to be said of a file once, whatever its frames.
+/// Notes to be given of a file once, whatever its frames.
 #[derive(Debug, Default)]
 struct Said {
     unread: BTreeSet<String>,
@@ -341,7 +341,7 @@ impl<'v> Keys<'v> {
     }
 }
 
-/// Whether a value says something: neither false, nor zero, nor empty.
+/// True if a value says something: neither false, nor zero, nor empty.
 fn is_on(value: &Value) -> bool {
     match value {
         Value::Null => false,

@@ -17,9 +17,9 @@ const CHUNK: usize = 1 << 14;
 /// A mesh as a file has it, before anything is known of it.
 #[derive(Debug)]
 pub(super) struct MeshCandidate {
-    /// What the file calls it.
+    /// Name of the mesh in the file.
     pub name: String,
-    /// Where it is in the file, for messages.
+    /// Place of the mesh in the file, for messages.
     pub place: String,
     pub positions: Positions,
     pub triangles: Buffer<[u32; 3]>,
@@ -83,7 +83,7 @@ pub(super) fn admit(
     Ok(Admitted { mesh, dropped: survey.broken, notes: gate.notes })
 }
 
-/// What one look at all triangles tells.
+/// Result of one look at all triangles.
 #[derive(Clone, Copy)]
 struct Survey {
     bounds: Bounds,
@@ -235,7 +235,7 @@ pub(crate) fn bounds_of(positions: &Positions, triangles: &[[u32; 3]]) -> Bounds
     triangles.par_chunks(CHUNK).map(of_chunk).reduce(|| Bounds::EMPTY, Bounds::union)
 }
 
-/// How many of `triangles`, whose indices exist, have no area.
+/// Number of `triangles`, whose indices exist, that have no area.
 pub(crate) fn count_degenerate(positions: &Positions, triangles: &[[u32; 3]]) -> u64 {
     let of_chunk = |chunk: &[[u32; 3]]| {
         let corners = chunk.iter().map(|t| t.map(|corner| positions.get(corner as usize)));

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::single;
 
-/// How a mesh changes its shape, in s from the moment that is shown.
+/// Deformation of a mesh over time, in s from the moment that is shown.
 #[derive(Debug)]
 pub struct Deformer {
     /// As the file has them (m).
@@ -26,13 +26,13 @@ pub struct Deformer {
 pub(super) struct Morph {
     /// The first number is its weight.
     pub weight: Track,
-    /// What is added at weight 1 (m).
+    /// Offsets of the points at weight 1 (m).
     pub points: Option<Vertices<3>>,
     pub normals: Option<Vertices<3>>,
 }
 
-/// What carries the vertices of a mesh from where they were bound to where the joints of a skin are, by joint: from the
-/// mesh's frame to the model's, the outermost frame first; one at least each.
+/// Links that carry the vertices of a mesh from where they were bound to where the joints of a skin are, by joint: from
+/// the mesh's frame to the model's, the outermost frame first; one at least each.
 #[derive(Debug, Clone)]
 pub(super) struct Joints(pub Vec<Vec<Link>>);
 
@@ -108,17 +108,18 @@ pub(super) fn number(joint: f32, count: usize) -> Option<usize> {
 /// Points (m) and normals of any length, of all vertices: straight lines of weights are straight lines of both.
 pub(super) type Shape = (Vec<DVec3>, Option<Vec<DVec3>>);
 
-/// How far a shape may be from the straight line between two steps (m, in the mesh's frame), at a point.
+/// Tolerance of a shape's distance from the straight line between two steps (m, in the mesh's frame), at a point.
 pub(crate) type Tolerance<'a> = &'a (dyn Fn(DVec3) -> f64 + Sync);
 
 /// Shares of the way between two steps at which the straight line is compared. The cubic whose middle is on it is farthest
 /// from it at 0.21 and 0.79.
 const LOOKED_AT: [f64; 3] = [0.25, 0.5, 0.75];
 
-/// What of the tolerance is used up where it is looked at; between those places a cubic is at most 1.03 times as far.
+/// Share of the tolerance that is used up where it is looked at; between those places a cubic is at
+/// most 1.03 times as far.
 const USED: f64 = 0.95;
 
-/// Why there are no steps.
+/// Error of a deformation without steps.
 #[derive(Debug)]
 pub(crate) enum NoSteps<E> {
     /// There is no room for them.
@@ -154,7 +155,7 @@ impl Deformer {
         self.morphs.iter().map(|morph| &morph.weight).chain(joints.flat_map(Link::tracks))
     }
 
-    /// Whether the shape changes between some times (s).
+    /// True if the shape changes between two times (s).
     pub(crate) fn moves_within(&self, span: [f64; 2]) -> bool {
         span[0] < span[1] && self.tracks().any(|track| track.moves_within(span))
     }
@@ -280,7 +281,8 @@ impl<E> DeformationSteps<'_, E> {
         Ok(())
     }
 
-    /// How far points are from the straight lines between two shapes, at a share of the way, over what is allowed.
+    /// Greatest distance of points from the straight lines between two shapes, at a share of the
+    /// way, over what is allowed.
     fn distance(&self, [start, points, end]: [&Vec<DVec3>; 3], share: f64) -> f64 {
         let of = |i: usize| {
             let straight = start[i].lerp(end[i], share);

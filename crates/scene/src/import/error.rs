@@ -1,4 +1,5 @@
-//! Why a model could not be read: refusals that name the file, the place in it, and what to do.
+//! Errors of models that cannot be read: refusals that name the file, the place in it, and what to
+//! do.
 //!
 //! What an import has to say without refusing the file.
 
@@ -88,7 +89,7 @@ impl Note {
         Self { kind, subject: subject.into(), message: message.into(), count: 1 }
     }
 
-    /// The same, `count` times.
+    /// Returns the note counted `count` times.
     pub(super) fn counted(mut self, count: u64) -> Self {
         self.count = count;
         self

@@ -94,13 +94,13 @@ impl Files {
         Budget::default().take(bytes).map_err(|source| error::too_much(file, place, source))
     }
 
-    /// Where `written`, a path inside the model, leads; see [`Self::locate_beside`].
+    /// Path that `written`, a path inside the model, leads to; see [`Self::locate_beside`].
     pub(super) fn locate(&self, written: &str) -> Result<Option<PathBuf>, Refusal> {
         self.locate_in(&self.folder, written)
     }
 
-    /// Where `written`, a path inside `file`, leads. Backslashes, which some exporters write,
-    /// count as slashes when no file has the name as it is.
+    /// Path that `written`, a path inside `file`, leads to. Backslashes, which some exporters
+    /// write, count as slashes when no file has the name as it is.
     ///
     /// `Ok(None)` when there is no such file.
     pub(super) fn locate_beside(

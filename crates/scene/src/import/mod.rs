@@ -42,7 +42,7 @@ use etendue_report::Refusal;
 
 pub use error::{Note, NoteKind};
 
-/// What the render will look at; the rest of the file is left alone.
+/// Attributes of a model that the render uses; the rest of the file is left alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Wanted {
     /// Shading normals.
@@ -80,7 +80,7 @@ impl Wanted {
     };
 }
 
-/// What becomes of defects in the data, such as a NaN position.
+/// Treatment of defects in the data, such as a NaN position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Strictness {
     /// The triangle (or value) is dropped and a note counts it.
@@ -90,10 +90,10 @@ pub enum Strictness {
     Strict,
 }
 
-/// How to import.
+/// Options of an import.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// What becomes of defects in the data.
+    /// Treatment of defects in the data.
     pub strictness: Strictness,
     /// The folder that the files named inside the model may not leave (after links are followed);
     /// `None` allows any place.
@@ -111,21 +111,21 @@ pub struct Options {
 pub struct Play {
     /// The animation's name, or its number from 0; the first when absent.
     pub which: Option<String>,
-    /// When (s): before the first key and after the last, things stand as there.
+    /// Time of the animation (s): before the first key and after the last, things stand as there.
     pub time: f64,
-    /// Whether it goes on from there: placements then have links.
+    /// True if the animation goes on from there: placements then have links.
     pub plays: bool,
 }
 
-/// What a model file holds.
+/// Content of a model file.
 #[derive(Debug, Clone, Default)]
 pub struct Import {
     /// Each mesh (a glTF primitive, an OBJ group of one material) once.
     pub meshes: Vec<Mesh>,
-    /// How some of them, by their indices, change their shapes from the moment that is shown on; nothing where no
-    /// animation plays.
+    /// Deformations of some of the meshes, by their indices, from the moment that is shown on;
+    /// nothing where no animation plays.
     pub deformers: BTreeMap<u32, Arc<Deformer>>,
-    /// Where they stand.
+    /// Placements of the meshes.
     pub placements: Vec<ImportedPlacement>,
     /// The materials that placements name.
     pub materials: Vec<Material>,
@@ -135,9 +135,9 @@ pub struct Import {
     pub cameras: Vec<ImportedCamera>,
     /// Lights of the default scene, in the order of their nodes; empty unless wanted.
     pub lights: Vec<ImportedLight>,
-    /// What was dropped, ignored or missing.
+    /// Notes on what was dropped, ignored or missing.
     pub notes: Vec<Note>,
-    /// What reading cost.
+    /// Statistics of reading.
     pub stats: Stats,
 }
 
@@ -152,12 +152,13 @@ pub struct ImportedPlacement {
     pub model_from_mesh: Transform,
     /// The node's or group's name; may be empty.
     pub name: String,
-    /// Which node or group of the file.
+    /// Index of the node or group of the file.
     pub node: u32,
-    /// Which copy, of a node that names many places for its mesh (`EXT_mesh_gpu_instancing`).
+    /// Index of the copy, of a node that names many places for its mesh
+    /// (`EXT_mesh_gpu_instancing`).
     pub instance: Option<u32>,
-    /// How it moves, from the mesh's frame to the model's, the outermost frame first, in s from the moment that is shown;
-    /// empty where it stands still.
+    /// Motion from the mesh's frame to the model's, the outermost frame first, in s from the moment
+    /// that is shown; empty where it stands still.
     pub links: Vec<Link>,
 }
 
@@ -183,8 +184,8 @@ pub struct ImportedLight {
     pub light: Light,
     /// From the node's frame to the model's (m).
     pub model_from_light: Transform,
-    /// How it moves, from the node's frame to the model's, the outermost frame first, in s from the moment that is shown;
-    /// empty where it stands still.
+    /// Motion from the node's frame to the model's, the outermost frame first, in s from the moment
+    /// that is shown; empty where it stands still.
     pub links: Vec<Link>,
 }
 
@@ -230,11 +231,11 @@ pub struct ImportedCamera {
     /// From the camera's frame (looking along −Z, +Y up) to the model's (m). Its linear part may
     /// hold the scale of the nodes above, which glTF tells readers to leave out of the view.
     pub model_from_camera: Transform,
-    /// What it sees.
+    /// Projection of the camera.
     pub projection: CameraProjection,
 }
 
-/// What a glTF camera sees. Clip planes are not kept: rays have none.
+/// Projection of a glTF camera. Clip planes are not kept: rays have none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CameraProjection {
     /// A pinhole.
@@ -253,7 +254,7 @@ pub enum CameraProjection {
     },
 }
 
-/// What reading a model cost and found.
+/// Statistics of reading a model.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Stats {
     /// Files that were opened, with their sizes in bytes.

@@ -64,7 +64,7 @@ fn flattened(points: &[DVec3]) -> Option<Vec<Coord<f64>>> {
     Some(points.iter().map(|p| Coord { x: p[x], y: p[y] }).collect())
 }
 
-/// Whether no corner turns right. (That it winds once is not asked: a star fans no worse.)
+/// True if no corner turns right. (That it winds once is not asked: a star fans no worse.)
 fn is_convex(polygon: &[Coord<f64>]) -> bool {
     let n = polygon.len();
     (0..n).all(|i| orient2d(polygon[i], polygon[(i + 1) % n], polygon[(i + 2) % n]) >= 0.0)
@@ -114,7 +114,7 @@ impl<'a> Ring<'a> {
         orient2d(self.polygon[a], self.polygon[b], self.polygon[c])
     }
 
-    /// Whether `other` lies in the triangle, or, where it is at one of its corners, whether the
+    /// True if `other` lies in the triangle, or, where it is at one of its corners, whether the
     /// polygon goes from there into it.
     fn blocks(&self, [a, b, c]: [usize; 3], other: usize) -> bool {
         let inside = |p: usize, of: &[(usize, usize)]| {

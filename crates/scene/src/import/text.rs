@@ -77,7 +77,7 @@ impl<'a> Words<'a> {
         self.at
     }
 
-    /// Whether the text is at its end.
+    /// True if the text is at its end.
     pub(super) fn is_done(&self) -> bool {
         self.at >= self.text.len()
     }
@@ -133,7 +133,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// Whether a backslash is here that joins the next line.
+    /// True if a backslash is here that joins the next line.
     #[inline]
     fn continues(&self) -> bool {
         self.text[self.at] == b'\\'
@@ -159,8 +159,8 @@ pub(super) fn number(word: &[u8]) -> Option<f64> {
         .or_else(|| not_finite(word))
 }
 
-/// What Microsoft's C library prints of numbers that are not finite: `1.#INF`, `-1.#IND`,
-/// `1.#QNAN0`, cut or filled to the digits asked for; newer ones print `-nan(ind)`.
+/// Value of a word that Microsoft's C library prints for numbers that are not finite: `1.#INF`,
+/// `-1.#IND`, `1.#QNAN0`, cut or filled to the digits asked for; newer ones print `-nan(ind)`.
 #[cold]
 fn not_finite(word: &[u8]) -> Option<f64> {
     let (negative, rest) = match word {

@@ -153,8 +153,8 @@ impl SceneFile {
         }
     }
 
-    /// What is odd about the camera's lens. Glasses and filters that are not known at a wavelength
-    /// that is traced are an error when strict.
+    /// Notes on oddities of the camera's lens. Glasses and filters that are not known at a
+    /// wavelength that is traced are an error when strict.
     pub(super) fn lens_notes(
         &self,
         camera: &Camera,
@@ -306,7 +306,7 @@ pub struct SceneCamera {
     pub spec: CameraSpec,
 }
 
-/// Where the camera of a scene came from.
+/// Origin of a scene's camera.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CameraOrigin {
     /// The scene file gives a camera and its pose.

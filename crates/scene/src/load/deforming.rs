@@ -15,7 +15,7 @@ use crate::file::SceneFile;
 use crate::import::{Deformer, NoSteps};
 use crate::memory::{Budget, TooMuch};
 
-/// How far a point may be from where the animation has it (pixels of the picture).
+/// Tolerance of a point's distance from where the animation has it (pixels of the picture).
 const CHORD_PIXELS: f64 = 1e-3;
 
 /// Points nearer to the camera than this share of their mesh's size are taken for as far: nothing could be
@@ -126,7 +126,7 @@ impl Eyes {
         Self { pixel, views, stretch, least, nearest }
     }
 
-    /// How far a point of the mesh may be from its place (m, in the mesh's frame).
+    /// Tolerance of a point of the mesh from its place (m, in the mesh's frame).
     fn tolerance(&self, point: DVec3) -> f64 {
         let at = |distance: f64, stretch: f64| {
             let pixel = match self.pixel {

@@ -19,7 +19,7 @@ use etendue_files::{FoundFile, InputFolder};
 use etendue_geometry::{Bounds, Geometry, Mesh, Placement};
 use etendue_tracer::{Light, LightKind, Material, Scattering};
 
-/// Where triangles come from, once for all objects that share them.
+/// Source of triangles, once for all objects that share them.
 pub(super) struct Origin {
     pub(super) kind: OriginKind,
     /// The first object that uses it, for messages.
@@ -186,7 +186,7 @@ impl SceneFile {
         })
     }
 
-    /// Which axis of an object's file points up.
+    /// Axis of an object's file that points up.
     pub(super) fn up_of(&self, spec: &ObjectSpec) -> Up {
         let silent = matches!(&spec.source, Source::File(path) if names_no_up(path));
         spec.up.unwrap_or(if silent { self.spec.up } else { Up::Y })
@@ -246,13 +246,13 @@ impl SceneFile {
     }
 }
 
-/// Whether a model's format leaves open which way is up.
+/// True if a model's format leaves open which way is up.
 fn names_no_up(path: &str) -> bool {
     let ending = path.rsplit_once('.').map_or("", |(_, ending)| ending);
     ["obj", "ply"].iter().any(|known| ending.eq_ignore_ascii_case(known))
 }
 
-/// How the box of a model stands when +Z seems to be up in it; `None` when nothing tells.
+/// Description of how the box of a model stands when +Z seems to be up in it; `None` when nothing tells.
 fn where_z_is_up(import: &Import) -> Option<&'static str> {
     /// Shares of the box's own sides.
     const ON_THE_GROUND: f64 = 0.01;
@@ -275,13 +275,13 @@ fn where_z_is_up(import: &Import) -> Option<&'static str> {
     (is_above && is_mirrored).then_some("its box is half below y = 0 and all above z = 0")
 }
 
-/// What the scene file itself brings, while its objects are resolved.
+/// Parts that the scene file itself brings, while its objects are resolved.
 pub(super) struct OwnParts<'a> {
     pub(super) materials: &'a [Material],
     /// Files that objects name beside their models.
     pub(super) files: Vec<PathBuf>,
     pub(super) kept: &'a Cache,
-    /// What copies are spoken for in, where the scene is to be rendered.
+    /// Budget that copies are spoken for in, where the scene is to be rendered.
     pub(super) budget: Option<&'a Budget>,
 }
 
@@ -294,7 +294,7 @@ fn unknown_material(name: &str, materials: &[Material]) -> String {
     }
 }
 
-/// What of the lights and the surfaces that shine finds no way into a picture, in words.
+/// Notes on lights and surfaces that shine but find no way into a picture, in words.
 pub(crate) fn of(geometry: &Geometry, materials: &[Material], lights: &[Light]) -> Vec<Note> {
     let mut placed: BTreeMap<u32, f64> = BTreeMap::new();
     let mut bends: Vec<&str> = Vec::new();

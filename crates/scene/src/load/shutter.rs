@@ -1,4 +1,5 @@
-//! When a scene's picture is taken: the frame's time, the shutter, and the camera's motion in the frame's clock.
+//! Time of a scene's picture: the frame's time, the shutter, and the camera's motion in the frame's
+//! clock.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -108,25 +109,25 @@ impl SceneFile {
         }
     }
 
-    /// Whether some object has a motion.
+    /// True if some object has a motion.
     fn objects_move(&self) -> bool {
         let plays = |object: &ObjectSpec| object.animation.as_ref().is_some_and(|it| it.plays);
         self.spec.objects.iter().any(|object| object.motion.is_some() || plays(object))
     }
 
-    /// How lights of the scene move.
+    /// Motions of the scene's lights.
     fn light_motions(&self) -> impl Iterator<Item = &LightMotionSpec> {
         let motions = self.spec.lights.iter().flatten().filter_map(LightSpec::motion);
         motions.map(|(motion, _)| motion)
     }
 
-    /// What says how lights change with time, and from when on.
+    /// Modulations of lights over time, and their starts.
     fn modulations(&self) -> impl Iterator<Item = &ModulationSpec> {
         let lights = self.spec.lights.iter().flatten().filter_map(LightSpec::modulation);
         lights.chain(self.spec.materials.values().filter_map(MaterialSpec::modulation))
     }
 
-    /// Whether some object or light has a motion, some light a modulation, or the exposure several slots.
+    /// True if some object or light has a motion, some light a modulation, or the exposure several slots.
     fn changes(&self) -> bool {
         let has_slots = !self.spec.serial.is_empty();
         let lights_move = self.light_motions().next().is_some();
@@ -155,14 +156,14 @@ impl SceneFile {
         Err(self.fault("frames", why))
     }
 
-    /// Whether frames are taken at their times.
+    /// True if frames are taken at their times.
     pub(crate) fn has_clock(&self) -> bool {
         let camera = self.spec.camera.as_ref();
         camera.is_some_and(|camera| camera.motion().is_some()) || self.changes()
     }
 }
 
-/// What a user should know of the camera's shutter and motion.
+/// Notes for the user on the camera's shutter and motion.
 pub(crate) fn notes(camera: &Camera) -> Vec<Note> {
     let note = |message: String| Note {
         kind: NoteKind::Irregular,

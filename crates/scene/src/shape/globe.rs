@@ -30,7 +30,7 @@ pub(super) struct Globe {
     cuts: u32,
 }
 
-/// Where a vertex is: fractions of a half turn from the north pole and of a turn to the east.
+/// Place of a vertex: fractions of a half turn from the north pole and of a turn to the east.
 #[derive(Debug, Clone, Copy)]
 struct GlobePoint {
     south: f64,
@@ -262,7 +262,7 @@ struct Cut {
     j: u32,
 }
 
-/// Where all vertices are: of the rings, in the middle of cut edges, and on the seam.
+/// Places of all vertices: of the rings, in the middle of cut edges, and on the seam.
 struct Places<'a> {
     globe: &'a Globe,
     cuts: &'a [Cut],

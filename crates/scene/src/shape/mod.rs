@@ -103,7 +103,7 @@ fn default_amplitude() -> f64 {
 pub struct ShapeError {
     /// The key.
     pub key: &'static str,
-    /// What is wrong, and what would do.
+    /// Description of the error, and of what is valid.
     pub reason: String,
 }
 
@@ -123,7 +123,7 @@ impl ShapeSpec {
         }
     }
 
-    /// How many triangles it is asked to have, and the bytes of memory that they take.
+    /// Number of triangles that the shape is asked to have, and the bytes of memory that they take.
     pub(crate) fn cost(&self, wanted: Wanted) -> (u64, u64) {
         let (triangles, is_flat) = match *self {
             Self::Rectangle { .. } | Self::Box { .. } => (12, true),

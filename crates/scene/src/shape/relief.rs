@@ -46,7 +46,7 @@ pub(super) fn sin_cos_turns(turns: f64) -> (f64, f64) {
     if quadrant >= 2 { (-sin, -cos) } else { (sin, cos) }
 }
 
-/// How many waves, from 0.4 on a radius to 7.2, each 1.3 times as many as the one before.
+/// Number of waves, from 0.4 on a radius to 7.2, each 1.3 times as many as the one before.
 const WAVES: usize = 12;
 
 /// The distance of the surface from the centre, by direction.

@@ -70,7 +70,8 @@ fn bad_triangles_are_counted() {
     assert_eq!(defects.duplicate, 1, "{defects:?}");
 }
 
-/// What lies in one plane and faces one side is named, the earlier first; a box that stands on the floor is not.
+/// Surfaces that lie in one plane and face one side are named, the earlier first; a box that stands
+/// on the floor is not.
 #[test]
 fn what_lies_in_one_plane_is_named() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! What the documents say in JSON is understood, and what they link to is there.
+//! Tests that the documents' JSON is understood, and that what they link to is there.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -130,8 +130,9 @@ fn links_lead_somewhere() {
     }
 }
 
-/// What a user reads is bounded: the pages of guides, how-tos and explanations, and the README. Words are those between
-/// blanks; blocks of code and rows of tables are not counted, nor are reference, measurements and development.
+/// The pages that a user reads are bounded: the pages of guides, how-tos and explanations, and the
+/// README. Words are those between blanks; blocks of code and rows of tables are not counted, nor
+/// are reference, measurements and development.
 #[test]
 fn the_pages_that_a_user_reads_are_few_and_short() {
     let Some(documents) = documents() else { return };
@@ -210,7 +211,7 @@ fn the_map_of_the_tree_names_files_that_are_there() {
     }
 }
 
-/// What the table "To add a …" names in brackets behind a file stands in that file.
+/// A name in brackets behind a file in the table "To add a …" stands in that file.
 #[test]
 fn the_table_of_additions_names_what_its_files_have() {
     let Some(documents) = documents() else { return };

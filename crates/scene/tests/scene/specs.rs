@@ -1,4 +1,4 @@
-//! What files say, written as JSON and read again, is the same.
+//! Tests that files, written as JSON and read again, say the same.
 
 use std::fmt::Debug;
 use std::fs;

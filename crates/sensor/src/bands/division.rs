@@ -18,7 +18,7 @@ const PLACES: usize = 24;
 /// The search for bands, which are runs of cells of a table.
 pub(super) struct Division<'a> {
     table: &'a BandTable,
-    /// What bands lose of each trial: the same are asked for again and again.
+    /// Losses of each trial by bands: the same are asked for again and again.
     known: RefCell<HashMap<[usize; 2], Rc<[f64]>>>,
 }
 
@@ -27,13 +27,13 @@ impl<'a> Division<'a> {
         Self { table, known: RefCell::default() }
     }
 
-    /// What a band loses of each trial.
+    /// Loss of each trial by a band.
     fn losses(&self, band: [usize; 2]) -> Rc<[f64]> {
         let mut known = self.known.borrow_mut();
         Rc::clone(known.entry(band).or_insert_with(|| self.table.losses(band).into()))
     }
 
-    /// What all bands together lose of each trial.
+    /// Loss of each trial by all bands together.
     fn totals(&self, cells: &[usize]) -> Vec<f64> {
         let mut totals = vec![0.0; self.table.trials.len()];
         for ends in cells.windows(2) {
@@ -63,7 +63,7 @@ impl<'a> Division<'a> {
         self.joined(cells, fixed, limit)
     }
 
-    /// Where to divide a band so that the worse of its halves is best.
+    /// Finds where to divide a band so that the worse of its halves is best.
     fn best_cut(&self, [a, b]: [usize; 2]) -> usize {
         let places = (b - a - 1).min(PLACES);
         let cuts = (1..=places).map(|i| a + ((b - a) * i).div_ceil(places + 1).clamp(1, b - a - 1));

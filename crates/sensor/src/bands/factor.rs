@@ -7,7 +7,7 @@ use super::DIM;
 /// Steps between the lengths of way that are tried.
 const STEP: f64 = 1.4;
 
-/// What the shortest way that is tried leaves of light.
+/// Share of light that the shortest way that is tried leaves.
 const NEARLY_CLEAR: f64 = 0.98;
 
 /// The most lengths of way that are tried.
@@ -16,13 +16,13 @@ const MOST_LENGTHS: usize = 32;
 /// A curve that light may be multiplied by, beside lights, filters and colours.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Factor {
-    /// What is left of light, 0 to 1; held beyond its ends.
+    /// Share of the light that is left, 0 to 1; held beyond its ends.
     pub curve: Curve,
-    /// How often.
+    /// Number of times that light meets the factor.
     pub times: Times,
 }
 
-/// How often light is multiplied by a curve.
+/// Number of times that light is multiplied by a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Times {
     /// Once to so many times: what surfaces reflect one after the other.
@@ -32,7 +32,7 @@ pub enum Times {
 }
 
 impl Times {
-    /// Whether light may meet a second curve after it.
+    /// True if light may meet a second curve after it.
     pub(super) fn may_repeat(self) -> bool {
         self != Self::UpTo(1)
     }
@@ -85,7 +85,7 @@ impl Product {
 #[derive(Debug, PartialEq)]
 pub(super) struct Products {
     pub(super) all: Vec<Product>,
-    /// Whether none is left out.
+    /// True if none is left out.
     pub(super) complete: bool,
 }
 

@@ -24,7 +24,7 @@ const MOST_ROWS: usize = 512;
 /// The share of pixels that may be clipped, at either end.
 const MOST_CLIPPED: f64 = 0.02;
 
-/// What counts: pixels that are expected to be dark enough, and are no defects.
+/// Pixels that count: those that are expected to be dark enough, and are no defects.
 pub(super) struct Kept {
     pub(super) line: Vec<f64>,
     /// DN, of what is expected.
@@ -80,8 +80,8 @@ impl Pixels<'_> {
         (0..sums.len()).max_by(|a, b| mean(a).total_cmp(&mean(b))).unwrap_or(0)
     }
 
-    /// What counts by a fit. Deviations are in units of their median, which defects do not bend, or of what is expected
-    /// where that is more.
+    /// Pixels that count by a fit. Deviations are in units of their median, which defects do not
+    /// bend, or of what is expected where that is more.
     pub(super) fn kept(&self, fit: &Fit, white: f64) -> Kept {
         let most = NEARLY_SATURATED * (white - fit.line[0]) + fit.line[0];
         let all = Kept {

@@ -48,7 +48,7 @@ fn summed(
     sum * 1e-6
 }
 
-/// The same as a render would count it.
+/// Electrons as a render would count them.
 fn rendered(lit: &Sensor, channel: usize, [light, filter]: [&Curve; 2], colours: &[usize]) -> f64 {
     let bands = lit.bands();
     let light = bands.from_curve(light, Outside::Zero).unwrap();
@@ -257,8 +257,9 @@ fn infrared_alone_is_seen_and_where_it_cannot_be_the_remedy_is_named() {
     assert!(matches!(own.bands(), Bands::Spectral(_)));
 }
 
-/// What bodies leave of light after ways of any length, in every channel of a sensor: within what is promised down to
-/// a fiftieth of the light, and a little more down to three thousandths.
+/// Bodies of any length take what an integration says: what they leave of light after ways of any
+/// length, in every channel of a sensor: within what is promised down to a fiftieth of the light,
+/// and a little more down to three thousandths.
 #[test]
 fn bodies_of_any_length_take_what_an_integration_says() {
     let silicon =

@@ -1,5 +1,4 @@
-//! What sensors make of light: full scale in digital mode, closed forms in physical mode, bands and
-//! colours.
+//! Response of sensors to light: full scale in digital mode, closed forms in physical mode, bands and colours.
 
 #![expect(clippy::cast_possible_truncation, reason = "films hold f32")]
 

@@ -50,12 +50,12 @@ fn hidden(k: usize) -> Hidden {
     }
 }
 
-/// What a sensor of hidden numbers takes of the chart, matched by one that knows them not.
+/// Chart as a sensor of hidden numbers takes it, matched by one that knows them not.
 fn matched(of: &Hidden, seed: u64) -> Matched {
     matched_with(of, seed, &json!({}))
 }
 
-/// The same of a chip with more keys.
+/// Chart matched as by [`matched`], of a chip with more keys.
 fn matched_with(of: &Hidden, seed: u64, more: &Value) -> Matched {
     let own = sensor(&json!({}));
     let film = chart(&own);
@@ -102,9 +102,8 @@ fn hidden_parameters_are_covered() {
     );
 }
 
-/// What is stated as standard deviation is that of fifty photographs within a factor of 1.5 (the spread of fifty is itself
-/// known to a tenth).
-/// Dead and stuck pixels are left out: what is found is as near as without them.
+/// The stated standard deviations are those of fifty photographs within a factor of 1.5 (the spread of fifty is itself
+/// known to a tenth). Dead and stuck pixels are left out: what is found is as near as without them.
 #[test]
 fn defective_pixels_do_not_count() {
     let of = hidden(4);

@@ -1,4 +1,4 @@
-//! What of an image is read out, and how it is packed.
+//! Part of an image that is read out, and its packing.
 
 use etendue_sensor::{InvalidValues, Packing, RawImage, Sensor, SensorSpec, Window};
 

@@ -1,4 +1,4 @@
-//! What is no sensor, no light or no film is refused, with the key and the remedy.
+//! Inputs that are no sensor, no light or no film are refused, with the key and the remedy.
 
 use etendue_sensor::{Film, InvalidValues, Sensor, SensorError, SensorSpec};
 use serde_json::{Value, json};

@@ -87,7 +87,7 @@ impl App {
             document.and_then(|document| written_lens(document.at("/camera/lens"), &document.path));
     }
 
-    /// The same place, after the scene has changed.
+    /// Asks the pixel at the same place again, after the scene has changed.
     pub(super) fn ask_again(&mut self) {
         if let Some(asked) = &self.asked {
             self.ask(asked.place);

@@ -15,7 +15,7 @@ fn rendered(folder: &Path, change: impl FnOnce(&mut Value)) -> PathBuf {
     out
 }
 
-/// What the window says of the pixel that was clicked.
+/// Value that the window gives of the pixel that was clicked.
 fn said(window: &Driver, name: &str) -> Option<String> {
     let (_, still) = window.app.still.as_ref().unwrap();
     let place = window.app.asked.as_ref().unwrap().place;

@@ -1,15 +1,15 @@
-//! How soon and how often there are pictures, and that memory stays: `cargo test --release -p etendue-window
-//! measured -- --ignored --nocapture`.
+//! Speed and memory of the window: how soon and how often there are pictures, and that memory
+//! stays: `cargo test --release -p etendue-window measured -- --ignored --nocapture`.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use super::*;
 
-/// How long the scene is turned.
+/// Time for which the scene is turned.
 const TURN: Duration = Duration::from_secs(5);
 
-/// How many changes are waited for.
+/// Number of changes that are waited for.
 const CHANGES: usize = 15;
 
 /// Opens a scene, turns it, and prints what was seen.

@@ -1,4 +1,4 @@
-//! What is done once: comparing, stopping, writing files.
+//! Tasks that are done once: comparing, stopping, writing files.
 
 use super::*;
 

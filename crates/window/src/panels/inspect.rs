@@ -1,4 +1,4 @@
-//! What the window tells on the left: the pixel that was asked, and the histogram.
+//! Readings on the left of the window: the pixel that was asked, and the histogram.
 //!
 //! The scene's values on the right, as its schema has them.
 
@@ -189,7 +189,7 @@ pub(crate) fn show_scene(app: &mut App, ctx: &Context) {
     }
 }
 
-/// What is reached for most: noise on and off.
+/// Shortcuts to what is reached for most: noise on and off.
 fn shortcuts(ui: &mut Ui, scene: &Value, edits: &mut Vec<Edit>) {
     let sensor = &scene["camera"]["sensor"];
     let has_any = |keys: &[&str]| keys.iter().any(|key| !sensor[*key].is_null());

@@ -15,15 +15,15 @@ pub(super) const COLORS: [[Color32; 2]; 3] = [
     [Color32::from_rgb(255, 123, 114), Color32::from_rgb(207, 34, 46)],
 ];
 
-/// What stands beside the section.
+/// Plot beside the section.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum LensPlot {
-    /// Where rays of a field land.
+    /// Spot diagram: where rays of a field land.
     #[default]
     Spots,
-    /// Where rays of two lines over the pupil land.
+    /// Ray fans: where rays of two lines over the pupil land.
     RayFans,
-    /// How far ahead of the sphere their waves are.
+    /// Wave fans: how far ahead of the sphere their waves are.
     WaveFans,
     /// Modulation by frequency.
     Modulation,

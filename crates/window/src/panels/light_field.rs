@@ -6,7 +6,7 @@ use etendue::{Error, LightFieldViews, Picture, Preview, Screen};
 
 use crate::form::{mark, short};
 
-/// What of a light field is shown.
+/// Part of a light field that is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) enum Shows {
     /// The picture on the sensor.
@@ -26,7 +26,7 @@ pub(crate) struct LightFieldPanel {
     offered: Option<Offered>,
 }
 
-/// What the views of the last whole picture offer: it stays while the next one is rendered.
+/// Choices that the views of the last whole picture offer: it stays while the next one is rendered.
 #[derive(Debug, Clone, Copy)]
 struct Offered {
     /// Views along a side of the pupil; 0 of focused cameras.
@@ -56,7 +56,7 @@ impl LightFieldPanel {
         Ok(())
     }
 
-    /// What is to be shown instead of the picture itself.
+    /// Screen that is to be shown instead of the picture itself.
     pub(crate) fn screen(&mut self, preview: Option<&Preview>) -> Result<Option<Screen>, Error> {
         self.find(preview)?;
         let Some(views) = &self.views else { return Ok(None) };

@@ -1,4 +1,5 @@
-//! What stands in the middle as long as there is no picture: scenes to begin with, what is being read, what went wrong.
+//! Start page, which stands in the middle as long as there is no picture: scenes to begin with,
+//! what is being read, what went wrong.
 
 use eframe::egui::{self, RichText, Ui};
 

@@ -12,7 +12,7 @@ use serde_json::Value;
 use super::{Kind, News, Shared, Shown, Task, Teller, WATCH, Wish};
 use crate::document::View;
 
-/// How long a first picture may take, so that it is on the screen within a tenth of a second, twenty in each: the
+/// Time that a first picture may take, so that it is on the screen within a tenth of a second, twenty in each: the
 /// window is drawn twice meanwhile, by the same processor where there is no other.
 const SOON: Duration = Duration::from_millis(30);
 
@@ -22,7 +22,7 @@ const FIRST_PIXELS: f64 = 40_000.0;
 /// Progress is told this often.
 const TELL: Duration = Duration::from_millis(60);
 
-/// What a file was when it was looked at last.
+/// Stamp of a file when it was looked at last.
 type Stamp = Option<(u64, SystemTime)>;
 
 pub(super) struct PreviewRenderer {
@@ -34,11 +34,11 @@ pub(super) struct PreviewRenderer {
     image: Option<(PathBuf, Stamp)>,
 }
 
-/// What is open.
+/// File that is open.
 struct Open {
     path: PathBuf,
     session: Session,
-    /// What the file says.
+    /// Values of the file.
     base: Arc<Value>,
     /// The user's scene of the last wish.
     scene: Arc<Value>,
@@ -50,7 +50,7 @@ struct Open {
     cost: Option<(View, f64)>,
 }
 
-/// What there is to do next.
+/// Job that is next.
 enum WorkerJob {
     Task(Task),
     Wish(Wish),
@@ -338,7 +338,7 @@ impl PreviewRenderer {
     }
 }
 
-/// What a view shows of a preview.
+/// Screen of a view of a preview.
 pub(crate) fn screen_of(preview: &Preview, view: &View, layer: &str) -> Result<Screen, Error> {
     let none = || {
         let why = "the camera's sensor is ideal: give it a `type` or a `model` to see its numbers";

@@ -29,7 +29,7 @@ pub(super) struct PacketTriangles<'a, 'b, L: Lanes, S> {
     test: TriangleTest<L::Sixteen>,
     /// From where on limits are certainly kept.
     surely_near: Wide<L>,
-    /// How far each ray looks in this frame; −∞ for rays of no concern.
+    /// Distance up to which each ray looks in this frame; −∞ for rays of no concern.
     far: Wide<L>,
     /// Triangles that end before this come before all others.
     surely_first: Wide<L>,

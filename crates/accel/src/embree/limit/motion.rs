@@ -81,7 +81,7 @@ impl BareScene {
     }
 }
 
-/// Whether times are from one end of the exposure to the other, each as far from the next.
+/// True if times run from one end of the exposure to the other, each as far from the next.
 fn are_even(times: &[f64], [open, close]: [f64; 2]) -> bool {
     let each = (close - open) / (times.len() - 1).max(1) as f64;
     let is_due =

@@ -1,4 +1,4 @@
-//! Where the sensor stands behind a lens, how a camera frames a scene, and what is refused.
+//! Tests of where the sensor stands behind a lens, how a camera frames a scene, and what is refused.
 
 use glam::DVec3;
 

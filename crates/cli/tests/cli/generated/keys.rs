@@ -43,7 +43,7 @@ fn list<'a>(schema: &'a Value, key: &str) -> &'a [Value] {
     schema.get(key).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
-/// What a schema says: its sentence, and a table of its keys, words or alternatives.
+/// Writes the section of a schema: its sentence, and a table of its keys, words or alternatives.
 fn section(page: &mut String, schema: &Value) {
     if let Some(words) = description(schema) {
         let _ = write!(page, "\n{words}\n");

@@ -1,4 +1,4 @@
-//! What a lens does in waves, in one piece: for tables, JSON and figures.
+//! Wave analysis of a lens as one report: for tables, JSON and figures.
 
 pub mod figures;
 mod text;
@@ -38,31 +38,31 @@ const FOCI: u32 = 12;
 /// Points a side of the distortion grid.
 const GRID: u32 = 9;
 
-/// What is asked of a lens, and where each answer came from.
+/// Inputs of a wave analysis of a lens, and where each came from.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct WaveInquiry {
     /// Wavelengths (nm), the main one first.
     pub wavelengths: Vec<f64>,
-    /// What each counts for; alike when empty.
+    /// Weight of each wavelength; equal weights when empty.
     pub weights: Vec<f64>,
     /// Field angles (degrees), or heights (mm) of a near object.
     pub fields: Vec<f64>,
-    /// Whether a field without light is an error, and no note.
+    /// True if a field without light is an error, false if it is only noted.
     pub fields_are_asked: bool,
-    /// Where the object is.
+    /// Position of the object.
     pub conjugate: Conjugate,
-    /// Where the sensor is.
+    /// Focus setting, which places the sensor.
     pub focus: Focus,
-    /// Whether the image plane is moved to where the wavefront on the axis is flattest.
+    /// True if the image plane is moved to where the wavefront on the axis is flattest.
     pub best_focus: bool,
-    /// Whether the train ends with an [eyepiece](OpticalTrain::with_eyepiece) of 1000 mm behind an afocal
-    /// lens, so that lengths on the image are thousandths of a radian.
+    /// True if the train ends with an [eyepiece](OpticalTrain::with_eyepiece) of 1000 mm behind an
+    /// afocal lens, so that lengths on the image are thousandths of a radian.
     pub is_afocal: bool,
     /// Cells over the pupil.
     pub cells: Cells,
     /// Frequencies (cycles/mm); shares of the limit on the axis when empty.
     pub frequencies: Vec<f64>,
-    /// Where fields, wavelengths, weights and the object come from.
+    /// Origin of the fields, wavelengths, weights and the object's position.
     pub taken: Taken,
 }
 

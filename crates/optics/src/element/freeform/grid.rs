@@ -43,7 +43,7 @@ impl HeightMapSpec {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Grid {
     picture: Picture,
-    /// What white is.
+    /// Value of white.
     scale: f64,
 }
 

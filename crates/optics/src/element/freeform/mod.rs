@@ -115,7 +115,7 @@ pub struct Freeform {
     sense: f64,
     /// Half the clear diameter (mm); infinite when unlimited.
     pub semi_diameter: f64,
-    /// What it is as a mirror, if it is one.
+    /// Properties as a mirror; `None` for a surface that is none.
     pub mirror: Option<MirrorMount>,
 }
 
@@ -200,7 +200,7 @@ impl FreeformSpec {
 }
 
 impl Freeform {
-    /// The same as light that runs against the axis meets it.
+    /// Returns the surface as seen by light that runs against the axis.
     #[must_use]
     pub fn flipped(&self) -> Self {
         Self { sense: -self.sense, ..self.clone() }
@@ -230,7 +230,7 @@ impl Freeform {
         })
     }
 
-    /// Whether its order has a share of the light alone.
+    /// True if its diffraction order has a share of the light of its own.
     #[must_use]
     pub fn is_blazed(&self) -> bool {
         self.phase.as_ref().is_some_and(|phase| phase.blaze.is_some())
@@ -249,13 +249,13 @@ impl Freeform {
         self.phase.as_ref().map_or(1.0, |phase| phase.efficiency(wavelength))
     }
 
-    /// Whether its phase sends wavelengths different ways.
+    /// True if its phase sends different wavelengths in different directions.
     #[must_use]
     pub fn is_dispersive(&self) -> bool {
         self.phase.as_ref().is_some_and(Phase::is_dispersive)
     }
 
-    /// Whether a turn about its axis changes nothing.
+    /// True if a turn about its axis changes nothing.
     #[must_use]
     pub fn is_round(&self) -> bool {
         self.rotation.is_none()
@@ -263,7 +263,8 @@ impl Freeform {
             && self.phase.as_ref().is_none_or(Phase::is_round)
     }
 
-    /// Whether rays meet it in a plane: it has no sag, or that of the grooves of a Fresnel surface.
+    /// True if rays meet the surface in a plane: it has no sag, or that of the grooves of a Fresnel
+    /// surface.
     fn is_in_a_plane(&self) -> bool {
         let has_sag = self.base.curvature != 0.0
             || self.rotation.is_some_and(|rotation| rotation != 0.0)

@@ -218,12 +218,12 @@ impl Phase {
         if off.abs() < 1e-9 { 1.0 } else { (off.sin() / off).powi(2) }
     }
 
-    /// Whether rays of different wavelengths run differently.
+    /// True if rays of different wavelengths are deflected differently.
     pub(super) fn is_dispersive(&self) -> bool {
         self.design.is_none()
     }
 
-    /// Whether a turn about the axis changes nothing.
+    /// True if a turn about the axis changes nothing.
     pub(super) fn is_round(&self) -> bool {
         matches!(self.pattern, Pattern::Radial { .. })
     }

@@ -12,7 +12,8 @@ use crate::element::refract::{Media, Root, meet_conic};
 #[derive(Debug, Clone)]
 pub(crate) struct FreeformSurface {
     pub(crate) shape: Arc<Freeform>,
-    /// What a radian a millimetre of phase adds to a direction behind it; as a kernel of mirrors has it.
+    /// Change of the direction behind the surface per radian a millimetre of phase; as a kernel of
+    /// mirrors has it.
     kick: f64,
     /// The path (mm) that a radian of phase adds.
     path: f64,

@@ -1,4 +1,5 @@
-//! What is added to a base: polynomials in x and y, of Zernike's, Chebyshev's and Forbes' kinds, and height maps.
+//! Terms added to a base surface: polynomials in x and y, of Zernike's, Chebyshev's and Forbes'
+//! kinds, and height maps.
 //!
 //! # Sources
 //!
@@ -74,7 +75,7 @@ fn one() -> Millimetres {
     Millimetres(1.0)
 }
 
-/// What is added to a base, ready to be asked.
+/// Term added to a base surface, ready for evaluation.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Term {
     /// Azimuthal order (sines below 0), and the radial polynomial over ρ to it in powers of ρ², the highest first.
@@ -206,7 +207,7 @@ fn zernike(
 }
 
 impl Term {
-    /// Whether a turn about the axis changes nothing.
+    /// True if a turn about the axis changes nothing.
     pub(super) fn is_round(&self) -> bool {
         match self {
             Self::QBfs { .. } | Self::QCon { .. } => true,

@@ -23,8 +23,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::train::paraxial::Abcd;
 
-/// What a step of the numerical integration turns the phase of a ray's swing by (radians). The rule's own error is the
-/// fourth power of it over 120 of the phase: 10⁻¹⁰ of it.
+/// Phase of a ray's swing per step of the numerical integration (radians). The rule's own error is
+/// the fourth power of it over 120 of the phase: 10⁻¹⁰ of it.
 const PHASE_STEP: f64 = 0.01;
 
 /// Steps that a gap is divided into at least.
@@ -87,7 +87,7 @@ pub struct Gradient {
     pub(crate) step: f64,
 }
 
-/// How the index goes.
+/// Law of the index in space.
 #[derive(Debug, Clone, PartialEq)]
 enum Law {
     /// n₀² (1 − g² r²).
@@ -99,7 +99,7 @@ enum Law {
 /// A gradient in the gap behind an element.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GradedGap {
-    /// What the index is.
+    /// Gradient of the index.
     pub(crate) gradient: Arc<Gradient>,
     /// z in the gradient at the element's vertex (mm).
     pub(crate) offset: f64,
@@ -252,7 +252,7 @@ impl Gradient {
         (PHASE_STEP / swing).min(of_gap)
     }
 
-    /// Whether the index is the same all along the axis.
+    /// True if the index is the same all along the axis.
     fn is_even(&self) -> bool {
         match &self.law {
             Law::Rod { .. } => true,
@@ -273,7 +273,7 @@ impl GradedGap {
         self.gradient.field(base, [0.0, 0.0, self.offset + self.sense * z]).square.max(0.0).sqrt()
     }
 
-    /// The same gradient behind a sheet `gap` (mm) farther on.
+    /// Returns the gradient behind a sheet `gap` (mm) farther on.
     pub(crate) fn behind(&self, gap: f64) -> Self {
         Self { offset: self.offset + self.sense * gap, ..self.clone() }
     }

@@ -13,16 +13,16 @@ use glam::DVec3;
 
 use super::{Field, Gradient, Law};
 
-/// How near (mm) a ray is brought to a surface.
+/// Distance (mm) to which a ray is brought to a surface.
 const ARRIVED: f64 = 1e-13;
 
-/// How near (mm) a ray counts as on the surface already.
+/// Distance (mm) within which a ray counts as on the surface already.
 const THERE: f64 = 1e-12;
 
 /// A ray in a gradient's own frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct OpticalRay {
-    /// Where it is (mm).
+    /// Position (mm).
     pub(crate) place: DVec3,
     /// n times its unit direction.
     pub(crate) optical: DVec3,
@@ -32,7 +32,7 @@ pub(crate) struct OpticalRay {
     pub(crate) length: f64,
 }
 
-/// What became of a ray in a gradient.
+/// Outcome of a ray in a gradient.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Arrival {
     /// It is on the surface.
@@ -122,8 +122,8 @@ impl Gradient {
         Arrival::Lost
     }
 
-    /// Where a step leaves the side, whose squared radius is `side2` (mm²): at its end, or where the ray is farthest from
-    /// the axis on the way.
+    /// Point at which a step leaves the side of the medium, whose squared radius is `side2` (mm²):
+    /// at its end, or where the ray is farthest from the axis on the way.
     fn leaves(
         &self,
         base: f64,

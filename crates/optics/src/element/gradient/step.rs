@@ -44,7 +44,7 @@ pub(crate) struct Graded {
     pub(crate) indices: [f64; 2],
     /// The element's shape.
     pub(crate) part: Part,
-    /// What is lost here with the indices of the glasses.
+    /// Losses of light at the surface, with the indices of the glasses.
     pub(crate) loss: Option<Loss>,
 }
 
@@ -118,7 +118,7 @@ impl Step {
         }
     }
 
-    /// What is above the element at a place of the lens (mm).
+    /// Height of a place of the lens above the element (mm), along the element's axis.
     fn height(&self, part: &Part, place: DVec3) -> Option<f64> {
         let local = self.frame.rotation.transpose() * (place - self.frame.vertex);
         Some(local.z - part.sag([local.x, local.y])?)
@@ -215,7 +215,7 @@ impl Step {
 }
 
 impl Action {
-    /// The same between other media. What does not refract stays as it is.
+    /// Returns the action between other media. What does not refract stays as it is.
     fn between(&self, between: Media) -> Self {
         let mut action = self.clone();
         match &mut action {

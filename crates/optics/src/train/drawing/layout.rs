@@ -81,7 +81,7 @@ fn as_built(train: &OpticalTrain, spaces: &[Isometry]) -> OpticalTrain {
     built
 }
 
-/// Where rays end (mm): at the sensor, or a little behind the lens.
+/// Axial position where drawn rays end (mm): at the sensor, or a little behind the lens.
 pub(super) fn end_of(train: &OpticalTrain, report: &LensReport) -> f64 {
     report.sensor_z.unwrap_or_else(|| train.last_vertex() + 0.3 * train.last_vertex().max(1.0))
 }
@@ -189,7 +189,7 @@ fn trace(
     points.iter().flatten().all(|number| number.is_finite()).then_some(points)
 }
 
-/// How far from its axis each element is drawn (mm): its rim, or where the rays are.
+/// Height from its axis to which each element is drawn (mm): its rim, or where the rays are.
 pub(super) fn heights(train: &OpticalTrain, fans: &[Fan]) -> Vec<f64> {
     let rays = || fans.iter().flat_map(|fan| &fan.rays);
     let reach = |i: usize| {
@@ -271,8 +271,8 @@ impl DrawingView {
         pieces
     }
 
-    /// What of a line (pixels) lies between the title and the legend (N. Liang and B. Barsky, "A new
-    /// concept and method for line clipping", 1984).
+    /// Part of a line (pixels) that lies between the title and the legend (N. Liang and B. Barsky,
+    /// "A new concept and method for line clipping", 1984).
     fn clipped(&self, [from, to]: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
         let (low, high) = ([0.0, HEAD - 8.0], [WIDTH, self.height - FOOT + 6.0]);
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);

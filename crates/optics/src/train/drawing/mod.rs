@@ -268,9 +268,9 @@ pub struct DrawnElement {
     pub lines: Vec<Polyline>,
     /// z of its vertex (mm).
     pub vertex: f64,
-    /// How far from the axis it is drawn (mm).
+    /// Height above the axis to which the element is drawn (mm).
     pub height: f64,
-    /// Whether it is the aperture stop.
+    /// True if the element is the aperture stop.
     pub is_stop: bool,
 }
 

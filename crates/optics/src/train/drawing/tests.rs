@@ -1,4 +1,4 @@
-//! What the drawings hold.
+//! Tests of the content of drawings.
 
 use super::*;
 use crate::train::{Inquiry, LensFile, LensReport, OpticalTrain};

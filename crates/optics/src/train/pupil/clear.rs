@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::element::{LossesSpec, Opening};
 use crate::train::{OpticalTrain, Part};
 
-/// The same lens with masks clear: the bound goes around their whole rectangle.
+/// Returns the lens with its masks clear: the bound goes around their whole rectangle.
 pub(super) fn without_masks(train: &OpticalTrain) -> OpticalTrain {
     let mut train = train.clone();
     for element in &mut train.elements {
@@ -31,8 +31,8 @@ impl OpticalTrain {
     }
 }
 
-/// The same lens with filters clear and mirrors that reflect alike at all wavelengths: what is left does not depend on the
-/// wavelength but for glass, coatings and orders of diffraction.
+/// Returns the lens with filters cleared and mirrors that reflect all wavelengths alike: what is
+/// left does not depend on the wavelength but for glass, coatings and orders of diffraction.
 pub fn without_filters(train: &OpticalTrain) -> OpticalTrain {
     let mut train = train.clone();
     for element in &mut train.elements {
@@ -48,7 +48,8 @@ pub fn without_filters(train: &OpticalTrain) -> OpticalTrain {
     train
 }
 
-/// The same lens with masks and filters clear, and nothing lost in glass, at mirrors or to other orders of diffraction.
+/// Returns the lens with masks and filters clear, and nothing lost in glass, at mirrors or to other
+/// orders of diffraction.
 pub fn without_dimming(train: &OpticalTrain) -> OpticalTrain {
     let mut train = without_filters(&without_masks(train)).with_losses(LossesSpec::default());
     for element in &mut train.elements {

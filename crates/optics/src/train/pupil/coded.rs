@@ -24,10 +24,11 @@ use crate::train::{MonochromaticTrain, OpticalTrain, Part};
 /// The share of samples that is drawn from the whole pupil.
 const ANYWHERE: f64 = 0.01;
 
-/// How near a ray lands to where it is aimed, as a share of a pixel, when polynomials can do it.
+/// Tolerance of a ray's landing from where it is aimed, as a share of a pixel, when polynomials can
+/// do it.
 const GOAL: f64 = 0.004;
 
-/// What misses are multiplied by: what may be greater between the places where they are measured.
+/// Factor on the misses: they may be greater between the places where they are measured.
 const SAFETY: f64 = 1.5;
 
 /// A mask as the points of a sensor see it.

@@ -72,7 +72,8 @@ impl Disk {
         centred.then(|| PI * squared / (squared + distance * distance))
     }
 
-    /// Whether it is as wide as it is far from a sensor, where samples that [`even`] moves still differ in weight.
+    /// True if the disk is as wide as it is far from a sensor, where samples that [`even`] moves
+    /// still differ in weight.
     fn is_wide(&self, sensor: &Frame) -> bool {
         self.radius >= (sensor.vertex.z - self.centre.z).abs() * (1.0 - 1e-9)
     }

@@ -42,14 +42,14 @@ pub struct LensletPupil {
     table: OutlineTable,
     /// The opening of a lenslet around its centre, in the array's axes (mm).
     opening: Vec<DVec2>,
-    /// The same of the other arrays, by kind and array.
+    /// Openings of a lenslet of the other arrays, by kind and array.
     others: Vec<Vec<DVec2>>,
-    /// What is between openings that let light by, in pieces around the centre of a cell.
+    /// Gaps between openings that let light by, in pieces around the centre of a cell.
     gaps: Vec<Vec<DVec2>>,
     /// The area of an opening (mm²), and the radius of the circle around it (mm).
     area: f64,
     around: f64,
-    /// How the slopes towards the pupil change over the array (1/mm).
+    /// Change of the slopes towards the pupil over the array (1/mm).
     drift: f64,
     margin: f64,
 }
@@ -121,7 +121,7 @@ impl LensletPupil {
         None
     }
 
-    /// Whether a point of a region belongs to it.
+    /// True if a point that was drawn from a region belongs to it.
     fn owns(&self, region: &Region, at: DVec2) -> bool {
         let (Region::Polygon { cell, checked: true, .. }
         | Region::Whole { cell, checked: true, .. }) = region
@@ -166,7 +166,7 @@ impl LensletPupil {
         (sum > 0.0).then(|| middle + mean / sum)
     }
 
-    /// Whether a point of the array is aimed at from a point of the sensor (mm).
+    /// True if a point of the array is among those aimed at from a point of the sensor (mm).
     fn aims_at(&self, film: DVec3, at: DVec2) -> bool {
         let sight = self.view.sight(0, film.z);
         self.regions(film, &sight).iter().any(|region| match region {
@@ -186,8 +186,8 @@ impl LensletPupil {
         })
     }
 
-    /// Where the chief ray of the lens before crosses the array on its way to a point of the sensor (mm),
-    /// were it not bent, and how far from there lenslets may matter.
+    /// Point where the chief ray of the lens before crosses the array on its way to a point of the
+    /// sensor (mm), were it not bent, and the distance from there within which lenslets may matter.
     fn middle(&self, film: DVec3, sight: &Sight) -> Option<(DVec2, f64)> {
         let [slope, _] = sight.central(self.view.principal_distance(0));
         let start = film.truncate();
@@ -231,7 +231,7 @@ impl LensletPupil {
         regions
     }
 
-    /// Whether openings are of another shape than cells.
+    /// True if the openings have another shape than the cells.
     fn mixed(&self) -> bool {
         !matches!(
             (self.view.array.lattice.grid, self.view.array.shape),
@@ -239,7 +239,7 @@ impl LensletPupil {
         )
     }
 
-    /// What is aimed at through a lenslet.
+    /// Region that is aimed at through a lenslet.
     fn region(&self, film: DVec3, cell: [f64; 2], kind: usize, sight: &Sight) -> Option<Region> {
         let array = &self.view.array;
         let centre = self.view.centre(cell);
@@ -364,7 +364,8 @@ impl LensletPupil {
         Ok(())
     }
 
-    /// How many of random rays around what is aimed at pass, and how many of these are not aimed at.
+    /// Counts of random rays around what is aimed at: those that pass, and those of them that are
+    /// not aimed at.
     fn strays(&self, lens: &MonochromaticTrain, pupil: &ExitPupil, first: u32) -> [u32; 2] {
         let mut rays = LensRays::with_capacity(CHECKS as usize);
         let mut aims = Vec::with_capacity(CHECKS as usize);

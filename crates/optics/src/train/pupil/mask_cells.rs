@@ -23,7 +23,8 @@ const LEAST_MARGIN: f64 = 1e-6;
 /// them pass, as a share of the greatest.
 const PARTLY: f32 = 0.05;
 
-/// What all cells together hold: sums of whole numbers below 2⁵³ are exact, and so are their differences.
+/// Total mass of all cells: sums of whole numbers below 2⁵³ are exact, and so are their
+/// differences.
 const TOTAL: f64 = (1_u64 << 50) as f64;
 
 /// The first mask that stops or dims anything.
@@ -48,7 +49,7 @@ pub(super) fn open_bounds(mask: &Picture) -> Option<[DVec2; 2]> {
     (size.min_element() > 0.0 && size.is_finite()).then_some([min, max])
 }
 
-/// How far the open pixels reach from a point of the mask (mm).
+/// Distance of the farthest open pixel from a point of the mask (mm).
 pub(super) fn open_reach(mask: &Picture, from: DVec2) -> f64 {
     let open = mask.values.iter().enumerate().filter(|(_, value)| **value > 0.0);
     let farthest = open.map(|(i, _)| {
@@ -268,7 +269,7 @@ struct Axis {
     lines: Vec<f64>,
     /// Of each interval: the pixels within a margin of it, as the picture counts them.
     near: Vec<[usize; 2]>,
-    /// Whether no lines were left out.
+    /// True if no lines were left out.
     is_exact: bool,
 }
 
@@ -330,7 +331,7 @@ impl Axis {
 }
 
 impl Picture {
-    /// Whether two columns (axis 0) or rows have the same values.
+    /// True if two columns (axis 0) or rows have the same values.
     fn are_equal(&self, axis: usize, a: usize, b: usize) -> bool {
         let [columns, rows] = self.pixels;
         if axis == 1 {

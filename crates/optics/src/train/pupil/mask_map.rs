@@ -25,8 +25,8 @@ const PLANAR: usize = 12;
 /// Points of the mask over each side of its square, at which directions are solved.
 const POINTS: usize = 16;
 
-/// What is added around the points that any node sees, as a share of the square, and how often the square is
-/// drawn in to them: polynomials of a high degree are for places that are seen.
+/// Margin around the points that any node sees, as a share of the square, and the number of times
+/// that the square is drawn in to them: polynomials of a high degree are for places that are seen.
 const AROUND: f64 = 0.12;
 const DRAWN_IN: u32 = 2;
 
@@ -62,7 +62,7 @@ macro_rules! of_degree {
     };
 }
 
-/// What a map is made of: a lens with its masks clear, at a wavelength, before a sensor.
+/// Geometry of a mask's map: a lens with its masks clear, at a wavelength, before a sensor.
 #[derive(Clone, Copy)]
 pub(super) struct MaskScene<'a> {
     pub(super) clear: &'a OpticalTrain,
@@ -75,7 +75,7 @@ pub(super) struct MaskScene<'a> {
 }
 
 impl MaskScene<'_> {
-    /// Where a ray along slopes crosses the mask's plane, in the mask's frame (mm).
+    /// Point where a ray along slopes crosses the mask's plane, in the mask's frame (mm).
     pub(super) fn crossing(&self, film: DVec3, slopes: DVec2) -> Option<DVec2> {
         let ray = Ray::new(film, towards_lens(slopes))?;
         self.lens.crossing(Side::Sensor, self.element, ray).map(DVec2::from)
@@ -87,8 +87,8 @@ impl MaskScene<'_> {
         })
     }
 
-    /// Whether a turn about the axis turns the directions towards the mask's plane: all that bends rays is
-    /// round and centred, and the mask and the sensor stand square to the axis.
+    /// True if a turn about the axis turns the directions towards the mask's plane: all that bends
+    /// rays is round and centred, and the mask and the sensor stand square to the axis.
     fn is_round(&self) -> bool {
         let bends_round = |(i, element): (usize, &crate::train::Element)| match &element.part {
             Part::Aperture(_) | Part::Filter(_) => {
@@ -109,7 +109,7 @@ pub(super) struct MaskMap {
     half_size: DVec2,
     /// The distance of the outermost node of a round lens from the axis (mm).
     radius: f64,
-    /// What is added to a point of the mask before it is turned (mm).
+    /// Offset added to a point of the mask before it is turned (mm).
     offset: DVec2,
     /// The square of the mask that the polynomials are made for: centre and half sides (mm).
     centre: DVec2,
@@ -117,7 +117,7 @@ pub(super) struct MaskMap {
     degree: usize,
     /// By nodes, [`terms`] of each; none where directions could not be solved.
     terms: Vec<Option<Vec<DVec2>>>,
-    /// How many nodes from the first on have terms.
+    /// Number of nodes, from the first on, that have terms.
     known: usize,
 }
 
@@ -137,7 +137,8 @@ struct Solved {
 }
 
 impl Solved {
-    /// How far from the middle points are seen, in −1..1; along x and y, or from the middle of a round map.
+    /// Greatest distance from the middle at which points are seen, in −1..1; along x and y, or from
+    /// the middle of a round map.
     fn reach(&self) -> DVec2 {
         let seen = self.points.iter().filter(|(.., weight)| *weight > HIDDEN);
         seen.fold(DVec2::ZERO, |most, (place, ..)| {
@@ -280,9 +281,9 @@ impl MaskMap {
         (0..POINTS * POINTS).map(place).collect()
     }
 
-    /// How far from where they are aimed rays land that leave the lens, between the nodes and between
-    /// the points (mm on the mask, x and y), of which those beyond `reach` (mm) from the axis are closed; `None`
-    /// when none leaves.
+    /// Greatest miss of rays that leave the lens from where they are aimed, between the nodes and
+    /// between the points (mm on the mask, x and y), of which those beyond `reach` (mm) from the
+    /// axis are closed; `None` when none leaves.
     fn greatest_miss(
         &self,
         scene: &MaskScene<'_>,

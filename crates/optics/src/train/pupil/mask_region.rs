@@ -42,7 +42,7 @@ const ROUNDS: u32 = 9;
 /// Random rays that look for more.
 const CHECKS: u32 = 1 << 15;
 
-/// What is visible from everywhere.
+/// Visible region of a mask, for all places of the sensor.
 #[derive(Debug, Clone)]
 pub(super) struct MaskRegion {
     half_size: DVec2,
@@ -50,7 +50,7 @@ pub(super) struct MaskRegion {
     intervals: Vec<Option<Interval>>,
 }
 
-/// What is visible from one node.
+/// Visible part of a mask from one node.
 #[derive(Debug, Clone)]
 enum Visibility {
     Nothing,
@@ -65,17 +65,17 @@ struct Chords {
     /// The lowest and the highest line.
     heights: [f64; 2],
     ends: [[f64; 2]; LINES + 1],
-    /// What is added around them, as a share of the mask's size.
+    /// Margin added around the lines, as a share of the mask's size.
     margin: f64,
 }
 
-/// How points are drawn from an interval of the sensor.
+/// Sampling of points for an interval of the sensor.
 #[derive(Debug, Clone)]
 struct Interval {
     /// From the lowest to the highest.
     bands: Vec<Rows>,
     mass: f64,
-    /// Whether ends of lines are the sensor's point's own.
+    /// True if the ends of lines are those of the sensor's own point.
     is_cut: bool,
 }
 
@@ -105,7 +105,7 @@ impl Chords {
 }
 
 impl MaskRegion {
-    /// What is visible of a mask's cells by rays of any of the maps.
+    /// Finds what is visible of a mask's cells by rays of any of the maps.
     pub(super) fn new(scenes: &[(MaskScene<'_>, &MaskMap)], cells: &MaskCells) -> Option<Self> {
         let (scene, _) = scenes.first()?;
         let mut region =
@@ -142,8 +142,8 @@ impl MaskRegion {
         [first, first + 1, first + FILM + 1, first + FILM + 2]
     }
 
-    /// What is visible between nodes, joined by straight lines; `None` unless all four have ends. Where they
-    /// have none, all of the mask is aimed at.
+    /// Visible lines between nodes, joined by straight lines; `None` unless all four have ends.
+    /// Where they have none, all of the mask is aimed at.
     fn joined(&self, view: &View) -> Option<Chords> {
         let mut joined = Chords { heights: [0.0; 2], ends: [[0.0; 2]; LINES + 1], margin: 0.0 };
         for (node, weight) in view.corners.into_iter().zip(view.weights) {
@@ -342,7 +342,7 @@ impl MaskRegion {
         nodes
     }
 
-    /// Whether a point of the mask is one that may be drawn where it is open.
+    /// True if a point of the mask may be drawn where the mask is open.
     fn holds(&self, film: DVec2, at: DVec2, bounds: [DVec2; 2]) -> bool {
         let Some((_, view)) = self.view(film) else { return true };
         let is_cut =
@@ -389,7 +389,7 @@ struct Sight<'a> {
 }
 
 impl Sight<'_> {
-    /// Which points of the mask (mm) are visible.
+    /// Tests which points of the mask (mm) are visible.
     fn passes(&self, places: &[DVec2]) -> Vec<bool> {
         let mut passed = vec![false; places.len()];
         for (scene, map) in self.scenes {
@@ -421,7 +421,7 @@ impl Sight<'_> {
         outside.y.clamp(self.low.y, self.high.y)
     }
 
-    /// What is visible; all, where nobody knows.
+    /// Visible part of the mask; all, where nobody knows.
     fn seen(&self) -> Visibility {
         let mut room = NO_TERMS;
         if self.scenes.iter().all(|(_, map)| map.at(self.film, &mut room).is_none()) {

@@ -16,15 +16,15 @@ use crate::train::{MonochromaticTrain, OpticalTrain, Side};
 /// Added to every radius, as a share of it: what rays measured on a grid may be short of.
 const MARGIN: f64 = 0.004;
 
-/// The same beside nodes in the dark: at the edge of the image circle the pupil closes as a square
-/// root, faster than straight lines.
+/// Margin beside nodes in the dark, likewise a share of the radius: at the edge of the image circle
+/// the pupil closes as a square root, faster than straight lines.
 const FADING_MARGIN: f64 = 0.2;
 
-/// How much of a bend in the frames from node to node is added to the margin, and the bend that
-/// comes from the search grid's cells alone.
+/// Share of the frames' bend from node to node that is added to the margin, and the bend that comes
+/// from the search grid's cells alone.
 const BEND: [f64; 2] = [0.4, 0.1];
 
-/// How far outside of the bound the closing check looks, as a share of the radius.
+/// Margin outside of the bound that the closing check looks at, as a share of the radius.
 const CHECKED: f64 = 0.35;
 
 /// Random rays of a round of the closing check.
@@ -346,7 +346,7 @@ pub(super) struct Stray {
     radius: f64,
 }
 
-/// How far from the axis there is light, up to `limit` (mm), and a little more.
+/// Greatest distance from the axis at which light arrives, up to `limit` (mm), with a small margin.
 pub fn lit_radius(train: &OpticalTrain, lenses: &[MonochromaticTrain], z: f64, limit: f64) -> f64 {
     let lit = |r: f64| {
         let film = DVec3::new(r, 0.0, z);
@@ -422,14 +422,14 @@ fn narrow(
     }
 }
 
-/// Where passing rays are looked for.
+/// Directions among which passing rays are looked for.
 struct Searched {
     /// The middle and the half axes of slopes.
     frame: [DVec2; 2],
     is_round: bool,
 }
 
-/// Which of the passing rays of an angle is looked for.
+/// Extreme that is looked for among the passing rays of an angle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Limit {
     /// That of the greatest radius.

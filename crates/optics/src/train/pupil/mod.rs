@@ -73,7 +73,7 @@ const RADIAL_INTERVALS: usize = 40;
 /// Intervals between nodes over each side of the sensor for other lenses.
 const PLANAR_INTERVALS: usize = 8;
 
-/// Why there is no exit pupil to sample.
+/// Error of a lens without an exit pupil to sample.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExitPupilError {
@@ -85,7 +85,7 @@ pub enum ExitPupilError {
     Dark {
         /// The element on which the rays end that got farthest.
         element: usize,
-        /// Where rays from the sensor's centre end.
+        /// Losses of the rays from the sensor's centre, as percentages by cause and element.
         losses: Vec<String>,
     },
     /// No element has a rim.
@@ -121,7 +121,7 @@ pub struct PupilSample {
     pub weight: f64,
 }
 
-/// Where light can come from, for each point of a sensor.
+/// Exit pupil: the directions from which light can come, for each point of a sensor.
 #[derive(Debug, Clone)]
 pub struct ExitPupil {
     sensor: Frame,
@@ -135,11 +135,11 @@ pub struct ExitPupil {
     /// The lenslets through which light comes; there are no nodes then.
     lenslets: Option<Box<LensletPupil>>,
     index2: f64,
-    /// How far from the sensor's centre the nodes of a radial layout reach (mm).
+    /// Distance from the sensor's centre to the outermost node of a radial layout (mm).
     radius: f64,
 }
 
-/// How nodes lie on the sensor.
+/// Layout of the nodes on the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum NodeLayout {
     /// On a radius, for all directions across the sensor.
@@ -257,8 +257,8 @@ impl ExitPupil {
         Ok(pupil.aimed_at_mask(masked, wavelengths))
     }
 
-    /// The same pupil with its first mask aimed at by rays of `wavelengths` (nm), which run apart where
-    /// the lens of `train` is dispersive: those that samples will be traced at.
+    /// Aims the pupil's samples at its first mask by rays of `wavelengths` (nm), which run apart
+    /// where the lens of `train` is dispersive: those that samples will be traced at.
     #[must_use]
     pub fn aimed_at_mask(mut self, train: &OpticalTrain, wavelengths: &[f64]) -> Self {
         if self.lenslets.is_none() && train.first_array().is_none() {
@@ -289,7 +289,7 @@ impl ExitPupil {
         self.lenslets.as_deref()
     }
 
-    /// Whether one radius of nodes serves the whole sensor; otherwise a coarser grid of nodes does,
+    /// True if one radius of nodes serves the whole sensor; otherwise a coarser grid of nodes does,
     /// and more rays are lost.
     #[must_use]
     pub fn is_radial(&self) -> bool {

@@ -17,7 +17,7 @@ const NODES: u32 = 17;
 /// Directions from the middle of an outline in which it is found.
 const ANGLES: u32 = 64;
 
-/// How outlines are found: steps inwards, and halvings.
+/// Steps inwards of the search for outlines, and its halvings.
 const STEPS: u32 = 12;
 const HALVINGS: u32 = 6;
 

@@ -1,4 +1,5 @@
-//! Where a point of the sensor lies between the nodes of a measured pupil, and values between them.
+//! Interpolation between the nodes of a measured pupil: the place of a sensor point among them, and
+//! values there.
 
 use glam::DVec2;
 
@@ -44,7 +45,7 @@ impl ExitPupil {
     }
 }
 
-/// Which nodes a point of the sensor lies between, and how it is turned against them.
+/// Nodes around a point of the sensor with their weights, and the turn of the point against them.
 pub(super) struct NodePlace {
     /// The direction on the sensor that is the nodes' +x.
     pub(super) axis: DVec2,

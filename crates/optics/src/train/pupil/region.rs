@@ -1,8 +1,8 @@
-//! What is aimed at of one lenslet: points of it, evenly.
+//! Aiming region of one lenslet: points of it, evenly.
 
 use glam::DVec2;
 
-/// What is aimed at of one lenslet, or of what is between them.
+/// Region that is aimed at: of one lenslet, or of what is between them.
 #[derive(Debug, Clone)]
 pub(super) enum Region {
     /// All of an opening that is a polygon.

@@ -1,5 +1,5 @@
-//! Which directions from a point of the sensor leave the lens: the rectangle of slopes that holds
-//! them all, found by grids of rays.
+//! Search for the directions from a point of the sensor that leave the lens: the rectangle of
+//! slopes that holds them all, found by grids of rays.
 
 use glam::{DVec2, DVec3};
 
@@ -10,7 +10,7 @@ use crate::train::{MonochromaticTrain, OpticalTrain, Side};
 /// Cells a side of a search grid.
 const GRID: u32 = 48;
 
-/// The same for trains through which rays take long to be traced.
+/// Cells a side of a search grid, for trains through which rays take long to be traced.
 const COARSE_GRID: u32 = 16;
 
 /// Cells a side of the last resort, which finds what is 1/36 000 of the widest window.

@@ -1,4 +1,4 @@
-//! Which wavelengths outlines are measured at, and which they are checked at.
+//! Choice of the wavelengths that outlines are measured at and checked at.
 //!
 //! The rims of a lens, as they are seen from the sensor, move over the spectrum as its glasses' indices do: nearly in
 //! proportion to 1/λ² (A.-L. Cauchy, 1836), so that what passes at any wavelength lies between what passes at a few. A

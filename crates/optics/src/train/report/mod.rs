@@ -24,7 +24,7 @@ const SHARES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 0.9];
 /// Field angles from here on come from behind (degrees).
 const WIDEST: f64 = 180.0;
 
-/// What a report is about.
+/// Inputs of a lens report.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Inquiry {
     /// Wavelengths of the chromatic shifts (nm); the F, d and C lines, where the glasses have an
@@ -34,11 +34,11 @@ pub struct Inquiry {
     pub fields: Option<Vec<f64>>,
     /// Fields as the lens' file states them: those whose pupil vignetting makes smaller are looked at over that, too.
     pub stated: Vec<FieldSpec>,
-    /// Where the sensor stands.
+    /// Focus setting, which places the sensor.
     pub focus: Focus,
 }
 
-/// Why there is no report.
+/// Error of a lens that gives no report.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReportError {
@@ -313,7 +313,7 @@ fn farthest(train: &OpticalTrain, sensor_z: f64) -> f64 {
     4.0 * (behind + train.last_vertex().abs() + train.lateral_scale())
 }
 
-/// What is not stated for the design wavelength, or for another one.
+/// Notes on glasses whose index is not stated for the design wavelength, or for another one.
 fn out_of_range(train: &OpticalTrain, wavelengths: &[f64]) -> Vec<String> {
     train.outside_of_range(&[&[train.wavelength()], wavelengths].concat())
 }

@@ -7,7 +7,7 @@ use etendue_report::{Cell, Table};
 
 use super::{LensReport, Paraxial};
 
-/// What stands where there is no number.
+/// Mark for a missing number.
 const NONE: &str = "-";
 
 impl Display for LensReport {

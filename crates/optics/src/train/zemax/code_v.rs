@@ -26,7 +26,7 @@ const NOT_TAKEN: [&str; 24] = [
     "UDS", "ZRN", "XDD", "YDD", "GRN", "RET", "REV", "ZDE", "GLB", "NSS", "MFL",
 ];
 
-/// What is read of one surface before it becomes rows.
+/// Surface as it is read, before it becomes rows.
 #[derive(Debug, Default)]
 struct Surface {
     row: SheetRow,
@@ -151,7 +151,7 @@ impl ZemaxSheet {
         Ok(sheet)
     }
 
-    /// Whether a command of the whole system is understood.
+    /// Reads a command of the whole system; false if it is not understood.
     fn header(&mut self, word: &str, command: &Command<'_>) -> Result<bool, ZemaxError> {
         let aperture = |value: f64, aperture: fn(f64) -> Aperture| {
             let why = || command.error(format!("{value} must be positive"));
@@ -271,7 +271,7 @@ pub(super) fn hyphened(name: &str, makers: &[&str]) -> String {
 }
 
 impl Surface {
-    /// Whether a command of a surface is understood.
+    /// Reads a command of a surface; false if it is not understood.
     fn read(&mut self, word: &str, command: &Command<'_>) -> Result<bool, ZemaxError> {
         if NOT_TAKEN.contains(&word) {
             return Err(command.error(

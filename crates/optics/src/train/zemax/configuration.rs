@@ -166,13 +166,13 @@ pub(super) struct Fields {
     /// 0 for angles, 1 for heights of the object, 2 and 3 for those of the paraxial and the real image.
     pub(super) kind: usize,
     pub(super) count: Option<usize>,
-    /// How many wavelengths are in use, which stands in the same line.
+    /// Number of wavelengths in use, which stands in the same line.
     pub(super) wavelengths: Option<usize>,
     pub(super) x: Vec<f64>,
     pub(super) y: Vec<f64>,
-    /// What each of them weighs.
+    /// Weight of each field.
     pub(super) weights: Vec<f64>,
-    /// What vignetting leaves of their pupils: VDX, VDY, VCX, VCY, VAN.
+    /// Vignetting of the fields' pupils: VDX
     pub(super) vignetting: [Vec<f64>; 5],
 }
 
@@ -315,7 +315,7 @@ pub(super) struct Axes {
     rotation: DMat3,
 }
 
-/// Where a surface stands, as a lens file says it.
+/// Placement of a surface, as a lens file states it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SheetPlace {
     pub(super) z: f64,
@@ -375,7 +375,8 @@ impl Axes {
         Self { origin: self.origin + self.rotation.z_axis * thickness, ..self }
     }
 
-    /// The same as it stands in an unfolded space, in which light that runs against the file's axis runs along +z.
+    /// Returns the axes as they stand in an unfolded space, in which light that runs against the
+    /// file's axis runs along +z.
     pub(super) fn unfolded(&self, space: &Isometry, sense: f64) -> Self {
         if *space == Isometry::ONE {
             return *self;
@@ -386,7 +387,7 @@ impl Axes {
         Self { origin: space.place(self.origin), rotation: DMat3::from_cols(x, y, z) * flip }
     }
 
-    /// The same moved across its axis (mm).
+    /// Returns the axes moved across their own axis (mm).
     pub(super) fn shifted(&self, [x, y]: [f64; 2]) -> Self {
         Self { origin: self.origin + self.rotation * DVec3::new(x, y, 0.0), ..*self }
     }
@@ -400,7 +401,7 @@ impl Axes {
         self.origin
     }
 
-    /// Whether it is turned about its own axis, which two tilts do not say.
+    /// True if the frame is turned about its own axis, which two tilts cannot express.
     pub(super) fn is_turned(&self) -> bool {
         let [about_x, about_y] = self.placed().tilt.map(f64::to_radians);
         let two = DMat3::from_rotation_x(about_x) * DMat3::from_rotation_y(about_y);

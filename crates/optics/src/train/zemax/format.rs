@@ -22,12 +22,12 @@ pub enum LensFormat {
     PhotonsToPhotos,
 }
 
-/// What the users of a program call what an error is about.
+/// Words of a program's users for what an error is about.
 #[derive(Debug)]
 pub(super) struct FormatWords {
     /// The file as a source of numbers.
     pub(super) source: &'static str,
-    /// Where the object stands.
+    /// Position of the object.
     pub(super) object: &'static str,
     pub(super) thickness: &'static str,
     pub(super) glass: &'static str,
@@ -39,7 +39,7 @@ pub(super) struct FormatWords {
     pub(super) f_number: &'static str,
     pub(super) object_aperture: &'static str,
     pub(super) toroid: &'static str,
-    /// What it says things with.
+    /// Name of the format's statements.
     pub(super) commands: &'static str,
     /// The list that surfaces stand in, of a file in which they have no lines.
     pub(super) surfaces: Option<&'static str>,
@@ -75,7 +75,7 @@ impl LensFormat {
         }
     }
 
-    /// Whether files of it may hold several configurations.
+    /// True if files of the format may hold several configurations.
     #[must_use]
     pub const fn has_configurations(self) -> bool {
         match self {
@@ -97,7 +97,7 @@ impl LensFormat {
     }
 }
 
-/// Whether `text` stands somewhere, letters in any case.
+/// Tests whether `text` stands somewhere in `bytes`, letters in any case.
 fn contains(bytes: &[u8], text: &[u8]) -> bool {
     bytes.windows(text.len()).any(|window| window.eq_ignore_ascii_case(text))
 }

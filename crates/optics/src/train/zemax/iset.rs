@@ -16,7 +16,7 @@ use super::pbrt::Interface;
 use super::sheet::ZemaxSheet;
 use crate::glass::GlassSpec;
 
-/// What a curve through indices may miss one by: the fifth decimal, that makers give.
+/// Greatest error of an index on a fitted curve: the fifth decimal, that makers give.
 const INDEX_MISSED: f64 = 1e-4;
 
 /// Keys that would change the light's way and have no counterpart.

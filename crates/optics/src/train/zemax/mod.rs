@@ -59,13 +59,13 @@ use stop::open_stop;
 /// A difference of focal lengths that is more than rounding (share).
 const SAME_FOCAL_LENGTH: f64 = 1e-3;
 
-/// Why another program's file gives no lens.
+/// Error of another program's lens file that cannot be converted.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{}{why}", match line { 0 => String::new(), line => format!("line {line}: ") })]
 pub struct ZemaxError {
     /// The line, from 1; 0 where the words name the place.
     pub line: usize,
-    /// What is wrong there and what would do.
+    /// Description of the error, and of what would be valid.
     pub why: String,
 }
 
@@ -80,14 +80,14 @@ impl ZemaxError {
 pub struct ZemaxLens {
     /// The lens, with its fields and wavelengths.
     pub file: LensFile,
-    /// What was changed, assumed or left out, in sentences.
+    /// Notes on what was changed, assumed or left out, as sentences.
     pub notes: Vec<String>,
     /// The effective focal length that the file states (mm).
     pub stated_efl: Option<f64>,
 }
 
 impl ZemaxLens {
-    /// Whether a file's name says that it is a Zemax file.
+    /// True if a file's name ends like that of a Zemax file.
     #[must_use]
     pub fn is_named(path: &Path) -> bool {
         path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("zmx"))

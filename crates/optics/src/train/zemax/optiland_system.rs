@@ -1,4 +1,4 @@
-//! What a lens of optiland says of its whole: wavelengths, aperture and fields.
+//! System data of an optiland lens: wavelengths, aperture and fields.
 
 use serde_json::Value;
 

@@ -37,7 +37,7 @@ const NOT_TAKEN: [&str; 22] = [
 /// A file on its way to a sheet.
 struct Reader {
     surfaces: Vec<OsloSurface>,
-    /// How many there are behind the object, as `LEN` says.
+    /// Number of surfaces behind the object, as `LEN` says.
     declared: Option<usize>,
     /// Values that are those of other surfaces, by surface.
     pickups: Vec<(usize, Statement)>,
@@ -54,7 +54,7 @@ struct Reader {
     is_whole: bool,
 }
 
-/// What statements behind the last surface belong to.
+/// Table that statements behind the last surface belong to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Table {
     None,
@@ -214,7 +214,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Whether the file is whole.
+    /// Checks that the file is whole.
     fn check(&self, sheet: &ZemaxSheet) -> Result<(), ZemaxError> {
         let error = |why: String| Err(ZemaxError::new(sheet.last_line.max(1), why));
         let Some(declared) = self.declared else {

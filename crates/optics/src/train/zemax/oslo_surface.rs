@@ -1,4 +1,4 @@
-//! What OSLO's statements say of one surface, and the row that it becomes.
+//! OSLO statements of one surface, and the row that they become.
 //!
 //! # Sources
 //!
@@ -78,7 +78,8 @@ impl OsloSurface {
         Self { line, ..Self::default() }
     }
 
-    /// Whether a statement is one of a surface. `own` is the surface's number, and `wavelengths` are those so far (µm).
+    /// Reads a statement of a surface; false if it is not one. `own` is the surface's number, and
+    /// `wavelengths` are those so far (µm).
     pub(super) fn read(
         &mut self,
         statement: &Statement,
@@ -176,7 +177,7 @@ impl OsloSurface {
         self.tilts_first = from.tilts_first != (sign < 0.0);
     }
 
-    /// Whether it stands otherwise than on the axis before it.
+    /// True if the surface stands otherwise than on the axis before it.
     pub(super) fn is_moved(&self) -> bool {
         let moves = self.decentre.iter().chain(&self.tilt).any(|value| *value != 0.0);
         moves || self.global.is_some() || self.returns.is_some() || self.bends

@@ -13,7 +13,7 @@ use crate::element::{
 };
 
 impl Importer<'_> {
-    /// What a row is; `None` for a plane between air and air that does nothing.
+    /// Converts a row to a part; `None` for a plane between air and air that does nothing.
     pub(super) fn part(
         &mut self,
         row: &SheetRow,
@@ -115,7 +115,7 @@ impl SheetRow {
         }))
     }
 
-    /// Whether it is a plane that does nothing but between media.
+    /// True if the row is a plane that only separates media.
     pub(super) fn is_flat(&self) -> bool {
         let bends = |(number, parameter): (&usize, &Parameter)| {
             parameter.value != 0.0 && (self.shape == SurfaceShape::EvenAsphere || *number > 2)
@@ -194,7 +194,7 @@ impl SheetRow {
         Ok(terms)
     }
 
-    /// Whether a turn about its axis changes nothing.
+    /// True if a turn about its axis changes nothing.
     pub(super) fn is_round(&self) -> bool {
         !matches!(
             self.shape,
@@ -207,7 +207,7 @@ impl SheetRow {
         ) && self.freeform.as_ref().is_none_or(|spec| spec.sag.is_empty() && spec.phase.is_none())
     }
 
-    /// The same surface in a frame that is turned about its x axis by half a turn.
+    /// Converts the surface to a frame that is turned about its x axis by half a turn.
     pub(super) fn turn_about(&mut self) -> Result<(), ZemaxError> {
         if !self.is_round() || self.shape == SurfaceShape::CoordinateBreak {
             let why = "a surface that is not round stands with its back to the light; turn its coordinates by half a turn";

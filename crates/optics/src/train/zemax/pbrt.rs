@@ -23,11 +23,11 @@ pub(super) struct Interface {
     pub(super) radius: [f64; 2],
     pub(super) conic: [f64; 2],
     pub(super) thickness: f64,
-    /// What follows; `None` for air.
+    /// Medium behind the interface; `None` for air.
     pub(super) glass: Option<GlassSpec>,
     /// Half its clear diameter; 0 where nothing limits it.
     pub(super) semi_aperture: f64,
-    /// Whether it is a diaphragm.
+    /// True if the interface is a diaphragm.
     pub(super) is_stop: bool,
 }
 

@@ -244,7 +244,7 @@ impl<'a> Table<'a> {
         Ok(Some(SheetGlass::model(cells.line, &name, nd, vd.unwrap_or(0.0))))
     }
 
-    /// How many odd powers there are, and the first power of all.
+    /// Number of odd powers, and the first power of all.
     fn powers(&self) -> Result<(usize, usize), ZemaxError> {
         for cells in &self.constants {
             let key = cells.cell(0).unwrap_or_default();

@@ -16,14 +16,14 @@ pub(super) struct SheetRow {
     pub(super) curvature: f64,
     pub(super) conic: f64,
     pub(super) thickness: f64,
-    /// Whether the file says how thick it is.
+    /// True if the file states the thickness.
     pub(super) is_closed: bool,
     pub(super) glass: Option<SheetGlass>,
-    /// Whether its glass is MIRROR.
+    /// True if the glass is MIRROR.
     pub(super) mirror: bool,
-    /// What it stops of light beside its rim, in the file's unit.
+    /// Openings that stop light beside the rim, in the file's unit.
     pub(super) openings: Vec<SheetOpening>,
-    /// Where those stand across its axis.
+    /// Shift of the openings across the surface's axis.
     pub(super) aperture_decentre: [f64; 2],
     /// Its own inner radius.
     pub(super) inner: f64,
@@ -101,7 +101,7 @@ pub(super) enum SheetOpening {
 pub(super) struct SheetGlass {
     pub(super) line: usize,
     pub(super) name: String,
-    /// What it is where its name does not say so.
+    /// Specification of the glass where its name does not give it.
     pub(super) spec: Option<GlassSpec>,
 }
 
@@ -123,7 +123,7 @@ pub(super) struct Parameter {
 }
 
 impl SheetRow {
-    /// Whether the line is understood.
+    /// Reads a line of a surface; false if it is not understood.
     pub(super) fn read(&mut self, line: &SheetLine<'_>) -> Result<bool, ZemaxError> {
         match line.command {
             "STOP" => self.stop = true,
@@ -167,7 +167,7 @@ impl SheetRow {
         Ok(true)
     }
 
-    /// Whether the line is one of an aperture's.
+    /// Reads a line of an aperture; false if it is not one.
     fn read_aperture(&mut self, line: &SheetLine<'_>) -> Result<bool, ZemaxError> {
         match line.command {
             // Without an end is how a file writes that there is none outside.
@@ -246,7 +246,7 @@ impl SheetRow {
         Ok(())
     }
 
-    /// How far from the axis light passes, in the file's unit.
+    /// Radius from the axis within which light passes, in the file's unit.
     pub(super) fn semi_diameter(&self) -> Option<f64> {
         // One that stands beside the axis is a sheet of its own, and rims of rectangles are corners.
         let is_beside = self.aperture_decentre != [0.0; 2];
@@ -280,7 +280,7 @@ impl SheetRow {
         self.openings.iter().any(is_shape)
     }
 
-    /// Whether someone wants this surface to stop light.
+    /// True if the surface is meant to stop light.
     pub(super) fn has_fixed_rim(&self) -> bool {
         self.clear.is_some() || (self.fixed && self.semi_diameter.is_some())
     }

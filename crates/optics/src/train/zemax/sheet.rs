@@ -37,7 +37,7 @@ pub(super) struct ZemaxSheet {
     pub(super) wavelengths: Vec<f64>,
     pub(super) primary: usize,
     pub(super) fields: Fields,
-    /// How many there are, the one in place from 1, and the values of all.
+    /// Number of configurations, the one in place from 1, and the values of all.
     pub(super) configurations: usize,
     pub(super) configuration: usize,
     pub(super) values: Vec<ConfigurationValue>,
@@ -48,7 +48,7 @@ pub(super) struct ZemaxSheet {
     pub(super) ignored: BTreeMap<String, Ignored>,
 }
 
-/// How wide the beam is.
+/// Width of the beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Aperture {
     /// The entrance pupil's diameter, in the file's unit.
@@ -190,7 +190,7 @@ impl ZemaxSheet {
         Ok(())
     }
 
-    /// Whether the line is understood.
+    /// Reads a line of the header; false if it is not understood.
     fn read_header(&mut self, line: &SheetLine<'_>) -> Result<bool, ZemaxError> {
         match line.command {
             "NAME" => line.rest.trim_matches('"').clone_into(&mut self.name),
@@ -350,7 +350,8 @@ impl ZemaxSheet {
         (all, weights)
     }
 
-    /// Where something is: a line or, in files in which surfaces have none, a surface.
+    /// Place of something in the file, for messages: a line or, in files in which surfaces have
+    /// none, a surface.
     pub(super) fn place(&self, line: usize) -> String {
         match (self.format.words().surfaces, line) {
             (None, line) => format!("line {line}"),
@@ -433,8 +434,8 @@ fn unit(line: &SheetLine<'_>) -> Result<f64, ZemaxError> {
     }
 }
 
-/// Whether a text may have lost the rest of its last line: there is no line break behind it, nor an exponent of two
-/// digits, which programs write in full.
+/// True if a text may have lost the rest of its last line: there is no line break behind it, nor an
+/// exponent of two digits, which programs write in full.
 fn ends_inside_of_a_line(text: &str) -> bool {
     let exponent = text.rsplit_once(['e', 'E']).map_or("", |(_, exponent)| exponent);
     let digits = exponent.trim_start_matches(['+', '-']);

@@ -58,7 +58,7 @@ const SINGLET: [&[&str]; 2] = [
     &["TYPE STANDARD", "CURV -2.0E-2 0 0 0 0 \"\"", "DISZ 47", "DIAM 10 1 0 0 1 \"\""],
 ];
 
-/// The same lens in a lens file.
+/// Singlet as a lens file.
 fn singlet(more: &str) -> OpticalTrain {
     let text = format!(
         r#"{{"elements": [

@@ -20,7 +20,7 @@ const LENGTH: f64 = 500e-6;
 const NM: f64 = 500.0;
 const NA: f64 = 0.05;
 
-/// What sums over cells leave.
+/// Tolerance of sums over cells.
 const TOLERANCE: f64 = 1e-4;
 
 fn field(cells: usize, inner: f64, waves: impl Fn(DVec2) -> f64) -> PupilField {

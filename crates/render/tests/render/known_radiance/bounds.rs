@@ -1,4 +1,4 @@
-//! What no picture may do: show what is no number, light where none can be, or the scale of its scene.
+//! Tests of what no picture may do: show what is no number, light where none can be, or the scale of its scene.
 
 use etendue_render::output::{Outputs, Values};
 use etendue_render::{Plan, render};
@@ -64,8 +64,8 @@ fn no_light_leaks_into_a_closed_box() {
     }
 }
 
-/// The same scene in millimetres, metres and kilometres, and moved by 10⁶ m, gives the same picture:
-/// hits differ by roundings, so a random choice or an edge may fall the other way in a few pixels.
+/// A scene in millimetres, metres and kilometres, and moved by 10⁶ m, gives the same picture: hits
+/// differ by roundings, so a random choice or an edge may fall the other way in a few pixels.
 #[test]
 fn neither_scale_nor_place_changes_the_picture() {
     let at = |scale: f64, far: f64| {

@@ -15,8 +15,8 @@ fn block(size: [f64; 3], z: f64, material: &str) -> String {
     )
 }
 
-/// What a stack of parallel layers lets pass whose indices follow one another, from air to air, of light that comes in
-/// at a cosine: of boundaries without loss of reflectances Rᵢ, (1 − T)/T = Σ Rᵢ/(1 − Rᵢ) (Stokes 1862).
+/// Transmittance of a stack of parallel layers whose indices follow one another, from air to air, of light that comes
+/// in at a cosine: of boundaries without loss of reflectances Rᵢ, (1 − T)/T = Σ Rᵢ/(1 − Rᵢ) (Stokes 1862).
 fn passes(indices: &[f64], cosine: f64) -> f64 {
     let sine = (1.0 - cosine * cosine).sqrt();
     let mut sum = 0.0;

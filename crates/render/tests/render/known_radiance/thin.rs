@@ -8,8 +8,8 @@ use etendue_scene::file::{AccelName, LightPrecision};
 use super::{picture, ways};
 use crate::steps::{load, mean};
 
-/// What light goes through, `d` thick or away from what follows, at the place `at` (m), turned by 35°. All else is as
-/// large as it, or more: two things 200 m apart, so that none is as small as a pane is thin.
+/// Scene of a thin thing that light goes through, `d` thick or away from what follows, at the place `at` (m), turned by
+/// 35°. All else is as large as it, or more: two things 200 m apart, so that none is as small as a pane is thin.
 fn scene(kind: &str, d: f64, at: f64) -> String {
     let scale = d.max(1.0);
     let (side, far) = (3.0 * scale, 100.0 * scale);

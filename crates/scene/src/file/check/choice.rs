@@ -1,4 +1,4 @@
-//! Which of several things a value is meant to be, and the message when it is none.
+//! Choice among several kinds that a value may be, and the message when it is none.
 
 use serde_json::{Map, Value};
 
@@ -82,8 +82,8 @@ impl<'a> Checker<'a> {
         self.choose_by_keys(branches, &tags, members, path)
     }
 
-    /// Where no tag was given: the branch with the most of these keys, and of them the one that lacks
-    /// the least.
+    /// Chooses a branch where no tag was given: the branch with the most of these keys, and of them
+    /// the one that lacks the least.
     fn choose_by_keys(
         &self,
         branches: &[&'a Value],

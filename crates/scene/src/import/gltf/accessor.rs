@@ -19,7 +19,7 @@ const LAST_READ: usize = 4;
 /// An accessor whose sizes have been checked.
 pub(super) struct Accessor<'a> {
     view: Option<BufferView<'a>>,
-    /// Where in the buffer the first element is (bytes).
+    /// Offset of the first element in the buffer (bytes).
     start: usize,
     /// From one element to the next (bytes).
     stride: usize,
@@ -265,7 +265,7 @@ impl Accessor<'_> {
         view.bytes.view(self.start, self.count / 3)
     }
 
-    /// Whether its elements are whole numbers that can count vertices.
+    /// True if its elements are whole numbers that can count vertices.
     pub(super) fn is_index(&self) -> bool {
         use ComponentType::{U8, U16, U32};
         self.components == 1 && matches!(self.component, U8 | U16 | U32)

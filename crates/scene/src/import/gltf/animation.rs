@@ -39,7 +39,7 @@ struct KeyTarget {
 }
 
 impl KeyTarget {
-    /// What is moved, in words: a path, or a pointer of `KHR_animation_pointer`.
+    /// Name of what is moved, in words: a path, or a pointer of `KHR_animation_pointer`.
     fn words(&self) -> &str {
         let extension = self.extensions.get("KHR_animation_pointer");
         let pointer = extension.and_then(|e| e.get("pointer")).and_then(Value::as_str);
@@ -73,7 +73,7 @@ struct KeySampler {
     interpolation: Option<String>,
 }
 
-/// What a channel makes of a node.
+/// Effect of a channel on a node.
 pub(super) struct Moved {
     node: usize,
     property: KeyProperty,
@@ -147,7 +147,7 @@ pub(super) fn apply(file: &Path, moved: &[Moved], nodes: &mut [GltfNode]) -> Res
     Ok(())
 }
 
-/// What moves while an animation plays.
+/// Nodes and weights that move while an animation plays.
 #[derive(Debug, Default)]
 pub(super) struct Playing {
     /// The nodes whose frames do, in s from the moment that is shown.
@@ -156,7 +156,7 @@ pub(super) struct Playing {
     pub(super) morphed: BTreeMap<usize, Vec<geometry::Track>>,
 }
 
-/// What goes on from the moment `time` (s), of nodes that stand as they do then.
+/// Collects what goes on from the moment `time` (s), of nodes that stand as they do then.
 pub(super) fn playing(
     file: &Path,
     moved: Vec<Moved>,
@@ -330,14 +330,14 @@ impl PropertyTrack {
         }
     }
 
-    /// Whether its value is another at some time.
+    /// True if its value is another at some time.
     fn changes(&self) -> bool {
         let first = self.key(0);
         let is_cubic = self.interpolation == KeyInterpolation::CubicSpline && self.times.len() > 1;
         is_cubic || (1..self.times.len()).any(|key| self.key(key) != first)
     }
 
-    /// The same as a track of a joint, in s from `time` on.
+    /// Track of a joint, in s from `time` on.
     fn since(&self, time: f64) -> geometry::Track {
         self.picked_since(time, |numbers: &[f64]| {
             let number = |k: usize| numbers.get(k).copied().unwrap_or(0.0);
@@ -345,7 +345,7 @@ impl PropertyTrack {
         })
     }
 
-    /// The same as a track of each of its numbers, in s from `time` on.
+    /// Tracks of each of its numbers, in s from `time` on.
     fn each_since(&self, time: f64) -> Vec<geometry::Track> {
         let of = |k: usize| self.picked_since(time, move |numbers| DVec4::X * numbers[k]);
         (0..self.width).map(of).collect()

@@ -1,4 +1,4 @@
-//! Where the bytes of a glTF file are: in the GLB, in files beside it, in data URIs.
+//! Buffers of a glTF file: its bytes in the GLB, in files beside it, in data URIs.
 //!
 //! The binary container: a header, a chunk of JSON, a chunk of bytes (glTF 2.0, section 4).
 

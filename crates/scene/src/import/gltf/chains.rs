@@ -7,7 +7,7 @@ use super::pose::{NodePoses, local};
 use crate::import::Import;
 use crate::import::error::{Note, NoteKind, push};
 
-/// What each node hangs on.
+/// Parents of the nodes.
 pub(super) struct Chains<'a> {
     reader: &'a GltfReader<'a>,
     parents: Vec<Option<usize>>,

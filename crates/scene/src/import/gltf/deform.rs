@@ -19,7 +19,7 @@ use crate::import::{Refusal, Strictness, precise_enough, single};
 use etendue_geometry::glam::{DMat3, DVec3, DVec4};
 use etendue_geometry::{Link, Positions, Track, Transform, Vertices};
 
-/// How far the sum of a vertex's weights may be from 1 before it is said: numbers of three digits
+/// Tolerance of the sum of a vertex's weights from 1 before it is said: numbers of three digits
 /// are, and 8 bits, whose sum exporters make 255, are not.
 const WEIGHTS_OFF: f64 = 2e-3;
 
@@ -27,11 +27,11 @@ const WEIGHTS_OFF: f64 = 2e-3;
 pub(super) struct PrimitiveCorners {
     pub positions: Positions,
     pub normals: Option<Vertices<3>>,
-    /// Whether a skin placed them in the model's frame, and its node no longer does.
+    /// True if a skin placed the corners in the model's frame, and its node no longer does.
     pub skinned: bool,
-    /// Whether the skin turned the triangles inside out.
+    /// True if the skin turned the triangles inside out.
     pub mirrored: bool,
-    /// How they go on from there, where they do.
+    /// Deformation from that moment on, where there is one.
     pub deformer: Option<Deformer>,
 }
 
@@ -119,7 +119,7 @@ impl PrimitiveReader<'_> {
         Ok(weights.into_iter().take(targets).enumerate().filter(counts).collect())
     }
 
-    /// What a target adds to one attribute of all `count` vertices; `None` where it leaves that alone.
+    /// Offsets that a target adds to one attribute of all `count` vertices; `None` where it leaves that alone.
     fn moves(
         &mut self,
         number: usize,
@@ -239,7 +239,7 @@ fn doubles(values: &Vertices<3>) -> Vec<DVec3> {
 /// Joints that the vertices of a mesh can name: their numbers have 16 bits.
 const MOST_JOINTS: usize = 1 << 16;
 
-/// How far the last row of an inverse bind matrix may be from 0 0 0 1: exporters invert in f32.
+/// Tolerance of the last row of an inverse bind matrix from 0 0 0 1: exporters invert in f32.
 const LAST_ROW: f32 = 1e-3;
 
 /// A skin in a pose, and how it goes on from there.
@@ -305,7 +305,7 @@ impl Skin {
         Ok(Self { model_from_bound: Joints(model_from_bound) })
     }
 
-    /// Whether the joints turn triangles inside out.
+    /// True if the joints turn triangles inside out.
     pub(super) fn mirrors(&self) -> bool {
         self.model_from_bound.at(0.0).iter().all(|joint| joint.linear.determinant() < 0.0)
     }

@@ -23,7 +23,7 @@ pub(super) struct GltfDocument {
     pub animations: Vec<Value>,
 }
 
-/// What crate `gltf` reads of the document.
+/// Keys of the document that crate `gltf` reads.
 const READ: [&str; 13] = [
     "asset",
     "accessors",
@@ -178,7 +178,7 @@ fn broken(path: &Path, json: &[u8], in_glb: bool, error: &serde_json::Error) -> 
     wrong_text(path, (place.line, place.column), reason, &shown)
 }
 
-/// Where a text is no JSON object, and why.
+/// Fault of a text that is no JSON object: its place, and the reason.
 fn fault_of(json: &[u8], error: &serde_json::Error) -> JsonFault {
     let at_its = |reason: String| JsonFault {
         place: Place { line: error.line().max(1), column: error.column().max(1) },

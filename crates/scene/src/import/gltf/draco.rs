@@ -25,8 +25,8 @@ use crate::import::Refusal;
 
 pub(super) const NAME: &str = "KHR_draco_mesh_compression";
 
-/// What the decoder and we hold of a triangle and of a point while it is decoded (bytes): tables of corners
-/// and neighbours, and the map from points to values.
+/// Memory that the decoder and we hold of a triangle and of a point while it is decoded (bytes):
+/// tables of corners and neighbours, and the map from points to values.
 const PER_FACE: u64 = 256;
 const PER_POINT: u64 = 128;
 

@@ -1,4 +1,4 @@
-//! What becomes of each extension: done, left out with a note, or refused with the command that
+//! Treatment of each extension: done, left out with a note, or refused with the command that
 //! converts the file.
 
 use std::path::Path;
@@ -9,7 +9,7 @@ use super::document::GltfDocument;
 use crate::import::error::{self, Note, NoteKind};
 use crate::import::{Refusal, Wanted};
 
-/// How far an extension is supported.
+/// Support of an extension.
 enum Support {
     /// Done.
     Full,
@@ -29,7 +29,7 @@ const FROM_AVIF: &str =
 const LOOK: &str = "surfaces are shown without it";
 const UNKNOWN: &str = "export the file without it";
 
-/// What is known of an extension by its name; `None` for one that nobody has heard of here.
+/// Support of an extension by its name; `None` for one that nobody has heard of here.
 fn support(name: &str) -> Option<Support> {
     Some(match name {
         "KHR_mesh_quantization"
@@ -123,7 +123,7 @@ pub(super) fn webp_image(texture: &json::Texture) -> Option<usize> {
     usize::try_from(extension.get("source")?.as_u64()?).ok()
 }
 
-/// What a texture without a plain image asks for: refused when its pixels are wanted.
+/// Checks a texture without a plain image: refused when its pixels are wanted.
 pub(super) fn encoded_texture(
     path: &Path,
     texture: &json::Texture,

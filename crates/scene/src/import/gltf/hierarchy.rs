@@ -10,7 +10,7 @@ use crate::import::error::Note;
 use crate::import::{CameraProjection, ImportedCamera, ImportedLight, Refusal};
 use etendue_geometry::Transform;
 
-/// What stands in the scene.
+/// Nodes that stand in the scene, by what they are.
 #[derive(Default)]
 pub(super) struct SceneNodes {
     pub pose: NodePoses,

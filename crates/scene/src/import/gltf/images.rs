@@ -11,7 +11,7 @@ use super::buffers::{Bytes, data_uri, percent_decoded};
 use super::{GltfReader, extensions};
 use crate::import::{Import, Refusal, Strictness, error};
 
-/// What crate `gltf` puts for an image that a texture does not name.
+/// Index that crate `gltf` puts for an image that a texture does not name.
 const NO_IMAGE: usize = u32::MAX as usize;
 
 /// The textures that materials name, each located once.
@@ -146,7 +146,7 @@ impl<'a> GltfImages<'a> {
     }
 }
 
-/// What to call a texture in messages.
+/// Name of a texture in messages.
 fn label(texture: &json::Texture, image: &json::Image, index: usize) -> String {
     let named = texture.name.as_ref().or(image.name.as_ref());
     let file = || image.uri.as_ref().filter(|uri| !uri.starts_with("data:"));

@@ -1,4 +1,5 @@
-//! Where the meshes of the scene's nodes stand. `EXT_mesh_gpu_instancing`: a node's mesh at many places.
+//! Placements of the meshes of the scene's nodes. `EXT_mesh_gpu_instancing`: a node's mesh at many
+//! places.
 
 use serde_json::Value;
 
@@ -55,12 +56,12 @@ pub(super) fn place(
 
 const NAME: &str = "EXT_mesh_gpu_instancing";
 
-/// Whether `node` says so.
+/// True if `node` has the extension.
 fn has(node: &GltfNode) -> bool {
     node.extensions.contains_key(NAME)
 }
 
-/// Where the instances of `node` stand in its frame: one at the node itself without the extension.
+/// Placements of the instances of `node` in its frame: one at the node itself without the extension.
 fn transforms(
     reader: &GltfReader<'_>,
     node: &GltfNode,

@@ -1,4 +1,4 @@
-//! What becomes of numbers of materials that no surface can have.
+//! Treatment of material values that no surface can have.
 
 use gltf::json;
 use serde_json::Value;
@@ -10,7 +10,7 @@ use crate::import::{Import, Refusal, Strictness};
 /// The judge of one material's numbers.
 pub(super) struct Judge<'a> {
     pub reader: &'a GltfReader<'a>,
-    /// What the material is called in messages.
+    /// Name of the material in messages.
     pub subject: String,
 }
 
@@ -26,7 +26,7 @@ impl Judge<'_> {
         Ok(())
     }
 
-    /// What messages call a key of the material.
+    /// Name of a key of the material in messages.
     pub(super) fn place(&self, key: &str) -> String {
         format!("material \"{}\".{key}", self.subject)
     }

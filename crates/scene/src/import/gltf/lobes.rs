@@ -1,4 +1,4 @@
-//! What lies over a metallic-roughness surface or shapes its highlights: sheen and anisotropy.
+//! Layers over a metallic-roughness surface, and shapes of its highlights: sheen and anisotropy.
 //!
 //! `KHR_materials_pbrSpecularGlossiness`: a diffuse colour beside a reflectance of any colour.
 //!
@@ -100,7 +100,7 @@ impl Default for Glossiness {
 }
 
 impl Glossiness {
-    /// What `material` says; `None`, with a note where it is damaged, when nothing.
+    /// Reads the extension of `material`; `None`, with a note where it is damaged, when there is none.
     pub(super) fn of(
         judge: &Judge<'_>,
         material: &json::Material,
@@ -150,7 +150,7 @@ impl Glossiness {
 
 const VOLUME: &str = "KHR_materials_volume";
 
-/// What `read` is when it has a thickness: glass where it is clear all over, else still a thin wall.
+/// Scattering of `read` when it has a thickness: glass where it is clear all over, else still a thin wall.
 pub(super) fn body(
     judge: &Judge<'_>,
     material: &json::Material,

@@ -16,7 +16,7 @@ const NAMES: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 /// be told by one byte of control bits.
 const MOST_GROWTH: usize = 1024;
 
-/// What a stream may have beside its blocks (bytes): a header, and the first vertex.
+/// Bytes that a stream may have beside its blocks: a header, and the first vertex.
 const AROUND: usize = 512;
 
 /// A compressed buffer view.
@@ -72,7 +72,7 @@ impl<'a> MeshoptView<'a> {
         usize::try_from(self.written.get("buffer")?.as_u64()?).ok()
     }
 
-    /// What it says of its stream; why not, when it makes no sense.
+    /// Description of the stream; an error, in words, when it makes no sense.
     pub(super) fn stream(&self) -> Result<Stream, String> {
         if !self.written.is_object() {
             return Err("expected an object\nhint: export the file again".to_owned());

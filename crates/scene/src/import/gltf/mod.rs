@@ -41,7 +41,7 @@ use chains::Chains;
 use document::GltfDocument;
 use draco::DracoMesh;
 
-/// What the parts of the reader share.
+/// State that the parts of the reader share.
 pub(super) struct GltfReader<'a> {
     /// The model, for messages.
     file: &'a Path,
@@ -52,7 +52,7 @@ pub(super) struct GltfReader<'a> {
     meshes_of_views: Vec<OnceLock<DracoMesh>>,
     wanted: Wanted,
     options: &'a Options,
-    /// What goes on from the moment that is shown.
+    /// Nodes and weights that go on from the moment that is shown.
     playing: &'a Playing,
 }
 
@@ -68,7 +68,7 @@ impl GltfReader<'_> {
     }
 }
 
-/// What to do about a file of glTF's first version.
+/// Advice on a file of glTF's first version.
 fn first_version() -> String {
     "this is glTF 1.0, which is not supported\nhint: convert it: npx gltf-pipeline -i OLD.gltf -o NEW.glb, or \
      export it as glTF 2.0"

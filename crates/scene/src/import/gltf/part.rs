@@ -16,7 +16,7 @@ use crate::import::{Refusal, Strictness};
 pub(super) struct PrimitiveReader<'a> {
     pub reader: &'a GltfReader<'a>,
     pub primitive: &'a Primitive,
-    /// Where its vertices and triangles are, when they are compressed.
+    /// Vertices and triangles, when they are compressed.
     draco: Option<(DracoPrimitive, &'a DracoMesh)>,
     pub place: String,
     pub notes: Vec<Note>,

@@ -1,4 +1,4 @@
-//! Where the nodes of a document stand: the one place where their transforms are evaluated.
+//! Placements of the nodes of a document: the one place where their transforms are evaluated.
 
 use std::path::Path;
 

@@ -26,7 +26,7 @@ pub(super) struct Loaded {
     pub mesh: u32,
     /// Index into the import's materials.
     pub material: u32,
-    /// Whether it stands in the model's frame already.
+    /// True if the primitive stands in the model's frame already.
     pub skinned: bool,
 }
 
@@ -166,7 +166,7 @@ fn note_no_triangles(notes: &mut Vec<Note>) {
     error::push(notes, Note::new(NoteKind::Unsupported, "primitives", message));
 }
 
-/// What messages call a primitive.
+/// Name of a primitive in messages.
 fn place(reader: &GltfReader<'_>, mesh: usize, number: usize) -> String {
     let name = reader.document.root.meshes[mesh].name.as_deref().unwrap_or_default();
     if name.is_empty() {

@@ -15,24 +15,24 @@ use etendue_tracer::spec::BRIGHTEST;
 /// The index of a corner that has none.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// What lines of an OBJ model begin with (Wavefront Technologies, appendix B1).
+/// Words that lines of an OBJ model begin with (Wavefront Technologies, appendix B1).
 const STATEMENTS: [&[u8]; 14] = [
     b"s", b"v", b"vt", b"vn", b"vp", b"f", b"fo", b"l", b"p", b"o", b"g", b"usemtl", b"mtllib",
     b"cstype",
 ];
 
-/// Whether a line that begins with `word` is neither one that is looked at nor a comment.
+/// True if a line that begins with `word` is neither one that is looked at nor a comment.
 fn is_foreign(word: &[u8]) -> bool {
     !word.starts_with(b"#") && !STATEMENTS.contains(&word)
 }
 
-/// What corners index: positions, texture coordinates, normals.
+/// Number of kinds that corners index: positions, texture coordinates, normals.
 pub(super) const KINDS: usize = 3;
 pub(super) const V: usize = 0;
 pub(super) const VT: usize = 1;
 pub(super) const VN: usize = 2;
 
-/// What is to be read beside positions and faces.
+/// Columns to be read beside positions and faces.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct WantedColumns {
     pub uvs: bool,
@@ -40,7 +40,7 @@ pub(super) struct WantedColumns {
     pub colors: bool,
 }
 
-/// What a piece of the file holds.
+/// Content of a piece of the file.
 #[derive(Debug, Default)]
 pub(super) struct Chunk {
     pub positions: Vec<[f64; 3]>,
@@ -48,13 +48,13 @@ pub(super) struct Chunk {
     pub colors: Vec<[f32; 3]>,
     pub uvs: Vec<[f32; 2]>,
     pub normals: Vec<[f32; 3]>,
-    /// How many of each kind are defined here, read or not.
+    /// Number of definitions of each kind here, read or not.
     pub defined: [usize; KINDS],
     /// The corners of all faces, by kind; empty for a kind that no face of this piece names.
     pub corners: [Vec<u32>; KINDS],
     /// Corners that count backwards: kind, corner, and index relative to the piece's first.
     pub relative: Vec<(usize, usize, i64)>,
-    /// Where faces with other than three corners are.
+    /// Faces with other than three corners.
     pub polygons: Vec<Polygon>,
     /// Statements, with the number of corners read before each.
     pub statements: Vec<(usize, FaceStatement)>,
@@ -64,7 +64,7 @@ pub(super) struct Chunk {
     pub free_form: u64,
     /// Faces of fewer than three corners.
     pub too_small: u64,
-    /// Where the first line begins that no statement of OBJ begins like, and how it begins.
+    /// Position of the first line that no statement of OBJ begins like, and how it begins.
     pub foreign: Option<(usize, String)>,
     /// Some line is one of OBJ.
     pub is_obj: bool,

@@ -179,16 +179,13 @@ fn note_leftovers(chunks: &[Chunk], missing: u64, notes: &mut Vec<Note>) {
     }
 }
 
-/// How much less of the model lies behind a lamp than before it (as a share) when it shines to the
-/// front alone.
+/// Share of the model that may lie behind a lamp, against that before it, when it shines to the front alone.
 const BEHIND: f64 = 0.02;
 
-/// How far a model reaches before a lamp, as a share of the lamp's size, when the lamp is there to light
-/// it.
+/// Least reach of a model before a lamp, as a share of the lamp's size, when the lamp is there to light it.
 const LEAST_BEFORE: f64 = 0.1;
 
-/// How far from a plane its corners may lie, as a share of the size of what they span: files have six
-/// digits.
+/// Tolerance of corners' distance from a plane, as a share of the size of what they span: files have six digits.
 const FLAT: f64 = 1e-5;
 
 /// Leaves the backs of flat lamps dark that have next to nothing behind them.
@@ -222,7 +219,7 @@ fn bounds<'a>(meshes: impl Iterator<Item = &'a Mesh>) -> Bounds {
 struct Sheet {
     /// Unit normal of the fronts.
     normal: DVec3,
-    /// How far along it they lie.
+    /// Distance along the normal at which they lie.
     at: f64,
     /// The diagonal of their box.
     size: f64,
@@ -244,7 +241,7 @@ impl Sheet {
     }
 }
 
-/// How far `bounds` reach behind a plane and before it.
+/// Reach of `bounds` behind a plane and before it.
 fn extent(bounds: Bounds, normal: DVec3, at: f64) -> [f64; 2] {
     let middle = normal.dot(bounds.centre()) - at;
     let reach = normal.abs().dot(0.5 * (bounds.max - bounds.min));

@@ -170,7 +170,7 @@ fn fit(line: &str) -> Option<String> {
     }
 }
 
-/// What stands for a material that no file defines.
+/// Material in the place of one that no file defines.
 fn undefined(name: Option<&str>, notes: &mut Vec<Note>) -> Material {
     let Some(name) = name else { return Material::unnamed() };
     let message = "no material file defines it; it is light grey";

@@ -93,7 +93,7 @@ impl<'a> Welder<'a> {
         })
     }
 
-    /// Whether any corner of `segment` has an index of this kind.
+    /// True if any corner of `segment` has an index of this kind.
     fn has(&self, segment: &Segment, kind: usize) -> bool {
         segment.runs.iter().any(|(chunk, range)| {
             let indices = &self.chunks[*chunk].corners[kind];
@@ -250,7 +250,7 @@ fn concat<T: Copy>(chunks: &mut [Chunk], part: impl Fn(&mut Chunk) -> &mut Vec<T
     all
 }
 
-/// How many of each kind come before each chunk, and in all.
+/// Number of definitions of each kind before each chunk, and in all.
 fn bases(chunks: &[Chunk]) -> (Vec<[usize; KINDS]>, [usize; KINDS]) {
     let mut before = [0; KINDS];
     let mut bases = Vec::with_capacity(chunks.len());
@@ -299,7 +299,7 @@ pub(super) fn settle(chunks: &mut [Chunk], strictness: Strictness) -> Result<u64
     Ok(missing)
 }
 
-/// Where in chunk number `chunk` an index names what does not exist.
+/// Fault of an index, in chunk number `chunk`, that names what does not exist.
 pub(super) fn find_bad_index(
     pieces: &[(usize, &[u8])],
     chunk: usize,

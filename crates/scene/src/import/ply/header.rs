@@ -2,7 +2,7 @@
 
 use crate::import::text::{TextFault, Words, whole, without_mark};
 
-/// How the data is written.
+/// Encoding of the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Format {
     Text,
@@ -46,12 +46,12 @@ pub(super) struct RowElement {
     pub properties: Vec<Property>,
 }
 
-/// What the file says of itself.
+/// Header of the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Header {
     pub format: Format,
     pub elements: Vec<RowElement>,
-    /// Where the data starts (bytes).
+    /// Offset at which the data starts (bytes).
     pub data: usize,
 }
 

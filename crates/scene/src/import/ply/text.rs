@@ -87,7 +87,7 @@ impl VertexTable for Matrix {
     }
 }
 
-/// What a piece of the text holds.
+/// Content of a piece of the text.
 #[derive(Default)]
 struct TextPiece {
     values: Vec<f64>,
@@ -275,7 +275,7 @@ fn index(kind: Type, order: Order, bytes: &[u8]) -> u32 {
 /// Rows of one size.
 struct RowsOfSize<'a> {
     map: &'a Arc<MappedFile>,
-    /// Where the rows start in the file.
+    /// Offset of the rows in the file.
     start: usize,
     data: &'a [u8],
     row: usize,
@@ -284,7 +284,7 @@ struct RowsOfSize<'a> {
 }
 
 impl RowsOfSize<'_> {
-    /// Where a property is in its row.
+    /// Offset of a property in its row.
     fn offset(&self, property: usize) -> usize {
         self.element.properties[..property].iter().map(|p| p.kind.size()).sum()
     }

@@ -32,7 +32,7 @@ pub(super) struct VertexData {
     pub colors: Option<Vertices<4>>,
 }
 
-/// Which properties are read.
+/// Properties that are read.
 #[derive(Debug, Clone)]
 pub(super) struct VertexColumns {
     xyz: [usize; 3],
@@ -134,7 +134,7 @@ fn each<const N: usize>(
     Vertices::new(floats.into(), N, table.rows()).unwrap_or_else(|| Vertices::from_arrays(&[]))
 }
 
-/// What the lists of an element are.
+/// Meaning of an element's lists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Lists {
     Polygons,
@@ -161,7 +161,7 @@ pub(super) struct Faces {
     triangles: Vec<[u32; 3]>,
     /// Corners of faces with more than three.
     corners: Vec<u32>,
-    /// Where in `corners` each of those ends.
+    /// Positions in `corners` at which each of those ends.
     ends: Vec<usize>,
 }
 

@@ -22,7 +22,7 @@ use super::Ring;
 /// Corners in a leaf of the tree.
 const LEAF: usize = 8;
 
-/// What an exact test costs in steps through the tree.
+/// Cost of an exact test in steps through the tree.
 const EXACT: u64 = 16;
 
 /// No node.
@@ -61,7 +61,7 @@ pub(super) fn clip(polygon: &[Coord<f64>], triangles: &mut Vec<[u32; 3]>) -> u64
 struct LargeClipper<'a> {
     ring: Ring<'a>,
     tree: BoxTree,
-    /// Whether a corner is there and does not turn left.
+    /// True for each corner that is there and does not turn left.
     in_the_way: Vec<bool>,
     /// Corners to be looked at, with the stamp that they had then; the first comes next.
     queue: VecDeque<(usize, u32)>,
@@ -295,7 +295,7 @@ impl Area {
             && other.min.y <= self.max.y
     }
 
-    /// Whether all of it lies to the right of a side of the triangle, whose corners run
+    /// True if all of it lies to the right of a side of the triangle, whose corners run
     /// counter-clockwise. In doubt it does not.
     fn is_beside(self, [a, b, c]: [Coord<f64>; 3]) -> bool {
         // Five roundings of 2⁻⁵³ each.

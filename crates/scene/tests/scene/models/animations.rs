@@ -37,7 +37,7 @@ fn at(bytes: &[u8], time: f64) -> Import {
     import(&path, Wanted::EVERYTHING, &Options { animation, ..Options::default() }).unwrap()
 }
 
-/// Where the corner (1, 0, 0) of the square is.
+/// Position of the corner (1, 0, 0) of the square.
 fn corner(bytes: &[u8], time: f64) -> DVec3 {
     at(bytes, time).placements[0].model_from_mesh.point(DVec3::X)
 }

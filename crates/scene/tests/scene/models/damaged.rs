@@ -101,7 +101,7 @@ fn mutate(bytes: &mut Vec<u8>, random: &mut Random) {
     }
 }
 
-/// What other crates rely on without looking again.
+/// Checks what other crates rely on without looking again.
 fn check_promises(import: &Import) {
     for mesh in &import.meshes {
         for &corner in mesh.triangles.iter().flatten() {

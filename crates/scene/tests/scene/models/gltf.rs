@@ -309,7 +309,7 @@ fn materials_have_colour_texture_and_transform() {
     assert!(plain.textures.is_empty());
 }
 
-/// What is clear all over and has a thickness is a body of glass; what is partly clear is a thin wall.
+/// A material that is clear all over and has a thickness is a body of glass; one that is partly clear is a thin wall.
 #[test]
 fn volumes_are_bodies_of_glass() {
     let folder = folder();

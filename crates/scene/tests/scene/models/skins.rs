@@ -20,8 +20,8 @@ const BAR: [[f32; 3]; 6] = [
 ];
 const STRIP: [u32; 12] = [0, 1, 2, 2, 1, 3, 2, 3, 4, 4, 3, 5];
 
-/// Where the bent bar's corners are: the lower half stays, the upper is turned about (0, 2), and the
-/// corners between are the mean of both (linear blend skinning).
+/// Corners of the bent bar: the lower half stays, the upper is turned about (0, 2), and the corners
+/// between are the mean of both (linear blend skinning).
 fn bent() -> [DVec3; 6] {
     BAR.map(|[x, y, _]| {
         let (x, y) = (f64::from(x), f64::from(y));
@@ -32,7 +32,7 @@ fn bent() -> [DVec3; 6] {
     })
 }
 
-/// What the bar's vertices say of their joints.
+/// Encodings of the joints' weights in the bar's vertices.
 #[derive(Clone, Copy, PartialEq)]
 enum Weights {
     Floats,

@@ -13,7 +13,7 @@ pub(crate) struct Measured {
     pub(crate) error: f64,
 }
 
-/// What a series tells of a sensor.
+/// Characteristics that a series tells of a sensor.
 #[derive(Debug)]
 pub(crate) struct Characterised {
     /// K (DN/e⁻).

@@ -13,7 +13,7 @@ pub(crate) fn python() -> Result<PathBuf, String> {
     environment::python_with("emva1288-1.0.2", &["numpy<2", "emva1288==1.0.2"])
 }
 
-/// What the reference implementation makes of the series that `descriptor` lists.
+/// Evaluation by the reference implementation of the series that `descriptor` lists.
 pub(crate) fn characterised(python: &Path, descriptor: &Path) -> Value {
     // The file of this module is compiled into the tests of another crate, too.
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a folder of crates");

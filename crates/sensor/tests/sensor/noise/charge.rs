@@ -7,7 +7,7 @@ use super::{even_frame, moments, sensor};
 
 const SHOT: Exposure = Exposure { exposure: 0.01, frame: 0 };
 
-/// What is read follows the curve from black to beyond the well, and its mean and variance are those that `moments` says.
+/// Readings follow the curve from black to beyond the well, and their mean and variance are those that `moments` says.
 #[test]
 fn what_is_read_follows_the_curve() {
     let (well, gain) = (10_000.0, 0.3);

@@ -1,5 +1,5 @@
-//! Whether the noise is that of the physics: moments, whole distributions, patterns, and the same
-//! bits for any number of threads.
+//! Noise against that of the physics: moments, whole distributions, patterns, and the same bits for
+//! any number of threads.
 
 #![expect(clippy::cast_possible_truncation, reason = "films hold f32")]
 

@@ -95,7 +95,7 @@ pub(crate) fn chi_square(counts: &[u64], probabilities: &[f64]) -> f64 {
     ((chi / freedom).cbrt() - (1.0 - spread)) / spread.sqrt()
 }
 
-/// How often each digital number occurs.
+/// Number of occurrences of each digital number.
 pub(crate) fn histogram(values: &[u16], white: u32) -> Vec<u64> {
     let mut counts = vec![0; white as usize + 1];
     for &value in values {
