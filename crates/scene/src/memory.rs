@@ -1,6 +1,8 @@
 //! How much memory a scene may take, and one account of what it will: whatever grows with a file is
 //! spoken for here before it is made.
 
+#![expect(clippy::disallowed_methods, reason = "tables of the kernel's, no user's files")]
+
 use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -26,7 +26,7 @@ const MOST_CURRENT: f64 = 1e15;
 
 /// Which read-out of a pixel's electrons: the noise of each is its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Readout {
+pub(crate) enum ReadoutPath {
     First,
     Second,
 }
@@ -72,7 +72,7 @@ pub(crate) struct SensorSettings {
     /// Sensitivity beside that of the first read-out's photodiode, which is 1.
     pub(crate) sensitivity: f64,
     /// Which read-out of the electrons it is.
-    pub(crate) readout: Readout,
+    pub(crate) readout: ReadoutPath,
     pub(crate) effects: Arc<Effects>,
     /// What a user should know.
     pub(crate) notes: Vec<String>,
@@ -157,7 +157,7 @@ impl SensorSettings {
             serial: spec.serial.unwrap_or(0),
             radiometry: spec.radiometry.unwrap_or_default(),
             sensitivity: 1.0,
-            readout: Readout::First,
+            readout: ReadoutPath::First,
             effects: Arc::default(),
             notes: Vec::new(),
         };

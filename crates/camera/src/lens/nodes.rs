@@ -21,7 +21,7 @@ impl SharingLimits {
 
 /// A wavelength between nodes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Interpolation {
+pub(super) struct NodeWeights {
     /// What each node counts.
     pub(super) weights: [f64; MOST_NODES],
     /// What filters pass.

@@ -5,7 +5,7 @@ use etendue_optics::glass::GlassError;
 use etendue_optics::train::{ExitPupil, MonochromaticTrain, OpticalTrain};
 use etendue_spectrum::{Bands, Curve, Outside, Spread};
 
-use super::nodes::Interpolation;
+use super::nodes::NodeWeights;
 
 /// The exit pupil measured at the wavelengths that are wanted.
 #[derive(Debug)]
@@ -15,7 +15,7 @@ pub(super) struct Opened {
     pub(super) groups: Vec<OpenedGroup>,
     pub(super) pupil: ExitPupil,
     /// How all bands share a ray; `None` where they do not.
-    pub(super) paths: Option<BandPaths>,
+    pub(super) paths: Option<BandInterpolation>,
 }
 
 /// The lens as it is for a group of bands.
@@ -27,11 +27,11 @@ pub(super) struct OpenedGroup {
 
 /// How bands share rays.
 #[derive(Debug)]
-pub(super) struct BandPaths {
+pub(super) struct BandInterpolation {
     /// The lens at its leading wavelengths, with filters clear.
     pub(super) nodes: Vec<MonochromaticTrain>,
     /// By band and by wavelength that it is drawn from.
-    pub(super) bands: Vec<Vec<Interpolation>>,
+    pub(super) bands: Vec<Vec<NodeWeights>>,
     /// Whether glass takes light.
     pub(super) has_losses: bool,
     /// From where a ray leaves the lens to where one starts that comes back (mm).

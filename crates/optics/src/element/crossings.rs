@@ -17,7 +17,7 @@ use super::newton::{
     Profile, cross_by_newton, cross_by_search, interval, keeps_off, reach_around, root_between,
 };
 use super::rays::Ray;
-use super::refract::{Media, Refracted, TOUCH};
+use super::refract::{IndexPair, Refracted, TOUCH};
 use super::surface::Surface;
 
 /// Rings about the axis whose slopes are bounded one by one.
@@ -111,7 +111,7 @@ impl Slopes {
 /// back; where there is none, as Newton's method and its search have it.
 pub(super) fn cross_first<P: Profile>(
     surface: &P,
-    (media, slopes): (Media, &Slopes),
+    (media, slopes): (IndexPair, &Slopes),
     ray: Ray,
     clip2: f64,
 ) -> Refracted {
@@ -122,7 +122,7 @@ pub(super) fn cross_first<P: Profile>(
 /// The same, where Newton's method has found `newton`.
 pub(super) fn cross_first_after<P: Profile>(
     surface: &P,
-    (media, slopes): (Media, &Slopes),
+    (media, slopes): (IndexPair, &Slopes),
     ray: Ray,
     clip2: f64,
     newton: Refracted,
@@ -187,7 +187,7 @@ fn part_near<P: Profile>(surface: &P, ray: Ray, start: f64) -> Option<[f64; 2]> 
 }
 
 /// Where a ray crosses a surface from front to back.
-struct Crossing {
+struct SurfaceCrossing {
     /// A part of the ray in which it crosses nowhere else.
     part: [f64; 2],
     root: f64,
@@ -199,7 +199,7 @@ fn first_within<P: Profile>(
     ray: Ray,
     part @ [from, to]: [f64; 2],
     halvings: u32,
-) -> Option<Crossing> {
+) -> Option<SurfaceCrossing> {
     if keeps_off(surface, ray, part) {
         return None;
     }
@@ -215,7 +215,7 @@ fn first_within<P: Profile>(
         }
         let root = root_between(part, |t| behind(surface, ray, t));
         let [x, y, _] = ray.advanced(root).position;
-        return surface.exists([x, y]).then_some(Crossing { part, root });
+        return surface.exists([x, y]).then_some(SurfaceCrossing { part, root });
     }
     let middle = 0.5 * (from + to);
     first_within(surface, ray, [from, middle], halvings - 1)

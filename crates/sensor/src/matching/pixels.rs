@@ -25,7 +25,7 @@ const MOST_ROWS: usize = 512;
 const MOST_CLIPPED: f64 = 0.02;
 
 /// What counts: pixels that are expected to be dark enough, and are no defects.
-pub(super) struct Kept {
+pub(super) struct DarkPixels {
     pub(super) line: Vec<f64>,
     /// DN, of what is expected.
     pub(super) most: f64,
@@ -36,7 +36,7 @@ pub(super) struct Kept {
     pub(super) reach: f64,
 }
 
-impl Kept {
+impl DarkPixels {
     pub(super) fn has(&self, channel: usize, x: f64, y: f64) -> bool {
         let signal = self.line[1 + channel] * x;
         let expected = self.line[0] + signal;
@@ -82,9 +82,9 @@ impl Pixels<'_> {
 
     /// What counts by a fit. Deviations are in units of their median, which defects do not bend, or of what is expected
     /// where that is more.
-    pub(super) fn kept(&self, fit: &Fit, white: f64) -> Kept {
+    pub(super) fn kept(&self, fit: &Fit, white: f64) -> DarkPixels {
         let most = NEARLY_SATURATED * (white - fit.line[0]) + fit.line[0];
-        let all = Kept {
+        let all = DarkPixels {
             line: fit.line.clone(),
             most,
             gain: fit.gain,
@@ -108,7 +108,7 @@ impl Pixels<'_> {
             true => 0.0,
             false => *deviations.select_nth_unstable_by(middle, f64::total_cmp).1,
         };
-        Kept { reach: OUTLIER * (median / MEDIAN_DEVIATION).max(1.0), ..all }
+        DarkPixels { reach: OUTLIER * (median / MEDIAN_DEVIATION).max(1.0), ..all }
     }
 
     /// Fits the line of numbers over electrons, a slope for each channel.
