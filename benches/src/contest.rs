@@ -14,7 +14,7 @@ use etendue_geometry::{Detail, HitBatch, RayBatch};
 use rustix::time::{ClockId, clock_gettime};
 
 use crate::rays::BATCH;
-use etendue_accel::limit::{BareScene, Packet, Single, WIDTH};
+use etendue_accel::limit::{BareScene, RayHit16, Single, WIDTH};
 
 /// Batches a chunk: its rays stay in the second-level cache.
 const CHUNK: usize = 16;
@@ -97,7 +97,7 @@ pub struct LimitPackets<'a> {
     /// What traces.
     pub scene: &'a BareScene,
     /// The rays.
-    pub packets: &'a [Packet],
+    pub packets: &'a [RayHit16],
     /// What is asked.
     pub query: Query,
 }

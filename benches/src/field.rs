@@ -7,7 +7,7 @@ use etendue_geometry::{Geometry, RayBatch};
 
 use crate::contest::{Contestant, LimitPackets, LimitSingles, Ours, Query};
 use crate::rays::one_by_one;
-use etendue_accel::limit::{BareScene, Mode, Packet, Single};
+use etendue_accel::limit::{BareScene, Mode, RayHit16, Single};
 
 /// The structures of every contestant over one geometry.
 #[derive(Debug)]
@@ -63,7 +63,7 @@ pub struct Rays {
     /// Not to be put into packets.
     pub scattered: Vec<RayBatch>,
     /// As the bare loop takes them; empty for rays that are no packets.
-    pub packets: Vec<Packet>,
+    pub packets: Vec<RayHit16>,
     /// As the other bare loop takes them.
     pub singles: Vec<Single>,
     /// What is asked of them.
@@ -75,7 +75,7 @@ impl Rays {
     #[must_use]
     pub fn new(batches: Vec<RayBatch>, query: Query) -> Self {
         let coherent = batches.first().is_some_and(|rays| rays.coherent);
-        let packets = if coherent { Packet::of(&batches) } else { Vec::new() };
+        let packets = if coherent { RayHit16::of(&batches) } else { Vec::new() };
         let scattered = one_by_one(&batches);
         Self { packets, scattered, singles: Single::of(&batches), query, batches }
     }

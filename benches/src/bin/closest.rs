@@ -2,6 +2,8 @@
 //! and the rays as plain numbers: `vertices.f64`, `faces.u32`, `origins.f64`, `directions.f64`. For each line
 //! on standard input all rays are traced once, and the seconds and the sum of the distances are printed.
 
+#![allow(clippy::disallowed_methods, reason = "it reads what it is told to")]
+
 use std::io::{BufRead, stdin};
 use std::path::Path;
 use std::sync::Arc;

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
-use etendue_accel::limit::{BareScene, Mode, Packet, Single};
+use etendue_accel::limit::{BareScene, Mode, RayHit16, Single};
 use etendue_accel::{Accel, BlockAccel, BuildOptions, Embree, build_moving};
 use etendue_benches::contest::{
     Contestant, LimitPackets, LimitSingles, Ours, Query, Worker, thread_time, time,
@@ -181,7 +181,7 @@ fn main() -> Result<()> {
     ];
     for (name, batches, query) in kinds {
         let sets = [batches.clone(), at_times(&batches, exposure)];
-        let packets = sets.each_ref().map(|batches| Packet::of(batches));
+        let packets = sets.each_ref().map(|batches| RayHit16::of(batches));
         let singles = sets.each_ref().map(|batches| Single::of(batches));
         let is_coherent = batches[0].coherent;
         let ours = [0, 1].map(|k| ours(&*rooms[k].accel, &sets[k], query));

@@ -32,12 +32,12 @@ use rayon::prelude::*;
 
 use self::fold::{InstanceLeafWriter, Triangles, fold};
 use self::lanes::{Lanes, Portable};
-use self::packet::Batch;
+use self::packet::BatchTraversal;
 use self::single::{AnyHit, Sink};
 use self::wide::{MOST_IN_LEAF, WideTree};
 use crate::few::FewTriangles;
 use crate::nearest::{Nearest, PlacementView, Triangle, settle, settle_blocks};
-use crate::parts::{Baking, Blas, Instance, Layout, Members, outward};
+use crate::parts::{Baking, Blas, Layout, Members, PartInstance, outward};
 use crate::tree::{LeafSize, Ref, Tree};
 use crate::{
     Accel, BlockAccel, BuildError, BuildOptions, BuildReport, BuildWatch, Quality, with_threads,
@@ -126,7 +126,7 @@ const MOST_INSTANCES: u64 = 1 << 26;
 /// triangles, twice while they are joined), then leaves of 13 numbers and an eighth of a node,
 /// twice while they are joined.
 const BYTES_PER_TRIANGLE: u64 = 2 * size_of::<Ref>() as u64 + 32 + 2 * (13 * 4 + 16);
-const BYTES_PER_INSTANCE: u64 = size_of::<Instance>() as u64 + 2 * 32 + 64 + 64;
+const BYTES_PER_INSTANCE: u64 = size_of::<PartInstance>() as u64 + 2 * 32 + 64 + 64;
 
 impl Bvh {
     /// Builds the trees over `geometry`. Of the options, threads, memory limit and progress are
@@ -226,7 +226,7 @@ fn top_tree(
 
 impl Bvh {
     fn run<L: Lanes, S: Sink>(&self, lanes: L, rays: &RayBatch, sink: impl FnMut(usize, S)) {
-        lanes.run(Batch { lanes, bvh: self, rays, sink, seen: PhantomData });
+        lanes.run(BatchTraversal { lanes, bvh: self, rays, sink, seen: PhantomData });
     }
 
     fn dispatch<S: Sink>(&self, rays: &RayBatch, sink: impl FnMut(usize, S)) {
@@ -283,7 +283,7 @@ impl Accel for Bvh {
 
     fn report(&self) -> BuildReport {
         let trees = self.parts.iter().map(|part| &part.tree).chain([&self.top]);
-        let instances = self.layout.instances.capacity() * size_of::<Instance>();
+        let instances = self.layout.instances.capacity() * size_of::<PartInstance>();
         BuildReport {
             backend: format!("bvh {}", self.isa.name()),
             quality: Quality::Medium,
@@ -331,7 +331,7 @@ struct PlacedTriangles<'a> {
 
 impl<'a> PlacedTriangles<'a> {
     #[inline(always)]
-    fn new(bvh: &'a Bvh, instance: &Instance) -> Self {
+    fn new(bvh: &'a Bvh, instance: &PartInstance) -> Self {
         let shape = &bvh.parts[instance.part as usize];
         let only = match shape.owner {
             TriangleOwner::Placement(placement) => Some(Placed::new(bvh, placement)),

@@ -11,13 +11,13 @@ use etendue_geometry::{
     Coplanar, Detail, Geometry, HitBatch, HitPrecision, MISS, RayBatch, RayBlock, RayBlocks,
 };
 
-use crate::embree::{ExactFilter, FoundHits, NearestSearch, Scene, version};
+use crate::embree::{CommittedScene, ExactFilter, FoundHits, NearestSearch, version};
 use crate::few::FewTriangles;
 use crate::nearest::{Nearest, Query, settle, settle_blocks};
 use crate::parts::check_scale;
 use crate::recheck::EndTriangles;
 use crate::single::{F32Frame, Rays32, round};
-use crate::solve::{self, ChunkTriangles, Solved};
+use crate::solve::{self, ChunkTriangles, HitSolutions};
 use crate::{Accel, BlockAccel, BuildError, BuildOptions, BuildReport, Counts, recheck};
 
 /// Bundles around a ray before it is believed to miss.
@@ -26,7 +26,7 @@ const TURNS: u32 = 4;
 /// The Embree backend.
 #[derive(Debug)]
 pub struct Embree {
-    scene: Scene,
+    scene: CommittedScene,
     frame: F32Frame,
     coplanar: Coplanar,
     few: Option<FewTriangles>,
@@ -43,7 +43,7 @@ struct BatchScratch {
     rays: Rays32,
     again: Rays32,
     found: FoundHits,
-    solved: Solved,
+    solved: HitSolutions,
     lanes: Box<ChunkTriangles>,
     ends: EndTriangles,
     suspects: Vec<u32>,
@@ -75,8 +75,12 @@ impl Embree {
         let bounds = geometry.loose_bounds();
         check_scale(bounds)?;
         let frame = F32Frame::of(bounds);
-        let scene =
-            Scene::build(geometry, frame.origin, options, before.map(|before| &before.scene))?;
+        let scene = CommittedScene::build(
+            geometry,
+            frame.origin,
+            options,
+            before.map(|before| &before.scene),
+        )?;
         let coplanar = Coplanar::of(scene.geometry());
         let few = FewTriangles::of(scene.geometry());
         // What was built, in words and numbers.

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use crate::exact::{Slabs, descend};
 use crate::nearest::{Nearest, PlacementView, Query, Triangle};
 use crate::parts::{LocalRay, outward};
-use crate::tree::{LeafSize, MAX_DEPTH, Node, Ref, Tree};
+use crate::tree::{BinaryNode, LeafSize, MAX_DEPTH, Ref, Tree};
 use crate::watertight::Hit;
 use crate::{Accel, BuildError, BuildOptions, BuildReport, BuildWatch, Quality};
 
@@ -30,7 +30,7 @@ const LEAF: LeafSize = LeafSize { most: 4, block: 1 };
 pub(crate) struct Deforming {
     geometry: Arc<Geometry>,
     steps: Arc<Steps>,
-    nodes: Vec<Node>,
+    nodes: Vec<BinaryNode>,
     /// Triangles in leaf order.
     triangles: Vec<u32>,
     /// Of each step the box of each node.
@@ -119,7 +119,7 @@ impl Deforming {
 }
 
 /// The boxes of all nodes at a step.
-fn boxes(mesh: &Mesh, nodes: &[Node], triangles: &[u32], time: f64) -> Vec<[[f32; 3]; 2]> {
+fn boxes(mesh: &Mesh, nodes: &[BinaryNode], triangles: &[u32], time: f64) -> Vec<[[f32; 3]; 2]> {
     let mut boxes = vec![[[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]]; nodes.len()];
     // Children stand after their parents.
     for i in (0..nodes.len()).rev() {

@@ -1,12 +1,12 @@
 #![expect(unsafe_code, reason = "Embree's C interface; the rest of the workspace has none")]
 //! Embree behind four owners, each of one handle that it releases itself: [`Device`], [`EmbreeGeometry`],
-//! [`SceneBuilder`] and [`Scene`].
+//! [`SceneBuilder`] and [`CommittedScene`].
 //!
-//! * `SceneBuilder` can be changed and not traced, `Scene` traced and not changed: Embree wants
+//! * `SceneBuilder` can be changed and not traced, `CommittedScene` traced and not changed: Embree wants
 //!   modifying, committing and tracing strictly one after the other (manual, `rtcCommitScene`), and
 //!   moving the one into the other proves it.
 //! * Vertex and index buffers are shared, not copied, where they stand as Embree wants them; a
-//!   `Scene` keeps the [`Geometry`] that owns them alive.
+//!   `CommittedScene` keeps the [`Geometry`] that owns them alive.
 //! * Errors come through the device's error function, with Embree's own words. Tracing reports none.
 //! * Masks, ids and the 16 bytes behind the last vertex are seen to here and nowhere else.
 
@@ -147,7 +147,7 @@ impl<'a> SceneBuilder<'a> {
 }
 
 /// A committed scene: nothing changes it any more, so any number of threads may trace it.
-pub(crate) struct Scene {
+pub(crate) struct CommittedScene {
     // The order matters: the scene lets go of the buffers, then the device, then the geometry.
     handle: SceneHandle,
     /// The scenes of meshes that have one of their own.
@@ -165,13 +165,13 @@ pub(crate) struct Scene {
     pub(crate) copied_bytes: u64,
 }
 
-impl fmt::Debug for Scene {
+impl fmt::Debug for CommittedScene {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Scene").field("device", &self.device).finish_non_exhaustive()
     }
 }
 
-impl Scene {
+impl CommittedScene {
     /// Builds the scene of `geometry` with coordinates relative to `origin`. After `before`, of which
     /// something was moved or replaced, large meshes get scenes of their own, and those that `before`
     /// has of the same meshes are kept.
@@ -275,7 +275,7 @@ impl Scene {
     }
 }
 
-/// [`Scene::turns`]: an instance's normal is its mesh's own; one that was baked into a mirror image is of
+/// [`CommittedScene::turns`]: an instance's normal is its mesh's own; one that was baked into a mirror image is of
 /// the wrong side.
 fn turns(geometry: &Geometry, instanced: &Instanced) -> Option<Vec<DMat3>> {
     let turn = |(placement, kind): (&Placement, &InstanceKind)| {

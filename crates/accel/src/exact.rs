@@ -19,8 +19,8 @@ use etendue_geometry::{Bounds, Coplanar, Geometry, HitBatch, MISS, RayBatch};
 use rayon::prelude::*;
 
 use crate::nearest::{Nearest, PlacementView, Query, Triangle, settle};
-use crate::parts::{Baking, Blas, Instance, Layout, LocalRay, outward};
-use crate::tree::{LeafSize, MAX_DEPTH, Node, Ref, Tree};
+use crate::parts::{Baking, Blas, Layout, LocalRay, PartInstance, outward};
+use crate::tree::{BinaryNode, LeafSize, MAX_DEPTH, Ref, Tree};
 use crate::{Accel, BuildError, BuildOptions, BuildReport, BuildWatch, Quality, with_threads};
 
 /// The exact f64 backend.
@@ -45,7 +45,7 @@ pub(crate) struct Boxes {
 #[derive(Debug)]
 struct ExactNode {
     bounds: Bounds,
-    node: Node,
+    node: BinaryNode,
 }
 
 const LEAF: LeafSize = LeafSize { most: 4, block: 1 };
@@ -53,9 +53,9 @@ const LEAF: LeafSize = LeafSize { most: 4, block: 1 };
 /// Bytes a triangle at the height of a build: refs twice, nodes (at most one and a half with this
 /// leaf size), items.
 const BYTES_PER_TRIANGLE: u64 = 2 * size_of::<Ref>() as u64
-    + 3 * (size_of::<ExactNode>() + size_of::<Node>()) as u64 / 2
+    + 3 * (size_of::<ExactNode>() + size_of::<BinaryNode>()) as u64 / 2
     + size_of::<[u32; 2]>() as u64;
-const BYTES_PER_INSTANCE: u64 = BYTES_PER_TRIANGLE + size_of::<Instance>() as u64;
+const BYTES_PER_INSTANCE: u64 = BYTES_PER_TRIANGLE + size_of::<PartInstance>() as u64;
 
 impl Exact {
     /// Builds the trees over `geometry`. Of the options, threads, memory limit and progress are
@@ -170,7 +170,7 @@ impl Accel for Exact {
 
     fn report(&self) -> BuildReport {
         let trees = self.parts.iter().chain([&self.top]);
-        let instances = self.layout.instances.capacity() * size_of::<Instance>();
+        let instances = self.layout.instances.capacity() * size_of::<PartInstance>();
         BuildReport {
             backend: "exact f64".to_owned(),
             quality: Quality::Medium,
@@ -229,7 +229,7 @@ impl Boxes {
     pub(crate) fn refitted(tree: Tree, bounds: impl Fn([u32; 2]) -> Bounds + Sync) -> Self {
         let items: Vec<[u32; 2]> = tree.refs.par_iter().map(|r| [r.first, r.second]).collect();
         drop(tree.refs);
-        let leaf = |node: &Node| {
+        let leaf = |node: &BinaryNode| {
             let range = node.leaf().unwrap_or(0..0);
             items[range].iter().fold(Bounds::EMPTY, |all, &item| all.union(bounds(item)))
         };
@@ -283,7 +283,7 @@ pub(crate) fn descend<'t>(
     slabs: &Slabs,
     t_max: &mut f64,
     stack: &mut Vec<(u32, f64)>,
-    node: impl Fn(usize) -> (&'t Node, Bounds),
+    node: impl Fn(usize) -> (&'t BinaryNode, Bounds),
     mut leaf: impl FnMut(Range<usize>, &mut f64) -> bool,
 ) {
     stack.clear();

@@ -19,7 +19,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Geometry, MISS, RayBatch, RayBlock, RayBlocks, is_degenerate};
 
 use self::edges::{FewTriangle, PluckerEdge};
-use self::faces::{Face, NearestFace, Occlusion};
+use self::faces::{BlockOcclusion, Face, NearestFace};
 use crate::single::{F32Frame, Rays32, round};
 
 /// Scenes of more triangles are traced by trees.
@@ -27,7 +27,7 @@ const MOST_TRIANGLES: usize = 64;
 
 /// Identity of a triangle in the scene.
 #[derive(Debug, Clone, Copy)]
-struct Named {
+struct TriangleId {
     /// Its normal as hits tell it: of the placement's front.
     front: [f32; 3],
     placement: u32,
@@ -39,7 +39,7 @@ const RUN: usize = 12;
 
 /// Faces of triangles that follow each other in the list, and their box.
 #[derive(Debug)]
-struct Run {
+struct FaceRun {
     faces: Range<usize>,
     /// Number of the first face.
     first: u32,
@@ -53,9 +53,9 @@ pub(crate) struct FewTriangles {
     frame: F32Frame,
     edges: Vec<PluckerEdge>,
     triangles: Vec<FewTriangle>,
-    named: Vec<Named>,
+    named: Vec<TriangleId>,
     faces: Vec<Face>,
-    runs: Vec<Run>,
+    runs: Vec<FaceRun>,
     /// The largest distance of a corner from the frame's origin (m).
     radius: f32,
 }
@@ -96,7 +96,7 @@ impl FewTriangles {
                     normal,
                     corner: wide[0],
                 });
-                few.named.push(Named {
+                few.named.push(TriangleId {
                     front: (normal * place.handedness()).to_array().map(round),
                     placement: number,
                     triangle: u32::try_from(triangle).unwrap_or(MISS),
@@ -125,7 +125,7 @@ impl FewTriangles {
 
     /// Makes faces and runs of the triangles, of which these are the corners.
     fn join(&mut self, corners: &[[DVec3; 3]]) {
-        let is_together = |a: &Named, b: &Named| a.placement == b.placement;
+        let is_together = |a: &TriangleId, b: &TriangleId| a.placement == b.placement;
         let ends = self.named.chunk_by(is_together).scan(0, |end, own| {
             *end += own.len();
             Some(*end)
@@ -137,7 +137,7 @@ impl FewTriangles {
                 if held + count > RUN {
                     (held, bounds) = (0, Bounds::EMPTY);
                     let start = self.faces.len();
-                    self.runs.push(Run {
+                    self.runs.push(FaceRun {
                         faces: start..start,
                         first: u32::try_from(start).unwrap_or(MISS),
                         bounds: [[0.0; 3]; 2],
@@ -203,7 +203,7 @@ impl FewTriangles {
 
     /// Tests whether anything is between the ends of the rays of blocks.
     pub(crate) fn occluded_of_blocks(&self, blocks: &mut [RayBlock]) {
-        let mut occlusion = Occlusion::default();
+        let mut occlusion = BlockOcclusion::default();
         for block in blocks {
             faces::occluded(self, block, &mut occlusion);
             for lane in 0..LANES {

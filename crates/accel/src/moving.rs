@@ -52,7 +52,7 @@ struct Moving {
     still: Box<dyn Accel>,
     /// One for each mesh that moves.
     shapes: Vec<Box<dyn Accel>>,
-    bodies: Vec<Body>,
+    bodies: Vec<MovingPlacement>,
     /// Over the boxes that they sweep.
     tree: Boxes,
     /// Of each placement, whether it moves.
@@ -68,7 +68,7 @@ struct Moving {
 
 /// A placement that moves.
 #[derive(Debug)]
-struct Body {
+struct MovingPlacement {
     placement: u32,
     shape: usize,
     motion: Arc<Motion>,
@@ -82,7 +82,7 @@ struct Body {
 
 /// Rays of a body, in its frame.
 #[derive(Default)]
-struct Carried {
+struct RaysInFrame {
     rays: RayBatch,
     hits: HitBatch,
     blocked: Vec<bool>,
@@ -137,7 +137,14 @@ impl Moving {
             let swept = motion.swept(bounds, options.exposure);
             let placement = u32::try_from(i).unwrap_or(MISS);
             let motion = Arc::clone(motion);
-            bodies.push(Body { placement, shape, motion, swept, local: bounds, deforms });
+            bodies.push(MovingPlacement {
+                placement,
+                shape,
+                motion,
+                swept,
+                local: bounds,
+                deforms,
+            });
         }
         let tree = over(&bodies, options)?;
         let standing = still.loose_bounds();
@@ -148,10 +155,11 @@ impl Moving {
             report.bytes += bytes;
             report.copied_bytes += copied_bytes;
         }
-        report.bytes += (bodies.capacity() * size_of::<Body>() + tree.bytes()) as u64;
+        report.bytes += (bodies.capacity() * size_of::<MovingPlacement>() + tree.bytes()) as u64;
         report.backend = format!("{}, {} moving", report.backend, bodies.len());
         report.time = start.elapsed();
-        let far = |body: &Body| body.swept.min.abs().max(body.swept.max.abs()).max_element();
+        let far =
+            |body: &MovingPlacement| body.swept.min.abs().max(body.swept.max.abs()).max_element();
         let size = bodies.iter().map(far).fold(0.0, f64::max);
         let exposure = options.exposure;
         let swept = bodies.iter().fold(Bounds::EMPTY, |all, body| all.union(body.swept));
@@ -205,10 +213,10 @@ impl Moving {
     /// Carries those of the rays `near` a body into its frame that meet it no farther than `t_max` says.
     fn carry(
         &self,
-        (body, near): (&Body, &[[u32; 2]]),
+        (body, near): (&MovingPlacement, &[[u32; 2]]),
         rays: &RayBatch,
         t_max: impl Fn(usize) -> Option<f64>,
-        carried: &mut Carried,
+        carried: &mut RaysInFrame,
     ) {
         carried.rays.clear();
         carried.rays.coherent = rays.coherent;
@@ -271,7 +279,7 @@ fn number(body: usize) -> u32 {
 }
 
 /// A tree over the boxes that bodies sweep.
-fn over(bodies: &[Body], options: &BuildOptions) -> Result<Boxes, BuildError> {
+fn over(bodies: &[MovingPlacement], options: &BuildOptions) -> Result<Boxes, BuildError> {
     let watch = BuildWatch::new(options, bodies.len() as u64);
     let refs = bodies.iter().enumerate().map(|(i, body)| {
         let (lo, hi) = outward([body.swept.min, body.swept.max]);
@@ -330,7 +338,7 @@ fn reach(rays: &RayBatch, hits: &HitBatch, i: usize, one_place: f64) -> f64 {
 impl Moving {
     /// Puts bodies into hits that are nearer than what those have.
     fn closest_of_bodies(&self, rays: &RayBatch, hits: &mut HitBatch) {
-        let mut carried = Carried::default();
+        let mut carried = RaysInFrame::default();
         carried.hits.detail = hits.detail;
         let near = self.near(rays, |i| Some(reach(rays, hits, i, ONE_PLACE)));
         for near in near.chunk_by(|a, b| a[0] == b[0]) {
@@ -342,10 +350,10 @@ impl Moving {
     /// Finds the closest hits on one body, for the rays `near` it.
     fn closest_of_body(
         &self,
-        (body, near): (&Body, &[[u32; 2]]),
+        (body, near): (&MovingPlacement, &[[u32; 2]]),
         rays: &RayBatch,
         hits: &mut HitBatch,
-        (one_place, carried): (f64, &mut Carried),
+        (one_place, carried): (f64, &mut RaysInFrame),
     ) {
         self.carry((body, near), rays, |i| Some(reach(rays, hits, i, one_place)), carried);
         if carried.from.is_empty() {
@@ -374,7 +382,7 @@ impl Moving {
     /// Takes a hit on a body at a distance if it is nearer than what ray `i` has, or later in the same place.
     fn offer(
         &self,
-        body: &Body,
+        body: &MovingPlacement,
         rays: &RayBatch,
         hits: &mut HitBatch,
         (i, t, one_place): (usize, f64, f64),
@@ -402,7 +410,7 @@ impl Moving {
 
     /// Says of rays that nothing blocked yet whether bodies do.
     fn occluded_by_bodies(&self, rays: &RayBatch, blocked: &mut [bool]) {
-        let mut carried = Carried::default();
+        let mut carried = RaysInFrame::default();
         let near = self.near(rays, |i| (!blocked[i]).then(|| rays.t_max()[i]));
         for near in near.chunk_by(|a, b| a[0] == b[0]) {
             let body = &self.bodies[near[0][0] as usize];
@@ -413,10 +421,10 @@ impl Moving {
     /// Tests for occlusion by one body, for the rays `near` it.
     fn occluded_by_body(
         &self,
-        (body, near): (&Body, &[[u32; 2]]),
+        (body, near): (&MovingPlacement, &[[u32; 2]]),
         rays: &RayBatch,
         blocked: &mut [bool],
-        carried: &mut Carried,
+        carried: &mut RaysInFrame,
     ) {
         let reach = |i: usize| (!blocked[i]).then(|| rays.t_max()[i]);
         self.carry((body, near), rays, reach, carried);

@@ -21,17 +21,17 @@ use crate::{BuildError, BuildOptions};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Geometry, MISS, Placement, Transform};
 
-pub(crate) use self::instance::{Instance, LocalRay, LocalRays};
+pub(crate) use self::instance::{LocalRay, LocalRays, PartInstance};
 pub(crate) use self::part::{Blas, Members, MeshTriangles};
 
 /// All parts and instances of a scene, and the frame of the tree over the instances.
 #[derive(Debug)]
 pub(crate) struct Layout {
     pub(crate) parts: Vec<Blas>,
-    pub(crate) instances: Vec<Instance>,
-    /// Box of the whole scene, parallel to the world, as an instance.
-    pub(crate) world: Instance,
-    pub(crate) world_frame: Frame,
+    pub(crate) instances: Vec<PartInstance>,
+    /// Where the whole scene lies, parallel to the world.
+    pub(crate) world: PartInstance,
+    pub(crate) world_frame: PartFrame,
 }
 
 /// The longest sides of scenes (m) that every accelerator takes: products of three of Embree's lengths stay in
@@ -68,12 +68,12 @@ const BAKED_RESOLUTION: f64 = 64.0;
 
 impl Layout {
     pub(crate) fn new(geometry: &Geometry, baking: Baking) -> Self {
-        let world_frame = Frame::around(geometry.loose_bounds());
+        let world_frame = PartFrame::around(geometry.loose_bounds());
         let uses = geometry.uses();
         let mut layout = Self {
             parts: Vec::new(),
             instances: Vec::new(),
-            world: Instance::parallel(MISS, world_frame, 0.0),
+            world: PartInstance::parallel(MISS, world_frame, 0.0),
             world_frame,
         };
         // Meshes that are placed once are baked into the world; others are parts of their own.
@@ -90,8 +90,8 @@ impl Layout {
                 baked.push(i);
                 continue;
             }
-            let frame = Frame::around(mesh.bounds);
-            let Some(instance) = Instance::placed(placement, i, frame, mesh.bounds) else {
+            let frame = PartFrame::around(mesh.bounds);
+            let Some(instance) = PartInstance::placed(placement, i, frame, mesh.bounds) else {
                 layout.bake(geometry, vec![i]);
                 continue;
             };
@@ -105,7 +105,7 @@ impl Layout {
         // The world's own instance, as far as what was baked into it reaches.
         layout.bake_together(geometry, baked);
         let reach = geometry.placements.iter().map(|p| baked_reach(geometry, p, world_frame));
-        layout.world = Instance::parallel(MISS, world_frame, reach.fold(0.0, f64::max));
+        layout.world = PartInstance::parallel(MISS, world_frame, reach.fold(0.0, f64::max));
         layout
     }
 
@@ -165,11 +165,11 @@ impl Layout {
     fn bake(&mut self, geometry: &Geometry, placements: Vec<u32>) {
         let members = || placements.iter().map(|&i| &geometry.placements[i as usize]);
         let bounds = members().fold(Bounds::EMPTY, |all, p| all.union(geometry.loose_bounds_of(p)));
-        let frame = Frame::around(bounds);
+        let frame = PartFrame::around(bounds);
         let reach = members().map(|p| baked_reach(geometry, p, frame)).fold(0.0, f64::max);
         let part = index(self.parts.len());
         self.parts.push(Blas { frame, members: Members::Baked(placements) });
-        self.instances.push(Instance::parallel(part, frame, reach));
+        self.instances.push(PartInstance::parallel(part, frame, reach));
     }
 }
 
@@ -180,15 +180,15 @@ fn index(i: usize) -> u32 {
 }
 
 /// The magnitudes that a placement's corners are summed from in `frame`.
-fn baked_reach(geometry: &Geometry, placement: &Placement, frame: Frame) -> f64 {
+fn baked_reach(geometry: &Geometry, placement: &Placement, frame: PartFrame) -> f64 {
     let transform = &placement.world_from_mesh;
     let local = largest(geometry.mesh_of(placement).bounds);
     let offset = transform.offset_from(frame.origin).abs().max_element();
     (norm(&transform.linear) * local + offset) * frame.scale
 }
 
-/// True if a placed mesh's typical triangle is large against what f32 resolves in `frame`.
-fn is_coarse(geometry: &Geometry, placement: &Placement, frame: Frame) -> bool {
+/// Whether a placed mesh's typical triangle is large against what f32 resolves in `frame`.
+fn is_coarse(geometry: &Geometry, placement: &Placement, frame: PartFrame) -> bool {
     let triangles = geometry.mesh_of(placement).triangles.len() as f64;
     let size = geometry.loose_bounds_of(placement).diagonal() / triangles.sqrt();
     size * frame.scale > BAKED_RESOLUTION * f64::from(f32::EPSILON)
@@ -196,13 +196,13 @@ fn is_coarse(geometry: &Geometry, placement: &Placement, frame: Frame) -> bool {
 
 /// Origin and scale of a part: `p ↦ (p − origin) · scale`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Frame {
+pub(crate) struct PartFrame {
     pub(crate) origin: DVec3,
     /// A power of two.
     pub(crate) scale: f64,
 }
 
-impl Frame {
+impl PartFrame {
     /// A frame in which `bounds` lies within about −1..1. The origin stays where it is unless it is
     /// far away, because f32 coordinates stay exact then.
     pub(crate) fn around(bounds: Bounds) -> Self {

@@ -87,7 +87,7 @@ impl Default for ChunkTriangles {
 
 /// Result of solving for each ray's hit, beside the hit itself.
 #[derive(Debug, Default)]
-pub(crate) struct Solved {
+pub(crate) struct HitSolutions {
     /// The ray meets its triangle within `t_min..=t_max`; true for misses.
     pub(crate) valid: Vec<bool>,
     /// It meets the triangle's front; false for misses.
@@ -105,7 +105,7 @@ pub(crate) fn solve(
     rays: &RayBatch,
     hits: &mut HitBatch,
     lanes: &mut ChunkTriangles,
-    solved: &mut Solved,
+    solved: &mut HitSolutions,
 ) {
     solved.valid.resize(rays.len(), true);
     solved.front.resize(rays.len(), false);
@@ -331,7 +331,7 @@ fn scatter(
     start: usize,
     count: usize,
     lanes: &ChunkTriangles,
-    solved: &mut Solved,
+    solved: &mut HitSolutions,
 ) -> ChunkSides {
     let range = start..start + count;
     let placement = &hits.placement[range.clone()];

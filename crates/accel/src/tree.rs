@@ -39,7 +39,7 @@ impl Ref {
 /// A node with its box. Nodes stand in depth-first order: an inner node's left child follows it,
 /// its right child stands [`right`](Node::right) places after it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Node {
+pub(crate) struct BinaryNode {
     pub(crate) lo: [f32; 3],
     pub(crate) hi: [f32; 3],
     /// A leaf's first ref; how far an inner node's right child is.
@@ -48,7 +48,7 @@ pub(crate) struct Node {
     count: u32,
 }
 
-impl Node {
+impl BinaryNode {
     /// The range of refs of a leaf; `None` for an inner node.
     pub(crate) fn leaf(&self) -> Option<std::ops::Range<usize>> {
         (self.count > 0).then(|| self.link as usize..(self.link + self.count) as usize)
@@ -82,7 +82,7 @@ pub(crate) struct LeafSize {
 #[derive(Debug)]
 pub(crate) struct Tree {
     /// In depth-first order; empty when there are no refs.
-    pub(crate) nodes: Vec<Node>,
+    pub(crate) nodes: Vec<BinaryNode>,
     pub(crate) refs: Vec<Ref>,
 }
 
@@ -123,8 +123,8 @@ impl Tree {
 
 /// A finished part of the tree. Parts built in parallel are joined once, at the end.
 enum BuiltSubtree {
-    Nodes(Vec<Node>),
-    Split(Node, Box<(Self, Self)>),
+    Nodes(Vec<BinaryNode>),
+    Split(BinaryNode, Box<(Self, Self)>),
 }
 
 impl BuiltSubtree {
@@ -135,12 +135,12 @@ impl BuiltSubtree {
         }
     }
 
-    fn flatten(self, nodes: &mut Vec<Node>) {
+    fn flatten(self, nodes: &mut Vec<BinaryNode>) {
         match self {
             Self::Nodes(part) => nodes.extend(part),
             Self::Split(node, sides) => {
                 let (left, right) = *sides;
-                nodes.push(Node { link: index(1 + left.len()), ..node });
+                nodes.push(BinaryNode { link: index(1 + left.len()), ..node });
                 left.flatten(nodes);
                 right.flatten(nodes);
             }
@@ -197,7 +197,7 @@ impl BuildTask<'_> {
         first: usize,
         depth: usize,
         extent: RefBounds,
-        work: &mut (&mut Vec<Node>, &mut Bins),
+        work: &mut (&mut Vec<BinaryNode>, &mut Bins),
     ) {
         let (nodes, bins) = work;
         let sides = match self.divide(refs, &mut [], depth, &extent, bins) {

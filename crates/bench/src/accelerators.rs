@@ -12,7 +12,7 @@ use serde::Serialize;
 
 pub use crate::hits::RENDER_WIDTH;
 use crate::hits::{HitErrors, Hits, Rays, trace};
-use crate::timing::{Series, TimeSpread, order};
+use crate::timing::{TimeSpread, Timings, order};
 use crate::{BenchError, Progress};
 
 /// Timing goes on for at least so long (s), however few the rays.
@@ -132,7 +132,7 @@ impl Effort {
 
 /// What was measured of one accelerator at one batch width and number of threads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Finding {
+pub struct AcceleratorMeasurement {
     /// The accelerator and its mode, as [`Method::name`] writes it.
     pub method: &'static str,
     /// As the accelerator writes itself, with its version.
@@ -166,7 +166,7 @@ pub fn measure(
     rays: &Rays,
     effort: &Effort,
     progress: Progress<'_>,
-) -> Result<Vec<Finding>, BenchError> {
+) -> Result<Vec<AcceleratorMeasurement>, BenchError> {
     // Rays in batches of each width, and the hits that others are compared with.
     let pools = pools(&effort.threads)?;
     let batches: Vec<Vec<RayBatch>> =
@@ -243,11 +243,11 @@ struct MethodRun {
     backend: String,
     bytes: u64,
     copied_bytes: u64,
-    builds: Series,
+    builds: Timings,
     /// One a width.
     errors: Vec<HitErrors>,
     /// One a width and number of threads.
-    traces: Vec<Series>,
+    traces: Vec<Timings>,
 }
 
 impl MethodRun {
@@ -257,9 +257,9 @@ impl MethodRun {
             backend: String::new(),
             bytes: 0,
             copied_bytes: 0,
-            builds: Series::default(),
+            builds: Timings::default(),
             errors: Vec::new(),
-            traces: vec![Series::default(); effort.widths.len() * effort.threads.len()],
+            traces: vec![Timings::default(); effort.widths.len() * effort.threads.len()],
         }
     }
 
@@ -276,14 +276,14 @@ impl MethodRun {
         Ok(accel)
     }
 
-    fn findings(&self, effort: &Effort, rays: usize) -> Vec<Finding> {
+    fn findings(&self, effort: &Effort, rays: usize) -> Vec<AcceleratorMeasurement> {
         let widths = effort.widths.iter().zip(&self.errors);
         let cells = widths
             .flat_map(|(width, errors)| effort.threads.iter().map(move |t| (width, t, errors)));
         let finding =
-            |((&width, &threads, errors), series): ((&usize, &usize, &HitErrors), &Series)| {
+            |((&width, &threads, errors), series): ((&usize, &usize, &HitErrors), &Timings)| {
                 let seconds = series.spread()?;
-                Some(Finding {
+                Some(AcceleratorMeasurement {
                     method: self.method.name(),
                     backend: self.backend.clone(),
                     width,

@@ -18,7 +18,7 @@ use etendue_scene::file::LightPrecision;
 use serde::Serialize;
 
 use crate::pictures::{Studio, opened};
-use crate::samplers::{Converged, Effort, Entry, take_pictures};
+use crate::samplers::{Converged, Effort, SamplerTrial, take_pictures};
 use crate::timing::TimeSpread;
 use crate::{BenchError, Progress};
 
@@ -30,14 +30,14 @@ pub struct Cameras {
     /// The picture through the full train that others are compared with.
     pub converged: Converged,
     /// Each model × number of samples.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<ModelMeasurement>,
     /// Models that there are not of this lens, and why.
     pub notes: Vec<String>,
 }
 
 /// What was measured of one model at one number of samples.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Finding {
+pub struct ModelMeasurement {
     /// `pinhole`, `thin`, `thick` or `full`.
     pub model: &'static str,
     /// Samples a pixel.
@@ -68,13 +68,13 @@ pub fn measure(
     let full = studio.camera().clone();
     let (models, notes) = models(&full)?;
     let converged = Converged::render(studio, &full, effort.converged)?;
-    let mut entries: Vec<Entry<usize>> =
-        (0..models.len()).flat_map(|model| Entry::each(model, &effort.counts)).collect();
+    let mut entries: Vec<SamplerTrial<usize>> =
+        (0..models.len()).flat_map(|model| SamplerTrial::each(model, &effort.counts)).collect();
     let way = |of: &usize| (&models[*of].1, (Sampler::Sobol, LightPrecision::Auto));
     take_pictures(studio, &mut entries, (effort, &converged, all), &way, progress)?;
-    let finding = |entry: &Entry<usize>| {
+    let finding = |entry: &SamplerTrial<usize>| {
         let rmse = entry.rmse();
-        Some(Finding {
+        Some(ModelMeasurement {
             model: models[entry.of].0,
             samples: entry.samples,
             seconds: entry.seconds.spread()?,

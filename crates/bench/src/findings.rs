@@ -22,7 +22,7 @@ pub struct Findings {
     /// Times that each was timed.
     pub rounds: usize,
     /// Each accelerator × batch width × threads.
-    pub accelerators: Vec<accelerators::Finding>,
+    pub accelerators: Vec<accelerators::AcceleratorMeasurement>,
     /// Each sampler × number of samples, where the scene has a picture.
     pub samplers: Option<Samplers>,
     /// Each model of the lens × number of samples, where the camera has one.

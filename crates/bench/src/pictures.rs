@@ -27,7 +27,7 @@ pub struct Studio<'a> {
 
 /// Sampling of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sampling {
+pub struct PointSet {
     /// Rays a pixel.
     pub samples: u32,
     /// The point set.
@@ -40,7 +40,7 @@ pub struct Sampling {
 
 /// A picture's values, one after the other, and the time it took.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Taken {
+pub struct TimedPicture {
     /// Red, green and blue planes.
     pub values: Vec<f64>,
     /// Wall time of the tracing (s).
@@ -99,7 +99,7 @@ impl<'a> Studio<'a> {
         let [width, height] = self.camera().resolution();
         let limit = (width.min(height) / LEAST_SIDE).max(1);
         let pilot = self.camera().coarser((width.max(height) / 64).clamp(1, limit));
-        let sampling = Sampling {
+        let sampling = PointSet {
             samples: 4,
             sampler: Sampler::default(),
             seed: 0,
@@ -126,7 +126,11 @@ impl<'a> Studio<'a> {
     /// # Errors
     ///
     /// When it cannot be rendered, such as when no light gets through the lens.
-    pub fn take(&mut self, camera: &Camera, sampling: Sampling) -> Result<Taken, BenchError> {
+    pub fn take(
+        &mut self,
+        camera: &Camera,
+        sampling: PointSet,
+    ) -> Result<TimedPicture, BenchError> {
         let render = &mut self.scene.render;
         (render.samples, render.sampler, render.seed) =
             (SamplesSpec::Count(sampling.samples), sampling.sampler, sampling.seed);
@@ -142,7 +146,7 @@ impl<'a> Studio<'a> {
             &|_: f64| true,
         )?;
         let seconds = rendered.trace_time.as_secs_f64();
-        Ok(Taken { values: values(&rendered.picture), seconds })
+        Ok(TimedPicture { values: values(&rendered.picture), seconds })
     }
 }
 

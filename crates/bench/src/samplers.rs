@@ -6,8 +6,8 @@ use etendue_geometry::HitPrecision;
 use etendue_scene::file::LightPrecision;
 use serde::Serialize;
 
-use crate::pictures::{Sampling, Studio, mean, mean_square};
-use crate::timing::{Series, TimeSpread, order};
+use crate::pictures::{PointSet, Studio, mean, mean_square};
+use crate::timing::{TimeSpread, Timings, order};
 use crate::{BenchError, Progress};
 
 /// Extent of the measurement.
@@ -31,7 +31,7 @@ pub struct Samplers {
     /// The picture that others are compared with.
     pub converged: Converged,
     /// Each sampler × number of samples.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<SamplerMeasurement>,
 }
 
 /// The picture that others are compared with: the mean of two of half the samples.
@@ -49,7 +49,7 @@ pub struct Converged {
 
 /// What was measured of one sampler at one number of samples.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Finding {
+pub struct SamplerMeasurement {
     /// The point set, as a scene file writes it, and the precision of hits where it is not the plan's.
     pub sampler: &'static str,
     /// Samples a pixel.
@@ -109,13 +109,13 @@ pub fn measure(
     studio.fit(all, effort.seconds)?;
     let camera = studio.camera().clone();
     let converged = Converged::render(studio, &camera, effort.converged)?;
-    let mut entries: Vec<Entry<Contestant>> =
-        contestants.iter().flat_map(|&who| Entry::each(who, &effort.counts)).collect();
+    let mut entries: Vec<SamplerTrial<Contestant>> =
+        contestants.iter().flat_map(|&who| SamplerTrial::each(who, &effort.counts)).collect();
     let way = |of: &Contestant| (&camera, (of.sampler, of.precision));
     take_pictures(studio, &mut entries, (effort, &converged, all), &way, progress)?;
-    let finding = |entry: &Entry<Contestant>| {
+    let finding = |entry: &SamplerTrial<Contestant>| {
         let rmse = entry.rmse();
-        Some(Finding {
+        Some(SamplerMeasurement {
             sampler: entry.of.name,
             samples: entry.samples,
             seconds: entry.seconds.spread()?,
@@ -134,7 +134,7 @@ pub(crate) type Way<'a> = (&'a Camera, (Sampler, LightPrecision));
 /// picture.
 pub(crate) fn take_pictures<'a, T: Clone>(
     studio: &mut Studio<'_>,
-    entries: &mut [Entry<T>],
+    entries: &mut [SamplerTrial<T>],
     (effort, converged, all): (&Effort, &Converged, f64),
     way: &dyn Fn(&T) -> Way<'a>,
     progress: Progress<'_>,
@@ -164,7 +164,7 @@ impl Converged {
         let mut take = |seed| {
             let precision = LightPrecision::Auto;
             studio
-                .take(camera, Sampling { samples: half, sampler: Sampler::Sobol, seed, precision })
+                .take(camera, PointSet { samples: half, sampler: Sampler::Sobol, seed, precision })
         };
         // Far from the seeds of the rounds.
         let [a, b] = [take(u64::MAX)?.values, take(u64::MAX - 1)?.values];
@@ -175,20 +175,20 @@ impl Converged {
 }
 
 /// One contestant at one number of samples while it is measured.
-pub(crate) struct Entry<T> {
+pub(crate) struct SamplerTrial<T> {
     pub(crate) of: T,
     pub(crate) samples: u32,
-    pub(crate) seconds: Series,
+    pub(crate) seconds: Timings,
     squares: Vec<f64>,
 }
 
-impl<T: Clone> Entry<T> {
+impl<T: Clone> SamplerTrial<T> {
     /// One for each of `counts`.
     pub(crate) fn each(of: T, counts: &[u32]) -> impl Iterator<Item = Self> {
         counts.iter().map(move |&samples| Self {
             of: of.clone(),
             samples,
-            seconds: Series::default(),
+            seconds: Timings::default(),
             squares: Vec::new(),
         })
     }
@@ -201,7 +201,7 @@ impl<T: Clone> Entry<T> {
         round: usize,
         converged: &Converged,
     ) -> Result<(), BenchError> {
-        let sampling = Sampling { samples: self.samples, sampler, seed: round as u64, precision };
+        let sampling = PointSet { samples: self.samples, sampler, seed: round as u64, precision };
         let taken = studio.take(camera, sampling)?;
         self.seconds.0.push(taken.seconds);
         self.squares.push(mean_square(&taken.values, &converged.values));

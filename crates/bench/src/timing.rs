@@ -3,6 +3,8 @@
 //! Contestants take turns: a round times each of them once, so that whatever else the machine does
 //! meanwhile meets all of them alike. A ratio is the median of the ratios of the rounds.
 
+#![expect(clippy::disallowed_methods, reason = "tables of the kernel's, no user's files")]
+
 use std::fs;
 use std::process::Command;
 use std::time::Instant;
@@ -104,9 +106,9 @@ pub fn wall<T>(work: impl FnOnce() -> T) -> (f64, T) {
 
 /// Times of one contestant, round by round (s).
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Series(pub Vec<f64>);
+pub struct Timings(pub Vec<f64>);
 
-impl Series {
+impl Timings {
     /// The median (s); NaN without rounds.
     #[must_use]
     pub fn median(&self) -> f64 {
@@ -170,8 +172,8 @@ pub type Turn<'a> = Box<dyn FnMut() -> f64 + 'a>;
 
 /// Times each of `turns` once a round, after one round that is not counted. Each round begins with
 /// another of them.
-pub fn take_turns(rounds: usize, turns: &mut [Turn<'_>]) -> Vec<Series> {
-    let mut series = vec![Series::default(); turns.len()];
+pub fn take_turns(rounds: usize, turns: &mut [Turn<'_>]) -> Vec<Timings> {
+    let mut series = vec![Timings::default(); turns.len()];
     for turn in turns.iter_mut() {
         turn();
     }
@@ -194,12 +196,12 @@ mod tests {
 
     #[test]
     fn ratios_are_medians_of_rounds() {
-        let (ours, limit) = (Series(vec![2.0, 4.0, 30.0]), Series(vec![1.0, 2.0, 3.0]));
+        let (ours, limit) = (Timings(vec![2.0, 4.0, 30.0]), Timings(vec![1.0, 2.0, 3.0]));
         assert_eq!(ours.speed_against(&limit), 0.5, "a round of noise does not move it");
         assert_eq!(ours.median(), 4.0);
-        assert_eq!(Series(vec![1.0, 3.0]).median(), 2.0);
-        assert!(Series::default().median().is_nan());
-        assert_eq!(Series::default().spread(), None);
+        assert_eq!(Timings(vec![1.0, 3.0]).median(), 2.0);
+        assert!(Timings::default().median().is_nan());
+        assert_eq!(Timings::default().spread(), None);
     }
 
     #[test]

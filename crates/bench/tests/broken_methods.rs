@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use etendue_accel::Quality;
-use etendue_bench::accelerators::{Effort, Finding, Method, RENDER_WIDTH, measure};
+use etendue_bench::accelerators::{AcceleratorMeasurement, Effort, Method, RENDER_WIDTH, measure};
 use etendue_bench::findings::Findings;
 use etendue_bench::hits::Rays;
 use etendue_geometry::glam::DVec3;
@@ -41,7 +41,7 @@ fn aimed(geometry: &Geometry) -> Rays {
     Rays::new(rays)
 }
 
-fn measured(place: DVec3) -> Vec<Finding> {
+fn measured(place: DVec3) -> Vec<AcceleratorMeasurement> {
     let geometry = blob(place);
     let effort = Effort {
         methods: Method::all().to_vec(),
@@ -55,7 +55,7 @@ fn measured(place: DVec3) -> Vec<Finding> {
 }
 
 /// The height of a method's point on a chart.
-fn on_chart(findings: &[Finding], chart: &str, method: Method) -> f64 {
+fn on_chart(findings: &[AcceleratorMeasurement], chart: &str, method: Method) -> f64 {
     let findings = Findings {
         machine: Vec::new(),
         scene: Vec::new(),

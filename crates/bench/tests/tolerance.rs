@@ -5,7 +5,7 @@ use std::path::Path;
 
 use etendue_accel::BuildOptions;
 use etendue_bench::BenchError;
-use etendue_bench::tolerance::{Comparison, Finding, Tolerance, compare};
+use etendue_bench::tolerance::{Comparison, ModelError, Tolerance, compare};
 use etendue_render::output::Outputs;
 use etendue_render::{Plan, build, plan};
 use etendue_scene::LoadOptions;
@@ -49,7 +49,7 @@ fn compared_in(
     compare(&scene, &*accel, tolerance, &|_| true)
 }
 
-fn model<'a>(all: &'a Comparison, name: &str) -> &'a Finding {
+fn model<'a>(all: &'a Comparison, name: &str) -> &'a ModelError {
     all.models.iter().find(|finding| finding.model == name).unwrap()
 }
 
@@ -141,7 +141,7 @@ fn opencv_has_the_distortion_that_other_models_lack() {
     assert!(model(&all, "thick").colour.value > 0.01);
     let undispersed = model(&all, "undispersed");
     assert_eq!(undispersed.chief_ray.value, 0.0);
-    let worst = |found: &Finding| {
+    let worst = |found: &ModelError| {
         let all = [found.chief_ray, found.centroid, found.blur, found.colour];
         all.map(|worst| worst.value).into_iter().fold(0.0, f64::max)
     };

@@ -24,7 +24,6 @@ pub mod light_field;
 pub mod motion;
 pub mod opencv_fit;
 pub mod pinhole;
-pub mod pixel_block;
 mod place;
 pub mod pose;
 pub mod sampler;
@@ -48,10 +47,9 @@ pub use light_field::{LightField, LightFieldSpec, ViewGrid};
 pub use motion::{CameraMotionSpec, Kinematics, MotionAxes, Trajectory};
 pub use opencv_fit::OpencvFit;
 pub use pinhole::{Orthographic, OrthographicSpec, Pinhole, PinholeSpec};
-pub use pixel_block::PixelBlock;
 pub use pose::{Convention, Maps, Pose, PoseSpec};
 pub use sampler::{PixelSamples, SampleKeys, Sampler, squares_of_pair};
-pub use samples::{CameraRays, FilmSamples};
+pub use samples::{CameraRays, FilmSamples, PixelBlock};
 pub use shutter::{Readout, Shutter, ShutterKind, ShutterSpec, TruthAt};
 
 /// A camera's description that makes no camera: where in it, and why.

@@ -213,12 +213,12 @@ impl CameraMotionSpec {
 }
 
 /// The places of poses.
-struct Places<'a> {
+struct PosePositions<'a> {
     poses: &'a [Pose],
     times: &'a [f64],
 }
 
-impl Points for Places<'_> {
+impl Points for PosePositions<'_> {
     fn count(&self) -> usize {
         self.poses.len()
     }
@@ -240,7 +240,7 @@ fn keys(
     revolutions: &[i32],
 ) -> Result<Vec<PoseKey>, CameraError> {
     let last = poses.len() - 1;
-    let places = Places { poses, times };
+    let places = PosePositions { poses, times };
     let way = |i: usize| -> Result<PoseKey, CameraError> {
         let key =
             PoseKey { time: times[i], pose: poses[i], slopes: [DVec3::ZERO; 2], turn: DVec3::ZERO };

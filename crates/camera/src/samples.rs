@@ -1,11 +1,44 @@
-//! Samples of a camera's film, and the rays that they become.
+//! Blocks of pixels, samples of a camera's film, and the rays that they become.
 
 use etendue_geometry::RayBatch;
 
 use etendue_optics::element::{LensRays, StatusCounts};
 
-/// Batch of samples: their places on the film and in the pupil, and their wavelengths. The arrays
-/// have one entry a sample.
+/// A rectangle of pixels. Rays of a block run row by row from its top left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PixelBlock {
+    /// The leftmost column.
+    pub x: u32,
+    /// The topmost row.
+    pub y: u32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl PixelBlock {
+    /// The number of pixels.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// Whether there is no pixel.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.width == 0 || self.height == 0
+    }
+
+    /// The columns and rows of the pixels, in the order of their rays.
+    pub fn pixels(&self) -> impl Iterator<Item = (u32, u32)> + use<> {
+        let Self { x, y, width, height } = *self;
+        (y..y + height).flat_map(move |row| (x..x + width).map(move |column| (column, row)))
+    }
+}
+
+/// Where a batch of samples lies: on the film, in the pupil, and at which wavelength. The arrays have
+/// one entry a sample.
 #[derive(Debug, Clone, Default)]
 pub struct FilmSamples {
     /// Columns (pixels) from the outer corner of the top left pixel, whose centre is (0.5, 0.5).

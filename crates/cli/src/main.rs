@@ -46,7 +46,7 @@ fn main() -> ExitCode {
         Some(Command::Render(arguments)) => arguments.threads,
         _ => 0,
     };
-    if let Err(fault) = room::secure(threads) {
+    if let Err(fault) = room::check_memory_limit(threads) {
         fault.print();
         return fault.exit_code();
     }

@@ -53,7 +53,7 @@ pub(crate) fn run(arguments: &MergeArguments) -> Result<(), Fault> {
         let progress = Phases::new(asked.quiet).progress(!asked.quiet);
         let results = session.check_place(&asked.output, &[], &progress)?;
         places::keep_apart(&arguments.shares, &results)?;
-        render::keep_report_apart(&asked, &session, &results)?;
+        render::check_report_path(&asked, &session, &results)?;
         let rendering = session.merge(&shares, &progress)?;
         render::write(&asked, &rendering, outputs, progress)
     })

@@ -60,7 +60,7 @@ struct Meaning {
 }
 
 /// One point's light.
-struct Point {
+struct PointField {
     pupil: PupilField,
     sphere: ReferenceSphere,
 }
@@ -178,7 +178,7 @@ fn points(
     sensor_z: f64,
     [fields, wavelengths]: [&[f64]; 2],
     depths: &[Option<f64>],
-) -> Result<Vec<Point>, String> {
+) -> Result<Vec<PointField>, String> {
     let mut points = Vec::new();
     for &depth in depths {
         for &field in fields {
@@ -199,7 +199,7 @@ fn point(
     report: &LensReport,
     sensor_z: f64,
     (depth, field, nm): (Option<f64>, f64, f64),
-) -> Result<Point, AnalysisError> {
+) -> Result<PointField, AnalysisError> {
     let at = lens.train.at(nm)?;
     let pupil = report.paraxial.entrance_pupil.z.unwrap_or(0.0);
     let object = match depth {
@@ -211,13 +211,13 @@ fn point(
         }
     };
     let front = Wavefront::new(&lens.train, &at, object, sensor_z, Cells::Needed)?;
-    Ok(Point { pupil: front.pupil, sphere: front.sphere })
+    Ok(PointField { pupil: front.pupil, sphere: front.sphere })
 }
 
 /// Huygens' sums in the middles of cells, times their area.
 #[expect(clippy::cast_possible_truncation, reason = "shares below 1")]
 fn by_huygens(
-    points: &[Point],
+    points: &[PointField],
     side: usize,
     (pitch, finest): (f64, f64),
 ) -> Result<Vec<Vec<f32>>, String> {
@@ -237,7 +237,7 @@ fn by_huygens(
              --psf-size, or fewer fields"
         ));
     }
-    let plane = |point: &Point| {
+    let plane = |point: &PointField| {
         let spread = PointSpread::by_huygens(&[(&point.pupil, &point.sphere, 1.0)], side, pitch);
         let rows = spread.values.chunks(side).rev();
         rows.flatten().map(|value| (value * pitch * pitch) as f32).collect()

@@ -96,7 +96,7 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     }
     let checkpoint = keep(arguments, &mut session, folder, CHECKPOINT);
     let results = session.check_place(folder, &[SO_FAR, CHECKPOINT], &progress)?;
-    keep_report_apart(arguments, &session, &results)?;
+    check_report_path(arguments, &session, &results)?;
     let watching = Watching::new(arguments, outputs, &session);
     let progress = progress.with_looks(move |so_far| watching.look(so_far));
     // By what is kept of this machine; a render does not begin with measuring it.
@@ -141,7 +141,7 @@ pub(crate) fn write(
     outputs: Outputs,
     progress: Progress,
 ) -> Result<(), Fault> {
-    let partial = heed_stop(rendering, arguments.discard_partial)?;
+    let partial = partial_note(rendering, arguments.discard_partial)?;
     if let Some(partial) = &partial
         && !arguments.quiet
     {
@@ -149,7 +149,7 @@ pub(crate) fn write(
     }
     // Files, in a folder of their own when the picture is partial.
     let folder = &rendering.place_in(&arguments.output);
-    if let (Some(partial), Some(samples)) = (&partial, rendering.outdone_in(folder)) {
+    if let (Some(partial), Some(samples)) = (&partial, rendering.more_samples_in(folder)) {
         let folder = folder.display();
         let stays = format!("{partial}; the picture of {samples} samples in {folder} stays");
         return Err(Fault::failed(stays));
@@ -192,7 +192,7 @@ pub(crate) fn open(arguments: &RenderArguments, outputs: Outputs) -> Result<Sess
 }
 
 /// Refuses to write the report over a result, over what the scene is made of, or where nothing can be written.
-pub(crate) fn keep_report_apart(
+pub(crate) fn check_report_path(
     arguments: &RenderArguments,
     session: &Session,
     results: &[PathBuf],
@@ -218,8 +218,8 @@ pub(crate) fn refuse_result(arguments: &RenderArguments, results: &[PathBuf]) ->
     }
 }
 
-/// Description of what a stop left of the picture; `None` when it is complete.
-pub(crate) fn heed_stop(rendering: &Rendering, discards: bool) -> Result<Option<String>, Fault> {
+/// What a stop left of the picture, in words; `None` when it is complete.
+pub(crate) fn partial_note(rendering: &Rendering, discards: bool) -> Result<Option<String>, Fault> {
     stop::saves(false);
     let Some(partial) = rendering.partial() else { return Ok(None) };
     if discards {

@@ -21,7 +21,7 @@ const THREAD: u64 = 8 << 20;
 
 /// Refuses to work on so many threads (all, for 0) where the shell leaves too few addresses. Under such a
 /// limit the program starts itself anew, with one arena.
-pub(crate) fn secure(threads: usize) -> Result<(), Fault> {
+pub(crate) fn check_memory_limit(threads: usize) -> Result<(), Fault> {
     let Some(left) = addresses() else { return Ok(()) };
     if std::env::var_os(ARENAS.0).is_none() {
         restart();

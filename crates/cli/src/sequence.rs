@@ -5,13 +5,13 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use etendue::{Dataset, Frame, FramePattern, Progress, Session, places};
-use etendue_files::{Ledger, Transaction};
+use etendue_files::{Ledger, MOST_OWN_BYTES, Transaction};
 use etendue_render::output::{Outputs, sidecar};
 
 use crate::arguments::RenderArguments;
 use crate::fault::{Fault, print_text};
 use crate::progress::say;
-use crate::render::{heed_stop, keep, keep_report_apart, refuse_result, remove};
+use crate::render::{check_report_path, keep, partial_note, refuse_result, remove};
 
 pub(crate) fn render(
     arguments: &RenderArguments,
@@ -32,7 +32,7 @@ pub(crate) fn render(
     // All names are known before the first frame is written.
     let is_no_result = |results: &[PathBuf]| refuse_result(arguments, results);
     session.check_frames((out, &pattern), wanted, progress, is_no_result)?;
-    keep_report_apart(arguments, session, &[])?;
+    check_report_path(arguments, session, &[])?;
     let mut ledger = Ledger::open(out, "render");
     ledger.list_below(frames.iter().map(|frame| pattern.list_of(frame.number)));
     keep_exposure(arguments, session, (frames, wanted), &pattern, progress)?;
@@ -60,7 +60,7 @@ pub(crate) fn render(
         pattern.keep_apart(out, frame.number, (&session.inputs(), &names))?;
         let checkpoint = keep(arguments, session, out, &checkpoint_of(frame));
         let rendering = session.render(progress)?;
-        if let Some(partial) = heed_stop(&rendering, true)? {
+        if let Some(partial) = partial_note(&rendering, true)? {
             return Err(Fault::failed(partial));
         }
         if reports.is_empty() {
@@ -125,7 +125,7 @@ fn keep_exposure(
     }
     let sidecar = out.join(pattern.place(first.number, "sensor.json"));
     let read = || -> Option<f64> {
-        let text = std::fs::read(&sidecar).ok()?;
+        let text = etendue_files::read(&sidecar, MOST_OWN_BYTES).ok()?;
         let sidecar: serde_json::Value = serde_json::from_slice(&text).ok()?;
         sidecar["metered_exposure_s"].as_f64().filter(|time| *time > 0.0)
     };

@@ -7,7 +7,7 @@ use etendue::places;
 use etendue_chart::{Axis, Chart, Series, Theme};
 use etendue_files::Transaction;
 use etendue_report::{Cell, Table};
-use etendue_spectrum::input::Column;
+use etendue_spectrum::table::Column;
 use etendue_spectrum::{Curve, Illuminant, Summary, table};
 use serde::Serialize;
 
@@ -70,7 +70,7 @@ fn curves(arguments: &SpectrumArguments) -> Result<Vec<(String, Curve)>, Fault> 
         let [n, k] = table::refractive_index_info(&text).map_err(refused)?;
         return Ok(vec![("n".to_owned(), n), ("k".to_owned(), k)]);
     }
-    let table = table::Table::read(&text).map_err(refused)?;
+    let table = table::CurveTable::read(&text).map_err(refused)?;
     let curve = |column: Column| table.column(Some(&column)).map_err(refused);
     match &arguments.column {
         Some(word) => {

@@ -84,6 +84,7 @@ fn came(say: fn(&str)) {
 
 /// The signals that the process was started to ignore, one a bit, where the system tells.
 #[cfg(unix)]
+#[expect(clippy::disallowed_methods, reason = "a table of the kernel's, no user's file")]
 fn ignored() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

@@ -3,14 +3,13 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use etendue_camera::{
     CameraFile, Convention, PixelOrigin, ProjectionName, Readout, ShutterKind, TruthAt,
 };
-use etendue_files::{MANIFEST, SOFTWARE, Transaction};
+use etendue_files::{MANIFEST, MOST_OWN_BYTES, SOFTWARE, Transaction};
 use etendue_geometry::glam::{DMat3, DQuat};
 use etendue_render::annotations::{self, BOP_DEPTH, COCO, INSTANCES, Models, Shot, Source};
 use etendue_render::denoise::DENOISED;
@@ -35,7 +34,7 @@ const COLMAP: [&str; 3] = ["cameras.txt", "images.txt", "points3D.txt"];
 /// The frames of a scene, as they are added.
 #[derive(Debug, Clone, Default)]
 pub struct Dataset {
-    entries: Vec<Entry>,
+    entries: Vec<DatasetFrame>,
     outputs: Option<Outputs>,
     /// Of BOP's set.
     models: Models,
@@ -43,7 +42,7 @@ pub struct Dataset {
 
 /// One frame.
 #[derive(Debug, Clone)]
-struct Entry {
+struct DatasetFrame {
     number: usize,
     rig: Option<RigCamera>,
     time: Option<f64>,
@@ -87,7 +86,7 @@ impl Dataset {
         }
         self.entries.insert(
             at,
-            Entry {
+            DatasetFrame {
                 number: frame.number,
                 rig: frame.rig.clone(),
                 time: frame.time.or(clock.then(|| scene.render.time())),
@@ -123,7 +122,7 @@ impl Dataset {
         let mut files = vec![folder.join(INDEX)];
         sidecar::write_json(to, &files[0], &self.index(folder))?;
         files.extend(self.write_annotations(to, folder)?);
-        if self.entries.is_empty() || !self.entries.iter().all(Entry::has_k) {
+        if self.entries.is_empty() || !self.entries.iter().all(DatasetFrame::has_k) {
             return Ok(files);
         }
         let transforms = folder.join(TRANSFORMS);
@@ -143,7 +142,7 @@ impl Dataset {
         let Some(outputs) = self.outputs.filter(|outputs| outputs.annotates()) else {
             return Ok(Vec::new());
         };
-        let shot = |entry: &Entry| {
+        let shot = |entry: &DatasetFrame| {
             let [annotated, depth] = entry.annotations.each_ref().map(|name| folder.join(name));
             let file_name = entry.picture.clone().unwrap_or_default();
             Ok(Shot {
@@ -169,7 +168,7 @@ impl Dataset {
                  velocities, which stand in {INDEX} and in each camera.json"
             )
         };
-        why.map(note).into_iter().filter(|_| self.entries.iter().all(Entry::has_k)).collect()
+        why.map(note).into_iter().filter(|_| self.entries.iter().all(DatasetFrame::has_k)).collect()
     }
 
     /// Timing of all frames' exposures, as `transforms.json` for moving cameras has it (Seiskari et al., "Gaussian
@@ -179,7 +178,7 @@ impl Dataset {
         if self.entries.iter().all(|entry| entry.velocities().is_none()) {
             return Ok(None);
         }
-        let of = |entry: &Entry| {
+        let of = |entry: &DatasetFrame| {
             let Some(shutter) = &entry.camera.shutter else {
                 return Err("some frames have no shutter");
             };
@@ -208,7 +207,7 @@ impl Dataset {
 
     /// Of the files of `folder`. A mask whose numbers are too large for its format was not written.
     fn index(&self, folder: &Path) -> Value {
-        let frame = |entry: &Entry| {
+        let frame = |entry: &DatasetFrame| {
             let mut layers = entry.files.clone();
             layers
                 .values_mut()
@@ -243,7 +242,7 @@ impl Dataset {
 
     fn transforms(&self) -> Value {
         let timing = self.timing().ok().flatten();
-        let frame = |entry: &Entry| {
+        let frame = |entry: &DatasetFrame| {
             let mut frame = Map::new();
             let name = entry.picture.clone().unwrap_or_else(|| entry.name.clone());
             frame.insert("file_path".to_owned(), json!(name));
@@ -258,7 +257,7 @@ impl Dataset {
                 frame.insert("camera_linear_velocity".to_owned(), json!(linear));
                 frame.insert("camera_angular_velocity".to_owned(), json!(angular));
             }
-            let Intrinsics { focal: [fx, fy], centre: [cx, cy], distortion, is_fisheye } =
+            let PixelIntrinsics { focal: [fx, fy], centre: [cx, cy], distortion, is_fisheye } =
                 entry.intrinsics();
             let [w, h] = entry.camera.resolution;
             let model = if is_fisheye { "OPENCV_FISHEYE" } else { "OPENCV" };
@@ -342,7 +341,7 @@ impl Dataset {
 
 /// The numbers of the frames of the data set that was written to `folder`.
 pub(crate) fn numbers(folder: &Path) -> Vec<usize> {
-    let index = fs::read(folder.join(INDEX)).ok();
+    let index = etendue_files::read(&folder.join(INDEX), MOST_OWN_BYTES).ok();
     let index: Option<Value> = index.and_then(|bytes| serde_json::from_slice(&bytes).ok());
     let frames = index.as_ref().and_then(|index| index["frames"].as_array());
     let number = |frame: &Value| usize::try_from(frame["frame"].as_u64()?).ok();
@@ -384,7 +383,7 @@ struct Timing {
 }
 
 /// Pixels from the corner of the top left one.
-struct Intrinsics {
+struct PixelIntrinsics {
     focal: [f64; 2],
     centre: [f64; 2],
     /// In OpenCV's order.
@@ -392,7 +391,7 @@ struct Intrinsics {
     is_fisheye: bool,
 }
 
-impl Entry {
+impl DatasetFrame {
     fn has_k(&self) -> bool {
         self.camera.k.is_some()
     }
@@ -417,14 +416,14 @@ impl Entry {
         Some([gl(velocity.linear_m_s), gl(velocity.angular_rad_s)])
     }
 
-    fn intrinsics(&self) -> Intrinsics {
+    fn intrinsics(&self) -> PixelIntrinsics {
         let k = self.camera.k.unwrap_or_default();
         let half = match self.camera.pixel_origin {
             PixelOrigin::Center => 0.5,
             PixelOrigin::Corner => 0.0,
         };
         let distortion = self.camera.distortion.as_ref();
-        Intrinsics {
+        PixelIntrinsics {
             focal: [k[0][0], k[1][1]],
             centre: [k[0][2] + half, k[1][2] + half],
             distortion: distortion.map(|d| d.coefficients.clone()).unwrap_or_default(),
@@ -434,7 +433,7 @@ impl Entry {
 
     /// The camera without its number.
     fn colmap_camera(&self) -> String {
-        let Intrinsics { focal, centre, distortion, is_fisheye } = self.intrinsics();
+        let PixelIntrinsics { focal, centre, distortion, is_fisheye } = self.intrinsics();
         let (model, count) = match (is_fisheye, distortion.len()) {
             (true, _) => ("OPENCV_FISHEYE", 4),
             (false, 0) => ("PINHOLE", 0),

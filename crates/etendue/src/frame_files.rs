@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-use etendue_files::{Ledger, MANIFEST, Transaction, WriteError, remove_empty_folders};
+use etendue_files::{
+    Ledger, MANIFEST, MOST_OWN_BYTES, Transaction, WriteError, remove_empty_folders,
+};
 use etendue_render::denoise;
 use etendue_render::output::{Outputs, sidecar};
 use serde::{Deserialize, Serialize};
@@ -265,7 +267,7 @@ fn record_of(out: &Path, number: usize) -> PathBuf {
 }
 
 fn read_record(path: &Path) -> Option<Record> {
-    serde_json::from_slice(&fs::read(path).ok()?).ok()
+    serde_json::from_slice(&etendue_files::read(path, MOST_OWN_BYTES).ok()?).ok()
 }
 
 /// True if `folder` has a complete picture of the scene with these fingerprints, `files` among its
@@ -307,7 +309,8 @@ pub(crate) fn stopped_samples(folder: &Path, fingerprints: &[(String, String)]) 
 /// missing.
 fn picture(folder: &Path) -> Option<(Value, Map<String, Value>)> {
     let read = |name: &str| -> Option<Value> {
-        serde_json::from_slice(&fs::read(folder.join(name)).ok()?).ok()
+        let bytes = etendue_files::read(&folder.join(name), MOST_OWN_BYTES).ok()?;
+        serde_json::from_slice(&bytes).ok()
     };
     let header = read("layers.json")?.get("header")?.clone();
     let Value::Object(files) = read(MANIFEST)?.pointer("/files/render")?.clone() else {

@@ -47,7 +47,6 @@ mod session;
 mod shares;
 mod still;
 mod structures;
-mod viewed;
 mod viewpoint;
 mod words;
 
@@ -81,8 +80,7 @@ pub use progress::{Phase, Progress};
 pub use rendering::{Rendering, Written};
 pub use session::{MeshAttributes, Session, read_glasses};
 pub use shares::Shares;
-pub use still::Still;
-pub use viewed::Viewed;
+pub use still::{Still, Viewed};
 pub use viewpoint::Viewpoint;
 
 /// The layers by the names that scenes give them.

@@ -61,7 +61,7 @@ const BESIDE: u64 = 16 << 20;
 
 /// Data of a file beside its values.
 #[derive(Debug, Default)]
-struct Sidecar {
+struct ImageMetadata {
     unit: Option<String>,
     edges: Option<Vec<f64>>,
     noise_seed: Option<u64>,
@@ -69,7 +69,7 @@ struct Sidecar {
     pixel_pitch: Option<f64>,
 }
 
-impl Sidecar {
+impl ImageMetadata {
     /// From a file's entries, by their names.
     fn of<'t>(entry: impl Fn(&str) -> Option<&'t str>) -> Self {
         let positive = |key: &str| {
@@ -164,11 +164,21 @@ impl LightImage {
         #[expect(clippy::cast_possible_truncation, reason = "values of f32 or less")]
         let plane = |k: usize| (0..raster.len()).map(|i| raster.texel(i)[k] as f32).collect();
         let light = PixelLight::Colors([plane(0), plane(1), plane(2)]);
-        Ok(Self::new(path, inputs, PictureLight { size: raster.size(), light }, Sidecar::default()))
+        Ok(Self::new(
+            path,
+            inputs,
+            PictureLight { size: raster.size(), light },
+            ImageMetadata::default(),
+        ))
     }
 
-    fn new(path: &Path, inputs: Vec<PathBuf>, picture: PictureLight, sidecar: Sidecar) -> Self {
-        let Sidecar { unit, noise_seed, solid_angle, pixel_pitch, edges: _ } = sidecar;
+    fn new(
+        path: &Path,
+        inputs: Vec<PathBuf>,
+        picture: PictureLight,
+        sidecar: ImageMetadata,
+    ) -> Self {
+        let ImageMetadata { unit, noise_seed, solid_angle, pixel_pitch, edges: _ } = sidecar;
         let (path, notes) = (path.to_owned(), Vec::new());
         let quantity = Quantity::Light;
         Self { path, inputs, picture, quantity, unit, noise_seed, solid_angle, pixel_pitch, notes }
@@ -179,7 +189,7 @@ impl LightImage {
             let names = [format!("etendue:{key}"), format!("etendue {key}")];
             names.iter().find_map(|name| cube.texts.get(name)).map(String::as_str)
         };
-        let mut sidecar = Sidecar::of(entry);
+        let mut sidecar = ImageMetadata::of(entry);
         sidecar.unit = cube.unit.clone().filter(|unit| !unit.is_empty()).or(sidecar.unit);
         let film = film(&cube.axis, cube.values)?;
         let picture = PictureLight { size: cube.size, light: PixelLight::Bands(film) };
@@ -190,8 +200,9 @@ impl LightImage {
 
     /// The colours, or the grey, of an EXR file.
     fn of_colors(path: &Path, channels: ExrChannels) -> Result<Self, String> {
-        let mut sidecar =
-            Sidecar::of(|key| channels.texts.get(&format!("etendue:{key}")).map(String::as_str));
+        let mut sidecar = ImageMetadata::of(|key| {
+            channels.texts.get(&format!("etendue:{key}")).map(String::as_str)
+        });
         let meaning = channels.texts.get("etendue:RGB");
         let meaning = meaning.and_then(|text| serde_json::from_str::<Value>(text).ok());
         let unit = meaning.as_ref().and_then(|value| value.get("unit")?.as_str());
@@ -246,7 +257,7 @@ impl LightImage {
                  side"
             )),
         })?;
-        let (sidecar, json) = Sidecar::of_array(path).unzip();
+        let (sidecar, json) = ImageMetadata::of_array(path).unzip();
         let sidecar = sidecar.unwrap_or_default();
         let inputs = [path.to_owned()].into_iter().chain(json).collect();
         Self::of_numbers((path, inputs), array, wavelengths, sidecar)
@@ -263,7 +274,7 @@ impl LightImage {
         array: npy::Array,
         wavelengths: Option<&[f64]>,
     ) -> Result<Self, Error> {
-        Self::of_numbers((name, Vec::new()), array, wavelengths, Sidecar::default())
+        Self::of_numbers((name, Vec::new()), array, wavelengths, ImageMetadata::default())
             .map_err(|why| refused(name, why))
     }
 
@@ -271,7 +282,7 @@ impl LightImage {
         (path, inputs): (&Path, Vec<PathBuf>),
         array: npy::Array,
         wavelengths: Option<&[f64]>,
-        sidecar: Sidecar,
+        sidecar: ImageMetadata,
     ) -> Result<Self, String> {
         let (rows, columns, depth) = match array.shape.as_slice() {
             &[rows, columns] => (rows, columns, 1),

@@ -190,7 +190,7 @@ impl Session {
         }
         let plan = Plan::new(&scene, self.outputs());
         let prepared = Prepared { accel: &*accel, images: &images, others: &[] };
-        let (start, course) = (Instant::now(), etendue_render::Course::default());
+        let (start, course) = (Instant::now(), etendue_render::RenderState::default());
         let film = etendue_render::trace(&scene, &plan, prepared, &[], &course, progress)?;
         let rendered = etendue_render::finish(&scene, &plan, film, Vec::new(), Some(&*accel))?;
         let time = start.elapsed();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use etendue_accel::{Accel, BuildOptions};
-use etendue_files::{Ledger, MANIFEST, Transaction};
+use etendue_files::{Ledger, MANIFEST, MOST_OWN_BYTES, Transaction};
 use etendue_oidn::Denoiser;
 use etendue_render::annotations::{
     self, Annotated, BOP_DEPTH, COCO, CRYPTOMATTE, INSTANCES, Models, Shot, Source,
@@ -46,7 +46,7 @@ pub struct Rendering {
 
 /// Part of the results that a picture is: whole by itself, or a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Part {
+enum PictureScope {
     /// It does, and its sets are of it alone.
     Whole,
     /// It is one of a scene's frames.
@@ -194,7 +194,7 @@ impl Rendering {
     /// The samples a pixel of a stopped picture of the same scene in `folder`, where it has more of them than
     /// this one, which was stopped earlier: it would be a loss to write this one over it.
     #[must_use]
-    pub fn outdone_in(&self, folder: &Path) -> Option<u64> {
+    pub fn more_samples_in(&self, folder: &Path) -> Option<u64> {
         self.partial()?;
         let samples = stopped_samples(folder, &self.fingerprints)?;
         (samples > u64::from(self.report.samples)).then_some(samples)
@@ -223,7 +223,7 @@ impl Rendering {
         outputs: Outputs,
         progress: &Progress,
     ) -> Result<Written, Error> {
-        self.write_part(folder, outputs, Part::Whole, progress)
+        self.write_part(folder, outputs, PictureScope::Whole, progress)
     }
 
     /// As [`Self::write_with`], of one frame among others: what annotates it is kept for the set of all.
@@ -233,14 +233,14 @@ impl Rendering {
         outputs: Outputs,
         progress: &Progress,
     ) -> Result<Written, Error> {
-        self.write_part(folder, outputs, Part::Frame, progress)
+        self.write_part(folder, outputs, PictureScope::Frame, progress)
     }
 
     fn write_part(
         &self,
         folder: &Path,
         outputs: Outputs,
-        part: Part,
+        part: PictureScope,
         progress: &Progress,
     ) -> Result<Written, Error> {
         let start = Instant::now();
@@ -294,7 +294,7 @@ impl Rendering {
         progress: &Progress,
     ) -> Result<LightFieldSet, Error> {
         let Some((accel, images)) = &self.traced else { return Ok(LightFieldSet::default()) };
-        let rendering = light_field::Rendering { scene: &self.scene, accel: &**accel, images };
+        let rendering = light_field::RenderedScene { scene: &self.scene, accel: &**accel, images };
         let goes_on = |share| progress.goes_on(Phase::LightField, share);
         Ok(light_field::write(rendering, &self.picture, to, outputs, &goes_on)?)
     }
@@ -304,7 +304,7 @@ impl Rendering {
         &self,
         (to, folder): (&Transaction, &Path),
         outputs: Outputs,
-        part: Part,
+        part: PictureScope,
         progress: &Progress,
     ) -> Result<Vec<PathBuf>, Error> {
         let mut files = Vec::new();
@@ -335,14 +335,14 @@ impl Rendering {
         sidecar::write_json(to, &path, &annotated)?;
         files.push(path);
         match part {
-            Part::Frame if outputs.bop => {
+            PictureScope::Frame if outputs.bop => {
                 let path = folder.join(BOP_DEPTH);
                 let size = self.scene.camera.resolution();
                 annotations::write_depth(to, &path, size, &depth)?;
                 files.push(path);
             }
-            Part::Frame => {}
-            Part::Whole => {
+            PictureScope::Frame => {}
+            PictureScope::Whole => {
                 let mut models = Models::default();
                 if outputs.bop {
                     models.add(&self.scene);
@@ -435,7 +435,7 @@ fn annotation_files(outputs: Outputs) -> impl Iterator<Item = String> {
 ///
 /// When they cannot be read.
 pub(crate) fn read_annotated(path: &Path) -> Result<Annotated, Error> {
-    let read = std::fs::read(path).map_err(|error| error.to_string());
+    let read = etendue_files::read(path, MOST_OWN_BYTES).map_err(|error| error.to_string());
     read.and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string()))
         .map_err(|why| Error::Refused(format!("{}: cannot be read: {why}", path.display())))
 }

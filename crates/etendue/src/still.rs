@@ -1,30 +1,55 @@
-//! An image file by itself, to be looked at: its layers, how each is shown, and the values of its pixels.
+//! What a file is that somebody wants to look at; an image file by itself: its layers, how each is shown, and the values of its pixels.
 
 use std::path::Path;
 
 use etendue_image::{Cube, ExrChannels, Limits, MOST_BYTES, Plane, Raster, Samples, cube, envi};
 use etendue_render::expose::{BandFilm, SPECTRUM};
 use etendue_render::output::{Channel, Layer, Look, Picture, Screen, Values};
+use etendue_scene::file::{FileKind, is_lens};
 use etendue_spectrum::{Bands, Grid};
+use etendue_tracer::LayerSpec;
 use serde_json::Value;
 
-use crate::Error;
+use crate::lens_view::through;
 use crate::light_image::read_envi;
 use crate::preview::layer_reading;
+use crate::{Error, Options, Session};
 
-/// Layers by the names that this program's EXR files give them, and how they are shown; others are told by
-/// their channels.
-const LOOKS: [(&str, Look); 9] = [
-    ("Depth", Look::Distance),
-    ("Distance", Look::Distance),
-    ("Normal", Look::Direction),
-    ("Id.", Look::Ids),
-    ("MaterialId", Look::Ids),
-    (SPECTRUM, Look::Cube),
-    (REFLECTANCE, Look::Cube),
-    ("Coverage", Look::Share),
-    ("Alpha", Look::Share),
-];
+/// A file that was opened to be looked at, by what it is.
+#[derive(Debug)]
+pub enum Viewed {
+    /// A scene.
+    Scene(Box<Session>),
+    /// A model, in a scene that frames it.
+    Model(Box<Session>),
+    /// A lens file or a Zemax file, in a scene that looks through it at a board of squares.
+    Lens(Box<Session>),
+    /// An image.
+    Image(Box<Still>),
+}
+
+impl Viewed {
+    /// Opens the file at `path`: images and Zemax files are told by their endings, lens files by what is in
+    /// them, all others as by [`Session::open_with`]. Settings are of scenes, models and lenses.
+    ///
+    /// # Errors
+    ///
+    /// When the file cannot be read or makes no sense as what it is, and when a lens by itself makes no
+    /// picture.
+    pub fn open(path: &Path, options: Options) -> Result<Self, Error> {
+        if Still::is_named(path) {
+            return Still::open(path).map(|still| Self::Image(Box::new(still)));
+        }
+        if is_lens(path) {
+            return through(path, options).map(|session| Self::Lens(Box::new(session)));
+        }
+        let session = Box::new(Session::open_with(path, options)?);
+        Ok(match session.file().kind() {
+            FileKind::Model => Self::Model(session),
+            FileKind::Scene => Self::Scene(session),
+        })
+    }
+}
 
 /// The layer of the bands of reflectance or transmittance of a spectral image.
 const REFLECTANCE: &str = "T";
@@ -269,6 +294,14 @@ fn meaning(text: Option<&String>) -> Vec<(String, String)> {
     unit.map(|unit| ("unit".to_owned(), unit.to_owned())).into_iter().collect()
 }
 
+/// How a layer of this name is shown, by the table of layers; other programs' layers are told by their channels.
+fn look_by_name(name: &str) -> Option<Look> {
+    if name.starts_with(SPECTRUM) || name == REFLECTANCE {
+        return Some(Look::Cube);
+    }
+    LayerSpec::from_file_name(name).map(|spec| spec.row().look)
+}
+
 /// Puts a layer's channels in order, and chooses how it is shown.
 fn arrange(layer: &mut Layer) {
     let is_colour = layer.channels.iter().all(|channel| "RGBAY".contains(&*channel.name));
@@ -281,7 +314,6 @@ fn arrange(layer: &mut Layer) {
         // An EXR file has them in the order of their names.
         layer.channels.sort_by(|a, b| wavelength(&a.name).total_cmp(&wavelength(&b.name)));
     }
-    let named = LOOKS.iter().find(|(name, _)| layer.name.starts_with(name)).map(|(_, look)| *look);
     let count = layer.channels.len();
     let own = match count {
         3 if is_colour => Look::Color,
@@ -289,10 +321,12 @@ fn arrange(layer: &mut Layer) {
         1..=3 => Look::Extent,
         _ => Look::Cube,
     };
-    let look = named.filter(|look| match look {
+    let look = look_by_name(&layer.name).filter(|look| match look {
         Look::Distance | Look::Share => count == 1,
         Look::Direction => count == 3,
-        Look::Color | Look::Extent | Look::Ids | Look::Cube | Look::Counts { .. } => true,
+        Look::Color => count == 3 && is_colour,
+        Look::Extent => (1..=3).contains(&count),
+        Look::Ids | Look::Cube | Look::Counts { .. } => true,
     });
     layer.look = look.unwrap_or(own);
     let is_float = layer.channels.iter().any(|channel| matches!(channel.values, Values::F32(_)));

@@ -21,8 +21,8 @@ mod transaction;
 pub use manifest::{Ledger, MANIFEST, remove_empty_folders};
 pub use mapped::MappedFile;
 pub use opener::{
-    FindError, FoundFile, InputFolder, Opener, Reach, Stamp, is_inside, open, read, read_head,
-    real_place,
+    FindError, FoundFile, InputFolder, MOST_OWN_BYTES, Opener, Reach, Stamp, is_inside, open, read,
+    read_head, real_place,
 };
 pub use part::{PartFile, Temporary, open_parts, prepare_folder, remove_open_parts};
 pub use transaction::{Transaction, WriteError};

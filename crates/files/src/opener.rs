@@ -14,7 +14,10 @@ use std::time::SystemTime;
 /// The longest path that Linux takes (bytes).
 const LONGEST_PATH: usize = 4096;
 
-/// Permission of a scene to read files outside its own folder.
+/// The most bytes of a file that this program has written itself, and reads again.
+pub const MOST_OWN_BYTES: u64 = 1 << 30;
+
+/// Whether a scene may read files outside its own folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Reach {
     /// No: also not through links.
@@ -124,10 +127,10 @@ impl InputFolder {
         // Judged by its text first, so that a scene cannot ask which files exist elsewhere.
         if self.limit().is_some() {
             match leaves(Path::new(written)) {
-                Some(Leaving::Absolute) => {
+                Some(FolderEscape::Absolute) => {
                     return Err(self.outside(written, "is absolute and may leave "));
                 }
-                Some(Leaving::Upwards) => return Err(self.outside(written, "leaves ")),
+                Some(FolderEscape::Upwards) => return Err(self.outside(written, "leaves ")),
                 None => {}
             }
         }
@@ -222,23 +225,23 @@ fn without_dots(path: &Path) -> PathBuf {
     plain
 }
 
-enum Leaving {
+enum FolderEscape {
     Absolute,
     Upwards,
 }
 
-/// Tests whether a path climbs above where it starts, judged by its text.
-fn leaves(path: &Path) -> Option<Leaving> {
+/// Whether a path climbs above where it starts, judged by its text.
+fn leaves(path: &Path) -> Option<FolderEscape> {
     let mut depth = 0_i64;
     for component in path.components() {
         match component {
             Component::Normal(_) => depth += 1,
             Component::ParentDir => depth -= 1,
             Component::CurDir => {}
-            Component::RootDir | Component::Prefix(_) => return Some(Leaving::Absolute),
+            Component::RootDir | Component::Prefix(_) => return Some(FolderEscape::Absolute),
         }
         if depth < 0 {
-            return Some(Leaving::Upwards);
+            return Some(FolderEscape::Upwards);
         }
     }
     None

@@ -114,7 +114,7 @@ enum Content {
         file: NamedTempFile,
         // After the file, so that the entry outlives it: a signal in between finds a path too many
         // rather than a file too many.
-        entry: Entry,
+        entry: PartRegistration,
     },
     /// In a file without a name, to be copied to where it goes.
     Apart { file: File, to: Special },
@@ -141,7 +141,11 @@ impl<'t> PartFile<'t> {
         let path = absolute(file.path());
         open.insert(path.clone());
         drop(open);
-        Ok(Self { content: Content::Beside { file, entry: Entry(path) }, target, transaction })
+        Ok(Self {
+            content: Content::Beside { file, entry: PartRegistration(path) },
+            target,
+            transaction,
+        })
     }
 
     fn file(&mut self) -> &mut File {
@@ -190,7 +194,7 @@ impl Seek for PartFile<'_> {
 /// A whole file that is of use while the work lasts. It goes when this is dropped, and with the files
 /// that are not finished when a signal ends the process.
 #[derive(Debug)]
-pub struct Temporary(Entry);
+pub struct Temporary(PartRegistration);
 
 impl Temporary {
     /// Of the file that is or will be at `path`.
@@ -198,7 +202,7 @@ impl Temporary {
     pub fn new(path: &Path) -> Self {
         let path = absolute(path);
         open_set().insert(path.clone());
-        Self(Entry(path))
+        Self(PartRegistration(path))
     }
 }
 
@@ -211,9 +215,9 @@ impl Drop for Temporary {
 
 /// A path in [`OPEN`], for as long as this lives.
 #[derive(Debug)]
-pub(crate) struct Entry(PathBuf);
+pub(crate) struct PartRegistration(PathBuf);
 
-impl Drop for Entry {
+impl Drop for PartRegistration {
     fn drop(&mut self) {
         open_set().remove(&self.0);
     }

@@ -11,7 +11,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::{NamedTempFile, TempPath};
 
-use crate::part::{Entry, PartFile};
+use crate::part::{PartFile, PartRegistration};
 
 /// Files that are kept open while they wait: a process may not have many more.
 const MOST_OPEN: usize = 200;
@@ -41,7 +41,7 @@ struct Waiting {
     target: PathBuf,
     /// Shows other processes that it is in use.
     _lock: Option<File>,
-    _entry: Entry,
+    _entry: PartRegistration,
 }
 
 impl Transaction {
@@ -146,7 +146,7 @@ impl Transaction {
         &self,
         file: NamedTempFile,
         target: PathBuf,
-        entry: Entry,
+        entry: PartRegistration,
     ) -> Result<(), WriteError> {
         if self.is_at_once {
             self.refuse_inputs([&*target])?;

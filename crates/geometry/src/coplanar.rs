@@ -72,7 +72,7 @@ impl Overlapping {
 /// A triangle that may lie in one plane with one of another placement, in one number, as there may be millions: the
 /// cell of the plane's distance from the middle of all, the placement and the triangle, from the high bits on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Candidate(u64);
+struct CoplanarityKey(u64);
 
 /// Bits of a placement and of a triangle.
 const PLACEMENT: u32 = MOST_PLACED.trailing_zeros();
@@ -82,7 +82,7 @@ const TRIANGLE: u32 = MOST_VISITS.trailing_zeros();
 /// in the outermost ones, and compared.
 const MOST_CELLS: f64 = (1_u64 << (63 - PLACEMENT - TRIANGLE)) as f64;
 
-impl Candidate {
+impl CoplanarityKey {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -143,17 +143,18 @@ impl Coplanar {
                     continue;
                 }
                 let Some(key) = key(corners, all.centre()) else { continue };
-                candidates.push(Candidate::new(key / (KEYS * apart), [placement, triangle]));
+                candidates.push(CoplanarityKey::new(key / (KEYS * apart), [placement, triangle]));
             }
         }
         candidates.sort_unstable();
         let mut left = MOST_TRIANGLES;
         let mut planes = candidates.chunk_by(|a, b| a.cell() == b.cell()).peekable();
         while let Some(plane) = planes.next() {
-            let placed: Vec<&[Candidate]> = plane.chunk_by(|a, b| a.id()[0] == b.id()[0]).collect();
+            let placed: Vec<&[CoplanarityKey]> =
+                plane.chunk_by(|a, b| a.id()[0] == b.id()[0]).collect();
             // One plane's triangles may fall into two cells.
             let beyond = planes.peek().filter(|next| next[0].cell() == plane[0].cell() + 1);
-            let beyond: Vec<&[Candidate]> = beyond.map_or_else(Vec::new, |next| {
+            let beyond: Vec<&[CoplanarityKey]> = beyond.map_or_else(Vec::new, |next| {
                 next.chunk_by(|a, b| a.id()[0] == b.id()[0]).collect()
             });
             for (i, one) in placed.iter().enumerate() {
@@ -182,19 +183,20 @@ impl Coplanar {
         let shared = shared_boxes(geometry, &|_| true);
         let meeting = geometry.placements.iter().zip(&shared).filter(|(_, own)| !own.is_empty());
         let triangles = meeting.map(|(own, _)| geometry.mesh_of(own).triangles.len());
-        triangles.sum::<usize>().min(MOST_VISITS) as u64 * size_of::<Candidate>() as u64
+        triangles.sum::<usize>().min(MOST_VISITS) as u64 * size_of::<CoplanarityKey>() as u64
     }
 
     /// Notes which triangles of two placements in about one plane lie over one another.
     fn compare(
         &mut self,
         geometry: &Geometry,
-        [one, other]: [&[Candidate]; 2],
+        [one, other]: [&[CoplanarityKey]; 2],
         apart: f64,
         left: &mut usize,
     ) {
         let (few, many) = if one.len() < other.len() { (one, other) } else { (other, one) };
-        let boxed = |own: &Candidate| (Bounds::of_points(corners(geometry, own.id())), own.id());
+        let boxed =
+            |own: &CoplanarityKey| (Bounds::of_points(corners(geometry, own.id())), own.id());
         let mut few: Vec<(Bounds, PlacedTriangle)> = few.iter().map(boxed).collect();
         let whole = few.iter().fold(Bounds::EMPTY, |all, (own, _)| all.union(*own));
         let axis = (whole.max - whole.min).max_position();

@@ -338,7 +338,7 @@ impl Motion {
         Way {
             length: b.time - a.time,
             across: b.translation - a.translation,
-            slopes: hermite::slopes(&Places(&self.keys), i, self.interpolation),
+            slopes: hermite::slopes(&KeyTranslations(&self.keys), i, self.interpolation),
         }
     }
 
@@ -384,9 +384,9 @@ impl Sweep {
 }
 
 /// The translations of keys.
-struct Places<'a>(&'a [Key]);
+struct KeyTranslations<'a>(&'a [Key]);
 
-impl Points for Places<'_> {
+impl Points for KeyTranslations<'_> {
     fn count(&self) -> usize {
         self.0.len()
     }

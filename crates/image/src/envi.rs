@@ -67,7 +67,7 @@ enum Interleave {
 
 /// Kinds of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Number {
+enum EnviDataType {
     U8,
     I16,
     U16,
@@ -79,7 +79,7 @@ enum Number {
     F64,
 }
 
-impl Number {
+impl EnviDataType {
     /// The kind that `data type` has this code for.
     fn of(code: u64) -> Result<Self, String> {
         Ok(match code {
@@ -140,7 +140,7 @@ pub struct Header {
     size: [usize; 2],
     bands: usize,
     interleave: Interleave,
-    number: Number,
+    number: EnviDataType,
     big_endian: bool,
     offset: usize,
     /// All keys in small letters, and their values without braces.
@@ -194,7 +194,7 @@ impl Header {
         };
         let code =
             whole("data type")?.ok_or("does not say `data type`, the kind of its numbers")?;
-        let number = Number::of(code)?;
+        let number = EnviDataType::of(code)?;
         let big_endian = match whole("byte order")? {
             Some(0) => false,
             Some(1) => true,
@@ -246,7 +246,7 @@ impl Header {
         // The file's numbers are those of f32 that are nearest to what the header writes.
         #[expect(clippy::cast_possible_truncation, reason = "that is what is meant")]
         let ignored = match self.number {
-            Number::F32 => ignored.map(|number| f64::from(number as f32)),
+            EnviDataType::F32 => ignored.map(|number| f64::from(number as f32)),
             _ => ignored,
         };
         let mut values = room::<f32>(columns * rows * kept.len())?;
@@ -325,7 +325,7 @@ impl Header {
         Ok((kept, axis))
     }
 
-    fn scale(&self) -> Result<Scale, String> {
+    fn scale(&self) -> Result<BandScaling, String> {
         const OF_REFLECTANCE: &str = "reflectance scale factor";
         let white = self.one(OF_REFLECTANCE)?;
         if let Some(white) = white.filter(|white| !(*white > 0.0 && white.is_finite())) {
@@ -333,7 +333,7 @@ impl Header {
                 "has a `{OF_REFLECTANCE}` of {white}: it is the number of white, above 0"
             ));
         }
-        Ok(Scale {
+        Ok(BandScaling {
             white,
             gains: self.list("data gain values")?,
             offsets: self.list("data offset values")?,
@@ -371,15 +371,15 @@ impl Header {
     }
 }
 
-/// Factors on the numbers and offsets added to them, a band each.
-struct Scale {
+/// What numbers are multiplied by, and what is added to them, a band each.
+struct BandScaling {
     /// The number of a reflectance of 1.
     white: Option<f64>,
     gains: Option<Vec<f64>>,
     offsets: Option<Vec<f64>>,
 }
 
-impl Scale {
+impl BandScaling {
     fn of(&self, band: usize, number: f64) -> f64 {
         let gain = self.gains.as_ref().map_or(1.0, |gains| gains[band]);
         // Without offsets as it is: adding 0 would take the sign of a zero.

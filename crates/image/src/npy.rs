@@ -27,7 +27,7 @@ pub struct Array {
 
 /// Kinds of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Number {
+enum Dtype {
     F32,
     F64,
 }
@@ -81,8 +81,8 @@ fn read_as<T>(
         return Err("is in Fortran order; save numpy.ascontiguousarray of it".to_owned());
     }
     let size = match kind {
-        Number::F32 => 4,
-        Number::F64 => 8,
+        Dtype::F32 => 4,
+        Dtype::F64 => 8,
     };
     let count = header.shape.iter().try_fold(1_usize, |product, &n| product.checked_mul(n));
     let length = count.and_then(|count| count.checked_mul(size));
@@ -96,14 +96,14 @@ fn read_as<T>(
         return Err(format!("holds {count} numbers, and the system has no memory for them"));
     }
     let numbers = match kind {
-        Number::F32 => {
+        Dtype::F32 => {
             let of = match order {
                 ByteOrder::Little => f32::from_le_bytes,
                 ByteOrder::Big => f32::from_be_bytes,
             };
             data.as_chunks().0.iter().map(|&bytes| rounded(f64::from(of(bytes)))).collect()
         }
-        Number::F64 => {
+        Dtype::F64 => {
             let of = match order {
                 ByteOrder::Little => f64::from_le_bytes,
                 ByteOrder::Big => f64::from_be_bytes,
@@ -142,7 +142,7 @@ fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
 }
 
 /// The type that `descr` names.
-fn number(descr: &str) -> Result<(Number, ByteOrder), String> {
+fn number(descr: &str) -> Result<(Dtype, ByteOrder), String> {
     let native = if cfg!(target_endian = "little") { ByteOrder::Little } else { ByteOrder::Big };
     let (order, kind) = match descr.split_at_checked(1) {
         Some(("<", kind)) => (ByteOrder::Little, kind),
@@ -151,8 +151,8 @@ fn number(descr: &str) -> Result<(Number, ByteOrder), String> {
         _ => (native, descr),
     };
     match kind {
-        "f4" => Ok((Number::F32, order)),
-        "f8" => Ok((Number::F64, order)),
+        "f4" => Ok((Dtype::F32, order)),
+        "f8" => Ok((Dtype::F64, order)),
         _ => {
             let descr = descr.escape_debug();
             Err(format!("holds '{descr}' instead of float32 or float64 numbers"))

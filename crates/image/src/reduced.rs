@@ -37,7 +37,7 @@ impl Coarseness {
 /// `raster` as coarse as it may be; as it is where that is as fine.
 pub(crate) fn reduced(raster: Raster, coarse: Coarseness) -> Result<Raster, DecodeError> {
     let (size, channels) = (raster.size(), raster.channels());
-    let mut rows = Rows::new(size, channels, coarse)?;
+    let mut rows = RowReduction::new(size, channels, coarse)?;
     if rows.halvings == 0 {
         return Ok(raster);
     }
@@ -86,7 +86,7 @@ pub(crate) fn png(bytes: &[u8], limits: Limits) -> Result<Option<Raster>, Decode
         channels as u64 * if depth == png::BitDepth::Sixteen { 2 } else { 1 },
     )?;
     let size = size.map(|side| side as usize);
-    let mut rows = Rows::new(size, channels, coarse)?;
+    let mut rows = RowReduction::new(size, channels, coarse)?;
     if !is_plain || rows.halvings == 0 {
         return Ok(None);
     }
@@ -111,7 +111,7 @@ pub(crate) fn png(bytes: &[u8], limits: Limits) -> Result<Option<Raster>, Decode
 }
 
 /// Rows on their way to fewer.
-struct Rows {
+struct RowReduction {
     size: [usize; 2],
     channels: usize,
     halvings: u32,
@@ -122,7 +122,7 @@ struct Rows {
     made: Vec<f32>,
 }
 
-impl Rows {
+impl RowReduction {
     fn new(size: [usize; 2], channels: usize, coarse: Coarseness) -> Result<Self, DecodeError> {
         let halvings = coarse.halvings(size);
         let made = (size[0] >> halvings) * (size[1] >> halvings) * channels;

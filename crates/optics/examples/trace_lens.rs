@@ -4,6 +4,7 @@
 //! ```sh
 //! cargo run --release -p etendue-camera --example trace_lens -- scenes/lenses/double-gauss.json 9
 //! ```
+#![allow(clippy::disallowed_methods, reason = "an example reads what it is told to")]
 
 use std::error::Error;
 use std::hint::black_box;

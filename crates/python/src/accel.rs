@@ -12,7 +12,7 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 
 use crate::arrays::{in_python, of_mesh, of_triples, refused, triples};
-use crate::work::{Stop, interruptible, threads_for};
+use crate::work::{StopSignal, interruptible, threads_for};
 
 /// Rays in a batch: as many as stay in a core's cache.
 const BATCH: usize = 1024;
@@ -47,7 +47,7 @@ impl Accel {
             motion: None,
         };
         let geometry = Arc::new(Geometry { meshes: vec![mesh], placements: vec![placement] });
-        let stop = Stop::default();
+        let stop = StopSignal::default();
         let build = || {
             let options = BuildOptions {
                 threads: rayon::current_num_threads(),
@@ -94,8 +94,8 @@ impl Accel {
         coherent: bool,
         threads: usize,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let rays = Rays::new(&origins, &directions, t_max.as_ref())?;
-        let stop = Stop::default();
+        let rays = RayArrays::new(&origins, &directions, t_max.as_ref())?;
+        let stop = StopSignal::default();
         let threads = threads_for(rays.len().div_ceil(BATCH), threads);
         let found = interruptible(py, threads, &stop, || self.found(&rays, coherent, &stop))?;
         let all = PyDict::new(py);
@@ -117,9 +117,9 @@ impl Accel {
         coherent: bool,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let rays = Rays::new(&origins, &directions, t_max.as_ref())?;
+        let rays = RayArrays::new(&origins, &directions, t_max.as_ref())?;
         let mut all = vec![false; rays.len()];
-        let stop = Stop::default();
+        let stop = StopSignal::default();
         let threads = threads_for(rays.len().div_ceil(BATCH), threads);
         interruptible(py, threads, &stop, || {
             all.par_chunks_mut(BATCH).enumerate().for_each_init(
@@ -139,7 +139,7 @@ impl Accel {
 }
 
 /// What the rays of a call met.
-struct Found {
+struct HitArrays {
     /// In lengths of the directions as they came; `+inf` for a miss.
     t: Vec<f64>,
     u: Vec<f64>,
@@ -150,12 +150,13 @@ struct Found {
 }
 
 impl Accel {
-    fn found(&self, rays: &Rays<'_>, coherent: bool, stop: &Stop) -> Found {
+    fn found(&self, rays: &RayArrays<'_>, coherent: bool, stop: &StopSignal) -> HitArrays {
         let count = rays.len();
         let numbers = || vec![0.0; count];
         let (t, u, v) = (numbers(), numbers(), numbers());
-        let mut found = Found { t, u, v, triangle: vec![0; count], normal: vec![[0.0; 3]; count] };
-        let Found { t, u, v, triangle, normal } = &mut found;
+        let mut found =
+            HitArrays { t, u, v, triangle: vec![0; count], normal: vec![[0.0; 3]; count] };
+        let HitArrays { t, u, v, triangle, normal } = &mut found;
         let tuv = t.par_chunks_mut(BATCH).zip(u.par_chunks_mut(BATCH)).zip(v.par_chunks_mut(BATCH));
         let rest = triangle.par_chunks_mut(BATCH).zip(normal.par_chunks_mut(BATCH));
         tuv.zip(rest).enumerate().for_each_init(
@@ -203,14 +204,14 @@ impl Unbuilt {
 }
 
 /// Rays as they came.
-struct Rays<'a> {
+struct RayArrays<'a> {
     origins: Cow<'a, [[f64; 3]]>,
     directions: Cow<'a, [[f64; 3]]>,
     /// In lengths of the directions.
     t_max: Option<Vec<f64>>,
 }
 
-impl<'a> Rays<'a> {
+impl<'a> RayArrays<'a> {
     fn new(
         origins: &'a PyReadonlyArray2<'_, f64>,
         directions: &'a PyReadonlyArray2<'_, f64>,

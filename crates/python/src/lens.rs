@@ -12,7 +12,7 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 
 use crate::arrays::{in_python, of_triples, raised, refused, triples};
-use crate::work::{Stop, interruptible};
+use crate::work::{StopSignal, interruptible};
 
 /// A lens of a lens file, a Zemax file or a scene.
 #[pyclass(frozen)]
@@ -36,7 +36,7 @@ impl Lens {
             // Measured again, on all processors.
             Some(f_number) => {
                 let measure = || read.train.with_f_number(f_number);
-                interruptible(py, 0, &Stop::default(), measure)?.map_err(refused)?
+                interruptible(py, 0, &StopSignal::default(), measure)?.map_err(refused)?
             }
             None => read.train,
         };
@@ -116,7 +116,7 @@ impl Lens {
         let at = self.train.at(wavelength).map_err(refused)?;
         let side = if from_sensor { Side::Sensor } else { Side::Object };
         let clip = if clip { Clip::On } else { Clip::Off };
-        let stop = Stop::default();
+        let stop = StopSignal::default();
         let trace = |&ray: &Ray| (!stop.is_asked_for()).then(|| at.run(side, clip, ray));
         let all = || rays.par_iter().map(trace).collect::<Option<Vec<_>>>();
         // None of them is left out unless it was stopped, which has raised.

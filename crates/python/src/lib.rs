@@ -27,13 +27,19 @@ mod _core {
     #[pymodule_export]
     use super::sensor::Sensor;
     #[pymodule_export]
-    use super::{has_embree, version};
+    use super::{has_embree, layer_key, version};
 }
 
 /// Whether Embree is built in.
 #[pyfunction]
 fn has_embree() -> bool {
     cfg!(feature = "embree")
+}
+
+/// A layer's key: `NormalCamera` is `normal_camera`, `Id.object` `id_object`, the picture's `picture`.
+#[pyfunction]
+fn layer_key(name: &str) -> String {
+    etendue_render::output::layer_stem(name).replace("__", "_")
 }
 
 /// The version of the package.

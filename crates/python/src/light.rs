@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::{in_python, raised, refused, shaped};
 use crate::sensor::Sensor;
-use crate::work::{Stop, interruptible};
+use crate::work::{StopSignal, interruptible};
 
 /// A picture of light.
 #[pyclass(frozen)]
@@ -27,7 +27,7 @@ impl LightImage {
             return Err(pyo3::exceptions::PyFileNotFoundError::new_err(why));
         }
         let open = || etendue::LightImage::open(path, wavelengths.as_deref(), None);
-        let image = interruptible(py, 0, &Stop::default(), open)?.map_err(raised)?;
+        let image = interruptible(py, 0, &StopSignal::default(), open)?.map_err(raised)?;
         Ok(Self { image })
     }
 
@@ -88,7 +88,7 @@ impl LightImage {
         let unit = unit.map(LightUnit::parse).transpose().map_err(refused)?;
         let options = ExposeOptions { unit, f_number, magnification, seed, frame, memory: None };
         let expose = || self.image.clone().on(&sensor.file, &options);
-        let exposed = interruptible(py, 0, &Stop::default(), expose)?.map_err(raised)?;
+        let exposed = interruptible(py, 0, &StopSignal::default(), expose)?.map_err(raised)?;
         Ok(ExposedImage { exposed })
     }
 }
@@ -113,7 +113,7 @@ impl ExposedImage {
             pyo3::exceptions::PyIndexError::new_err(format!("{index}: there are {count} exposures"))
         })?;
         let raw = || self.exposed.raw(exposure);
-        let image = interruptible(py, 0, &Stop::default(), raw)?.map_err(raised)?;
+        let image = interruptible(py, 0, &StopSignal::default(), raw)?.map_err(raised)?;
         let size = [image.height, image.width, image.depth];
         shaped(image.values.into_pyarray(py).into_any(), size)
     }
@@ -124,7 +124,7 @@ impl ExposedImage {
 
     fn write(&self, py: Python<'_>, folder: &str, outputs: &str) -> PyResult<Vec<String>> {
         let outputs = Outputs::from_list(outputs).map_err(refused)?;
-        let stop = Stop::default();
+        let stop = StopSignal::default();
         let progress: Progress = stop.progress(None);
         let write = || self.exposed.write(folder.as_ref(), outputs, &progress);
         let written = interruptible(py, 0, &stop, write)?.map_err(raised)?;

@@ -14,7 +14,7 @@ use serde_json::Value;
 use crate::arrays::{
     in_python, of_layer, of_mesh, of_vertices, raised, refused, rows, shaped, triples,
 };
-use crate::work::{Stop, interruptible};
+use crate::work::{StopSignal, interruptible};
 
 /// Name, vertices, faces, and what is known at the vertices: texture coordinates, normals and colours.
 type NamedMesh<'py> = (String, Bound<'py, PyAny>, Bound<'py, PyAny>, AtVertices<'py>);
@@ -58,7 +58,7 @@ impl Session {
         (threads, callback): (usize, Option<Py<PyAny>>),
         work: impl FnOnce(&mut etendue::Session, &Progress) -> Result<T, Error> + Send,
     ) -> PyResult<T> {
-        let stop = Stop::default();
+        let stop = StopSignal::default();
         let (session, progress) = (&mut self.session, stop.progress(callback));
         interruptible(py, threads, &stop, || work(session, &progress))?.map_err(raised)
     }
@@ -218,7 +218,7 @@ impl Rendering {
         py: Python<'_>,
         work: impl FnOnce(&etendue::Rendering, &Progress) -> Result<T, Error> + Send,
     ) -> PyResult<T> {
-        let stop = Stop::default();
+        let stop = StopSignal::default();
         let progress = stop.progress(None);
         let work = || work(&self.rendering, &progress);
         interruptible(py, self.threads, &stop, work)?.map_err(raised)

@@ -11,7 +11,7 @@ use pyo3::types::PyDict;
 use serde_json::Value;
 
 use crate::arrays::{raised, refused, shaped};
-use crate::work::{Stop, interruptible};
+use crate::work::{StopSignal, interruptible};
 
 fn text(letters: &[u8]) -> String {
     String::from_utf8_lossy(letters).into_owned()
@@ -74,7 +74,7 @@ impl Sensor {
         let expose = || {
             self.file.sensor.expose_electrons(&electrons, size, Exposure { exposure, frame }, seed)
         };
-        let image = interruptible(py, 0, &Stop::default(), expose)?.map_err(refused)?;
+        let image = interruptible(py, 0, &StopSignal::default(), expose)?.map_err(refused)?;
         shaped(image.values.into_pyarray(py).into_any(), [size[1], size[0], 1])
     }
 }

@@ -29,12 +29,12 @@ pub(crate) fn threads_for(pieces: usize, threads: usize) -> usize {
 
 /// What stops work, and the exception that did.
 #[derive(Clone, Default)]
-pub(crate) struct Stop {
+pub(crate) struct StopSignal {
     stopped: Arc<AtomicBool>,
     raised: Arc<Mutex<Option<PyErr>>>,
 }
 
-impl Stop {
+impl StopSignal {
     pub(crate) fn is_asked_for(&self) -> bool {
         self.stopped.load(Ordering::Relaxed)
     }
@@ -79,7 +79,7 @@ impl Stop {
 pub(crate) fn interruptible<T: Send>(
     py: Python<'_>,
     threads: usize,
-    stop: &Stop,
+    stop: &StopSignal,
     work: impl FnOnce() -> T + Send,
 ) -> PyResult<T> {
     let pool = pool(threads)?;
@@ -97,7 +97,10 @@ pub(crate) fn interruptible<T: Send>(
 }
 
 /// The result of `work`, done in a thread of its own; `None` when it panicked, which was told.
-fn watched<T: Send>(stop: &Stop, work: impl FnOnce() -> T + Send) -> std::io::Result<Option<T>> {
+fn watched<T: Send>(
+    stop: &StopSignal,
+    work: impl FnOnce() -> T + Send,
+) -> std::io::Result<Option<T>> {
     std::thread::scope(|scope| {
         let (sender, receiver) = mpsc::channel();
         let worker = std::thread::Builder::new().spawn_scoped(scope, move || {

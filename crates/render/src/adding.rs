@@ -6,7 +6,7 @@ use etendue_camera::{CameraRays, LensCamera, PixelSamples, squares_of_pair};
 use etendue_tracer::layer::Taken;
 
 use crate::film::{PlaneRows, Strip};
-use crate::sampling::{Averaged, DIFFUSION_PAIR, Memory, Run, Sampling, TIME_PAIR};
+use crate::sampling::{Averaged, DIFFUSION_PAIR, Memory, SampleRun, Sampling, TIME_PAIR};
 use crate::sum::{Sum, add_run};
 use crate::tile::{TILE, Tile};
 use crate::watch::{Stopped, Watcher};
@@ -30,7 +30,7 @@ pub(crate) fn put(strip: &mut Strip<'_>, index: usize, sums: &[Sum], bands: usiz
 }
 
 /// Sums of the pixels of some rows, on which light of a strip lands.
-pub(crate) struct Window<'a> {
+pub(crate) struct RowSums<'a> {
     /// The topmost row.
     pub(crate) first: u32,
     /// Greatest number of rows from where light starts to where it lands.
@@ -116,7 +116,8 @@ impl Adding<'_> {
         for (pixels, slot) in pixels.chunks(pixels_at_once).zip((0_u32..).step_by(pixels_at_once)) {
             for first in pass.clone().step_by(at_once as usize) {
                 let range = first..pass.end.min(first + at_once);
-                let of_pixel = |(&pixel, slot)| Run { pixel, set: 0, range: range.clone(), slot };
+                let of_pixel =
+                    |(&pixel, slot)| SampleRun { pixel, set: 0, range: range.clone(), slot };
                 runs.clear();
                 runs.extend(pixels.iter().zip(slot..).map(of_pixel));
                 self.add_runs(tile, &runs, memory)?;
@@ -141,7 +142,7 @@ impl Adding<'_> {
                 let (mut first, end) = (start / sets, end / sets);
                 while first < end {
                     let last = end.min(first + room);
-                    runs.push(Run { pixel, set, range: first..last, slot: slot + set });
+                    runs.push(SampleRun { pixel, set, range: first..last, slot: slot + set });
                     (room, first) = (room - (last - first), last);
                     if room == 0 {
                         self.add_runs(tile, &runs, memory)?;
@@ -155,7 +156,7 @@ impl Adding<'_> {
     }
 
     /// Adds the samples of a batch.
-    fn add_runs(&self, tile: Tile, runs: &[Run], memory: &mut Memory) -> Result<(), Stopped> {
+    fn add_runs(&self, tile: Tile, runs: &[SampleRun], memory: &mut Memory) -> Result<(), Stopped> {
         self.place(tile, runs, memory);
         memory.slots.clear();
         for run in runs {
@@ -174,7 +175,7 @@ impl Adding<'_> {
     pub(crate) fn fill_window(
         &self,
         (strip, pass): ([u32; 2], &Range<u32>),
-        window: &mut Window<'_>,
+        window: &mut RowSums<'_>,
         memory: &mut Memory,
     ) -> Result<(), Stopped> {
         let [width, height] = self.what.camera().resolution();
@@ -195,8 +196,9 @@ impl Adding<'_> {
                 for first in pass.clone().step_by(at_once as usize) {
                     let range = first..pass.end.min(first + at_once);
                     let a_pixel = range.end - range.start;
-                    let of_pixel = |&pixel| Run { pixel, set: 0, range: range.clone(), slot: 0 };
-                    let runs: Vec<Run> = pixels.iter().map(of_pixel).collect();
+                    let of_pixel =
+                        |&pixel| SampleRun { pixel, set: 0, range: range.clone(), slot: 0 };
+                    let runs: Vec<SampleRun> = pixels.iter().map(of_pixel).collect();
                     self.place(tile, &runs, memory);
                     let Memory { film, rays, landings, .. } = memory;
                     self.what.camera().sample_band_rays(film, rays, landings);
@@ -211,12 +213,12 @@ impl Adding<'_> {
     }
 
     /// Refills the batch with the samples of `runs`. A camera without a lens looks at places alone.
-    fn place(&self, tile: Tile, runs: &[Run], memory: &mut Memory) {
+    fn place(&self, tile: Tile, runs: &[SampleRun], memory: &mut Memory) {
         let Memory { numbers, film, .. } = memory;
         let numbers: &mut Vec<(PixelSamples, u32)> = &mut numbers.samples;
         numbers.clear();
         // The numbers of all samples of these pixels.
-        let pixel = |run: &Run| [tile.left + run.pixel.0, tile.top + run.pixel.1];
+        let pixel = |run: &SampleRun| [tile.left + run.pixel.0, tile.top + run.pixel.1];
         for run in runs {
             self.sampling.extend(pixel(run), run, numbers);
         }
@@ -310,13 +312,13 @@ impl Memory {
     /// them lands.
     fn add_where_it_lands(
         &mut self,
-        window: &mut Window<'_>,
+        window: &mut RowSums<'_>,
         [layers, bands]: [usize; 2],
         width: usize,
     ) {
         let Self { rays, values, landings, film, order, .. } = self;
         let count = layers * bands;
-        let Window { first, rows, sums } = window;
+        let RowSums { first, rows, sums } = window;
         let mut add = |ray: usize| {
             #[expect(
                 clippy::cast_possible_truncation,

@@ -70,7 +70,7 @@ impl Offsets {
 }
 
 /// A place from which it is looked along the normal to both sides.
-struct Probe {
+struct NormalProbe {
     point: DVec3,
     normal: DVec3,
     /// Distance up to which it looks, and the distance within which it is the same place (m).
@@ -157,7 +157,7 @@ fn probes(
     near: &[Near<'_>],
     offsets: &Offsets,
     is_near: &dyn Fn(&Bounds) -> bool,
-) -> Vec<Probe> {
+) -> Vec<NormalProbe> {
     /// The middle, and places towards each corner.
     const PLACES: [[f64; 3]; 4] = [
         [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0],
@@ -186,7 +186,7 @@ fn probes(
                 let point = a * *x + b * *y + c * *z;
                 let offset = offsets.at(point, own);
                 let same = roundings(HitPrecision::Double) / roundings(HitPrecision::Single);
-                probes.push(Probe {
+                probes.push(NormalProbe {
                     point,
                     normal,
                     reach: scene.accuracy.path_clearance * offset,
@@ -203,7 +203,7 @@ fn probes(
 }
 
 /// Holds every triangle that is near against the probes about it.
-fn probe(scene: &Scene, near: &[Near<'_>], probes: &mut [Probe]) {
+fn probe(scene: &Scene, near: &[Near<'_>], probes: &mut [NormalProbe]) {
     let mut bounds = Bounds::EMPTY;
     probes.iter().for_each(|probe| bounds.include(probe.point));
     let most = probes.iter().map(|probe| probe.reach).fold(0.0, f64::max);
@@ -246,7 +246,13 @@ fn probe(scene: &Scene, near: &[Near<'_>], probes: &mut [Probe]) {
 }
 
 /// Holds a triangle against a probe. Of two surfaces light crosses at least one.
-fn hold(probe: &mut Probe, near: &Near<'_>, triangle: usize, [a, b, c]: [DVec3; 3], scene: &Scene) {
+fn hold(
+    probe: &mut NormalProbe,
+    near: &Near<'_>,
+    triangle: usize,
+    [a, b, c]: [DVec3; 3],
+    scene: &Scene,
+) {
     /// Shares of a triangle beyond its edges: a probe at the edge of two meets one of them.
     const BEYOND: f64 = 1e-9;
     if (probe.placement, probe.triangle) == (near.index, triangle) {
@@ -270,7 +276,7 @@ fn hold(probe: &mut Probe, near: &Near<'_>, triangle: usize, [a, b, c]: [DVec3; 
 }
 
 /// The thinnest place against its offset, of placements that are thin over more than contacts.
-fn thinnest(probes: &[Probe], offsets: &Offsets, scene: &Scene) -> Option<Gap> {
+fn thinnest(probes: &[NormalProbe], offsets: &Offsets, scene: &Scene) -> Option<Gap> {
     let mut gap: Option<Gap> = None;
     // Probes of a placement stand together.
     for own in probes.chunk_by(|a, b| a.placement == b.placement) {

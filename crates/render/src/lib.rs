@@ -67,7 +67,9 @@ pub use images::Images;
 pub use other_frame::FollowedFrame;
 pub use plan::{Plan, Unseen};
 pub use precision::accelerators;
-pub use render::{Course, Film, Prepared, Progress, Rendered, finish, render, sample_set, trace};
+pub use render::{
+    Film, Prepared, Progress, RenderState, Rendered, finish, render, sample_set, trace,
+};
 pub use report::{Report, Seconds};
 pub use shard::{Shard, ShardBy};
 pub use stopping::Stopping;

@@ -27,13 +27,13 @@ pub struct FollowedFrame<'a> {
     camera: &'a Camera,
     geometry: &'a Geometry,
     accel: &'a dyn Accel,
-    /// Motion of each placement of this frame, and its number there; `None` when all stand still.
-    motions: Option<Vec<(Motion, u32)>>,
+    /// What became of each placement of this frame, and its number there; `None` when all stand still.
+    motions: Option<Vec<(PlacementChange, u32)>>,
 }
 
 /// Motion of a placement on the way to the other frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Motion {
+enum PlacementChange {
     Still,
     Moved,
     /// Its mesh is another one, whose points have nothing to do with this one's.
@@ -51,7 +51,7 @@ impl<'a> FollowedFrame<'a> {
                 (0..).zip(names(geometry)).map(|(i, n)| (n, i)).collect();
             let of = |(name, placement)| match there.get(&name) {
                 Some(&number) => (motion(from, placement, geometry, number), number),
-                None => (Motion::Gone, MISS),
+                None => (PlacementChange::Gone, MISS),
             };
             names(from).into_iter().zip(&from.placements).map(of).collect()
         });
@@ -61,12 +61,16 @@ impl<'a> FollowedFrame<'a> {
     /// True if there is something that cannot be followed, because its mesh is another one there.
     #[must_use]
     pub fn loses_some(&self) -> bool {
-        self.motions.as_ref().is_some_and(|motions| motions.iter().any(|one| one.0 == Motion::Gone))
+        self.motions
+            .as_ref()
+            .is_some_and(|motions| motions.iter().any(|one| one.0 == PlacementChange::Gone))
     }
 
-    /// Motion of a placement of this frame, and its number in the other one.
-    fn motion(&self, number: u32) -> (Motion, u32) {
-        self.motions.as_ref().map_or((Motion::Still, number), |motions| motions[number as usize])
+    /// What becomes of a placement of this frame, and its number in the other one.
+    fn motion(&self, number: u32) -> (PlacementChange, u32) {
+        self.motions
+            .as_ref()
+            .map_or((PlacementChange::Still, number), |motions| motions[number as usize])
     }
 
     /// From the other camera, in its frame's pose, to the point of hit `i` (m) at `time` (s from the other frame's time).
@@ -78,12 +82,12 @@ impl<'a> FollowedFrame<'a> {
         }
         let (motion, number) = self.motion(number);
         match motion {
-            Motion::Still => {
+            PlacementChange::Still => {
                 // Far from the world's origin the difference of the two cameras is what counts.
                 let along = traced.rays.direction(i) * traced.hits.t[i];
                 Some((traced.rays.origin(i) - origin) + along)
             }
-            Motion::Moved => {
+            PlacementChange::Moved => {
                 let placement = &self.geometry.placements[number as usize];
                 let mesh = self.geometry.mesh_of(placement);
                 let corners = mesh.corners_at(traced.hits.triangle[i] as usize, time);
@@ -92,7 +96,7 @@ impl<'a> FollowedFrame<'a> {
                     corners[0] + u * (corners[1] - corners[0]) + v * (corners[2] - corners[0]);
                 Some(placement.world_from_mesh_at(time).point_from(local, origin))
             }
-            Motion::Gone => None,
+            PlacementChange::Gone => None,
         }
     }
 
@@ -149,21 +153,21 @@ fn names(geometry: &Geometry) -> Vec<Name> {
     names
 }
 
-fn motion(from: &Geometry, placement: &Placement, to: &Geometry, number: u32) -> Motion {
+fn motion(from: &Geometry, placement: &Placement, to: &Geometry, number: u32) -> PlacementChange {
     let there = &to.placements[number as usize];
     let (mesh, mesh_there) = (from.mesh_of(placement), to.mesh_of(there));
     let is_same_mesh = mesh.has_surface_of(mesh_there);
     if mesh.triangles.len() != mesh_there.triangles.len() {
-        return Motion::Gone;
+        return PlacementChange::Gone;
     }
     // A mesh of the same triangles with its corners elsewhere was bent.
     if !is_same_mesh && mesh.triangles[..] != mesh_there.triangles[..] {
-        return Motion::Gone;
+        return PlacementChange::Gone;
     }
     let moves = placement.motion.is_some() || there.motion.is_some();
     match is_same_mesh && !moves && placement.world_from_mesh == there.world_from_mesh {
-        true => Motion::Still,
-        false => Motion::Moved,
+        true => PlacementChange::Still,
+        false => PlacementChange::Moved,
     }
 }
 

@@ -76,7 +76,7 @@ pub struct Prepared<'a> {
 
 /// Scope of a render: which part of it is wanted, and where it is kept on the way.
 #[derive(Debug, Clone, Default)]
-pub struct Course<'a> {
+pub struct RenderState<'a> {
     /// The share of the picture's rows, or of its samples; all of it when absent.
     pub shard: Option<Shard>,
     /// Shares of the samples, which are put together instead of being traced.
@@ -87,7 +87,7 @@ pub struct Course<'a> {
     pub identity: Identity,
 }
 
-impl Course<'_> {
+impl RenderState<'_> {
     /// Refuses what cannot be kept, or put together.
     fn allows(&self, stopping: Stopping) -> Result<(), RenderError> {
         if !self.shares.is_empty() {
@@ -142,7 +142,7 @@ pub fn render(
     watch: &dyn Watch,
 ) -> Result<Rendered, RenderError> {
     let prepared = Prepared { accel, images, others: &[] };
-    let film = trace(scene, plan, prepared, &header, &Course::default(), watch)?;
+    let film = trace(scene, plan, prepared, &header, &RenderState::default(), watch)?;
     finish(scene, plan, film, header, Some(accel))
 }
 
@@ -202,7 +202,7 @@ pub fn trace(
     plan: &Plan,
     Prepared { accel, images, others }: Prepared<'_>,
     header: &[(String, String)],
-    course: &Course<'_>,
+    course: &RenderState<'_>,
     watch: &dyn Watch,
 ) -> Result<Film, RenderError> {
     course.allows(plan.stopping)?;

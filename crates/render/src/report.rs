@@ -118,6 +118,7 @@ pub fn seconds(duration: Duration) -> f64 {
 /// The most memory that this process held so far (bytes), and how much of what it holds now is
 /// private; zeros when the system does not tell.
 #[must_use]
+#[expect(clippy::disallowed_methods, reason = "a table of the kernel's, no user's file")]
 pub fn memory() -> (u64, u64) {
     let Ok(status) = std::fs::read_to_string("/proc/self/status") else { return (0, 0) };
     let field = |name: &str| {

@@ -10,7 +10,7 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use crate::adding::{Adding, Wanted, Window, Work, put};
+use crate::adding::{Adding, RowSums, Wanted, Work, put};
 use crate::film::{FilmLayer, NoMemory, filled, strips, take};
 pub(crate) use crate::sampling::passes;
 use crate::sampling::{Averaged, Memory, Sampling};
@@ -126,7 +126,7 @@ impl<'a> Averaging<'a> {
                 let (_, after) = left.split_at_mut((first - top_left) as usize * a_row);
                 let (window, after) = after.split_at_mut((end - first) as usize * a_row);
                 (left, top_left) = (after, end);
-                strips.push(Mutex::new(Some((strip, Window { first, rows, sums: window }))));
+                strips.push(Mutex::new(Some((strip, RowSums { first, rows, sums: window }))));
             }
             strips.par_iter().try_for_each(|strip| {
                 let Some((strip, mut window)) = take(strip) else { return Ok(()) };

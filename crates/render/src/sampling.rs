@@ -82,7 +82,7 @@ const SECOND_SET: u64 = 0xD1B5_4A32_D192_ED03;
 
 /// Samples of a pixel, side by side.
 #[derive(Debug, Clone)]
-pub(crate) struct Run {
+pub(crate) struct SampleRun {
     /// The pixel from its tile's corner, and which of its sequences they are of.
     pub(crate) pixel: (u32, u32),
     pub(crate) set: u32,
@@ -96,7 +96,7 @@ impl Sampling {
     pub(crate) fn extend(
         &self,
         pixel: [u32; 2],
-        run: &Run,
+        run: &SampleRun,
         numbers: &mut Vec<(PixelSamples, u32)>,
     ) {
         let seed = if run.set == 0 { self.seed } else { self.seed ^ SECOND_SET };

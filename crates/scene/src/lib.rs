@@ -26,7 +26,6 @@
 mod cache;
 mod cubes;
 pub mod doctor;
-mod envi;
 pub mod error;
 pub mod escape;
 mod facing;
@@ -45,8 +44,8 @@ mod sniff;
 mod words;
 
 pub use cache::Cache;
+pub use cubes::{EnviFault, read_envi};
 pub use doctor::{Diagnosis, MemoryForecast};
-pub use envi::{EnviFault, read_envi};
 pub use error::SceneError;
 pub use etendue_report::Refusal;
 pub use file::{FileKind, PathStep, SceneFile, ScenePath, SceneSpec, scene_schema};

@@ -24,13 +24,13 @@ use crate::file::{FileKind, ObjectSpec, SceneFile, ScenePath};
 use crate::identity::Ingredients;
 use crate::import::{self, Import, ImportedPlacement, Note, NoteKind, Wanted};
 use crate::memory::Budget;
-use crate::parts::{Object, Parts};
+use crate::parts::{Object, SceneParts};
 use crate::scene::{LoadOptions, LoadProgress, Scene};
 use crate::shape::{GoOn, ShapeError, ShapeSpec};
 use crate::{Cache, SceneError};
 use camera::CameraAhead;
 pub(crate) use camera::CameraFiles;
-use objects::{Origin, OriginKind, OwnParts};
+use objects::{OriginKind, OwnParts, TriangleOrigin};
 
 impl SceneFile {
     /// Opens all that the scene names and puts it together. Of the models only what is `wanted` is
@@ -69,7 +69,8 @@ impl SceneFile {
         let instance_files = named.files;
         let imports =
             self.import_all(&origins, &objects, &folder, wanted, options, (&budget, kept))?;
-        let mut parts = Parts::new(own.materials, own.textures, lights.clone().unwrap_or_default());
+        let mut parts =
+            SceneParts::new(own.materials, own.textures, lights.clone().unwrap_or_default());
         let split_nodes = self.kind() == FileKind::Model;
         for (spec, object) in self.spec.objects.iter().zip(&objects) {
             let note = self.note_up(spec, &imports[object.origin]);
@@ -138,7 +139,7 @@ impl SceneFile {
 
     fn import_all(
         &self,
-        origins: &[Origin],
+        origins: &[TriangleOrigin],
         objects: &[Object],
         folder: &InputFolder,
         wanted: Wanted,
@@ -153,7 +154,7 @@ impl SceneFile {
             copy: options.copy,
             animation: None,
         };
-        let goes_on = |origin: &Origin, done: usize| {
+        let goes_on = |origin: &TriangleOrigin, done: usize| {
             let name = &objects[origin.user].title;
             let step = LoadProgress { name, done, total: origins.len() };
             options.progress.is_none_or(|progress| progress(step))
@@ -248,7 +249,7 @@ impl SceneFile {
 
     fn finish(
         &self,
-        (parts, ahead): (Parts, CameraAhead),
+        (parts, ahead): (SceneParts, CameraAhead),
         folder: &InputFolder,
         options: &LoadOptions<'_>,
         (budget, kept): (&Budget, &Cache),

@@ -37,7 +37,7 @@ impl SceneFile {
         let mut own = OwnMaterials::default();
         let mut curves = 0;
         for (name, spec) in &self.spec.materials {
-            let mut supply = Named {
+            let mut supply = MaterialSources {
                 folder,
                 glasses,
                 wanted,
@@ -70,7 +70,7 @@ impl SceneFile {
         for (index, spec) in specs.iter().enumerate() {
             let at = ScenePath::of("lights").index(index);
             let curves = &mut 0;
-            let mut supply = Named { folder, glasses, wanted, textures, files, curves };
+            let mut supply = MaterialSources { folder, glasses, wanted, textures, files, curves };
             let fault = |Fault { key, why }| self.fault(at.join(&key), why);
             let time = self.spec.render.time();
             let mut built = spec.build(&mut supply).map_err(fault)?;
@@ -103,7 +103,7 @@ fn start_at(modulation: &mut Option<Arc<Modulation>>, time: f64) {
 const LONGEST_TABLE: u64 = 1 << 26;
 
 /// The scene's folder and the catalogue of glasses.
-struct Named<'a> {
+struct MaterialSources<'a> {
     folder: &'a InputFolder,
     glasses: &'a [AgfCatalogue],
     wanted: Wanted,
@@ -113,7 +113,7 @@ struct Named<'a> {
     curves: &'a mut u32,
 }
 
-impl Supply for Named<'_> {
+impl Supply for MaterialSources<'_> {
     fn image(&mut self, spec: &ImageSpec) -> Result<Paint, Fault> {
         let path = self.file(&spec.image).map_err(|why| Fault::new("image", why))?;
         if !spec.repeat.iter().all(|r| r.is_finite() && *r != 0.0) {

@@ -1,6 +1,8 @@
 //! Memory limit of a scene, and one account of the memory it will take: whatever grows with a file
 //! is spoken for here before it is made.
 
+#![expect(clippy::disallowed_methods, reason = "tables of the kernel's, no user's files")]
+
 use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -47,7 +47,7 @@ struct Home {
 
 /// A scene being put together.
 #[derive(Default)]
-pub(crate) struct Parts {
+pub(crate) struct SceneParts {
     pub(crate) geometry: Geometry,
     /// Deformations of meshes, by their indices.
     pub(crate) deformers: BTreeMap<u32, Arc<Deformer>>,
@@ -64,8 +64,8 @@ pub(crate) struct Parts {
     homes: Vec<Home>,
 }
 
-impl Parts {
-    /// Starts with what the scene file itself declares, before any model is added.
+impl SceneParts {
+    /// What the scene file itself declares, before any model is added.
     pub(crate) fn new(
         materials: Vec<Material>,
         textures: Vec<Texture>,

@@ -20,7 +20,7 @@ pub use factor::{Factor, Times};
 
 use etendue_spectrum::{Bands, Curve, Grid, Outside, WeightedBands, rgb};
 
-use crate::response::{Filter, Response, filters, photons_caught, sensitive_range};
+use crate::response::{ColourFilter, Response, filters, photons_caught, sensitive_range};
 use crate::spec::{Radiometry, SensorKind};
 use crate::{Sensor, SensorError};
 use division::{Division, Nodes, RunningSums, cell_edges, product};
@@ -204,7 +204,7 @@ impl BandTable {
     /// `None` when it would be too large.
     fn new(
         sensor: &Sensor,
-        filters: &[Filter],
+        filters: &[ColourFilter],
         light: &Illumination,
         range: [f64; 2],
         fixed: &[f64],
@@ -217,7 +217,7 @@ impl BandTable {
             light.factors.iter().filter(|factor| factor.curve.as_flat().is_none()).collect();
         let curves: Vec<&Curve> = (spectra.iter().chain(&light.filters))
             .chain(factors.iter().map(|factor| &factor.curve))
-            .chain(filters.iter().filter_map(Filter::curve))
+            .chain(filters.iter().filter_map(ColourFilter::curve))
             .chain([efficiency, &rgb::PRIMARIES[0]])
             .collect();
         let edges = cell_edges(&curves, range, fixed);
@@ -373,7 +373,7 @@ impl BandTable {
     fn error_of(
         &self,
         response: &Response,
-        filters: &[Filter],
+        filters: &[ColourFilter],
         efficiency: &Curve,
         light: &Illumination,
     ) -> f64 {

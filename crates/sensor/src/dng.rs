@@ -14,7 +14,7 @@ use etendue_spectrum::{Curve, Illuminant, integral};
 use tiff::encoder::{Rational, SRational, TiffEncoder, TiffValue};
 use tiff::tags::{Tag, Type};
 
-use crate::response::{Filter, filters};
+use crate::response::{ColourFilter, filters};
 use crate::{RawImage, Sensor};
 
 /// Error of a DNG that cannot be written.
@@ -265,13 +265,13 @@ impl Sensor {
     #[must_use]
     pub fn fitted_matrix(&self) -> Option<Matrix3> {
         let filters = filters(self.spec()).ok()?.filters;
-        if !filters.iter().all(|filter| matches!(filter, Filter::Curve(_))) {
+        if !filters.iter().all(|filter| matches!(filter, ColourFilter::Curve(_))) {
             return None;
         }
         let light = Illuminant::D65.curve().ok()?;
         let [from, to] = light.range();
         let ramp = Curve::sampled(vec![[from, from], [to, to]]).ok()?;
-        let curves = self.of_rgb(|k| filters.get(k).and_then(Filter::curve).cloned());
+        let curves = self.of_rgb(|k| filters.get(k).and_then(ColourFilter::curve).cloned());
         let [Some(r), Some(g), Some(b)] = curves else { return None };
         let efficiency = &self.settings.efficiency;
         let raw = |patch: &Curve| {

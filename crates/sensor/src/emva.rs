@@ -27,7 +27,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::film::{Exposure, Film, RawImage};
-use crate::response::{Channel, Response};
+use crate::response::{PhotositeKind, Response};
 use crate::spec::Radiometry;
 use crate::{NoiseModel, Sensor, SensorError};
 use etendue_spectrum::Bands;
@@ -364,7 +364,8 @@ impl EvenLight {
 impl Response {
     /// One channel, of which one band of light is worth one electron.
     fn of_electrons() -> Self {
-        let channel = Channel { name: "Y".into(), electrons: vec![1.0], primaries: [1.0 / 3.0; 3] };
+        let channel =
+            PhotositeKind { name: "Y".into(), electrons: vec![1.0], primaries: [1.0 / 3.0; 3] };
         Self { bands: Bands::Grey, channels: vec![channel], pattern: Some(vec![vec![0]]) }
     }
 }

@@ -50,7 +50,7 @@ pub struct HdrImage {
 
 /// Knowledge of a pixel before numbers are weighed.
 #[derive(Debug, Clone, Copy)]
-struct Pilot {
+struct RateEstimate {
     /// Numbers that count, the least exposed first; 0 of a pixel that is saturated in that.
     count: usize,
     /// Electrons a second by the most exposed of them.
@@ -86,16 +86,19 @@ impl Sensor {
         // Which numbers count.
         let RawImage { width, height, depth, values, .. } = expose(first.sensor, first.shot)?;
         let limit = first.limit();
-        let mut pilots: Vec<Pilot> = values
+        let mut pilots: Vec<RateEstimate> = values
             .par_iter()
-            .map(|&y| Pilot { count: usize::from(f64::from(y) < limit), rate: first.rate(y) })
+            .map(|&y| RateEstimate {
+                count: usize::from(f64::from(y) < limit),
+                rate: first.rate(y),
+            })
             .collect();
         for (number, reading) in readings.iter().enumerate().skip(1) {
             let image = expose(reading.sensor, reading.shot)?;
             let limit = reading.limit();
             pilots.par_iter_mut().zip(&image.values).for_each(|(pilot, &y)| {
                 if pilot.count == number && f64::from(y) < limit {
-                    *pilot = Pilot { count: number + 1, rate: reading.rate(y) };
+                    *pilot = RateEstimate { count: number + 1, rate: reading.rate(y) };
                 }
             });
         }

@@ -25,7 +25,7 @@ pub(crate) const BAND_WIDTH: f64 = 10.0;
 
 /// One kind of photosite.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Channel {
+pub(crate) struct PhotositeKind {
     /// A filter's letter, or a band's wavelength.
     pub(crate) name: String,
     /// Mean photo-electrons a unit of each band makes: a second in physical mode, in digital mode
@@ -39,14 +39,14 @@ pub(crate) struct Channel {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Response {
     pub(crate) bands: Bands,
-    pub(crate) channels: Vec<Channel>,
+    pub(crate) channels: Vec<PhotositeKind>,
     /// For a sensor of one channel a pixel: which, by the pattern's rows and columns.
     pub(crate) pattern: Option<Vec<Vec<usize>>>,
 }
 
 /// Filter between the light and the silicon.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Filter {
+pub(crate) enum ColourFilter {
     Clear,
     /// One of the render's own colours.
     Primary(usize),
@@ -55,7 +55,7 @@ pub(crate) enum Filter {
     Band(Band),
 }
 
-impl Filter {
+impl ColourFilter {
     /// The curve, if it is one.
     pub(crate) fn curve(&self) -> Option<&Curve> {
         match self {
@@ -104,7 +104,7 @@ fn extent(curve: &Curve) -> [f64; 2] {
 /// The wavelengths at which a sensor of this quantum efficiency behind these filters sees something
 /// (nm). A number for the quantum efficiency is a statement about visible light, and about what
 /// filters pass that have curves of their own.
-pub(crate) fn sensitive_range(efficiency: &Curve, filters: &[Filter]) -> Option<[f64; 2]> {
+pub(crate) fn sensitive_range(efficiency: &Curve, filters: &[ColourFilter]) -> Option<[f64; 2]> {
     let silicon = match efficiency.as_flat() {
         Some(_) => None,
         None => Some(extent(efficiency)),
@@ -132,7 +132,7 @@ impl Response {
             Some(bands) => bands,
             None => fewest_bands(spec, settings, &filters)?,
         };
-        if filters.iter().any(|f| matches!(f, Filter::Band(_)))
+        if filters.iter().any(|f| matches!(f, ColourFilter::Band(_)))
             && !spec.bands.as_ref().is_some_and(|grid| divides(&bands, grid))
         {
             let why = "the bands of a multispectral sensor are the bands of its render";
@@ -140,7 +140,9 @@ impl Response {
         }
         // Ideal primaries are compared with an ideal primary, unless other filters show that a
         // primary is less than all light.
-        let own = |filter: &Filter| matches!(filter, Filter::Band(_) | Filter::Primary(_));
+        let own = |filter: &ColourFilter| {
+            matches!(filter, ColourFilter::Band(_) | ColourFilter::Primary(_))
+        };
         let alone = filters.iter().all(own);
         let holder = match spec.kind {
             SensorKind::Multispectral => "channels",
@@ -148,7 +150,7 @@ impl Response {
         };
         let mut channels = Vec::with_capacity(filters.len());
         for (name, filter) in names.into_iter().zip(&filters) {
-            let ideal = if alone { filter } else { &Filter::Clear };
+            let ideal = if alone { filter } else { &ColourFilter::Clear };
             channels.push(channel(name, holder, [filter, ideal], &bands, settings)?);
         }
         if settings.radiometry == Radiometry::Digital {
@@ -173,7 +175,7 @@ fn divides(bands: &Bands, edges: &Grid) -> bool {
 /// The kinds of photosites, what stands before each, and which pixel has which.
 pub(crate) struct Filtered {
     names: Vec<String>,
-    pub(crate) filters: Vec<Filter>,
+    pub(crate) filters: Vec<ColourFilter>,
     pattern: Option<Vec<Vec<usize>>>,
 }
 
@@ -194,7 +196,11 @@ pub(crate) fn filters(spec: &SensorSpec) -> Result<Filtered, SensorError> {
 fn raw(spec: &SensorSpec) -> Result<Filtered, SensorError> {
     let Some(cfa) = &spec.cfa else {
         let pattern = Some(vec![vec![0]]);
-        return Ok(Filtered { names: vec!["Y".into()], filters: vec![Filter::Clear], pattern });
+        return Ok(Filtered {
+            names: vec!["Y".into()],
+            filters: vec![ColourFilter::Clear],
+            pattern,
+        });
     };
     let letters = cfa.letters();
     let filters = letters
@@ -238,7 +244,7 @@ fn multispectral(spec: &SensorSpec) -> Result<Filtered, SensorError> {
                 return Err(SensorError::Channel { index, why });
             }
             let key = || format!("channels.{}", channel.name);
-            filters.push(Filter::Curve(transmission(&channel.curve, key)?));
+            filters.push(ColourFilter::Curve(transmission(&channel.curve, key)?));
         }
         let names = channels.iter().map(|channel| channel.name.clone()).collect();
         return Ok(Filtered { names, filters, pattern: None });
@@ -248,24 +254,24 @@ fn multispectral(spec: &SensorSpec) -> Result<Filtered, SensorError> {
         let why = "a multispectral sensor needs the edges of its bands (nm), or `channels`";
         return Err(SensorError::Missing { key: "bands", why });
     };
-    let filters = grid.bands().map(Filter::Band).collect();
+    let filters = grid.bands().map(ColourFilter::Band).collect();
     Ok(Filtered { names: Bands::Spectral(grid.clone()).names(), filters, pattern: None })
 }
 
 /// The filter of a letter: the user's curve, one of a named set, or an ideal one.
-fn filter(letter: char, filters: Option<&Filters>) -> Result<Filter, SensorError> {
+fn filter(letter: char, filters: Option<&Filters>) -> Result<ColourFilter, SensorError> {
     let primary = ['r', 'g', 'b'].iter().position(|&other| other == letter.to_ascii_lowercase());
     if let Some(Filters::Curves(curves)) = filters
         && let Some(curve) = curves.get(&letter)
     {
-        return Ok(Filter::Curve(transmission(curve, || format!("filters.{letter}"))?));
+        return Ok(ColourFilter::Curve(transmission(curve, || format!("filters.{letter}"))?));
     }
     match (primary, filters) {
         (Some(k), Some(Filters::Set(FilterSet::NikonD5100))) => Ok(nikon_d5100()
             .get(k)
-            .map_or(Filter::Primary(k), |curve| Filter::Curve(curve.clone()))),
-        (Some(k), _) => Ok(Filter::Primary(k)),
-        (None, _) if letter.eq_ignore_ascii_case(&'w') => Ok(Filter::Clear),
+            .map_or(ColourFilter::Primary(k), |curve| ColourFilter::Curve(curve.clone()))),
+        (Some(k), _) => Ok(ColourFilter::Primary(k)),
+        (None, _) if letter.eq_ignore_ascii_case(&'w') => Ok(ColourFilter::Clear),
         (None, _) => Err(SensorError::UnknownFilter { letter }),
     }
 }
@@ -278,14 +284,14 @@ fn transmission(curve: &Curve, key: impl Fn() -> String) -> Result<Curve, Sensor
 fn fewest_bands(
     spec: &SensorSpec,
     settings: &SensorSettings,
-    filters: &[Filter],
+    filters: &[ColourFilter],
 ) -> Result<Bands, SensorError> {
     if let Some(grid) = &spec.bands {
         return Ok(Bands::Spectral(grid.clone()));
     }
-    let ideal = |f: &Filter| matches!(f, Filter::Clear | Filter::Primary(_));
+    let ideal = |f: &ColourFilter| matches!(f, ColourFilter::Clear | ColourFilter::Primary(_));
     if settings.efficiency.as_flat().is_some() && filters.iter().all(ideal) {
-        let coloured = filters.iter().any(|filter| *filter != Filter::Clear);
+        let coloured = filters.iter().any(|filter| *filter != ColourFilter::Clear);
         return Ok(if coloured { Bands::Rgb } else { Bands::Grey });
     }
     let blind = || SensorError::Blind {
@@ -304,17 +310,19 @@ fn fewest_bands(
 fn channel(
     name: String,
     holder: &'static str,
-    [filter, ideal]: [&Filter; 2],
+    [filter, ideal]: [&ColourFilter; 2],
     bands: &Bands,
     settings: &SensorSettings,
-) -> Result<Channel, SensorError> {
+) -> Result<PhotositeKind, SensorError> {
     let count = bands.count();
     let caught = |i: usize| photons_caught(bands, i, filter, &settings.efficiency);
     let mut electrons: Vec<f64> = (0..count).map(caught).collect();
     if electrons.iter().all(|&value| value <= 0.0) {
         let key = match filter {
-            Filter::Curve(_) => holder,
-            Filter::Clear | Filter::Primary(_) | Filter::Band(_) => "quantum_efficiency",
+            ColourFilter::Curve(_) => holder,
+            ColourFilter::Clear | ColourFilter::Primary(_) | ColourFilter::Band(_) => {
+                "quantum_efficiency"
+            }
         };
         return Err(SensorError::Blind { key, channel: name, bands: bands.range() });
     }
@@ -338,7 +346,7 @@ fn channel(
     for value in electrons.iter_mut().chain(&mut primaries) {
         *value *= factor;
     }
-    Ok(Channel { name, electrons, primaries })
+    Ok(PhotositeKind { name, electrons, primaries })
 }
 
 /// Electrons that red, green and blue make, from those that bands make.
@@ -347,26 +355,30 @@ fn in_bands(bands: &Bands, electrons: &[f64]) -> [f64; 3] {
     std::array::from_fn(|k| rows.iter().zip(electrons).map(|(row, e)| row[k] * e).sum())
 }
 
-/// Electrons that red, green and blue make, from the curves, over a range of wavelengths (nm),
-/// beyond which there is no light.
-fn of_primaries(filter: &Filter, efficiency: &Curve, [from, to]: [f64; 2]) -> [f64; 3] {
+/// The same from the curves, over a range of wavelengths (nm), beyond which there is no light.
+fn of_primaries(filter: &ColourFilter, efficiency: &Curve, [from, to]: [f64; 2]) -> [f64; 3] {
     let nm = Curve::sampled(vec![[from, from], [to, to]]).unwrap_or(Curve::ONE);
     std::array::from_fn(|k| {
         let held = rgb::PRIMARIES[k].held_over(from, to);
         let curves = [&held, efficiency, &nm];
         match filter {
-            Filter::Clear => integral(&curves, from, to),
-            Filter::Primary(_) | Filter::Curve(_) => {
+            ColourFilter::Clear => integral(&curves, from, to),
+            ColourFilter::Primary(_) | ColourFilter::Curve(_) => {
                 let own = filter.curve().unwrap_or(&Curve::ONE);
                 integral(&[&held, efficiency, &nm, own], from, to)
             }
-            Filter::Band(band) => integral(&curves, band.from.max(from), band.to.min(to)),
+            ColourFilter::Band(band) => integral(&curves, band.from.max(from), band.to.min(to)),
         }
     })
 }
 
 /// ∫ shape·η·filter·λ dλ (nm²): proportional to the photons of band `i` that free an electron.
-pub(crate) fn photons_caught(bands: &Bands, i: usize, filter: &Filter, efficiency: &Curve) -> f64 {
+pub(crate) fn photons_caught(
+    bands: &Bands,
+    i: usize,
+    filter: &ColourFilter,
+    efficiency: &Curve,
+) -> f64 {
     let mut shape = bands.shape(i);
     if *bands == Bands::Rgb && efficiency.as_flat().is_none() {
         // Silicon may see what colours are not known for: they go on as they end.
@@ -377,9 +389,9 @@ pub(crate) fn photons_caught(bands: &Bands, i: usize, filter: &Filter, efficienc
     let ramp = [[from, from], [to, to]];
     let Ok(ramp) = Curve::sampled(ramp.to_vec()) else { return 0.0 };
     match filter {
-        Filter::Clear => integral(&[&shape, efficiency, &ramp], from, to),
-        Filter::Curve(curve) => integral(&[&shape, efficiency, curve, &ramp], from, to),
-        Filter::Band(band) => {
+        ColourFilter::Clear => integral(&[&shape, efficiency, &ramp], from, to),
+        ColourFilter::Curve(curve) => integral(&[&shape, efficiency, curve, &ramp], from, to),
+        ColourFilter::Band(band) => {
             // Edges that agree to rounding are one.
             let middle = 0.5 * (from + to);
             match (band.from..band.to).contains(&middle) {
@@ -387,22 +399,24 @@ pub(crate) fn photons_caught(bands: &Bands, i: usize, filter: &Filter, efficienc
                 false => 0.0,
             }
         }
-        Filter::Primary(k) if *bands == Bands::Rgb && *k != i => 0.0,
-        Filter::Primary(_) if *bands == Bands::Rgb => {
+        ColourFilter::Primary(k) if *bands == Bands::Rgb && *k != i => 0.0,
+        ColourFilter::Primary(_) if *bands == Bands::Rgb => {
             integral(&[&shape, efficiency, &ramp], VISIBLE[0], VISIBLE[1])
         }
-        Filter::Primary(k) => integral(&[&shape, efficiency, &rgb::PRIMARIES[*k], &ramp], from, to),
+        ColourFilter::Primary(k) => {
+            integral(&[&shape, efficiency, &rgb::PRIMARIES[*k], &ramp], from, to)
+        }
     }
 }
 
 /// Digital mode: the most sensitive channel's value for 1 in all bands becomes full scale, in
 /// electrons.
-fn to_full_scale(channels: &mut [Channel], settings: &SensorSettings) {
-    let white = |channel: &Channel| channel.primaries.iter().sum::<f64>();
+fn to_full_scale(channels: &mut [PhotositeKind], settings: &SensorSettings) {
+    let white = |channel: &PhotositeKind| channel.primaries.iter().sum::<f64>();
     let most = channels.iter().map(white).fold(0.0, f64::max);
     let full_scale = (settings.white() - settings.black) / settings.gain;
     let all = |channel| {
-        let Channel { electrons, primaries, .. }: &mut Channel = channel;
+        let PhotositeKind { electrons, primaries, .. }: &mut PhotositeKind = channel;
         electrons.iter_mut().chain(primaries)
     };
     for value in channels.iter_mut().flat_map(all) {

@@ -2,7 +2,7 @@
 
 use crate::film::Film;
 use crate::philox::mixed_seed;
-use crate::settings::{EXPOSURES, Readout, at_its_iso};
+use crate::settings::{EXPOSURES, ReadoutPath, at_its_iso};
 use crate::spec::SensorSpec;
 use crate::{AutoExposure, SecondReadout, Sensor, SensorError};
 
@@ -35,7 +35,7 @@ impl Sensor {
         own.noise = settings.noise;
         own.exposures.clone_from(&settings.exposures);
         match second {
-            SecondReadout::DualGain { .. } => own.readout = Readout::Second,
+            SecondReadout::DualGain { .. } => own.readout = ReadoutPath::Second,
             SecondReadout::SplitPixel { ratio, dark_current, .. } => {
                 own.sensitivity = ratio;
                 own.serial = mixed_seed(settings.serial, b"second photodiode");

@@ -12,7 +12,7 @@ use crate::exposing::Exposing;
 use crate::film::{Exposure, Film, InvalidValues, Moments, RawImage};
 use crate::philox::{PhiloxKey, Site};
 use crate::response::Response;
-use crate::settings::{Readout, SensorSettings};
+use crate::settings::{ReadoutPath, SensorSettings};
 use crate::spec::{HotPixels, NoiseModel, Radiometry, SensorSpec};
 use crate::{CfaSpec, SensorError};
 
@@ -408,8 +408,8 @@ impl Sensor {
             effects: Arc::clone(&s.effects),
             temporal: PhiloxKey::temporal(seed, s.serial),
             second: match s.readout {
-                Readout::First => None,
-                Readout::Second => Some(PhiloxKey::temporal(!seed, s.serial)),
+                ReadoutPath::First => None,
+                ReadoutPath::Second => Some(PhiloxKey::temporal(!seed, s.serial)),
             },
             pattern: PhiloxKey::new(s.serial),
         }

@@ -26,7 +26,7 @@ const MOST_CURRENT: f64 = 1e15;
 
 /// Read-out of a pixel's electrons: the noise of each is its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Readout {
+pub(crate) enum ReadoutPath {
     First,
     Second,
 }
@@ -71,8 +71,8 @@ pub(crate) struct SensorSettings {
     pub(crate) radiometry: Radiometry,
     /// Sensitivity beside that of the first read-out's photodiode, which is 1.
     pub(crate) sensitivity: f64,
-    /// Read-out of the electrons that this is.
-    pub(crate) readout: Readout,
+    /// Which read-out of the electrons it is.
+    pub(crate) readout: ReadoutPath,
     pub(crate) effects: Arc<Effects>,
     /// Notes for the user.
     pub(crate) notes: Vec<String>,
@@ -157,7 +157,7 @@ impl SensorSettings {
             serial: spec.serial.unwrap_or(0),
             radiometry: spec.radiometry.unwrap_or_default(),
             sensitivity: 1.0,
-            readout: Readout::First,
+            readout: ReadoutPath::First,
             effects: Arc::default(),
             notes: Vec::new(),
         };

@@ -153,7 +153,7 @@ pub fn slanted_edge(
     let (along, lines) = if is_upright { (&columns, &rows) } else { (&rows, &columns) };
     let at = |k: usize, line: usize| if is_upright { value(k, line) } else { value(line, k) };
     let place = |indices: &[usize], k: usize| indices[k] as f64 + 0.5;
-    let grid = Lines {
+    let grid = EdgeProfiles {
         places: (0..along.len()).map(|k| place(along, k)).collect(),
         lines: (0..lines.len()).map(|k| place(lines, k)).collect(),
         values: (0..lines.len())
@@ -168,7 +168,7 @@ pub fn slanted_edge(
 }
 
 /// Lines across the edge.
-struct Lines {
+struct EdgeProfiles {
     /// Places along a line (pixels).
     places: Vec<f64>,
     /// Places of the lines (pixels).
@@ -189,7 +189,7 @@ impl Edge {
     }
 }
 
-impl Lines {
+impl EdgeProfiles {
     fn measure(
         &self,
         is_upright: bool,

@@ -8,12 +8,12 @@
 use std::sync::LazyLock;
 
 use crate::Curve;
-use crate::input::Column;
-use crate::table::Table;
+use crate::table::Column;
+use crate::table::CurveTable;
 
 /// The patches, row by row from the dark skin to black.
 pub static PATCHES: LazyLock<Vec<Curve>> = LazyLock::new(|| {
-    let table = Table::read(include_str!("colorchecker.csv"));
+    let table = CurveTable::read(include_str!("colorchecker.csv"));
     let column = |k| table.as_ref().ok()?.column(Some(&Column::Number(k))).ok();
     (1..=24).filter_map(column).collect()
 });
@@ -32,6 +32,7 @@ mod tests {
 
     /// The crate has its own copy, as it is published without the scenes.
     #[test]
+    #[expect(clippy::disallowed_methods, reason = "a file of the source is read")]
     fn the_scenes_have_the_same_table() {
         let scenes = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/spectra/colorchecker.csv");
         assert_eq!(std::fs::read_to_string(scenes).unwrap(), include_str!("colorchecker.csv"));

@@ -9,7 +9,8 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Curve, Illuminant, table};
+use crate::table::{Column, CurveTable};
+use crate::{Curve, Illuminant};
 
 /// One curve, or several that are added.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -59,16 +60,6 @@ pub struct FileSpec {
     /// Multiplies the values.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub scale: f64,
-}
-
-/// A column of a table.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum Column {
-    /// Counted from 1, behind the wavelengths.
-    Number(u32),
-    /// By the header's word.
-    Name(String),
 }
 
 /// The spectrum of a lamp by name, 1 at 560 nm.
@@ -159,7 +150,7 @@ impl CurveSource {
                                     a .csv or .spd file"
                             .to_owned());
                     }
-                    let table = table::Table::read(&text)?;
+                    let table = CurveTable::read(&text)?;
                     table.column(column.as_ref())
                 });
                 ("file", curve.map_err(|why| format!("\"{file}\": {why}")), *scale)

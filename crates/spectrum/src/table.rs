@@ -1,11 +1,23 @@
 //! Tables of measured curves: CSV and `.spd` files, and refractiveindex.info's `.yml`.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::Curve;
-use crate::input::Column;
+
+/// A column of a table.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Column {
+    /// Counted from 1, behind the wavelengths.
+    Number(u32),
+    /// By the header's word.
+    Name(String),
+}
 
 /// A table of numbers over wavelengths (nm).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Table {
+pub struct CurveTable {
     /// The header's words, those of the values alone; empty where there is no header.
     names: Vec<String>,
     /// Rows: a wavelength and its values.
@@ -15,7 +27,7 @@ pub struct Table {
 /// The most rows of a table.
 const MOST_ROWS: usize = 1_000_000;
 
-impl Table {
+impl CurveTable {
     /// Reads rows of numbers that commas, semicolons, tabs, colons or spaces part. Lines that begin with `#` or `//` are
     /// notes; words before the first row are its header.
     ///
@@ -181,7 +193,7 @@ mod tests {
             "400:0.5\n500:0.7",
             "\"wavelength (nm)\",\"r\"\n400, 0.5\n\n500, 0.7\n",
         ] {
-            let curve = Table::read(text).and_then(|table| table.column(None));
+            let curve = CurveTable::read(text).and_then(|table| table.column(None));
             let curve = curve.unwrap_or_else(|why| panic!("{text}: {why}"));
             assert!((curve.at(450.0).unwrap() - 0.6).abs() < 1e-12);
         }
@@ -190,7 +202,7 @@ mod tests {
             ("400,0.5\n500,x\n", "line 2: \"x\""),
             ("400,0.5\n500\n", "line 2: 1 numbers"),
         ] {
-            assert!(Table::read(text).unwrap_err().contains(word), "{text}");
+            assert!(CurveTable::read(text).unwrap_err().contains(word), "{text}");
         }
     }
 

@@ -17,7 +17,7 @@ pub(crate) const MOST: usize = 1 << 16;
 
 /// A triangle in the world.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Shape {
+pub(crate) struct LightTriangle {
     /// From the first corner to the others (m).
     pub(crate) edges: [DVec3; 2],
     /// Unit normal on the front.
@@ -26,7 +26,7 @@ pub(crate) struct Shape {
     pub(crate) area: f64,
 }
 
-impl Shape {
+impl LightTriangle {
     /// The triangle of a spot at its time; `None` without area.
     fn of(point: &SurfacePoint<'_>) -> Option<Self> {
         let place = &point.placement.world_from_mesh_at(point.time);
@@ -46,7 +46,7 @@ pub(crate) struct AreaLight {
     pub(crate) id: [u32; 2],
     /// The first corner in the world (m): what f64 holds of it, and what is left.
     pub(crate) corner: [DVec3; 2],
-    pub(crate) shape: Shape,
+    pub(crate) shape: LightTriangle,
     pub(crate) two_sided: bool,
     /// It shines alike all over.
     pub(crate) is_plain: bool,
@@ -72,7 +72,7 @@ impl AreaLight {
         Some(Self {
             id,
             corner: [sum, lost + place.translation_low],
-            shape: Shape::of(&point)?,
+            shape: LightTriangle::of(&point)?,
             two_sided: emission.two_sided,
             is_plain: matches!(emission.radiance, Paint::Plain(_) | Paint::Curve { .. })
                 && material.alpha == Alpha::Opaque,
@@ -171,7 +171,7 @@ pub(crate) fn triangle_power(
     let Some(emission) = &material.emission else { return 0.0 };
     let corner = SurfacePoint::corner(scene.geometry, placement, triangle);
     let point = SurfacePoint { time, ..corner };
-    let Some(Shape { area, .. }) = Shape::of(&point) else { return 0.0 };
+    let Some(LightTriangle { area, .. }) = LightTriangle::of(&point) else { return 0.0 };
     let third = 1.0 / 3.0;
     let weights = [[third, third, third], [0.8, 0.1, 0.1], [0.1, 0.8, 0.1], [0.1, 0.1, 0.8]];
     let radiance: f64 = weights

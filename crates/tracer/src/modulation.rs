@@ -116,11 +116,11 @@ pub struct Modulation {
     clock: Clock,
     /// The time in its own clock at time 0 of the frame's (s).
     offset: f64,
-    form: Form,
+    form: Waveform,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum Form {
+enum Waveform {
     Curve {
         /// (s, factor), in order.
         points: Vec<[f64; 2]>,
@@ -171,7 +171,7 @@ impl ModulationSpec {
                         return Err(Fault::new("modulation.period", why));
                     }
                 }
-                of(Form::curve(points, period))
+                of(Waveform::curve(points, period))
             }
             Self::Pulse { start: Seconds(start), duration: Seconds(duration), factor, .. } => {
                 if !start.is_finite() {
@@ -184,7 +184,7 @@ impl ModulationSpec {
                 check_factor("factor", *factor)?;
                 let end = start + duration;
                 let points = [[*start, 0.0], [*start, *factor], [end, *factor], [end, 0.0]];
-                of(Form::curve(points.to_vec(), None))
+                of(Waveform::curve(points.to_vec(), None))
             }
             Self::Square { frequency, duty, high, low, phase, .. } => {
                 check_frequency(*frequency, *phase)?;
@@ -197,7 +197,7 @@ impl ModulationSpec {
                 let period = 1.0 / frequency;
                 let step = duty * period;
                 let points = [[0.0, *high], [step, *high], [step, *low], [period, *low]];
-                let form = Form::curve(points.to_vec(), Some(period));
+                let form = Waveform::curve(points.to_vec(), Some(period));
                 let offset = phase.rem_euclid(1.0) * period;
                 Ok(Modulation { clock: self.clock(), offset, form })
             }
@@ -209,7 +209,7 @@ impl ModulationSpec {
                     );
                     return Err(Fault::new("modulation.depth", why));
                 }
-                of(Form::Sine {
+                of(Waveform::Sine {
                     frequency: *frequency,
                     depth: *depth,
                     phase: phase.rem_euclid(1.0),
@@ -265,7 +265,7 @@ fn check_frequency(frequency: f64, phase: f64) -> Result<(), Fault> {
     }
 }
 
-impl Form {
+impl Waveform {
     /// Through points in order, of which there is one at least.
     fn curve(points: Vec<[f64; 2]>, period: Option<f64>) -> Self {
         let mut sums = Vec::with_capacity(points.len());
@@ -309,10 +309,10 @@ impl Modulation {
     pub fn at(&self, time: f64) -> f64 {
         let time = time + self.offset;
         match &self.form {
-            Form::Sine { frequency, depth, phase } => {
+            Waveform::Sine { frequency, depth, phase } => {
                 1.0 + depth * (TAU * ((frequency * time).fract() + phase)).sin()
             }
-            Form::Curve { points, sums, period } => {
+            Waveform::Curve { points, sums, period } => {
                 let time = period.map_or(time, |period| time.rem_euclid(period));
                 along(points, sums, time)[0]
             }
@@ -327,13 +327,13 @@ impl Modulation {
             return self.at(from);
         }
         match &self.form {
-            Form::Sine { frequency, depth, phase } => {
+            Waveform::Sine { frequency, depth, phase } => {
                 let middle = (frequency * (0.5 * (from + to) + self.offset)).fract();
                 let half_turn = PI * frequency * length;
                 let share = half_turn.sin() / half_turn;
                 1.0 + depth * share * (TAU * (middle + phase)).sin()
             }
-            Form::Curve { points, sums, period } => {
+            Waveform::Curve { points, sums, period } => {
                 let [_, whole] = along(points, sums, period.unwrap_or(0.0));
                 let [_, before] = along(points, sums, 0.0);
                 let integral = |time: f64| match period {

@@ -12,7 +12,7 @@
 //! * Choice on a grid: a row by the sums of rows, then a column within it (Pharr, Jakob and Humphreys,
 //!   *Physically Based Rendering*, 4th edition, section A.5).
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use etendue_geometry::disk;
 use etendue_geometry::glam::DVec3;
@@ -82,12 +82,6 @@ pub fn cone_direction([u, v]: [f64; 2], cos_max: f64) -> DVec3 {
     let (sin, cos) = (TAU * v).sin_cos();
     let r = (short * (2.0 - short)).max(0.0).sqrt();
     DVec3::new(r * cos, r * sin, 1.0 - short)
-}
-
-/// Solid angle of that cone (sr).
-#[must_use]
-pub fn cone_angle(cos_max: f64) -> f64 {
-    2.0 * PI * (1.0 - cos_max)
 }
 
 /// Barycentric weights of the second and third corner, uniform over a triangle (Turk 1990).

@@ -66,7 +66,7 @@ impl Spectra {
 
 /// Directions that are asked together; kept for the next.
 #[derive(Debug, Default)]
-pub(crate) struct Asked {
+pub(crate) struct SkySamples {
     /// Lanes and the chance of each.
     lanes: Vec<(usize, f64)>,
     squares: Vec<[f64; 2]>,
@@ -75,7 +75,7 @@ pub(crate) struct Asked {
     pub(crate) there: OnMap,
 }
 
-impl Asked {
+impl SkySamples {
     pub(crate) fn clear(&mut self) {
         self.lanes.clear();
         self.squares.clear();
@@ -124,11 +124,11 @@ impl Sky {
     /// direction with the density of that (1/sr), its place on the map, and the colour there.
     pub(crate) fn choose(
         &self,
-        asked: &mut Asked,
+        asked: &mut SkySamples,
         mut each: impl FnMut(usize, (DVec3, f64), ([f64; 2], &Color)),
     ) {
         let Some((map, sampler)) = &self.map else { return };
-        let Asked { lanes, squares, there, .. } = asked;
+        let SkySamples { lanes, squares, there, .. } = asked;
         sampler.sample(map, squares, there);
         let lit = there.places.iter().copied().zip(&there.colors);
         let chosen = there.directions.iter().zip(&there.densities);

@@ -14,7 +14,7 @@ use crate::form::Form;
 use crate::panels::lens_curves::LensCurves;
 use crate::panels::light_field::{LightFieldPanel, Shows};
 use crate::state::{Asking, Listing, PictureCanvas, PixelQuery, ShownPicture, Tool};
-use crate::worker::{Kind, News, Shown, Task, Wake, Wish, Worker};
+use crate::worker::{Kind, News, ScreenPicture, Task, Wake, Wish, Worker};
 
 /// All of the window.
 pub(crate) struct App {
@@ -203,7 +203,7 @@ impl App {
         }
     }
 
-    fn shown(&mut self, ctx: &Context, shown: Shown) {
+    fn shown(&mut self, ctx: &Context, shown: ScreenPicture) {
         if self.document.is_none() {
             return;
         }
@@ -214,8 +214,8 @@ impl App {
         }
     }
 
-    fn show_picture(&mut self, ctx: &Context, shown: Shown) {
-        let Shown { number, screen, factor, samples, layer, is_final, preview, .. } = shown;
+    fn show_picture(&mut self, ctx: &Context, shown: ScreenPicture) {
+        let ScreenPicture { number, screen, factor, samples, layer, is_final, preview, .. } = shown;
         let before = self.picture.take();
         let layers = match (preview.is_some(), &before) {
             // Between two passes the layers are those of the picture before.

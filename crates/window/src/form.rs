@@ -22,7 +22,7 @@ pub(crate) struct Form {
 
 /// A value in a form: where it is, and what it is there (null where it is absent).
 #[derive(Debug, Clone, Copy)]
-struct Field<'a> {
+struct FormField<'a> {
     schema: &'a Value,
     pointer: &'a str,
     value: &'a Value,
@@ -39,7 +39,7 @@ impl Form {
     pub(crate) fn show(&self, ui: &mut Ui, key: &str, value: &Value, edits: &mut Vec<Edit>) {
         let pointer = pointer_below("", key);
         let schema = &self.schema["properties"][key];
-        let field = Field { schema, pointer: &pointer, value, is_required: true };
+        let field = FormField { schema, pointer: &pointer, value, is_required: true };
         self.inner(ui, field, edits);
     }
 
@@ -74,7 +74,7 @@ impl Form {
     }
 
     /// A labelled value: a line, or a heading with what is below it.
-    fn field(&self, ui: &mut Ui, key: &str, field: Field<'_>, edits: &mut Vec<Edit>) {
+    fn field(&self, ui: &mut Ui, key: &str, field: FormField<'_>, edits: &mut Vec<Edit>) {
         let schema = self.resolved(field.schema);
         let about = field.schema["description"].as_str().or(schema["description"].as_str());
         let label = key.replace('_', " ");
@@ -111,12 +111,12 @@ impl Form {
         });
     }
 
-    fn inner(&self, ui: &mut Ui, field: Field<'_>, edits: &mut Vec<Edit>) {
+    fn inner(&self, ui: &mut Ui, field: FormField<'_>, edits: &mut Vec<Edit>) {
         let schema = match self.resolved(field.schema) {
             schema if field.value.is_object() => self.of_objects(schema),
             schema => schema,
         };
-        let field = Field { schema, ..field };
+        let field = FormField { schema, ..field };
         if let Some(variants) = variants(schema) {
             return self.tagged(ui, field, &variants, edits);
         }
@@ -134,7 +134,7 @@ impl Form {
     fn tagged(
         &self,
         ui: &mut Ui,
-        field: Field<'_>,
+        field: FormField<'_>,
         (tag, variants): &(&str, Vec<(&str, &Value)>),
         edits: &mut Vec<Edit>,
     ) {
@@ -155,7 +155,7 @@ impl Form {
         mark(ui.ctx(), &place, shown.response.rect);
         let chosen = variants.iter().find(|(name, _)| Some(*name) == now);
         if let (Some((_, variant)), Value::Object(members)) = (chosen, field.value) {
-            self.members(ui, Field { schema: variant, ..field }, members, edits);
+            self.members(ui, FormField { schema: variant, ..field }, members, edits);
         }
     }
 
@@ -220,7 +220,7 @@ impl Form {
     fn members(
         &self,
         ui: &mut Ui,
-        field: Field<'_>,
+        field: FormField<'_>,
         members: &Map<String, Value>,
         edits: &mut Vec<Edit>,
     ) {
@@ -235,7 +235,7 @@ impl Form {
         for (key, schema) in there {
             let pointer = pointer_below(field.pointer, key);
             let is_required = needed.contains(&&**key);
-            let below = Field { schema, pointer: &pointer, value: &members[key], is_required };
+            let below = FormField { schema, pointer: &pointer, value: &members[key], is_required };
             self.field(ui, key, below, edits);
         }
         // Names that the user gives: materials.
@@ -243,7 +243,8 @@ impl Form {
         if others.is_object() {
             for (key, value) in members {
                 let pointer = pointer_below(field.pointer, key);
-                let below = Field { schema: others, pointer: &pointer, value, is_required: false };
+                let below =
+                    FormField { schema: others, pointer: &pointer, value, is_required: false };
                 self.field(ui, key, below, edits);
             }
         }
@@ -288,14 +289,14 @@ impl Form {
         mark(ui.ctx(), &format!("{pointer}+"), menu.response.rect);
     }
 
-    fn list(&self, ui: &mut Ui, field: Field<'_>, list: &[Value], edits: &mut Vec<Edit>) {
+    fn list(&self, ui: &mut Ui, field: FormField<'_>, list: &[Value], edits: &mut Vec<Edit>) {
         let items = &field.schema["items"];
         for (i, value) in list.iter().enumerate() {
             let pointer = format!("{}/{i}", field.pointer);
             let name =
                 ["name", "file", "shape", "type"].iter().find_map(|key| value[*key].as_str());
             let title = format!("{} {}", i + 1, name.unwrap_or_default());
-            let below = Field { schema: items, pointer: &pointer, value, is_required: false };
+            let below = FormField { schema: items, pointer: &pointer, value, is_required: false };
             self.field(ui, &title, below, edits);
         }
         if items.is_object() && ui.small_button("add one").clicked() {
@@ -304,7 +305,7 @@ impl Form {
         }
     }
 
-    fn absent(&self, ui: &mut Ui, field: Field<'_>, edits: &mut Vec<Edit>) {
+    fn absent(&self, ui: &mut Ui, field: FormField<'_>, edits: &mut Vec<Edit>) {
         ui.weak("default");
         if ui.small_button("set").clicked() {
             edits.push(Edit::set(field.pointer, self.something(field.schema)));

@@ -71,8 +71,8 @@ pub(crate) enum News {
     /// A wish makes no sense.
     Refused(u64, String),
     /// A picture, rough or fine.
-    Shown(Box<Shown>),
-    /// Work that is being done, and the share of it that is done.
+    Shown(Box<ScreenPicture>),
+    /// What is being done, and the share of it that is done.
     Busy(&'static str, f64),
     /// Nothing is being done.
     Idle,
@@ -86,7 +86,7 @@ pub(crate) enum News {
 
 /// A picture to be shown.
 #[derive(Debug)]
-pub(crate) struct Shown {
+pub(crate) struct ScreenPicture {
     /// The wish that it answers.
     pub(crate) number: u64,
     pub(crate) screen: Screen,

@@ -1,8 +1,10 @@
-//! The calls of `oidn.h` that are made: those of versions 1.4 and 2, which differ in names alone.
+//! Where the library is, and the calls of `oidn.h` that are made: those of versions 1.4 and 2, which differ in names alone.
 
-use std::ffi::{c_char, c_int, c_void};
+use std::ffi::{OsStr, OsString, c_char, c_int, c_void};
 
 use libloading::{Error, Library};
+
+use crate::OidnError;
 
 /// A device or a filter of the library.
 type Handle = *mut c_void;
@@ -73,4 +75,41 @@ unsafe fn function<T: Copy>(library: &Library, names: &[&str]) -> Result<T, Erro
     let found = |name: &&str| unsafe { library.get::<T>(name.as_bytes()) }.map(|symbol| *symbol);
     let [first, others @ ..] = names else { return Err(Error::DlSymUnknown) };
     others.iter().fold(found(first), |before, name| before.or_else(|_| found(name)))
+}
+
+/// The names that the dynamic loader is asked for, the best first.
+const NAMES: [&str; 3] =
+    ["libOpenImageDenoise.so.2", "libOpenImageDenoise.so.1", "libOpenImageDenoise.so"];
+
+/// The environment variable that names the library.
+const VARIABLE: &str = "ETENDUE_OIDN";
+
+/// The functions of the library that is named, or else found, and what it is called.
+pub(crate) fn find() -> Result<(Api, String), OidnError> {
+    let named = std::env::var_os(VARIABLE).filter(|name| !name.is_empty());
+    let found = match &named {
+        Some(name) => {
+            load(name).map_err(|why| unusable(name, &why)).map(|library| (name.clone(), library))?
+        }
+        None => {
+            let loaded = |name: &str| Some((OsString::from(name), load(OsStr::new(name)).ok()?));
+            NAMES.iter().find_map(|name| loaded(name)).ok_or(OidnError::Missing)?
+        }
+    };
+    let (name, library) = found;
+    // SAFETY: its name says that it is Open Image Denoise, and it is not unloaded.
+    let api = unsafe { Api::of(&library) };
+    // Its threads may outlive what was asked of it.
+    std::mem::forget(library);
+    Ok((api.map_err(|why| unusable(&name, &why))?, name.to_string_lossy().into_owned()))
+}
+
+fn load(name: &OsStr) -> Result<Library, libloading::Error> {
+    // SAFETY: what runs when the library is loaded is its own start; the user, or the system's dynamic
+    // loader, has chosen it.
+    unsafe { Library::new(name) }
+}
+
+fn unusable(name: &OsStr, why: &libloading::Error) -> OidnError {
+    OidnError::Unusable { library: name.to_string_lossy().into_owned(), why: why.to_string() }
 }

@@ -10,7 +10,6 @@
 //!   `RT`, and guides that lose their own noise first ("prefiltering").
 
 mod api;
-mod library;
 
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::fmt;
@@ -113,7 +112,7 @@ impl Denoiser {
     ///
     /// When there is no library, or none that works on this machine.
     pub fn open(threads: usize) -> Result<Self, OidnError> {
-        let (api, library) = library::find()?;
+        let (api, library) = api::find()?;
         let unusable = |why: String| OidnError::Unusable { library: library.clone(), why };
         // SAFETY: the type of device is one of the interface's.
         let device = NonNull::new(unsafe { (api.new_device)(CPU) });
@@ -161,7 +160,7 @@ impl Denoiser {
         let mut guides = guides;
         if let Some(Guides { albedo, normal }) = &mut guides {
             for (name, image) in [(c"albedo", albedo), (c"normal", normal)] {
-                let filter = Filter::new(self)?;
+                let filter = FilterHandle::new(self)?;
                 let data = checked(size, image)?;
                 // SAFETY: the image has the pixels of `size`, and lives until the filter has run.
                 unsafe {
@@ -171,7 +170,7 @@ impl Denoiser {
                 filter.run()?;
             }
         }
-        let filter = Filter::new(self)?;
+        let filter = FilterHandle::new(self)?;
         let data = checked(size, color)?;
         // SAFETY: the images have the pixels of `size`, which was checked of the guides above, and live until
         // the filter has run: `guides` is not touched before.
@@ -226,12 +225,12 @@ fn checked([width, height]: [usize; 2], image: &mut [f32]) -> Result<*mut f32, O
 }
 
 /// A filter of a device, until it has run.
-struct Filter<'a> {
+struct FilterHandle<'a> {
     denoiser: &'a Denoiser,
     handle: NonNull<c_void>,
 }
 
-impl<'a> Filter<'a> {
+impl<'a> FilterHandle<'a> {
     fn new(denoiser: &'a Denoiser) -> Result<Self, OidnError> {
         // SAFETY: the device is valid, and the name is a string of C.
         let handle = unsafe { (denoiser.api.new_filter)(denoiser.device.as_ptr(), c"RT".as_ptr()) };
@@ -274,7 +273,7 @@ impl<'a> Filter<'a> {
     }
 }
 
-impl Drop for Filter<'_> {
+impl Drop for FilterHandle<'_> {
     fn drop(&mut self) {
         // SAFETY: the filter is released once, and nothing of it is used afterwards.
         unsafe { (self.denoiser.api.release_filter)(self.handle.as_ptr()) };

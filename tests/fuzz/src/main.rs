@@ -2,6 +2,8 @@
 //! process of its own; the seeds alone with `--seconds 0`. `--write-seeds FOLDER` writes the seeds
 //! for `cargo fuzz`; `--one TARGET FILE` reads one file.
 
+#![allow(clippy::disallowed_methods, reason = "it reads and writes what it is told to")]
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;

@@ -1,4 +1,5 @@
 //! Every case is a test, and the page of the documents names every case and no other.
+#![allow(clippy::disallowed_methods, reason = "tests set their stage by hand")]
 
 use std::collections::BTreeSet;
 use std::process::ExitCode;

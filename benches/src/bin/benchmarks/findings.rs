@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use etendue_bench::timing::Series;
+use etendue_bench::timing::Timings;
 
 /// One contestant at one question.
 #[derive(Debug, Clone)]
 pub(crate) struct Record {
     pub(crate) who: String,
     /// Seconds, round by round.
-    pub(crate) series: Series,
+    pub(crate) series: Timings,
     /// Bytes that it holds, where that was asked.
     pub(crate) bytes: Option<u64>,
 }

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use etendue_accel::limit::{BareScene, Mode, Packet};
+use etendue_accel::limit::{BareScene, Mode, RayHit16};
 use etendue_accel::{Accel, BuildOptions};
 use etendue_bench::timing::{Turn, take_turns, wall};
 use etendue_benches::effort::Effort;
@@ -48,7 +48,7 @@ pub(crate) fn measure(effort: Effort, findings: &mut Findings) -> anyhow::Result
     let picture = Prepared::load(&[])?;
     let mode = Mode { quality: data.plan.quality, compact: false };
     let bare = BareScene::build(baked(&data.scene.geometry), mode, 0)?;
-    let packets = Packet::of(&tiles(&data.scene.camera));
+    let packets = RayHit16::of(&tiles(&data.scene.camera));
     let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pools = [(1, pool(1)?), (2, pool(2)?)];
     let mut titles = Vec::new();
@@ -109,7 +109,7 @@ impl Prepared {
     }
 }
 
-fn trace_bare(pool: &ThreadPool, scene: &BareScene, packets: &[Packet]) -> f64 {
+fn trace_bare(pool: &ThreadPool, scene: &BareScene, packets: &[RayHit16]) -> f64 {
     let mut records = packets.to_vec();
     let (seconds, ()) = wall(|| {
         pool.install(|| {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::Context;
 use etendue_bench::timing;
-use etendue_bench::timing::Series;
+use etendue_bench::timing::Timings;
 use etendue_benches::effort::Effort;
 use etendue_benches::field::names;
 
@@ -261,14 +261,14 @@ fn ratio(value: Option<f64>) -> String {
 }
 
 /// Median, fastest and slowest as millions a second.
-fn rates(series: &Series, items: f64) -> String {
+fn rates(series: &Timings, items: f64) -> String {
     let rate = |seconds: f64| items / seconds / 1e6;
     let [middle, fast, slow] = [series.median(), series.fastest(), series.slowest()].map(rate);
     format!("{middle:.2} ({slow:.2} to {fast:.2})")
 }
 
 /// Median, fastest and slowest in seconds.
-fn seconds(series: &Series) -> String {
+fn seconds(series: &Timings) -> String {
     let digits = if series.median() < 0.1 { 4 } else { 3 };
     let [middle, fast, slow] = [series.median(), series.fastest(), series.slowest()];
     format!("{middle:.digits$} ({fast:.digits$} to {slow:.digits$})")

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, ensure};
-use etendue_accel::limit::{BareScene, Mode, Packet};
+use etendue_accel::limit::{BareScene, Mode, RayHit16};
 use etendue_accel::{BuildOptions, Quality};
 use etendue_bench::timing::ProcessMemory;
 use etendue_bench::timing::{Turn, take_turns, wall};
@@ -120,7 +120,7 @@ impl Job {
 
 fn contest(effort: Effort, mesh: &str, triangles: u64, job: &Job) -> anyhow::Result<Contest> {
     let geometry = meshes::blob(triangles)?;
-    let packets = Packet::of(&View::framing(geometry.bounds()).primary());
+    let packets = RayHit16::of(&View::framing(geometry.bounds()).primary());
     let model = job.folder.join("blob.glb");
     let fault: RefCell<Option<anyhow::Error>> = RefCell::new(None);
     let run = |more: &[&str]| {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, anyhow};
 use etendue_accel::Quality;
-use etendue_bench::accelerators::{self, Finding, Method, RENDER_WIDTH};
+use etendue_bench::accelerators::{self, AcceleratorMeasurement, Method, RENDER_WIDTH};
 use etendue_bench::findings::Findings;
 use etendue_bench::hits::Rays;
 use etendue_benches::effort::Effort;
@@ -115,7 +115,7 @@ fn accelerators(
     effort: Effort,
     geometry: &Arc<Geometry>,
     rays: &Rays,
-) -> anyhow::Result<(Vec<Finding>, usize)> {
+) -> anyhow::Result<(Vec<AcceleratorMeasurement>, usize)> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let mut threads = vec![1, cores];
     threads.dedup();
@@ -133,7 +133,7 @@ fn accelerators(
 }
 
 /// One of the charts that `etendue bench` draws.
-fn chart(findings: &[Finding], stem: &str) -> anyhow::Result<Chart> {
+fn chart(findings: &[AcceleratorMeasurement], stem: &str) -> anyhow::Result<Chart> {
     let findings = Findings {
         machine: Vec::new(),
         scene: Vec::new(),
@@ -151,9 +151,9 @@ fn chart(findings: &[Finding], stem: &str) -> anyhow::Result<Chart> {
 const TITLES: [&str; 7] =
     ["", "build (s)", "MB", "Mrays/s, all threads", "missed", "false", "wrong triangle"];
 
-fn rows(findings: &[Finding]) -> Vec<Vec<String>> {
+fn rows(findings: &[AcceleratorMeasurement]) -> Vec<Vec<String>> {
     let most = findings.iter().map(|finding| finding.threads).max().unwrap_or(1);
-    let row = |finding: &Finding| {
+    let row = |finding: &AcceleratorMeasurement| {
         let errors = &finding.errors;
         let rate = |seconds: f64| errors.rays as f64 / seconds / 1e6;
         vec![

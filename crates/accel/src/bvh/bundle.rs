@@ -4,7 +4,7 @@ use etendue_geometry::glam::Vec3;
 
 use super::lanes::{Arithmetic, Lanes};
 use super::ray::{BoxTest, FAR, SKEW_TRIANGLE_ERROR, TriangleTest, axes, box_error, steer};
-use crate::parts::{Instance, LocalRays};
+use crate::parts::{LocalRays, PartInstance};
 
 /// Rays of a packet: as many as there are lanes.
 pub(super) const PACKET: usize = 16;
@@ -65,7 +65,7 @@ impl FrameRays {
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "single precision finds")]
     pub(super) fn parallel(
-        instance: &Instance,
+        instance: &PartInstance,
         origin: [&[f64; PACKET]; 3],
         direction: [&[f64; PACKET]; 3],
         t_min: &[f64; PACKET],

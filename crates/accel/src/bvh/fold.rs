@@ -7,8 +7,8 @@ use etendue_geometry::Geometry;
 use rayon::prelude::*;
 
 use super::wide::{
-    Arena, Cell, Child, INSTANCE_NUMBERS, LEAF_CELLS, LeafNumbers, LeafUnits, MOST_CELLS,
-    MOST_IN_LEAF, NO_CHILDREN, WideTree,
+    Arena, Child, INSTANCE_NUMBERS, LEAF_CELLS, LeafNumbers, LeafUnits, MOST_CELLS, MOST_IN_LEAF,
+    NO_CHILDREN, NodeChunk, WideTree,
 };
 use crate::parts::{Blas, MeshTriangles};
 use crate::tree::{Ref, Tree};
@@ -26,14 +26,14 @@ const PARALLEL_NODES: usize = 1 << 13;
 pub(super) fn fold(tree: &Tree, leaf: &impl WriteLeaf) -> Option<WideTree> {
     let Some(root) = tree.nodes.first() else { return Some(WideTree::default()) };
     // The top of the tree, and its subtrees side by side.
-    let mut top = Fold::new(tree, leaf);
+    let mut top = TreeCollapse::new(tree, leaf);
     top.later = Some(Vec::new());
     top.node(0, tree.nodes.len());
     let later = top.later.take().unwrap_or_default();
     let mut pieces: Vec<Piece> = later
         .par_iter()
         .map(|subtree| {
-            let mut fold = Fold::new(tree, leaf);
+            let mut fold = TreeCollapse::new(tree, leaf);
             fold.node(subtree.root, subtree.size);
             fold.piece
         })
@@ -67,8 +67,8 @@ pub(super) fn fold(tree: &Tree, leaf: &impl WriteLeaf) -> Option<WideTree> {
 /// A part of the tree whose place in the whole is not known yet.
 #[derive(Default)]
 struct Piece {
-    cells: Vec<Cell>,
-    /// Positions in `cells` at which its nodes begin.
+    cells: Vec<NodeChunk>,
+    /// Where its nodes begin.
     nodes: Vec<usize>,
     place: usize,
 }
@@ -95,7 +95,7 @@ impl Piece {
     }
 }
 
-struct Fold<'a, L> {
+struct TreeCollapse<'a, L> {
     tree: &'a Tree,
     leaf: &'a L,
     piece: Piece,
@@ -118,7 +118,7 @@ struct Children {
     len: usize,
 }
 
-impl<'a, L: WriteLeaf> Fold<'a, L> {
+impl<'a, L: WriteLeaf> TreeCollapse<'a, L> {
     fn new(tree: &'a Tree, leaf: &'a L) -> Self {
         Self { tree, leaf, piece: Piece::default(), later: None }
     }
@@ -190,7 +190,7 @@ impl<'a, L: WriteLeaf> Fold<'a, L> {
     }
 
     fn write_leaf(&mut self, node: usize, slot: usize, range: std::ops::Range<usize>) {
-        let mut cells = [Cell([0.0; 8]); LEAF_CELLS];
+        let mut cells = [NodeChunk([0.0; 8]); LEAF_CELLS];
         let numbers: &mut [LeafNumbers; 1] = bytemuck::cast_mut(&mut cells);
         let refs = &self.tree.refs[range];
         let used = self.leaf.write(refs, &mut numbers[0]);

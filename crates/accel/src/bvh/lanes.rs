@@ -11,7 +11,7 @@ mod x86;
 
 use pulp::NullaryFnOnce;
 
-use super::wide::Cell;
+use super::wide::NodeChunk;
 
 /// Arithmetic on some numbers side by side.
 pub(super) trait Arithmetic: Copy {
@@ -54,7 +54,7 @@ pub(super) trait Lanes: Arithmetic + Send + Sync {
     fn run<F: NullaryFnOnce>(self, f: F) -> F::Output;
 
     /// Begins to fetch the cells from `place` on that a node or a leaf may have.
-    fn prefetch(self, cells: &[Cell], place: usize);
+    fn prefetch(self, cells: &[NodeChunk], place: usize);
     fn load(self, values: &[f32; 8]) -> Self::F;
     fn store(self, values: Self::F) -> [f32; 8];
 
@@ -250,7 +250,7 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn prefetch(self, _: &[Cell], _: usize) {}
+    fn prefetch(self, _: &[NodeChunk], _: usize) {}
 
     #[inline(always)]
     fn load(self, values: &[f32; 8]) -> [f32; 8] {

@@ -19,11 +19,11 @@ use self::triangles::PacketTriangles;
 use super::bundle::{Bundle, EachRay, FEWEST, FrameRays, PACKET, bits};
 use super::lanes::{Arithmetic, Lanes};
 use super::single::{Search, Sink, Stacks, Visit};
-use super::traverse::{Leaves, Stack, traverse};
-use super::wide::{Cell, Child, instances_of};
+use super::traverse::{Leaves, TraversalStack, traverse};
+use super::wide::{Child, NodeChunk, instances_of};
 use super::{Bvh, PlacedTriangles};
 use crate::nearest::Query;
-use crate::parts::Instance;
+use crate::parts::PartInstance;
 
 /// Sixteen rays and what has become of them.
 pub(super) struct Packet<'a, S> {
@@ -85,7 +85,7 @@ impl<'a, S: Sink> Packet<'a, S> {
     }
 
     #[inline(always)]
-    fn in_frame(&self, instance: &Instance) -> FrameRays {
+    fn in_frame(&self, instance: &PartInstance) -> FrameRays {
         let parallel = FrameRays::parallel(instance, self.origin, self.direction, self.t_min);
         parallel.unwrap_or_else(|| {
             FrameRays::new(&instance.rays(self.origin, self.direction), self.t_min)
@@ -134,7 +134,7 @@ impl<'a, S: Sink> Packet<'a, S> {
         bvh: &'b Bvh,
         lane: usize,
         query: &'b Query,
-        stack: &'b mut Stack,
+        stack: &'b mut TraversalStack,
     ) -> Search<'b, L, S> {
         let t_max = self.t_max[lane];
         Search { lanes, bvh, query, t_max, sink: &mut self.sinks[lane], stack }
@@ -146,9 +146,9 @@ impl<'a, S: Sink> Packet<'a, S> {
         &mut self,
         lanes: L,
         bvh: &Bvh,
-        instance: &Instance,
+        instance: &PartInstance,
         group: u32,
-        stack: &mut Stack,
+        stack: &mut TraversalStack,
     ) {
         if group.count_ones() < FEWEST {
             self.visit_alone(lanes, bvh, instance, group, stack);
@@ -162,9 +162,9 @@ impl<'a, S: Sink> Packet<'a, S> {
         &mut self,
         lanes: L,
         bvh: &Bvh,
-        instance: &Instance,
+        instance: &PartInstance,
         group: u32,
-        stack: &mut Stack,
+        stack: &mut TraversalStack,
     ) {
         for lane in bits(group) {
             let query = self.query(lane);
@@ -219,7 +219,7 @@ struct PacketInstances<'a, 'b, L: Lanes, S> {
     rays: &'a FrameRays,
     each: EachRay<L::Sixteen>,
     group: u32,
-    stack: &'a mut Stack,
+    stack: &'a mut TraversalStack,
 }
 
 impl<L: Lanes, S: Sink> Leaves for PacketInstances<'_, '_, L, S> {
@@ -246,9 +246,9 @@ struct VisitTogether<'a, 'b, L, S> {
     lanes: L,
     bvh: &'a Bvh,
     packet: &'a mut Packet<'b, S>,
-    instance: &'a Instance,
+    instance: &'a PartInstance,
     group: u32,
-    stack: &'a mut Stack,
+    stack: &'a mut TraversalStack,
 }
 
 impl<L: Lanes, S: Sink> NullaryFnOnce for VisitTogether<'_, '_, L, S> {
@@ -262,7 +262,7 @@ impl<L: Lanes, S: Sink> NullaryFnOnce for VisitTogether<'_, '_, L, S> {
             let together = rays.same_octant(group);
             group &= !together;
             if let Some(bundle) = Bundle::new(lanes, &rays, together) {
-                let cells: &[Cell] = &bvh.parts[instance.part as usize].tree.cells;
+                let cells: &[NodeChunk] = &bvh.parts[instance.part as usize].tree.cells;
                 let triangles = PlacedTriangles::new(bvh, instance);
                 let mut leaves =
                     PacketTriangles::new(lanes, cells, triangles, packet, &rays, together, &bundle);
@@ -277,7 +277,7 @@ impl<L: Lanes, S: Sink> NullaryFnOnce for VisitTogether<'_, '_, L, S> {
 }
 
 /// A batch of rays, with the instruction set to trace it by.
-pub(super) struct Batch<'a, L, S, F> {
+pub(super) struct BatchTraversal<'a, L, S, F> {
     pub(super) lanes: L,
     pub(super) bvh: &'a Bvh,
     pub(super) rays: &'a RayBatch,
@@ -286,7 +286,7 @@ pub(super) struct Batch<'a, L, S, F> {
     pub(super) seen: PhantomData<S>,
 }
 
-impl<L: Lanes, S: Sink, F: FnMut(usize, S)> NullaryFnOnce for Batch<'_, L, S, F> {
+impl<L: Lanes, S: Sink, F: FnMut(usize, S)> NullaryFnOnce for BatchTraversal<'_, L, S, F> {
     type Output = ();
 
     #[inline(always)]
@@ -314,7 +314,7 @@ impl<L: Lanes, S: Sink, F: FnMut(usize, S)> NullaryFnOnce for Batch<'_, L, S, F>
     }
 }
 
-impl<L: Lanes, S: Sink, F: FnMut(usize, S)> Batch<'_, L, S, F> {
+impl<L: Lanes, S: Sink, F: FnMut(usize, S)> BatchTraversal<'_, L, S, F> {
     /// Traces as many whole packets as there are; answers how many rays that were.
     #[inline(always)]
     fn packets(&mut self, stacks: &mut Stacks) -> usize {

@@ -11,7 +11,7 @@ use etendue_geometry::glam::{DVec3, Vec3};
 use super::lanes::{Arithmetic, Lanes};
 use super::wide::LeafNumbers;
 use crate::nearest::Query;
-use crate::parts::{Instance, LocalRay};
+use crate::parts::{LocalRay, PartInstance};
 
 /// A ray in a frame's single-precision coordinates, with unit direction; its own distance τ is
 /// (t · `length`) − `skipped`.
@@ -63,7 +63,7 @@ const LEAST: f32 = 1e-12;
 impl NarrowRay {
     /// The world's ray in `instance`'s frame.
     #[inline(always)]
-    pub(super) fn new(instance: &Instance, query: &Query) -> Self {
+    pub(super) fn new(instance: &PartInstance, query: &Query) -> Self {
         let local = instance.ray(query.origin, query.direction);
         // Nearly always a frame parallel to the world, a unit direction and an origin nearby.
         let scale = instance.parallel_scale;
@@ -240,7 +240,13 @@ impl<L: Arithmetic> TriangleTest<L> {
     /// Tests some rays (this test being that of a different ray in each lane) against triangle `i`
     /// of a leaf before `far`.
     #[inline(always)]
-    pub(super) fn look(&self, l: L, runs: &Runs<'_>, i: usize, far: L::F) -> TriangleLook<L> {
+    pub(super) fn look(
+        &self,
+        l: L,
+        runs: &LeafCorners<'_>,
+        i: usize,
+        far: L::F,
+    ) -> TriangleLook<L> {
         let [a, b, c] = runs.corners;
         let a = self.shear(l, [l.splat(a[0][i]), l.splat(a[1][i]), l.splat(a[2][i])]);
         let b = self.shear(l, [l.splat(b[0][i]), l.splat(b[1][i]), l.splat(b[2][i])]);
@@ -346,11 +352,11 @@ fn meet_slabs<L: Lanes>(
 }
 
 /// The coordinates of a leaf's triangles: a run for each corner and axis, along a test's axes.
-pub(super) struct Runs<'a> {
+pub(super) struct LeafCorners<'a> {
     corners: [[&'a [f32]; 3]; 3],
 }
 
-impl<'a> Runs<'a> {
+impl<'a> LeafCorners<'a> {
     #[inline(always)]
     pub(super) fn new(numbers: &'a LeafNumbers, n: usize, axes: [usize; 3]) -> Option<Self> {
         let [x, y, z] = [axes[0] * n, axes[1] * n, axes[2] * n];

@@ -4,11 +4,11 @@ use pulp::NullaryFnOnce;
 
 use super::lanes::Lanes;
 use super::ray::{BoxTest, NarrowRay, TriangleTest};
-use super::traverse::{Leaves, Stack, traverse};
-use super::wide::{Cell, Child, instances_of, leaf_numbers};
+use super::traverse::{Leaves, TraversalStack, traverse};
+use super::wide::{Child, NodeChunk, instances_of, leaf_numbers};
 use super::{Bvh, PlacedTriangles};
 use crate::nearest::{Nearest, Query, Triangle};
-use crate::parts::Instance;
+use crate::parts::PartInstance;
 use crate::watertight;
 
 /// Receiver of the hits of one ray.
@@ -59,13 +59,13 @@ impl Sink for AnyHit {
 
 /// The stacks of the tree over the instances and of the instances' own.
 pub(super) struct Stacks {
-    pub(super) outer: Stack,
-    pub(super) inner: Stack,
+    pub(super) outer: TraversalStack,
+    pub(super) inner: TraversalStack,
 }
 
 impl Stacks {
     pub(super) fn new() -> Self {
-        Self { outer: Stack::new(), inner: Stack::new() }
+        Self { outer: TraversalStack::new(), inner: TraversalStack::new() }
     }
 }
 
@@ -77,12 +77,12 @@ pub(super) struct Search<'a, L, S> {
     /// Distance up to which to look.
     pub(super) t_max: f64,
     pub(super) sink: &'a mut S,
-    pub(super) stack: &'a mut Stack,
+    pub(super) stack: &'a mut TraversalStack,
 }
 
 impl<L: Lanes, S: Sink> Search<'_, L, S> {
     #[inline(always)]
-    pub(super) fn run(&mut self, outer: &mut Stack) {
+    pub(super) fn run(&mut self, outer: &mut TraversalStack) {
         if let [instance] = &self.bvh.layout.instances[..] {
             self.lanes.run(Visit { search: self, instance });
         } else if !self.bvh.top.cells.is_empty() {
@@ -119,7 +119,7 @@ impl<L: Lanes, S: Sink> Leaves for InstanceLeaves<'_, '_, L, S> {
 /// not be inlined twice.
 pub(super) struct Visit<'a, 'b, L, S> {
     pub(super) search: &'a mut Search<'b, L, S>,
-    pub(super) instance: &'a Instance,
+    pub(super) instance: &'a PartInstance,
 }
 
 impl<L: Lanes, S: Sink> NullaryFnOnce for Visit<'_, '_, L, S> {
@@ -132,7 +132,7 @@ impl<L: Lanes, S: Sink> NullaryFnOnce for Visit<'_, '_, L, S> {
         let shape = &search.bvh.parts[instance.part as usize];
         let ray = NarrowRay::new(instance, search.query);
         let boxes = BoxTest::new(lanes, &ray);
-        let cells: &[Cell] = &shape.tree.cells;
+        let cells: &[NodeChunk] = &shape.tree.cells;
         let mut leaves = TriangleLeaves {
             cells,
             test: TriangleTest::new(lanes, &ray),
@@ -154,7 +154,7 @@ impl<L: Lanes, S: Sink> NullaryFnOnce for Visit<'_, '_, L, S> {
 /// Leaves of a part.
 struct TriangleLeaves<'a, L: Lanes, S> {
     lanes: L,
-    cells: &'a [Cell],
+    cells: &'a [NodeChunk],
     triangles: PlacedTriangles<'a>,
     query: &'a Query,
     ray: NarrowRay,

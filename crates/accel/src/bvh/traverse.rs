@@ -2,17 +2,17 @@
 
 use super::lanes::Lanes;
 use super::ray::BoxTest;
-use super::wide::{Cell, Child, WideNode};
+use super::wide::{Child, NodeChunk, WideNode};
 use crate::tree::MAX_DEPTH;
 
 /// Children still to visit, each with the distance at which the ray enters it in the upper half
 /// and the [`Child`] in the lower: positive floats order like their bits.
-pub(super) struct Stack(Box<[u64; STACK]>);
+pub(super) struct TraversalStack(Box<[u64; STACK]>);
 
 /// Seven siblings a level, rounded up to a power of two so that an index can be masked.
 const STACK: usize = (7 * MAX_DEPTH + 1).next_power_of_two();
 
-impl Stack {
+impl TraversalStack {
     pub(super) fn new() -> Self {
         Self(Box::new([0; STACK]))
     }
@@ -24,7 +24,7 @@ fn entry(near: f32, child: f32) -> u64 {
 }
 
 #[inline(always)]
-fn node_at(cells: &[Cell], child: Child) -> Option<&WideNode> {
+fn node_at(cells: &[NodeChunk], child: Child) -> Option<&WideNode> {
     cells.get(child.place()..child.place() + 7)?.first_chunk()
 }
 
@@ -80,10 +80,10 @@ pub(super) trait Leaves {
 #[inline(always)]
 pub(super) fn traverse<L: Lanes>(
     lanes: L,
-    cells: &[Cell],
+    cells: &[NodeChunk],
     test: &BoxTest<L>,
     mut far: f32,
-    stack: &mut Stack,
+    stack: &mut TraversalStack,
     leaves: &mut impl Leaves,
 ) {
     let stack = &mut *stack.0;

@@ -1,7 +1,7 @@
 //! The tree as it is traversed: eight boxes a node, tested side by side, and leaves of up to eight
 //! triangles.
 //!
-//! All of it stands in one array of [`Cell`]s, a node before its leaves and those before its inner
+//! All of it stands in one array of [`NodeChunk`]s, a node before its leaves and those before its inner
 //! children, so that what is visited together lies together.
 //!
 //! Memory for a tree: on huge pages where there are any, because rays jump about in it and would
@@ -12,22 +12,22 @@ use std::ops::Deref;
 use bytemuck::{Pod, Zeroable};
 use memmap2::MmapMut;
 
-use crate::parts::Frame;
+use crate::parts::PartFrame;
 use etendue_geometry::glam::DVec3;
 
 /// Eight numbers: the grain in which a tree is stored.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C, align(32))]
-pub(super) struct Cell(pub(super) [f32; 8]);
+pub(super) struct NodeChunk(pub(super) [f32; 8]);
 
 /// A node: the lower and upper bounds of its eight children along x, y and z, a cell each, and the
 /// bits of their [`Child`]. Unused children have boxes that no ray meets.
-pub(super) type WideNode = [Cell; 7];
+pub(super) type WideNode = [NodeChunk; 7];
 
 pub(super) const NO_CHILDREN: WideNode = {
     // Far outside of any frame, and finite, so that a product with 0 is 0.
-    let (lower, upper) = (Cell([1e30; 8]), Cell([-1e30; 8]));
-    [lower, upper, lower, upper, lower, upper, Cell([0.0; 8])]
+    let (lower, upper) = (NodeChunk([1e30; 8]), NodeChunk([-1e30; 8]));
+    [lower, upper, lower, upper, lower, upper, NodeChunk([0.0; 8])]
 };
 
 /// Position of a node or a leaf, and the number of things in a leaf: 32 bits.
@@ -86,7 +86,7 @@ pub(super) const LEAF_CELLS: usize = 16;
 pub(super) type LeafNumbers = [f32; 8 * LEAF_CELLS];
 
 #[inline(always)]
-pub(super) fn leaf_numbers(cells: &[Cell], leaf: Child) -> Option<&LeafNumbers> {
+pub(super) fn leaf_numbers(cells: &[NodeChunk], leaf: Child) -> Option<&LeafNumbers> {
     let cells = cells.get(leaf.place()..leaf.place() + LEAF_CELLS)?;
     bytemuck::cast_slice(cells).first_chunk()
 }
@@ -94,7 +94,7 @@ pub(super) fn leaf_numbers(cells: &[Cell], leaf: Child) -> Option<&LeafNumbers> 
 /// The instances of a leaf: the number, the lower and the upper bounds of each.
 #[inline(always)]
 pub(super) fn instances_of(
-    cells: &[Cell],
+    cells: &[NodeChunk],
     leaf: Child,
 ) -> Option<impl Iterator<Item = (usize, [f32; 3], [f32; 3])>> {
     let (instances, _) = leaf_numbers(cells, leaf)?.as_chunks::<INSTANCE_NUMBERS>();
@@ -114,7 +114,7 @@ impl WideTree {
     }
 
     pub(super) fn bytes(&self) -> usize {
-        size_of_val::<[Cell]>(&self.cells)
+        size_of_val::<[NodeChunk]>(&self.cells)
     }
 }
 
@@ -126,7 +126,7 @@ pub(super) struct LeafUnits {
 }
 
 impl LeafUnits {
-    pub(super) fn of(frame: Frame) -> Self {
+    pub(super) fn of(frame: PartFrame) -> Self {
         Self { origin: frame.origin, inverse_scale: 1.0 / frame.scale }
     }
 
@@ -154,17 +154,17 @@ pub(super) enum Arena {
     Empty,
     /// Mapped memory, which begins on a page.
     Mapped(MmapMut),
-    /// Memory on the heap, where mapping failed.
-    Heap(Vec<Cell>),
+    /// Where mapping failed.
+    Heap(Vec<NodeChunk>),
 }
 
 impl Arena {
     /// `len` cells of zeros, which `fill` sets.
-    pub(super) fn new(len: usize, fill: impl FnOnce(&mut [Cell])) -> Self {
+    pub(super) fn new(len: usize, fill: impl FnOnce(&mut [NodeChunk])) -> Self {
         if len == 0 {
             return Self::Empty;
         }
-        match MmapMut::map_anon(len * size_of::<Cell>()) {
+        match MmapMut::map_anon(len * size_of::<NodeChunk>()) {
             Ok(mut map) => {
                 // Only a wish: without huge pages the same memory works.
                 #[cfg(target_os = "linux")]
@@ -173,7 +173,7 @@ impl Arena {
                 Self::Mapped(map)
             }
             Err(_) => {
-                let mut cells = vec![Cell([0.0; 8]); len];
+                let mut cells = vec![NodeChunk([0.0; 8]); len];
                 fill(&mut cells);
                 Self::Heap(cells)
             }
@@ -182,10 +182,10 @@ impl Arena {
 }
 
 impl Deref for Arena {
-    type Target = [Cell];
+    type Target = [NodeChunk];
 
     #[inline]
-    fn deref(&self) -> &[Cell] {
+    fn deref(&self) -> &[NodeChunk] {
         match self {
             Self::Empty => &[],
             Self::Mapped(map) => bytemuck::cast_slice(map),

@@ -33,7 +33,7 @@ pub enum LimitError {
 
 /// Bytes that Embree holds by its own count.
 #[derive(Debug, Default)]
-struct Bytes {
+struct ByteCounter {
     now: AtomicI64,
     peak: AtomicI64,
 }
@@ -43,7 +43,7 @@ pub struct BareScene {
     scene: sys::RTCScene,
     parts: Vec<sys::RTCScene>,
     device: sys::RTCDevice,
-    bytes: Box<Bytes>,
+    bytes: Box<ByteCounter>,
     /// Owns the buffers that Embree reads, where those are shared.
     _geometry: Option<Arc<Geometry>>,
 }
@@ -92,7 +92,7 @@ impl BareScene {
         // geometry whose buffers they share is kept beside them.
         unsafe {
             let device = sys::rtcNewDevice(config.as_ptr());
-            let bytes = Box::<Bytes>::default();
+            let bytes = Box::<ByteCounter>::default();
             let counter: *mut c_void = ptr::from_ref(&*bytes).cast_mut().cast();
             sys::rtcSetDeviceMemoryMonitorFunction(device, Some(count_bytes), counter);
             let scene = new_scene(device, mode);
@@ -158,7 +158,7 @@ impl BareScene {
     }
 
     /// Finds the closest hits of packets of coherent rays.
-    pub fn closest_packets(&self, packets: &mut [Packet]) {
+    pub fn closest_packets(&self, packets: &mut [RayHit16]) {
         let valid = Valid([-1; WIDTH]);
         let mut arguments = sys::RTCIntersectArguments {
             flags: sys::RTC_RAY_QUERY_FLAG_COHERENT,
@@ -166,7 +166,7 @@ impl BareScene {
         };
         for packet in packets {
             // SAFETY: the scene is committed; packet and mask are of the C types and aligned by
-            // theirs; `Packet::of` has set ids and masks.
+            // theirs; `RayHit16::of` has set ids and masks.
             unsafe {
                 sys::rtcIntersect16(valid.0.as_ptr(), self.scene, &mut packet.0, &mut arguments);
             }
@@ -183,7 +183,7 @@ impl BareScene {
     }
 
     /// Finds whether anything is in the way of packets of coherent rays.
-    pub fn occluded_packets(&self, packets: &mut [Packet]) {
+    pub fn occluded_packets(&self, packets: &mut [RayHit16]) {
         let valid = Valid([-1; WIDTH]);
         let mut arguments = sys::RTCOccludedArguments {
             flags: sys::RTC_RAY_QUERY_FLAG_COHERENT,
@@ -223,7 +223,7 @@ impl Drop for BareScene {
 
 unsafe extern "C" fn count_bytes(user: *mut c_void, bytes: isize, _post: bool) -> bool {
     // SAFETY: `user` is the counter that `build` registered.
-    let counter = unsafe { &*user.cast::<Bytes>() };
+    let counter = unsafe { &*user.cast::<ByteCounter>() };
     let now = counter.now.fetch_add(bytes as i64, Ordering::Relaxed) + bytes as i64;
     counter.peak.fetch_max(now, Ordering::Relaxed);
     true
@@ -296,9 +296,9 @@ struct Valid([i32; WIDTH]);
 
 /// Sixteen rays and their hits, as Embree takes them.
 #[derive(Clone, Copy)]
-pub struct Packet(sys::RTCRayHit16);
+pub struct RayHit16(sys::RTCRayHit16);
 
-impl Packet {
+impl RayHit16 {
     /// Packets of all `batches`, whose lengths are multiples of [`WIDTH`].
     #[must_use]
     pub fn of(batches: &[RayBatch]) -> Vec<Self> {
@@ -333,7 +333,7 @@ impl Packet {
     }
 }
 
-impl fmt::Debug for Packet {
+impl fmt::Debug for RayHit16 {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Packet").field("hits", &self.hits()).finish_non_exhaustive()
     }

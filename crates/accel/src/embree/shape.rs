@@ -78,7 +78,7 @@ impl EmbreeGeometry {
     /// Lets Embree read the triangles where they stand. `mesh` must outlive the scene.
     fn share_triangles(&mut self, mesh: &Mesh) {
         let triangles: &[[u32; 3]] = &mesh.triangles;
-        // SAFETY: the indices stand behind `mesh`, which outlives the scene (`Scene` keeps the
+        // SAFETY: the indices stand behind `mesh`, which outlives the scene (`CommittedScene` keeps the
         // geometry alive, `Buffer` never moves its values), three u32 a triangle; each is less than
         // the number of positions, as `Mesh` promises.
         unsafe {

@@ -6,7 +6,7 @@ use embree4_sys as sys;
 use etendue_geometry::block::LANES;
 use etendue_geometry::{Geometry, MISS, Mesh, Positions, RayBlock};
 
-use super::Scene;
+use super::CommittedScene;
 use super::filter::{self, ExactFilter, NearestSearch};
 use crate::single::Rays32;
 
@@ -60,7 +60,7 @@ impl FoundHits {
     }
 }
 
-impl Scene {
+impl CommittedScene {
     /// The closest hit of each ray in single precision.
     pub(crate) fn closest(&self, rays: &Rays32, coherent: bool, found: &mut FoundHits) {
         self.intersect(rays, coherent, &mut intersect_arguments(coherent), found);
@@ -391,7 +391,7 @@ fn occluded_arguments(coherent: bool) -> sys::RTCOccludedArguments {
 macro_rules! packets {
     ($closest:ident, $occluded:ident, $width:literal, $rayhit:ident, $ray:ident, $intersect:ident,
      $occlude:ident) => {
-        impl Scene {
+        impl CommittedScene {
             fn $closest(
                 &self,
                 rays: &Rays32,

@@ -34,7 +34,7 @@ pub(super) struct FewTriangle {
 }
 
 /// The ray of a lane.
-struct Line {
+struct LaneRay {
     origin: DVec3,
     direction: DVec3,
     moment: DVec3,
@@ -42,7 +42,7 @@ struct Line {
     t_max: f64,
 }
 
-impl Line {
+impl LaneRay {
     fn of(block: &RayBlock, lane: usize) -> Self {
         let (origin, direction) = (vector(&block.origin, lane), vector(&block.direction, lane));
         let [t_min, t_max] = [block.t_min[lane], block.t_max[lane]].map(f64::from);
@@ -51,7 +51,7 @@ impl Line {
 }
 
 /// A hit on a triangle of the list: its number, distance (m), and weights of the second and third corners.
-pub(super) struct Hit {
+pub(super) struct TriangleHit {
     pub(super) number: usize,
     pub(super) t: f64,
     pub(super) weights: [f64; 2],
@@ -59,7 +59,7 @@ pub(super) struct Hit {
 
 impl FewTriangle {
     /// The distance (m) and weights with which a line meets it between its ends.
-    fn hit(&self, edges: &[PluckerEdge], line: &Line) -> Option<(f64, [f64; 2])> {
+    fn hit(&self, edges: &[PluckerEdge], line: &LaneRay) -> Option<(f64, [f64; 2])> {
         let mut sides = self.lengths;
         for (side, &edge) in sides.iter_mut().zip(&self.edges) {
             // The distance of the lines times the sine of their angle (m): the same of both triangles of an edge.
@@ -79,11 +79,11 @@ impl FewTriangle {
 }
 
 /// The closest hit of the ray of a lane; of those in one place the last.
-pub(super) fn closest(few: &FewTriangles, block: &RayBlock, lane: usize) -> Option<Hit> {
-    let (mut line, mut nearest) = (Line::of(block, lane), None);
+pub(super) fn closest(few: &FewTriangles, block: &RayBlock, lane: usize) -> Option<TriangleHit> {
+    let (mut line, mut nearest) = (LaneRay::of(block, lane), None);
     for (number, triangle) in few.triangles.iter().enumerate() {
         let Some((t, weights)) = triangle.hit(&few.edges, &line) else { continue };
-        nearest = Some(Hit { number, t, weights });
+        nearest = Some(TriangleHit { number, t, weights });
         line.t_max = t;
     }
     nearest
@@ -91,6 +91,6 @@ pub(super) fn closest(few: &FewTriangles, block: &RayBlock, lane: usize) -> Opti
 
 /// Tests whether anything is between the ends of the ray of a lane.
 pub(super) fn is_occluded(few: &FewTriangles, block: &RayBlock, lane: usize) -> bool {
-    let line = Line::of(block, lane);
+    let line = LaneRay::of(block, lane);
     few.triangles.iter().any(|triangle| triangle.hit(&few.edges, &line).is_some())
 }

@@ -47,13 +47,13 @@ pub(super) struct Face {
 }
 
 /// A face's axes while it is made, in double precision.
-struct Plane {
+struct FaceBasis {
     origin: DVec3,
     x: DVec3,
     y: DVec3,
 }
 
-impl Plane {
+impl FaceBasis {
     fn linear(&self, at_origin: f64, gradient: DVec3) -> Linear {
         [at_origin, gradient.dot(self.x), gradient.dot(self.y)].map(round)
     }
@@ -85,7 +85,7 @@ impl Face {
         let normal = (own[1] - own[0]).cross(own[2] - own[0]).normalize();
         let outline = quad.as_ref().map_or(&own[..], |quad| &quad[..]);
         let along = (outline[1] - outline[0]).normalize();
-        let plane = Plane { origin: outline[0], x: normal.cross(along).normalize(), y: along };
+        let plane = FaceBasis { origin: outline[0], x: normal.cross(along).normalize(), y: along };
         let side = |k: usize| {
             let k = k.min(outline.len() - 1);
             plane.side(normal, [outline[k], outline[(k + 1) % outline.len()]])
@@ -151,15 +151,15 @@ impl NearestFace {
 
 /// Occlusion of the rays of a block.
 #[derive(Default)]
-pub(super) struct Occlusion {
+pub(super) struct BlockOcclusion {
     /// 1 of rays that have.
     pub(super) blocked: [u32; LANES],
     /// 1 of rays of which roundings leave it open.
     pub(super) doubts: [u32; LANES],
 }
 
-/// Values computed once for a block's rays.
-struct Lines {
+/// What is worked out once of a block's rays.
+struct BlockRays {
     /// Farthest distances that count (m), finite.
     t_max: Floats,
     /// The distances from the frame's origin of their starts and of the scene's farthest corner (m).
@@ -168,7 +168,7 @@ struct Lines {
     inverse: [Floats; 3],
 }
 
-impl Lines {
+impl BlockRays {
     #[inline(always)]
     fn of(block: &RayBlock, radius: f32) -> Self {
         let [x, y, z] = &block.origin;
@@ -186,8 +186,8 @@ impl Lines {
     }
 }
 
-/// Crossing of a block's rays with a face's plane.
-struct Crossing {
+/// Where a block's rays cross a face's plane.
+struct FaceCrossing {
     /// Distances (m); infinity of rays that do not cross it between their ends.
     t: Floats,
     place: [Floats; 2],
@@ -201,9 +201,9 @@ struct Crossing {
 #[inline(always)]
 fn cross(
     face: &Face,
-    (block, lines): (&RayBlock, &Lines),
+    (block, lines): (&RayBlock, &BlockRays),
     (t_min, t_max): (&Floats, &Floats),
-) -> Option<Crossing> {
+) -> Option<FaceCrossing> {
     let ([x, y, z], [dx, dy, dz]) = (&block.origin, &block.direction);
     let [nx, ny, nz] = face.normal;
     let (mut t, mut blur) = ([0.0; LANES], [0.0; LANES]);
@@ -235,10 +235,10 @@ fn cross(
             least[i] = select_unpredictable(side < least[i], side, least[i]);
         }
     }
-    Some(Crossing { t, place, least, blur })
+    Some(FaceCrossing { t, place, least, blur })
 }
 
-impl Crossing {
+impl FaceCrossing {
     /// Notes rays of which roundings leave it open whether they meet the face.
     #[inline(always)]
     fn doubt(&self, doubts: &mut [u32; LANES]) {
@@ -282,7 +282,7 @@ fn reaches([from, to]: [[f32; 3]; 2], block: &RayBlock, inverse: &[Floats; 3]) -
 /// The closest hits of a block.
 #[multiversion::multiversion(targets = "simd")]
 pub(super) fn closest(few: &FewTriangles, block: &RayBlock, nearest: &mut NearestFace) {
-    let lines = Lines::of(block, few.radius);
+    let lines = BlockRays::of(block, few.radius);
     let mut doubts = [0; LANES];
     let (mut t, mut hit, mut place) = (lines.t_max, [MISS; LANES], [[0.0; LANES]; 2]);
     for run in &few.runs {
@@ -307,8 +307,8 @@ pub(super) fn closest(few: &FewTriangles, block: &RayBlock, nearest: &mut Neares
 
 /// Finds the rays of a block that have anything between their ends.
 #[multiversion::multiversion(targets = "simd")]
-pub(super) fn occluded(few: &FewTriangles, block: &RayBlock, occlusion: &mut Occlusion) {
-    let lines = Lines::of(block, few.radius);
+pub(super) fn occluded(few: &FewTriangles, block: &RayBlock, occlusion: &mut BlockOcclusion) {
+    let lines = BlockRays::of(block, few.radius);
     let (mut doubts, mut hit) = ([0; LANES], [0; LANES]);
     for run in &few.runs {
         if !reaches(run.bounds, block, &lines.inverse) {
@@ -323,5 +323,5 @@ pub(super) fn occluded(few: &FewTriangles, block: &RayBlock, occlusion: &mut Occ
             }
         }
     }
-    *occlusion = Occlusion { blocked: hit, doubts };
+    *occlusion = BlockOcclusion { blocked: hit, doubts };
 }

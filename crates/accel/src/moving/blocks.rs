@@ -5,7 +5,7 @@ use etendue_geometry::block::{LANES, vector};
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Bounds, Detail, HitBatch, MISS, RayBatch, RayBlock, RayBlocks};
 
-use super::{Body, BodyHit, Carried, Moving, meets, reach, span, turned_normal};
+use super::{BodyHit, Moving, MovingPlacement, RaysInFrame, meets, reach, span, turned_normal};
 use crate::single::{F32Frame, Rays32, round};
 use crate::{Accel, BlockAccel};
 
@@ -91,7 +91,7 @@ impl BlockAccel for Moving {
                     hits.t[k] = f64::from(block.t_max[lane]);
                 }
             }
-            let (mut packed, mut carried) = (Packed::default(), Carried::default());
+            let (mut packed, mut carried) = (Packed::default(), RaysInFrame::default());
             carried.hits.detail = Detail::Surface;
             let near = self.near(rays, |i| Some(reach(rays, &hits, i, ONE_PLACE)));
             for near in near.chunk_by(|a, b| a[0] == b[0]) {
@@ -138,7 +138,7 @@ impl BlockAccel for Moving {
             |_, _| false,
             |rays, lanes, blocks| {
                 let mut blocked = vec![false; rays.len()];
-                let (mut packed, mut carried) = (Packed::default(), Carried::default());
+                let (mut packed, mut carried) = (Packed::default(), RaysInFrame::default());
                 let near = self.near(rays, |i| Some(rays.t_max()[i]));
                 for near in near.chunk_by(|a, b| a[0] == b[0]) {
                     let body = &self.bodies[near[0][0] as usize];
@@ -177,7 +177,7 @@ impl Packed {
     /// in f64, and then rounded where they enter the box, so that f32 has the body's own lengths alone.
     fn fill(
         &mut self,
-        (body, near): (&Body, &[[u32; 2]]),
+        (body, near): (&MovingPlacement, &[[u32; 2]]),
         rays: &RayBatch,
         origin: DVec3,
         t_max: impl Fn(usize) -> Option<f64>,

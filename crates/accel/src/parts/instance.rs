@@ -3,11 +3,11 @@
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Bounds, Geometry, MISS, Placement};
 
-use super::{Frame, Layout, reciprocal_power};
+use super::{Layout, PartFrame, reciprocal_power};
 
 /// A part at a place.
 #[derive(Debug, Clone)]
-pub(crate) struct Instance {
+pub(crate) struct PartInstance {
     pub(crate) part: u32,
     /// The placement, or [`MISS`] for a baked part, which knows its triangles' placements.
     pub(crate) placement: u32,
@@ -53,9 +53,9 @@ const ROUNDINGS: f64 = 1024.0;
 /// A worse conditioned placement is baked: its inverse would eat into single precision's slack.
 const WORST_CONDITION: f64 = 1e5;
 
-impl Instance {
+impl PartInstance {
     /// A frame parallel to the world.
-    pub(super) fn parallel(part: u32, frame: Frame, reach: f64) -> Self {
+    pub(super) fn parallel(part: u32, frame: PartFrame, reach: f64) -> Self {
         Self {
             part,
             placement: MISS,
@@ -74,7 +74,7 @@ impl Instance {
     pub(super) fn placed(
         placement: &Placement,
         i: u32,
-        frame: Frame,
+        frame: PartFrame,
         bounds: Bounds,
     ) -> Option<Self> {
         let transform = &placement.world_from_mesh;

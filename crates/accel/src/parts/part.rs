@@ -4,7 +4,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{AreaTest, Geometry, MISS, Positions, Transform};
 use rayon::prelude::*;
 
-use super::{Frame, index, outward};
+use super::{PartFrame, index, outward};
 use crate::BuildError;
 use crate::tree::Ref;
 
@@ -20,7 +20,7 @@ pub(crate) enum Members {
 /// A set of triangles in one frame.
 #[derive(Debug, Clone)]
 pub(crate) struct Blas {
-    pub(crate) frame: Frame,
+    pub(crate) frame: PartFrame,
     pub(crate) members: Members,
 }
 
@@ -149,7 +149,7 @@ impl Blas {
 /// The triangles of one mesh on their way into a frame, for loops over many.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MeshTriangles<'a> {
-    frame: Frame,
+    frame: PartFrame,
     /// `None` when it changes nothing, or when the frame is the mesh's own.
     transform: Option<&'a Transform>,
     triangles: &'a [[u32; 3]],

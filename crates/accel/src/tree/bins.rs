@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::{CHUNK, Node, Ref, WIDE_NODE};
+use super::{BinaryNode, CHUNK, Ref, WIDE_NODE};
 use etendue_geometry::glam::Vec4;
 
 /// Grid of bins: their start and scale.
@@ -209,9 +209,9 @@ impl RefBounds {
         }
     }
 
-    pub(super) fn node(&self, link: u32, count: u32) -> Node {
+    pub(super) fn node(&self, link: u32, count: u32) -> BinaryNode {
         let three = |v: Vec4| v.truncate().to_array();
-        Node { lo: three(self.lo), hi: three(self.hi), link, count }
+        BinaryNode { lo: three(self.lo), hi: three(self.hi), link, count }
     }
 }
 

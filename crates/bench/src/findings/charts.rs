@@ -1,15 +1,15 @@
 //! Charts: the accelerators by what is wrong, and how far, against time; pictures by their error against
 //! time and against the number of samples.
-use crate::accelerators::{Finding, RENDER_WIDTH};
+use crate::accelerators::{AcceleratorMeasurement, RENDER_WIDTH};
 use crate::cameras::Cameras;
 use crate::samplers::{Converged, Samplers};
 use crate::target::{AS_IT_IS, Target};
 use etendue_chart::{Axis, Chart, GREY, Mark, Point, Series, Stroke};
 
-/// Quantity on a chart's axes for one finding.
-type Measure = fn(&Finding) -> Option<f64>;
+/// What stands on a chart's axes for one finding.
+type Measure = fn(&AcceleratorMeasurement) -> Option<f64>;
 
-pub(super) fn accelerators(findings: &[Finding]) -> Vec<(&'static str, Chart)> {
+pub(super) fn accelerators(findings: &[AcceleratorMeasurement]) -> Vec<(&'static str, Chart)> {
     let rays = findings.first().map_or(0, |finding| finding.errors.rays);
     let hits = Chart {
         title: "Rays with a wrong answer".to_owned(),
@@ -30,7 +30,7 @@ pub(super) fn accelerators(findings: &[Finding]) -> Vec<(&'static str, Chart)> {
         ..against_time(findings, |finding| Some(finding.errors.relative_distance?.p999))
     };
     let mut charts = vec![("accelerators-hits", hits), ("accelerators-depth", depth)];
-    let widths = |finding: &Finding| finding.width;
+    let widths = |finding: &AcceleratorMeasurement| finding.width;
     if findings.iter().any(|finding| Some(widths(finding)) != findings.first().map(widths)) {
         charts.push(("accelerators-batch", batch_widths(findings)));
     }
@@ -39,12 +39,12 @@ pub(super) fn accelerators(findings: &[Finding]) -> Vec<(&'static str, Chart)> {
 
 const TIME: &str = "wall time a ray (µs)";
 
-fn micros(finding: &Finding) -> f64 {
+fn micros(finding: &AcceleratorMeasurement) -> f64 {
     finding.seconds.median / finding.errors.rays.max(1) as f64 * 1e6
 }
 
 /// Every method with all its batch widths; for each number of threads a series of its own.
-fn against_time(findings: &[Finding], error: Measure) -> Chart {
+fn against_time(findings: &[AcceleratorMeasurement], error: Measure) -> Chart {
     let most = most_threads(findings);
     let mut notes = Vec::new();
     let others: Vec<String> = threads(findings)
@@ -90,7 +90,7 @@ fn against_time(findings: &[Finding], error: Measure) -> Chart {
     Chart { notes, series, front: true, ..Chart::default() }
 }
 
-fn batch_widths(findings: &[Finding]) -> Chart {
+fn batch_widths(findings: &[AcceleratorMeasurement]) -> Chart {
     let most = most_threads(findings);
     let series = methods(findings).into_iter().enumerate().map(|(colour, method)| {
         let own = findings.iter().filter(|f| f.method == method && f.threads == most);
@@ -107,25 +107,25 @@ fn batch_widths(findings: &[Finding]) -> Chart {
 }
 
 /// The methods in their order.
-fn methods(findings: &[Finding]) -> Vec<&'static str> {
+fn methods(findings: &[AcceleratorMeasurement]) -> Vec<&'static str> {
     let mut methods: Vec<&str> = findings.iter().map(|finding| finding.method).collect();
     methods.dedup();
     methods
 }
 
-fn threads(findings: &[Finding]) -> Vec<usize> {
+fn threads(findings: &[AcceleratorMeasurement]) -> Vec<usize> {
     let mut threads: Vec<usize> = findings.iter().map(|finding| finding.threads).collect();
     threads.sort_unstable();
     threads.dedup();
     threads
 }
 
-fn most_threads(findings: &[Finding]) -> usize {
+fn most_threads(findings: &[AcceleratorMeasurement]) -> usize {
     findings.iter().map(|finding| finding.threads).max().unwrap_or(1)
 }
 
 /// The batch width that points are named at: a render's, or else the widest.
-fn width(findings: &[Finding]) -> usize {
+fn width(findings: &[AcceleratorMeasurement]) -> usize {
     let widths = || findings.iter().map(|finding| finding.width);
     if widths().any(|width| width == RENDER_WIDTH) {
         return RENDER_WIDTH;

@@ -9,11 +9,11 @@ use crate::samplers::Samplers;
 use crate::target::Target;
 use crate::timing::TimeSpread;
 
-pub(super) fn accelerators(findings: &[accelerators::Finding]) -> Table {
+pub(super) fn accelerators(findings: &[accelerators::AcceleratorMeasurement]) -> Table {
     Table::of_rows(findings.iter().map(accelerator).collect())
 }
 
-fn accelerator(finding: &accelerators::Finding) -> Vec<(&'static str, Cell)> {
+fn accelerator(finding: &accelerators::AcceleratorMeasurement) -> Vec<(&'static str, Cell)> {
     let errors = &finding.errors;
     let of = |quantiles: Option<Quantiles>, which: fn(Quantiles) -> f64| quantiles.map(which);
     let mega = |bytes: u64| Cell::number(bytes as f64, format!("{:.1}", bytes as f64 / 1e6));
@@ -57,7 +57,7 @@ fn accelerator(finding: &accelerators::Finding) -> Vec<(&'static str, Cell)> {
 }
 
 pub(super) fn samplers(found: &Samplers) -> Table {
-    let row = |finding: &crate::samplers::Finding| {
+    let row = |finding: &crate::samplers::SamplerMeasurement| {
         let name = ("sampler", Cell::word(finding.sampler));
         picture(name, finding.samples, finding.seconds, [finding.rmse, finding.relative_rmse])
     };
@@ -65,7 +65,7 @@ pub(super) fn samplers(found: &Samplers) -> Table {
 }
 
 pub(super) fn cameras(found: &Cameras) -> Table {
-    let row = |finding: &crate::cameras::Finding| {
+    let row = |finding: &crate::cameras::ModelMeasurement| {
         let name = ("model", Cell::word(finding.model));
         picture(name, finding.samples, finding.seconds, [finding.rmse, finding.relative_rmse])
     };

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::pictures::{mean, mean_square};
 use crate::{BenchError, Progress};
-use forecast::{Forecast, MOST_SAMPLES, Point, forecast, seconds_of};
+use forecast::{Forecast, MOST_SAMPLES, TrialRender, forecast, seconds_of};
 
 /// Samples of the first two renders of everybody.
 const FIRST: [u32; 2] = [4, 16];
@@ -33,9 +33,9 @@ const MOST_TRIES: usize = 6;
 const ROUNDING: f64 = 1e-9;
 
 /// What is known of a contender.
-struct Entry {
+struct ContenderRecord {
     contender: Contender,
-    points: Vec<Point>,
+    points: Vec<TrialRender>,
     renders: usize,
     is_out: bool,
 }
@@ -98,7 +98,7 @@ struct Race<'a, E> {
     samples: u32,
     mean: f64,
     own_square: f64,
-    entries: Vec<Entry>,
+    entries: Vec<ContenderRecord>,
     renders: Vec<Render>,
     notes: Vec<String>,
     seed: u64,
@@ -147,8 +147,12 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
                 100.0 * own
             ));
         }
-        let entries =
-            vec![Entry { contender: plain, points: Vec::new(), renders: 0, is_out: false }];
+        let entries = vec![ContenderRecord {
+            contender: plain,
+            points: Vec::new(),
+            renders: 0,
+            is_out: false,
+        }];
         Ok(Self {
             effort,
             program,
@@ -166,7 +170,12 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
     }
 
     fn add(&mut self, contenders: Vec<Contender>) {
-        let entry = |contender| Entry { contender, points: Vec::new(), renders: 0, is_out: false };
+        let entry = |contender| ContenderRecord {
+            contender,
+            points: Vec::new(),
+            renders: 0,
+            is_out: false,
+        };
         self.entries.extend(contenders.into_iter().map(entry));
     }
 
@@ -218,7 +227,7 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
         Ok(true)
     }
 
-    fn render(&mut self, who: usize, samples: u32) -> Result<Option<Point>, E> {
+    fn render(&mut self, who: usize, samples: u32) -> Result<Option<TrialRender>, E> {
         let done = (self.start.elapsed().as_secs_f64() / self.effort.seconds).min(1.0);
         if !(self.progress)(done) {
             return Err(BenchError::Stopped.into());
@@ -244,7 +253,7 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
         Ok(Some(point))
     }
 
-    fn judged(&self, name: String, samples: u32, run: &WholeRun) -> (Point, Render) {
+    fn judged(&self, name: String, samples: u32, run: &WholeRun) -> (TrialRender, Render) {
         let square = mean_square(&run.values, &self.converged) / (self.mean * self.mean);
         let square = (square - self.own_square).max(0.0);
         let floor = 0.01 * self.mean * self.mean;
@@ -253,15 +262,15 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
         let seconds = run.seconds();
         let (stages, error) = (run.stages, square.sqrt());
         let render = Render { name, samples, stages, seconds, error, relative_mse: mean(&shares) };
-        (Point { samples, seconds, square }, render)
+        (TrialRender { samples, seconds, square }, render)
     }
 
-    fn forecast_of(&self, entry: &Entry) -> Option<Forecast> {
+    fn forecast_of(&self, entry: &ContenderRecord) -> Option<Forecast> {
         forecast(&entry.points, self.effort.target)
     }
 
     /// The time (s) at which an entry reaches the target.
-    fn time_of(&self, entry: &Entry) -> f64 {
+    fn time_of(&self, entry: &ContenderRecord) -> f64 {
         self.forecast_of(entry).map_or(f64::INFINITY, |forecast| forecast.seconds)
     }
 
@@ -378,7 +387,7 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
     }
 
     fn conclude(self, verified: Option<Verified>) -> Target {
-        let foretold = |entry: &Entry| {
+        let foretold = |entry: &ContenderRecord| {
             let forecast = self.forecast_of(entry);
             Foretold {
                 name: entry.contender.name.clone(),
@@ -499,7 +508,7 @@ mod tests {
 
     #[test]
     fn two_renders_tell_when_a_third_reaches_the_target() {
-        let law = |n: u32| Point {
+        let law = |n: u32| TrialRender {
             samples: n,
             seconds: 2.0 + 0.1 * f64::from(n),
             square: 1e-4 + 0.01 / f64::from(n),

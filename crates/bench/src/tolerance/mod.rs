@@ -17,7 +17,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use etendue_render::tolerance::{Field, FullView};
-pub use etendue_render::tolerance::{Finding, Place, Tolerance, Worst};
+pub use etendue_render::tolerance::{ModelError, Place, Tolerance, Worst};
 
 pub use self::waves::WaveFinding;
 use crate::pictures::Studio;
@@ -34,7 +34,7 @@ pub struct Comparison {
     /// Places that were compared.
     pub places: Vec<Place>,
     /// The models, the simplest first.
-    pub models: Vec<Finding>,
+    pub models: Vec<ModelError>,
     /// The keys of a scene that take each of these, in their order; `null` for the full train.
     pub scenes: Vec<Value>,
     /// The simplest that stays within the tolerance.

@@ -3,8 +3,8 @@
 use etendue_camera::{Camera, Sampler};
 use etendue_scene::file::LightPrecision;
 
-use crate::pictures::{Sampling, Studio};
-use crate::timing::{Series, order};
+use crate::pictures::{PointSet, Studio};
+use crate::timing::{Timings, order};
 use crate::{BenchError, Progress};
 
 /// Samples a pixel of the shorter and the longer picture: their difference has none of what is done once.
@@ -23,7 +23,7 @@ pub(super) fn seconds_a_sample(
     models: &[Camera],
     progress: Progress<'_>,
 ) -> Result<Vec<f64>, BenchError> {
-    let mut series = vec![Series::default(); models.len()];
+    let mut series = vec![Timings::default(); models.len()];
     let [few, many] = SAMPLES;
     for round in 0..ROUNDS {
         for who in order(round, models.len()) {
@@ -36,7 +36,7 @@ pub(super) fn seconds_a_sample(
             let camera = models[who].coarser(factor);
             let [width, height] = camera.resolution().map(f64::from);
             let mut take = |samples| {
-                let sampling = Sampling {
+                let sampling = PointSet {
                     samples,
                     sampler: Sampler::Sobol,
                     seed: round as u64,
@@ -52,5 +52,5 @@ pub(super) fn seconds_a_sample(
             series[who].0.push((long - short).max(0.0) / (width * height * f64::from(many - few)));
         }
     }
-    Ok(series.iter().map(Series::median).collect())
+    Ok(series.iter().map(Timings::median).collect())
 }

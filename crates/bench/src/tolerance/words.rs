@@ -4,7 +4,7 @@ use std::fmt;
 
 use etendue_report::{Cell, Table};
 
-use super::{Comparison, Finding, WaveFinding, Worst};
+use super::{Comparison, ModelError, WaveFinding, Worst};
 
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -71,8 +71,8 @@ impl Comparison {
     }
 }
 
-fn cells(finding: &Finding) -> Vec<(&'static str, Cell)> {
-    let Finding { model, chief_ray, centroid, blur, colour, light, .. } = finding;
+fn cells(finding: &ModelError) -> Vec<(&'static str, Cell)> {
+    let ModelError { model, chief_ray, centroid, blur, colour, light, .. } = finding;
     let pixels = |worst: &Worst| Cell::number(worst.value, format!("{:.3}", worst.value));
     let percent = 100.0 * light.value;
     let number = |value: Option<f64>, decimals: usize| {
@@ -105,8 +105,8 @@ fn of_waves(finding: &WaveFinding) -> Vec<(&'static str, Cell)> {
     ]
 }
 
-/// Description of where the greatest differences of a model are.
-fn where_it_misses(finding: &Finding) -> String {
+/// Where the greatest differences of a model are.
+fn where_it_misses(finding: &ModelError) -> String {
     let place = |name: &str, worst: &Worst| {
         let [column, row] = worst.at;
         let depth = match worst.depth {

@@ -39,8 +39,8 @@ use etendue_spectrum::{Bands, Spread};
 use glam::{DVec2, DVec3};
 
 use super::lens_camera::LensCamera;
-use super::nodes::{Interpolation, MOST_NODES, Variable};
-use super::opened::{BandPaths, filtered, place_of};
+use super::nodes::{MOST_NODES, NodeWeights, Variable};
+use super::opened::{BandInterpolation, filtered, place_of};
 use super::traced_at::TracedAt;
 use crate::{CameraRays, FilmSamples, Pose};
 
@@ -113,7 +113,7 @@ impl LensCamera {
         Some(self.shared(paths))
     }
 
-    fn shared(&self, paths: &BandPaths) -> SharedPaths {
+    fn shared(&self, paths: &BandInterpolation) -> SharedPaths {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few dozen")]
         let rows = (paths.reach / self.focused.film().pitch).ceil() as u32 + 1;
         SharedPaths { traced: paths.nodes.len(), error: paths.error, rows }
@@ -145,7 +145,7 @@ impl LensCamera {
     }
 
     /// Chooses the nodes, and measures how well they do.
-    pub(super) fn band_paths(&self, bands: &Bands) -> Result<BandPaths, String> {
+    pub(super) fn band_paths(&self, bands: &Bands) -> Result<BandInterpolation, String> {
         if let Some(why) = self.parted() {
             return Err(why.to_owned());
         }
@@ -204,12 +204,12 @@ impl LensCamera {
                 let filters = filtered(train, bands, band, spread);
                 let places = spread.wavelengths.iter().zip(filters).map(|(&nm, filters)| {
                     let nm = if self.runs_apart() { nm } else { train.wavelength() };
-                    Interpolation { weights: index.weights(&chosen, nm), filters }
+                    NodeWeights { weights: index.weights(&chosen, nm), filters }
                 });
                 places.collect()
             };
             let bands = spreads.iter().enumerate().map(of_band).collect();
-            return Ok(BandPaths { nodes, bands, has_losses, lead, reach, error });
+            return Ok(BandInterpolation { nodes, bands, has_losses, lead, reach, error });
         }
         Err(format!(
             "places between {MOST_NODES} wavelengths are {:.2} pixels off, {} being the most, and \
@@ -347,7 +347,7 @@ impl LensCamera {
     /// Computes where each band's light of each ray lands, and its weight.
     fn land(
         &self,
-        (paths, resolution): (&BandPaths, [u32; 2]),
+        (paths, resolution): (&BandInterpolation, [u32; 2]),
         samples: &FilmSamples,
         out: &CameraRays,
         landings: &mut BandLandings,
@@ -371,7 +371,7 @@ impl LensCamera {
             let u = samples.spectrum[out.sample[ray] as usize];
             for (band, wavelengths) in paths.bands.iter().enumerate() {
                 let number = place_of(u, wavelengths.len());
-                let Interpolation { weights, filters } = &wavelengths[number];
+                let NodeWeights { weights, filters } = &wavelengths[number];
                 let (place, passed) = if passes {
                     let (mut place, mut passed) = ([0.0; 2], 0.0);
                     for node in 0..nodes {

@@ -13,7 +13,7 @@ use glam::{DVec2, DVec3};
 use super::focused::Focused;
 use crate::CameraError;
 use etendue_optics::element::{Clip, Frame, Ray, RayStatus};
-use etendue_optics::train::pupil::{Window, lit_radius};
+use etendue_optics::train::pupil::{SlopeWindow, lit_radius};
 use etendue_optics::train::{BehindLenslets, MonochromaticTrain, OpticalTrain, Side};
 
 /// Nodes over the half diagonal, for lenses with rotational symmetry.
@@ -306,7 +306,8 @@ impl ImageCircle {
             let lenses = std::slice::from_ref(lens);
             return Self::Circle(lit_radius(train, lenses, frame.vertex.z, half.length()));
         }
-        let lit = |film: DVec2| Window::find(train, lens, frame.point(film.extend(0.0))).is_some();
+        let lit =
+            |film: DVec2| SlopeWindow::find(train, lens, frame.point(film.extend(0.0))).is_some();
         if !lit(DVec2::ZERO) {
             return Self::Unknown;
         }

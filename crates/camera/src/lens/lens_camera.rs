@@ -9,7 +9,6 @@
 //! on. A filter dims, a mask passes what it leaves open, and losses in glass, where they are asked for,
 //! are lost.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use etendue_geometry::{RayBatch, RaysMut};
@@ -20,22 +19,13 @@ use super::chief::{ChiefTable, ImageCircle, LensletChiefs};
 use super::focused::{Focused, View};
 use super::nodes::SharingLimits;
 use super::opened::{Opened, OpenedGroup, through_filters, uniform_filters};
-use super::traced_at::{TracedAt, grouped};
+use super::traced_at::{BandGroup, TracedAt, grouped};
 
 use crate::{CameraError, Pose};
 use etendue_optics::element::{Clip, Ray, RayStatus, Reflection};
 use etendue_optics::train::analysis::projected_solid_angle;
-use etendue_optics::train::pupil::{Disk, Window, blocked, without_dimming, without_filters};
+use etendue_optics::train::pupil::{Disk, SlopeWindow, blocked, without_dimming, without_filters};
 use etendue_optics::train::{ExitPupil, ExitPupilError, MonochromaticTrain, OpticalTrain, Side};
-
-/// Bands whose rays run the same way.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BandGroup {
-    /// The bands.
-    pub bands: Range<usize>,
-    /// At which wavelength their rays run (nm): `None` when all bands are in one group.
-    pub wavelength: Option<f64>,
-}
 
 /// A lens with a sensor behind it.
 #[derive(Debug, Clone)]
@@ -107,7 +97,7 @@ impl LensCamera {
             return Err(dark(blocked(&unbent, &design, frame.vertex)));
         }
         let lit_from =
-            |film: DVec2| Window::find(train, &clear, frame.point(film.extend(0.0))).is_some();
+            |film: DVec2| SlopeWindow::find(train, &clear, frame.point(film.extend(0.0))).is_some();
         let places = [-1.0, 0.0, 1.0].map(|y| [-1.0, 0.0, 1.0].map(|x| DVec2::new(x, y) * half));
         if !lit_from(DVec2::ZERO) && !places.into_iter().flatten().any(lit_from) {
             let closed = train.elements().iter().any(|e| e.clear_radius() == 0.0);
@@ -193,7 +183,19 @@ impl LensCamera {
         self.running_at(TracedAt::Design)
     }
 
-    /// Returns the camera with rays that run at other wavelengths.
+    /// The same whose neighbouring bands run together in `count` groups, at most, which are even in 1/λ²: the index of
+    /// glass moves nearly in proportion to it. `None` where bands differ by more than where they run: where filters,
+    /// coatings or glass dim each by its own share.
+    pub(crate) fn with_bands_grouped(&self, count: usize) -> Option<Self> {
+        let train = self.focused.train();
+        let has_filters = !self.filter_curves().is_empty();
+        let dims = has_filters || self.dims_wavelengths_apart();
+        let is_apart = self.traced_at == TracedAt::Own && self.runs_apart();
+        let groups = TracedAt::Grouped(count.max(1));
+        (is_apart && !dims && train.first_array().is_none()).then(|| self.running_at(groups))
+    }
+
+    /// The same with rays that run at other wavelengths.
     pub(super) fn running_at(&self, traced_at: TracedAt) -> Self {
         Self { traced_at, opened: None, ..self.clone() }
     }

@@ -5,7 +5,7 @@
 //!
 //! | module | idea |
 //! |---|---|
-//! | [`spec`] | the cameras of the scene file, and the lens files that they stand for |
+//! | [`spec`] | the cameras of the scene file, the lens files that they stand for, and a lens by itself as a camera |
 //! | [`source`] | a lens by its file or in place, and parts put on its axis |
 //! | [`focused`] | a lens and its sensor: where pixels lie, and the paraxial camera of both |
 //! | [`chief`] | the chief rays of a whole sensor; which lenslet a place on the sensor belongs to; the part of the sensor that light reaches |
@@ -14,13 +14,11 @@
 //! | `nodes` | wavelengths that rays of all bands are traced at |
 //! | `implausible` | sizes that no camera has |
 //! | `paths` | rays of a pixel on their way through the lens |
-//! | `alone` | a lens by itself as a camera |
 //! | `rays` | weighted rays of the pupil for pictures |
 //! | [`waves`] | how light is spread on the sensor as waves, and what of it arrives |
 //! | `traced_at` | bands whose rays run together through the lens |
 //! | `band_paths` | one ray of the scene for all bands, and where each band's light of it lands |
 
-mod alone;
 mod band_paths;
 pub mod chief;
 pub mod focused;
@@ -35,14 +33,15 @@ pub mod spec;
 mod traced_at;
 pub mod waves;
 
-pub(crate) use alone::alone;
 pub use band_paths::{BandLandings, SharedPaths};
 pub use chief::LensletChiefs;
 pub use focused::Focused;
-pub use lens_camera::{BandGroup, LensCamera};
+pub use lens_camera::LensCamera;
 pub use nodes::SharingLimits;
 pub use source::{LensSource, PlacedSpec};
+pub(crate) use spec::alone;
 pub use spec::{
     ChromaticRealLensCameraSpec, LensCameraSpec, RealLensCameraSpec, ThinLensCameraSpec,
 };
+pub use traced_at::BandGroup;
 pub use waves::WaveLens;

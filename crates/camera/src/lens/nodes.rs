@@ -21,8 +21,8 @@ impl SharingLimits {
 
 /// A wavelength between nodes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Interpolation {
-    /// Weight of each node.
+pub(super) struct NodeWeights {
+    /// What each node counts.
     pub(super) weights: [f64; MOST_NODES],
     /// Transmission of the filters.
     pub(super) filters: f64,

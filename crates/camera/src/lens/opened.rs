@@ -5,7 +5,7 @@ use etendue_optics::glass::GlassError;
 use etendue_optics::train::{ExitPupil, MonochromaticTrain, OpticalTrain};
 use etendue_spectrum::{Bands, Curve, Outside, Spread};
 
-use super::nodes::Interpolation;
+use super::nodes::NodeWeights;
 
 /// The exit pupil measured at the wavelengths that are wanted.
 #[derive(Debug)]
@@ -14,8 +14,8 @@ pub(super) struct Opened {
     /// In the order of [`LensCamera::band_groups`].
     pub(super) groups: Vec<OpenedGroup>,
     pub(super) pupil: ExitPupil,
-    /// Paths by which all bands share a ray; `None` where they do not.
-    pub(super) paths: Option<BandPaths>,
+    /// How all bands share a ray; `None` where they do not.
+    pub(super) paths: Option<BandInterpolation>,
 }
 
 /// The lens as it is for a group of bands.
@@ -27,12 +27,12 @@ pub(super) struct OpenedGroup {
 
 /// Paths by which bands share rays.
 #[derive(Debug)]
-pub(super) struct BandPaths {
+pub(super) struct BandInterpolation {
     /// The lens at its leading wavelengths, with filters clear.
     pub(super) nodes: Vec<MonochromaticTrain>,
     /// By band and by wavelength that it is drawn from.
-    pub(super) bands: Vec<Vec<Interpolation>>,
-    /// True if glass takes light.
+    pub(super) bands: Vec<Vec<NodeWeights>>,
+    /// Whether glass takes light.
     pub(super) has_losses: bool,
     /// From where a ray leaves the lens to where one starts that comes back (mm).
     pub(super) lead: f64,

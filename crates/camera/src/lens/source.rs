@@ -103,15 +103,22 @@ impl LensResources for LensFolder<'_> {
 
 /// The fault of a lens that is written in the camera at `key`.
 pub(crate) fn in_camera(key: &str, error: &LensError) -> CameraError {
-    let dot = if key.is_empty() { "" } else { "." };
+    in_element(error, key, |index| format!("{key}.elements[{index}]"))
+}
+
+/// The fault of a part that is built alone, as the camera's element `index`.
+pub(crate) fn in_part(index: usize, error: &LensError) -> CameraError {
+    in_element(error, "", |_| format!("elements[{index}]"))
+}
+
+/// The fault of a lens: of one of its elements where `at` says, of all of it at `key`.
+fn in_element(error: &LensError, key: &str, at: impl Fn(usize) -> String) -> CameraError {
     match error {
-        LensError::Element { index, why } => {
-            CameraError::new(format!("{key}{dot}elements[{index}]"), why.clone())
-        }
+        LensError::Element { index, why } => CameraError::new(at(*index), why.clone()),
         LensError::Glass { index, source } => {
-            CameraError::new(format!("{key}{dot}elements[{index}].glass"), source.to_string())
+            CameraError::new(format!("{}.glass", at(*index)), source.to_string())
         }
-        other => CameraError::new(key, other.to_string()),
+        _ => CameraError::new(key, error.to_string()),
     }
 }
 

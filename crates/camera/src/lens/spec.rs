@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::focused::{Focused, View, positive};
 use super::lens_camera::LensCamera;
-use super::source::{FocusDistance, LensSource, PlacedSpec, Setup, in_camera};
+use super::source::{FocusDistance, LensSource, PlacedSpec, Setup, in_part};
 use crate::framing::{self, FieldExtent, Subject};
 use crate::{CameraError, CameraMotionSpec, Pose, PoseSpec, SensorSpec, ShutterSpec};
 use etendue_geometry::units::{Degrees, Millimetres};
@@ -324,31 +324,42 @@ impl ThinLensCameraSpec {
         focal_length: f64,
         resolve: Resolve<'_>,
     ) -> Result<OpticalTrain, CameraError> {
-        if focal_length == 0.0 || !focal_length.is_finite() {
-            let why = format!("{focal_length} mm is no focal length");
-            return Err(CameraError::new("focal_length", why));
-        }
-        let has_opening = |e: &PlacedSpec| matches!(e.element.part, PartSpec::Aperture(_));
-        let opening = match (&self.aperture, self.f_number) {
-            (Some(aperture), _) => Some(PartSpec::Aperture(aperture.clone())),
-            // The f-number sets the radius.
-            (None, Some(_)) if !self.elements.iter().any(|e| e.element.mount.stop) => {
-                Some(PartSpec::circular(1.0))
-            }
-            (None, None) if !self.elements.iter().any(has_opening) => {
-                return Err(CameraError::new(
-                    "f_number",
-                    "is missing: a thin lens needs an opening\nhint: give this, or `aperture`",
-                ));
-            }
-            _ => None,
-        };
-        let lens = ThinLensSpec { focal_length: Millimetres(focal_length), semi_diameter: None };
-        let lens = PartSpec::ThinLens(lens);
-        let opening = opening.map(|part| (0.0, ElementSpec::new(part, 0.0).as_stop()));
-        let lens = [(0.0, ElementSpec::new(lens, 0.0))];
-        assemble(lens.into_iter().chain(opening).collect(), &self.elements, resolve)
+        thin_lens(focal_length, (self.aperture.as_ref(), self.f_number), &self.elements, resolve)
     }
+}
+
+/// The thin lens of the given focal length (mm) with an opening, or one that the f-number is to set, and the parts on
+/// its axis.
+pub(crate) fn thin_lens(
+    focal_length: f64,
+    (aperture, f_number): (Option<&ApertureSpec>, Option<f64>),
+    elements: &[PlacedSpec],
+    resolve: Resolve<'_>,
+) -> Result<OpticalTrain, CameraError> {
+    if focal_length == 0.0 || !focal_length.is_finite() {
+        let why = format!("{focal_length} mm is no focal length");
+        return Err(CameraError::new("focal_length", why));
+    }
+    let has_opening = |e: &PlacedSpec| matches!(e.element.part, PartSpec::Aperture(_));
+    let opening = match (aperture, f_number) {
+        (Some(aperture), _) => Some(PartSpec::Aperture(aperture.clone())),
+        // The f-number sets the radius.
+        (None, Some(_)) if !elements.iter().any(|e| e.element.mount.stop) => {
+            Some(PartSpec::circular(1.0))
+        }
+        (None, None) if !elements.iter().any(has_opening) => {
+            return Err(CameraError::new(
+                "f_number",
+                "is missing: a thin lens needs an opening\nhint: give this, or `aperture`",
+            ));
+        }
+        _ => None,
+    };
+    let lens = ThinLensSpec { focal_length: Millimetres(focal_length), semi_diameter: None };
+    let lens = PartSpec::ThinLens(lens);
+    let opening = opening.map(|part| (0.0, ElementSpec::new(part, 0.0).as_stop()));
+    let lens = [(0.0, ElementSpec::new(lens, 0.0))];
+    assemble(lens.into_iter().chain(opening).collect(), elements, resolve)
 }
 
 impl RealLensCameraSpec {
@@ -441,11 +452,8 @@ fn assemble(
     for (index, placed) in besides.iter().enumerate() {
         let Millimetres(at) = placed.at;
         // Alone first: a fault there is told by the part's number in the camera.
-        LensFile::new(vec![placed.element.clone()]).build(resolve).map_err(|fault| {
-            let mut fault = in_camera("", &fault);
-            fault.at = fault.at.replacen("elements[0]", &format!("elements[{index}]"), 1);
-            fault
-        })?;
+        let alone = LensFile::new(vec![placed.element.clone()]).build(resolve);
+        alone.map_err(|fault| in_part(index, &fault))?;
         parts.push((at, placed.element.clone()));
     }
     parts.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -456,4 +464,26 @@ fn assemble(
     }
     let lens = LensFile::new(elements).build(resolve);
     lens.map_err(|fault| CameraError::new("elements", fault.to_string()))
+}
+
+/// The lens focused onto `sensor`, whose pixels have a pitch, at the world's origin.
+pub(crate) fn alone(
+    train: &OpticalTrain,
+    focus: Focus,
+    sensor: &SensorSpec,
+) -> Result<(Pose, LensCamera), CameraError> {
+    let setup = Setup {
+        f_number: None,
+        focus: None,
+        fov: None,
+        sensor_height: None,
+        sensor_tilt: Default::default(),
+        sensor_decentre: Default::default(),
+        losses: train.losses().clone(),
+        diffraction: false,
+        pose: None,
+        sensor,
+    };
+    let focused = Focused::new(train.clone(), &setup, focus)?;
+    Ok((Pose::IDENTITY, LensCamera::new(focused)?))
 }

@@ -1,8 +1,17 @@
 //! At which wavelengths the rays of bands run through a lens: each band's own, or one for a group of neighbours.
 
+use std::ops::Range;
+
 use etendue_spectrum::Bands;
 
-use super::lens_camera::{BandGroup, LensCamera};
+/// Bands whose rays run the same way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BandGroup {
+    /// The bands.
+    pub bands: Range<usize>,
+    /// At which wavelength their rays run (nm): `None` when all bands are in one group.
+    pub wavelength: Option<f64>,
+}
 
 /// At which wavelengths rays run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -14,20 +23,6 @@ pub(super) enum TracedAt {
     Grouped(usize),
     /// All at the design wavelength.
     Design,
-}
-
-impl LensCamera {
-    /// Returns the camera with neighbouring bands that run together in `count` groups, at most, which are even in 1/λ²:
-    /// the index of glass moves nearly in proportion to it. `None` where bands differ by more than where they run:
-    /// where filters, coatings or glass dim each by its own share.
-    pub(crate) fn with_bands_grouped(&self, count: usize) -> Option<Self> {
-        let train = self.focused.train();
-        let has_filters = !self.filter_curves().is_empty();
-        let dims = has_filters || self.dims_wavelengths_apart();
-        let is_apart = self.traced_at == TracedAt::Own && self.runs_apart();
-        let groups = TracedAt::Grouped(count.max(1));
-        (is_apart && !dims && train.first_array().is_none()).then(|| self.running_at(groups))
-    }
 }
 
 /// Runs of neighbouring bands in the same of `count` parts of 1/λ².

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::LightField;
 use crate::framing::Subject;
 use crate::lens::source::{FocusDistance, PlacedSpec, Setup, in_camera};
-use crate::lens::spec::{ThinLensCameraSpec, place};
+use crate::lens::spec::{place, thin_lens};
 use crate::lens::{LensCamera, LensSource};
 use crate::{CameraError, Pose, PoseSpec, SensorSpec};
 use crate::{CameraMotionSpec, ShutterSpec};
@@ -203,25 +203,8 @@ impl LightFieldSpec {
         // A thin lens with what stands around it, or a lens from its file; its stop set.
         let train = match (&self.focal_length, &self.lens) {
             (Some(Millimetres(focal_length)), None) => {
-                let thin = ThinLensCameraSpec {
-                    diffraction: false,
-                    focal_length: self.focal_length,
-                    aperture: self.aperture.clone(),
-                    elements: self.elements.clone(),
-                    f_number: self.f_number,
-                    focus_distance: None,
-                    sensor_distance: None,
-                    fov: None,
-                    sensor_height: None,
-                    sensor_tilt: Default::default(),
-                    sensor_decentre: Default::default(),
-                    losses: LossesSpec::default(),
-                    pose: None,
-                    shutter: None,
-                    motion: None,
-                    sensor: SensorSpec::default(),
-                };
-                thin.train(*focal_length, resolve)?
+                let opening = (self.aperture.as_ref(), self.f_number);
+                thin_lens(*focal_length, opening, &self.elements, resolve)?
             }
             (None, Some(lens)) if self.aperture.is_none() && self.elements.is_empty() => {
                 lens.read(resolve)?

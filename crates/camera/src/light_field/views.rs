@@ -39,7 +39,7 @@ pub struct ViewGrid {
     vergence: f64,
     /// The slope of the chief ray at the array per distance from the axis (1/mm).
     chief: f64,
-    stop: Stop,
+    stop: EntranceOpening,
     solid_angle: f64,
     /// Pixels of the picture per pixel of this, as of a coarser camera.
     coarse: f64,
@@ -47,7 +47,7 @@ pub struct ViewGrid {
 
 /// Opening of the stop, as part of the entrance pupil.
 #[derive(Debug, Clone, PartialEq)]
-struct Stop {
+struct EntranceOpening {
     opening: Arc<Opening>,
     /// The stop's radius over the entrance pupil's.
     magnification: f64,
@@ -98,7 +98,7 @@ impl ViewGrid {
             }),
             vergence: 1.0 / focus,
             chief: -(to_array.d - pupil * to_array.c) / scale,
-            stop: Stop { opening, magnification },
+            stop: EntranceOpening { opening, magnification },
             solid_angle: lens.solid_angle(),
             coarse: 1.0,
         })

@@ -77,11 +77,8 @@ fn keep(path: &Path, rates: Calibration) -> Result<(), Error> {
 
 /// Reads the rates that are kept; nothing when it cannot be read.
 fn read(path: &Path) -> KeptRates {
-    let is_small =
-        std::fs::metadata(path).is_ok_and(|file| file.is_file() && file.len() <= MOST_BYTES);
-    let text =
-        if is_small { std::fs::read_to_string(path).unwrap_or_default() } else { String::new() };
-    serde_json::from_str(&text).unwrap_or_default()
+    let text = etendue_files::read(path, MOST_BYTES).unwrap_or_default();
+    serde_json::from_slice(&text).unwrap_or_default()
 }
 
 /// `$XDG_CACHE_HOME`, or `.cache` at home (XDG Base Directory Specification 0.8).
@@ -91,8 +88,8 @@ fn place() -> Option<PathBuf> {
     Some(cache.join(FILE))
 }
 
-/// Identity of the machine, on which rates depend: the processor, the threads, and this program
-/// with the accelerator that it has.
+/// What rates depend on: the processor, the threads, and this program with the accelerator that it has.
+#[expect(clippy::disallowed_methods, reason = "a table of the kernel's, no user's file")]
 fn machine() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let line = text.lines().find(|line| line.starts_with("model name"));

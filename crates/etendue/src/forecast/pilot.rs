@@ -9,7 +9,7 @@ use etendue_accel::Accel;
 use etendue_camera::Camera;
 use etendue_render::light_field::white_rows;
 use etendue_render::output::Outputs;
-use etendue_render::{Course, Images, Plan, Prepared, RenderError, Shard, render, trace};
+use etendue_render::{Images, Plan, Prepared, RenderError, RenderState, Shard, render, trace};
 use etendue_scene::Scene;
 use etendue_scene::file::SamplesSpec;
 use etendue_spectrum::Bands;
@@ -113,7 +113,7 @@ impl Pilot<'_> {
         let mut plan = Plan::new(&scene, Outputs::ALL);
         plan.passes = std::iter::once(0..samples).collect();
         let prepared = Prepared { accel: self.accel, images: self.images, others: &[] };
-        let course = Course { shard: Some(share), ..Course::default() };
+        let course = RenderState { shard: Some(share), ..RenderState::default() };
         let mut times = [0.0; TIMES];
         for time in &mut times {
             let film = trace(&scene, &plan, prepared, &[], &course, &|_: f64| self.goes_on())?;

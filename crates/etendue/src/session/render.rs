@@ -11,7 +11,7 @@ use etendue_render::expose::SensorLight;
 use etendue_render::output::{ImageHash, Layer};
 use etendue_render::report::memory;
 use etendue_render::{
-    Checkpoint, Course, Film, FilmFile, FollowedFrame, Identity, Plan, Prepared, RenderError,
+    Checkpoint, Film, FilmFile, FollowedFrame, Identity, Plan, Prepared, RenderError, RenderState,
     Rendered, Report, Seconds, Shard, sample_set,
 };
 use etendue_scene::Scene;
@@ -105,7 +105,7 @@ impl Session {
             (None, Some(_)) if shares.is_empty() => self.kept_identity(scene, plan)?,
             _ => self.identity(scene, plan)?,
         };
-        let course = Course { shard, shares, checkpoint: self.checkpoint.clone(), identity };
+        let course = RenderState { shard, shares, checkpoint: self.checkpoint.clone(), identity };
         if let Some(film) = self.trace_slots(&course, progress)? {
             return Ok(film);
         }

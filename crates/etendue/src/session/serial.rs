@@ -4,7 +4,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use etendue_render::serial::SerialFilm;
-use etendue_render::{Course, Film, FollowedFrame, Identity, Plan, Prepared, RenderError, Shard};
+use etendue_render::{
+    Film, FollowedFrame, Identity, Plan, Prepared, RenderError, RenderState, Shard,
+};
 use etendue_scene::Scene;
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
@@ -23,7 +25,7 @@ fn with_layers(scene: &Scene, wanted: impl Fn(&LayerSpec) -> bool) -> Scene {
 
 impl Session {
     /// Refuses what is not divided into slots.
-    fn allows_slots(&self, scene: &Scene, course: &Course<'_>) -> Result<(), Error> {
+    fn allows_slots(&self, scene: &Scene, course: &RenderState<'_>) -> Result<(), Error> {
         let why = if scene.picture != Some(LayerSpec::Radiance) {
             "adds up light, and the picture shows none\nhint: give the scene a `tracer` of light, such as \
              {\"type\": \"path\"}"
@@ -45,7 +47,7 @@ impl Session {
     /// without light are those of the scene by itself.
     pub(super) fn trace_slots(
         &mut self,
-        course: &Course<'_>,
+        course: &RenderState<'_>,
         progress: &Progress,
     ) -> Result<Option<Film>, Error> {
         if self.file().spec.serial.is_empty() {
@@ -59,7 +61,7 @@ impl Session {
         let plan = plan.clone();
         // What is no light, of the scene itself.
         let head = header(&scene, &fingerprints(&scene, neighbours)?);
-        let of_part = Course { shard, identity: Identity::new(), ..Course::default() };
+        let of_part = RenderState { shard, identity: Identity::new(), ..RenderState::default() };
         let seen = with_layers(&scene, |layer| !layer.is_light());
         let data = match seen.layers.is_empty() {
             true => None,
@@ -86,7 +88,7 @@ impl Session {
         &mut self,
         film: &mut SerialFilm,
         bands: &Bands,
-        (head, course): (&[(String, String)], &Course<'_>),
+        (head, course): (&[(String, String)], &RenderState<'_>),
         progress: &Progress,
     ) -> Result<(), Error> {
         for slot in self.file().slots(&self.opener)? {

@@ -62,7 +62,7 @@ pub(super) struct FirstRay {
 
 /// A grid over the pupil.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Sampling {
+pub(crate) struct PupilGrid {
     /// Cells a side.
     pub(crate) cells: usize,
     /// A cell's side (optical direction cosines).
@@ -71,7 +71,7 @@ pub(crate) struct Sampling {
     pub(crate) middle: DVec2,
 }
 
-impl Sampling {
+impl PupilGrid {
     /// So many cells over an outline.
     pub(crate) fn cells(cells: usize, outline: &Outline) -> Self {
         let step = outline.half / (0.5 * cells as f64 - RIM);
@@ -217,9 +217,9 @@ pub(crate) fn field(
     beam: &Beam<'_>,
     sphere: &ReferenceSphere,
     outline: &Outline,
-    sampling: Sampling,
+    sampling: PupilGrid,
 ) -> Result<PupilField, AnalysisError> {
-    let Sampling { cells, step, middle } = sampling;
+    let PupilGrid { cells, step, middle } = sampling;
     if !(LEAST_CELLS..=MOST_CELLS).contains(&cells) {
         return Err(AnalysisError::Cells(cells));
     }

@@ -8,7 +8,7 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::aim::{self, Sampling};
+use super::aim::{self, PupilGrid};
 use super::object::Beam;
 use super::pupil::PupilField;
 use super::{AnalysisError, MOST_CELLS, ObjectPoint, ReferenceSphere, smooth};
@@ -84,7 +84,7 @@ impl FieldsBetween {
         let half = parts.iter().map(|part| reach(&part.2)).fold(0.0, f64::max);
         let traced = |cells: usize| -> Result<Vec<PupilField>, AnalysisError> {
             let step = half / (0.5 * cells as f64 - super::pupil::RIM);
-            let sampling = Sampling { cells, step, middle };
+            let sampling = PupilGrid { cells, step, middle };
             let field = |(beam, sphere, outline): &(Beam<'_>, ReferenceSphere, aim::Outline)| {
                 smooth::field(beam, sphere, outline, sampling, SMOOTH)
                     .map_or_else(|| aim::field(beam, sphere, outline, sampling), Ok)

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::aim::{self, Sampling};
+use super::aim::{self, PupilGrid};
 use super::object::{Beam, ObjectPoint};
 use super::pupil::RIM;
 use super::spread::quick_length;
@@ -50,7 +50,7 @@ pub fn wavefronts(
         let outline = aim::outline(beam, &sphere)?;
         let mut count = 0;
         if cells == Cells::Needed {
-            let coarse = field((beam, &sphere, &outline), Sampling::cells(COARSE, &outline))?;
+            let coarse = field((beam, &sphere, &outline), PupilGrid::cells(COARSE, &outline))?;
             count = coarse.needed_cells(COMFORTABLE);
             if count > MOST_CELLS {
                 let waves = coarse.statistics().peak_to_valley;
@@ -80,7 +80,7 @@ pub fn wavefronts(
     let widest = widest / (0.5 * count as f64 - RIM);
     let wavefront = |(beam, sphere, outline): (&Beam<'_>, ReferenceSphere, aim::Outline)| {
         let step = widest * beam.at.wavelength();
-        let sampling = Sampling { cells: count, step, middle: outline.middle };
+        let sampling = PupilGrid { cells: count, step, middle: outline.middle };
         let pupil = field((beam, &sphere, &outline), sampling)?;
         Wavefront::resolved(beam.object, sphere, pupil)
     };

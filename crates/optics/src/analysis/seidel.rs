@@ -88,7 +88,7 @@ pub struct StopShift {
 
 /// A paraxial ray.
 #[derive(Debug, Clone, Copy)]
-struct Paraxial {
+struct ParaxialRay {
     height: f64,
     slope: f64,
 }
@@ -114,7 +114,7 @@ pub fn seidel(
         if !eccentricity.is_finite() || across == 0.0 {
             return Ok(None);
         }
-        let chief = Paraxial {
+        let chief = ParaxialRay {
             height: chief.height + eccentricity * marginal.height,
             slope: chief.slope + eccentricity * marginal.slope,
         };
@@ -139,7 +139,7 @@ fn sums(
     train: &OpticalTrain,
     object: &ObjectPoint,
     colours: [f64; 2],
-    (mut marginal, mut chief): (Paraxial, Paraxial),
+    (mut marginal, mut chief): (ParaxialRay, ParaxialRay),
 ) -> Result<(SeidelTable, Option<f64>), AnalysisError> {
     let indices = train.indices(train.wavelength())?;
     let [short, long] = [train.indices(colours[0])?, train.indices(colours[1])?];
@@ -156,7 +156,7 @@ fn sums(
     };
     let first = train.elements().first().map_or(0.0, |element| element.frame.vertex.z);
     // From a vertex to where the chief ray crosses the axis.
-    let crossing = |chief: Paraxial| Some(-chief.height / chief.slope).filter(|z| z.is_finite());
+    let crossing = |chief: ParaxialRay| Some(-chief.height / chief.slope).filter(|z| z.is_finite());
     let mut crossed = crossing(chief).filter(|z| *z <= 0.0).map(|z| first + z);
     for (i, element) in train.elements().iter().enumerate() {
         if i > 0 {
@@ -169,8 +169,10 @@ fn sums(
         }
         let (n, n1) = (indices[i], indices[i + 1]);
         let power = train.power(&indices, i);
-        let bent =
-            |ray: Paraxial| Paraxial { slope: (n * ray.slope - power * ray.height) / n1, ..ray };
+        let bent = |ray: ParaxialRay| ParaxialRay {
+            slope: (n * ray.slope - power * ray.height) / n1,
+            ..ray
+        };
         let sums = match &element.part {
             Part::Surface(surface) => {
                 let dispersion = (short[i + 1] - long[i + 1]) / n1 - (short[i] - long[i]) / n;
@@ -215,7 +217,10 @@ fn sums(
 }
 
 /// The marginal and the chief ray at the first vertex.
-fn rays(train: &OpticalTrain, object: &ObjectPoint) -> Result<(Paraxial, Paraxial), AnalysisError> {
+fn rays(
+    train: &OpticalTrain,
+    object: &ObjectPoint,
+) -> Result<(ParaxialRay, ParaxialRay), AnalysisError> {
     let pupil = train.paraxial(train.wavelength())?.entrance_pupil;
     let (Some(z), Some(diameter)) = (pupil.z, pupil.diameter) else {
         return Err(AnalysisError::Unlimited);
@@ -224,14 +229,14 @@ fn rays(train: &OpticalTrain, object: &ObjectPoint) -> Result<(Paraxial, Paraxia
     Ok(match *object {
         ObjectPoint::Infinity { angles } => {
             let slope = angles[1].to_radians().tan();
-            let marginal = Paraxial { height: radius, slope: 0.0 };
-            (marginal, Paraxial { height: -z * slope, slope })
+            let marginal = ParaxialRay { height: radius, slope: 0.0 };
+            (marginal, ParaxialRay { height: -z * slope, slope })
         }
         ObjectPoint::Near { place } => {
             let way = z - place.z;
             let (u, bar) = (radius / way, -place.y / way);
-            let marginal = Paraxial { height: -place.z * u, slope: u };
-            (marginal, Paraxial { height: -z * bar, slope: bar })
+            let marginal = ParaxialRay { height: -place.z * u, slope: u };
+            (marginal, ParaxialRay { height: -z * bar, slope: bar })
         }
     })
 }
@@ -247,7 +252,7 @@ fn at_surface(
     [n, n1]: [f64; 2],
     (c, quartic): (f64, f64),
     dispersion: f64,
-    [marginal, chief]: [Paraxial; 2],
+    [marginal, chief]: [ParaxialRay; 2],
     invariant: f64,
 ) -> SeidelSums {
     let (h, bar) = (marginal.height, chief.height);

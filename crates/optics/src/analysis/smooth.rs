@@ -7,7 +7,7 @@
 
 use glam::{DMat2, DVec2};
 
-use super::aim::{self, FirstRay, Outline, Sampling};
+use super::aim::{self, FirstRay, Outline, PupilGrid};
 use super::least_squares::LeastSquares;
 use super::object::Beam;
 use super::pupil::PupilField;
@@ -61,12 +61,12 @@ fn powers(x: f64) -> Basis {
 
 /// A polynomial of two coordinates along a line of one y: coefficients of functions of x, and those of its
 /// derivative by y. Coefficients come by total degree, and in each by the degree in x.
-struct Line {
+struct LinePolynomial {
     degree: usize,
     values: [[f64; MOST]; 2],
 }
 
-impl Line {
+impl LinePolynomial {
     fn new(coefficients: &[f64], degree: usize, y: &Basis) -> Self {
         let mut values = [[0.0; MOST]; 2];
         let mut term = coefficients.iter();
@@ -90,14 +90,14 @@ impl Line {
 }
 
 /// Path differences (mm) over places from the chief ray's.
-struct Smooth {
+struct PathPolynomial {
     /// The unit of places (optical direction cosines).
     scale: f64,
     degree: usize,
     coefficients: Vec<f64>,
 }
 
-impl Smooth {
+impl PathPolynomial {
     /// The polynomial that rays are within `tolerance` (mm) of; `None` where there is none.
     fn through(rays: &[FirstRay], tolerance: f64) -> Option<Self> {
         let far = |ray: &FirstRay| ray.from_middle.abs().max_element();
@@ -134,7 +134,7 @@ impl Smooth {
 
     fn at(&self, from_middle: DVec2) -> (f64, DVec2) {
         let [x, y] = (from_middle / self.scale).to_array().map(chebyshev);
-        Line::new(&self.coefficients, self.degree, &y).at(&x)
+        LinePolynomial::new(&self.coefficients, self.degree, &y).at(&x)
     }
 }
 
@@ -157,12 +157,12 @@ pub(crate) fn field(
     beam: &Beam<'_>,
     sphere: &ReferenceSphere,
     outline: &Outline,
-    sampling: Sampling,
+    sampling: PupilGrid,
     tolerance: f64,
 ) -> Option<PupilField> {
-    let Sampling { cells, step, middle } = sampling;
+    let PupilGrid { cells, step, middle } = sampling;
     let wavelength = beam.at.wavelength();
-    let smooth = Smooth::through(&outline.rays, tolerance * wavelength * 1e-6)?;
+    let smooth = PathPolynomial::through(&outline.rays, tolerance * wavelength * 1e-6)?;
     if !has_places(outline) {
         return None;
     }
@@ -184,9 +184,11 @@ pub(crate) fn field(
     for row in (0..cells).filter(|&row| is_inside(row, 1)) {
         let [power, polynomial] = &rows[row];
         let by_place = [0, 1].map(|axis| {
-            outline.along(axis, |coefficients, degree| Line::new(coefficients, degree, power))
+            outline.along(axis, |coefficients, degree| {
+                LinePolynomial::new(coefficients, degree, power)
+            })
         });
-        let ahead = Line::new(&smooth.coefficients, smooth.degree, polynomial);
+        let ahead = LinePolynomial::new(&smooth.coefficients, smooth.degree, polynomial);
         for column in (0..cells).filter(|&column| is_inside(column, 0)) {
             let i = row * cells + column;
             let [power, polynomial] = &columns[column];
@@ -246,7 +248,7 @@ mod tests {
         let centre = chief_point(&beam, train.sensor_z(crate::train::Focus::AsWritten).unwrap());
         let sphere = ReferenceSphere::about(train, &at, centre).unwrap();
         let outline = aim::outline(&beam, &sphere).unwrap();
-        let sampling = Sampling::cells(64, &outline);
+        let sampling = PupilGrid::cells(64, &outline);
         let aimed = aim::field(&beam, &sphere, &outline, sampling).unwrap();
         (aimed, field(&beam, &sphere, &outline, sampling, tolerance))
     }

@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::aim::{self, Sampling};
+use super::aim::{self, PupilGrid};
 use super::least_squares::LeastSquares;
 use super::object::{Beam, ObjectPoint};
 use super::pupil::PupilField;
@@ -151,7 +151,7 @@ impl Wavefront {
         let count = match cells {
             Cells::Given(count) => count,
             Cells::Needed => {
-                let coarse = aim::field(beam, &sphere, &outline, Sampling::cells(64, &outline))?;
+                let coarse = aim::field(beam, &sphere, &outline, PupilGrid::cells(64, &outline))?;
                 let needed = coarse.needed_cells(COMFORTABLE).max(USUAL_CELLS);
                 let needed = 2 * quick_length(needed.div_ceil(2));
                 if needed > MOST_CELLS {
@@ -161,7 +161,7 @@ impl Wavefront {
                 needed
             }
         };
-        Self::sampled(beam, sphere, &outline, Sampling::cells(count, &outline))
+        Self::sampled(beam, sphere, &outline, PupilGrid::cells(count, &outline))
     }
 
     /// The wavefront on a grid that is given.
@@ -169,7 +169,7 @@ impl Wavefront {
         beam: &Beam<'_>,
         sphere: ReferenceSphere,
         outline: &aim::Outline,
-        sampling: Sampling,
+        sampling: PupilGrid,
     ) -> Result<Self, AnalysisError> {
         let pupil = aim::field(beam, &sphere, outline, sampling)?;
         Self::resolved(beam.object, sphere, pupil)

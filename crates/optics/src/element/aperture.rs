@@ -13,7 +13,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Resolve;
-use super::shapes::{AnnularSpec, BoxSpec, OutlineSpec, Shape, SpiderSpec};
+use super::shapes::{AnnularSpec, BoxSpec, OutlineSpec, SMALLEST_RADIUS, Shape, SpiderSpec};
 use etendue_geometry::units::{Degrees, Millimetres};
 use etendue_image::{Limits, Samples};
 
@@ -75,10 +75,6 @@ pub struct MaskSpec {
 
 /// The most blades; a real iris has about 20.
 const MOST_BLADES: u32 = 1024;
-
-/// Radius (mm) of the smallest opening that lets rays through beside each other: squares of smaller ones would
-/// soon be no numbers.
-pub(crate) const SMALLEST_RADIUS: f64 = 1e-9;
 
 /// An opening in its own plane (mm).
 #[derive(Debug, Clone, PartialEq)]

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use super::newton::{Profile, squares_along};
 use super::rays::Ray;
 use super::real::Real;
-use super::refract::{Media, Root, meet_conic};
+use super::refract::{IndexPair, Root, meet_conic};
 use super::surface::{Surface, checked_semi_diameter, vertex_curvature};
 use crate::glass::GlassSpec;
 use etendue_geometry::units::Millimetres;
@@ -216,7 +216,7 @@ impl Profile for Biconic {
     #[inline(always)]
     fn refract<T: Real>(
         &self,
-        media: Media,
+        media: IndexPair,
         at: Ray<T>,
         [along_x, along_y]: [T; 2],
     ) -> (Ray<T>, bool) {
@@ -369,7 +369,7 @@ impl Profile for Surface {
     }
 
     #[inline(always)]
-    fn refract<T: Real>(&self, media: Media, at: Ray<T>, slope: T) -> (Ray<T>, bool) {
+    fn refract<T: Real>(&self, media: IndexPair, at: Ray<T>, slope: T) -> (Ray<T>, bool) {
         let Ray { position: [x, y, _], direction: [u, v, w] } = at;
         let one = T::constant(1.0);
         let m = [-slope * x, -slope * y, one];
@@ -472,7 +472,7 @@ mod tests {
             for height in [0.1, 3.0, 9.0, 14.0] {
                 let mut start = [0.0, 0.0, -3.0];
                 start[axis] = height;
-                let media = Media::new(1.0, n);
+                let media = IndexPair::new(1.0, n);
                 let out = cross(&s, media, ray(start, [0.0, 0.0, 1.0]), 1e9).ray;
                 let t = -out.position[axis] / out.direction[axis];
                 assert!((out.position[2] + t * out.direction[2] - focus).abs() < 1e-11, "{height}");
@@ -484,7 +484,7 @@ mod tests {
     #[test]
     fn a_cylinder_bends_along_one_axis_alone_and_is_met_beside_its_domain() {
         let s = read(r#"{"radius_x": 10}"#).unwrap();
-        let media = Media::new(1.0, 1.5);
+        let media = IndexPair::new(1.0, 1.5);
         let out = cross(&s, media, ray([3.0, 50.0, -5.0], [0.0, 0.2, 1.0]), 1e9);
         assert!(out.hit && (out.ray.position[2] - (10.0 - 91.0_f64.sqrt())).abs() < 1e-14);
         // Snell along the cylinder: the component of n d along its axis is kept.
@@ -497,7 +497,7 @@ mod tests {
     #[test]
     fn what_is_found_lies_on_the_surface_and_steep_rays_are_no_nonsense() {
         let s = read(r#"{"radius": 12, "radius_x": -15, "conic": 0.5}"#).unwrap();
-        let media = Media::new(1.0, 1.5);
+        let media = IndexPair::new(1.0, 1.5);
         let mut hits = 0;
         for i in -20..20 {
             for j in -20..20 {

@@ -17,7 +17,7 @@ use super::newton::{
     Profile, cross_by_newton, cross_by_search, interval, keeps_off, reach_around, root_between,
 };
 use super::rays::Ray;
-use super::refract::{Media, Refracted, TOUCH};
+use super::refract::{IndexPair, Refracted, TOUCH};
 use super::surface::Surface;
 
 /// Rings about the axis whose slopes are bounded one by one.
@@ -113,7 +113,7 @@ impl Slopes {
 /// back; where there is none, as Newton's method and its search have it.
 pub(super) fn cross_first<P: Profile>(
     surface: &P,
-    (media, slopes): (Media, &Slopes),
+    (media, slopes): (IndexPair, &Slopes),
     ray: Ray,
     clip2: f64,
 ) -> Refracted {
@@ -124,7 +124,7 @@ pub(super) fn cross_first<P: Profile>(
 /// Crosses the surface where Newton's method has found `newton`.
 pub(super) fn cross_first_after<P: Profile>(
     surface: &P,
-    (media, slopes): (Media, &Slopes),
+    (media, slopes): (IndexPair, &Slopes),
     ray: Ray,
     clip2: f64,
     newton: Refracted,
@@ -188,8 +188,8 @@ fn part_near<P: Profile>(surface: &P, ray: Ray, start: f64) -> Option<[f64; 2]> 
     (from < to && to - from < f64::INFINITY).then_some([from, to])
 }
 
-/// Crossing of a surface by a ray, from front to back.
-struct Crossing {
+/// Where a ray crosses a surface from front to back.
+struct SurfaceCrossing {
     /// A part of the ray in which it crosses nowhere else.
     part: [f64; 2],
     root: f64,
@@ -201,7 +201,7 @@ fn first_within<P: Profile>(
     ray: Ray,
     part @ [from, to]: [f64; 2],
     halvings: u32,
-) -> Option<Crossing> {
+) -> Option<SurfaceCrossing> {
     if keeps_off(surface, ray, part) {
         return None;
     }
@@ -217,7 +217,7 @@ fn first_within<P: Profile>(
         }
         let root = root_between(part, |t| behind(surface, ray, t));
         let [x, y, _] = ray.advanced(root).position;
-        return surface.exists([x, y]).then_some(Crossing { part, root });
+        return surface.exists([x, y]).then_some(SurfaceCrossing { part, root });
     }
     let middle = 0.5 * (from + to);
     first_within(surface, ray, [from, middle], halvings - 1)

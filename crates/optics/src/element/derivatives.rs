@@ -7,10 +7,10 @@ use super::newton::cross_at;
 use super::rays::{Ray, RayStatus};
 use super::real::Real;
 use super::refract::Refraction;
-use super::step::{Action, Clip, Step};
+use super::step::{Action, Clip, ElementStep};
 use super::thin_lens::at_thin_lens;
 
-impl Step {
+impl ElementStep {
     /// Takes one ray through the element in any number, as rays without end of the element go; `None` where it does not
     /// go on, and at lenslets and gradients, which have no derivatives here.
     pub(crate) fn run_in<T: Real>(&self, ray: Ray<T>) -> Option<Ray<T>> {

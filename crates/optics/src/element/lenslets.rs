@@ -20,14 +20,14 @@ const MOST_CELLS: u32 = 4;
 #[derive(Debug, Clone)]
 pub(crate) struct Lenslets {
     pub(crate) array: Arc<MicrolensArray>,
-    kinds: Kinds,
+    kinds: LensletOptics,
     /// The share of light that each type passes; all of it when empty.
     pub(crate) transmissions: Vec<f64>,
 }
 
 /// Optical model of each type of lenslet, in the order of the types.
 #[derive(Debug, Clone)]
-enum Kinds {
+enum LensletOptics {
     /// Thin lenses of these powers (1/mm).
     Thin(Vec<f64>),
     /// Faces, and what is between them.
@@ -63,8 +63,11 @@ impl Lenslets {
             }
         }
         let flat = Refraction::new(Surface::sphere(0.0), before, behind);
-        let kinds =
-            if faces.is_empty() { Kinds::Thin(powers) } else { Kinds::Faces { faces, flat } };
+        let kinds = if faces.is_empty() {
+            LensletOptics::Thin(powers)
+        } else {
+            LensletOptics::Faces { faces, flat }
+        };
         Self { array: Arc::clone(array), kinds, transmissions }
     }
 
@@ -95,7 +98,7 @@ impl Lenslets {
         clip: Clip,
     ) -> bool {
         match &self.kinds {
-            Kinds::Thin(powers) => match powers[..] {
+            LensletOptics::Thin(powers) => match powers[..] {
                 [power] => each_lane(
                     block,
                     element,
@@ -111,7 +114,7 @@ impl Lenslets {
                     |ray| self.at_thin(form, ray, clip, |index| powers[self.array.type_at(index)]),
                 ),
             },
-            Kinds::Faces { faces, flat } => match (&faces[..], self.array.gaps) {
+            LensletOptics::Faces { faces, flat } => match (&faces[..], self.array.gaps) {
                 // Where nothing passes, a ray ends in the plane.
                 ([one], Gaps::Opaque) if is_sphere(one) => each_lane(
                     block,
@@ -214,13 +217,13 @@ impl Lenslets {
         let kind = self.array.type_at(place.index);
         let acting = place.open.then_some(kind);
         match &self.kinds {
-            Kinds::Thin(powers) => {
+            LensletOptics::Thin(powers) => {
                 (self.at_thin(form, ray, clip, |index| powers[self.array.type_at(index)]), acting)
             }
-            Kinds::Faces { flat, .. } if !(place.open && place.clear) => {
+            LensletOptics::Faces { flat, .. } if !(place.open && place.clear) => {
                 (Refracted { clear: place.clear, ..flat.at_plane(ray, f64::INFINITY) }, acting)
             }
-            Kinds::Faces { faces, .. } => {
+            LensletOptics::Faces { faces, .. } => {
                 let centre = [x - place.away[0], y - place.away[1]];
                 (self.on_faces(faces, ray, place.index, centre), acting)
             }

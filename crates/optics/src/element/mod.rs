@@ -24,7 +24,7 @@ mod part;
 mod rays;
 pub(crate) mod real;
 mod refract;
-mod shapes;
+pub(crate) mod shapes;
 mod step;
 mod surface;
 mod thin_lens;
@@ -64,7 +64,7 @@ pub use real::Real;
 pub(crate) use refract::Refraction;
 pub use shapes::{AnnularSpec, BoxSpec, OutlineSpec, Shape, SpiderSpec};
 pub use step::Clip;
-pub(crate) use step::{Action, Step};
+pub(crate) use step::{Action, ElementStep};
 pub use surface::{Surface, SurfaceSpec};
 pub use thin_lens::{ThinLens, ThinLensSpec};
 

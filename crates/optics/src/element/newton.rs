@@ -9,7 +9,7 @@
 use super::crossings::Slopes;
 use super::rays::{Block, LANES, PENDING, Ray, at_lane};
 use super::real::Real;
-use super::refract::{Media, Refracted, TOUCH, each_numbered_lane};
+use super::refract::{IndexPair, Refracted, TOUCH, each_numbered_lane};
 
 /// The step (mm) at which the method has arrived.
 const SETTLED: f64 = 1e-10;
@@ -55,7 +55,12 @@ pub(super) trait Profile {
     fn exists(&self, place: [f64; 2]) -> bool;
 
     /// The ray as it goes on from its place on the surface, and whether it does.
-    fn refract<T: Real>(&self, media: Media, at: Ray<T>, slope: Self::Slope<T>) -> (Ray<T>, bool);
+    fn refract<T: Real>(
+        &self,
+        media: IndexPair,
+        at: Ray<T>,
+        slope: Self::Slope<T>,
+    ) -> (Ray<T>, bool);
 
     /// The distance from the axis beyond which none of it exists, and another of the size of its radii
     /// of curvature (mm).
@@ -80,7 +85,7 @@ pub(super) trait Profile {
 #[inline(always)]
 pub(super) fn cross_block<P: Profile>(
     surface: &P,
-    (media, slopes): (Media, &Slopes),
+    (media, slopes): (IndexPair, &Slopes),
     block: &mut Block,
     (element, z): (usize, f64),
     clip2: f64,
@@ -122,7 +127,7 @@ pub(super) fn cross_block<P: Profile>(
 
 /// A ray in the surface's frame: Newton first, then the search, wherever it crosses first.
 #[cfg(test)]
-pub(super) fn cross<P: Profile>(surface: &P, media: Media, ray: Ray, clip2: f64) -> Refracted {
+pub(super) fn cross<P: Profile>(surface: &P, media: IndexPair, ray: Ray, clip2: f64) -> Refracted {
     let met = cross_by_newton(surface, media, ray, clip2);
     if met.hit { met } else { cross_by_search(surface, media, ray, clip2) }
 }
@@ -131,7 +136,7 @@ pub(super) fn cross<P: Profile>(surface: &P, media: Media, ray: Ray, clip2: f64)
 #[inline(always)]
 pub(super) fn cross_by_newton<P: Profile>(
     surface: &P,
-    media: Media,
+    media: IndexPair,
     ray: Ray,
     clip2: f64,
 ) -> Refracted {
@@ -142,7 +147,7 @@ pub(super) fn cross_by_newton<P: Profile>(
 /// a last step of Newton's method has the derivatives of the place, since F is 0 there.
 pub(super) fn cross_at<P: Profile, T: Real>(
     surface: &P,
-    media: Media,
+    media: IndexPair,
     ray: Ray<T>,
     place: [f64; 3],
 ) -> Ray<T> {
@@ -157,7 +162,7 @@ pub(super) fn cross_at<P: Profile, T: Real>(
 /// A ray in the surface's frame that Newton's method does not bring to it.
 pub(super) fn cross_by_search<P: Profile>(
     surface: &P,
-    media: Media,
+    media: IndexPair,
     ray: Ray,
     clip2: f64,
 ) -> Refracted {
@@ -248,7 +253,7 @@ impl<const N: usize, P: Profile> Newton<N, P> {
 
     /// Refracts a ray at its root; no hit where [`search`] has to look again.
     #[inline(always)]
-    fn refracted(&self, surface: &P, media: Media, clip2: f64, lane: usize) -> Refracted {
+    fn refracted(&self, surface: &P, media: IndexPair, clip2: f64, lane: usize) -> Refracted {
         let root = self.ray(lane);
         let [x, y, _] = root.position;
         let slope = surface.slope_at(root, self.slope[lane]);

@@ -13,7 +13,7 @@ use super::crossings::Slopes;
 use super::freeform::{Freeform, FreeformSpec, FreeformSurface};
 use super::lenslets::Lenslets;
 use super::mirror::{Mirror, MirrorMount, MirrorSpec};
-use super::refract::Media;
+use super::refract::IndexPair;
 use super::step::Action;
 use super::{
     ApertureSpec, Biconic, BiconicSpec, CircularSpec, Filter, FilterSpec, Gaps, MicrolensArray,
@@ -486,7 +486,7 @@ impl Part {
             ],
             Self::Biconic(surface) => {
                 [[before, behind], [behind, before]].map(|[before, behind]| {
-                    let (surface, media) = (surface.clone(), Media::new(before, behind));
+                    let (surface, media) = (surface.clone(), IndexPair::new(before, behind));
                     let slopes = Slopes::of_biconic(&surface);
                     Action::Biconic { surface, media, slopes }
                 })
@@ -500,7 +500,11 @@ impl Part {
                 let action = |shape: Arc<Freeform>, before, behind| Action::Freeform {
                     efficiency: shape.efficiency(wavelength),
                     surface: FreeformSurface::new(shape, behind, wavelength),
-                    media: if is_mirror { Media::MIRROR } else { Media::new(before, behind) },
+                    media: if is_mirror {
+                        IndexPair::MIRROR
+                    } else {
+                        IndexPair::new(before, behind)
+                    },
                 };
                 let from_behind = match is_mirror {
                     true => Arc::new(surface.flipped()),

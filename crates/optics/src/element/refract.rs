@@ -31,14 +31,14 @@ pub(crate) const TOUCH: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub(crate) struct Refraction {
     pub(crate) surface: Surface,
-    pub(crate) media: Media,
-    /// Slopes that tell which rays cross an asphere only once.
+    pub(crate) media: IndexPair,
+    /// What tells which rays cross an asphere but once.
     pub(super) slopes: Slopes,
 }
 
 /// The media on both sides of a surface at one wavelength, met from one side.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Media {
+pub(crate) struct IndexPair {
     /// The index before over the index behind, in the direction of travel.
     ratio: f64,
     /// 1 − μ².
@@ -69,7 +69,7 @@ pub(crate) enum Root {
     Far,
 }
 
-impl Media {
+impl IndexPair {
     /// From a medium of index `before` into one of index `behind`.
     pub(crate) fn new(before: f64, behind: f64) -> Self {
         let ratio = before / behind;
@@ -101,7 +101,7 @@ impl Media {
     }
 }
 
-impl Media {
+impl IndexPair {
     /// As [`Self::refract`] at a surface whose phase adds `kick` to the direction in its tangent plane. What is
     /// evanescent does not go on.
     pub(crate) fn diffract<T: Real>(
@@ -128,12 +128,12 @@ impl Refraction {
     /// From a medium of index `before` into one of index `behind`.
     pub(crate) fn new(surface: Surface, before: f64, behind: f64) -> Self {
         let slopes = Slopes::of_surface(&surface);
-        Self { surface, media: Media::new(before, behind), slopes }
+        Self { surface, media: IndexPair::new(before, behind), slopes }
     }
 
     /// At a mirror.
     pub(crate) fn mirror(surface: Surface) -> Self {
-        Self { media: Media::MIRROR, ..Self::new(surface, 1.0, 1.0) }
+        Self { media: IndexPair::MIRROR, ..Self::new(surface, 1.0, 1.0) }
     }
 
     /// A ray in the surface's frame at a plane.

@@ -5,7 +5,9 @@ use etendue_geometry::units::{Degrees, Millimetres};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::aperture::SMALLEST_RADIUS;
+/// Radius (mm) of the smallest opening that lets rays through beside each other: squares of smaller ones would
+/// soon be no numbers.
+pub(crate) const SMALLEST_RADIUS: f64 = 1e-9;
 
 /// A rectangle, or an ellipse in one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

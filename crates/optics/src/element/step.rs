@@ -1,7 +1,7 @@
 //! One element at one wavelength, met from one side: what a ray does there.
 //!
-//! Two ways through the same arithmetic. [`Step::run`] takes a block of rays, decides the ordinary
-//! cases in vector registers and leaves the others marked; [`Step::run_one`] takes a single ray and
+//! Two ways through the same arithmetic. [`ElementStep::run`] takes a block of rays, decides the ordinary
+//! cases in vector registers and leaves the others marked; [`ElementStep::run_one`] takes a single ray and
 //! decides everything. Both give the same bits.
 
 use std::sync::Arc;
@@ -20,7 +20,7 @@ use super::losses::{Filter, Loss};
 use super::mirror::{Fold, Shadow};
 use super::newton::{Profile, cross_block};
 use super::rays::{Block, LANES, PENDING, Ray, RayStatus};
-use super::refract::{Media, Refracted, Refraction, each_lane};
+use super::refract::{IndexPair, Refracted, Refraction, each_lane};
 use super::thin_lens::at_thin_lens;
 
 /// Clipping of rays by clear apertures.
@@ -35,7 +35,7 @@ pub enum Clip {
 
 /// An element as one ray meets it.
 #[derive(Debug, Clone)]
-pub(crate) struct Step {
+pub(crate) struct ElementStep {
     /// The element's index from the object side.
     pub(crate) element: usize,
     pub(crate) frame: Frame,
@@ -58,7 +58,7 @@ pub(crate) enum Action {
     Asphere(Refraction),
     Biconic {
         surface: Biconic,
-        media: Media,
+        media: IndexPair,
         slopes: Slopes,
     },
     ThinLens {
@@ -74,7 +74,7 @@ pub(crate) enum Action {
     /// A surface of any shape, and the share of light in its order.
     Freeform {
         surface: FreeformSurface,
-        media: Media,
+        media: IndexPair,
         efficiency: f64,
     },
     /// A mirror in the way to another element.
@@ -136,7 +136,7 @@ fn limit(semi_diameter: f64, clip: Clip) -> f64 {
     }
 }
 
-impl Step {
+impl ElementStep {
     /// Takes a block of rays through the element.
     #[inline(always)]
     pub(crate) fn run(&self, block: &mut Block, clip: Clip) {
@@ -259,7 +259,7 @@ impl Step {
     fn cross_block<P: Profile>(
         &self,
         surface: &P,
-        (media, slopes): (Media, &Slopes),
+        (media, slopes): (IndexPair, &Slopes),
         block: &mut Block,
         z: f64,
         clip2: f64,
@@ -282,7 +282,7 @@ impl Step {
     fn cross_lane<P: Profile>(
         &self,
         surface: &P,
-        (media, slopes): (Media, &Slopes),
+        (media, slopes): (IndexPair, &Slopes),
         (block, lane): (&mut Block, usize),
         (z, clip2): (f64, f64),
         newton: Refracted,

@@ -141,7 +141,6 @@ impl AgfCatalogue {
             namesakes: Vec::new(),
             dispersion,
             extinction,
-            gradient: None,
         };
         self.glasses.insert(entry.name.to_owned(), glass);
         Ok(())

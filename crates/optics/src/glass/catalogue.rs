@@ -170,7 +170,6 @@ impl Entry {
             namesakes: Vec::new(),
             dispersion,
             extinction,
-            gradient: None,
         })
     }
 }

@@ -101,8 +101,6 @@ pub struct Glass {
     dispersion: Dispersion,
     /// `[nm, k]`: extinction coefficients in ascending order of wavelength.
     extinction: Vec<[f64; 2]>,
-    /// Gradient of the index behind an element of a lens, if there is one.
-    pub(crate) gradient: Option<crate::element::GradedGap>,
 }
 
 impl Glass {
@@ -121,7 +119,6 @@ impl Glass {
             namesakes: Vec::new(),
             dispersion,
             extinction: Vec::new(),
-            gradient: None,
         }
     }
 

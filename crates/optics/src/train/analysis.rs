@@ -19,7 +19,7 @@ use serde::Serialize;
 use crate::element::{Clip, LensRays, RayStatus};
 use crate::glass::GlassError;
 use crate::train::aim::towards_lens;
-use crate::train::pupil::Window;
+use crate::train::pupil::SlopeWindow;
 use crate::train::{FieldSpec, MonochromaticTrain, OpticalTrain, Side};
 
 /// How the image of one wavelength stands to that of the design wavelength.
@@ -200,7 +200,7 @@ pub fn projected_solid_angle(train: &OpticalTrain, at: &MonochromaticTrain, film
 
 /// Projected solid angle, for one of `places`, which share the rays that a table is worth.
 fn solid_angle(train: &OpticalTrain, at: &MonochromaticTrain, film: DVec3, places: usize) -> f64 {
-    let Some(window) = Window::find(train, at, film) else { return 0.0 };
+    let Some(window) = SlopeWindow::find(train, at, film) else { return 0.0 };
     if film.truncate() == DVec2::ZERO && train.is_rotationally_symmetric() {
         let corner = window.min.abs().max(window.max.abs());
         return solid_angle_of_rings(at, film, corner.max_element());
@@ -277,7 +277,7 @@ pub fn image_circle(
     sensor_z: f64,
     limit: f64,
 ) -> Option<f64> {
-    let lit = |r: f64| Window::find(train, at, DVec3::new(0.0, r, sensor_z)).is_some();
+    let lit = |r: f64| SlopeWindow::find(train, at, DVec3::new(0.0, r, sensor_z)).is_some();
     if !lit(0.0) || lit(limit) {
         return None;
     }
@@ -300,7 +300,7 @@ pub fn half_field(
     radius: f64,
 ) -> Option<f64> {
     let film = DVec3::new(0.0, radius, sensor_z);
-    let window = Window::find(train, at, film)?;
+    let window = SlopeWindow::find(train, at, film)?;
     let outside = |slopes: DVec2| {
         let path = at.path(Side::Sensor, Clip::Off, film, towards_lens(slopes));
         path.direction.map(|d| d.truncate().length().atan2(-d.z).to_degrees())

@@ -115,7 +115,7 @@ impl LensFile {
             true => Cow::Borrowed(resolve.glasses()),
             false => Cow::Owned([resolve.glasses(), &own].concat()),
         };
-        let mut media = vec![Glass::air()];
+        let (mut media, mut gradients) = (vec![Glass::air()], vec![None::<GradedGap>]);
         let mut elements = Vec::with_capacity(self.elements.len());
         // Files count along the axis as it is built, trains along the way of light.
         let (mut z, mut sense) = (0.0, 1.0);
@@ -132,16 +132,21 @@ impl LensFile {
             }
             elements.push(element);
             let mut medium = behind(spec, index, &media, &catalogues)?;
-            if spec.part.medium_behind().is_none() && index > 0 {
-                // A sheet stands in what began farther in front.
+            // A sheet stands in what began farther in front.
+            let mut graded = match spec.part.medium_behind() {
+                None => gradients[index].clone(),
+                Some(_) => None,
+            };
+            if index > 0 {
                 let gap = z - elements[index - 1].frame.vertex.z;
-                medium.gradient = medium.gradient.map(|gradient| gradient.behind(gap));
+                graded = graded.map(|gradient| gradient.behind(gap));
             }
             if let Some(gradient) = self.gradient(index, &medium, wavelength)? {
-                medium.gradient = Some(GradedGap { gradient: gradient.into(), offset: 0.0, sense });
+                graded = Some(GradedGap { gradient: gradient.into(), offset: 0.0, sense });
                 medium.name.push_str(", graded");
             }
             media.push(medium);
+            gradients.push(graded);
             z += sense * spec.mount.thickness.0;
         }
         let sensor = self.sensor.unwrap_or_default();
@@ -152,6 +157,7 @@ impl LensFile {
             source: self.source.clone(),
             elements,
             media,
+            gradients,
             stop: 0,
             wavelength,
             end: z,

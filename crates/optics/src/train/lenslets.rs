@@ -119,6 +119,7 @@ impl OpticalTrain {
             element
         }));
         self.media.extend(rear.media.iter().skip(1).cloned());
+        self.gradients.extend(rear.gradients.iter().skip(1).cloned());
         self.end = start + rear.end;
         self.notes = self.oddities();
         self
@@ -136,6 +137,7 @@ impl OpticalTrain {
         let mut train = self.without_arrays();
         train.elements.drain(..first);
         train.media.drain(..first);
+        train.gradients.drain(..first);
         train.stop = 0;
         train
     }
@@ -199,6 +201,7 @@ impl OpticalTrain {
         let mut main = self.clone();
         main.elements.truncate(end);
         main.media.truncate(end + 1);
+        main.gradients.truncate(end + 1);
         main.sensor = super::SensorMount::default();
         main.end = 0.0;
         main

@@ -36,8 +36,8 @@ pub mod report;
 pub mod trace;
 pub mod zemax;
 
-use crate::element::aperture::SMALLEST_RADIUS;
-use crate::element::{Frame, LossesSpec, Symbol, ThinLens};
+use crate::element::shapes::SMALLEST_RADIUS;
+use crate::element::{Frame, GradedGap, LossesSpec, Symbol, ThinLens};
 use crate::glass::{Glass, GlassError};
 
 /// The most elements that a lens may have: the largest that were built have a hundred.
@@ -136,6 +136,8 @@ pub struct OpticalTrain {
     pub(crate) elements: Vec<Element>,
     /// One more than elements: `media[i]` is before element `i`.
     pub(crate) media: Vec<Glass>,
+    /// How the index of each of them changes from place to place.
+    pub(crate) gradients: Vec<Option<GradedGap>>,
     pub(crate) stop: usize,
     pub(crate) wavelength: f64,
     pub(crate) end: f64,
@@ -217,6 +219,7 @@ impl OpticalTrain {
             Part::ThinLens(ThinLens { power: 1.0 / focal_length, semi_diameter: f64::INFINITY });
         self.elements.push(Element { part, frame: Frame::on_axis(z) });
         self.media.extend(self.media.last().cloned());
+        self.gradients.extend(self.gradients.last().cloned());
         self.end = z + focal_length;
         self
     }

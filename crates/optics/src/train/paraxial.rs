@@ -212,7 +212,7 @@ impl OpticalTrain {
         match i.checked_sub(1) {
             Some(previous) => {
                 let gap = self.elements[i].frame.vertex.z - self.elements[previous].frame.vertex.z;
-                match &self.media[i].gradient {
+                match &self.gradients[i] {
                     None => Abcd::gap(gap / indices[i]),
                     Some(gradient) => gradient.matrix(indices[i], gap),
                 }
@@ -229,11 +229,11 @@ impl OpticalTrain {
     /// The indices on the axis at both sides of element `i`.
     pub(crate) fn indices_at(&self, indices: &Indices, i: usize) -> [f64; 2] {
         let z = |i: usize| self.elements[i].frame.vertex.z;
-        let before = match (&self.media[i].gradient, i.checked_sub(1)) {
+        let before = match (&self.gradients[i], i.checked_sub(1)) {
             (Some(gradient), Some(last)) => gradient.on_axis(indices[i], z(i) - z(last)),
             _ => indices[i],
         };
-        let behind = match &self.media[i + 1].gradient {
+        let behind = match &self.gradients[i + 1] {
             Some(gradient) => gradient.on_axis(indices[i + 1], 0.0),
             None => indices[i + 1],
         };

@@ -11,15 +11,17 @@ use serde::{Deserialize, Serialize};
 use super::OpticalTrain;
 use super::folds::Obstruction;
 use crate::element::gradient::step::{Graded, GradedMedium};
-use crate::element::{Action, Block, Clip, Fold, Frame, LensRays, Loss, Ray, RayStatus, Step};
+use crate::element::{
+    Action, Block, Clip, ElementStep, Fold, Frame, LensRays, Loss, Ray, RayStatus,
+};
 use crate::glass::GlassError;
 
 /// More elements than these make a train long: the largest zoom lenses have some fifty surfaces.
 const LONG: f64 = 64.0;
 
-/// Cost of a ray's way from the element before to this one, in elements: a step in a graded medium
-/// looks at the index thrice and at the surface, which counts as two.
-fn cost(step: &Step) -> f64 {
+/// How long a ray takes from the element before to this one, in elements: a step in a graded medium looks at the index
+/// thrice and at the surface, which counts as two.
+fn cost(step: &ElementStep) -> f64 {
     let graded = step.graded.as_ref().and_then(|graded| graded.media[0].as_ref());
     1.0 + graded.map_or(0.0, |medium| 2.0 * medium.steps())
 }
@@ -39,9 +41,9 @@ pub enum Side {
 pub struct MonochromaticTrain {
     wavelength: f64,
     indices: Indices,
-    forward: Vec<Step>,
-    backward: Vec<Step>,
-    /// Cost of tracing a ray, in elements.
+    forward: Vec<ElementStep>,
+    backward: Vec<ElementStep>,
+    /// How long a ray takes, in elements.
     cost_of_a_ray: f64,
     /// True if rays take long to be traced through the train.
     is_costly: bool,
@@ -103,21 +105,24 @@ impl OpticalTrain {
                 let reflectance = mirror.reflectance.as_ref().map_or(1.0, transmission);
                 Fold::new(mirror, &placed.frame, reflectance)
             });
-            let add =
-                |steps: &mut Vec<Step>, action: Action, loss: Option<Loss>, fold, frame: Frame| {
-                    // Sheets do not move rays: what absorbs before one is counted at the next surface.
-                    let loss = loss.filter(|_| action.moves());
-                    let graded = None;
-                    steps.push(Step {
-                        element,
-                        frame,
-                        axial: frame.is_axial(),
-                        action,
-                        loss,
-                        fold,
-                        graded,
-                    });
-                };
+            let add = |steps: &mut Vec<ElementStep>,
+                       action: Action,
+                       loss: Option<Loss>,
+                       fold,
+                       frame: Frame| {
+                // Sheets do not move rays: what absorbs before one is counted at the next surface.
+                let loss = loss.filter(|_| action.moves());
+                let graded = None;
+                steps.push(ElementStep {
+                    element,
+                    frame,
+                    axial: frame.is_axial(),
+                    action,
+                    loss,
+                    fold,
+                    graded,
+                });
+            };
             add(&mut forward, towards_sensor, loss([before, behind], element), fold, placed.frame);
             let (frame, fold) = match fold.map(|fold| fold.seen_from_behind(&placed.frame)) {
                 Some((frame, fold)) => (frame, Some(fold)),
@@ -131,19 +136,19 @@ impl OpticalTrain {
         }
         backward.reverse();
         let cost_of_a_ray = forward.iter().map(cost).sum();
-        let is_costly = cost_of_a_ray > LONG || forward.iter().any(Step::has_wall);
+        let is_costly = cost_of_a_ray > LONG || forward.iter().any(ElementStep::has_wall);
         Ok(MonochromaticTrain { wavelength, indices, forward, backward, cost_of_a_ray, is_costly })
     }
 
     /// Gives steps the gradients on their sides.
-    fn grade(&self, indices: &Indices, steps: &mut [Step], from: Side) {
+    fn grade(&self, indices: &Indices, steps: &mut [ElementStep], from: Side) {
         if !self.is_graded() {
             return;
         }
         for step in steps.iter_mut().filter(|step| !step.is_shadow()) {
             let element = step.element;
             let medium = |index: usize| {
-                let gap = self.media[index].gradient.clone()?;
+                let gap = self.gradients[index].clone()?;
                 let before = index.checked_sub(1)?;
                 let z = |i: usize| self.elements.get(i).map(|element| element.frame.vertex.z);
                 let length = z(index)? - z(before)?;
@@ -172,7 +177,7 @@ impl OpticalTrain {
     /// True if the index of a medium varies in space.
     #[must_use]
     pub fn is_graded(&self) -> bool {
-        self.media.iter().any(|medium| medium.gradient.is_some())
+        self.gradients.iter().any(Option::is_some)
     }
 
     /// The index of each medium at `wavelength` (nm), from the object's to the sensor's.
@@ -201,9 +206,9 @@ impl std::ops::Deref for Indices {
 }
 
 /// Adds the mirrors in the way of a leg.
-fn shade(obstructions: &[Obstruction], steps: [&mut Vec<Step>; 2]) {
+fn shade(obstructions: &[Obstruction], steps: [&mut Vec<ElementStep>; 2]) {
     for steps in steps {
-        steps.extend(obstructions.iter().map(|obstruction| Step {
+        steps.extend(obstructions.iter().map(|obstruction| ElementStep {
             element: obstruction.element,
             frame: obstruction.frame,
             axial: obstruction.frame.is_axial(),
@@ -251,11 +256,11 @@ impl MonochromaticTrain {
     }
 
     /// The elements as light from the object meets them.
-    pub(crate) fn forward_steps(&self) -> &[Step] {
+    pub(crate) fn forward_steps(&self) -> &[ElementStep] {
         &self.forward
     }
 
-    pub(super) fn steps(&self, from: Side) -> &[Step] {
+    pub(super) fn steps(&self, from: Side) -> &[ElementStep] {
         match from {
             Side::Object => &self.forward,
             Side::Sensor => &self.backward,
@@ -333,7 +338,7 @@ impl MonochromaticTrain {
         const PLACES: u32 = 48;
         let Some(mut ray) = Ray::new(position, direction) else { return Vec::new() };
         let steps = self.forward.iter().filter(|step| !step.is_shadow());
-        let mut way = |step: &Step| {
+        let mut way = |step: &ElementStep| {
             let places = step.graded_way(ray, PLACES);
             ray = step.run_one(ray, Clip::Off).ray;
             places
@@ -407,12 +412,12 @@ pub enum Registers {
 
 // Widest first: the first set that the processor has is taken, at run time.
 #[multiversion(targets = "simd")]
-fn trace_blocks(blocks: &mut [Block], steps: &[Step], clip: Clip) {
+fn trace_blocks(blocks: &mut [Block], steps: &[ElementStep], clip: Clip) {
     all_blocks(blocks, steps, clip);
 }
 
 #[multiversion(targets("x86_64+avx2"))]
-fn trace_blocks_of_four(blocks: &mut [Block], steps: &[Step], clip: Clip) {
+fn trace_blocks_of_four(blocks: &mut [Block], steps: &[ElementStep], clip: Clip) {
     all_blocks(blocks, steps, clip);
 }
 
@@ -420,7 +425,7 @@ fn trace_blocks_of_four(blocks: &mut [Block], steps: &[Step], clip: Clip) {
 const STEPS_BETWEEN_LOOKS: usize = 8;
 
 #[inline(always)]
-fn all_blocks(blocks: &mut [Block], steps: &[Step], clip: Clip) {
+fn all_blocks(blocks: &mut [Block], steps: &[ElementStep], clip: Clip) {
     for block in blocks {
         for some in steps.chunks(STEPS_BETWEEN_LOOKS) {
             if block.is_over() {

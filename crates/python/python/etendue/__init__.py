@@ -97,16 +97,6 @@ def _threads(threads: Optional[int]) -> int:
     return int(threads)
 
 
-def _stem(layer: str) -> str:
-    """A layer's key: NormalCamera is normal_camera, Id.object id_object, the picture's picture."""
-    if not layer:
-        return "picture"
-    stem = ""
-    for c in layer.replace(".", "_"):
-        stem += ("_" if c.isupper() and stem else "") + c.lower()
-    return stem.replace("__", "_")
-
-
 def load(
     path: Union[_Path, bytes],
     settings: Optional[Mapping[str, Any]] = None,
@@ -403,7 +393,7 @@ class Shot(Mapping[str, np.ndarray]):
 
     def __init__(self, core: Any) -> None:
         self._core = core
-        self._names = {_stem(name): name for name in core.layers()}
+        self._names = {_core.layer_key(name): name for name in core.layers()}
         self._arrays: Dict[str, np.ndarray] = {}
         self._camera = json.loads(core.camera())
 

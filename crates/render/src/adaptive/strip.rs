@@ -75,14 +75,14 @@ pub(super) struct StripOfPixels<'a> {
 
 /// The pixels that those of a block ask.
 #[derive(Debug, Clone, Copy)]
-struct Window {
+struct PixelWindow {
     /// Columns of the strip, and the first and the one behind the last of columns and rows.
     width: usize,
     columns: [usize; 2],
     rows: [usize; 2],
 }
 
-impl Window {
+impl PixelWindow {
     /// Around a block of a strip of so many columns and rows.
     fn around(block: [usize; 2], size: [usize; 2]) -> Self {
         let [columns, rows] = [0, 1].map(|axis| {
@@ -178,7 +178,7 @@ impl StripOfPixels<'_> {
     fn half(&self, place: [usize; 2], half: usize, variances: &[f64]) -> HalfOfBlock {
         let pixels: Vec<usize> =
             self.pixels(place).filter(|&index| self.half_of(index) == half).collect();
-        let window = Window::around(place, [self.width, self.height()]);
+        let window = PixelWindow::around(place, [self.width, self.height()]);
         let mut of_one = Vec::with_capacity(pixels.len());
         // How much each of those asked bears on each pixel.
         let mut weights: Vec<(usize, f64)> = Vec::new();
@@ -359,7 +359,7 @@ mod tests {
     fn a_pixel_asks_those_of_the_other_colour() {
         let size @ [width, _] = [30, 16];
         for block in [[0, 0], [1, 1], [3, 0]] {
-            let window = Window::around(block, size);
+            let window = PixelWindow::around(block, size);
             let all: Vec<usize> = window.pixels().collect();
             assert_eq!(all.len(), window.len());
             for index in

@@ -125,7 +125,7 @@ pub fn write(
         false => camera,
     };
     let samples = scene.render.samples.typical().clamp(FEWEST, MOST);
-    let tracing = Tracing { scene, accel, camera: &camera, mattes: &mattes, samples };
+    let tracing = MatteTracing { scene, accel, camera: &camera, mattes: &mattes, samples };
     let pixels = width as usize * height as usize;
     let mut planes: Vec<Vec<f32>> = Vec::new();
     for _ in 0..mattes.len() * 2 * RANKS {
@@ -172,7 +172,7 @@ pub fn write(
     Ok(exr::write(files, path, &picture, &options)?)
 }
 
-struct Tracing<'a> {
+struct MatteTracing<'a> {
     scene: &'a Scene,
     accel: &'a dyn Accel,
     camera: &'a Camera,
@@ -180,7 +180,7 @@ struct Tracing<'a> {
     samples: u32,
 }
 
-impl Tracing<'_> {
+impl MatteTracing<'_> {
     /// The pairs of a row's pixels: `[pixel][matte][rank][number, share]`.
     fn row(&self, row: u32) -> Vec<f32> {
         let [width, _] = self.camera.resolution();

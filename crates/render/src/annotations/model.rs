@@ -11,7 +11,7 @@ use etendue_geometry::{Bounds, Geometry};
 use etendue_scene::Scene;
 use serde_json::{Value, json};
 
-use super::rigid::{Frame, copies};
+use super::rigid::{RigidFrame, copies};
 use crate::output::OutputError;
 
 /// Millimetres a metre.
@@ -26,12 +26,12 @@ const FEW: usize = 16;
 /// The models of a data set, by the words that poses call them by.
 #[derive(Debug, Clone, Default)]
 pub struct Models {
-    models: BTreeMap<String, Model>,
+    models: BTreeMap<String, ModelSource>,
 }
 
 /// Geometry that a model is made from.
 #[derive(Debug, Clone)]
-struct Model {
+struct ModelSource {
     geometry: Arc<Geometry>,
     placements: Vec<usize>,
     time: f64,
@@ -49,10 +49,10 @@ impl Models {
     pub fn add(&mut self, scene: &Scene) {
         let (geometry, time) = (&scene.geometry, truth_time(scene));
         for placements in copies(geometry).into_values() {
-            let Some(frame) = Frame::of(geometry, &placements, time) else { continue };
+            let Some(frame) = RigidFrame::of(geometry, &placements, time) else { continue };
             let name = frame.pose(geometry, &placements, time).model;
             let geometry = Arc::clone(geometry);
-            self.models.entry(name).or_insert(Model { geometry, placements, time });
+            self.models.entry(name).or_insert(ModelSource { geometry, placements, time });
         }
     }
 
@@ -64,7 +64,7 @@ impl Models {
         path: &Path,
     ) -> Result<Value, OutputError> {
         let unknown = || OutputError::format(path, format!("no model {name} is in the scene"));
-        let solid = self.models.get(name).and_then(Model::solid).ok_or_else(unknown)?;
+        let solid = self.models.get(name).and_then(ModelSource::solid).ok_or_else(unknown)?;
         files.write(path, |part| solid.write(BufWriter::new(part)))?;
         Ok(solid.info())
     }
@@ -76,9 +76,9 @@ pub(super) fn truth_time(scene: &Scene) -> f64 {
     scene.camera.truth_time(0.5 * f64::from(rows))
 }
 
-impl Model {
+impl ModelSource {
     fn solid(&self) -> Option<Solid> {
-        let frame = Frame::of(&self.geometry, &self.placements, self.time)?;
+        let frame = RigidFrame::of(&self.geometry, &self.placements, self.time)?;
         let (mut corners, mut triangles) = (Vec::new(), Vec::new());
         for &index in &self.placements {
             let placement = &self.geometry.placements[index];
@@ -153,13 +153,13 @@ impl Solid {
 }
 
 /// A box of points in a tree of them.
-struct Part {
+struct PointTree {
     bounds: Bounds,
     points: Vec<DVec3>,
     halves: Option<Box<[Self; 2]>>,
 }
 
-impl Part {
+impl PointTree {
     fn of(mut points: Vec<DVec3>) -> Self {
         let bounds = Bounds::of_points(points.iter().copied());
         if points.len() <= FEW {
@@ -212,7 +212,7 @@ impl Part {
 /// The longest distance between two of `points`, to a millionth: of pairs of boxes those are passed over that reach no
 /// farther than what was found.
 fn diameter(points: &[DVec3]) -> f64 {
-    let root = Part::of(points.to_vec());
+    let root = PointTree::of(points.to_vec());
     let mut best = 0.0;
     root.longest(&root, &mut best);
     best

@@ -22,13 +22,13 @@ const STEPS: usize = 100;
 
 /// The frame of a copy: its rotation, and its origin as a place in the world.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Frame {
+pub(super) struct RigidFrame {
     pub(super) rotation: DMat3,
     /// Its own place is that of the first of its placements.
     origin: Transform,
 }
 
-impl Frame {
+impl RigidFrame {
     /// That of the placements of one copy at `time` (s from the frame's time); `None` where none has a volume.
     pub(super) fn of(geometry: &Geometry, placements: &[usize], time: f64) -> Option<Self> {
         placements.iter().find_map(|&index| {

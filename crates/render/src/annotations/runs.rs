@@ -17,12 +17,12 @@ pub struct Mask {
 
 /// A mask while it is made: pixels are added down the columns, from the first column on.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Runs {
+pub(super) struct RunLengths {
     /// The first pixel and the one behind the last of each.
     runs: Vec<[u32; 2]>,
 }
 
-impl Runs {
+impl RunLengths {
     /// Adds the pixel of this number, down the columns; greater than all before it.
     pub(super) fn push(&mut self, pixel: u32) {
         match self.runs.last_mut() {
@@ -155,7 +155,7 @@ mod tests {
     use super::*;
 
     fn mask(size: [u32; 2], pixels: &[u32]) -> Mask {
-        let mut runs = Runs::default();
+        let mut runs = RunLengths::default();
         pixels.iter().for_each(|&pixel| runs.push(pixel));
         runs.mask(size)
     }

@@ -1,8 +1,7 @@
 //! COCO's file of annotations and BOP's folder, of one picture or of many.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use etendue_files::{SOFTWARE, Transaction, prepare_folder};
@@ -211,8 +210,9 @@ impl Bop<'_> {
             Source::Picture(picture) => png::write(self.files, &path, picture, "", Bits::Eight),
             Source::Numbers(numbers) => write_depth(self.files, &path, [*width, *height], numbers),
             Source::File(from) => {
-                let bytes = fs::read(from).map_err(|error| OutputError::io(from, error))?;
-                Ok(self.files.write(&path, |part| part.write_all(&bytes))?)
+                let image = etendue_files::open(from);
+                let mut image = image.map_err(|error| OutputError::io(from, error))?;
+                Ok(self.files.write(&path, |part| io::copy(&mut image, part).map(|_| ()))?)
             }
         }
     }

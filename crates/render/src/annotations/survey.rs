@@ -11,8 +11,8 @@ use etendue_scene::Scene;
 use rayon::prelude::*;
 
 use super::model::{MM, truth_time};
-use super::rigid::{Frame, copies};
-use super::runs::Runs;
+use super::rigid::{RigidFrame, copies};
+use super::runs::RunLengths;
 use super::{Annotated, AnnotationError, Instance, PinholeCamera, Silhouette};
 use crate::build::build_over;
 use crate::output::Outputs;
@@ -49,11 +49,11 @@ pub fn survey(
     let [width, height] = scene.camera.resolution();
     let pixels = copies_by_pixel(scene, accel);
     let copies = copies(&scene.geometry);
-    let mut visible: Vec<Runs> = Vec::new();
+    let mut visible: Vec<RunLengths> = Vec::new();
     for (pixel, &copy) in (0..).zip(&pixels.copy).filter(|(_, copy)| **copy != MISS) {
         let copy = copy as usize;
         if visible.len() <= copy {
-            visible.resize_with(copy + 1, Runs::default);
+            visible.resize_with(copy + 1, RunLengths::default);
         }
         visible[copy].push(pixel);
     }
@@ -76,7 +76,7 @@ pub fn survey(
             continue;
         }
         let object = geometry.placements[placements[0]].object;
-        let frame = plan.as_ref().and_then(|_| Frame::of(geometry, placements, time));
+        let frame = plan.as_ref().and_then(|_| RigidFrame::of(geometry, placements, time));
         instances.push(Instance {
             instance: copy + 1,
             object: object + 1,
@@ -167,7 +167,7 @@ fn silhouette(
         pixels = found.into_iter().flatten().collect();
     }
     // Those in the picture, and the box around all.
-    let (mut runs, mut inside) = (Runs::default(), 0);
+    let (mut runs, mut inside) = (RunLengths::default(), 0);
     let (mut least, mut most) = ([i64::MAX; 2], [i64::MIN; 2]);
     for &[x, y] in &pixels {
         least = [least[0].min(x), least[1].min(y)];

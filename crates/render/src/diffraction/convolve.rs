@@ -9,7 +9,7 @@ use rustfft::num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
 use std::sync::Arc;
 
-use super::Illumination;
+use super::IlluminationGrid;
 use super::layers::DepthLayers;
 use super::spreads::Spreads;
 use etendue_optics::analysis::CellSpread;
@@ -30,8 +30,8 @@ pub(crate) struct CellPicture {
     pub(crate) depths: Vec<f32>,
 }
 
-/// Planes of one layer that are spread: its light, where it is, and where it could be seen.
-struct Planes {
+/// What is spread of one layer: its light, where it is, and where it could be seen.
+struct LayerPlanes {
     light: Vec<Vec<f64>>,
     /// Of the rearmost, which nothing shines through, it is not asked.
     covers: Option<Vec<f64>>,
@@ -46,7 +46,7 @@ pub(crate) fn composed(
     picture: &CellPicture,
     (layers, spreads): (&DepthLayers, &Spreads),
     band: usize,
-    arrives: &Illumination,
+    arrives: &IlluminationGrid,
 ) -> Vec<Vec<f32>> {
     let pixels = picture.size.map(|side| side / picture.cells);
     let count = pixels[0] * pixels[1];
@@ -60,7 +60,7 @@ pub(crate) fn composed(
     }
     let first = shines.iter().position(|shines| *shines).unwrap_or(shines.len());
     for layer in first..layers.nearness.len() {
-        let Planes { light, covers, known } =
+        let LayerPlanes { light, covers, known } =
             spread_layer(picture, (layers, spreads), (layer, band), (arrives, layer > first));
         for i in 0..count {
             if known[i] <= KNOWN {
@@ -83,13 +83,13 @@ fn spread_layer(
     picture: &CellPicture,
     (layers, spreads): (&DepthLayers, &Spreads),
     (layer, band): (usize, usize),
-    (arrives, covers): (&Illumination, bool),
-) -> Planes {
+    (arrives, covers): (&IlluminationGrid, bool),
+) -> LayerPlanes {
     let pixels = picture.size.map(|side| side / picture.cells);
     let count = pixels[0] * pixels[1];
     let nodes = spreads.side * spreads.side;
-    let windows: Vec<Window> =
-        (0..nodes).map(|node| Window::of(node, spreads, picture.size)).collect();
+    let windows: Vec<CellWindow> =
+        (0..nodes).map(|node| CellWindow::of(node, spreads, picture.size)).collect();
     // The layer's cells, and how far their light gets.
     let around = |margin: usize| {
         let [low, high] = layers.boxes[layer];
@@ -109,7 +109,7 @@ fn spread_layer(
         band,
     );
     let of_layer: Vec<_> = of_layer.into_iter().zip(rest).map(|(own, rest)| own.or(rest)).collect();
-    let blocks: Vec<Vec<Block>> = (0..nodes)
+    let blocks: Vec<Vec<ConvolutionBlock>> = (0..nodes)
         .into_par_iter()
         .map(|node| {
             let Some((spread, mirrored)) = spreads.of_node(&of_layer, node) else {
@@ -134,18 +134,18 @@ fn spread_layer(
     }
     let known = sums.pop().unwrap_or_default();
     let covers = if covers { sums.pop() } else { None };
-    Planes { light: sums, covers, known }
+    LayerPlanes { light: sums, covers, known }
 }
 
 /// Pixels of a part of the picture.
-struct Block {
+struct ConvolutionBlock {
     left: usize,
     top: usize,
     width: usize,
     values: Vec<f64>,
 }
 
-impl Block {
+impl ConvolutionBlock {
     fn add_to(&self, sum: &mut [f64], width: usize) {
         for (row, values) in self.values.chunks(self.width.max(1)).enumerate() {
             let start = (self.top + row) * width + self.left;
@@ -155,12 +155,12 @@ impl Block {
 }
 
 /// The cells that light of a node belongs to, with its share of each column and row.
-struct Window {
+struct CellWindow {
     start: [usize; 2],
     shares: [Vec<f64>; 2],
 }
 
-impl Window {
+impl CellWindow {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside a picture")]
     fn of(node: usize, spreads: &Spreads, size: [usize; 2]) -> Self {
         let side = spreads.side;
@@ -203,7 +203,7 @@ impl Window {
         picture: &CellPicture,
         layers: &DepthLayers,
         (layer, band): (usize, usize),
-        (arrives, covers): (&Illumination, bool),
+        (arrives, covers): (&IlluminationGrid, bool),
     ) -> Vec<Vec<f64>> {
         let [width, height] = self.size();
         let kinds = picture.light.len();
@@ -244,11 +244,11 @@ impl Window {
         planes: Vec<Vec<f64>>,
         (spread, mirrored): (&CellSpread, [bool; 2]),
         picture: &CellPicture,
-    ) -> Vec<Block> {
+    ) -> Vec<ConvolutionBlock> {
         let [width, height] = self.size();
         let half = spread.half;
         let size = [width, height].map(|side| quick_length(side + 2 * half));
-        let transform = Transform::new(size);
+        let transform = Fft2d::new(size);
         let side = 2 * half + 1;
         let mut kernel = vec![Complex64::ZERO; size[0] * size[1]];
         for row in 0..side {
@@ -288,7 +288,7 @@ impl Window {
         half: usize,
         picture: &CellPicture,
         part: impl Fn(&Complex64) -> f64,
-    ) -> Block {
+    ) -> ConvolutionBlock {
         let n = picture.cells;
         // Cells of the picture that the light gets to: cell c of it is c + half - start of the grid.
         let range = |axis: usize| {
@@ -308,17 +308,17 @@ impl Window {
                 to[x / n - left] += scale * part(&line[x + half - self.start[0]]);
             }
         }
-        Block { left, top, width, values }
+        ConvolutionBlock { left, top, width, values }
     }
 }
 
 /// Two-dimensional transforms of one size.
-struct Transform {
+struct Fft2d {
     size: [usize; 2],
     plans: [[Arc<dyn Fft<f64>>; 2]; 2],
 }
 
-impl Transform {
+impl Fft2d {
     fn new(size: [usize; 2]) -> Self {
         let mut planner = FftPlanner::new();
         let plans =

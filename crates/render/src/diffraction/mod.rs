@@ -23,7 +23,7 @@ use etendue_tracer::LayerSpec;
 use crate::error::RenderError;
 use crate::film::FilmLayer;
 use crate::output::{Outputs, Values};
-use crate::render::{Course, Film, Prepared, trace};
+use crate::render::{Film, Prepared, RenderState, trace};
 use crate::stopping::Stopping;
 use crate::tile::RayCounts;
 use crate::watch::{SoFar, Watch};
@@ -81,7 +81,7 @@ pub(crate) fn bytes(scene: &Scene, plan: &Plan) -> u64 {
 }
 
 /// Refuses what light that is spread over the picture cannot be.
-fn check(scene: &Scene, plan: &Plan, course: &Course<'_>) -> Result<(), RenderError> {
+fn check(scene: &Scene, plan: &Plan, course: &RenderState<'_>) -> Result<(), RenderError> {
     let camera = &scene.camera;
     let refused = |why: &str| Err(RenderError::Diffraction(why.to_owned()));
     if camera.is_timed() || camera.light_of_rows_differs() || scene.slots > 0 {
@@ -112,13 +112,13 @@ fn check(scene: &Scene, plan: &Plan, course: &Course<'_>) -> Result<(), RenderEr
 }
 
 /// Passes on a part of the work, and no pictures: those on the way are of cells.
-struct Part<'a> {
+struct PartialProgress<'a> {
     watch: &'a dyn Watch,
     from: f64,
     to: f64,
 }
 
-impl Watch for Part<'_> {
+impl Watch for PartialProgress<'_> {
     fn goes_on(&self, share: f64) -> bool {
         self.watch.goes_on(self.from + (self.to - self.from) * share.clamp(0.0, 1.0))
     }
@@ -142,7 +142,7 @@ pub(crate) fn spread_light(
     scene: &Scene,
     plan: &Plan,
     prepared: Prepared<'_>,
-    course: &Course<'_>,
+    course: &RenderState<'_>,
     opened: &Camera,
     watch: &dyn Watch,
 ) -> Result<Option<SpreadLight>, RenderError> {
@@ -169,7 +169,7 @@ pub(crate) fn spread_light(
     let bands = plan.bands.count();
     let mut planes: Vec<Vec<Vec<f32>>> = vec![Vec::new(); lit.len()];
     for (band, arrives) in illumination.iter().enumerate() {
-        let part = Part { watch, from: TRACING, to: 1.0 };
+        let part = PartialProgress { watch, from: TRACING, to: 1.0 };
         if !part.goes_on(band as f64 / bands.max(1) as f64) {
             return Err(RenderError::Stopped);
         }
@@ -200,8 +200,8 @@ fn cell_picture(
     // Nobody sees it on the way.
     fine_plan.passes = std::iter::once(0..fine_plan.samples).collect();
     let prepared = Prepared { others: &[], ..prepared };
-    let part = Part { watch, from: 0.0, to: TRACING };
-    let mut film = trace(&fine, &fine_plan, prepared, &[], &Course::default(), &part)?;
+    let part = PartialProgress { watch, from: 0.0, to: TRACING };
+    let mut film = trace(&fine, &fine_plan, prepared, &[], &RenderState::default(), &part)?;
     let mut depths = Vec::new();
     let mut light = Vec::new();
     for layer in std::mem::take(&mut film.layers) {
@@ -223,7 +223,7 @@ fn cell_picture(
 
 /// Illumination: the light that arrives, on a grid over the picture that is interpolated in.
 #[derive(Debug, Clone)]
-pub(crate) struct Illumination {
+pub(crate) struct IlluminationGrid {
     values: Vec<f64>,
     size: [f64; 2],
 }
@@ -231,8 +231,8 @@ pub(crate) struct Illumination {
 /// Places a side of the grid of what arrives.
 const PLACES: u32 = 25;
 
-impl Illumination {
-    /// Illumination at a place of the picture (pixels from the corner).
+impl IlluminationGrid {
+    /// What arrives at a place of the picture (pixels from the corner).
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the grid")]
     pub(crate) fn at(&self, [column, row]: [f64; 2]) -> f64 {
         let last = f64::from(PLACES - 1);
@@ -255,7 +255,7 @@ fn illumination(
     plan: &Plan,
     resolution: [u32; 2],
     is_mirrored: bool,
-) -> Vec<Illumination> {
+) -> Vec<IlluminationGrid> {
     let size = resolution.map(f64::from);
     let share = |k: u32| f64::from(k) / f64::from(PLACES - 1);
     let traced = if is_mirrored { PLACES.div_ceil(2) } else { PLACES };
@@ -268,7 +268,7 @@ fn illumination(
         let quarter = opened.illumination(&places, number);
         let value = |k: u32| quarter[(own(k / PLACES) * traced + own(k % PLACES)) as usize];
         let values: Vec<f64> = (0..PLACES * PLACES).map(value).collect();
-        by_band.extend(group.bands.map(|_| Illumination { values: values.clone(), size }));
+        by_band.extend(group.bands.map(|_| IlluminationGrid { values: values.clone(), size }));
     }
     by_band
 }

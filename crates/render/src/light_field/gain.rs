@@ -5,7 +5,7 @@ const POWERS: [[i32; 2]; 6] = [[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]];
 
 /// A lenslet (row and column), and what its light is to be multiplied with.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Node {
+pub(super) struct GainNode {
     pub(super) at: [u32; 2],
     pub(super) gain: f64,
 }
@@ -21,7 +21,7 @@ pub(super) struct Gain {
 impl Gain {
     /// The parabola of least squares through nodes, of which the `last` row and column are given; 1
     /// without any.
-    pub(super) fn fitted(nodes: &[Node], last: [u32; 2]) -> Self {
+    pub(super) fn fitted(nodes: &[GainNode], last: [u32; 2]) -> Self {
         const N: usize = POWERS.len();
         let mut gain = Self { factors: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0], last };
         if nodes.is_empty() {
@@ -82,14 +82,14 @@ mod tests {
             let (x, y) = (f64::from(col) / 10.0 - 1.0, f64::from(row) / 5.0 - 1.0);
             1.3 + 0.1 * x - 0.2 * y + 0.05 * x * x - 0.03 * x * y + 0.02 * y * y
         };
-        let node = |at| Node { at, gain: f(at) };
-        let all: Vec<Node> =
+        let node = |at| GainNode { at, gain: f(at) };
+        let all: Vec<GainNode> =
             [0, 3, 5, 8, 10].map(|row| [0, 7, 13, 20].map(|col| node([row, col]))).concat();
         let gain = Gain::fitted(&all, [10, 20]);
         // A millionth of the square of each factor takes about as much of it.
         assert!((gain.at([4, 11]) - f([4, 11])).abs() < 1e-5, "{gain:?}");
         // One row, of which nothing is known down the view.
-        let row: Vec<Node> = [0, 7, 13, 20].map(|col| node([0, col])).into();
+        let row: Vec<GainNode> = [0, 7, 13, 20].map(|col| node([0, col])).into();
         let gain = Gain::fitted(&row, [0, 20]);
         assert!((gain.at([0, 7]) - f([0, 7])).abs() < 1e-5, "{gain:?}");
         assert_eq!(Gain::fitted(&[], [10, 20]).at([3, 4]), 1.0);

@@ -19,12 +19,12 @@ use crate::output::{Development, Picture};
 /// Views of a light-field camera's picture, or, of a focused camera, what its lenslets see of a plane.
 #[derive(Debug, Clone)]
 pub struct LightFieldViews {
-    source: Source,
+    source: LightFieldSource,
     development: Development,
 }
 
 #[derive(Debug, Clone)]
-enum Source {
+enum LightFieldSource {
     Views { views: Views, grid: Arc<ViewGrid> },
     Patches { camera: Box<Camera>, raw: Arc<Picture>, white: Arc<Picture> },
 }
@@ -54,13 +54,15 @@ impl LightFieldViews {
             (Some(lens), Some(response), None) => {
                 let centres = by_layer(scene, lens, &light_field).map_err(fault)?;
                 let views = Views::decoded(picture, &centres, &light_field, (&grid, &response))?;
-                Some(Source::Views { views, grid })
+                Some(LightFieldSource::Views { views, grid })
             }
             (Some(lens), _, Some(_)) => {
                 let is_seen = PatchPlane::new(lens, &light_field, None).is_ok();
-                is_seen.then(|| Source::patches(scene, picture)).transpose()?.flatten()
+                is_seen.then(|| LightFieldSource::patches(scene, picture)).transpose()?.flatten()
             }
-            (_, _, None) => Some(Source::Views { views: Views::split(picture, &grid), grid }),
+            (_, _, None) => {
+                Some(LightFieldSource::Views { views: Views::split(picture, &grid), grid })
+            }
             (None, _, Some(_)) => None,
         };
         let development = *picture.development();
@@ -71,8 +73,8 @@ impl LightFieldViews {
     #[must_use]
     pub fn count(&self) -> u32 {
         match &self.source {
-            Source::Views { views, .. } => views.views,
-            Source::Patches { .. } => 0,
+            LightFieldSource::Views { views, .. } => views.views,
+            LightFieldSource::Patches { .. } => 0,
         }
     }
 
@@ -80,8 +82,8 @@ impl LightFieldViews {
     #[must_use]
     pub fn focus(&self) -> f64 {
         match &self.source {
-            Source::Views { grid, .. } => grid.focus(),
-            Source::Patches { camera, .. } => {
+            LightFieldSource::Views { grid, .. } => grid.focus(),
+            LightFieldSource::Patches { camera, .. } => {
                 camera.lens().map_or(f64::INFINITY, |lens| lens.focused().object_distance())
             }
         }
@@ -93,7 +95,7 @@ impl LightFieldViews {
     pub fn distances(&self) -> [f64; 2] {
         let focus = self.focus();
         let focus = if focus.is_finite() && focus > 0.0 { focus } else { 1.0 };
-        let Source::Patches { camera, .. } = &self.source else {
+        let LightFieldSource::Patches { camera, .. } = &self.source else {
             return [focus / FARTHEST, focus * FARTHEST];
         };
         let Some((lens, light_field)) = camera.lens().zip(camera.light_field()) else {
@@ -116,7 +118,7 @@ impl LightFieldViews {
     ///
     /// When there are none.
     pub fn view(&self, [across, down]: [u32; 2]) -> Result<Picture, LightFieldError> {
-        let Source::Views { views, .. } = &self.source else {
+        let LightFieldSource::Views { views, .. } = &self.source else {
             return Err(RenderError::Camera("the camera has no views".to_owned()).into());
         };
         let last = views.views.saturating_sub(1);
@@ -131,10 +133,10 @@ impl LightFieldViews {
     /// When the patches of the lenslets leave gaps there, see [`distances`](Self::distances).
     pub fn refocused(&self, depth: f64) -> Result<Picture, LightFieldError> {
         let picture = match &self.source {
-            Source::Views { views, grid } => {
+            LightFieldSource::Views { views, grid } => {
                 views.averaged(grid.disparity(depth), grid.row_height())?
             }
-            Source::Patches { camera, raw, white } => {
+            LightFieldSource::Patches { camera, raw, white } => {
                 let lenslets = camera.lens().zip(camera.light_field());
                 let (lens, light_field) = lenslets
                     .ok_or_else(|| RenderError::Camera("there are no lenslets".to_owned()))?;
@@ -146,7 +148,7 @@ impl LightFieldViews {
     }
 }
 
-impl Source {
+impl LightFieldSource {
     /// A raw picture of lenslets, and the white one that goes with it.
     fn patches(scene: &Scene, raw: &Picture) -> Result<Option<Self>, LightFieldError> {
         let Some(planes) = planes(raw, "").filter(|planes| planes.len() == 3) else {

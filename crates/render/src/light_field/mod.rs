@@ -91,7 +91,7 @@ pub struct LightFieldSet {
 /// The scene, its structure and its images, as they were rendered.
 #[derive(Clone, Copy)]
 #[expect(missing_debug_implementations, reason = "holds an accelerator")]
-pub struct Rendering<'a> {
+pub struct RenderedScene<'a> {
     /// The scene.
     pub scene: &'a Scene,
     /// Its structure.
@@ -128,7 +128,7 @@ fn view_name(across: u32, down: u32) -> String {
 ///
 /// When the reference views cannot be rendered, a file cannot be written, or `progress` says stop.
 pub fn write(
-    rendering: Rendering<'_>,
+    rendering: RenderedScene<'_>,
     picture: &Picture,
     (files, folder): (&Transaction, &Path),
     outputs: Outputs,
@@ -241,7 +241,7 @@ fn shown_to(scene: &Scene, camera: Camera, layers: Vec<LayerSpec>) -> Scene {
 
 /// The picture of all views by an ideal lens.
 fn reference_picture(
-    Rendering { scene, accel, images }: Rendering<'_>,
+    RenderedScene { scene, accel, images }: RenderedScene<'_>,
     reference: &Camera,
     outputs: Outputs,
     progress: &(dyn Fn(f64) -> bool + Sync),
@@ -253,7 +253,7 @@ fn reference_picture(
 
 /// z of what the middle view sees (m), row by row; infinite where it sees nothing.
 fn central_depth(
-    Rendering { scene, accel, images }: Rendering<'_>,
+    RenderedScene { scene, accel, images }: RenderedScene<'_>,
     reference: &Camera,
     outputs: Outputs,
     progress: &(dyn Fn(f64) -> bool + Sync),

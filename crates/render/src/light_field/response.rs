@@ -14,7 +14,7 @@ use etendue_spectrum::Bands;
 use rayon::prelude::*;
 
 use super::centres::Centres;
-use super::gain::{Gain, Node};
+use super::gain::{Gain, GainNode};
 
 /// Lenslets a side at which rays are traced.
 const NODES: u32 = 5;
@@ -68,7 +68,7 @@ struct Waves {
 
 /// Source of a pixel's value.
 #[derive(Debug, Clone, Copy)]
-enum Sampling {
+enum PixelSource {
     /// A pixel whose corner is here.
     Pixel([f64; 2]),
     /// Cubic convolution of the pixels about a place (from the corner of the first one).
@@ -117,15 +117,18 @@ impl ViewRays {
                 centre.map(|[x, y]| [x + right, y + below])
             };
             let waves = |&color: &usize| {
-                let of = Asked { group: color, count, number, first_set: SETS.len() * color };
+                let of =
+                    RequestedRays { group: color, count, number, first_set: SETS.len() * color };
                 let at = place(color);
-                at.map_or_else(Vec::new, |at| seen(camera, &of, Sampling::Cubic(at), unit).colors)
+                at.map_or_else(Vec::new, |at| {
+                    seen(camera, &of, PixelSource::Cubic(at), unit).colors
+                })
             };
             // The pixel at the place has the same light wherever that is even about it, and rays that
             // do not count less than nothing tell it with less noise.
-            let of = Asked { group: green, count: RAYS, number, first_set: 0 };
+            let of = RequestedRays { group: green, count: RAYS, number, first_set: 0 };
             let pixel = place(green).map_or_else(PixelView::default, |at| {
-                seen(camera, &of, Sampling::Pixel(at.map(|x| x - 0.5)), unit)
+                seen(camera, &of, PixelSource::Pixel(at.map(|x| x - 0.5)), unit)
             });
             PixelView { colors: colors.iter().flat_map(waves).collect(), ..pixel }
         })
@@ -136,8 +139,8 @@ impl ViewRays {
         let [cols, rows] = unit.view_resolution();
         Self::traced(views, unit, |number, [across, down], [row, col]| {
             let corner = [across * cols + col, down * rows + row].map(f64::from);
-            let of = Asked { group: 0, count: RAYS, number, first_set: 0 };
-            seen(reference, &of, Sampling::Pixel(corner), unit)
+            let of = RequestedRays { group: 0, count: RAYS, number, first_set: 0 };
+            seen(reference, &of, PixelSource::Pixel(corner), unit)
         })
     }
 
@@ -207,8 +210,11 @@ impl ViewResponse {
             let shares = pairs().enumerate().filter(|(_, (ours, ideal))| {
                 ideal.light > 0.0 && ours.light > LEAST_LIGHT * ideal.light
             });
-            let shares: Vec<Node> = shares
-                .map(|(node, (ours, ideal))| Node { at: at(node), gain: ideal.light / ours.light })
+            let shares: Vec<GainNode> = shares
+                .map(|(node, (ours, ideal))| GainNode {
+                    at: at(node),
+                    gain: ideal.light / ours.light,
+                })
                 .collect();
             let gain = Gain::fitted(&shares, [rows, cols].map(|nodes| nodes[nodes.len() - 1]));
             // The worst wave of the mean over the field.
@@ -296,7 +302,7 @@ fn cubic(at: f64, number: f64) -> (f64, f64) {
 }
 
 /// The rays that are asked for.
-struct Asked {
+struct RequestedRays {
     /// Of the camera's bands.
     group: usize,
     /// In each set.
@@ -306,9 +312,14 @@ struct Asked {
     first_set: usize,
 }
 
-/// View of a pixel of a camera, by rays of its own.
-fn seen(camera: &Camera, asked: &Asked, sampling: Sampling, unit: &ViewGrid) -> PixelView {
-    let Asked { group, count: count_of_set, number, first_set } = *asked;
+/// What a pixel of a camera sees, by rays of its own.
+fn seen(
+    camera: &Camera,
+    asked: &RequestedRays,
+    sampling: PixelSource,
+    unit: &ViewGrid,
+) -> PixelView {
+    let RequestedRays { group, count: count_of_set, number, first_set } = *asked;
     let mut film = FilmSamples { group, ..FilmSamples::default() };
     let mut counts = Vec::with_capacity(SETS.len() * count_of_set as usize);
     let mut squares = [Vec::new(), Vec::new(), Vec::new()];
@@ -321,8 +332,8 @@ fn seen(camera: &Camera, asked: &Asked, sampling: Sampling, unit: &ViewGrid) -> 
         let [places, pupil, spectrum] = &squares;
         for ((place, pupil), spectrum) in places.iter().zip(pupil).zip(spectrum) {
             let (place, count) = match sampling {
-                Sampling::Pixel([x, y]) => ([x + place[0], y + place[1]], 1.0),
-                Sampling::Cubic([x, y]) => {
+                PixelSource::Pixel([x, y]) => ([x + place[0], y + place[1]], 1.0),
+                PixelSource::Cubic([x, y]) => {
                     let ((x, across), (y, down)) = (cubic(x, place[0]), cubic(y, place[1]));
                     ([x, y], across * down)
                 }

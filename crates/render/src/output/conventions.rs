@@ -8,7 +8,7 @@
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use super::look::{Bits, Channels, Shown, fill, indices};
+use super::look::{Bits, ColourType, LayerImage, fill, indices};
 use super::{Layer, OutputError, Picture, png};
 use crate::film::NoMemory;
 use crate::losses::Losses;
@@ -62,14 +62,14 @@ fn sixteen_bits(value: f64) -> u16 {
     if (1.0..=65535.0).contains(&rounded) { rounded as u16 } else { 0 }
 }
 
-fn scaled(layer: &Layer, factor: f64, unit: &str) -> Result<Shown, NoMemory> {
+fn scaled(layer: &Layer, factor: f64, unit: &str) -> Result<LayerImage, NoMemory> {
     let plane = &layer.channels[0].values;
     let bytes = fill(&[plane], |i| [sixteen_bits(plane.at(i) * factor).to_be_bytes()])?;
     let most = 65535.0 / factor;
     let note = format!(
         "data: {unit} times {factor}; 0 is nothing, and what is not above 0 or beyond {most:.3} {unit}"
     );
-    Ok(Shown { channels: Channels::Grey, bits: Bits::Sixteen, bytes, note })
+    Ok(LayerImage { channels: ColourType::Grey, bits: Bits::Sixteen, bytes, note })
 }
 
 /// Number of the layer's hits that become 0 in 16 bits of `factor` a unit.
@@ -92,14 +92,14 @@ fn kitti_flow(flow: [f64; 2]) -> [u16; 3] {
     if u == 0 || v == 0 { [0; 3] } else { [u, v, 1] }
 }
 
-fn flow(layer: &Layer) -> Result<Shown, NoMemory> {
+fn flow(layer: &Layer) -> Result<LayerImage, NoMemory> {
     let [x, y] = [0, 1].map(|k| &layer.channels[k].values);
     let bytes = fill(&[x], |i| kitti_flow([x.at(i), y.at(i)]).map(u16::to_be_bytes))?;
     let note = format!(
         "data: red and green are 32768 + {KITTI_FLOW} times the flow right and down (pixels), blue is 1 \
          where it is known; flow of 512 pixels and more is not"
     );
-    Ok(Shown { channels: Channels::Rgb, bits: Bits::Sixteen, bytes, note })
+    Ok(LayerImage { channels: ColourType::Rgb, bits: Bits::Sixteen, bytes, note })
 }
 
 /// `PIEH`, columns and rows, and two little-endian floats a pixel.

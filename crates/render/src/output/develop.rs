@@ -13,7 +13,7 @@
 use etendue_scene::file::{Exposure, RenderSpec, ToneMap};
 use serde_json::{Value, json};
 
-use super::look::{Channels, Shown, srgb, unit};
+use super::look::{ColourType, LayerImage, srgb, unit};
 use super::{Layer, Picture, Values, png::Bits};
 use crate::film::NoMemory;
 
@@ -94,7 +94,7 @@ impl Development {
         picture: &Picture,
         layer: &Layer,
         bits: Bits,
-    ) -> Result<Shown, NoMemory> {
+    ) -> Result<LayerImage, NoMemory> {
         let planes: Vec<_> = layer.channels.iter().map(|channel| &channel.values).collect();
         let light = |i: usize| match *planes.as_slice() {
             [r, g, b] => [r, g, b].map(|plane| plane.at(i)),
@@ -105,10 +105,12 @@ impl Development {
         let alpha = picture.layer("Alpha").and_then(|layer| layer.channels.first());
         let Some(alpha) = alpha.filter(|_| self.alpha) else {
             return match planes.len() {
-                3 => Shown::new(Channels::Rgb, bits, &planes, |i| self.encode(light(i)), note),
+                3 => {
+                    LayerImage::new(ColourType::Rgb, bits, &planes, |i| self.encode(light(i)), note)
+                }
                 _ => {
                     let grey = |i| [self.encode(light(i))[0]];
-                    Shown::new(Channels::Grey, bits, &planes, grey, note)
+                    LayerImage::new(ColourType::Grey, bits, &planes, grey, note)
                 }
             };
         };
@@ -129,7 +131,7 @@ impl Development {
             let [r, g, b] = self.encode(rgb.map(|c| c / share));
             [r, g, b, unit(share)]
         };
-        Shown::new(Channels::Rgba, bits, &planes, rgba, note)
+        LayerImage::new(ColourType::Rgba, bits, &planes, rgba, note)
     }
 }
 
@@ -313,7 +315,7 @@ mod tests {
             picture(vec![0.4, 0.6, 0.8], vec![layer("Alpha", ["A"], vec![0.0, 0.5, 1.0]), behind]);
         let develop = Development { alpha: true, ..Development::default() };
         let shown = develop.show(&all, all.layer("").unwrap(), Bits::Eight).unwrap();
-        assert_eq!(shown.channels, Channels::Rgba);
+        assert_eq!(shown.channels, ColourType::Rgba);
         let edge = &shown.bytes[4..8];
         // 0.8 is 0.9063 in sRGB, 231 of 255.
         assert_eq!(

@@ -80,7 +80,7 @@ pub fn write(
     picture: &Picture,
     options: &Options<'_>,
 ) -> Result<(), OutputError> {
-    let blocks = Blocks::new(picture, options.compression);
+    let blocks = ScanLineBlocks::new(picture, options.compression);
     let header = header(path, picture, &blocks, options.attributes)?;
     let head = head_bytes(&header).map_err(|error| OutputError::format(path, error))?;
     let mut part = files.create(path)?;
@@ -104,7 +104,7 @@ pub fn write(
 fn write_blocks(
     file: &mut impl Write,
     mut offset: u64,
-    blocks: &Blocks<'_>,
+    blocks: &ScanLineBlocks<'_>,
     path: &Path,
     options: &Options<'_>,
 ) -> Result<Vec<u64>, OutputError> {
@@ -140,14 +140,14 @@ fn block_head(row: usize, bytes: usize) -> Option<[u8; 8]> {
 }
 
 /// The picture cut into the blocks of rows that the format packs together.
-struct Blocks<'a> {
+struct ScanLineBlocks<'a> {
     width: usize,
     height: usize,
     channels: Vec<(String, &'a Values, SampleType)>,
     compression: Compression,
 }
 
-impl<'a> Blocks<'a> {
+impl<'a> ScanLineBlocks<'a> {
     fn new(picture: &'a Picture, compression: Compression) -> Self {
         let (width, height) = (picture.width(), picture.height());
         let channels = picture.exr_channels().into_iter();
@@ -282,7 +282,7 @@ fn zip(raw: Vec<u8>) -> Vec<u8> {
 fn header(
     path: &Path,
     picture: &Picture,
-    blocks: &Blocks<'_>,
+    blocks: &ScanLineBlocks<'_>,
     attributes: &[(String, String)],
 ) -> Result<Header, OutputError> {
     // The format counts pixels in i32, and the crate panics beyond.

@@ -8,6 +8,7 @@ use super::png::Bits;
 use super::{Look, OutputError, Outputs, Picture, envi, npy, png};
 use crate::expose::SPECTRUM;
 use etendue_files::Transaction;
+use etendue_tracer::LayerSpec;
 
 /// A file of one layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,18 +41,21 @@ impl LayerFile {
     /// Those of the layer called `layer` (empty for the picture itself) among `outputs`, in the order in which
     /// they are written.
     pub fn of(layer: &str, outputs: Outputs) -> impl Iterator<Item = Self> {
-        let is = |start: &str| layer.starts_with(start);
+        let spec = LayerSpec::from_file_name(layer);
+        let is_depth = spec == Some(LayerSpec::Depth);
+        let is_disparity = matches!(spec, Some(LayerSpec::Disparity { .. }));
+        let is_flow = matches!(spec, Some(LayerSpec::Flow { .. }));
         let named = has_mask(layer);
         let all = [
             // The picture's own shows what is denoised.
             (outputs.png && layer != DENOISED, Self::Preview),
             (outputs.png && named, Self::Mask),
             (outputs.npy, Self::Array),
-            (outputs.tum && layer == "Depth", Self::TumDepth),
-            (outputs.kitti && layer == "Depth", Self::KittiDepth),
-            (outputs.kitti && is("Disparity"), Self::KittiDisparity),
-            (outputs.kitti && is("Flow"), Self::KittiFlow),
-            (outputs.flo && is("Flow"), Self::Flo),
+            (outputs.tum && is_depth, Self::TumDepth),
+            (outputs.kitti && is_depth, Self::KittiDepth),
+            (outputs.kitti && is_disparity, Self::KittiDisparity),
+            (outputs.kitti && is_flow, Self::KittiFlow),
+            (outputs.flo && is_flow, Self::Flo),
             (outputs.indexed && named, Self::Indexed),
             (outputs.envi && layer == SPECTRUM, Self::EnviHeader),
             (outputs.envi && layer == SPECTRUM, Self::EnviNumbers),
@@ -91,7 +95,7 @@ impl LayerFile {
             Self::EnviHeader => "hdr",
             Self::EnviNumbers => "img",
         };
-        format!("{}.{ending}", stem(layer))
+        format!("{}.{ending}", layer_stem(layer))
     }
 
     /// True if the file is written whatever the layer holds: numbers may be too large for masks.
@@ -146,7 +150,7 @@ impl LayerFile {
                 "{}: {lost} of the hits are outside of what it holds, {range}; {}.npy and layers.exr have \
                  them (`--outputs npy,exr`)",
                 self.name(name),
-                stem(name)
+                layer_stem(name)
             )
         })
     }
@@ -201,12 +205,14 @@ impl LayerFile {
 
 /// True if a layer's numbers are worth a mask: names of things, and not the numbers of triangles.
 pub(crate) fn has_mask(layer: &str) -> bool {
-    layer == "MaterialId" || layer.starts_with("Id.") && layer != "Id.primitive"
+    let spec = LayerSpec::from_file_name(layer);
+    spec.is_some_and(|spec| spec.row().look == Look::Ids) && !layer.ends_with(".primitive")
 }
 
 /// A layer's name as files have it: `NormalCamera` is `normal_camera`, `Id.object` `id_object`, the picture
 /// `picture`.
-fn stem(layer: &str) -> String {
+#[must_use]
+pub fn layer_stem(layer: &str) -> String {
     if layer.is_empty() {
         return "picture".to_owned();
     }

@@ -45,8 +45,8 @@ pub enum Bits {
 }
 
 /// A layer made visible: bytes as PNG has them, rows from the top, 16-bit samples big-endian.
-pub(super) struct Shown {
-    pub(super) channels: Channels,
+pub(super) struct LayerImage {
+    pub(super) channels: ColourType,
     pub(super) bits: Bits,
     pub(super) bytes: Vec<u8>,
     /// Explanation of how to read it.
@@ -55,7 +55,7 @@ pub(super) struct Shown {
 
 /// Channels of a preview's pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Channels {
+pub(super) enum ColourType {
     Grey,
     Rgb,
     Rgba,
@@ -64,7 +64,7 @@ pub(super) enum Channels {
 }
 
 /// Shows `layer`, whose channels fit its look.
-pub(super) fn show(layer: &Layer, bits: Bits) -> Result<Shown, NoMemory> {
+pub(super) fn show(layer: &Layer, bits: Bits) -> Result<LayerImage, NoMemory> {
     let planes: Vec<_> = layer.channels.iter().map(|channel| &channel.values).collect();
     let planes = planes.as_slice();
     match layer.look {
@@ -76,22 +76,22 @@ pub(super) fn show(layer: &Layer, bits: Bits) -> Result<Shown, NoMemory> {
         Look::Share => {
             let note = "linear grey: black is 0, white is 1".into();
             let grey = |i| [unit(planes[0].at(i))];
-            Shown::new(Channels::Grey, bits, planes, grey, note)
+            LayerImage::new(ColourType::Grey, bits, planes, grey, note)
         }
         Look::Cube => {
             let note = "grey: the channels' mean through the sRGB curve".into();
             let mean =
                 |i| planes.iter().map(|plane| plane.at(i)).sum::<f64>() / planes.len() as f64;
-            Shown::new(Channels::Grey, bits, planes, |i| [srgb(mean(i))], note)
+            LayerImage::new(ColourType::Grey, bits, planes, |i| [srgb(mean(i))], note)
         }
         Look::Counts { bits } => counts(planes, bits),
     }
 }
 
-impl Shown {
+impl LayerImage {
     /// Shades every pixel with `N` values in 0..=1, by all threads of the current rayon pool.
     pub(super) fn new<const N: usize>(
-        channels: Channels,
+        channels: ColourType,
         bits: Bits,
         planes: &[&Values],
         shade: impl Fn(usize) -> [f32; N] + Sync,
@@ -144,25 +144,25 @@ pub(super) fn srgb(linear: f64) -> f32 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
-fn color(planes: &[&Values], bits: Bits) -> Result<Shown, NoMemory> {
+fn color(planes: &[&Values], bits: Bits) -> Result<LayerImage, NoMemory> {
     let note = "sRGB; light above full scale is clipped".into();
     match *planes {
         [r, g, b] => {
             let rgb = |i| [r, g, b].map(|plane| srgb(plane.at(i)));
-            Shown::new(Channels::Rgb, bits, planes, rgb, note)
+            LayerImage::new(ColourType::Rgb, bits, planes, rgb, note)
         }
-        _ => Shown::new(Channels::Grey, bits, planes, |i| [srgb(planes[0].at(i))], note),
+        _ => LayerImage::new(ColourType::Grey, bits, planes, |i| [srgb(planes[0].at(i))], note),
     }
 }
 
 /// Brightness of the farthest distance shown: darker is only a miss.
 const FAR_GREY: f64 = 0.125;
 
-fn distance(planes: &[&Values], bits: Bits) -> Result<Shown, NoMemory> {
+fn distance(planes: &[&Values], bits: Bits) -> Result<LayerImage, NoMemory> {
     let plane = planes[0];
     let Some((near, far)) = spread(plane) else {
         let note = "every pixel is a miss (black)".into();
-        return Shown::new(Channels::Grey, bits, planes, |_| [0.0], note);
+        return LayerImage::new(ColourType::Grey, bits, planes, |_| [0.0], note);
     };
     // Reciprocal distances give a plane that runs to the horizon, or a room, even steps; they need
     // a range on one side of zero.
@@ -182,7 +182,7 @@ fn distance(planes: &[&Values], bits: Bits) -> Result<Shown, NoMemory> {
          of white is {far} or farther (farthest hundredth), black is a miss",
         if reciprocal { "the reciprocal distance" } else { "the distance" },
     );
-    Shown::new(Channels::Grey, bits, planes, grey, note)
+    LayerImage::new(ColourType::Grey, bits, planes, grey, note)
 }
 
 /// The 1st and the 99th percentile of finite values, from an even sample of all: single outliers
@@ -204,7 +204,7 @@ pub(super) fn spread(plane: &Values) -> Option<(f64, f64)> {
     Some((sample[last / 100], sample[last - last / 100]))
 }
 
-fn direction(planes: &[&Values], bits: Bits) -> Result<Shown, NoMemory> {
+fn direction(planes: &[&Values], bits: Bits) -> Result<LayerImage, NoMemory> {
     let rgba = |i| {
         let n = [0, 1, 2].map(|axis| planes[axis].at(i));
         if n == [0.0; 3] {
@@ -214,10 +214,10 @@ fn direction(planes: &[&Values], bits: Bits) -> Result<Shown, NoMemory> {
         [r, g, b, 1.0]
     };
     let note = "red, green, blue are (n + 1)/2 of x, y, z; transparent is a miss".into();
-    Shown::new(Channels::Rgba, bits, planes, rgba, note)
+    LayerImage::new(ColourType::Rgba, bits, planes, rgba, note)
 }
 
-fn extent(planes: &[&Values], bits: Bits) -> Result<Shown, NoMemory> {
+fn extent(planes: &[&Values], bits: Bits) -> Result<LayerImage, NoMemory> {
     let ranges: Vec<_> = planes.iter().map(|plane| finite_range(plane)).collect();
     let rgba = |i| {
         let mut shade = [0.0, 0.0, 0.0, 1.0];
@@ -244,7 +244,7 @@ fn extent(planes: &[&Values], bits: Bits) -> Result<Shown, NoMemory> {
         .map(|(colour, (low, high))| format!("{colour} from {low} to {high}"))
         .collect();
     let note = format!("{}; transparent is a miss", axes.join(", "));
-    Shown::new(Channels::Rgba, bits, planes, rgba, note)
+    LayerImage::new(ColourType::Rgba, bits, planes, rgba, note)
 }
 
 /// The least and the greatest finite value; `+inf` and `−inf` when there is none.
@@ -257,7 +257,7 @@ fn finite_range(plane: &Values) -> (f64, f64) {
         .reduce(|| (f64::INFINITY, f64::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
-fn ids(planes: &[&Values], bits: Bits) -> Result<Shown, NoMemory> {
+fn ids(planes: &[&Values], bits: Bits) -> Result<LayerImage, NoMemory> {
     let rgba = |i| match planes[0].at(i) {
         0.0 => [0.0; 4],
         id => {
@@ -266,7 +266,7 @@ fn ids(planes: &[&Values], bits: Bits) -> Result<Shown, NoMemory> {
         }
     };
     let note = "each number in a colour of its own, which means nothing; transparent is 0, a miss";
-    Shown::new(Channels::Rgba, bits, planes, rgba, note.into())
+    LayerImage::new(ColourType::Rgba, bits, planes, rgba, note.into())
 }
 
 /// A colour for a number: hues a golden section apart, so that neighbours differ most, in two
@@ -285,7 +285,7 @@ fn id_color(id: f64) -> [f32; 3] {
 }
 
 /// Numbers of a layer of ids as they are; `None` when one has more than 16 bits.
-pub(super) fn mask(layer: &Layer) -> Result<Option<Shown>, NoMemory> {
+pub(super) fn mask(layer: &Layer) -> Result<Option<LayerImage>, NoMemory> {
     let plane = layer.channels.first().map(|channel| &channel.values);
     let Some(plane) = plane.filter(|plane| plane.largest_integer() <= u16::MAX.into()) else {
         return Ok(None);
@@ -298,23 +298,23 @@ pub(super) fn mask(layer: &Layer) -> Result<Option<Shown>, NoMemory> {
     };
     let bytes = fill(&[plane], |i| [number(i)])?;
     let note = "data: the numbers themselves, not scaled; 0 is nothing".into();
-    Ok(Some(Shown { channels: Channels::Grey, bits: Bits::Sixteen, bytes, note }))
+    Ok(Some(LayerImage { channels: ColourType::Grey, bits: Bits::Sixteen, bytes, note }))
 }
 
 /// Numbers of a layer of ids as indices of [`palette`]; `None` when one has more than 8 bits.
-pub(super) fn indices(layer: &Layer) -> Result<Option<Shown>, NoMemory> {
+pub(super) fn indices(layer: &Layer) -> Result<Option<LayerImage>, NoMemory> {
     let plane = layer.channels.first().map(|channel| &channel.values);
     if plane.is_none_or(|plane| plane.largest_integer() > u8::MAX.into()) {
         return Ok(None);
     }
-    let Some(Shown { mut bytes, .. }) = mask(layer)? else { return Ok(None) };
+    let Some(LayerImage { mut bytes, .. }) = mask(layer)? else { return Ok(None) };
     // Of two bytes the second is all of it.
     for i in 0..bytes.len() / 2 {
         bytes[i] = bytes[2 * i + 1];
     }
     bytes.truncate(bytes.len() / 2);
     let note = "data: the index of a pixel is the number itself; 0 is nothing".into();
-    Ok(Some(Shown { channels: Channels::Indexed, bits: Bits::Eight, bytes, note }))
+    Ok(Some(LayerImage { channels: ColourType::Indexed, bits: Bits::Eight, bytes, note }))
 }
 
 /// The colours of the numbers from 0 to 255, as previews have them; nothing is black.
@@ -326,18 +326,18 @@ pub(super) fn palette() -> Vec<u8> {
     (0..=255).flat_map(color).collect()
 }
 
-fn counts(planes: &[&Values], bits: u8) -> Result<Shown, NoMemory> {
+fn counts(planes: &[&Values], bits: u8) -> Result<LayerImage, NoMemory> {
     // `lacks` has seen to the type.
     fn number(plane: &Values, i: usize) -> [u8; 2] {
         let Values::U16(values) = plane else { return [0; 2] };
         values[i].to_be_bytes()
     }
     let (channels, bytes) = match *planes {
-        [r, g, b] => (Channels::Rgb, fill(planes, |i| [r, g, b].map(|p| number(p, i)))?),
-        _ => (Channels::Grey, fill(planes, |i| [number(planes[0], i)])?),
+        [r, g, b] => (ColourType::Rgb, fill(planes, |i| [r, g, b].map(|p| number(p, i)))?),
+        _ => (ColourType::Grey, fill(planes, |i| [number(planes[0], i)])?),
     };
     let note = format!("digital numbers (DN), 0 to {}, not scaled", (1_u32 << bits) - 1);
-    Ok(Shown { channels, bits: Bits::Sixteen, bytes, note })
+    Ok(LayerImage { channels, bits: Bits::Sixteen, bytes, note })
 }
 
 #[cfg(test)]
@@ -354,7 +354,7 @@ mod tests {
         Layer { name: "L".into(), look, channels, meaning: Vec::new() }
     }
 
-    fn eight(look: Look, planes: Vec<Values>) -> (Channels, Vec<u8>) {
+    fn eight(look: Look, planes: Vec<Values>) -> (ColourType, Vec<u8>) {
         let shown = show(&layer(look, planes), Bits::Eight).unwrap();
         (shown.channels, shown.bytes)
     }
@@ -364,7 +364,7 @@ mod tests {
         // Encoded values of IEC 61966-2-1: 0.5 → 0.735357, 0.18 → 0.461356, 0.002 → 0.02584.
         let linear = Values::F32(vec![0.0, 0.002, 0.18, 0.5, 1.0, 7.0, -1.0, f32::INFINITY]);
         let (channels, bytes) = eight(Look::Color, vec![linear]);
-        assert_eq!(channels, Channels::Grey);
+        assert_eq!(channels, ColourType::Grey);
         assert_eq!(bytes, [0, 7, 118, 188, 255, 255, 0, 255]);
     }
 
@@ -412,7 +412,7 @@ mod tests {
         let plane = |values: [f32; 3]| Values::F32(values.to_vec());
         let planes = vec![plane([1.0, 0.0, 0.0]), plane([0.0, -1.0, 0.0]), plane([0.0, 0.0, 0.0])];
         let (channels, bytes) = eight(Look::Direction, planes);
-        assert_eq!(channels, Channels::Rgba);
+        assert_eq!(channels, ColourType::Rgba);
         assert_eq!(bytes, [255, 128, 128, 255, 128, 0, 128, 255, 0, 0, 0, 0]);
     }
 
@@ -450,11 +450,11 @@ mod tests {
             Bits::Eight,
         )
         .unwrap();
-        assert_eq!((shown.channels, shown.bits), (Channels::Grey, Bits::Sixteen));
+        assert_eq!((shown.channels, shown.bits), (ColourType::Grey, Bits::Sixteen));
         assert_eq!(shown.bytes, [0, 0, 0, 1, 0x0f, 0xff]);
         let planes = vec![Values::U16(vec![1]), Values::U16(vec![2]), Values::U16(vec![255])];
         let shown = show(&layer(Look::Counts { bits: 8 }, planes), Bits::Sixteen).unwrap();
-        assert_eq!((shown.channels, shown.bits), (Channels::Rgb, Bits::Sixteen));
+        assert_eq!((shown.channels, shown.bits), (ColourType::Rgb, Bits::Sixteen));
         assert_eq!(shown.bytes, [0, 1, 0, 2, 0, 255]);
     }
 

@@ -14,7 +14,7 @@ use ::png::{BitDepth, ColorType, EncodingError, Info, SrgbRenderingIntent};
 
 use super::DENOISED;
 pub use super::look::Bits;
-use super::look::{Channels, Shown, mask, palette, show};
+use super::look::{ColourType, LayerImage, mask, palette, show};
 use super::{Layer, Look, OutputError, Picture};
 use crate::film::check_room;
 use etendue_files::{PartFile, SOFTWARE, Transaction};
@@ -68,7 +68,7 @@ pub(super) fn write_shown(
     path: &Path,
     picture: &Picture,
     layer: &Layer,
-    shown: &Shown,
+    shown: &LayerImage,
 ) -> Result<(), OutputError> {
     let [width, height] = [picture.width(), picture.height()].map(|side| {
         let side = i32::try_from(side).ok().map(i32::unsigned_abs);
@@ -77,12 +77,12 @@ pub(super) fn write_shown(
     let mut info = Info::with_size(width?, height?);
     info.utf8_text = texts(picture, layer, shown);
     info.color_type = match shown.channels {
-        Channels::Grey => ColorType::Grayscale,
-        Channels::Rgb => ColorType::Rgb,
-        Channels::Rgba => ColorType::Rgba,
-        Channels::Indexed => ColorType::Indexed,
+        ColourType::Grey => ColorType::Grayscale,
+        ColourType::Rgb => ColorType::Rgb,
+        ColourType::Rgba => ColorType::Rgba,
+        ColourType::Indexed => ColorType::Indexed,
     };
-    info.palette = (shown.channels == Channels::Indexed).then(|| palette().into());
+    info.palette = (shown.channels == ColourType::Indexed).then(|| palette().into());
     info.bit_depth = match shown.bits {
         Bits::Eight => BitDepth::Eight,
         Bits::Sixteen => BitDepth::Sixteen,
@@ -108,8 +108,8 @@ fn encode(part: &mut PartFile<'_>, info: Info<'_>, bytes: &[u8]) -> Result<(), E
     writer.finish()
 }
 
-/// Texts of the file beside the pixels.
-fn texts(picture: &Picture, layer: &Layer, shown: &Shown) -> Vec<ITXtChunk> {
+/// What stands in the file beside the pixels.
+fn texts(picture: &Picture, layer: &Layer, shown: &LayerImage) -> Vec<ITXtChunk> {
     let comment = match layer.look {
         Look::Counts { .. } => "data",
         _ if shown.note.starts_with("data") => "data",
@@ -131,7 +131,7 @@ fn texts(picture: &Picture, layer: &Layer, shown: &Shown) -> Vec<ITXtChunk> {
     let entries = layer.meaning.iter().chain(picture.header());
     let entries = entries.map(|(key, text)| (Cow::from(format!("etendue:{key}")), text.as_str()));
     let fixed = fixed.into_iter().map(|(key, text)| (Cow::from(key), text));
-    let names = picture.names(&layer.name).filter(|_| shown.channels == Channels::Indexed);
+    let names = picture.names(&layer.name).filter(|_| shown.channels == ColourType::Indexed);
     let names = names.map(|names| ITXtChunk::new("Names", names.to_string()));
     fixed.chain(entries).map(|(key, text)| ITXtChunk::new(key, text)).chain(names).collect()
 }

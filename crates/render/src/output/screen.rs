@@ -3,7 +3,7 @@
 use etendue_sensor::{RawImage, Sensor};
 use rayon::prelude::*;
 
-use super::look::{Channels, Shown, show, spread, srgb};
+use super::look::{ColourType, LayerImage, show, spread, srgb};
 use super::png::Bits;
 use super::{Layer, Look, OutputError, Picture, Values};
 
@@ -162,13 +162,13 @@ impl Screen {
 }
 
 /// `shown` with four bytes a pixel.
-fn rgba(shown: &Shown, pixels: usize) -> Vec<u8> {
+fn rgba(shown: &LayerImage, pixels: usize) -> Vec<u8> {
     let bytes = &shown.bytes;
     let step = match (shown.channels, shown.bits) {
-        (Channels::Rgba, Bits::Eight) => return bytes.clone(),
-        (Channels::Rgb, _) => 3,
-        (Channels::Rgba, _) => 4,
-        (Channels::Grey | Channels::Indexed, _) => 1,
+        (ColourType::Rgba, Bits::Eight) => return bytes.clone(),
+        (ColourType::Rgb, _) => 3,
+        (ColourType::Rgba, _) => 4,
+        (ColourType::Grey | ColourType::Indexed, _) => 1,
     };
     // Of 16 bits, big-endian, the first byte.
     let width = if shown.bits == Bits::Sixteen { 2 } else { 1 };

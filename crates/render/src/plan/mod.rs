@@ -30,7 +30,7 @@ use crate::output::Outputs;
 use crate::precision::light_precision;
 use crate::samples::{self, BYTES_OF_SUM};
 use crate::stopping::Stopping;
-use crate::tolerance::Taken;
+use crate::tolerance::Approximations;
 
 /// Attributes of the models that have to be read for `layers`: decided before they are opened.
 #[must_use]
@@ -93,8 +93,8 @@ pub struct Plan {
     pub bands: Bands,
     /// Forecast of the memory, by counts and headers alone: within 1.5 of the peak of the example scenes.
     pub memory: MemoryForecast,
-    /// Part of the scene's tolerance that is used.
-    pub taken: Option<Taken>,
+    /// What is taken of the scene's tolerance.
+    pub taken: Option<Approximations>,
     /// The decisions, with their reasons.
     pub decisions: Vec<Decision>,
 }
@@ -168,7 +168,7 @@ impl Plan {
 
     /// Plans the scene with what is `taken` of the scene's tolerance ([`crate::tolerance::choose`]).
     #[must_use]
-    pub fn taking(scene: &Scene, outputs: Outputs, taken: Option<Taken>) -> Self {
+    pub fn taking(scene: &Scene, outputs: Outputs, taken: Option<Approximations>) -> Self {
         Self::of(scene, outputs, expose::bands(scene), taken)
     }
 
@@ -178,7 +178,12 @@ impl Plan {
         Self::of(scene, outputs, BandChoice::untried(bands.clone()), None)
     }
 
-    fn of(scene: &Scene, outputs: Outputs, chosen: BandChoice, taken: Option<Taken>) -> Self {
+    fn of(
+        scene: &Scene,
+        outputs: Outputs,
+        chosen: BandChoice,
+        taken: Option<Approximations>,
+    ) -> Self {
         // What the layers need of hits, and how many rays that takes.
         let layers = scene.layers.clone();
         let needs = needs(&layers);

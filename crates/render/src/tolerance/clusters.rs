@@ -20,8 +20,8 @@ pub(super) fn clustered(mesh: &Mesh, side: f64) -> Option<Mesh> {
     if !is_coarse || mesh.bounds.is_empty() {
         return None;
     }
-    let cells = Cells::over(&mesh.bounds, side);
-    let mut clusters = Clusters::new(&cells, mesh.positions.len());
+    let cells = CubeGrid::over(&mesh.bounds, side);
+    let mut clusters = VertexClusters::new(&cells, mesh.positions.len());
     let of_corner: Vec<u32> = (0..mesh.positions.len())
         .map(|i| {
             let normal =
@@ -59,14 +59,14 @@ pub(super) fn clustered(mesh: &Mesh, side: f64) -> Option<Mesh> {
 }
 
 /// A grid of cubes over a box.
-struct Cells {
+struct CubeGrid {
     origin: DVec3,
     side: f64,
     /// Columns, rows and layers.
     counts: [u64; 3],
 }
 
-impl Cells {
+impl CubeGrid {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 2²⁰")]
     fn over(bounds: &Bounds, side: f64) -> Self {
         let extent = (bounds.max - bounds.min) / side;
@@ -103,7 +103,7 @@ enum NumberOfCell {
 const NONE: u32 = u32::MAX;
 
 /// Corners that were put together.
-struct Clusters {
+struct VertexClusters {
     number: NumberOfCell,
     /// Of each cell the corner for each way that normals point ([`facing`]); without normals the first alone.
     corners: Vec<[u32; 6]>,
@@ -113,9 +113,9 @@ struct Clusters {
     of_corner: Vec<(u32, DVec3)>,
 }
 
-impl Clusters {
+impl VertexClusters {
     /// For so many corners in the cells of a grid.
-    fn new(cells: &Cells, corners: usize) -> Self {
+    fn new(cells: &CubeGrid, corners: usize) -> Self {
         let number = match usize::try_from(cells.len()) {
             Ok(count) if count <= 4 * corners => NumberOfCell::Dense(vec![NONE; count]),
             _ => NumberOfCell::Sparse(HashMap::new()),

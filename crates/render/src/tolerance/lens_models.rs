@@ -14,6 +14,7 @@
 
 use std::path::PathBuf;
 
+use etendue_accel::Accel;
 use etendue_camera::lens::PlacedSpec;
 use etendue_camera::lens::focused::View;
 use etendue_camera::{
@@ -23,9 +24,13 @@ use etendue_camera::{
 use etendue_geometry::Bounds;
 use etendue_geometry::units::{Micrometres, Millimetres};
 use etendue_optics::element::{ApertureSpec, ElementSpec, MaskSpec, Opening, PartSpec, Picture};
+use etendue_scene::Scene;
 use serde_json::{Value, json};
 
-/// Reason why a camera has no models.
+use super::{Field, FullView, TakenCamera, Tolerance};
+use crate::{BandPaths, Plan, RenderError};
+
+/// Why a camera has no models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("there are no models of the camera's lens: {0}")]
 pub struct NoModels(
@@ -297,4 +302,52 @@ impl Gauss {
             },
         })
     }
+}
+
+/// All bands are looked at: those at the sides of a group are farthest from where they run together.
+const ALL_BANDS: Field = Field { bands: usize::MAX, rays: 64, ..Field::QUICK };
+
+/// The name of the model whose bands are in groups.
+const GROUPED: &str = "grouped";
+
+/// How many numbers of groups are tried.
+const TRIES: usize = 6;
+
+/// Bands of a lens run together in groups, where the scene is traced for each band. Where bands share the paths of the
+/// scene ([`BandPaths::Shared`]), a group would save nothing: each costs as much as a scene traced once for all.
+///
+/// The camera of `scene` with its bands in as few groups as stay within the tolerance; `None` where the scene is traced
+/// once for all bands, or where more than half as many groups as bands are needed.
+pub(super) fn fewest_groups(
+    scene: &Scene,
+    plan: &Plan,
+    accel: &dyn Accel,
+    tolerance: Tolerance,
+) -> Result<Option<TakenCamera>, RenderError> {
+    let most = plan.bands.count() / 2;
+    let paths = || BandPaths::of((scene, &scene.camera), &plan.bands, plan.stopping, true);
+    let can_pay = || most >= 2 && matches!(paths(), BandPaths::Apart(_));
+    let Some(two) = scene.camera.with_bands_grouped(2).filter(|_| can_pay()) else {
+        return Ok(None);
+    };
+    let view = FullView::new(scene, accel, &plan.bands, ALL_BANDS)?;
+    // Displacements within a group go as its width.
+    let found = view.finding(GROUPED, &two, tolerance)?;
+    if found.is_within {
+        return Ok(Some(TakenCamera { camera: two, finding: found }));
+    }
+    let wanted = 2.0 * found.displacement() / tolerance.pixels;
+    let first = match wanted.is_finite() {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "few")]
+        true => (wanted.ceil() as usize).max(3),
+        false => return Ok(None),
+    };
+    for count in (first..=most).take(TRIES) {
+        let Some(camera) = scene.camera.with_bands_grouped(count) else { break };
+        let finding = view.finding(GROUPED, &camera, tolerance)?;
+        if finding.is_within {
+            return Ok(Some(TakenCamera { camera, finding }));
+        }
+    }
+    Ok(None)
 }

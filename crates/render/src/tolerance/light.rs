@@ -8,7 +8,7 @@ use etendue_scene::Scene;
 use etendue_scene::file::{SamplesSpec, TracerSpec};
 use etendue_tracer::LayerSpec;
 
-use super::{Taken, TakenBounces, lens_models};
+use super::{Approximations, TakenBounces, lens_models};
 use crate::output::Outputs;
 use crate::{Images, Plan, RenderError, Watch, render};
 
@@ -95,7 +95,7 @@ pub(super) fn values(
     scene: &Scene,
     camera: &Camera,
     (accel, images): (&dyn Accel, &Images),
-    (samples, taken): (u32, Option<Taken>),
+    (samples, taken): (u32, Option<Approximations>),
     watch: &dyn Watch,
 ) -> Result<Vec<f64>, RenderError> {
     let mut scene = scene.clone();

@@ -7,7 +7,6 @@
 mod clusters;
 mod coarse_images;
 mod detail;
-mod groups;
 pub mod lens_models;
 mod light;
 mod pixel_views;
@@ -23,7 +22,7 @@ use etendue_tracer::LayerSpec;
 use serde::Serialize;
 
 use self::lens_models::{LensModel, LensModels, NoModels};
-use self::pixel_views::{Line, PlaceView, chief_rays, places, seen};
+use self::pixel_views::{LightRay, PlaceView, chief_rays, places, seen};
 use crate::{Images, Plan, RenderError, Watch};
 
 pub use self::coarse_images::coarse_images;
@@ -77,7 +76,7 @@ pub struct Place {
 
 /// What a model misses, and what it costs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Finding {
+pub struct ModelError {
     /// `pinhole`, `opencv`, `falloff`, `thin`, `thick`, `undispersed`, `grouped` or `full`.
     pub model: &'static str,
     /// How far chief rays are from the train's (pixels).
@@ -98,7 +97,7 @@ pub struct Finding {
     pub speed: Option<f64>,
 }
 
-impl Finding {
+impl ModelError {
     /// The greatest displacement, of whatever kind (pixels).
     #[must_use]
     pub fn displacement(&self) -> f64 {
@@ -247,7 +246,7 @@ impl FullView {
     fn chief_displacement(&self, camera: &Camera) -> f64 {
         let own = chief_rays(camera, &self.places);
         let places = own.iter().zip(&self.seen).zip(&self.places);
-        let of_place = |((own, full), place): ((&Option<Line>, &PlaceView), &Place)| {
+        let of_place = |((own, full), place): ((&Option<LightRay>, &PlaceView), &Place)| {
             let (Some(own), Some(full)) = (own, &full.chief) else { return 0.0 };
             let depths = place.depths.iter().map(|depth| 1.0 / depth);
             depths.map(|near| (own.at(near) - full.at(near)).length()).fold(0.0, f64::max)
@@ -265,7 +264,7 @@ impl FullView {
         model: &'static str,
         camera: &Camera,
         tolerance: Tolerance,
-    ) -> Result<Finding, RenderError> {
+    ) -> Result<ModelError, RenderError> {
         let rays = self.field.rays;
         let camera = open(camera, &self.bands)?;
         let own = seen((&camera, &self.bands), &self.chosen, &self.places, rays);
@@ -274,11 +273,11 @@ impl FullView {
 
     /// The lens against itself.
     #[must_use]
-    pub fn itself(&self, tolerance: Tolerance) -> Finding {
+    pub fn itself(&self, tolerance: Tolerance) -> ModelError {
         self.compared("full", &self.seen, tolerance)
     }
 
-    fn compared(&self, model: &'static str, own: &[PlaceView], tolerance: Tolerance) -> Finding {
+    fn compared(&self, model: &'static str, own: &[PlaceView], tolerance: Tolerance) -> ModelError {
         let [mut chief_ray, mut centroid, mut blur, mut colour, mut light] = [Worst::default(); 5];
         let scale = self.scale;
         for ((own, full), place) in own.iter().zip(&self.seen).zip(&self.places) {
@@ -308,7 +307,7 @@ impl FullView {
         let in_pixels = [chief_ray, centroid, blur, colour];
         let is_within = in_pixels.iter().all(|worst| worst.value <= tolerance.pixels)
             && tolerance.light.is_none_or(|most| light.value <= most);
-        Finding {
+        ModelError {
             model,
             chief_ray,
             centroid,
@@ -351,7 +350,7 @@ fn some_of(count: usize, most: usize) -> Vec<usize> {
 
 /// Part of a scene's tolerance that is used.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Taken {
+pub struct Approximations {
     /// The tolerance.
     pub tolerance: ToleranceSpec,
     /// The camera that light is sampled by, in the place of the scene's.
@@ -366,7 +365,7 @@ pub struct Taken {
     pub notes: Vec<String>,
 }
 
-impl Taken {
+impl Approximations {
     /// Nothing but the detail of meshes yet.
     fn nothing(tolerance: ToleranceSpec, detail: Option<TakenDetail>) -> Self {
         Self { tolerance, camera: None, bounces: None, detail, images: 0, notes: Vec::new() }
@@ -378,8 +377,8 @@ impl Taken {
 pub struct TakenCamera {
     /// The camera.
     pub camera: Camera,
-    /// Deviation of the camera from the scene's.
-    pub finding: Finding,
+    /// What it misses.
+    pub finding: ModelError,
 }
 
 /// Fewer surfaces to which light is followed.
@@ -408,9 +407,9 @@ pub fn choose(
     (accel, images): (&dyn Accel, &Images),
     detail: Option<TakenDetail>,
     watch: &dyn Watch,
-) -> Result<Option<Taken>, RenderError> {
+) -> Result<Option<Approximations>, RenderError> {
     let Some(tolerance) = scene.tolerance else { return Ok(None) };
-    let mut taken = Taken::nothing(tolerance, detail);
+    let mut taken = Approximations::nothing(tolerance, detail);
     taken.images = images.coarser(scene);
     if !plan.layers.contains(&LayerSpec::Radiance) {
         taken.notes.push("no light is rendered: data layers are exact".to_owned());
@@ -470,7 +469,7 @@ fn simplest(
             return Ok(Some(TakenCamera { camera, finding }));
         }
     }
-    let grouped = groups::fewest(scene, plan, accel, tolerance)?;
+    let grouped = lens_models::fewest_groups(scene, plan, accel, tolerance)?;
     if grouped.is_none() {
         notes.push("no simpler model of the lens is within it".to_owned());
     }

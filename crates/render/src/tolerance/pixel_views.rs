@@ -7,7 +7,7 @@
 //! Beside it the depths of the scene where the camera looks.
 
 use super::Place;
-use super::small_things::Cells;
+use super::small_things::PictureGrid;
 use etendue_accel::Accel;
 use etendue_camera::{Camera, CameraRays, FilmSamples, Pose, Sampler};
 use etendue_geometry::glam::{DVec2, DVec3};
@@ -21,14 +21,14 @@ use etendue_tracer::light::EnvironmentImage;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct PlaceView {
     /// The chief ray; `None` where the camera sees nothing.
-    pub(super) chief: Option<Line>,
+    pub(super) chief: Option<LightRay>,
     /// The light of each band.
     pub(super) bands: Vec<BandRays>,
 }
 
 /// A straight line: its slope, and its offset (m) in the entrance pupil's plane. x right, y down.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Line {
+pub(super) struct LightRay {
     slope: DVec2,
     offset: DVec2,
 }
@@ -39,13 +39,13 @@ pub(super) struct BandRays {
     /// Light of the picture for a radiance of 1.
     pub(super) light: f64,
     /// Their mean.
-    middle: Line,
+    middle: LightRay,
     /// The variances of slope and offset, and their covariance, over both axes together.
     spread: [f64; 3],
 }
 
-impl Line {
-    /// Point of the line at a depth whose inverse (1/m) is given, in tangents.
+impl LightRay {
+    /// Where it runs at a depth whose inverse (1/m) is given, in tangents.
     pub(super) fn at(&self, nearness: f64) -> DVec2 {
         self.slope + self.offset * nearness
     }
@@ -65,15 +65,16 @@ impl Line {
 
 impl BandRays {
     /// Of weighted lines, `count` rays having been sent.
-    fn of(lines: &[(Line, f64)], count: usize) -> Self {
+    fn of(lines: &[(LightRay, f64)], count: usize) -> Self {
         let sum: f64 = lines.iter().map(|(_, weight)| weight).sum();
         if sum <= 0.0 {
             return Self::default();
         }
-        let mean = |of: &dyn Fn(&Line) -> DVec2| {
+        let mean = |of: &dyn Fn(&LightRay) -> DVec2| {
             lines.iter().map(|(line, weight)| of(line) * *weight).sum::<DVec2>() / sum
         };
-        let middle = Line { slope: mean(&|line| line.slope), offset: mean(&|line| line.offset) };
+        let middle =
+            LightRay { slope: mean(&|line| line.slope), offset: mean(&|line| line.offset) };
         let spread = lines.iter().fold([0.0; 3], |[a, b, c], (line, weight)| {
             let (slope, offset) = (line.slope - middle.slope, line.offset - middle.offset);
             [
@@ -107,13 +108,13 @@ impl PlaceView {
 }
 
 /// The chief rays of `camera` from `places`; `None` where it sees nothing.
-pub(super) fn chief_rays(camera: &Camera, places: &[Place]) -> Vec<Option<Line>> {
+pub(super) fn chief_rays(camera: &Camera, places: &[Place]) -> Vec<Option<LightRay>> {
     let (columns, rows): (Vec<f64>, Vec<f64>) =
         places.iter().map(|place| (place.column, place.row)).unzip();
     let mut rays = RayBatch::default();
     camera.rays_through(&columns, &rows, &mut rays);
     let line = |i: usize| {
-        let line = || Line::of(camera.pose(), rays.origin(i), rays.direction(i));
+        let line = || LightRay::of(camera.pose(), rays.origin(i), rays.direction(i));
         (rays.t_max()[i] >= 0.0).then(line).flatten()
     };
     (0..places.len()).map(line).collect()
@@ -149,9 +150,10 @@ pub(super) fn seen(
                 samples.push([place.column, place.row], points.square(k, 1), spectrum);
             }
             camera.sample_rays(&samples, &mut out);
-            let lines: Vec<(Line, f64)> = (0..out.rays.len())
+            let lines: Vec<(LightRay, f64)> = (0..out.rays.len())
                 .filter_map(|k| {
-                    let line = Line::of(camera.pose(), out.rays.origin(k), out.rays.direction(k));
+                    let line =
+                        LightRay::of(camera.pose(), out.rays.origin(k), out.rays.direction(k));
                     Some((line?, out.weight[k]))
                 })
                 .collect();
@@ -195,8 +197,11 @@ pub(super) fn places(
     }
     let step = [width / f64::from(columns - 1), height / f64::from(rows - 1)];
     let across = step.map(|side| side / f64::from(rays_across(side, most_across)));
-    let cells =
-        Cells { count: size.map(|count| count as usize), step, ray_step: across[0].max(across[1]) };
+    let cells = PictureGrid {
+        count: size.map(|count| count as usize),
+        step,
+        ray_step: across[0].max(across[1]),
+    };
     cells.look_for_small((&scene.geometry, accel), &scene.camera, &mut places);
     places
 }

@@ -24,7 +24,7 @@ const SMALL: f64 = 4.0;
 const MOST: usize = 4096;
 
 /// A box in the picture.
-struct Target {
+struct ScreenBox {
     /// Slopes to the right and down, the least and the greatest.
     slopes: [DVec2; 2],
     /// The cells of the picture in which it is, by columns and rows.
@@ -34,8 +34,8 @@ struct Target {
 }
 
 /// Places of the picture in even columns and rows.
-pub(super) struct Cells {
-    /// Number of columns and rows of cells.
+pub(super) struct PictureGrid {
+    /// How many columns and rows of them.
     pub(super) count: [usize; 2],
     /// From one to the next (pixels).
     pub(super) step: [f64; 2],
@@ -74,7 +74,7 @@ impl Eye<'_> {
     }
 }
 
-impl Cells {
+impl PictureGrid {
     /// The cells that a part of the picture touches, whose middles are even places with the corners among them.
     fn of(&self, least: DVec2, most: DVec2) -> [Range<usize>; 2] {
         [0, 1].map(|axis| {
@@ -113,11 +113,11 @@ impl Cells {
             let bounds = geometry.loose_bounds_of(placement);
             self.target(&eye, known, &bounds)
         });
-        let mut targets: Vec<Target> = targets.collect();
+        let mut targets: Vec<ScreenBox> = targets.collect();
         targets.sort_by(|a, b| b.beyond.total_cmp(&a.beyond));
         targets.truncate(MOST);
         let mut rays = RayBatch::default();
-        for Target { slopes: [least, most], .. } in &targets {
+        for ScreenBox { slopes: [least, most], .. } in &targets {
             let share = |k: u32| (f64::from(k) + 0.5) / f64::from(AIMED);
             for (x, y) in (0..AIMED).flat_map(|y| (0..AIMED).map(move |x| (x, y))) {
                 let slope = *least + (*most - *least) * DVec2::new(share(x), share(y));
@@ -137,9 +137,9 @@ impl Cells {
         }
     }
 
-    /// Target to be aimed at of a placement in a box; `None` where even rays meet it, where it is
-    /// not seen, or where its depths lie within those that are known.
-    fn target(&self, eye: &Eye<'_>, places: &[Place], bounds: &Bounds) -> Option<Target> {
+    /// What is to be aimed at of a placement in a box; `None` where even rays meet it, where it is not seen, or where its
+    /// depths lie within those that are known.
+    fn target(&self, eye: &Eye<'_>, places: &[Place], bounds: &Bounds) -> Option<ScreenBox> {
         if bounds.is_empty() {
             return None;
         }
@@ -158,7 +158,7 @@ impl Cells {
             ends.map_or(f64::INFINITY, outside)
         };
         let beyond = self.places(&cells).map(beyond).fold(0.0, f64::max);
-        (beyond > 0.0).then_some(Target { slopes, cells, beyond })
+        (beyond > 0.0).then_some(ScreenBox { slopes, cells, beyond })
     }
 }
 

@@ -8,7 +8,7 @@ use etendue_scene::Scene;
 use serde::Serialize;
 
 use super::light::{BLOCK, differing, values};
-use super::{Field, FullView, Taken, TakenCamera, Tolerance};
+use super::{Approximations, Field, FullView, TakenCamera, Tolerance};
 use crate::{Images, Plan, RenderError, Watch};
 
 /// The longer side of the small pictures, at most.
@@ -73,7 +73,7 @@ impl fmt::Display for Verified {
 pub fn verify(
     (scene, accel, images): (&Scene, &dyn Accel, &Images),
     rendered: (&Scene, &dyn Accel, &Images),
-    taken: &Taken,
+    taken: &Approximations,
     watch: &dyn Watch,
 ) -> Result<Verified, RenderError> {
     let tolerance = Tolerance::from(taken.tolerance);
@@ -95,7 +95,7 @@ pub fn verify(
     let [width, height] = scene.camera.resolution();
     let factor = width.max(height).div_ceil(SIDE).max(BLOCK);
     let full = scene.camera.coarser(factor);
-    let own = Taken {
+    let own = Approximations {
         camera: taken.camera.as_ref().map(|taken| TakenCamera {
             camera: taken.camera.coarser(factor),
             finding: taken.finding.clone(),

@@ -5,7 +5,7 @@ use std::path::Path;
 use etendue_files::Transaction;
 use etendue_render::output::Outputs;
 use etendue_render::{
-    Course, Film, FilmFile, Plan, Prepared, RenderError, Rendered, Shard, finish, trace,
+    Film, FilmFile, Plan, Prepared, RenderError, RenderState, Rendered, Shard, finish, trace,
 };
 use etendue_scene::Scene;
 use serde_json::{Value, json};
@@ -253,7 +253,7 @@ fn threads_and_shares_make_one_picture() {
     let prepared = Prepared { accel: &*accel, images: &images, others: &[] };
     let folder = tempfile::tempdir().unwrap();
     let share = |number| {
-        let course = Course { shard: Shard::new(number, 2), ..Course::default() };
+        let course = RenderState { shard: Shard::new(number, 2), ..RenderState::default() };
         let film = trace(&scene, &plan, prepared, &[], &course, &|_: f64| true).unwrap();
         let path = folder.path().join(number.to_string());
         film.write((&Transaction::at_once(), &path), &Vec::new(), &Value::Null).unwrap();
@@ -309,7 +309,7 @@ fn a_time_gives_the_picture_of_some_number_of_samples() {
 /// Checkpoints and shares that cannot be kept or divided are refused by name.
 #[test]
 fn checkpoints_of_such_samples_and_shares_of_a_time_are_refused() {
-    let refused = |samples: &Value, course: Course<'_>| {
+    let refused = |samples: &Value, course: RenderState<'_>| {
         let scene = loaded(room(samples, &json!({ "/layers": [] })));
         let plan = Plan::new(&scene, Outputs::ALL);
         let (accel, images) = prepare(&scene, &plan);
@@ -319,8 +319,8 @@ fn checkpoints_of_such_samples_and_shares_of_a_time_are_refused() {
     };
     let path = Path::new("unused").to_owned();
     let kept = etendue_render::Checkpoint { path, every: std::time::Duration::ZERO };
-    let checkpoint = Course { checkpoint: Some(kept), ..Course::default() };
-    let shard = Course { shard: Shard::new(1, 2), ..Course::default() };
+    let checkpoint = RenderState { checkpoint: Some(kept), ..RenderState::default() };
+    let shard = RenderState { shard: Shard::new(1, 2), ..RenderState::default() };
     let error = refused(&json!({ "relative_error": 0.1 }), checkpoint.clone());
     assert!(matches!(error, RenderError::Checkpoint), "{error}");
     for course in [checkpoint, shard] {

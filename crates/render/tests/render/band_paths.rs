@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use etendue_files::Transaction;
 use etendue_render::output::Outputs;
-use etendue_render::render::{Course, Prepared, finish, trace};
+use etendue_render::render::{Prepared, RenderState, finish, trace};
 use etendue_render::{BandPaths, Checkpoint, Film, FilmFile, Plan, Rendered, Shard};
 use etendue_report::DecisionKind;
 use etendue_scene::Scene;
@@ -211,7 +211,7 @@ fn threads_passes_and_shares_make_one_picture() {
             true => shard.by(etendue_render::ShardBy::Samples),
             false => shard,
         });
-        let course = Course { shard, ..Course::default() };
+        let course = RenderState { shard, ..RenderState::default() };
         let film = trace(&scene, &plan, prepared, &[], &course, &|_: f64| true).unwrap();
         let path = folder.path().join(format!("{number}{by_samples}"));
         film.write((&Transaction::at_once(), &path), &Vec::new(), &Value::Null).unwrap();
@@ -221,12 +221,12 @@ fn threads_passes_and_shares_make_one_picture() {
     let film = Film::merged(&scene, &plan, &rows, &Vec::new()).unwrap();
     let of_rows = finish(&scene, &plan, film, Vec::new(), Some(&*accel)).unwrap();
     let samples = [3, 1, 2].map(|number| share(number, true));
-    let course = Course { shares: &samples, ..Course::default() };
+    let course = RenderState { shares: &samples, ..RenderState::default() };
     let film = trace(&scene, &plan, prepared, &[], &course, &|_: f64| true).unwrap();
     let of_samples = finish(&scene, &plan, film, Vec::new(), Some(&*accel)).unwrap();
     // Stopped half-way, and gone on with.
     let checkpoint = Checkpoint { path: folder.path().join("kept"), every: Duration::ZERO };
-    let course = Course { checkpoint: Some(checkpoint.clone()), ..Course::default() };
+    let course = RenderState { checkpoint: Some(checkpoint.clone()), ..RenderState::default() };
     let stopped = trace(&scene, &plan, prepared, &[], &course, &|share: f64| share < 0.5).unwrap();
     assert!(!stopped.is_complete() && checkpoint.path.exists());
     let film = trace(&scene, &plan, prepared, &[], &course, &|_: f64| true).unwrap();

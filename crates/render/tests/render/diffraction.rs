@@ -6,7 +6,7 @@ use etendue_optics::analysis::spread::WeightedFields;
 use etendue_optics::analysis::wavefront::Cells;
 use etendue_optics::analysis::{CellGrid, CellSpread, ObjectPoint, Transfer, Wavefront};
 use etendue_render::output::Outputs;
-use etendue_render::{Course, Plan, Prepared, RenderError, Shard};
+use etendue_render::{Plan, Prepared, RenderError, RenderState, Shard};
 use etendue_scene::Scene;
 use etendue_scene::file::SamplesSpec;
 use etendue_sensor::slanted_edge::{Lattice, slanted_edge};
@@ -241,7 +241,7 @@ fn what_goes_with_no_diffraction_is_refused() {
     let plan = Plan::new(&scene, Outputs::NONE);
     let (accel, images) = prepare(&scene, &plan);
     let prepared = Prepared { accel: &*accel, images: &images, others: &[] };
-    let course = Course { shard: Some(Shard::new(1, 2).unwrap()), ..Course::default() };
+    let course = RenderState { shard: Some(Shard::new(1, 2).unwrap()), ..RenderState::default() };
     let error =
         etendue_render::trace(&scene, &plan, prepared, &[], &course, &|_: f64| true).unwrap_err();
     assert!(matches!(&error, RenderError::Diffraction(why) if why.contains("--shard")), "{error}");
@@ -250,8 +250,14 @@ fn what_goes_with_no_diffraction_is_refused() {
         serde_json::from_str(r#"{"relative_error": 0.1, "min": 4, "max": 64}"#).unwrap();
     let plan = Plan::new(&adaptive, Outputs::NONE);
     let prepared = Prepared { accel: &*accel, images: &images, others: &[] };
-    let error =
-        etendue_render::trace(&adaptive, &plan, prepared, &[], &Course::default(), &|_: f64| true)
-            .unwrap_err();
+    let error = etendue_render::trace(
+        &adaptive,
+        &plan,
+        prepared,
+        &[],
+        &RenderState::default(),
+        &|_: f64| true,
+    )
+    .unwrap_err();
     assert!(matches!(&error, RenderError::Diffraction(why) if why.contains("samples")), "{error}");
 }

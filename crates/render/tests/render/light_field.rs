@@ -6,7 +6,7 @@ use std::path::Path;
 
 use etendue_files::Transaction;
 use etendue_render::Plan;
-use etendue_render::light_field::{self, Rendering};
+use etendue_render::light_field::{self, RenderedScene};
 use etendue_render::output::Outputs;
 
 use crate::steps::{load, load_in, prepare, rendered, trace};
@@ -19,7 +19,7 @@ fn write_scene(folder: &Path, text: &str) -> serde_json::Value {
     let plan = Plan::new(&scene, OUTPUTS);
     let (accel, images) = prepare(&scene, &plan);
     let rendered = trace(&scene, &plan, &*accel, &images);
-    let rendering = Rendering { scene: &scene, accel: &*accel, images: &images };
+    let rendering = RenderedScene { scene: &scene, accel: &*accel, images: &images };
     let set = light_field::write(
         rendering,
         &rendered.picture,

@@ -8,7 +8,9 @@ use etendue_geometry::Geometry;
 use etendue_geometry::HitPrecision;
 use etendue_render::expose::SPECTRUM;
 use etendue_render::output::Outputs;
-use etendue_render::tolerance::{Taken, TakenBounces, choose, coarser, lens_models, with_meshes};
+use etendue_render::tolerance::{
+    Approximations, TakenBounces, choose, coarser, lens_models, with_meshes,
+};
 use etendue_render::{BandPaths, Plan};
 #[cfg(feature = "embree")]
 use etendue_report::Decision;
@@ -63,14 +65,14 @@ fn allowed(pixels: &str, light: &str) -> Value {
     json!({ "displacement": pixels, "light": light })
 }
 
-fn taken(scene: &Scene) -> Taken {
+fn taken(scene: &Scene) -> Approximations {
     let plan = Plan::new(scene, Outputs::ALL);
     let (accel, images) = prepare(scene, &plan);
     choose(scene, &plan, (&*accel, &images), None, &|_: f64| true).unwrap().unwrap()
 }
 
 /// The light of blocks of 8 × 8 pixels with what is `taken`.
-fn blocks(scene: &Scene, taken: Option<Taken>) -> Vec<f64> {
+fn blocks(scene: &Scene, taken: Option<Approximations>) -> Vec<f64> {
     let plan = Plan::taking(scene, Outputs::ALL, taken);
     let (accel, images) = prepare(scene, &plan);
     let done = trace(scene, &plan, &*accel, &images);
@@ -157,7 +159,8 @@ fn light_is_followed_to_as_few_surfaces_as_the_tolerance_allows() {
         assert!(share <= percent / 100.0);
         let full = blocks(&scene, None);
         let with = |bounces| {
-            let taken = Taken { bounces: Some(TakenBounces { bounces, share }), ..own.clone() };
+            let taken =
+                Approximations { bounces: Some(TakenBounces { bounces, share }), ..own.clone() };
             difference(&blocks(&scene, Some(taken)), &full)
         };
         let found = with(bounces);
@@ -384,8 +387,8 @@ fn parted_colours(pixels: &str) -> Scene {
     load_json(tempfile::tempdir().unwrap().path(), scene)
 }
 
-/// Centre of the light of each band (pixels).
-fn middles(scene: &Scene, taken: Option<Taken>) -> Vec<[f64; 2]> {
+/// Where the middle of the light of each band lies (pixels).
+fn middles(scene: &Scene, taken: Option<Approximations>) -> Vec<[f64; 2]> {
     let plan = Plan::taking(scene, Outputs::ALL, taken);
     let (accel, images) = prepare(scene, &plan);
     let done = trace(scene, &plan, &*accel, &images);
@@ -417,7 +420,7 @@ fn bands_run_together_in_as_few_groups_as_the_tolerance_allows() {
     assert!(plan.rays * 2 <= Plan::new(&scene, Outputs::ALL).rays, "{}", plan.rays);
     let full = middles(&scene, None);
     assert_eq!(full.len(), 12);
-    let farthest = |taken: Taken| {
+    let farthest = |taken: Approximations| {
         let own = middles(&scene, Some(taken));
         let off = own.iter().zip(&full).map(|(a, b)| f64::hypot(a[0] - b[0], a[1] - b[1]));
         off.fold(0.0, f64::max)

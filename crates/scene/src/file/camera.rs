@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::document::Document;
+use super::document::JsonDocument;
 use super::{SCENE_KEYS, ScenePath, WrittenPlaces, check, read_document, spec, values};
 use crate::SceneError;
 use crate::error::not_found;
@@ -23,7 +23,7 @@ use etendue_spectrum::CurveFault;
 #[derive(Debug, Clone)]
 pub(super) struct CameraDocument {
     pub(super) path: PathBuf,
-    pub(super) document: Document,
+    pub(super) document: JsonDocument,
 }
 
 impl CameraDocument {

@@ -30,7 +30,7 @@ const MOST_LEVELS: usize = 127;
 
 /// A parsed text, and the places of its values.
 #[derive(Debug, Clone)]
-pub(crate) struct Document {
+pub(crate) struct JsonDocument {
     text: String,
     /// All values in the order of the text, each before those inside it.
     values: Vec<ValueSpan>,
@@ -46,12 +46,12 @@ struct ValueSpan {
     is_member: bool,
 }
 
-impl Document {
+impl JsonDocument {
     /// Parses `text` into the document and its values; refused when it is not JSON (RFC 8259), or an object
     /// has a key twice.
     pub(crate) fn parse(text: String) -> Result<(Self, Value), JsonFault> {
         let mut reader =
-            Reader { text: &text, at: 0, values: Vec::new(), path: Vec::new(), levels: 0 };
+            JsonReader { text: &text, at: 0, values: Vec::new(), path: Vec::new(), levels: 0 };
         match reader.document() {
             Ok(value) => {
                 let values = reader.values;
@@ -126,7 +126,7 @@ fn place_of(text: &str, at: usize) -> Place {
 }
 
 /// Reads a text once, from its start.
-struct Reader<'a> {
+struct JsonReader<'a> {
     text: &'a str,
     at: usize,
     values: Vec<ValueSpan>,
@@ -145,7 +145,7 @@ struct Wrong {
 const A_VALUE: &str =
     "a value should stand here: a string in quotes, a number, true, false, null, [ or {";
 
-impl Reader<'_> {
+impl JsonReader<'_> {
     /// The next byte that is no blank; 0 at the end.
     fn peek(&mut self) -> u8 {
         let bytes = self.text.as_bytes();
@@ -339,7 +339,7 @@ mod tests {
     #[test]
     fn every_value_knows_its_place() {
         let text = "{\n  \"a\": [1, {\"b\": \"}\\\"\"}],\n  \"é\": 2, \"x y\": {\"c\": null}\n}";
-        let (document, _) = Document::parse(text.to_owned()).unwrap();
+        let (document, _) = JsonDocument::parse(text.to_owned()).unwrap();
         let place = |path: &str| document.place(&path.into()).map(|p| (p.line, p.column));
         assert_eq!(place("a"), Some((2, 3)));
         assert_eq!(place("a[0]"), Some((2, 9)));
@@ -352,22 +352,22 @@ mod tests {
     #[test]
     fn broken_text_says_where() {
         let text = "{\n  \"fov\": 30\n  \"x\": 1\n}";
-        let fault = Document::parse(text.to_owned()).unwrap_err();
+        let fault = JsonDocument::parse(text.to_owned()).unwrap_err();
         assert_eq!(fault.place, Place { line: 3, column: 3 });
         assert!(fault.reason.contains("expected `,` or `}`"), "{}", fault.reason);
         assert_eq!(excerpt(text, fault.place), "  3 |   \"x\": 1\n    |   ^");
-        let end = Document::parse("{\"a\": ".to_owned()).unwrap_err();
+        let end = JsonDocument::parse("{\"a\": ".to_owned()).unwrap_err();
         assert!(end.reason.contains("EOF"), "{}", end.reason);
-        let wide = Document::parse("{\"é\": tru }".to_owned()).unwrap_err();
+        let wide = JsonDocument::parse("{\"é\": tru }".to_owned()).unwrap_err();
         assert_eq!(wide.place.line, 1);
-        assert!(Document::parse(String::new()).is_err());
+        assert!(JsonDocument::parse(String::new()).is_err());
         let deep = "[".repeat(100_000);
-        assert!(Document::parse(deep).unwrap_err().reason.contains("recursion"));
+        assert!(JsonDocument::parse(deep).unwrap_err().reason.contains("recursion"));
     }
 
     #[test]
     fn a_key_given_twice_is_refused() {
-        let fault = Document::parse("{\"a\": {\"b\": 1,\n\"b\": 2}}".to_owned()).unwrap_err();
+        let fault = JsonDocument::parse("{\"a\": {\"b\": 1,\n\"b\": 2}}".to_owned()).unwrap_err();
         assert_eq!(fault.place, Place { line: 2, column: 1 });
         assert!(fault.reason.contains("a.b"), "{}", fault.reason);
     }
@@ -375,10 +375,10 @@ mod tests {
     #[test]
     fn a_key_that_all_below_would_repeat_is_refused() {
         let text = |length: usize| format!("{{\"{}\": [1, 2, 3]}}", "k".repeat(length));
-        let fault = Document::parse(text(1001)).unwrap_err();
+        let fault = JsonDocument::parse(text(1001)).unwrap_err();
         assert_eq!(fault.place, Place { line: 1, column: 2 });
         assert!(fault.reason.contains("1001 bytes"), "{}", fault.reason);
-        assert!(Document::parse(text(1000)).is_ok());
+        assert!(JsonDocument::parse(text(1000)).is_ok());
     }
 
     #[test]
@@ -391,7 +391,7 @@ mod tests {
 
     /// Checks that `text` is read as `serde_json` reads it: the independent reference.
     fn check_against_serde(text: &str) {
-        match (serde_json::from_str::<Value>(text), Document::parse(text.to_owned())) {
+        match (serde_json::from_str::<Value>(text), JsonDocument::parse(text.to_owned())) {
             (Ok(theirs), Ok((_, ours))) => assert_eq!(ours, theirs, "{text}"),
             // What JSON leaves open and we do not.
             (Ok(_), Err(fault)) => {

@@ -50,7 +50,7 @@ pub use settings::{
 pub use spec::{FormatVersion, SceneSpec, scene_schema};
 pub use tolerance::{DisplacementSpec, ShareSpec, ToleranceSpec};
 
-pub(crate) use document::{Document, JsonFault};
+pub(crate) use document::{JsonDocument, JsonFault};
 pub(crate) use values::read as read_value;
 
 use crate::SceneError;
@@ -90,7 +90,7 @@ pub struct SceneFile {
 struct WrittenPlaces {
     path: PathBuf,
     /// The text; none for a model.
-    document: Option<Document>,
+    document: Option<JsonDocument>,
     /// Opens the camera's file, where the scene names one.
     opener: Opener,
     /// That file, once it is read.
@@ -322,7 +322,7 @@ impl SceneFile {
 }
 
 impl WrittenPlaces {
-    fn new(opener: &Opener, path: &Path, document: Option<Document>) -> Self {
+    fn new(opener: &Opener, path: &Path, document: Option<JsonDocument>) -> Self {
         Self {
             path: path.to_owned(),
             document,
@@ -432,7 +432,7 @@ fn is_model(path: &Path) -> bool {
     MODELS.iter().any(|model| ending.eq_ignore_ascii_case(model))
 }
 
-fn read_document(path: &Path) -> Result<(Document, Value), SceneError> {
+fn read_document(path: &Path) -> Result<(JsonDocument, Value), SceneError> {
     let bytes = read_bytes(path)?;
     let not_a_scene = |reason| SceneError::NotAScene { file: path.to_owned(), reason };
     if let Some(what) = what_it_is(&bytes) {
@@ -451,7 +451,7 @@ fn read_document(path: &Path) -> Result<(Document, Value), SceneError> {
     if !is_named_json && !text.trim_start().starts_with(['{', '[']) {
         return Err(not_a_scene("is text that is no JSON".to_owned()));
     }
-    Document::parse(text.clone()).map_err(|fault| {
+    JsonDocument::parse(text.clone()).map_err(|fault| {
         let Place { line, column } = fault.place;
         let why = Refusal::new(fault.reason).and(&format!("\n{}", excerpt(&text, fault.place)));
         let place = format!("{}, line {line}, column {column}: broken JSON", path.display());

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::document::Document;
+use super::document::JsonDocument;
 use super::path::{MOST_STEPS, ScenePath};
 
 /// Error of a setting that cannot be applied.
@@ -72,7 +72,7 @@ pub(crate) fn apply(root: &mut Value, path: &str, text: &str) -> Result<ScenePat
 fn read(text: &str) -> Result<Value, OverrideError> {
     let is_number = text.trim_start().starts_with(|c: char| c.is_ascii_digit() || c == '-');
     match serde_json::from_str::<serde::de::IgnoredAny>(text) {
-        Ok(_) => match Document::parse(text.to_owned()) {
+        Ok(_) => match JsonDocument::parse(text.to_owned()) {
             Ok((_, value)) => Ok(value),
             Err(fault) => Err(OverrideError::Refused { reason: fault.reason }),
         },

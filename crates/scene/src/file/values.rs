@@ -13,7 +13,7 @@ use crate::words::{kind_of, suggest};
 
 /// `value` as a `T`; the error has the place below `value`, and why it is none.
 pub(crate) fn read<T: DeserializeOwned>(value: &Value) -> Result<T, (ScenePath, String)> {
-    serde_path_to_error::deserialize(Node::<Reason>::new(value)).map_err(|error| {
+    serde_path_to_error::deserialize(ValueNode::<Reason>::new(value)).map_err(|error| {
         let path = ScenePath::from(error.path());
         (path, error.into_inner().0)
     })
@@ -21,22 +21,22 @@ pub(crate) fn read<T: DeserializeOwned>(value: &Value) -> Result<T, (ScenePath, 
 
 /// `value` as a `T`, inside of what a deserializer with the errors `E` reads.
 pub(crate) fn read_within<T: DeserializeOwned, E: de::Error>(value: &Value) -> Result<T, E> {
-    T::deserialize(Node::new(value))
+    T::deserialize(ValueNode::new(value))
 }
 
 /// A value that is read, with errors `E`.
-struct Node<'a, E> {
+struct ValueNode<'a, E> {
     value: &'a Value,
     errors: PhantomData<E>,
 }
 
-impl<'a, E> Node<'a, E> {
+impl<'a, E> ValueNode<'a, E> {
     fn new(value: &'a Value) -> Self {
         Self { value, errors: PhantomData }
     }
 }
 
-impl<'a, E: de::Error> IntoDeserializer<'a, E> for Node<'a, E> {
+impl<'a, E: de::Error> IntoDeserializer<'a, E> for ValueNode<'a, E> {
     type Deserializer = Self;
 
     fn into_deserializer(self) -> Self {
@@ -44,7 +44,7 @@ impl<'a, E: de::Error> IntoDeserializer<'a, E> for Node<'a, E> {
     }
 }
 
-impl<'de, E: de::Error> Deserializer<'de> for Node<'de, E> {
+impl<'de, E: de::Error> Deserializer<'de> for ValueNode<'de, E> {
     type Error = E;
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, E> {

@@ -217,7 +217,9 @@ impl ImportedLight {
             LightKind::Directional { cos_radius, .. } => {
                 LightKind::Directional { along: along()?, cos_radius }
             }
-            other => other,
+            kind @ (LightKind::Projector(_)
+            | LightKind::Goniometric(_)
+            | LightKind::Environment { .. }) => kind,
         };
         Some(Light { kind, ..self.light.clone() })
     }

@@ -62,12 +62,12 @@ fn ends_line(text: &[u8]) -> bool {
 
 /// Walks through the words of a text, line by line.
 #[derive(Debug, Clone)]
-pub(super) struct Words<'a> {
+pub(super) struct WordReader<'a> {
     text: &'a [u8],
     at: usize,
 }
 
-impl<'a> Words<'a> {
+impl<'a> WordReader<'a> {
     pub(super) fn new(text: &'a [u8]) -> Self {
         Self { text, at: 0 }
     }
@@ -306,7 +306,7 @@ mod tests {
     #[test]
     fn lines_continue_behind_a_backslash() {
         let text = b"f 1 2\\\r\n 3\\\n 4 a\\b\n\nx";
-        let mut words = Words::new(text);
+        let mut words = WordReader::new(text);
         let mut line = Vec::new();
         while let Some(word) = words.word() {
             line.push(std::str::from_utf8(word).unwrap());

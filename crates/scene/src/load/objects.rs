@@ -11,7 +11,7 @@ use crate::error::not_found;
 use crate::file::{AnimationSpec, FileKind, ObjectSpec, SceneFile, ScenePath, Source, Up};
 use crate::import::{Import, Note, NoteKind, Play};
 use crate::memory::Budget;
-use crate::parts::{Instances, Object, Parts};
+use crate::parts::{Instances, Object, SceneParts};
 use crate::shape::ShapeSpec;
 use crate::words::suggest;
 use crate::{Cache, SceneError, cache};
@@ -19,8 +19,8 @@ use etendue_files::{FoundFile, InputFolder};
 use etendue_geometry::{Bounds, Geometry, Mesh, Placement};
 use etendue_tracer::{Light, LightKind, Material, Scattering};
 
-/// Source of triangles, once for all objects that share them.
-pub(super) struct Origin {
+/// Where triangles come from, once for all objects that share them.
+pub(super) struct TriangleOrigin {
     pub(super) kind: OriginKind,
     /// The first object that uses it, for messages.
     pub(super) user: usize,
@@ -62,8 +62,8 @@ impl SceneFile {
         &self,
         folder: &InputFolder,
         own: &mut OwnParts<'_>,
-    ) -> Result<(Vec<Origin>, Vec<Object>), SceneError> {
-        let mut origins: Vec<Origin> = Vec::new();
+    ) -> Result<(Vec<TriangleOrigin>, Vec<Object>), SceneError> {
+        let mut origins: Vec<TriangleOrigin> = Vec::new();
         // Links to one file are one file.
         let mut files: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
         let mut objects = Vec::new();
@@ -73,7 +73,7 @@ impl SceneFile {
                 Source::File(written) if own.kept.given(written).is_some() => {
                     let kind = OriginKind::Given(written.clone());
                     origins.iter().position(|known| known.kind == kind).unwrap_or_else(|| {
-                        origins.push(Origin { kind, user: index });
+                        origins.push(TriangleOrigin { kind, user: index });
                         origins.len() - 1
                     })
                 }
@@ -82,7 +82,7 @@ impl SceneFile {
                     let path = files.entry(real).or_insert(path).clone();
                     let kind = OriginKind::File(path, self.play(spec, &at)?);
                     origins.iter().position(|known| known.kind == kind).unwrap_or_else(|| {
-                        origins.push(Origin { kind, user: index });
+                        origins.push(TriangleOrigin { kind, user: index });
                         origins.len() - 1
                     })
                 }
@@ -93,7 +93,7 @@ impl SceneFile {
                 Source::Shape(shape) => {
                     let kind = OriginKind::Shape(shape.clone());
                     origins.iter().position(|known| known.kind == kind).unwrap_or_else(|| {
-                        origins.push(Origin { kind, user: index });
+                        origins.push(TriangleOrigin { kind, user: index });
                         origins.len() - 1
                     })
                 }
@@ -211,7 +211,7 @@ impl SceneFile {
     /// Materials that an object replaces and its model does not have are refused.
     pub(super) fn check_overrides(
         &self,
-        parts: &Parts,
+        parts: &SceneParts,
         object: &Object,
         index: usize,
     ) -> Result<(), SceneError> {

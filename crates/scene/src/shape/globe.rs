@@ -71,7 +71,7 @@ impl Globe {
         let cuts = self.cut_edges();
         let triangles = self.triangles(&cuts, wanted.uvs, go_on)?;
         // Places first; normals and texture coordinates where they are wanted.
-        let places = Places { globe: self, cuts: &cuts, seam: wanted.uvs, go_on };
+        let places = GlobeVertices { globe: self, cuts: &cuts, seam: wanted.uvs, go_on };
         let (floats, bounds) = places.positions(relief)?;
         let count = places.count();
         let positions = Positions::F32(vertices(floats, count));
@@ -262,15 +262,15 @@ struct Cut {
     j: u32,
 }
 
-/// Places of all vertices: of the rings, in the middle of cut edges, and on the seam.
-struct Places<'a> {
+/// Where all vertices are: of the rings, in the middle of cut edges, and on the seam.
+struct GlobeVertices<'a> {
     globe: &'a Globe,
     cuts: &'a [Cut],
     seam: bool,
     go_on: GoOn<'a>,
 }
 
-impl Places<'_> {
+impl GlobeVertices<'_> {
     fn count(&self) -> usize {
         let seam = if self.seam { 2 * self.globe.n as usize - 1 } else { 0 };
         self.globe.ring_vertices() + self.cuts.len() + seam

@@ -211,7 +211,7 @@ fn in_range(triangles: u64) -> Result<u64, ShapeError> {
 const CORNERS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
 
 /// A face's centre and half axes, to the right and up as seen from its front.
-struct Face {
+struct FaceAxes {
     centre: DVec3,
     right: DVec3,
     up: DVec3,
@@ -219,7 +219,7 @@ struct Face {
 
 /// A rectangle of half width and half height in the plane z = 0, facing +Z.
 fn rectangle([width, height]: [f64; 2], wanted: Wanted) -> Mesh {
-    let face = Face { centre: DVec3::ZERO, right: DVec3::X * width, up: DVec3::Y * height };
+    let face = FaceAxes { centre: DVec3::ZERO, right: DVec3::X * width, up: DVec3::Y * height };
     mesh("rectangle", &[face], wanted)
 }
 
@@ -227,18 +227,18 @@ fn rectangle([width, height]: [f64; 2], wanted: Wanted) -> Mesh {
 fn cuboid([x, y, z]: [f64; 3], wanted: Wanted) -> Mesh {
     let [x, y, z] = [DVec3::X * x, DVec3::Y * y, DVec3::Z * z];
     let faces = [
-        Face { centre: x, right: -z, up: y },
-        Face { centre: -x, right: z, up: y },
-        Face { centre: y, right: x, up: -z },
-        Face { centre: -y, right: x, up: z },
-        Face { centre: z, right: x, up: y },
-        Face { centre: -z, right: -x, up: y },
+        FaceAxes { centre: x, right: -z, up: y },
+        FaceAxes { centre: -x, right: z, up: y },
+        FaceAxes { centre: y, right: x, up: -z },
+        FaceAxes { centre: -y, right: x, up: z },
+        FaceAxes { centre: z, right: x, up: y },
+        FaceAxes { centre: -z, right: -x, up: y },
     ];
     mesh("box", &faces, wanted)
 }
 
-fn mesh(name: &str, faces: &[Face], wanted: Wanted) -> Mesh {
-    let per_corner = |value: &dyn Fn(&Face, [f64; 2]) -> DVec3| -> Vec<[f32; 3]> {
+fn mesh(name: &str, faces: &[FaceAxes], wanted: Wanted) -> Mesh {
+    let per_corner = |value: &dyn Fn(&FaceAxes, [f64; 2]) -> DVec3| -> Vec<[f32; 3]> {
         let corners = faces.iter().flat_map(|face| CORNERS.map(|corner| value(face, corner)));
         corners.map(|v| v.as_vec3().to_array()).collect()
     };

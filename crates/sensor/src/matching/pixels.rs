@@ -24,8 +24,8 @@ const MOST_ROWS: usize = 512;
 /// The share of pixels that may be clipped, at either end.
 const MOST_CLIPPED: f64 = 0.02;
 
-/// Pixels that count: those that are expected to be dark enough, and are no defects.
-pub(super) struct Kept {
+/// What counts: pixels that are expected to be dark enough, and are no defects.
+pub(super) struct DarkPixels {
     pub(super) line: Vec<f64>,
     /// DN, of what is expected.
     pub(super) most: f64,
@@ -36,7 +36,7 @@ pub(super) struct Kept {
     pub(super) reach: f64,
 }
 
-impl Kept {
+impl DarkPixels {
     pub(super) fn has(&self, channel: usize, x: f64, y: f64) -> bool {
         let signal = self.line[1 + channel] * x;
         let expected = self.line[0] + signal;
@@ -80,11 +80,11 @@ impl Pixels<'_> {
         (0..sums.len()).max_by(|a, b| mean(a).total_cmp(&mean(b))).unwrap_or(0)
     }
 
-    /// Pixels that count by a fit. Deviations are in units of their median, which defects do not
-    /// bend, or of what is expected where that is more.
-    pub(super) fn kept(&self, fit: &Fit, white: f64) -> Kept {
+    /// What counts by a fit. Deviations are in units of their median, which defects do not bend, or of what is expected
+    /// where that is more.
+    pub(super) fn kept(&self, fit: &Fit, white: f64) -> DarkPixels {
         let most = NEARLY_SATURATED * (white - fit.line[0]) + fit.line[0];
-        let all = Kept {
+        let all = DarkPixels {
             line: fit.line.clone(),
             most,
             gain: fit.gain,
@@ -108,7 +108,7 @@ impl Pixels<'_> {
             true => 0.0,
             false => *deviations.select_nth_unstable_by(middle, f64::total_cmp).1,
         };
-        Kept { reach: OUTLIER * (median / MEDIAN_DEVIATION).max(1.0), ..all }
+        DarkPixels { reach: OUTLIER * (median / MEDIAN_DEVIATION).max(1.0), ..all }
     }
 
     /// Fits the line of numbers over electrons, a slope for each channel.

@@ -51,10 +51,10 @@ impl<'de> Visitor<'de> for CurveVisitor {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Curve, A::Error> {
         let (mut samples, mut sum) = (Vec::new(), None::<Curve>);
-        while let Some(element) = list.next_element::<Element>()? {
+        while let Some(element) = list.next_element::<CurveItem>()? {
             match element {
-                Element::Sample(sample) => samples.push(sample),
-                Element::Curve(source) => {
+                CurveItem::Sample(sample) => samples.push(sample),
+                CurveItem::Curve(source) => {
                     let curve = of_source(CurveSpec::One(source))?;
                     sum = Some(sum.map_or_else(|| curve.clone(), |sum| sum.plus(&curve)));
                 }
@@ -76,12 +76,12 @@ impl<'de> Visitor<'de> for CurveVisitor {
 }
 
 /// An element of a curve's list.
-enum Element {
+enum CurveItem {
     Sample([f64; 2]),
     Curve(CurveSource),
 }
 
-impl<'de> Deserialize<'de> for Element {
+impl<'de> Deserialize<'de> for CurveItem {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(ElementVisitor)
     }
@@ -91,18 +91,18 @@ impl<'de> Deserialize<'de> for Element {
 struct ElementVisitor;
 
 impl<'de> Visitor<'de> for ElementVisitor {
-    type Value = Element;
+    type Value = CurveItem;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("an array of length 2")
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Element, A::Error> {
-        <[f64; 2]>::deserialize(de::value::SeqAccessDeserializer::new(list)).map(Element::Sample)
+    fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<CurveItem, A::Error> {
+        <[f64; 2]>::deserialize(de::value::SeqAccessDeserializer::new(list)).map(CurveItem::Sample)
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Element, A::Error> {
-        CurveSource::deserialize(de::value::MapAccessDeserializer::new(map)).map(Element::Curve)
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<CurveItem, A::Error> {
+        CurveSource::deserialize(de::value::MapAccessDeserializer::new(map)).map(CurveItem::Curve)
     }
 }
 

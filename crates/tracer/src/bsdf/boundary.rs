@@ -17,7 +17,7 @@ use crate::sampling::cosine_direction;
 
 /// A rough boundary, seen from one direction.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Rough {
+pub(super) struct RoughBoundary {
     /// The square of the roughness, above 0.
     alpha: f64,
     /// Index behind the surface over the index in front.
@@ -25,7 +25,7 @@ pub(super) struct Rough {
     lacking: Option<Lacking>,
 }
 
-impl Rough {
+impl RoughBoundary {
     pub(super) fn new(alpha: f64, eta: f64, wo: DVec3) -> Self {
         Self { alpha, eta, lacking: Lacking::new(alpha, eta, wo.z) }
     }

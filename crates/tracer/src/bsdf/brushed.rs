@@ -6,8 +6,8 @@ use std::sync::LazyLock;
 
 use etendue_geometry::glam::DVec3;
 
-use super::albedo::{EXACT, cosine, entry, obliquity, place};
 use super::ggx::Facets;
+use super::split_sum::{EXACT, cosine, entry, obliquity, place};
 
 /// Knots in the fourth root of the smaller α.
 const ROUGHNESSES: usize = 16;

@@ -25,7 +25,7 @@ pub struct Coat {
 
 /// The coat as seen from one direction.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Seen {
+pub(super) struct CoatView {
     share: f64,
     alpha: f64,
     albedo: Albedo,
@@ -35,15 +35,15 @@ pub(super) struct Seen {
 
 impl Coat {
     /// As seen from `wo`; `None` where there is none.
-    pub(super) fn seen(&self, wo: DVec3) -> Option<Seen> {
+    pub(super) fn seen(&self, wo: DVec3) -> Option<CoatView> {
         let alpha = self.alpha.max(SMOOTHEST);
         let albedo = Albedo::new(alpha, FACE_ON, 1.0);
         let returned = (self.share * albedo.at(wo)).min(1.0);
-        (self.share > 0.0).then_some(Seen { share: self.share, alpha, albedo, returned })
+        (self.share > 0.0).then_some(CoatView { share: self.share, alpha, albedo, returned })
     }
 }
 
-impl Seen {
+impl CoatView {
     /// What it passes of light from `wi` on to the viewer.
     pub(super) fn passes(&self, wi: DVec3) -> f64 {
         (1.0 - self.returned) * (1.0 - self.share * self.albedo.at(wi.abs())).max(0.0)

@@ -56,7 +56,22 @@ pub(super) struct Peaks {
 pub(super) struct LayeredSample {
     pub(super) wi: DVec3,
     pub(super) weights: Weights,
+    /// Density per solid angle (1/sr); `+inf` of a specular event.
     pub(super) pdf: f64,
+    /// Whether the event is specular: the sheet is a mirror or a smooth pane.
+    pub(super) is_specular: bool,
+}
+
+impl LayeredSample {
+    /// A specular event.
+    fn specular(wi: DVec3, weights: Weights) -> Self {
+        Self { wi, weights, pdf: f64::INFINITY, is_specular: true }
+    }
+
+    /// A direction with its value times cosine and its density; `None` where the model never gives it.
+    fn of_density(wi: DVec3, (value, pdf): (Weights, f64)) -> Option<Self> {
+        (pdf > 0.0).then(|| Self { wi, weights: value.times(1.0 / pdf), pdf, is_specular: false })
+    }
 }
 
 /// Probabilities of the three parts as seen from one direction.
@@ -82,8 +97,8 @@ pub(super) struct LayeredView {
     /// The mean of what facets of reflectance 1 lack.
     lacking: f64,
     chances: Chances,
-    sheen: Option<sheen::Seen>,
-    coat: Option<coat::Seen>,
+    sheen: Option<sheen::SheenView>,
+    coat: Option<coat::CoatView>,
 }
 
 impl Layered {
@@ -280,12 +295,12 @@ impl Layered {
         // The coat, the fibres, or what is below both, which may be one direction alone.
         let wi = match (coat, sheen) {
             (Some(coat), _) if choice < returned => above(coat.sample(wo, square))?,
-            (_, Some(_)) if choice < returned + fibres => above(sheen::Seen::sample(square))?,
+            (_, Some(_)) if choice < returned + fibres => above(sheen::SheenView::sample(square))?,
             _ => {
                 let rest = 1.0 - returned - fibres;
                 let choice = ((choice - returned - fibres) / rest).min(1.0);
                 let below = self.sample_uncoated(wo, choice, square, viewed)?;
-                if below.pdf == f64::INFINITY {
+                if below.is_specular {
                     let coat = coat.map_or(1.0, |coat| coat.passes(below.wi));
                     let sheen = sheen.map_or(1.0, |sheen| sheen.passes(below.wi));
                     let weights = below.weights.times(coat * sheen / rest);
@@ -294,8 +309,7 @@ impl Layered {
                 below.wi
             }
         };
-        let (weights, pdf) = self.evaluate(wo, wi, viewed);
-        (pdf > 0.0).then(|| LayeredSample { wi, weights: weights.times(1.0 / pdf), pdf })
+        LayeredSample::of_density(wi, self.evaluate(wo, wi, viewed))
     }
 
     fn sample_uncoated(
@@ -310,7 +324,7 @@ impl Layered {
         let wi = if choice < chances.sheet {
             if self.alpha == 0.0 {
                 let weights = self.sheet(wo.z).times(1.0 / chances.sheet);
-                return Some(LayeredSample { wi: mirrored(wo), weights, pdf: f64::INFINITY });
+                return Some(LayeredSample::specular(mirrored(wo), weights));
             }
             self.reflected(wo, square)
         } else if choice < chances.sheet + chances.base {
@@ -318,7 +332,7 @@ impl Layered {
         } else if chances.through > 0.0 {
             if self.alpha == 0.0 {
                 let weights = self.straight(wo, peaks)?.times(1.0 / chances.through);
-                return Some(LayeredSample { wi: -wo, weights, pdf: f64::INFINITY });
+                return Some(LayeredSample::specular(-wo, weights));
             }
             let up = self.reflected(wo, square);
             DVec3::new(up.x, up.y, -up.z)
@@ -330,8 +344,7 @@ impl Layered {
             return None;
         }
         // Weighed by all ways in which this direction could have been found.
-        let (weights, pdf) = self.evaluate_uncoated(wo, wi, viewed);
-        (pdf > 0.0).then(|| LayeredSample { wi, weights: weights.times(1.0 / pdf), pdf })
+        LayeredSample::of_density(wi, self.evaluate_uncoated(wo, wi, viewed))
     }
 
     fn reflected(&self, wo: DVec3, square: [f64; 2]) -> DVec3 {

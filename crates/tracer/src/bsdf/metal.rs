@@ -19,7 +19,8 @@ use std::f64::consts::PI;
 
 use etendue_geometry::glam::DVec3;
 
-use super::albedo::{Albedo, lacking};
+use super::albedo::Albedo;
+use super::split_sum::lacking;
 use super::{Weights, fresnel, ggx};
 
 /// The cosine at which a metal's reflectance is met beside that face on.
@@ -53,7 +54,7 @@ pub(super) fn facets(cosine: f64) -> Weights {
 
 /// A rough metal seen from one direction.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Rough {
+pub(super) struct RoughMetal {
     alpha: f64,
     albedo: Albedo,
     /// `E` for the direction of the viewer, its mean, and the mean of what it lacks.
@@ -62,7 +63,7 @@ pub(super) struct Rough {
     lacking: f64,
 }
 
-impl Rough {
+impl RoughMetal {
     pub(super) fn new(alpha: f64, wo: DVec3) -> Self {
         let albedo = Albedo::new(alpha, 1.0, 1.0);
         let ([a, b, lacking], seen) = (albedo.means(), albedo.at(wo).min(1.0));

@@ -20,6 +20,7 @@ mod losses;
 pub(crate) mod metal;
 mod sheen;
 pub(crate) mod sheets;
+mod split_sum;
 
 use std::f64::consts::PI;
 
@@ -132,15 +133,15 @@ pub struct Bsdf {
     /// The colour of light that met several facets, where the surface's has no curve.
     pub(crate) deep: Color,
     /// What of the model follows from the viewer's direction alone.
-    seen: Seen,
+    seen: ModelView,
 }
 
 /// What of a model follows from the viewer's direction alone.
 #[derive(Debug, Clone, Copy)]
-enum Seen {
+enum ModelView {
     Plain,
-    Metal(metal::Rough),
-    Glass(boundary::Rough),
+    Metal(metal::RoughMetal),
+    Glass(boundary::RoughBoundary),
     Layered(layered::LayeredView),
 }
 
@@ -151,8 +152,10 @@ pub struct BsdfSample {
     pub direction: DVec3,
     /// Value times cosine over density.
     pub weights: Weights,
-    /// Density per solid angle (1/sr); `+inf` for a direction that only this model can give.
+    /// Density per solid angle (1/sr); `+inf` of a specular event.
     pub pdf: f64,
+    /// Whether the event is specular: only this model can give the direction.
+    pub is_specular: bool,
 }
 
 impl Bsdf {
@@ -177,21 +180,21 @@ impl Bsdf {
         let local = frame.local(wo);
         let (seen, mean) = match model {
             Model::Metal { alpha, .. } if alpha > 0.0 => {
-                let rough = metal::Rough::new(alpha, local);
-                (Seen::Metal(rough), Some(rough.mean))
+                let rough = metal::RoughMetal::new(alpha, local);
+                (ModelView::Metal(rough), Some(rough.mean))
             }
             Model::Dielectric { alpha, eta } if alpha > 0.0 => {
-                (Seen::Glass(boundary::Rough::new(alpha, eta, local)), None)
+                (ModelView::Glass(boundary::RoughBoundary::new(alpha, eta, local)), None)
             }
             Model::Layered(layered) => {
                 let viewed = layered.viewed(local, &peaks([&base, &highlight]));
-                (Seen::Layered(viewed), (layered.metallic > 0.0).then_some(viewed.mean))
+                (ModelView::Layered(viewed), (layered.metallic > 0.0).then_some(viewed.mean))
             }
             Model::Black
             | Model::Matte
             | Model::Mirror
             | Model::Metal { .. }
-            | Model::Dielectric { .. } => (Seen::Plain, None),
+            | Model::Dielectric { .. } => (ModelView::Plain, None),
         };
         let deep = mean.map_or([0.0; 3], |mean| {
             base.color.map(|c| metal::multiple(metal::mean_reflectance(c, 0.0), mean))
@@ -214,9 +217,9 @@ impl Bsdf {
     /// The share of light that facets of reflectance 1 return at once, over all directions.
     pub(crate) fn mean_albedo(&self) -> f64 {
         match self.seen {
-            Seen::Plain | Seen::Glass(_) => 1.0,
-            Seen::Metal(rough) => rough.mean,
-            Seen::Layered(viewed) => viewed.mean,
+            ModelView::Plain | ModelView::Glass(_) => 1.0,
+            ModelView::Metal(rough) => rough.mean,
+            ModelView::Layered(viewed) => viewed.mean,
         }
     }
 
@@ -269,12 +272,12 @@ impl Bsdf {
             return (Weights::default(), 0.0);
         }
         match (&self.model, &self.seen) {
-            (Model::Layered(layered), Seen::Layered(viewed)) => {
+            (Model::Layered(layered), ModelView::Layered(viewed)) => {
                 layered.evaluate(self.wo, local, viewed)
             }
-            (_, Seen::Glass(rough)) => rough.evaluate(self.wo, local),
+            (_, ModelView::Glass(rough)) => rough.evaluate(self.wo, local),
             (Model::Matte, _) if !transmits => (Weights::base(local.z / PI), local.z / PI),
-            (_, Seen::Metal(rough)) if !transmits => rough.evaluate(self.wo, local),
+            (_, ModelView::Metal(rough)) if !transmits => rough.evaluate(self.wo, local),
             // All of their directions are single rays, or on the other side.
             (
                 Model::Black
@@ -283,7 +286,7 @@ impl Bsdf {
                 | Model::Metal { .. }
                 | Model::Dielectric { .. }
                 | Model::Layered(_),
-                Seen::Plain | Seen::Metal(_) | Seen::Layered(_),
+                ModelView::Plain | ModelView::Metal(_) | ModelView::Layered(_),
             ) => (Weights::default(), 0.0),
         }
     }
@@ -303,21 +306,21 @@ impl Bsdf {
             }
             Model::Mirror => self.single(mirrored(self.wo), Weights::base(1.0)),
             Model::Metal { .. } => {
-                let Seen::Metal(rough) = &self.seen else {
+                let ModelView::Metal(rough) = &self.seen else {
                     return self.single(mirrored(self.wo), metal::facets(self.wo.z));
                 };
                 self.sampled(rough.sample(self.wo, choice, square))
             }
             Model::Dielectric { eta, .. } => {
-                let Seen::Glass(rough) = &self.seen else {
+                let ModelView::Glass(rough) = &self.seen else {
                     return self.boundary(*eta, choice);
                 };
                 self.sampled(rough.sample(self.wo, choice, square)?)
             }
             Model::Layered(layered) => {
-                let Seen::Layered(viewed) = &self.seen else { return None };
+                let ModelView::Layered(viewed) = &self.seen else { return None };
                 let found = layered.sample(self.wo, choice, square, viewed)?;
-                if found.pdf == f64::INFINITY {
+                if found.is_specular {
                     self.single(found.wi, found.weights)
                 } else {
                     self.given(found.wi, found.weights, found.pdf)
@@ -329,9 +332,9 @@ impl Bsdf {
     /// A sampled direction with what [`Self::evaluate`] says of it.
     fn sampled(&self, local: DVec3) -> Option<BsdfSample> {
         let (value, pdf) = match &self.seen {
-            Seen::Metal(rough) if local.z > 0.0 => rough.evaluate(self.wo, local),
-            Seen::Glass(rough) => rough.evaluate(self.wo, local),
-            Seen::Plain | Seen::Metal(_) | Seen::Layered(_) => return None,
+            ModelView::Metal(rough) if local.z > 0.0 => rough.evaluate(self.wo, local),
+            ModelView::Glass(rough) => rough.evaluate(self.wo, local),
+            ModelView::Plain | ModelView::Metal(_) | ModelView::Layered(_) => return None,
         };
         if pdf <= 0.0 {
             return None;
@@ -377,11 +380,12 @@ impl Bsdf {
         if transmits != (local.z < 0.0) || pdf <= 0.0 || weights.is_zero() {
             return None;
         }
-        Some(BsdfSample { direction, weights, pdf })
+        Some(BsdfSample { direction, weights, pdf, is_specular: false })
     }
 
     fn single(&self, local: DVec3, weights: Weights) -> Option<BsdfSample> {
-        self.given(local, weights, f64::INFINITY)
+        let sample = self.given(local, weights, f64::INFINITY)?;
+        Some(BsdfSample { is_specular: true, ..sample })
     }
 }
 

@@ -44,9 +44,9 @@ pub struct Sheen {
 
 /// The sheen as seen from one direction.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Seen {
+pub(super) struct SheenView {
     alpha: f64,
-    table: Albedo,
+    table: SheenAlbedo,
     /// The largest part of the colour.
     peak: f64,
     /// Λ and the albedo for the direction of the viewer.
@@ -58,20 +58,20 @@ pub(super) struct Seen {
 
 impl Sheen {
     /// As seen from `wo`; `None` where there is none.
-    pub(super) fn seen(&self, wo: DVec3) -> Option<Seen> {
+    pub(super) fn seen(&self, wo: DVec3) -> Option<SheenView> {
         let peak = self.color.peak().min(1.0);
         if peak <= 0.0 {
             return None;
         }
         let roughness = self.roughness.clamp(SMOOTHEST, 1.0);
-        let (alpha, table) = (roughness * roughness, Albedo::new(roughness));
+        let (alpha, table) = (roughness * roughness, SheenAlbedo::new(roughness));
         let albedo = table.at(wo.z);
         let chance = peak * albedo.min(1.0);
-        Some(Seen { alpha, table, peak, lambda: lambda(wo.z, alpha), albedo, chance })
+        Some(SheenView { alpha, table, peak, lambda: lambda(wo.z, alpha), albedo, chance })
     }
 }
 
-impl Seen {
+impl SheenView {
     /// What it leaves of light from `wi` on its way to the viewer by what lies beneath.
     pub(super) fn passes(&self, wi: DVec3) -> f64 {
         1.0 - self.peak * self.albedo.max(self.table.at(wi.z.abs())).min(1.0)
@@ -161,12 +161,12 @@ fn integrated(seen: f64, alpha: f64) -> f64 {
 
 /// The albedo of one roughness.
 #[derive(Debug, Clone, Copy)]
-struct Albedo {
+struct SheenAlbedo {
     row: usize,
     share: f64,
 }
 
-impl Albedo {
+impl SheenAlbedo {
     fn new(roughness: f64) -> Self {
         let (row, share) = place((roughness - SMOOTHEST) / (1.0 - SMOOTHEST), ROUGHNESSES);
         Self { row, share }

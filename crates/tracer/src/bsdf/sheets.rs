@@ -8,8 +8,9 @@ use std::f64::consts::PI;
 
 use etendue_geometry::disk;
 
-use super::albedo::{AlbedoTable, OBLIQUITIES, ROUGHNESSES, TABLE, lacking, obliquity};
+use super::albedo::{AlbedoTable, OBLIQUITIES, ROUGHNESSES, TABLE};
 use super::metal::{mean_reflectance, multiple};
+use super::split_sum::{lacking, obliquity};
 use super::{Weights, fresnel};
 use crate::{LANES, Row};
 
@@ -45,12 +46,12 @@ pub(crate) struct Sheets {
     /// Chances of the facets and of the base.
     sheet: Row,
     base: Row,
-    values: Values,
+    values: SheetValues,
 }
 
 /// Values times cosine, as [`Weights`], and densities.
 #[derive(Debug)]
-struct Values {
+struct SheetValues {
     white: Row,
     base: Row,
     highlight: Row,
@@ -80,7 +81,7 @@ impl Default for Sheets {
             lacking: ZERO,
             sheet: ZERO,
             base: ZERO,
-            values: Values {
+            values: SheetValues {
                 white: ZERO,
                 base: ZERO,
                 highlight: ZERO,
@@ -96,7 +97,7 @@ impl Sheets {
     /// What was found last of a lane's value.
     #[inline(always)]
     pub(crate) fn weights(&self, lane: usize) -> Weights {
-        let Values { white, base, highlight, dip, deep, .. } = &self.values;
+        let SheetValues { white, base, highlight, dip, deep, .. } = &self.values;
         Weights {
             white: white[lane],
             base: base[lane],
@@ -136,7 +137,7 @@ impl Sheets {
     }
 }
 
-/// The knot of `count` below `x` in 0..=1 and the share of the next, as [`super::albedo::place`] has them.
+/// The knot of `count` below `x` in 0..=1 and the share of the next, as [`super::split_sum::place`] has them.
 #[inline(always)]
 fn place(x: f64, count: usize) -> (u32, f64) {
     let x = if x > 0.0 { x } else { 0.0 };
@@ -287,7 +288,7 @@ fn reflect(
     }
     evaluate(sheets, table, &wi);
     for i in 0..LANES {
-        let Values { white, base, highlight, deep, pdf: own, .. } = &sheets.values;
+        let SheetValues { white, base, highlight, deep, pdf: own, .. } = &sheets.values;
         let is_seen = white[i] + base[i] + highlight[i] + deep[i] > 0.0;
         let faces = (sheets.wo[2][i] > 0.0) & (wi[2][i] > 0.0) & (above[i] >= 0.0);
         let ratio = own[i] / pdf[i];
@@ -345,7 +346,7 @@ fn scatter(
         along[1][i] = dy * inverse;
         along[2][i] = dz * inverse;
         let above = dx * normal[0][i] + dy * normal[1][i] + dz * normal[2][i];
-        let Values { white, base, highlight, dip, deep, pdf: own } = &mut sheets.values;
+        let SheetValues { white, base, highlight, dip, deep, pdf: own } = &mut sheets.values;
         let is_seen = white[i] + base[i] + highlight[i] + deep[i] > 0.0;
         let faces = (sheets.wo[2][i] > 0.0) & (z > 0.0) & (above >= 0.0);
         let is_chosen =

@@ -24,7 +24,7 @@ fn blurred(bright: &[f64], [columns, rows]: [usize; 2]) -> Vec<f64> {
 
 /// How bright a map is, in cells: texels, or the means of some.
 #[derive(Debug, Clone)]
-struct Cells {
+struct LuminanceGrid {
     /// Columns and rows.
     size: [usize; 2],
     /// The mean over the colours or bands of each. Empty where the texels of a map of colours are the cells: what they
@@ -32,7 +32,7 @@ struct Cells {
     bright: Vec<f32>,
 }
 
-impl Cells {
+impl LuminanceGrid {
     /// The cells at the corners of a patch between the middles of four: left and right above, and below.
     #[inline]
     fn about(&self, [x, y]: [usize; 2]) -> [u32; 4] {
@@ -57,7 +57,7 @@ impl Cells {
 /// poles is taken to be as at the middle of each row of patches.
 #[derive(Debug, Clone)]
 pub struct MapSampler {
-    cells: Cells,
+    cells: LuminanceGrid,
     /// One row more than there are cells, of which the first and the last are half as high.
     patches: GridDistribution,
     /// By row of patches, the density over the unit square where the brightness is 1.
@@ -110,7 +110,7 @@ impl MapSampler {
         };
         // Patches are as probable as what is kept has it: where that is 0, none is chosen.
         bright.iter_mut().zip(&kept).for_each(|(bright, kept)| *bright = f64::from(*kept));
-        let cells = Cells { size, bright: kept };
+        let cells = LuminanceGrid { size, bright: kept };
         let sines: Vec<f64> =
             (0..=rows).map(|row| sine(0.5 * cells.ends(row).iter().sum::<f64>())).collect();
         let mut weights = Vec::with_capacity(columns * (rows + 1));

@@ -26,14 +26,14 @@ macro_rules! layers {
         /// The same, with every option optional and unknown keys refused: what is read.
         #[derive(Deserialize, schemars::JsonSchema)]
         #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
-        pub(super) enum Written {
+        pub(super) enum LayerInput {
             $($named { $($(#[serde(default)] $option: $kind),*)? },)*
         }
 
-        impl From<Written> for LayerSpec {
-            fn from(written: Written) -> Self {
+        impl From<LayerInput> for LayerSpec {
+            fn from(written: LayerInput) -> Self {
                 match written {
-                    $(Written::$named { $($($option),*)? } =>
+                    $(LayerInput::$named { $($($option),*)? } =>
                         Self::$named $({ $($option),* })?,)*
                 }
             }

@@ -3,8 +3,6 @@
 
 mod fill;
 mod layers;
-mod look;
-mod meaning;
 pub mod pair;
 mod rows;
 pub mod table;
@@ -15,7 +13,6 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
-pub use self::look::Look;
 pub use self::pair::{Along, FrameStep, OtherFrame, RowMoment, Sight, WrittenStep};
 pub use self::table::LayerSpec;
 use crate::{LightingContext, Needs, SceneView, Traced};
@@ -76,6 +73,36 @@ impl Layer {
             None => vec![self.name.clone().into_owned()],
         }
     }
+}
+
+/// What the numbers of a layer are, and so how a preview shows them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Look {
+    /// Linear light, one channel (grey) or three (red, green, blue), 1 being full scale. Shown
+    /// through the sRGB curve; what is brighter than 1 is clipped.
+    Color,
+    /// One channel of distances: the nearest hundredth white, farther ones darker, linear in the
+    /// reciprocal; a miss (not finite) black.
+    Distance,
+    /// Three channels of a unit vector n, shown as (n + 1)/2; a miss (the zero vector)
+    /// transparent.
+    Direction,
+    /// One to three channels, each stretched from its least to its greatest finite value (one alone is grey):
+    /// positions, texture coordinates, numbers of samples. A pixel that is not finite is transparent.
+    Extent,
+    /// Integers that name things, each in a colour of its own; 0 (a miss) transparent. Only the
+    /// first channel is shown.
+    Ids,
+    /// One channel of shares in 0..=1, linear grey: coverage, vignetting.
+    Share,
+    /// Any number of channels of linear light, shown as the grey of their mean.
+    Cube,
+    /// One channel or three of a sensor's digital numbers of so many bits. Not a preview: a PNG
+    /// holds the numbers themselves, unscaled, in 16 bits.
+    Counts {
+        /// Bits of a number, 1 to 16.
+        bits: u8,
+    },
 }
 
 /// What numbers are kept as.
@@ -158,6 +185,20 @@ impl PupilPart {
 }
 
 impl LayerSpec {
+    /// The layer that files call `name`, with default options: names of layers with options begin with that of their
+    /// row. `None` of other programs' layers.
+    #[must_use]
+    pub fn from_file_name(name: &str) -> Option<Self> {
+        let layers = Self::NAMES.iter().filter_map(|plain| Self::from_name(plain));
+        let begins = |spec: &Self| {
+            let row = spec.row();
+            // Where each channel is a layer of its own, its name stands behind a dot.
+            let is_channel = |rest: &str| row.apart.is_none() || rest.contains('.');
+            name.strip_prefix(&*row.name).is_some_and(is_channel)
+        };
+        layers.filter(begins).max_by_key(|spec| spec.row().name.len())
+    }
+
     /// Whether the layer is a mean over the samples of a pixel; the others are taken along the chief
     /// ray of its centre.
     #[must_use]
@@ -218,7 +259,9 @@ impl<'de> Deserialize<'de> for LayerSpec {
                     Self::NAMES.map(|name| format!("`{name}`")).join(", ")
                 ))
             }),
-            other => table::Written::deserialize(other).map(Self::from).map_err(D::Error::custom),
+            other => {
+                table::LayerInput::deserialize(other).map(Self::from).map_err(D::Error::custom)
+            }
         }
     }
 }
@@ -229,7 +272,7 @@ impl JsonSchema for LayerSpec {
     }
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let object = generator.subschema_for::<table::Written>();
+        let object = generator.subschema_for::<table::LayerInput>();
         json_schema!({ "anyOf": [{ "type": "string", "enum": Self::NAMES }, object] })
     }
 }
@@ -296,5 +339,18 @@ mod tests {
         let names: std::collections::HashSet<_> =
             rows.iter().flat_map(|layer| layer.row().names_in_files()).collect();
         assert_eq!(names.len(), count, "{names:?}");
+        // And files' names lead back to them.
+        for layer in rows
+            .iter()
+            .filter(|layer| layer.row().name != "Backdrop" && layer.row().name != "Radiance")
+        {
+            for name in layer.row().names_in_files() {
+                let found = LayerSpec::from_file_name(&name).unwrap();
+                assert_eq!(std::mem::discriminant(&found), std::mem::discriminant(layer), "{name}");
+            }
+        }
+        for foreign in ["", "Radiance", "Id", "Identity", "T"] {
+            assert_eq!(LayerSpec::from_file_name(foreign), None, "{foreign}");
+        }
     }
 }

@@ -7,8 +7,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::layers::layers;
-use super::meaning::{CHIEF_RAY, LINEAR, definition_of_normals, frame, name_in, name_of_normals};
-use super::rows::{BASE_COLOUR, SURFACE, colour, light, measured, part_of_pupil};
+use super::rows::{
+    BASE_COLOUR, CHIEF_RAY, LINEAR, SURFACE, colour, definition_of_normals, frame, light, measured,
+    name_in, name_of_normals, part_of_pupil,
+};
 use super::{Columns, FrameStep, Kept, Layer, Look, NormalKind, Seen, Space, Taken};
 use crate::{LightGroup, Needs};
 

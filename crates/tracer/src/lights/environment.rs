@@ -5,7 +5,7 @@ use etendue_geometry::glam::DVec3;
 use super::Lights;
 use crate::environment::place;
 use crate::light_sampler::Receiver;
-use crate::sky::{Asked, Spectra, uniform_density};
+use crate::sky::{SkySamples, Spectra, uniform_density};
 use crate::{Color, Spectral};
 
 impl Lights {
@@ -16,7 +16,7 @@ impl Lights {
         &self,
         spectral: &Spectral,
         wanted: impl Iterator<Item = (Option<Receiver>, DVec3)>,
-        asked: &mut Asked,
+        asked: &mut SkySamples,
         radiance: &mut [f64],
         mut each: impl FnMut(usize, f64, &mut [f64]),
     ) {
@@ -32,7 +32,7 @@ impl Lights {
             }
             return;
         };
-        let Asked { chances, there, .. } = asked;
+        let SkySamples { chances, there, .. } = asked;
         let map_from_world = sky.world_from_map.transpose();
         chances.clear();
         there.directions.clear();

@@ -287,14 +287,7 @@ impl MaterialSpec {
                         None => None,
                     },
                 };
-                // What it looks like, of which nothing is reflected.
-                let look = match radiance {
-                    Paint::Checker { colors, squares, .. } => {
-                        Paint::Checker { colors, curves: None, squares }
-                    }
-                    other => other,
-                };
-                let plain = Material::new(name, look, Scattering::Black);
+                let plain = Material::new(name, look_of(radiance), Scattering::Black);
                 Material { emission: Some(emission), ..plain }
             }
             Self::Checker { colors, squares } => {
@@ -386,6 +379,17 @@ impl MaterialSpec {
             | Self::Gltf { .. }
             | Self::Checker { .. } => None,
         }
+    }
+}
+
+/// What a surface looks like that shines by `radiance` and of which nothing is reflected.
+fn look_of(radiance: Paint) -> Paint {
+    match radiance {
+        Paint::Checker { colors, squares, .. } => Paint::Checker { colors, curves: None, squares },
+        paint @ (Paint::Plain(_)
+        | Paint::Curve { .. }
+        | Paint::Image { .. }
+        | Paint::Cube { .. }) => paint,
     }
 }
 

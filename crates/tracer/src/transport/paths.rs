@@ -13,7 +13,7 @@ use crate::footprint::Cone;
 use crate::light_sampler::Receiver;
 use crate::placed::SurfaceKind;
 use crate::sampling::power_heuristic;
-use crate::sky::Asked;
+use crate::sky::SkySamples;
 
 /// What a path uses random numbers for at each step.
 #[derive(Debug, Clone, Copy)]
@@ -187,7 +187,7 @@ pub(super) struct Workspace<R> {
     pub(super) smooth: Vec<(usize, usize)>,
     /// Paths that met nothing, and what is asked of the sky together.
     pub(super) missed: Vec<u32>,
-    pub(super) asked: Asked,
+    pub(super) asked: SkySamples,
     /// Lanes of a patch that are worked on.
     pub(super) picked: Vec<usize>,
     /// Light of one hit by band.

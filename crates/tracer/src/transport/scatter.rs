@@ -145,7 +145,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let Some(scattered) = bsdf.sample(choice, workspace.number(Draw::Direction, k)) else {
                 continue;
             };
-            let is_specular = scattered.pdf == f64::INFINITY;
+            let is_specular = scattered.is_specular;
             let is_last = if is_specular { self.is_end(bounces) } else { ends_unless_specular };
             if is_last && !is_specular && !hittable {
                 continue;

@@ -13,7 +13,7 @@ use super::App;
 use crate::document::Edit;
 use crate::panels::light_field::LightFieldPanel;
 use crate::state::{Asking, PictureCanvas, PixelQuery};
-use crate::worker::Shown;
+use crate::worker::ScreenPicture;
 use etendue::Still;
 use serde_json::Value;
 
@@ -140,8 +140,16 @@ impl App {
             Ok(screen) => {
                 let number = self.number;
                 let (samples, preview, is_final) = (None, None, true);
-                let shown =
-                    Shown { number, screen, factor: 1, layer, layers, preview, samples, is_final };
+                let shown = ScreenPicture {
+                    number,
+                    screen,
+                    factor: 1,
+                    layer,
+                    layers,
+                    preview,
+                    samples,
+                    is_final,
+                };
                 self.show_picture(ctx, shown);
             }
             Err(error) => self.error = Some(error.to_string()),

@@ -121,13 +121,13 @@ fn words(ui: &Ui, place: Rect, text: &str) {
 }
 
 /// Axes of a plot: what its left and right, its bottom and top stand for.
-struct Axes {
+struct PlotAxes {
     place: Rect,
     x: [f64; 2],
     y: [f64; 2],
 }
 
-impl Axes {
+impl PlotAxes {
     #[expect(clippy::cast_possible_truncation, reason = "points on the screen")]
     fn point(&self, [x, y]: [f64; 2]) -> Pos2 {
         let share = |value: f64, [low, high]: [f64; 2]| ((value - low) / (high - low)) as f32;
@@ -192,7 +192,7 @@ fn fans(ui: &Ui, waves: &LensWaves, place: Rect, are_rays: bool) {
         #[expect(clippy::cast_precision_loss, reason = "a few fields")]
         let left = place.min + Vec2::new(width * i as f32, 0.0);
         let size = Vec2::new(width - 8.0, (place.height() - BELOW).max(8.0));
-        let axes = Axes { place: Rect::from_min_size(left, size), x: [-x, x], y: [-y, y] };
+        let axes = PlotAxes { place: Rect::from_min_size(left, size), x: [-x, x], y: [-y, y] };
         let color = COLORS[i % COLORS.len()][usize::from(!dark)];
         let unit = if are_rays { "\u{b5}m" } else { "waves" };
         let title = format!("{}\n\u{b1}{} {unit}", field.name, short(y));
@@ -213,7 +213,8 @@ fn modulation(ui: &Ui, waves: &LensWaves, place: Rect) {
     }
     let limit = waves.limit;
     let size = Vec2::new(place.width() - 8.0, (place.height() - BELOW).max(8.0));
-    let axes = Axes { place: Rect::from_min_size(place.min, size), x: [0.0, limit], y: [0.0, 1.0] };
+    let axes =
+        PlotAxes { place: Rect::from_min_size(place.min, size), x: [0.0, limit], y: [0.0, 1.0] };
     let title = format!("0 to {} cycles/mm at {} nm\nfrom 0 to 1", short(limit), waves.wavelength);
     axes.draw(ui, &title, &curves);
 }

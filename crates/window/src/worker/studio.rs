@@ -9,7 +9,7 @@ use etendue::{
 };
 use serde_json::Value;
 
-use super::{Kind, News, Shared, Shown, Task, Teller, WATCH, Wish};
+use super::{Kind, News, ScreenPicture, Shared, Task, Teller, WATCH, Wish};
 use crate::document::View;
 
 /// Time that a first picture may take, so that it is on the screen within a tenth of a second, twenty in each: the
@@ -300,7 +300,7 @@ impl PreviewRenderer {
             }
             let screen = so_far.picture().ok().and_then(|p| Screen::of_layer(&p, "").ok());
             if let Some(screen) = screen {
-                teller.tell(News::Shown(Box::new(Shown {
+                teller.tell(News::Shown(Box::new(ScreenPicture {
                     number,
                     screen,
                     factor: 1,
@@ -332,7 +332,8 @@ impl PreviewRenderer {
         let factor = preview.factor();
         let preview = Some(Arc::new(preview));
         let number = wish.number;
-        let shown = Shown { number, screen, factor, layer, layers, preview, samples, is_final };
+        let shown =
+            ScreenPicture { number, screen, factor, layer, layers, preview, samples, is_final };
         self.teller.tell(News::Shown(Box::new(shown)));
         Ok(())
     }

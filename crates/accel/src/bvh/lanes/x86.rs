@@ -5,7 +5,7 @@ use std::arch::x86_64::{__m256, __m512, _CMP_LE_OQ, _MM_HINT_T0};
 use pulp::x86::{V3, V4};
 use pulp::{NullaryFnOnce, cast};
 
-use super::{Arithmetic, Cell, Lanes, Twice, halves, least};
+use super::{Arithmetic, Lanes, NodeChunk, Twice, halves, least};
 
 macro_rules! eight_lanes {
     ($Token:ty) => {
@@ -99,7 +99,7 @@ macro_rules! lanes {
         }
 
         #[inline(always)]
-        fn prefetch(self, cells: &[Cell], place: usize) {
+        fn prefetch(self, cells: &[NodeChunk], place: usize) {
             // Only a hint: nothing is read through the pointer.
             let line = cells.as_ptr().wrapping_add(place).cast::<i8>();
             self.sse._mm_prefetch::<_MM_HINT_T0>(line);

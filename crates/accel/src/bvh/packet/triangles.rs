@@ -10,17 +10,17 @@ use super::Packet;
 use crate::bvh::PlacedTriangles;
 use crate::bvh::bundle::{Bundle, FrameRays, PACKET, bits};
 use crate::bvh::lanes::{Arithmetic, Lanes};
-use crate::bvh::ray::{BoxTest, Runs, TriangleTest, meet_triangles};
+use crate::bvh::ray::{BoxTest, LeafCorners, TriangleTest, meet_triangles};
 use crate::bvh::single::Sink;
 use crate::bvh::traverse::Leaves;
-use crate::bvh::wide::{Cell, Child, LeafNumbers, leaf_numbers};
+use crate::bvh::wide::{Child, LeafNumbers, NodeChunk, leaf_numbers};
 use crate::nearest::Triangle;
 use crate::watertight::{self, Lines};
 
 /// Leaves of a part, for a bundle of rays.
 pub(super) struct PacketTriangles<'a, 'b, L: Lanes, S> {
     lanes: L,
-    cells: &'a [Cell],
+    cells: &'a [NodeChunk],
     triangles: PlacedTriangles<'a>,
     packet: &'a mut Packet<'b, S>,
     rays: &'a FrameRays,
@@ -46,7 +46,7 @@ impl<'a, 'b, L: Lanes, S: Sink> PacketTriangles<'a, 'b, L, S> {
     #[inline(always)]
     pub(super) fn new(
         lanes: L,
-        cells: &'a [Cell],
+        cells: &'a [NodeChunk],
         triangles: PlacedTriangles<'a>,
         packet: &'a mut Packet<'b, S>,
         rays: &'a FrameRays,
@@ -162,7 +162,7 @@ impl<L: Lanes, S: Sink> Leaves for PacketTriangles<'_, '_, L, S> {
         let l = self.lanes.sixteen();
         let n = leaf.count();
         let numbers = leaf_numbers(self.cells, leaf)?;
-        let runs = Runs::new(numbers, n, self.test.axes)?;
+        let runs = LeafCorners::new(numbers, n, self.test.axes)?;
         let mut any = 0;
         for i in bits(meet_triangles(self.lanes, numbers, n, &self.boxes, far)) {
             let i = i.min(n - 1);

@@ -65,7 +65,7 @@ impl<E: From<BenchError>> Race<'_, E> {
 }
 
 /// The samples that fit into so many seconds, by the last two renders, one at least; `None` where there are not two.
-fn within(points: &[super::Point], seconds: f64) -> Option<Forecast> {
+fn within(points: &[super::TrialRender], seconds: f64) -> Option<Forecast> {
     let (one, two) = apart(points)?;
     let [n, m] = [one, two].map(|point| f64::from(point.samples));
     // Two short times may be alike by chance: a tenth of the longer one is its samples', at least.
@@ -124,18 +124,21 @@ fn strip(pictures: &[Vec<f64>], shape @ [width, height, depth]: [usize; 3]) -> O
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::target::race::Point;
+    use crate::target::race::TrialRender;
 
     #[test]
     fn as_many_samples_as_fit_are_told_by_two_renders() {
-        let point =
-            |samples: u32| Point { samples, seconds: 0.5 + 0.01 * f64::from(samples), square: 0.0 };
+        let point = |samples: u32| TrialRender {
+            samples,
+            seconds: 0.5 + 0.01 * f64::from(samples),
+            square: 0.0,
+        };
         let found = within(&[point(4), point(16)], 2.5).unwrap();
         assert!((199..=200).contains(&found.samples), "{found:?}");
         assert_eq!(within(&[point(4), point(16)], 0.1).unwrap().samples, 1);
         assert_eq!(within(&[point(4)], 1.0), None);
         // Times that do not differ are no reason for a million.
-        let same = [4, 16].map(|samples| Point { samples, seconds: 0.5, square: 0.0 });
+        let same = [4, 16].map(|samples| TrialRender { samples, seconds: 0.5, square: 0.0 });
         assert_eq!(within(&same, 1.0).unwrap().samples, 176);
     }
 

@@ -5,7 +5,7 @@ pub(super) const MOST_SAMPLES: f64 = 1e6;
 
 /// One render of a contender.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Point {
+pub(super) struct TrialRender {
     pub(super) samples: u32,
     pub(super) seconds: f64,
     /// The squared error over the squared mean, less that of the converged picture.
@@ -21,7 +21,7 @@ pub(super) struct Forecast {
 
 /// The render with most samples, and one before it with half as many at most, where there is one: what two of nearly
 /// one number differ by is noise, and that a number is a power of two.
-pub(super) fn apart(points: &[Point]) -> Option<(&Point, &Point)> {
+pub(super) fn apart(points: &[TrialRender]) -> Option<(&TrialRender, &TrialRender)> {
     let (two, before) = points.split_last()?;
     let half = before.iter().rev().find(|one| 2 * one.samples <= two.samples);
     Some((half.or(before.first())?, two))
@@ -29,7 +29,7 @@ pub(super) fn apart(points: &[Point]) -> Option<(&Point, &Point)> {
 
 /// The last two renders carried on to a squared error: as b² + v/n, and a + c n. `None` where no number of samples
 /// is enough, or nothing is known.
-pub(super) fn forecast(points: &[Point], target: f64) -> Option<Forecast> {
+pub(super) fn forecast(points: &[TrialRender], target: f64) -> Option<Forecast> {
     let (one, two) = apart(points)?;
     let [n, m] = [one, two].map(|point| f64::from(point.samples));
     let fallen = (one.square - two.square) / (1.0 / n - 1.0 / m);
@@ -50,7 +50,7 @@ pub(super) fn forecast(points: &[Point], target: f64) -> Option<Forecast> {
 }
 
 /// The time (s) of so many samples by the last two renders: as a + c n.
-pub(super) fn seconds_of(points: &[Point], samples: u32) -> f64 {
+pub(super) fn seconds_of(points: &[TrialRender], samples: u32) -> f64 {
     let Some((one, two)) = apart(points) else { return f64::INFINITY };
     let [n, m] = [one, two].map(|point| f64::from(point.samples));
     let slope = ((two.seconds - one.seconds) / (m - n)).max(0.0);

@@ -185,7 +185,7 @@ pub struct ThroughFocus {
 }
 
 /// One problem's premises.
-struct Bench<'a> {
+struct AnalysisSetup<'a> {
     train: &'a OpticalTrain,
     lenses: Vec<MonochromaticTrain>,
     weights: Vec<f64>,
@@ -211,7 +211,7 @@ impl WaveReport {
             refocused = best_focus(train, &lenses, &planes, &weights)?;
             planes.image_z += refocused;
         }
-        let mut bench = Bench {
+        let mut bench = AnalysisSetup {
             train,
             lenses,
             weights: weights.clone(),
@@ -300,7 +300,7 @@ fn best_focus(
     Ok(sum)
 }
 
-impl Bench<'_> {
+impl AnalysisSetup<'_> {
     fn field(&mut self, field: f64, area: &mut Option<f64>) -> Result<FieldWaves, AnalysisError> {
         let object = self.planes.point(field);
         let image_z = self.planes.image_z;

@@ -28,26 +28,26 @@ pub struct HeightMapSpec {
 }
 
 impl HeightMapSpec {
-    pub(super) fn build(&self, resolve: Resolve<'_>) -> Result<Grid, String> {
+    pub(super) fn build(&self, resolve: Resolve<'_>) -> Result<HeightGrid, String> {
         let depth = self.depth.0;
         if !depth.is_finite() {
             return Err("depth must be finite".to_owned());
         }
         let height = self.height.map(|height| height.0);
         let picture = Picture::read(&self.file, self.width.0, height, resolve)?;
-        Ok(Grid::new(picture, depth))
+        Ok(HeightGrid::new(picture, depth))
     }
 }
 
 /// Values over a rectangle.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Grid {
+pub(super) struct HeightGrid {
     picture: Picture,
     /// Value of white.
     scale: f64,
 }
 
-impl Grid {
+impl HeightGrid {
     pub(super) fn new(picture: Picture, scale: f64) -> Self {
         Self { picture, scale }
     }

@@ -34,7 +34,7 @@ use etendue_spectrum::Curve;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use self::phase::Phase;
+use self::phase::PhaseProfile;
 use self::terms::Term;
 use super::Resolve;
 use super::mirror::MirrorMount;
@@ -110,7 +110,7 @@ pub struct Freeform {
     rotation: Option<f64>,
     terms: Vec<Term>,
     is_fresnel: bool,
-    phase: Option<Phase>,
+    phase: Option<PhaseProfile>,
     /// −1 where light runs against the axis.
     sense: f64,
     /// Half the clear diameter (mm); infinite when unlimited.
@@ -252,7 +252,7 @@ impl Freeform {
     /// True if its phase sends different wavelengths in different directions.
     #[must_use]
     pub fn is_dispersive(&self) -> bool {
-        self.phase.as_ref().is_some_and(Phase::is_dispersive)
+        self.phase.as_ref().is_some_and(PhaseProfile::is_dispersive)
     }
 
     /// True if a turn about its axis changes nothing.
@@ -260,7 +260,7 @@ impl Freeform {
     pub fn is_round(&self) -> bool {
         self.rotation.is_none()
             && self.terms.iter().all(Term::is_round)
-            && self.phase.as_ref().is_none_or(Phase::is_round)
+            && self.phase.as_ref().is_none_or(PhaseProfile::is_round)
     }
 
     /// True if rays meet the surface in a plane: it has no sag, or that of the grooves of a Fresnel
@@ -283,7 +283,7 @@ impl Freeform {
 
     /// Half the sizes of what is known by pictures (mm).
     fn half_size(&self) -> [f64; 2] {
-        let phase = self.phase.iter().map(Phase::half_size);
+        let phase = self.phase.iter().map(PhaseProfile::half_size);
         let sizes = self.terms.iter().map(Term::half_size).chain(phase);
         sizes.fold([f64::INFINITY; 2], |[x, y], [w, h]| [x.min(w), y.min(h)])
     }
@@ -306,7 +306,7 @@ impl Freeform {
         });
         let fresnel = self.is_fresnel.then(|| "Fresnel".to_owned());
         let terms = self.terms.iter().map(|term| term.word().to_owned());
-        let phase = self.phase.iter().map(Phase::word);
+        let phase = self.phase.iter().map(PhaseProfile::word);
         conic
             .into_iter()
             .chain(powers)

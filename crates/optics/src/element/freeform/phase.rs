@@ -12,7 +12,7 @@ use etendue_geometry::units::{Millimetres, Nanometres};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::grid::Grid;
+use super::grid::HeightGrid;
 use super::terms::{pairs, polynomial};
 use crate::element::Resolve;
 use crate::element::aperture::Picture;
@@ -79,7 +79,7 @@ pub enum PatternSpec {
 
 /// A phase, ready to be asked.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Phase {
+pub(super) struct PhaseProfile {
     pattern: Pattern,
     order: f64,
     pub(super) blaze: Option<f64>,
@@ -98,7 +98,7 @@ enum Pattern {
         scale: f64,
         terms: Vec<(u32, u32, f64)>,
     },
-    Image(Grid),
+    Image(HeightGrid),
 }
 
 fn length(key: &str, value: f64) -> Result<f64, String> {
@@ -113,7 +113,7 @@ impl PhaseSpec {
     /// # Errors
     ///
     /// A sentence on the number or file that describes none, or on a picture too coarse for its phase.
-    pub(super) fn build(&self, resolve: Resolve<'_>) -> Result<Phase, String> {
+    pub(super) fn build(&self, resolve: Resolve<'_>) -> Result<PhaseProfile, String> {
         let wavelength = |key: &str, nm: Option<Nanometres>| match nm {
             Some(nm) if !(nm.0 > 0.0 && nm.0.is_finite()) => {
                 Err(format!("phase.{key} is {} nm; it must be positive", nm.0))
@@ -131,7 +131,7 @@ impl PhaseSpec {
         if self.order.is_some_and(|order| order.unsigned_abs() > 1000) {
             return Err("phase.order must be within -1000 to 1000".to_owned());
         }
-        Ok(Phase {
+        Ok(PhaseProfile {
             pattern: self.pattern.build(resolve)?,
             order: f64::from(self.order.unwrap_or(1)),
             blaze,
@@ -171,7 +171,7 @@ impl PatternSpec {
                     return Err("phase.depth must be finite".to_owned());
                 }
                 let height = height.map(|height| height.0);
-                let grid = Grid::new(Picture::read(file, width.0, height, resolve)?, *depth);
+                let grid = HeightGrid::new(Picture::read(file, width.0, height, resolve)?, *depth);
                 let step = grid.greatest_step();
                 if step > std::f64::consts::PI {
                     return Err(format!(
@@ -185,7 +185,7 @@ impl PatternSpec {
     }
 }
 
-impl Phase {
+impl PhaseProfile {
     /// The phase (rad) in the first order.
     pub(super) fn at<T: Real>(&self, [x, y]: [T; 2]) -> T {
         match &self.pattern {

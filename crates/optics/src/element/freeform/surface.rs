@@ -6,7 +6,7 @@ use super::Freeform;
 use crate::element::newton::Profile;
 use crate::element::rays::Ray;
 use crate::element::real::{Dual, Real};
-use crate::element::refract::{Media, Root, meet_conic};
+use crate::element::refract::{IndexPair, Root, meet_conic};
 
 /// A surface at a wavelength, met from one side.
 #[derive(Debug, Clone)]
@@ -77,7 +77,7 @@ impl Profile for FreeformSurface {
         self.shape.holds(place)
     }
 
-    fn refract<T: Real>(&self, media: Media, at: Ray<T>, slope: [T; 2]) -> (Ray<T>, bool) {
+    fn refract<T: Real>(&self, media: IndexPair, at: Ray<T>, slope: [T; 2]) -> (Ray<T>, bool) {
         let [x, y, _] = at.position;
         let [along_x, along_y] = match self.shape.is_fresnel {
             true => self.shape.sag_and_slopes([x, y]).1,

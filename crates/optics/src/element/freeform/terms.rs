@@ -13,7 +13,7 @@ use etendue_geometry::units::Millimetres;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::grid::{Grid, HeightMapSpec};
+use super::grid::{HeightGrid, HeightMapSpec};
 use crate::analysis::zernike::ZernikeOrder;
 use crate::element::Resolve;
 use crate::element::real::{Real, power};
@@ -101,7 +101,7 @@ pub(super) enum Term {
         scale: f64,
         coefficients: Vec<f64>,
     },
-    Grid(Grid),
+    Grid(HeightGrid),
 }
 
 fn positive(key: &str, length: Millimetres) -> Result<f64, String> {

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use super::*;
 use crate::element::newton::{Profile, cross};
 use crate::element::rays::Ray;
-use crate::element::refract::Media;
+use crate::element::refract::IndexPair;
 
 fn read(json: &str) -> Result<Freeform, String> {
     let spec = serde_json::from_str::<FreeformSpec>(json).map_err(|e| e.to_string())?;
@@ -135,7 +135,7 @@ fn rays_meet_the_surface_and_a_fresnel_lens_bends_as_its_facets() {
     let surface = FreeformSurface::new(Arc::clone(&shape), 1.5, 550.0);
     for [x, y] in places() {
         let ray = Ray::new([x, y, -20.0].into(), [0.05, -0.02, 1.0].into()).unwrap();
-        let crossing = cross(&surface, Media::new(1.0, 1.5), ray, 1e9);
+        let crossing = cross(&surface, IndexPair::new(1.0, 1.5), ray, 1e9);
         let [x, y, z] = crossing.ray.position;
         assert!(crossing.hit && crossing.through && (z - shape.sag([x, y]).unwrap()).abs() < 1e-13);
     }
@@ -143,7 +143,7 @@ fn rays_meet_the_surface_and_a_fresnel_lens_bends_as_its_facets() {
     let fresnel = Arc::new(read(r#"{"radius": 40, "conic": -1, "fresnel": true}"#).unwrap());
     let surface = FreeformSurface::new(fresnel, 1.5, 550.0);
     let ray = Ray::new([0.0, 6.0, -5.0].into(), [0.0, 0.0, 1.0].into()).unwrap();
-    let crossing = cross(&surface, Media::new(1.0, 1.5), ray, 1e9);
+    let crossing = cross(&surface, IndexPair::new(1.0, 1.5), ray, 1e9);
     let facet = (6.0_f64 / 40.0).atan();
     let bent = facet - (facet.sin() / 1.5).asin();
     assert_eq!(crossing.ray.position, [0.0, 6.0, 0.0]);
@@ -182,7 +182,7 @@ fn gratings_obey_the_grating_equation_and_lose_what_is_evanescent() {
         for angle in [-20.0_f64, 0.0, 35.0] {
             let (sine, cosine) = angle.to_radians().sin_cos();
             let ray = Ray::new([0.3, 0.0, -5.0].into(), [0.0, sine, cosine].into()).unwrap();
-            let crossing = cross(&surface, Media::new(n, n1), ray, 1e9);
+            let crossing = cross(&surface, IndexPair::new(n, n1), ray, 1e9);
             let expected = (n * sine + f64::from(order) * wavelength * 1e-6 / 0.005) / n1;
             assert_eq!(crossing.through, expected.abs() <= 1.0, "order {order} at {angle}");
             if crossing.through {

@@ -109,7 +109,7 @@ pub struct GradedGap {
 
 /// The index and what bends rays at a place.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Field {
+pub(crate) struct IndexField {
     /// n².
     pub(crate) square: f64,
     /// (∂n²/∂x)/(2x) = (∂n²/∂y)/(2y) (mm⁻²).
@@ -182,18 +182,18 @@ impl GradientTerms {
 impl Gradient {
     /// The index at a place (mm) where it is `base` on the axis at the start.
     #[inline]
-    pub(crate) fn field(&self, base: f64, [x, y, z]: [f64; 3]) -> Field {
+    pub(crate) fn field(&self, base: f64, [x, y, z]: [f64; 3]) -> IndexField {
         let u = x * x + y * y;
         match &self.law {
             Law::Rod { g } => {
                 let (n2, g2) = (base * base, g * g);
-                Field { square: n2 * (1.0 - g2 * u), across: -n2 * g2, along: 0.0 }
+                IndexField { square: n2 * (1.0 - g2 * u), across: -n2 * g2, along: 0.0 }
             }
             Law::Sum { squared, radial, axial } => {
                 let (across, by_u) = sum(radial, u);
                 let (along, by_z) = sum(axial, z);
                 match squared {
-                    true => Field {
+                    true => IndexField {
                         square: base * base + across + along,
                         across: by_u,
                         along: 0.5 * by_z,
@@ -201,7 +201,7 @@ impl Gradient {
                     false => {
                         let n = base + across + along;
                         // An index below 0 is none.
-                        Field { square: n * n.abs(), across: 2.0 * n * by_u, along: n * by_z }
+                        IndexField { square: n * n.abs(), across: 2.0 * n * by_u, along: n * by_z }
                     }
                 }
             }
@@ -243,7 +243,7 @@ impl Gradient {
                 .map(|(i, k)| {
                     let r = self.semi_diameter * f64::from(i) / f64::from(LOOKS);
                     let z = thickness * f64::from(k) / f64::from(LOOKS);
-                    let Field { square, across, .. } = self.field(base, [0.0, r, z]);
+                    let IndexField { square, across, .. } = self.field(base, [0.0, r, z]);
                     across.abs() / square
                 })
                 .fold(0.0, f64::max)
@@ -283,7 +283,7 @@ impl GradedGap {
         // The index on the axis, and what changes the reduced slope for height.
         let at = |z: f64| {
             let place = [0.0, 0.0, self.offset + self.sense * z];
-            let Field { square, across, .. } = self.gradient.field(base, place);
+            let IndexField { square, across, .. } = self.gradient.field(base, place);
             let n = square.max(f64::MIN_POSITIVE).sqrt();
             [n, across / n]
         };

@@ -11,7 +11,7 @@
 
 use glam::DVec3;
 
-use super::{Field, Gradient, Law};
+use super::{Gradient, IndexField, Law};
 
 /// Distance (mm) to which a ray is brought to a surface.
 const ARRIVED: f64 = 1e-13;
@@ -56,7 +56,7 @@ impl Gradient {
     fn step(&self, base: f64, ray: OpticalRay, h: f64) -> OpticalRay {
         let (r, t) = (ray.place, ray.optical);
         let look = |place: DVec3| {
-            let Field { square, across, along } = self.field(base, place.to_array());
+            let IndexField { square, across, along } = self.field(base, place.to_array());
             (h * DVec3::new(across * place.x, across * place.y, along), square)
         };
         let (a, first) = look(r);

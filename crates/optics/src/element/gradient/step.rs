@@ -10,8 +10,8 @@ use super::path::{Arrival, OpticalRay};
 use crate::element::losses::Loss;
 use crate::element::part::Part;
 use crate::element::rays::{Block, LANES, Ray, RayStatus};
-use crate::element::refract::Media;
-use crate::element::step::{Action, Clip, Step, Traversal};
+use crate::element::refract::IndexPair;
+use crate::element::step::{Action, Clip, ElementStep, Traversal};
 
 /// A gap with a gradient at one wavelength, in lens coordinates.
 #[derive(Debug, Clone)]
@@ -96,7 +96,7 @@ impl GradedMedium {
     }
 }
 
-impl Step {
+impl ElementStep {
     /// Takes a block of rays through an element at a gradient, one by one.
     #[cold]
     #[inline(never)]
@@ -195,7 +195,7 @@ impl Step {
             medium.as_ref().map_or(glass, |medium| medium.index(point.into()))
         };
         let indices = [index(before, graded.indices[0]), index(behind, graded.indices[1])];
-        let media = Media::new(indices[0], indices[1]);
+        let media = IndexPair::new(indices[0], indices[1]);
         let mut traversal = self.pass_one_with(start, clip, media);
         if traversal.status != RayStatus::Exited {
             return Traversal { ray, ..traversal };
@@ -207,7 +207,7 @@ impl Step {
         traversal
     }
 
-    fn pass_one_with(&self, ray: Ray, clip: Clip, media: Media) -> Traversal {
+    fn pass_one_with(&self, ray: Ray, clip: Clip, media: IndexPair) -> Traversal {
         let action = self.action.between(media);
         let step = Self { action, graded: None, loss: None, ..self.clone() };
         step.pass_one(ray, clip)
@@ -215,8 +215,8 @@ impl Step {
 }
 
 impl Action {
-    /// Returns the action between other media. What does not refract stays as it is.
-    fn between(&self, between: Media) -> Self {
+    /// The same between other media. What does not refract stays as it is.
+    fn between(&self, between: IndexPair) -> Self {
         let mut action = self.clone();
         match &mut action {
             Self::Plane(refraction)

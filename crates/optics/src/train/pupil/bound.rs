@@ -3,13 +3,13 @@
 
 use glam::DVec2;
 
-use super::Outline;
+use super::PupilOutline;
 use super::coded::Anywhere;
 use super::place::{NodePlace, between};
 
 /// The outline from one point of the sensor.
 pub(super) struct PupilBound<'a> {
-    pub(super) nodes: &'a [Outline],
+    pub(super) nodes: &'a [PupilOutline],
     /// Between which nodes; `None` for a disk.
     pub(super) place: Option<NodePlace>,
     /// Centre and half axes in slopes, as the nodes are turned.

@@ -70,12 +70,12 @@ pub(super) struct MaskCells {
 
 /// Columns from one place to another.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Columns([(usize, f64); 2]);
+pub(super) struct ColumnSpan([(usize, f64); 2]);
 
 /// Rows of some columns.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Rows {
-    columns: Columns,
+pub(super) struct RowSpan {
+    columns: ColumnSpan,
     first: usize,
     last: usize,
     /// The sum before the first, and of all of them.
@@ -83,8 +83,8 @@ pub(super) struct Rows {
     pub(super) mass: f64,
 }
 
-impl Rows {
-    pub(super) fn columns(&self) -> Columns {
+impl RowSpan {
+    pub(super) fn columns(&self) -> ColumnSpan {
         self.columns
     }
 
@@ -99,7 +99,7 @@ impl MaskCells {
     pub(super) fn new(mask: &Picture, bounds: [DVec2; 2], margin: DVec2) -> Option<Self> {
         let pixel = DVec2::from(mask.size) / DVec2::from(mask.pixels.map(|n| n as f64));
         let margin = margin.max(LEAST_MARGIN * pixel);
-        let [x, y] = [0, 1].map(|axis| Axis::new(mask, bounds, margin, axis));
+        let [x, y] = [0, 1].map(|axis| GridLines::new(mask, bounds, margin, axis));
         let exact = x.is_exact && y.is_exact;
         // Columns first, then rows: the greatest and the mean of what is near a cell.
         let [columns, rows] = mask.pixels;
@@ -149,15 +149,15 @@ impl MaskCells {
     }
 
     /// The columns between two places (mm).
-    pub(super) fn columns(&self, ends: [f64; 2]) -> Columns {
-        Columns(ends.map(|x| locate(&self.lines[0], x)))
+    pub(super) fn columns(&self, ends: [f64; 2]) -> ColumnSpan {
+        ColumnSpan(ends.map(|x| locate(&self.lines[0], x)))
     }
 
     /// The rows between two places (mm), of some columns. They reach from line to line: `ends` that
     /// lie between lines are moved out to them.
-    pub(super) fn rows(&self, columns: Columns, first: usize, last: usize) -> Rows {
+    pub(super) fn rows(&self, columns: ColumnSpan, first: usize, last: usize) -> RowSpan {
         let before = self.sum(columns, first);
-        Rows { columns, first, last, before, mass: self.sum(columns, last) - before }
+        RowSpan { columns, first, last, before, mass: self.sum(columns, last) - before }
     }
 
     /// The row that holds a place (mm).
@@ -171,7 +171,7 @@ impl MaskCells {
     }
 
     /// y of the place (mm) up to which rows hold the share `v` of them, and its row.
-    pub(super) fn draw_row(&self, rows: &Rows, v: f64) -> (f64, usize) {
+    pub(super) fn draw_row(&self, rows: &RowSpan, v: f64) -> (f64, usize) {
         let target = rows.before + v * rows.mass;
         let (mut low, mut high) = (rows.first, rows.last);
         let (mut at_low, mut at_high) = (rows.before, rows.before + rows.mass);
@@ -190,14 +190,19 @@ impl MaskCells {
     }
 
     /// The sum over a row of some columns by the height of the row: per mm.
-    pub(super) fn row_density(&self, columns: Columns, row: usize) -> f64 {
+    pub(super) fn row_density(&self, columns: ColumnSpan, row: usize) -> f64 {
         (self.sum(columns, row + 1) - self.sum(columns, row))
             / (self.lines[1][row + 1] - self.lines[1][row])
     }
 
     /// x of the place (mm) up to which the columns of a row hold the share `u` of them, and the share
     /// that a millimetre has there; `None` where they hold nothing.
-    pub(super) fn draw_column(&self, row: usize, columns: Columns, u: f64) -> Option<(f64, f64)> {
+    pub(super) fn draw_column(
+        &self,
+        row: usize,
+        columns: ColumnSpan,
+        u: f64,
+    ) -> Option<(f64, f64)> {
         let [from, to] = columns.0.map(|end| self.up_to(row, end));
         let target = from + u * (to - from);
         let (mut low, mut high) = (columns.0[0].0, columns.0[1].0 + 1);
@@ -216,7 +221,7 @@ impl MaskCells {
     }
 
     /// The share of the columns of a row that a millimetre has at `x` (mm).
-    pub(super) fn column_density(&self, row: usize, columns: Columns, x: f64) -> f64 {
+    pub(super) fn column_density(&self, row: usize, columns: ColumnSpan, x: f64) -> f64 {
         let [from, to] = columns.0.map(|end| self.up_to(row, end));
         let low = locate(&self.lines[0], x).0;
         let mass = self.of_row(row, low + 1) - self.of_row(row, low);
@@ -228,7 +233,7 @@ impl MaskCells {
     }
 
     /// The sum of some columns of all rows below a line.
-    fn sum(&self, Columns(ends): Columns, line: usize) -> f64 {
+    fn sum(&self, ColumnSpan(ends): ColumnSpan, line: usize) -> f64 {
         let sums = &self.sums[line * self.lines[0].len()..];
         let [from, to] = ends.map(|(i, share)| sums[i] + share * (sums[i + 1] - sums[i]));
         to - from
@@ -265,7 +270,7 @@ fn greatest_and_mean(values: impl Iterator<Item = f64>) -> [f32; 2] {
 }
 
 /// Lines along one direction.
-struct Axis {
+struct GridLines {
     lines: Vec<f64>,
     /// Of each interval: the pixels within a margin of it, as the picture counts them.
     near: Vec<[usize; 2]>,
@@ -273,7 +278,7 @@ struct Axis {
     is_exact: bool,
 }
 
-impl Axis {
+impl GridLines {
     fn new(mask: &Picture, [low, high]: [DVec2; 2], margin: DVec2, axis: usize) -> Self {
         let count = mask.pixels[axis];
         let (size, margin) = (mask.size[axis], margin[axis]);

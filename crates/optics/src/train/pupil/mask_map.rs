@@ -130,15 +130,14 @@ pub(super) struct LocalMap<'a> {
 }
 
 /// Directions solved from one node.
-struct Solved {
+struct DirectionSolution {
     /// Point of the mask in −1..1, slopes, weight.
     points: Vec<(DVec2, DVec2, f64)>,
     is_round: bool,
 }
 
-impl Solved {
-    /// Greatest distance from the middle at which points are seen, in −1..1; along x and y, or from
-    /// the middle of a round map.
+impl DirectionSolution {
+    /// How far from the middle points are seen, in −1..1; along x and y, or from the middle of a round map.
     fn reach(&self) -> DVec2 {
         let seen = self.points.iter().filter(|(.., weight)| *weight > HIDDEN);
         seen.fold(DVec2::ZERO, |most, (place, ..)| {
@@ -185,12 +184,12 @@ impl MaskMap {
             known: 0,
         };
         let count = if round { RADIAL + 1 } else { (PLANAR + 1) * (PLANAR + 1) };
-        let solve = |map: &Self| -> Vec<Option<Solved>> {
+        let solve = |map: &Self| -> Vec<Option<DirectionSolution>> {
             (0..count).into_par_iter().map(|node| map.solve(scene, node)).collect()
         };
         let mut solved = solve(&map);
         for _ in 0..DRAWN_IN {
-            let seen = solved.iter().flatten().map(Solved::reach).reduce(DVec2::max);
+            let seen = solved.iter().flatten().map(DirectionSolution::reach).reduce(DVec2::max);
             let Some(mut reach) = seen.map(|reach| reach + AROUND) else { break };
             if reach.min_element() <= AROUND {
                 break;
@@ -240,7 +239,7 @@ impl MaskMap {
     }
 
     /// Solves the directions from a node towards points of the mask; `None` when there are too few.
-    fn solve(&self, scene: &MaskScene<'_>, node: usize) -> Option<Solved> {
+    fn solve(&self, scene: &MaskScene<'_>, node: usize) -> Option<DirectionSolution> {
         let film = self.node_film(node);
         // In the mask's frame, for the node as it stands.
         let target = |place: DVec2| self.centre + place * self.half - self.offset;
@@ -263,7 +262,8 @@ impl MaskMap {
             let weight = if scene.passes(film, slopes) { 1.0 } else { HIDDEN };
             points.push((place, slopes, weight));
         }
-        (points.len() >= POINTS * POINTS / 4).then_some(Solved { points, is_round: self.round })
+        (points.len() >= POINTS * POINTS / 4)
+            .then_some(DirectionSolution { points, is_round: self.round })
     }
 
     /// Points of the mask in −1..1: Chebyshev's in a square, and the same mapped to the disk of a round
@@ -471,7 +471,7 @@ fn chebyshev(x: f64, degree: usize) -> Powers {
 }
 
 /// The polynomial of a degree nearest to what was solved, by the normal equations.
-fn fit(solved: &Solved, degree: usize) -> Option<Vec<DVec2>> {
+fn fit(solved: &DirectionSolution, degree: usize) -> Option<Vec<DVec2>> {
     let count = terms(degree);
     if solved.points.len() < count {
         return None;

@@ -14,7 +14,7 @@ use std::f64::consts::PI;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::mask_cells::{MaskCells, Rows};
+use super::mask_cells::{MaskCells, RowSpan};
 use super::mask_map::{MaskMap, MaskScene, NO_TERMS, roberts};
 use crate::element::{Clip, LensRays, RayStatus};
 use crate::train::Side;
@@ -73,7 +73,7 @@ struct Chords {
 #[derive(Debug, Clone)]
 struct Interval {
     /// From the lowest to the highest.
-    bands: Vec<Rows>,
+    bands: Vec<RowSpan>,
     mass: f64,
     /// True if the ends of lines are those of the sensor's own point.
     is_cut: bool,
@@ -117,7 +117,7 @@ impl MaskRegion {
                 let at = DVec2::new((node % (FILM + 1)) as f64, (node / (FILM + 1)) as f64);
                 let film = (2.0 * at / FILM as f64 - 1.0) * scene.half_size;
                 let [low, high] = bounds;
-                Sight { scenes, film, low, high }.seen()
+                MaskRays { scenes, film, low, high }.seen()
             })
             .collect();
         for _ in 0..ROUNDS {
@@ -142,9 +142,9 @@ impl MaskRegion {
         [first, first + 1, first + FILM + 1, first + FILM + 2]
     }
 
-    /// Visible lines between nodes, joined by straight lines; `None` unless all four have ends.
-    /// Where they have none, all of the mask is aimed at.
-    fn joined(&self, view: &View) -> Option<Chords> {
+    /// What is visible between nodes, joined by straight lines; `None` unless all four have ends. Where they
+    /// have none, all of the mask is aimed at.
+    fn joined(&self, view: &FilmCell) -> Option<Chords> {
         let mut joined = Chords { heights: [0.0; 2], ends: [[0.0; 2]; LINES + 1], margin: 0.0 };
         for (node, weight) in view.corners.into_iter().zip(view.weights) {
             let Visibility::Part(chords) = &self.nodes[node] else { return None };
@@ -172,7 +172,7 @@ impl MaskRegion {
         let (x, y, side) = (place(column), place(row), 1.0 / PARTS as f64);
         let ends = [[x, y], [x + side, y], [x, y + side], [x + side, y + side]];
         let parts: Vec<Chords> =
-            ends.iter().filter_map(|at| self.joined(&View::new(corners, *at))).collect();
+            ends.iter().filter_map(|at| self.joined(&FilmCell::new(corners, *at))).collect();
         let is_cut = parts.len() == ends.len();
         let least = |of: &dyn Fn(&Chords) -> f64| parts.iter().map(of).fold(f64::MAX, f64::min);
         let most = |of: &dyn Fn(&Chords) -> f64| parts.iter().map(of).fold(f64::MIN, f64::max);
@@ -269,20 +269,20 @@ impl MaskRegion {
     }
 
     /// The part of an interval of the sensor around a point (mm), and the weights of the interval's corners.
-    fn view(&self, film: DVec2) -> Option<(usize, View)> {
+    fn view(&self, film: DVec2) -> Option<(usize, FilmCell)> {
         let along = |x: f64, half: f64| {
             let at = if half > 0.0 { 0.5 * (x / half + 1.0) } else { 0.0 };
             (-1e-9..=1.0 + 1e-9).contains(&at).then(|| split(at.clamp(0.0, 1.0), FILM))
         };
         let (column, right) = along(film.x, self.half_size.x)?;
         let (row, down) = along(film.y, self.half_size.y)?;
-        let view = View::new(Self::corners(row * FILM + column), [right, down]);
+        let view = FilmCell::new(Self::corners(row * FILM + column), [right, down]);
         let part = |low: usize, share: f64| low * PARTS + split(share, PARTS).0;
         Some((part(row, down) * FILM * PARTS + part(column, right), view))
     }
 
     /// The ends (mm) of the line at a height; `None` above and below what is visible.
-    fn ends(&self, view: &View, y: f64, [low, high]: [DVec2; 2]) -> Option<[f64; 2]> {
+    fn ends(&self, view: &FilmCell, y: f64, [low, high]: [DVec2; 2]) -> Option<[f64; 2]> {
         let chords = view.corners.map(|node| match &self.nodes[node] {
             Visibility::Part(chords) => Some(&**chords),
             Visibility::All | Visibility::Nothing => None,
@@ -353,12 +353,12 @@ impl MaskRegion {
 }
 
 /// The corners of an interval of the sensor, and their weights.
-struct View {
+struct FilmCell {
     corners: [usize; 4],
     weights: [f64; 4],
 }
 
-impl View {
+impl FilmCell {
     /// At shares of the interval's sides.
     fn new(corners: [usize; 4], [right, down]: [f64; 2]) -> Self {
         let (left, up) = (1.0 - right, 1.0 - down);
@@ -379,7 +379,7 @@ fn split(share: f64, count: usize) -> (usize, f64) {
 }
 
 /// Rays from a point of the sensor towards points of the mask, at any of the wavelengths.
-struct Sight<'a> {
+struct MaskRays<'a> {
     scenes: &'a [(MaskScene<'a>, &'a MaskMap)],
     /// The point of the sensor (mm).
     film: DVec2,
@@ -388,8 +388,8 @@ struct Sight<'a> {
     high: DVec2,
 }
 
-impl Sight<'_> {
-    /// Tests which points of the mask (mm) are visible.
+impl MaskRays<'_> {
+    /// Which points of the mask (mm) are visible.
     fn passes(&self, places: &[DVec2]) -> Vec<bool> {
         let mut passed = vec![false; places.len()];
         for (scene, map) in self.scenes {

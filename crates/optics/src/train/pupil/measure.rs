@@ -6,9 +6,11 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::place::{NodePlace, between};
-use super::search::Window;
-use super::wavelengths::Divided;
-use super::{ANGLES, ExitPupil, NodeLayout, Outline, PLANAR_INTERVALS, RADIAL_INTERVALS, turn_of};
+use super::search::SlopeWindow;
+use super::wavelengths::{Divided, Stray};
+use super::{
+    ANGLES, ExitPupil, NodeLayout, PLANAR_INTERVALS, PupilOutline, RADIAL_INTERVALS, turn_of,
+};
 use crate::element::{Clip, LensRays, RayStatus};
 use crate::train::aim::towards_lens;
 use crate::train::{MonochromaticTrain, OpticalTrain, Side};
@@ -26,9 +28,6 @@ const BEND: [f64; 2] = [0.4, 0.1];
 
 /// Margin outside of the bound that the closing check looks at, as a share of the radius.
 const CHECKED: f64 = 0.35;
-
-/// Random rays of a round of the closing check.
-pub(super) const CHECKS: u32 = 1 << 16;
 
 impl ExitPupil {
     /// The sensor's point at a node of the grid that is twice as fine.
@@ -337,20 +336,11 @@ fn turn_index(turn: f64) -> usize {
 pub(super) const ROBERTS: [f64; 4] =
     [0.856_674_883_854_503, 0.733_891_856_627_126, 0.628_706_721_037_806, 0.538_597_270_645_735];
 
-/// A ray that passes outside of the bound.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Stray {
-    nodes: [(usize, f64); 4],
-    turn: f64,
-    /// In its frame.
-    radius: f64,
-}
-
-/// Greatest distance from the axis at which light arrives, up to `limit` (mm), with a small margin.
+/// How far from the axis there is light, up to `limit` (mm), and a little more.
 pub fn lit_radius(train: &OpticalTrain, lenses: &[MonochromaticTrain], z: f64, limit: f64) -> f64 {
     let lit = |r: f64| {
         let film = DVec3::new(r, 0.0, z);
-        lenses.iter().any(|lens| Window::find(train, lens, film).is_some())
+        lenses.iter().any(|lens| SlopeWindow::find(train, lens, film).is_some())
     };
     if lit(limit) || !lit(0.0) {
         return limit;
@@ -368,21 +358,20 @@ fn frame_at(
     train: &OpticalTrain,
     lenses: &[MonochromaticTrain],
     film: DVec3,
-    previous: Option<&Outline>,
-) -> Outline {
-    let mut window: Option<Window> = None;
+    previous: Option<&PupilOutline>,
+) -> PupilOutline {
+    let mut window: Option<SlopeWindow> = None;
     let mut chief = None;
     for lens in lenses {
         // Around the neighbour's frame first, else anywhere.
         let near = previous
             .filter(|node| !node.is_dark())
-            .and_then(|node| Window::near(node.centre, node.half * 1.5, lens, film));
-        let Some(found) = near.or_else(|| Window::find(train, lens, film)) else { continue };
-        window =
-            Some(window.map_or(found, |w| Window {
-                min: w.min.min(found.min),
-                max: w.max.max(found.max),
-            }));
+            .and_then(|node| SlopeWindow::near(node.centre, node.half * 1.5, lens, film));
+        let Some(found) = near.or_else(|| SlopeWindow::find(train, lens, film)) else { continue };
+        window = Some(window.map_or(found, |w| SlopeWindow {
+            min: w.min.min(found.min),
+            max: w.max.max(found.max),
+        }));
         chief = chief.or_else(|| {
             let start = previous.and_then(|node| node.chief);
             let direction = train.chief_direction_from(lens, film, start)?;
@@ -390,10 +379,13 @@ fn frame_at(
         });
     }
     match window {
-        Some(window) => {
-            Outline { centre: window.centre(), half: window.half(), chief, ..Outline::DARK }
-        }
-        None => Outline::DARK,
+        Some(window) => PupilOutline {
+            centre: window.centre(),
+            half: window.half(),
+            chief,
+            ..PupilOutline::DARK
+        },
+        None => PupilOutline::DARK,
     }
 }
 
@@ -404,7 +396,7 @@ fn widen(
     film: DVec3,
     searched: &Searched,
 ) {
-    for (radius, found) in radii.iter_mut().zip(limits(Limit::Outer, lens, film, searched)) {
+    for (radius, found) in radii.iter_mut().zip(limits(RimSide::Outer, lens, film, searched)) {
         *radius = found.map_or(*radius, |found| radius.max(found));
     }
 }
@@ -416,7 +408,7 @@ fn narrow(
     film: DVec3,
     searched: &Searched,
 ) {
-    for (radius, found) in radii.iter_mut().zip(limits(Limit::Inner, lens, film, searched)) {
+    for (radius, found) in radii.iter_mut().zip(limits(RimSide::Inner, lens, film, searched)) {
         // Where nothing passes at an angle, nothing is known.
         *radius = radius.min(found.unwrap_or(0.0));
     }
@@ -431,7 +423,7 @@ struct Searched {
 
 /// Extreme that is looked for among the passing rays of an angle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Limit {
+enum RimSide {
     /// That of the greatest radius.
     Outer,
     /// That of the least.
@@ -441,7 +433,7 @@ enum Limit {
 /// The radius of the last passing ray of each angle from `film` in the frame, rounded to the side where none passes;
 /// `None` where none does.
 fn limits(
-    limit: Limit,
+    limit: RimSide,
     lens: &MonochromaticTrain,
     film: DVec3,
     &Searched { frame: [centre, half], is_round }: &Searched,
@@ -465,15 +457,15 @@ fn limits(
     };
     // A radius moved farther beyond what passes.
     let beyond = |radius: f64, by: f64| match limit {
-        Limit::Outer => radius + by,
-        Limit::Inner => (radius - by).max(0.0),
+        RimSide::Outer => radius + by,
+        RimSide::Inner => (radius - by).max(0.0),
     };
     let mut width = OUTERMOST / f64::from(scanned);
     let scan: Vec<(usize, f64)> =
         (0..angles).flat_map(|i| (0..scanned).map(move |s| (i, width * f64::from(s)))).collect();
     let mut last = [None; 2 * ANGLES];
     for (&(i, radius), passed) in scan.iter().zip(passes(&scan)) {
-        if passed && (limit == Limit::Outer || last[i].is_none()) {
+        if passed && (limit == RimSide::Outer || last[i].is_none()) {
             last[i] = Some(radius);
         }
     }

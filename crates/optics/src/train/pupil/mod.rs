@@ -62,7 +62,7 @@ pub use clear::{without_dimming, without_filters};
 pub use disk::{Disk, DiskSamples};
 pub use lenslets::LensletPupil;
 pub use measure::lit_radius;
-pub use search::Window;
+pub use search::SlopeWindow;
 
 /// Angles in the table of a node.
 const ANGLES: usize = 128;
@@ -129,7 +129,7 @@ pub struct ExitPupil {
     layout: NodeLayout,
     /// The pupil in closed form; there are no nodes then.
     disk: Option<Disk>,
-    nodes: Vec<Outline>,
+    nodes: Vec<PupilOutline>,
     /// The first mask, which is sampled by what it passes.
     coded: Option<Coded>,
     /// The lenslets through which light comes; there are no nodes then.
@@ -150,7 +150,7 @@ enum NodeLayout {
 
 /// The passing directions from one point of the sensor.
 #[derive(Debug, Clone)]
-struct Outline {
+struct PupilOutline {
     /// The middle of the frame in slopes.
     centre: DVec2,
     /// The frame's half axes in slopes; 0 when nothing passes.
@@ -165,7 +165,7 @@ struct Outline {
     chief: Option<DVec2>,
 }
 
-impl Outline {
+impl PupilOutline {
     const DARK: Self = Self {
         centre: DVec2::ZERO,
         half: DVec2::ZERO,
@@ -244,7 +244,7 @@ impl ExitPupil {
         // All others are measured by rays at nodes over the sensor.
         let lenses = Divided::of(train, lenses);
         pupil.measure(train, &lenses.measured);
-        if pupil.nodes.iter().all(Outline::is_dark) {
+        if pupil.nodes.iter().all(PupilOutline::is_dark) {
             return Err(blocked(train, &train.at(wavelengths[0])?, pupil.sensor.vertex));
         }
         pupil.widen_until_tight(&lenses);
@@ -428,7 +428,7 @@ impl ExitPupil {
 /// The error that names what blocks the light.
 pub fn blocked(train: &OpticalTrain, lens: &MonochromaticTrain, film: DVec3) -> ExitPupilError {
     let mut counts = StatusCounts::new(train.elements.len());
-    match Window::probe(train, film) {
+    match SlopeWindow::probe(train, film) {
         Some(mut rays) => {
             lens.trace(Side::Sensor, Clip::On, &mut rays);
             counts.add_all(&rays);
@@ -446,7 +446,7 @@ pub fn blocked(train: &OpticalTrain, lens: &MonochromaticTrain, film: DVec3) -> 
 
 #[cfg(test)]
 mod tests {
-    use super::measure::CHECKS;
+    use super::wavelengths::CHECKS;
     use super::*;
     use crate::train::{Focus, LensFile};
 

@@ -22,12 +22,12 @@ fn grid(at: &MonochromaticTrain) -> u32 {
 
 /// A rectangle of slopes x/−z, y/−z.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Window {
+pub struct SlopeWindow {
     pub(crate) min: DVec2,
     pub(crate) max: DVec2,
 }
 
-impl Window {
+impl SlopeWindow {
     fn around(centre: DVec2, half: DVec2) -> Self {
         Self { min: centre - half, max: centre + half }
     }

@@ -5,12 +5,23 @@
 //! bound around these is held against random rays of all others, and widened where one passes outside of it.
 
 use super::ExitPupil;
-use super::measure::{CHECKS, Stray};
 use crate::element::Part;
 use crate::train::{MonochromaticTrain, OpticalTrain};
 
 /// The most wavelengths at which a lens of glass is measured.
 const MEASURED: usize = 5;
+
+/// Random rays of a round of the closing check.
+pub(super) const CHECKS: u32 = 1 << 16;
+
+/// A ray that passes outside of the bound.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stray {
+    pub(super) nodes: [(usize, f64); 4],
+    pub(super) turn: f64,
+    /// In its frame.
+    pub(super) radius: f64,
+}
 
 /// The lenses at which outlines are measured, and all others, each in the order in which they were given.
 pub(super) struct Divided {

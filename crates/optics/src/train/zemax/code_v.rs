@@ -28,7 +28,7 @@ const NOT_TAKEN: [&str; 24] = [
 
 /// Surface as it is read, before it becomes rows.
 #[derive(Debug, Default)]
-struct Surface {
+struct CodeVSurface {
     row: SheetRow,
     line: usize,
     decentre: [f64; 2],
@@ -41,12 +41,12 @@ struct Surface {
 }
 
 /// One command with its place.
-struct Command<'a> {
+struct CodeVCommand<'a> {
     line: usize,
     words: Vec<&'a str>,
 }
 
-impl Command<'_> {
+impl CodeVCommand<'_> {
     fn error(&self, why: impl std::fmt::Display) -> ZemaxError {
         ZemaxError::new(self.line, format!("{}: {why}", self.words[0]))
     }
@@ -68,8 +68,8 @@ impl Command<'_> {
 }
 
 /// The commands of a text: lines taken apart and put together.
-fn commands(text: &str) -> Vec<Command<'_>> {
-    let mut found: Vec<Command<'_>> = Vec::new();
+fn commands(text: &str) -> Vec<CodeVCommand<'_>> {
+    let mut found: Vec<CodeVCommand<'_>> = Vec::new();
     let mut goes_on = false;
     for (number, line) in text.lines().enumerate().map(|(i, line)| (i + 1, line)) {
         let line = line.split('!').next().unwrap_or_default().trim();
@@ -81,7 +81,7 @@ fn commands(text: &str) -> Vec<Command<'_>> {
                 _ => {
                     let words: Vec<&str> = words.collect();
                     if !words.is_empty() {
-                        found.push(Command { line: number, words });
+                        found.push(CodeVCommand { line: number, words });
                     }
                 }
             }
@@ -96,7 +96,7 @@ impl ZemaxSheet {
     pub(super) fn read_code_v(text: &str) -> Result<Self, ZemaxError> {
         let mut sheet = Self { format: LensFormat::CodeV, ..Self::default() };
         (sheet.unit, sheet.configurations, sheet.configuration) = (1.0, 1, 1);
-        let mut surface: Option<Surface> = None;
+        let mut surface: Option<CodeVSurface> = None;
         let (mut by_radius, mut is_whole) = (true, false);
         let mut in_catalogue = false;
         for command in commands(text) {
@@ -151,8 +151,8 @@ impl ZemaxSheet {
         Ok(sheet)
     }
 
-    /// Reads a command of the whole system; false if it is not understood.
-    fn header(&mut self, word: &str, command: &Command<'_>) -> Result<bool, ZemaxError> {
+    /// Whether a command of the whole system is understood.
+    fn header(&mut self, word: &str, command: &CodeVCommand<'_>) -> Result<bool, ZemaxError> {
         let aperture = |value: f64, aperture: fn(f64) -> Aperture| {
             let why = || command.error(format!("{value} must be positive"));
             (value > 0.0).then(|| aperture(value)).ok_or_else(why)
@@ -206,7 +206,7 @@ impl ZemaxSheet {
 }
 
 /// A surface by `S radius thickness glass`.
-fn begin(command: &Command<'_>, by_radius: bool) -> Result<Surface, ZemaxError> {
+fn begin(command: &CodeVCommand<'_>, by_radius: bool) -> Result<CodeVSurface, ZemaxError> {
     let number = |i: usize| match command.words.get(i) {
         None => Ok(0.0),
         // Values that are solved for stand with their number elsewhere.
@@ -219,7 +219,7 @@ fn begin(command: &Command<'_>, by_radius: bool) -> Result<Surface, ZemaxError> 
         (true, radius) => 1.0 / radius,
         (false, curvature) => curvature,
     };
-    let mut surface = Surface { line: command.line, ..Surface::default() };
+    let mut surface = CodeVSurface { line: command.line, ..CodeVSurface::default() };
     surface.row.line = command.line;
     surface.row.curvature = curvature;
     surface.row.thickness = if thickness >= INFINITE { f64::INFINITY } else { thickness };
@@ -233,7 +233,7 @@ fn begin(command: &Command<'_>, by_radius: bool) -> Result<Surface, ZemaxError> 
 }
 
 /// `NBK7_SCHOTT`, `'BSM24'`, `517000.642000` or `1.517:64.2`.
-fn glass(command: &Command<'_>, word: &str) -> Result<SheetGlass, ZemaxError> {
+fn glass(command: &CodeVCommand<'_>, word: &str) -> Result<SheetGlass, ZemaxError> {
     let word = word.trim_matches(['\'', '"']);
     let line = command.line;
     let model = |nd: f64, vd: f64| SheetGlass::model(line, word, nd, vd);
@@ -270,9 +270,9 @@ pub(super) fn hyphened(name: &str, makers: &[&str]) -> String {
     }
 }
 
-impl Surface {
-    /// Reads a command of a surface; false if it is not understood.
-    fn read(&mut self, word: &str, command: &Command<'_>) -> Result<bool, ZemaxError> {
+impl CodeVSurface {
+    /// Whether a command of a surface is understood.
+    fn read(&mut self, word: &str, command: &CodeVCommand<'_>) -> Result<bool, ZemaxError> {
         if NOT_TAKEN.contains(&word) {
             return Err(command.error(
                 "has no counterpart here; known of surfaces: SPH, CON, ASP, K, A to J, STO, CIR, REX, REY, ELX, ELY, ADX, ADY, \

@@ -5,11 +5,14 @@
 //! |---|---|
 //! | `sheet`, `row` | lines to the lens data sheet, and to its rows |
 //! | `parts` | a row to what it is |
-//! | `configuration` | the values of one position of a zoom lens; field points to field angles; coordinate breaks to tilts and decentrings; bytes to lines: UTF-8 and UTF-16 |
+//! | `line` | bytes to text, UTF-8 or UTF-16, and a line to its command and values |
+//! | `configuration` | the values of one position of a zoom lens |
+//! | `fields` | field points to field angles |
+//! | `axes` | coordinate breaks to tilts and decentrings |
 //! | `format` | which program a file is of, and what its users call things |
 //! | `code_v` | lines of CODE V's files to the same rows |
 //! | `oslo`, `oslo_statement`, `oslo_surface` | OSLO's files, their statements, and what those say of one surface |
-//! | `optiland`, `optiland_system`, `python_json` | surfaces of optiland's JSON, what it says of the whole, and its numbers |
+//! | `optiland`, `optiland_system` | surfaces of optiland's JSON, what it says of the whole, and its numbers |
 //! | `stop` | the stop's opening |
 //! | `pbrt`, `iset` | tables of pbrt's realistic camera, and ISET's JSON, which has the same |
 //! | `photons_to_photos` | tables of `PhotonsToPhotos`' Optical Bench |
@@ -24,10 +27,13 @@
 //! The format has no public specification. What the lines mean is taken from files in the wild and
 //! from OpticStudio's knowledge base ("Rotation Matrix and Tilt About X/Y/Z in OpticStudio", 2021).
 
+mod axes;
 mod code_v;
 mod configuration;
+mod fields;
 mod format;
 mod iset;
+mod line;
 mod optiland;
 mod optiland_system;
 mod oslo;
@@ -36,7 +42,6 @@ mod oslo_surface;
 mod parts;
 mod pbrt;
 mod photons_to_photos;
-mod python_json;
 mod row;
 mod sheet;
 mod stop;
@@ -49,7 +54,7 @@ use glam::DVec3;
 use super::{Isometry, LensFile, OpticalTrain, SensorMount};
 use crate::element::{ApertureSpec, ElementSpec, PartSpec};
 use crate::glass::{AgfCatalogue, GlassSpec, Makers};
-use configuration::{Axes, Break};
+use axes::{Axes, Break};
 use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
 pub use format::LensFormat;
 use row::{SheetGlass, SheetRow, SurfaceShape};
@@ -106,7 +111,7 @@ impl ZemaxLens {
         configuration: Option<usize>,
         glasses: &[AgfCatalogue],
     ) -> Result<Self, ZemaxError> {
-        let text = configuration::decode(bytes)?;
+        let text = line::decode(bytes)?;
         // The lines of the file, and the elements that they describe.
         let mut sheet = match format {
             LensFormat::Zemax => ZemaxSheet::read(&text)?,
@@ -240,7 +245,7 @@ impl Importer<'_> {
         let mut axes = Axes::default();
         let mut medium_is_air = true;
         let mut first_z = None;
-        let mut way = Way { space: Isometry::ONE, sense: 1.0, last_z: None, run: None };
+        let mut way = LightWay { space: Isometry::ONE, sense: 1.0, last_z: None, run: None };
         for (i, row) in inner.iter().enumerate() {
             if row.shape == SurfaceShape::CoordinateBreak {
                 let by = row.coordinate_break(unit);
@@ -300,7 +305,7 @@ impl Importer<'_> {
 
     /// Goes on behind a mirror that stands as `here` in the unfolded space before it, where the file's axes go on
     /// as `turned`: the axis is folded where that is what the mirror's vertex does to it.
-    fn fold(&mut self, here: &Axes, turned: &Axes, way: &mut Way) {
+    fn fold(&mut self, here: &Axes, turned: &Axes, way: &mut LightWay) {
         way.sense = -way.sense;
         let normal = here.axis();
         let leaves = way.space.direction(turned.axis()) * way.sense;
@@ -362,7 +367,7 @@ impl Importer<'_> {
         })
     }
 
-    fn place(&mut self, part: PartSpec, row: &SheetRow, here: &Axes, way: &mut Way) {
+    fn place(&mut self, part: PartSpec, row: &SheetRow, here: &Axes, way: &mut LightWay) {
         self.close_gap(here, way);
         let placed = here.placed();
         let mut element = ElementSpec::new(part, 0.0);
@@ -378,7 +383,7 @@ impl Importer<'_> {
         opening: ApertureSpec,
         decentre: [f64; 2],
         here: &Axes,
-        way: &mut Way,
+        way: &mut LightWay,
     ) {
         let moved = here.shifted(decentre);
         self.close_gap(&moved, way);
@@ -390,7 +395,7 @@ impl Importer<'_> {
     }
 
     /// Ends the gap behind the last element where `here` stands.
-    fn close_gap(&mut self, here: &Axes, way: &mut Way) {
+    fn close_gap(&mut self, here: &Axes, way: &mut LightWay) {
         let z = here.placed().z;
         if let (Some(last), Some(before)) = (self.elements.last_mut(), way.last_z) {
             let along = way.run.filter(|_| here.axis() == DVec3::Z);
@@ -402,7 +407,7 @@ impl Importer<'_> {
 }
 
 /// The way of light so far.
-struct Way {
+struct LightWay {
     /// From the file's space to the unfolded one.
     space: Isometry,
     /// −1 where light runs against the file's axis.

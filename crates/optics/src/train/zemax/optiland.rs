@@ -15,11 +15,11 @@ use glam::{DMat3, DVec3};
 use serde_json::Value;
 
 use super::ZemaxError;
-use super::configuration::Axes;
+use super::axes::Axes;
 use super::format::LensFormat;
+use super::optiland_system::{as_json, finite, list, number};
 use super::optiland_system::{put_aperture, put_fields, put_wavelengths};
 use super::oslo::add_placed;
-use super::python_json::{as_json, finite, list, number};
 use super::row::{Parameter, SheetGlass, SheetOpening, SheetRow, SurfaceShape};
 use super::sheet::ZemaxSheet;
 use crate::analysis::ZernikeOrder;

@@ -11,7 +11,7 @@
 use std::collections::BTreeMap;
 
 use super::ZemaxError;
-use super::configuration::{Axes, Break};
+use super::axes::{Axes, Break};
 use super::format::LensFormat;
 use super::oslo_statement::{Statement, statements};
 use super::oslo_surface::{INFINITE, OsloSurface};
@@ -35,7 +35,7 @@ const NOT_TAKEN: [&str; 22] = [
 ];
 
 /// A file on its way to a sheet.
-struct Reader {
+struct OsloReader {
     surfaces: Vec<OsloSurface>,
     /// Number of surfaces behind the object, as `LEN` says.
     declared: Option<usize>,
@@ -50,13 +50,13 @@ struct Reader {
     points: Vec<[f64; 2]>,
     /// Thicknesses by configuration and surface.
     thicknesses: BTreeMap<(usize, usize), f64>,
-    table: Table,
+    table: OsloTable,
     is_whole: bool,
 }
 
 /// Table that statements behind the last surface belong to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Table {
+enum OsloTable {
     None,
     Configurations,
     Fields,
@@ -67,7 +67,7 @@ impl ZemaxSheet {
     /// Reads the text of a `.len` file at a configuration, from 1; the first without.
     pub(super) fn read_oslo(text: &str, configuration: Option<usize>) -> Result<Self, ZemaxError> {
         let mut sheet = Self::of_camera(LensFormat::Oslo);
-        let mut reader = Reader {
+        let mut reader = OsloReader {
             surfaces: Vec::new(),
             declared: None,
             pickups: Vec::new(),
@@ -77,7 +77,7 @@ impl ZemaxSheet {
             field: None,
             points: Vec::new(),
             thicknesses: BTreeMap::new(),
-            table: Table::None,
+            table: OsloTable::None,
             is_whole: false,
         };
         for statement in statements(text)? {
@@ -97,7 +97,7 @@ impl ZemaxSheet {
     }
 }
 
-impl Reader {
+impl OsloReader {
     fn read(&mut self, statement: Statement, sheet: &mut ZemaxSheet) -> Result<(), ZemaxError> {
         let word = statement.word().to_owned();
         if word == "LEN" {
@@ -186,12 +186,12 @@ impl Reader {
     fn read_footer(&mut self, statement: Statement) -> Result<(), ZemaxError> {
         let is_new = statement.text(1).is_some_and(|word| word.eq_ignore_ascii_case("NEW"));
         match (statement.word(), self.table) {
-            (_, Table::Ignored) => {}
-            ("CFG", _) if is_new => self.table = Table::Configurations,
-            ("RST", _) if is_new => self.table = Table::Fields,
-            ("LEN", _) => self.table = Table::Ignored,
-            ("END", _) => self.table = Table::None,
-            ("TH", Table::Configurations) => {
+            (_, OsloTable::Ignored) => {}
+            ("CFG", _) if is_new => self.table = OsloTable::Configurations,
+            ("RST", _) if is_new => self.table = OsloTable::Fields,
+            ("LEN", _) => self.table = OsloTable::Ignored,
+            ("END", _) => self.table = OsloTable::None,
+            ("TH", OsloTable::Configurations) => {
                 let (surface, configuration) = (statement.index(1)?, statement.index(2)?);
                 if surface >= self.surfaces.len()
                     || !(1..=MOST_CONFIGURATIONS).contains(&configuration)
@@ -202,14 +202,16 @@ impl Reader {
                 }
                 self.thicknesses.insert((configuration, surface), statement.number(3)?);
             }
-            (_, Table::Configurations) => {
+            (_, OsloTable::Configurations) => {
                 return Err(statement.error(
                     "what a configuration changes here has no counterpart; known: TH. Take the line out, or save the lens \
                      at that configuration",
                 ));
             }
-            ("F", Table::Fields) => self.points.push([statement.number(3)?, statement.number(2)?]),
-            (_, Table::Fields | Table::None) => {}
+            ("F", OsloTable::Fields) => {
+                self.points.push([statement.number(3)?, statement.number(2)?]);
+            }
+            (_, OsloTable::Fields | OsloTable::None) => {}
         }
         Ok(())
     }

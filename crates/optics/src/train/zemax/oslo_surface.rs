@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DVec3};
 
 use super::ZemaxError;
-use super::configuration::Axes;
+use super::axes::Axes;
 use super::iset::glass_through;
 use super::oslo_statement::Statement;
 use super::row::{Parameter, SheetGlass, SheetRow, SurfaceShape};

@@ -29,12 +29,12 @@ const SAME_INDEX: f64 = 1e-3;
 const LINES: [f64; 3] = [0.587_56, 0.486_13, 0.656_27];
 
 /// A row of cells with its line.
-struct Cells<'a> {
+struct TableRow<'a> {
     line: usize,
     cells: Vec<&'a str>,
 }
 
-impl Cells<'_> {
+impl TableRow<'_> {
     fn error(&self, why: impl Into<String>) -> ZemaxError {
         ZemaxError::new(self.line, why)
     }
@@ -47,12 +47,12 @@ impl Cells<'_> {
 
 /// A file taken apart.
 #[derive(Default)]
-struct Table<'a> {
+struct OpticalBenchTable<'a> {
     title: String,
-    constants: Vec<Cells<'a>>,
-    variables: BTreeMap<String, Cells<'a>>,
-    surfaces: Vec<Cells<'a>>,
-    aspheres: Vec<Cells<'a>>,
+    constants: Vec<TableRow<'a>>,
+    variables: BTreeMap<String, TableRow<'a>>,
+    surfaces: Vec<TableRow<'a>>,
+    aspheres: Vec<TableRow<'a>>,
     /// Configurations, from 1.
     count: usize,
     /// The one that is taken, from 0.
@@ -66,7 +66,7 @@ impl ZemaxSheet {
         configuration: Option<usize>,
     ) -> Result<Self, ZemaxError> {
         let mut sheet = Self::of_camera(LensFormat::PhotonsToPhotos);
-        let mut table = Table::read(text, &mut sheet)?;
+        let mut table = OpticalBenchTable::read(text, &mut sheet)?;
         // What is beyond them is told by who chooses.
         let chosen = configuration.filter(|chosen| (1..=table.count).contains(chosen));
         table.taken = chosen.unwrap_or(1) - 1;
@@ -86,7 +86,7 @@ impl ZemaxSheet {
     }
 }
 
-impl<'a> Table<'a> {
+impl<'a> OpticalBenchTable<'a> {
     fn read(text: &'a str, sheet: &mut ZemaxSheet) -> Result<Self, ZemaxError> {
         let mut table = Self { count: 1, ..Self::default() };
         let mut section = String::new();
@@ -100,7 +100,7 @@ impl<'a> Table<'a> {
                 section = written.trim().to_ascii_lowercase();
                 continue;
             }
-            let cells = Cells { line, cells: written.split('\t').map(str::trim).collect() };
+            let cells = TableRow { line, cells: written.split('\t').map(str::trim).collect() };
             let key = cells.cell(0).unwrap_or_default().to_owned();
             match section.as_str() {
                 "[descriptive data]" => {
@@ -156,7 +156,12 @@ impl<'a> Table<'a> {
     }
 
     /// A length in a cell, or of the variable that it names.
-    fn length(&self, cells: &Cells<'_>, i: usize, what: &str) -> Result<Option<f64>, ZemaxError> {
+    fn length(
+        &self,
+        cells: &TableRow<'_>,
+        i: usize,
+        what: &str,
+    ) -> Result<Option<f64>, ZemaxError> {
         let Some(word) = cells.cell(i) else { return Ok(None) };
         match number(word) {
             Some(value) => Ok(Some(value)),
@@ -174,7 +179,11 @@ impl<'a> Table<'a> {
         Ok(self.variable("d0")?.unwrap_or(f64::INFINITY))
     }
 
-    fn surface(&self, cells: &Cells<'_>, sheet: &mut ZemaxSheet) -> Result<SheetRow, ZemaxError> {
+    fn surface(
+        &self,
+        cells: &TableRow<'_>,
+        sheet: &mut ZemaxSheet,
+    ) -> Result<SheetRow, ZemaxError> {
         let word = cells.cell(1).ok_or_else(|| cells.error("a radius is missing"))?;
         let is_plane = ["AS", "FS", "CG"].iter().any(|plane| word.eq_ignore_ascii_case(plane));
         let curvature = match (is_plane, number(word)) {
@@ -211,7 +220,7 @@ impl<'a> Table<'a> {
     /// By nd and Abbe number, or the named glass that has this nd.
     fn glass(
         &self,
-        cells: &Cells<'_>,
+        cells: &TableRow<'_>,
         sheet: &mut ZemaxSheet,
     ) -> Result<Option<SheetGlass>, ZemaxError> {
         let Some(nd) = self.length(cells, 3, "nd")?.filter(|nd| *nd != 1.0) else {
@@ -315,7 +324,7 @@ impl<'a> Table<'a> {
         for (name, cells) in &self.variables {
             let is_known =
                 ["Focal Length", "Angle of View", "F-Number", "d0"].contains(&name.as_str());
-            let is_named = |surface: &Cells<'_>| {
+            let is_named = |surface: &TableRow<'_>| {
                 surface.cells.iter().any(|cell| cell.eq_ignore_ascii_case(name))
             };
             if !is_known && !self.surfaces.iter().any(is_named) {
@@ -339,7 +348,7 @@ fn power(k: usize, odd: usize, first: usize) -> usize {
 /// Puts coefficients by power of r.
 fn shape(
     row: &mut SheetRow,
-    cells: &Cells<'_>,
+    cells: &TableRow<'_>,
     coefficients: &BTreeMap<usize, f64>,
 ) -> Result<(), ZemaxError> {
     let line = cells.line;

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::ZemaxError;
-use super::configuration::Break;
-use super::sheet::SheetLine;
+use super::axes::Break;
+use super::line::SheetLine;
 use crate::element::FreeformSpec;
 use crate::glass::GlassSpec;
 

@@ -6,8 +6,9 @@
 use std::collections::BTreeMap;
 
 use super::ZemaxError;
-use super::configuration::{ConfigurationValue, Fields};
+use super::fields::Fields;
 use super::format::LensFormat;
+use super::line::{ConfigurationValue, SheetLine};
 use super::row::{Parameter, SheetRow};
 
 /// The most surfaces.
@@ -62,49 +63,6 @@ pub(super) enum Aperture {
 pub(super) struct Ignored {
     first: usize,
     times: usize,
-}
-
-/// One line, taken apart.
-pub(super) struct SheetLine<'a> {
-    pub(super) number: usize,
-    pub(super) command: &'a str,
-    pub(super) rest: &'a str,
-}
-
-impl SheetLine<'_> {
-    pub(super) fn error(&self, why: impl std::fmt::Display) -> ZemaxError {
-        ZemaxError::new(self.number, format!("{}: {why}", self.command))
-    }
-
-    pub(super) fn word(&self, i: usize) -> Option<&str> {
-        self.rest.split_whitespace().nth(i)
-    }
-
-    pub(super) fn number(&self, i: usize) -> Result<f64, ZemaxError> {
-        let word = self.word(i).ok_or_else(|| self.error("a number is missing"))?;
-        self.parse(word)
-    }
-
-    /// The number at `i`, or `absent`.
-    pub(super) fn number_or(&self, i: usize, absent: f64) -> Result<f64, ZemaxError> {
-        self.word(i).map_or(Ok(absent), |word| self.parse(word))
-    }
-
-    fn parse(&self, word: &str) -> Result<f64, ZemaxError> {
-        word.parse::<f64>()
-            .ok()
-            .filter(|number| number.is_finite())
-            .ok_or_else(|| self.error(format!("`{word}` is not a number")))
-    }
-
-    fn numbers(&self) -> Result<Vec<f64>, ZemaxError> {
-        self.rest.split_whitespace().map(|word| self.parse(word)).collect()
-    }
-
-    pub(super) fn index(&self, i: usize) -> Result<usize, ZemaxError> {
-        let word = self.word(i).ok_or_else(|| self.error("a whole number is missing"))?;
-        word.parse().map_err(|_| self.error(format!("`{word}` is not a whole number")))
-    }
 }
 
 impl ZemaxSheet {

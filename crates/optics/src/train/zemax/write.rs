@@ -12,12 +12,12 @@ use etendue_geometry::units::Millimetres;
 
 /// The lines of one surface.
 #[derive(Default)]
-struct Row {
+struct SurfaceLines {
     lines: Vec<String>,
     thickness: f64,
 }
 
-impl Row {
+impl SurfaceLines {
     fn new(kind: &str) -> Self {
         Self { lines: vec![format!("TYPE {kind}")], thickness: 0.0 }
     }
@@ -88,8 +88,9 @@ impl LensFile {
         if !makers.is_empty() {
             let _ = writeln!(text, "GCAT {}", makers.join(" "));
         }
-        let object = Row { lines: vec!["TYPE STANDARD".to_owned()], thickness: f64::INFINITY };
-        let mut image = vec![Row::new("STANDARD")];
+        let object =
+            SurfaceLines { lines: vec!["TYPE STANDARD".to_owned()], thickness: f64::INFINITY };
+        let mut image = vec![SurfaceLines::new("STANDARD")];
         if let Some(sensor) = self.sensor {
             let mount = crate::element::Mount {
                 tilt: sensor.tilt,
@@ -167,8 +168,8 @@ impl LensFile {
 }
 
 /// A break to where an element stands, or, with −1, back.
-fn coordinate_break(mount: &crate::element::Mount, sense: f64) -> Row {
-    let mut row = Row::new("COORDBRK");
+fn coordinate_break(mount: &crate::element::Mount, sense: f64) -> SurfaceLines {
+    let mut row = SurfaceLines::new("COORDBRK");
     let values = [mount.decentre[0].0, mount.decentre[1].0, mount.tilt[0].0, mount.tilt[1].0];
     for (i, value) in values.into_iter().enumerate().filter(|(_, value)| *value != 0.0) {
         row.parameter(i + 1, sense * value);
@@ -184,7 +185,7 @@ fn coordinate_break(mount: &crate::element::Mount, sense: f64) -> Row {
 fn axis_break(
     broken: &crate::element::CoordinateBreakSpec,
     mount: &crate::element::Mount,
-) -> Result<Row, String> {
+) -> Result<SurfaceLines, String> {
     if broken.return_to.is_some() {
         return Err(
             "return_to is not written; write the turns and decentres of the way back".to_owned()
@@ -202,7 +203,7 @@ fn axis_break(
 }
 
 /// Adds the row of an element with the breaks that it takes.
-fn placed(element: &ElementSpec, mut row: Row, rows: &mut Vec<Row>) {
+fn placed(element: &ElementSpec, mut row: SurfaceLines, rows: &mut Vec<SurfaceLines>) {
     let mount = &element.mount;
     let is_moved = mount.tilt.iter().any(|angle| angle.0 != 0.0)
         || mount.decentre.iter().any(|length| length.0 != 0.0);
@@ -219,12 +220,12 @@ fn placed(element: &ElementSpec, mut row: Row, rows: &mut Vec<Row>) {
     if folds {
         // About y first and then about x, as the reflection of the way there; and back across.
         let turn = |axis: usize| {
-            let mut row = Row::new("COORDBRK");
+            let mut row = SurfaceLines::new("COORDBRK");
             row.parameter(axis + 3, mount.tilt[axis].0);
             row
         };
         rows.extend([turn(1), turn(0)]);
-        let mut back = Row::new("COORDBRK");
+        let mut back = SurfaceLines::new("COORDBRK");
         for (i, length) in mount.decentre.iter().enumerate().filter(|(_, length)| length.0 != 0.0) {
             back.parameter(i + 1, -length.0);
         }
@@ -238,10 +239,10 @@ fn placed(element: &ElementSpec, mut row: Row, rows: &mut Vec<Row>) {
 }
 
 /// The row of an element between media.
-fn surface(element: &ElementSpec, before: Option<&GlassSpec>) -> Result<Row, String> {
+fn surface(element: &ElementSpec, before: Option<&GlassSpec>) -> Result<SurfaceLines, String> {
     let none =
         |what: &str| Err(format!("Zemax files have no counterpart for {what}; leave it out"));
-    let rim = |row: &mut Row, radius: Option<f64>| {
+    let rim = |row: &mut SurfaceLines, radius: Option<f64>| {
         if let Some(radius) = radius {
             row.push(format!("DIAM {radius:e} 1 0 0 1 \"\""));
         }
@@ -269,7 +270,7 @@ fn surface(element: &ElementSpec, before: Option<&GlassSpec>) -> Result<Row, Str
         }
         PartSpec::Mirror(_) => return none("what a mirror reflects"),
         PartSpec::Biconic(spec) => {
-            let mut row = Row::new("BICONICX");
+            let mut row = SurfaceLines::new("BICONICX");
             row.curved(bend(spec.radius, None), spec.conic);
             row.parameter(1, spec.radius_x.map_or(0.0, |radius| radius.0));
             row.parameter(2, spec.conic_x);
@@ -277,7 +278,7 @@ fn surface(element: &ElementSpec, before: Option<&GlassSpec>) -> Result<Row, Str
             row
         }
         PartSpec::ThinLens(spec) => {
-            let mut row = Row::new("PARAXIAL");
+            let mut row = SurfaceLines::new("PARAXIAL");
             row.parameter(1, spec.focal_length.0);
             rim(&mut row, length(spec.semi_diameter));
             row
@@ -312,15 +313,15 @@ fn surface(element: &ElementSpec, before: Option<&GlassSpec>) -> Result<Row, Str
 }
 
 /// A plane in air with an opening, or with what is in the way.
-fn opening(spec: &ApertureSpec) -> Result<Row, String> {
-    let mut row = Row::new("STANDARD");
+fn opening(spec: &ApertureSpec) -> Result<SurfaceLines, String> {
+    let mut row = SurfaceLines::new("STANDARD");
     row.curved(0.0, 0.0);
     let turned = || {
         Err("Zemax files have no counterpart for an aperture that is turned; leave rotation out, or save the lens as \
              .json"
             .to_owned())
     };
-    let half_widths = |row: &mut Row, command: &str, spec: &BoxSpec| {
+    let half_widths = |row: &mut SurfaceLines, command: &str, spec: &BoxSpec| {
         row.push(format!("{command} {:e} {:e} 0", 0.5 * spec.width.0, 0.5 * spec.height.0));
     };
     // Without an end, as OpticStudio has it.
@@ -373,11 +374,11 @@ fn named(glass: &GlassSpec) -> Result<String, String> {
 }
 
 /// Powers of r by the type that has them.
-fn even(terms: &std::collections::BTreeMap<String, f64>) -> Result<Row, String> {
+fn even(terms: &std::collections::BTreeMap<String, f64>) -> Result<SurfaceLines, String> {
     let powers = powers(terms)?;
     let highest = powers.iter().map(|(power, _)| *power).max().unwrap_or(0);
     if highest > 16 {
-        let mut row = Row::new("XASPHERE");
+        let mut row = SurfaceLines::new("XASPHERE");
         let mut values = vec![0.0; highest / 2];
         for (power, value) in powers {
             values[power / 2 - 1] = value;
@@ -385,7 +386,7 @@ fn even(terms: &std::collections::BTreeMap<String, f64>) -> Result<Row, String> 
         row.data(1.0, &values);
         return Ok(row);
     }
-    let mut row = Row::new(if powers.is_empty() { "STANDARD" } else { "EVENASPH" });
+    let mut row = SurfaceLines::new(if powers.is_empty() { "STANDARD" } else { "EVENASPH" });
     for (power, value) in powers {
         row.parameter(power / 2, value);
     }
@@ -400,14 +401,14 @@ fn powers(terms: &std::collections::BTreeMap<String, f64>) -> Result<Vec<(usize,
     terms.collect()
 }
 
-fn freeform(spec: &FreeformSpec) -> Result<Row, String> {
+fn freeform(spec: &FreeformSpec) -> Result<SurfaceLines, String> {
     let none =
         |what: &str| Err(format!("Zemax files have no counterpart for {what}; leave it out"));
     if spec.reflectance.is_some() || spec.hole.0 != 0.0 {
         return none("the hole or reflectance of a freeform mirror");
     }
     let powers = powers(&spec.aspheric)?;
-    let evens = |row: &mut Row| {
+    let evens = |row: &mut SurfaceLines| {
         for (power, value) in &powers {
             if power % 2 == 1 || *power > 16 {
                 return Err(format!(
@@ -421,12 +422,12 @@ fn freeform(spec: &FreeformSpec) -> Result<Row, String> {
     let plain = spec.phase.is_none() && !spec.fresnel && spec.rotation_radius.is_none();
     let mut row = match (&spec.sag[..], &spec.phase) {
         ([], None) if spec.fresnel && spec.rotation_radius.is_none() => {
-            let mut row = Row::new("FRESNELS");
+            let mut row = SurfaceLines::new("FRESNELS");
             evens(&mut row)?;
             row
         }
         ([], None) if plain => {
-            let mut row = Row::new("ODDASPHE");
+            let mut row = SurfaceLines::new("ODDASPHE");
             for (power, value) in &powers {
                 if *power > 8 {
                     return none("powers of r beyond 8 with odd ones among them");
@@ -436,7 +437,7 @@ fn freeform(spec: &FreeformSpec) -> Result<Row, String> {
             row
         }
         ([], None) if !spec.fresnel => {
-            let mut row = Row::new("TOROIDAL");
+            let mut row = SurfaceLines::new("TOROIDAL");
             row.parameter(1, spec.rotation_radius.map_or(0.0, |radius| radius.0));
             for (power, value) in &powers {
                 if power % 2 == 1 || *power > 14 {
@@ -447,7 +448,7 @@ fn freeform(spec: &FreeformSpec) -> Result<Row, String> {
             row
         }
         ([SagSpec::Zernike { radius, order, coefficients }], None) if plain => {
-            let mut row = Row::new(match order {
+            let mut row = SurfaceLines::new(match order {
                 ZernikeOrder::Fringe => "FZERNSAG",
                 ZernikeOrder::Noll => "SZERNSAG",
             });
@@ -474,12 +475,12 @@ fn freeform(spec: &FreeformSpec) -> Result<Row, String> {
         _ => return none("what is added to this surface, or these together"),
     };
     if row.lines.is_empty() {
-        row = Row::new("STANDARD");
+        row = SurfaceLines::new("STANDARD");
     }
     Ok(row)
 }
 
-fn diffracting(phase: &PhaseSpec) -> Result<Row, String> {
+fn diffracting(phase: &PhaseSpec) -> Result<SurfaceLines, String> {
     let none =
         |what: &str| Err(format!("Zemax files have no counterpart for {what}; leave it out"));
     if phase.blaze_wavelength.is_some() || phase.design_wavelength.is_some() {
@@ -488,13 +489,13 @@ fn diffracting(phase: &PhaseSpec) -> Result<Row, String> {
     let order = f64::from(phase.order.unwrap_or(1));
     match &phase.pattern {
         PatternSpec::Grating { period, rotation: 0.0 } => {
-            let mut row = Row::new("DGRATING");
+            let mut row = SurfaceLines::new("DGRATING");
             row.parameter(1, 1e-3 / period.0);
             row.parameter(2, order);
             Ok(row)
         }
         PatternSpec::Radial { radius, coefficients } => {
-            let mut row = Row::new("BINARY_2");
+            let mut row = SurfaceLines::new("BINARY_2");
             row.parameter(0, order);
             row.data(radius.0, coefficients);
             Ok(row)

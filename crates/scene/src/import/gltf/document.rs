@@ -7,7 +7,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
-use crate::file::{Document as JsonText, JsonFault, Place, read_value};
+use crate::file::{JsonDocument as JsonText, JsonFault, Place, read_value};
 use crate::import::Refusal;
 use crate::import::error::wrong_text;
 use crate::words::kind_of;

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use crate::import::single;
-use crate::import::text::{TextFault, Words, number, whole};
+use crate::import::text::{TextFault, WordReader, number, whole};
 use etendue_tracer::spec::BRIGHTEST;
 
 /// The index of a corner that has none.
@@ -93,7 +93,7 @@ impl Chunk {
     /// Reads `text`, which starts and ends with whole lines.
     pub(super) fn parse(text: &[u8], wish: WantedColumns) -> Result<Self, TextFault> {
         let mut chunk = Self::default();
-        let mut words = Words::new(text);
+        let mut words = WordReader::new(text);
         while !words.is_done() {
             let word = words.word();
             chunk.is_obj |= word.is_some_and(|word| STATEMENTS.contains(&word));
@@ -130,7 +130,7 @@ impl Chunk {
         Ok(chunk)
     }
 
-    fn vertex(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), TextFault> {
+    fn vertex(&mut self, words: &mut WordReader<'_>, wish: WantedColumns) -> Result<(), TextFault> {
         let position = floats::<3>(words, 3)?;
         self.positions.push(position);
         self.defined[V] += 1;
@@ -141,7 +141,7 @@ impl Chunk {
     }
 
     /// `v x y z r g b`; a fourth number alone is a weight, which only curves use.
-    fn vertex_color(&mut self, words: &mut Words<'_>) {
+    fn vertex_color(&mut self, words: &mut WordReader<'_>) {
         let mut color = [0.0; 3];
         for value in &mut color {
             let Some(number) = words.word().and_then(number) else { return };
@@ -152,7 +152,7 @@ impl Chunk {
         self.colors.push(color);
     }
 
-    fn uv(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), TextFault> {
+    fn uv(&mut self, words: &mut WordReader<'_>, wish: WantedColumns) -> Result<(), TextFault> {
         self.defined[VT] += 1;
         if wish.uvs {
             let [u, v] = floats::<2>(words, 1)?;
@@ -162,7 +162,7 @@ impl Chunk {
         Ok(())
     }
 
-    fn normal(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), TextFault> {
+    fn normal(&mut self, words: &mut WordReader<'_>, wish: WantedColumns) -> Result<(), TextFault> {
         self.defined[VN] += 1;
         if wish.normals {
             self.normals.push(floats::<3>(words, 3)?.map(single));
@@ -170,7 +170,7 @@ impl Chunk {
         Ok(())
     }
 
-    fn face(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), TextFault> {
+    fn face(&mut self, words: &mut WordReader<'_>, wish: WantedColumns) -> Result<(), TextFault> {
         let first = self.corners[V].len();
         while let Some(word) = words.word() {
             let at = words.at() - word.len();
@@ -247,7 +247,10 @@ impl Chunk {
 
 /// The next `N` numbers of the line, of which the first `needed` have to be there.
 #[inline]
-fn floats<const N: usize>(words: &mut Words<'_>, needed: usize) -> Result<[f64; N], TextFault> {
+fn floats<const N: usize>(
+    words: &mut WordReader<'_>,
+    needed: usize,
+) -> Result<[f64; N], TextFault> {
     let mut values = [0.0; N];
     for (i, value) in values.iter_mut().enumerate() {
         match words.word() {

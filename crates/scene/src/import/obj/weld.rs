@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::chunk::{Chunk, KINDS, NONE, Polygon, Segment, V, VN, VT};
 use crate::import::admit::MeshCandidate;
 use crate::import::files::Files;
-use crate::import::text::{TextFault, Words, whole};
+use crate::import::text::{TextFault, WordReader, whole};
 use crate::import::{Refusal, Strictness, polygon, precise_enough};
 use etendue_geometry::Vertices;
 use etendue_geometry::glam::DVec3;
@@ -310,7 +310,7 @@ pub(super) fn find_bad_index(
     let (bases, total) = bases(chunks);
     let (start, text) = pieces[chunk];
     let mut defined = bases[chunk];
-    let mut words = Words::new(text);
+    let mut words = WordReader::new(text);
     while !words.is_done() {
         match words.word() {
             Some(b"v") => defined[V] += 1,

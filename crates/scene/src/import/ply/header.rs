@@ -1,6 +1,6 @@
 //! The header: what elements follow, and how they are written.
 
-use crate::import::text::{TextFault, Words, whole, without_mark};
+use crate::import::text::{TextFault, WordReader, whole, without_mark};
 
 /// Encoding of the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,7 +48,7 @@ pub(super) struct RowElement {
 
 /// Header of the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Header {
+pub(super) struct PlyHeader {
     pub format: Format,
     pub elements: Vec<RowElement>,
     /// Offset at which the data starts (bytes).
@@ -99,7 +99,7 @@ impl RowElement {
 /// Bytes of a vertex with position, normal, texture coordinates and colour.
 const BYTES_PER_VERTEX: u64 = 3 * 8 + (3 + 2 + 4) * 4;
 
-impl Header {
+impl PlyHeader {
     /// Reads the header at the start of `file`. Its lines end as the first one does, by a newline,
     /// a carriage return, or both; lines of other words than the format's, which some programs
     /// write, are passed over.
@@ -129,7 +129,7 @@ impl Header {
         let mut lines = HeaderLines::new(file)?;
         let (mut format, mut elements, mut properties) = (None, Vec::new(), 0);
         while let Some((start, line)) = lines.next() {
-            let mut words = Words::new(line);
+            let mut words = WordReader::new(line);
             match words.word() {
                 Some(b"format") => format = Some(parse_format(&mut words, start)?),
                 Some(b"element") => elements.push(parse_element(&mut words, start)?),
@@ -209,7 +209,7 @@ impl<'a> HeaderLines<'a> {
     }
 }
 
-fn parse_format(words: &mut Words<'_>, start: usize) -> Result<Format, TextFault> {
+fn parse_format(words: &mut WordReader<'_>, start: usize) -> Result<Format, TextFault> {
     match words.word() {
         Some(b"ascii") => Ok(Format::Text),
         Some(b"binary_little_endian") => Ok(Format::Binary(Order::Little)),
@@ -221,7 +221,7 @@ fn parse_format(words: &mut Words<'_>, start: usize) -> Result<Format, TextFault
     }
 }
 
-fn parse_element(words: &mut Words<'_>, start: usize) -> Result<RowElement, TextFault> {
+fn parse_element(words: &mut WordReader<'_>, start: usize) -> Result<RowElement, TextFault> {
     let name = words.word();
     let count = words.word().and_then(whole).and_then(|count| usize::try_from(count).ok());
     match (name, count) {
@@ -234,7 +234,7 @@ fn parse_element(words: &mut Words<'_>, start: usize) -> Result<RowElement, Text
     }
 }
 
-fn parse_property(words: &mut Words<'_>, start: usize) -> Result<Property, TextFault> {
+fn parse_property(words: &mut WordReader<'_>, start: usize) -> Result<Property, TextFault> {
     let unknown = || TextFault::new(start, "a property needs a type and a name");
     let first = words.word().ok_or_else(unknown)?;
     let (list, kind) = if first == b"list" {

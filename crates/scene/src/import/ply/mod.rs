@@ -23,7 +23,7 @@ use super::admit::{self, MeshCandidate, cost};
 use super::files::Files;
 use super::text::TextFault;
 use super::{Import, ImportedPlacement, Options, Refusal, Wanted, error};
-use header::{Format, Header};
+use header::{Format, PlyHeader};
 
 /// Reads the PLY file at `path`.
 pub(super) fn import(
@@ -37,7 +37,7 @@ pub(super) fn import(
         super::refuse_other_kind(path, map.bytes(), "a PLY model")?;
     }
     let fault = |fault: TextFault| fault.locate(path, map.bytes());
-    let header = Header::parse(map.bytes()).map_err(fault)?;
+    let header = PlyHeader::parse(map.bytes()).map_err(fault)?;
     let damaged = |reason: String| error::damaged(path, "PLY data", reason);
     let bytes = header.bytes_to_make(map.bytes().len());
     files.take(bytes, || "vertices and faces".to_owned())?;

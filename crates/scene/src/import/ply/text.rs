@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::header::{Header, Order, Property, RowElement, Type};
+use super::header::{Order, PlyHeader, Property, RowElement, Type};
 use super::vertices::{Faces, Lists, VertexColumns, VertexData, VertexTable};
 use crate::import::Wanted;
-use crate::import::text::{TextFault, Words, number, pieces, with_newlines};
+use crate::import::text::{TextFault, WordReader, number, pieces, with_newlines};
 use etendue_files::MappedFile;
 use etendue_geometry::{Buffer, Vertices};
 
@@ -19,7 +19,7 @@ const PIECE: usize = 1 << 20;
 /// Reads vertices and faces.
 pub(super) fn read_text(
     map: &MappedFile,
-    header: &Header,
+    header: &PlyHeader,
     wanted: Wanted,
 ) -> Result<(VertexData, Faces), TextFault> {
     let text = with_newlines(&map.bytes()[header.data..]);
@@ -96,9 +96,9 @@ struct TextPiece {
 
 impl TextPiece {
     /// Reads `text`, whose first row is number `row` of the data.
-    fn parse(text: &[u8], header: &Header, row: usize) -> Result<Self, TextFault> {
+    fn parse(text: &[u8], header: &PlyHeader, row: usize) -> Result<Self, TextFault> {
         let mut part = Self::default();
-        let mut words = Words::new(text);
+        let mut words = WordReader::new(text);
         let mut corners = Vec::new();
         let (mut number_of_row, mut elements) = (row, header.elements.iter());
         let Some(mut element) = elements.next() else { return Ok(part) };
@@ -126,7 +126,11 @@ impl TextPiece {
         Ok(part)
     }
 
-    fn vertex(&mut self, words: &mut Words<'_>, element: &RowElement) -> Result<(), TextFault> {
+    fn vertex(
+        &mut self,
+        words: &mut WordReader<'_>,
+        element: &RowElement,
+    ) -> Result<(), TextFault> {
         for property in &element.properties {
             if property.list.is_some() {
                 let reason = "vertices with lists are not supported; export without them";
@@ -140,7 +144,7 @@ impl TextPiece {
 
 /// The list `column` of a face.
 fn face(
-    words: &mut Words<'_>,
+    words: &mut WordReader<'_>,
     element: &RowElement,
     column: usize,
     corners: &mut Vec<u32>,
@@ -162,7 +166,7 @@ fn face(
     Ok(())
 }
 
-fn next_number(words: &mut Words<'_>) -> Result<f64, TextFault> {
+fn next_number(words: &mut WordReader<'_>) -> Result<f64, TextFault> {
     let Some(word) = words.word() else {
         return Err(TextFault::new(words.at(), "the row has too few numbers"));
     };
@@ -174,7 +178,7 @@ fn next_number(words: &mut Words<'_>) -> Result<f64, TextFault> {
 
 /// A whole number; below zero as its two's complement, as the strips' −1.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be whole")]
-fn next_index(words: &mut Words<'_>) -> Result<u32, TextFault> {
+fn next_index(words: &mut WordReader<'_>) -> Result<u32, TextFault> {
     let start = words.at();
     let value = next_number(words)?;
     if value.fract() == 0.0 && value >= -1.0 && value <= f64::from(u32::MAX) {
@@ -187,7 +191,7 @@ fn next_index(words: &mut Words<'_>) -> Result<u32, TextFault> {
 /// Reads vertices and faces.
 pub(super) fn read_binary(
     map: &Arc<MappedFile>,
-    header: &Header,
+    header: &PlyHeader,
     order: Order,
     wanted: Wanted,
 ) -> Result<(VertexData, Faces), String> {
