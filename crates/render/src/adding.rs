@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use etendue_camera::{CameraRays, LensCamera, PixelSamples, squares_of_pair};
-use etendue_tracer::layer::Taken;
+use etendue_tracer::layer::RaySource;
 
 use crate::film::{PlaneRows, Strip};
 use crate::sampling::{Averaged, DIFFUSION_PAIR, Memory, SampleRun, Sampling, TIME_PAIR};
@@ -17,7 +17,7 @@ pub(crate) type Wanted<'a> = &'a (dyn Fn(usize) -> Range<u32> + Sync);
 /// Writes the means of a pixel of a strip; of one band those of all, where all are alike.
 pub(crate) fn put(strip: &mut Strip<'_>, index: usize, sums: &[Sum], bands: usize, samples: u32) {
     for (layer, sums) in strip.layers.iter_mut().zip(sums.chunks(bands)) {
-        if let (Taken::PictureShare, &[part, all, _]) = (layer.taken, sums) {
+        if let (RaySource::PictureShare, &[part, all, _]) = (layer.taken, sums) {
             let (part, all) = (part.total(), all.total());
             let share = if all > 0.0 { (part / all).clamp(0.0, 1.0) } else { 0.0 };
             layer.planes[0].put(index, share);

@@ -6,7 +6,7 @@ use etendue_report::Size;
 use etendue_scene::memory::has_room;
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
-use etendue_tracer::layer::{self, Kept, Look, Taken};
+use etendue_tracer::layer::{self, Look, RaySource, ValueKind};
 
 use crate::output::{Channel, Layer, Values};
 
@@ -29,9 +29,9 @@ enum PlaneKind {
 
 fn kind_of_plane(spec: LayerSpec, precision: Precision) -> PlaneKind {
     match (spec.row().kept, precision) {
-        (Kept::Counted, _) => PlaneKind::U32,
-        (Kept::Shown, _) | (Kept::Measured, Precision::Single) => PlaneKind::F32,
-        (Kept::Measured, Precision::Double) => PlaneKind::F64,
+        (ValueKind::Counted, _) => PlaneKind::U32,
+        (ValueKind::Shown, _) | (ValueKind::Measured, Precision::Single) => PlaneKind::F32,
+        (ValueKind::Measured, Precision::Double) => PlaneKind::F64,
     }
 }
 
@@ -138,7 +138,7 @@ pub(crate) struct Strip<'a> {
 #[derive(Debug)]
 pub(crate) struct StripLayer<'a> {
     pub(crate) spec: LayerSpec,
-    pub(crate) taken: Taken,
+    pub(crate) taken: RaySource,
     pub(crate) planes: Vec<PlaneRows<'a>>,
 }
 

@@ -8,7 +8,7 @@ use etendue_camera::Camera;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Detail, Geometry, HitBatch, MISS, Placement, RayBatch};
 use etendue_scene::Scene;
-use etendue_tracer::layer::{FrameStep, OtherFrame, Seen, Sight};
+use etendue_tracer::layer::{FrameStep, LayerContext, OtherFrame, Sight};
 
 /// Share of a point's distance within which something nearer does not hide it: the point was
 /// interpolated and its ray aimed with roundings of 10⁻¹⁵, which grazing surfaces stretch.
@@ -74,7 +74,7 @@ impl<'a> FollowedFrame<'a> {
     }
 
     /// From the other camera, in its frame's pose, to the point of hit `i` (m) at `time` (s from the other frame's time).
-    fn offset(&self, seen: &Seen<'_>, i: usize, time: f64) -> Option<DVec3> {
+    fn offset(&self, seen: &LayerContext<'_>, i: usize, time: f64) -> Option<DVec3> {
         let (traced, origin) = (seen.traced, self.camera.pose().position);
         let number = traced.hits.placement[i];
         if number == MISS {
@@ -102,7 +102,7 @@ impl<'a> FollowedFrame<'a> {
 
     /// The place in the other picture where the point of hit `i` arrives: the row says when it is seen, and that where
     /// it is.
-    fn place(&self, seen: &Seen<'_>, i: usize) -> Option<[f64; 2]> {
+    fn place(&self, seen: &LayerContext<'_>, i: usize) -> Option<[f64; 2]> {
         let [_, rows] = self.camera.resolution().map(f64::from);
         let mut time = self.camera.truth_time(0.5 * rows);
         let mut place = None;
@@ -176,13 +176,13 @@ impl OtherFrame for FollowedFrame<'_> {
         self.step
     }
 
-    fn follow(&self, seen: &Seen<'_>, places: &mut Vec<Option<[f64; 2]>>) {
+    fn follow(&self, seen: &LayerContext<'_>, places: &mut Vec<Option<[f64; 2]>>) {
         places.clear();
         let rays = 0..seen.traced.rays.len();
         places.extend(rays.map(|i| self.place(seen, i)));
     }
 
-    fn look_for(&self, seen: &Seen<'_>, sights: &mut Vec<Sight>) {
+    fn look_for(&self, seen: &LayerContext<'_>, sights: &mut Vec<Sight>) {
         let mut places = Vec::new();
         self.follow(seen, &mut places);
         sights.clear();

@@ -8,7 +8,7 @@ use etendue_accel::Accel;
 use etendue_camera::{BandGroup, Camera, CameraRays};
 use etendue_geometry::{Detail, HitBatch, HitPrecision, RayBatch};
 use etendue_optics::element::StatusCounts;
-use etendue_tracer::layer::{Columns, OtherFrame, Seen};
+use etendue_tracer::layer::{Columns, LayerContext, OtherFrame};
 use etendue_tracer::{LayerSpec, SceneView, Traced};
 use rayon::prelude::*;
 
@@ -226,7 +226,8 @@ impl Job<'_> {
             self.accel.closest(&batch.rays, &mut batch.hits);
             batch.traced += batch.rays.len() as u64;
             let RayBuffers { rays, hits, columns, rows, places, values, .. } = &mut *batch;
-            let mut seen = Seen { places: [columns, rows], ..self.seen(Traced { rays, hits }) };
+            let mut seen =
+                LayerContext { places: [columns, rows], ..self.seen(Traced { rays, hits }) };
             if self.camera.rows_differ() {
                 let time = self.camera.truth_time(f64::from(tile.top) + 0.5);
                 let pose = self.camera.pose_at(time);
@@ -274,10 +275,16 @@ impl Job<'_> {
         Ok(all)
     }
 
-    /// Data that layers are filled from.
-    fn seen<'b>(&'b self, traced: Traced<'b>) -> Seen<'b> {
+    /// What layers are filled from.
+    fn seen<'b>(&'b self, traced: Traced<'b>) -> LayerContext<'b> {
         let light = self.light.as_ref().map(|pass| pass.stage);
-        Seen { scene: self.surroundings, traced, light, places: [&[]; 2], others: self.others }
+        LayerContext {
+            scene: self.surroundings,
+            traced,
+            light,
+            places: [&[]; 2],
+            others: self.others,
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use etendue_report::{Decision, DecisionKind as Kind, DecisionValue, Saving, Tabl
 use etendue_scene::Scene;
 use etendue_scene::file::{LightPrecision, TracerRow, TracerSpec};
 use etendue_sensor::BandChoice;
-use etendue_tracer::layer::Kept;
+use etendue_tracer::layer::ValueKind;
 use etendue_tracer::{LayerSpec, Needs};
 
 use super::{
@@ -276,7 +276,8 @@ impl Plan {
         let (bits, because, saving) = match self.precision {
             Precision::Single => {
                 let [width, height] = scene.camera.resolution().map(u64::from);
-                let planes = self.layers.iter().filter(|layer| layer.row().kept == Kept::Measured);
+                let planes =
+                    self.layers.iter().filter(|layer| layer.row().kept == ValueKind::Measured);
                 let planes: u64 = planes.map(|layer| layer.row().channels.len() as u64).sum();
                 let saving = Saving { bytes: 4 * planes * width * height, images: None };
                 (32, "an EXR holds no more", (planes > 0).then_some(saving))

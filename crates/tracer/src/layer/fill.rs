@@ -6,10 +6,10 @@ use std::ops::Range;
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{HitBatch, MISS, Placement};
 
-use super::{Columns, NormalKind, Seen, Space};
+use super::{Columns, LayerContext, NormalKind, Space};
 use crate::{Color, Paint, SceneView, Traced};
 
-impl Seen<'_> {
+impl LayerContext<'_> {
     /// Refills the first columns with `value` of each ray.
     pub(super) fn each<const N: usize>(
         &self,

@@ -63,7 +63,7 @@ macro_rules! layers {
 
             /// Refills the first columns with the layer's channels, a number for each ray. A layer
             /// that is averaged refills three.
-            pub fn fill(self, seen: &Seen<'_>, out: &mut Columns) {
+            pub fn fill(self, seen: &LayerContext<'_>, out: &mut Columns) {
                 match self {
                     $(Self::$named $({ $($option),* })? => {
                         let ($seen, $out) = (seen, out);

@@ -50,9 +50,9 @@ pub struct Layer {
     /// bands are others than red, green and blue.
     pub channels: &'static [&'static str],
     /// What the numbers are kept as.
-    pub kept: Kept,
+    pub kept: ValueKind,
     /// Which rays of a pixel they are taken from.
-    pub taken: Taken,
+    pub taken: RaySource,
     /// How a preview shows them.
     pub look: Look,
     /// What filling it needs of the meshes and of hits.
@@ -107,7 +107,7 @@ pub enum Look {
 
 /// What numbers are kept as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Kept {
+pub enum ValueKind {
     /// As 64-bit floats where a file is wanted that holds them, else 32-bit: measurements.
     Measured,
     /// As 32-bit floats: colours and shares.
@@ -118,7 +118,7 @@ pub enum Kept {
 
 /// Which rays of a pixel a layer is taken from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Taken {
+pub enum RaySource {
     /// The chief ray of its centre.
     ChiefRay,
     /// The mean over its samples. What is averaged is three numbers a ray, of which the camera sends
@@ -136,7 +136,7 @@ pub enum Taken {
     Sampling,
 }
 
-impl Taken {
+impl RaySource {
     /// Whether the layer is taken where the picture's own samples are.
     #[must_use]
     pub fn with_picture(self) -> bool {
@@ -149,7 +149,7 @@ impl Taken {
 
 /// What layers are filled from: the rays of a batch, what they hit, and the scene.
 #[derive(Debug, Clone, Copy)]
-pub struct Seen<'a> {
+pub struct LayerContext<'a> {
     /// The scene.
     pub scene: SceneView<'a>,
     /// The batch.
@@ -203,13 +203,13 @@ impl LayerSpec {
     /// ray of its centre.
     #[must_use]
     pub fn is_averaged(self) -> bool {
-        !matches!(self.row().taken, Taken::ChiefRay | Taken::Sampling)
+        !matches!(self.row().taken, RaySource::ChiefRay | RaySource::Sampling)
     }
 
     /// Whether the layer is light, or a part of it, which a tracer of light fills.
     #[must_use]
     pub fn is_light(self) -> bool {
-        self.row().taken == Taken::Light
+        self.row().taken == RaySource::Light
     }
 
     /// Of which part of the pupil's light it is: whether that is left or right, and above or below where it is a
@@ -230,7 +230,7 @@ impl LayerSpec {
     /// Whether the layer tells of the samples of the picture.
     #[must_use]
     pub fn is_of_sampling(self) -> bool {
-        self.row().taken == Taken::Sampling
+        self.row().taken == RaySource::Sampling
     }
 
     /// The other frame that it compares this one with.

@@ -6,7 +6,7 @@ use std::fmt::Debug;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Columns, Seen};
+use super::{Columns, LayerContext};
 
 /// The way from a frame to the other one: 1 for the next, −1 for the one before; or to the end or the beginning of its
 /// own exposure.
@@ -174,10 +174,10 @@ pub trait OtherFrame: Debug + Sync {
 
     /// Where the other camera sees each point that was hit (pixels from the corner of the top left one),
     /// objects having moved: `places` is refilled, with `None` for misses and what has no place there.
-    fn follow(&self, seen: &Seen<'_>, places: &mut Vec<Option<[f64; 2]>>);
+    fn follow(&self, seen: &LayerContext<'_>, places: &mut Vec<Option<[f64; 2]>>);
 
     /// How each of these points is seen there: `sights` is refilled.
-    fn look_for(&self, seen: &Seen<'_>, sights: &mut Vec<Sight>);
+    fn look_for(&self, seen: &LayerContext<'_>, sights: &mut Vec<Sight>);
 }
 
 /// How another frame sees a point of this one.
@@ -193,7 +193,7 @@ pub enum Sight {
     Outside,
 }
 
-impl Seen<'_> {
+impl LayerContext<'_> {
     fn other(&self, to: FrameStep) -> Option<&dyn OtherFrame> {
         self.others.iter().copied().find(|other| other.step() == to)
     }

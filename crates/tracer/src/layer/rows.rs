@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::{Kept, Layer, Look, NormalKind, Space, Taken};
+use super::{Layer, Look, NormalKind, RaySource, Space, ValueKind};
 use crate::Needs;
 
 /// A row to begin with: a measurement along the chief ray.
@@ -10,8 +10,8 @@ pub(super) fn measured(name: &'static str, channels: &'static [&'static str], lo
     Layer {
         name: name.into(),
         channels,
-        kept: Kept::Measured,
-        taken: Taken::ChiefRay,
+        kept: ValueKind::Measured,
+        taken: RaySource::ChiefRay,
         look,
         needs: Needs::default(),
         meaning: Vec::new(),
@@ -22,8 +22,8 @@ pub(super) fn measured(name: &'static str, channels: &'static [&'static str], lo
 /// A row to begin with: a colour, averaged over the samples.
 pub(super) fn colour(name: &'static str) -> Layer {
     Layer {
-        kept: Kept::Shown,
-        taken: Taken::Samples,
+        kept: ValueKind::Shown,
+        taken: RaySource::Samples,
         ..measured(name, &["R", "G", "B"], Look::Color)
     }
 }
@@ -31,7 +31,7 @@ pub(super) fn colour(name: &'static str) -> Layer {
 /// A row to begin with: light that a tracer follows.
 pub(super) fn light(name: &'static str) -> Layer {
     Layer {
-        taken: Taken::Light,
+        taken: RaySource::Light,
         needs: Needs { normals: true, light: true, ..BASE_COLOUR },
         ..colour(name)
     }

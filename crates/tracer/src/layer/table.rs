@@ -11,7 +11,9 @@ use super::rows::{
     BASE_COLOUR, CHIEF_RAY, LINEAR, SURFACE, colour, definition_of_normals, frame, light, measured,
     name_in, name_of_normals, part_of_pupil,
 };
-use super::{Columns, FrameStep, Kept, Layer, Look, NormalKind, Seen, Space, Taken};
+use super::{
+    Columns, FrameStep, Layer, LayerContext, Look, NormalKind, RaySource, Space, ValueKind,
+};
 use crate::{LightGroup, Needs};
 
 layers! {
@@ -95,7 +97,7 @@ layers! {
         /// `Id.object.X`, `Id.instance.X`, `Id.node.X` and `Id.primitive.X`: which object, which copy
         /// of it, which node of its model, and which triangle of its mesh.
         Ids = "ids": Layer {
-            kept: Kept::Counted,
+            kept: ValueKind::Counted,
             meaning: vec![CHIEF_RAY, ("miss", "0")],
             apart: Some(&[
                 "number of the object in the scene, from 1",
@@ -124,7 +126,7 @@ layers! {
 
         /// `Coverage.A`: 1 where the pixel's chief ray hits, else 0.
         Coverage = "coverage": Layer {
-            kept: Kept::Shown,
+            kept: ValueKind::Shown,
             meaning: vec![("definition", "1 where something was hit, else 0"), CHIEF_RAY],
             ..measured("Coverage", &["A"], Look::Share)
         }, |seen, out| {
@@ -159,7 +161,7 @@ layers! {
 
         /// `Albedo.R G B`: base colour along the chief ray, not averaged.
         Albedo = "albedo": Layer {
-            taken: Taken::ChiefRay,
+            taken: RaySource::ChiefRay,
             needs: BASE_COLOUR,
             meaning: vec![
                 ("definition", "base colour without light"),
@@ -172,7 +174,7 @@ layers! {
 
         /// `MeanAlbedo.R G B`: colour of the first surfaces, mean over the picture's samples.
         MeanAlbedo = "mean_albedo": Layer {
-            taken: Taken::PictureSamples,
+            taken: RaySource::PictureSamples,
             needs: BASE_COLOUR,
             meaning: vec![
                 (
@@ -188,8 +190,8 @@ layers! {
 
         /// `MeanNormal.X Y Z`: shading normals of the first surfaces, mean over the picture's samples.
         MeanNormal = "mean_normal": Layer {
-            kept: Kept::Shown,
-            taken: Taken::PictureSamples,
+            kept: ValueKind::Shown,
+            taken: RaySource::PictureSamples,
             needs: Needs { normals: true, ..SURFACE },
             meaning: vec![
                 (
@@ -224,7 +226,7 @@ layers! {
 
         /// `MaterialId.X`: which material.
         MaterialId = "material_id": Layer {
-            kept: Kept::Counted,
+            kept: ValueKind::Counted,
             meaning: vec![
                 ("definition", "number of the material in the scene, counted from 1"),
                 CHIEF_RAY,
@@ -286,7 +288,7 @@ layers! {
         } = "occlusion": Layer {
             name: to.name("Occlusion"),
             needs: SURFACE,
-            kept: Kept::Shown,
+            kept: ValueKind::Shown,
             meaning: vec![to.meaning(), CHIEF_RAY, ("miss", "0")],
             apart: Some(&[
                 "1 where something is before the point in another frame, else 0",
@@ -297,8 +299,8 @@ layers! {
 
         /// `Alpha.A`: share of the pixel's samples that hit something.
         Alpha = "alpha": Layer {
-            kept: Kept::Shown,
-            taken: Taken::PictureShare,
+            kept: ValueKind::Shown,
+            taken: RaySource::PictureShare,
             meaning: vec![(
                 "definition",
                 "share of the pixel's samples that hit something; holes that a texture's alpha cuts \
@@ -358,8 +360,8 @@ layers! {
 
         /// `SampleCount.X`: samples that the pixel got.
         SampleCount = "sample_count": Layer {
-            kept: Kept::Counted,
-            taken: Taken::Sampling,
+            kept: ValueKind::Counted,
+            taken: RaySource::Sampling,
             meaning: vec![
                 ("definition", "samples that the pixel's mean was taken over"),
                 ("unit", "1"),
@@ -369,8 +371,8 @@ layers! {
 
         /// `Variance.R G B`: variance of the picture's pixels, by their samples.
         Variance = "variance": Layer {
-            kept: Kept::Shown,
-            taken: Taken::Sampling,
+            kept: ValueKind::Shown,
+            taken: RaySource::Sampling,
             meaning: vec![
                 (
                     "definition",
@@ -406,7 +408,7 @@ layers! {
         /// `Backdrop.R G B`: the part of the picture's radiance that came past everything. No file
         /// names it; it comes with `render.alpha` and a tracer of light.
         Backdrop: Layer {
-            taken: Taken::PictureSamples,
+            taken: RaySource::PictureSamples,
             needs: Needs { light: true, ..Needs::default() },
             meaning: vec![
                 (
