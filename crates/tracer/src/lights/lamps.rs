@@ -89,8 +89,10 @@ impl Lights {
 /// Where a light is (m), if it is a point that shines alike to all sides and stands still.
 #[inline(always)]
 pub(super) fn standing_point(light: &Light) -> Option<DVec3> {
-    match light {
-        Light { kind: LightKind::Point(at), motion: None, .. } => Some(*at),
-        _ => None,
+    let LightKind::Point(at) = light.kind else { return None };
+    let stands = || !light.moves_within([f64::NEG_INFINITY, f64::INFINITY]);
+    match light.motion {
+        None => Some(at),
+        Some(_) => stands().then(|| light.stand(0.0).point(at)),
     }
 }
