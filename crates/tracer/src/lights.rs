@@ -1,7 +1,7 @@
 //! The lights of a scene: what each gives off, and a place on one that is chosen for a point.
 
 mod environment;
-mod lamps;
+mod plain;
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use etendue_geometry::MISS;
 use etendue_geometry::glam::DVec3;
 use etendue_spectrum::{NoOverlap, Outside};
 
-pub(crate) use self::lamps::{Lamp, LampBounds};
+pub(crate) use self::plain::{PlainLight, PlainLightBounds};
 use crate::area_light::{self, AreaLight, AreaLightMotion, triangle_power};
 use crate::environment::EnvironmentMap;
 use crate::group::Groups;
@@ -43,8 +43,8 @@ pub struct Lights {
     /// and what those that shine alike all over give off in all bands.
     area_lights: Vec<Option<AreaLight>>,
     area_light_bands: Vec<f64>,
-    /// Bounds of all, if each is a lamp.
-    lamps: Option<LampBounds>,
+    /// Bounds of all, if each is a point or a plain triangle.
+    plain_lights: Option<PlainLightBounds>,
     groups: Groups,
 }
 
@@ -168,11 +168,11 @@ impl Lights {
             sampler,
             area_lights,
             area_light_bands,
-            lamps: None,
+            plain_lights: None,
             groups,
         };
         all.prepare_area_lights(scene, spectral);
-        all.lamps = all.bound_lamps();
+        all.plain_lights = all.bound_plain_lights();
         Ok(all)
     }
 
@@ -201,7 +201,7 @@ impl Lights {
     /// Where light `index` is (m) and its bands, if it is a point that shines alike to all sides and stands still.
     #[inline(always)]
     pub(crate) fn plain_point(&self, index: usize, count: usize) -> Option<(DVec3, &[f64])> {
-        Some((lamps::standing_point(self.lights.get(index)?)?, self.bands_of(index, count)))
+        Some((plain::standing_point(self.lights.get(index)?)?, self.bands_of(index, count)))
     }
 
     /// The number among all lights of a triangle that shines.

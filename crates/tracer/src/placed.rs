@@ -59,8 +59,13 @@ impl PlainSurface {
         if is_tilted && (moves || material.normal_map.is_some()) {
             return None;
         }
-        let rows = || placed.turn.unwrap_or(DMat3::IDENTITY).transpose().to_cols_array_2d();
-        let turn = is_tilted.then(|| rows().map(|row| row.map(|x| x as f32)));
+        // Directions alone count: what a mesh is scaled by would leave the range of single precision.
+        let rows = || {
+            let turn = placed.turn.unwrap_or(DMat3::IDENTITY).transpose();
+            let largest = turn.to_cols_array().into_iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+            turn.to_cols_array_2d().map(|row| row.map(|x| (x / largest) as f32))
+        };
+        let turn = is_tilted.then(rows);
         let color = if scatters { placed.color?.color } else { [0.0; 3] };
         Some(Self {
             color: color.map(|band| band as f32),

@@ -251,6 +251,7 @@ fn plain_scenes_are_the_same_in_single_precision() {
         // Light is scattered about the normals of its corners.
         ("direct, a sphere", &direct, "", LAMP),
         ("four, points and a sphere", &path(4), points, LAMP),
+        ("two, a tiny scale of a huge sphere", &path(2), points, LAMP),
         ("three", &path(3), "", &two),
         ("three, points", &path(3), points, ""),
         // Dim paths end by chance.
@@ -259,10 +260,13 @@ fn plain_scenes_are_the_same_in_single_precision() {
         // Boxes share a mesh, of which a structure for many triangles has instances.
         let ball = match () {
             () if lamps == blob => r#"blob", "triangles": 200, "name": "ball"#,
+            () if name.ends_with("huge sphere") => r#"sphere", "radius": 1e15, "name": "ball"#,
             () if name.ends_with("sphere") => "sphere",
             () => "box",
         };
+        let scale = if ball.contains("1e15") { "5e-16" } else { "0.5" };
         let text = room(tracer, lights, lamps, ball)
+            .replace(r#""translate": [0.6, 0.5, 0.2], "scale": 0.5"#, &format!(r#""translate": [0.6, 0.5, 0.2], "scale": {scale}"#))
             .replace(r#""layers": ["direct", "indirect"],"#, "")
             .replace(
                 r#"{"type": "checker", "colors": [[0.8, 0.8, 0.7], [0.2, 0.3, 0.4]], "squares": 8}"#,

@@ -23,7 +23,7 @@ use super::trace::Encounter;
 use super::{LightingContext, Parts, RaySamples, Tracing};
 use crate::light_sampler::Receiver;
 use crate::light_tree::Choices;
-use crate::lights::LampBounds;
+use crate::lights::PlainLightBounds;
 
 /// Single precision holds squares of lengths, and densities over areas, of scenes between these sizes (m).
 pub(crate) const SIZES: [f64; 2] = [1e-6, 1e9];
@@ -131,7 +131,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         let all = placed.plain().filter(|_| is_taken)?;
         let surfaces = Surfaces { all, geometry: scene.geometry, are_tilted: placed.are_tilted() };
         let origin = self.ctx.accel.blocks()?.origin();
-        let LampBounds { least_area, farthest } = lights.lamps()?;
+        let PlainLightBounds { least_area, farthest } = lights.plain_lights()?;
         let least = LEAST_AREA * placed.size().powi(2);
         let are_near = 2.0 * (farthest + origin.abs().max_element()) < SIZES[1];
         let are_taken = least_area > least && are_near && !lights.is_dark();

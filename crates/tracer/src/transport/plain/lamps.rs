@@ -78,9 +78,9 @@ impl<'a> Lights<'a> {
 
     #[inline(always)]
     fn lamp(&self, number: usize) -> Lamp {
-        match self.all.lamp(number) {
-            Some(lights::Lamp::Point(at)) => Lamp::point(at, self.origin),
-            Some(lights::Lamp::Triangle(own)) => Lamp::triangle(own, self.origin),
+        match self.all.plain_light(number) {
+            Some(lights::PlainLight::Point(at)) => Lamp::point(at, self.origin),
+            Some(lights::PlainLight::Triangle(own)) => Lamp::triangle(own, self.origin),
             None => Lamp::default(),
         }
     }
@@ -94,7 +94,7 @@ impl<'a> Lights<'a> {
 
     #[inline(always)]
     fn bands_of(&self, number: usize) -> [f64; 3] {
-        self.all.lamp_bands(number, 3).try_into().unwrap_or_default()
+        self.all.plain_light_bands(number, 3).try_into().unwrap_or_default()
     }
 }
 

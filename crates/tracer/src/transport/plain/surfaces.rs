@@ -93,10 +93,19 @@ impl Found {
 #[inline(always)]
 pub(super) fn bend(tilted: &[Row; 3], normal: &[Row; 3], direction: &[Row; 3]) -> [Row; 3] {
     let (mut shading, mut squared, mut along) = ([ZERO; 3], ZERO, ZERO);
+    // Squares of what is as long as a file has it may be too small or too large.
+    let (mut unit, mut largest) = (*tilted, ZERO);
+    for row in tilted {
+        for i in 0..LANES {
+            let size = row[i].abs();
+            largest[i] = if size > largest[i] { size } else { largest[i] };
+        }
+    }
     for axis in 0..3 {
         for i in 0..LANES {
-            squared[i] += tilted[axis][i] * tilted[axis][i];
-            along[i] += tilted[axis][i] * normal[axis][i];
+            unit[axis][i] /= largest[i];
+            squared[i] += unit[axis][i] * unit[axis][i];
+            along[i] += unit[axis][i] * normal[axis][i];
         }
     }
     for i in 0..LANES {
@@ -104,7 +113,7 @@ pub(super) fn bend(tilted: &[Row; 3], normal: &[Row; 3], direction: &[Row; 3]) -
         let scale = if along[i] < 0.0 { -1.0 } else { 1.0 } / squared[i].sqrt();
         let has = (squared[i] > 0.0) & (squared[i] <= f32::MAX);
         for axis in 0..3 {
-            let own = tilted[axis][i] * scale;
+            let own = unit[axis][i] * scale;
             shading[axis][i] = select_unpredictable(has, own, normal[axis][i]);
         }
     }

@@ -1,4 +1,4 @@
-//! Scenes whose lights are all lamps: points that stand still, and triangles that shine alike all over.
+//! Scenes whose lights are all plain: points that stand still, and triangles that shine alike all over.
 
 use etendue_geometry::glam::DVec3;
 
@@ -6,18 +6,18 @@ use super::Lights;
 use crate::area_light::AreaLight;
 use crate::light::{Light, LightKind};
 
-/// Bounds of all lamps.
+/// Bounds of all plain lights.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct LampBounds {
+pub(crate) struct PlainLightBounds {
     /// The least area of a triangle (m²); infinite without any.
     pub(crate) least_area: f64,
     /// The largest absolute coordinate of a point (m).
     pub(crate) farthest: f64,
 }
 
-/// A lamp.
+/// A plain light.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Lamp<'a> {
+pub(crate) enum PlainLight<'a> {
     /// m.
     Point(DVec3),
     Triangle(&'a AreaLight),
@@ -32,14 +32,14 @@ impl Lights {
 
     /// All lights and their bands, if they are few triangles that are kept ready and shine alike all over.
     pub(crate) fn few_triangles(&self) -> Option<(&[Option<AreaLight>], &[f64])> {
-        let are_triangles = self.lights.is_empty() && self.lamps.is_some();
+        let are_triangles = self.lights.is_empty() && self.plain_lights.is_some();
         let are_taken = are_triangles && self.few().is_some() && !self.triangles.is_empty();
         are_taken.then_some((&*self.area_lights, &*self.area_light_bands))
     }
 
-    /// Bounds of the lights, if all are lamps that are kept ready.
-    pub(crate) fn lamps(&self) -> Option<LampBounds> {
-        self.lamps
+    /// Bounds of the lights, if all are plain and kept ready.
+    pub(crate) fn plain_lights(&self) -> Option<PlainLightBounds> {
+        self.plain_lights
     }
 
     /// How many lights there are.
@@ -47,37 +47,39 @@ impl Lights {
         self.lights.len() + self.triangles.len()
     }
 
-    /// A light that is a lamp, by its number.
+    /// A plain light by its number; `None` of another.
     #[inline(always)]
-    pub(crate) fn lamp(&self, number: usize) -> Option<Lamp<'_>> {
+    pub(crate) fn plain_light(&self, number: usize) -> Option<PlainLight<'_>> {
         match self.lights.get(number) {
-            Some(light) => standing_point(light).map(Lamp::Point),
+            Some(light) => standing_point(light).map(PlainLight::Point),
             None => {
                 let own = self.area_lights.get(number - self.lights.len())?.as_ref();
-                own.filter(|own| own.is_plain).map(Lamp::Triangle)
+                own.filter(|own| own.is_plain).map(PlainLight::Triangle)
             }
         }
     }
 
-    /// What a lamp gives off in each band: the intensity of a point, the radiance of a triangle.
+    /// Light of a plain light in each band: the intensity of a point, the radiance of a triangle.
     #[inline(always)]
-    pub(crate) fn lamp_bands(&self, number: usize, count: usize) -> &[f64] {
+    pub(crate) fn plain_light_bands(&self, number: usize, count: usize) -> &[f64] {
         match number.checked_sub(self.lights.len()) {
             Some(own) => &self.area_light_bands[own * count..(own + 1) * count],
             None => self.bands_of(number, count),
         }
     }
 
-    /// Bounds of all lights once triangles are kept ready; `None` if one is no lamp.
-    pub(super) fn bound_lamps(&self) -> Option<LampBounds> {
+    /// Bounds of all lights once triangles are kept ready; `None` if one is not plain.
+    pub(super) fn bound_plain_lights(&self) -> Option<PlainLightBounds> {
         if self.area_lights.len() != self.triangles.len() {
             return None;
         }
-        let mut bounds = LampBounds { least_area: f64::INFINITY, farthest: 0.0 };
+        let mut bounds = PlainLightBounds { least_area: f64::INFINITY, farthest: 0.0 };
         for number in 0..self.count() {
-            match self.lamp(number)? {
-                Lamp::Point(at) => bounds.farthest = bounds.farthest.max(at.abs().max_element()),
-                Lamp::Triangle(own) => {
+            match self.plain_light(number)? {
+                PlainLight::Point(at) => {
+                    bounds.farthest = bounds.farthest.max(at.abs().max_element());
+                }
+                PlainLight::Triangle(own) => {
                     bounds.least_area = bounds.least_area.min(own.shape.area);
                 }
             }
