@@ -59,8 +59,10 @@ impl<const N: usize> Vertices<N> {
     #[must_use]
     #[inline]
     pub fn get(&self, i: usize) -> [f32; N] {
-        let start = i * self.stride;
-        std::array::from_fn(|k| self.floats[start + k])
+        let (floats, start) = (&*self.floats, i * self.stride);
+        let mut own = [0.0; N];
+        own.copy_from_slice(&floats[start..start + N]);
+        own
     }
 
     /// True if both are the same values in the same place.

@@ -1,4 +1,5 @@
-//! Angles of many directions side by side, in turns: what a map of all directions is looked up by, and back.
+//! Angles of many directions side by side, in turns, in either precision: what a map of all directions is looked up by,
+//! and back.
 //! Polynomials on local arrays, without a table or a branch, so that they vectorise.
 //!
 //! # Sources
@@ -10,7 +11,7 @@
 
 use std::f64::consts::TAU;
 
-use etendue_geometry::disk;
+use crate::real::Real;
 
 /// tan π/8.
 const EIGHTH: f64 = 0.414_213_562_373_095_03;
@@ -31,66 +32,63 @@ const ARC: [f64; 11] = [
 ];
 
 #[inline(always)]
-fn polynomial<const N: usize>(coefficients: &[f64; N], x: f64) -> f64 {
-    let mut sum = coefficients[N - 1];
+fn polynomial<F: Real, const N: usize>(coefficients: &[f64; N], x: F) -> F {
+    let mut sum = F::of(coefficients[N - 1]);
     for k in (0..N - 1).rev() {
-        sum = sum * x + coefficients[k];
+        sum = sum * x + F::of(coefficients[k]);
     }
     sum
 }
 
-/// The angle of (x, y) against the first axis (turns, −1/2 to 1/2), to 2 · 10⁻¹⁶; some number where both are 0.
+/// The angle of (x, y) against the first axis (turns, −1/2 to 1/2), to 2 · 10⁻¹⁶ in double precision; some number where
+/// both are 0.
 #[inline(always)]
-fn arc_tangent(y: f64, x: f64) -> f64 {
+fn arc_tangent<F: Real>(y: F, x: F) -> F {
     let (tall, wide) = (y.abs(), x.abs());
     let is_flat = tall < wide;
     let (least, most) = if is_flat { (tall, wide) } else { (wide, tall) };
-    let is_steep = least > EIGHTH * most;
+    let is_steep = least > F::of(EIGHTH) * most;
     let numerator = if is_steep { least - most } else { least };
     let denominator = if is_steep { least + most } else { most };
-    let t = numerator / if denominator > 0.0 { denominator } else { 1.0 };
-    let angle = t * polynomial(&ARC, t * t) + if is_steep { 0.125 } else { 0.0 };
-    let angle = if is_flat { angle } else { 0.25 - angle };
-    let angle = if x < 0.0 { 0.5 - angle } else { angle };
+    let t = numerator / if denominator > F::ZERO { denominator } else { F::of(1.0) };
+    let angle = t * polynomial(&ARC, t * t) + if is_steep { F::of(0.125) } else { F::ZERO };
+    let angle = if is_flat { angle } else { F::of(0.25) - angle };
+    let angle = if x < F::ZERO { F::of(0.5) - angle } else { angle };
     angle.copysign(y)
 }
 
-/// Sine and cosine of an angle (turns, at most 2⁵⁰ of them), to 3 · 10⁻¹⁶.
+/// Sine and cosine of an angle (turns, few of them), to 3 · 10⁻¹⁶ in double precision.
 #[inline(always)]
-fn sine_and_cosine(turns: f64) -> [f64; 2] {
-    // Adding it leaves the nearest whole number in the last bits.
-    const WHOLE: f64 = 6_755_399_441_055_744.0;
-    let shifted = 4.0 * turns + WHOLE;
-    let quarter = shifted.to_bits();
-    let x = TAU * (turns - 0.25 * (shifted - WHOLE));
-    let (sine, cosine) = disk::small_sine_cosine(x);
+fn sine_and_cosine<F: Real>(turns: F) -> [F; 2] {
+    let (whole, quarter) = (F::of(4.0) * turns).nearest();
+    let (sine, cosine) = (F::of(TAU) * (turns - F::of(0.25) * whole)).small_sine_cosine();
     let (a, b) = if quarter & 1 == 0 { (sine, cosine) } else { (cosine, sine) };
     [if quarter & 2 == 0 { a } else { -a }, if quarter.wrapping_add(1) & 2 == 0 { b } else { -b }]
 }
 
 /// Longitudes and latitudes (u, v) in 0..=1 of unit directions by axis: −Z is in the middle, +Y above.
 #[inline(always)]
-pub(crate) fn places<const N: usize>([x, y, z]: &[[f64; N]; 3]) -> [[f64; N]; 2] {
-    let [mut u, mut v] = [[0.0; N]; 2];
+pub(crate) fn places<F: Real, const N: usize>([x, y, z]: &[[F; N]; 3]) -> [[F; N]; 2] {
+    let [mut u, mut v] = [[F::ZERO; N]; 2];
     for i in 0..N {
-        u[i] = 0.5 + arc_tangent(x[i], -z[i]);
+        u[i] = F::of(0.5) + arc_tangent(x[i], -z[i]);
     }
     for i in 0..N {
-        v[i] = 2.0 * arc_tangent((x[i] * x[i] + z[i] * z[i]).sqrt(), y[i]);
+        v[i] = F::of(2.0) * arc_tangent((x[i] * x[i] + z[i] * z[i]).sqrt(), y[i]);
     }
     [u, v]
 }
 
 /// The unit directions of such places, and the sines of their angles with +Y.
 #[inline(always)]
-pub(crate) fn directions<const N: usize>([u, v]: &[[f64; N]; 2]) -> ([[f64; N]; 3], [f64; N]) {
-    let [mut x, mut y, mut z, mut sines] = [[0.0; N]; 4];
+pub(crate) fn directions<F: Real, const N: usize>([u, v]: &[[F; N]; 2]) -> ([[F; N]; 3], [F; N]) {
+    let [mut x, mut y, mut z, mut sines] = [[F::ZERO; N]; 4];
     for i in 0..N {
-        let [sine, cosine] = sine_and_cosine(0.5 * v[i]);
+        let [sine, cosine] = sine_and_cosine(F::of(0.5) * v[i]);
         (sines[i], y[i]) = (sine, cosine);
     }
     for i in 0..N {
-        let [sine, cosine] = sine_and_cosine(u[i] - 0.5);
+        let [sine, cosine] = sine_and_cosine(u[i] - F::of(0.5));
         (x[i], z[i]) = (sines[i] * sine, -sines[i] * cosine);
     }
     ([x, y, z], sines)
@@ -112,7 +110,7 @@ mod tests {
                 let (found, known) = (arc_tangent(y, x), y.atan2(x) / TAU);
                 assert!((found - known).abs() < 2e-16, "{y} {x}: {found} {known}");
             }
-            let turns = f64::from(k) / 100_000.0 - 1.0;
+            let turns: f64 = f64::from(k) / 100_000.0 - 1.0;
             let found = sine_and_cosine(turns);
             // The library is given the angle as rounded: 2π has an error of 2.4e-16, and up to four roundings.
             let known = (turns * TAU).sin_cos();
@@ -127,9 +125,9 @@ mod tests {
         for (y, x) in [(0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (-0.0, -1.0)] {
             assert_eq!(arc_tangent(y, x), f64::atan2(y, x) / TAU);
         }
-        assert!(arc_tangent(0.0, 0.0).is_finite());
+        assert!(arc_tangent::<f64>(0.0, 0.0).is_finite());
         assert_eq!(
-            [0.0, 0.25, 0.5, -0.25].map(|turns| sine_and_cosine(turns)[0]),
+            [0.0_f64, 0.25, 0.5, -0.25].map(|turns| sine_and_cosine(turns)[0]),
             [0.0, 1.0, 0.0, -1.0]
         );
     }
@@ -137,7 +135,7 @@ mod tests {
     #[test]
     fn places_and_directions_are_inverse() {
         for k in 0..4_096 {
-            let columns = [(f64::from(k) + 0.5) / 4_096.0; LANES];
+            let columns: [f64; LANES] = [(f64::from(k) + 0.5) / 4_096.0; LANES];
             let row = [columns, std::array::from_fn(|i| (i as f64 + 0.5) / LANES as f64)];
             let (directions, sines) = directions(&row);
             let back = places(&directions);

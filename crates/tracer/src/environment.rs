@@ -11,13 +11,14 @@ use etendue_geometry::glam::DVec3;
 use etendue_image::Limits;
 
 use crate::angles;
+use crate::real::Real;
 use crate::spec::BRIGHTEST;
 use crate::spectral_sky::{self, Spectrum};
 use crate::texture::{ImageError, read_file, read_image};
 use crate::{Color, Cube};
 
 pub use sampler::MapSampler;
-pub(crate) use sampler::OnMap;
+pub(crate) use sampler::{Lit, OnMap};
 
 /// The most cells of the grid that directions are chosen on, across and down.
 const CELLS: [usize; 2] = [2048, 1024];
@@ -151,7 +152,7 @@ impl EnvironmentMap {
     /// texel has.
     pub(crate) fn bands_at(&self, texels: &[f32], [u, v]: [f64; 2], out: &mut [f64]) {
         let count = out.len();
-        let about = Corners::of([[u], [v]], self.size());
+        let about = Corners::<f64, 1>::of([[u], [v]], self.size());
         let corners = about.numbers.map(|[number]| &texels[number as usize * count..][..count]);
         let at = [about.across[0], about.down[0]];
         for (i, out) in out.iter_mut().enumerate() {
@@ -164,7 +165,7 @@ impl EnvironmentMap {
         if texels.is_empty() {
             return [0.0; N];
         }
-        let about = Corners::of([[u], [v]], self.size());
+        let about = Corners::<f64, 1>::of([[u], [v]], self.size());
         let corners = about.numbers.map(|[number]| &texels[number as usize]);
         let at = [about.across[0], about.down[0]];
         std::array::from_fn(|k| between(corners.map(|texel| f64::from(texel[k])), at))
@@ -177,8 +178,8 @@ struct CornerTexels<const N: usize>([[[f32; N]; 3]; 4]);
 impl<const N: usize> CornerTexels<N> {
     /// How bright each is.
     #[inline(always)]
-    fn bright(&self) -> [[f64; N]; 4] {
-        let mut bright = [[0.0; N]; 4];
+    fn bright<F: Real>(&self) -> [[F; N]; 4] {
+        let mut bright = [[F::ZERO; N]; 4];
         for (bright, [r, g, b]) in bright.iter_mut().zip(&self.0) {
             for i in 0..N {
                 bright[i] = mean([r[i].into(), g[i].into(), b[i].into()]);
@@ -187,17 +188,17 @@ impl<const N: usize> CornerTexels<N> {
         bright
     }
 
-    /// The colours of places that are so far, across and down, from the first.
+    /// The colours of places that are so far, across and down, from the first, a row a colour.
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "a colour is an index into many arrays")]
-    fn between(&self, [across, down]: [&[f64; N]; 2]) -> [Color; N] {
-        let mut colors = [[0.0; 3]; N];
+    fn between<F: Real>(&self, [across, down]: [&[F; N]; 2]) -> [[F; N]; 3] {
+        let mut colors = [[F::ZERO; N]; 3];
         for k in 0..3 {
             for i in 0..N {
                 let [a, b, c, d] =
                     [self.0[0][k][i], self.0[1][k][i], self.0[2][k][i], self.0[3][k][i]];
-                let corners = [f64::from(a), f64::from(b), f64::from(c), f64::from(d)];
-                colors[i][k] = between(corners, [across[i], down[i]]);
+                let corners = [F::from(a), F::from(b), F::from(c), F::from(d)];
+                colors[k][i] = between(corners, [across[i], down[i]]);
             }
         }
         colors
@@ -206,8 +207,8 @@ impl<const N: usize> CornerTexels<N> {
 
 /// The mean of three colours.
 #[inline(always)]
-fn mean([r, g, b]: Color) -> f64 {
-    (r + g + b) / 3.0
+fn mean<F: Real>([r, g, b]: [F; 3]) -> F {
+    (r + g + b) / F::of(3.0)
 }
 
 /// Places worked on side by side.
@@ -215,7 +216,7 @@ const LANES: usize = 16;
 
 /// What four corners have between them: left and right above, and below.
 #[inline(always)]
-fn between([a, b, c, d]: [f64; 4], [across, down]: [f64; 2]) -> f64 {
+fn between<F: Real>([a, b, c, d]: [F; 4], [across, down]: [F; 2]) -> F {
     let [left, right] = [a + (c - a) * down, b + (d - b) * down];
     left + (right - left) * across
 }
@@ -223,27 +224,27 @@ fn between([a, b, c, d]: [f64; 4], [across, down]: [f64; 2]) -> f64 {
 /// The cells of a grid whose middles are about each of some places, and how far each place is from the first of
 /// them. Columns go around; there are no more rows above the first and below the last.
 #[derive(Debug)]
-struct Corners<const N: usize = LANES> {
+struct Corners<F, const N: usize> {
     /// Left and right above, and below.
     numbers: [[u32; N]; 4],
-    across: [f64; N],
-    down: [f64; N],
+    across: [F; N],
+    down: [F; N],
     /// The row below, from 0 to as many as there are.
     row: [u32; N],
 }
 
-impl<const N: usize> Corners<N> {
+impl<F: Real, const N: usize> Corners<F, N> {
     /// Of a grid of `columns` and `rows`, neither of which is 0.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "sides of images have 32 bits")]
-    fn of([u, v]: [[f64; N]; 2], [columns, rows]: [usize; 2]) -> Self {
-        let (wide, high) = (columns as f64, rows as f64);
+    fn of([u, v]: [[F; N]; 2], [columns, rows]: [usize; 2]) -> Self {
+        let (wide, high) = (F::of(columns as f64), F::of(rows as f64));
         let [columns, rows] = [columns as u32, rows as u32];
         let (mut numbers, mut row) = ([[0; N]; 4], [0; N]);
-        let [mut across, mut down] = [[0.0; N]; 2];
+        let [mut across, mut down] = [[F::ZERO; N]; 2];
         for i in 0..N {
-            let (x, right) = whole(u[i] * wide + 0.5);
-            let (y, below) = whole(v[i] * high + 0.5);
+            let (x, right) = whole(u[i] * wide + F::of(0.5));
+            let (y, below) = whole(v[i] * high + F::of(0.5));
             (across[i], down[i]) = (x, y);
             let (right, below) = (right.min(columns), below.min(rows));
             row[i] = below;
@@ -261,20 +262,18 @@ impl<const N: usize> Corners<N> {
 
     /// How far the places are from the first cell, across and down.
     #[inline(always)]
-    fn within(&self) -> [&[f64; N]; 2] {
+    fn within(&self) -> [&[F; N]; 2] {
         [&self.across, &self.down]
     }
 }
 
-/// What a number of at least 0 has behind the point, and the whole number below 2³² before it.
+/// What a number of at least 0 has behind the point, and the whole number before it.
 #[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "the low half is wanted")]
-fn whole(x: f64) -> (f64, u32) {
-    // Adding it leaves the nearest whole number in the last bits.
-    const WHOLE: f64 = 4_503_599_627_370_496.0;
-    let nearest = (x + WHOLE) - WHOLE;
-    let below = if nearest > x { nearest - 1.0 } else { nearest };
-    (x - below, (below + WHOLE).to_bits() as u32)
+fn whole<F: Real>(x: F) -> (F, u32) {
+    let (nearest, bits) = x.nearest();
+    let is_above = nearest > x;
+    let below = if is_above { nearest - F::of(1.0) } else { nearest };
+    (x - below, bits - u32::from(is_above))
 }
 
 /// Places (u, v) in 0..1 of a map for a unit direction.

@@ -43,6 +43,7 @@ pub mod modulation;
 pub mod placed;
 pub mod projector;
 mod pyramid;
+mod real;
 pub mod reference;
 pub mod sampling;
 pub mod scattering;

@@ -202,6 +202,16 @@ impl LightKind {
         }
     }
 
+    /// Where it is (m), in its own frame; `None` of what is far away.
+    pub(crate) fn place(&self) -> Option<DVec3> {
+        match self {
+            Self::Point(at) | Self::Spot { at, .. } => Some(*at),
+            Self::Projector(projector) => Some(projector.at),
+            Self::Goniometric(measured) => Some(measured.at),
+            Self::Directional { .. } | Self::Environment { .. } => None,
+        }
+    }
+
     /// Where it is and shines, with an intensity (W/sr); `None` of what is far away.
     pub(crate) fn cluster(&self, intensity: f64, scene: &SceneView<'_>) -> Option<Cluster> {
         let (at, axis, cone, reach) = match self {

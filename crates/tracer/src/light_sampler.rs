@@ -137,7 +137,7 @@ impl LightSampler {
     pub(crate) fn pick(&self, choices: &mut Choices) {
         let Some(tree) = &self.tree else {
             for number in 0..choices.len() {
-                self.pick_other(choices, number, (choices.get(number).u, 1.0));
+                choices.set(number, self.pick_other((choices.get(number).u, 1.0)));
             }
             return;
         };
@@ -153,16 +153,16 @@ impl LightSampler {
                     choices.leave_to_tree(number, share, u / share);
                 } else {
                     let rest = ((u - share) / (1.0 - share)).min(ONE_BELOW);
-                    self.pick_other(choices, number, (rest, 1.0 - share));
+                    choices.set(number, self.pick_other((rest, 1.0 - share)));
                 }
             }
         }
         tree.pick(choices);
     }
 
-    /// Makes a choice by a number in 0..1 among the lights that are in no tree, of which this is the chance.
+    /// A choice by a number in 0..1 among the lights that are in no tree, of which this is the chance.
     #[inline(always)]
-    fn pick_other(&self, choices: &mut Choices, number: usize, (u, share): (f64, f64)) {
+    pub(crate) fn pick_other(&self, (u, share): (f64, f64)) -> Choice {
         let (light, rest, chance) = match self.others.len() {
             0 => (0, u, 0.0),
             1 => (0, u, 1.0),
@@ -172,7 +172,19 @@ impl LightSampler {
             }
         };
         let light = u32::try_from(light).unwrap_or(u32::MAX);
-        choices.set(number, Choice { light, u: rest, chance: share * chance });
+        Choice { light, u: rest, chance: share * chance }
+    }
+
+    /// The chance with which [`Self::pick`] picks light `index`, which is in no tree, for a point that chose.
+    pub(crate) fn chance_of_other(&self, choices: &Choices, number: usize, index: usize) -> f64 {
+        if self.others.is_empty() {
+            return 0.0;
+        }
+        let share = match &self.tree {
+            Some(_) => self.share(choices.importance(number)),
+            None => 0.0,
+        };
+        (1.0 - share) * self.others.probability(index)
     }
 
     /// The chance with which [`Self::pick`] picks light `index` for a point.

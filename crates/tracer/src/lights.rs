@@ -186,6 +186,12 @@ impl Lights {
         self.sampler.pick(choices);
     }
 
+    /// The chance with which [`Self::pick`] picks the sky for a point that chose.
+    pub(crate) fn chance_of_sky(&self, choices: &Choices, number: usize) -> f64 {
+        let sky = self.sky.as_ref();
+        sky.map_or(0.0, |sky| self.sampler.chance_of_other(choices, number, sky.index))
+    }
+
     /// Light `index` and its bands, if it is a triangle that is kept ready and shines alike all over.
     #[inline(always)]
     pub(crate) fn plain_triangle(

@@ -1,9 +1,12 @@
 //! What there is to know of each placement before any ray meets it: worked out once, looked up at each
 //! hit.
 
-use etendue_geometry::glam::{DMat3, DVec3};
-use etendue_geometry::{Coplanar, Geometry, Mesh, Placement};
+mod plain;
 
+use etendue_geometry::glam::{DMat3, DVec3};
+use etendue_geometry::{Coplanar, Geometry, Placement};
+
+pub(crate) use self::plain::{PlainFacets, PlainKind, PlainSurfaces};
 use crate::bodies::{Body, bodies};
 use crate::scattering::Absorption;
 use crate::spawn::magnitudes;
@@ -16,66 +19,10 @@ pub struct PlacedSurfaces {
     all: Vec<Option<PlacedSurface>>,
     /// The boundaries of bodies that lie over one another.
     pub(crate) touching: Coplanar,
-    /// What is known of all where each is matte and of one colour, and what it is of none behind the last; empty
-    /// elsewhere.
-    plain: Vec<PlainSurface>,
-    are_tilted: bool,
+    /// What is known of all, if each is plain.
+    plain: Option<PlainSurfaces>,
     /// The diagonal of the box around all (m).
     size: f64,
-}
-
-/// A matte surface of one colour, or one that only shines, in single precision.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct PlainSurface {
-    pub(crate) color: [f32; 3],
-    /// [`PlacedSurface::magnitudes`] (m).
-    pub(crate) magnitudes: [f32; 3],
-    pub(crate) is_there: bool,
-    pub(crate) scatters: bool,
-    pub(crate) shines: bool,
-    /// It scatters light about normals of its mesh's corners, which this carries into the world, row by row.
-    pub(crate) turn: Option<[[f32; 3]; 3]>,
-}
-
-impl PlainSurface {
-    /// `None` of a surface of another kind.
-    #[expect(clippy::cast_possible_truncation, reason = "single precision is the purpose")]
-    fn of(
-        placed: &PlacedSurface,
-        material: &Material,
-        (placement, mesh): (&Placement, &Mesh),
-    ) -> Option<Self> {
-        let scatters = match placed.kind {
-            SurfaceKind::Matte => true,
-            SurfaceKind::Black => false,
-            SurfaceKind::Sheet | SurfaceKind::Smooth | SurfaceKind::Other => return None,
-        };
-        let is_unlit = material.scattering == Scattering::Unlit;
-        if placed.has_alpha || placed.may_vanish() || is_unlit {
-            return None;
-        }
-        let is_tilted = scatters && placed.is_tilted;
-        let moves = placement.motion.is_some() || mesh.steps.is_some();
-        if is_tilted && (moves || material.normal_map.is_some()) {
-            return None;
-        }
-        // Directions alone count: what a mesh is scaled by would leave the range of single precision.
-        let rows = || {
-            let turn = placed.turn.unwrap_or(DMat3::IDENTITY).transpose();
-            let largest = turn.to_cols_array().into_iter().fold(0.0, |a: f64, x| a.max(x.abs()));
-            turn.to_cols_array_2d().map(|row| row.map(|x| (x / largest) as f32))
-        };
-        let turn = is_tilted.then(rows);
-        let color = if scatters { placed.color?.color } else { [0.0; 3] };
-        Some(Self {
-            color: color.map(|band| band as f32),
-            magnitudes: placed.magnitudes.to_array().map(|size| size as f32),
-            is_there: true,
-            scatters,
-            shines: placed.is_seen,
-            turn,
-        })
-    }
 }
 
 /// As what hits are worked on, where a surface is wholly there.
@@ -190,28 +137,14 @@ impl PlacedSurfaces {
         let size = bounds.diagonal();
         let [least, most] = crate::transport::PLAIN_SIZES;
         let fits = size >= least && size + bounds.centre().length() <= most && spectral.is_rgb();
-        let row = |(placed, placement): (&Option<PlacedSurface>, &Placement)| {
-            let material = materials.get(placement.material as usize)?;
-            PlainSurface::of(placed.as_ref()?, material, (placement, geometry.mesh_of(placement)))
-        };
-        let rows = all.iter().zip(&geometry.placements).map(row);
-        let plain: Option<Vec<_>> = if fits { rows.collect() } else { None };
-        let mut plain = plain.unwrap_or_default();
-        if !plain.is_empty() {
-            plain.push(PlainSurface::default());
-        }
-        let are_tilted = plain.iter().any(|surface| surface.turn.is_some());
-        Self { all, touching, plain, are_tilted, size }
+        let plain = || PlainSurfaces::of(&all, (geometry, materials), spectral);
+        let plain = fits.then(plain).flatten();
+        Self { all, touching, plain, size }
     }
 
-    /// All in single precision and, behind the last, none: where all are matte and of one colour each.
-    pub(crate) fn plain(&self) -> Option<&[PlainSurface]> {
-        (!self.plain.is_empty()).then_some(&*self.plain)
-    }
-
-    /// Tests whether any of these scatters light about normals of its mesh's corners.
-    pub(crate) fn are_tilted(&self) -> bool {
-        self.are_tilted
+    /// All in single precision, if each is plain.
+    pub(crate) fn plain(&self) -> Option<&PlainSurfaces> {
+        self.plain.as_ref()
     }
 
     /// The diagonal of the box around all (m).

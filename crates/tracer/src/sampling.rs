@@ -17,6 +17,8 @@ use std::f64::consts::TAU;
 use etendue_geometry::disk;
 use etendue_geometry::glam::DVec3;
 
+use crate::real::Real;
+
 /// Three unit vectors at right angles; z is a surface's normal.
 #[derive(Debug, Clone, Copy)]
 pub struct Frame {
@@ -30,8 +32,12 @@ impl Frame {
     /// A frame around the unit vector `z`.
     #[must_use]
     pub fn around(z: DVec3) -> Self {
-        let (x, y) = z.any_orthonormal_pair();
-        Self { x, y, z }
+        // Duff et al.; a z of −0 counts as one of 0, as it does where many frames are made side by side.
+        let sign = if z.z < 0.0 { -1.0 } else { 1.0 };
+        let f = -1.0 / (sign + z.z);
+        let g = z.x * z.y * f;
+        let x = DVec3::new(1.0 + sign * z.x * z.x * f, sign * g, -sign * z.x);
+        Self { x, y: DVec3::new(g, sign + z.y * z.y * f, -z.y), z }
     }
 
     /// A frame around the unit vector `z` whose x axis is as near to `along` as it can; any where they are
@@ -168,20 +174,21 @@ impl DiscreteDistribution {
 
     /// The first and the last index that `u` may pick.
     #[inline]
-    fn guided(&self, u: f64) -> [usize; 2] {
+    fn guided(&self, u: f64) -> [u32; 2] {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "u is in 0..1, and the cast saturates"
         )]
         let interval = ((u * self.len() as f64) as usize).min(self.len() - 1);
-        let first = self.guide[interval] as usize;
-        [first, self.guide.get(interval + 1).map_or(self.len() - 1, |&index| index as usize)]
+        let last = || u32::try_from(self.len() - 1).unwrap_or(u32::MAX);
+        [self.guide[interval], self.guide.get(interval + 1).copied().unwrap_or_else(last)]
     }
 
     /// [`Self::pick`] from these on.
     #[inline]
-    fn pick_between(&self, u: f64, [first, last]: [usize; 2]) -> (usize, f64) {
+    fn pick_between(&self, u: f64, ends: [u32; 2]) -> (usize, f64) {
+        let [first, last] = ends.map(|index| index as usize);
         // The first whose end is beyond u.
         let index = first + self.below[first + 1..=last].partition_point(|&end| end <= u);
         let (start, end) = (self.below[index], self.below[index + 1]);
@@ -198,12 +205,14 @@ impl DiscreteDistribution {
 /// A place between 0 and 1 whose density goes from `start` to `end` in a straight line, to a factor (Pharr,
 /// Jakob and Humphreys, *Physically Based Rendering*, 4th edition, section A.5.1).
 #[must_use]
-#[inline]
-pub fn linear_place(u: f64, [start, end]: [f64; 2]) -> f64 {
-    let root = ((1.0 - u) * start * start + u * end * end).sqrt();
+#[inline(always)]
+pub(crate) fn linear_place<F: Real>(u: F, [start, end]: [F; 2]) -> F {
+    let root = ((F::of(1.0) - u) * start * start + u * end * end).sqrt();
     let sum = start + root;
+    let place = u * (start + end) / sum;
+    let place = if place < F::ONE_BELOW { place } else { F::ONE_BELOW };
     // Where both are 0, or so small that their squares are.
-    if sum > 0.0 { (u * (start + end) / sum).min(ONE_BELOW) } else { u }
+    if sum > F::ZERO { place } else { u }
 }
 
 /// Cells of a grid by weight.
@@ -217,12 +226,10 @@ pub struct GridDistribution {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct GridCell {
     /// Its column and row.
-    pub at: [usize; 2],
+    pub at: [u32; 2],
     /// What is left of the numbers that chose them, in 0..1.
     pub rest: [f64; 2],
-    /// Its probability.
-    pub probability: f64,
-    between: [usize; 2],
+    between: [u32; 2],
 }
 
 impl GridDistribution {
@@ -245,15 +252,16 @@ impl GridDistribution {
         cells.clear();
         cells.extend(squares.map(|[u, v]| {
             let (row, down) = self.rows.pick(v);
+            let row = u32::try_from(row).unwrap_or(u32::MAX);
             GridCell { at: [0, row], rest: [u, down], ..GridCell::default() }
         }));
         for cell in cells.iter_mut() {
-            cell.between = self.columns[cell.at[1]].guided(cell.rest[0]);
+            cell.between = self.columns[cell.at[1] as usize].guided(cell.rest[0]);
         }
-        for GridCell { at: [column, row], rest: [across, _], probability, between } in cells {
-            let columns = &self.columns[*row];
-            (*column, *across) = columns.pick_between(*across, *between);
-            *probability = self.rows.probability(*row) * columns.probability(*column);
+        for GridCell { at: [column, row], rest: [across, _], between } in cells {
+            let columns = &self.columns[*row as usize];
+            let (own, rest) = columns.pick_between(*across, *between);
+            (*column, *across) = (u32::try_from(own).unwrap_or(u32::MAX), rest);
         }
     }
 }
@@ -315,7 +323,9 @@ mod tests {
         for k in 0..n * n {
             let square = [k % n, k / n].map(|i| (f64::from(i) + 0.5) / f64::from(n));
             grid.cells(std::iter::once(square), &mut cells);
-            let GridCell { at: [x, y], rest, probability, .. } = cells[0];
+            let GridCell { at, rest, .. } = cells[0];
+            let [x, y] = at.map(|index| index as usize);
+            let probability = grid.rows.probability(y) * grid.columns[y].probability(x);
             assert!(rest.iter().all(|rest| (0.0..1.0).contains(rest)));
             counts[y * 3 + x] += 1.0 / f64::from(n * n);
             assert!((probability - weights[y * 3 + x] / 16.0).abs() < 1e-12);

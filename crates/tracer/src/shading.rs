@@ -7,7 +7,7 @@ use crate::reference::{SceneView, SurfacePoint};
 use crate::sampling::Frame;
 use crate::scattering::{GltfSurface, part};
 use crate::surface::SurfaceInteraction;
-use crate::{Conductor, Scattering, Spectral, Tint};
+use crate::{Conductor, Scattering, Spectral, TextureUse, Tint};
 
 /// The least α across a grain.
 const SMOOTHEST_GRAIN: f64 = 1e-3;
@@ -72,6 +72,30 @@ impl GltfSurface {
             Some(image) => scene.texel(image, point),
             None => [1.0; 4],
         };
+        let tint = self.specular_color_texture.as_ref();
+        let tint = tint.map_or([1.0; 4], |image| scene.tint(image, point));
+        self.sheet_of(texel, tint, spectral)
+    }
+
+    /// Its sheet of facets, where no image is laid over it.
+    pub(crate) fn plain_sheet(&self, spectral: &Spectral) -> Option<SheetSurface> {
+        let images = [
+            &self.metallic_roughness,
+            &self.glossiness_texture,
+            &self.specular_texture,
+            &self.specular_color_texture,
+        ];
+        let are_none = images.iter().all(|image| image.is_none());
+        are_none.then(|| self.sheet_of(|_| [1.0; 4], [1.0; 4], spectral))
+    }
+
+    /// Its sheet of facets, where images say so much and tint its highlights so.
+    fn sheet_of(
+        &self,
+        texel: impl Fn(&Option<TextureUse>) -> [f64; 4],
+        tint: [f64; 4],
+        spectral: &Spectral,
+    ) -> SheetSurface {
         let rough = texel(&self.metallic_roughness);
         let roughness = match &self.glossiness_texture {
             Some(_) => 1.0 - (1.0 - self.roughness) * texel(&self.glossiness_texture)[3],
@@ -80,8 +104,6 @@ impl GltfSurface {
         let roughness = roughness.clamp(0.0, 1.0);
         let specular = (self.specular * texel(&self.specular_texture)[3]).clamp(0.0, 1.0);
         let face_on = fresnel::normal_reflectance(self.ior);
-        let tint = self.specular_color_texture.as_ref();
-        let tint = tint.map_or([1.0; 4], |image| scene.tint(image, point));
         // The extension caps the reflectance face on at 1.
         let most = if face_on > 0.0 { 1.0 / face_on } else { f64::INFINITY };
         SheetSurface {

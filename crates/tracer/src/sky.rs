@@ -89,6 +89,11 @@ impl SkySamples {
 }
 
 impl Sky {
+    /// Tests whether its bands are those of its colours.
+    pub(crate) fn is_of_colors(&self) -> bool {
+        matches!(self.spectra, Spectra::Colors)
+    }
+
     /// That of `lights`; `map` is its decoded image, if it has one.
     ///
     /// # Errors

@@ -95,11 +95,11 @@ const POINTS: &str = r#"{"type": "point", "at": [1, 2, 1], "intensity": [1, 2, 3
     {"type": "spot", "at": [-1, 2, 1], "look_at": [0, 0, 0], "cone": 50, "intensity": [2, 2, 1]}"#;
 
 /// Red, green, blue and alpha that change across: as a colour, as roughness and metal, and as a normal.
-fn save_waves(folder: &Path) {
+fn save_waves(folder: &Path, least: u8) {
     let wave = |x: u32, step: u32| u8::try_from(x * step % 256).unwrap();
     let texels = image::RgbImage::from_fn(32, 32, |x, y| {
         // Where green is 0 the surface is smooth.
-        let green = if (x / 4 + y / 4) % 5 == 0 { 0 } else { 60 + wave(y, 5) / 2 };
+        let green = if (x / 4 + y / 4) % 5 == 0 { least } else { 60 + wave(y, 5) / 2 };
         image::Rgb([110 + wave(x, 8) / 8, green, 150 + wave(x + y, 3) / 3])
     });
     texels.save(folder.join("waves.png")).unwrap();
@@ -190,7 +190,7 @@ fn blocks_and_batches_follow_the_same_paths() {
         ("textures, direct", all(["mirror", "printed"], direct)),
     ];
     let folder = tempfile::tempdir().unwrap();
-    save_waves(folder.path());
+    save_waves(folder.path(), 0);
     for (name, text) in scenes {
         let mut scene = load_in(folder.path(), &text);
         if text.matches(r#""printed""#).count() > 1 {
@@ -214,7 +214,7 @@ fn plain_scenes_are_the_same_in_single_precision() {
         {"shape": "box", "material": "red", "transform": {"scale": 0.2, "translate": [1.2, 0.2, 0.8]}},
         {"shape": "box", "material": "green", "transform": {"scale": 0.3, "translate": [-0.9, 0.3, 1]}}"#;
     let folder = tempfile::tempdir().unwrap();
-    save_waves(folder.path());
+    save_waves(folder.path(), 0);
     let two = format!("{LAMP}{ANOTHER}");
     let path = |bounces: u32| format!(r#"{{"type": "path", "max_bounces": {bounces}}}"#);
     let direct = r#"{"type": "direct"}"#.to_owned();
@@ -279,10 +279,69 @@ fn plain_scenes_are_the_same_in_single_precision() {
     }
 }
 
+/// So are facets, mirrors, smooth glass and what is printed on surfaces, under skies and lights of all kinds.
+#[test]
+fn plain_facets_skies_and_other_lights_are_the_same_in_single_precision() {
+    let folder = tempfile::tempdir().unwrap();
+    save_waves(folder.path(), 20);
+    let path = |bounces: u32| format!(r#"{{"type": "path", "max_bounces": {bounces}}}"#);
+    let whitted = |bounces: u32| format!(r#"{{"type": "whitted", "max_bounces": {bounces}}}"#);
+    let direct = r#"{"type": "direct"}"#.to_owned();
+    let sky = r#"{"type": "environment", "radiance": [0.6, 0.7, 0.9]}"#;
+    let unseen = r#"{"type": "environment", "radiance": [0.6, 0.7, 0.9], "visible": false}"#;
+    let image = r#"{"type": "environment", "image": "waves.png", "radiance": [2, 1, 0.5],
+        "rotate": 40}"#;
+    let sun = r#"{"type": "directional", "direction": [0.2, -1, -0.3], "irradiance": [0.5, 0.5, 0.5],
+        "angle": 4}"#;
+    let sunny = format!("{image}, {sun}");
+    let all = format!("{POINTS}, {image}");
+    for (name, materials, tracer, lights, lamps) in [
+        ("a sky", ["red", "green"], path(4), sky, ""),
+        ("a sky that is not seen", ["red", "gold"], path(4), unseen, ""),
+        ("an image", ["red", "green"], path(4), image, ""),
+        ("an image, direct", ["gold", "plastic"], direct.clone(), image, ""),
+        ("an image and a sun", ["gold", "plastic"], path(4), &sunny, ""),
+        ("an image and a lamp", ["copper", "plastic"], path(4), image, LAMP),
+        ("all lights", ["copper", "plastic"], path(5), &all, LAMP),
+        ("points", ["gold", "plastic"], path(3), POINTS, ""),
+        ("a lamp", ["gold", "plastic"], path(3), "", LAMP),
+        ("a lamp and mirrors", ["mirror", "polished"], path(4), "", LAMP),
+        ("a lamp and glass", ["red", "glass"], path(6), "", LAMP),
+        ("glass, all lights", ["plastic", "glass"], path(12), &all, LAMP),
+        ("mirrors, whitted", ["mirror", "copper"], whitted(4), &all, LAMP),
+        ("glass, whitted", ["red", "glass"], whitted(6), sky, ""),
+        ("mirrors, direct", ["polished", "mirror"], direct.clone(), POINTS, LAMP),
+        ("printed", ["red", "printed"], path(3), "", LAMP),
+        ("printed, all lights", ["printed", "printed"], path(4), &all, LAMP),
+        ("printed, direct", ["mirror", "printed"], direct.clone(), image, ""),
+        ("printed, seen in mirrors", ["printed", "mirror"], path(5), &all, LAMP),
+        ("printed, seen through glass", ["printed", "glass"], whitted(8), &all, LAMP),
+        ("one bounce, glass", ["glass", "mirror"], path(1), sky, LAMP),
+    ] {
+        for ball in ["sphere", "box"] {
+            let text = room_of(materials, [&tracer, lights, lamps, ball])
+                .replace(r#""layers": ["direct", "indirect"],"#, "");
+            // A box stands on squares, a sphere on a floor that is alike all over.
+            let squares = r#"{"type": "checker", "colors": [[0.8, 0.8, 0.7], [0.2, 0.3, 0.4]], "squares": 8}"#;
+            let text = match ball {
+                "box" => text,
+                _ => text.replace(squares, r#"{"type": "matte", "color": [0.8, 0.8, 0.7]}"#),
+            };
+            let mut scene = load_in(folder.path(), &text);
+            if name.starts_with("printed") {
+                print(&mut scene);
+            }
+            let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
+            let name = format!("plain, {name}, {ball}");
+            assert!(compare(&name, &scene, &plan, &[""]) > 0, "{name}");
+        }
+    }
+}
+
 #[test]
 fn a_lamp_that_is_half_there_shines_half_as_much() {
     let folder = tempfile::tempdir().unwrap();
-    save_waves(folder.path());
+    save_waves(folder.path(), 0);
     let lit = |radiance: f64, factor: f64| {
         let lamp = LAMP.replace("\"lamp\"", "\"shining\"");
         let text = room(r#"{"type": "path", "max_bounces": 1}"#, "", &lamp, "sphere");

@@ -20,6 +20,7 @@ mod losses;
 pub(crate) mod metal;
 mod sheen;
 pub(crate) mod sheets;
+pub(crate) mod smooth;
 mod split_sum;
 
 use std::f64::consts::PI;

@@ -12,88 +12,86 @@ use super::albedo::{AlbedoTable, OBLIQUITIES, ROUGHNESSES, TABLE};
 use super::metal::{mean_reflectance, multiple};
 use super::split_sum::{lacking, obliquity};
 use super::{Weights, fresnel};
-use crate::{LANES, Row};
+use crate::LANES;
 
-const ZERO: Row = [0.0; LANES];
-
-/// The sheets of the hits of a patch.
+/// The sheets of so many hits.
 #[derive(Debug)]
-pub(crate) struct Sheets {
+pub(crate) struct Sheets<const N: usize = LANES> {
     /// The square of the roughness, above 0, and the share of metal.
-    pub(crate) alpha: Row,
-    pub(crate) metallic: Row,
+    pub(crate) alpha: [f64; N],
+    pub(crate) metallic: [f64; N],
     /// The dielectric's reflectance face on, before the highlights' colour, and at grazing incidence.
-    pub(crate) f0: Row,
-    pub(crate) f90: Row,
+    pub(crate) f0: [f64; N],
+    pub(crate) f90: [f64; N],
     /// The largest bands of the surface's colour, and of the dielectric's reflectance face on.
-    pub(crate) base_peak: Row,
-    pub(crate) f0_peak: Row,
+    pub(crate) base_peak: [f64; N],
+    pub(crate) f0_peak: [f64; N],
     /// 1 for [`super::Model::Metal`], which chooses by what its facets return of white light.
-    pub(crate) is_metal: Row,
+    pub(crate) is_metal: [f64; N],
     /// The x and y axes of the shading frames, and the viewer in them.
-    axes: [[Row; 3]; 2],
-    wo: [Row; 3],
+    axes: [[[f64; N]; 3]; 2],
+    wo: [[f64; N]; 3],
     /// Rows of the table and the shares of the next.
-    rows: [u32; LANES],
-    shares: Row,
+    rows: [u32; N],
+    shares: [f64; N],
     /// What facets of reflectance 1, and the dielectric, return of light from the viewer; their means over
     /// directions; the mean of what facets of reflectance 1 lack.
-    facets: Row,
-    dielectric: Row,
-    pub(crate) mean: Row,
-    dielectric_mean: Row,
-    lacking: Row,
+    facets: [f64; N],
+    dielectric: [f64; N],
+    pub(crate) mean: [f64; N],
+    dielectric_mean: [f64; N],
+    lacking: [f64; N],
     /// Chances of the facets and of the base.
-    sheet: Row,
-    base: Row,
-    values: SheetValues,
+    sheet: [f64; N],
+    base: [f64; N],
+    values: SheetValues<N>,
 }
 
 /// Values times cosine, as [`Weights`], and densities.
 #[derive(Debug)]
-struct SheetValues {
-    white: Row,
-    base: Row,
-    highlight: Row,
-    dip: Row,
-    deep: Row,
-    pdf: Row,
+struct SheetValues<const N: usize> {
+    white: [f64; N],
+    base: [f64; N],
+    highlight: [f64; N],
+    dip: [f64; N],
+    deep: [f64; N],
+    pdf: [f64; N],
 }
 
-impl Default for Sheets {
+impl<const N: usize> Default for Sheets<N> {
     fn default() -> Self {
         Self {
-            alpha: ZERO,
-            metallic: ZERO,
-            f0: ZERO,
-            f90: ZERO,
-            base_peak: ZERO,
-            f0_peak: ZERO,
-            is_metal: ZERO,
-            axes: [[ZERO; 3]; 2],
-            wo: [ZERO; 3],
-            rows: [0; LANES],
-            shares: ZERO,
-            facets: ZERO,
-            dielectric: ZERO,
-            mean: ZERO,
-            dielectric_mean: ZERO,
-            lacking: ZERO,
-            sheet: ZERO,
-            base: ZERO,
+            alpha: [0.0; N],
+            metallic: [0.0; N],
+            f0: [0.0; N],
+            f90: [0.0; N],
+            base_peak: [0.0; N],
+            f0_peak: [0.0; N],
+            is_metal: [0.0; N],
+            axes: [[[0.0; N]; 3]; 2],
+            wo: [[0.0; N]; 3],
+            rows: [0; N],
+            shares: [0.0; N],
+            facets: [0.0; N],
+            dielectric: [0.0; N],
+            mean: [0.0; N],
+            dielectric_mean: [0.0; N],
+            lacking: [0.0; N],
+            sheet: [0.0; N],
+            base: [0.0; N],
             values: SheetValues {
-                white: ZERO,
-                base: ZERO,
-                highlight: ZERO,
-                dip: ZERO,
-                deep: ZERO,
-                pdf: ZERO,
+                white: [0.0; N],
+                base: [0.0; N],
+                highlight: [0.0; N],
+                dip: [0.0; N],
+                deep: [0.0; N],
+                pdf: [0.0; N],
             },
         }
     }
 }
 
-impl Sheets {
+impl<const N: usize> Sheets<N> {
     /// What was found last of a lane's value.
     #[inline(always)]
     pub(crate) fn weights(&self, lane: usize) -> Weights {
@@ -109,7 +107,7 @@ impl Sheets {
     }
 
     /// As seen against `direction` (unit), with these shading normals on the viewer's side.
-    pub(crate) fn view(&mut self, shading: &[Row; 3], direction: &[Row; 3]) {
+    pub(crate) fn view(&mut self, shading: &[[f64; N]; 3], direction: &[[f64; N]; 3]) {
         view(self, &TABLE, shading, direction);
     }
 
@@ -118,9 +116,9 @@ impl Sheets {
     /// which is 0 where there is none, times the weights.
     pub(crate) fn reflect(
         &mut self,
-        [normal, shading]: [&[Row; 3]; 2],
-        (toward, pdf, is_delta): (&[Row; 3], &Row, &Row),
-        share: &mut Row,
+        [normal, shading]: [&[[f64; N]; 3]; 2],
+        (toward, pdf, is_delta): (&[[f64; N]; 3], &[f64; N], &[f64; N]),
+        share: &mut [f64; N],
     ) {
         reflect(self, &TABLE, [normal, shading], (toward, pdf, is_delta), share);
     }
@@ -129,9 +127,9 @@ impl Sheets {
     /// `along`; their density to `pdf`, 0 where the light is lost, and value over density to the weights.
     pub(crate) fn scatter(
         &mut self,
-        [normal, shading]: [&[Row; 3]; 2],
-        (choices, squares): (&Row, &[[f64; 2]; LANES]),
-        (along, pdf): (&mut [Row; 3], &mut Row),
+        [normal, shading]: [&[[f64; N]; 3]; 2],
+        (choices, squares): (&[f64; N], &[[f64; 2]; N]),
+        (along, pdf): (&mut [[f64; N]; 3], &mut [f64; N]),
     ) {
         scatter(self, &TABLE, [normal, shading], (choices, squares), (along, pdf));
     }
@@ -150,14 +148,18 @@ fn place(x: f64, count: usize) -> (u32, f64) {
 
 /// A and B for the cosines of some directions.
 #[inline(always)]
-fn terms(sheets: &Sheets, table: &AlbedoTable, cosines: &Row) -> [Row; 2] {
-    let (mut knots, mut parts) = ([0_u32; LANES], ZERO);
-    for i in 0..LANES {
+fn terms<const N: usize>(
+    sheets: &Sheets<N>,
+    table: &AlbedoTable,
+    cosines: &[f64; N],
+) -> [[f64; N]; 2] {
+    let (mut knots, mut parts) = ([0_u32; N], [0.0; N]);
+    for i in 0..N {
         let mu = if cosines[i] > 0.0 { cosines[i] } else { 0.0 };
         (knots[i], parts[i]) = place(obliquity(mu, sheets.alpha[i]), OBLIQUITIES);
     }
-    let mut both = [ZERO; 2];
-    for i in 0..LANES {
+    let mut both = [[0.0; N]; 2];
+    for i in 0..N {
         let first = sheets.rows[i] as usize * OBLIQUITIES + knots[i] as usize;
         let all = &table.entries[first..first + OBLIQUITIES + 2];
         let (part, share) = (parts[i], sheets.shares[i]);
@@ -170,8 +172,13 @@ fn terms(sheets: &Sheets, table: &AlbedoTable, cosines: &Row) -> [Row; 2] {
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn view(sheets: &mut Sheets, table: &AlbedoTable, shading: &[Row; 3], direction: &[Row; 3]) {
-    for i in 0..LANES {
+fn view<const N: usize>(
+    sheets: &mut Sheets<N>,
+    table: &AlbedoTable,
+    shading: &[[f64; N]; 3],
+    direction: &[[f64; N]; 3],
+) {
+    for i in 0..N {
         let (x, y, z) = (shading[0][i], shading[1][i], shading[2][i]);
         // Duff et al., "Building an Orthonormal Basis, Revisited", 2017.
         let sign = if z < 0.0 { -1.0 } else { 1.0 };
@@ -189,12 +196,12 @@ fn view(sheets: &mut Sheets, table: &AlbedoTable, shading: &[Row; 3], direction:
         sheets.wo[1][i] = along(v);
         sheets.wo[2][i] = along([x, y, z]);
     }
-    for i in 0..LANES {
+    for i in 0..N {
         let root = sheets.alpha[i].sqrt().sqrt();
         (sheets.rows[i], sheets.shares[i]) = place(root, ROUGHNESSES);
     }
-    let mut means = [ZERO; 3];
-    for i in 0..LANES {
+    let mut means = [[0.0; N]; 3];
+    for i in 0..N {
         let row = sheets.rows[i] as usize;
         let [own, next] = [table.means[row], table.means[row + 1]];
         for term in 0..3 {
@@ -202,7 +209,7 @@ fn view(sheets: &mut Sheets, table: &AlbedoTable, shading: &[Row; 3], direction:
         }
     }
     let [a, b] = terms(sheets, table, &sheets.wo[2]);
-    for i in 0..LANES {
+    for i in 0..N {
         let least = |x: f64| if x < 1.0 { x } else { 1.0 };
         let [mean_a, mean_b] = [means[0][i], means[1][i]];
         let (f0, f90) = (sheets.f0_peak[i], sheets.f90[i]);
@@ -229,10 +236,10 @@ fn view(sheets: &mut Sheets, table: &AlbedoTable, shading: &[Row; 3], direction:
 
 /// Values and densities for light from directions in the shading frames, above the surfaces.
 #[inline(always)]
-fn evaluate(sheets: &mut Sheets, table: &AlbedoTable, wi: &[Row; 3]) {
+fn evaluate<const N: usize>(sheets: &mut Sheets<N>, table: &AlbedoTable, wi: &[[f64; N]; 3]) {
     let [a, b] = terms(sheets, table, &wi[2]);
     let Sheets { alpha, metallic, f0, f90, f0_peak, is_metal, wo, values, .. } = sheets;
-    for i in 0..LANES {
+    for i in 0..N {
         let [vx, vy, vz] = [wo[0][i], wo[1][i], wo[2][i]];
         let [lx, ly, lz] = [wi[0][i], wi[1][i], wi[2][i]];
         // Facets (`super::ggx`).
@@ -268,17 +275,17 @@ fn evaluate(sheets: &mut Sheets, table: &AlbedoTable, wi: &[Row; 3]) {
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn reflect(
-    sheets: &mut Sheets,
+fn reflect<const N: usize>(
+    sheets: &mut Sheets<N>,
     table: &AlbedoTable,
-    [normal, shading]: [&[Row; 3]; 2],
-    (toward, pdf, is_delta): (&[Row; 3], &Row, &Row),
-    share: &mut Row,
+    [normal, shading]: [&[[f64; N]; 3]; 2],
+    (toward, pdf, is_delta): (&[[f64; N]; 3], &[f64; N], &[f64; N]),
+    share: &mut [f64; N],
 ) {
-    let mut wi = [ZERO; 3];
-    let mut above = ZERO;
-    for i in 0..LANES {
-        let along = |axes: &[Row; 3]| {
+    let mut wi = [[0.0; N]; 3];
+    let mut above = [0.0; N];
+    for i in 0..N {
+        let along = |axes: &[[f64; N]; 3]| {
             toward[0][i] * axes[0][i] + toward[1][i] * axes[1][i] + toward[2][i] * axes[2][i]
         };
         wi[0][i] = along(&sheets.axes[0]);
@@ -287,7 +294,7 @@ fn reflect(
         above[i] = along(normal);
     }
     evaluate(sheets, table, &wi);
-    for i in 0..LANES {
+    for i in 0..N {
         let SheetValues { white, base, highlight, deep, pdf: own, .. } = &sheets.values;
         let is_seen = white[i] + base[i] + highlight[i] + deep[i] > 0.0;
         let faces = (sheets.wo[2][i] > 0.0) & (wi[2][i] > 0.0) & (above[i] >= 0.0);
@@ -299,15 +306,15 @@ fn reflect(
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn scatter(
-    sheets: &mut Sheets,
+fn scatter<const N: usize>(
+    sheets: &mut Sheets<N>,
     table: &AlbedoTable,
-    [normal, shading]: [&[Row; 3]; 2],
-    (choices, squares): (&Row, &[[f64; 2]; LANES]),
-    (along, pdf): (&mut [Row; 3], &mut Row),
+    [normal, shading]: [&[[f64; N]; 3]; 2],
+    (choices, squares): (&[f64; N], &[[f64; 2]; N]),
+    (along, pdf): (&mut [[f64; N]; 3], &mut [f64; N]),
 ) {
-    let mut wi = [ZERO; 3];
-    for i in 0..LANES {
+    let mut wi = [[0.0; N]; 3];
+    for i in 0..N {
         // A facet's normal by its visible area, and the direction that it mirrors (`super::ggx`).
         let alpha = sheets.alpha[i];
         let [vx, vy, vz] = [sheets.wo[0][i], sheets.wo[1][i], sheets.wo[2][i]];
@@ -335,7 +342,7 @@ fn scatter(
         }
     }
     evaluate(sheets, table, &wi);
-    for i in 0..LANES {
+    for i in 0..N {
         let [x, y, z] = [wi[0][i], wi[1][i], wi[2][i]];
         let world = |axis: usize| {
             sheets.axes[0][axis][i] * x + sheets.axes[1][axis][i] * y + shading[axis][i] * z
@@ -365,8 +372,11 @@ mod tests {
     use etendue_geometry::glam::DVec3;
 
     use super::*;
+    use crate::Row;
     use crate::bsdf::{Bsdf, Coat, Layered, Model, Sheen};
     use crate::sampling::{Frame, power_heuristic};
+
+    const ZERO: Row = [0.0; LANES];
 
     /// Unit vectors all over the upper half about z.
     fn upward(k: usize, steps: [f64; 2]) -> DVec3 {
@@ -433,7 +443,7 @@ mod tests {
     /// roughnesses, for directions on both sides.
     #[test]
     fn side_by_side_as_one_by_one() {
-        let mut sheets = Sheets::default();
+        let mut sheets = Sheets::<LANES>::default();
         let (surfaces, [shading, normal, direction]) = laid_out(&mut sheets);
         let (mut toward, pdf, mut is_delta) = ([ZERO; 3], [0.7; LANES], ZERO);
         let (mut choices, mut squares) = (ZERO, [[0.0; 2]; LANES]);

@@ -1,12 +1,12 @@
 //! Directions by how bright a map of all directions is.
-#![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
 use std::f64::consts::PI;
 
 use etendue_geometry::glam::DVec3;
 
-use super::{CELLS, Corners, EnvironmentMap, LANES, between, mean, place};
-use crate::sampling::{GridCell, GridDistribution, ONE_BELOW, linear_place};
+use super::{CELLS, Corners, EnvironmentMap, LANES, between, mean};
+use crate::real::Real;
+use crate::sampling::{GridCell, GridDistribution, linear_place};
 use crate::{Color, angles};
 
 /// What cells get of their neighbours, along each axis 1/8 of both. Columns go around, rows end.
@@ -127,17 +127,22 @@ impl MapSampler {
         Self { cells, patches: GridDistribution::new(columns, &weights), scale, mean }
     }
 
-    /// A direction, its [`place`], and its density (1/sr) for each of `squares`, and the radiance of `map` there.
+    /// The patches for each of `squares`; `cells` is refilled.
+    pub(crate) fn cells(&self, squares: impl Iterator<Item = [f64; 2]>, cells: &mut Vec<GridCell>) {
+        self.patches.cells(squares, cells);
+    }
+
+    /// A direction, its [`place`](super::place), and its density (1/sr) for each of `squares`, and the radiance of `map` there.
     pub(crate) fn sample(&self, map: &EnvironmentMap, squares: &[[f64; 2]], out: &mut OnMap) {
         out.directions.clear();
-        self.patches.cells(squares.iter().copied(), &mut out.cells);
+        self.cells(squares.iter().copied(), &mut out.cells);
         out.resize(squares.len());
         if !map.texels.is_empty() {
             chosen(self, map, out);
         }
     }
 
-    /// The [`place`]s of the unit directions in `asked`, their densities (1/sr), and the radiance of `map` there.
+    /// The [`place`](super::place)s of the unit directions in `asked`, their densities (1/sr), and the radiance of `map` there.
     pub(crate) fn look_up(&self, map: &EnvironmentMap, asked: &mut OnMap) {
         asked.resize(asked.directions.len());
         if !map.texels.is_empty() {
@@ -152,8 +157,8 @@ impl MapSampler {
 
     /// How bright cells of the table are.
     #[inline(always)]
-    fn bright_at<const N: usize>(&self, numbers: &[[u32; N]; 4]) -> [[f64; N]; 4] {
-        let mut bright = [[0.0; N]; 4];
+    fn bright_at<F: Real, const N: usize>(&self, numbers: &[[u32; N]; 4]) -> [[F; N]; 4] {
+        let mut bright = [[F::ZERO; N]; 4];
         for corner in 0..4 {
             for i in 0..N {
                 bright[corner][i] = self.cells.bright[numbers[corner][i] as usize].into();
@@ -162,38 +167,92 @@ impl MapSampler {
         bright
     }
 
+    /// Directions in the patches that were chosen, with what the map has there.
+    #[inline(always)]
+    pub(crate) fn in_patches<F: Real>(
+        &self,
+        map: &EnvironmentMap,
+        patches: &[GridCell; LANES],
+    ) -> Lit<F, LANES> {
+        let mut numbers = [[0; LANES]; 4];
+        for (i, patch) in patches.iter().enumerate() {
+            let about = self.cells.about([patch.at[0] as usize, patch.at[1] as usize]);
+            for corner in 0..4 {
+                numbers[corner][i] = about[corner];
+            }
+        }
+        let (places, over_square, colors) = if self.is_of_texels() {
+            let texels = map.texels_at(&numbers);
+            let (places, [across, down], density) = self.places_in(patches, &texels.bright());
+            (places, density, texels.between([&across, &down]))
+        } else {
+            let (places, _, density) = self.places_in(patches, &self.bright_at(&numbers));
+            let about = Corners::of(places, map.size());
+            (places, density, map.texels_at(&about.numbers).between(about.within()))
+        };
+        let (directions, sines) = angles::directions(&places);
+        let mut densities = [F::ZERO; LANES];
+        for i in 0..LANES {
+            densities[i] = over_the_sphere(over_square[i], sines[i]);
+        }
+        Lit { directions, places, densities, colors }
+    }
+
+    /// What the map has in unit directions.
+    #[inline(always)]
+    pub(crate) fn in_directions<F: Real, const N: usize>(
+        &self,
+        map: &EnvironmentMap,
+        directions: [[F; N]; 3],
+    ) -> Lit<F, N> {
+        let [x, _, z] = &directions;
+        let mut sines = [F::ZERO; N];
+        for i in 0..N {
+            sines[i] = (x[i] * x[i] + z[i] * z[i]).sqrt();
+        }
+        let places = angles::places(&directions);
+        let about = Corners::of(places, map.size());
+        let colors = map.texels_at(&about.numbers).between(about.within());
+        let densities = self.pdf_of(&places, sines, &about, &colors);
+        Lit { directions, places, densities, colors }
+    }
+
     /// Places in the patches that were chosen, of which the corners shine so, how far they are from the first of
     /// these, and their density over the unit square.
     #[inline(always)]
-    fn places_in(
+    fn places_in<F: Real>(
         &self,
         patches: &[GridCell; LANES],
-        corners: &[Row; 4],
-    ) -> ([Row; 2], [Row; 2], Row) {
-        let [columns, rows] = self.cells.size.map(|cells| cells as f64);
+        corners: &[[F; LANES]; 4],
+    ) -> ([[F; LANES]; 2], [[F; LANES]; 2], [F; LANES]) {
+        let [columns, rows] = self.cells.size.map(|cells| F::of(cells as f64));
         // What there is in memory of each.
-        let mut scale = [0.0; LANES];
-        let [mut start, mut end, mut x] = [[0.0; LANES]; 3];
+        let mut scale = [F::ZERO; LANES];
+        let [mut start, mut end, mut x] = [[F::ZERO; LANES]; 3];
+        let (mut across, mut down) = ([F::ZERO; LANES], [F::ZERO; LANES]);
         for (i, patch) in patches.iter().enumerate() {
-            scale[i] = self.scale[patch.at[1]];
-            [start[i], end[i]] = self.cells.ends(patch.at[1]);
-            x[i] = patch.at[0] as f64;
+            (across[i], down[i]) = (F::of(patch.rest[0]), F::of(patch.rest[1]));
+            scale[i] = F::of(self.scale[patch.at[1] as usize]);
+            [start[i], end[i]] = self.cells.ends(patch.at[1] as usize).map(F::of);
+            x[i] = F::of(f64::from(patch.at[0]));
         }
-        let (mut places, mut inside, mut density) =
-            ([[0.0; LANES]; 2], [[0.0; LANES]; 2], [0.0; LANES]);
+        let (mut places, mut density) = ([[F::ZERO; LANES]; 2], [F::ZERO; LANES]);
         for i in 0..LANES {
-            let (a, b, c, d) = (corners[0][i], corners[1][i], corners[2][i], corners[3][i]);
-            let [across, down] = patches[i].rest;
-            let down = linear_place(down, [a + b, c + d]);
-            let [left, right] = [a + (c - a) * down, b + (d - b) * down];
-            let across = linear_place(across, [left, right]);
-            density[i] = (left + (right - left) * across) * scale[i];
-            (inside[0][i], inside[1][i]) = (across, down);
-            let u = (x[i] + 0.5 + across) / columns;
-            places[0][i] = if u < 1.0 { u } else { u - 1.0 };
-            places[1][i] = ((start[i] + down * (end[i] - start[i])) / rows).min(ONE_BELOW);
+            // Densities stay in the range of single precision where they are squared.
+            let (a, b) = (corners[0][i] * scale[i], corners[1][i] * scale[i]);
+            let (c, d) = (corners[2][i] * scale[i], corners[3][i] * scale[i]);
+            down[i] = linear_place(down[i], [a + b, c + d]);
+            let (left, right) = (a + (c - a) * down[i], b + (d - b) * down[i]);
+            across[i] = linear_place(across[i], [left, right]);
+            density[i] = left + (right - left) * across[i];
         }
-        (places, inside, density)
+        for i in 0..LANES {
+            let u = (x[i] + F::of(0.5) + across[i]) / columns;
+            places[0][i] = if u < F::of(1.0) { u } else { u - F::of(1.0) };
+            let v = (start[i] + down[i] * (end[i] - start[i])) / rows;
+            places[1][i] = if v < F::ONE_BELOW { v } else { F::ONE_BELOW };
+        }
+        (places, [across, down], density)
     }
 
     /// The density (1/sr) of a unit direction on `map`, which this is of.
@@ -202,35 +261,31 @@ impl MapSampler {
         if map.texels.is_empty() {
             return 0.0;
         }
-        let places = place(d).map(|at| [at]);
-        let sines = [(d.x * d.x + d.z * d.z).sqrt()];
-        let about = Corners::of(places, map.size());
-        let colors = map.texels_at(&about.numbers).between(about.within());
-        let [pdf] = self.pdf_of(&places, sines, &about, &colors);
+        let [pdf] = self.in_directions(map, [[d.x], [d.y], [d.z]]).densities;
         pdf
     }
 
     /// Densities (1/sr) of places with the sines of their polar angles, about which the texels are known, and the colours
     /// there.
     #[inline(always)]
-    fn pdf_of<const N: usize>(
+    fn pdf_of<F: Real, const N: usize>(
         &self,
-        places: &[[f64; N]; 2],
-        sines: [f64; N],
-        about: &Corners<N>,
-        colors: &[Color; N],
-    ) -> [f64; N] {
-        let mut pdf = [0.0; N];
+        places: &[[F; N]; 2],
+        sines: [F; N],
+        about: &Corners<F, N>,
+        colors: &[[F; N]; 3],
+    ) -> [F; N] {
+        let mut pdf = [F::ZERO; N];
         let rows = match self.is_of_texels() {
             true => {
                 for i in 0..N {
-                    pdf[i] = mean(colors[i]);
+                    pdf[i] = mean([colors[0][i], colors[1][i], colors[2][i]]);
                 }
                 about.row
             }
             false => {
                 let about = Corners::of(*places, self.cells.size);
-                let bright = self.bright_at(&about.numbers);
+                let bright: [[F; N]; 4] = self.bright_at(&about.numbers);
                 for i in 0..N {
                     let corners = [bright[0][i], bright[1][i], bright[2][i], bright[3][i]];
                     pdf[i] = between(corners, [about.across[i], about.down[i]]);
@@ -238,9 +293,9 @@ impl MapSampler {
                 about.row
             }
         };
-        let mut scale = [0.0; N];
+        let mut scale = [F::ZERO; N];
         for i in 0..N {
-            scale[i] = self.scale[rows[i] as usize];
+            scale[i] = F::of(self.scale[rows[i] as usize]);
         }
         for i in 0..N {
             pdf[i] = over_the_sphere(pdf[i] * scale[i], sines[i]);
@@ -249,7 +304,15 @@ impl MapSampler {
     }
 }
 
-type Row = [f64; LANES];
+/// What a map has in directions side by side, a row a number.
+pub(crate) struct Lit<F, const N: usize> {
+    /// Unit.
+    pub(crate) directions: [[F; N]; 3],
+    places: [[F; N]; 2],
+    /// 1/sr.
+    pub(crate) densities: [F; N],
+    pub(crate) colors: [[F; N]; 3],
+}
 
 /// Directions, and what a map has there; kept for the next.
 #[derive(Debug, Default)]
@@ -276,67 +339,44 @@ impl OnMap {
     }
 }
 
+impl OnMap {
+    /// Takes what a map has in the directions from one on.
+    #[inline(always)]
+    fn put(&mut self, start: usize, lit: &Lit<f64, LANES>) {
+        let Lit { directions: [x, y, z], places: [u, v], densities, colors: [r, g, b] } = lit;
+        for i in 0..LANES.min(self.directions.len() - start) {
+            self.directions[start + i] = DVec3::new(x[i], y[i], z[i]);
+            self.places[start + i] = [u[i], v[i]];
+            self.densities[start + i] = densities[i];
+            self.colors[start + i] = [r[i], g[i], b[i]];
+        }
+    }
+}
+
 #[multiversion::multiversion(targets = "simd")]
 fn chosen(sampler: &MapSampler, map: &EnvironmentMap, out: &mut OnMap) {
     for start in (0..out.directions.len()).step_by(LANES) {
         let count = LANES.min(out.directions.len() - start);
         let mut patches = [GridCell::default(); LANES];
         patches[..count].copy_from_slice(&out.cells[start..start + count]);
-        let mut numbers = [[0; LANES]; 4];
-        for (i, patch) in patches.iter().enumerate() {
-            let about = sampler.cells.about(patch.at);
-            for corner in 0..4 {
-                numbers[corner][i] = about[corner];
-            }
-        }
-        let (places, over_square, colors) = if sampler.is_of_texels() {
-            let texels = map.texels_at(&numbers);
-            let (places, [across, down], density) = sampler.places_in(&patches, &texels.bright());
-            (places, density, texels.between([&across, &down]))
-        } else {
-            let (places, _, density) = sampler.places_in(&patches, &sampler.bright_at(&numbers));
-            let about = Corners::of(places, map.size());
-            (places, density, map.texels_at(&about.numbers).between(about.within()))
-        };
-        let ([x, y, z], sines) = angles::directions(&places);
-        for i in 0..count {
-            out.directions[start + i] = DVec3::new(x[i], y[i], z[i]);
-            out.places[start + i] = [places[0][i], places[1][i]];
-            out.densities[start + i] = over_the_sphere(over_square[i], sines[i]);
-        }
-        out.colors[start..start + count].copy_from_slice(&colors[..count]);
+        out.put(start, &sampler.in_patches(map, &patches));
     }
 }
 
 #[multiversion::multiversion(targets = "simd")]
 fn looked_up(sampler: &MapSampler, map: &EnvironmentMap, asked: &mut OnMap) {
     for start in (0..asked.directions.len()).step_by(LANES) {
-        let count = LANES.min(asked.directions.len() - start);
         let mut directions = [[0.0; LANES]; 3];
-        for i in 0..count {
-            let d = asked.directions[start + i];
+        for (i, d) in asked.directions[start..].iter().take(LANES).enumerate() {
             (directions[0][i], directions[1][i], directions[2][i]) = (d.x, d.y, d.z);
         }
-        let mut sines = [0.0; LANES];
-        for i in 0..LANES {
-            let (x, z) = (directions[0][i], directions[2][i]);
-            sines[i] = (x * x + z * z).sqrt();
-        }
-        let places = angles::places(&directions);
-        let about = Corners::of(places, map.size());
-        let colors = map.texels_at(&about.numbers).between(about.within());
-        let pdf = sampler.pdf_of(&places, sines, &about, &colors);
-        for i in 0..count {
-            asked.places[start + i] = [places[0][i], places[1][i]];
-        }
-        asked.densities[start..start + count].copy_from_slice(&pdf[..count]);
-        asked.colors[start..start + count].copy_from_slice(&colors[..count]);
+        asked.put(start, &sampler.in_directions(map, directions));
     }
 }
 
 /// A density over the map's places as one over solid angles (1/sr), by the sine of the polar angle.
 #[inline(always)]
-fn over_the_sphere(density: f64, sin_theta: f64) -> f64 {
-    let over = density / (2.0 * PI * PI * sin_theta);
-    if sin_theta > 0.0 { over } else { 0.0 }
+fn over_the_sphere<F: Real>(density: F, sin_theta: F) -> F {
+    let over = density / (F::of(2.0 * PI * PI) * sin_theta);
+    if sin_theta > F::ZERO { over } else { F::ZERO }
 }

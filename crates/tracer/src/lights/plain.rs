@@ -1,21 +1,27 @@
-//! Scenes whose lights are all plain: points that stand still, and triangles that shine alike all over.
+//! Scenes whose lights are all plain: triangles that shine alike all over, and lights that are no surfaces. Among these,
+//! points that stand still and shine alike to all sides need no more than their place.
 
 use etendue_geometry::glam::DVec3;
 
 use super::Lights;
 use crate::area_light::AreaLight;
 use crate::light::{Light, LightKind};
+use crate::light_tree::Choice;
 
 /// Bounds of all plain lights.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PlainLightBounds {
     /// The least area of a triangle (m²); infinite without any.
     pub(crate) least_area: f64,
-    /// The largest absolute coordinate of a point (m).
+    /// The largest absolute coordinate of what has a place and is no triangle (m).
     pub(crate) farthest: f64,
+    /// Some are neither triangles nor points that stand still and shine alike to all sides.
+    pub(crate) has_others: bool,
+    /// All are far away.
+    pub(crate) are_far: bool,
 }
 
-/// A plain light.
+/// A light that needs no more than its place.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum PlainLight<'a> {
     /// m.
@@ -37,6 +43,18 @@ impl Lights {
         are_taken.then_some((&*self.area_lights, &*self.area_light_bands))
     }
 
+    /// Tests whether some lights need more than their place.
+    pub(crate) fn has_others(&self) -> bool {
+        self.plain_lights.is_none_or(|bounds| bounds.has_others)
+    }
+
+    /// Chooses a light by a number in 0..1, where all are far away and each is as likely from everywhere; what is left of
+    /// the number goes to the choice.
+    #[inline(always)]
+    pub(crate) fn pick_far(&self, u: f64) -> Choice {
+        self.sampler.pick_other((u, 1.0))
+    }
+
     /// Bounds of the lights, if all are plain and kept ready.
     pub(crate) fn plain_lights(&self) -> Option<PlainLightBounds> {
         self.plain_lights
@@ -47,7 +65,7 @@ impl Lights {
         self.lights.len() + self.triangles.len()
     }
 
-    /// A plain light by its number; `None` of another.
+    /// A light that needs no more than its place, by its number; `None` of another.
     #[inline(always)]
     pub(crate) fn plain_light(&self, number: usize) -> Option<PlainLight<'_>> {
         match self.lights.get(number) {
@@ -59,7 +77,7 @@ impl Lights {
         }
     }
 
-    /// Light of a plain light in each band: the intensity of a point, the radiance of a triangle.
+    /// Light of such a light in each band: the intensity of a point, the radiance of a triangle.
     #[inline(always)]
     pub(crate) fn plain_light_bands(&self, number: usize, count: usize) -> &[f64] {
         match number.checked_sub(self.lights.len()) {
@@ -73,16 +91,23 @@ impl Lights {
         if self.area_lights.len() != self.triangles.len() {
             return None;
         }
-        let mut bounds = PlainLightBounds { least_area: f64::INFINITY, farthest: 0.0 };
-        for number in 0..self.count() {
-            match self.plain_light(number)? {
-                PlainLight::Point(at) => {
-                    bounds.farthest = bounds.farthest.max(at.abs().max_element());
-                }
-                PlainLight::Triangle(own) => {
-                    bounds.least_area = bounds.least_area.min(own.shape.area);
-                }
+        let mut bounds = PlainLightBounds {
+            least_area: f64::INFINITY,
+            farthest: 0.0,
+            has_others: false,
+            are_far: self.triangles.is_empty(),
+        };
+        for light in &self.lights {
+            bounds.has_others |= standing_point(light).is_none();
+            if let Some(at) = light.kind.place() {
+                bounds.are_far = false;
+                let at = light.stand(0.0).point(at);
+                bounds.farthest = bounds.farthest.max(at.abs().max_element());
             }
+        }
+        for number in self.lights.len()..self.count() {
+            let PlainLight::Triangle(own) = self.plain_light(number)? else { return None };
+            bounds.least_area = bounds.least_area.min(own.shape.area);
         }
         Some(bounds)
     }

@@ -11,7 +11,6 @@ use etendue_geometry::{RayBlock, disk};
 use super::patch::{BESIDE, Patch, Picks};
 use crate::LANES;
 use crate::area_light::AreaLight;
-use crate::bsdf::fresnel::schlick_weight;
 use crate::sampling::ONE_BELOW;
 use crate::surface::facing;
 
@@ -316,50 +315,19 @@ pub(super) fn scatter(patch: &mut Patch, squares: &[[f64; 2]; LANES]) {
     start_outside(patch);
 }
 
-/// Directions that smooth surfaces mirror or, by choices and Fresnel's share, refract: as
-/// [`crate::bsdf::Bsdf`] has them of mirrors, metal and boundaries. The value is 1 where there is one.
+/// Directions that smooth surfaces mirror or refract light from, and the rays along them. The value is 1 where there is
+/// one.
 #[multiversion::multiversion(targets = "simd")]
 pub(super) fn mirror_or_refract(patch: &mut Patch, choices: &[f64; LANES]) {
     let Patch { seen, away, smooth, .. } = patch;
+    let found = (&mut away.along, &mut away.value);
+    smooth.scatter([&seen.normal, &seen.shading], (&seen.direction, choices), found);
     for i in 0..LANES {
-        let (mut cosine, is_boundary) = (0.0, smooth.eta[i] > 0.0);
+        let side = if smooth.refracts[i] > 0.0 { -seen.error[i] } else { seen.error[i] };
         for axis in 0..3 {
-            cosine -= seen.direction[axis][i] * seen.shading[axis][i];
-        }
-        // Fresnel's equations (`crate::bsdf::fresnel`).
-        let eta = if is_boundary { smooth.eta[i] } else { 1.0 };
-        let sin2_out = (1.0 - cosine * cosine) / (eta * eta);
-        let is_total = sin2_out >= 1.0;
-        let cos_out = if is_total { 0.0 } else { 1.0 - sin2_out }.sqrt();
-        let s = (cosine - eta * cos_out) / (cosine + eta * cos_out);
-        let p = (eta * cosine - cos_out) / (eta * cosine + cos_out);
-        let reflected = 0.5 * (s * s + p * p);
-        let refracts = is_boundary & !is_total & (choices[i] >= reflected);
-        let (along, back) =
-            if refracts { (cosine / eta - cos_out, 1.0 / eta) } else { (2.0 * cosine, 1.0) };
-        let (mut way, mut squared, mut above) = ([0.0; 3], 0.0, 0.0);
-        for axis in 0..3 {
-            way[axis] = seen.shading[axis][i] * along + seen.direction[axis][i] * back;
-            squared += way[axis] * way[axis];
-            above += way[axis] * seen.normal[axis][i];
-        }
-        let inverse = 1.0 / squared.sqrt();
-        let side = if refracts { -seen.error[i] } else { seen.error[i] };
-        for axis in 0..3 {
-            away.along[axis][i] = way[axis] * inverse;
             let lifted = seen.normal[axis][i] * side + seen.back[axis][i];
             away.start[axis][i] = seen.point[axis][i] + lifted;
         }
-        // The shading normal may lean a reflection through the surface.
-        let is_sound = (cosine > 0.0) & ((above < 0.0) == refracts);
-        away.value[i] = if is_sound { 1.0 } else { 0.0 };
-        let w = schlick_weight(cosine);
-        let is_metal = smooth.is_metal[i] > 0.0;
-        let mirrored = if is_metal { [w, 1.0 - w] } else { [0.0, 1.0] };
-        let mirrored = if is_boundary { [1.0, 0.0] } else { mirrored };
-        let [white, base] = if refracts { [0.0, 1.0 / (eta * eta)] } else { mirrored };
-        (smooth.white[i], smooth.base[i]) = (white, base);
-        smooth.dip[i] = if is_metal { -cosine * (1.0 - cosine) * w } else { 0.0 };
     }
 }
 

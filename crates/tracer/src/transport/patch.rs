@@ -6,6 +6,7 @@ use etendue_geometry::glam::DVec3;
 use super::media::Crossing;
 use crate::area_light::AreaLight;
 use crate::bsdf::sheets::Sheets;
+use crate::bsdf::smooth::Smooth;
 use crate::bsdf::{Bsdf, Weights};
 use crate::light_sampler::Receiver;
 use crate::light_tree::Choices;
@@ -76,20 +77,6 @@ pub(super) struct Seen {
     pub(super) back: [Row; 3],
 }
 
-/// Mirrors and smooth boundaries.
-#[derive(Debug)]
-pub(super) struct Smooth {
-    /// Index behind a boundary over the index in front; 0 of mirrors.
-    pub(super) eta: Row,
-    /// 1 for metal, which is white at grazing incidence.
-    pub(super) is_metal: Row,
-    /// What goes the way that was chosen, as multiples of white, of the surface's colour, and of what a measured
-    /// metal's reflectance lacks of Schlick's.
-    pub(super) white: Row,
-    pub(super) base: Row,
-    pub(super) dip: Row,
-}
-
 /// The places on lights that the hits ask, as [`Target`] has them.
 #[derive(Debug)]
 pub(super) struct Targets {
@@ -151,12 +138,6 @@ impl Default for Seen {
             is_beside: ZERO,
             back: [ZERO; 3],
         }
-    }
-}
-
-impl Default for Smooth {
-    fn default() -> Self {
-        Self { eta: ZERO, is_metal: ZERO, white: ZERO, base: ZERO, dip: ZERO }
     }
 }
 

@@ -1,29 +1,37 @@
-//! Plain scenes: matte surfaces of one colour each, flat or smooth, under lamps that stand still, few or many. All of a
-//! step is done on blocks of sixteen paths in single precision, whose numbers stay in registers between the hit and the
-//! rays that leave it.
+//! Plain scenes: surfaces that are alike all over, matte, of facets or smooth, under lights of all kinds that stand still,
+//! few or many. All of a step is done on blocks of sixteen paths in single precision, whose numbers stay in registers
+//! between the hit and the rays that leave it; facets are worked out in double precision.
 //!
 //! The estimators, and the random numbers by use, are those of the other scenes ([`super::trace`]): pictures are the
 //! same up to the roundings of single precision. What is rare, such as the light of a lamp that is met, is done there.
 
+mod ask;
+mod choose;
 mod compaction;
+mod depart;
+mod facets;
 mod kernel;
 mod lamps;
+mod sky;
 mod surfaces;
+mod varied;
 
 use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitPrecision, RayBlocks};
 
-use self::kernel::{Leaving, Numbers, ask_for_lamps, leave_blocks};
-use self::lamps::Lights;
-use self::surfaces::Surfaces;
+use self::facets::Facets;
+use self::kernel::{Leaving, Numbers, leave_blocks};
+use self::lamps::{ChosenLamps, Lights};
+use self::surfaces::{Surfaces, Varied};
 use super::paths::{DRAWS, Draw, Step, Way, Workspace};
 use super::rays::{Blocks, RayHit};
 use super::trace::Encounter;
 use super::{LightingContext, Parts, RaySamples, Tracing};
+use crate::Image;
 use crate::light_sampler::Receiver;
-use crate::light_tree::Choices;
 use crate::lights::PlainLightBounds;
+use crate::sky::Sky;
 
 /// Single precision holds squares of lengths, and densities over areas, of scenes between these sizes (m).
 pub(crate) const SIZES: [f64; 2] = [1e-6, 1e9];
@@ -41,7 +49,20 @@ pub(super) struct Columns {
     pub(super) throughput: [Vec<f32>; 3],
     /// The normal of the surface that each left, where there are many lamps; unused of the camera's.
     pub(super) normal: [Vec<f32>; 3],
+    /// The chance with which the sky was chosen there; unused of the camera's, and without a sky.
+    pub(super) sky_chance: Vec<f32>,
+    /// What each stands for where it starts, if that is more than a point: a width (m), and by how much that grows per
+    /// length. Unused of the camera's, and where no surface is smooth or all are alike all over.
+    pub(super) cone: [Vec<f32>; 2],
+    /// [`SPECULAR`] and [`LAST`]; empty where no surface is smooth.
+    pub(super) flags: Vec<u32>,
 }
+
+/// A path came by a mirror or a smooth boundary: no light was asked in its stead.
+const SPECULAR: u32 = 1;
+
+/// A path looks for light and goes no farther.
+const LAST: u32 = 2;
 
 /// Rays that leave a block's hits, a column a number, with room for a block behind the last.
 #[derive(Debug, Default)]
@@ -64,37 +85,35 @@ pub(super) struct PlainScratch {
     carried: Columns,
     shadows: RayColumns,
     next: RayColumns,
+    /// Last directions that ask what shines first.
+    last: RayColumns,
     shadow_rays: RayBlocks,
     numbers: [[Vec<f32>; 2]; DRAWS as usize],
     chosen: ChosenLamps,
-    /// Hits on what shines.
+    /// Hits on what shines, and rays that met nothing.
     seen: Vec<u32>,
-}
-
-/// Lamps that are chosen by where paths are: for points side by side, and by lane.
-#[derive(Debug, Default)]
-struct ChosenLamps {
-    choices: Choices,
-    /// The lane of each choice.
-    asking: Vec<u32>,
-    lamp: Vec<u32>,
-    /// 0 where none was chosen.
-    chance: Vec<f32>,
+    missed: Vec<u32>,
+    facets: Facets,
+    varied: Vec<Varied>,
 }
 
 impl Columns {
-    fn resize(&mut self, len: usize) {
+    /// Makes room for so many; whether surfaces may be smooth.
+    fn resize(&mut self, len: usize, are_smooth: bool) {
         let len = len.next_multiple_of(LANES) + LANES;
+        self.flags.resize(if are_smooth { len } else { 0 }, 0);
         self.ray.resize(len, 0);
         self.pdf.resize(len, 0.0);
-        self.throughput.iter_mut().chain(&mut self.normal).for_each(|row| row.resize(len, 0.0));
+        self.sky_chance.resize(len, 0.0);
+        let rows = self.throughput.iter_mut().chain(&mut self.normal).chain(&mut self.cone);
+        rows.for_each(|row| row.resize(len, 0.0));
     }
 }
 
 impl RayColumns {
-    fn restart(&mut self, most: usize) {
+    fn restart(&mut self, most: usize, are_smooth: bool) {
         self.len = 0;
-        self.carried.resize(most);
+        self.carried.resize(most, are_smooth);
         let len = self.carried.ray.len();
         for axis in self.start.iter_mut().chain(&mut self.along) {
             axis.resize(len, 0.0);
@@ -125,13 +144,17 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             && self.ctx.precision == HitPrecision::Single
             && self.parts == Parts::Whole
             && self.times.is_empty()
-            && traits.is_matte
             && !(traits.may_pass() || traits.has_media || traits.has_panes)
-            && !lights.has_environment();
+            && !traits.has_dispersion
+            && lights.sky.as_ref().is_none_or(Sky::is_of_colors);
         let all = placed.plain().filter(|_| is_taken)?;
-        let surfaces = Surfaces { all, geometry: scene.geometry, are_tilted: placed.are_tilted() };
+        let image = |&texture: &u32| scene.images.get(texture as usize)?.as_deref();
+        if !all.rough_by.iter().filter_map(image).all(Image::has_green) {
+            return None;
+        }
+        let surfaces = Surfaces { all, geometry: scene.geometry, varied: &[] };
         let origin = self.ctx.accel.blocks()?.origin();
-        let PlainLightBounds { least_area, farthest } = lights.plain_lights()?;
+        let PlainLightBounds { least_area, farthest, .. } = lights.plain_lights()?;
         let least = LEAST_AREA * placed.size().powi(2);
         let are_near = 2.0 * (farthest + origin.abs().max_element()) < SIZES[1];
         let are_taken = least_area > least && are_near && !lights.is_dark();
@@ -149,8 +172,13 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         let Some(accel) = self.ctx.accel.blocks() else { return };
         workspace.radiance.resize(self.count(), 0.0);
         accel.convert(camera.rays, &mut plain.rays);
-        start(camera, &mut plain.carried);
+        let all = surfaces.all;
+        let are_smooth = all.are_smooth;
+        let are_rich = !surfaces.all.facets.is_empty() || surfaces.all.are_varied;
+        let is_rich = are_rich || self.ctx.lights.has_others();
+        start(camera, are_smooth, &mut plain.carried);
         let mut coherent = camera.rays.coherent;
+        let has_environment = self.ctx.lights.has_environment();
         let emitters = self.ctx.emitters.map(|emitters| emitters.sphere(lights.origin));
         let mut is_scattered = true;
         for number in 0..=self.rules.bounces {
@@ -162,44 +190,57 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             self.tally.rays += len as u64;
             is_scattered &= number < self.rules.bounces;
             let is_last = self.is_end_unless_specular(number);
-            plain.shadows.restart(len);
-            plain.next.restart(len);
+            for columns in [&mut plain.shadows, &mut plain.next, &mut plain.last] {
+                columns.restart(len, are_smooth);
+            }
             plain.seen.clear();
+            plain.missed.clear();
             // Nobody comes upon points.
             let goes_on = !is_last || self.ctx.lights.is_hittable();
             let roulette = !is_last && self.rules.roulette.is_some_and(|after| number + 1 >= after);
             if is_scattered {
-                self.draw_plain(camera, number, [goes_on, roulette], plain);
+                self.look_up_varied((camera, number), surfaces, plain);
+                let has_choice = !surfaces.all.facets.is_empty();
+                let goes_on = goes_on || are_smooth;
+                self.draw_plain(camera, number, [goes_on, roulette, has_choice], plain);
                 if lights.are_many() {
                     self.choose_lamps((surfaces, lights), plain);
                 }
             }
-            let ChosenLamps { lamp, chance, .. } = &plain.chosen;
-            let chosen = lights.are_many().then_some((&**lamp, &**chance));
+            let surfaces = Surfaces { varied: &plain.varied, ..surfaces };
+            let chosen = lights.are_many().then_some(&plain.chosen);
+            let asks_emitters = emitters.is_some();
+            let drawn = &plain.numbers;
             let numbers =
-                Numbers { is_scattered, goes_on, roulette, drawn: &plain.numbers, chosen };
+                Numbers { is_scattered, goes_on, roulette, is_last, asks_emitters, drawn, chosen };
             let leaving = Leaving {
                 shadows: &mut plain.shadows,
                 next: &mut plain.next,
+                last: &mut plain.last,
                 seen: &mut plain.seen,
+                missed: has_environment.then_some(&mut plain.missed),
+                facets: &mut plain.facets,
             };
-            let sphere = emitters.filter(|_| is_last);
-            let leave =
-                if surfaces.are_tilted { leave_blocks::<true> } else { leave_blocks::<false> };
+            let sphere = emitters.filter(|_| is_last && !has_environment);
+            let leave = match (surfaces.all.are_tilted, is_rich) {
+                (false, false) => leave_blocks::<false, false>,
+                (false, true) => leave_blocks::<false, true>,
+                (true, false) => leave_blocks::<true, false>,
+                (true, true) => leave_blocks::<true, true>,
+            };
             leave(
                 (surfaces, lights),
                 (plain.rays.blocks(), &plain.carried),
                 (numbers, sphere),
                 leaving,
             );
+            self.carry_cones((camera, number), all, plain);
             self.meet_plain(number, plain, workspace, out);
+            self.add_sky_plain((camera, number), lights, plain, out);
             self.light_plain(plain, lights, coherent, out);
-            if is_last && emitters.is_some() {
-                self.ask_emitters_plain(camera, number, plain, workspace, out);
-                break;
-            }
-            // Where much of the scene shines, last directions are followed as the others are.
-            is_scattered &= !is_last;
+            self.ask_emitters_plain(camera, number, plain, workspace, out);
+            // Last directions that do not ask what shines are followed as the others are.
+            is_scattered &= !is_last || are_smooth;
             plain.next.pack(&mut plain.rays);
             std::mem::swap(&mut plain.carried, &mut plain.next.carried);
             plain.carried.len = plain.next.len;
@@ -212,47 +253,23 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         &self,
         camera: &RaySamples<'_>,
         number: u32,
-        [goes_on, roulette]: [bool; 2],
+        [goes_on, roulette, has_choice]: [bool; 3],
         plain: &mut PlainScratch,
     ) {
         let rays = &plain.carried.ray[..plain.rays.len()];
         let padded = rays.len().next_multiple_of(LANES);
-        for (draw, needs) in
-            [(Draw::Light, true), (Draw::Direction, goes_on), (Draw::Chance, roulette)]
-        {
+        for (draw, needs) in [
+            (Draw::Choice, has_choice),
+            (Draw::Light, true),
+            (Draw::Direction, goes_on),
+            (Draw::Chance, roulette),
+        ] {
             if needs {
                 let drawn = &mut plain.numbers[draw as usize];
                 let pair = number * DRAWS + draw as u32;
                 camera.samples.floats_of_pair(rays, pair, drawn);
                 drawn.iter_mut().for_each(|half| half.resize(padded, 0.5));
             }
-        }
-    }
-
-    /// Chooses one of many lamps for each path that is scattered.
-    fn choose_lamps(
-        &self,
-        (surfaces, lights): (Surfaces<'_>, &Lights<'_>),
-        plain: &mut PlainScratch,
-    ) {
-        let PlainScratch { rays, carried, numbers, chosen, .. } = plain;
-        let ChosenLamps { choices, asking, lamp, chance } = chosen;
-        let [first, _] = &mut numbers[Draw::Light as usize];
-        let room = first.len() + LANES;
-        self.ctx.lights.restart(choices, room);
-        asking.resize(room, 0);
-        let ask = if surfaces.are_tilted { ask_for_lamps::<true> } else { ask_for_lamps::<false> };
-        ask((surfaces, lights.origin), (rays.blocks(), carried), first, (choices, asking));
-        self.ctx.lights.pick(choices);
-        lamp.clear();
-        lamp.resize(room, 0);
-        chance.clear();
-        chance.resize(room, 0.0);
-        for (number, &lane) in asking[..choices.len()].iter().enumerate() {
-            let (lane, choice) = (lane as usize, choices.get(number));
-            (lamp[lane], chance[lane]) = (choice.light, kernel::round(choice.chance));
-            // What is left of the number that chose the lamp chooses the place: both stay even.
-            first[lane] = super::below_one(choice.u);
         }
     }
 
@@ -264,7 +281,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         workspace: &mut Workspace<Blocks>,
         out: &mut [f64],
     ) {
-        let Columns { ray, pdf, throughput, normal, .. } = &plain.carried;
+        let Columns { ray, pdf, throughput, normal, flags, .. } = &plain.carried;
         for &i in &plain.seen {
             let i = i as usize;
             let (block, lane) = (&plain.rays.blocks()[i / LANES], i % LANES);
@@ -284,6 +301,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             let encounter = Encounter { hit, ray: (from, vector(&block.direction)), receiver };
             let way = match number {
                 0 => Way::CAMERA,
+                _ if flags.get(i).is_some_and(|flags| flags & SPECULAR != 0) => Way::CAMERA,
                 _ => Way { pdf: f64::from(pdf[i]), is_specular: false, ..Way::CAMERA },
             };
             let light = &mut workspace.radiance;
@@ -336,29 +354,32 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         workspace: &mut Workspace<Blocks>,
         out: &mut [f64],
     ) {
-        let (next, onward) = (&plain.next, &mut workspace.onward);
+        let (last, onward) = (&plain.last, &mut workspace.onward);
+        if last.len == 0 {
+            return;
+        }
         onward.last.clear();
         onward.of_last.clear();
         let origin = self.ctx.accel.blocks().map_or(DVec3::ZERO, |blocks| blocks.origin());
-        for i in 0..next.len {
+        for i in 0..last.len {
             let vector = |axes: &[Vec<f32>; 3]| {
                 DVec3::from_array(axes.each_ref().map(|axis| f64::from(axis[i])))
             };
-            onward.last.push(origin + vector(&next.start), vector(&next.along).normalize());
-            let left = next.left[i] as usize;
+            onward.last.push(origin + vector(&last.start), vector(&last.along).normalize());
+            let left = last.left[i] as usize;
             let (block, lane) = (&plain.rays.blocks()[left / LANES], left % LANES);
             let of_last = &mut onward.of_last;
             of_last.left.push([block.placement[lane], block.triangle[lane]]);
-            of_last.ray.push(next.carried.ray[i]);
+            of_last.ray.push(last.carried.ray[i]);
             of_last.ways.push(Way {
-                pdf: f64::from(next.carried.pdf[i]),
+                pdf: f64::from(last.carried.pdf[i]),
                 is_specular: false,
                 is_last: true,
-                normal: next.carried.normal.each_ref().map(|axis| axis[i]),
+                normal: last.carried.normal.each_ref().map(|axis| axis[i]),
             });
             of_last
                 .throughput
-                .extend(next.carried.throughput.iter().map(|band| f64::from(band[i])));
+                .extend(last.carried.throughput.iter().map(|band| f64::from(band[i])));
         }
         let step = Step { camera, number, asks_emitters: true, is_mixed: false };
         self.ask_emitters(&step, workspace, out);
@@ -366,9 +387,10 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
 }
 
 /// The camera's rays as paths.
-fn start(camera: &RaySamples<'_>, carried: &mut Columns) {
+fn start(camera: &RaySamples<'_>, are_smooth: bool, carried: &mut Columns) {
     let len = camera.rays.len();
-    carried.resize(len);
+    carried.resize(len, are_smooth);
+    carried.flags.fill(SPECULAR);
     carried.len = len;
     for (number, ray) in (0..).zip(&mut carried.ray) {
         *ray = number;

@@ -8,7 +8,6 @@ use super::paths::{Draw, Passage, Step, Way, Workspace};
 use super::rays::Rays;
 use super::{LightingContext, Tracing, kernels};
 use crate::LANES;
-use crate::bsdf::Weights;
 use crate::footprint::Cone;
 use crate::placed::SurfaceKind;
 
@@ -100,9 +99,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                     });
                 }
                 SurfaceKind::Smooth => {
-                    let (white, base) = (patch.smooth.white[lane], patch.smooth.base[lane]);
-                    let weights =
-                        Weights { white, base, dip: patch.smooth.dip[lane], ..Weights::default() };
+                    let weights = patch.smooth.weights(lane);
                     bands.for_each(|(k, band)| {
                         *band *= self.in_band_of_sheet(patch, lane, weights, k);
                     });

@@ -2,24 +2,26 @@
 //! the rays that leave them side by side.
 #![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
-use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
 use std::hint::select_unpredictable;
 
 use etendue_geometry::RayBlock;
 use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::glam::DVec3;
 
+use super::ask::{ask, send};
 use super::compaction::{Compaction, Instructions};
-use super::lamps::{Lights, Places, place, place_on_chosen};
+use super::depart::{Departing, depart, end_some, keep_those_that_may_meet, scatter};
+use super::facets::Facets;
+use super::lamps::{ChosenLamps, Lights, OtherPlaces, place, place_on_chosen};
 use super::surfaces::{Found, Surfaces, bend};
-use super::{Columns, RayColumns};
+use super::{Columns, LAST, RayColumns};
 use crate::light_tree::Choices;
 use crate::transport::paths::{DRAWS, Draw};
 use crate::transport::{kernels, patch};
 
 /// Roundings of a hit and of the rays that leave it: those of [`crate::spawn`] in single precision, and as many
 /// again of the point, of the normal and of the start, which are of single precision, too.
-const ROUNDINGS: f32 = 12.0 * f32::EPSILON;
+pub(super) const ROUNDINGS: f32 = 12.0 * f32::EPSILON;
 
 /// [`kernels::BACK`] and [`patch::BESIDE`], which single precision holds.
 #[expect(clippy::cast_possible_truncation, reason = "a power of two")]
@@ -38,58 +40,77 @@ pub(super) struct Numbers<'a> {
     pub(super) is_scattered: bool,
     pub(super) goes_on: bool,
     pub(super) roulette: bool,
+    /// Paths go on no farther than to the light that they meet, but for those of smooth surfaces; and whether what
+    /// shines is asked for that light first.
+    pub(super) is_last: bool,
+    pub(super) asks_emitters: bool,
     pub(super) drawn: &'a [[Vec<f32>; 2]; DRAWS as usize],
-    /// The lamps that lanes chose, and with which chances, where they are many; what is left of the number that chose
-    /// each is drawn.
-    pub(super) chosen: Option<(&'a [u32], &'a [f32])>,
+    /// What lanes chose where each chooses by itself; what is left of the number that chose is drawn.
+    pub(super) chosen: Option<&'a ChosenLamps>,
 }
 
 /// Where rays go that leave hits.
 pub(super) struct Leaving<'a> {
     pub(super) shadows: &'a mut RayColumns,
     pub(super) next: &'a mut RayColumns,
+    /// Last directions that ask what shines first.
+    pub(super) last: &'a mut RayColumns,
     pub(super) seen: &'a mut Vec<u32>,
+    /// Rays that met nothing, if that is asked for.
+    pub(super) missed: Option<&'a mut Vec<u32>>,
+    pub(super) facets: &'a mut Facets,
 }
 
 /// A sphere around all that shines, relative to the blocks' origin: its centre and its radius (m).
 pub(super) type Sphere = ([f32; 3], f32);
 
 /// The hits of a block.
-struct Hits {
-    point: [Row; 3],
-    normal: [Row; 3],
+pub(super) struct Hits {
+    pub(super) point: [Row; 3],
+    pub(super) normal: [Row; 3],
     /// The normals of meshes that light is scattered about, on the viewer's side, where there are any.
-    bent: [Row; 3],
-    error: Row,
-    back: [Row; 3],
+    pub(super) bent: [Row; 3],
+    pub(super) error: Row,
+    pub(super) back: [Row; 3],
+    /// Lanes that see the front.
+    pub(super) front: Mask,
 }
 
 impl Hits {
     /// The normals that light is scattered about.
     #[inline(always)]
-    fn shading<const TILTED: bool>(&self) -> &[Row; 3] {
+    pub(super) fn shading<const TILTED: bool>(&self) -> &[Row; 3] {
         if TILTED { &self.bent } else { &self.normal }
     }
 }
 
 /// The points of some blocks, where surfaces scatter light, that choose among many lamps by a number a lane; their lanes
-/// go to `asking`, which has room for all.
+/// go to `asking` and, unless that is empty, their places from the origin to `points`, which have room for all.
 #[multiversion::multiversion(targets = "simd")]
-pub(super) fn ask_for_lamps<const TILTED: bool>(
+pub(super) fn ask_for_lamps<const TILTED: bool, const RICH: bool>(
     (surfaces, origin): (Surfaces<'_>, DVec3),
     (blocks, carried): (&[RayBlock], &Columns),
     numbers: &[f32],
-    (choices, asking): (&mut Choices, &mut [u32]),
+    (choices, asking, points): (&mut Choices, &mut [u32], &mut [Vec<f32>; 3]),
 ) {
     let instructions = Instructions::of_machine();
     for (number, block) in blocks.iter().enumerate() {
         let first = number * LANES;
         let count = carried.len.saturating_sub(first);
-        let found = Found::of::<TILTED>(surfaces, (block, count), |_| ());
+        let mut found =
+            Found::of::<TILTED, RICH>(surfaces, (block, first, count), (|_| (), |_| ()));
+        if RICH {
+            leave_out(&mut found, carried, first);
+        }
         let own: &Row = numbers[first..first + LANES].try_into().unwrap_or(&ZERO);
         let hits = measure(block, &found, [0.0; 3]);
-        let (wanted, at) = (Compaction::new(&found.scatters, instructions), choices.len());
+        let (wanted, at) = (Compaction::new(&found.asks(), instructions), choices.len());
         wanted.put(&lanes_from(first), asking, at);
+        for axis in 0..3 {
+            if !points[axis].is_empty() {
+                wanted.put(&hits.point[axis], &mut points[axis], at);
+            }
+        }
         choices.push_some((&hits.point, origin), hits.shading::<TILTED>(), own, |row, to| {
             wanted.put(row, to, 0);
             wanted.count
@@ -97,13 +118,14 @@ pub(super) fn ask_for_lamps<const TILTED: bool>(
     }
 }
 
-/// A step of all paths of some blocks: lists those that met what shines, and notes the rays that leave.
+/// A step of all paths of some blocks: lists those that met what shines, and notes the rays that leave. Scenes are `RICH`
+/// in which some surface is not matte or not alike all over, or some light needs more than its place.
 #[multiversion::multiversion(targets = "simd")]
-pub(super) fn leave_blocks<const TILTED: bool>(
+pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool>(
     (surfaces, lights): (Surfaces<'_>, &Lights<'_>),
     (blocks, carried): (&[RayBlock], &Columns),
     (numbers, sphere): (Numbers<'_>, Option<Sphere>),
-    Leaving { shadows, next, seen }: Leaving<'_>,
+    mut leaving: Leaving<'_>,
 ) {
     // Blocks' coordinates are those of the world less their origin, whose roundings count as well.
     let offset = single(lights.origin).map(|axis| 2.0 * axis.abs());
@@ -111,9 +133,18 @@ pub(super) fn leave_blocks<const TILTED: bool>(
     for (number, block) in blocks.iter().enumerate() {
         let first = number * LANES;
         let count = carried.len.saturating_sub(first);
-        let numbers_of_lanes = lanes_from(first);
-        let meets = |lane: usize| seen.push(numbers_of_lanes[lane]);
-        let found = Found::of::<TILTED>(surfaces, (block, count), meets);
+        let lanes = lanes_from(first);
+        let (seen, missed) = (&mut *leaving.seen, &mut leaving.missed);
+        let meets = |lane: usize| seen.push(lanes[lane]);
+        let misses = |lane: usize| {
+            if let Some(missed) = missed {
+                missed.push(lanes[lane]);
+            }
+        };
+        let mut found = Found::of::<TILTED, RICH>(surfaces, (block, first, count), (meets, misses));
+        if RICH {
+            leave_out(&mut found, carried, first);
+        }
         if !numbers.is_scattered || found.scatters == [0; LANES] {
             continue;
         }
@@ -122,77 +153,100 @@ pub(super) fn leave_blocks<const TILTED: bool>(
         let row = |column: &[f32]| -> Row { column[run.clone()].try_into().unwrap_or(ZERO) };
         // (What maps arrays is a function of its own, compiled without wide registers.)
         let [red, green, blue] = &carried.throughput;
-        let mut throughput = [row(red), row(green), row(blue)];
-        for band in 0..3 {
-            for i in 0..LANES {
-                throughput[band][i] *= found.color[band][i];
-            }
-        }
+        let arrived = [row(red), row(green), row(blue)];
         let square = |draw: Draw| {
             let [first, second] = &numbers.drawn[draw as usize];
             [row(first), row(second)]
         };
+        let has_facets = RICH && found.has_facets();
+        if has_facets {
+            leaving.facets.see(surfaces, (block, first, &found), (&hits, hits.shading::<TILTED>()));
+        }
         let ray: [u32; LANES] = carried.ray[run.clone()].try_into().unwrap_or([0; LANES]);
         let light = square(Draw::Light);
-        let places = match numbers.chosen {
+        let mut places = match numbers.chosen {
             None => place(lights, &hits.point, light),
-            Some((lamps, chances)) => {
-                let own: &[u32; LANES] = lamps[run.clone()].try_into().unwrap_or(&[0; LANES]);
-                place_on_chosen(lights, &hits.point, &light, (own, &row(chances)))
-            }
+            Some(chosen) => place_on_chosen((lights, chosen), &hits.point, (&light, first)),
         };
-        let asking = (&found.scatters, &throughput, &ray);
-        ask::<TILTED>((&places, offset), &hits, asking, (instructions, shadows));
-        if !numbers.goes_on {
-            continue;
+        let others = RICH.then(|| {
+            OtherPlaces::of::<TILTED>(numbers.chosen, &hits, (&light, first), &mut places)
+        });
+        let mut asked = ask::<TILTED, RICH>((&places, others.as_ref(), offset), &hits);
+        let mut share = found.color;
+        if RICH && found.sheets != [0; LANES] {
+            let toward = (&asked.toward, &asked.pdf, &places.is_delta);
+            leaving.facets.reflect(&found.sheets, toward, (&mut asked.value, &mut share));
         }
-        let direction = square(Draw::Direction);
-        let (start, along, pdf, mut goes) = scatter::<TILTED>(&hits, direction);
-        for i in 0..LANES {
-            goes[i] &= found.scatters[i];
-        }
-        let mut most = ZERO;
-        for i in 0..LANES {
-            let [r, g, b] = [throughput[0][i], throughput[1][i], throughput[2][i]];
-            let larger = if g > r { g } else { r };
-            most[i] = if b > larger { b } else { larger };
-            goes[i] &= mask(most[i] > 0.0);
-        }
-        if let Some(sphere) = &sphere {
-            keep_those_that_may_meet(sphere, (&start, &along), &mut goes);
-        }
-        if numbers.roulette {
-            let [_, chance] = square(Draw::Chance);
+        for band in 0..3 {
             for i in 0..LANES {
-                // Its root: where few paths come this far, ending them saves little and leaves noise.
-                let root = most[i].sqrt();
-                let survival = if root < 1.0 { root } else { 1.0 };
-                goes[i] &= mask(chance[i] < survival);
-                let inverse = if survival > 0.0 { 1.0 / survival } else { 0.0 };
-                for band in 0..3 {
-                    throughput[band][i] *= inverse;
+                share[band][i] *= arrived[band][i] * asked.value[i];
+            }
+        }
+        if let Some(others) = &others {
+            for band in 0..3 {
+                for i in 0..LANES {
+                    share[band][i] *= others.radiance[band][i];
                 }
             }
         }
-        let (going, at) = (Compaction::new(&goes, instructions), next.len);
-        for axis in 0..3 {
-            going.put(&start[axis], &mut next.start[axis], at);
-            going.put(&along[axis], &mut next.along[axis], at);
-            going.put(&throughput[axis], &mut next.carried.throughput[axis], at);
+        let asks = if RICH { found.asks() } else { found.scatters };
+        let asking = (&asks, &share, &ray);
+        send(&asked, &places, asking, (instructions, leaving.shadows));
+        if !numbers.goes_on && (!RICH || found.smooth == [0; LANES]) {
+            continue;
         }
-        if numbers.chosen.is_some() {
-            for axis in 0..3 {
-                going.put(&hits.shading::<TILTED>()[axis], &mut next.carried.normal[axis], at);
+        let mut left = scatter::<TILTED>(&hits, square(Draw::Direction), found.color);
+        for i in 0..LANES {
+            left.goes[i] &= found.scatters[i];
+        }
+        if has_facets {
+            let choice = square(Draw::Choice);
+            leaving.facets.scatter(
+                &found,
+                &hits,
+                (&choice[1], &square(Draw::Direction)),
+                &mut left,
+            );
+        }
+        if RICH && !numbers.goes_on {
+            for i in 0..LANES {
+                left.goes[i] &= found.smooth[i];
             }
         }
-        going.put(&pdf, &mut next.carried.pdf, at);
-        going.put(&ray, &mut next.carried.ray, at);
-        going.put(&[f32::INFINITY; LANES], &mut next.reach, at);
-        going.put(&numbers_of_lanes, &mut next.left, at);
-        next.len += going.count;
+        let mut throughput = arrived;
+        for band in 0..3 {
+            for i in 0..LANES {
+                throughput[band][i] *= left.share[band][i];
+            }
+        }
+        if let Some(sphere) = &sphere {
+            keep_those_that_may_meet(
+                sphere,
+                (&left.start, &left.along),
+                &found.smooth,
+                &mut left.goes,
+            );
+        }
+        end_some(&mut throughput, &mut left.goes, numbers.roulette.then(|| square(Draw::Chance)));
+        let sky_chance = numbers.chosen.filter(|chosen| RICH && !chosen.sky_chance.is_empty());
+        let sky_chance = sky_chance.map(|chosen| row(&chosen.sky_chance));
+        let departing = Departing { throughput, ray, lanes, smooth: found.smooth, sky_chance };
+        let shading = numbers.chosen.is_some().then(|| hits.shading::<TILTED>());
+        depart::<RICH>((&left, shading), &departing, &numbers, (instructions, &mut leaving));
     }
 }
 
+/// Leaves out the surfaces that paths met which only look for light.
+#[inline(always)]
+fn leave_out(found: &mut Found, carried: &Columns, first: usize) {
+    let Some(flags) = carried.flags.get(first..first + LANES) else { return };
+    for i in 0..LANES {
+        let goes_on = if flags[i] & LAST == 0 { u32::MAX } else { 0 };
+        found.scatters[i] &= goes_on;
+        found.sheets[i] &= goes_on;
+        found.smooth[i] &= goes_on;
+    }
+}
 #[inline(always)]
 pub(super) fn mask(holds: bool) -> u32 {
     select_unpredictable(holds, u32::MAX, 0)
@@ -215,10 +269,11 @@ fn measure(block: &RayBlock, found: &Found, offset: [f32; 3]) -> Hits {
     let magnitudes = &found.magnitudes;
     let [x, y, z] = &block.normal;
     let [dx, dy, dz] = &block.direction;
-    let mut normal = [ZERO; 3];
+    let (mut normal, mut front) = ([ZERO; 3], [0; LANES]);
     for i in 0..LANES {
         let squared = x[i] * x[i] + y[i] * y[i] + z[i] * z[i];
         let along = x[i] * dx[i] + y[i] * dy[i] + z[i] * dz[i];
+        front[i] = mask(along <= 0.0);
         let scale = if along <= 0.0 { 1.0 } else { -1.0 } / squared.sqrt();
         normal[0][i] = x[i] * scale;
         normal[1][i] = y[i] * scale;
@@ -251,170 +306,8 @@ fn measure(block: &RayBlock, found: &Found, offset: [f32; 3]) -> Hits {
         None => normal,
         Some(tilted) => bend(tilted, &normal, &block.direction),
     };
-    Hits { point, normal, bent, error, back }
+    Hits { point, normal, bent, error, back, front }
 }
-
-/// Notes the rays to lamps, each with the share of the lamp's radiance that it brings, as
-/// [`super::super::kernels::aim`] and [`super::super::kernels::reflect`] have them.
-#[inline(always)]
-fn ask<const TILTED: bool>(
-    (places, offset): (&Places, [f32; 3]),
-    hits: &Hits,
-    (scatters, throughput, ray): (&Mask, &[Row; 3], &[u32; LANES]),
-    (instructions, shadows): (Instructions, &mut RayColumns),
-) {
-    let (mut squared, mut facing, mut above, mut blur) = (ZERO, ZERO, ZERO, ZERO);
-    let mut turned = ZERO;
-    for axis in 0..3 {
-        for i in 0..LANES {
-            let (here, way) = (hits.point[axis][i], places.way[axis][i]);
-            squared[i] += way * way;
-            facing[i] -= way * places.normal[axis][i];
-            above[i] += way * hits.normal[axis][i];
-            if TILTED {
-                turned[i] += way * hits.bent[axis][i];
-            }
-            let size =
-                (here.abs() + (here + way).abs()) + (places.magnitudes[axis][i] + offset[axis]);
-            blur[i] += places.normal[axis][i].abs() * size;
-        }
-    }
-    let mut value = ZERO;
-    for i in 0..LANES {
-        let inverse = 1.0 / squared[i].sqrt();
-        let shown = facing[i] * inverse;
-        let is_point = places.is_point[i] > 0.0;
-        let shines = (shown > 0.0) | ((shown < 0.0) & (places.two_sided[i] > 0.0)) | is_point;
-        let slope = select_unpredictable(is_point, 1.0, shown.abs());
-        let pdf = places.density[i] * squared[i] / slope;
-        let cosine = if TILTED { turned[i] } else { above[i] };
-        let reflected = cosine * inverse * FRAC_1_PI;
-        // No direction comes upon a point by chance.
-        let ratio = select_unpredictable(is_point, 0.0, reflected / pdf);
-        let share = reflected / ((1.0 + ratio * ratio) * pdf);
-        value[i] = select_unpredictable(shines & (reflected > 0.0) & (above[i] > 0.0), share, 0.0);
-        blur[i] *= if shown < 0.0 { -ROUNDINGS } else { ROUNDINGS };
-    }
-    let (mut start, mut along, mut length) = ([ZERO; 3], [ZERO; 3], ZERO);
-    for axis in 0..3 {
-        for i in 0..LANES {
-            let lifted = hits.normal[axis][i] * hits.error[i] + hits.back[axis][i];
-            let way = (places.way[axis][i] + places.normal[axis][i] * blur[i]) - lifted;
-            start[axis][i] = hits.point[axis][i] + lifted;
-            along[axis][i] = way;
-            length[i] += way * way;
-        }
-    }
-    let mut goes = [0; LANES];
-    for i in 0..LANES {
-        length[i] = length[i].sqrt();
-        // Any comparison with NaN is false.
-        goes[i] = scatters[i] & mask((value[i] > 0.0) & (value[i] <= f32::MAX));
-    }
-    for axis in 0..3 {
-        for i in 0..LANES {
-            // Points that fall together see each other: a ray of no length meets nothing.
-            along[axis][i] /= if length[i] > 0.0 { length[i] } else { 1.0 };
-        }
-    }
-    let mut share = [ZERO; 3];
-    for band in 0..3 {
-        for i in 0..LANES {
-            share[band][i] = throughput[band][i] * value[i];
-        }
-    }
-    let (going, at) = (Compaction::new(&goes, instructions), shadows.len);
-    for axis in 0..3 {
-        going.put(&start[axis], &mut shadows.start[axis], at);
-        going.put(&along[axis], &mut shadows.along[axis], at);
-        going.put(&share[axis], &mut shadows.carried.throughput[axis], at);
-    }
-    going.put(&length, &mut shadows.reach, at);
-    going.put(&places.lamp, &mut shadows.lamp, at);
-    going.put(ray, &mut shadows.carried.ray, at);
-    shadows.len += going.count;
-}
-
-/// Where rays start (m), their unit directions about the shading normals with density cos θ / π (1/sr), that density, and
-/// whether there is one, as [`super::super::kernels::scatter`] has them.
-#[inline(always)]
-fn scatter<const TILTED: bool>(hits: &Hits, [u, v]: [Row; 2]) -> ([Row; 3], [Row; 3], Row, Mask) {
-    let ([nx, ny, nz], [gx, gy, gz]) = (hits.shading::<TILTED>(), &hits.normal);
-    let (mut along, mut start, mut pdf) = ([ZERO; 3], [ZERO; 3], ZERO);
-    let mut goes = [0; LANES];
-    let (mut a, mut b) = (ZERO, ZERO);
-    for i in 0..LANES {
-        [a[i], b[i]] = disk_point([u[i], v[i]]);
-    }
-    for i in 0..LANES {
-        let (x, y, z, a, b) = (nx[i], ny[i], nz[i], a[i], b[i]);
-        let rest = 1.0 - a * a - b * b;
-        let c = if rest > 0.0 { rest } else { 0.0 }.sqrt();
-        // Duff et al., "Building an Orthonormal Basis, Revisited", 2017.
-        let sign = if z < 0.0 { -1.0 } else { 1.0 };
-        let f = -1.0 / (sign + z);
-        let g = x * y * f;
-        let dx = (1.0 + sign * x * x * f) * a + g * b + x * c;
-        let dy = sign * g * a + (sign + y * y * f) * b + y * c;
-        let dz = z * c - sign * x * a - y * b;
-        let inverse = 1.0 / (dx * dx + dy * dy + dz * dz).sqrt();
-        along[0][i] = dx * inverse;
-        along[1][i] = dy * inverse;
-        along[2][i] = dz * inverse;
-        pdf[i] = c * FRAC_1_PI;
-        goes[i] = mask((dx * gx[i] + dy * gy[i] + dz * gz[i] > 0.0) & (c > 0.0));
-    }
-    for axis in 0..3 {
-        for i in 0..LANES {
-            let lifted = hits.normal[axis][i] * hits.error[i] + hits.back[axis][i];
-            start[axis][i] = hits.point[axis][i] + lifted;
-        }
-    }
-    (start, along, pdf, goes)
-}
-
-/// A point of the unit square on the unit disk, as [`etendue_geometry::disk::point`] has it.
-#[inline(always)]
-fn disk_point([u, v]: [f32; 2]) -> [f32; 2] {
-    let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
-    let flat = a.abs() > b.abs();
-    let (radius, other) = (select_unpredictable(flat, a, b), select_unpredictable(flat, b, a));
-    let ratio = if radius == 0.0 { 0.0 } else { other / radius };
-    // Taylor's series as far as π/4: what is left out is below 4 · 10⁻⁹.
-    let angle = FRAC_PI_4 * ratio;
-    let x = angle * angle;
-    let sine = 1.0 + x * (-1.0 / 6.0 + x * (1.0 / 120.0 + x * (-1.0 / 5_040.0 + x / 362_880.0)));
-    let cosine = -0.5 + x * (1.0 / 24.0 + x * (-1.0 / 720.0 + x / 40_320.0));
-    let (sine, cosine) = (angle * sine, 1.0 + x * cosine);
-    let (near, far) = (radius * cosine, radius * sine);
-    [select_unpredictable(flat, near, far), select_unpredictable(flat, far, near)]
-}
-
-/// Leaves out rays that meet nothing of a sphere for sure.
-#[inline(always)]
-fn keep_those_that_may_meet(
-    (centre, radius): &Sphere,
-    (start, along): (&[Row; 3], &[Row; 3]),
-    goes: &mut Mask,
-) {
-    let (mut foot, mut squared) = (ZERO, ZERO);
-    for axis in 0..3 {
-        for i in 0..LANES {
-            let way = centre[axis] - start[axis][i];
-            foot[i] += way * along[axis][i];
-            squared[i] += way * way;
-        }
-    }
-    let within = radius * radius;
-    for i in 0..LANES {
-        let is_ahead = (foot[i] >= 0.0) | (squared[i] <= within);
-        // Roundings of what is subtracted.
-        let slack = ROUNDINGS * squared[i];
-        let is_near = squared[i] - foot[i] * foot[i] <= within + slack;
-        goes[i] &= mask((*radius >= 0.0) & is_ahead & is_near);
-    }
-}
-
 pub(super) fn single(v: DVec3) -> [f32; 3] {
     v.to_array().map(round)
 }
@@ -422,25 +315,4 @@ pub(super) fn single(v: DVec3) -> [f32; 3] {
 #[expect(clippy::cast_possible_truncation, reason = "rounding to single precision is the purpose")]
 pub(super) fn round(x: f64) -> f32 {
     x as f32
-}
-
-#[cfg(test)]
-mod tests {
-    use etendue_geometry::disk;
-
-    use super::*;
-
-    #[test]
-    fn points_on_the_disk_are_those_of_double_precision() {
-        for i in 0..=64_u8 {
-            for k in 0..=64_u8 {
-                let square = [i, k].map(|n| f32::from(n) / 64.0);
-                let [own, other] =
-                    [disk_point(square).map(f64::from), disk::point(square.map(f64::from))];
-                // Some roundings of numbers below 1.
-                let error = (own[0] - other[0]).abs().max((own[1] - other[1]).abs());
-                assert!(error < 4.0 * f64::from(f32::EPSILON), "{square:?}: {error}");
-            }
-        }
-    }
 }

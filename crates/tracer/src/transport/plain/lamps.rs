@@ -1,4 +1,4 @@
-//! The lamps of a plain scene in single precision, and places that are chosen on them.
+//! The lights of a plain scene in single precision, and places that are chosen on them.
 #![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
 use std::hint::select_unpredictable;
@@ -6,9 +6,13 @@ use std::hint::select_unpredictable;
 use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::glam::DVec3;
 
-use super::kernel::{ZERO, round, single};
+use super::depart::cosine_directions;
+use super::kernel::{Hits, ZERO, round, single};
+use super::sky::PlainSky;
 use crate::area_light::AreaLight;
+use crate::light_tree::Choices;
 use crate::lights;
+use crate::sampling::GridCell;
 
 /// The largest number below 1.
 const ONE_BELOW: f32 = 1.0 - f32::EPSILON / 2.0;
@@ -50,11 +54,14 @@ impl Lamp {
 #[derive(Debug)]
 pub(in crate::transport) struct Lights<'a> {
     all: &'a lights::Lights,
-    /// All of them, and the sum of the chances of all before each with 1 at the end, where they are few and alike from
-    /// everywhere; else each point chooses among all ([`lights::Lights::pick`]).
+    /// All of them, and the sum of the chances of all before each with 1 at the end, where they are few points and
+    /// triangles that are alike from everywhere; else each point chooses among all ([`lights::Lights::pick`]).
     few: Vec<Lamp>,
     few_bands: Vec<[f64; 3]>,
     below: Vec<f32>,
+    pub(super) sky: Option<PlainSky<'a>>,
+    /// All are far away.
+    pub(super) are_far: bool,
     /// What blocks' coordinates are relative to (m).
     pub(super) origin: DVec3,
 }
@@ -62,8 +69,10 @@ pub(in crate::transport) struct Lights<'a> {
 impl<'a> Lights<'a> {
     pub(super) fn new(all: &'a lights::Lights, origin: DVec3) -> Self {
         let (few, few_bands) = (Vec::new(), Vec::new());
-        let mut own = Self { all, few, few_bands, below: Vec::new(), origin };
-        if let Some(below) = all.few() {
+        let sky = PlainSky::of(all);
+        let are_far = all.plain_lights().is_some_and(|bounds| bounds.are_far);
+        let mut own = Self { all, few, few_bands, below: Vec::new(), sky, are_far, origin };
+        if let Some(below) = all.few().filter(|_| !all.has_others()) {
             own.few = (0..all.count()).map(|number| own.lamp(number)).collect();
             own.few_bands = (0..all.count()).map(|number| own.bands_of(number)).collect();
             own.below = below.iter().map(|&sum| round(sum)).collect();
@@ -78,6 +87,9 @@ impl<'a> Lights<'a> {
 
     #[inline(always)]
     fn lamp(&self, number: usize) -> Lamp {
+        if number >= SKY as usize {
+            return Lamp { area: 1.0, ..Lamp::default() };
+        }
         match self.all.plain_light(number) {
             Some(lights::PlainLight::Point(at)) => Lamp::point(at, self.origin),
             Some(lights::PlainLight::Triangle(own)) => Lamp::triangle(own, self.origin),
@@ -85,9 +97,14 @@ impl<'a> Lights<'a> {
         }
     }
 
-    /// Radiance of a triangle, intensity of a point.
+    /// Radiance of a triangle or the sky, intensity of a point; 1 of other lights, whose rays carry it.
     #[inline(always)]
     pub(super) fn radiance(&self, lamp: u32) -> [f64; 3] {
+        match lamp {
+            OTHER => return [1.0; 3],
+            SKY => return self.sky.map_or([0.0; 3], |sky| sky.bands),
+            _ => {}
+        }
         let kept = self.few_bands.get(lamp as usize).copied();
         kept.unwrap_or_else(|| self.bands_of(lamp as usize))
     }
@@ -98,21 +115,104 @@ impl<'a> Lights<'a> {
     }
 }
 
-/// The lamps that sixteen points chose, and with which chances.
-pub(super) type Chosen<'a> = (&'a [u32; LANES], &'a Row);
+/// The number of all lights but points that shine alike to all sides, triangles and [`SKY`].
+const OTHER: u32 = u32::MAX;
 
-/// Places on lamps, one for each of sixteen points. Flags are 1 where they hold, else 0.
+/// The number of a sky that is alike all over.
+pub(super) const SKY: u32 = OTHER - 1;
+
+/// Lights that are chosen by where paths are: for points side by side, and by lane.
+#[derive(Debug, Default)]
+pub(in crate::transport) struct ChosenLamps {
+    pub(super) choices: Choices,
+    /// The lane of each choice.
+    pub(super) asking: Vec<u32>,
+    /// Where each is that chooses, from the blocks' origin (m); empty where no light is [`OTHER`].
+    pub(super) points: [Vec<f32>; 3],
+    pub(super) lamp: Vec<u32>,
+    /// 0 where none was chosen.
+    pub(super) chance: Vec<f32>,
+    /// Of [`OTHER`] lights: where they are from the blocks' origin (m), or unit directions to them, their density, and
+    /// their radiance.
+    pub(super) place: [Vec<f32>; 3],
+    pub(super) density: Vec<f32>,
+    pub(super) radiance: [Vec<f32>; 3],
+    pub(super) is_far: Vec<f32>,
+    pub(super) is_delta: Vec<f32>,
+    /// The lanes that chose the sky's image with which chances, by which squares, and the patches of the image.
+    pub(super) of_sky: Vec<(u32, f32)>,
+    pub(super) squares: Vec<[f64; 2]>,
+    pub(super) cells: Vec<GridCell>,
+    /// With which the sky is chosen in each lane; empty without one.
+    pub(super) sky_chance: Vec<f32>,
+}
+
+/// A place on a light of any kind, or a direction to it.
+pub(super) struct OtherPlace {
+    /// From the blocks' origin (m), or unit.
+    pub(super) place: [f32; 3],
+    pub(super) is_far: bool,
+    pub(super) is_delta: bool,
+    /// As [`crate::target::Target::density`].
+    pub(super) density: f32,
+}
+
+impl ChosenLamps {
+    /// Empties it for so many lanes, of which some may choose other lights, the sky among them.
+    pub(super) fn restart(&mut self, room: usize, [has_others, has_sky]: [bool; 2]) {
+        let Self { lamp, chance, density, place, radiance, is_far, is_delta, .. } = self;
+        lamp.clear();
+        lamp.resize(room, 0);
+        chance.clear();
+        chance.resize(room, 0.0);
+        self.asking.resize(room, 0);
+        if has_others {
+            let rows = place.iter_mut().chain(radiance).chain(&mut self.points);
+            rows.chain([density, is_far, is_delta]).for_each(|row| row.resize(room, 0.0));
+        }
+        self.sky_chance.resize(if has_sky { room } else { 0 }, 0.0);
+        self.of_sky.clear();
+        self.squares.clear();
+    }
+
+    /// Notes what a lane chose.
+    #[inline(always)]
+    pub(super) fn put(&mut self, lane: usize, own: &OtherPlace, radiance: [f32; 3]) {
+        self.lamp[lane] = OTHER;
+        for axis in 0..3 {
+            self.place[axis][lane] = own.place[axis];
+            self.radiance[axis][lane] = radiance[axis];
+        }
+        self.density[lane] = own.density;
+        self.is_far[lane] = f32::from(u8::from(own.is_far));
+        self.is_delta[lane] = f32::from(u8::from(own.is_delta));
+    }
+}
+
+/// Places on lights, one for each of sixteen points. Flags are 1 where they hold, else 0.
 pub(super) struct Places {
     /// From the point (m).
     pub(super) way: [Row; 3],
     pub(super) normal: [Row; 3],
     /// What its own numbers add to the rounding of the place (m).
     pub(super) magnitudes: [Row; 3],
-    /// Of the place (1/m²).
+    /// Of the place (1/m²), of the direction (1/sr).
     pub(super) density: Row,
     pub(super) two_sided: Row,
-    pub(super) is_point: Row,
+    /// No direction comes upon it by chance.
+    pub(super) is_delta: Row,
     pub(super) lamp: [u32; LANES],
+}
+
+/// What places on lights have beyond those on triangles and on points that shine alike to all sides.
+#[derive(Debug)]
+pub(super) struct OtherPlaces {
+    /// It is a direction.
+    pub(super) is_far: Row,
+    /// It shines to the side of its normal alone, as triangles do, unless they shine to both.
+    pub(super) has_side: Row,
+    /// Of [`OTHER`] lights, and 1 of all else.
+    pub(super) radiance: [Row; 3],
 }
 
 impl Places {
@@ -123,7 +223,7 @@ impl Places {
             magnitudes: [ZERO; 3],
             density: ZERO,
             two_sided: ZERO,
-            is_point: ZERO,
+            is_delta: ZERO,
             lamp: [0; LANES],
         }
     }
@@ -132,11 +232,13 @@ impl Places {
 /// Places on the lamps that sixteen points chose, by what was left of the numbers that chose them and others.
 #[inline(always)]
 pub(super) fn place_on_chosen(
-    lights: &Lights<'_>,
+    (lights, chosen): (&Lights<'_>, &ChosenLamps),
     points: &[Row; 3],
-    square: &[Row; 2],
-    (lamps, chance): Chosen<'_>,
+    (square, first): (&[Row; 2], usize),
 ) -> Places {
+    let run = first..first + LANES;
+    let lamps: &[u32; LANES] = chosen.lamp[run.clone()].try_into().unwrap_or(&[0; LANES]);
+    let chance: &Row = chosen.chance[run.clone()].try_into().unwrap_or(&ZERO);
     let mut places = Places { lamp: *lamps, ..Places::nowhere() };
     // What there is in memory of each.
     let (mut corner, mut edges, mut area) = ([ZERO; 3], [[ZERO; 3]; 2], ZERO);
@@ -150,7 +252,7 @@ pub(super) fn place_on_chosen(
             places.magnitudes[axis][i] = lamp.magnitudes[axis];
         }
         (area[i], places.two_sided[i]) = (lamp.area, lamp.two_sided);
-        places.is_point[i] = lamp.is_point;
+        places.is_delta[i] = lamp.is_point;
     }
     let [second, third] = corner_weights(square);
     for axis in 0..3 {
@@ -163,6 +265,92 @@ pub(super) fn place_on_chosen(
         places.density[i] = chance[i] / area[i];
     }
     places
+}
+
+impl OtherPlaces {
+    /// Puts the places and directions of lanes that chose other lights in place of what is there.
+    #[inline(always)]
+    pub(super) fn of<const TILTED: bool>(
+        chosen: Option<&ChosenLamps>,
+        hits: &Hits,
+        (square, first): (&[Row; 2], usize),
+        places: &mut Places,
+    ) -> Self {
+        let (mut has_side, ones) = (ZERO, [1.0; LANES]);
+        for i in 0..LANES {
+            has_side[i] = 1.0 - places.is_delta[i];
+        }
+        let mut others = Self { is_far: ZERO, has_side, radiance: [ones; 3] };
+        let Some(chosen) = chosen else { return others };
+        let (mut is_other, mut is_sky) = (false, false);
+        for i in 0..LANES {
+            is_other |= places.lamp[i] == OTHER;
+            is_sky |= places.lamp[i] == SKY;
+        }
+        let run = first..first + LANES;
+        if is_other {
+            others.take_others(chosen, &hits.point, run.clone(), places);
+        }
+        if is_sky {
+            let chance = chosen.chance[run].try_into().unwrap_or(&ZERO);
+            others.take_sky(chance, hits.shading::<TILTED>(), square, places);
+        }
+        others
+    }
+
+    /// Takes directions to a sky that is alike all over, by their cosines with the normals.
+    #[inline(always)]
+    fn take_sky(
+        &mut self,
+        chance: &Row,
+        shading: &[Row; 3],
+        square: &[Row; 2],
+        places: &mut Places,
+    ) {
+        let (directions, density) = cosine_directions(shading, square);
+        for i in 0..LANES {
+            let is_own = places.lamp[i] == SKY;
+            for axis in 0..3 {
+                let way = &mut places.way[axis][i];
+                *way = if is_own { directions[axis][i] } else { *way };
+            }
+            places.density[i] = if is_own { chance[i] * density[i] } else { places.density[i] };
+            self.is_far[i] = if is_own { 1.0 } else { self.is_far[i] };
+            self.has_side[i] = if is_own { 0.0 } else { self.has_side[i] };
+        }
+    }
+
+    /// Takes places on [`OTHER`] lights, and directions to them.
+    #[inline(always)]
+    fn take_others(
+        &mut self,
+        chosen: &ChosenLamps,
+        points: &[Row; 3],
+        run: std::ops::Range<usize>,
+        places: &mut Places,
+    ) {
+        let row = |column: &[f32]| -> Row { column[run.clone()].try_into().unwrap_or(ZERO) };
+        let (density, is_far) = (row(&chosen.density), row(&chosen.is_far));
+        let is_delta = row(&chosen.is_delta);
+        for axis in 0..3 {
+            let (place, own) = (row(&chosen.place[axis]), row(&chosen.radiance[axis]));
+            for i in 0..LANES {
+                let is_own = places.lamp[i] == OTHER;
+                let way = if is_far[i] > 0.0 { place[i] } else { place[i] - points[axis][i] };
+                places.way[axis][i] = if is_own { way } else { places.way[axis][i] };
+                places.normal[axis][i] = if is_own { 0.0 } else { places.normal[axis][i] };
+                places.magnitudes[axis][i] = if is_own { 0.0 } else { places.magnitudes[axis][i] };
+                self.radiance[axis][i] = if is_own { own[i] } else { 1.0 };
+            }
+        }
+        for i in 0..LANES {
+            let is_own = places.lamp[i] == OTHER;
+            places.density[i] = if is_own { density[i] } else { places.density[i] };
+            places.is_delta[i] = if is_own { is_delta[i] } else { places.is_delta[i] };
+            self.is_far[i] = if is_own { is_far[i] } else { 0.0 };
+            self.has_side[i] = if is_own { 0.0 } else { self.has_side[i] };
+        }
+    }
 }
 
 /// Weights of the second and third corner by squares, uniform over triangles.
@@ -217,13 +405,14 @@ pub(super) fn place(lights: &Lights<'_>, points: &[Row; 3], [mut u, v]: [Row; 2]
                 magnitudes[i] = select_unpredictable(is_own, magnitude, magnitudes[i]);
             }
         }
-        let (inverse, two_sided, is_point) = (1.0 / lamp.area, lamp.two_sided, lamp.is_point);
+        let (inverse, two_sided) = (1.0 / lamp.area, lamp.two_sided);
+        let is_point = lamp.is_point;
         for i in 0..LANES {
             let is_own = places.lamp[i] == number;
             let density = &mut places.density[i];
             *density = select_unpredictable(is_own, chance[i] * inverse, *density);
             places.two_sided[i] = select_unpredictable(is_own, two_sided, places.two_sided[i]);
-            places.is_point[i] = select_unpredictable(is_own, is_point, places.is_point[i]);
+            places.is_delta[i] = select_unpredictable(is_own, is_point, places.is_delta[i]);
         }
     }
     places

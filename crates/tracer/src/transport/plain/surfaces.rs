@@ -1,4 +1,5 @@
 //! What is looked up for the hits of a block, and the normals that light is scattered about.
+#![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
 use std::hint::select_unpredictable;
 
@@ -6,18 +7,30 @@ use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::{Geometry, RayBlock};
 
 use super::kernel::{Mask, ZERO, mask};
-use crate::placed::PlainSurface;
+use crate::placed::{PlainFacets, PlainKind, PlainSurfaces};
 
 #[expect(clippy::cast_possible_truncation, reason = "single precision is enough for it")]
 const LEAST_ELEVATION: f32 = crate::surface::LEAST_ELEVATION as f32;
 
-/// The surfaces of a plain scene by placement, behind the last one that is not there, and where their meshes are.
+/// The surfaces of a plain scene, and where their meshes are.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::transport) struct Surfaces<'a> {
-    pub(super) all: &'a [PlainSurface],
+    pub(super) all: &'a PlainSurfaces,
     pub(super) geometry: &'a Geometry,
-    /// Some scatter light about other normals than those of their triangles.
-    pub(super) are_tilted: bool,
+    /// By lane, of surfaces that are not alike all over; empty where all are.
+    pub(super) varied: &'a [Varied],
+}
+
+/// What a surface that is not alike all over has where it was hit.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Varied {
+    pub(super) color: [f32; 3],
+    /// The largest band of the colour.
+    pub(super) peak: f64,
+    /// About which light is scattered, of any length and side, where normals are mapped.
+    pub(super) normal: [f32; 3],
+    /// Where these are not alike all over.
+    pub(super) facets: PlainFacets,
 }
 
 impl Surfaces<'_> {
@@ -44,42 +57,84 @@ impl Surfaces<'_> {
 }
 
 /// What is looked up for the hits of a block.
+#[derive(Debug)]
 pub(super) struct Found {
     pub(super) color: [Row; 3],
     pub(super) magnitudes: [Row; 3],
     pub(super) scatters: Mask,
+    /// Those that scatter light which are sheets of facets, and which are smooth.
+    pub(super) sheets: Mask,
+    pub(super) smooth: Mask,
     /// The normals of meshes, of any length and side, where some lane has one; else zero.
     pub(super) tilted: Option<[Row; 3]>,
 }
 
 impl Found {
-    /// What the lanes of a block hit, of which so many are rays; each that hit what shines goes to `meets`.
+    /// Lanes that ask for light.
     #[inline(always)]
-    pub(super) fn of<const TILTED: bool>(
+    pub(super) fn asks(&self) -> Mask {
+        let mut asks = self.scatters;
+        for i in 0..LANES {
+            asks[i] &= !self.smooth[i];
+        }
+        asks
+    }
+
+    /// Tests whether some lane hit anything but a matte surface.
+    #[inline(always)]
+    pub(super) fn has_facets(&self) -> bool {
+        (self.sheets != [0; LANES]) | (self.smooth != [0; LANES])
+    }
+
+    /// What the lanes of a block hit from the first on, of which so many are rays; each that hit what shines goes to `meets`, each that
+    /// hit nothing to `misses`.
+    #[inline(always)]
+    pub(super) fn of<const TILTED: bool, const RICH: bool>(
         surfaces: Surfaces<'_>,
-        (block, count): (&RayBlock, usize),
-        mut meets: impl FnMut(usize),
+        (block, first, count): (&RayBlock, usize, usize),
+        (mut meets, mut misses): (impl FnMut(usize), impl FnMut(usize)),
     ) -> Self {
-        let mut found =
-            Self { color: [ZERO; 3], magnitudes: [ZERO; 3], scatters: [0; LANES], tilted: None };
-        let Some(last) = surfaces.all.len().checked_sub(1) else { return found };
+        let none = [0; LANES];
+        let mut found = Self {
+            color: [ZERO; 3],
+            magnitudes: [ZERO; 3],
+            scatters: none,
+            sheets: none,
+            smooth: none,
+            tilted: None,
+        };
+        let all = &*surfaces.all.all;
+        let Some(last) = all.len().checked_sub(1) else { return found };
         for lane in 0..LANES {
-            let surface = &surfaces.all[(block.placement[lane] as usize).min(last)];
+            let surface = &all[(block.placement[lane] as usize).min(last)];
+            let is_varied = RICH && surface.is_varied && lane < count;
+            let varied = surfaces.varied.get(first + lane).filter(|_| is_varied);
+            let color = varied.map_or(&surface.color, |varied| &varied.color);
             for axis in 0..3 {
-                found.color[axis][lane] = surface.color[axis];
+                found.color[axis][lane] = color[axis];
                 found.magnitudes[axis][lane] = surface.magnitudes[axis];
             }
             let is_hit = surface.is_there & (lane < count);
-            let scatters = surface.scatters & is_hit;
+            let scatters = (surface.kind != PlainKind::Black) & is_hit;
             found.scatters[lane] = mask(scatters);
+            if RICH {
+                found.sheets[lane] = mask((surface.kind == PlainKind::Sheet) & is_hit);
+                found.smooth[lane] = mask((surface.kind == PlainKind::Smooth) & is_hit);
+            }
             if surface.shines & is_hit {
                 meets(lane);
+            }
+            if RICH && (!surface.is_there & (lane < count)) {
+                misses(lane);
             }
             if !TILTED || !scatters {
                 continue;
             }
             if let Some(turn) = &surface.turn {
-                let normal = surfaces.mesh_normal(block, lane, turn);
+                let normal = match varied.filter(|_| surface.is_mapped) {
+                    Some(varied) => varied.normal,
+                    None => surfaces.mesh_normal(block, lane, turn),
+                };
                 let tilted = found.tilted.get_or_insert([ZERO; 3]);
                 (tilted[0][lane], tilted[1][lane], tilted[2][lane]) = normal.into();
             }

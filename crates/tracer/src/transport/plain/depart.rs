@@ -1,0 +1,226 @@
+//! Paths that leave hits: their directions by matte surfaces, those that end, and what the others carry.
+#![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
+
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
+use std::hint::select_unpredictable;
+
+use etendue_geometry::block::{Floats as Row, LANES};
+
+use super::compaction::{Compaction, Instructions};
+use super::facets::Scattered;
+use super::kernel::{Hits, Leaving, Mask, Numbers, ROUNDINGS, Sphere, ZERO, mask};
+use super::{LAST, RayColumns, SPECULAR};
+
+/// Leaves out paths that carry nothing and, by roulette, some of those that carry little.
+#[inline(always)]
+pub(super) fn end_some(throughput: &mut [Row; 3], goes: &mut Mask, roulette: Option<[Row; 2]>) {
+    let mut most = ZERO;
+    for i in 0..LANES {
+        let [r, g, b] = [throughput[0][i], throughput[1][i], throughput[2][i]];
+        let larger = if g > r { g } else { r };
+        most[i] = if b > larger { b } else { larger };
+        goes[i] &= mask(most[i] > 0.0);
+    }
+    let Some([_, chance]) = roulette else { return };
+    for i in 0..LANES {
+        // Its root: where few paths come this far, ending them saves little and leaves noise.
+        let root = most[i].sqrt();
+        let survival = if root < 1.0 { root } else { 1.0 };
+        goes[i] &= mask(chance[i] < survival);
+        let inverse = if survival > 0.0 { 1.0 / survival } else { 0.0 };
+        for band in 0..3 {
+            throughput[band][i] *= inverse;
+        }
+    }
+}
+
+/// What the paths of a block carry that leave its hits.
+pub(super) struct Departing {
+    pub(super) throughput: [Row; 3],
+    pub(super) ray: [u32; LANES],
+    pub(super) lanes: [u32; LANES],
+    pub(super) smooth: Mask,
+    pub(super) sky_chance: Option<Row>,
+}
+
+/// Notes the paths that leave a block's hits.
+#[inline(always)]
+pub(super) fn depart<const RICH: bool>(
+    (left, shading): (&Scattered, Option<&[Row; 3]>),
+    departing: &Departing,
+    numbers: &Numbers<'_>,
+    (instructions, leaving): (Instructions, &mut Leaving<'_>),
+) {
+    let ends_apart = numbers.is_last && numbers.asks_emitters;
+    let (mut rough, mut smooth) = (left.goes, left.goes);
+    if RICH && ends_apart {
+        for i in 0..LANES {
+            rough[i] &= !departing.smooth[i];
+            smooth[i] &= departing.smooth[i];
+        }
+    }
+    let to = if ends_apart { &mut *leaving.last } else { &mut *leaving.next };
+    if RICH && !to.carried.flags.is_empty() {
+        let of_rough = if numbers.is_last { LAST } else { 0 };
+        put_flags(departing, Compaction::new(&rough, instructions), of_rough, to);
+    }
+    put((left, shading), departing, Compaction::new(&rough, instructions), to);
+    if RICH && ends_apart && departing.smooth != [0; LANES] {
+        put_flags(departing, Compaction::new(&smooth, instructions), 0, leaving.next);
+        put((left, shading), departing, Compaction::new(&smooth, instructions), leaving.next);
+    }
+}
+
+/// Notes which paths leave smooth surfaces, and so much of the others.
+#[inline(always)]
+fn put_flags(departing: &Departing, going: Compaction, of_rough: u32, to: &mut RayColumns) {
+    let mut flags = [of_rough; LANES];
+    for i in 0..LANES {
+        flags[i] = if departing.smooth[i] != 0 { SPECULAR } else { of_rough };
+    }
+    going.put(&flags, &mut to.carried.flags, to.len);
+}
+
+/// Notes paths, and how they came to their directions.
+#[inline(always)]
+fn put(
+    (left, shading): (&Scattered, Option<&[Row; 3]>),
+    departing: &Departing,
+    going: Compaction,
+    to: &mut RayColumns,
+) {
+    let at = to.len;
+    for axis in 0..3 {
+        going.put(&left.start[axis], &mut to.start[axis], at);
+        going.put(&left.along[axis], &mut to.along[axis], at);
+        going.put(&departing.throughput[axis], &mut to.carried.throughput[axis], at);
+    }
+    if let Some(shading) = shading {
+        for axis in 0..3 {
+            going.put(&shading[axis], &mut to.carried.normal[axis], at);
+        }
+    }
+    if let Some(chance) = &departing.sky_chance {
+        going.put(chance, &mut to.carried.sky_chance, at);
+    }
+    going.put(&left.pdf, &mut to.carried.pdf, at);
+    going.put(&departing.ray, &mut to.carried.ray, at);
+    going.put(&[f32::INFINITY; LANES], &mut to.reach, at);
+    going.put(&departing.lanes, &mut to.left, at);
+    to.len += going.count;
+}
+
+/// Where rays of matte surfaces start (m), their unit directions about the shading normals with density cos θ / π (1/sr),
+/// that density, and whether there is one, as [`super::super::kernels::scatter`] has them.
+#[inline(always)]
+pub(super) fn scatter<const TILTED: bool>(
+    hits: &Hits,
+    square: [Row; 2],
+    share: [Row; 3],
+) -> Scattered {
+    let (along, pdf) = cosine_directions(hits.shading::<TILTED>(), &square);
+    let [gx, gy, gz] = &hits.normal;
+    let (mut start, mut goes) = ([ZERO; 3], [0; LANES]);
+    for i in 0..LANES {
+        let above = along[0][i] * gx[i] + along[1][i] * gy[i] + along[2][i] * gz[i];
+        goes[i] = mask((above > 0.0) & (pdf[i] > 0.0));
+    }
+    for axis in 0..3 {
+        for i in 0..LANES {
+            let lifted = hits.normal[axis][i] * hits.error[i] + hits.back[axis][i];
+            start[axis][i] = hits.point[axis][i] + lifted;
+        }
+    }
+    Scattered { start, along, pdf, goes, share }
+}
+
+/// Unit directions about normals with density cos θ / π (1/sr), and that density.
+#[inline(always)]
+pub(super) fn cosine_directions([nx, ny, nz]: &[Row; 3], [u, v]: &[Row; 2]) -> ([Row; 3], Row) {
+    let (mut along, mut pdf, mut a, mut b) = ([ZERO; 3], ZERO, ZERO, ZERO);
+    for i in 0..LANES {
+        [a[i], b[i]] = disk_point([u[i], v[i]]);
+    }
+    for i in 0..LANES {
+        let (x, y, z, a, b) = (nx[i], ny[i], nz[i], a[i], b[i]);
+        let rest = 1.0 - a * a - b * b;
+        let c = if rest > 0.0 { rest } else { 0.0 }.sqrt();
+        // Duff et al., "Building an Orthonormal Basis, Revisited", 2017.
+        let sign = if z < 0.0 { -1.0 } else { 1.0 };
+        let f = -1.0 / (sign + z);
+        let g = x * y * f;
+        let dx = (1.0 + sign * x * x * f) * a + g * b + x * c;
+        let dy = sign * g * a + (sign + y * y * f) * b + y * c;
+        let dz = z * c - sign * x * a - y * b;
+        let inverse = 1.0 / (dx * dx + dy * dy + dz * dz).sqrt();
+        along[0][i] = dx * inverse;
+        along[1][i] = dy * inverse;
+        along[2][i] = dz * inverse;
+        pdf[i] = c * FRAC_1_PI;
+    }
+    (along, pdf)
+}
+
+/// A point of the unit square on the unit disk, as [`etendue_geometry::disk::point`] has it.
+#[inline(always)]
+fn disk_point([u, v]: [f32; 2]) -> [f32; 2] {
+    let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
+    let flat = a.abs() > b.abs();
+    let (radius, other) = (select_unpredictable(flat, a, b), select_unpredictable(flat, b, a));
+    let ratio = if radius == 0.0 { 0.0 } else { other / radius };
+    // Taylor's series as far as π/4: what is left out is below 4 · 10⁻⁹.
+    let angle = FRAC_PI_4 * ratio;
+    let x = angle * angle;
+    let sine = 1.0 + x * (-1.0 / 6.0 + x * (1.0 / 120.0 + x * (-1.0 / 5_040.0 + x / 362_880.0)));
+    let cosine = -0.5 + x * (1.0 / 24.0 + x * (-1.0 / 720.0 + x / 40_320.0));
+    let (sine, cosine) = (angle * sine, 1.0 + x * cosine);
+    let (near, far) = (radius * cosine, radius * sine);
+    [select_unpredictable(flat, near, far), select_unpredictable(flat, far, near)]
+}
+
+/// Leaves out rays that meet nothing of a sphere for sure, but for those of some lanes.
+#[inline(always)]
+pub(super) fn keep_those_that_may_meet(
+    (centre, radius): &Sphere,
+    (start, along): (&[Row; 3], &[Row; 3]),
+    others: &Mask,
+    goes: &mut Mask,
+) {
+    let (mut foot, mut squared) = (ZERO, ZERO);
+    for axis in 0..3 {
+        for i in 0..LANES {
+            let way = centre[axis] - start[axis][i];
+            foot[i] += way * along[axis][i];
+            squared[i] += way * way;
+        }
+    }
+    let within = radius * radius;
+    for i in 0..LANES {
+        let is_ahead = (foot[i] >= 0.0) | (squared[i] <= within);
+        // Roundings of what is subtracted.
+        let slack = ROUNDINGS * squared[i];
+        let is_near = squared[i] - foot[i] * foot[i] <= within + slack;
+        goes[i] &= mask((*radius >= 0.0) & is_ahead & is_near) | others[i];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use etendue_geometry::disk;
+
+    use super::*;
+
+    #[test]
+    fn points_on_the_disk_are_those_of_double_precision() {
+        for i in 0..=64_u8 {
+            for k in 0..=64_u8 {
+                let square = [i, k].map(|n| f32::from(n) / 64.0);
+                let [own, other] =
+                    [disk_point(square).map(f64::from), disk::point(square.map(f64::from))];
+                // Some roundings of numbers below 1.
+                let error = (own[0] - other[0]).abs().max((own[1] - other[1]).abs());
+                assert!(error < 4.0 * f64::from(f32::EPSILON), "{square:?}: {error}");
+            }
+        }
+    }
+}

@@ -1,0 +1,264 @@
+//! Sheets of facets and smooth surfaces among the hits of a block, in double precision: few numbers are theirs alone,
+//! and highlights of smooth sheets are narrower than what single precision resolves.
+#![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
+
+use etendue_geometry::RayBlock;
+use etendue_geometry::block::{Floats as Row, LANES};
+
+use super::kernel::{Hits, Mask, mask, round};
+use super::surfaces::{Found, Surfaces};
+use crate::bsdf::Weights;
+use crate::bsdf::metal::{mean_reflectance, multiple};
+use crate::bsdf::sheets::Sheets;
+use crate::bsdf::smooth::Smooth;
+
+type Wide = [f64; LANES];
+
+/// The facets of a block's hits, kept for the next block.
+#[derive(Debug, Default)]
+pub(super) struct Facets {
+    sheets: Box<Sheets<LANES>>,
+    smooth: Box<Smooth<LANES>>,
+    normal: [Wide; 3],
+    shading: [Wide; 3],
+    direction: [Wide; 3],
+    base: [Wide; 3],
+    highlight: [Wide; 3],
+    dip: [Wide; 3],
+    /// Of what met several facets of a sheet.
+    deep: [Wide; 3],
+}
+
+/// The rays that leave a block's hits by chance, and what they carry.
+pub(super) struct Scattered {
+    pub(super) start: [Row; 3],
+    pub(super) along: [Row; 3],
+    pub(super) pdf: Row,
+    pub(super) goes: Mask,
+    /// Over what arrived, by band.
+    pub(super) share: [Row; 3],
+}
+
+impl Facets {
+    /// Takes the facets of a block's hits as they are seen, with normals that light is scattered about.
+    #[inline(always)]
+    pub(super) fn see(
+        &mut self,
+        surfaces: Surfaces<'_>,
+        (block, first, found): (&RayBlock, usize, &Found),
+        (hits, shading): (&Hits, &[Row; 3]),
+    ) {
+        see(self, surfaces, (block, first, found), (hits, shading));
+    }
+
+    /// What sheets turn to the viewer of light that comes from unit directions which were chosen with a density (1/sr):
+    /// to `value` and, by band, to `share`, in the lanes of sheets.
+    #[inline(always)]
+    pub(super) fn reflect(
+        &mut self,
+        lanes: &Mask,
+        (toward, pdf, is_delta): (&[Row; 3], &Row, &Row),
+        (value, share): (&mut Row, &mut [Row; 3]),
+    ) {
+        reflect(self, lanes, (toward, pdf, is_delta), (value, share));
+    }
+
+    /// Puts the directions in which sheets and smooth surfaces send the paths in place of what is there.
+    #[inline(always)]
+    pub(super) fn scatter(
+        &mut self,
+        found: &Found,
+        hits: &Hits,
+        (choice, square): (&Row, &[Row; 2]),
+        scattered: &mut Scattered,
+    ) {
+        if found.sheets != [0; LANES] {
+            scatter_sheets(self, &found.sheets, (choice, square), scattered);
+        }
+        if found.smooth != [0; LANES] {
+            scatter_smooth(self, (&found.smooth, hits), choice, scattered);
+        }
+    }
+
+    /// What a lane has of light in a band.
+    #[inline(always)]
+    fn in_band(&self, value: Weights, lane: usize, k: usize) -> f64 {
+        let sum = value.white
+            + value.base * self.base[k][lane]
+            + value.highlight * self.highlight[k][lane]
+            + value.dip * self.dip[k][lane]
+            + value.deep * self.deep[k][lane];
+        if sum > 0.0 { sum } else { 0.0 }
+    }
+}
+
+#[inline(always)]
+fn widen(rows: &[Row; 3], to: &mut [Wide; 3]) {
+    for axis in 0..3 {
+        for i in 0..LANES {
+            to[axis][i] = f64::from(rows[axis][i]);
+        }
+    }
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn see(
+    facets: &mut Facets,
+    surfaces: Surfaces<'_>,
+    (block, first, found): (&RayBlock, usize, &Found),
+    (hits, shading): (&Hits, &[Row; 3]),
+) {
+    widen(&hits.normal, &mut facets.normal);
+    widen(shading, &mut facets.shading);
+    widen(&block.direction, &mut facets.direction);
+    widen(&found.color, &mut facets.base);
+    let Facets { sheets, smooth, .. } = facets;
+    // What lanes of other surfaces hold is of no use, and a number.
+    sheets.alpha = [1.0; LANES];
+    for lane in 0..LANES {
+        if found.sheets[lane] | found.smooth[lane] == 0 {
+            continue;
+        }
+        let placement = block.placement[lane] as usize;
+        let surface = &surfaces.all.all[placement];
+        let varied = surfaces.varied.get(first + lane).filter(|_| surface.is_varied);
+        let own = match varied.filter(|_| surface.has_own_facets) {
+            Some(varied) => &varied.facets,
+            None => &surfaces.all.facets[placement],
+        };
+        for k in 0..3 {
+            facets.highlight[k][lane] = own.highlight[k];
+            facets.dip[k][lane] = own.dip[k];
+        }
+        let is_metal = f64::from(u8::from(own.is_metal));
+        if found.sheets[lane] != 0 {
+            (sheets.alpha[lane], sheets.metallic[lane]) = (own.alpha, own.metallic);
+            (sheets.f0[lane], sheets.f90[lane]) = (own.f0, own.f90);
+            sheets.base_peak[lane] = varied.map_or(own.base_peak, |varied| varied.peak);
+            sheets.f0_peak[lane] = own.f0_peak;
+            sheets.is_metal[lane] = is_metal;
+        } else {
+            smooth.is_metal[lane] = is_metal;
+            let is_front = hits.front[lane] != 0;
+            // Of a mirror 0.
+            let from_behind = if own.ior > 0.0 { 1.0 / own.ior } else { 0.0 };
+            smooth.eta[lane] = if is_front { own.ior } else { from_behind };
+        }
+    }
+    if found.sheets == [0; LANES] {
+        return;
+    }
+    sheets.view(&facets.shading, &facets.direction);
+    for k in 0..3 {
+        for i in 0..LANES {
+            let reflectance = mean_reflectance(facets.base[k][i], facets.dip[k][i]);
+            facets.deep[k][i] = multiple(reflectance, sheets.mean[i]);
+        }
+    }
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn reflect(
+    facets: &mut Facets,
+    lanes: &Mask,
+    (toward, pdf, is_delta): (&[Row; 3], &Row, &Row),
+    (value, share): (&mut Row, &mut [Row; 3]),
+) {
+    let mut wide = [[0.0; LANES]; 3];
+    widen(toward, &mut wide);
+    let (mut of_pdf, mut of_delta, mut found) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    for i in 0..LANES {
+        (of_pdf[i], of_delta[i]) = (f64::from(pdf[i]), f64::from(is_delta[i]));
+    }
+    let asked = (&wide, &of_pdf, &of_delta);
+    facets.sheets.reflect([&facets.normal, &facets.shading], asked, &mut found);
+    for i in 0..LANES {
+        value[i] = if lanes[i] != 0 { round(found[i]) } else { value[i] };
+    }
+    for k in 0..3 {
+        for i in 0..LANES {
+            let own = round(facets.in_band(facets.sheets.weights(i), i, k));
+            share[k][i] = if lanes[i] != 0 { own } else { share[k][i] };
+        }
+    }
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn scatter_sheets(
+    facets: &mut Facets,
+    lanes: &Mask,
+    (choice, square): (&Row, &[Row; 2]),
+    scattered: &mut Scattered,
+) {
+    let (mut choices, mut squares) = ([0.0; LANES], [[0.0; 2]; LANES]);
+    for i in 0..LANES {
+        choices[i] = f64::from(choice[i]);
+        squares[i] = [f64::from(square[0][i]), f64::from(square[1][i])];
+    }
+    let (mut along, mut pdf) = ([[0.0; LANES]; 3], [0.0; LANES]);
+    let normals = [&facets.normal, &facets.shading];
+    facets.sheets.scatter(normals, (&choices, &squares), (&mut along, &mut pdf));
+    for axis in 0..3 {
+        for i in 0..LANES {
+            let own = round(along[axis][i]);
+            let row = &mut scattered.along[axis];
+            row[i] = if lanes[i] != 0 { own } else { row[i] };
+        }
+    }
+    for i in 0..LANES {
+        let is_own = lanes[i] != 0;
+        let density = round(pdf[i]);
+        scattered.pdf[i] = if is_own { density } else { scattered.pdf[i] };
+        let goes = mask((density > 0.0) & (density <= f32::MAX));
+        scattered.goes[i] = if is_own { goes } else { scattered.goes[i] };
+    }
+    for k in 0..3 {
+        for i in 0..LANES {
+            let own = round(facets.in_band(facets.sheets.weights(i), i, k));
+            let row = &mut scattered.share[k];
+            row[i] = if lanes[i] != 0 { own } else { row[i] };
+        }
+    }
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn scatter_smooth(
+    facets: &mut Facets,
+    (lanes, hits): (&Mask, &Hits),
+    choice: &Row,
+    scattered: &mut Scattered,
+) {
+    let mut choices = [0.0; LANES];
+    for i in 0..LANES {
+        choices[i] = f64::from(choice[i]);
+    }
+    let (mut along, mut goes) = ([[0.0; LANES]; 3], [0.0; LANES]);
+    let normals = [&facets.normal, &facets.shading];
+    let seen = (&facets.direction, &choices);
+    facets.smooth.scatter(normals, seen, (&mut along, &mut goes));
+    let smooth = &facets.smooth;
+    for axis in 0..3 {
+        for i in 0..LANES {
+            let is_own = lanes[i] != 0;
+            let (along, row) = (round(along[axis][i]), &mut scattered.along[axis]);
+            row[i] = if is_own { along } else { row[i] };
+            let side = if smooth.refracts[i] > 0.0 { -hits.error[i] } else { hits.error[i] };
+            // Rays that pass a surface leave it on the other side.
+            let back = if smooth.eta[i] > 0.0 { 0.0 } else { hits.back[axis][i] };
+            let start = hits.point[axis][i] + (hits.normal[axis][i] * side + back);
+            let row = &mut scattered.start[axis];
+            row[i] = if is_own { start } else { row[i] };
+        }
+    }
+    for i in 0..LANES {
+        let own = mask(goes[i] > 0.0);
+        scattered.goes[i] = if lanes[i] != 0 { own } else { scattered.goes[i] };
+    }
+    for k in 0..3 {
+        for i in 0..LANES {
+            let own = round(facets.in_band(smooth.weights(i), i, k));
+            let row = &mut scattered.share[k];
+            row[i] = if lanes[i] != 0 { own } else { row[i] };
+        }
+    }
+}

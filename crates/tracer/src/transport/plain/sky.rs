@@ -1,0 +1,178 @@
+//! Light of the sky in plain scenes.
+#![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
+
+use std::f32::consts::FRAC_1_PI;
+
+use etendue_geometry::block::{Floats as Row, LANES, vector};
+use etendue_geometry::glam::DMat3;
+
+use super::kernel::{ZERO, round, single};
+use super::lamps::{ChosenLamps, Lights, OtherPlace};
+use super::{Columns, PlainScratch, SPECULAR};
+use crate::environment::{EnvironmentMap, Lit, MapSampler};
+use crate::sampling::GridCell;
+use crate::transport::{RaySamples, Tracing};
+
+/// The sky of a plain scene.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PlainSky<'a> {
+    /// Which of the lights it is.
+    pub(super) index: usize,
+    pub(super) map: Option<(&'a EnvironmentMap, &'a MapSampler)>,
+    world_from_map: DMat3,
+    /// Radiance where its image has 1.
+    pub(super) bands: [f64; 3],
+    visible: bool,
+}
+
+/// What paths that met the sky brought there, side by side.
+struct Arrived {
+    direction: [Row; 3],
+    throughput: [Row; 3],
+    /// Density (1/sr) of the direction, and the chance with which the sky was asked where it began; 1 and 0 where no
+    /// light was asked in its stead.
+    pdf: Row,
+    chance: Row,
+    /// Of the surface that they left.
+    normal: [Row; 3],
+}
+
+impl<'a> PlainSky<'a> {
+    /// That of all lights.
+    pub(super) fn of(lights: &'a crate::lights::Lights) -> Option<Self> {
+        let sky = lights.sky.as_ref()?;
+        Some(Self {
+            index: sky.index,
+            map: sky.map.as_ref().map(|(map, sampler)| (&**map, sampler)),
+            world_from_map: sky.world_from_map,
+            bands: lights.bands_of(sky.index, 3).try_into().unwrap_or_default(),
+            visible: sky.visible,
+        })
+    }
+
+    /// Light that comes along the ways that paths arrived by, in terms of [`Self::bands`].
+    fn light_of(&self, arrived: &Arrived, light: &mut [Row; 3]) {
+        light_of(self, arrived, light);
+    }
+}
+
+/// Vectors carried by a rotation, row by row.
+#[inline(always)]
+fn turned(rows: DMat3, [x, y, z]: &[Row; 3]) -> [Row; 3] {
+    let mut turned = [ZERO; 3];
+    for axis in 0..3 {
+        let row = rows.row(axis);
+        let [a, b, c] = [round(row.x), round(row.y), round(row.z)];
+        for i in 0..LANES {
+            turned[axis][i] = a * x[i] + b * y[i] + c * z[i];
+        }
+    }
+    turned
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn light_of(sky: &PlainSky<'_>, arrived: &Arrived, light: &mut [Row; 3]) {
+    let (mut density, mut color) = (ZERO, [[1.0; LANES]; 3]);
+    match sky.map {
+        Some((map, sampler)) => {
+            let own = turned(sky.world_from_map.transpose(), &arrived.direction);
+            let lit: Lit<f32, LANES> = sampler.in_directions(map, own);
+            (density, color) = (lit.densities, lit.colors);
+        }
+        None => {
+            for i in 0..LANES {
+                let mut cosine = 0.0;
+                for axis in 0..3 {
+                    cosine += arrived.normal[axis][i] * arrived.direction[axis][i];
+                }
+                density[i] = if cosine > 0.0 { cosine * FRAC_1_PI } else { 0.0 };
+            }
+        }
+    }
+    for band in 0..3 {
+        for i in 0..LANES {
+            let ratio = arrived.chance[i] * density[i] / arrived.pdf[i];
+            let weight = 1.0 / (1.0 + ratio * ratio);
+            light[band][i] = color[band][i] * arrived.throughput[band][i] * weight;
+        }
+    }
+}
+
+/// Directions to the sky's image in the patches that lanes chose.
+#[multiversion::multiversion(targets = "simd")]
+pub(super) fn place_on_sky(sky: &PlainSky<'_>, chosen: &mut ChosenLamps) {
+    let Some((map, sampler)) = sky.map else { return };
+    let cells = std::mem::take(&mut chosen.cells);
+    for (number, run) in cells.chunks(LANES).enumerate() {
+        let mut patches = [GridCell::default(); LANES];
+        patches[..run.len()].copy_from_slice(run);
+        let lit: Lit<f32, LANES> = sampler.in_patches(map, &patches);
+        let directions = turned(sky.world_from_map, &lit.directions);
+        for i in 0..run.len() {
+            let (lane, chance) = chosen.of_sky[number * LANES + i];
+            let density = lit.densities[i] * chance;
+            if density > 0.0 {
+                let axis = |rows: &[Row; 3]| [rows[0][i], rows[1][i], rows[2][i]];
+                let (is_far, is_delta) = (true, false);
+                let own = OtherPlace { place: axis(&directions), is_far, is_delta, density };
+                let mut radiance = axis(&lit.colors);
+                for band in 0..3 {
+                    radiance[band] *= round(sky.bands[band]);
+                }
+                chosen.put(lane as usize, &own, radiance);
+            }
+        }
+    }
+    chosen.cells = cells;
+}
+
+impl<const RGB: bool> Tracing<'_, RGB> {
+    /// Adds the light of the sky that paths met.
+    pub(super) fn add_sky_plain(
+        &mut self,
+        (camera, number): (&RaySamples<'_>, u32),
+        lights: &Lights<'_>,
+        plain: &PlainScratch,
+        out: &mut [f64],
+    ) {
+        let Some(sky) = lights.sky.filter(|sky| sky.visible || number > 0) else { return };
+        let Columns { ray, pdf, throughput, normal, flags, sky_chance, .. } = &plain.carried;
+        for missed in plain.missed.chunks(LANES) {
+            let mut arrived = Arrived {
+                direction: [ZERO; 3],
+                throughput: [ZERO; 3],
+                pdf: [1.0; LANES],
+                chance: ZERO,
+                normal: [ZERO; 3],
+            };
+            for (i, &own) in missed.iter().enumerate() {
+                let own = own as usize;
+                for axis in 0..3 {
+                    arrived.throughput[axis][i] = throughput[axis][own];
+                }
+                // The camera's rays are not all traced: those that cannot hit anything are other ones in blocks.
+                let direction = match number {
+                    0 => camera.rays.direction(own),
+                    _ => vector(&plain.rays.blocks()[own / LANES].direction, own % LANES),
+                };
+                let direction = single(direction);
+                for axis in 0..3 {
+                    arrived.direction[axis][i] = direction[axis];
+                }
+                let is_specular = flags.get(own).is_some_and(|flags| flags & SPECULAR != 0);
+                if number > 0 && !is_specular {
+                    (arrived.pdf[i], arrived.chance[i]) = (pdf[own], sky_chance[own]);
+                    for axis in 0..3 {
+                        arrived.normal[axis][i] = normal[axis][own];
+                    }
+                }
+            }
+            let mut light = [ZERO; 3];
+            sky.light_of(&arrived, &mut light);
+            for (i, &own) in missed.iter().enumerate() {
+                let band = |k: usize| f64::from(light[k][i]) * sky.bands[k];
+                self.add(&[band(0), band(1), band(2)], ray[own as usize], out);
+            }
+        }
+    }
+}
