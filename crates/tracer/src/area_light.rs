@@ -50,7 +50,7 @@ pub(crate) struct AreaLight {
     pub(crate) two_sided: bool,
     /// It shines alike all over.
     pub(crate) is_plain: bool,
-    /// What the placement's own numbers add to the rounding of a point on it (m).
+    /// Magnitudes of the placement's own numbers, which add to the rounding of a point on it (m).
     pub(crate) magnitudes: DVec3,
 }
 
@@ -92,8 +92,8 @@ impl AreaLight {
     }
 }
 
-/// Where an emissive triangle of some power (W) is and shines, at a time (s from the frame's time) or, of a placement
-/// that moves, while it does; `None` without area.
+/// Cluster of an emissive triangle of some power (W): where it is and shines, at a time (s from the frame's time) or,
+/// of a placement that moves, while it does; `None` without area.
 pub(crate) fn cluster(
     scene: &SceneView<'_>,
     (id, time): ([u32; 2], f64),

@@ -21,7 +21,7 @@ const MOST_COMPARED: usize = 4096;
 /// A placement that encloses a medium.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Body {
-    /// Where several bodies are, the medium is that of the highest rank.
+    /// Rank: where several bodies are, the medium is that of the highest.
     pub(crate) rank: u32,
     /// Some of its boundary may not be there: its box meets that of another body, or its index is that of air.
     pub(crate) may_vanish: bool,
@@ -68,7 +68,7 @@ pub(crate) fn bodies(geometry: &Geometry, materials: &[Material]) -> Vec<Option<
     bodies
 }
 
-/// Whether the box of each meets that of another.
+/// Tests, for each of them, whether its box meets that of another.
 fn nested(found: &[(f64, usize, Bounds)]) -> Vec<bool> {
     if found.len() > MOST_COMPARED {
         return vec![true; found.len()];

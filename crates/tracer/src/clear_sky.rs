@@ -65,13 +65,13 @@ impl ClearSky {
         })
     }
 
-    /// Whether the sun shines beside the dome.
+    /// Tests whether the sun shines in addition to the dome.
     #[must_use]
     pub fn is_sunlit(&self) -> bool {
         self.sunlit
     }
 
-    /// Where the sun stands (unit).
+    /// Direction to the sun (unit).
     #[must_use]
     pub fn toward_sun(&self) -> DVec3 {
         DVec3::new(0.0, self.elevation.sin(), -self.elevation.cos())
@@ -139,7 +139,7 @@ impl ClearSky {
         dome.into_iter().chain(self.sunlit.then(|| self.sun_spectrum())).collect()
     }
 
-    /// Where the authors' wavelengths end (nm).
+    /// Last of the authors' wavelengths (nm).
     #[must_use]
     pub fn last_wavelength() -> f64 {
         spectral_sky::last_wavelength()

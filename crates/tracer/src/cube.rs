@@ -10,7 +10,7 @@ use crate::Color;
 use crate::spec::BRIGHTEST;
 use crate::texture::{Filter, Wrap};
 
-/// What the numbers of a [`Cube`] are.
+/// Kind of the numbers of a [`Cube`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CubeKind {
     /// Shares of light, 0 to 1, held beyond the outer bands.
@@ -28,7 +28,7 @@ pub struct Cube {
     axis: BandAxis,
     /// `[row][column][band]`.
     values: Vec<f32>,
-    /// What each texel looks like: linear RGB.
+    /// Colour of each texel: linear RGB.
     looks: Vec<[f32; 3]>,
     wrap: Wrap,
     filter: Filter,
@@ -140,7 +140,7 @@ impl Cube {
         self.size
     }
 
-    /// What each texel looks like: linear RGB, row by row from the top.
+    /// Colour of each texel: linear RGB, row by row from the top.
     pub(crate) fn looks(&self) -> &[[f32; 3]] {
         &self.looks
     }
@@ -191,7 +191,7 @@ impl Cube {
         [edges[0], edges[edges.len() - 1]]
     }
 
-    /// Whether it shines in any of the bands' wavelengths.
+    /// Checks that it shines in any of the bands' wavelengths.
     ///
     /// # Errors
     ///
@@ -260,7 +260,7 @@ impl Cube {
         ]
     }
 
-    /// What it looks like at (u, v): linear RGB.
+    /// Colour at (u, v): linear RGB.
     #[must_use]
     pub fn look(&self, at: [f64; 2]) -> Color {
         let corners = self.corners(at);

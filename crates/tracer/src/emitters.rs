@@ -71,7 +71,7 @@ impl Emitters {
         (centre.to_array().map(|axis| axis as f32), radius as f32)
     }
 
-    /// Whether a ray may meet any of them: `false` for most, at hardly a cost.
+    /// Tests whether a ray may meet any of them: `false` for most, at hardly a cost.
     pub(crate) fn may_meet(&self, origin: DVec3, direction: DVec3) -> bool {
         let way = self.centre - origin;
         let foot = way.dot(direction);

@@ -16,7 +16,7 @@ use crate::reference::{SurfacePoint, View};
 /// Grazing rays see no more of a surface than this (a cosine).
 const LEAST_COSINE: f64 = 1e-4;
 
-/// What one sample of the picture covers.
+/// Extent that one sample of the picture covers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Pixel {
     /// A side per distance along the camera's axis, where rays pass through a point.
@@ -60,7 +60,7 @@ impl View {
     }
 }
 
-/// Where a cone meets a surface.
+/// A cone where it meets a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Footprint {
     /// The ray's unit direction.

@@ -19,14 +19,14 @@ const MOST_ANGLES: f64 = 4096.0;
 /// A point that shines by a measured distribution.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Goniometric {
-    /// Where it is (m).
+    /// Position (m).
     pub at: DVec3,
     /// Its axes in the world: +X in the plane of the horizontal angle 0, +Y in that of 90 degrees, and +Z
     /// against the vertical angle 0.
     pub axes: DMat3,
     /// The file.
     pub file: PathBuf,
-    /// What it says.
+    /// Intensities that the file states.
     pub photometry: Photometry,
 }
 
@@ -39,7 +39,7 @@ impl Goniometric {
         self.photometry.intensity(vertical, local.y.atan2(local.x))
     }
 
-    /// Where it is aimed (unit).
+    /// Direction in which it is aimed (unit).
     pub(crate) fn axis(&self) -> DVec3 {
         -self.axes.z_axis
     }

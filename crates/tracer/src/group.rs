@@ -91,10 +91,10 @@ impl JsonSchema for LightGroup {
     }
 }
 
-/// What of the light of a ray is told apart: that of a group, and of it what changes with time alike.
+/// Part of the light of a ray that is told apart: that of a group, and of it what changes with time alike.
 type Part = (LightGroup, Option<Arc<Modulation>>);
 
-/// Which part each light of a scene is of.
+/// Part that each light of a scene is of.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Groups {
     /// All that there are, each group's side by side; that of [`LightGroup::OTHER`] without modulation among them.

@@ -15,23 +15,23 @@ pub type Color = [f64; 3];
 /// A material ready to be looked up at a hit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
-    /// What the file calls it, for messages and overrides.
+    /// Name in the file, for messages and overrides.
     pub name: String,
     /// Base colour.
     pub base_color: Paint,
     /// The mesh's vertex colours multiply the base colour (glTF's `COLOR_0`).
     pub vertex_colors: bool,
-    /// How light is scattered.
+    /// Way in which light is scattered.
     pub scattering: Scattering,
-    /// What the surface gives off.
+    /// Light that the surface gives off.
     pub emission: Option<Emission>,
-    /// Where the surface is not there at all.
+    /// Places where the surface is not there at all.
     pub alpha: Alpha,
     /// The back is not there: rays from the camera, and those that go on from them, pass where they meet it.
     pub one_sided: bool,
     /// Tilts of the normal.
     pub normal_map: Option<NormalMap>,
-    /// How much of the light from all around reaches the surface.
+    /// Share of the light from all directions that reaches the surface.
     pub occlusion: Option<Occlusion>,
 }
 
@@ -42,11 +42,11 @@ pub struct Material {
 pub struct Occlusion {
     /// The image (linear): the share that arrives, in red.
     pub image: TextureUse,
-    /// How much of it counts, 0..=1.
+    /// Share of it that counts, 0..=1.
     pub strength: f64,
 }
 
-/// What a surface gives off.
+/// Light that a surface gives off.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Emission {
     /// Radiance, times [`Self::strength`].
@@ -59,17 +59,17 @@ pub struct Emission {
     pub two_sided: bool,
     /// The group of lights that it is of, if it names one.
     pub group: Option<LightGroup>,
-    /// How its strength changes with time, in the frame's clock; `None` when it does not.
+    /// Change of its strength with time, in the frame's clock; `None` when it does not change.
     pub modulation: Option<Arc<Modulation>>,
 }
 
-/// Where a surface lets rays pass as if it were not there.
+/// Places where a surface lets rays pass as if it were not there.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Alpha {
     /// Nowhere.
     #[default]
     Opaque,
-    /// Where the base colour's alpha is below the cut-off.
+    /// At points where the base colour's alpha is below the cut-off.
     Mask {
         /// Multiplies the alpha.
         factor: f64,
@@ -128,7 +128,7 @@ impl Material {
         Self { vertex_colors: true, ..plain }
     }
 
-    /// Which textures a render of this scope looks at, and as what.
+    /// Textures that a render of this scope looks at, each with its encoding.
     #[must_use]
     pub fn textures(&self, scope: TextureScope) -> Vec<(u32, Encoding)> {
         let mut copy = self.clone();
@@ -151,7 +151,7 @@ impl Material {
         uses
     }
 
-    /// Whether anything of it changes over texture coordinates.
+    /// Tests whether anything of it changes over texture coordinates.
     #[must_use]
     pub fn is_patterned(&self) -> bool {
         let shines = self.emission.as_ref().is_some_and(|emission| emission.radiance.needs_uv());
@@ -197,7 +197,7 @@ impl Material {
         self.reflected_cube().into_iter().chain(self.emitted_cube())
     }
 
-    /// Whether it may be a smooth pane without thickness, which light passes straight
+    /// Tests whether it may be a smooth pane without thickness, which light passes straight
     /// (`KHR_materials_transmission` without roughness).
     #[must_use]
     pub fn is_pane(&self) -> bool {
@@ -205,20 +205,20 @@ impl Material {
         self.scattering.gltf().is_some_and(passes)
     }
 
-    /// What the body behind its front takes from light.
+    /// Absorption of light by the body behind its front.
     #[must_use]
     pub fn absorption(&self) -> Option<Absorption> {
         self.scattering.absorption()
     }
 
-    /// Whether rays may pass the surface as if it were not there.
+    /// Tests whether rays may pass the surface as if it were not there.
     #[must_use]
     pub fn has_alpha(&self) -> bool {
         self.alpha != Alpha::Opaque || self.one_sided
     }
 }
 
-/// How much of a material a render looks at beside the base colour.
+/// Parts of a material, other than the base colour, that a render looks at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct TextureScope {
     /// All that light transport does.
@@ -239,7 +239,7 @@ pub enum Paint {
     Plain(Color),
     /// One curve everywhere.
     Curve {
-        /// What it looks like, as linear RGB: its colour where light is traced in no bands of wavelengths.
+        /// Its look as linear RGB: the colour where light is traced in no bands of wavelengths.
         look: Color,
         /// The curve.
         curve: SceneCurve,
@@ -259,7 +259,7 @@ pub enum Paint {
         factor: Color,
         /// A curve of which the factor is the look, and which multiplies the image in its place in bands of wavelengths.
         curve: Option<SceneCurve>,
-        /// Which image, over which coordinates.
+        /// Image, and the coordinates that it is looked up by.
         image: TextureUse,
     },
     /// A reflectance, or of light a radiance, by wavelength over texture coordinate set 0.
@@ -272,13 +272,13 @@ pub enum Paint {
 }
 
 impl Paint {
-    /// Whether a lookup needs texture coordinates.
+    /// Tests whether a lookup needs texture coordinates.
     #[must_use]
     pub fn needs_uv(&self) -> bool {
         !matches!(self, Self::Plain(_) | Self::Curve { .. })
     }
 
-    /// Whether it has more than the three numbers of a colour.
+    /// Tests whether it has more than the three numbers of a colour.
     #[must_use]
     pub fn has_spectrum(&self) -> bool {
         matches!(self, Self::Cube { .. }) || !self.curves().is_empty()

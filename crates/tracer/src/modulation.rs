@@ -139,7 +139,7 @@ enum Waveform {
 }
 
 impl ModulationSpec {
-    /// What its times count from.
+    /// Clock that its times count from.
     #[must_use]
     pub fn clock(&self) -> Clock {
         match self {

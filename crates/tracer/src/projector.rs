@@ -10,7 +10,7 @@ use crate::{Color, Paint, TextureUse};
 /// edges as 1/cos³ θ.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Projector {
-    /// Where it is (m).
+    /// Position (m).
     pub at: DVec3,
     /// Its axes in the world: +X to the right of the image as the projector sees it, +Y up, +Z backwards.
     pub axes: DMat3,
@@ -18,7 +18,7 @@ pub struct Projector {
     pub tangent: f64,
     /// Width over height; that of the image when absent, of a plain colour 1.
     pub aspect: Option<f64>,
-    /// What is thrown.
+    /// Image that is thrown.
     pub image: Paint,
 }
 
@@ -33,8 +33,7 @@ impl Projector {
         [self.tangent, self.tangent / aspect]
     }
 
-    /// What its axial intensity is multiplied by towards the point `to` (m), by colour; `None` outside of its
-    /// image.
+    /// Factor of its axial intensity towards the point `to` (m), by colour; `None` outside of its image.
     pub(crate) fn toward(&self, scene: &SceneView<'_>, to: DVec3) -> Option<Color> {
         let local = self.axes.transpose() * (to - self.at);
         let ahead = -local.z;
@@ -67,7 +66,7 @@ impl Projector {
         4.0 * across * down
     }
 
-    /// Where it is aimed (unit).
+    /// Direction in which it is aimed (unit).
     pub(crate) fn axis(&self) -> DVec3 {
         -self.axes.z_axis
     }

@@ -80,7 +80,7 @@ impl Pyramid {
         }
     }
 
-    /// How many levels there are above the image.
+    /// Number of levels above the image.
     pub(crate) fn len(&self) -> usize {
         self.levels.len()
     }
@@ -130,7 +130,7 @@ impl Level {
     }
 }
 
-/// Whether each texel of half as many columns and rows is the mean of four.
+/// Tests whether each texel of half as many columns and rows is the mean of four.
 fn is_even(size: [usize; 2]) -> bool {
     size.iter().all(|side| side.is_multiple_of(2))
 }
@@ -253,7 +253,7 @@ fn shares(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
         .collect()
 }
 
-/// What lies between the four texels around a place, whose centres are at whole numbers.
+/// Interpolates between the four texels nearest to a place, whose centres are at whole numbers.
 pub(crate) fn bilinear([x, y]: [f64; 2], at: impl Fn(f64, f64) -> [f64; 4]) -> [f64; 4] {
     let (x0, y0) = (x.floor(), y.floor());
     let (fx, fy) = (x - x0, y - y0);

@@ -20,7 +20,7 @@ pub struct View {
     pub origin: DVec3,
     /// The camera's axes in the world: +X right, +Y up, and +Z, which points backwards.
     pub axes: DMat3,
-    /// What a sample of the picture covers, where the camera tells.
+    /// Extent that a sample of the picture covers, where the camera tells.
     pub pixel: Option<Pixel>,
 }
 
@@ -43,7 +43,7 @@ impl View {
     }
 }
 
-/// What looking at a hit needs to know of the scene.
+/// Parts of the scene that looking at a hit needs.
 #[derive(Debug, Clone, Copy)]
 pub struct SceneView<'a> {
     /// Meshes and placements.
@@ -106,7 +106,7 @@ impl SceneView<'_> {
         self.spot(hits, i)?.shading_normal(hits.normal(i))
     }
 
-    /// Where hit `i` is on its mesh; `None` for a miss.
+    /// Place of hit `i` on its mesh; `None` for a miss.
     #[must_use]
     pub fn spot(&self, hits: &HitBatch, i: usize) -> Option<SurfacePoint<'_>> {
         let placement = self.placement(hits, i)?;
@@ -153,7 +153,7 @@ impl SceneView<'_> {
         }
     }
 
-    /// Where ray `i` of the camera hit, with its footprint; `None` for a miss.
+    /// Place that ray `i` of the camera hit, with its footprint; `None` for a miss.
     fn seen(&self, traced: Traced<'_>, i: usize) -> Option<SurfacePoint<'_>> {
         let direction = traced.rays.direction(i);
         let cone = self.view.cone(direction).map(|cone| cone.after(traced.hits.t[i]));
@@ -296,13 +296,13 @@ impl SceneView<'_> {
         self.decoded(image).map_or([1.0; 4], |pixels| Self::over(pixels, image, point))
     }
 
-    /// What an image of data (a roughness, a share) says at a spot; 1 without the image.
+    /// Value of an image of data (a roughness, a share) at a spot; 1 without the image.
     #[must_use]
     pub fn texel(&self, image: &TextureUse, point: &SurfacePoint<'_>) -> [f64; 4] {
         self.lookup(image, point).unwrap_or([1.0; 4])
     }
 
-    /// What an image of data says at a spot; `None` without the image.
+    /// Value of an image of data at a spot; `None` without the image.
     #[must_use]
     pub fn lookup(&self, image: &TextureUse, point: &SurfacePoint<'_>) -> Option<[f64; 4]> {
         // Magenta is for looking at, not a roughness or a tilt.
@@ -375,17 +375,17 @@ pub(crate) fn squares_at(point: &SurfacePoint<'_>, squares: f64) -> Squares {
 /// A place on a mesh.
 #[derive(Debug, Clone, Copy)]
 pub struct SurfacePoint<'a> {
-    /// Which placement.
+    /// Placement of the mesh.
     pub placement: &'a Placement,
     /// Its mesh.
     pub mesh: &'a Mesh,
-    /// Which triangle of the mesh.
+    /// Index of the triangle in the mesh.
     pub triangle: usize,
     /// Barycentric weights of its corners.
     pub weights: [f64; 3],
-    /// When it is looked at (s from the frame's time), as far as that counts: 0 where nothing moves.
+    /// Time at which it is looked at (s from the frame's time), as far as that counts: 0 where nothing moves.
     pub time: f64,
-    /// How much around it is seen at once; a point when absent.
+    /// Area of the surface that is seen at once; a point when absent.
     pub footprint: Option<Footprint>,
 }
 
@@ -431,7 +431,7 @@ impl<'a> SurfacePoint<'a> {
         self.turned_normal(turn.as_ref(), geometric)
     }
 
-    /// What turns and stretches the mesh, at its time.
+    /// Matrix that turns and stretches the mesh, at its time.
     pub(crate) fn linear(&self) -> DMat3 {
         match &self.placement.motion {
             None => self.placement.world_from_mesh.linear,
@@ -463,7 +463,7 @@ impl<'a> SurfacePoint<'a> {
         Some(a? * self.weights[0] + b? * self.weights[1] + c? * self.weights[2])
     }
 
-    /// How the world's places change along the texture coordinates of a set: the directions of
+    /// Change of the world's places along the texture coordinates of a set: the directions of
     /// growing u and of growing v. `None` where they do not tell.
     #[must_use]
     pub fn texture_axes(&self, set: usize) -> Option<[DVec3; 2]> {
@@ -482,7 +482,7 @@ impl<'a> SurfacePoint<'a> {
     }
 }
 
-/// What a layer needs of the mesh and of the hit.
+/// Data of the mesh and of the hit that a layer needs.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Needs {
     /// Barycentric coordinates or the normal: [`etendue_geometry::Detail::Surface`].

@@ -4,7 +4,7 @@ use etendue_spectrum::Curve;
 
 use crate::{Color, Conductor, SceneCurve, Spectral, TextureUse, Tint, TintSpectrum};
 
-/// How a surface scatters light.
+/// Way in which a surface scatters light.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Scattering {
     /// Not at all.
@@ -29,7 +29,7 @@ pub enum Scattering {
 }
 
 impl Scattering {
-    /// Whether it scatters light in several ways, among which is chosen.
+    /// Tests whether it scatters light in several ways, among which is chosen.
     #[must_use]
     pub fn has_parts(&self) -> bool {
         match self {
@@ -39,7 +39,7 @@ impl Scattering {
         }
     }
 
-    /// Whether it is made to show other surfaces, mirrored or through it.
+    /// Tests whether it is made to show other surfaces, mirrored or through it.
     #[must_use]
     pub fn shows_others(&self) -> bool {
         match self {
@@ -48,7 +48,7 @@ impl Scattering {
         }
     }
 
-    /// What the body behind its front takes from light.
+    /// Absorption of light by the body behind its front.
     #[must_use]
     pub fn absorption(&self) -> Option<Absorption> {
         match self {
@@ -104,7 +104,7 @@ pub struct Glass {
     pub ior: Ior,
     /// Roughness of its surface, 0..=1; its square is GGX's α.
     pub roughness: f64,
-    /// What is left of light on its way through.
+    /// Absorption of light on its way through.
     pub absorption: Option<Absorption>,
 }
 
@@ -120,7 +120,7 @@ impl Glass {
 /// `color` to the power `s` / `distance` left (`KHR_materials_volume`).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Absorption {
-    /// What is left after `distance`.
+    /// Share of light that is left after `distance`.
     pub color: Color,
     /// The same as a curve, of which the colour is the look.
     pub curve: Option<SceneCurve>,
@@ -129,7 +129,7 @@ pub struct Absorption {
 }
 
 impl Absorption {
-    /// What is left after the distance.
+    /// Share of light that is left after the distance.
     pub(crate) fn tint(&self, spectral: &Spectral) -> Tint {
         let (color, spectrum) = part(spectral, self.color, self.curve.as_ref());
         Tint { color, spectrum }
@@ -203,10 +203,10 @@ pub struct GltfSurface {
     pub sheen_roughness: f64,
     /// Roughness in alpha (linear).
     pub sheen_roughness_texture: Option<TextureUse>,
-    /// How much rougher highlights are along the surface's grain than across it
+    /// Degree to which highlights are rougher along the surface's grain than across it
     /// (`KHR_materials_anisotropy`), 0..=1.
     pub anisotropy: f64,
-    /// Where the grain goes: the angle from growing u towards falling v (rad).
+    /// Direction of the grain: the angle from growing u towards falling v (rad).
     pub anisotropy_rotation: f64,
     /// The grain in red and green (over 0..=1 what is −1..=1), strength in blue (linear).
     pub anisotropy_texture: Option<TextureUse>,
@@ -256,7 +256,7 @@ impl Default for GltfSurface {
 }
 
 impl GltfSurface {
-    /// Whether there is nothing but a sheet of facets over a base that lets no light through, which may be smooth
+    /// Tests whether there is nothing but a sheet of facets over a base that lets no light through, which may be smooth
     /// here and there by a texture alone.
     pub(crate) fn is_bare_sheet(&self) -> bool {
         let is_rough = self.roughness > 0.0 || self.glossiness_texture.is_some();

@@ -42,7 +42,7 @@ pub struct Anchor {
     pub point: DVec3,
     /// Unit geometric normal.
     pub normal: DVec3,
-    /// How far (m) the point may lie off its triangle's plane, whatever is traced next.
+    /// Bound on the distance (m) of the point from its triangle's plane, whatever is traced next.
     pub error: f64,
 }
 

@@ -14,7 +14,7 @@ const SHARES: usize = 32;
 #[derive(Debug, Clone)]
 pub struct Spectral {
     bands: Bands,
-    /// What red, green and blue are in each band.
+    /// Values of red, green and blue in each band.
     from_rgb: [Vec<f64>; 3],
     is_rgb: bool,
     /// The [`Bands::wavelength`] of each band (nm): of weighted bands it is an integral, and paths ask for it at
@@ -77,7 +77,7 @@ impl Spectral {
         spectral
     }
 
-    /// What a metal reflects face on in band `i`, and the dip of its reflectance
+    /// Reflectance of a metal face on in band `i`, and the dip of its reflectance
     /// ([`crate::bsdf::Weights::dip`]).
     pub(crate) fn metal(&self, metal: ConductorId, i: usize) -> [f64; 2] {
         match metal {
@@ -146,13 +146,13 @@ impl Spectral {
         &self.bands
     }
 
-    /// How many bands a ray has.
+    /// Number of bands of a ray.
     #[must_use]
     pub fn count(&self) -> usize {
         self.wavelengths.len()
     }
 
-    /// Whether the bands are linear red, green and blue.
+    /// Tests whether the bands are linear red, green and blue.
     #[must_use]
     pub fn is_rgb(&self) -> bool {
         self.is_rgb
@@ -200,7 +200,7 @@ impl Spectral {
         }
     }
 
-    /// What a light sends in all bands, nothing outside of the curve's range.
+    /// Emission of a light in all bands, nothing outside of the curve's range.
     ///
     /// # Errors
     ///
@@ -240,7 +240,7 @@ fn held_in(bands: &Bands, curve: &Curve) -> Vec<f64> {
         .unwrap_or_else(|_| (0..bands.count()).map(|i| curve.held(bands.wavelength(i))).collect())
 }
 
-/// What a metal reflects face on in each band, and the dip of its reflectance.
+/// Reflectance of a metal face on in each band, and the dip of its reflectance.
 fn reflectances(named: Metal, bands: &Bands) -> Vec<[f64; 2]> {
     let at = |cosine| held_in(bands, &named.reflectance(cosine));
     let (face_on, second) = (at(1.0), at(metal::SECOND_COSINE));

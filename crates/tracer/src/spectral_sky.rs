@@ -14,7 +14,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use etendue_spectrum::{Bands, Curve, NoOverlap, Outside};
 
-/// How many wavelengths there are.
+/// Number of wavelengths.
 pub(crate) const COUNT: usize = 11;
 
 /// The first of them, the step to the next, and the last (nm).
@@ -36,7 +36,7 @@ const LIMB: usize = 6;
 
 const NUMBERS: &[u8; 132_264] = include_bytes!("../data/hosek-wilkie.bin");
 
-/// Where each table begins.
+/// Indices at which the tables begin.
 const RADIANCES: usize = TURBIDITIES * ALBEDOS * CONTROLS * COUNT * PARAMETERS;
 const SUN: usize = RADIANCES + TURBIDITIES * ALBEDOS * CONTROLS * COUNT;
 const DARKENING: usize = SUN + TURBIDITIES * PIECES * COUNT * POWERS;
@@ -153,7 +153,7 @@ pub(crate) fn curve(values: &Spectrum) -> Curve {
     Curve::sampled(samples).unwrap_or(Curve::ONE)
 }
 
-/// Where the authors' wavelengths end (nm).
+/// Last of the authors' wavelengths (nm).
 pub(crate) fn last_wavelength() -> f64 {
     WAVELENGTHS[2]
 }

@@ -65,7 +65,7 @@ impl<'a> SurfaceInteraction<'a> {
         behind / here
     }
 
-    /// Whether the media on its sides part wavelengths.
+    /// Tests whether the media on its sides part wavelengths.
     pub(crate) fn disperses(&self, scene: &SceneView<'_>) -> bool {
         let disperses = |ior: &Ior| matches!(ior, Ior::Dispersive(_));
         self.media.into_iter().filter_map(|medium| scene.index(medium)).any(disperses)
@@ -123,8 +123,8 @@ impl SurfacePoint<'_> {
     }
 }
 
-/// How far above the surface the mirrored direction is raised before it is brought back to unit length, as a share of the
-/// viewer's elevation: enough to stay above it in rounding.
+/// Elevation above the surface that the mirrored direction is raised to before it is brought back to unit length, as a
+/// share of the viewer's elevation: enough to stay above it in rounding.
 pub(crate) const LEAST_ELEVATION: f64 = 0.05;
 
 /// A shading normal as light is scattered by: the geometric one where the viewer would see its back,

@@ -6,14 +6,14 @@ use etendue_geometry::glam::DVec3;
 /// A place on a light, or a direction to it, that was chosen.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Target {
-    /// What it is a place of.
+    /// Kind of place that it is.
     pub(crate) kind: TargetKind,
-    /// Where it is (m), the sum of the three: where a triangle begins, what f64 lost of that, and from
-    /// there to the place. Of a direction, the first alone.
+    /// Position (m), the sum of the three: where a triangle begins, what f64 lost of that, and from there to the place.
+    /// Of a direction, the first alone.
     pub(crate) place: [DVec3; 3],
     /// Unit normal of a triangle; else zero.
     pub(crate) normal: DVec3,
-    /// What a triangle's own numbers add to the rounding of the place (m).
+    /// Magnitudes of a triangle's own numbers, which add to the rounding of the place (m).
     pub(crate) magnitudes: DVec3,
     /// Density over the area (1/m²) or, of a direction, over the solid angle (1/sr), the light's chance
     /// included; of a point the chance alone.
@@ -40,7 +40,7 @@ pub(crate) enum TargetKind {
     },
 }
 
-/// What a light was chosen with.
+/// Result of choosing a place on a light.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Chosen {
     /// Nothing that shines here.

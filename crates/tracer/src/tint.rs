@@ -44,7 +44,7 @@ impl Conductor {
         }
     }
 
-    /// What it reflects face on, by wavelength (nm).
+    /// Reflectance face on, by wavelength (nm).
     #[must_use]
     pub fn face_on(&self) -> Curve {
         match self {
@@ -67,7 +67,7 @@ impl Conductor {
 pub struct Tint {
     /// Linear RGB.
     pub color: Color,
-    /// What multiplies it in bands of wavelengths.
+    /// Curve that multiplies it in bands of wavelengths.
     pub spectrum: TintSpectrum,
 }
 
@@ -88,7 +88,7 @@ pub enum TintSpectrum {
     Texel {
         /// The number of the cube.
         number: u32,
-        /// Where: u and v.
+        /// Place on it: u and v.
         at: [f64; 2],
     },
     /// Two mixed, as squares of a checker within one sample are.
@@ -120,7 +120,7 @@ impl Tint {
         }
     }
 
-    /// Whether it has a curve.
+    /// Tests whether it has a curve.
     #[must_use]
     pub fn has_curve(&self) -> bool {
         self.spectrum != TintSpectrum::White

@@ -27,7 +27,7 @@ const SMOOTHEST: f64 = 1e-6;
 /// Facets that each entry is averaged over.
 const FACETS: u32 = 256;
 
-/// What entries are raised by, as the table is exact to less: so nothing returns more than falls in.
+/// Factor by which entries are raised, as the table is exact to less: so nothing returns more than falls in.
 const MARGIN: f64 = 1.01;
 
 /// Knots in roughness, strength, azimuth and obliquity.
@@ -135,7 +135,7 @@ impl BrushedTable {
     }
 }
 
-/// Where the table has some facets, found once.
+/// Rows of the table for some facets, found once.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rows {
     rough: (usize, f64),

@@ -29,7 +29,7 @@ pub(super) struct CoatView {
     share: f64,
     alpha: f64,
     albedo: Albedo,
-    /// What it returns of light from the viewer, which is also how often it is sampled.
+    /// Share of light from the viewer that it returns, which is also how often it is sampled.
     pub(super) returned: f64,
 }
 
@@ -44,7 +44,7 @@ impl Coat {
 }
 
 impl CoatView {
-    /// What it passes of light from `wi` on to the viewer.
+    /// Share of light from `wi` that it passes on to the viewer.
     pub(super) fn passes(&self, wi: DVec3) -> f64 {
         (1.0 - self.returned) * (1.0 - self.share * self.albedo.at(wi.abs())).max(0.0)
     }

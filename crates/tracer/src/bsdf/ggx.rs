@@ -11,7 +11,7 @@ use std::f64::consts::{PI, TAU};
 
 use etendue_geometry::glam::DVec3;
 
-/// How rough a surface is: α along x and along y, each the square of a roughness in 0..=1.
+/// Roughness of a surface: α along x and along y, each the square of a roughness in 0..=1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Facets {
     /// Along x.
@@ -69,8 +69,8 @@ pub fn sample_visible(w: DVec3, [u, v]: [f64; 2], alpha: impl Into<Facets>) -> D
     DVec3::new(alpha.x * half.x, alpha.y * half.y, half.z.max(0.0)).normalize_or(DVec3::Z)
 }
 
-/// What a sheet of facets of reflectance 1 scatters from `wo` to `wi` (both z > 0), times the cosine
-/// of `wi`; and the density of [`sample_visible`]'s reflections. 0 in both below the surface.
+/// Value of a sheet of facets of reflectance 1 from `wo` to `wi` (both z > 0), times the cosine of
+/// `wi`; and the density of [`sample_visible`]'s reflections. 0 in both below the surface.
 #[must_use]
 #[inline]
 pub fn reflection(wo: DVec3, wi: DVec3, alpha: impl Into<Facets>) -> (f64, f64) {

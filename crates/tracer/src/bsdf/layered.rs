@@ -58,7 +58,7 @@ pub(super) struct LayeredSample {
     pub(super) weights: Weights,
     /// Density per solid angle (1/sr); `+inf` of a specular event.
     pub(super) pdf: f64,
-    /// Whether the event is specular: the sheet is a mirror or a smooth pane.
+    /// True if the event is specular: the sheet is a mirror or a smooth pane.
     pub(super) is_specular: bool,
 }
 
@@ -88,7 +88,7 @@ pub(super) struct LayeredView {
     peaks: Peaks,
     /// Of the dielectric.
     albedo: Albedo,
-    /// What the dielectric, and facets of reflectance 1, return of light from the viewer.
+    /// Shares of light from the viewer that the dielectric, and facets of reflectance 1, return.
     dielectric: f64,
     facets: f64,
     /// Their means over directions.
@@ -107,7 +107,7 @@ impl Layered {
         self.alpha == 0.0 && matte == 0.0 && self.is_bare()
     }
 
-    /// Whether neither a sheen nor a coat lies over it.
+    /// Tests whether neither a sheen nor a coat lies over it.
     fn is_bare(&self) -> bool {
         self.coat.share == 0.0 && self.sheen.color.peak() <= 0.0
     }
@@ -154,12 +154,12 @@ impl Layered {
         }
     }
 
-    /// Whether the dielectric is a smooth pane, which reflects by Fresnel.
+    /// Tests whether the dielectric is a smooth pane, which reflects by Fresnel.
     fn is_pane(&self) -> bool {
         self.alpha == 0.0 && self.transmission > 0.0 && fresnel::normal_reflectance(self.ior) < 1.0
     }
 
-    /// What the dielectric returns of light from a direction, for A and B of its albedo.
+    /// Share of light from a direction that the dielectric returns, for A and B of its albedo.
     fn returned(&self, w: DVec3, albedo: &Albedo, terms: [f64; 2]) -> f64 {
         if !self.is_pane() {
             return albedo.of(terms);
@@ -204,7 +204,7 @@ impl Layered {
         }
     }
 
-    /// What the dielectric's facets let pass.
+    /// Share of light that the dielectric's facets let pass.
     fn passed(&self, cosine: f64, peaks: &Peaks) -> f64 {
         let w = self.obliqueness(cosine);
         let f0 = (self.f0 * peaks.highlight).min(1.0);
@@ -266,7 +266,7 @@ impl Layered {
         (share * self.passed(cosine, peaks) * value, pdf)
     }
 
-    /// What a smooth wall with what lies over it lets pass straight.
+    /// Share of light that a smooth wall, with what lies over it, lets pass straight.
     pub(super) fn straight_through(&self, wo: DVec3, peaks: &Peaks) -> Option<Weights> {
         let coat = self.coat.seen(wo).map_or(1.0, |coat| coat.passes(wo));
         let sheen = self.sheen.seen(wo).map_or(1.0, |sheen| sheen.passes(wo));

@@ -33,7 +33,7 @@ const FACETS: u32 = 256;
 /// The least α that loses anything.
 const SMOOTHEST: f64 = 0.01;
 
-/// How exact interpolated entries are: less is not taken for lacking.
+/// Accuracy of interpolated entries: less is not taken for lacking.
 const EXACT: f64 = 0.01;
 
 /// The fractional part of the golden ratio.
@@ -46,7 +46,7 @@ struct Slab {
     entries: Vec<f64>,
     /// Their means over directions, by roughness.
     means: Vec<f64>,
-    /// What a smooth boundary passes in the mean, 1 − F̄.
+    /// Mean share of light that a smooth boundary passes, 1 − F̄.
     passes: f64,
 }
 
@@ -85,7 +85,7 @@ fn mean(f: impl Fn(f64) -> f64) -> f64 {
     (0..STEPS).map(|step| 4.0 * at(step).powi(3) * f(at(step))).sum::<f64>() / f64::from(STEPS)
 }
 
-/// What visible facets return to both sides of light from the cosine `mu`.
+/// Share of light from the cosine `mu` that visible facets return to both sides.
 fn entry(mu: f64, alpha: f64, eta: f64) -> f64 {
     let mu = mu.max(1e-6);
     let wo = DVec3::new((1.0 - mu * mu).sqrt(), 0.0, mu);
@@ -160,7 +160,7 @@ fn passes(eta: f64) -> f64 {
     Slab::of(index).passes * (1.0 - share) + Slab::of(index + 1).passes * share
 }
 
-/// What a rough boundary lacks, seen from one direction.
+/// Light that a rough boundary lacks, seen from one direction.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lacking {
     own: BoundarySide,

@@ -64,7 +64,7 @@ impl Weights {
         Self { base, ..Self::default() }
     }
 
-    /// Whether nothing is left.
+    /// Tests whether nothing is left.
     #[must_use]
     pub fn is_zero(&self) -> bool {
         *self == Self::default()
@@ -133,11 +133,11 @@ pub struct Bsdf {
     pub highlight: Tint,
     /// The colour of light that met several facets, where the surface's has no curve.
     pub(crate) deep: Color,
-    /// What of the model follows from the viewer's direction alone.
+    /// Part of the model that follows from the viewer's direction alone.
     seen: ModelView,
 }
 
-/// What of a model follows from the viewer's direction alone.
+/// Part of a model that follows from the viewer's direction alone.
 #[derive(Debug, Clone, Copy)]
 enum ModelView {
     Plain,
@@ -149,13 +149,13 @@ enum ModelView {
 /// A direction that light comes from, chosen in proportion to what it contributes.
 #[derive(Debug, Clone, Copy)]
 pub struct BsdfSample {
-    /// Where from (unit, world).
+    /// Direction that light comes from (unit, world).
     pub direction: DVec3,
     /// Value times cosine over density.
     pub weights: Weights,
     /// Density per solid angle (1/sr); `+inf` of a specular event.
     pub pdf: f64,
-    /// Whether the event is specular: only this model can give the direction.
+    /// True if the event is specular: only this model can give the direction.
     pub is_specular: bool,
 }
 
@@ -236,7 +236,7 @@ impl Bsdf {
         }
     }
 
-    /// Whether light of one direction only can be scattered to `wo` (no light can be aimed at).
+    /// Tests whether light of one direction only can be scattered to `wo` (no light can be aimed at).
     #[must_use]
     pub fn is_delta(&self) -> bool {
         match self.model {
@@ -257,7 +257,7 @@ impl Bsdf {
         if is_one_sided { self.frame.z } else { DVec3::ZERO }
     }
 
-    /// Whether [`Self::sample`] may give a direction that only this model can give.
+    /// Tests whether [`Self::sample`] may give a direction that only this model can give.
     #[must_use]
     pub fn has_single(&self) -> bool {
         self.is_delta() || matches!(self.model, Model::Layered(_))
@@ -343,8 +343,7 @@ impl Bsdf {
         self.given(local, value.times(1.0 / pdf), pdf)
     }
 
-    /// What passes a smooth pane without thickness straight on, over what arrives; `None` for all other
-    /// surfaces.
+    /// Light that passes a smooth pane without thickness straight on, over what arrives; `None` for all other surfaces.
     #[must_use]
     pub fn straight_through(&self) -> Option<Weights> {
         let Model::Layered(layered) = &self.model else { return None };
@@ -356,7 +355,7 @@ impl Bsdf {
         if choice < self.reflectance(eta) { self.mirrored() } else { self.refracted(eta) }
     }
 
-    /// What a smooth boundary of relative index `eta` reflects of light to `wo`.
+    /// Share of light that a smooth boundary of relative index `eta` reflects to `wo`.
     pub(crate) fn reflectance(&self, eta: f64) -> f64 {
         fresnel::dielectric(self.wo.z, eta).0
     }

@@ -52,7 +52,7 @@ pub(super) struct SheenView {
     /// Λ and the albedo for the direction of the viewer.
     lambda: f64,
     albedo: f64,
-    /// How often it is sampled.
+    /// Probability with which it is sampled.
     pub(super) chance: f64,
 }
 
@@ -72,7 +72,7 @@ impl Sheen {
 }
 
 impl SheenView {
-    /// What it leaves of light from `wi` on its way to the viewer by what lies beneath.
+    /// Share of light from `wi` that it leaves on the way to the viewer by what lies beneath.
     pub(super) fn passes(&self, wi: DVec3) -> f64 {
         1.0 - self.peak * self.albedo.max(self.table.at(wi.z.abs())).min(1.0)
     }

@@ -5,8 +5,8 @@ use etendue_geometry::glam::DVec3;
 use super::fresnel;
 use super::ggx::{self, Facets};
 
-/// Where the table has the cosine `mu`, from 0 to 1. A sheet's albedo changes with μ/α at the horizon,
-/// by the masking of its facets, and with μ elsewhere, by Fresnel: half of the knots are for each.
+/// Place of the cosine `mu` in the table, from 0 to 1. A sheet's albedo changes with μ/α at the horizon, by the masking
+/// of its facets, and with μ elsewhere, by Fresnel: half of the knots are for each.
 #[inline(always)]
 pub(super) fn obliquity(mu: f64, alpha: f64) -> f64 {
     let masking = mu / (mu + alpha).max(f64::MIN_POSITIVE) * (1.0 + alpha);
@@ -23,10 +23,10 @@ pub(super) fn cosine(place: f64, alpha: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// How exact the table is: less is not taken for lacking.
+/// Accuracy of the table: less is not taken for lacking.
 pub(super) const EXACT: f64 = 1e-3;
 
-/// What facets of reflectance 1 lack that return so much.
+/// Share of light that facets of reflectance 1 lack when they return so much.
 #[inline(always)]
 pub(super) fn lacking(returned: f64) -> f64 {
     (1.0 - EXACT - returned).max(0.0)

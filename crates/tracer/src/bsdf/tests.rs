@@ -119,7 +119,7 @@ fn measured_metals_follow_fresnel() {
     }
 }
 
-/// Whether its lobe is finer than cells of a hemisphere.
+/// Tests whether its lobe is finer than cells of a hemisphere.
 fn is_narrow(model: Model) -> bool {
     matches!(model, Model::Metal { alpha, .. } if alpha < 0.01)
         || matches!(model, Model::Layered(l) if l.alpha.min(l.along) < 0.01)

@@ -52,7 +52,7 @@ macro_rules! layers {
                 })
             }
 
-            /// What is known of the layer without rendering it.
+            /// Row of the layer: what is known of it without rendering it.
             #[must_use]
             pub fn row(self) -> Layer {
                 match self {

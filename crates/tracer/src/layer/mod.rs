@@ -49,15 +49,15 @@ pub struct Layer {
     /// The channels in files, in order. [`LayerSpec::Radiance`] has one a band instead, where the
     /// bands are others than red, green and blue.
     pub channels: &'static [&'static str],
-    /// What the numbers are kept as.
+    /// Format in which the numbers are kept.
     pub kept: ValueKind,
-    /// Which rays of a pixel they are taken from.
+    /// Rays of a pixel that they are taken from.
     pub taken: RaySource,
-    /// How a preview shows them.
+    /// Way in which a preview shows them.
     pub look: Look,
-    /// What filling it needs of the meshes and of hits.
+    /// Data of the meshes and of hits that filling it needs.
     pub needs: Needs,
-    /// What the numbers mean, by key: `definition`, `unit`, `frame`, `miss` and their like.
+    /// Meaning of the numbers, by key: `definition`, `unit`, `frame`, `miss` and their like.
     pub meaning: Vec<(&'static str, &'static str)>,
     /// The definition of each channel, where each is a layer of its own in files, `Id.object.X`:
     /// the form that Blender reads.
@@ -75,7 +75,7 @@ impl Layer {
     }
 }
 
-/// What the numbers of a layer are, and so how a preview shows them.
+/// Kind of the numbers of a layer, and so the way in which a preview shows them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Look {
     /// Linear light, one channel (grey) or three (red, green, blue), 1 being full scale. Shown
@@ -105,7 +105,7 @@ pub enum Look {
     },
 }
 
-/// What numbers are kept as.
+/// Format in which numbers are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ValueKind {
     /// As 64-bit floats where a file is wanted that holds them, else 32-bit: measurements.
@@ -116,7 +116,7 @@ pub enum ValueKind {
     Counted,
 }
 
-/// Which rays of a pixel a layer is taken from.
+/// Rays of a pixel that a layer is taken from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RaySource {
     /// The chief ray of its centre.
@@ -132,12 +132,12 @@ pub enum RaySource {
     /// The sum of the first number over the samples of the picture, as a share of the sum of the
     /// second.
     PictureShare,
-    /// What sampling the picture found out about itself.
+    /// Statistics of the picture's own sampling.
     Sampling,
 }
 
 impl RaySource {
-    /// Whether the layer is taken where the picture's own samples are.
+    /// Tests whether the layer is taken where the picture's own samples are.
     #[must_use]
     pub fn with_picture(self) -> bool {
         match self {
@@ -147,7 +147,7 @@ impl RaySource {
     }
 }
 
-/// What layers are filled from: the rays of a batch, what they hit, and the scene.
+/// Data that layers are filled from: the rays of a batch, what they hit, and the scene.
 #[derive(Debug, Clone, Copy)]
 pub struct LayerContext<'a> {
     /// The scene.
@@ -176,8 +176,8 @@ pub struct PupilPart {
 }
 
 impl PupilPart {
-    /// Whether a place of the entrance pupil, to the right of its middle and above it, is in this part. The middle is
-    /// right and above.
+    /// Tests whether a place of the entrance pupil, to the right of its middle and above it, is in this part. The
+    /// middle is right and above.
     #[must_use]
     pub fn contains(self, [right, up]: [f64; 2]) -> bool {
         self.left == (right < 0.0) && self.top.is_none_or(|top| top == (up >= 0.0))
@@ -199,14 +199,14 @@ impl LayerSpec {
         layers.filter(begins).max_by_key(|spec| spec.row().name.len())
     }
 
-    /// Whether the layer is a mean over the samples of a pixel; the others are taken along the chief
-    /// ray of its centre.
+    /// Tests whether the layer is a mean over the samples of a pixel; the others are taken along
+    /// the chief ray of its centre.
     #[must_use]
     pub fn is_averaged(self) -> bool {
         !matches!(self.row().taken, RaySource::ChiefRay | RaySource::Sampling)
     }
 
-    /// Whether the layer is light, or a part of it, which a tracer of light fills.
+    /// Tests whether the layer is light, or a part of it, which a tracer of light fills.
     #[must_use]
     pub fn is_light(self) -> bool {
         self.row().taken == RaySource::Light
@@ -227,7 +227,7 @@ impl LayerSpec {
         })
     }
 
-    /// Whether the layer tells of the samples of the picture.
+    /// Tests whether the layer tells of the samples of the picture.
     #[must_use]
     pub fn is_of_sampling(self) -> bool {
         self.row().taken == RaySource::Sampling
@@ -243,7 +243,7 @@ impl LayerSpec {
         }
     }
 
-    /// What this layer needs.
+    /// Data of the meshes and of hits that this layer needs.
     #[must_use]
     pub fn needs(self) -> Needs {
         self.row().needs

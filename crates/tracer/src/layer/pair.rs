@@ -19,7 +19,7 @@ pub struct FrameStep {
     along: Along,
 }
 
-/// What the frames of a step are counted along.
+/// Axis along which the frames of a step are counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Along {
     /// Time: the same camera of a rig, where there is one.
@@ -62,7 +62,7 @@ impl FrameStep {
         self.count
     }
 
-    /// What they are counted along.
+    /// Axis along which they are counted.
     #[must_use]
     pub fn along(self) -> Along {
         self.along
@@ -92,7 +92,7 @@ impl FrameStep {
         number.checked_add_signed(isize::try_from(self.count).ok()?)
     }
 
-    /// Which frame it is, as headers say it.
+    /// Entry of headers that says which frame it is.
     pub(super) fn meaning(self) -> (&'static str, &'static str) {
         let which = match (self.along, self.count) {
             (Along::Exposure, ..0) => "this one, when the shutter of the row opens",
@@ -172,15 +172,15 @@ pub trait OtherFrame: Debug + Sync {
     /// The way to it.
     fn step(&self) -> FrameStep;
 
-    /// Where the other camera sees each point that was hit (pixels from the corner of the top left one),
-    /// objects having moved: `places` is refilled, with `None` for misses and what has no place there.
+    /// Finds where the other camera sees each point that was hit (pixels from the corner of the top left one), objects
+    /// having moved: `places` is refilled, with `None` for misses and what has no place there.
     fn follow(&self, seen: &LayerContext<'_>, places: &mut Vec<Option<[f64; 2]>>);
 
-    /// How each of these points is seen there: `sights` is refilled.
+    /// Finds how each of these points is seen there: `sights` is refilled.
     fn look_for(&self, seen: &LayerContext<'_>, sights: &mut Vec<Sight>);
 }
 
-/// How another frame sees a point of this one.
+/// Visibility of a point of this frame in another one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sight {
     /// There is no point.
@@ -198,7 +198,7 @@ impl LayerContext<'_> {
         self.others.iter().copied().find(|other| other.step() == to)
     }
 
-    /// Where points of this frame are in the other, less where they are here (pixels); `+inf` for none.
+    /// Places of points of this frame in the other, less their places here (pixels); `+inf` for none.
     pub(super) fn flows(&self, to: FrameStep, out: &mut Columns) {
         let mut places = Vec::new();
         if let Some(other) = self.other(to) {
@@ -211,7 +211,7 @@ impl LayerContext<'_> {
         });
     }
 
-    /// How far points move to the left on their way to the other frame (pixels); `+inf` for none.
+    /// Distances that points move to the left on their way to the other frame (pixels); `+inf` for none.
     pub(super) fn disparities(&self, to: FrameStep, out: &mut Columns) {
         self.flows(to, out);
         out[0].iter_mut().filter(|flow| flow.is_finite()).for_each(|flow| *flow = -*flow);

@@ -62,13 +62,13 @@ pub(super) const SURFACE: Needs = Needs {
 };
 pub(super) const BASE_COLOUR: Needs = Needs { materials: true, uvs: true, ..SURFACE };
 
-/// Where data layers look.
+/// Ray that data layers are taken along.
 pub(super) const CHIEF_RAY: (&str, &str) = ("taken along", "the chief ray of the pixel's centre");
 
 /// The unit of colours.
 pub(super) const LINEAR: (&str, &str) = ("unit", "1 (linear light, sRGB primaries)");
 
-/// What vectors of a frame refer to.
+/// Definition of a frame that vectors refer to.
 pub(super) fn frame(space: Space) -> (&'static str, &'static str) {
     match space {
         Space::World => ("frame", "world: right-handed, +Y up"),
@@ -102,7 +102,7 @@ pub(super) fn name_of_normals(space: Space, kind: NormalKind) -> Cow<'static, st
     }
 }
 
-/// What each kind of normal is.
+/// Definition of each kind of normal.
 pub(super) fn definition_of_normals(kind: NormalKind) -> (&'static str, &'static str) {
     match kind {
         NormalKind::Geometric => {

@@ -13,7 +13,7 @@ pub(crate) struct Cluster {
     pub(crate) axis: DVec3,
     /// Half-angle of the cone within which their own axes lie (radians).
     pub(crate) cone: f64,
-    /// How far beyond it they shine (radians).
+    /// Angle beyond the cone up to which they shine (radians).
     pub(crate) reach: f64,
     /// The sum of their intensities (W/sr) along their axes.
     pub(crate) intensity: f64,
@@ -24,7 +24,7 @@ impl Cluster {
     pub(super) const DARK: Self =
         Self { bounds: Bounds::EMPTY, axis: DVec3::ZERO, cone: 0.0, reach: 0.0, intensity: 0.0 };
 
-    /// Whether it is a point that shines to all sides.
+    /// Tests whether it is a point that shines to all sides.
     pub(super) fn is_point(&self) -> bool {
         self.cone >= PI && self.bounds.diagonal() == 0.0
     }
@@ -44,7 +44,7 @@ impl Cluster {
         }
     }
 
-    /// What it costs to have these lights in one node, to a factor: equation 2 of the source.
+    /// Cost of having these lights in one node, to a factor: equation 2 of the source.
     pub(super) fn cost(&self) -> f64 {
         let extent = self.bounds.max - self.bounds.min;
         let area = extent.x * extent.y + extent.y * extent.z + extent.z * extent.x;

@@ -27,7 +27,7 @@ pub(crate) struct Choices {
     pub(super) u: Vec<f64>,
     pub(super) light: Vec<u32>,
     pub(super) chance: Vec<f64>,
-    /// What all lights of a tree may send to each (W/m²).
+    /// Irradiance that each may get from all lights of a tree (W/m²).
     pub(super) importance: Vec<f64>,
     pub(super) descent: Descent,
 }
@@ -37,7 +37,7 @@ pub(crate) struct Choices {
 pub(crate) struct Choice {
     /// Its number.
     pub(crate) light: u32,
-    /// What is left of the number in 0..1 that chose it.
+    /// Rest of the number in 0..1 that chose it.
     pub(crate) u: f64,
     /// With which it was chosen; 0 where none shines.
     pub(crate) chance: f64,
@@ -109,7 +109,8 @@ impl Choices {
         DVec3::new(x[number].into(), y[number].into(), z[number].into())
     }
 
-    /// What all lights of a tree may send to a point (W/m²), once that is known ([`LightTree::sum_importance`]).
+    /// Irradiance that a point may get from all lights of a tree (W/m²), once that is known
+    /// ([`LightTree::sum_importance`]).
     #[inline(always)]
     pub(crate) fn importance(&self, number: usize) -> f64 {
         self.importance[number]
@@ -161,7 +162,7 @@ pub(super) struct Descent {
 /// A choice that goes down by itself.
 #[derive(Debug, Default)]
 pub(super) struct Walker {
-    /// Which of the choices it is.
+    /// Its index among the choices.
     pub(super) number: usize,
     viewer: Viewer,
     /// The node that it is at; [`END`] once it has a branch of which a light is chosen by intensity, or none.
@@ -321,7 +322,7 @@ impl Choices {
 struct Taken {
     /// The branch; and [`WIDTH`] more where a light of it is chosen by intensity.
     codes: [u32; LANES],
-    /// What is left of the numbers that chose them.
+    /// Rests of the numbers that chose them.
     rest: [f64; LANES],
     /// 0 where none sends anything.
     share: [f64; LANES],

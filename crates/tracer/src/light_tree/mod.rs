@@ -82,7 +82,8 @@ fn descend_to(nodes: &[Node], mut at: usize, viewer: &Viewer, place: u32) -> Opt
     }
 }
 
-/// What all lights of a tree may send to each point that chooses one and faces them all (W/m²).
+/// Sums, for each point that chooses one of a tree's lights, the irradiance that it may get from all of them if it
+/// faces them all (W/m²).
 #[multiversion::multiversion(targets = "simd")]
 fn sum_importance(tree: &LightTree, choices: &mut Choices) {
     choices.importance.clear();
@@ -105,7 +106,7 @@ pub(crate) struct LightTree {
     places: Vec<u32>,
 }
 
-/// What lights have become in the tree.
+/// Branch that lights have become in the tree, and their cluster.
 struct Grown {
     cluster: Cluster,
     /// They are all points.
@@ -164,7 +165,7 @@ impl LightTree {
         Grown { cluster: all, is_points, branch }
     }
 
-    /// Where a point begins to ask: what parts all lights, unless it need not ([`ALL`]).
+    /// Node at which a point begins to ask: the one that parts all lights, unless it need not ([`ALL`]).
     fn start(&self, viewer: &Viewer) -> usize {
         let goes_on = |whole: &Node| !whole.is_end(0, whole.squared(0, viewer));
         usize::from(self.nodes.first().is_some_and(goes_on))
@@ -231,14 +232,14 @@ impl LightTree {
         (self.below[k + 1] - self.below[k]) / (self.below[end] - self.below[begin])
     }
 
-    /// What all lights may send to a point that faces them, in units of the tree.
+    /// Irradiance that a point that faces all lights may get from them, in units of the tree.
     fn sent(&self, viewer: &Viewer) -> f64 {
         let Some(whole) = self.nodes.first() else { return 0.0 };
         let ([sent], _) = whole.clusters.spread::<1>(0).sent(&viewer.point.map(|x| [x]), None);
         f64::from(sent)
     }
 
-    /// What its lights may send to a point (m) that faces them all (W/m²).
+    /// Irradiance that a point (m) that faces all of its lights may get from them (W/m²).
     pub(crate) fn importance(&self, from: DVec3) -> f64 {
         let [importance] = self.importances(&self.extent.local(from).to_array().map(|x| [x]));
         importance
@@ -259,7 +260,7 @@ impl LightTree {
         sent.map(|sent| (f64::from(sent) * intensity * scale * scale).min(most))
     }
 
-    /// Whether a light is in it.
+    /// Tests whether a light is in it.
     pub(crate) fn holds(&self, number: usize) -> bool {
         self.places.get(number).is_some_and(|&place| place != MISS)
     }

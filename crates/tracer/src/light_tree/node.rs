@@ -31,7 +31,7 @@ const FARTHEST: f64 = 1e6;
 /// of the branch's centre. What can bring light keeps this share of each of its two bounds.
 const SHARE_OF_MOST: f32 = 0.125;
 
-/// What rounding may take from a cosine in single precision, with room.
+/// Bound, with room, on what rounding may take from a cosine in single precision.
 const ROOM: f32 = 1e-5;
 
 /// Clusters of lights, as they are asked side by side; what is not there has no intensity.
@@ -45,7 +45,7 @@ pub(super) struct Clusters<const N: usize> {
     cone: [[f32; N]; 2],
     pub(super) cos_reach: [f32; N],
     pub(super) intensity: [f32; N],
-    /// What it may send to points between its lights.
+    /// Light that it may send to points between its lights.
     within: [f32; N],
     /// All shine to all sides.
     is_isotropic: bool,
@@ -67,7 +67,7 @@ pub(super) struct Branch {
     pub(super) node: u32,
     /// They shine the same way.
     pub(super) alike: bool,
-    /// Which of the lights in the tree's order they are: the first, and the first behind them.
+    /// Range of its lights in the tree's order: the first, and the first behind them.
     pub(super) lights: [u32; 2],
 }
 
@@ -200,13 +200,13 @@ impl Node {
         way(0) * way(0) + way(1) * way(1) + way(2) * way(2)
     }
 
-    /// Whether one of the lights of a branch at this squared distance is chosen by intensity.
+    /// Tests whether one of the lights of a branch at this squared distance is chosen by intensity.
     #[inline(always)]
     pub(super) fn is_end(&self, lane: usize, squared: f32) -> bool {
         squared > self.limits[lane]
     }
 
-    /// What the viewer has of each branch: what the branch may send, to a factor, and the squared distance.
+    /// View that the viewer has of each branch: what the branch may send, to a factor, and the squared distance.
     #[inline(always)]
     pub(super) fn view(&self, viewer: &Viewer) -> View {
         let [view, _] = Self::views([self; 2], [viewer; 2]);
@@ -276,8 +276,8 @@ impl Clusters<TWICE> {
 }
 
 impl<const N: usize> Clusters<N> {
-    /// What each may send to a point, to a factor, and the squared distance; the normals of the points are asked where
-    /// they get light from one side alone, and are zero where they do not.
+    /// Light that each may send to a point, to a factor, and the squared distance; the normals of the points are asked
+    /// where they get light from one side alone, and are zero where they do not.
     ///
     /// All is worked out for all of them, and from local arrays: else compilers do it one by one.
     #[inline(always)]
@@ -351,8 +351,8 @@ impl<const N: usize> Clusters<N> {
     }
 }
 
-/// What is taken for a cosine of which the most is known and what it is at the centre: nearer to the mean over the
-/// lights than either.
+/// Cosine that is assumed where its maximum and its value at the centre are known: nearer to the mean over the lights
+/// than either.
 #[inline(always)]
 fn typical_cosine(most: f32, at_centre: f32) -> f32 {
     let centre = if at_centre > 0.0 { at_centre } else { 0.0 };
@@ -382,10 +382,10 @@ fn less([cos_a, sin_a]: [f32; 2], [cos_b, sin_b]: [f32; 2]) -> [f32; 2] {
     [if is_more { cos } else { 1.0 }, if is_more { sin } else { 0.0 }]
 }
 
-/// What a point has of each branch of a node.
+/// View that a point has of each branch of a node.
 #[derive(Debug, Default)]
 pub(super) struct View {
-    /// What the branch may send, to a factor.
+    /// Light that the branch may send, to a factor.
     pub(super) importance: [f64; WIDTH],
     /// The squared distance to its centre.
     pub(super) squared: [f32; WIDTH],

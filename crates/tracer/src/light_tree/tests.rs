@@ -95,7 +95,7 @@ fn picks_have_the_chances_that_are_stated() {
     }
 }
 
-/// What is chosen for a point does not depend, to the bit, on how many others choose with it: whether it goes down in a
+/// The choice for a point does not depend, to the bit, on how many others choose with it: whether it goes down in a
 /// lane or by itself.
 #[test]
 fn choices_are_the_same_alone_and_among_others() {

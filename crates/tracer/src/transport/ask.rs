@@ -162,7 +162,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         }
     }
 
-    /// What a sheet of facets has of light in band `k`.
+    /// Value of the weights of a sheet of facets in band `k`.
     #[inline(always)]
     pub(super) fn in_band_of_sheet(
         &self,

@@ -31,7 +31,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         Some(crossing)
     }
 
-    /// What there is of a boundary whose media on both sides are the same; `None` of one that is there.
+    /// Effect that is left of a boundary whose media on both sides are the same; `None` of one that is there.
     pub(super) fn vanishes(
         &self,
         placement: u32,

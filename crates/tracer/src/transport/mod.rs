@@ -53,21 +53,21 @@ use crate::{Color, ConductorId, Glass, Ior, Material, Scattering, Tint};
 /// The scene as light sees it.
 #[derive(Debug, Clone, Copy)]
 pub struct LightingContext<'a> {
-    /// What finds the hits.
+    /// Acceleration structure that finds the hits.
     pub accel: &'a dyn Accel,
     /// Meshes, materials and images.
     pub scene: SceneView<'a>,
-    /// Where light comes from.
+    /// Sources of the light.
     pub lights: &'a Lights,
     /// The bands.
     pub spectral: &'a Spectral,
-    /// What its surfaces make tracers do.
+    /// Features that its surfaces ask of tracers.
     pub traits: Traits,
     /// The surfaces that shine, where they are few.
     pub emitters: Option<&'a Emitters>,
-    /// What is known of each placement beforehand.
+    /// Surface of each placement, as far as it is known beforehand.
     pub placed: &'a PlacedSurfaces,
-    /// How precisely its paths hit.
+    /// Precision of its paths' hits.
     pub precision: HitPrecision,
 }
 
@@ -83,13 +83,13 @@ impl LightingContext<'_> {
         Anchor::new(point, normal, origin, placed.magnitudes, self.roundings())
     }
 
-    /// How often numbers of a hit are rounded, times the spacing of its precision.
+    /// Number of roundings of the numbers of a hit, times the spacing of its precision.
     pub(crate) fn roundings(&self) -> f64 {
         spawn::roundings(self.precision)
     }
 }
 
-/// What no surface of a scene asks for is not done.
+/// Features that the surfaces of a scene ask for: what none asks for is not done.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Traits {
     /// Some surface is not wholly there ([`Material::has_alpha`]).
@@ -109,7 +109,7 @@ pub struct Traits {
 }
 
 impl Traits {
-    /// Whether paths may pass surfaces as if they were not there.
+    /// Tests whether paths may pass surfaces as if they were not there.
     pub(crate) fn may_pass(&self) -> bool {
         self.has_alpha || self.has_nested
     }
@@ -151,11 +151,11 @@ pub struct RaySamples<'a> {
     pub samples: &'a dyn Samples,
     /// The bands that these rays stand for: all, unless the camera sends wavelengths separate ways.
     pub bands: Range<usize>,
-    /// What of their light is told apart.
+    /// Parts of their light that are told apart.
     pub parts: Parts,
 }
 
-/// What of the light that rays carry is told apart.
+/// Parts of the light of rays that are told apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Parts {
     /// Nothing: there is one number a band, the whole.
@@ -176,7 +176,7 @@ impl Parts {
         }
     }
 
-    /// Where light of a ray is summed up that so many surfaces scattered, from a group's lights.
+    /// Row that sums up the light of a ray that so many surfaces scattered, from a group's lights.
     fn row(self, ray: u32, scatterings: u32, group: impl FnOnce() -> u32) -> u32 {
         match self {
             Self::Whole => ray,
@@ -211,7 +211,7 @@ fn below_one(x: f64) -> f32 {
     (x as f32).min(1.0 - f32::EPSILON / 2.0)
 }
 
-/// What became of a batch.
+/// Statistics of a batch.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct RayStats {
     /// Rays traced for their closest hit.
@@ -288,13 +288,13 @@ struct Tracing<'a, const RGB: bool> {
     rules: Rules,
     ctx: &'a LightingContext<'a>,
     parts: Parts,
-    /// When the camera's rays are (s from the frame's time); empty when all are at 0.
+    /// Times of the camera's rays (s from the frame's time); empty when all are at 0.
     times: &'a [f64],
     tally: RayStats,
 }
 
 impl<const RGB: bool> Tracing<'_, RGB> {
-    /// How many bands there are.
+    /// Number of bands.
     #[inline(always)]
     fn count(&self) -> usize {
         if RGB { 3 } else { self.ctx.spectral.count() }
@@ -349,7 +349,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         }
     }
 
-    /// What a surface has of light in band `k`.
+    /// Value of the weights of a surface in band `k`.
     #[inline]
     fn in_band(&self, bsdf: &Bsdf, value: Weights, k: usize) -> f64 {
         if let Some(named) = bsdf.named() {

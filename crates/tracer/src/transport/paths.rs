@@ -15,7 +15,7 @@ use crate::placed::SurfaceKind;
 use crate::sampling::power_heuristic;
 use crate::sky::SkySamples;
 
-/// What a path uses random numbers for at each step.
+/// Use that a path makes of random numbers at each step.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Draw {
     /// Choosing among the ways in which a surface scatters.
@@ -24,11 +24,11 @@ pub(super) enum Draw {
     Light,
     /// The direction to follow.
     Direction,
-    /// Whether a surface is there, and whether a path goes on.
+    /// Deciding whether a surface is there, and whether a path goes on.
     Chance,
 }
 
-/// How many uses there are.
+/// Number of uses.
 pub(super) const DRAWS: u32 = 4;
 
 impl Draw {
@@ -43,14 +43,14 @@ pub(super) struct Paths<R> {
     pub(super) carried: Carried,
 }
 
-/// What each path, or each ray to a light, brings.
+/// Data that each path, or each ray to a light, carries.
 #[derive(Debug, Default)]
 pub(super) struct Carried {
     /// The camera's ray; or the [row](super::Parts::row) that its light is added to.
     pub(super) ray: Vec<u32>,
     /// Of paths alone.
     pub(super) ways: Vec<Way>,
-    /// What each path stands for, as long as it only met mirrors and clear boundaries; as wide as where its ray
+    /// Cone that each path stands for, as long as it only met mirrors and clear boundaries; as wide as where its ray
     /// starts. Empty before the first surface, and where all surfaces are matte.
     pub(super) cones: Vec<Option<Cone>>,
     /// The surfaces that were not there; empty where all are.
@@ -67,7 +67,7 @@ pub(super) struct Carried {
     pub(super) throughput: Vec<f64>,
 }
 
-/// How a path came to its direction.
+/// Way in which a path came to its direction.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Way {
     /// Density (1/sr) of the direction; unused where it is specular.
@@ -140,7 +140,7 @@ impl<R: Rays> Paths<R> {
         steps - self.carried.passages.get(i).map_or(0, |passage| passage.surfaces)
     }
 
-    /// Where the direction of a path begins (m).
+    /// Point where the direction of a path begins (m).
     #[inline(always)]
     pub(super) fn from(&self, i: usize) -> DVec3 {
         let from = self.carried.passages.get(i).and_then(|passage| passage.from);
@@ -152,7 +152,7 @@ impl<R: Rays> Paths<R> {
 pub(super) const KINDS: [SurfaceKind; 4] =
     [SurfaceKind::Matte, SurfaceKind::Sheet, SurfaceKind::Smooth, SurfaceKind::Other];
 
-/// Where paths go on.
+/// Directions in which paths go on.
 #[derive(Debug, Default)]
 pub(super) struct Onward<R> {
     pub(super) next: Paths<R>,
@@ -202,7 +202,7 @@ impl<R> Workspace<R> {
     }
 }
 
-/// What all paths of a batch have in common at one step.
+/// Data that all paths of a batch have in common at one step.
 pub(super) struct Step<'a> {
     pub(super) camera: &'a RaySamples<'a>,
     /// Surfaces that the paths have met.

@@ -14,7 +14,7 @@ use super::patch::{BESIDE, Patch, put};
 use super::{LightingContext, kernels};
 use crate::LANES;
 
-/// What a ray hit.
+/// Hit of a ray.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RayHit {
     /// Placement and triangle.
@@ -25,7 +25,7 @@ pub(super) struct RayHit {
     pub(super) t: f64,
     /// Of the triangle (unit), on its front.
     pub(super) normal: DVec3,
-    /// When (s from the frame's time).
+    /// Time (s from the frame's time).
     pub(super) time: f64,
 }
 
@@ -50,22 +50,22 @@ pub(super) trait Rays: Debug + Default {
     /// Finds whether anything is between the ends of each.
     fn occlude(&mut self, ctx: &LightingContext<'_>, coherent: bool);
 
-    /// Whether there is anything between the ends of a ray, of which that was asked.
+    /// Returns true if there is anything between the ends of a ray, of which that was asked.
     fn is_blocked(&self, i: usize) -> bool;
 
-    /// How many there are.
+    /// Number of rays.
     fn len(&self) -> usize;
 
-    /// Where a ray starts (m), which may be nearer to the scene than its camera.
+    /// Start of a ray (m), which may be nearer to the scene than its camera.
     fn origin(&self, i: usize) -> DVec3;
 
     /// Its unit direction.
     fn direction(&self, i: usize) -> DVec3;
 
-    /// How far a ray goes that hit nothing (m).
+    /// Length of a ray that hit nothing (m).
     fn reach(&self, i: usize) -> f64;
 
-    /// How far from its start a ray hit (m).
+    /// Distance from its start at which a ray hit (m).
     fn t(&self, i: usize) -> f64;
 
     /// The placement that it hit, or [`MISS`](etendue_geometry::MISS).
@@ -77,7 +77,7 @@ pub(super) trait Rays: Debug + Default {
     /// The placement's triangle that it hit.
     fn triangle(&self, i: usize) -> PlacedTriangle;
 
-    /// What it hit.
+    /// Hit of ray `i`.
     fn hit(&self, i: usize) -> RayHit;
 
     /// Sets a patch to the hits of a run of rays.
@@ -96,9 +96,9 @@ pub(super) trait Rays: Debug + Default {
 #[derive(Debug, Default)]
 pub(super) struct Blocks {
     rays: RayBlocks,
-    /// What coordinates are relative to (m).
+    /// Origin that coordinates are relative to (m).
     origin: DVec3,
-    /// When each ray is (s from the frame's time), where that counts.
+    /// Time of each ray (s from the frame's time), where that counts.
     times: Vec<f64>,
     has_times: bool,
 }

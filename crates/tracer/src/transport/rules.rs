@@ -7,13 +7,13 @@ use super::{LightingContext, RaySamples, RayStats, Scratch, trace};
 pub struct Rules {
     /// The most surfaces that scatter light on a path.
     pub bounces: u32,
-    /// Which directions are followed beyond the first light that they meet.
+    /// Directions that are followed beyond the first light that they meet.
     pub follow: Follow,
     /// Surfaces after which paths go on with a chance of the root of what they carry of their brightest band.
     pub roulette: Option<u32>,
 }
 
-/// Which scattered directions a tracer follows.
+/// Scattered directions that a tracer follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Follow {
     /// Those of mirrors and clear glass alone.

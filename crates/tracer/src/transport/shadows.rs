@@ -16,13 +16,13 @@ use crate::surface::SurfaceInteraction;
 const MOST_LAYERS: u32 = 256;
 
 impl<const RGB: bool> Tracing<'_, RGB> {
-    /// Whether paths that only look for light ask what shines before they ask the scene. Through
-    /// surfaces that are partly there they have to be followed.
+    /// Tests whether paths that only look for light ask what shines before they ask the scene.
+    /// Through surfaces that are partly there they have to be followed.
     pub(super) fn asks_emitters(&self) -> bool {
         self.ctx.emitters.is_some() && !self.ctx.traits.may_pass()
     }
 
-    /// Whether there may be light along a ray that asks what shines.
+    /// Tests whether there may be light along a ray that asks what shines.
     pub(super) fn may_shine(&self, [origin, direction]: [DVec3; 2]) -> bool {
         let met = |emitters: &Emitters| emitters.may_meet(origin, direction);
         self.ctx.lights.has_environment() || self.ctx.emitters.is_some_and(met)

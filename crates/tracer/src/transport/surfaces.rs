@@ -14,7 +14,7 @@ use crate::surface::SurfaceInteraction;
 use crate::{Conductor, LANES, Scattering, Tint};
 
 impl<const RGB: bool> Tracing<'_, RGB> {
-    /// Where a hit is on its mesh, as path `i` sees it.
+    /// Place of a hit on its mesh, as path `i` sees it.
     pub(super) fn point_of<R: Rays>(
         &self,
         step: &Step<'_>,
@@ -30,7 +30,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         Some((hit.id[0], SurfacePoint { weights, time: hit.time, footprint, ..corner }))
     }
 
-    /// What is known of a hit on a matte surface: its colour, and its shading normal where that is not the
+    /// Looks up what is known of a hit on a matte surface: its colour, and its shading normal where that is not the
     /// triangle's.
     #[inline(always)]
     pub(super) fn look_up_matte<R: Rays>(
@@ -70,7 +70,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         });
     }
 
-    /// What is known of a hit on a sheet of facets; whether it is rough.
+    /// Looks up what is known of a hit on a sheet of facets, and returns whether it is rough.
     pub(super) fn look_up_sheet<R: Rays>(
         &self,
         step: &Step<'_>,
@@ -114,7 +114,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         true
     }
 
-    /// What is known of a hit on a smooth surface.
+    /// Looks up what is known of a hit on a smooth surface.
     pub(super) fn look_up_smooth<R: Rays>(
         &self,
         step: &Step<'_>,
@@ -148,8 +148,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         patch.sheet_colors[lane] = SheetColors { named, ..SheetColors::default() };
     }
 
-    /// How a surface of any other kind scatters light; whether there is anything to be worked on of it: a path may
-    /// pass a surface that is not there, and be parted by a glass.
+    /// Looks up how a surface of any other kind scatters light, and returns whether there is anything to be worked on
+    /// of it: a path may pass a surface that is not there, and be parted by a glass.
     pub(super) fn look_up_other<R: Rays>(
         &self,
         step: &Step<'_>,

@@ -28,12 +28,12 @@ pub(super) struct Encounter {
     pub(super) hit: RayHit,
     /// The ray's start (m) and its unit direction.
     pub(super) ray: (DVec3, DVec3),
-    /// Where the path left the last surface that scattered it, as lights were chosen for it.
+    /// Point where the path left the last surface that scattered it, as lights were chosen for it.
     pub(super) receiver: Receiver,
 }
 
 impl Encounter {
-    /// Whether it is the front of the triangle that was met.
+    /// Tests whether it is the front of the triangle that was met.
     pub(super) fn is_front(&self) -> bool {
         self.hit.normal.dot(self.ray.1) <= 0.0
     }
@@ -188,8 +188,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         }
     }
 
-    /// What path `i` stands for where it hit, which is a point where it was scattered by chance: a cone as wide as
-    /// there.
+    /// Cone that path `i` stands for where it hit, as wide as there; a point where it was scattered by chance.
     pub(super) fn cone_at_hit<R: Rays>(
         &self,
         step: &Step<'_>,
@@ -207,7 +206,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         Some(cone.after((hit - origin).dot(direction)))
     }
 
-    /// How much path `i` covers where it hit.
+    /// Footprint of path `i` where it hit.
     pub(super) fn footprint<R: Rays>(
         &self,
         step: &Step<'_>,
@@ -293,7 +292,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         }
     }
 
-    /// Whether the next surface that scatters a path is its last.
+    /// Tests whether the next surface that scatters a path is its last.
     #[inline(always)]
     pub(super) fn is_end(&self, bounces: u32) -> bool {
         bounces + 1 >= self.rules.bounces
