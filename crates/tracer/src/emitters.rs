@@ -61,6 +61,11 @@ impl Emitters {
         Some(Self { accel: Some(accel), numbers, centre, radius })
     }
 
+    /// Tests whether nothing shines.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.accel.is_none()
+    }
+
     /// A sphere around them in single precision, about `origin` (m): its centre and its radius, with room for
     /// rounding.
     #[expect(clippy::cast_possible_truncation, reason = "the radius has room for it")]

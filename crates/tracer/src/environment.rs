@@ -32,6 +32,8 @@ pub struct EnvironmentMap {
     texels: Vec<[f32; 3]>,
     /// The same at the wavelengths of a clear sky; empty where the map has colours alone.
     spectra: Vec<[f32; spectral_sky::COUNT]>,
+    /// The largest colour of a texel.
+    pub(crate) peak: f32,
     /// Texels that were not finite, below zero or above [`BRIGHTEST`], and count as black.
     pub dropped: u64,
 }
@@ -76,7 +78,8 @@ impl EnvironmentMap {
                 dropped += 1;
             }
         }
-        Self { width, height, texels, spectra: Vec::new(), dropped }
+        let peak = texels.iter().flatten().copied().fold(0.0, f32::max);
+        Self { width, height, texels, spectra: Vec::new(), peak, dropped }
     }
 
     /// The same with the spectra of a clear sky, as many as there are texels.

@@ -308,6 +308,14 @@ impl Lights {
         placement.map_or(0, |placement| self.groups.of_material(placement.material))
     }
 
+    /// The group of a light of any kind.
+    pub(crate) fn group_of_any(&self, scene: &SceneView<'_>, index: u32) -> u32 {
+        match (index as usize).checked_sub(self.lights.len()) {
+            None => self.groups.of_light(index as usize),
+            Some(number) => self.group_of_placement(scene, self.triangles[number][0]),
+        }
+    }
+
     /// The group of what was aimed at.
     pub(crate) fn group_of(&self, scene: &SceneView<'_>, [placement, light]: [u32; 2]) -> u32 {
         match placement {

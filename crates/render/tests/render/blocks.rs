@@ -338,6 +338,42 @@ fn plain_facets_skies_and_other_lights_are_the_same_in_single_precision() {
     }
 }
 
+/// So are scenes in which bodies and lights move while the shutter is open, with light told apart by bounces.
+#[test]
+fn plain_scenes_that_move_are_the_same_in_single_precision() {
+    let folder = tempfile::tempdir().unwrap();
+    save_waves(folder.path(), 20);
+    let moving = |by: [f64; 3]| {
+        let [x, y, z] = by;
+        format!(r#""motion": {{"type": "velocity", "velocity": [{x}, {y}, {z}]}}"#)
+    };
+    let point = |motion: &str| {
+        format!(r#"{{"type": "point", "at": [1, 2, 1], "intensity": [1, 2, 3], {motion}}}"#)
+    };
+    let lights = format!("{}, {POINTS}", point(&moving([-4.0, 0.0, 2.0])));
+    let path = r#"{"type": "path", "max_bounces": 4}"#;
+    for (name, materials, lights, lamps) in [
+        ("points", ["red", "green"], &*lights, ""),
+        ("facets", ["gold", "plastic"], &*lights, LAMP),
+        ("mirrors", ["mirror", "printed"], &*lights, LAMP),
+        ("a lamp", ["red", "glass"], "", LAMP),
+    ] {
+        for ball in ["sphere", "box"] {
+            let place = r#""transform": {"translate": [0.6, 0.5, 0.2], "scale": 0.5}"#;
+            let text = room_of(materials, [path, lights, lamps, ball])
+                .replace(place, &format!("{place}, {}", moving([1.5, 0.3, -0.4])))
+                .replace(r#""fov": 40,"#, r#""fov": 40, "shutter": {"exposure": 0.2},"#);
+            let mut scene = load_in(folder.path(), &text);
+            if name == "mirrors" {
+                print(&mut scene);
+            }
+            let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
+            let name = format!("plain and moving, {name}, {ball}");
+            assert!(compare(&name, &scene, &plan, &LAYERS) > 0, "{name}");
+        }
+    }
+}
+
 #[test]
 fn a_lamp_that_is_half_there_shines_half_as_much() {
     let folder = tempfile::tempdir().unwrap();

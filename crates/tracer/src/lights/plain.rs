@@ -17,6 +17,8 @@ pub(crate) struct PlainLightBounds {
     pub(crate) farthest: f64,
     /// Some are neither triangles nor points that stand still and shine alike to all sides.
     pub(crate) has_others: bool,
+    /// The largest band of those (W/sr, W/m² or W/(m² sr)).
+    pub(crate) brightest: f64,
     /// All are far away.
     pub(crate) are_far: bool,
 }
@@ -95,10 +97,20 @@ impl Lights {
             least_area: f64::INFINITY,
             farthest: 0.0,
             has_others: false,
+            brightest: 0.0,
             are_far: self.triangles.is_empty(),
         };
-        for light in &self.lights {
-            bounds.has_others |= standing_point(light).is_none();
+        let count = self.bands.len() / self.lights.len().max(1);
+        for (index, light) in self.lights.iter().enumerate() {
+            if standing_point(light).is_none() {
+                bounds.has_others = true;
+                let sky = self.sky.as_ref().filter(|sky| sky.index == index);
+                let map = sky.and_then(|sky| sky.map.as_ref());
+                let peak = map.map_or(1.0, |(map, _)| f64::from(map.peak));
+                let bands = self.bands_of(index, count);
+                let most = bands.iter().copied().fold(0.0, f64::max);
+                bounds.brightest = bounds.brightest.max(most * peak);
+            }
             if let Some(at) = light.kind.place() {
                 bounds.are_far = false;
                 let at = light.stand(0.0).point(at);

@@ -35,7 +35,8 @@ pub(crate) struct PlainSurface {
     pub(crate) is_there: bool,
     pub(crate) kind: PlainKind,
     pub(crate) shines: bool,
-    /// Its colour, its facets or its normals are those of the place where it is hit; its facets are, and its normals.
+    /// Its colour, its facets or its normals are those of the place where it is hit; its facets are, and its normals, as
+    /// where they are mapped or move.
     pub(crate) is_varied: bool,
     pub(crate) has_own_facets: bool,
     pub(crate) is_mapped: bool,
@@ -78,6 +79,11 @@ pub(crate) struct PlainFacets {
 }
 
 impl PlainSurfaces {
+    /// Tests whether some are not matte, or not alike all over.
+    pub(crate) fn are_rich(&self) -> bool {
+        !self.facets.is_empty() || self.are_varied
+    }
+
     /// `None` if one is not plain.
     pub(super) fn of(
         placed: &[Option<PlacedSurface>],
@@ -95,7 +101,7 @@ impl PlainSurfaces {
                 *of_own = PlainFacets::of(placed.as_ref()?, material, spectral)?;
                 if let Some(face_on) = of_own.measure(material, spectral) {
                     own.color = face_on.map(single);
-                    own.is_varied = material.normal_map.is_some();
+                    own.is_varied = own.is_mapped;
                 }
                 if let Scattering::Gltf(surface) = &material.scattering {
                     own.has_own_facets = surface.plain_sheet(spectral).is_none();
@@ -144,9 +150,7 @@ impl PlainSurface {
         let scatters = kind != PlainKind::Black;
         let is_tilted = scatters && placed.is_tilted;
         let moves = placement.motion.is_some() || mesh.steps.is_some();
-        if is_tilted && moves {
-            return None;
-        }
+        let is_mapped = is_tilted && (moves || material.normal_map.is_some());
         // Directions alone count: what a mesh is scaled by would leave the range of single precision.
         let rows = || {
             let turn = placed.turn.unwrap_or(DMat3::IDENTITY).transpose();
@@ -161,9 +165,9 @@ impl PlainSurface {
             is_there: true,
             kind,
             shines: placed.is_seen,
-            is_varied: scatters && (color.is_none() || material.normal_map.is_some()),
+            is_varied: scatters && (color.is_none() || is_mapped),
             has_own_facets: false,
-            is_mapped: material.normal_map.is_some(),
+            is_mapped,
             turn,
         })
     }

@@ -16,6 +16,8 @@ mod sky;
 mod surfaces;
 mod varied;
 
+use std::ops::RangeInclusive;
+
 use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitPrecision, RayBlocks};
@@ -23,12 +25,14 @@ use etendue_geometry::{HitPrecision, RayBlocks};
 use self::facets::Facets;
 use self::kernel::{Leaving, Numbers, leave_blocks};
 use self::lamps::{ChosenLamps, Lights};
+use self::sky::ask_sky;
 use self::surfaces::{Surfaces, Varied};
 use super::paths::{DRAWS, Draw, Step, Way, Workspace};
 use super::rays::{Blocks, RayHit};
 use super::trace::Encounter;
-use super::{LightingContext, Parts, RaySamples, Tracing};
+use super::{LightingContext, RaySamples, Tracing};
 use crate::Image;
+use crate::emitters::Emitters;
 use crate::light_sampler::Receiver;
 use crate::lights::PlainLightBounds;
 use crate::sky::Sky;
@@ -38,6 +42,10 @@ pub(crate) const SIZES: [f64; 2] = [1e-6, 1e9];
 
 /// The least area of a lamp over the square of the scene's size that it holds.
 const LEAST_AREA: f64 = 1e-12;
+
+/// Largest bands of lights whose light single precision holds, however near or far they are (W/sr, W/m² or
+/// W/(m² sr)).
+const BRIGHTNESS: RangeInclusive<f64> = 1e-12..=1e18;
 
 /// What sixteen and more paths carry, a column a number; behind the last there is room for a block.
 #[derive(Debug, Default)]
@@ -95,6 +103,8 @@ pub(super) struct PlainScratch {
     missed: Vec<u32>,
     facets: Facets,
     varied: Vec<Varied>,
+    /// When rays are (s from the frame's time), where that counts.
+    times: Vec<f64>,
 }
 
 impl Columns {
@@ -142,8 +152,6 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         let &LightingContext { lights, placed, traits, scene, .. } = self.ctx;
         let is_taken = RGB
             && self.ctx.precision == HitPrecision::Single
-            && self.parts == Parts::Whole
-            && self.times.is_empty()
             && !(traits.may_pass() || traits.has_media || traits.has_panes)
             && !traits.has_dispersion
             && lights.sky.as_ref().is_none_or(Sky::is_of_colors);
@@ -154,10 +162,11 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         }
         let surfaces = Surfaces { all, geometry: scene.geometry, varied: &[] };
         let origin = self.ctx.accel.blocks()?.origin();
-        let PlainLightBounds { least_area, farthest, .. } = lights.plain_lights()?;
+        let PlainLightBounds { least_area, farthest, brightest, .. } = lights.plain_lights()?;
         let least = LEAST_AREA * placed.size().powi(2);
         let are_near = 2.0 * (farthest + origin.abs().max_element()) < SIZES[1];
-        let are_taken = least_area > least && are_near && !lights.is_dark();
+        let is_held = brightest == 0.0 || BRIGHTNESS.contains(&brightest);
+        let are_taken = least_area > least && are_near && is_held && !lights.is_dark();
         are_taken.then(|| (surfaces, Lights::new(lights, origin)))
     }
 
@@ -172,79 +181,103 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         let Some(accel) = self.ctx.accel.blocks() else { return };
         workspace.radiance.resize(self.count(), 0.0);
         accel.convert(camera.rays, &mut plain.rays);
-        let all = surfaces.all;
-        let are_smooth = all.are_smooth;
-        let are_rich = !surfaces.all.facets.is_empty() || surfaces.all.are_varied;
-        let is_rich = are_rich || self.ctx.lights.has_others();
+        let are_smooth = surfaces.all.are_smooth;
         start(camera, are_smooth, &mut plain.carried);
         let mut coherent = camera.rays.coherent;
-        let has_environment = self.ctx.lights.has_environment();
-        let emitters = self.ctx.emitters.map(|emitters| emitters.sphere(lights.origin));
         let mut is_scattered = true;
         for number in 0..=self.rules.bounces {
             let len = plain.rays.len();
             if len == 0 {
                 break;
             }
-            accel.closest_of_blocks(plain.rays.blocks_mut(), &[], coherent);
+            self.times_of(&plain.carried.ray[..len], &mut plain.times);
+            accel.closest_of_blocks(plain.rays.blocks_mut(), &plain.times, coherent);
             self.tally.rays += len as u64;
             is_scattered &= number < self.rules.bounces;
-            let is_last = self.is_end_unless_specular(number);
-            for columns in [&mut plain.shadows, &mut plain.next, &mut plain.last] {
-                columns.restart(len, are_smooth);
-            }
-            plain.seen.clear();
-            plain.missed.clear();
-            // Nobody comes upon points.
-            let goes_on = !is_last || self.ctx.lights.is_hittable();
-            let roulette = !is_last && self.rules.roulette.is_some_and(|after| number + 1 >= after);
-            if is_scattered {
-                self.look_up_varied((camera, number), surfaces, plain);
-                let has_choice = !surfaces.all.facets.is_empty();
-                let goes_on = goes_on || are_smooth;
-                self.draw_plain(camera, number, [goes_on, roulette, has_choice], plain);
-                if lights.are_many() {
-                    self.choose_lamps((surfaces, lights), plain);
-                }
-            }
-            let surfaces = Surfaces { varied: &plain.varied, ..surfaces };
-            let chosen = lights.are_many().then_some(&plain.chosen);
-            let asks_emitters = emitters.is_some();
-            let drawn = &plain.numbers;
-            let numbers =
-                Numbers { is_scattered, goes_on, roulette, is_last, asks_emitters, drawn, chosen };
-            let leaving = Leaving {
-                shadows: &mut plain.shadows,
-                next: &mut plain.next,
-                last: &mut plain.last,
-                seen: &mut plain.seen,
-                missed: has_environment.then_some(&mut plain.missed),
-                facets: &mut plain.facets,
-            };
-            let sphere = emitters.filter(|_| is_last && !has_environment);
-            let leave = match (surfaces.all.are_tilted, is_rich) {
-                (false, false) => leave_blocks::<false, false>,
-                (false, true) => leave_blocks::<false, true>,
-                (true, false) => leave_blocks::<true, false>,
-                (true, true) => leave_blocks::<true, true>,
-            };
-            leave(
-                (surfaces, lights),
-                (plain.rays.blocks(), &plain.carried),
-                (numbers, sphere),
-                leaving,
-            );
-            self.carry_cones((camera, number), all, plain);
+            self.leave_plain((camera, number), (surfaces, lights), is_scattered, plain);
+            self.carry_cones((camera, number), surfaces.all, plain);
             self.meet_plain(number, plain, workspace, out);
             self.add_sky_plain((camera, number), lights, plain, out);
-            self.light_plain(plain, lights, coherent, out);
+            let nothing_else = self.ctx.emitters.is_some_and(Emitters::is_empty);
+            if let Some(sky) = lights.sky.filter(|_| nothing_else) {
+                ask_sky(&sky, &mut plain.last, &mut plain.shadows);
+            }
+            self.light_plain(plain, lights, (number, coherent), out);
             self.ask_emitters_plain(camera, number, plain, workspace, out);
             // Last directions that do not ask what shines are followed as the others are.
-            is_scattered &= !is_last || are_smooth;
+            is_scattered &= !self.is_end_unless_specular(number) || are_smooth;
             plain.next.pack(&mut plain.rays);
             std::mem::swap(&mut plain.carried, &mut plain.next.carried);
             plain.carried.len = plain.next.len;
             coherent = false;
+        }
+    }
+
+    /// Notes the rays that leave the hits of a step, where these scatter light.
+    fn leave_plain(
+        &self,
+        (camera, number): (&RaySamples<'_>, u32),
+        (surfaces, lights): (Surfaces<'_>, &Lights<'_>),
+        is_scattered: bool,
+        plain: &mut PlainScratch,
+    ) {
+        let (len, all) = (plain.rays.len(), surfaces.all);
+        // Last directions may become rays to the sky.
+        plain.shadows.restart(2 * len, all.are_smooth);
+        plain.next.restart(len, all.are_smooth);
+        plain.last.restart(len, all.are_smooth);
+        plain.seen.clear();
+        plain.missed.clear();
+        let is_last = self.is_end_unless_specular(number);
+        // Nobody comes upon points.
+        let goes_on = !is_last || self.ctx.lights.is_hittable();
+        let roulette = !is_last && self.rules.roulette.is_some_and(|after| number + 1 >= after);
+        if is_scattered {
+            self.look_up_varied((camera, number), surfaces, plain);
+            let needs = [goes_on || all.are_smooth, roulette, !all.facets.is_empty()];
+            self.draw_plain(camera, number, needs, plain);
+            if lights.are_many() {
+                self.choose_lamps((surfaces, lights), plain);
+            }
+        }
+        let surfaces = Surfaces { varied: &plain.varied, ..surfaces };
+        let chosen = lights.are_many().then_some(&plain.chosen);
+        let emitters = self.ctx.emitters.map(|emitters| emitters.sphere(lights.origin));
+        let (asks_emitters, drawn) = (emitters.is_some(), &plain.numbers);
+        let numbers =
+            Numbers { is_scattered, goes_on, roulette, is_last, asks_emitters, drawn, chosen };
+        let has_environment = self.ctx.lights.has_environment();
+        let leaving = Leaving {
+            shadows: &mut plain.shadows,
+            next: &mut plain.next,
+            last: &mut plain.last,
+            seen: &mut plain.seen,
+            missed: has_environment.then_some(&mut plain.missed),
+            facets: &mut plain.facets,
+        };
+        let sphere = emitters.filter(|_| is_last && !has_environment);
+        let is_rich = all.are_rich() || self.ctx.lights.has_others();
+        let leave = match (all.are_tilted, is_rich) {
+            (false, false) => leave_blocks::<false, false>,
+            (false, true) => leave_blocks::<false, true>,
+            (true, false) => leave_blocks::<true, false>,
+            (true, true) => leave_blocks::<true, true>,
+        };
+        let paths = (plain.rays.blocks(), &plain.carried);
+        leave((surfaces, lights), paths, (numbers, sphere), leaving);
+    }
+
+    /// When a ray of the camera is (s from the frame's time).
+    #[inline(always)]
+    fn time_of(&self, ray: u32) -> f64 {
+        self.times.get(ray as usize).copied().unwrap_or(0.0)
+    }
+
+    /// The times of some rays of the camera, where that counts; else none.
+    fn times_of(&self, rays: &[u32], times: &mut Vec<f64>) {
+        times.clear();
+        if !self.times.is_empty() && self.ctx.accel.blocks().is_some_and(|own| own.has_times()) {
+            times.extend(rays.iter().map(|&ray| self.time_of(ray)));
         }
     }
 
@@ -293,7 +326,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
                 weights: [block.u[lane], block.v[lane]].map(f64::from),
                 t: f64::from(block.t_max[lane]),
                 normal: vector(&block.normal).normalize(),
-                time: 0.0,
+                time: self.time_of(ray[i]),
             };
             // Few lamps are chosen with the same chance for all points.
             let own = normal.each_ref().map(|axis| f64::from(axis[i]));
@@ -309,7 +342,9 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             for (light, band) in light.iter_mut().zip(throughput) {
                 *light *= f64::from(band[i]) * weight;
             }
-            self.add(&workspace.radiance, ray[i], out);
+            let group = || self.ctx.lights.group_of_placement(&self.ctx.scene, hit.id[0]);
+            let row = self.parts.row(ray[i], number, group);
+            self.add(&workspace.radiance, row, out);
         }
     }
 
@@ -318,17 +353,17 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         &mut self,
         plain: &mut PlainScratch,
         lights: &Lights<'_>,
-        coherent: bool,
+        (number, coherent): (u32, bool),
         out: &mut [f64],
     ) {
-        let PlainScratch { shadows, shadow_rays, .. } = plain;
+        let PlainScratch { shadows, shadow_rays, times, .. } = plain;
         let Some(accel) = self.ctx.accel.blocks().filter(|_| shadows.len > 0) else { return };
         self.tally.shadow_rays += shadows.len as u64;
         shadows.pack(shadow_rays);
-        accel.occluded_of_blocks(shadow_rays.blocks_mut(), &[], coherent);
+        self.times_of(&shadows.carried.ray[..shadows.len], times);
+        accel.occluded_of_blocks(shadow_rays.blocks_mut(), times, coherent);
         let [red, green, blue] = &shadows.carried.throughput;
-        for (number, block) in shadow_rays.blocks().iter().enumerate() {
-            let first = number * LANES;
+        for (block, first) in shadow_rays.blocks().iter().zip((0..).step_by(LANES)) {
             for lane in 0..LANES.min(shadows.len - first) {
                 if block.is_blocked(lane) {
                     continue;
@@ -340,7 +375,9 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
                     f64::from(green[i]) * radiance[1],
                     f64::from(blue[i]) * radiance[2],
                 ];
-                self.add(&light, shadows.carried.ray[i], out);
+                let group = || lights.group_of(&self.ctx.scene, shadows.lamp[i]);
+                let row = self.parts.row(shadows.carried.ray[i], number + 1, group);
+                self.add(&light, row, out);
             }
         }
     }

@@ -35,8 +35,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             return;
         }
         self.ctx.lights.restart(&mut chosen.choices, room);
-        let are_rich = !surfaces.all.facets.is_empty() || surfaces.all.are_varied;
-        let ask = match (surfaces.all.are_tilted, are_rich) {
+        let ask = match (surfaces.all.are_tilted, surfaces.all.are_rich()) {
             (false, false) => ask_for_lamps::<false, false>,
             (false, true) => ask_for_lamps::<false, true>,
             (true, false) => ask_for_lamps::<true, false>,
@@ -59,7 +58,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 let (point, normal) = (lights.origin + point, chosen.choices.normal(number));
                 let (lane, square) = (chosen.asking[number], [choice.u, second[lane].into()]);
                 let receiver = Receiver { point, normal };
-                self.place_on_other(lights, chosen, (lane, receiver), (choice, square));
+                let time = self.time_of(carried.ray[lane as usize]);
+                self.place_on_other(lights, chosen, (lane, receiver, time), (choice, square));
                 continue;
             }
             (chosen.lamp[lane], chosen.chance[lane]) = (choice.light, round(choice.chance));
@@ -80,7 +80,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let choice = self.ctx.lights.pick_far(first[number].into());
             first[number] = crate::transport::below_one(choice.u);
             let square = [choice.u, second[number].into()];
-            self.place_on_other(lights, chosen, (lane, receiver), (choice, square));
+            let time = self.time_of(carried.ray[number]);
+            self.place_on_other(lights, chosen, (lane, receiver, time), (choice, square));
         }
         if lights.sky.is_some() {
             let chance = self.ctx.lights.chance_of_sky(&chosen.choices, 0);
@@ -95,7 +96,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         &self,
         lights: &Lights<'_>,
         chosen: &mut ChosenLamps,
-        (lane, receiver): (u32, Receiver),
+        (lane, receiver, time): (u32, Receiver, f64),
         (choice, square): (Choice, [f64; 2]),
     ) {
         if choice.chance <= 0.0 {
@@ -114,13 +115,13 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let one = ((choice.light as usize, choice.chance), square);
         let (scene, spectral) = (&self.ctx.scene, self.ctx.spectral);
         let mut radiance = [0.0; 3];
-        let found = self.ctx.lights.place(scene, spectral, (&receiver, 0.0), one, &mut radiance);
+        let found = self.ctx.lights.place(scene, spectral, (&receiver, time), one, &mut radiance);
         if let Chosen::Place(target) = found {
             let is_far = matches!(target.kind, TargetKind::Far | TargetKind::Parallel);
             let is_delta = matches!(target.kind, TargetKind::Point | TargetKind::Parallel);
             let origin = if is_far { DVec3::ZERO } else { lights.origin };
             let (place, density) = (single(target.place[0] - origin), round(target.density));
-            let own = OtherPlace { place, is_far, is_delta, density };
+            let own = OtherPlace { light: choice.light, place, is_far, is_delta, density };
             chosen.put(lane as usize, &own, radiance.map(round));
         }
     }

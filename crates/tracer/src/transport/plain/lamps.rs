@@ -12,6 +12,7 @@ use super::sky::PlainSky;
 use crate::area_light::AreaLight;
 use crate::light_tree::Choices;
 use crate::lights;
+use crate::reference::SceneView;
 use crate::sampling::GridCell;
 
 /// The largest number below 1.
@@ -100,13 +101,21 @@ impl<'a> Lights<'a> {
     /// Radiance of a triangle or the sky, intensity of a point; 1 of other lights, whose rays carry it.
     #[inline(always)]
     pub(super) fn radiance(&self, lamp: u32) -> [f64; 3] {
-        match lamp {
-            OTHER => return [1.0; 3],
-            SKY => return self.sky.map_or([0.0; 3], |sky| sky.bands),
-            _ => {}
+        if lamp >= SKY {
+            return if lamp == SKY { self.sky.map_or([0.0; 3], |sky| sky.bands) } else { [1.0; 3] };
         }
         let kept = self.few_bands.get(lamp as usize).copied();
         kept.unwrap_or_else(|| self.bands_of(lamp as usize))
+    }
+
+    /// The group of a light, or of the sky.
+    #[inline(always)]
+    pub(super) fn group_of(&self, scene: &SceneView<'_>, lamp: u32) -> u32 {
+        if lamp == SKY {
+            self.all.group_of_sky()
+        } else {
+            self.all.group_of_any(scene, lamp & !OTHER)
+        }
     }
 
     #[inline(always)]
@@ -115,11 +124,11 @@ impl<'a> Lights<'a> {
     }
 }
 
-/// The number of all lights but points that shine alike to all sides, triangles and [`SKY`].
-const OTHER: u32 = u32::MAX;
+/// The bit of the numbers of all lights but points that shine alike to all sides, triangles and [`SKY`].
+pub(super) const OTHER: u32 = 1 << 31;
 
 /// The number of a sky that is alike all over.
-pub(super) const SKY: u32 = OTHER - 1;
+pub(super) const SKY: u32 = 1 << 30;
 
 /// Lights that are chosen by where paths are: for points side by side, and by lane.
 #[derive(Debug, Default)]
@@ -149,6 +158,7 @@ pub(in crate::transport) struct ChosenLamps {
 
 /// A place on a light of any kind, or a direction to it.
 pub(super) struct OtherPlace {
+    pub(super) light: u32,
     /// From the blocks' origin (m), or unit.
     pub(super) place: [f32; 3],
     pub(super) is_far: bool,
@@ -178,7 +188,7 @@ impl ChosenLamps {
     /// Notes what a lane chose.
     #[inline(always)]
     pub(super) fn put(&mut self, lane: usize, own: &OtherPlace, radiance: [f32; 3]) {
-        self.lamp[lane] = OTHER;
+        self.lamp[lane] = OTHER | own.light;
         for axis in 0..3 {
             self.place[axis][lane] = own.place[axis];
             self.radiance[axis][lane] = radiance[axis];
@@ -284,7 +294,7 @@ impl OtherPlaces {
         let Some(chosen) = chosen else { return others };
         let (mut is_other, mut is_sky) = (false, false);
         for i in 0..LANES {
-            is_other |= places.lamp[i] == OTHER;
+            is_other |= places.lamp[i] >= OTHER;
             is_sky |= places.lamp[i] == SKY;
         }
         let run = first..first + LANES;
@@ -335,7 +345,7 @@ impl OtherPlaces {
         for axis in 0..3 {
             let (place, own) = (row(&chosen.place[axis]), row(&chosen.radiance[axis]));
             for i in 0..LANES {
-                let is_own = places.lamp[i] == OTHER;
+                let is_own = places.lamp[i] >= OTHER;
                 let way = if is_far[i] > 0.0 { place[i] } else { place[i] - points[axis][i] };
                 places.way[axis][i] = if is_own { way } else { places.way[axis][i] };
                 places.normal[axis][i] = if is_own { 0.0 } else { places.normal[axis][i] };
@@ -344,7 +354,7 @@ impl OtherPlaces {
             }
         }
         for i in 0..LANES {
-            let is_own = places.lamp[i] == OTHER;
+            let is_own = places.lamp[i] >= OTHER;
             places.density[i] = if is_own { density[i] } else { places.density[i] };
             places.is_delta[i] = if is_own { is_delta[i] } else { places.is_delta[i] };
             self.is_far[i] = if is_own { is_far[i] } else { 0.0 };

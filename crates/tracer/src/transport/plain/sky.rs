@@ -7,8 +7,8 @@ use etendue_geometry::block::{Floats as Row, LANES, vector};
 use etendue_geometry::glam::DMat3;
 
 use super::kernel::{ZERO, round, single};
-use super::lamps::{ChosenLamps, Lights, OtherPlace};
-use super::{Columns, PlainScratch, SPECULAR};
+use super::lamps::{ChosenLamps, Lights, OTHER, OtherPlace};
+use super::{Columns, PlainScratch, RayColumns, SPECULAR};
 use crate::environment::{EnvironmentMap, Lit, MapSampler};
 use crate::sampling::GridCell;
 use crate::transport::{RaySamples, Tracing};
@@ -35,6 +35,37 @@ struct Arrived {
     chance: Row,
     /// Of the surface that they left.
     normal: [Row; 3],
+}
+
+impl Arrived {
+    const NOTHING: Self = Self {
+        direction: [ZERO; 3],
+        throughput: [ZERO; 3],
+        pdf: [1.0; LANES],
+        chance: ZERO,
+        normal: [ZERO; 3],
+    };
+
+    /// Takes a path, which left a surface where the sky may have been asked, too.
+    #[inline(always)]
+    fn put(
+        &mut self,
+        i: usize,
+        (carried, own): (&Columns, usize),
+        direction: [f32; 3],
+        was_asked: bool,
+    ) {
+        for axis in 0..3 {
+            self.direction[axis][i] = direction[axis];
+            self.throughput[axis][i] = carried.throughput[axis][own];
+        }
+        if was_asked {
+            (self.pdf[i], self.chance[i]) = (carried.pdf[own], carried.sky_chance[own]);
+            for axis in 0..3 {
+                self.normal[axis][i] = carried.normal[axis][own];
+            }
+        }
+    }
 }
 
 impl<'a> PlainSky<'a> {
@@ -98,6 +129,10 @@ fn light_of(sky: &PlainSky<'_>, arrived: &Arrived, light: &mut [Row; 3]) {
     }
 }
 
+fn number_of(sky: &PlainSky<'_>) -> u32 {
+    u32::try_from(sky.index).unwrap_or_default()
+}
+
 /// Directions to the sky's image in the patches that lanes chose.
 #[multiversion::multiversion(targets = "simd")]
 pub(super) fn place_on_sky(sky: &PlainSky<'_>, chosen: &mut ChosenLamps) {
@@ -114,7 +149,8 @@ pub(super) fn place_on_sky(sky: &PlainSky<'_>, chosen: &mut ChosenLamps) {
             if density > 0.0 {
                 let axis = |rows: &[Row; 3]| [rows[0][i], rows[1][i], rows[2][i]];
                 let (is_far, is_delta) = (true, false);
-                let own = OtherPlace { place: axis(&directions), is_far, is_delta, density };
+                let (light, place) = (number_of(sky), axis(&directions));
+                let own = OtherPlace { light, place, is_far, is_delta, density };
                 let mut radiance = axis(&lit.colors);
                 for band in 0..3 {
                     radiance[band] *= round(sky.bands[band]);
@@ -136,43 +172,56 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         out: &mut [f64],
     ) {
         let Some(sky) = lights.sky.filter(|sky| sky.visible || number > 0) else { return };
-        let Columns { ray, pdf, throughput, normal, flags, sky_chance, .. } = &plain.carried;
+        let flags = &plain.carried.flags;
         for missed in plain.missed.chunks(LANES) {
-            let mut arrived = Arrived {
-                direction: [ZERO; 3],
-                throughput: [ZERO; 3],
-                pdf: [1.0; LANES],
-                chance: ZERO,
-                normal: [ZERO; 3],
-            };
+            let mut arrived = Arrived::NOTHING;
             for (i, &own) in missed.iter().enumerate() {
                 let own = own as usize;
-                for axis in 0..3 {
-                    arrived.throughput[axis][i] = throughput[axis][own];
-                }
                 // The camera's rays are not all traced: those that cannot hit anything are other ones in blocks.
                 let direction = match number {
                     0 => camera.rays.direction(own),
                     _ => vector(&plain.rays.blocks()[own / LANES].direction, own % LANES),
                 };
-                let direction = single(direction);
-                for axis in 0..3 {
-                    arrived.direction[axis][i] = direction[axis];
-                }
                 let is_specular = flags.get(own).is_some_and(|flags| flags & SPECULAR != 0);
-                if number > 0 && !is_specular {
-                    (arrived.pdf[i], arrived.chance[i]) = (pdf[own], sky_chance[own]);
-                    for axis in 0..3 {
-                        arrived.normal[axis][i] = normal[axis][own];
-                    }
-                }
+                let was_asked = number > 0 && !is_specular;
+                arrived.put(i, (&plain.carried, own), single(direction), was_asked);
             }
             let mut light = [ZERO; 3];
             sky.light_of(&arrived, &mut light);
             for (i, &own) in missed.iter().enumerate() {
                 let band = |k: usize| f64::from(light[k][i]) * sky.bands[k];
-                self.add(&[band(0), band(1), band(2)], ray[own as usize], out);
+                let group = || self.ctx.lights.group_of_sky();
+                let row = self.parts.row(plain.carried.ray[own as usize], number, group);
+                self.add(&[band(0), band(1), band(2)], row, out);
             }
         }
     }
+}
+
+/// Makes last directions rays to the sky, where nothing else shines: they bring its light unless something is in between.
+pub(super) fn ask_sky(sky: &PlainSky<'_>, last: &mut RayColumns, shadows: &mut RayColumns) {
+    for first in (0..last.len).step_by(LANES) {
+        let mut arrived = Arrived::NOTHING;
+        let count = LANES.min(last.len - first);
+        for i in 0..count {
+            let direction = [0, 1, 2].map(|axis| last.along[axis][first + i]);
+            arrived.put(i, (&last.carried, first + i), direction, true);
+        }
+        let mut light = [ZERO; 3];
+        sky.light_of(&arrived, &mut light);
+        for i in 0..count {
+            let (from, to) = (first + i, shadows.len);
+            for axis in 0..3 {
+                shadows.start[axis][to] = last.start[axis][from];
+                shadows.along[axis][to] = last.along[axis][from];
+                let band = light[axis][i] * round(sky.bands[axis]);
+                shadows.carried.throughput[axis][to] = band;
+            }
+            shadows.reach[to] = f32::INFINITY;
+            shadows.lamp[to] = number_of(sky) | OTHER;
+            shadows.carried.ray[to] = last.carried.ray[from];
+            shadows.len += 1;
+        }
+    }
+    last.len = 0;
 }

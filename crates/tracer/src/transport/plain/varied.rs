@@ -59,7 +59,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             _ => vector(&block.direction, i),
         };
         let footprint = cone.map(|Cone { width, .. }| Footprint { direction: direction(), width });
-        let point = SurfacePoint { weights: [1.0 - u - v, u, v], footprint, ..corner };
+        let time = self.time_of(plain.carried.ray[lane]);
+        let point = SurfacePoint { weights: [1.0 - u - v, u, v], time, footprint, ..corner };
         let material = scene.material(&point)?;
         let is_measured = matches!(&material.scattering, Scattering::Metal { named: Some(_), .. });
         let looked_up = || scene.base_tint(spectral, material, &point).0.clamped();
