@@ -13,7 +13,7 @@ use crate::{Conductor, Material, Scattering, Spectral};
 pub(crate) struct PlainSurfaces {
     /// Behind the last one that is not there.
     pub(crate) all: Vec<PlainSurface>,
-    /// Their facets; empty where all are matte.
+    /// Their facets, by material; empty where all are matte.
     pub(crate) facets: Vec<PlainFacets>,
     /// Some scatter light about other normals than those of their triangles.
     pub(crate) are_tilted: bool,
@@ -32,6 +32,8 @@ pub(crate) struct PlainSurface {
     pub(crate) color: [f32; 3],
     /// [`PlacedSurface::magnitudes`] (m).
     pub(crate) magnitudes: [f32; 3],
+    /// Index of its material.
+    pub(crate) material: u32,
     pub(crate) is_there: bool,
     pub(crate) kind: PlainKind,
     pub(crate) shines: bool,
@@ -66,8 +68,7 @@ pub(crate) struct PlainFacets {
     /// The dielectric's reflectance face on, before the highlights' colour, and at grazing incidence.
     pub(crate) f0: f64,
     pub(crate) f90: f64,
-    /// The largest bands of the surface's colour, and of the dielectric's reflectance face on.
-    pub(crate) base_peak: f64,
+    /// The largest band of the dielectric's reflectance face on.
     pub(crate) f0_peak: f64,
     /// It is [`Scattering::Metal`].
     pub(crate) is_metal: bool,
@@ -90,31 +91,20 @@ impl PlainSurfaces {
         (geometry, materials): (&Geometry, &[Material]),
         spectral: &Spectral,
     ) -> Option<Self> {
-        let (mut all, mut facets, mut rough_by) = (Vec::new(), Vec::new(), Vec::new());
+        // Many copies are of few materials.
+        let mut all = Vec::with_capacity(placed.len() + 1);
         for (placed, placement) in placed.iter().zip(&geometry.placements) {
             let material = materials.get(placement.material as usize)?;
             let mesh = geometry.mesh_of(placement);
-            let mut own = PlainSurface::of(placed.as_ref()?, material, (placement, mesh))?;
-            facets.push(PlainFacets::default());
-            if matches!(own.kind, PlainKind::Sheet | PlainKind::Smooth) {
-                let of_own = facets.last_mut()?;
-                *of_own = PlainFacets::of(placed.as_ref()?, material, spectral)?;
-                if let Some(face_on) = of_own.measure(material, spectral) {
-                    own.color = face_on.map(single);
-                    own.is_varied = own.is_mapped;
-                }
-                if let Scattering::Gltf(surface) = &material.scattering {
-                    own.has_own_facets = surface.plain_sheet(spectral).is_none();
-                    own.is_varied |= own.has_own_facets;
-                    rough_by.extend(surface.metallic_roughness.as_ref().map(|image| image.texture));
-                    // Its roughness is 0 where the image says so.
-                    if surface.glossiness_texture.is_some() && surface.roughness <= 0.0 {
-                        return None;
-                    }
-                }
-            }
-            all.push(own);
+            all.push(PlainSurface::of(placed.as_ref()?, material, (placement, mesh), spectral)?);
         }
+        let rough_by = materials.iter().filter_map(|material| match &material.scattering {
+            Scattering::Gltf(surface) => surface.metallic_roughness.as_ref(),
+            _ => None,
+        });
+        let mut rough_by: Vec<u32> = rough_by.map(|image| image.texture).collect();
+        let mut facets: Vec<_> =
+            materials.iter().map(|material| PlainFacets::of(material, spectral)).collect();
         let has = |kind| all.iter().any(|own: &PlainSurface| own.kind == kind);
         let (are_smooth, has_sheets) = (has(PlainKind::Smooth), has(PlainKind::Sheet));
         if !are_smooth && !has_sheets {
@@ -135,6 +125,7 @@ impl PlainSurface {
         placed: &PlacedSurface,
         material: &Material,
         (placement, mesh): (&Placement, &Mesh),
+        spectral: &Spectral,
     ) -> Option<Self> {
         let kind = match placed.kind {
             SurfaceKind::Black => PlainKind::Black,
@@ -158,67 +149,75 @@ impl PlainSurface {
             turn.to_cols_array_2d().map(|row| row.map(|x| single(x / largest)))
         };
         let turn = is_tilted.then(rows);
-        let color = placed.color.filter(|_| scatters);
+        let has_own_facets = match &material.scattering {
+            Scattering::Gltf(surface) if kind == PlainKind::Sheet => {
+                // Where its image says so its roughness is 0.
+                if surface.glossiness_texture.is_some() && surface.roughness <= 0.0 {
+                    return None;
+                }
+                surface.plain_sheet(spectral).is_none()
+            }
+            _ => false,
+        };
+        let color = match measured(material, spectral) {
+            Some(bands) => Some(bands.map(|[face_on, _]| face_on)),
+            None => placed.color.map(|tint| tint.color),
+        };
+        let is_varied = color.is_none() || is_mapped || has_own_facets;
         Some(Self {
-            color: color.map_or([0.0; 3], |tint| tint.color.map(single)),
+            color: color.filter(|_| scatters).unwrap_or_default().map(single),
             magnitudes: placed.magnitudes.to_array().map(single),
+            material: placement.material,
             is_there: true,
             kind,
             shines: placed.is_seen,
-            is_varied: scatters && (color.is_none() || is_mapped),
-            has_own_facets: false,
+            is_varied: scatters && is_varied,
+            has_own_facets,
             is_mapped,
             turn,
         })
     }
 }
 
+/// What a measured metal reflects face on in each band, and what its reflectance lacks of Schlick's; `None` of others.
+fn measured(material: &Material, spectral: &Spectral) -> Option<[[f64; 2]; 3]> {
+    let Scattering::Metal { named: Some(named), .. } = &material.scattering else { return None };
+    let id = Conductor::id(named);
+    Some([0, 1, 2].map(|band| spectral.metal(id, band)))
+}
+
 impl PlainFacets {
-    /// Those of a surface; of what is not alike all over none.
-    fn of(placed: &PlacedSurface, material: &Material, spectral: &Spectral) -> Option<Self> {
+    /// Those of a material; of what is not alike all over none.
+    fn of(material: &Material, spectral: &Spectral) -> Self {
         let own = Self { highlight: [1.0; 3], ..Self::default() };
         match &material.scattering {
             Scattering::Metal { roughness, .. } => {
-                let alpha = roughness * roughness;
-                Some(Self { alpha, metallic: 1.0, is_metal: true, ..own })
+                let dip = measured(material, spectral).map(|bands| bands.map(|[_, dip]| dip));
+                let (alpha, dip) = (roughness * roughness, dip.unwrap_or_default());
+                Self { alpha, metallic: 1.0, is_metal: true, dip, ..own }
             }
             Scattering::Gltf(surface) => {
-                let Some(sheet) = surface.plain_sheet(spectral) else { return Some(own) };
-                let base_peak = placed.color.map_or(0.0, |color| color.peak());
-                Some(Self::of_sheet(&sheet, base_peak))
+                let sheet = surface.plain_sheet(spectral);
+                sheet.map_or(own, |sheet| Self::of_sheet(&sheet))
             }
             Scattering::Dielectric(glass) => {
-                Some(Self { ior: glass.ior.at(spectral.wavelength(0)), ..own })
+                Self { ior: glass.ior.at(spectral.wavelength(0)), ..own }
             }
-            Scattering::Mirror => Some(own),
-            Scattering::Black | Scattering::Matte | Scattering::Unlit => None,
+            Scattering::Mirror | Scattering::Black | Scattering::Matte | Scattering::Unlit => own,
         }
     }
 
-    /// Those of a rough sheet over a surface whose colour has this largest band.
-    pub(crate) fn of_sheet(sheet: &SheetSurface, base_peak: f64) -> Self {
+    /// Those of a rough sheet.
+    pub(crate) fn of_sheet(sheet: &SheetSurface) -> Self {
         Self {
             alpha: sheet.alpha,
             metallic: sheet.metallic,
             f0: sheet.f0,
             f90: sheet.f90,
-            base_peak,
             f0_peak: (sheet.f0 * sheet.highlight.peak()).min(1.0),
             highlight: sheet.highlight.color,
             ..Self::default()
         }
-    }
-
-    /// Takes the dip of a metal by whose measured index the surface reflects; what that reflects face on.
-    fn measure(&mut self, material: &Material, spectral: &Spectral) -> Option<[f64; 3]> {
-        let Scattering::Metal { named: Some(named), .. } = &material.scattering else {
-            return None;
-        };
-        let id = Conductor::id(named);
-        let of_band = |k| spectral.metal(id, k);
-        let bands = [of_band(0), of_band(1), of_band(2)];
-        self.dip = bands.map(|[_, dip]| dip);
-        Some(bands.map(|[face_on, _]| face_on))
     }
 }
 

@@ -119,12 +119,11 @@ fn see(
         if found.sheets[lane] | found.smooth[lane] == 0 {
             continue;
         }
-        let placement = block.placement[lane] as usize;
-        let surface = &surfaces.all.all[placement];
+        let surface = &surfaces.all.all[block.placement[lane] as usize];
         let varied = surfaces.varied.get(first + lane).filter(|_| surface.is_varied);
         let own = match varied.filter(|_| surface.has_own_facets) {
             Some(varied) => &varied.facets,
-            None => &surfaces.all.facets[placement],
+            None => &surfaces.all.facets[surface.material as usize],
         };
         for k in 0..3 {
             facets.highlight[k][lane] = own.highlight[k];
@@ -134,7 +133,8 @@ fn see(
         if found.sheets[lane] != 0 {
             (sheets.alpha[lane], sheets.metallic[lane]) = (own.alpha, own.metallic);
             (sheets.f0[lane], sheets.f90[lane]) = (own.f0, own.f90);
-            sheets.base_peak[lane] = varied.map_or(own.base_peak, |varied| varied.peak);
+            let [r, g, b] = [0, 1, 2].map(|k| facets.base[k][lane]);
+            sheets.base_peak[lane] = r.max(g).max(b);
             sheets.f0_peak[lane] = own.f0_peak;
             sheets.is_metal[lane] = is_metal;
         } else {

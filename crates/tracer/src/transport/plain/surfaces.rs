@@ -25,8 +25,6 @@ pub(in crate::transport) struct Surfaces<'a> {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Varied {
     pub(super) color: [f32; 3],
-    /// The largest band of the colour.
-    pub(super) peak: f64,
     /// About which light is scattered, of any length and side, where normals are mapped.
     pub(super) normal: [f32; 3],
     /// Where these are not alike all over.

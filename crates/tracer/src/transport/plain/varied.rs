@@ -66,12 +66,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let looked_up = || scene.base_tint(spectral, material, &point).0.clamped();
         let tint = placed.color.unwrap_or_else(looked_up);
         found.color = if is_measured { own.color } else { tint.color.map(round) };
-        found.peak = tint.peak();
         if let Scattering::Gltf(surface) = &material.scattering
             && own.has_own_facets
         {
-            found.facets =
-                PlainFacets::of_sheet(&surface.sheet(&point, scene, spectral), found.peak);
+            found.facets = PlainFacets::of_sheet(&surface.sheet(&point, scene, spectral));
         }
         if own.is_mapped {
             let front = vector(&block.normal, i).normalize();
