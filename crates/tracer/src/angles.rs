@@ -11,7 +11,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::real::Real;
+use crate::float::Float;
 
 /// tan π/8.
 const EIGHTH: f64 = 0.414_213_562_373_095_03;
@@ -32,7 +32,7 @@ const ARC: [f64; 11] = [
 ];
 
 #[inline(always)]
-fn polynomial<F: Real, const N: usize>(coefficients: &[f64; N], x: F) -> F {
+fn polynomial<F: Float, const N: usize>(coefficients: &[f64; N], x: F) -> F {
     let mut sum = F::of(coefficients[N - 1]);
     for k in (0..N - 1).rev() {
         sum = sum * x + F::of(coefficients[k]);
@@ -43,7 +43,7 @@ fn polynomial<F: Real, const N: usize>(coefficients: &[f64; N], x: F) -> F {
 /// The angle of (x, y) against the first axis (turns, −1/2 to 1/2), to 2 · 10⁻¹⁶ in double precision; some number where
 /// both are 0.
 #[inline(always)]
-fn arc_tangent<F: Real>(y: F, x: F) -> F {
+fn arc_tangent<F: Float>(y: F, x: F) -> F {
     let (tall, wide) = (y.abs(), x.abs());
     let is_flat = tall < wide;
     let (least, most) = if is_flat { (tall, wide) } else { (wide, tall) };
@@ -59,7 +59,7 @@ fn arc_tangent<F: Real>(y: F, x: F) -> F {
 
 /// Sine and cosine of an angle (turns, few of them), to 3 · 10⁻¹⁶ in double precision.
 #[inline(always)]
-fn sine_and_cosine<F: Real>(turns: F) -> [F; 2] {
+fn sine_and_cosine<F: Float>(turns: F) -> [F; 2] {
     let (whole, quarter) = (F::of(4.0) * turns).nearest();
     let (sine, cosine) = (F::of(TAU) * (turns - F::of(0.25) * whole)).small_sine_cosine();
     let (a, b) = if quarter & 1 == 0 { (sine, cosine) } else { (cosine, sine) };
@@ -68,7 +68,7 @@ fn sine_and_cosine<F: Real>(turns: F) -> [F; 2] {
 
 /// Longitudes and latitudes (u, v) in 0..=1 of unit directions by axis: −Z is in the middle, +Y above.
 #[inline(always)]
-pub(crate) fn places<F: Real, const N: usize>([x, y, z]: &[[F; N]; 3]) -> [[F; N]; 2] {
+pub(crate) fn places<F: Float, const N: usize>([x, y, z]: &[[F; N]; 3]) -> [[F; N]; 2] {
     let [mut u, mut v] = [[F::ZERO; N]; 2];
     for i in 0..N {
         u[i] = F::of(0.5) + arc_tangent(x[i], -z[i]);
@@ -81,7 +81,7 @@ pub(crate) fn places<F: Real, const N: usize>([x, y, z]: &[[F; N]; 3]) -> [[F; N
 
 /// The unit directions of such places, and the sines of their angles with +Y.
 #[inline(always)]
-pub(crate) fn directions<F: Real, const N: usize>([u, v]: &[[F; N]; 2]) -> ([[F; N]; 3], [F; N]) {
+pub(crate) fn directions<F: Float, const N: usize>([u, v]: &[[F; N]; 2]) -> ([[F; N]; 3], [F; N]) {
     let [mut x, mut y, mut z, mut sines] = [[F::ZERO; N]; 4];
     for i in 0..N {
         let [sine, cosine] = sine_and_cosine(F::of(0.5) * v[i]);
@@ -146,6 +146,29 @@ mod tests {
                 // Rounding of the direction moves its longitude by that over the sine, here at least 0.09.
                 for axis in 0..2 {
                     assert!((back[axis][i] - row[axis][i]).abs() < 2e-15, "{:?}", [x, y, z]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn single_precision_is_double_rounded() {
+        for k in 0..4_096 {
+            let u = [(f64::from(k) + 0.5) / 4_096.0; LANES];
+            let v = std::array::from_fn(|i| (i as f64 + 0.5) / LANES as f64);
+            let (wide, _) = directions(&[u, v]);
+            let (narrow, _) = directions(&[u, v].map(|row| row.map(f32::of)));
+            let back = places(&narrow);
+            for i in 0..LANES {
+                for axis in 0..3 {
+                    // Some roundings of angles of up to 2π.
+                    let error = (f64::from(narrow[axis][i]) - wide[axis][i]).abs();
+                    assert!(error < 2e-6, "{k} {i}: {error}");
+                }
+                for (axis, place) in [u[i], v[i]].into_iter().enumerate() {
+                    // The same over the sine, here at least 0.09, and 2π.
+                    let error = (f64::from(back[axis][i]) - place).abs();
+                    assert!(error < 4e-6, "{k} {i}: {error}");
                 }
             }
         }

@@ -11,7 +11,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_image::Limits;
 
 use crate::angles;
-use crate::real::Real;
+use crate::float::Float;
 use crate::spec::BRIGHTEST;
 use crate::spectral_sky::{self, Spectrum};
 use crate::texture::{ImageError, read_file, read_image};
@@ -181,7 +181,7 @@ struct CornerTexels<const N: usize>([[[f32; N]; 3]; 4]);
 impl<const N: usize> CornerTexels<N> {
     /// How bright each is.
     #[inline(always)]
-    fn bright<F: Real>(&self) -> [[F; N]; 4] {
+    fn bright<F: Float>(&self) -> [[F; N]; 4] {
         let mut bright = [[F::ZERO; N]; 4];
         for (bright, [r, g, b]) in bright.iter_mut().zip(&self.0) {
             for i in 0..N {
@@ -194,7 +194,7 @@ impl<const N: usize> CornerTexels<N> {
     /// The colours of places that are so far, across and down, from the first, a row a colour.
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "a colour is an index into many arrays")]
-    fn between<F: Real>(&self, [across, down]: [&[F; N]; 2]) -> [[F; N]; 3] {
+    fn between<F: Float>(&self, [across, down]: [&[F; N]; 2]) -> [[F; N]; 3] {
         let mut colors = [[F::ZERO; N]; 3];
         for k in 0..3 {
             for i in 0..N {
@@ -210,7 +210,7 @@ impl<const N: usize> CornerTexels<N> {
 
 /// The mean of three colours.
 #[inline(always)]
-fn mean<F: Real>([r, g, b]: [F; 3]) -> F {
+fn mean<F: Float>([r, g, b]: [F; 3]) -> F {
     (r + g + b) / F::of(3.0)
 }
 
@@ -219,7 +219,7 @@ const LANES: usize = 16;
 
 /// What four corners have between them: left and right above, and below.
 #[inline(always)]
-fn between<F: Real>([a, b, c, d]: [F; 4], [across, down]: [F; 2]) -> F {
+fn between<F: Float>([a, b, c, d]: [F; 4], [across, down]: [F; 2]) -> F {
     let [left, right] = [a + (c - a) * down, b + (d - b) * down];
     left + (right - left) * across
 }
@@ -236,7 +236,7 @@ struct Corners<F, const N: usize> {
     row: [u32; N],
 }
 
-impl<F: Real, const N: usize> Corners<F, N> {
+impl<F: Float, const N: usize> Corners<F, N> {
     /// Of a grid of `columns` and `rows`, neither of which is 0.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "sides of images have 32 bits")]
@@ -272,7 +272,7 @@ impl<F: Real, const N: usize> Corners<F, N> {
 
 /// What a number of at least 0 has behind the point, and the whole number before it.
 #[inline(always)]
-fn whole<F: Real>(x: F) -> (F, u32) {
+fn whole<F: Float>(x: F) -> (F, u32) {
     let (nearest, bits) = x.nearest();
     let is_above = nearest > x;
     let below = if is_above { nearest - F::of(1.0) } else { nearest };

@@ -17,7 +17,7 @@ use std::f64::consts::TAU;
 use etendue_geometry::disk;
 use etendue_geometry::glam::DVec3;
 
-use crate::real::Real;
+use crate::float::Float;
 
 /// Three unit vectors at right angles; z is a surface's normal.
 #[derive(Debug, Clone, Copy)]
@@ -206,7 +206,7 @@ impl DiscreteDistribution {
 /// Jakob and Humphreys, *Physically Based Rendering*, 4th edition, section A.5.1).
 #[must_use]
 #[inline(always)]
-pub(crate) fn linear_place<F: Real>(u: F, [start, end]: [F; 2]) -> F {
+pub(crate) fn linear_place<F: Float>(u: F, [start, end]: [F; 2]) -> F {
     let root = ((F::of(1.0) - u) * start * start + u * end * end).sqrt();
     let sum = start + root;
     let place = u * (start + end) / sum;

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use etendue_geometry::glam::DVec3;
 
 use super::{CELLS, Corners, EnvironmentMap, LANES, between, mean};
-use crate::real::Real;
+use crate::float::Float;
 use crate::sampling::{GridCell, GridDistribution, linear_place};
 use crate::{Color, angles};
 
@@ -157,7 +157,7 @@ impl MapSampler {
 
     /// How bright cells of the table are.
     #[inline(always)]
-    fn bright_at<F: Real, const N: usize>(&self, numbers: &[[u32; N]; 4]) -> [[F; N]; 4] {
+    fn bright_at<F: Float, const N: usize>(&self, numbers: &[[u32; N]; 4]) -> [[F; N]; 4] {
         let mut bright = [[F::ZERO; N]; 4];
         for corner in 0..4 {
             for i in 0..N {
@@ -169,7 +169,7 @@ impl MapSampler {
 
     /// Directions in the patches that were chosen, with what the map has there.
     #[inline(always)]
-    pub(crate) fn in_patches<F: Real>(
+    pub(crate) fn in_patches<F: Float>(
         &self,
         map: &EnvironmentMap,
         patches: &[GridCell; LANES],
@@ -200,7 +200,7 @@ impl MapSampler {
 
     /// What the map has in unit directions.
     #[inline(always)]
-    pub(crate) fn in_directions<F: Real, const N: usize>(
+    pub(crate) fn in_directions<F: Float, const N: usize>(
         &self,
         map: &EnvironmentMap,
         directions: [[F; N]; 3],
@@ -220,7 +220,7 @@ impl MapSampler {
     /// Places in the patches that were chosen, of which the corners shine so, how far they are from the first of
     /// these, and their density over the unit square.
     #[inline(always)]
-    fn places_in<F: Real>(
+    fn places_in<F: Float>(
         &self,
         patches: &[GridCell; LANES],
         corners: &[[F; LANES]; 4],
@@ -268,7 +268,7 @@ impl MapSampler {
     /// Densities (1/sr) of places with the sines of their polar angles, about which the texels are known, and the colours
     /// there.
     #[inline(always)]
-    fn pdf_of<F: Real, const N: usize>(
+    fn pdf_of<F: Float, const N: usize>(
         &self,
         places: &[[F; N]; 2],
         sines: [F; N],
@@ -376,7 +376,7 @@ fn looked_up(sampler: &MapSampler, map: &EnvironmentMap, asked: &mut OnMap) {
 
 /// A density over the map's places as one over solid angles (1/sr), by the sine of the polar angle.
 #[inline(always)]
-fn over_the_sphere<F: Real>(density: F, sin_theta: F) -> F {
+fn over_the_sphere<F: Float>(density: F, sin_theta: F) -> F {
     let over = density / (F::of(2.0 * PI * PI) * sin_theta);
     if sin_theta > F::ZERO { over } else { F::ZERO }
 }

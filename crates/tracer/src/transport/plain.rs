@@ -22,7 +22,7 @@ use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitPrecision, RayBlocks};
 
-use self::facets::Facets;
+use self::facets::BlockFacets;
 use self::kernel::{Leaving, Numbers, leave_blocks};
 use self::lamps::{ChosenLamps, Lights};
 use self::sky::ask_sky;
@@ -101,7 +101,7 @@ pub(super) struct PlainScratch {
     /// Hits on what shines, and rays that met nothing.
     seen: Vec<u32>,
     missed: Vec<u32>,
-    facets: Facets,
+    facets: BlockFacets,
     varied: Vec<Varied>,
     /// When rays are (s from the frame's time), where that counts.
     times: Vec<f64>,

@@ -16,7 +16,7 @@ type Wide = [f64; LANES];
 
 /// The facets of a block's hits, kept for the next block.
 #[derive(Debug, Default)]
-pub(super) struct Facets {
+pub(super) struct BlockFacets {
     sheets: Box<Sheets<LANES>>,
     smooth: Box<Smooth<LANES>>,
     normal: [Wide; 3],
@@ -39,7 +39,7 @@ pub(super) struct Scattered {
     pub(super) share: [Row; 3],
 }
 
-impl Facets {
+impl BlockFacets {
     /// Takes the facets of a block's hits as they are seen, with normals that light is scattered about.
     #[inline(always)]
     pub(super) fn see(
@@ -103,7 +103,7 @@ fn widen(rows: &[Row; 3], to: &mut [Wide; 3]) {
 
 #[multiversion::multiversion(targets = "simd")]
 fn see(
-    facets: &mut Facets,
+    facets: &mut BlockFacets,
     surfaces: Surfaces<'_>,
     (block, first, found): (&RayBlock, usize, &Found),
     (hits, shading): (&Hits, &[Row; 3]),
@@ -112,7 +112,7 @@ fn see(
     widen(shading, &mut facets.shading);
     widen(&block.direction, &mut facets.direction);
     widen(&found.color, &mut facets.base);
-    let Facets { sheets, smooth, .. } = facets;
+    let BlockFacets { sheets, smooth, .. } = facets;
     // What lanes of other surfaces hold is of no use, and a number.
     sheets.alpha = [1.0; LANES];
     for lane in 0..LANES {
@@ -159,7 +159,7 @@ fn see(
 
 #[multiversion::multiversion(targets = "simd")]
 fn reflect(
-    facets: &mut Facets,
+    facets: &mut BlockFacets,
     lanes: &Mask,
     (toward, pdf, is_delta): (&[Row; 3], &Row, &Row),
     (value, share): (&mut Row, &mut [Row; 3]),
@@ -185,7 +185,7 @@ fn reflect(
 
 #[multiversion::multiversion(targets = "simd")]
 fn scatter_sheets(
-    facets: &mut Facets,
+    facets: &mut BlockFacets,
     lanes: &Mask,
     (choice, square): (&Row, &[Row; 2]),
     scattered: &mut Scattered,
@@ -223,7 +223,7 @@ fn scatter_sheets(
 
 #[multiversion::multiversion(targets = "simd")]
 fn scatter_smooth(
-    facets: &mut Facets,
+    facets: &mut BlockFacets,
     (lanes, hits): (&Mask, &Hits),
     choice: &Row,
     scattered: &mut Scattered,

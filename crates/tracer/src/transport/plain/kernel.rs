@@ -11,7 +11,7 @@ use etendue_geometry::glam::DVec3;
 use super::ask::{ask, send};
 use super::compaction::{Compaction, Instructions};
 use super::depart::{Departing, depart, end_some, keep_those_that_may_meet, scatter};
-use super::facets::Facets;
+use super::facets::BlockFacets;
 use super::lamps::{ChosenLamps, Lights, OtherPlaces, place, place_on_chosen};
 use super::surfaces::{Found, Surfaces, bend};
 use super::{Columns, LAST, RayColumns};
@@ -58,7 +58,7 @@ pub(super) struct Leaving<'a> {
     pub(super) seen: &'a mut Vec<u32>,
     /// Rays that met nothing, if that is asked for.
     pub(super) missed: Option<&'a mut Vec<u32>>,
-    pub(super) facets: &'a mut Facets,
+    pub(super) facets: &'a mut BlockFacets,
 }
 
 /// A sphere around all that shines, relative to the blocks' origin: its centre and its radius (m).

@@ -5,7 +5,7 @@ use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub};
 use etendue_geometry::disk;
 
 /// A number of either precision.
-pub(crate) trait Real:
+pub(crate) trait Float:
     Copy
     + PartialOrd
     + From<f32>
@@ -38,7 +38,7 @@ pub(crate) trait Real:
     fn small_sine_cosine(self) -> (Self, Self);
 }
 
-impl Real for f64 {
+impl Float for f64 {
     const ZERO: Self = 0.0;
     const ONE_BELOW: Self = crate::sampling::ONE_BELOW;
 
@@ -77,7 +77,7 @@ impl Real for f64 {
     }
 }
 
-impl Real for f32 {
+impl Float for f32 {
     const ZERO: Self = 0.0;
     const ONE_BELOW: Self = 1.0 - Self::EPSILON / 2.0;
 
