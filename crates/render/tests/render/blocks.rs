@@ -58,6 +58,7 @@ fn room_of([of_box, of_ball]: [&str; 2], [tracer, lights, more, ball]: [&str; 4]
             "red": {{"type": "matte", "color": [0.7, 0.1, 0.1]}},
             "green": {{"type": "matte", "color": [0.1, 0.5, 0.2]}},
             "gold": {{"type": "metal", "color": [0.9, 0.7, 0.3], "roughness": 0.35}},
+            "burnished": {{"type": "metal", "color": [0.9, 0.7, 0.3], "roughness": 1e-11}},
             "polished": {{"type": "metal", "metal": "copper", "roughness": 0}},
             "copper": {{"type": "metal", "metal": "copper", "roughness": 0.3}},
             "mirror": {{"type": "mirror"}},
@@ -303,6 +304,8 @@ fn plain_facets_skies_and_other_lights_are_the_same_in_single_precision() {
         ("an image and a sun", ["gold", "plastic"], path(4), &sunny, ""),
         ("an image and a lamp", ["copper", "plastic"], path(4), image, LAMP),
         ("all lights", ["copper", "plastic"], path(5), &all, LAMP),
+        // Denser than single precision holds.
+        ("an image and facets that are hardly rough", ["burnished", "plastic"], path(3), image, LAMP),
         ("points", ["gold", "plastic"], path(3), POINTS, ""),
         ("a lamp", ["gold", "plastic"], path(3), "", LAMP),
         ("a lamp and mirrors", ["mirror", "polished"], path(4), "", LAMP),

@@ -79,6 +79,9 @@ pub(crate) struct PlainFacets {
     pub(crate) dip: [f64; 3],
 }
 
+/// The least square of a roughness whose densities, and directions within whose highlights, single precision holds.
+pub(crate) const LEAST_ALPHA: f64 = 1e-6;
+
 impl PlainSurfaces {
     /// Tests whether some are not matte, or not alike all over.
     pub(crate) fn are_rich(&self) -> bool {
@@ -159,6 +162,12 @@ impl PlainSurface {
             }
             _ => false,
         };
+        let is_resolved = kind != PlainKind::Sheet
+            || has_own_facets
+            || PlainFacets::of(material, spectral).alpha >= LEAST_ALPHA;
+        if !is_resolved {
+            return None;
+        }
         let color = match measured(material, spectral) {
             Some(bands) => Some(bands.map(|[face_on, _]| face_on)),
             None => placed.color.map(|tint| tint.color),

@@ -108,29 +108,40 @@ pub(super) struct PlainScratch {
 }
 
 impl Columns {
-    /// Makes room for so many; whether surfaces may be smooth.
-    fn resize(&mut self, len: usize, are_smooth: bool) {
+    /// Makes room for at least so many; whether surfaces may be smooth.
+    fn reserve(&mut self, len: usize, are_smooth: bool) {
         let len = len.next_multiple_of(LANES) + LANES;
-        self.flags.resize(if are_smooth { len } else { 0 }, 0);
-        self.ray.resize(len, 0);
-        self.pdf.resize(len, 0.0);
-        self.sky_chance.resize(len, 0.0);
+        if are_smooth {
+            grow(&mut self.flags, len);
+        } else {
+            self.flags.clear();
+        }
+        grow(&mut self.ray, len);
+        grow(&mut self.pdf, len);
+        grow(&mut self.sky_chance, len);
         let rows = self.throughput.iter_mut().chain(&mut self.normal).chain(&mut self.cone);
-        rows.for_each(|row| row.resize(len, 0.0));
+        rows.for_each(|row| grow(row, len));
+    }
+}
+
+/// Makes a column at least so long.
+fn grow<T: Copy + Default>(column: &mut Vec<T>, len: usize) {
+    if column.len() < len {
+        column.resize(len, T::default());
     }
 }
 
 impl RayColumns {
     fn restart(&mut self, most: usize, are_smooth: bool) {
         self.len = 0;
-        self.carried.resize(most, are_smooth);
+        self.carried.reserve(most, are_smooth);
         let len = self.carried.ray.len();
         for axis in self.start.iter_mut().chain(&mut self.along) {
-            axis.resize(len, 0.0);
+            grow(axis, len);
         }
-        self.reach.resize(len, 0.0);
-        self.left.resize(len, 0);
-        self.lamp.resize(len, 0);
+        grow(&mut self.reach, len);
+        grow(&mut self.left, len);
+        grow(&mut self.lamp, len);
     }
 
     /// The rays as blocks, which are refilled.
@@ -426,7 +437,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
 /// The camera's rays as paths.
 fn start(camera: &RaySamples<'_>, are_smooth: bool, carried: &mut Columns) {
     let len = camera.rays.len();
-    carried.resize(len, are_smooth);
+    carried.reserve(len, are_smooth);
     carried.flags.fill(SPECULAR);
     carried.len = len;
     for (number, ray) in (0..).zip(&mut carried.ray) {

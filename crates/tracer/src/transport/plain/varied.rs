@@ -8,7 +8,7 @@ use super::surfaces::{Surfaces, Varied};
 use super::{PlainScratch, SPECULAR};
 use crate::Scattering;
 use crate::footprint::{Cone, Footprint};
-use crate::placed::{PlainFacets, PlainSurfaces};
+use crate::placed::{LEAST_ALPHA, PlainFacets, PlainSurfaces};
 use crate::reference::SurfacePoint;
 use crate::transport::{RaySamples, Tracing};
 
@@ -24,17 +24,16 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             plain.varied.clear();
             return;
         }
-        let len = plain.carried.len;
-        plain.varied.resize(len, Varied::default());
-        for lane in 0..len {
+        let mut varied = std::mem::take(&mut plain.varied);
+        varied.resize(plain.carried.len, Varied::default());
+        for (lane, found) in varied.iter_mut().enumerate() {
             let placement = plain.rays.blocks()[lane / LANES].placement[lane % LANES];
             let own = surfaces.all.all.get(placement as usize);
             if own.is_some_and(|own| own.is_varied) {
-                let mut found = plain.varied[lane];
-                self.look_up_lane((camera, number), surfaces, plain, (lane, &mut found));
-                plain.varied[lane] = found;
+                self.look_up_lane((camera, number), surfaces, plain, (lane, found));
             }
         }
+        plain.varied = varied;
     }
 
     /// The same of one lane; what its surface has that is alike all over is left.
@@ -69,7 +68,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         if let Scattering::Gltf(surface) = &material.scattering
             && own.has_own_facets
         {
-            found.facets = PlainFacets::of_sheet(&surface.sheet(&point, scene, spectral));
+            let facets = PlainFacets::of_sheet(&surface.sheet(&point, scene, spectral));
+            found.facets = PlainFacets { alpha: facets.alpha.max(LEAST_ALPHA), ..facets };
         }
         if own.is_mapped {
             let front = vector(&block.normal, i).normalize();
