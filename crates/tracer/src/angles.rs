@@ -7,7 +7,7 @@
 //! * The arc tangent of t up to tan π/8: t times a polynomial in t² through its values at the eleven Chebyshev
 //!   nodes, whose relative error is below 1.2 · 10⁻¹⁶ before rounding; from there to 1 by
 //!   arctan t = π/4 + arctan((t − 1)/(t + 1)) (Hart et al., *Computer Approximations*, 1968, section 6.5).
-//! * Sine and cosine to π/4: [`disk::small_sine_cosine`].
+//! * Sine and cosine to π/4: [`Float::small_sine_cosine`].
 
 use std::f64::consts::TAU;
 

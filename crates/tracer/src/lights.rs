@@ -217,7 +217,7 @@ impl Lights {
         Some(first as usize + triangle as usize)
     }
 
-    /// The chance with which [`Self::choose`] chooses light `index` for a point.
+    /// The chance with which [`Self::pick`] picks light `index` for a point.
     pub(crate) fn chance(&self, receiver: &Receiver, index: usize) -> f64 {
         self.sampler.chance(receiver, index)
     }

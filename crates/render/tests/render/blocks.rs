@@ -305,7 +305,13 @@ fn plain_facets_skies_and_other_lights_are_the_same_in_single_precision() {
         ("an image and a lamp", ["copper", "plastic"], path(4), image, LAMP),
         ("all lights", ["copper", "plastic"], path(5), &all, LAMP),
         // Denser than single precision holds.
-        ("an image and facets that are hardly rough", ["burnished", "plastic"], path(3), image, LAMP),
+        (
+            "an image and facets that are hardly rough",
+            ["burnished", "plastic"],
+            path(3),
+            image,
+            LAMP,
+        ),
         ("points", ["gold", "plastic"], path(3), POINTS, ""),
         ("a lamp", ["gold", "plastic"], path(3), "", LAMP),
         ("a lamp and mirrors", ["mirror", "polished"], path(4), "", LAMP),

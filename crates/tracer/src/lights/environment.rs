@@ -10,7 +10,7 @@ use crate::{Color, Spectral};
 
 impl Lights {
     /// Radiance that comes to a point from each unit direction without meeting anything, and the density
-    /// (1/sr), chance included, with which [`Self::choose`] gives that direction for that point; 0 without a point.
+    /// (1/sr), chance included, with which [`Self::pick`] and [`Self::place`] give that direction for that point; 0 without a point.
     /// Both go to `each`, with the number of the pair.
     pub(crate) fn environment(
         &self,
