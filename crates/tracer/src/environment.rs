@@ -18,7 +18,7 @@ use crate::texture::{ImageError, read_file, read_image};
 use crate::{Color, Cube};
 
 pub use sampler::MapSampler;
-pub(crate) use sampler::{Lit, OnMap};
+pub(crate) use sampler::{MapLookup, OnMap};
 
 /// The most cells of the grid that directions are chosen on, across and down.
 const CELLS: [usize; 2] = [2048, 1024];

@@ -38,6 +38,26 @@ pub(crate) trait Float:
     fn small_sine_cosine(self) -> (Self, Self);
 }
 
+/// What both precisions have by these names.
+macro_rules! own_functions {
+    () => {
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            self.sqrt()
+        }
+
+        #[inline(always)]
+        fn abs(self) -> Self {
+            self.abs()
+        }
+
+        #[inline(always)]
+        fn copysign(self, sign: Self) -> Self {
+            self.copysign(sign)
+        }
+    };
+}
+
 impl Float for f64 {
     const ZERO: Self = 0.0;
     const ONE_BELOW: Self = crate::sampling::ONE_BELOW;
@@ -47,20 +67,7 @@ impl Float for f64 {
         x
     }
 
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        self.sqrt()
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        self.abs()
-    }
-
-    #[inline(always)]
-    fn copysign(self, sign: Self) -> Self {
-        self.copysign(sign)
-    }
+    own_functions!();
 
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "the low half is wanted")]
@@ -87,20 +94,7 @@ impl Float for f32 {
         x as Self
     }
 
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        self.sqrt()
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        self.abs()
-    }
-
-    #[inline(always)]
-    fn copysign(self, sign: Self) -> Self {
-        self.copysign(sign)
-    }
+    own_functions!();
 
     #[inline(always)]
     fn nearest(self) -> (Self, u32) {

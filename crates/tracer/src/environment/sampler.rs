@@ -173,7 +173,7 @@ impl MapSampler {
         &self,
         map: &EnvironmentMap,
         patches: &[GridCell; LANES],
-    ) -> Lit<F, LANES> {
+    ) -> MapLookup<F, LANES> {
         let mut numbers = [[0; LANES]; 4];
         for (i, patch) in patches.iter().enumerate() {
             let about = self.cells.about([patch.at[0] as usize, patch.at[1] as usize]);
@@ -195,7 +195,7 @@ impl MapSampler {
         for i in 0..LANES {
             densities[i] = over_the_sphere(over_square[i], sines[i]);
         }
-        Lit { directions, places, densities, colors }
+        MapLookup { directions, places, densities, colors }
     }
 
     /// What the map has in unit directions.
@@ -204,7 +204,7 @@ impl MapSampler {
         &self,
         map: &EnvironmentMap,
         directions: [[F; N]; 3],
-    ) -> Lit<F, N> {
+    ) -> MapLookup<F, N> {
         let [x, _, z] = &directions;
         let mut sines = [F::ZERO; N];
         for i in 0..N {
@@ -214,7 +214,7 @@ impl MapSampler {
         let about = Corners::of(places, map.size());
         let colors = map.texels_at(&about.numbers).between(about.within());
         let densities = self.pdf_of(&places, sines, &about, &colors);
-        Lit { directions, places, densities, colors }
+        MapLookup { directions, places, densities, colors }
     }
 
     /// Places in the patches that were chosen, of which the corners shine so, how far they are from the first of
@@ -305,7 +305,7 @@ impl MapSampler {
 }
 
 /// What a map has in directions side by side, a row a number.
-pub(crate) struct Lit<F, const N: usize> {
+pub(crate) struct MapLookup<F, const N: usize> {
     /// Unit.
     pub(crate) directions: [[F; N]; 3],
     places: [[F; N]; 2],
@@ -342,8 +342,8 @@ impl OnMap {
 impl OnMap {
     /// Takes what a map has in the directions from one on.
     #[inline(always)]
-    fn put(&mut self, start: usize, lit: &Lit<f64, LANES>) {
-        let Lit { directions: [x, y, z], places: [u, v], densities, colors: [r, g, b] } = lit;
+    fn put(&mut self, start: usize, lit: &MapLookup<f64, LANES>) {
+        let MapLookup { directions: [x, y, z], places: [u, v], densities, colors: [r, g, b] } = lit;
         for i in 0..LANES.min(self.directions.len() - start) {
             self.directions[start + i] = DVec3::new(x[i], y[i], z[i]);
             self.places[start + i] = [u[i], v[i]];

@@ -26,7 +26,7 @@ use self::facets::BlockFacets;
 use self::kernel::{Leaving, Numbers, leave_blocks};
 use self::lamps::{ChosenLamps, Lights};
 use self::sky::ask_sky;
-use self::surfaces::{Surfaces, Varied};
+use self::surfaces::{Surfaces, TextureLookup};
 use super::paths::{DRAWS, Draw, Step, Way, Workspace};
 use super::rays::{Blocks, RayHit};
 use super::trace::Encounter;
@@ -102,7 +102,7 @@ pub(super) struct PlainScratch {
     seen: Vec<u32>,
     missed: Vec<u32>,
     facets: BlockFacets,
-    varied: Vec<Varied>,
+    varied: Vec<TextureLookup>,
     /// When rays are (s from the frame's time), where that counts.
     times: Vec<f64>,
 }

@@ -12,7 +12,7 @@ use super::kernel::{Hits, Mask, ROUNDINGS, ZERO, mask};
 use super::lamps::{OtherPlaces, Places};
 
 /// The rays to lights.
-pub(super) struct Asked {
+pub(super) struct LightRays {
     start: [Row; 3],
     along: [Row; 3],
     length: Row,
@@ -29,7 +29,7 @@ pub(super) struct Asked {
 pub(super) fn ask<const TILTED: bool, const RICH: bool>(
     (places, others, offset): (&Places, Option<&OtherPlaces>, [f32; 3]),
     hits: &Hits,
-) -> Asked {
+) -> LightRays {
     let (mut squared, mut facing, mut above, mut blur) = (ZERO, ZERO, ZERO, ZERO);
     let mut turned = ZERO;
     for axis in 0..3 {
@@ -90,13 +90,13 @@ pub(super) fn ask<const TILTED: bool, const RICH: bool>(
         let is_far = others.is_some_and(|others| others.is_far[i] > 0.0);
         length[i] = select_unpredictable(is_far, f32::INFINITY, length[i]);
     }
-    Asked { start, along, length, toward, pdf, value }
+    LightRays { start, along, length, toward, pdf, value }
 }
 
 /// Notes the rays to lights that bring some share of their radiance.
 #[inline(always)]
 pub(super) fn send(
-    asked: &Asked,
+    asked: &LightRays,
     places: &Places,
     (asks, share, ray): (&Mask, &[Row; 3], &[u32; LANES]),
     (instructions, shadows): (Instructions, &mut RayColumns),

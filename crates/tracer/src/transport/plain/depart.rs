@@ -7,9 +7,10 @@ use std::hint::select_unpredictable;
 use etendue_geometry::block::{Floats as Row, LANES};
 
 use super::compaction::{Compaction, Instructions};
-use super::facets::Scattered;
+use super::facets::BsdfSamples;
 use super::kernel::{Hits, Leaving, Mask, Numbers, ROUNDINGS, Sphere, ZERO, mask};
 use super::{LAST, RayColumns, SPECULAR};
+use crate::float::Float;
 
 /// Leaves out paths that carry nothing and, by roulette, some of those that carry little.
 #[inline(always)]
@@ -35,7 +36,7 @@ pub(super) fn end_some(throughput: &mut [Row; 3], goes: &mut Mask, roulette: Opt
 }
 
 /// What the paths of a block carry that leave its hits.
-pub(super) struct Departing {
+pub(super) struct BlockPaths {
     pub(super) throughput: [Row; 3],
     pub(super) ray: [u32; LANES],
     pub(super) lanes: [u32; LANES],
@@ -46,8 +47,8 @@ pub(super) struct Departing {
 /// Notes the paths that leave a block's hits.
 #[inline(always)]
 pub(super) fn depart<const RICH: bool>(
-    (left, shading): (&Scattered, Option<&[Row; 3]>),
-    departing: &Departing,
+    (left, shading): (&BsdfSamples, Option<&[Row; 3]>),
+    departing: &BlockPaths,
     numbers: &Numbers<'_>,
     (instructions, leaving): (Instructions, &mut Leaving<'_>),
 ) {
@@ -73,7 +74,7 @@ pub(super) fn depart<const RICH: bool>(
 
 /// Notes which paths leave smooth surfaces, and so much of the others.
 #[inline(always)]
-fn put_flags(departing: &Departing, going: Compaction, of_rough: u32, to: &mut RayColumns) {
+fn put_flags(departing: &BlockPaths, going: Compaction, of_rough: u32, to: &mut RayColumns) {
     let mut flags = [of_rough; LANES];
     for i in 0..LANES {
         flags[i] = if departing.smooth[i] != 0 { SPECULAR } else { of_rough };
@@ -84,8 +85,8 @@ fn put_flags(departing: &Departing, going: Compaction, of_rough: u32, to: &mut R
 /// Notes paths, and how they came to their directions.
 #[inline(always)]
 fn put(
-    (left, shading): (&Scattered, Option<&[Row; 3]>),
-    departing: &Departing,
+    (left, shading): (&BsdfSamples, Option<&[Row; 3]>),
+    departing: &BlockPaths,
     going: Compaction,
     to: &mut RayColumns,
 ) {
@@ -117,7 +118,7 @@ pub(super) fn scatter<const TILTED: bool>(
     hits: &Hits,
     square: [Row; 2],
     share: [Row; 3],
-) -> Scattered {
+) -> BsdfSamples {
     let (along, pdf) = cosine_directions(hits.shading::<TILTED>(), &square);
     let [gx, gy, gz] = &hits.normal;
     let (mut start, mut goes) = ([ZERO; 3], [0; LANES]);
@@ -131,7 +132,7 @@ pub(super) fn scatter<const TILTED: bool>(
             start[axis][i] = hits.point[axis][i] + lifted;
         }
     }
-    Scattered { start, along, pdf, goes, share }
+    BsdfSamples { start, along, pdf, goes, share }
 }
 
 /// Unit directions about normals with density cos θ / π (1/sr), and that density.
@@ -168,12 +169,7 @@ fn disk_point([u, v]: [f32; 2]) -> [f32; 2] {
     let flat = a.abs() > b.abs();
     let (radius, other) = (select_unpredictable(flat, a, b), select_unpredictable(flat, b, a));
     let ratio = if radius == 0.0 { 0.0 } else { other / radius };
-    // Taylor's series as far as π/4: what is left out is below 4 · 10⁻⁹.
-    let angle = FRAC_PI_4 * ratio;
-    let x = angle * angle;
-    let sine = 1.0 + x * (-1.0 / 6.0 + x * (1.0 / 120.0 + x * (-1.0 / 5_040.0 + x / 362_880.0)));
-    let cosine = -0.5 + x * (1.0 / 24.0 + x * (-1.0 / 720.0 + x / 40_320.0));
-    let (sine, cosine) = (angle * sine, 1.0 + x * cosine);
+    let (sine, cosine) = (FRAC_PI_4 * ratio).small_sine_cosine();
     let (near, far) = (radius * cosine, radius * sine);
     [select_unpredictable(flat, near, far), select_unpredictable(flat, far, near)]
 }

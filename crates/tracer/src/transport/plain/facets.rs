@@ -30,7 +30,7 @@ pub(super) struct BlockFacets {
 }
 
 /// The rays that leave a block's hits by chance, and what they carry.
-pub(super) struct Scattered {
+pub(super) struct BsdfSamples {
     pub(super) start: [Row; 3],
     pub(super) along: [Row; 3],
     pub(super) pdf: Row,
@@ -70,7 +70,7 @@ impl BlockFacets {
         found: &Found,
         hits: &Hits,
         (choice, square): (&Row, &[Row; 2]),
-        scattered: &mut Scattered,
+        scattered: &mut BsdfSamples,
     ) {
         if found.sheets != [0; LANES] {
             scatter_sheets(self, &found.sheets, (choice, square), scattered);
@@ -188,7 +188,7 @@ fn scatter_sheets(
     facets: &mut BlockFacets,
     lanes: &Mask,
     (choice, square): (&Row, &[Row; 2]),
-    scattered: &mut Scattered,
+    scattered: &mut BsdfSamples,
 ) {
     let (mut choices, mut squares) = ([0.0; LANES], [[0.0; 2]; LANES]);
     for i in 0..LANES {
@@ -226,7 +226,7 @@ fn scatter_smooth(
     facets: &mut BlockFacets,
     (lanes, hits): (&Mask, &Hits),
     choice: &Row,
-    scattered: &mut Scattered,
+    scattered: &mut BsdfSamples,
 ) {
     let mut choices = [0.0; LANES];
     for i in 0..LANES {

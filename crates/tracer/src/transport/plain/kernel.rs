@@ -10,7 +10,7 @@ use etendue_geometry::glam::DVec3;
 
 use super::ask::{ask, send};
 use super::compaction::{Compaction, Instructions};
-use super::depart::{Departing, depart, end_some, keep_those_that_may_meet, scatter};
+use super::depart::{BlockPaths, depart, end_some, keep_those_that_may_meet, scatter};
 use super::facets::BlockFacets;
 use super::lamps::{ChosenLamps, Lights, OtherPlaces, place, place_on_chosen};
 use super::surfaces::{Found, Surfaces, bend};
@@ -230,7 +230,7 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool>(
         end_some(&mut throughput, &mut left.goes, numbers.roulette.then(|| square(Draw::Chance)));
         let sky_chance = numbers.chosen.filter(|chosen| RICH && !chosen.sky_chance.is_empty());
         let sky_chance = sky_chance.map(|chosen| row(&chosen.sky_chance));
-        let departing = Departing { throughput, ray, lanes, smooth: found.smooth, sky_chance };
+        let departing = BlockPaths { throughput, ray, lanes, smooth: found.smooth, sky_chance };
         let shading = numbers.chosen.is_some().then(|| hits.shading::<TILTED>());
         depart::<RICH>((&left, shading), &departing, &numbers, (instructions, &mut leaving));
     }

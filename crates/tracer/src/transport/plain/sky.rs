@@ -9,7 +9,7 @@ use etendue_geometry::glam::DMat3;
 use super::kernel::{ZERO, round, single};
 use super::lamps::{ChosenLamps, Lights, OTHER, OtherPlace};
 use super::{Columns, PlainScratch, RayColumns, SPECULAR};
-use crate::environment::{EnvironmentMap, Lit, MapSampler};
+use crate::environment::{EnvironmentMap, MapLookup, MapSampler};
 use crate::sampling::GridCell;
 use crate::transport::{RaySamples, Tracing};
 
@@ -26,7 +26,7 @@ pub(super) struct PlainSky<'a> {
 }
 
 /// What paths that met the sky brought there, side by side.
-struct Arrived {
+struct SkyHits {
     direction: [Row; 3],
     throughput: [Row; 3],
     /// Density (1/sr) of the direction, and the chance with which the sky was asked where it began; 1 and 0 where no
@@ -37,7 +37,7 @@ struct Arrived {
     normal: [Row; 3],
 }
 
-impl Arrived {
+impl SkyHits {
     const NOTHING: Self = Self {
         direction: [ZERO; 3],
         throughput: [ZERO; 3],
@@ -82,7 +82,7 @@ impl<'a> PlainSky<'a> {
     }
 
     /// Light that comes along the ways that paths arrived by, in terms of [`Self::bands`].
-    fn light_of(&self, arrived: &Arrived, light: &mut [Row; 3]) {
+    fn light_of(&self, arrived: &SkyHits, light: &mut [Row; 3]) {
         light_of(self, arrived, light);
     }
 }
@@ -102,12 +102,12 @@ fn turned(rows: DMat3, [x, y, z]: &[Row; 3]) -> [Row; 3] {
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn light_of(sky: &PlainSky<'_>, arrived: &Arrived, light: &mut [Row; 3]) {
+fn light_of(sky: &PlainSky<'_>, arrived: &SkyHits, light: &mut [Row; 3]) {
     let (mut density, mut color) = (ZERO, [[1.0; LANES]; 3]);
     match sky.map {
         Some((map, sampler)) => {
             let own = turned(sky.world_from_map.transpose(), &arrived.direction);
-            let lit: Lit<f32, LANES> = sampler.in_directions(map, own);
+            let lit: MapLookup<f32, LANES> = sampler.in_directions(map, own);
             (density, color) = (lit.densities, lit.colors);
         }
         None => {
@@ -141,7 +141,7 @@ pub(super) fn place_on_sky(sky: &PlainSky<'_>, chosen: &mut ChosenLamps) {
     for (number, run) in cells.chunks(LANES).enumerate() {
         let mut patches = [GridCell::default(); LANES];
         patches[..run.len()].copy_from_slice(run);
-        let lit: Lit<f32, LANES> = sampler.in_patches(map, &patches);
+        let lit: MapLookup<f32, LANES> = sampler.in_patches(map, &patches);
         let directions = turned(sky.world_from_map, &lit.directions);
         for i in 0..run.len() {
             let (lane, chance) = chosen.of_sky[number * LANES + i];
@@ -174,7 +174,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let Some(sky) = lights.sky.filter(|sky| sky.visible || number > 0) else { return };
         let flags = &plain.carried.flags;
         for missed in plain.missed.chunks(LANES) {
-            let mut arrived = Arrived::NOTHING;
+            let mut arrived = SkyHits::NOTHING;
             for (i, &own) in missed.iter().enumerate() {
                 let own = own as usize;
                 // The camera's rays are not all traced: those that cannot hit anything are other ones in blocks.
@@ -201,7 +201,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
 /// Makes last directions rays to the sky, where nothing else shines: they bring its light unless something is in between.
 pub(super) fn ask_sky(sky: &PlainSky<'_>, last: &mut RayColumns, shadows: &mut RayColumns) {
     for first in (0..last.len).step_by(LANES) {
-        let mut arrived = Arrived::NOTHING;
+        let mut arrived = SkyHits::NOTHING;
         let count = LANES.min(last.len - first);
         for i in 0..count {
             let direction = [0, 1, 2].map(|axis| last.along[axis][first + i]);

@@ -18,12 +18,12 @@ pub(in crate::transport) struct Surfaces<'a> {
     pub(super) all: &'a PlainSurfaces,
     pub(super) geometry: &'a Geometry,
     /// By lane, of surfaces that are not alike all over; empty where all are.
-    pub(super) varied: &'a [Varied],
+    pub(super) varied: &'a [TextureLookup],
 }
 
 /// What a surface that is not alike all over has where it was hit.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Varied {
+pub(super) struct TextureLookup {
     pub(super) color: [f32; 3],
     /// About which light is scattered, of any length and side, where normals are mapped.
     pub(super) normal: [f32; 3],

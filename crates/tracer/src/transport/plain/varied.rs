@@ -4,7 +4,7 @@ use etendue_geometry::block::{LANES, vector};
 use etendue_geometry::glam::DVec3;
 
 use super::kernel::{round, single};
-use super::surfaces::{Surfaces, Varied};
+use super::surfaces::{Surfaces, TextureLookup};
 use super::{PlainScratch, SPECULAR};
 use crate::Scattering;
 use crate::footprint::{Cone, Footprint};
@@ -25,7 +25,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             return;
         }
         let mut varied = std::mem::take(&mut plain.varied);
-        varied.resize(plain.carried.len, Varied::default());
+        varied.resize(plain.carried.len, TextureLookup::default());
         for (lane, found) in varied.iter_mut().enumerate() {
             let placement = plain.rays.blocks()[lane / LANES].placement[lane % LANES];
             let own = surfaces.all.all.get(placement as usize);
@@ -42,7 +42,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         (camera, number): (&RaySamples<'_>, u32),
         surfaces: Surfaces<'_>,
         plain: &PlainScratch,
-        (lane, found): (usize, &mut Varied),
+        (lane, found): (usize, &mut TextureLookup),
     ) -> Option<()> {
         let (block, i) = (&plain.rays.blocks()[lane / LANES], lane % LANES);
         let (scene, spectral) = (&self.ctx.scene, self.ctx.spectral);
