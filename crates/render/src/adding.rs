@@ -346,14 +346,19 @@ impl Memory {
     }
 }
 
-/// Adds rays in the order of their samples.
+/// Adds rays in the order of their samples, of which each has one at most.
 fn in_order(sample: &[u32], order: &mut Vec<u32>, add: &mut dyn FnMut(usize)) {
+    /// No ray.
+    const NONE: u32 = u32::MAX;
     if sample.is_sorted() {
         return (0..sample.len()).for_each(add);
     }
     // A lens that disperses sorts its rays by wavelength.
+    let last = sample.iter().copied().max().unwrap_or(0);
     order.clear();
-    order.extend(0..u32::try_from(sample.len()).unwrap_or(u32::MAX));
-    order.sort_unstable_by_key(|&ray| sample[ray as usize]);
-    order.iter().for_each(|&ray| add(ray as usize));
+    order.resize(last as usize + 1, NONE);
+    for (&sample, ray) in sample.iter().zip(0..) {
+        order[sample as usize] = ray;
+    }
+    order.iter().filter(|&&ray| ray != NONE).for_each(|&ray| add(ray as usize));
 }

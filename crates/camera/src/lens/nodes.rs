@@ -1,6 +1,8 @@
 //! Wavelengths that the rays of all bands are traced at, and polynomials between them.
 
+use etendue_optics::analysis::least_squares::LeastSquares;
 use etendue_optics::train::OpticalTrain;
+use glam::{DVec2, DVec3};
 
 /// The most wavelengths that a ray is traced at.
 pub(super) const MOST_NODES: usize = 8;
@@ -24,6 +26,8 @@ impl SharingLimits {
 pub(super) struct NodeWeights {
     /// What each node counts.
     pub(super) weights: [f64; MOST_NODES],
+    /// What the [`NextTerm`] counts.
+    pub(super) next: f64,
     /// Transmission of the filters.
     pub(super) filters: f64,
 }
@@ -76,6 +80,26 @@ impl<'a> Variable<'a> {
         (0..count).map(node).collect()
     }
 
+    /// The wavelength (nm) between the nodes at which the product of the distances from all of them is greatest: there
+    /// [`Self::next_weight`] is 1.
+    pub(super) fn farthest(&self, nodes: &[f64]) -> f64 {
+        let (from, to) = (nodes[0], nodes[nodes.len() - 1]);
+        let fine = (1..256).map(|k| from + (to - from) * f64::from(k) / 256.0);
+        let off = |nm: &f64| self.off(nodes, *nm).abs();
+        fine.max_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(from)
+    }
+
+    /// The product of the distances from all nodes.
+    fn off(&self, nodes: &[f64], nm: f64) -> f64 {
+        nodes.iter().map(|&node| self.at(nm) - self.at(node)).product()
+    }
+
+    /// Weight of the [`NextTerm`] at a wavelength (nm), whose greatest between the nodes is 1.
+    pub(super) fn next_weight(&self, nodes: &[f64], nm: f64) -> f64 {
+        let greatest = self.off(nodes, self.farthest(nodes));
+        if greatest == 0.0 { 0.0 } else { self.off(nodes, nm) / greatest }
+    }
+
     /// Weight of each node at a wavelength (nm): Lagrange's polynomials.
     pub(super) fn weights(&self, nodes: &[f64], nm: f64) -> [f64; MOST_NODES] {
         let x = self.at(nm);
@@ -87,4 +111,49 @@ impl<'a> Variable<'a> {
         }
         weights
     }
+}
+
+/// The next term of Newton's polynomial through the nodes, for which a ray would have to be traced once more: by how much
+/// places are off in between (pixels), as a straight line in where a ray lands and where it leaves the lens. That is
+/// what secondary spectra are in the third order: longitudinal as the pupil's point, lateral as the field's.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct NextTerm {
+    /// Of columns and rows.
+    factors: [[f64; TERMS]; 2],
+}
+
+const TERMS: usize = 5;
+
+impl NextTerm {
+    /// By least squares of rays that land on a place (pixels), leave the lens at a point (mm), and are off by so much
+    /// (pixels); zero where these do not tell it.
+    pub(super) fn fitted(rays: impl Iterator<Item = (DVec2, DVec3, DVec2)>) -> Self {
+        let mut fits = [LeastSquares::new(TERMS), LeastSquares::new(TERMS)];
+        for (place, point, off) in rays {
+            let row = terms(place.into(), point);
+            fits[0].add(&row, off.x, 1.0);
+            fits[1].add(&row, off.y, 1.0);
+        }
+        let factors = fits.map(|fit| fit.solve().and_then(|found| found.try_into().ok()));
+        match factors {
+            [Some(columns), Some(rows)] => Self { factors: [columns, rows] },
+            _ => Self::default(),
+        }
+    }
+
+    /// That of a ray (pixels).
+    #[inline(always)]
+    pub(super) fn at(&self, place: [f64; 2], point: DVec3) -> [f64; 2] {
+        let terms = terms(place, point);
+        let sum = |factors: &[f64; TERMS]| {
+            let [a, b, c, d, e] = *factors;
+            a * terms[0] + b * terms[1] + c * terms[2] + d * terms[3] + e * terms[4]
+        };
+        [sum(&self.factors[0]), sum(&self.factors[1])]
+    }
+}
+
+#[inline(always)]
+fn terms([column, row]: [f64; 2], point: DVec3) -> [f64; TERMS] {
+    [1.0, column, row, point.x, point.y]
 }

@@ -5,7 +5,7 @@ use etendue_optics::glass::GlassError;
 use etendue_optics::train::{ExitPupil, MonochromaticTrain, OpticalTrain};
 use etendue_spectrum::{Bands, Curve, Outside, Spread};
 
-use super::nodes::NodeWeights;
+use super::nodes::{NextTerm, NodeWeights};
 
 /// The exit pupil measured at the wavelengths that are wanted.
 #[derive(Debug)]
@@ -32,6 +32,7 @@ pub(super) struct BandInterpolation {
     pub(super) nodes: Vec<MonochromaticTrain>,
     /// By band and by wavelength that it is drawn from.
     pub(super) bands: Vec<Vec<NodeWeights>>,
+    pub(super) next: NextTerm,
     /// Whether glass takes light.
     pub(super) has_losses: bool,
     /// From where a ray leaves the lens to where one starts that comes back (mm).

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::lens_camera::LensCamera;
 use crate::{CameraRays, FilmSamples, Pose};
 use etendue_optics::element::{Block, Clip, LANES};
-use etendue_optics::train::pupil::{Disk, DiskSamples};
+use etendue_optics::train::pupil::PupilSamples;
 use etendue_optics::train::{ExitPupil, MonochromaticTrain, Side};
 
 impl LensCamera {
@@ -54,22 +54,6 @@ impl LensCamera {
     ) -> usize {
         let first = out.sample.len();
         out.sample.extend(numbers);
-        match pupil.disk() {
-            Some(disk) => self.aim_at_disk((pupil, disk), samples, first, out),
-            None => self.aim_at_pupil((pupil, lens), samples, first, out),
-        }
-        first
-    }
-
-    /// Starts rays for the samples that `out` names from `first` on, towards a pupil known in closed
-    /// form.
-    fn aim_at_disk(
-        &self,
-        (pupil, disk): (&ExitPupil, &Disk),
-        samples: &FilmSamples,
-        first: usize,
-        out: &mut CameraRays,
-    ) {
         let film = self.focused.film();
         let [x, y] = &mut out.places;
         x.clear();
@@ -82,15 +66,17 @@ impl LensCamera {
             y.push(place.y);
             out.squares.push(samples.pupil[i]);
         }
-        let scale = pupil.index2() / self.solid_angle;
-        let bundle =
-            DiskSamples { sensor: &film.frame, scale, film: [x, y], squares: &out.squares };
-        disk.fill(&bundle, &mut out.in_lens);
+        let scale = 1.0 / self.solid_angle;
+        let bundle = PupilSamples { scale, film: [x, y], squares: &out.squares };
+        if !pupil.fill(&bundle, &mut out.in_lens) {
+            self.aim_one_by_one((pupil, lens), samples, first, out);
+        }
+        first
     }
 
     /// Starts rays for the samples that `out` names from `first` on, and leaves out those of places
     /// where no light arrives.
-    fn aim_at_pupil(
+    fn aim_one_by_one(
         &self,
         (pupil, lens): (&ExitPupil, &MonochromaticTrain),
         samples: &FilmSamples,

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use etendue_optics::element::{Clip, LensRays};
 use etendue_optics::train::analysis::projected_solid_angle;
-use etendue_optics::train::pupil::DiskSamples;
+use etendue_optics::train::pupil::PupilSamples;
 use etendue_optics::train::{ExitPupil, Focus, LensFile, OpticalTrain, Side};
 use glam::{DVec2, DVec3};
 
@@ -105,10 +105,8 @@ fn samples_of_a_thin_lens_weigh_all_but_the_same() {
             assert!(most <= allowed + 1e-12, "f/{f_number} at {r} mm: {most} and {allowed}");
             let mut rays = LensRays::default();
             let (x, y) = (vec![film.x; squares.len()], vec![film.y; squares.len()]);
-            let frame = train.sensor_frame(f);
-            let samples =
-                DiskSamples { sensor: &frame, scale: 1.0, film: [&x, &y], squares: &squares };
-            pupil.disk().unwrap().fill(&samples, &mut rays);
+            let samples = PupilSamples { scale: 1.0, film: [&x, &y], squares: &squares };
+            assert!(pupil.fill(&samples, &mut rays));
             for (i, weight) in weights.iter().enumerate() {
                 let own = rays.throughput(i);
                 assert!((own / weight - 1.0).abs() < 1e-12, "f/{f_number} at {r} mm: {own}");
@@ -129,7 +127,6 @@ fn thin_lenses_faster_than_half_an_f_number_have_bounded_weights_and_the_irradia
         ));
         let half_size = [2.5 * a, 2.0 * a];
         let pupil = ExitPupil::new(&train, &[587.56], f, half_size).unwrap();
-        let disk = pupil.disk().unwrap();
         for r in [0.0, 0.3 * a, 0.99 * a, 1.01 * a, 3.0 * a] {
             let film = DVec2::new(0.6 * r, -0.8 * r);
             let root = ((f * f + r * r + a * a).powi(2) - 4.0 * r * r * a * a).sqrt();
@@ -151,12 +148,10 @@ fn thin_lenses_faster_than_half_an_f_number_have_bounded_weights_and_the_irradia
             }
             // In batches, the same; and no ray is lost.
             let mut rays = LensRays::default();
-            let frame = train.sensor_frame(f);
             let x = vec![film.x; squares.len()];
             let y = vec![film.y; squares.len()];
-            let samples =
-                DiskSamples { sensor: &frame, scale: 1.0, film: [&x, &y], squares: &squares };
-            disk.fill(&samples, &mut rays);
+            let samples = PupilSamples { scale: 1.0, film: [&x, &y], squares: &squares };
+            assert!(pupil.fill(&samples, &mut rays));
             let at = train.at(587.56).unwrap();
             at.trace(Side::Sensor, Clip::On, &mut rays);
             let batch = rays.passed_throughput() / f64::from(COUNT);
@@ -195,6 +190,54 @@ fn lenses_without_symmetry_are_sampled_without_bias_too() {
             assert!((irradiance / exact - 1.0).abs() < 2.5e-3, "{film}: {irradiance} and {exact}");
             println!("{film}: {left:.4} leave, off by {:.1e}", irradiance / exact - 1.0);
         }
+    }
+}
+
+/// Along a radius, on a grid, and around what stands in the middle of the light; a place where none arrives is asked
+/// one by one.
+#[test]
+fn measured_pupils_are_sampled_side_by_side_as_one_by_one() {
+    let iris = build(
+        r#"{"elements": [
+        {"type": "surface", "radius": 62.8, "thickness": 4, "glass": "N-BK7", "semi_diameter": 12},
+        {"type": "surface", "radius": -45.7, "thickness": 2.5, "glass": "N-SF5", "semi_diameter": 12.7},
+        {"type": "surface", "radius": -128.2, "thickness": 3, "semi_diameter": 12.7, "decentre": [1, 0.5]},
+        {"type": "aperture", "shape": "polygon", "radius": 9, "blades": 6, "rotation": 10}],
+        "sensor": {"tilt": [8, 0]}}"#,
+    );
+    let lenses = [
+        (preset("double-gauss"), 14.0, true),
+        (preset("schmidt-cassegrain"), 6.0, true),
+        (iris, 8.0, false),
+    ];
+    for (train, radius, is_radial) in lenses {
+        let z = train.sensor_z(Focus::Infinity).unwrap();
+        let nm = train.wavelength();
+        let pupil = ExitPupil::new(&train, &[nm], z, [radius, radius]).unwrap();
+        assert_eq!(pupil.is_radial(), is_radial);
+        let squares: Vec<[f64; 2]> = [[0.5; 2], [0.0; 2], [1.0, 0.0], [0.5, 1.0]]
+            .into_iter()
+            .chain((0..3_000).map(unit_square))
+            .collect();
+        let film: Vec<DVec2> = (0..squares.len())
+            .map(|i| DVec2::from_angle(0.7 * i as f64) * radius * (i % 7) as f64 / 6.0)
+            .collect();
+        let [x, y] = [0, 1].map(|axis| film.iter().map(|at| at[axis]).collect::<Vec<_>>());
+        let mut rays = LensRays::default();
+        let samples = PupilSamples { scale: 0.5, film: [&x, &y], squares: &squares };
+        assert!(pupil.fill(&samples, &mut rays));
+        for (i, (&film, &u)) in film.iter().zip(&squares).enumerate() {
+            let one = pupil.sample(film, u, nm).unwrap();
+            // Some roundings, of sines and cosines among them.
+            let off = (rays.direction(i) - one.direction).length();
+            assert!(off < 1e-14, "{film} at {u:?}: {off}");
+            let off = rays.throughput(i) / (0.5 * one.weight) - 1.0;
+            assert!(off.abs() < 1e-13, "{film} at {u:?}: {off}");
+            assert!((rays.position(i) - pupil.film_point(film)).length() < 1e-13);
+        }
+        let far = [10.0 * radius, 0.0];
+        let beyond = PupilSamples { scale: 1.0, film: [&far, &far], squares: &squares[..2] };
+        assert!(!pupil.fill(&beyond, &mut rays));
     }
 }
 

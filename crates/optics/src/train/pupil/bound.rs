@@ -1,11 +1,13 @@
 //! The bound around the passing directions from one point of the sensor, joined from those of the nodes
-//! around it: samples of it.
+//! around it: samples of it, one by one and side by side.
 
+use etendue_geometry::disk;
 use glam::DVec2;
 
-use super::PupilOutline;
 use super::coded::Anywhere;
 use super::place::{NodePlace, between};
+use super::{ANGLES, ExitPupil, PupilOutline, PupilSamples};
+use crate::element::{Block, Frame, LANES, RayStatus};
 
 /// The outline from one point of the sensor.
 pub(super) struct PupilBound<'a> {
@@ -51,20 +53,140 @@ impl PupilBound<'_> {
     /// Slopes for a place in the unit square, uniform in area at each angle, and the area of slopes that
     /// they stand for; `None` when the bound is empty there.
     pub(super) fn draw(&self, u: [f64; 2]) -> Option<(DVec2, f64)> {
-        let (disc_radius, turn) = concentric(u);
-        let reach = self.reach(turn);
+        let (radius, turn) = concentric(u);
+        let radii = [self.inner(turn), self.reach(turn)];
+        let ([along, across], area) = spread(radii, disk::point(u), radius);
         let [centre, half] = self.frame;
-        let angle = DVec2::from_angle(turn * std::f64::consts::TAU);
-        let inner = self.inner(turn);
-        if inner > 0.0 && inner < reach {
-            let squares = [inner * inner, reach * reach];
-            let rest = squares[1] - squares[0];
-            let radius = (squares[0] + rest * disc_radius * disc_radius).sqrt();
-            let area = std::f64::consts::PI * half.x * half.y * rest;
-            return Some((self.turned(centre + angle * half * radius), area));
+        let slopes = centre + DVec2::new(along, across) * half;
+        (area > 0.0).then(|| (self.turned(slopes), area * half.x * half.y))
+    }
+}
+
+/// A point of the unit disk, which is so far from its middle, between two radii along the same angle, of which the
+/// inner one counts if it is the lesser; and the area that it stands for. In the units of the radii.
+#[inline(always)]
+fn spread([inner, reach]: [f64; 2], [a, b]: [f64; 2], radius: f64) -> ([f64; 2], f64) {
+    let from = if (inner > 0.0) & (inner < reach) { inner * inner } else { 0.0 };
+    let rest = if reach > 0.0 { reach * reach - from } else { 0.0 };
+    let (a, b, inverse) = if radius > 0.0 { (a, b, 1.0 / radius) } else { (1.0, 0.0, 1.0) };
+    let scale = (from + rest * radius * radius).sqrt() * inverse;
+    ([a * scale, b * scale], std::f64::consts::PI * rest)
+}
+
+type Row = [f64; LANES];
+
+/// What the nodes around the places of a block have there.
+struct NodeRows {
+    /// The direction that is the nodes' +x.
+    axis: [Row; 2],
+    centre: [Row; 2],
+    half: [Row; 2],
+    /// The inner radius and the outer one, at the sample's angle.
+    radii: [Row; 2],
+}
+
+impl NodeRows {
+    const NOTHING: Self = Self {
+        axis: [[1.0; LANES], [0.0; LANES]],
+        centre: [[0.0; LANES]; 2],
+        half: [[0.0; LANES]; 2],
+        radii: [[0.0; LANES]; 2],
+    };
+
+    /// Adds a node's share to a lane, at an angle between two of its table.
+    #[inline(always)]
+    fn add(
+        &mut self,
+        lane: usize,
+        (node, weight): (&PupilOutline, f64),
+        (low, share): (usize, f64),
+    ) {
+        let (centre, half) = (node.centre.to_array(), node.half.to_array());
+        for axis in 0..2 {
+            self.centre[axis][lane] += centre[axis] * weight;
+            self.half[axis][lane] += half[axis] * weight;
         }
-        let area = std::f64::consts::PI * half.x * half.y * reach * reach;
-        (reach > 0.0).then(|| (self.turned(centre + angle * half * (reach * disc_radius)), area))
+        for (row, table) in self.radii.iter_mut().zip([&node.inner, &node.reach]) {
+            row[lane] += (table[low] + (table[low + 1] - table[low]) * share) * weight;
+        }
+    }
+}
+
+impl ExitPupil {
+    /// Fills blocks with rays towards the bounds that were measured, a sample a ray; false where no light arrives at
+    /// the place of some sample, which stays as it was.
+    pub(super) fn fill_bounds(&self, bundle: &PupilSamples<'_>, blocks: &mut [Block]) -> bool {
+        let mut are_lit = true;
+        for (number, block) in blocks.iter_mut().enumerate() {
+            let first = number * LANES;
+            let count = LANES.min(bundle.squares.len() - first);
+            let (mut square, mut film) = ([[0.5; 2]; LANES], [[0.0; LANES]; 2]);
+            square[..count].copy_from_slice(&bundle.squares[first..first + count]);
+            for (row, from) in film.iter_mut().zip(bundle.film) {
+                row[..count].copy_from_slice(&from[first..first + count]);
+            }
+            let mut rows = NodeRows::NOTHING;
+            for lane in 0..count {
+                let place = self.place(DVec2::new(film[0][lane], film[1][lane]));
+                let Some(NodePlace { axis, nodes }) = place else { return false };
+                let (_, turn) = concentric(square[lane]);
+                #[expect(clippy::cast_precision_loss, reason = "128 angles")]
+                let at = turn * ANGLES as f64;
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "in 0..=128"
+                )]
+                let low = (at as usize).min(ANGLES - 1);
+                #[expect(clippy::cast_precision_loss, reason = "128 angles")]
+                let angle = (low, at - low as f64);
+                (rows.axis[0][lane], rows.axis[1][lane]) = axis.into();
+                for (node, weight) in nodes.into_iter().filter(|(_, weight)| *weight != 0.0) {
+                    rows.add(lane, (&self.nodes[node], weight), angle);
+                }
+            }
+            let scale = bundle.scale * self.index2;
+            aim(&rows, (&self.sensor, scale), (&film, &square), block);
+            are_lit &= block.throughput[..count].iter().all(|weight| *weight > 0.0);
+            block.outcome[..count].fill(RayStatus::Exited.code());
+        }
+        are_lit
+    }
+}
+
+/// Rays of a block towards places in their bounds, each with its weight; 0 where its bound is empty.
+#[multiversion::multiversion(targets = "simd")]
+fn aim(
+    rows: &NodeRows,
+    (sensor, scale): (&Frame, f64),
+    (film, squares): (&[Row; 2], &[[f64; 2]; LANES]),
+    block: &mut Block,
+) {
+    let Frame { vertex, rotation } = *sensor;
+    let (right, up, normal) = (rotation.x_axis, rotation.y_axis, rotation.z_axis);
+    for i in 0..LANES {
+        let [u, v] = squares[i];
+        let sides = [(2.0 * u - 1.0).abs(), (2.0 * v - 1.0).abs()];
+        let radius = if sides[0] > sides[1] { sides[0] } else { sides[1] };
+        let point = disk::point([u, v]);
+        let ([a, b], area) = spread([rows.radii[0][i], rows.radii[1][i]], point, radius);
+        let (along, across) =
+            (rows.centre[0][i] + a * rows.half[0][i], rows.centre[1][i] + b * rows.half[1][i]);
+        let (x, y) = (rows.axis[0][i], rows.axis[1][i]);
+        let slopes = [x * along - y * across, y * along + x * across];
+        let inverse = 1.0 / (slopes[0] * slopes[0] + slopes[1] * slopes[1] + 1.0).sqrt();
+        let (dx, dy, dz) = (slopes[0] * inverse, slopes[1] * inverse, -inverse);
+        let on_sensor = (dx * normal.x + dy * normal.y + dz * normal.z).abs();
+        let (half, cubed) = (rows.half[0][i] * rows.half[1][i], inverse * inverse * inverse);
+        let is_open = (rows.half[0][i] > 0.0) & (rows.half[1][i] > 0.0);
+        block.throughput[i] = if is_open { scale * area * half * cubed * on_sensor } else { 0.0 };
+        block.direction[0][i] = dx;
+        block.direction[1][i] = dy;
+        block.direction[2][i] = dz;
+        let (x, y) = (film[0][i], film[1][i]);
+        block.position[0][i] = vertex.x + (right.x * x + up.x * y);
+        block.position[1][i] = vertex.y + (right.y * x + up.y * y);
+        block.position[2][i] = vertex.z + (right.z * x + up.z * y);
     }
 }
 
@@ -77,7 +199,7 @@ fn concentric(u: [f64; 2]) -> (f64, f64) {
     }
     let (radius, eighths) = if a.abs() > b.abs() { (a, b / a) } else { (b, 2.0 - a / b) };
     let turn = eighths / 8.0 + if radius < 0.0 { 0.5 } else { 0.0 };
-    (radius.abs(), turn.rem_euclid(1.0))
+    (radius.abs(), if turn < 0.0 { turn + 1.0 } else { turn })
 }
 
 #[cfg(test)]

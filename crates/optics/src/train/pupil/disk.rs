@@ -13,7 +13,8 @@ use std::f64::consts::PI;
 use etendue_geometry::disk;
 use glam::{DMat3, DVec2, DVec3};
 
-use crate::element::{Block, Frame, LANES, LensRays, Opening, RayStatus};
+use super::PupilSamples;
+use crate::element::{Block, Frame, LANES, Opening, RayStatus};
 use crate::train::{OpticalTrain, Part};
 
 /// A round opening square to the axis (mm).
@@ -21,19 +22,6 @@ use crate::train::{OpticalTrain, Part};
 pub struct Disk {
     centre: DVec3,
     radius: f64,
-}
-
-/// From samples of the film to weighted rays.
-#[derive(Debug, Clone, Copy)]
-pub struct DiskSamples<'a> {
-    /// The sensor's place.
-    pub sensor: &'a Frame,
-    /// Weight of a sample per its projected solid angle (1/sr).
-    pub scale: f64,
-    /// Places on the sensor (mm), one array an axis.
-    pub film: [&'a [f64]; 2],
-    /// Places in the unit square.
-    pub squares: &'a [[f64; 2]],
 }
 
 impl Disk {
@@ -123,13 +111,18 @@ impl Disk {
         ((self.centre - film).truncate() / distance, self.radius / distance)
     }
 
-    /// Refills `rays` with one ray a sample, as [`super::ExitPupil::sample`] gives them one by one.
-    pub fn fill(&self, bundle: &DiskSamples<'_>, rays: &mut LensRays) {
-        rays.resize(bundle.squares.len());
-        if self.is_wide(bundle.sensor) {
-            fill_wide(self, bundle, &mut rays.blocks);
+    /// Fills blocks with one ray a sample from a sensor, behind a medium of an index squared.
+    pub(super) fn fill(
+        &self,
+        sensor: &Frame,
+        (bundle, index2): (&PupilSamples<'_>, f64),
+        blocks: &mut [Block],
+    ) {
+        let bundle = PupilSamples { scale: bundle.scale * index2, ..*bundle };
+        if self.is_wide(sensor) {
+            fill_wide(self, sensor, &bundle, blocks);
         } else {
-            fill_blocks(self, bundle, &mut rays.blocks);
+            fill_blocks(self, sensor, &bundle, blocks);
         }
     }
 }
@@ -160,8 +153,8 @@ fn even(centre: [f64; 2], radius: f64, [x, y]: [f64; 2]) -> ([f64; 2], f64) {
     ([p * axis[0] - q * axis[1], q * axis[0] + p * axis[1]], stretch)
 }
 
-fn fill_wide(disk: &Disk, bundle: &DiskSamples<'_>, blocks: &mut [Block]) {
-    let DiskSamples { sensor, scale, film, squares } = *bundle;
+fn fill_wide(disk: &Disk, sensor: &Frame, bundle: &PupilSamples<'_>, blocks: &mut [Block]) {
+    let PupilSamples { scale, film, squares } = *bundle;
     for (i, &square) in squares.iter().enumerate() {
         let (block, lane) = (&mut blocks[i / LANES], i % LANES);
         let at = sensor.point(DVec3::new(film[0][i], film[1][i], 0.0));
@@ -179,8 +172,8 @@ fn fill_wide(disk: &Disk, bundle: &DiskSamples<'_>, blocks: &mut [Block]) {
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn fill_blocks(disk: &Disk, bundle: &DiskSamples<'_>, blocks: &mut [Block]) {
-    let DiskSamples { sensor, scale, film, squares } = *bundle;
+fn fill_blocks(disk: &Disk, sensor: &Frame, bundle: &PupilSamples<'_>, blocks: &mut [Block]) {
+    let PupilSamples { scale, film, squares } = *bundle;
     let Frame { vertex, rotation } = *sensor;
     let (right, up, normal) = (rotation.x_axis, rotation.y_axis, rotation.z_axis);
     let factor = scale * PI * disk.radius * disk.radius;
