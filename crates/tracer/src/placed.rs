@@ -6,7 +6,7 @@ mod plain;
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Coplanar, Geometry, Placement};
 
-pub(crate) use self::plain::{LEAST_ALPHA, PlainFacets, PlainKind, PlainSurfaces};
+pub(crate) use self::plain::{LEAST_ALPHA, PlainFacets, PlainKind, PlainSurface, PlainSurfaces};
 use crate::bodies::{Body, bodies};
 use crate::scattering::Absorption;
 use crate::spawn::magnitudes;
@@ -136,7 +136,7 @@ impl PlacedSurfaces {
         let bounds = geometry.loose_bounds();
         let size = bounds.diagonal();
         let [least, most] = crate::transport::PLAIN_SIZES;
-        let fits = size >= least && size + bounds.centre().length() <= most && spectral.is_rgb();
+        let fits = size >= least && size + bounds.centre().length() <= most;
         let plain = || PlainSurfaces::of(&all, (geometry, materials), spectral);
         let plain = fits.then(plain).flatten();
         Self { all, touching, plain, size }

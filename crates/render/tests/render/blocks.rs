@@ -152,6 +152,17 @@ fn compare(name: &str, scene: &Scene, plan: &Plan, layers: &[&str]) -> usize {
     compared
 }
 
+/// That `layers` of a plain scene are the same by both ways: in red, green and blue, in five bands, and in one.
+fn compare_plain(name: &str, scene: &Scene, layers: &[&str]) {
+    let grid = Bands::Spectral(Grid::of_width(400.0, 700.0, 60.0).unwrap());
+    for bands in [Bands::Rgb, grid, Bands::Grey] {
+        let mut plan = Plan::new(scene, Outputs::from_list("exr").unwrap());
+        plan.bands = bands;
+        let name = format!("{name}, {} bands", plan.bands.count());
+        assert!(compare(&name, scene, &plan, layers) > 0, "{name}");
+    }
+}
+
 #[test]
 fn blocks_and_batches_follow_the_same_paths() {
     let path = r#"{"type": "path", "max_bounces": 7}"#;
@@ -275,8 +286,7 @@ fn plain_scenes_are_the_same_in_single_precision() {
                 "sign": {"type": "emissive", "radiance": [0.5, 2, 4], "two_sided": true}"#,
             );
         let scene = load_in(folder.path(), &text);
-        let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
-        assert!(compare(&format!("plain, {name}"), &scene, &plan, &[""]) > 0, "{name}");
+        compare_plain(&format!("plain, {name}"), &scene, &[""]);
     }
 }
 
@@ -340,9 +350,7 @@ fn plain_facets_skies_and_other_lights_are_the_same_in_single_precision() {
             if name.starts_with("printed") {
                 print(&mut scene);
             }
-            let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
-            let name = format!("plain, {name}, {ball}");
-            assert!(compare(&name, &scene, &plan, &[""]) > 0, "{name}");
+            compare_plain(&format!("plain, {name}, {ball}"), &scene, &[""]);
         }
     }
 }
@@ -376,9 +384,7 @@ fn plain_scenes_that_move_are_the_same_in_single_precision() {
             if name == "mirrors" {
                 print(&mut scene);
             }
-            let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
-            let name = format!("plain and moving, {name}, {ball}");
-            assert!(compare(&name, &scene, &plan, &LAYERS) > 0, "{name}");
+            compare_plain(&format!("plain and moving, {name}, {ball}"), &scene, &LAYERS);
         }
     }
 }

@@ -28,7 +28,7 @@ use std::f64::consts::PI;
 use etendue_geometry::glam::DVec3;
 
 use crate::sampling::{Frame, cosine_direction};
-use crate::{Color, ConductorId, Tint};
+use crate::{ConductorId, Tint};
 pub use coat::Coat;
 pub use layered::Layered;
 pub use metal::SECOND_COSINE;
@@ -131,8 +131,6 @@ pub struct Bsdf {
     pub base: Tint,
     /// The colour of its highlights.
     pub highlight: Tint,
-    /// The colour of light that met several facets, where the surface's has no curve.
-    pub(crate) deep: Color,
     /// Part of the model that follows from the viewer's direction alone.
     seen: ModelView,
 }
@@ -179,28 +177,23 @@ impl Bsdf {
         [base, highlight]: [Tint; 2],
     ) -> Self {
         let local = frame.local(wo);
-        let (seen, mean) = match model {
+        let seen = match model {
             Model::Metal { alpha, .. } if alpha > 0.0 => {
-                let rough = metal::RoughMetal::new(alpha, local);
-                (ModelView::Metal(rough), Some(rough.mean))
+                ModelView::Metal(metal::RoughMetal::new(alpha, local))
             }
             Model::Dielectric { alpha, eta } if alpha > 0.0 => {
-                (ModelView::Glass(boundary::RoughBoundary::new(alpha, eta, local)), None)
+                ModelView::Glass(boundary::RoughBoundary::new(alpha, eta, local))
             }
             Model::Layered(layered) => {
-                let viewed = layered.viewed(local, &peaks([&base, &highlight]));
-                (ModelView::Layered(viewed), (layered.metallic > 0.0).then_some(viewed.mean))
+                ModelView::Layered(layered.viewed(local, &peaks([&base, &highlight])))
             }
             Model::Black
             | Model::Matte
             | Model::Mirror
             | Model::Metal { .. }
-            | Model::Dielectric { .. } => (ModelView::Plain, None),
+            | Model::Dielectric { .. } => ModelView::Plain,
         };
-        let deep = mean.map_or([0.0; 3], |mean| {
-            base.color.map(|c| metal::multiple(metal::mean_reflectance(c, 0.0), mean))
-        });
-        Self { model, frame, geometric, wo: local, base, highlight, deep, seen }
+        Self { model, frame, geometric, wo: local, base, highlight, seen }
     }
 
     /// The metal by whose measured index it reflects.

@@ -3,6 +3,7 @@ use std::f64::consts::TAU;
 use etendue_spectrum::Metal;
 
 use super::*;
+use crate::Color;
 
 const WHITE: Color = [1.0; 3];
 

@@ -4,9 +4,9 @@
 use etendue_geometry::glam::DMat3;
 use etendue_geometry::{Geometry, Mesh, Placement};
 
-use super::{PlacedSurface, SurfaceKind};
+use super::{PlacedSurface, SurfaceKind, plain_tint};
 use crate::shading::SheetSurface;
-use crate::{Conductor, Material, Scattering, Spectral};
+use crate::{Conductor, ConductorId, Material, Scattering, Spectral};
 
 /// The surfaces of a scene by their placements, where each is of one of these kinds and wholly there.
 #[derive(Debug, Clone)]
@@ -23,12 +23,18 @@ pub(crate) struct PlainSurfaces {
     pub(crate) are_varied: bool,
     /// The textures by which surfaces are rough, which leave none smooth where all their green is above 0.
     pub(crate) rough_by: Vec<u32>,
+    /// The colours of materials that are alike all over, `[material][band]`; 0 of others. Of measured metals what they
+    /// reflect face on. Empty where bands are red, green and blue.
+    colors: Vec<f32>,
+    /// Those of their facets' highlights, and the dips of measured metals, likewise; empty where all are matte.
+    facet_bands: Vec<[f64; 2]>,
+    count: usize,
 }
 
 /// A surface that scatters light, or only shines.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct PlainSurface {
-    /// Of a measured metal what it reflects face on.
+    /// Red, green and blue; of a measured metal what it reflects face on. Unused where bands are others.
     pub(crate) color: [f32; 3],
     /// [`PlacedSurface::magnitudes`] (m).
     pub(crate) magnitudes: [f32; 3],
@@ -68,14 +74,16 @@ pub(crate) struct PlainFacets {
     /// The dielectric's reflectance face on, before the highlights' colour, and at grazing incidence.
     pub(crate) f0: f64,
     pub(crate) f90: f64,
-    /// The largest band of the dielectric's reflectance face on.
+    /// The largest band of the dielectric's reflectance face on, and of the colour.
     pub(crate) f0_peak: f64,
+    pub(crate) base_peak: f64,
     /// It is [`Scattering::Metal`].
     pub(crate) is_metal: bool,
     /// Index of refraction; 0 of mirrors and sheets.
     pub(crate) ior: f64,
+    /// The highlights' red, green and blue; and what a measured metal's reflectance lacks of Schlick's. Unused where bands
+    /// are others.
     pub(crate) highlight: [f64; 3],
-    /// What a measured metal's reflectance lacks of Schlick's.
     pub(crate) dip: [f64; 3],
 }
 
@@ -86,6 +94,25 @@ impl PlainSurfaces {
     /// Tests whether some are not matte, or not alike all over.
     pub(crate) fn are_rich(&self) -> bool {
         !self.facets.is_empty() || self.are_varied
+    }
+
+    /// How many bands there are.
+    pub(crate) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The bands of a material's colour.
+    #[inline(always)]
+    pub(crate) fn color_of(&self, material: u32) -> &[f32] {
+        let first = material as usize * self.count;
+        self.colors.get(first..first + self.count).unwrap_or_default()
+    }
+
+    /// Bands of the highlights and the dip of a material's facets.
+    #[inline(always)]
+    pub(crate) fn facet_bands_of(&self, material: u32) -> &[[f64; 2]] {
+        let first = material as usize * self.count;
+        self.facet_bands.get(first..first + self.count).unwrap_or_default()
     }
 
     /// `None` if one is not plain.
@@ -115,10 +142,28 @@ impl PlainSurfaces {
         }
         let are_tilted = all.iter().any(|surface| surface.turn.is_some());
         let are_varied = all.iter().any(|surface| surface.is_varied);
+        let count = spectral.count();
+        let (mut colors, mut facet_bands) = (Vec::new(), Vec::new());
+        for material in materials.iter().filter(|_| !spectral.is_rgb()) {
+            colors.extend((0..count).map(|k| single(face_on(material, spectral, k))));
+            if !facets.is_empty() {
+                facet_bands.extend((0..count).map(|k| bands_of_facets(material, spectral, k)));
+            }
+        }
         all.push(PlainSurface::default());
         rough_by.sort_unstable();
         rough_by.dedup();
-        Some(Self { all, facets, are_tilted, are_smooth, are_varied, rough_by })
+        Some(Self {
+            all,
+            facets,
+            are_tilted,
+            are_smooth,
+            are_varied,
+            rough_by,
+            colors,
+            facet_bands,
+            count,
+        })
     }
 }
 
@@ -168,13 +213,14 @@ impl PlainSurface {
         if !is_resolved {
             return None;
         }
-        let color = match measured(material, spectral) {
-            Some(bands) => Some(bands.map(|[face_on, _]| face_on)),
-            None => placed.color.map(|tint| tint.color),
+        let is_known = measured(material).is_some() || placed.color.is_some();
+        let is_varied = !is_known || is_mapped || has_own_facets;
+        let color = match spectral.is_rgb() && scatters && is_known {
+            true => [0, 1, 2].map(|k| face_on(material, spectral, k)),
+            false => [0.0; 3],
         };
-        let is_varied = color.is_none() || is_mapped || has_own_facets;
         Some(Self {
-            color: color.filter(|_| scatters).unwrap_or_default().map(single),
+            color: color.map(single),
             magnitudes: placed.magnitudes.to_array().map(single),
             material: placement.material,
             is_there: true,
@@ -188,26 +234,53 @@ impl PlainSurface {
     }
 }
 
-/// What a measured metal reflects face on in each band, and what its reflectance lacks of Schlick's; `None` of others.
-fn measured(material: &Material, spectral: &Spectral) -> Option<[[f64; 2]; 3]> {
-    let Scattering::Metal { named: Some(named), .. } = &material.scattering else { return None };
-    let id = Conductor::id(named);
-    Some([0, 1, 2].map(|band| spectral.metal(id, band)))
+/// The metal by whose measured index a material reflects.
+fn measured(material: &Material) -> Option<ConductorId> {
+    match &material.scattering {
+        Scattering::Metal { named, .. } => named.as_ref().map(Conductor::id),
+        _ => None,
+    }
+}
+
+/// What a material that is alike all over reflects in a band: of a measured metal face on.
+fn face_on(material: &Material, spectral: &Spectral, band: usize) -> f64 {
+    match measured(material) {
+        Some(metal) => spectral.metal(metal, band)[0],
+        None => {
+            let tint = plain_tint(&material.base_color, spectral);
+            tint.map_or(0.0, |tint| spectral.tint(&tint, band))
+        }
+    }
+}
+
+/// The colour of a material's highlights in a band, and what a measured metal's reflectance lacks of Schlick's.
+fn bands_of_facets(material: &Material, spectral: &Spectral, band: usize) -> [f64; 2] {
+    let highlight = match &material.scattering {
+        Scattering::Gltf(surface) => surface.plain_sheet(spectral).map(|sheet| sheet.highlight),
+        _ => None,
+    };
+    let dip = measured(material).map_or(0.0, |metal| spectral.metal(metal, band)[1]);
+    [highlight.map_or(1.0, |tint| spectral.tint(&tint, band)), dip]
 }
 
 impl PlainFacets {
     /// Those of a material; of what is not alike all over none.
     fn of(material: &Material, spectral: &Spectral) -> Self {
-        let own = Self { highlight: [1.0; 3], ..Self::default() };
+        let base = plain_tint(&material.base_color, spectral);
+        let base_peak = base.map_or(0.0, |tint| tint.peak());
+        let own = Self { highlight: [1.0; 3], base_peak, ..Self::default() };
         match &material.scattering {
             Scattering::Metal { roughness, .. } => {
-                let dip = measured(material, spectral).map(|bands| bands.map(|[_, dip]| dip));
-                let (alpha, dip) = (roughness * roughness, dip.unwrap_or_default());
+                let dip = match spectral.is_rgb() {
+                    true => [0, 1, 2].map(|k| bands_of_facets(material, spectral, k)[1]),
+                    false => [0.0; 3],
+                };
+                let alpha = roughness * roughness;
                 Self { alpha, metallic: 1.0, is_metal: true, dip, ..own }
             }
             Scattering::Gltf(surface) => {
                 let sheet = surface.plain_sheet(spectral);
-                sheet.map_or(own, |sheet| Self::of_sheet(&sheet))
+                sheet.map_or(own, |sheet| Self { base_peak, ..Self::of_sheet(&sheet) })
             }
             Scattering::Dielectric(glass) => {
                 Self { ior: glass.ior.at(spectral.wavelength(0)), ..own }

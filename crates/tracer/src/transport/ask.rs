@@ -171,14 +171,18 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         value: Weights,
         k: usize,
     ) -> f64 {
-        let SheetColors { highlight, deep, named } = &patch.sheet_colors[lane];
+        let SheetColors { highlight, named } = &patch.sheet_colors[lane];
         if let Some(named) = named {
             return self.in_band_of_metal(*named, patch.sheets.mean[lane], value, k);
         }
-        value.white
-            + value.base * self.band(&patch.colors[lane], k)
-            + value.highlight * self.band(highlight, k)
-            + value.deep * self.deep_band((&patch.colors[lane], deep), patch.sheets.mean[lane], k)
+        let color = &patch.colors[lane];
+        let mut sum = value.white + value.base * self.band(color, k);
+        sum += value.highlight * self.band(highlight, k);
+        // Smooth surfaces have none.
+        if value.deep != 0.0 {
+            sum += value.deep * self.deep_band(color, patch.sheets.mean[lane], k);
+        }
+        sum
     }
 }
 

@@ -48,7 +48,7 @@ use crate::placed::{PlacedSurface, PlacedSurfaces};
 use crate::reference::SceneView;
 use crate::spawn::{self, Anchor};
 use crate::spectral::Spectral;
-use crate::{Color, ConductorId, Glass, Ior, Material, Scattering, Tint};
+use crate::{ConductorId, Glass, Ior, Material, Scattering, Tint};
 
 /// The scene as light sees it.
 #[derive(Debug, Clone, Copy)]
@@ -300,12 +300,6 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         if RGB { 3 } else { self.ctx.spectral.count() }
     }
 
-    /// A linear sRGB colour in band `k`.
-    #[inline(always)]
-    fn color_band(&self, color: &Color, k: usize) -> f64 {
-        if RGB { color[k] } else { self.ctx.spectral.band(color, k) }
-    }
-
     /// A colour, with its curve, in band `k`.
     #[inline(always)]
     fn band(&self, tint: &Tint, k: usize) -> f64 {
@@ -321,14 +315,11 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         }
     }
 
-    /// The light of band `k` that met several facets, which return `mean` of all light where they reflect all of it:
-    /// `deep` of colours, and of a curve what its own mean in the band makes.
+    /// The light of band `k` that met several facets of a colour, which return `mean` of all light where they reflect all
+    /// of it.
     #[inline(always)]
-    fn deep_band(&self, (base, deep): (&Tint, &Color), mean: f64, k: usize) -> f64 {
-        if !RGB && base.has_curve() {
-            return metal::multiple(metal::mean_reflectance(self.band(base, k), 0.0), mean);
-        }
-        self.color_band(deep, k)
+    fn deep_band(&self, base: &Tint, mean: f64, k: usize) -> f64 {
+        metal::multiple(metal::mean_reflectance(self.band(base, k), 0.0), mean)
     }
 
     /// Adds light to one of the [rows](Parts::row), and to the whole of its ray.
@@ -363,7 +354,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             sum += value.highlight * self.band(&bsdf.highlight, k);
         }
         if value.deep != 0.0 {
-            sum += value.deep * self.deep_band((&bsdf.base, &bsdf.deep), bsdf.mean_albedo(), k);
+            sum += value.deep * self.deep_band(&bsdf.base, bsdf.mean_albedo(), k);
         }
         if value.sheen != 0.0 {
             sum += value.sheen * self.band(&bsdf.sheen(), k);

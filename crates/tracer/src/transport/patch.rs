@@ -12,7 +12,7 @@ use crate::light_sampler::Receiver;
 use crate::light_tree::Choices;
 use crate::spawn::Anchor;
 use crate::target::{Target, TargetKind};
-use crate::{Color, ConductorId, LANES, Row, Tint};
+use crate::{ConductorId, LANES, Row, Tint};
 
 /// Hits of f32 are beside an edge of their triangle where their least barycentric weight is below this: only
 /// triangles that are less than some hundred of the bounds of [`spawn`](crate::spawn) high have others as near
@@ -52,8 +52,6 @@ pub(super) struct Patch {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct SheetColors {
     pub(super) highlight: Tint,
-    /// Of light that met several facets.
-    pub(super) deep: Color,
     /// The metal by whose measured index it reflects.
     pub(super) named: Option<ConductorId>,
 }

@@ -26,7 +26,7 @@ use self::facets::BlockFacets;
 use self::kernel::{Leaving, Numbers, leave_blocks};
 use self::lamps::{ChosenLamps, Lights};
 use self::sky::ask_sky;
-use self::surfaces::{Surfaces, TextureLookup};
+use self::surfaces::{Surfaces, Varied};
 use super::paths::{DRAWS, Draw, Step, Way, Workspace};
 use super::rays::{Blocks, RayHit};
 use super::trace::Encounter;
@@ -54,7 +54,8 @@ pub(super) struct Columns {
     pub(super) ray: Vec<u32>,
     /// Density (1/sr) of the direction, unused of the camera's.
     pub(super) pdf: Vec<f32>,
-    pub(super) throughput: [Vec<f32>; 3],
+    /// By band.
+    pub(super) throughput: Vec<Vec<f32>>,
     /// The normal of the surface that each left, where there are many lamps; unused of the camera's.
     pub(super) normal: [Vec<f32>; 3],
     /// The chance with which the sky was chosen there; unused of the camera's, and without a sky.
@@ -102,14 +103,21 @@ pub(super) struct PlainScratch {
     seen: Vec<u32>,
     missed: Vec<u32>,
     facets: BlockFacets,
-    varied: Vec<TextureLookup>,
+    varied: Varied,
     /// When rays are (s from the frame's time), where that counts.
     times: Vec<f64>,
 }
 
 impl Columns {
-    /// Makes room for at least so many; whether surfaces may be smooth.
-    fn reserve(&mut self, len: usize, are_smooth: bool) {
+    /// How many bands there are.
+    #[inline(always)]
+    pub(super) fn count<const RGB: bool>(&self) -> usize {
+        if RGB { 3 } else { self.throughput.len() }
+    }
+
+    /// Makes room for at least so many of so many bands; whether surfaces may be smooth.
+    fn reserve(&mut self, (len, count): (usize, usize), are_smooth: bool) {
+        self.throughput.resize(count, Vec::new());
         let len = len.next_multiple_of(LANES) + LANES;
         if are_smooth {
             grow(&mut self.flags, len);
@@ -132,7 +140,7 @@ fn grow<T: Copy + Default>(column: &mut Vec<T>, len: usize) {
 }
 
 impl RayColumns {
-    fn restart(&mut self, most: usize, are_smooth: bool) {
+    fn restart(&mut self, most: (usize, usize), are_smooth: bool) {
         self.len = 0;
         self.carried.reserve(most, are_smooth);
         let len = self.carried.ray.len();
@@ -161,8 +169,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
     /// The surfaces and lamps of a plain scene; `None` of any other.
     pub(super) fn plain(&self) -> Option<(Surfaces<'a>, Lights<'a>)> {
         let &LightingContext { lights, placed, traits, scene, .. } = self.ctx;
-        let is_taken = RGB
-            && self.ctx.precision == HitPrecision::Single
+        let is_taken = self.ctx.precision == HitPrecision::Single
             && !(traits.may_pass() || traits.has_media || traits.has_panes)
             && !traits.has_dispersion
             && lights.sky.as_ref().is_none_or(Sky::is_of_colors);
@@ -171,14 +178,14 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         if !all.rough_by.iter().filter_map(image).all(Image::has_green) {
             return None;
         }
-        let surfaces = Surfaces { all, geometry: scene.geometry, varied: &[] };
+        let surfaces = Surfaces { all, geometry: scene.geometry, varied: Varied::NONE };
         let origin = self.ctx.accel.blocks()?.origin();
         let PlainLightBounds { least_area, farthest, brightest, .. } = lights.plain_lights()?;
         let least = LEAST_AREA * placed.size().powi(2);
         let are_near = 2.0 * (farthest + origin.abs().max_element()) < SIZES[1];
         let is_held = brightest == 0.0 || BRIGHTNESS.contains(&brightest);
         let are_taken = least_area > least && are_near && is_held && !lights.is_dark();
-        are_taken.then(|| (surfaces, Lights::new(lights, origin)))
+        are_taken.then(|| (surfaces, Lights::new(lights, origin, self.count())))
     }
 
     /// Traces the camera's rays through a plain scene.
@@ -193,7 +200,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         workspace.radiance.resize(self.count(), 0.0);
         accel.convert(camera.rays, &mut plain.rays);
         let are_smooth = surfaces.all.are_smooth;
-        start(camera, are_smooth, &mut plain.carried);
+        start(camera, self.count(), are_smooth, &mut plain.carried);
         let mut coherent = camera.rays.coherent;
         let mut is_scattered = true;
         for number in 0..=self.rules.bounces {
@@ -211,7 +218,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             self.add_sky_plain((camera, number), lights, plain, out);
             let nothing_else = self.ctx.emitters.is_some_and(Emitters::is_empty);
             if let Some(sky) = lights.sky.filter(|_| nothing_else) {
-                ask_sky(&sky, &mut plain.last, &mut plain.shadows);
+                ask_sky::<RGB>(&sky, self.ctx.spectral, &mut plain.last, &mut plain.shadows);
             }
             self.light_plain(plain, lights, (number, coherent), out);
             self.ask_emitters_plain(camera, number, plain, workspace, out);
@@ -234,9 +241,10 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
     ) {
         let (len, all) = (plain.rays.len(), surfaces.all);
         // Last directions may become rays to the sky.
-        plain.shadows.restart(2 * len, all.are_smooth);
-        plain.next.restart(len, all.are_smooth);
-        plain.last.restart(len, all.are_smooth);
+        let count = self.count();
+        plain.shadows.restart((2 * len, count), all.are_smooth);
+        plain.next.restart((len, count), all.are_smooth);
+        plain.last.restart((len, count), all.are_smooth);
         plain.seen.clear();
         plain.missed.clear();
         let is_last = self.is_end_unless_specular(number);
@@ -269,10 +277,10 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         let sphere = emitters.filter(|_| is_last && !has_environment);
         let is_rich = all.are_rich() || self.ctx.lights.has_others();
         let leave = match (all.are_tilted, is_rich) {
-            (false, false) => leave_blocks::<false, false>,
-            (false, true) => leave_blocks::<false, true>,
-            (true, false) => leave_blocks::<true, false>,
-            (true, true) => leave_blocks::<true, true>,
+            (false, false) => leave_blocks::<false, false, RGB>,
+            (false, true) => leave_blocks::<false, true, RGB>,
+            (true, false) => leave_blocks::<true, false, RGB>,
+            (true, true) => leave_blocks::<true, true, RGB>,
         };
         let paths = (plain.rays.blocks(), &plain.carried);
         leave((surfaces, lights), paths, (numbers, sphere), leaving);
@@ -373,7 +381,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         shadows.pack(shadow_rays);
         self.times_of(&shadows.carried.ray[..shadows.len], times);
         accel.occluded_of_blocks(shadow_rays.blocks_mut(), times, coherent);
-        let [red, green, blue] = &shadows.carried.throughput;
+        let (share, mut light) = (&shadows.carried.throughput, vec![0.0; self.count()]);
         for (block, first) in shadow_rays.blocks().iter().zip((0..).step_by(LANES)) {
             for lane in 0..LANES.min(shadows.len - first) {
                 if block.is_blocked(lane) {
@@ -381,11 +389,9 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
                 }
                 let i = first + lane;
                 let radiance = lights.radiance(shadows.lamp[i]);
-                let light = [
-                    f64::from(red[i]) * radiance[0],
-                    f64::from(green[i]) * radiance[1],
-                    f64::from(blue[i]) * radiance[2],
-                ];
+                for ((band, share), radiance) in light.iter_mut().zip(share).zip(radiance) {
+                    *band = f64::from(share[i]) * radiance;
+                }
                 let group = || lights.group_of(&self.ctx.scene, shadows.lamp[i]);
                 let row = self.parts.row(shadows.carried.ray[i], number + 1, group);
                 self.add(&light, row, out);
@@ -435,9 +441,9 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
 }
 
 /// The camera's rays as paths.
-fn start(camera: &RaySamples<'_>, are_smooth: bool, carried: &mut Columns) {
+fn start(camera: &RaySamples<'_>, count: usize, are_smooth: bool, carried: &mut Columns) {
     let len = camera.rays.len();
-    carried.reserve(len, are_smooth);
+    carried.reserve((len, count), are_smooth);
     carried.flags.fill(SPECULAR);
     carried.len = len;
     for (number, ray) in (0..).zip(&mut carried.ray) {

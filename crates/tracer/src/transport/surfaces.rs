@@ -110,7 +110,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         sheets.f0_peak[lane] = (f0 * highlight.peak()).min(1.0);
         sheets.is_metal[lane] = is_metal;
         patch.sheet_colors.resize(LANES, SheetColors::default());
-        patch.sheet_colors[lane] = SheetColors { highlight, deep: [0.0; 3], named };
+        patch.sheet_colors[lane] = SheetColors { highlight, named };
         true
     }
 

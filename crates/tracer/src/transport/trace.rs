@@ -12,7 +12,7 @@ use super::media::Media;
 use super::patch::Patch;
 use super::paths::{Carried, DRAWS, Draw, KINDS, Passage, Paths, Step, Way, Workspace};
 use super::rays::{RayHit, Rays};
-use super::{Follow, LightingContext, RaySamples, Tracing, kernels, metal};
+use super::{Follow, LightingContext, RaySamples, Tracing, kernels};
 use crate::bsdf::Bsdf;
 use crate::footprint::{Cone, Footprint};
 use crate::light_sampler::Receiver;
@@ -415,13 +415,6 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         }
         if kind == SurfaceKind::Sheet {
             patch.sheets.view(&patch.seen.shading, &patch.seen.direction);
-            for &lane in &workspace.picked {
-                let mean = patch.sheets.mean[lane];
-                let deep = |c| metal::multiple(metal::mean_reflectance(c, 0.0), mean);
-                if patch.sheets.metallic[lane] > 0.0 {
-                    patch.sheet_colors[lane].deep = patch.colors[lane].color.map(deep);
-                }
-            }
         }
         let is_delta = |bsdf: &Bsdf| bsdf.is_delta();
         // What scatters light of single directions asks none.

@@ -93,12 +93,12 @@ pub(super) fn ask<const TILTED: bool, const RICH: bool>(
     LightRays { start, along, length, toward, pdf, value }
 }
 
-/// Notes the rays to lights that bring some share of their radiance.
+/// Notes the rays to lights that bring some share of their radiance, by band.
 #[inline(always)]
-pub(super) fn send(
+pub(super) fn send<const RGB: bool>(
     asked: &LightRays,
     places: &Places,
-    (asks, share, ray): (&Mask, &[Row; 3], &[u32; LANES]),
+    (asks, ray, share): (&Mask, &[u32; LANES], impl Fn(usize) -> Row),
     (instructions, shadows): (Instructions, &mut RayColumns),
 ) {
     let mut goes = [0; LANES];
@@ -110,7 +110,9 @@ pub(super) fn send(
     for axis in 0..3 {
         going.put(&asked.start[axis], &mut shadows.start[axis], at);
         going.put(&asked.along[axis], &mut shadows.along[axis], at);
-        going.put(&share[axis], &mut shadows.carried.throughput[axis], at);
+    }
+    for band in 0..shadows.carried.count::<RGB>() {
+        going.put(&share(band), &mut shadows.carried.throughput[band], at);
     }
     going.put(&asked.length, &mut shadows.reach, at);
     going.put(&places.lamp, &mut shadows.lamp, at);

@@ -29,7 +29,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let room = first.len() + LANES;
         let has_others = self.ctx.lights.has_others();
         let has_sky = lights.sky.is_some();
-        chosen.restart(room, [has_others, has_sky]);
+        chosen.restart((room, self.count()), [has_others, has_sky]);
         if lights.are_far {
             self.choose_far(lights, plain);
             return;
@@ -114,7 +114,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         }
         let one = ((choice.light as usize, choice.chance), square);
         let (scene, spectral) = (&self.ctx.scene, self.ctx.spectral);
-        let mut radiance = [0.0; 3];
+        let mut radiance = std::mem::take(&mut chosen.light);
         let found = self.ctx.lights.place(scene, spectral, (&receiver, time), one, &mut radiance);
         if let Chosen::Place(target) = found {
             let is_far = matches!(target.kind, TargetKind::Far | TargetKind::Parallel);
@@ -122,8 +122,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let origin = if is_far { DVec3::ZERO } else { lights.origin };
             let (place, density) = (single(target.place[0] - origin), round(target.density));
             let own = OtherPlace { light: choice.light, place, is_far, is_delta, density };
-            chosen.put(lane as usize, &own, radiance.map(round));
+            chosen.put(lane as usize, &own, |band| radiance[band]);
         }
+        chosen.light = radiance;
     }
 
     /// Chooses directions to the sky's image for the lanes that chose it.
@@ -131,6 +132,6 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let Some(sky) = &lights.sky else { return };
         let Some((_, sampler)) = sky.map else { return };
         sampler.cells(chosen.squares.iter().copied(), &mut chosen.cells);
-        place_on_sky(sky, chosen);
+        place_on_sky::<RGB>(sky, self.ctx.spectral, chosen);
     }
 }

@@ -8,36 +8,33 @@ use etendue_geometry::block::{Floats as Row, LANES};
 
 use super::compaction::{Compaction, Instructions};
 use super::facets::BsdfSamples;
-use super::kernel::{Hits, Leaving, Mask, Numbers, ROUNDINGS, Sphere, ZERO, mask};
+use super::kernel::{Hits, Mask, Numbers, ROUNDINGS, Sphere, ZERO, mask};
 use super::{LAST, RayColumns, SPECULAR};
 use crate::float::Float;
 
-/// Leaves out paths that carry nothing and, by roulette, some of those that carry little.
+/// Leaves out paths that carry nothing and, by roulette, some of those that carry little of their largest band: by how
+/// much the others count more.
 #[inline(always)]
-pub(super) fn end_some(throughput: &mut [Row; 3], goes: &mut Mask, roulette: Option<[Row; 2]>) {
-    let mut most = ZERO;
+pub(super) fn end_some(most: &Row, goes: &mut Mask, roulette: Option<[Row; 2]>) -> Row {
+    let mut more = [1.0; LANES];
     for i in 0..LANES {
-        let [r, g, b] = [throughput[0][i], throughput[1][i], throughput[2][i]];
-        let larger = if g > r { g } else { r };
-        most[i] = if b > larger { b } else { larger };
         goes[i] &= mask(most[i] > 0.0);
     }
-    let Some([_, chance]) = roulette else { return };
+    let Some([_, chance]) = roulette else { return more };
     for i in 0..LANES {
         // Its root: where few paths come this far, ending them saves little and leaves noise.
         let root = most[i].sqrt();
         let survival = if root < 1.0 { root } else { 1.0 };
         goes[i] &= mask(chance[i] < survival);
-        let inverse = if survival > 0.0 { 1.0 / survival } else { 0.0 };
-        for band in 0..3 {
-            throughput[band][i] *= inverse;
-        }
+        more[i] = if survival > 0.0 { 1.0 / survival } else { 0.0 };
     }
+    more
 }
 
 /// What the paths of a block carry that leave its hits.
-pub(super) struct BlockPaths {
-    pub(super) throughput: [Row; 3],
+pub(super) struct BlockPaths<F: Fn(usize) -> Row> {
+    /// By band.
+    pub(super) throughput: F,
     pub(super) ray: [u32; LANES],
     pub(super) lanes: [u32; LANES],
     pub(super) smooth: Mask,
@@ -46,11 +43,11 @@ pub(super) struct BlockPaths {
 
 /// Notes the paths that leave a block's hits.
 #[inline(always)]
-pub(super) fn depart<const RICH: bool>(
+pub(super) fn depart<const RICH: bool, const RGB: bool>(
     (left, shading): (&BsdfSamples, Option<&[Row; 3]>),
-    departing: &BlockPaths,
+    departing: &BlockPaths<impl Fn(usize) -> Row>,
     numbers: &Numbers<'_>,
-    (instructions, leaving): (Instructions, &mut Leaving<'_>),
+    (instructions, (next, last)): (Instructions, (&mut RayColumns, &mut RayColumns)),
 ) {
     let ends_apart = numbers.is_last && numbers.asks_emitters;
     let (mut rough, mut smooth) = (left.goes, left.goes);
@@ -60,21 +57,26 @@ pub(super) fn depart<const RICH: bool>(
             smooth[i] &= departing.smooth[i];
         }
     }
-    let to = if ends_apart { &mut *leaving.last } else { &mut *leaving.next };
+    let to = if ends_apart { last } else { &mut *next };
     if RICH && !to.carried.flags.is_empty() {
         let of_rough = if numbers.is_last { LAST } else { 0 };
         put_flags(departing, Compaction::new(&rough, instructions), of_rough, to);
     }
-    put((left, shading), departing, Compaction::new(&rough, instructions), to);
+    put::<RGB>((left, shading), departing, Compaction::new(&rough, instructions), to);
     if RICH && ends_apart && departing.smooth != [0; LANES] {
-        put_flags(departing, Compaction::new(&smooth, instructions), 0, leaving.next);
-        put((left, shading), departing, Compaction::new(&smooth, instructions), leaving.next);
+        put_flags(departing, Compaction::new(&smooth, instructions), 0, next);
+        put::<RGB>((left, shading), departing, Compaction::new(&smooth, instructions), next);
     }
 }
 
 /// Notes which paths leave smooth surfaces, and so much of the others.
 #[inline(always)]
-fn put_flags(departing: &BlockPaths, going: Compaction, of_rough: u32, to: &mut RayColumns) {
+fn put_flags(
+    departing: &BlockPaths<impl Fn(usize) -> Row>,
+    going: Compaction,
+    of_rough: u32,
+    to: &mut RayColumns,
+) {
     let mut flags = [of_rough; LANES];
     for i in 0..LANES {
         flags[i] = if departing.smooth[i] != 0 { SPECULAR } else { of_rough };
@@ -84,9 +86,9 @@ fn put_flags(departing: &BlockPaths, going: Compaction, of_rough: u32, to: &mut 
 
 /// Notes paths, and how they came to their directions.
 #[inline(always)]
-fn put(
+fn put<const RGB: bool>(
     (left, shading): (&BsdfSamples, Option<&[Row; 3]>),
-    departing: &BlockPaths,
+    departing: &BlockPaths<impl Fn(usize) -> Row>,
     going: Compaction,
     to: &mut RayColumns,
 ) {
@@ -94,7 +96,9 @@ fn put(
     for axis in 0..3 {
         going.put(&left.start[axis], &mut to.start[axis], at);
         going.put(&left.along[axis], &mut to.along[axis], at);
-        going.put(&departing.throughput[axis], &mut to.carried.throughput[axis], at);
+    }
+    for band in 0..to.carried.count::<RGB>() {
+        going.put(&(departing.throughput)(band), &mut to.carried.throughput[band], at);
     }
     if let Some(shading) = shading {
         for axis in 0..3 {
@@ -114,11 +118,7 @@ fn put(
 /// Where rays of matte surfaces start (m), their unit directions about the shading normals with density cos θ / π (1/sr),
 /// that density, and whether there is one, as [`super::super::kernels::scatter`] has them.
 #[inline(always)]
-pub(super) fn scatter<const TILTED: bool>(
-    hits: &Hits,
-    square: [Row; 2],
-    share: [Row; 3],
-) -> BsdfSamples {
+pub(super) fn scatter<const TILTED: bool>(hits: &Hits, square: [Row; 2]) -> BsdfSamples {
     let (along, pdf) = cosine_directions(hits.shading::<TILTED>(), &square);
     let [gx, gy, gz] = &hits.normal;
     let (mut start, mut goes) = ([ZERO; 3], [0; LANES]);
@@ -132,7 +132,7 @@ pub(super) fn scatter<const TILTED: bool>(
             start[axis][i] = hits.point[axis][i] + lifted;
         }
     }
-    BsdfSamples { start, along, pdf, goes, share }
+    BsdfSamples { start, along, pdf, goes }
 }
 
 /// Unit directions about normals with density cos θ / π (1/sr), and that density.

@@ -5,7 +5,7 @@
 use etendue_geometry::RayBlock;
 use etendue_geometry::block::{Floats as Row, LANES};
 
-use super::kernel::{Hits, Mask, mask, round};
+use super::kernel::{Hits, Mask, ZERO, mask, round};
 use super::surfaces::{Found, Surfaces};
 use crate::bsdf::Weights;
 use crate::bsdf::metal::{mean_reflectance, multiple};
@@ -22,11 +22,19 @@ pub(super) struct BlockFacets {
     normal: [Wide; 3],
     shading: [Wide; 3],
     direction: [Wide; 3],
-    base: [Wide; 3],
-    highlight: [Wide; 3],
-    dip: [Wide; 3],
+    bands: Vec<FacetBand>,
+    /// Of what was scattered by chance what goes on, by band.
+    scattered: Vec<Row>,
+}
+
+/// A band of a block's facets.
+#[derive(Debug, Clone, Copy, Default)]
+struct FacetBand {
+    base: Wide,
+    highlight: Wide,
+    dip: Wide,
     /// Of what met several facets of a sheet.
-    deep: [Wide; 3],
+    deep: Wide,
 }
 
 /// The rays that leave a block's hits by chance, and what they carry.
@@ -35,39 +43,38 @@ pub(super) struct BsdfSamples {
     pub(super) along: [Row; 3],
     pub(super) pdf: Row,
     pub(super) goes: Mask,
-    /// Over what arrived, by band.
-    pub(super) share: [Row; 3],
 }
 
 impl BlockFacets {
     /// Takes the facets of a block's hits as they are seen, with normals that light is scattered about.
     #[inline(always)]
-    pub(super) fn see(
+    pub(super) fn see<const RGB: bool>(
         &mut self,
         surfaces: Surfaces<'_>,
-        (block, first, found): (&RayBlock, usize, &Found),
+        (block, first, found): (&RayBlock, usize, &Found<'_>),
         (hits, shading): (&Hits, &[Row; 3]),
     ) {
-        see(self, surfaces, (block, first, found), (hits, shading));
+        see::<RGB>(self, surfaces, (block, first, found), (hits, shading));
     }
 
     /// What sheets turn to the viewer of light that comes from unit directions which were chosen with a density (1/sr):
-    /// to `value` and, by band, to `share`, in the lanes of sheets.
+    /// to `value`, in the lanes of sheets. How much of it in each band [`Self::sheets_in_band`] says.
     #[inline(always)]
     pub(super) fn reflect(
         &mut self,
         lanes: &Mask,
         (toward, pdf, is_delta): (&[Row; 3], &Row, &Row),
-        (value, share): (&mut Row, &mut [Row; 3]),
+        value: &mut Row,
     ) {
-        reflect(self, lanes, (toward, pdf, is_delta), (value, share));
+        reflect(self, lanes, (toward, pdf, is_delta), value);
     }
 
-    /// Puts the directions in which sheets and smooth surfaces send the paths in place of what is there.
+    /// Puts the directions in which sheets and smooth surfaces send the paths in place of what is there. How much of the
+    /// light in each band [`Self::in_band`] says.
     #[inline(always)]
     pub(super) fn scatter(
         &mut self,
-        found: &Found,
+        found: &Found<'_>,
         hits: &Hits,
         (choice, square): (&Row, &[Row; 2]),
         scattered: &mut BsdfSamples,
@@ -78,17 +85,57 @@ impl BlockFacets {
         if found.smooth != [0; LANES] {
             scatter_smooth(self, (&found.smooth, hits), choice, scattered);
         }
+        let mut shares = std::mem::take(&mut self.scattered);
+        shares.resize(self.bands.len(), ZERO);
+        for (band, share) in shares.iter_mut().enumerate() {
+            if found.sheets != [0; LANES] {
+                self.sheets_in_band(&found.sheets, band, share);
+            }
+            if found.smooth != [0; LANES] {
+                self.smooth_in_band(&found.smooth, band, share);
+            }
+        }
+        self.scattered = shares;
     }
 
-    /// What a lane has of light in a band.
+    /// Puts a band of what [`Self::scatter`] passes on in place of what is there.
     #[inline(always)]
-    fn in_band(&self, value: Weights, lane: usize, k: usize) -> f64 {
+    pub(super) fn in_band(&self, found: &Found<'_>, band: usize, share: &mut Row) {
+        for i in 0..LANES {
+            let is_own = found.sheets[i] | found.smooth[i] != 0;
+            share[i] = if is_own { self.scattered[band][i] } else { share[i] };
+        }
+    }
+
+    /// Puts a band of what sheets were last asked in place of what is there.
+    #[inline(always)]
+    pub(super) fn sheets_in_band(&self, lanes: &Mask, band: usize, share: &mut Row) {
+        for i in 0..LANES {
+            let own = self.bands[band].of(self.sheets.weights(i), i);
+            share[i] = if lanes[i] != 0 { own } else { share[i] };
+        }
+    }
+
+    /// The same of smooth surfaces.
+    #[inline(always)]
+    fn smooth_in_band(&self, lanes: &Mask, band: usize, share: &mut Row) {
+        for i in 0..LANES {
+            let own = self.bands[band].of(self.smooth.weights(i), i);
+            share[i] = if lanes[i] != 0 { own } else { share[i] };
+        }
+    }
+}
+
+impl FacetBand {
+    /// What a lane has of light.
+    #[inline(always)]
+    fn of(&self, value: Weights, lane: usize) -> f32 {
         let sum = value.white
-            + value.base * self.base[k][lane]
-            + value.highlight * self.highlight[k][lane]
-            + value.dip * self.dip[k][lane]
-            + value.deep * self.deep[k][lane];
-        if sum > 0.0 { sum } else { 0.0 }
+            + value.base * self.base[lane]
+            + value.highlight * self.highlight[lane]
+            + value.dip * self.dip[lane]
+            + value.deep * self.deep[lane];
+        round(if sum > 0.0 { sum } else { 0.0 })
     }
 }
 
@@ -102,17 +149,24 @@ fn widen(rows: &[Row; 3], to: &mut [Wide; 3]) {
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn see(
+fn see<const RGB: bool>(
     facets: &mut BlockFacets,
     surfaces: Surfaces<'_>,
-    (block, first, found): (&RayBlock, usize, &Found),
+    (block, first, found): (&RayBlock, usize, &Found<'_>),
     (hits, shading): (&Hits, &[Row; 3]),
 ) {
     widen(&hits.normal, &mut facets.normal);
     widen(shading, &mut facets.shading);
     widen(&block.direction, &mut facets.direction);
-    widen(&found.color, &mut facets.base);
-    let BlockFacets { sheets, smooth, .. } = facets;
+    let count = if RGB { 3 } else { surfaces.all.count() };
+    let BlockFacets { sheets, smooth, bands, .. } = facets;
+    bands.resize(count, FacetBand::default());
+    for band in 0..count {
+        let color = found.color::<RGB>(band);
+        for i in 0..LANES {
+            bands[band].base[i] = f64::from(color[i]);
+        }
+    }
     // What lanes of other surfaces hold is of no use, and a number.
     sheets.alpha = [1.0; LANES];
     for lane in 0..LANES {
@@ -120,21 +174,32 @@ fn see(
             continue;
         }
         let surface = &surfaces.all.all[block.placement[lane] as usize];
-        let varied = surfaces.varied.get(first + lane).filter(|_| surface.is_varied);
+        let varied = surfaces.varied.lookups.get(first + lane).filter(|_| surface.is_varied);
         let own = match varied.filter(|_| surface.has_own_facets) {
             Some(varied) => &varied.facets,
             None => &surfaces.all.facets[surface.material as usize],
         };
-        for k in 0..3 {
-            facets.highlight[k][lane] = own.highlight[k];
-            facets.dip[k][lane] = own.dip[k];
+        if RGB {
+            for k in 0..3 {
+                (bands[k].highlight[lane], bands[k].dip[lane]) = (own.highlight[k], own.dip[k]);
+            }
+        } else {
+            let own = match surface.has_own_facets {
+                true => &surfaces.varied.facet_bands[(first + lane) * count..][..count],
+                false => surfaces.all.facet_bands_of(surface.material),
+            };
+            for (band, [highlight, dip]) in bands.iter_mut().zip(own) {
+                (band.highlight[lane], band.dip[lane]) = (*highlight, *dip);
+            }
         }
         let is_metal = f64::from(u8::from(own.is_metal));
         if found.sheets[lane] != 0 {
             (sheets.alpha[lane], sheets.metallic[lane]) = (own.alpha, own.metallic);
             (sheets.f0[lane], sheets.f90[lane]) = (own.f0, own.f90);
-            let [r, g, b] = [0, 1, 2].map(|k| facets.base[k][lane]);
-            sheets.base_peak[lane] = r.max(g).max(b);
+            sheets.base_peak[lane] = match varied {
+                Some(varied) => varied.base_peak,
+                None => surfaces.all.facets[surface.material as usize].base_peak,
+            };
             sheets.f0_peak[lane] = own.f0_peak;
             sheets.is_metal[lane] = is_metal;
         } else {
@@ -149,10 +214,10 @@ fn see(
         return;
     }
     sheets.view(&facets.shading, &facets.direction);
-    for k in 0..3 {
+    for band in bands {
         for i in 0..LANES {
-            let reflectance = mean_reflectance(facets.base[k][i], facets.dip[k][i]);
-            facets.deep[k][i] = multiple(reflectance, sheets.mean[i]);
+            let reflectance = mean_reflectance(band.base[i], band.dip[i]);
+            band.deep[i] = multiple(reflectance, sheets.mean[i]);
         }
     }
 }
@@ -162,7 +227,7 @@ fn reflect(
     facets: &mut BlockFacets,
     lanes: &Mask,
     (toward, pdf, is_delta): (&[Row; 3], &Row, &Row),
-    (value, share): (&mut Row, &mut [Row; 3]),
+    value: &mut Row,
 ) {
     let mut wide = [[0.0; LANES]; 3];
     widen(toward, &mut wide);
@@ -174,12 +239,6 @@ fn reflect(
     facets.sheets.reflect([&facets.normal, &facets.shading], asked, &mut found);
     for i in 0..LANES {
         value[i] = if lanes[i] != 0 { round(found[i]) } else { value[i] };
-    }
-    for k in 0..3 {
-        for i in 0..LANES {
-            let own = round(facets.in_band(facets.sheets.weights(i), i, k));
-            share[k][i] = if lanes[i] != 0 { own } else { share[k][i] };
-        }
     }
 }
 
@@ -211,13 +270,6 @@ fn scatter_sheets(
         scattered.pdf[i] = if is_own { density } else { scattered.pdf[i] };
         let goes = mask((density > 0.0) & (density <= f32::MAX));
         scattered.goes[i] = if is_own { goes } else { scattered.goes[i] };
-    }
-    for k in 0..3 {
-        for i in 0..LANES {
-            let own = round(facets.in_band(facets.sheets.weights(i), i, k));
-            let row = &mut scattered.share[k];
-            row[i] = if lanes[i] != 0 { own } else { row[i] };
-        }
     }
 }
 
@@ -253,12 +305,5 @@ fn scatter_smooth(
     for i in 0..LANES {
         let own = mask(goes[i] > 0.0);
         scattered.goes[i] = if lanes[i] != 0 { own } else { scattered.goes[i] };
-    }
-    for k in 0..3 {
-        for i in 0..LANES {
-            let own = round(facets.in_band(smooth.weights(i), i, k));
-            let row = &mut scattered.share[k];
-            row[i] = if lanes[i] != 0 { own } else { row[i] };
-        }
     }
 }

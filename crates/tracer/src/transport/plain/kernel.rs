@@ -98,7 +98,7 @@ pub(super) fn ask_for_lamps<const TILTED: bool, const RICH: bool>(
         let first = number * LANES;
         let count = carried.len.saturating_sub(first);
         let mut found =
-            Found::of::<TILTED, RICH>(surfaces, (block, first, count), (|_| (), |_| ()));
+            Found::of::<TILTED, RICH, true>(surfaces, (block, first, count), (|_| (), |_| ()));
         if RICH {
             leave_out(&mut found, carried, first);
         }
@@ -121,7 +121,7 @@ pub(super) fn ask_for_lamps<const TILTED: bool, const RICH: bool>(
 /// A step of all paths of some blocks: lists those that met what shines, and notes the rays that leave. Scenes are `RICH`
 /// in which some surface is not matte or not alike all over, or some light needs more than its place.
 #[multiversion::multiversion(targets = "simd")]
-pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool>(
+pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool>(
     (surfaces, lights): (Surfaces<'_>, &Lights<'_>),
     (blocks, carried): (&[RayBlock], &Columns),
     (numbers, sphere): (Numbers<'_>, Option<Sphere>),
@@ -141,7 +141,8 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool>(
                 missed.push(lanes[lane]);
             }
         };
-        let mut found = Found::of::<TILTED, RICH>(surfaces, (block, first, count), (meets, misses));
+        let own = (block, first, count);
+        let mut found = Found::of::<TILTED, RICH, RGB>(surfaces, own, (meets, misses));
         if RICH {
             leave_out(&mut found, carried, first);
         }
@@ -151,16 +152,15 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool>(
         let hits = measure(block, &found, offset);
         let run = first..first + LANES;
         let row = |column: &[f32]| -> Row { column[run.clone()].try_into().unwrap_or(ZERO) };
-        // (What maps arrays is a function of its own, compiled without wide registers.)
-        let [red, green, blue] = &carried.throughput;
-        let arrived = [row(red), row(green), row(blue)];
+        let arrived = |band: usize| row(&carried.throughput[band]);
         let square = |draw: Draw| {
             let [first, second] = &numbers.drawn[draw as usize];
             [row(first), row(second)]
         };
         let has_facets = RICH && found.has_facets();
         if has_facets {
-            leaving.facets.see(surfaces, (block, first, &found), (&hits, hits.shading::<TILTED>()));
+            let seen = (&hits, hits.shading::<TILTED>());
+            leaving.facets.see::<RGB>(surfaces, (block, first, &found), seen);
         }
         let ray: [u32; LANES] = carried.ray[run.clone()].try_into().unwrap_or([0; LANES]);
         let light = square(Draw::Light);
@@ -172,30 +172,34 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool>(
             OtherPlaces::of::<TILTED>(numbers.chosen, &hits, (&light, first), &mut places)
         });
         let mut asked = ask::<TILTED, RICH>((&places, others.as_ref(), offset), &hits);
-        let mut share = found.color;
-        if RICH && found.sheets != [0; LANES] {
+        let has_sheets = RICH && found.sheets != [0; LANES];
+        if has_sheets {
             let toward = (&asked.toward, &asked.pdf, &places.is_delta);
-            leaving.facets.reflect(&found.sheets, toward, (&mut asked.value, &mut share));
-        }
-        for band in 0..3 {
-            for i in 0..LANES {
-                share[band][i] *= arrived[band][i] * asked.value[i];
-            }
-        }
-        if let Some(others) = &others {
-            for band in 0..3 {
-                for i in 0..LANES {
-                    share[band][i] *= others.radiance[band][i];
-                }
-            }
+            leaving.facets.reflect(&found.sheets, toward, &mut asked.value);
         }
         let asks = if RICH { found.asks() } else { found.scatters };
-        let asking = (&asks, &share, &ray);
-        send(&asked, &places, asking, (instructions, leaving.shadows));
+        let facets = &*leaving.facets;
+        let share = |band: usize| {
+            let (mut share, arrived) = (found.color::<RGB>(band), arrived(band));
+            if has_sheets {
+                facets.sheets_in_band(&found.sheets, band, &mut share);
+            }
+            for i in 0..LANES {
+                share[i] *= arrived[i] * asked.value[i];
+            }
+            if let (Some(others), Some(chosen)) = (&others, numbers.chosen) {
+                let radiance = others.radiance((chosen, first), &places.lamp, band);
+                for i in 0..LANES {
+                    share[i] *= radiance[i];
+                }
+            }
+            share
+        };
+        send::<RGB>(&asked, &places, (&asks, &ray, share), (instructions, leaving.shadows));
         if !numbers.goes_on && (!RICH || found.smooth == [0; LANES]) {
             continue;
         }
-        let mut left = scatter::<TILTED>(&hits, square(Draw::Direction), found.color);
+        let mut left = scatter::<TILTED>(&hits, square(Draw::Direction));
         for i in 0..LANES {
             left.goes[i] &= found.scatters[i];
         }
@@ -213,12 +217,6 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool>(
                 left.goes[i] &= found.smooth[i];
             }
         }
-        let mut throughput = arrived;
-        for band in 0..3 {
-            for i in 0..LANES {
-                throughput[band][i] *= left.share[band][i];
-            }
-        }
         if let Some(sphere) = &sphere {
             keep_those_that_may_meet(
                 sphere,
@@ -227,18 +225,45 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool>(
                 &mut left.goes,
             );
         }
-        end_some(&mut throughput, &mut left.goes, numbers.roulette.then(|| square(Draw::Chance)));
+        let facets = &*leaving.facets;
+        let passed = |band: usize| {
+            let (mut share, arrived) = (found.color::<RGB>(band), arrived(band));
+            if has_facets {
+                facets.in_band(&found, band, &mut share);
+            }
+            for i in 0..LANES {
+                share[i] *= arrived[i];
+            }
+            share
+        };
+        let mut most = ZERO;
+        for band in 0..carried.count::<RGB>() {
+            let passed = passed(band);
+            for i in 0..LANES {
+                most[i] = if passed[i] > most[i] { passed[i] } else { most[i] };
+            }
+        }
+        let chances = numbers.roulette.then(|| square(Draw::Chance));
+        let more = end_some(&most, &mut left.goes, chances);
+        let throughput = |band: usize| {
+            let mut throughput = passed(band);
+            for i in 0..LANES {
+                throughput[i] *= more[i];
+            }
+            throughput
+        };
         let sky_chance = numbers.chosen.filter(|chosen| RICH && !chosen.sky_chance.is_empty());
         let sky_chance = sky_chance.map(|chosen| row(&chosen.sky_chance));
         let departing = BlockPaths { throughput, ray, lanes, smooth: found.smooth, sky_chance };
         let shading = numbers.chosen.is_some().then(|| hits.shading::<TILTED>());
-        depart::<RICH>((&left, shading), &departing, &numbers, (instructions, &mut leaving));
+        let to = (&mut *leaving.next, &mut *leaving.last);
+        depart::<RICH, RGB>((&left, shading), &departing, &numbers, (instructions, to));
     }
 }
 
 /// Leaves out the surfaces that paths met which only look for light.
 #[inline(always)]
-fn leave_out(found: &mut Found, carried: &Columns, first: usize) {
+fn leave_out(found: &mut Found<'_>, carried: &Columns, first: usize) {
     let Some(flags) = carried.flags.get(first..first + LANES) else { return };
     for i in 0..LANES {
         let goes_on = if flags[i] & LAST == 0 { u32::MAX } else { 0 };
@@ -265,7 +290,7 @@ fn lanes_from(first: usize) -> [u32; LANES] {
 
 /// Points, their errors, and normals on the viewer's side, as [`super::super::kernels::measure`] has them.
 #[inline(always)]
-fn measure(block: &RayBlock, found: &Found, offset: [f32; 3]) -> Hits {
+fn measure(block: &RayBlock, found: &Found<'_>, offset: [f32; 3]) -> Hits {
     let magnitudes = &found.magnitudes;
     let [x, y, z] = &block.normal;
     let [dx, dy, dz] = &block.direction;

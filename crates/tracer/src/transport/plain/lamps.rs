@@ -58,24 +58,28 @@ pub(in crate::transport) struct Lights<'a> {
     /// All of them, and the sum of the chances of all before each with 1 at the end, where they are few points and
     /// triangles that are alike from everywhere; else each point chooses among all ([`lights::Lights::pick`]).
     few: Vec<Lamp>,
-    few_bands: Vec<[f64; 3]>,
+    few_bands: Vec<f64>,
     below: Vec<f32>,
     pub(super) sky: Option<PlainSky<'a>>,
     /// All are far away.
     pub(super) are_far: bool,
     /// What blocks' coordinates are relative to (m).
     pub(super) origin: DVec3,
+    /// Of lights whose rays carry their radiance.
+    ones: Vec<f64>,
 }
 
 impl<'a> Lights<'a> {
-    pub(super) fn new(all: &'a lights::Lights, origin: DVec3) -> Self {
+    pub(super) fn new(all: &'a lights::Lights, origin: DVec3, count: usize) -> Self {
         let (few, few_bands) = (Vec::new(), Vec::new());
-        let sky = PlainSky::of(all);
+        let sky = PlainSky::of(all, count);
         let are_far = all.plain_lights().is_some_and(|bounds| bounds.are_far);
-        let mut own = Self { all, few, few_bands, below: Vec::new(), sky, are_far, origin };
+        let (below, ones) = (Vec::new(), vec![1.0; count]);
+        let mut own = Self { all, few, few_bands, below, sky, are_far, origin, ones };
         if let Some(below) = all.few().filter(|_| !all.has_others()) {
             own.few = (0..all.count()).map(|number| own.lamp(number)).collect();
-            own.few_bands = (0..all.count()).map(|number| own.bands_of(number)).collect();
+            let bands = (0..all.count()).flat_map(|number| own.bands_of(number));
+            own.few_bands = bands.copied().collect();
             own.below = below.iter().map(|&sum| round(sum)).collect();
         }
         own
@@ -100,11 +104,13 @@ impl<'a> Lights<'a> {
 
     /// Radiance of a triangle or the sky, intensity of a point; 1 of other lights, whose rays carry it.
     #[inline(always)]
-    pub(super) fn radiance(&self, lamp: u32) -> [f64; 3] {
+    pub(super) fn radiance(&self, lamp: u32) -> &[f64] {
         if lamp >= SKY {
-            return if lamp == SKY { self.sky.map_or([0.0; 3], |sky| sky.bands) } else { [1.0; 3] };
+            let sky = self.sky.as_ref().filter(|_| lamp == SKY);
+            return sky.map_or(&*self.ones, |sky| sky.bands);
         }
-        let kept = self.few_bands.get(lamp as usize).copied();
+        let first = lamp as usize * self.ones.len();
+        let kept = self.few_bands.get(first..first + self.ones.len());
         kept.unwrap_or_else(|| self.bands_of(lamp as usize))
     }
 
@@ -119,8 +125,8 @@ impl<'a> Lights<'a> {
     }
 
     #[inline(always)]
-    fn bands_of(&self, number: usize) -> [f64; 3] {
-        self.all.plain_light_bands(number, 3).try_into().unwrap_or_default()
+    fn bands_of(&self, number: usize) -> &'a [f64] {
+        self.all.plain_light_bands(number, self.ones.len())
     }
 }
 
@@ -145,7 +151,9 @@ pub(in crate::transport) struct ChosenLamps {
     /// their radiance.
     pub(super) place: [Vec<f32>; 3],
     pub(super) density: Vec<f32>,
-    pub(super) radiance: [Vec<f32>; 3],
+    radiance: Vec<Vec<f32>>,
+    /// That of one light, by band.
+    pub(super) light: Vec<f64>,
     pub(super) is_far: Vec<f32>,
     pub(super) is_delta: Vec<f32>,
     /// The lanes that chose the sky's image with which chances, by which squares, and the patches of the image.
@@ -168,9 +176,15 @@ pub(super) struct OtherPlace {
 }
 
 impl ChosenLamps {
-    /// Empties it for so many lanes, of which some may choose other lights, the sky among them.
-    pub(super) fn restart(&mut self, room: usize, [has_others, has_sky]: [bool; 2]) {
+    /// Empties it for so many lanes and bands, of which some may choose other lights, the sky among them.
+    pub(super) fn restart(
+        &mut self,
+        (room, count): (usize, usize),
+        [has_others, has_sky]: [bool; 2],
+    ) {
         let Self { lamp, chance, density, place, radiance, is_far, is_delta, .. } = self;
+        self.light.resize(count, 0.0);
+        radiance.resize(count, Vec::new());
         lamp.clear();
         lamp.resize(room, 0);
         chance.clear();
@@ -185,13 +199,15 @@ impl ChosenLamps {
         self.squares.clear();
     }
 
-    /// Notes what a lane chose.
+    /// Notes what a lane chose, which brings so much of a band.
     #[inline(always)]
-    pub(super) fn put(&mut self, lane: usize, own: &OtherPlace, radiance: [f32; 3]) {
+    pub(super) fn put(&mut self, lane: usize, own: &OtherPlace, radiance: impl Fn(usize) -> f64) {
         self.lamp[lane] = OTHER | own.light;
         for axis in 0..3 {
             self.place[axis][lane] = own.place[axis];
-            self.radiance[axis][lane] = radiance[axis];
+        }
+        for (band, row) in self.radiance.iter_mut().enumerate() {
+            row[lane] = round(radiance(band));
         }
         self.density[lane] = own.density;
         self.is_far[lane] = f32::from(u8::from(own.is_far));
@@ -221,8 +237,7 @@ pub(super) struct OtherPlaces {
     pub(super) is_far: Row,
     /// It shines to the side of its normal alone, as triangles do, unless they shine to both.
     pub(super) has_side: Row,
-    /// Of [`OTHER`] lights, and 1 of all else.
-    pub(super) radiance: [Row; 3],
+    has_others: bool,
 }
 
 impl Places {
@@ -286,11 +301,11 @@ impl OtherPlaces {
         (square, first): (&[Row; 2], usize),
         places: &mut Places,
     ) -> Self {
-        let (mut has_side, ones) = (ZERO, [1.0; LANES]);
+        let mut has_side = ZERO;
         for i in 0..LANES {
             has_side[i] = 1.0 - places.is_delta[i];
         }
-        let mut others = Self { is_far: ZERO, has_side, radiance: [ones; 3] };
+        let mut others = Self { is_far: ZERO, has_side, has_others: false };
         let Some(chosen) = chosen else { return others };
         let (mut is_other, mut is_sky) = (false, false);
         for i in 0..LANES {
@@ -298,6 +313,7 @@ impl OtherPlaces {
             is_sky |= places.lamp[i] == SKY;
         }
         let run = first..first + LANES;
+        others.has_others = is_other;
         if is_other {
             others.take_others(chosen, &hits.point, run.clone(), places);
         }
@@ -330,6 +346,24 @@ impl OtherPlaces {
         }
     }
 
+    /// A band of [`OTHER`] lights that lanes chose, and 1 of all else.
+    #[inline(always)]
+    pub(super) fn radiance(
+        &self,
+        (chosen, first): (&ChosenLamps, usize),
+        lamps: &[u32; LANES],
+        band: usize,
+    ) -> Row {
+        let mut radiance = [1.0; LANES];
+        if self.has_others {
+            let own = &chosen.radiance[band][first..first + LANES];
+            for i in 0..LANES {
+                radiance[i] = if lamps[i] >= OTHER { own[i] } else { 1.0 };
+            }
+        }
+        radiance
+    }
+
     /// Takes places on [`OTHER`] lights, and directions to them.
     #[inline(always)]
     fn take_others(
@@ -343,14 +377,13 @@ impl OtherPlaces {
         let (density, is_far) = (row(&chosen.density), row(&chosen.is_far));
         let is_delta = row(&chosen.is_delta);
         for axis in 0..3 {
-            let (place, own) = (row(&chosen.place[axis]), row(&chosen.radiance[axis]));
+            let place = row(&chosen.place[axis]);
             for i in 0..LANES {
                 let is_own = places.lamp[i] >= OTHER;
                 let way = if is_far[i] > 0.0 { place[i] } else { place[i] - points[axis][i] };
                 places.way[axis][i] = if is_own { way } else { places.way[axis][i] };
                 places.normal[axis][i] = if is_own { 0.0 } else { places.normal[axis][i] };
                 places.magnitudes[axis][i] = if is_own { 0.0 } else { places.magnitudes[axis][i] };
-                self.radiance[axis][i] = if is_own { own[i] } else { 1.0 };
             }
         }
         for i in 0..LANES {

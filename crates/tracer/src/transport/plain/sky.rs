@@ -9,6 +9,7 @@ use etendue_geometry::glam::DMat3;
 use super::kernel::{ZERO, round, single};
 use super::lamps::{ChosenLamps, Lights, OTHER, OtherPlace};
 use super::{Columns, PlainScratch, RayColumns, SPECULAR};
+use crate::Spectral;
 use crate::environment::{EnvironmentMap, MapLookup, MapSampler};
 use crate::sampling::GridCell;
 use crate::transport::{RaySamples, Tracing};
@@ -21,14 +22,13 @@ pub(super) struct PlainSky<'a> {
     pub(super) map: Option<(&'a EnvironmentMap, &'a MapSampler)>,
     world_from_map: DMat3,
     /// Radiance where its image has 1.
-    pub(super) bands: [f64; 3],
+    pub(super) bands: &'a [f64],
     visible: bool,
 }
 
 /// What paths that met the sky brought there, side by side.
 struct SkyHits {
     direction: [Row; 3],
-    throughput: [Row; 3],
     /// Density (1/sr) of the direction, and the chance with which the sky was asked where it began; 1 and 0 where no
     /// light was asked in its stead.
     pdf: Row,
@@ -38,13 +38,8 @@ struct SkyHits {
 }
 
 impl SkyHits {
-    const NOTHING: Self = Self {
-        direction: [ZERO; 3],
-        throughput: [ZERO; 3],
-        pdf: [1.0; LANES],
-        chance: ZERO,
-        normal: [ZERO; 3],
-    };
+    const NOTHING: Self =
+        Self { direction: [ZERO; 3], pdf: [1.0; LANES], chance: ZERO, normal: [ZERO; 3] };
 
     /// Takes a path, which left a surface where the sky may have been asked, too.
     #[inline(always)]
@@ -57,7 +52,6 @@ impl SkyHits {
     ) {
         for axis in 0..3 {
             self.direction[axis][i] = direction[axis];
-            self.throughput[axis][i] = carried.throughput[axis][own];
         }
         if was_asked {
             (self.pdf[i], self.chance[i]) = (carried.pdf[own], carried.sky_chance[own]);
@@ -70,20 +64,39 @@ impl SkyHits {
 
 impl<'a> PlainSky<'a> {
     /// That of all lights.
-    pub(super) fn of(lights: &'a crate::lights::Lights) -> Option<Self> {
+    pub(super) fn of(lights: &'a crate::lights::Lights, count: usize) -> Option<Self> {
         let sky = lights.sky.as_ref()?;
         Some(Self {
             index: sky.index,
             map: sky.map.as_ref().map(|(map, sampler)| (&**map, sampler)),
             world_from_map: sky.world_from_map,
-            bands: lights.bands_of(sky.index, 3).try_into().unwrap_or_default(),
+            bands: lights.bands_of(sky.index, count),
             visible: sky.visible,
         })
     }
 
-    /// Light that comes along the ways that paths arrived by, in terms of [`Self::bands`].
-    fn light_of(&self, arrived: &SkyHits, light: &mut [Row; 3]) {
-        light_of(self, arrived, light);
+    /// A band of the light that comes where its image has a colour, of 1 without one.
+    #[inline(always)]
+    fn band<const RGB: bool>(&self, spectral: &Spectral, color: [f32; 3], band: usize) -> f64 {
+        let own = match (RGB, self.map) {
+            (_, None) => 1.0,
+            (true, _) => f64::from(color[band]),
+            (false, _) => spectral.band(&color.map(f64::from), band),
+        };
+        own * self.bands[band]
+    }
+}
+
+/// The colours of a sky's image along the ways that paths arrived by, and their weights against having been asked.
+struct SkyLight {
+    color: [Row; 3],
+    weight: Row,
+}
+
+impl SkyLight {
+    #[inline(always)]
+    fn color(&self, lane: usize) -> [f32; 3] {
+        [self.color[0][lane], self.color[1][lane], self.color[2][lane]]
     }
 }
 
@@ -102,7 +115,7 @@ fn turned(rows: DMat3, [x, y, z]: &[Row; 3]) -> [Row; 3] {
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn light_of(sky: &PlainSky<'_>, arrived: &SkyHits, light: &mut [Row; 3]) {
+fn light_of(sky: &PlainSky<'_>, arrived: &SkyHits, light: &mut SkyLight) {
     let (mut density, mut color) = (ZERO, [[1.0; LANES]; 3]);
     match sky.map {
         Some((map, sampler)) => {
@@ -120,12 +133,10 @@ fn light_of(sky: &PlainSky<'_>, arrived: &SkyHits, light: &mut [Row; 3]) {
             }
         }
     }
-    for band in 0..3 {
-        for i in 0..LANES {
-            let ratio = arrived.chance[i] * density[i] / arrived.pdf[i];
-            let weight = 1.0 / (1.0 + ratio * ratio);
-            light[band][i] = color[band][i] * arrived.throughput[band][i] * weight;
-        }
+    light.color = color;
+    for i in 0..LANES {
+        let ratio = arrived.chance[i] * density[i] / arrived.pdf[i];
+        light.weight[i] = 1.0 / (1.0 + ratio * ratio);
     }
 }
 
@@ -135,7 +146,11 @@ fn number_of(sky: &PlainSky<'_>) -> u32 {
 
 /// Directions to the sky's image in the patches that lanes chose.
 #[multiversion::multiversion(targets = "simd")]
-pub(super) fn place_on_sky(sky: &PlainSky<'_>, chosen: &mut ChosenLamps) {
+pub(super) fn place_on_sky<const RGB: bool>(
+    sky: &PlainSky<'_>,
+    spectral: &Spectral,
+    chosen: &mut ChosenLamps,
+) {
     let Some((map, sampler)) = sky.map else { return };
     let cells = std::mem::take(&mut chosen.cells);
     for (number, run) in cells.chunks(LANES).enumerate() {
@@ -151,11 +166,8 @@ pub(super) fn place_on_sky(sky: &PlainSky<'_>, chosen: &mut ChosenLamps) {
                 let (is_far, is_delta) = (true, false);
                 let (light, place) = (number_of(sky), axis(&directions));
                 let own = OtherPlace { light, place, is_far, is_delta, density };
-                let mut radiance = axis(&lit.colors);
-                for band in 0..3 {
-                    radiance[band] *= round(sky.bands[band]);
-                }
-                chosen.put(lane as usize, &own, radiance);
+                let color = axis(&lit.colors);
+                chosen.put(lane as usize, &own, |k| sky.band::<RGB>(spectral, color, k));
             }
         }
     }
@@ -172,7 +184,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         out: &mut [f64],
     ) {
         let Some(sky) = lights.sky.filter(|sky| sky.visible || number > 0) else { return };
-        let flags = &plain.carried.flags;
+        let (flags, throughput) = (&plain.carried.flags, &plain.carried.throughput);
+        let (mut lit, mut light) = (SkyLight { color: [ZERO; 3], weight: ZERO }, Vec::new());
+        light.resize(self.count(), 0.0);
         for missed in plain.missed.chunks(LANES) {
             let mut arrived = SkyHits::NOTHING;
             for (i, &own) in missed.iter().enumerate() {
@@ -186,20 +200,29 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 let was_asked = number > 0 && !is_specular;
                 arrived.put(i, (&plain.carried, own), single(direction), was_asked);
             }
-            let mut light = [ZERO; 3];
-            sky.light_of(&arrived, &mut light);
+            light_of(&sky, &arrived, &mut lit);
             for (i, &own) in missed.iter().enumerate() {
-                let band = |k: usize| f64::from(light[k][i]) * sky.bands[k];
+                let own = own as usize;
+                for (k, band) in light.iter_mut().enumerate() {
+                    let carried = f64::from(throughput[k][own] * lit.weight[i]);
+                    *band = carried * sky.band::<RGB>(self.ctx.spectral, lit.color(i), k);
+                }
                 let group = || self.ctx.lights.group_of_sky();
-                let row = self.parts.row(plain.carried.ray[own as usize], number, group);
-                self.add(&[band(0), band(1), band(2)], row, out);
+                let row = self.parts.row(plain.carried.ray[own], number, group);
+                self.add(&light, row, out);
             }
         }
     }
 }
 
 /// Makes last directions rays to the sky, where nothing else shines: they bring its light unless something is in between.
-pub(super) fn ask_sky(sky: &PlainSky<'_>, last: &mut RayColumns, shadows: &mut RayColumns) {
+pub(super) fn ask_sky<const RGB: bool>(
+    sky: &PlainSky<'_>,
+    spectral: &Spectral,
+    last: &mut RayColumns,
+    shadows: &mut RayColumns,
+) {
+    let mut lit = SkyLight { color: [ZERO; 3], weight: ZERO };
     for first in (0..last.len).step_by(LANES) {
         let mut arrived = SkyHits::NOTHING;
         let count = LANES.min(last.len - first);
@@ -207,15 +230,17 @@ pub(super) fn ask_sky(sky: &PlainSky<'_>, last: &mut RayColumns, shadows: &mut R
             let direction = [0, 1, 2].map(|axis| last.along[axis][first + i]);
             arrived.put(i, (&last.carried, first + i), direction, true);
         }
-        let mut light = [ZERO; 3];
-        sky.light_of(&arrived, &mut light);
+        light_of(sky, &arrived, &mut lit);
         for i in 0..count {
             let (from, to) = (first + i, shadows.len);
             for axis in 0..3 {
                 shadows.start[axis][to] = last.start[axis][from];
                 shadows.along[axis][to] = last.along[axis][from];
-                let band = light[axis][i] * round(sky.bands[axis]);
-                shadows.carried.throughput[axis][to] = band;
+            }
+            for band in 0..shadows.carried.count::<RGB>() {
+                let carried = f64::from(last.carried.throughput[band][from] * lit.weight[i]);
+                let light = carried * sky.band::<RGB>(spectral, lit.color(i), band);
+                shadows.carried.throughput[band][to] = round(light);
             }
             shadows.reach[to] = f32::INFINITY;
             shadows.lamp[to] = number_of(sky) | OTHER;

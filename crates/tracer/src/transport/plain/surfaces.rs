@@ -7,7 +7,7 @@ use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::{Geometry, RayBlock};
 
 use super::kernel::{Mask, ZERO, mask};
-use crate::placed::{PlainFacets, PlainKind, PlainSurfaces};
+use crate::placed::{PlainFacets, PlainKind, PlainSurface, PlainSurfaces};
 
 #[expect(clippy::cast_possible_truncation, reason = "single precision is enough for it")]
 const LEAST_ELEVATION: f32 = crate::surface::LEAST_ELEVATION as f32;
@@ -17,21 +17,49 @@ const LEAST_ELEVATION: f32 = crate::surface::LEAST_ELEVATION as f32;
 pub(in crate::transport) struct Surfaces<'a> {
     pub(super) all: &'a PlainSurfaces,
     pub(super) geometry: &'a Geometry,
-    /// By lane, of surfaces that are not alike all over; empty where all are.
-    pub(super) varied: &'a [TextureLookup],
+    pub(super) varied: &'a Varied,
+}
+
+/// What surfaces that are not alike all over have, by lane; empty where all are.
+#[derive(Debug, Default)]
+pub(in crate::transport) struct Varied {
+    pub(super) lookups: Vec<TextureLookup>,
+    /// Where bands are not red, green and blue: colours, `[lane][band]`, and those of highlights with the dips of
+    /// measured metals.
+    pub(super) colors: Vec<f32>,
+    pub(super) facet_bands: Vec<[f64; 2]>,
+}
+
+impl Varied {
+    /// What all have that are alike all over.
+    pub(super) const NONE: &'static Self =
+        &Self { lookups: Vec::new(), colors: Vec::new(), facet_bands: Vec::new() };
 }
 
 /// What a surface that is not alike all over has where it was hit.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct TextureLookup {
+    /// Red, green and blue, and the largest band of any.
     pub(super) color: [f32; 3],
+    pub(super) base_peak: f64,
     /// About which light is scattered, of any length and side, where normals are mapped.
     pub(super) normal: [f32; 3],
     /// Where these are not alike all over.
     pub(super) facets: PlainFacets,
 }
 
-impl Surfaces<'_> {
+impl<'a> Surfaces<'a> {
+    /// The bands of a lane's colour, which are not red, green and blue.
+    #[inline(always)]
+    fn bands(&self, surface: &PlainSurface, lane: Option<usize>, count: usize) -> &'a [f32] {
+        match lane {
+            Some(lane) => {
+                self.varied.colors.get(lane * count..(lane + 1) * count).unwrap_or_default()
+            }
+            None => self.all.color_of(surface.material),
+        }
+    }
+
     /// The normal of a mesh's corners where a lane hit one of its triangles, in the world, of any length and side; zero
     /// of a mesh without.
     #[inline(always)]
@@ -56,8 +84,10 @@ impl Surfaces<'_> {
 
 /// What is looked up for the hits of a block.
 #[derive(Debug)]
-pub(super) struct Found {
-    pub(super) color: [Row; 3],
+pub(super) struct Found<'a> {
+    /// Red, green and blue; or what there is of each lane's bands.
+    color: [Row; 3],
+    bands: [&'a [f32]; LANES],
     pub(super) magnitudes: [Row; 3],
     pub(super) scatters: Mask,
     /// Those that scatter light which are sheets of facets, and which are smooth.
@@ -67,7 +97,20 @@ pub(super) struct Found {
     pub(super) tilted: Option<[Row; 3]>,
 }
 
-impl Found {
+impl<'a> Found<'a> {
+    /// A band of all lanes' colours.
+    #[inline(always)]
+    pub(super) fn color<const RGB: bool>(&self, band: usize) -> Row {
+        if RGB {
+            return self.color[band];
+        }
+        let mut row = ZERO;
+        for lane in 0..LANES {
+            row[lane] = self.bands[lane].get(band).copied().unwrap_or(0.0);
+        }
+        row
+    }
+
     /// Lanes that ask for light.
     #[inline(always)]
     pub(super) fn asks(&self) -> Mask {
@@ -87,14 +130,15 @@ impl Found {
     /// What the lanes of a block hit from the first on, of which so many are rays; each that hit what shines goes to `meets`, each that
     /// hit nothing to `misses`.
     #[inline(always)]
-    pub(super) fn of<const TILTED: bool, const RICH: bool>(
-        surfaces: Surfaces<'_>,
+    pub(super) fn of<const TILTED: bool, const RICH: bool, const RGB: bool>(
+        surfaces: Surfaces<'a>,
         (block, first, count): (&RayBlock, usize, usize),
         (mut meets, mut misses): (impl FnMut(usize), impl FnMut(usize)),
     ) -> Self {
         let none = [0; LANES];
         let mut found = Self {
             color: [ZERO; 3],
+            bands: [&[]; LANES],
             magnitudes: [ZERO; 3],
             scatters: none,
             sheets: none,
@@ -106,10 +150,17 @@ impl Found {
         for lane in 0..LANES {
             let surface = &all[(block.placement[lane] as usize).min(last)];
             let is_varied = RICH && surface.is_varied && lane < count;
-            let varied = surfaces.varied.get(first + lane).filter(|_| is_varied);
-            let color = varied.map_or(&surface.color, |varied| &varied.color);
+            let varied = surfaces.varied.lookups.get(first + lane).filter(|_| is_varied);
+            if RGB {
+                let color = varied.map_or(&surface.color, |varied| &varied.color);
+                for band in 0..3 {
+                    found.color[band][lane] = color[band];
+                }
+            } else if lane < count {
+                let own = varied.is_some().then_some(first + lane);
+                found.bands[lane] = surfaces.bands(surface, own, surfaces.all.count());
+            }
             for axis in 0..3 {
-                found.color[axis][lane] = color[axis];
                 found.magnitudes[axis][lane] = surface.magnitudes[axis];
             }
             let is_hit = surface.is_there & (lane < count);

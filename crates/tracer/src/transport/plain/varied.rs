@@ -4,7 +4,7 @@ use etendue_geometry::block::{LANES, vector};
 use etendue_geometry::glam::DVec3;
 
 use super::kernel::{round, single};
-use super::surfaces::{Surfaces, TextureLookup};
+use super::surfaces::{Surfaces, TextureLookup, Varied};
 use super::{PlainScratch, SPECULAR};
 use crate::Scattering;
 use crate::footprint::{Cone, Footprint};
@@ -21,16 +21,21 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         plain: &mut PlainScratch,
     ) {
         if !surfaces.all.are_varied {
-            plain.varied.clear();
+            plain.varied.lookups.clear();
             return;
         }
         let mut varied = std::mem::take(&mut plain.varied);
-        varied.resize(plain.carried.len, TextureLookup::default());
-        for (lane, found) in varied.iter_mut().enumerate() {
+        let (len, count) = (plain.carried.len, self.count());
+        varied.lookups.resize(len, TextureLookup::default());
+        if !RGB {
+            varied.colors.resize(len * count, 0.0);
+            varied.facet_bands.resize(len * count, [0.0; 2]);
+        }
+        for lane in 0..len {
             let placement = plain.rays.blocks()[lane / LANES].placement[lane % LANES];
             let own = surfaces.all.all.get(placement as usize);
             if own.is_some_and(|own| own.is_varied) {
-                self.look_up_lane((camera, number), surfaces, plain, (lane, found));
+                self.look_up_lane((camera, number), surfaces, plain, (lane, &mut varied));
             }
         }
         plain.varied = varied;
@@ -42,7 +47,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         (camera, number): (&RaySamples<'_>, u32),
         surfaces: Surfaces<'_>,
         plain: &PlainScratch,
-        (lane, found): (usize, &mut TextureLookup),
+        (lane, varied): (usize, &mut Varied),
     ) -> Option<()> {
         let (block, i) = (&plain.rays.blocks()[lane / LANES], lane % LANES);
         let (scene, spectral) = (&self.ctx.scene, self.ctx.spectral);
@@ -64,12 +69,29 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let is_measured = matches!(&material.scattering, Scattering::Metal { named: Some(_), .. });
         let looked_up = || scene.base_tint(spectral, material, &point).0.clamped();
         let tint = placed.color.unwrap_or_else(looked_up);
-        found.color = if is_measured { own.color } else { tint.color.map(round) };
+        let bands = lane * self.count()..(lane + 1) * self.count();
+        let found = &mut varied.lookups[lane];
+        (found.color, found.base_peak) = (tint.color.map(round), tint.peak());
+        if is_measured {
+            found.color = own.color;
+        }
+        if !RGB {
+            let known = surfaces.all.color_of(own.material);
+            for (k, band) in varied.colors[bands.clone()].iter_mut().enumerate() {
+                *band = if is_measured { known[k] } else { round(spectral.tint(&tint, k)) };
+            }
+        }
         if let Scattering::Gltf(surface) = &material.scattering
             && own.has_own_facets
         {
-            let facets = PlainFacets::of_sheet(&surface.sheet(&point, scene, spectral));
+            let sheet = surface.sheet(&point, scene, spectral);
+            let facets = PlainFacets::of_sheet(&sheet);
             found.facets = PlainFacets { alpha: facets.alpha.max(LEAST_ALPHA), ..facets };
+            if !RGB {
+                for (k, band) in varied.facet_bands[bands].iter_mut().enumerate() {
+                    *band = [spectral.tint(&sheet.highlight, k), 0.0];
+                }
+            }
         }
         if own.is_mapped {
             let front = vector(&block.normal, i).normalize();
