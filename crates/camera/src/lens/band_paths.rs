@@ -33,6 +33,8 @@
 //! drawn within [`SharingLimits::places`](super::SharingLimits) of where rays land that are traced, over film and pupil.
 //! A ray that ends at some node is traced at every band's wavelength by itself.
 
+use std::sync::Arc;
+
 use etendue_optics::element::{Clip, LensRays, Opening, Ray, RayStatus};
 use etendue_optics::train::pupil::without_filters;
 use etendue_optics::train::{Element, MonochromaticTrain, Side};
@@ -41,7 +43,7 @@ use glam::{DVec2, DVec3};
 
 use super::lens_camera::LensCamera;
 use super::nodes::{MOST_NODES, NextTerm, NodeWeights, Variable};
-use super::opened::{BandInterpolation, filtered, place_of};
+use super::opened::{BandInterpolation, FoundPaths, filtered, place_of};
 use super::traced_at::TracedAt;
 use crate::{CameraRays, FilmSamples, Pose};
 
@@ -145,8 +147,13 @@ impl LensCamera {
         )
     }
 
+    /// Paths by which bands share rays, or why they do not, in words.
+    pub(super) fn band_paths(&self, bands: &Bands) -> FoundPaths {
+        self.measured_paths.get_or(bands, || self.measure_paths(bands).map(Arc::new))
+    }
+
     /// Chooses the nodes, and measures how well they do.
-    pub(super) fn band_paths(&self, bands: &Bands) -> Result<BandInterpolation, String> {
+    fn measure_paths(&self, bands: &Bands) -> Result<BandInterpolation, String> {
         if let Some(why) = self.parted() {
             return Err(why.to_owned());
         }

@@ -18,7 +18,7 @@ mod varied;
 
 use std::ops::RangeInclusive;
 
-use etendue_geometry::block::LANES;
+use etendue_geometry::block::{Floats, LANES};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitPrecision, RayBlocks};
 
@@ -103,6 +103,7 @@ pub(super) struct PlainScratch {
     seen: Vec<u32>,
     missed: Vec<u32>,
     facets: BlockFacets,
+    colors: Vec<Floats>,
     varied: Varied,
     /// When rays are (s from the frame's time), where that counts.
     times: Vec<f64>,
@@ -273,6 +274,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             seen: &mut plain.seen,
             missed: has_environment.then_some(&mut plain.missed),
             facets: &mut plain.facets,
+            colors: &mut plain.colors,
         };
         let sphere = emitters.filter(|_| is_last && !has_environment);
         let is_rich = all.are_rich() || self.ctx.lights.has_others();

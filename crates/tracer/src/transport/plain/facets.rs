@@ -46,15 +46,16 @@ pub(super) struct BsdfSamples {
 }
 
 impl BlockFacets {
-    /// Takes the facets of a block's hits as they are seen, with normals that light is scattered about.
+    /// Takes the facets of a block's hits as they are seen, with normals that light is scattered about and colours by
+    /// band.
     #[inline(always)]
     pub(super) fn see<const RGB: bool>(
         &mut self,
         surfaces: Surfaces<'_>,
         (block, first, found): (&RayBlock, usize, &Found<'_>),
-        (hits, shading): (&Hits, &[Row; 3]),
+        (hits, shading, colors): (&Hits, &[Row; 3], &[Row]),
     ) {
-        see::<RGB>(self, surfaces, (block, first, found), (hits, shading));
+        see::<RGB>(self, surfaces, (block, first, found), (hits, shading, colors));
     }
 
     /// What sheets turn to the viewer of light that comes from unit directions which were chosen with a density (1/sr):
@@ -153,7 +154,7 @@ fn see<const RGB: bool>(
     facets: &mut BlockFacets,
     surfaces: Surfaces<'_>,
     (block, first, found): (&RayBlock, usize, &Found<'_>),
-    (hits, shading): (&Hits, &[Row; 3]),
+    (hits, shading, colors): (&Hits, &[Row; 3], &[Row]),
 ) {
     widen(&hits.normal, &mut facets.normal);
     widen(shading, &mut facets.shading);
@@ -161,10 +162,9 @@ fn see<const RGB: bool>(
     let count = if RGB { 3 } else { surfaces.all.count() };
     let BlockFacets { sheets, smooth, bands, .. } = facets;
     bands.resize(count, FacetBand::default());
-    for band in 0..count {
-        let color = found.color::<RGB>(band);
+    for (band, color) in bands.iter_mut().zip(colors) {
         for i in 0..LANES {
-            bands[band].base[i] = f64::from(color[i]);
+            band.base[i] = f64::from(color[i]);
         }
     }
     // What lanes of other surfaces hold is of no use, and a number.

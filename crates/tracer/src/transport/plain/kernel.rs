@@ -59,6 +59,8 @@ pub(super) struct Leaving<'a> {
     /// Rays that met nothing, if that is asked for.
     pub(super) missed: Option<&'a mut Vec<u32>>,
     pub(super) facets: &'a mut BlockFacets,
+    /// Room for a block's colours by band, where bands are not red, green and blue.
+    pub(super) colors: &'a mut Vec<Row>,
 }
 
 /// A sphere around all that shines, relative to the blocks' origin: its centre and its radius (m).
@@ -130,6 +132,7 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
     // Blocks' coordinates are those of the world less their origin, whose roundings count as well.
     let offset = single(lights.origin).map(|axis| 2.0 * axis.abs());
     let instructions = Instructions::of_machine();
+    leaving.colors.resize(if RGB { 0 } else { carried.throughput.len() }, ZERO);
     for (number, block) in blocks.iter().enumerate() {
         let first = number * LANES;
         let count = carried.len.saturating_sub(first);
@@ -157,9 +160,10 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
             let [first, second] = &numbers.drawn[draw as usize];
             [row(first), row(second)]
         };
+        let colors = found.colors::<RGB>(leaving.colors);
         let has_facets = RICH && found.has_facets();
         if has_facets {
-            let seen = (&hits, hits.shading::<TILTED>());
+            let seen = (&hits, hits.shading::<TILTED>(), colors);
             leaving.facets.see::<RGB>(surfaces, (block, first, &found), seen);
         }
         let ray: [u32; LANES] = carried.ray[run.clone()].try_into().unwrap_or([0; LANES]);
@@ -180,7 +184,7 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
         let asks = if RICH { found.asks() } else { found.scatters };
         let facets = &*leaving.facets;
         let share = |band: usize| {
-            let (mut share, arrived) = (found.color::<RGB>(band), arrived(band));
+            let (mut share, arrived) = (colors[band], arrived(band));
             if has_sheets {
                 facets.sheets_in_band(&found.sheets, band, &mut share);
             }
@@ -227,7 +231,7 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
         }
         let facets = &*leaving.facets;
         let passed = |band: usize| {
-            let (mut share, arrived) = (found.color::<RGB>(band), arrived(band));
+            let (mut share, arrived) = (colors[band], arrived(band));
             if has_facets {
                 facets.in_band(&found, band, &mut share);
             }

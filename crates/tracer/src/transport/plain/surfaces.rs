@@ -85,7 +85,7 @@ impl<'a> Surfaces<'a> {
 /// What is looked up for the hits of a block.
 #[derive(Debug)]
 pub(super) struct Found<'a> {
-    /// Red, green and blue; or what there is of each lane's bands.
+    /// Red, green and blue; or what there is of each lane's bands, whose other lanes hold what is of no use.
     color: [Row; 3],
     bands: [&'a [f32]; LANES],
     pub(super) magnitudes: [Row; 3],
@@ -98,17 +98,18 @@ pub(super) struct Found<'a> {
 }
 
 impl<'a> Found<'a> {
-    /// A band of all lanes' colours.
+    /// All lanes' colours by band, of which `rows` has room for those that are not red, green and blue.
     #[inline(always)]
-    pub(super) fn color<const RGB: bool>(&self, band: usize) -> Row {
+    pub(super) fn colors<'b, const RGB: bool>(&'b self, rows: &'b mut [Row]) -> &'b [Row] {
         if RGB {
-            return self.color[band];
+            return &self.color;
         }
-        let mut row = ZERO;
-        for lane in 0..LANES {
-            row[lane] = self.bands[lane].get(band).copied().unwrap_or(0.0);
+        for (lane, bands) in self.bands.iter().enumerate() {
+            for (row, band) in rows.iter_mut().zip(*bands) {
+                row[lane] = *band;
+            }
         }
-        row
+        rows
     }
 
     /// Lanes that ask for light.
