@@ -2,7 +2,6 @@
 
 use std::io::{BufReader, Cursor};
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 
 use etendue_geometry::Buffer;
 use etendue_image::{DecodeError, Limits, Raster, Samples};
@@ -88,8 +87,6 @@ pub struct Image {
     /// For each encoding that is filtered by footprint.
     pyramids: [Option<Pyramid>; 2],
     stands_in: bool,
-    /// [`Self::has_green`], once that is known.
-    has_green: OnceLock<bool>,
     /// Texels that were not finite or below zero, and count as black.
     pub dropped: u64,
 }
@@ -173,15 +170,7 @@ impl Texture {
         let dropped = raster.drop_unsound();
         let raster = raster.packed();
         let (wrap, filter) = (self.wrap, self.filter);
-        Ok(Image {
-            raster,
-            wrap,
-            filter,
-            pyramids: [None, None],
-            stands_in: false,
-            has_green: OnceLock::new(),
-            dropped,
-        })
+        Ok(Image { raster, wrap, filter, pyramids: [None, None], stands_in: false, dropped })
     }
 }
 
@@ -216,7 +205,6 @@ impl Image {
             filter: Filter::Nearest,
             pyramids: [None, None],
             stands_in: true,
-            has_green: OnceLock::new(),
             dropped: 0,
         }
     }
@@ -226,12 +214,6 @@ impl Image {
     #[must_use]
     pub fn stands_in(&self) -> bool {
         self.stands_in
-    }
-
-    /// Tests whether the green of all texels is above 0, and so that of what is between them.
-    pub(crate) fn has_green(&self) -> bool {
-        let is_green = |i| self.raster.texel(i)[1] > 0.0;
-        *self.has_green.get_or_init(|| (0..self.raster.len()).all(is_green))
     }
 
     /// Makes ready for [`Self::sample_over`] in an encoding.

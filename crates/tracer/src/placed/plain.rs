@@ -21,8 +21,6 @@ pub(crate) struct PlainSurfaces {
     pub(crate) are_smooth: bool,
     /// Some are not alike all over.
     pub(crate) are_varied: bool,
-    /// The textures by which surfaces are rough, which leave none smooth where all their green is above 0.
-    pub(crate) rough_by: Vec<u32>,
     /// The colours of materials that are alike all over, `[material][band]`; 0 of others. Of measured metals what they
     /// reflect face on. Empty where bands are red, green and blue.
     colors: Vec<f32>,
@@ -63,6 +61,8 @@ pub(crate) enum PlainKind {
     Sheet,
     /// [`SurfaceKind::Smooth`].
     Smooth,
+    /// Of any other kind, or a sheet smoother than [`LEAST_ALPHA`]: worked out hit by hit.
+    Other,
 }
 
 /// What a sheet of facets has, or a smooth surface, as [`crate::bsdf::sheets::Sheets`] takes it.
@@ -128,19 +128,17 @@ impl PlainSurfaces {
             let mesh = geometry.mesh_of(placement);
             all.push(PlainSurface::of(placed.as_ref()?, material, (placement, mesh), spectral)?);
         }
-        let rough_by = materials.iter().filter_map(|material| match &material.scattering {
-            Scattering::Gltf(surface) => surface.metallic_roughness.as_ref(),
-            _ => None,
-        });
-        let mut rough_by: Vec<u32> = rough_by.map(|image| image.texture).collect();
         let mut facets: Vec<_> =
             materials.iter().map(|material| PlainFacets::of(material, spectral)).collect();
         let has = |kind| all.iter().any(|own: &PlainSurface| own.kind == kind);
-        let (are_smooth, has_sheets) = (has(PlainKind::Smooth), has(PlainKind::Sheet));
-        if !are_smooth && !has_sheets {
+        let (has_smooth, has_sheets) = (has(PlainKind::Smooth), has(PlainKind::Sheet));
+        if !has_smooth && !has_sheets {
             facets.clear();
         }
-        let are_tilted = all.iter().any(|surface| surface.turn.is_some());
+        // What is worked out by itself may be smooth, and has normals of its own.
+        let has_others = has(PlainKind::Other) || all.iter().any(|own| own.has_own_facets);
+        let are_smooth = has_smooth || has_others;
+        let are_tilted = has_others || all.iter().any(|surface| surface.turn.is_some());
         let are_varied = all.iter().any(|surface| surface.is_varied);
         let count = spectral.count();
         let (mut colors, mut facet_bands) = (Vec::new(), Vec::new());
@@ -151,19 +149,7 @@ impl PlainSurfaces {
             }
         }
         all.push(PlainSurface::default());
-        rough_by.sort_unstable();
-        rough_by.dedup();
-        Some(Self {
-            all,
-            facets,
-            are_tilted,
-            are_smooth,
-            are_varied,
-            rough_by,
-            colors,
-            facet_bands,
-            count,
-        })
+        Some(Self { all, facets, are_tilted, are_smooth, are_varied, colors, facet_bands, count })
     }
 }
 
@@ -180,7 +166,7 @@ impl PlainSurface {
             SurfaceKind::Matte => PlainKind::Matte,
             SurfaceKind::Sheet => PlainKind::Sheet,
             SurfaceKind::Smooth => PlainKind::Smooth,
-            SurfaceKind::Other => return None,
+            SurfaceKind::Other => PlainKind::Other,
         };
         let is_unlit = material.scattering == Scattering::Unlit;
         if placed.has_alpha || placed.may_vanish() || is_unlit {
@@ -198,23 +184,16 @@ impl PlainSurface {
         };
         let turn = is_tilted.then(rows);
         let has_own_facets = match &material.scattering {
-            Scattering::Gltf(surface) if kind == PlainKind::Sheet => {
-                // Where its image says so its roughness is 0.
-                if surface.glossiness_texture.is_some() && surface.roughness <= 0.0 {
-                    return None;
-                }
-                surface.plain_sheet(spectral).is_none()
+            Scattering::Gltf(surface) => {
+                kind == PlainKind::Sheet && surface.plain_sheet(spectral).is_none()
             }
             _ => false,
         };
-        let is_resolved = kind != PlainKind::Sheet
-            || has_own_facets
-            || PlainFacets::of(material, spectral).alpha >= LEAST_ALPHA;
-        if !is_resolved {
-            return None;
-        }
+        let is_resolved =
+            has_own_facets || PlainFacets::of(material, spectral).alpha >= LEAST_ALPHA;
+        let kind = if kind == PlainKind::Sheet && !is_resolved { PlainKind::Other } else { kind };
         let is_known = measured(material).is_some() || placed.color.is_some();
-        let is_varied = !is_known || is_mapped || has_own_facets;
+        let is_varied = !is_known || is_mapped || has_own_facets || kind == PlainKind::Other;
         let color = match spectral.is_rgb() && scatters && is_known {
             true => [0, 1, 2].map(|k| face_on(material, spectral, k)),
             false => [0.0; 3],

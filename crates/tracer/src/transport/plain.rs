@@ -12,6 +12,7 @@ mod depart;
 mod facets;
 mod kernel;
 mod lamps;
+mod single;
 mod sky;
 mod surfaces;
 mod varied;
@@ -25,13 +26,13 @@ use etendue_geometry::{HitPrecision, RayBlocks};
 use self::facets::BlockFacets;
 use self::kernel::{Leaving, Numbers, leave_blocks};
 use self::lamps::{ChosenLamps, Lights};
+use self::single::SingleHits;
 use self::sky::ask_sky;
 use self::surfaces::{Surfaces, Varied};
 use super::paths::{DRAWS, Draw, Step, Way, Workspace};
 use super::rays::{Blocks, RayHit};
 use super::trace::Encounter;
 use super::{LightingContext, RaySamples, Tracing};
-use crate::Image;
 use crate::emitters::Emitters;
 use crate::light_sampler::Receiver;
 use crate::lights::PlainLightBounds;
@@ -104,6 +105,7 @@ pub(super) struct PlainScratch {
     missed: Vec<u32>,
     facets: BlockFacets,
     colors: Vec<Floats>,
+    singles: SingleHits,
     varied: Varied,
     /// When rays are (s from the frame's time), where that counts.
     times: Vec<f64>,
@@ -175,10 +177,6 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             && !traits.has_dispersion
             && lights.sky.as_ref().is_none_or(Sky::is_of_colors);
         let all = placed.plain().filter(|_| is_taken)?;
-        let image = |&texture: &u32| scene.images.get(texture as usize)?.as_deref();
-        if !all.rough_by.iter().filter_map(image).all(Image::has_green) {
-            return None;
-        }
         let surfaces = Surfaces { all, geometry: scene.geometry, varied: Varied::NONE };
         let origin = self.ctx.accel.blocks()?.origin();
         let PlainLightBounds { least_area, farthest, brightest, .. } = lights.plain_lights()?;
@@ -254,7 +252,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         let roulette = !is_last && self.rules.roulette.is_some_and(|after| number + 1 >= after);
         if is_scattered {
             self.look_up_varied((camera, number), surfaces, plain);
-            let needs = [goes_on || all.are_smooth, roulette, !all.facets.is_empty()];
+            let needs = [goes_on || all.are_smooth, roulette, all.are_rich()];
             self.draw_plain(camera, number, needs, plain);
             if lights.are_many() {
                 self.choose_lamps((surfaces, lights), plain);
@@ -274,6 +272,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             seen: &mut plain.seen,
             missed: has_environment.then_some(&mut plain.missed),
             facets: &mut plain.facets,
+            singles: &mut plain.singles,
             colors: &mut plain.colors,
         };
         let sphere = emitters.filter(|_| is_last && !has_environment);
@@ -285,7 +284,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             (true, true) => leave_blocks::<true, true, RGB>,
         };
         let paths = (plain.rays.blocks(), &plain.carried);
-        leave((surfaces, lights), paths, (numbers, sphere), leaving);
+        leave((self, surfaces, lights), paths, (numbers, sphere), leaving);
     }
 
     /// When a ray of the camera is (s from the frame's time).

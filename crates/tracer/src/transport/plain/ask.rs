@@ -69,10 +69,17 @@ pub(super) fn ask<const TILTED: bool, const RICH: bool>(
             }
         }
     }
+    let mut side = hits.error;
+    if RICH {
+        for i in 0..LANES {
+            let is_behind = (hits.passed[i] != 0) & (above[i] < 0.0);
+            side[i] = if is_behind { -hits.error[i] } else { hits.error[i] };
+        }
+    }
     let (mut start, mut along, mut length) = ([ZERO; 3], [ZERO; 3], ZERO);
     for axis in 0..3 {
         for i in 0..LANES {
-            let lifted = hits.normal[axis][i] * hits.error[i] + hits.back[axis][i];
+            let lifted = hits.normal[axis][i] * side[i] + hits.back[axis][i];
             let way = (places.way[axis][i] + places.normal[axis][i] * blur[i]) - lifted;
             let is_far = others.is_some_and(|others| others.is_far[i] > 0.0);
             let way = select_unpredictable(is_far, places.way[axis][i], way);

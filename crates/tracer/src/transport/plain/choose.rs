@@ -23,7 +23,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         (surfaces, lights): (Surfaces<'_>, &Lights<'_>),
         plain: &mut PlainScratch,
     ) {
-        let PlainScratch { rays, carried, numbers, chosen, varied, .. } = plain;
+        let PlainScratch { rays, carried, numbers, chosen, varied, singles, .. } = plain;
         let surfaces = Surfaces { varied, ..surfaces };
         let [first, second] = &mut numbers[Draw::Light as usize];
         let room = first.len() + LANES;
@@ -42,7 +42,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             (true, true) => ask_for_lamps::<true, true>,
         };
         let asked = (&mut chosen.choices, &mut *chosen.asking, &mut chosen.points);
-        ask((surfaces, lights.origin), (rays.blocks(), carried), first, asked);
+        ask((surfaces, lights.origin, singles), (rays.blocks(), carried), first, asked);
         self.ctx.lights.pick(&mut chosen.choices);
         for number in 0..chosen.choices.len() {
             let (lane, choice) = (chosen.asking[number] as usize, chosen.choices.get(number));

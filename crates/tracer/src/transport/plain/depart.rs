@@ -37,7 +37,8 @@ pub(super) struct BlockPaths<F: Fn(usize) -> Row> {
     pub(super) throughput: F,
     pub(super) ray: [u32; LANES],
     pub(super) lanes: [u32; LANES],
-    pub(super) smooth: Mask,
+    /// Those whose directions only their surfaces can give.
+    pub(super) specular: Mask,
     pub(super) sky_chance: Option<Row>,
 }
 
@@ -50,11 +51,11 @@ pub(super) fn depart<const RICH: bool, const RGB: bool>(
     (instructions, (next, last)): (Instructions, (&mut RayColumns, &mut RayColumns)),
 ) {
     let ends_apart = numbers.is_last && numbers.asks_emitters;
-    let (mut rough, mut smooth) = (left.goes, left.goes);
+    let (mut rough, mut specular) = (left.goes, left.goes);
     if RICH && ends_apart {
         for i in 0..LANES {
-            rough[i] &= !departing.smooth[i];
-            smooth[i] &= departing.smooth[i];
+            rough[i] &= !departing.specular[i];
+            specular[i] &= departing.specular[i];
         }
     }
     let to = if ends_apart { last } else { &mut *next };
@@ -63,13 +64,13 @@ pub(super) fn depart<const RICH: bool, const RGB: bool>(
         put_flags(departing, Compaction::new(&rough, instructions), of_rough, to);
     }
     put::<RGB>((left, shading), departing, Compaction::new(&rough, instructions), to);
-    if RICH && ends_apart && departing.smooth != [0; LANES] {
-        put_flags(departing, Compaction::new(&smooth, instructions), 0, next);
-        put::<RGB>((left, shading), departing, Compaction::new(&smooth, instructions), next);
+    if RICH && ends_apart && departing.specular != [0; LANES] {
+        put_flags(departing, Compaction::new(&specular, instructions), 0, next);
+        put::<RGB>((left, shading), departing, Compaction::new(&specular, instructions), next);
     }
 }
 
-/// Notes which paths leave smooth surfaces, and so much of the others.
+/// Notes which paths are specular, and so much of the others.
 #[inline(always)]
 fn put_flags(
     departing: &BlockPaths<impl Fn(usize) -> Row>,
@@ -79,7 +80,7 @@ fn put_flags(
 ) {
     let mut flags = [of_rough; LANES];
     for i in 0..LANES {
-        flags[i] = if departing.smooth[i] != 0 { SPECULAR } else { of_rough };
+        flags[i] = if departing.specular[i] != 0 { SPECULAR } else { of_rough };
     }
     going.put(&flags, &mut to.carried.flags, to.len);
 }

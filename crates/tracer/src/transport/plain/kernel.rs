@@ -13,11 +13,12 @@ use super::compaction::{Compaction, Instructions};
 use super::depart::{BlockPaths, depart, end_some, keep_those_that_may_meet, scatter};
 use super::facets::BlockFacets;
 use super::lamps::{ChosenLamps, Lights, OtherPlaces, place, place_on_chosen};
+use super::single::SingleHits;
 use super::surfaces::{Found, Surfaces, bend};
 use super::{Columns, LAST, RayColumns};
 use crate::light_tree::Choices;
 use crate::transport::paths::{DRAWS, Draw};
-use crate::transport::{kernels, patch};
+use crate::transport::{Tracing, kernels, patch};
 
 /// Roundings of a hit and of the rays that leave it: those of [`crate::spawn`] in single precision, and as many
 /// again of the point, of the normal and of the start, which are of single precision, too.
@@ -59,6 +60,7 @@ pub(super) struct Leaving<'a> {
     /// Rays that met nothing, if that is asked for.
     pub(super) missed: Option<&'a mut Vec<u32>>,
     pub(super) facets: &'a mut BlockFacets,
+    pub(super) singles: &'a mut SingleHits,
     /// Room for a block's colours by band, where bands are not red, green and blue.
     pub(super) colors: &'a mut Vec<Row>,
 }
@@ -74,6 +76,8 @@ pub(super) struct Hits {
     pub(super) bent: [Row; 3],
     pub(super) error: Row,
     pub(super) back: [Row; 3],
+    /// Lanes whose surfaces light may pass, so that rays to lights may leave them on either side.
+    pub(super) passed: Mask,
     /// Lanes that see the front.
     pub(super) front: Mask,
 }
@@ -90,7 +94,7 @@ impl Hits {
 /// go to `asking` and, unless that is empty, their places from the origin to `points`, which have room for all.
 #[multiversion::multiversion(targets = "simd")]
 pub(super) fn ask_for_lamps<const TILTED: bool, const RICH: bool>(
-    (surfaces, origin): (Surfaces<'_>, DVec3),
+    (surfaces, origin, singles): (Surfaces<'_>, DVec3, &SingleHits),
     (blocks, carried): (&[RayBlock], &Columns),
     numbers: &[f32],
     (choices, asking, points): (&mut Choices, &mut [u32], &mut [Vec<f32>; 3]),
@@ -103,9 +107,13 @@ pub(super) fn ask_for_lamps<const TILTED: bool, const RICH: bool>(
             Found::of::<TILTED, RICH, true>(surfaces, (block, first, count), (|_| (), |_| ()));
         if RICH {
             leave_out(&mut found, carried, first);
+            singles.mark(first, &mut found);
         }
         let own: &Row = numbers[first..first + LANES].try_into().unwrap_or(&ZERO);
-        let hits = measure(block, &found, [0.0; 3]);
+        let mut hits = measure(block, &found, [0.0; 3]);
+        if RICH && TILTED && found.single != [0; LANES] {
+            singles.put_normals(first, &mut hits.bent);
+        }
         let (wanted, at) = (Compaction::new(&found.asks(), instructions), choices.len());
         wanted.put(&lanes_from(first), asking, at);
         for axis in 0..3 {
@@ -124,7 +132,7 @@ pub(super) fn ask_for_lamps<const TILTED: bool, const RICH: bool>(
 /// in which some surface is not matte or not alike all over, or some light needs more than its place.
 #[multiversion::multiversion(targets = "simd")]
 pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool>(
-    (surfaces, lights): (Surfaces<'_>, &Lights<'_>),
+    (tracing, surfaces, lights): (&Tracing<'_, RGB>, Surfaces<'_>, &Lights<'_>),
     (blocks, carried): (&[RayBlock], &Columns),
     (numbers, sphere): (Numbers<'_>, Option<Sphere>),
     mut leaving: Leaving<'_>,
@@ -148,11 +156,16 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
         let mut found = Found::of::<TILTED, RICH, RGB>(surfaces, own, (meets, misses));
         if RICH {
             leave_out(&mut found, carried, first);
+            leaving.singles.mark(first, &mut found);
         }
         if !numbers.is_scattered || found.scatters == [0; LANES] {
             continue;
         }
-        let hits = measure(block, &found, offset);
+        let mut hits = measure(block, &found, offset);
+        let has_singles = RICH && TILTED && found.single != [0; LANES];
+        if has_singles {
+            leaving.singles.put_normals(first, &mut hits.bent);
+        }
         let run = first..first + LANES;
         let row = |column: &[f32]| -> Row { column[run.clone()].try_into().unwrap_or(ZERO) };
         let arrived = |band: usize| row(&carried.throughput[band]);
@@ -181,12 +194,20 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
             let toward = (&asked.toward, &asked.pdf, &places.is_delta);
             leaving.facets.reflect(&found.sheets, toward, &mut asked.value);
         }
+        if has_singles {
+            let toward = (&asked.toward, &asked.pdf, &places.is_delta);
+            leaving.singles.reflect(tracing, (&found, first), toward, &mut asked.value);
+        }
         let asks = if RICH { found.asks() } else { found.scatters };
-        let facets = &*leaving.facets;
+        let (facets, singles, bands) =
+            (&*leaving.facets, &*leaving.singles, carried.count::<RGB>());
         let share = |band: usize| {
             let (mut share, arrived) = (colors[band], arrived(band));
             if has_sheets {
                 facets.sheets_in_band(&found.sheets, band, &mut share);
+            }
+            if has_singles {
+                singles.in_band((&found, first), (band, bands), &mut share);
             }
             for i in 0..LANES {
                 share[i] *= arrived[i] * asked.value[i];
@@ -200,9 +221,10 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
             share
         };
         send::<RGB>(&asked, &places, (&asks, &ray, share), (instructions, leaving.shadows));
-        if !numbers.goes_on && (!RICH || found.smooth == [0; LANES]) {
+        if !numbers.goes_on && !has_singles && (!RICH || found.smooth == [0; LANES]) {
             continue;
         }
+        let mut specular = found.smooth;
         let mut left = scatter::<TILTED>(&hits, square(Draw::Direction));
         for i in 0..LANES {
             left.goes[i] &= found.scatters[i];
@@ -216,24 +238,27 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
                 &mut left,
             );
         }
+        if has_singles {
+            let drawn = (&hits, &square(Draw::Choice)[1], &square(Draw::Direction));
+            let scattered = (&mut left, &mut specular);
+            leaving.singles.scatter(tracing, (&found, first), drawn, scattered);
+        }
         if RICH && !numbers.goes_on {
             for i in 0..LANES {
-                left.goes[i] &= found.smooth[i];
+                left.goes[i] &= specular[i];
             }
         }
         if let Some(sphere) = &sphere {
-            keep_those_that_may_meet(
-                sphere,
-                (&left.start, &left.along),
-                &found.smooth,
-                &mut left.goes,
-            );
+            keep_those_that_may_meet(sphere, (&left.start, &left.along), &specular, &mut left.goes);
         }
-        let facets = &*leaving.facets;
+        let (facets, singles) = (&*leaving.facets, &*leaving.singles);
         let passed = |band: usize| {
             let (mut share, arrived) = (colors[band], arrived(band));
             if has_facets {
                 facets.in_band(&found, band, &mut share);
+            }
+            if has_singles {
+                singles.in_band((&found, first), (band, bands), &mut share);
             }
             for i in 0..LANES {
                 share[i] *= arrived[i];
@@ -258,7 +283,7 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
         };
         let sky_chance = numbers.chosen.filter(|chosen| RICH && !chosen.sky_chance.is_empty());
         let sky_chance = sky_chance.map(|chosen| row(&chosen.sky_chance));
-        let departing = BlockPaths { throughput, ray, lanes, smooth: found.smooth, sky_chance };
+        let departing = BlockPaths { throughput, ray, lanes, specular, sky_chance };
         let shading = numbers.chosen.is_some().then(|| hits.shading::<TILTED>());
         let to = (&mut *leaving.next, &mut *leaving.last);
         depart::<RICH, RGB>((&left, shading), &departing, &numbers, (instructions, to));
@@ -274,6 +299,7 @@ fn leave_out(found: &mut Found<'_>, carried: &Columns, first: usize) {
         found.scatters[i] &= goes_on;
         found.sheets[i] &= goes_on;
         found.smooth[i] &= goes_on;
+        found.single[i] &= goes_on;
     }
 }
 #[inline(always)]
@@ -325,7 +351,8 @@ fn measure(block: &RayBlock, found: &Found<'_>, offset: [f32; 3]) -> Hits {
         let (u, v) = (block.u[i], block.v[i]);
         let (rest, least) = (1.0 - u - v, if u < v { u } else { v });
         let least = if rest < least { rest } else { least };
-        let amount = if least < BESIDE { BACK * ROUNDINGS * most[i] } else { 0.0 };
+        let is_beside = (least < BESIDE) & (found.passed[i] == 0);
+        let amount = if is_beside { BACK * ROUNDINGS * most[i] } else { 0.0 };
         let across = normal[0][i] * dx[i] + normal[1][i] * dy[i] + normal[2][i] * dz[i];
         back[0][i] = (normal[0][i] * across - dx[i]) * amount;
         back[1][i] = (normal[1][i] * across - dy[i]) * amount;
@@ -335,7 +362,7 @@ fn measure(block: &RayBlock, found: &Found<'_>, offset: [f32; 3]) -> Hits {
         None => normal,
         Some(tilted) => bend(tilted, &normal, &block.direction),
     };
-    Hits { point, normal, bent, error, back, front }
+    Hits { point, normal, bent, error, back, passed: found.passed, front }
 }
 pub(super) fn single(v: DVec3) -> [f32; 3] {
     v.to_array().map(round)

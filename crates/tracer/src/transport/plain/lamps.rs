@@ -1,6 +1,7 @@
 //! The lights of a plain scene in single precision, and places that are chosen on them.
 #![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
+use std::f32::consts::FRAC_1_PI;
 use std::hint::select_unpredictable;
 
 use etendue_geometry::block::{Floats as Row, LANES};
@@ -13,7 +14,7 @@ use crate::area_light::AreaLight;
 use crate::light_tree::Choices;
 use crate::lights;
 use crate::reference::SceneView;
-use crate::sampling::GridCell;
+use crate::sampling::{GridCell, sphere_direction};
 
 /// The largest number below 1.
 const ONE_BELOW: f32 = 1.0 - f32::EPSILON / 2.0;
@@ -333,7 +334,18 @@ impl OtherPlaces {
         square: &[Row; 2],
         places: &mut Places,
     ) {
-        let (directions, density) = cosine_directions(shading, square);
+        let (mut directions, mut density) = cosine_directions(shading, square);
+        for i in 0..LANES {
+            // To where light comes from both sides any direction is as likely.
+            if shading[0][i] == 0.0 && shading[1][i] == 0.0 && shading[2][i] == 0.0 {
+                let square = [square[0][i], square[1][i]].map(f64::from);
+                let direction = single(sphere_direction(square));
+                for axis in 0..3 {
+                    directions[axis][i] = direction[axis];
+                }
+                density[i] = 0.25 * FRAC_1_PI;
+            }
+        }
         for i in 0..LANES {
             let is_own = places.lamp[i] == SKY;
             for axis in 0..3 {

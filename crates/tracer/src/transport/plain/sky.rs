@@ -125,11 +125,13 @@ fn light_of(sky: &PlainSky<'_>, arrived: &SkyHits, light: &mut SkyLight) {
         }
         None => {
             for i in 0..LANES {
-                let mut cosine = 0.0;
+                let (mut cosine, mut is_one_sided) = (0.0, false);
                 for axis in 0..3 {
                     cosine += arrived.normal[axis][i] * arrived.direction[axis][i];
+                    is_one_sided |= arrived.normal[axis][i] != 0.0;
                 }
-                density[i] = if cosine > 0.0 { cosine * FRAC_1_PI } else { 0.0 };
+                let shown = if cosine > 0.0 { cosine } else { 0.0 };
+                density[i] = if is_one_sided { shown } else { 0.25 } * FRAC_1_PI;
             }
         }
     }

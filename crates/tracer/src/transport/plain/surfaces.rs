@@ -46,6 +46,8 @@ pub(super) struct TextureLookup {
     pub(super) normal: [f32; 3],
     /// Where these are not alike all over.
     pub(super) facets: PlainFacets,
+    /// It is worked out by itself.
+    pub(super) is_single: bool,
 }
 
 impl<'a> Surfaces<'a> {
@@ -93,6 +95,11 @@ pub(super) struct Found<'a> {
     /// Those that scatter light which are sheets of facets, and which are smooth.
     pub(super) sheets: Mask,
     pub(super) smooth: Mask,
+    /// Those that are worked out one by one; of these, which scatter light of single directions alone, and whose surfaces
+    /// light may pass.
+    pub(super) single: Mask,
+    pub(super) delta: Mask,
+    pub(super) passed: Mask,
     /// The normals of meshes, of any length and side, where some lane has one; else zero.
     pub(super) tilted: Option<[Row; 3]>,
 }
@@ -117,7 +124,7 @@ impl<'a> Found<'a> {
     pub(super) fn asks(&self) -> Mask {
         let mut asks = self.scatters;
         for i in 0..LANES {
-            asks[i] &= !self.smooth[i];
+            asks[i] &= !(self.smooth[i] | self.delta[i]);
         }
         asks
     }
@@ -144,6 +151,9 @@ impl<'a> Found<'a> {
             scatters: none,
             sheets: none,
             smooth: none,
+            single: none,
+            delta: none,
+            passed: none,
             tilted: None,
         };
         let all = &*surfaces.all.all;
@@ -168,7 +178,11 @@ impl<'a> Found<'a> {
             let scatters = (surface.kind != PlainKind::Black) & is_hit;
             found.scatters[lane] = mask(scatters);
             if RICH {
-                found.sheets[lane] = mask((surface.kind == PlainKind::Sheet) & is_hit);
+                let is_single = surface.kind == PlainKind::Other
+                    || varied.is_some_and(|varied| varied.is_single);
+                found.single[lane] = mask(is_single & is_hit);
+                let is_sheet = (surface.kind == PlainKind::Sheet) & !is_single;
+                found.sheets[lane] = mask(is_sheet & is_hit);
                 found.smooth[lane] = mask((surface.kind == PlainKind::Smooth) & is_hit);
             }
             if surface.shines & is_hit {
@@ -177,7 +191,7 @@ impl<'a> Found<'a> {
             if RICH && (!surface.is_there & (lane < count)) {
                 misses(lane);
             }
-            if !TILTED || !scatters {
+            if !TILTED || !scatters || (RICH && found.single[lane] != 0) {
                 continue;
             }
             if let Some(turn) = &surface.turn {

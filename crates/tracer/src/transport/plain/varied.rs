@@ -4,12 +4,14 @@ use etendue_geometry::block::{LANES, vector};
 use etendue_geometry::glam::DVec3;
 
 use super::kernel::{round, single};
+use super::single::SingleHits;
 use super::surfaces::{Surfaces, TextureLookup, Varied};
 use super::{PlainScratch, SPECULAR};
 use crate::Scattering;
 use crate::footprint::{Cone, Footprint};
-use crate::placed::{LEAST_ALPHA, PlainFacets, PlainSurfaces};
+use crate::placed::{LEAST_ALPHA, PlainFacets, PlainKind, PlainSurfaces};
 use crate::reference::SurfacePoint;
+use crate::surface::SurfaceInteraction;
 use crate::transport::{RaySamples, Tracing};
 
 impl<const RGB: bool> Tracing<'_, RGB> {
@@ -22,9 +24,12 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     ) {
         if !surfaces.all.are_varied {
             plain.varied.lookups.clear();
+            plain.singles.clear();
             return;
         }
         let mut varied = std::mem::take(&mut plain.varied);
+        let mut singles = std::mem::take(&mut plain.singles);
+        singles.clear();
         let (len, count) = (plain.carried.len, self.count());
         varied.lookups.resize(len, TextureLookup::default());
         if !RGB {
@@ -35,10 +40,12 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let placement = plain.rays.blocks()[lane / LANES].placement[lane % LANES];
             let own = surfaces.all.all.get(placement as usize);
             if own.is_some_and(|own| own.is_varied) {
-                self.look_up_lane((camera, number), surfaces, plain, (lane, &mut varied));
+                let found = (&mut varied, &mut singles);
+                self.look_up_lane((camera, number), surfaces, plain, (lane, found));
             }
         }
         plain.varied = varied;
+        plain.singles = singles;
     }
 
     /// The same of one lane; what its surface has that is alike all over is left.
@@ -47,7 +54,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         (camera, number): (&RaySamples<'_>, u32),
         surfaces: Surfaces<'_>,
         plain: &PlainScratch,
-        (lane, varied): (usize, &mut Varied),
+        (lane, (varied, singles)): (usize, (&mut Varied, &mut SingleHits)),
     ) -> Option<()> {
         let (block, i) = (&plain.rays.blocks()[lane / LANES], lane % LANES);
         let (scene, spectral) = (&self.ctx.scene, self.ctx.spectral);
@@ -66,6 +73,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let time = self.time_of(plain.carried.ray[lane]);
         let point = SurfacePoint { weights: [1.0 - u - v, u, v], time, footprint, ..corner };
         let material = scene.material(&point)?;
+        varied.lookups[lane].is_single = false;
+        if own.kind == PlainKind::Other {
+            return self.look_up_single((plain, direction()), (number_of, point), (lane, singles));
+        }
         let is_measured = matches!(&material.scattering, Scattering::Metal { named: Some(_), .. });
         let looked_up = || scene.base_tint(spectral, material, &point).0.clamped();
         let tint = placed.color.unwrap_or_else(looked_up);
@@ -85,8 +96,12 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             && own.has_own_facets
         {
             let sheet = surface.sheet(&point, scene, spectral);
-            let facets = PlainFacets::of_sheet(&sheet);
-            found.facets = PlainFacets { alpha: facets.alpha.max(LEAST_ALPHA), ..facets };
+            found.facets = PlainFacets::of_sheet(&sheet);
+            if sheet.alpha < LEAST_ALPHA {
+                found.is_single = true;
+                let hit = (plain, direction());
+                return self.look_up_single(hit, (number_of, point), (lane, singles));
+            }
             if !RGB {
                 for (k, band) in varied.facet_bands[bands].iter_mut().enumerate() {
                     *band = [spectral.tint(&sheet.highlight, k), 0.0];
@@ -98,6 +113,25 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let turn = placed.turn.as_ref();
             found.normal = single(point.tilted_normal(scene, material, turn, front));
         }
+        Some(())
+    }
+
+    /// How the surface that a lane hit scatters light, which is worked out by itself.
+    fn look_up_single(
+        &self,
+        (plain, direction): (&PlainScratch, DVec3),
+        (placement, point): (u32, SurfacePoint<'_>),
+        (lane, singles): (usize, &mut SingleHits),
+    ) -> Option<()> {
+        let (block, i) = (&plain.rays.blocks()[lane / LANES], lane % LANES);
+        let origin = self.ctx.accel.blocks().map_or(DVec3::ZERO, |blocks| blocks.origin());
+        let from = (origin + vector(&block.origin, i), direction);
+        let hit = (f64::from(block.t_max[i]), vector(&block.normal, i).normalize());
+        let interaction = SurfaceInteraction::at(self.ctx, (placement, point), from, hit)?;
+        let spectral = self.ctx.spectral;
+        let bsdf = interaction.bsdf(&self.ctx.scene, spectral, spectral.wavelength(0));
+        let passes = self.ctx.placed.get(placement).is_some_and(|placed| !placed.is_opaque);
+        singles.push(u32::try_from(lane).unwrap_or(u32::MAX), bsdf, passes);
         Some(())
     }
 

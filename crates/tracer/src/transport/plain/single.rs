@@ -1,0 +1,168 @@
+//! Hits on surfaces that are neither matte nor bare sheets nor smooth, such as coats, brushed metal and frosted glass, and
+//! on sheets too smooth for single precision: they are worked out one by one, by [`Bsdf`], among those of their block.
+#![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
+
+use etendue_geometry::block::{Floats as Row, LANES};
+use etendue_geometry::glam::DVec3;
+
+use super::facets::BsdfSamples;
+use super::kernel::{Hits, Mask, round, single};
+use super::surfaces::Found;
+use crate::bsdf::{Bsdf, Weights};
+use crate::sampling::power_heuristic;
+use crate::transport::Tracing;
+
+/// Hits that are worked out one by one, in the order of their lanes.
+#[derive(Debug, Default)]
+pub(super) struct SingleHits {
+    hits: Vec<SingleHit>,
+    /// What goes to the viewer of the light that was asked, or of what was scattered by chance, `[hit][band]`.
+    shares: Vec<f32>,
+}
+
+/// A hit that is worked out by itself.
+#[derive(Debug, Clone, Copy)]
+struct SingleHit {
+    /// Counted from the first block.
+    lane: u32,
+    bsdf: Bsdf,
+    /// Light may pass the surface.
+    passes: bool,
+}
+
+impl SingleHits {
+    pub(super) fn clear(&mut self) {
+        self.hits.clear();
+    }
+
+    /// Appends the hit of a lane, behind those before it.
+    pub(super) fn push(&mut self, lane: u32, bsdf: Bsdf, passes: bool) {
+        self.hits.push(SingleHit { lane, bsdf, passes });
+    }
+
+    /// Those of the block whose first lane that is, by their numbers, each with its lane in the block.
+    fn of_block(&self, first: usize) -> impl Iterator<Item = (usize, usize)> {
+        let lane = |own: &SingleHit| own.lane as usize;
+        let start = self.hits.partition_point(|own| lane(own) < first);
+        let own = self.hits[start..].iter().take_while(move |own| lane(own) < first + LANES);
+        own.zip(start..).map(move |(own, number)| (number, own.lane as usize - first))
+    }
+
+    /// Says of a block's lanes what hits have that is known before they are measured.
+    pub(super) fn mark(&self, first: usize, found: &mut Found<'_>) {
+        for (number, lane) in self.of_block(first) {
+            let SingleHit { bsdf, passes, .. } = &self.hits[number];
+            if bsdf.is_delta() {
+                found.delta[lane] = u32::MAX;
+            }
+            if *passes {
+                found.passed[lane] = u32::MAX;
+            }
+        }
+    }
+
+    /// Gives the hits of a block the normals by which lights are chosen for them: zero where light comes from both sides.
+    pub(super) fn put_normals(&self, first: usize, bent: &mut [Row; 3]) {
+        for (number, lane) in self.of_block(first) {
+            let normal = single(self.hits[number].bsdf.receiving_normal());
+            for axis in 0..3 {
+                bent[axis][lane] = normal[axis];
+            }
+        }
+    }
+
+    /// What hits turn to the viewer of light from unit directions that were chosen with a density (1/sr), in their lanes
+    /// of `value`. How much of it in each band [`Self::in_band`] says.
+    pub(super) fn reflect<const RGB: bool>(
+        &mut self,
+        tracing: &Tracing<'_, RGB>,
+        (found, first): (&Found<'_>, usize),
+        (toward, pdf, is_delta): (&[Row; 3], &Row, &Row),
+        value: &mut Row,
+    ) {
+        let own: Vec<(usize, usize)> = self.of_block(first).collect();
+        for (number, lane) in own {
+            if found.single[lane] == 0 {
+                continue;
+            }
+            let bsdf = self.hits[number].bsdf;
+            let toward = at(toward, lane).normalize();
+            let (weights, density) = match pdf[lane] < f32::INFINITY {
+                true => bsdf.evaluate(toward),
+                false => (Weights::default(), 0.0),
+            };
+            let pdf = f64::from(pdf[lane]);
+            let balance = if is_delta[lane] > 0.0 { 1.0 } else { power_heuristic(pdf, density) };
+            value[lane] = if weights.is_zero() { 0.0 } else { round(balance / pdf) };
+            self.put_shares(tracing, number, (&bsdf, weights));
+        }
+    }
+
+    /// Puts the directions in which hits send the paths in place of what is there; those that only the surface can give
+    /// are marked. How much goes on in each band [`Self::in_band`] says.
+    pub(super) fn scatter<const RGB: bool>(
+        &mut self,
+        tracing: &Tracing<'_, RGB>,
+        (found, first): (&Found<'_>, usize),
+        (hits, choice, square): (&Hits, &Row, &[Row; 2]),
+        (left, specular): (&mut BsdfSamples, &mut Mask),
+    ) {
+        let own: Vec<(usize, usize)> = self.of_block(first).collect();
+        for (number, lane) in own {
+            if found.single[lane] == 0 {
+                continue;
+            }
+            left.goes[lane] = 0;
+            let bsdf = self.hits[number].bsdf;
+            let square = [square[0][lane], square[1][lane]].map(f64::from);
+            let Some(sample) = bsdf.sample(f64::from(choice[lane]), square) else { continue };
+            let (along, normal) = (single(sample.direction), at(&hits.normal, lane));
+            let is_behind = sample.direction.dot(normal) < 0.0;
+            let side = if is_behind { -hits.error[lane] } else { hits.error[lane] };
+            for axis in 0..3 {
+                let lifted = hits.normal[axis][lane] * side + hits.back[axis][lane];
+                left.start[axis][lane] = hits.point[axis][lane] + lifted;
+                left.along[axis][lane] = along[axis];
+            }
+            // What is denser than single precision holds is as good as specular against any light.
+            left.pdf[lane] = round(sample.pdf).min(f32::MAX);
+            left.goes[lane] = u32::MAX;
+            specular[lane] = if sample.is_specular { u32::MAX } else { 0 };
+            self.put_shares(tracing, number, (&bsdf, sample.weights));
+        }
+    }
+
+    fn put_shares<const RGB: bool>(
+        &mut self,
+        tracing: &Tracing<'_, RGB>,
+        number: usize,
+        (bsdf, weights): (&Bsdf, Weights),
+    ) {
+        let count = tracing.count();
+        let end = (number + 1) * count;
+        if self.shares.len() < end {
+            self.shares.resize(end, 0.0);
+        }
+        for (k, share) in self.shares[number * count..end].iter_mut().enumerate() {
+            *share = round(tracing.in_band(bsdf, weights, k));
+        }
+    }
+
+    /// Puts a band, of so many, of what hits were last asked in place of what is there.
+    pub(super) fn in_band(
+        &self,
+        (found, first): (&Found<'_>, usize),
+        (band, count): (usize, usize),
+        share: &mut Row,
+    ) {
+        for (number, lane) in self.of_block(first) {
+            if found.single[lane] != 0 {
+                share[lane] = self.shares.get(number * count + band).copied().unwrap_or(0.0);
+            }
+        }
+    }
+}
+
+fn at(axes: &[Row; 3], lane: usize) -> DVec3 {
+    DVec3::new(axes[0][lane].into(), axes[1][lane].into(), axes[2][lane].into())
+}
