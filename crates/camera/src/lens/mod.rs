@@ -17,8 +17,10 @@
 //! | `rays` | weighted rays of the pupil for pictures |
 //! | [`waves`] | how light is spread on the sensor as waves, and what of it arrives |
 //! | `traced_at` | bands whose rays run together through the lens |
-//! | `band_paths` | one ray of the scene for all bands, and where each band's light of it lands |
+//! | `band_paths` | one ray of the scene for all bands: why, and by how many wavelengths |
+//! | `band_landings` | such rays, and where each band's light of them lands |
 
+mod band_landings;
 mod band_paths;
 pub mod chief;
 pub mod focused;
@@ -33,7 +35,8 @@ pub mod spec;
 mod traced_at;
 pub mod waves;
 
-pub use band_paths::{BandLandings, SharedPaths};
+pub use band_landings::BandLandings;
+pub use band_paths::SharedPaths;
 pub use chief::LensletChiefs;
 pub use focused::Focused;
 pub use lens_camera::LensCamera;
