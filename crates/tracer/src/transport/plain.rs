@@ -1,6 +1,7 @@
-//! Plain scenes: surfaces that are alike all over, matte, of facets or smooth, under lights of all kinds that stand still,
-//! few or many. All of a step is done on blocks of sixteen paths in single precision, whose numbers stay in registers
-//! between the hit and the rays that leave it; facets are worked out in double precision.
+//! Plain scenes: surfaces that are wholly there and part no media or wavelengths, under lights of all kinds, few or many,
+//! in any bands. All of a step is done on blocks of sixteen paths in single precision, whose numbers stay in registers
+//! between the hit and the rays that leave it; facets are worked out in double precision, and what is neither matte nor of
+//! facets nor smooth is hit by hit.
 //!
 //! The estimators, and the random numbers by use, are those of the other scenes ([`super::trace`]): pictures are the
 //! same up to the roundings of single precision. What is rare, such as the light of a lamp that is met, is done there.
@@ -105,6 +106,7 @@ pub(super) struct PlainScratch {
     missed: Vec<u32>,
     facets: BlockFacets,
     colors: Vec<Floats>,
+    shares: Vec<Floats>,
     singles: SingleHits,
     varied: Varied,
     /// When rays are (s from the frame's time), where that counts.
@@ -274,6 +276,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             facets: &mut plain.facets,
             singles: &mut plain.singles,
             colors: &mut plain.colors,
+            shares: &mut plain.shares,
         };
         let sphere = emitters.filter(|_| is_last && !has_environment);
         let is_rich = all.are_rich() || self.ctx.lights.has_others();
@@ -382,20 +385,23 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         shadows.pack(shadow_rays);
         self.times_of(&shadows.carried.ray[..shadows.len], times);
         accel.occluded_of_blocks(shadow_rays.blocks_mut(), times, coherent);
-        let (share, mut light) = (&shadows.carried.throughput, vec![0.0; self.count()]);
+        let (count, mut three) = (self.count(), [0.0; 3]);
+        let mut more = if RGB { Vec::new() } else { vec![0.0; count] };
+        let light: &mut [f64] = if RGB { &mut three } else { &mut more };
+        let shares = &shadows.carried.throughput[..count];
         for (block, first) in shadow_rays.blocks().iter().zip((0..).step_by(LANES)) {
             for lane in 0..LANES.min(shadows.len - first) {
                 if block.is_blocked(lane) {
                     continue;
                 }
                 let i = first + lane;
-                let radiance = lights.radiance(shadows.lamp[i]);
-                for ((band, share), radiance) in light.iter_mut().zip(share).zip(radiance) {
-                    *band = f64::from(share[i]) * radiance;
+                let radiance = &lights.radiance(shadows.lamp[i], count)[..count];
+                for band in 0..count {
+                    light[band] = f64::from(shares[band][i]) * radiance[band];
                 }
                 let group = || lights.group_of(&self.ctx.scene, shadows.lamp[i]);
                 let row = self.parts.row(shadows.carried.ray[i], number + 1, group);
-                self.add(&light, row, out);
+                self.add(light, row, out);
             }
         }
     }

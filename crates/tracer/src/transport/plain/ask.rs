@@ -102,10 +102,10 @@ pub(super) fn ask<const TILTED: bool, const RICH: bool>(
 
 /// Notes the rays to lights that bring some share of their radiance, by band.
 #[inline(always)]
-pub(super) fn send<const RGB: bool>(
+pub(super) fn send(
     asked: &LightRays,
     places: &Places,
-    (asks, ray, share): (&Mask, &[u32; LANES], impl Fn(usize) -> Row),
+    (asks, ray, shares): (&Mask, &[u32; LANES], &[Row]),
     (instructions, shadows): (Instructions, &mut RayColumns),
 ) {
     let mut goes = [0; LANES];
@@ -118,8 +118,8 @@ pub(super) fn send<const RGB: bool>(
         going.put(&asked.start[axis], &mut shadows.start[axis], at);
         going.put(&asked.along[axis], &mut shadows.along[axis], at);
     }
-    for band in 0..shadows.carried.count::<RGB>() {
-        going.put(&share(band), &mut shadows.carried.throughput[band], at);
+    for (share, column) in shares.iter().zip(&mut shadows.carried.throughput) {
+        going.put(share, column, at);
     }
     going.put(&asked.length, &mut shadows.reach, at);
     going.put(&places.lamp, &mut shadows.lamp, at);

@@ -12,15 +12,20 @@ use super::kernel::{Hits, Mask, Numbers, ROUNDINGS, Sphere, ZERO, mask};
 use super::{LAST, RayColumns, SPECULAR};
 use crate::float::Float;
 
-/// Leaves out paths that carry nothing and, by roulette, some of those that carry little of their largest band: by how
-/// much the others count more.
+/// Leaves out paths that carry nothing and, by roulette, some of those that carry little of their largest band.
 #[inline(always)]
-pub(super) fn end_some(most: &Row, goes: &mut Mask, roulette: Option<[Row; 2]>) -> Row {
-    let mut more = [1.0; LANES];
+pub(super) fn end_some(throughput: &mut [Row], goes: &mut Mask, roulette: Option<[Row; 2]>) {
+    let mut most = ZERO;
+    for band in &*throughput {
+        for i in 0..LANES {
+            most[i] = if band[i] > most[i] { band[i] } else { most[i] };
+        }
+    }
     for i in 0..LANES {
         goes[i] &= mask(most[i] > 0.0);
     }
-    let Some([_, chance]) = roulette else { return more };
+    let Some([_, chance]) = roulette else { return };
+    let mut more = [1.0; LANES];
     for i in 0..LANES {
         // Its root: where few paths come this far, ending them saves little and leaves noise.
         let root = most[i].sqrt();
@@ -28,13 +33,17 @@ pub(super) fn end_some(most: &Row, goes: &mut Mask, roulette: Option<[Row; 2]>) 
         goes[i] &= mask(chance[i] < survival);
         more[i] = if survival > 0.0 { 1.0 / survival } else { 0.0 };
     }
-    more
+    for band in throughput {
+        for i in 0..LANES {
+            band[i] *= more[i];
+        }
+    }
 }
 
 /// What the paths of a block carry that leave its hits.
-pub(super) struct BlockPaths<F: Fn(usize) -> Row> {
+pub(super) struct BlockPaths<'a> {
     /// By band.
-    pub(super) throughput: F,
+    pub(super) throughput: &'a [Row],
     pub(super) ray: [u32; LANES],
     pub(super) lanes: [u32; LANES],
     /// Those whose directions only their surfaces can give.
@@ -44,9 +53,9 @@ pub(super) struct BlockPaths<F: Fn(usize) -> Row> {
 
 /// Notes the paths that leave a block's hits.
 #[inline(always)]
-pub(super) fn depart<const RICH: bool, const RGB: bool>(
+pub(super) fn depart<const RICH: bool>(
     (left, shading): (&BsdfSamples, Option<&[Row; 3]>),
-    departing: &BlockPaths<impl Fn(usize) -> Row>,
+    departing: &BlockPaths<'_>,
     numbers: &Numbers<'_>,
     (instructions, (next, last)): (Instructions, (&mut RayColumns, &mut RayColumns)),
 ) {
@@ -63,21 +72,16 @@ pub(super) fn depart<const RICH: bool, const RGB: bool>(
         let of_rough = if numbers.is_last { LAST } else { 0 };
         put_flags(departing, Compaction::new(&rough, instructions), of_rough, to);
     }
-    put::<RGB>((left, shading), departing, Compaction::new(&rough, instructions), to);
+    put((left, shading), departing, Compaction::new(&rough, instructions), to);
     if RICH && ends_apart && departing.specular != [0; LANES] {
         put_flags(departing, Compaction::new(&specular, instructions), 0, next);
-        put::<RGB>((left, shading), departing, Compaction::new(&specular, instructions), next);
+        put((left, shading), departing, Compaction::new(&specular, instructions), next);
     }
 }
 
 /// Notes which paths are specular, and so much of the others.
 #[inline(always)]
-fn put_flags(
-    departing: &BlockPaths<impl Fn(usize) -> Row>,
-    going: Compaction,
-    of_rough: u32,
-    to: &mut RayColumns,
-) {
+fn put_flags(departing: &BlockPaths<'_>, going: Compaction, of_rough: u32, to: &mut RayColumns) {
     let mut flags = [of_rough; LANES];
     for i in 0..LANES {
         flags[i] = if departing.specular[i] != 0 { SPECULAR } else { of_rough };
@@ -87,9 +91,9 @@ fn put_flags(
 
 /// Notes paths, and how they came to their directions.
 #[inline(always)]
-fn put<const RGB: bool>(
+fn put(
     (left, shading): (&BsdfSamples, Option<&[Row; 3]>),
-    departing: &BlockPaths<impl Fn(usize) -> Row>,
+    departing: &BlockPaths<'_>,
     going: Compaction,
     to: &mut RayColumns,
 ) {
@@ -98,8 +102,8 @@ fn put<const RGB: bool>(
         going.put(&left.start[axis], &mut to.start[axis], at);
         going.put(&left.along[axis], &mut to.along[axis], at);
     }
-    for band in 0..to.carried.count::<RGB>() {
-        going.put(&(departing.throughput)(band), &mut to.carried.throughput[band], at);
+    for (band, column) in departing.throughput.iter().zip(&mut to.carried.throughput) {
+        going.put(band, column, at);
     }
     if let Some(shading) = shading {
         for axis in 0..3 {

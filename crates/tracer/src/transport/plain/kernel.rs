@@ -61,8 +61,9 @@ pub(super) struct Leaving<'a> {
     pub(super) missed: Option<&'a mut Vec<u32>>,
     pub(super) facets: &'a mut BlockFacets,
     pub(super) singles: &'a mut SingleHits,
-    /// Room for a block's colours by band, where bands are not red, green and blue.
+    /// Room for a block's colours, and for what they leave of light, by band, where bands are not red, green and blue.
     pub(super) colors: &'a mut Vec<Row>,
+    pub(super) shares: &'a mut Vec<Row>,
 }
 
 /// A sphere around all that shines, relative to the blocks' origin: its centre and its radius (m).
@@ -140,7 +141,9 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
     // Blocks' coordinates are those of the world less their origin, whose roundings count as well.
     let offset = single(lights.origin).map(|axis| 2.0 * axis.abs());
     let instructions = Instructions::of_machine();
-    leaving.colors.resize(if RGB { 0 } else { carried.throughput.len() }, ZERO);
+    for rows in [&mut *leaving.colors, &mut *leaving.shares] {
+        rows.resize(if RGB { 0 } else { carried.throughput.len() }, ZERO);
+    }
     for (number, block) in blocks.iter().enumerate() {
         let first = number * LANES;
         let count = carried.len.saturating_sub(first);
@@ -168,7 +171,6 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
         }
         let run = first..first + LANES;
         let row = |column: &[f32]| -> Row { column[run.clone()].try_into().unwrap_or(ZERO) };
-        let arrived = |band: usize| row(&carried.throughput[band]);
         let square = |draw: Draw| {
             let [first, second] = &numbers.drawn[draw as usize];
             [row(first), row(second)]
@@ -199,15 +201,17 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
             leaving.singles.reflect(tracing, (&found, first), toward, &mut asked.value);
         }
         let asks = if RICH { found.asks() } else { found.scatters };
-        let (facets, singles, bands) =
-            (&*leaving.facets, &*leaving.singles, carried.count::<RGB>());
-        let share = |band: usize| {
-            let (mut share, arrived) = (colors[band], arrived(band));
+        // (What is asked for each band by a closure is a function of its own, which takes rows through memory.)
+        let (mut three, bands) = ([ZERO; 3], carried.count::<RGB>());
+        let shares: &mut [Row] = if RGB { &mut three } else { leaving.shares };
+        for band in 0..bands {
+            let (share, arrived) = (&mut shares[band], row(&carried.throughput[band]));
+            *share = colors[band];
             if has_sheets {
-                facets.sheets_in_band(&found.sheets, band, &mut share);
+                leaving.facets.sheets_in_band(&found.sheets, band, share);
             }
             if has_singles {
-                singles.in_band((&found, first), (band, bands), &mut share);
+                leaving.singles.in_band((&found, first), (band, bands), share);
             }
             for i in 0..LANES {
                 share[i] *= arrived[i] * asked.value[i];
@@ -218,9 +222,8 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
                     share[i] *= radiance[i];
                 }
             }
-            share
-        };
-        send::<RGB>(&asked, &places, (&asks, &ray, share), (instructions, leaving.shadows));
+        }
+        send(&asked, &places, (&asks, &ray, shares), (instructions, leaving.shadows));
         if !numbers.goes_on && !has_singles && (!RICH || found.smooth == [0; LANES]) {
             continue;
         }
@@ -251,42 +254,28 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
         if let Some(sphere) = &sphere {
             keep_those_that_may_meet(sphere, (&left.start, &left.along), &specular, &mut left.goes);
         }
-        let (facets, singles) = (&*leaving.facets, &*leaving.singles);
-        let passed = |band: usize| {
-            let (mut share, arrived) = (colors[band], arrived(band));
+        let mut three = [ZERO; 3];
+        let throughput: &mut [Row] = if RGB { &mut three } else { leaving.shares };
+        for band in 0..bands {
+            let (passed, arrived) = (&mut throughput[band], row(&carried.throughput[band]));
+            *passed = colors[band];
             if has_facets {
-                facets.in_band(&found, band, &mut share);
+                leaving.facets.in_band(&found, band, passed);
             }
             if has_singles {
-                singles.in_band((&found, first), (band, bands), &mut share);
+                leaving.singles.in_band((&found, first), (band, bands), passed);
             }
             for i in 0..LANES {
-                share[i] *= arrived[i];
-            }
-            share
-        };
-        let mut most = ZERO;
-        for band in 0..carried.count::<RGB>() {
-            let passed = passed(band);
-            for i in 0..LANES {
-                most[i] = if passed[i] > most[i] { passed[i] } else { most[i] };
+                passed[i] *= arrived[i];
             }
         }
-        let chances = numbers.roulette.then(|| square(Draw::Chance));
-        let more = end_some(&most, &mut left.goes, chances);
-        let throughput = |band: usize| {
-            let mut throughput = passed(band);
-            for i in 0..LANES {
-                throughput[i] *= more[i];
-            }
-            throughput
-        };
+        end_some(throughput, &mut left.goes, numbers.roulette.then(|| square(Draw::Chance)));
         let sky_chance = numbers.chosen.filter(|chosen| RICH && !chosen.sky_chance.is_empty());
         let sky_chance = sky_chance.map(|chosen| row(&chosen.sky_chance));
         let departing = BlockPaths { throughput, ray, lanes, specular, sky_chance };
         let shading = numbers.chosen.is_some().then(|| hits.shading::<TILTED>());
         let to = (&mut *leaving.next, &mut *leaving.last);
-        depart::<RICH, RGB>((&left, shading), &departing, &numbers, (instructions, to));
+        depart::<RICH>((&left, shading), &departing, &numbers, (instructions, to));
     }
 }
 

@@ -105,13 +105,13 @@ impl<'a> Lights<'a> {
 
     /// Radiance of a triangle or the sky, intensity of a point; 1 of other lights, whose rays carry it.
     #[inline(always)]
-    pub(super) fn radiance(&self, lamp: u32) -> &[f64] {
+    pub(super) fn radiance(&self, lamp: u32, count: usize) -> &[f64] {
         if lamp >= SKY {
             let sky = self.sky.as_ref().filter(|_| lamp == SKY);
             return sky.map_or(&*self.ones, |sky| sky.bands);
         }
-        let first = lamp as usize * self.ones.len();
-        let kept = self.few_bands.get(first..first + self.ones.len());
+        let first = lamp as usize * count;
+        let kept = self.few_bands.get(first..first + count);
         kept.unwrap_or_else(|| self.bands_of(lamp as usize))
     }
 
