@@ -122,7 +122,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let origin = if is_far { DVec3::ZERO } else { lights.origin };
             let (place, density) = (single(target.place[0] - origin), round(target.density));
             let own = OtherPlace { light: choice.light, place, is_far, is_delta, density };
-            chosen.put(lane as usize, &own, |band| radiance[band]);
+            chosen.put(lane as usize, &own, &radiance);
         }
         chosen.light = radiance;
     }

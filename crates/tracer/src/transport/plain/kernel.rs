@@ -108,7 +108,9 @@ pub(super) fn ask_for_lamps<const TILTED: bool, const RICH: bool>(
             Found::of::<TILTED, RICH, true>(surfaces, (block, first, count), (|_| (), |_| ()));
         if RICH {
             leave_out(&mut found, carried, first);
-            singles.mark(first, &mut found);
+            if TILTED && !singles.is_empty() {
+                singles.mark(first, &mut found);
+            }
         }
         let own: &Row = numbers[first..first + LANES].try_into().unwrap_or(&ZERO);
         let mut hits = measure(block, &found, [0.0; 3]);
@@ -159,7 +161,9 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
         let mut found = Found::of::<TILTED, RICH, RGB>(surfaces, own, (meets, misses));
         if RICH {
             leave_out(&mut found, carried, first);
-            leaving.singles.mark(first, &mut found);
+            if TILTED && !leaving.singles.is_empty() {
+                leaving.singles.mark(first, &mut found);
+            }
         }
         if !numbers.is_scattered || found.scatters == [0; LANES] {
             continue;
@@ -353,11 +357,13 @@ fn measure(block: &RayBlock, found: &Found<'_>, offset: [f32; 3]) -> Hits {
     };
     Hits { point, normal, bent, error, back, passed: found.passed, front }
 }
+#[inline(always)]
 pub(super) fn single(v: DVec3) -> [f32; 3] {
-    v.to_array().map(round)
+    [round(v.x), round(v.y), round(v.z)]
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "rounding to single precision is the purpose")]
+#[inline(always)]
 pub(super) fn round(x: f64) -> f32 {
     x as f32
 }

@@ -39,10 +39,10 @@ impl Lamp {
     }
 
     fn triangle(own: &AreaLight, origin: DVec3) -> Self {
-        let [corner, rest] = own.corner;
+        let ([corner, rest], [along, across]) = (own.corner, own.shape.edges);
         Self {
             corner: single((corner - origin) + rest),
-            edges: own.shape.edges.map(single),
+            edges: [single(along), single(across)],
             normal: single(own.shape.normal),
             magnitudes: single(own.magnitudes),
             area: round(own.shape.area),
@@ -200,15 +200,15 @@ impl ChosenLamps {
         self.squares.clear();
     }
 
-    /// Notes what a lane chose, which brings so much of a band.
+    /// Notes what a lane chose, which brings so much of each band.
     #[inline(always)]
-    pub(super) fn put(&mut self, lane: usize, own: &OtherPlace, radiance: impl Fn(usize) -> f64) {
+    pub(super) fn put(&mut self, lane: usize, own: &OtherPlace, radiance: &[f64]) {
         self.lamp[lane] = OTHER | own.light;
         for axis in 0..3 {
             self.place[axis][lane] = own.place[axis];
         }
-        for (band, row) in self.radiance.iter_mut().enumerate() {
-            row[lane] = round(radiance(band));
+        for (row, band) in self.radiance.iter_mut().zip(radiance) {
+            row[lane] = round(*band);
         }
         self.density[lane] = own.density;
         self.is_far[lane] = f32::from(u8::from(own.is_far));

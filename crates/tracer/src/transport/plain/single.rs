@@ -35,6 +35,10 @@ impl SingleHits {
         self.hits.clear();
     }
 
+    pub(super) fn is_empty(&self) -> bool {
+        self.hits.is_empty()
+    }
+
     /// Appends the hit of a lane, behind those before it.
     pub(super) fn push(&mut self, lane: u32, bsdf: Bsdf, passes: bool) {
         self.hits.push(SingleHit { lane, bsdf, passes });
@@ -49,6 +53,7 @@ impl SingleHits {
     }
 
     /// Says of a block's lanes what hits have that is known before they are measured.
+    #[inline(never)]
     pub(super) fn mark(&self, first: usize, found: &mut Found<'_>) {
         for (number, lane) in self.of_block(first) {
             let SingleHit { bsdf, passes, .. } = &self.hits[number];
@@ -62,6 +67,7 @@ impl SingleHits {
     }
 
     /// Gives the hits of a block the normals by which lights are chosen for them: zero where light comes from both sides.
+    #[inline(never)]
     pub(super) fn put_normals(&self, first: usize, bent: &mut [Row; 3]) {
         for (number, lane) in self.of_block(first) {
             let normal = single(self.hits[number].bsdf.receiving_normal());
@@ -73,6 +79,7 @@ impl SingleHits {
 
     /// What hits turn to the viewer of light from unit directions that were chosen with a density (1/sr), in their lanes
     /// of `value`. How much of it in each band [`Self::in_band`] says.
+    #[inline(never)]
     pub(super) fn reflect<const RGB: bool>(
         &mut self,
         tracing: &Tracing<'_, RGB>,
@@ -100,6 +107,7 @@ impl SingleHits {
 
     /// Puts the directions in which hits send the paths in place of what is there; those that only the surface can give
     /// are marked. How much goes on in each band [`Self::in_band`] says.
+    #[inline(never)]
     pub(super) fn scatter<const RGB: bool>(
         &mut self,
         tracing: &Tracing<'_, RGB>,
@@ -149,6 +157,7 @@ impl SingleHits {
     }
 
     /// Puts a band, of so many, of what hits were last asked in place of what is there.
+    #[inline(never)]
     pub(super) fn in_band(
         &self,
         (found, first): (&Found<'_>, usize),

@@ -154,7 +154,8 @@ pub(super) fn place_on_sky<const RGB: bool>(
     chosen: &mut ChosenLamps,
 ) {
     let Some((map, sampler)) = sky.map else { return };
-    let cells = std::mem::take(&mut chosen.cells);
+    let (cells, mut radiance) =
+        (std::mem::take(&mut chosen.cells), std::mem::take(&mut chosen.light));
     for (number, run) in cells.chunks(LANES).enumerate() {
         let mut patches = [GridCell::default(); LANES];
         patches[..run.len()].copy_from_slice(run);
@@ -169,11 +170,14 @@ pub(super) fn place_on_sky<const RGB: bool>(
                 let (light, place) = (number_of(sky), axis(&directions));
                 let own = OtherPlace { light, place, is_far, is_delta, density };
                 let color = axis(&lit.colors);
-                chosen.put(lane as usize, &own, |k| sky.band::<RGB>(spectral, color, k));
+                for (k, band) in radiance.iter_mut().enumerate() {
+                    *band = sky.band::<RGB>(spectral, color, k);
+                }
+                chosen.put(lane as usize, &own, &radiance);
             }
         }
     }
-    chosen.cells = cells;
+    (chosen.cells, chosen.light) = (cells, radiance);
 }
 
 impl<const RGB: bool> Tracing<'_, RGB> {
