@@ -6,7 +6,7 @@ mod plain;
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Coplanar, Geometry, Placement};
 
-pub(crate) use self::plain::{LEAST_ALPHA, PlainFacets, PlainKind, PlainSurface, PlainSurfaces};
+pub(crate) use self::plain::{LEAST_ALPHA, PlainFacets, PlainKind, PlainSurfaces};
 use crate::bodies::{Body, bodies};
 use crate::scattering::Absorption;
 use crate::spawn::magnitudes;

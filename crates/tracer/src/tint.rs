@@ -120,12 +120,6 @@ impl Tint {
         }
     }
 
-    /// Tests whether it has a curve.
-    #[must_use]
-    pub fn has_curve(&self) -> bool {
-        self.spectrum != TintSpectrum::White
-    }
-
     /// The same with a colour in 0..=1.
     #[must_use]
     pub fn clamped(self) -> Self {

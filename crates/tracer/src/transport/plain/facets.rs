@@ -52,7 +52,7 @@ impl BlockFacets {
     pub(super) fn see<const RGB: bool>(
         &mut self,
         surfaces: Surfaces<'_>,
-        (block, first, found): (&RayBlock, usize, &Found<'_>),
+        (block, first, found): (&RayBlock, usize, &Found),
         (hits, shading, colors): (&Hits, &[Row; 3], &[Row]),
     ) {
         see::<RGB>(self, surfaces, (block, first, found), (hits, shading, colors));
@@ -75,7 +75,7 @@ impl BlockFacets {
     #[inline(always)]
     pub(super) fn scatter(
         &mut self,
-        found: &Found<'_>,
+        found: &Found,
         hits: &Hits,
         (choice, square): (&Row, &[Row; 2]),
         scattered: &mut BsdfSamples,
@@ -101,7 +101,7 @@ impl BlockFacets {
 
     /// Puts a band of what [`Self::scatter`] passes on in place of what is there.
     #[inline(always)]
-    pub(super) fn in_band(&self, found: &Found<'_>, band: usize, share: &mut Row) {
+    pub(super) fn in_band(&self, found: &Found, band: usize, share: &mut Row) {
         for i in 0..LANES {
             let is_own = found.sheets[i] | found.smooth[i] != 0;
             share[i] = if is_own { self.scattered[band][i] } else { share[i] };
@@ -153,7 +153,7 @@ fn widen(rows: &[Row; 3], to: &mut [Wide; 3]) {
 fn see<const RGB: bool>(
     facets: &mut BlockFacets,
     surfaces: Surfaces<'_>,
-    (block, first, found): (&RayBlock, usize, &Found<'_>),
+    (block, first, found): (&RayBlock, usize, &Found),
     (hits, shading, colors): (&Hits, &[Row; 3], &[Row]),
 ) {
     widen(&hits.normal, &mut facets.normal);

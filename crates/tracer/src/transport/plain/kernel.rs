@@ -104,8 +104,8 @@ pub(super) fn ask_for_lamps<const TILTED: bool, const RICH: bool>(
     for (number, block) in blocks.iter().enumerate() {
         let first = number * LANES;
         let count = carried.len.saturating_sub(first);
-        let mut found =
-            Found::of::<TILTED, RICH, true>(surfaces, (block, first, count), (|_| (), |_| ()));
+        let mut found = Found::NOTHING;
+        found.look_up::<TILTED, RICH, true>(surfaces, (block, first, count), (|_| (), |_| ()));
         if RICH {
             leave_out(&mut found, carried, first);
             if TILTED && !singles.is_empty() {
@@ -157,8 +157,8 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
                 missed.push(lanes[lane]);
             }
         };
-        let own = (block, first, count);
-        let mut found = Found::of::<TILTED, RICH, RGB>(surfaces, own, (meets, misses));
+        let mut found = Found::NOTHING;
+        found.look_up::<TILTED, RICH, RGB>(surfaces, (block, first, count), (meets, misses));
         if RICH {
             leave_out(&mut found, carried, first);
             if TILTED && !leaving.singles.is_empty() {
@@ -179,7 +179,7 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
             let [first, second] = &numbers.drawn[draw as usize];
             [row(first), row(second)]
         };
-        let colors = found.colors::<RGB>(leaving.colors);
+        let colors = found.colors::<RGB>(surfaces, leaving.colors);
         let has_facets = RICH && found.has_facets();
         if has_facets {
             let seen = (&hits, hits.shading::<TILTED>(), colors);
@@ -205,17 +205,16 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
             leaving.singles.reflect(tracing, (&found, first), toward, &mut asked.value);
         }
         let asks = if RICH { found.asks() } else { found.scatters };
-        // (What is asked for each band by a closure is a function of its own, which takes rows through memory.)
+        // Rows are worked out in locals: closures for them, and rows that change in place, go through memory.
         let (mut three, bands) = ([ZERO; 3], carried.count::<RGB>());
         let shares: &mut [Row] = if RGB { &mut three } else { leaving.shares };
         for band in 0..bands {
-            let (share, arrived) = (&mut shares[band], row(&carried.throughput[band]));
-            *share = colors[band];
+            let (mut share, arrived) = (colors[band], row(&carried.throughput[band]));
             if has_sheets {
-                leaving.facets.sheets_in_band(&found.sheets, band, share);
+                leaving.facets.sheets_in_band(&found.sheets, band, &mut share);
             }
             if has_singles {
-                leaving.singles.in_band((&found, first), (band, bands), share);
+                leaving.singles.in_band((&found, first), (band, bands), &mut share);
             }
             for i in 0..LANES {
                 share[i] *= arrived[i] * asked.value[i];
@@ -226,6 +225,7 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
                     share[i] *= radiance[i];
                 }
             }
+            shares[band] = share;
         }
         send(&asked, &places, (&asks, &ray, shares), (instructions, leaving.shadows));
         if !numbers.goes_on && !has_singles && (!RICH || found.smooth == [0; LANES]) {
@@ -261,17 +261,17 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
         let mut three = [ZERO; 3];
         let throughput: &mut [Row] = if RGB { &mut three } else { leaving.shares };
         for band in 0..bands {
-            let (passed, arrived) = (&mut throughput[band], row(&carried.throughput[band]));
-            *passed = colors[band];
+            let (mut passed, arrived) = (colors[band], row(&carried.throughput[band]));
             if has_facets {
-                leaving.facets.in_band(&found, band, passed);
+                leaving.facets.in_band(&found, band, &mut passed);
             }
             if has_singles {
-                leaving.singles.in_band((&found, first), (band, bands), passed);
+                leaving.singles.in_band((&found, first), (band, bands), &mut passed);
             }
             for i in 0..LANES {
                 passed[i] *= arrived[i];
             }
+            throughput[band] = passed;
         }
         end_some(throughput, &mut left.goes, numbers.roulette.then(|| square(Draw::Chance)));
         let sky_chance = numbers.chosen.filter(|chosen| RICH && !chosen.sky_chance.is_empty());
@@ -285,7 +285,7 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
 
 /// Leaves out the surfaces that paths met which only look for light.
 #[inline(always)]
-fn leave_out(found: &mut Found<'_>, carried: &Columns, first: usize) {
+fn leave_out(found: &mut Found, carried: &Columns, first: usize) {
     let Some(flags) = carried.flags.get(first..first + LANES) else { return };
     for i in 0..LANES {
         let goes_on = if flags[i] & LAST == 0 { u32::MAX } else { 0 };
@@ -313,7 +313,7 @@ fn lanes_from(first: usize) -> [u32; LANES] {
 
 /// Points, their errors, and normals on the viewer's side, as [`super::super::kernels::measure`] has them.
 #[inline(always)]
-fn measure(block: &RayBlock, found: &Found<'_>, offset: [f32; 3]) -> Hits {
+fn measure(block: &RayBlock, found: &Found, offset: [f32; 3]) -> Hits {
     let magnitudes = &found.magnitudes;
     let [x, y, z] = &block.normal;
     let [dx, dy, dz] = &block.direction;

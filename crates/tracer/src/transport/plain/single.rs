@@ -54,7 +54,7 @@ impl SingleHits {
 
     /// Says of a block's lanes what hits have that is known before they are measured.
     #[inline(never)]
-    pub(super) fn mark(&self, first: usize, found: &mut Found<'_>) {
+    pub(super) fn mark(&self, first: usize, found: &mut Found) {
         for (number, lane) in self.of_block(first) {
             let SingleHit { bsdf, passes, .. } = &self.hits[number];
             if bsdf.is_delta() {
@@ -83,7 +83,7 @@ impl SingleHits {
     pub(super) fn reflect<const RGB: bool>(
         &mut self,
         tracing: &Tracing<'_, RGB>,
-        (found, first): (&Found<'_>, usize),
+        (found, first): (&Found, usize),
         (toward, pdf, is_delta): (&[Row; 3], &Row, &Row),
         value: &mut Row,
     ) {
@@ -111,7 +111,7 @@ impl SingleHits {
     pub(super) fn scatter<const RGB: bool>(
         &mut self,
         tracing: &Tracing<'_, RGB>,
-        (found, first): (&Found<'_>, usize),
+        (found, first): (&Found, usize),
         (hits, choice, square): (&Hits, &Row, &[Row; 2]),
         (left, specular): (&mut BsdfSamples, &mut Mask),
     ) {
@@ -160,7 +160,7 @@ impl SingleHits {
     #[inline(never)]
     pub(super) fn in_band(
         &self,
-        (found, first): (&Found<'_>, usize),
+        (found, first): (&Found, usize),
         (band, count): (usize, usize),
         share: &mut Row,
     ) {

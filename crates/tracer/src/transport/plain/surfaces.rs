@@ -7,7 +7,7 @@ use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::{Geometry, RayBlock};
 
 use super::kernel::{Mask, ZERO, mask};
-use crate::placed::{PlainFacets, PlainKind, PlainSurface, PlainSurfaces};
+use crate::placed::{PlainFacets, PlainKind, PlainSurfaces};
 
 #[expect(clippy::cast_possible_truncation, reason = "single precision is enough for it")]
 const LEAST_ELEVATION: f32 = crate::surface::LEAST_ELEVATION as f32;
@@ -50,18 +50,7 @@ pub(super) struct TextureLookup {
     pub(super) is_single: bool,
 }
 
-impl<'a> Surfaces<'a> {
-    /// The bands of a lane's colour, which are not red, green and blue.
-    #[inline(always)]
-    fn bands(&self, surface: &PlainSurface, lane: Option<usize>, count: usize) -> &'a [f32] {
-        match lane {
-            Some(lane) => {
-                self.varied.colors.get(lane * count..(lane + 1) * count).unwrap_or_default()
-            }
-            None => self.all.color_of(surface.material),
-        }
-    }
-
+impl Surfaces<'_> {
     /// The normal of a mesh's corners where a lane hit one of its triangles, in the world, of any length and side; zero
     /// of a mesh without.
     #[inline(always)]
@@ -86,10 +75,11 @@ impl<'a> Surfaces<'a> {
 
 /// What is looked up for the hits of a block.
 #[derive(Debug)]
-pub(super) struct Found<'a> {
-    /// Red, green and blue; or what there is of each lane's bands, whose other lanes hold what is of no use.
+pub(super) struct Found {
+    /// Red, green and blue; or what has each lane's bands: its material, or with the bit [`VARIED`] itself, counted from
+    /// the first block.
     color: [Row; 3],
-    bands: [&'a [f32]; LANES],
+    source: [u32; LANES],
     pub(super) magnitudes: [Row; 3],
     pub(super) scatters: Mask,
     /// Those that scatter light which are sheets of facets, and which are smooth.
@@ -104,15 +94,41 @@ pub(super) struct Found<'a> {
     pub(super) tilted: Option<[Row; 3]>,
 }
 
-impl<'a> Found<'a> {
+/// The bit of lanes whose colours are looked up.
+const VARIED: u32 = 1 << 31;
+
+impl Found {
+    pub(super) const NOTHING: Self = Self {
+        color: [ZERO; 3],
+        source: [0; LANES],
+        magnitudes: [ZERO; 3],
+        scatters: [0; LANES],
+        sheets: [0; LANES],
+        smooth: [0; LANES],
+        single: [0; LANES],
+        delta: [0; LANES],
+        passed: [0; LANES],
+        tilted: None,
+    };
+
     /// All lanes' colours by band, of which `rows` has room for those that are not red, green and blue.
     #[inline(always)]
-    pub(super) fn colors<'b, const RGB: bool>(&'b self, rows: &'b mut [Row]) -> &'b [Row] {
+    pub(super) fn colors<'b, const RGB: bool>(
+        &'b self,
+        surfaces: Surfaces<'_>,
+        rows: &'b mut [Row],
+    ) -> &'b [Row] {
         if RGB {
             return &self.color;
         }
-        for (lane, bands) in self.bands.iter().enumerate() {
-            for (row, band) in rows.iter_mut().zip(*bands) {
+        let count = rows.len();
+        for (lane, source) in self.source.into_iter().enumerate() {
+            let first = (source & !VARIED) as usize * count;
+            let own = match source & VARIED {
+                0 => surfaces.all.color_of(source),
+                _ => surfaces.varied.colors.get(first..first + count).unwrap_or_default(),
+            };
+            for (row, band) in rows.iter_mut().zip(own) {
                 row[lane] = *band;
             }
         }
@@ -138,26 +154,14 @@ impl<'a> Found<'a> {
     /// What the lanes of a block hit from the first on, of which so many are rays; each that hit what shines goes to `meets`, each that
     /// hit nothing to `misses`.
     #[inline(always)]
-    pub(super) fn of<const TILTED: bool, const RICH: bool, const RGB: bool>(
-        surfaces: Surfaces<'a>,
+    pub(super) fn look_up<const TILTED: bool, const RICH: bool, const RGB: bool>(
+        &mut self,
+        surfaces: Surfaces<'_>,
         (block, first, count): (&RayBlock, usize, usize),
         (mut meets, mut misses): (impl FnMut(usize), impl FnMut(usize)),
-    ) -> Self {
-        let none = [0; LANES];
-        let mut found = Self {
-            color: [ZERO; 3],
-            bands: [&[]; LANES],
-            magnitudes: [ZERO; 3],
-            scatters: none,
-            sheets: none,
-            smooth: none,
-            single: none,
-            delta: none,
-            passed: none,
-            tilted: None,
-        };
+    ) {
         let all = &*surfaces.all.all;
-        let Some(last) = all.len().checked_sub(1) else { return found };
+        let Some(last) = all.len().checked_sub(1) else { return };
         for lane in 0..LANES {
             let surface = &all[(block.placement[lane] as usize).min(last)];
             let is_varied = RICH && surface.is_varied && lane < count;
@@ -165,25 +169,26 @@ impl<'a> Found<'a> {
             if RGB {
                 let color = varied.map_or(&surface.color, |varied| &varied.color);
                 for band in 0..3 {
-                    found.color[band][lane] = color[band];
+                    self.color[band][lane] = color[band];
                 }
             } else if lane < count {
-                let own = varied.is_some().then_some(first + lane);
-                found.bands[lane] = surfaces.bands(surface, own, surfaces.all.count());
+                #[expect(clippy::cast_possible_truncation, reason = "a batch has few")]
+                let own = (first + lane) as u32 | VARIED;
+                self.source[lane] = if varied.is_some() { own } else { surface.material };
             }
             for axis in 0..3 {
-                found.magnitudes[axis][lane] = surface.magnitudes[axis];
+                self.magnitudes[axis][lane] = surface.magnitudes[axis];
             }
             let is_hit = surface.is_there & (lane < count);
             let scatters = (surface.kind != PlainKind::Black) & is_hit;
-            found.scatters[lane] = mask(scatters);
+            self.scatters[lane] = mask(scatters);
             if RICH {
                 let is_single = surface.kind == PlainKind::Other
                     || varied.is_some_and(|varied| varied.is_single);
-                found.single[lane] = mask(is_single & is_hit);
+                self.single[lane] = mask(is_single & is_hit);
                 let is_sheet = (surface.kind == PlainKind::Sheet) & !is_single;
-                found.sheets[lane] = mask(is_sheet & is_hit);
-                found.smooth[lane] = mask((surface.kind == PlainKind::Smooth) & is_hit);
+                self.sheets[lane] = mask(is_sheet & is_hit);
+                self.smooth[lane] = mask((surface.kind == PlainKind::Smooth) & is_hit);
             }
             if surface.shines & is_hit {
                 meets(lane);
@@ -191,7 +196,7 @@ impl<'a> Found<'a> {
             if RICH && (!surface.is_there & (lane < count)) {
                 misses(lane);
             }
-            if !TILTED || !scatters || (RICH && found.single[lane] != 0) {
+            if !TILTED || !scatters || (RICH && self.single[lane] != 0) {
                 continue;
             }
             if let Some(turn) = &surface.turn {
@@ -199,11 +204,10 @@ impl<'a> Found<'a> {
                     Some(varied) => varied.normal,
                     None => surfaces.mesh_normal(block, lane, turn),
                 };
-                let tilted = found.tilted.get_or_insert([ZERO; 3]);
+                let tilted = self.tilted.get_or_insert([ZERO; 3]);
                 (tilted[0][lane], tilted[1][lane], tilted[2][lane]) = normal.into();
             }
         }
-        found
     }
 }
 
