@@ -33,8 +33,6 @@
 //! drawn within [`SharingLimits::places`](super::SharingLimits) of where rays land that are traced, over film and pupil.
 //! A ray that ends at some node is traced at every band's wavelength by itself.
 
-use std::sync::Arc;
-
 use etendue_optics::element::{Clip, LensRays, Opening, RayStatus};
 use etendue_optics::train::pupil::without_filters;
 use etendue_optics::train::{Element, MonochromaticTrain, Side};
@@ -43,7 +41,7 @@ use glam::{DVec2, DVec3};
 
 use super::lens_camera::LensCamera;
 use super::nodes::{MOST_NODES, NextTerm, NodeWeights, Variable};
-use super::opened::{BandInterpolation, FoundPaths, filtered};
+use super::opened::{BandInterpolation, filtered};
 use super::traced_at::TracedAt;
 
 /// Wavelengths at which interpolation is checked, at most.
@@ -122,13 +120,8 @@ impl LensCamera {
         )
     }
 
-    /// Paths by which bands share rays, or why they do not, in words.
-    pub(super) fn band_paths(&self, bands: &Bands) -> FoundPaths {
-        self.measured_paths.get_or(bands, || self.measure_paths(bands).map(Arc::new))
-    }
-
     /// Chooses the nodes, and measures how well they do.
-    fn measure_paths(&self, bands: &Bands) -> Result<BandInterpolation, String> {
+    pub(super) fn band_paths(&self, bands: &Bands) -> Result<BandInterpolation, String> {
         if let Some(why) = self.parted() {
             return Err(why.to_owned());
         }

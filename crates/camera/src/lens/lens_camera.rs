@@ -18,7 +18,7 @@ use glam::{DVec2, DVec3};
 use super::chief::{ChiefTable, ImageCircle, LensletChiefs};
 use super::focused::{Focused, View};
 use super::nodes::SharingLimits;
-use super::opened::{MeasuredPaths, Opened, OpenedGroup, through_filters, uniform_filters};
+use super::opened::{Opened, OpenedGroup, through_filters, uniform_filters};
 use super::traced_at::{BandGroup, TracedAt, grouped};
 
 use crate::{CameraError, Pose};
@@ -45,8 +45,6 @@ pub struct LensCamera {
     pub(super) spread: SpreadBy,
     /// Limits of the distance between shared rays of bands and rays of their own.
     pub(super) sharing: SharingLimits,
-    /// Of the lens as it is: anew for each that differs in what rays do.
-    pub(super) measured_paths: MeasuredPaths,
 }
 
 /// By what light of a point is spread on the sensor.
@@ -124,7 +122,6 @@ impl LensCamera {
             traced_at,
             spread,
             sharing: SharingLimits::DEFAULT,
-            measured_paths: MeasuredPaths::default(),
         })
     }
 
@@ -141,8 +138,7 @@ impl LensCamera {
 
     /// Returns the camera on pixels `factor` times as large: what was measured of the pupil holds for them too.
     pub(crate) fn coarser(&self, factor: f64) -> Self {
-        let measured_paths = MeasuredPaths::default();
-        Self { focused: self.focused.coarser(factor), measured_paths, ..self.clone() }
+        Self { focused: self.focused.coarser(factor), ..self.clone() }
     }
 
     /// The centroid of a lenslet's light on the sensor (pixels from the corner) when the same radiance comes
@@ -201,22 +197,18 @@ impl LensCamera {
 
     /// The same with rays that run at other wavelengths.
     pub(super) fn running_at(&self, traced_at: TracedAt) -> Self {
-        let measured_paths = MeasuredPaths::default();
-        Self { traced_at, opened: None, measured_paths, ..self.clone() }
+        Self { traced_at, opened: None, ..self.clone() }
     }
 
     /// Returns the camera with bands that share rays within other limits.
     pub(crate) fn sharing_within(&self, sharing: SharingLimits) -> Self {
-        if sharing == self.sharing {
-            return self.clone();
-        }
-        let measured_paths = MeasuredPaths::default();
-        Self { sharing, opened: None, measured_paths, ..self.clone() }
+        let opened = self.opened.clone().filter(|_| sharing == self.sharing);
+        Self { sharing, opened, ..self.clone() }
     }
 
     /// Returns the camera with its light spread another way.
     pub(super) fn spread_by(self, spread: SpreadBy) -> Self {
-        Self { spread, measured_paths: MeasuredPaths::default(), ..self }
+        Self { spread, ..self }
     }
 
     /// True if rays of other wavelengths run differently, or lose another share on the way.

@@ -1,8 +1,6 @@
 //! A lens as it is measured for the bands of a picture: its exit pupil, itself at each wavelength with what its
 //! filters pass of a band, and how bands share rays.
 
-use std::sync::{Arc, OnceLock};
-
 use etendue_optics::glass::GlassError;
 use etendue_optics::train::{ExitPupil, MonochromaticTrain, OpticalTrain};
 use etendue_spectrum::{Bands, Curve, Outside, Spread};
@@ -17,28 +15,7 @@ pub(super) struct Opened {
     pub(super) groups: Vec<OpenedGroup>,
     pub(super) pupil: ExitPupil,
     /// How all bands share a ray; `None` where they do not.
-    pub(super) paths: Option<Arc<BandInterpolation>>,
-}
-
-/// How bands share rays, or why they do not, once it was measured for some bands. It takes longer than all else that
-/// opening a camera does, and plans ask for it before.
-#[derive(Debug, Clone, Default)]
-pub(super) struct MeasuredPaths(Arc<OnceLock<(Bands, FoundPaths)>>);
-
-/// How bands share rays, or why they do not.
-pub(super) type FoundPaths = Result<Arc<BandInterpolation>, String>;
-
-impl MeasuredPaths {
-    /// What was measured for these bands, or is now.
-    pub(super) fn get_or(&self, bands: &Bands, measure: impl FnOnce() -> FoundPaths) -> FoundPaths {
-        if let Some((_, paths)) = self.0.get().filter(|(own, _)| own == bands) {
-            return paths.clone();
-        }
-        let paths = measure();
-        // What others measured in the meantime is as good.
-        let _ = self.0.set((bands.clone(), paths.clone()));
-        paths
-    }
+    pub(super) paths: Option<BandInterpolation>,
 }
 
 /// The lens as it is for a group of bands.
