@@ -5,9 +5,20 @@ use etendue_geometry::disk;
 use glam::DVec2;
 
 use super::coded::Anywhere;
-use super::place::{NodePlace, between};
-use super::{ANGLES, ExitPupil, PupilOutline, PupilSamples};
-use crate::element::{Block, Frame, LANES, RayStatus};
+use super::place::{NodePlace, angle_below, between};
+use super::{ExitPupil, PupilOutline};
+use crate::element::{Block, Frame, LANES, LensRays, RayStatus};
+
+/// From samples of the film to weighted rays.
+#[derive(Debug, Clone, Copy)]
+pub struct PupilSamples<'a> {
+    /// Factor on all weights.
+    pub scale: f64,
+    /// Places on the sensor from its centre (mm), in the lens' axes, one array an axis.
+    pub film: [&'a [f64]; 2],
+    /// Places in the unit square.
+    pub squares: &'a [[f64; 2]],
+}
 
 /// The outline from one point of the sensor.
 pub(super) struct PupilBound<'a> {
@@ -22,8 +33,9 @@ impl PupilBound<'_> {
     /// The radius in the frame at a share of a full turn.
     fn reach(&self, turn: f64) -> f64 {
         self.place.as_ref().map_or(1.0, |place| {
-            let reach =
-                |&(node, weight): &(usize, f64)| between(&self.nodes[node].reach, turn) * weight;
+            let reach = |&(node, weight): &(usize, f64)| {
+                between(&self.nodes[node].reach, angle_below(turn)) * weight
+            };
             place.nodes.iter().map(reach).sum()
         })
     }
@@ -31,8 +43,9 @@ impl PupilBound<'_> {
     /// The radius within which nothing passes.
     fn inner(&self, turn: f64) -> f64 {
         self.place.as_ref().map_or(0.0, |place| {
-            let inner =
-                |&(node, weight): &(usize, f64)| between(&self.nodes[node].inner, turn) * weight;
+            let inner = |&(node, weight): &(usize, f64)| {
+                between(&self.nodes[node].inner, angle_below(turn)) * weight
+            };
             place.nodes.iter().map(inner).sum()
         })
     }
@@ -95,27 +108,37 @@ impl NodeRows {
 
     /// Adds a node's share to a lane, at an angle between two of its table.
     #[inline(always)]
-    fn add(
-        &mut self,
-        lane: usize,
-        (node, weight): (&PupilOutline, f64),
-        (low, share): (usize, f64),
-    ) {
+    fn add(&mut self, lane: usize, (node, weight): (&PupilOutline, f64), angle: (usize, f64)) {
         let (centre, half) = (node.centre.to_array(), node.half.to_array());
         for axis in 0..2 {
             self.centre[axis][lane] += centre[axis] * weight;
             self.half[axis][lane] += half[axis] * weight;
         }
         for (row, table) in self.radii.iter_mut().zip([&node.inner, &node.reach]) {
-            row[lane] += (table[low] + (table[low + 1] - table[low]) * share) * weight;
+            row[lane] += between(table, angle) * weight;
         }
     }
 }
 
 impl ExitPupil {
+    /// Refills `rays` with one ray a sample, ready to be traced from [`Side::Sensor`](crate::train::Side::Sensor), as [`Self::sample`] gives them
+    /// one by one. False where it has to be asked one by one: at a mask, behind lenslets, and where no light arrives at
+    /// the place of some sample.
+    pub fn fill(&self, bundle: &PupilSamples<'_>, rays: &mut LensRays) -> bool {
+        if self.lenslets.is_some() || self.coded.is_some() {
+            return false;
+        }
+        rays.resize(bundle.squares.len());
+        match &self.disk {
+            Some(disk) => disk.fill(&self.sensor, (bundle, self.index2), &mut rays.blocks),
+            None => return self.fill_bounds(bundle, &mut rays.blocks),
+        }
+        true
+    }
+
     /// Fills blocks with rays towards the bounds that were measured, a sample a ray; false where no light arrives at
     /// the place of some sample, which stays as it was.
-    pub(super) fn fill_bounds(&self, bundle: &PupilSamples<'_>, blocks: &mut [Block]) -> bool {
+    fn fill_bounds(&self, bundle: &PupilSamples<'_>, blocks: &mut [Block]) -> bool {
         let mut are_lit = true;
         for (number, block) in blocks.iter_mut().enumerate() {
             let first = number * LANES;
@@ -130,16 +153,7 @@ impl ExitPupil {
                 let place = self.place(DVec2::new(film[0][lane], film[1][lane]));
                 let Some(NodePlace { axis, nodes }) = place else { return false };
                 let (_, turn) = concentric(square[lane]);
-                #[expect(clippy::cast_precision_loss, reason = "128 angles")]
-                let at = turn * ANGLES as f64;
-                #[expect(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "in 0..=128"
-                )]
-                let low = (at as usize).min(ANGLES - 1);
-                #[expect(clippy::cast_precision_loss, reason = "128 angles")]
-                let angle = (low, at - low as f64);
+                let angle = angle_below(turn);
                 (rows.axis[0][lane], rows.axis[1][lane]) = axis.into();
                 for (node, weight) in nodes.into_iter().filter(|(_, weight)| *weight != 0.0) {
                     rows.add(lane, (&self.nodes[node], weight), angle);

@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::place::{NodePlace, between};
+use super::place::{NodePlace, angle_below, between};
 use super::search::SlopeWindow;
 use super::wavelengths::{Divided, Stray};
 use super::{
@@ -263,7 +263,8 @@ impl ExitPupil {
     ) -> Vec<Stray> {
         self.random_strays(lens, numbers, |place, u| {
             let nodes = place.nodes.iter();
-            let inner: f64 = nodes.map(|&(n, w)| between(&self.nodes[n].inner, u[1]) * w).sum();
+            let inner: f64 =
+                nodes.map(|&(n, w)| between(&self.nodes[n].inner, angle_below(u[1])) * w).sum();
             inner * (1.0 - CHECKED * u[2])
         })
     }
@@ -272,7 +273,8 @@ impl ExitPupil {
     pub(super) fn strays(&self, lens: &MonochromaticTrain, numbers: Range<u32>) -> Vec<Stray> {
         self.random_strays(lens, numbers, |place, u| {
             let nodes = place.nodes.iter();
-            let bound: f64 = nodes.map(|&(n, w)| between(&self.nodes[n].reach, u[1]) * w).sum();
+            let bound: f64 =
+                nodes.map(|&(n, w)| between(&self.nodes[n].reach, angle_below(u[1])) * w).sum();
             bound * (1.0 + CHECKED * u[2])
         })
     }

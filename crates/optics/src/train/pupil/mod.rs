@@ -58,6 +58,7 @@ use super::{MonochromaticTrain, OpticalTrain, Side};
 use crate::element::{Clip, Frame, LensRays, RayStatus, StatusCounts};
 use crate::glass::GlassError;
 
+pub use bound::PupilSamples;
 pub use clear::{without_dimming, without_filters};
 pub use disk::Disk;
 pub use lenslets::LensletPupil;
@@ -109,17 +110,6 @@ pub enum ExitPupilError {
     /// A glass without index.
     #[error(transparent)]
     Glass(#[from] GlassError),
-}
-
-/// From samples of the film to weighted rays.
-#[derive(Debug, Clone, Copy)]
-pub struct PupilSamples<'a> {
-    /// Factor on all weights.
-    pub scale: f64,
-    /// Places on the sensor from its centre (mm), in the lens' axes, one array an axis.
-    pub film: [&'a [f64]; 2],
-    /// Places in the unit square.
-    pub squares: &'a [[f64; 2]],
 }
 
 /// One sample of the exit pupil.
@@ -341,21 +331,6 @@ impl ExitPupil {
             None => bound.draw(u)?,
         };
         Some(self.weigh(slopes, area))
-    }
-
-    /// Refills `rays` with one ray a sample, ready to be traced from [`Side::Sensor`], as [`Self::sample`] gives them
-    /// one by one. False where it has to be asked one by one: at a mask, behind lenslets, and where no light arrives at
-    /// the place of some sample.
-    pub fn fill(&self, bundle: &PupilSamples<'_>, rays: &mut LensRays) -> bool {
-        if self.lenslets.is_some() || self.coded.is_some() {
-            return false;
-        }
-        rays.resize(bundle.squares.len());
-        match &self.disk {
-            Some(disk) => disk.fill(&self.sensor, (bundle, self.index2), &mut rays.blocks),
-            None => return self.fill_bounds(bundle, &mut rays.blocks),
-        }
-        true
     }
 
     /// The sample along slopes that stands for an area of slopes.

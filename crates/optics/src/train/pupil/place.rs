@@ -82,8 +82,9 @@ pub(super) fn turn_of(i: usize) -> f64 {
     i as f64 / ANGLES as f64
 }
 
-/// The table's value at a share of a full turn.
-pub(super) fn between(reach: &[f64; ANGLES + 1], turn: f64) -> f64 {
+/// The angle of the table below a share of a full turn, 0..=1, and the share of the way to the next.
+#[inline(always)]
+pub(super) fn angle_below(turn: f64) -> (usize, f64) {
     #[expect(clippy::cast_precision_loss, reason = "128 angles")]
     let at = turn * ANGLES as f64;
     #[expect(
@@ -94,5 +95,11 @@ pub(super) fn between(reach: &[f64; ANGLES + 1], turn: f64) -> f64 {
     let low = (at as usize).min(ANGLES - 1);
     #[expect(clippy::cast_precision_loss, reason = "128 angles")]
     let share = at - low as f64;
-    reach[low] + (reach[low + 1] - reach[low]) * share
+    (low, share)
+}
+
+/// The table's value at an angle.
+#[inline(always)]
+pub(super) fn between(table: &[f64; ANGLES + 1], (low, share): (usize, f64)) -> f64 {
+    table[low] + (table[low + 1] - table[low]) * share
 }
