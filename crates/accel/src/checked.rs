@@ -468,7 +468,7 @@ impl Accel for Embree {
     }
 
     fn blocks(&self) -> Option<&dyn BlockAccel> {
-        (self.few.is_some() || self.scene.takes_blocks()).then_some(self)
+        (self.few.is_some() || CommittedScene::takes_blocks()).then_some(self)
     }
 
     fn rebuilt(

@@ -10,6 +10,7 @@
 //! * Errors come through the device's error function, with Embree's own words. Tracing reports none.
 //! * Masks, ids and the 16 bytes behind the last vertex are seen to here and nowhere else.
 
+mod blocks;
 mod device;
 mod filter;
 #[cfg(feature = "limit")]

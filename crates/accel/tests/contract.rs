@@ -4,6 +4,8 @@
 
 #[path = "contract/accuracy.rs"]
 mod accuracy;
+#[path = "contract/blocks.rs"]
+mod blocks;
 #[path = "contract/deforming.rs"]
 mod deforming;
 #[path = "contract/degenerate.rs"]
@@ -19,9 +21,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 #[cfg(feature = "embree")]
 use etendue_accel::Embree;
 use etendue_accel::{Accel, BuildError, BuildOptions, Bvh, Exact, watertight};
-use etendue_geometry::block::LANES;
 use etendue_geometry::glam::{DQuat, DVec3};
-use etendue_geometry::{Detail, Geometry, HitBatch, MISS, Mesh, RayBatch, RayBlocks, Transform};
+use etendue_geometry::{Detail, Geometry, HitBatch, MISS, RayBatch, Transform};
 use meshes::{Random, at, blob, mesh, placed, rays, scene, soup};
 
 type Build = fn(Arc<Geometry>, &BuildOptions) -> Result<Box<dyn Accel>, BuildError>;
@@ -362,91 +363,6 @@ fn packets_agree_with_single_rays() {
             assert_bvh_equals_exact(&geometry, &batch, what);
         }
     }
-}
-
-/// A decal and a box on a floor, in both orders, with and without more triangles than are tested without a tree: what
-/// lies in the floor's plane is told by the rule in blocks of rays, too.
-#[test]
-fn surfaces_in_one_plane_follow_the_rule_in_blocks() {
-    let square = |size: f32, at: [f32; 2]| {
-        let corner = |x: f32, z: f32| [at[0] + x * size, 0.0, at[1] + z * size];
-        let corners = [corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)];
-        mesh("square", &corners, vec![[0, 1, 2], [0, 2, 3]])
-    };
-    let floor = || square(2.0, [0.0, 0.0]);
-    let others =
-        || [square(0.4, [0.7, 0.6]), cube_on_floor([-0.8, -0.5]), cube_on_floor([0.3, -1.1])];
-    let mut compared = 0;
-    for (floor_first, crowded) in [(true, false), (false, false), (true, true), (false, true)] {
-        let mut meshes: Vec<Mesh> = others().into();
-        meshes.insert(if floor_first { 0 } else { meshes.len() }, floor());
-        let mut placements: Vec<_> =
-            (0..meshes.len() as u32).map(|mesh| placed(mesh, Transform::IDENTITY)).collect();
-        if crowded {
-            placements.push(placed(meshes.len() as u32, Transform::IDENTITY));
-            meshes.push(soup(200, 0.05, 3));
-        } else {
-            // A copy in the very same place, of which the last counts; Embree has no blocks of many instances.
-            placements.push(placements[0].clone());
-        }
-        let geometry = at(meshes, placements);
-        let mut random = Random(19);
-        let mut batch = RayBatch::default();
-        for k in 0..4096 {
-            let mut from = 1.8 * random.cube();
-            // From above, from below, and from within the boxes.
-            from.y = [2.0, -1.5, 0.3][k % 3];
-            let down = DVec3::new(0.0, if k % 3 == 1 { 1.0 } else { -1.0 }, 0.0);
-            batch.push(from, (down + 0.4 * random.cube()).normalize());
-        }
-        let truth = closest(
-            &Exact::build(Arc::clone(&geometry), &BuildOptions::default()).unwrap(),
-            &batch,
-        );
-        for (name, accel) in each(&geometry) {
-            let Some(blocks) = accel.blocks() else { continue };
-            compared += 1;
-            let mut rays = RayBlocks::default();
-            blocks.convert(&batch, &mut rays);
-            blocks.closest_of_blocks(rays.blocks_mut(), &[], false);
-            for i in 0..batch.len() {
-                let (block, lane) = (&rays.blocks()[i / LANES], i % LANES);
-                let own = [block.placement[lane], block.triangle[lane]];
-                let due = [truth.placement[i], truth.triangle[i]];
-                let at_edge =
-                    own[0] != MISS && due[0] != MISS && is_at_edge(&geometry, &batch, &truth, i);
-                let both = truth.is_hit(i) == (own[0] != MISS);
-                assert!(
-                    own == due || at_edge,
-                    "{name} {floor_first} {crowded}: {own:?} {due:?}, {both}"
-                );
-                if own == due && truth.is_hit(i) {
-                    let [t, u, v] = [block.t_max, block.u, block.v].map(|row| f64::from(row[lane]));
-                    assert!((t - truth.t[i]).abs() < 1e-5, "{name}: {t} {}", truth.t[i]);
-                    // Of edges of 0.05 m and more.
-                    let off = (u - truth.u[i]).abs() + (v - truth.v[i]).abs();
-                    assert!(off < 1e-3, "{name}: {off}");
-                    let normal = DVec3::from(block.normal.map(|axis| f64::from(axis[lane])));
-                    assert!(normal.normalize().distance(truth.normal(i)) < 1e-5, "{name}");
-                }
-            }
-        }
-    }
-    assert!(compared >= if cfg!(feature = "embree") { 6 } else { 2 }, "{compared}");
-}
-
-/// A box of 0.6 m that stands on y = 0.
-fn cube_on_floor([x, z]: [f32; 2]) -> Mesh {
-    let corners: Vec<[f32; 3]> = (0..8)
-        .map(|k| {
-            let side = |bit: u32| if k >> bit & 1 == 1 { 0.3 } else { -0.3 };
-            [x + side(0), side(1) + 0.3, z + side(2)]
-        })
-        .collect();
-    let quads =
-        [[0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5], [0, 2, 3, 1], [4, 5, 7, 6]];
-    let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    mesh("box", &corners, triangles)
 }
 
 #[test]

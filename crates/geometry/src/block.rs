@@ -1,34 +1,36 @@
-//! Rays in blocks of sixteen in single precision, as Embree's packets have them: light is traced in these.
+//! Rays in blocks of sixteen: in single precision as Embree's packets have them, or in double precision. Light is traced
+//! in these.
 
 use glam::DVec3;
 
 use crate::batch::MISS;
+use crate::float::Float;
 
 /// Rays of a block.
 pub const LANES: usize = 16;
 
-/// One single-precision number of each ray of a block.
-pub type Floats = [f32; LANES];
+/// One number of each ray of a block.
+pub type Floats<F = f32> = [F; LANES];
 
 /// One index of each ray of a block.
 pub type Indices = [u32; LANES];
 
-/// Sixteen rays and what they hit, in the order of Embree's `RTCRayHit16`, so that they can be handed over as
-/// they are. Origins are relative to what the accelerator says (m), directions are unit vectors.
+/// Sixteen rays and what they hit, in single precision in the order of Embree's `RTCRayHit16`, so that they can be handed
+/// over as they are. Origins are relative to what the accelerator says (m), directions are unit vectors.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
-pub struct RayBlock {
+pub struct RayBlock<F = f32> {
     /// Origins (m), one array an axis.
-    pub origin: [Floats; 3],
+    pub origin: [Floats<F>; 3],
     /// Nearest distances that count (m).
-    pub t_min: Floats,
+    pub t_min: Floats<F>,
     /// Unit directions, one array an axis.
-    pub direction: [Floats; 3],
+    pub direction: [Floats<F>; 3],
     /// Embree's time of each ray: 0, for its structures stand still.
     pub time: Floats,
     /// Farthest distances that count (m): nothing is traced where this is not above 0. A closest hit puts its
     /// distance here, occlusion puts −∞.
-    pub t_max: Floats,
+    pub t_max: Floats<F>,
     /// Embree's mask of each ray: all bits.
     pub mask: Indices,
     /// Embree's number of each ray, which nothing reads.
@@ -36,11 +38,11 @@ pub struct RayBlock {
     /// Embree's flags of each ray: 0.
     pub flags: Indices,
     /// Normals of the triangles that were hit, of any length, on their front; one array an axis.
-    pub normal: [Floats; 3],
+    pub normal: [Floats<F>; 3],
     /// Barycentric weights of their second corners.
-    pub u: Floats,
+    pub u: Floats<F>,
     /// Barycentric weights of their third corners.
-    pub v: Floats,
+    pub v: Floats<F>,
     /// Triangles in their meshes, or [`MISS`].
     pub triangle: Indices,
     /// Placements, or [`MISS`].
@@ -54,25 +56,25 @@ pub struct RayBlock {
 /// The vector of a lane of three arrays, one an axis.
 #[must_use]
 #[inline(always)]
-pub fn vector(axes: &[Floats; 3], lane: usize) -> DVec3 {
+pub fn vector<F: Float>(axes: &[Floats<F>; 3], lane: usize) -> DVec3 {
     let [x, y, z] = axes;
-    DVec3::new(f64::from(x[lane]), f64::from(y[lane]), f64::from(z[lane]))
+    DVec3::new(x[lane].into(), y[lane].into(), z[lane].into())
 }
 
-impl RayBlock {
+impl<F: Float> RayBlock<F> {
     /// A block of which no ray is traced.
     pub const EMPTY: Self = Self {
-        origin: [[0.0; LANES]; 3],
-        t_min: [0.0; LANES],
-        direction: [[0.0; LANES]; 3],
+        origin: [[F::ZERO; LANES]; 3],
+        t_min: [F::ZERO; LANES],
+        direction: [[F::ZERO; LANES]; 3],
         time: [0.0; LANES],
-        t_max: [-1.0; LANES],
+        t_max: [F::ZERO; LANES],
         mask: [u32::MAX; LANES],
         id: [0; LANES],
         flags: [0; LANES],
-        normal: [[0.0; LANES]; 3],
-        u: [0.0; LANES],
-        v: [0.0; LANES],
+        normal: [[F::ZERO; LANES]; 3],
+        u: [F::ZERO; LANES],
+        v: [F::ZERO; LANES],
         triangle: [MISS; LANES],
         placement: [MISS; LANES],
         instance: [MISS; LANES],
@@ -104,18 +106,18 @@ impl RayBlock {
     #[must_use]
     #[inline]
     pub fn is_blocked(&self, lane: usize) -> bool {
-        self.t_max[lane] == f32::NEG_INFINITY
+        self.t_max[lane] == -F::INFINITY
     }
 }
 
 /// Rays side by side in blocks, without gaps. Memory is kept.
 #[derive(Debug, Clone, Default)]
-pub struct RayBlocks {
-    blocks: Vec<RayBlock>,
+pub struct RayBlocks<F = f32> {
+    blocks: Vec<RayBlock<F>>,
     len: usize,
 }
 
-impl RayBlocks {
+impl<F: Float> RayBlocks<F> {
     /// Removes all rays.
     pub fn clear(&mut self) {
         self.len = 0;
@@ -135,18 +137,18 @@ impl RayBlocks {
 
     /// The blocks that have rays.
     #[must_use]
-    pub fn blocks(&self) -> &[RayBlock] {
+    pub fn blocks(&self) -> &[RayBlock<F>] {
         &self.blocks[..self.len.div_ceil(LANES)]
     }
 
     /// The blocks that have rays, to be traced.
-    pub fn blocks_mut(&mut self) -> &mut [RayBlock] {
+    pub fn blocks_mut(&mut self) -> &mut [RayBlock<F>] {
         &mut self.blocks[..self.len.div_ceil(LANES)]
     }
 
     /// Makes them `len` rays, which `fill` sets: a block at a time, with the number of its first ray and how many
     /// there are. Other lanes are not traced.
-    pub fn refill(&mut self, len: usize, mut fill: impl FnMut(&mut RayBlock, usize, usize)) {
+    pub fn refill(&mut self, len: usize, mut fill: impl FnMut(&mut RayBlock<F>, usize, usize)) {
         let count = len.div_ceil(LANES);
         if self.blocks.len() < count {
             self.blocks.resize(count, RayBlock::EMPTY);
@@ -154,23 +156,23 @@ impl RayBlocks {
         self.len = len;
         for (number, block) in self.blocks[..count].iter_mut().enumerate() {
             let start = number * LANES;
-            block.t_min = [0.0; LANES];
-            block.t_max = [-1.0; LANES];
+            block.t_min = [F::ZERO; LANES];
+            block.t_max = [F::ZERO; LANES];
             fill(block, start, LANES.min(len - start));
         }
     }
 
     /// Appends a ray from `origin` (m) along the unit `direction` that counts hits from 0 to `t_max` (m).
     #[inline(always)]
-    pub fn push(&mut self, origin: [f32; 3], direction: [f32; 3], t_max: f32) {
+    pub fn push(&mut self, origin: [F; 3], direction: [F; 3], t_max: F) {
         let (number, lane) = (self.len / LANES, self.len % LANES);
         if lane == 0 {
             if number == self.blocks.len() {
                 self.blocks.push(RayBlock::EMPTY);
             }
             let block = &mut self.blocks[number];
-            block.t_min = [0.0; LANES];
-            block.t_max = [-1.0; LANES];
+            block.t_min = [F::ZERO; LANES];
+            block.t_max = [F::ZERO; LANES];
         }
         let block = &mut self.blocks[number];
         for axis in 0..3 {

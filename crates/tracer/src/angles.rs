@@ -11,7 +11,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::float::Float;
+use etendue_geometry::Float;
 
 /// tan π/8.
 const EIGHTH: f64 = 0.414_213_562_373_095_03;

@@ -7,10 +7,10 @@ use etendue_geometry::{Bounds, Geometry, Mesh, Placement, Sweep};
 
 use crate::light::mean;
 use crate::light_tree::Cluster;
-use crate::material::Alpha;
+use crate::material::{Alpha, Emission};
 use crate::reference::{SceneView, SurfacePoint};
 use crate::spawn::magnitudes;
-use crate::{Material, Paint};
+use crate::{Color, Material, Paint, SceneCurve};
 
 /// More emissive triangles than this are not kept ready.
 pub(crate) const MOST: usize = 1 << 16;
@@ -28,7 +28,7 @@ pub(crate) struct LightTriangle {
 
 impl LightTriangle {
     /// The triangle of a spot at its time; `None` without area.
-    fn of(point: &SurfacePoint<'_>) -> Option<Self> {
+    pub(crate) fn of(point: &SurfacePoint<'_>) -> Option<Self> {
         let place = &point.placement.world_from_mesh_at(point.time);
         let [a, b, c] = point.mesh.corners_at(point.triangle, point.time);
         let edges = [place.linear * (b - a), place.linear * (c - a)];
@@ -195,4 +195,25 @@ pub(crate) fn triangle_power(
         Paint::Image { factor, .. } => 0.05 * mean(factor),
     };
     sides * PI * area * emission.strength * (radiance / 4.0).max(0.1 * least)
+}
+
+/// A bound of what a surface gives off where its spectrum is that of its paint, per band (W/(m² sr)).
+pub(crate) fn brightest(scene: &SceneView<'_>, emission: &Emission) -> f64 {
+    let most = |color: &Color| color.iter().copied().fold(0.0, f64::max);
+    let peak = |curve: &SceneCurve| curve.curve.extent()[1];
+    let of_paint = match &emission.radiance {
+        Paint::Plain(color) => most(color),
+        Paint::Curve { look, curve } => most(look).max(peak(curve)),
+        Paint::Checker { colors, curves, .. } => {
+            let curves = curves.iter().flat_map(|both| both.each_ref()).map(peak);
+            curves.fold(most(&colors[0]).max(most(&colors[1])), f64::max)
+        }
+        Paint::Image { factor, curve, image } => {
+            let of_image = scene.images.get(image.texture as usize).and_then(Option::as_ref);
+            let factor = curve.as_ref().map_or(0.0, peak).max(most(factor));
+            factor * of_image.map_or(1.0, |image| image.brightest())
+        }
+        Paint::Cube { cube, .. } => cube.cube.peak(),
+    };
+    emission.strength * of_paint
 }

@@ -184,6 +184,12 @@ impl Cube {
         self.values.chunks_exact(count).map(mean).fold(0.0, f64::max)
     }
 
+    /// The greatest band or colour of a texel.
+    pub(crate) fn peak(&self) -> f64 {
+        let looks = self.looks.as_flattened().iter();
+        f64::from(self.values.iter().chain(looks).copied().fold(0.0, f32::max))
+    }
+
     /// The outer edges of its bands (nm).
     #[must_use]
     pub fn range(&self) -> [f64; 2] {

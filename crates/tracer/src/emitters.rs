@@ -8,10 +8,9 @@ use std::sync::Arc;
 
 use etendue_accel::{Accel, BuildOptions, Bvh};
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Geometry, HitBatch, MISS, RayBatch};
+use etendue_geometry::{Float, Geometry, HitBatch, MISS, RayBatch};
 
 use crate::Material;
-use crate::{LANES, Row};
 
 /// Emissive surfaces are kept apart when they are at most this share of the scene's triangles.
 const MOST: f64 = 0.125;
@@ -66,29 +65,13 @@ impl Emitters {
         self.accel.is_none()
     }
 
-    /// A sphere around them in single precision, about `origin` (m): its centre and its radius, with room for
-    /// rounding.
-    #[expect(clippy::cast_possible_truncation, reason = "the radius has room for it")]
-    pub(crate) fn sphere(&self, origin: DVec3) -> ([f32; 3], f32) {
+    /// A sphere around them, about `origin` (m): its centre and its radius, with room for rounding.
+    pub(crate) fn sphere<F: Float>(&self, origin: DVec3) -> ([F; 3], F) {
         let centre = self.centre - origin;
-        let room = 4.0 * f64::from(f32::EPSILON) * (centre.length() + self.radius);
+        let epsilon: f64 = F::EPSILON.into();
+        let room = 4.0 * epsilon * (centre.length() + self.radius);
         let radius = if self.radius >= 0.0 { self.radius + room } else { -1.0 };
-        (centre.to_array().map(|axis| axis as f32), radius as f32)
-    }
-
-    /// Tests whether a ray may meet any of them: `false` for most, at hardly a cost.
-    pub(crate) fn may_meet(&self, origin: DVec3, direction: DVec3) -> bool {
-        let way = self.centre - origin;
-        let foot = way.dot(direction);
-        let squared = self.radius * self.radius;
-        self.radius >= 0.0
-            && (foot >= 0.0 || way.length_squared() <= squared)
-            && way.length_squared() - foot * foot <= squared * (1.0 + 1e-9)
-    }
-
-    /// Sets to 0 the `values` of rays, from `starts` (m) along unit directions, that meet none of them for sure.
-    pub(crate) fn keep_those_that_may_meet(&self, rays: [&[Row; 3]; 2], values: &mut Row) {
-        keep_those_that_may_meet(self, rays, values);
+        (centre.to_array().map(F::of), F::of(radius))
     }
 
     /// The closest emissive surface along each ray, by the scene's numbers.
@@ -100,30 +83,6 @@ impl Emitters {
         for number in hits.placement.iter_mut().filter(|number| **number != MISS) {
             *number = self.numbers[*number as usize];
         }
-    }
-}
-
-#[multiversion::multiversion(targets = "simd")]
-fn keep_those_that_may_meet(
-    emitters: &Emitters,
-    [starts, along]: [&[Row; 3]; 2],
-    values: &mut Row,
-) {
-    let (mut foot, mut squared) = ([0.0; LANES], [0.0; LANES]);
-    let centre = emitters.centre.to_array();
-    for axis in 0..3 {
-        for i in 0..LANES {
-            let way = centre[axis] - starts[axis][i];
-            foot[i] += way * along[axis][i];
-            squared[i] += way * way;
-        }
-    }
-    let radius = emitters.radius;
-    let (within, beside) = (radius * radius, radius * radius * (1.0 + 1e-9));
-    for i in 0..LANES {
-        let is_ahead = (foot[i] >= 0.0) | (squared[i] <= within);
-        let may_meet = (radius >= 0.0) & is_ahead & (squared[i] - foot[i] * foot[i] <= beside);
-        values[i] = if may_meet { values[i] } else { 0.0 };
     }
 }
 

@@ -11,14 +11,16 @@ use etendue_geometry::glam::DVec3;
 use etendue_image::Limits;
 
 use crate::angles;
-use crate::float::Float;
 use crate::spec::BRIGHTEST;
 use crate::spectral_sky::{self, Spectrum};
 use crate::texture::{ImageError, read_file, read_image};
 use crate::{Color, Cube};
+use etendue_geometry::Float;
 
+pub(crate) use sampler::MapLookup;
 pub use sampler::MapSampler;
-pub(crate) use sampler::{MapLookup, OnMap};
+#[cfg(test)]
+pub(crate) use sampler::OnMap;
 
 /// The most cells of the grid that directions are chosen on, across and down.
 const CELLS: [usize; 2] = [2048, 1024];
@@ -34,6 +36,8 @@ pub struct EnvironmentMap {
     spectra: Vec<[f32; spectral_sky::COUNT]>,
     /// The largest colour of a texel.
     pub(crate) peak: f32,
+    /// The largest of any texel at each of those wavelengths.
+    pub(crate) spectral_peaks: Spectrum,
     /// Texels that were not finite, below zero or above [`BRIGHTEST`], and count as black.
     pub dropped: u64,
 }
@@ -79,12 +83,18 @@ impl EnvironmentMap {
             }
         }
         let peak = texels.iter().flatten().copied().fold(0.0, f32::max);
-        Self { width, height, texels, spectra: Vec::new(), peak, dropped }
+        let (spectra, spectral_peaks) = (Vec::new(), [0.0; spectral_sky::COUNT]);
+        Self { width, height, texels, spectra, peak, spectral_peaks, dropped }
     }
 
     /// The same with the spectra of a clear sky, as many as there are texels.
     pub(crate) fn with_spectra(mut self, spectra: Vec<[f32; spectral_sky::COUNT]>) -> Self {
         if spectra.len() == self.texels.len() {
+            for spectrum in &spectra {
+                for (peak, value) in self.spectral_peaks.iter_mut().zip(spectrum) {
+                    *peak = peak.max(f64::from(*value));
+                }
+            }
             self.spectra = spectra;
         }
         self

@@ -30,7 +30,6 @@ pub mod clear_sky;
 pub mod cube;
 pub mod emitters;
 pub mod environment;
-mod float;
 pub mod footprint;
 pub mod goniometric;
 pub mod group;
@@ -80,9 +79,3 @@ pub use spectral::Spectral;
 pub use texture::{Image, ImageSource, Texture, TextureUse};
 pub use tint::{Conductor, ConductorId, SceneCurve, Tint, TintSpectrum};
 pub use transport::{LightingContext, RayStats, Rules, Samples, Scratch, Traits};
-
-/// Hits that are worked on side by side.
-pub(crate) const LANES: usize = 64;
-
-/// One number of each of them.
-pub(crate) type Row = [f64; LANES];

@@ -112,6 +112,7 @@ impl LightSampler {
     }
 
     /// Whether there is more than one to choose from.
+    #[cfg(test)]
     pub(crate) fn are_several(&self) -> bool {
         self.others.len() > 1 || self.tree.is_some()
     }

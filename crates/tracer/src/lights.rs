@@ -6,11 +6,10 @@ mod plain;
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use etendue_geometry::MISS;
 use etendue_geometry::glam::DVec3;
 use etendue_spectrum::{NoOverlap, Outside};
 
-pub(crate) use self::plain::{PlainLight, PlainLightBounds};
+pub(crate) use self::plain::{LightBounds, PlainLight};
 use crate::area_light::{self, AreaLight, AreaLightMotion, triangle_power};
 use crate::environment::EnvironmentMap;
 use crate::group::Groups;
@@ -22,7 +21,7 @@ use crate::reference::{SceneView, SurfacePoint, squares_at};
 use crate::sampling::{Frame, cone_direction, triangle_point};
 use crate::sky::{Sky, uniform_direction};
 use crate::spectral::Spectral;
-use crate::target::{Chosen, Target, TargetKind};
+use crate::target::{Target, TargetKind};
 use crate::{LightGroup, Material, Modulation, Paint, SceneCurve};
 
 /// All lights of a scene, ready to be chosen from.
@@ -43,8 +42,7 @@ pub struct Lights {
     /// and what those that shine alike all over give off in all bands.
     area_lights: Vec<Option<AreaLight>>,
     area_light_bands: Vec<f64>,
-    /// Bounds of all, if each is a point or a plain triangle.
-    plain_lights: Option<PlainLightBounds>,
+    bounds: LightBounds,
     groups: Groups,
 }
 
@@ -60,6 +58,14 @@ enum EmissionBands {
 }
 
 impl EmissionBands {
+    /// The most that a band of its paint is multiplied by.
+    fn most(&self) -> f64 {
+        match self {
+            Self::Times(tint) => tint.iter().copied().fold(0.0, f64::max),
+            Self::Own | Self::Squares(_) => 1.0,
+        }
+    }
+
     /// That of a material.
     fn of(material: &Material, spectral: &Spectral) -> Result<Self, NoOverlap> {
         let Some(emission) = &material.emission else { return Ok(Self::Own) };
@@ -168,11 +174,11 @@ impl Lights {
             sampler,
             area_lights,
             area_light_bands,
-            plain_lights: None,
+            bounds: LightBounds::NOTHING,
             groups,
         };
         all.prepare_area_lights(scene, spectral);
-        all.plain_lights = all.bound_plain_lights();
+        all.bounds = all.bound(scene, span);
         Ok(all)
     }
 
@@ -202,12 +208,6 @@ impl Lights {
         let number = index.checked_sub(self.lights.len())?;
         let area_light = self.area_lights.get(number)?.as_ref().filter(|own| own.is_plain)?;
         Some((area_light, &self.area_light_bands[number * count..(number + 1) * count]))
-    }
-
-    /// Where light `index` is (m) and its bands, if it is a point that shines alike to all sides and stands still.
-    #[inline(always)]
-    pub(crate) fn plain_point(&self, index: usize, count: usize) -> Option<(DVec3, &[f64])> {
-        Some((plain::standing_point(self.lights.get(index)?)?, self.bands_of(index, count)))
     }
 
     /// The number among all lights of a triangle that shines.
@@ -265,19 +265,6 @@ impl Lights {
         self.sky.is_some() || !self.triangles.is_empty()
     }
 
-    /// Whether a place on one of them is chosen: not on points and parallel light.
-    #[must_use]
-    pub fn are_extended(&self) -> bool {
-        let is_soft = |light: &Light| matches!(light.kind, LightKind::Directional { cos_radius, .. } if cos_radius < 1.0);
-        self.is_hittable() || self.lights.iter().any(is_soft)
-    }
-
-    /// Whether there is more than one to choose from.
-    #[must_use]
-    pub fn are_several(&self) -> bool {
-        self.sampler.are_several()
-    }
-
     /// Whether light comes from where nothing is.
     #[must_use]
     pub fn has_environment(&self) -> bool {
@@ -316,14 +303,6 @@ impl Lights {
         }
     }
 
-    /// The group of what was aimed at.
-    pub(crate) fn group_of(&self, scene: &SceneView<'_>, [placement, light]: [u32; 2]) -> u32 {
-        match placement {
-            MISS => self.groups.of_light(light as usize),
-            placement => self.group_of_placement(scene, placement),
-        }
-    }
-
     pub(crate) fn bands_of(&self, light: usize, count: usize) -> &[f64] {
         &self.bands[light * count..(light + 1) * count]
     }
@@ -335,73 +314,50 @@ impl Lights {
         &self,
         scene: &SceneView<'_>,
         spectral: &Spectral,
-        receiver: (&Receiver, f64),
-        (one, square): ((usize, f64), [f64; 2]),
-        radiance: &mut [f64],
-    ) -> Chosen {
-        let mut chosen = self.place_on(scene, spectral, receiver, one, square, radiance);
-        if let Chosen::Place(target) = &mut chosen {
-            target.light = u32::try_from(one.0).unwrap_or(MISS);
-        }
-        chosen
-    }
-
-    /// A place on light `index`, which was chosen with this chance, by `square`.
-    #[inline(always)]
-    fn place_on(
-        &self,
-        scene: &SceneView<'_>,
-        spectral: &Spectral,
         (receiver, time): (&Receiver, f64),
-        (index, chance): (usize, f64),
-        square: [f64; 2],
+        ((index, chance), square): ((usize, f64), [f64; 2]),
         radiance: &mut [f64],
-    ) -> Chosen {
+    ) -> Option<Target> {
         let Some(light) = self.lights.get(index) else {
             let number = index - self.lights.len();
             let area_light = (number, time);
-            return self
-                .place_on_area_light(scene, spectral, area_light, square, chance, radiance)
-                .into();
+            return self.place_on_area_light(scene, spectral, area_light, square, chance, radiance);
         };
         radiance.copy_from_slice(self.bands_of(index, radiance.len()));
         let stand = light.stand(time);
         match &light.kind {
-            LightKind::Point(at) => {
-                Target::bare(TargetKind::Point, stand.point(*at), chance).into()
-            }
+            LightKind::Point(at) => Some(Target::bare(TargetKind::Point, stand.point(*at), chance)),
             &LightKind::Spot { at, axis, cos_outer, cos_inner } => {
                 let (at, axis) = (stand.point(at), stand.direction(axis));
                 let cosine = (receiver.point - at).try_normalize().map_or(-1.0, |d| d.dot(axis));
                 let factor = spot_falloff(cosine, cos_outer, cos_inner);
                 radiance.iter_mut().for_each(|band| *band *= factor);
-                (factor > 0.0).then(|| Target::bare(TargetKind::Point, at, chance)).into()
+                (factor > 0.0).then(|| Target::bare(TargetKind::Point, at, chance))
             }
             LightKind::Projector(projector) => {
-                let Some(color) = projector.toward(scene, stand.seen(receiver.point)) else {
-                    return Chosen::Dark;
-                };
+                let color = projector.toward(scene, stand.seen(receiver.point))?;
                 for (k, band) in radiance.iter_mut().enumerate() {
                     *band *= spectral.band(&color, k);
                 }
-                Target::bare(TargetKind::Point, stand.point(projector.at), chance).into()
+                Some(Target::bare(TargetKind::Point, stand.point(projector.at), chance))
             }
             LightKind::Goniometric(measured) => {
                 let intensity = measured.toward(stand.seen(receiver.point));
                 radiance.iter_mut().for_each(|band| *band *= intensity);
                 let place = Target::bare(TargetKind::Point, stand.point(measured.at), chance);
-                (intensity > 0.0).then_some(place).into()
+                (intensity > 0.0).then_some(place)
             }
             &LightKind::Directional { along, cos_radius } => {
                 let toward = Frame::around(-stand.direction(along))
                     .world(cone_direction(square, cos_radius));
-                Target::bare(TargetKind::Parallel, toward, chance).into()
+                Some(Target::bare(TargetKind::Parallel, toward, chance))
             }
             LightKind::Environment { image: EnvironmentImage::Constant, .. } => {
                 let (toward, density) = uniform_direction(receiver, square);
-                Target::bare(TargetKind::Far, toward, chance * density).into()
+                Some(Target::bare(TargetKind::Far, toward, chance * density))
             }
-            LightKind::Environment { .. } => Chosen::Sky { square, chance },
+            // Directions to an image are chosen side by side.
+            LightKind::Environment { .. } => None,
         }
     }
 
@@ -437,8 +393,6 @@ impl Lights {
             normal: area_light.shape.normal,
             magnitudes: area_light.magnitudes,
             density: chance / area_light.shape.area,
-            id: area_light.id,
-            light: MISS,
         })
     }
 

@@ -1,15 +1,16 @@
 //! What there is to know of each placement before any ray meets it: worked out once, looked up at each
 //! hit.
 
-mod plain;
+mod table;
 
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Coplanar, Geometry, Placement};
 
-pub(crate) use self::plain::{LEAST_ALPHA, PlainFacets, PlainKind, PlainSurfaces};
+pub(crate) use self::table::{Facets, LEAST_ALPHA, SurfaceKind, SurfaceRow, SurfaceTable};
 use crate::bodies::{Body, bodies};
 use crate::scattering::Absorption;
 use crate::spawn::magnitudes;
+use crate::transport::Traits;
 use crate::{Material, Paint, Scattering, Spectral, Tint};
 
 /// What light has to know of the placements of a scene, by their numbers.
@@ -19,43 +20,12 @@ pub struct PlacedSurfaces {
     all: Vec<Option<PlacedSurface>>,
     /// The boundaries of bodies that lie over one another.
     pub(crate) touching: Coplanar,
-    /// What is known of all, if each is plain.
-    plain: Option<PlainSurfaces>,
+    /// What is looked up for each hit.
+    table: SurfaceTable,
+    /// Single precision holds their places.
+    fits_single: bool,
     /// The diagonal of the box around all (m).
     size: f64,
-}
-
-/// As what hits are worked on, where a surface is wholly there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum SurfaceKind {
-    /// It scatters nothing.
-    Black,
-    /// Lambert's.
-    Matte,
-    /// A sheet of facets over a matte base ([`crate::bsdf::sheets`]): rough metal, and glTF's surfaces without
-    /// more over them.
-    Sheet,
-    /// A mirror, or a smooth boundary of glass.
-    Smooth,
-    /// Of any other kind, or partly not there.
-    Other,
-}
-
-impl SurfaceKind {
-    fn of(material: &Material) -> Self {
-        if material.has_alpha() {
-            return Self::Other;
-        }
-        match &material.scattering {
-            Scattering::Black | Scattering::Unlit => Self::Black,
-            Scattering::Matte => Self::Matte,
-            Scattering::Metal { roughness, .. } if *roughness > 0.0 => Self::Sheet,
-            Scattering::Gltf(surface) if surface.is_bare_sheet() => Self::Sheet,
-            Scattering::Mirror | Scattering::Metal { .. } => Self::Smooth,
-            Scattering::Dielectric(glass) if glass.roughness == 0.0 => Self::Smooth,
-            Scattering::Dielectric(_) | Scattering::Gltf(_) => Self::Other,
-        }
-    }
 }
 
 /// A placement as light meets it.
@@ -69,8 +39,6 @@ pub(crate) struct PlacedSurface {
     pub(crate) is_seen: bool,
     /// It is partly not there.
     pub(crate) has_alpha: bool,
-    /// As what its hits are worked on.
-    pub(crate) kind: SurfaceKind,
     /// No light passes it.
     pub(crate) is_opaque: bool,
     /// Its shading normal is not that of its triangles.
@@ -115,7 +83,6 @@ impl PlacedSurfaces {
                 turn: (place.linear != DMat3::IDENTITY).then(|| place.normal_matrix()),
                 is_seen: material.emission.is_some() || material.scattering == Scattering::Unlit,
                 has_alpha: material.has_alpha(),
-                kind: SurfaceKind::of(material),
                 is_opaque: !material.has_alpha()
                     && !material.is_pane()
                     && !matches!(material.scattering, Scattering::Dielectric(_)),
@@ -135,27 +102,28 @@ impl PlacedSurfaces {
         let all: Vec<_> = geometry.placements.iter().zip(bodies).map(surface).collect();
         let bounds = geometry.loose_bounds();
         let size = bounds.diagonal();
-        let [least, most] = crate::transport::PLAIN_SIZES;
-        let fits = size >= least && size + bounds.centre().length() <= most;
-        let plain = || PlainSurfaces::of(&all, (geometry, materials), spectral);
-        let plain = fits.then(plain).flatten();
-        Self { all, touching, plain, size }
+        let [least, most] = crate::transport::SIZES;
+        let fits_single = size >= least && size + bounds.centre().length() <= most;
+        let table = SurfaceTable::default();
+        let mut own = Self { all, touching, table, fits_single, size };
+        let traits = Traits::of(geometry, materials, &own);
+        own.table = SurfaceTable::of(&own.all, (geometry, materials), (spectral, &traits));
+        own
     }
 
-    /// All in single precision, if each is plain.
-    pub(crate) fn plain(&self) -> Option<&PlainSurfaces> {
-        self.plain.as_ref()
+    /// What is looked up for each hit.
+    pub(crate) fn table(&self) -> &SurfaceTable {
+        &self.table
+    }
+
+    /// Tests whether single precision holds their places.
+    pub(crate) fn fits_single(&self) -> bool {
+        self.fits_single
     }
 
     /// The diagonal of the box around all (m).
     pub(crate) fn size(&self) -> f64 {
         self.size
-    }
-
-    /// Whether all scatter light as Lambert's law has it, or not at all.
-    pub(crate) fn are_matte(&self) -> bool {
-        let is_taken = |kind| matches!(kind, SurfaceKind::Matte | SurfaceKind::Black);
-        self.all.iter().flatten().all(|surface| is_taken(surface.kind))
     }
 
     /// All bodies.

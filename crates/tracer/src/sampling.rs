@@ -17,7 +17,7 @@ use std::f64::consts::TAU;
 use etendue_geometry::disk;
 use etendue_geometry::glam::DVec3;
 
-use crate::float::Float;
+use etendue_geometry::Float;
 
 /// Three unit vectors at right angles; z is a surface's normal.
 #[derive(Debug, Clone, Copy)]

@@ -29,16 +29,6 @@ pub enum Scattering {
 }
 
 impl Scattering {
-    /// Tests whether it scatters light in several ways, among which is chosen.
-    #[must_use]
-    pub fn has_parts(&self) -> bool {
-        match self {
-            Self::Dielectric(_) | Self::Gltf(_) => true,
-            Self::Metal { roughness, .. } => *roughness > 0.0,
-            Self::Black | Self::Matte | Self::Unlit | Self::Mirror => false,
-        }
-    }
-
     /// Tests whether it is made to show other surfaces, mirrored or through it.
     #[must_use]
     pub fn shows_others(&self) -> bool {

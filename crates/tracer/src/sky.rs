@@ -7,8 +7,7 @@ use std::sync::Arc;
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_spectrum::NoOverlap;
 
-use crate::Color;
-use crate::environment::{EnvironmentMap, MapSampler, OnMap};
+use crate::environment::{EnvironmentMap, MapSampler};
 use crate::light::{EnvironmentImage, Light, LightKind};
 use crate::light_sampler::Receiver;
 use crate::sampling::{Frame, cosine_direction, sphere_direction};
@@ -64,30 +63,6 @@ impl Spectra {
     }
 }
 
-/// Directions that are asked together; kept for the next.
-#[derive(Debug, Default)]
-pub(crate) struct SkySamples {
-    /// Lanes and the chance of each.
-    lanes: Vec<(usize, f64)>,
-    squares: Vec<[f64; 2]>,
-    /// With which the sky is chosen for each direction that was met.
-    pub(crate) chances: Vec<f64>,
-    pub(crate) there: OnMap,
-}
-
-impl SkySamples {
-    pub(crate) fn clear(&mut self) {
-        self.lanes.clear();
-        self.squares.clear();
-    }
-
-    /// Adds a lane that chose the sky.
-    pub(crate) fn push(&mut self, lane: usize, square: [f64; 2], chance: f64) {
-        self.lanes.push((lane, chance));
-        self.squares.push(square);
-    }
-}
-
 impl Sky {
     /// Tests whether its bands are those of its colours.
     pub(crate) fn is_of_colors(&self) -> bool {
@@ -125,20 +100,18 @@ impl Sky {
         self.map.as_ref().map_or(1.0, |(_, sampler)| sampler.mean)
     }
 
-    /// Chooses the directions of the lanes that were pushed, by brightness: `each` gets a lane, its unit
-    /// direction with the density of that (1/sr), its place on the map, and the colour there.
-    pub(crate) fn choose(
-        &self,
-        asked: &mut SkySamples,
-        mut each: impl FnMut(usize, (DVec3, f64), ([f64; 2], &Color)),
-    ) {
-        let Some((map, sampler)) = &self.map else { return };
-        let SkySamples { lanes, squares, there, .. } = asked;
-        sampler.sample(map, squares, there);
-        let lit = there.places.iter().copied().zip(&there.colors);
-        let chosen = there.directions.iter().zip(&there.densities);
-        for ((&(lane, chance), (&local, &pdf)), lit) in lanes.iter().zip(chosen).zip(lit) {
-            each(lane, (self.world_from_map * local, pdf * chance), lit);
+    /// A bound of what its image has in any band, or 1.
+    pub(crate) fn peak(&self) -> f64 {
+        let Some((map, _)) = &self.map else { return 1.0 };
+        match &self.spectra {
+            Spectra::Colors => f64::from(map.peak),
+            Spectra::ClearSky(rows) => {
+                let of = |row: &Spectrum| {
+                    row.iter().zip(&map.spectral_peaks).map(|(row, peak)| row * peak).sum()
+                };
+                rows.iter().map(of).fold(0.0, f64::max)
+            }
+            Spectra::Texels(texels) => f64::from(texels.iter().copied().fold(0.0, f32::max)),
         }
     }
 }
@@ -151,12 +124,4 @@ pub(crate) fn uniform_direction(receiver: &Receiver, square: [f64; 2]) -> (DVec3
     }
     let local = cosine_direction(square);
     (Frame::around(receiver.normal).world(local), local.z / PI)
-}
-
-/// The density (1/sr) with which [`uniform_direction`] gives a unit direction.
-pub(crate) fn uniform_density(receiver: &Receiver, direction: DVec3) -> f64 {
-    match receiver.is_one_sided() {
-        true => receiver.normal.dot(direction).max(0.0) / PI,
-        false => 0.25 / PI,
-    }
 }

@@ -120,6 +120,7 @@ impl Spectral {
 
     /// Multiplies light in all bands by a tint: to the bit as [`Self::tint`] band by band.
     #[inline]
+    #[cfg(test)]
     pub(crate) fn times(&self, tint: &Tint, light: &mut [f64]) {
         let rows = self.from_rgb.each_ref().map(Vec::as_slice);
         let known = |number: u32| {

@@ -1,6 +1,5 @@
 //! What is aimed at when a light is asked.
 
-use etendue_geometry::MISS;
 use etendue_geometry::glam::DVec3;
 
 /// A place on a light, or a direction to it, that was chosen.
@@ -18,10 +17,6 @@ pub(crate) struct Target {
     /// Density over the area (1/m²) or, of a direction, over the solid angle (1/sr), the light's chance
     /// included; of a point the chance alone.
     pub(crate) density: f64,
-    /// Placement and triangle, or [`MISS`].
-    pub(crate) id: [u32; 2],
-    /// The number of the light that it is on, of those that are no triangle.
-    pub(crate) light: u32,
 }
 
 /// Kinds of places that light comes from.
@@ -40,39 +35,11 @@ pub(crate) enum TargetKind {
     },
 }
 
-/// Result of choosing a place on a light.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Chosen {
-    /// Nothing that shines here.
-    Dark,
-    /// A place on it.
-    Place(Target),
-    /// The image of the sky, whose directions are chosen together ([`crate::sky::Sky::choose`]).
-    Sky {
-        /// Chooses the direction.
-        square: [f64; 2],
-        /// With which the sky was chosen.
-        chance: f64,
-    },
-}
-
-impl From<Target> for Chosen {
-    fn from(target: Target) -> Self {
-        Self::Place(target)
-    }
-}
-
-impl From<Option<Target>> for Chosen {
-    fn from(target: Option<Target>) -> Self {
-        target.map_or(Self::Dark, Self::Place)
-    }
-}
-
 impl Target {
     /// A direction (unit) or a point (m).
     pub(crate) fn bare(kind: TargetKind, place: DVec3, density: f64) -> Self {
         let place = [place, DVec3::ZERO, DVec3::ZERO];
         let (normal, magnitudes) = (DVec3::ZERO, DVec3::ZERO);
-        Self { kind, place, normal, magnitudes, density, id: [MISS; 2], light: MISS }
+        Self { kind, place, normal, magnitudes, density }
     }
 }

@@ -254,6 +254,16 @@ impl Image {
         self.raster.size()
     }
 
+    /// A bound of its colours.
+    pub(crate) fn brightest(&self) -> f64 {
+        match self.raster.samples() {
+            Samples::U8(_) | Samples::U16(_) => 1.0,
+            // The largest number of half precision.
+            Samples::F16(_) => 65_504.0,
+            Samples::F32(values) => f64::from(values.iter().copied().fold(0.0, f32::max)),
+        }
+    }
+
     /// Linear colour and alpha at (u, v): (0, 0) is the upper left corner of the upper left texel, as
     /// in glTF.
     #[must_use]

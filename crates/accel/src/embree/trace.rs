@@ -1,33 +1,11 @@
 //! Tracing a committed scene: one by one, or in packets of the width that the processor has.
 
-use std::mem::offset_of;
-
 use embree4_sys as sys;
-use etendue_geometry::block::LANES;
-use etendue_geometry::{Geometry, MISS, Mesh, Positions, RayBlock};
+use etendue_geometry::{Geometry, MISS, Mesh, Positions};
 
 use super::CommittedScene;
 use super::filter::{self, ExactFilter, NearestSearch};
 use crate::single::Rays32;
-
-/// True if a [`RayBlock`] is a packet of the installed Embree as it stands: same rows, and room for all of them.
-const BLOCKS_ARE_PACKETS: bool = size_of::<sys::RTCRayHit16>() <= size_of::<RayBlock>()
-    && align_of::<sys::RTCRayHit16>() <= align_of::<RayBlock>()
-    && offset_of!(sys::RTCRayHit16, ray) == 0
-    && offset_of!(sys::RTCRay16, org_x) == offset_of!(RayBlock, origin)
-    && offset_of!(sys::RTCRay16, tnear) == offset_of!(RayBlock, t_min)
-    && offset_of!(sys::RTCRay16, dir_x) == offset_of!(RayBlock, direction)
-    && offset_of!(sys::RTCRay16, time) == offset_of!(RayBlock, time)
-    && offset_of!(sys::RTCRay16, tfar) == offset_of!(RayBlock, t_max)
-    && offset_of!(sys::RTCRay16, mask) == offset_of!(RayBlock, mask)
-    && offset_of!(sys::RTCRay16, id) == offset_of!(RayBlock, id)
-    && offset_of!(sys::RTCRay16, flags) == offset_of!(RayBlock, flags)
-    && offset_of!(sys::RTCRayHit16, hit.Ng_x) == offset_of!(RayBlock, normal)
-    && offset_of!(sys::RTCRayHit16, hit.u) == offset_of!(RayBlock, u)
-    && offset_of!(sys::RTCRayHit16, hit.v) == offset_of!(RayBlock, v)
-    && offset_of!(sys::RTCRayHit16, hit.primID) == offset_of!(RayBlock, triangle)
-    && offset_of!(sys::RTCRayHit16, hit.geomID) == offset_of!(RayBlock, placement)
-    && offset_of!(sys::RTCRayHit16, hit.instID) == offset_of!(RayBlock, instance);
 
 /// Hits that single precision found for a batch of rays.
 #[derive(Debug, Default)]
@@ -105,52 +83,6 @@ impl CommittedScene {
         found.has_surface = false;
     }
 
-    /// True if rays in blocks can be traced: where blocks are packets, and packets come back.
-    pub(crate) fn takes_blocks(&self) -> bool {
-        BLOCKS_ARE_PACKETS && !self.has_instances && !self.is_compact
-    }
-
-    /// The closest hits of blocks. Only for scenes that [take blocks](Self::takes_blocks).
-    pub(crate) fn closest_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool) {
-        debug_assert!(self.takes_blocks(), "checked by the caller");
-        let mut arguments = intersect_arguments(coherent);
-        for block in blocks {
-            block.clear_hits();
-            let valid = Aligned(live_lanes::<LANES>(&block.t_max));
-            if !BLOCKS_ARE_PACKETS || valid.0 == [0; LANES] {
-                continue;
-            }
-            let packet: *mut sys::RTCRayHit16 = std::ptr::from_mut(block).cast();
-            // SAFETY: the scene is committed; `BLOCKS_ARE_PACKETS` has that the block is a packet, aligned as
-            // one; lanes without a ray are masked off; Embree keeps no pointer.
-            unsafe {
-                let scene = self.handle.0.as_ptr();
-                sys::rtcIntersect16(valid.0.as_ptr(), scene, packet, &mut arguments);
-            }
-        }
-    }
-
-    /// Occlusion of blocks. Only for scenes that [take blocks](Self::takes_blocks).
-    pub(crate) fn occluded_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool) {
-        debug_assert!(self.takes_blocks(), "checked by the caller");
-        let mut arguments = occluded_arguments(coherent);
-        let mut spread = occluded_arguments(false);
-        for block in blocks {
-            let valid = Aligned(live_lanes::<LANES>(&block.t_max));
-            if !BLOCKS_ARE_PACKETS || valid.0 == [0; LANES] {
-                continue;
-            }
-            let apart = coherent && spread_out(&block.direction, |lane| valid.0[lane] != 0);
-            let arguments = if apart { &mut spread } else { &mut arguments };
-            let packet: *mut sys::RTCRay16 = std::ptr::from_mut(block).cast();
-            // SAFETY: as above; rays are the first part of a packet of rays and hits.
-            unsafe {
-                let scene = self.handle.0.as_ptr();
-                sys::rtcOccluded16(valid.0.as_ptr(), scene, packet, arguments);
-            }
-        }
-    }
-
     /// As [`Self::occluded`], in packets whether coherent or not.
     pub(crate) fn occluded_in_packets(&self, rays: &Rays32, coherent: bool, blocked: &mut [bool]) {
         self.occlude(rays, true, &mut occluded_arguments(coherent), blocked);
@@ -192,6 +124,13 @@ impl CommittedScene {
         self.occlude(rays, coherent, &mut arguments, blocked);
     }
 
+    /// True if packets come back from occlusion. Debian 12's Embree keeps the 16 rays of a packet that meets instances
+    /// in 16 bits and reads 64 of them: by what lies beside, it never comes back. Nor does it from packets through small
+    /// boxes in its compact mode.
+    pub(super) fn packets_come_back(&self) -> bool {
+        !self.has_instances && !self.is_compact
+    }
+
     fn occlude(
         &self,
         rays: &Rays32,
@@ -199,10 +138,7 @@ impl CommittedScene {
         arguments: &mut sys::RTCOccludedArguments,
         blocked: &mut [bool],
     ) {
-        // Debian 12's Embree keeps the 16 rays of a packet that meets instances in 16 bits and reads
-        // 64 of them: by what lies beside, it never comes back. Nor does it from packets through small
-        // boxes in its compact mode.
-        match (in_packets && !self.has_instances && !self.is_compact, self.device.width) {
+        match (in_packets && self.packets_come_back(), self.device.width) {
             (true, 16) => self.occluded16(rays, arguments, blocked),
             (true, 8) => self.occluded8(rays, arguments, blocked),
             (true, 4) => self.occluded4(rays, arguments, blocked),
@@ -330,17 +266,7 @@ fn run_apart(rays: &Rays32, start: usize, count: usize) -> bool {
 }
 
 /// The widest range of a component of directions that run together.
-const MOST_SPREAD: f32 = 0.25;
-
-/// True if the live lanes of a block spread as in [`run_apart`].
-fn spread_out(direction: &[[f32; LANES]; 3], is_live: impl Fn(usize) -> bool) -> bool {
-    direction.iter().any(|axis| {
-        let pick = |lane: usize, other: f32| if is_live(lane) { axis[lane] } else { other };
-        let least = (0..LANES).map(|k| pick(k, f32::INFINITY)).fold(f32::INFINITY, f32::min);
-        let most = (0..LANES).map(|k| pick(k, f32::NEG_INFINITY));
-        most.fold(f32::NEG_INFINITY, f32::max) - least > MOST_SPREAD
-    })
-}
+pub(super) const MOST_SPREAD: f32 = 0.25;
 
 fn single_ray(rays: &Rays32, i: usize) -> sys::RTCRay {
     sys::RTCRay {
@@ -363,7 +289,7 @@ fn number(i: usize) -> u32 {
     i as u32
 }
 
-fn intersect_arguments(coherent: bool) -> sys::RTCIntersectArguments {
+pub(super) fn intersect_arguments(coherent: bool) -> sys::RTCIntersectArguments {
     let mut arguments = sys::RTCIntersectArguments::default();
     // SAFETY: a plain C initialiser of a struct of ours.
     unsafe { sys::rtcInitIntersectArguments(&mut arguments) };
@@ -375,7 +301,7 @@ fn intersect_arguments(coherent: bool) -> sys::RTCIntersectArguments {
     arguments
 }
 
-fn occluded_arguments(coherent: bool) -> sys::RTCOccludedArguments {
+pub(super) fn occluded_arguments(coherent: bool) -> sys::RTCOccludedArguments {
     let mut arguments = sys::RTCOccludedArguments::default();
     // SAFETY: a plain C initialiser of a struct of ours.
     unsafe { sys::rtcInitOccludedArguments(&mut arguments) };
@@ -521,7 +447,7 @@ fn put<T: Copy, const W: usize>(to: &mut [T], start: usize, count: usize, lanes:
 /// The mask of the lanes whose rays can hit anything, by their ends. From a coherent packet without any, Debian 12's
 /// Embree never comes back.
 #[inline(always)]
-fn live_lanes<const W: usize>(t_far: &[f32]) -> [i32; W] {
+pub(super) fn live_lanes<const W: usize>(t_far: &[f32]) -> [i32; W] {
     let mut live = [0; W];
     for (lane, &t_far) in live.iter_mut().zip(t_far) {
         *lane = -i32::from(t_far > 0.0);
@@ -531,7 +457,7 @@ fn live_lanes<const W: usize>(t_far: &[f32]) -> [i32; W] {
 
 /// The alignment of the widest packet, for all of them.
 #[repr(C, align(64))]
-struct Aligned<T>(T);
+pub(super) struct Aligned<T>(pub(super) T);
 
 packets!(closest4, occluded4, 4, RTCRayHit4, RTCRay4, rtcIntersect4, rtcOccluded4);
 packets!(closest8, occluded8, 8, RTCRayHit8, RTCRay8, rtcIntersect8, rtcOccluded8);

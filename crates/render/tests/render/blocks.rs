@@ -1,9 +1,11 @@
 //! Light in blocks of rays against light in batches: the same paths by two ways, whose random numbers are the same.
 
+mod shining;
+
 use std::path::Path;
 use std::sync::Arc;
 
-use etendue_accel::{Accel, BuildOptions, BuildReport, Bvh};
+use etendue_accel::{Accel, Build, BuildOptions, BuildReport, Bvh, build_moving};
 use etendue_geometry::{HitBatch, RayBatch};
 use etendue_render::Plan;
 use etendue_render::output::Outputs;
@@ -13,6 +15,7 @@ use etendue_tracer::material::{Alpha, NormalMap};
 use etendue_tracer::texture::Encoding;
 use etendue_tracer::{Scattering, TextureUse};
 
+use crate::curves::npy;
 use crate::steps::{channels, load_in, prepare, trace};
 
 /// A structure that traces batches alone.
@@ -77,6 +80,9 @@ fn room_of([of_box, of_ball]: [&str; 2], [tracer, lights, more, ball]: [&str; 4]
             "water": {{"type": "dielectric", "ior": 1.33}},
             "flint": {{"type": "dielectric", "ior": "N-SF11"}},
             "etched": {{"type": "dielectric", "ior": "N-SF11", "roughness": 0.3}},
+            "tiles": {{"type": "emissive", "radiance": {{"checker": [[9, 8, 6], [1, 2, 5]], "squares": 3}}}},
+            "screen": {{"type": "emissive", "two_sided": true,
+                "radiance": {{"image": "waves.png", "factor": [3, 5, 4], "repeat": [2, 3]}}}},
             "lamp": {{"type": "emissive", "radiance": [9, 8, 6]}}}},
         "render": {{"samples": 16}}, "plan": {{"light_precision": "single"}}}}"#
     )
@@ -95,6 +101,16 @@ const POINTS: &str = r#"{"type": "point", "at": [1, 2, 1], "intensity": [1, 2, 3
     {"type": "directional", "direction": [0.2, -1, -0.3], "irradiance": [0.5, 0.5, 0.5]},
     {"type": "spot", "at": [-1, 2, 1], "look_at": [0, 0, 0], "cone": 50, "intensity": [2, 2, 1]}"#;
 
+/// A box stands on squares, a sphere on a floor that is alike all over.
+fn on_floor(ball: &str, room: String) -> String {
+    let squares =
+        r#"{"type": "checker", "colors": [[0.8, 0.8, 0.7], [0.2, 0.3, 0.4]], "squares": 8}"#;
+    match ball {
+        "box" => room,
+        _ => room.replace(squares, r#"{"type": "matte", "color": [0.8, 0.8, 0.7]}"#),
+    }
+}
+
 /// Red, green, blue and alpha that change across: as a colour, as roughness and metal, and as a normal.
 fn save_waves(folder: &Path, least: u8) {
     let wave = |x: u32, step: u32| u8::try_from(x * step % 256).unwrap();
@@ -104,6 +120,16 @@ fn save_waves(folder: &Path, least: u8) {
         image::Rgb([110 + wave(x, 8) / 8, green, 150 + wave(x + y, 3) / 3])
     });
     texels.save(folder.join("waves.png")).unwrap();
+}
+
+/// The bands of the cube (nm).
+const BANDS: &str = r#""bands": [400, 450, 500, 550, 600, 650, 700]"#;
+
+/// Light by wavelength from all around, of which no two directions have the same spectrum.
+fn save_cube(folder: &Path) {
+    let value = |k: u16| f32::from(k * 37 % 101) / 50.0 + if k == 61 { 40.0 } else { 0.1 };
+    let values: Vec<f32> = (0..8 * 16 * 6).map(value).collect();
+    std::fs::write(folder.join("around.npy"), npy([8, 16, 6], &values)).unwrap();
 }
 
 /// Gives the printed surface roughness, metal and a normal by its image, which scene files cannot name.
@@ -122,8 +148,11 @@ const LAYERS: [&str; 3] = ["", "Direct", "Indirect"];
 /// That `layers` of the scene are the same by both ways, where there are two; how many structures have both.
 fn compare(name: &str, scene: &Scene, plan: &Plan, layers: &[&str]) -> usize {
     let (accel, images) = prepare(scene, plan);
-    let bvh = Bvh::build(Arc::clone(&scene.geometry), &BuildOptions::default()).unwrap();
-    let structures: [&dyn Accel; 2] = [&*accel, &bvh];
+    let exposure = scene.camera.exposure_span();
+    let options = BuildOptions { exposure, ..BuildOptions::default() };
+    let bvh: Build<'_> = &|geometry, options| Ok(Box::new(Bvh::build(geometry, options)?));
+    let bvh = build_moving(Arc::clone(&scene.geometry), &options, bvh).unwrap();
+    let structures: [&dyn Accel; 2] = [&*accel, &*bvh];
     let mut compared = 0;
     for accel in structures {
         let name = format!("{name}, {}", accel.report().backend);
@@ -304,6 +333,14 @@ fn plain_facets_skies_and_other_lights_are_the_same_in_single_precision() {
     let sun = r#"{"type": "directional", "direction": [0.2, -1, -0.3], "irradiance": [0.5, 0.5, 0.5],
         "angle": 4}"#;
     let sunny = format!("{image}, {sun}");
+    let clear =
+        r#"{"type": "sky", "turbidity": 3, "sun": {"elevation": 35, "azimuth": 70}, "scale": 9}"#;
+    let clouded = r#"{"type": "sky", "turbidity": 5, "ground_albedo": 0.4, "scale": 9,
+        "sun": {"elevation": 20, "azimuth": 200, "shines": false}}"#;
+    let cube = format!(
+        r#"{{"type": "environment", "image": {{"cube": "around.npy", {BANDS}}}, "rotate": 25}}"#
+    );
+    save_cube(folder.path());
     let all = format!("{POINTS}, {image}");
     for (name, materials, tracer, lights, lamps) in [
         ("a sky", ["red", "green"], path(4), sky, ""),
@@ -311,6 +348,11 @@ fn plain_facets_skies_and_other_lights_are_the_same_in_single_precision() {
         ("an image", ["red", "green"], path(4), image, ""),
         ("an image, direct", ["gold", "plastic"], direct.clone(), image, ""),
         ("an image and a sun", ["gold", "plastic"], path(4), &sunny, ""),
+        ("a clear sky", ["gold", "green"], path(4), clear, ""),
+        ("a clear sky and a lamp", ["red", "glass"], path(4), clear, LAMP),
+        ("a clear sky, direct", ["mirror", "coated"], direct.clone(), clouded, ""),
+        ("a cube", ["gold", "glass"], path(5), &cube, ""),
+        ("a cube and a lamp", ["coated", "green"], direct.clone(), &cube, LAMP),
         ("an image and a lamp", ["copper", "plastic"], path(4), image, LAMP),
         ("all lights", ["copper", "plastic"], path(5), &all, LAMP),
         // Denser than single precision holds.
@@ -349,17 +391,50 @@ fn plain_facets_skies_and_other_lights_are_the_same_in_single_precision() {
         for ball in ["sphere", "box"] {
             let text = room_of(materials, [&tracer, lights, lamps, ball])
                 .replace(r#""layers": ["direct", "indirect"],"#, "");
-            // A box stands on squares, a sphere on a floor that is alike all over.
-            let squares = r#"{"type": "checker", "colors": [[0.8, 0.8, 0.7], [0.2, 0.3, 0.4]], "squares": 8}"#;
-            let text = match ball {
-                "box" => text,
-                _ => text.replace(squares, r#"{"type": "matte", "color": [0.8, 0.8, 0.7]}"#),
-            };
-            let mut scene = load_in(folder.path(), &text);
+            let mut scene = load_in(folder.path(), &on_floor(ball, text));
             if name.starts_with("printed") {
                 print(&mut scene);
             }
             compare_plain(&format!("plain, {name}, {ball}"), &scene, &[""]);
+        }
+    }
+}
+
+/// So are surfaces that are partly there, panes, media and bodies within one another, and glass that parts wavelengths.
+#[test]
+fn plain_paths_that_pass_surfaces_are_the_same_in_single_precision() {
+    let folder = tempfile::tempdir().unwrap();
+    save_waves(folder.path(), 20);
+    let path = |bounces: u32| format!(r#"{{"type": "path", "max_bounces": {bounces}}}"#);
+    let whitted = r#"{"type": "whitted", "max_bounces": 6}"#.to_owned();
+    let direct = r#"{"type": "direct"}"#.to_owned();
+    let sky = r#"{"type": "environment", "radiance": [0.6, 0.7, 0.9]}"#;
+    let image = r#"{"type": "environment", "image": "waves.png", "radiance": [2, 1, 0.5]}"#;
+    let all = format!("{POINTS}, {image}");
+    let drop = format!("{LAMP}{DROP}");
+    for (name, materials, tracer, lights, more) in [
+        ("veils", ["veil", "veil"], path(4), &*all, LAMP),
+        ("veils, points", ["veil", "red"], direct.clone(), POINTS, ""),
+        ("a veil and a mirror", ["veil", "mirror"], path(3), sky, DROP),
+        ("a veil, direct", ["mirror", "veil"], direct, image, LAMP),
+        ("veils, whitted", ["veil", "glass"], whitted.clone(), &all, LAMP),
+        ("panes", ["pane", "veil"], path(4), &all, LAMP),
+        ("panes, points", ["pane", "plastic"], path(3), POINTS, ""),
+        ("amber", ["amber", "gold"], path(6), &all, LAMP),
+        ("amber, whitted", ["printed", "amber"], whitted, sky, LAMP),
+        ("a drop in amber", ["veil", "amber"], path(8), &all, &drop),
+        ("flint", ["red", "flint"], path(6), &all, LAMP),
+        ("flint and dim paths", ["flint", "flint"], path(12), "", LAMP),
+        ("etched flint", ["veil", "etched"], path(5), &all, LAMP),
+        ("flint in amber", ["flint", "amber"], path(6), sky, &drop),
+    ] {
+        for ball in ["sphere", "box"] {
+            let text = room_of(materials, [&tracer, lights, more, ball]);
+            let mut scene = load_in(folder.path(), &text);
+            if name.contains("whitted") {
+                print(&mut scene);
+            }
+            compare_plain(&format!("plain, {name}, {ball}"), &scene, &LAYERS);
         }
     }
 }
@@ -369,8 +444,7 @@ fn plain_facets_skies_and_other_lights_are_the_same_in_single_precision() {
 fn plain_scenes_that_move_are_the_same_in_single_precision() {
     let folder = tempfile::tempdir().unwrap();
     save_waves(folder.path(), 20);
-    let moving = |by: [f64; 3]| {
-        let [x, y, z] = by;
+    let moving = |[x, y, z]: [f64; 3]| {
         format!(r#""motion": {{"type": "velocity", "velocity": [{x}, {y}, {z}]}}"#)
     };
     let point = |motion: &str| {
@@ -378,11 +452,21 @@ fn plain_scenes_that_move_are_the_same_in_single_precision() {
     };
     let lights = format!("{}, {POINTS}", point(&moving([-4.0, 0.0, 2.0])));
     let path = r#"{"type": "path", "max_bounces": 4}"#;
+    let moving_lamp = LAMP.replace("\"width\"", &format!("{}, \"width\"", moving([2.0, 0.0, 1.0])));
+    let moving_box = format!(
+        r#"{LAMP}, {{"shape": "box", "material": "tiles",
+            "transform": {{"scale": 0.3, "translate": [-0.4, 1.4, 0.6]}},
+            "motion": {{"type": "velocity", "velocity": [1, 0, 0], "angular_velocity": [0, 200, 90]}}}}"#
+    );
     for (name, materials, lights, lamps) in [
         ("points", ["red", "green"], &*lights, ""),
         ("facets", ["gold", "plastic"], &*lights, LAMP),
         ("mirrors", ["mirror", "printed"], &*lights, LAMP),
         ("a lamp", ["red", "glass"], "", LAMP),
+        ("a veil", ["red", "veil"], &*lights, LAMP),
+        ("amber", ["veil", "amber"], "", LAMP),
+        ("a lamp that moves", ["gold", "green"], "", &moving_lamp),
+        ("lamps that move", ["mirror", "plastic"], &*lights, &moving_box),
     ] {
         for ball in ["sphere", "box"] {
             let place = r#""transform": {"translate": [0.6, 0.5, 0.2], "scale": 0.5}"#;

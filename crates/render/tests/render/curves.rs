@@ -255,7 +255,7 @@ fn electrons_of_lines_and_notches_are_counted() {
 }
 
 /// An NPY file of little-endian f32.
-fn npy(shape: [usize; 3], values: &[f32]) -> Vec<u8> {
+pub(crate) fn npy(shape: [usize; 3], values: &[f32]) -> Vec<u8> {
     let [rows, columns, bands] = shape;
     let mut header = format!(
         "{{'descr': '<f4', 'fortran_order': False, 'shape': ({rows}, {columns}, {bands}), }}"

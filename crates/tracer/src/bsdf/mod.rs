@@ -250,12 +250,6 @@ impl Bsdf {
         if is_one_sided { self.frame.z } else { DVec3::ZERO }
     }
 
-    /// Tests whether [`Self::sample`] may give a direction that only this model can give.
-    #[must_use]
-    pub fn has_single(&self) -> bool {
-        self.is_delta() || matches!(self.model, Model::Layered(_))
-    }
-
     /// Value times cosine for light from `wi`, and the density (1/sr) with which [`Self::sample`]
     /// gives that direction. Directions of single rays are not among them.
     #[must_use]

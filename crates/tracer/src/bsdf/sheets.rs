@@ -12,7 +12,7 @@ use super::albedo::{AlbedoTable, OBLIQUITIES, ROUGHNESSES, TABLE};
 use super::metal::{mean_reflectance, multiple};
 use super::split_sum::{lacking, obliquity};
 use super::{Weights, fresnel};
-use crate::LANES;
+use etendue_geometry::block::LANES;
 
 /// The sheets of so many hits.
 #[derive(Debug)]
@@ -372,9 +372,13 @@ mod tests {
     use etendue_geometry::glam::DVec3;
 
     use super::*;
-    use crate::Row;
     use crate::bsdf::{Bsdf, Coat, Layered, Model, Sheen};
     use crate::sampling::{Frame, power_heuristic};
+
+    /// More than a block has, so that all kinds are among them.
+    const LANES: usize = 64;
+
+    type Row = [f64; LANES];
 
     const ZERO: Row = [0.0; LANES];
 
@@ -392,7 +396,7 @@ mod tests {
 
     /// Surfaces of the lanes, one by one, with what sets them side by side: their shading and geometric normals, and
     /// the directions that they are seen along.
-    fn laid_out(sheets: &mut Sheets) -> (Vec<Bsdf>, [[Row; 3]; 3]) {
+    fn laid_out(sheets: &mut Sheets<LANES>) -> (Vec<Bsdf>, [[Row; 3]; 3]) {
         let [mut shading, mut normal, mut direction] = [[ZERO; 3]; 3];
         let surface = |k: usize| {
             let share = |step: f64| (0.3 + k as f64 * step).fract();

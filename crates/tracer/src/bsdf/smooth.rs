@@ -3,7 +3,7 @@
 
 use super::Weights;
 use super::fresnel::schlick_weight;
-use crate::LANES;
+use etendue_geometry::block::LANES;
 
 /// The smooth surfaces of so many hits.
 #[derive(Debug)]

@@ -5,9 +5,11 @@ use std::f64::consts::PI;
 use etendue_geometry::glam::DVec3;
 
 use super::{CELLS, Corners, EnvironmentMap, LANES, between, mean};
-use crate::float::Float;
+#[cfg(test)]
+use crate::Color;
+use crate::angles;
 use crate::sampling::{GridCell, GridDistribution, linear_place};
-use crate::{Color, angles};
+use etendue_geometry::Float;
 
 /// What cells get of their neighbours, along each axis 1/8 of both. Columns go around, rows end.
 fn blurred(bright: &[f64], [columns, rows]: [usize; 2]) -> Vec<f64> {
@@ -133,6 +135,7 @@ impl MapSampler {
     }
 
     /// A direction, its [`place`](super::place), and its density (1/sr) for each of `squares`, and the radiance of `map` there.
+    #[cfg(test)]
     pub(crate) fn sample(&self, map: &EnvironmentMap, squares: &[[f64; 2]], out: &mut OnMap) {
         out.directions.clear();
         self.cells(squares.iter().copied(), &mut out.cells);
@@ -143,6 +146,7 @@ impl MapSampler {
     }
 
     /// The [`place`](super::place)s of the unit directions in `asked`, their densities (1/sr), and the radiance of `map` there.
+    #[cfg(test)]
     pub(crate) fn look_up(&self, map: &EnvironmentMap, asked: &mut OnMap) {
         asked.resize(asked.directions.len());
         if !map.texels.is_empty() {
@@ -308,13 +312,14 @@ impl MapSampler {
 pub(crate) struct MapLookup<F, const N: usize> {
     /// Unit.
     pub(crate) directions: [[F; N]; 3],
-    places: [[F; N]; 2],
+    pub(crate) places: [[F; N]; 2],
     /// 1/sr.
     pub(crate) densities: [F; N],
     pub(crate) colors: [[F; N]; 3],
 }
 
 /// Directions, and what a map has there; kept for the next.
+#[cfg(test)]
 #[derive(Debug, Default)]
 pub(crate) struct OnMap {
     cells: Vec<GridCell>,
@@ -326,6 +331,7 @@ pub(crate) struct OnMap {
     pub(crate) colors: Vec<Color>,
 }
 
+#[cfg(test)]
 impl OnMap {
     /// Makes room for so many, which have nothing yet.
     fn resize(&mut self, count: usize) {
@@ -339,6 +345,7 @@ impl OnMap {
     }
 }
 
+#[cfg(test)]
 impl OnMap {
     /// Takes what a map has in the directions from one on.
     #[inline(always)]
@@ -353,6 +360,7 @@ impl OnMap {
     }
 }
 
+#[cfg(test)]
 #[multiversion::multiversion(targets = "simd")]
 fn chosen(sampler: &MapSampler, map: &EnvironmentMap, out: &mut OnMap) {
     for start in (0..out.directions.len()).step_by(LANES) {
@@ -363,6 +371,7 @@ fn chosen(sampler: &MapSampler, map: &EnvironmentMap, out: &mut OnMap) {
     }
 }
 
+#[cfg(test)]
 #[multiversion::multiversion(targets = "simd")]
 fn looked_up(sampler: &MapSampler, map: &EnvironmentMap, asked: &mut OnMap) {
     for start in (0..asked.directions.len()).step_by(LANES) {

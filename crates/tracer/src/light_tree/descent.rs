@@ -4,11 +4,12 @@
 use std::hint::select_unpredictable;
 use std::ops::Range;
 
-use etendue_geometry::MISS;
 use etendue_geometry::glam::DVec3;
+use etendue_geometry::{Float, MISS};
 
 use super::LightTree;
 use super::node::{self, Branch, Extent, LANES, Node, View, Viewer, WIDTH};
+#[cfg(test)]
 use crate::light_sampler::Receiver;
 use crate::sampling::ONE_BELOW;
 
@@ -60,6 +61,7 @@ impl Choices {
     }
 
     /// Appends a point that chooses by `u` in 0..1.
+    #[cfg(test)]
     #[inline(always)]
     pub(crate) fn push(&mut self, receiver: &Receiver, u: f64) {
         let (point, normal) = (self.extent.local(receiver.point), receiver.normal.as_vec3());
@@ -74,27 +76,32 @@ impl Choices {
     /// Appends some of sixteen points, told from `origin` (m), with their normals and the numbers by which they choose:
     /// `compress` puts those that are wanted of a row side by side, and says how many they are.
     #[inline(always)]
-    pub(crate) fn push_some(
+    pub(crate) fn push_some<F: Float>(
         &mut self,
-        (points, origin): (&[[f32; LANES]; 3], DVec3),
-        normals: &[[f32; LANES]; 3],
-        u: &[f32; LANES],
+        (points, origin): (&[[F; LANES]; 3], DVec3),
+        normals: &[[F; LANES]; 3],
+        u: &[F; LANES],
         compress: impl Fn(&[f32; LANES], &mut [f32]) -> usize,
+        compress_wide: impl Fn(&[f64; LANES], &mut [f64]),
     ) {
         let Extent { centre, scale, .. } = self.extent;
-        let (at, mut local, mut wanted) = (self.len, [0.0; LANES], [0.0; LANES]);
+        let (at, mut count, mut wide) = (self.len, 0, [0.0; LANES]);
+        let (mut local, mut normal) = ([0.0; LANES], [0.0; LANES]);
         for axis in 0..3 {
             let offset = origin[axis] - centre[axis];
             for i in 0..LANES {
-                local[i] = node::local((f64::from(points[axis][i]) + offset) * scale);
+                let point: f64 = points[axis][i].into();
+                local[i] = node::local((point + offset) * scale);
+                normal[i] = f32::of(normals[axis][i].into());
             }
             compress(&local, &mut self.local[axis][at..at + LANES]);
-            compress(&normals[axis], &mut self.normal[axis][at..at + LANES]);
+            count = compress(&normal, &mut self.normal[axis][at..at + LANES]);
         }
-        self.len += compress(u, &mut wanted);
         for i in 0..LANES {
-            self.u[at + i] = f64::from(wanted[i]);
+            wide[i] = u[i].into();
         }
+        compress_wide(&wide, &mut self.u[at..at + LANES]);
+        self.len += count;
     }
 
     #[inline(always)]

@@ -1,26 +1,46 @@
-//! Scenes whose lights are all plain: triangles that shine alike all over, and lights that are no surfaces. Among these,
-//! points that stand still and shine alike to all sides need no more than their place.
+//! Lights that are plain: triangles that shine alike all over and stand still, and points that stand still and shine alike
+//! to all sides, which need no more than their place; and what bounds all others.
 
 use etendue_geometry::glam::DVec3;
+use etendue_geometry::{MISS, PlacedTriangle};
 
 use super::Lights;
-use crate::area_light::AreaLight;
+use crate::area_light::{AreaLight, LightTriangle, brightest};
 use crate::light::{Light, LightKind};
 use crate::light_tree::Choice;
+use crate::reference::{SceneView, SurfacePoint};
+use crate::sky::Sky;
 
-/// Bounds of all plain lights.
+/// Bounds of all lights.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct PlainLightBounds {
+pub(crate) struct LightBounds {
     /// The least area of a triangle (m²); infinite without any.
     pub(crate) least_area: f64,
-    /// The largest absolute coordinate of what has a place and is no triangle (m).
+    /// The largest absolute coordinate of what has a place and is no triangle that stands still (m).
     pub(crate) farthest: f64,
-    /// Some are neither triangles nor points that stand still and shine alike to all sides.
+    /// Some need more than their place.
     pub(crate) has_others: bool,
     /// The largest band of those (W/sr, W/m² or W/(m² sr)).
     pub(crate) brightest: f64,
+    /// Some of those are triangles: they are not alike all over, they move, or they are too many to be kept ready.
+    pub(crate) has_other_triangles: bool,
+    /// What some of these shine is looked up in a texture.
+    pub(crate) are_textured: bool,
     /// All are far away.
     pub(crate) are_far: bool,
+}
+
+impl LightBounds {
+    /// Those of no light.
+    pub(super) const NOTHING: Self = Self {
+        least_area: f64::INFINITY,
+        farthest: 0.0,
+        has_others: false,
+        brightest: 0.0,
+        has_other_triangles: false,
+        are_textured: false,
+        are_far: false,
+    };
 }
 
 /// A light that needs no more than its place.
@@ -38,16 +58,9 @@ impl Lights {
         self.sampler.few()
     }
 
-    /// All lights and their bands, if they are few triangles that are kept ready and shine alike all over.
-    pub(crate) fn few_triangles(&self) -> Option<(&[Option<AreaLight>], &[f64])> {
-        let are_triangles = self.lights.is_empty() && self.plain_lights.is_some();
-        let are_taken = are_triangles && self.few().is_some() && !self.triangles.is_empty();
-        are_taken.then_some((&*self.area_lights, &*self.area_light_bands))
-    }
-
     /// Tests whether some lights need more than their place.
     pub(crate) fn has_others(&self) -> bool {
-        self.plain_lights.is_none_or(|bounds| bounds.has_others)
+        self.bounds.has_others
     }
 
     /// Chooses a light by a number in 0..1, where all are far away and each is as likely from everywhere; what is left of
@@ -57,9 +70,9 @@ impl Lights {
         self.sampler.pick_other((u, 1.0))
     }
 
-    /// Bounds of the lights, if all are plain and kept ready.
-    pub(crate) fn plain_lights(&self) -> Option<PlainLightBounds> {
-        self.plain_lights
+    /// Bounds of all of them.
+    pub(crate) fn bounds(&self) -> &LightBounds {
+        &self.bounds
     }
 
     /// How many lights there are.
@@ -79,6 +92,24 @@ impl Lights {
         }
     }
 
+    /// The placement's triangle that a light is, or [`MISS`].
+    pub(crate) fn triangle_of(&self, number: usize) -> PlacedTriangle {
+        let own = number.checked_sub(self.lights.len());
+        own.and_then(|own| self.triangles.get(own)).copied().unwrap_or([MISS; 2])
+    }
+
+    /// Tests whether no direction meets a light by chance.
+    pub(crate) fn is_delta(&self, number: usize) -> bool {
+        self.lights.get(number).is_some_and(|light| match light.kind {
+            LightKind::Point(_)
+            | LightKind::Spot { .. }
+            | LightKind::Projector(_)
+            | LightKind::Goniometric(_)
+            | LightKind::Directional { .. } => true,
+            LightKind::Environment { .. } => false,
+        })
+    }
+
     /// Light of such a light in each band: the intensity of a point, the radiance of a triangle.
     #[inline(always)]
     pub(crate) fn plain_light_bands(&self, number: usize, count: usize) -> &[f64] {
@@ -88,25 +119,16 @@ impl Lights {
         }
     }
 
-    /// Bounds of all lights once triangles are kept ready; `None` if one is not plain.
-    pub(super) fn bound_plain_lights(&self) -> Option<PlainLightBounds> {
-        if self.area_lights.len() != self.triangles.len() {
-            return None;
-        }
-        let mut bounds = PlainLightBounds {
-            least_area: f64::INFINITY,
-            farthest: 0.0,
-            has_others: false,
-            brightest: 0.0,
-            are_far: self.triangles.is_empty(),
-        };
+    /// Bounds of all lights once triangles are kept ready; of what moves by where it is within `span` (s from the
+    /// frame's time).
+    pub(super) fn bound(&self, scene: &SceneView<'_>, span: [f64; 2]) -> LightBounds {
+        let mut bounds = LightBounds { are_far: self.triangles.is_empty(), ..LightBounds::NOTHING };
         let count = self.bands.len() / self.lights.len().max(1);
         for (index, light) in self.lights.iter().enumerate() {
             if standing_point(light).is_none() {
                 bounds.has_others = true;
                 let sky = self.sky.as_ref().filter(|sky| sky.index == index);
-                let map = sky.and_then(|sky| sky.map.as_ref());
-                let peak = map.map_or(1.0, |(map, _)| f64::from(map.peak));
+                let peak = sky.map_or(1.0, Sky::peak);
                 let bands = self.bands_of(index, count);
                 let most = bands.iter().copied().fold(0.0, f64::max);
                 bounds.brightest = bounds.brightest.max(most * peak);
@@ -117,11 +139,50 @@ impl Lights {
                 bounds.farthest = bounds.farthest.max(at.abs().max_element());
             }
         }
-        for number in self.lights.len()..self.count() {
-            let PlainLight::Triangle(own) = self.plain_light(number)? else { return None };
-            bounds.least_area = bounds.least_area.min(own.shape.area);
+        for (placement, first) in (0_u32..).zip(&self.first) {
+            if let Some(first) = first {
+                self.bound_surface(scene, span, (placement, *first as usize), &mut bounds);
+            }
         }
-        Some(bounds)
+        bounds
+    }
+
+    /// Takes the bounds of a placement that shines, whose triangles are lights from `first` on.
+    fn bound_surface(
+        &self,
+        scene: &SceneView<'_>,
+        span: [f64; 2],
+        (number, first): (u32, usize),
+        bounds: &mut LightBounds,
+    ) {
+        let placement = &scene.geometry.placements[number as usize];
+        let mesh = scene.geometry.mesh_of(placement);
+        let time = if placement.motion.is_some() { 0.5 * (span[0] + span[1]) } else { 0.0 };
+        let mut are_others = false;
+        for triangle in 0..mesh.triangles.len() {
+            let area = match self.plain_light(first + triangle) {
+                Some(PlainLight::Triangle(own)) => Some(own.shape.area),
+                Some(PlainLight::Point(_)) | None => {
+                    let corner = SurfacePoint::corner(scene.geometry, placement, triangle);
+                    let own = LightTriangle::of(&SurfacePoint { time, ..corner });
+                    are_others |= own.is_some();
+                    own.map(|own| own.area)
+                }
+            };
+            bounds.least_area = bounds.least_area.min(area.unwrap_or(f64::INFINITY));
+        }
+        let material = placement.material as usize;
+        let emission = scene.materials.get(material).and_then(|own| own.emission.as_ref());
+        let Some(emission) = emission.filter(|_| are_others) else { return };
+        (bounds.has_others, bounds.has_other_triangles) = (true, true);
+        bounds.are_textured |= emission.radiance.needs_uv();
+        let brightest = brightest(scene, emission) * self.tints[material].most();
+        bounds.brightest = bounds.brightest.max(brightest);
+        if let Some(motion) = &placement.motion {
+            let swept = motion.swept(mesh.bounds_at_all_times(), span);
+            let far = swept.min.abs().max(swept.max.abs()).max_element();
+            bounds.farthest = bounds.farthest.max(far);
+        }
     }
 }
 

@@ -2,12 +2,10 @@
 //! (`KHR_materials_volume`).
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Detail, HitBatch, HitPrecision, MISS, RayBatch};
+use etendue_geometry::{Detail, HitBatch, HitPrecision, RayBatch};
 
 use super::Tracing;
 use super::media::{Coincident, Crossing, Media};
-use super::paths::Paths;
-use super::rays::Rays;
 use crate::surface::SurfaceInteraction;
 use crate::{Ior, Scattering};
 
@@ -52,24 +50,13 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         (here == behind).then_some(Vanished { is_tinted: true })
     }
 
-    /// The boundaries of other bodies in the place of each hit of one: `found` is refilled, or emptied where bodies do
-    /// not touch.
-    pub(super) fn find_coincident<R: Rays>(&self, rays: &R, found: &mut Vec<Coincident>) {
-        found.clear();
-        if self.ctx.placed.touching.is_empty() {
-            return;
-        }
-        found.extend((0..rays.len()).map(|i| {
-            let (direction, own) = (rays.direction(i), rays.triangle(i));
-            if own[0] == MISS {
-                return Coincident::NONE;
-            }
-            self.coincident_at(rays.origin(i) + direction * rays.t(i), direction, own)
-        }));
-    }
-
     /// The other boundary at a point of one that a ray along `direction` interaction.
-    fn coincident_at(&self, point: DVec3, direction: DVec3, own: [u32; 2]) -> Coincident {
+    pub(super) fn coincident_at(
+        &self,
+        point: DVec3,
+        direction: DVec3,
+        own: [u32; 2],
+    ) -> Coincident {
         /// Shares of a triangle beyond its edges, as the point is known to no more.
         const BEYOND: f64 = 1e-6;
         let geometry = self.ctx.scene.geometry;
@@ -94,19 +81,6 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             }
         }
         Coincident::NONE
-    }
-
-    /// Takes from each path what the medium that it went through absorbs. A path that leaves into the open
-    /// without having met the body's other side (a surface that is not closed) loses nothing.
-    pub(super) fn absorb<R: Rays>(&self, now: &mut Paths<R>) {
-        let count = self.count();
-        for i in 0..now.rays.len() {
-            if now.rays.placement(i) != MISS {
-                let media = now.carried.media_of(i);
-                let throughput = &mut now.carried.throughput[i * count..(i + 1) * count];
-                self.dim_along(&media, now.rays.t(i), throughput);
-            }
-        }
     }
 
     /// Takes from light what a medium absorbs over a way (m); nothing over one without end.

@@ -6,10 +6,6 @@
 //! costs `n` paths and has none. All draw the same random numbers, so that bands do not part by noise.
 
 use super::Tracing;
-use super::media::Crossing;
-use super::paths::{Draw, Step, Way, Workspace};
-use super::rays::Rays;
-use super::scatter::Departure;
 use crate::bsdf::{Bsdf, BsdfSample};
 use crate::surface::SurfaceInteraction;
 
@@ -26,38 +22,33 @@ struct TransmittedBand {
     reflectance: f64,
 }
 
-/// A path at a boundary: its hit, which of those that go on it is, and how its surface scatters.
+/// A path at a boundary: its lane, its hit, and how its surface scatters.
 pub(super) struct Boundary<'a> {
-    pub(super) path: (usize, usize),
+    pub(super) lane: usize,
     pub(super) interaction: &'a SurfaceInteraction<'a>,
-    /// The media on its sides, where they count.
-    pub(super) crossing: Option<Crossing>,
     pub(super) bsdf: Bsdf,
 }
 
 impl<const RGB: bool> Tracing<'_, RGB> {
-    /// The step of a path that still carries several bands at a boundary whose index is each one's own.
-    pub(super) fn disperse<R: Rays>(
+    /// Parts what a path carries to a boundary whose index is each band's own, by three numbers: `each` gets the ways that
+    /// leave it, with the wavelength (nm) of the one band that passes, and what goes along them.
+    pub(super) fn part_bands(
         &self,
-        step: &Step<'_>,
         boundary: &Boundary<'_>,
-        workspace: &mut Workspace<R>,
+        throughput: &[f64],
+        ([pick, place], choice): ([f64; 2], f64),
+        mut each: impl FnMut((&BsdfSample, Option<f64>), &mut [f64]),
     ) {
-        let (i, k) = boundary.path;
-        let [pick, place] = workspace.number(Draw::Light, k);
-        let count = self.count();
-        let throughput = workspace.now.carried.throughput[i * count..(i + 1) * count].to_vec();
-        let passages = self.passages(boundary, &throughput, place);
+        let passages = self.passages(boundary, throughput, place);
         let live = passages.len() as f64;
         let mean = passages.iter().map(|passage| passage.reflectance).sum::<f64>() / live;
-        let choice = workspace.number(Draw::Choice, k)[1];
-        let mut sent = vec![0.0; count];
+        let mut sent = vec![0.0; self.count()];
         if choice < mean {
             let Some(mirrored) = boundary.bsdf.mirrored() else { return };
             for passage in &passages {
                 sent[passage.band] = throughput[passage.band] * passage.reflectance / mean;
             }
-            return self.send_single(step, boundary, (&mirrored, None), &mut sent, workspace);
+            return each((&mirrored, None), &mut sent);
         }
         let parts = passages.len().min(MOST_PARTS);
         for part in 0..parts {
@@ -69,8 +60,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let tint = self.in_band(&boundary.bsdf, refracted.weights, passage.band);
             sent.fill(0.0);
             sent[passage.band] = throughput[passage.band] * passed * tint;
-            let way = (&refracted, Some(passage.wavelength));
-            self.send_single(step, boundary, way, &mut sent, workspace);
+            each((&refracted, Some(passage.wavelength)), &mut sent);
         }
     }
 
@@ -90,61 +80,40 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         (0..self.count()).filter(live).map(passage).collect()
     }
 
-    /// Notes a path along a direction that only the boundary can give, unless it carries nothing, ends
-    /// by chance, or nothing is left for it to find.
-    fn send_single<R: Rays>(
+    /// Tests whether a part of a path, which surfaces have scattered so often, goes on: it carries anything, and does not
+    /// end by chance. What it carries is told of that.
+    pub(super) fn goes_on(
         &self,
-        step: &Step<'_>,
-        boundary: &Boundary<'_>,
-        (way, wavelength): (&BsdfSample, Option<f64>),
-        throughput: &mut [f64],
-        workspace: &mut Workspace<R>,
-    ) {
-        let ((i, k), count) = (boundary.path, self.count());
-        let bounces = workspace.now.bounces(step.number, i) + 1;
-        if throughput.iter().copied().fold(0.0, f64::max) <= 0.0 {
-            return;
+        (bounces, chance): (u32, f64),
+        before: &[f64],
+        part: &mut [f64],
+    ) -> bool {
+        if part.iter().copied().fold(0.0, f64::max) <= 0.0 {
+            return false;
         }
         let is_last = bounces >= self.rules.bounces;
         if self.rules.roulette.is_some_and(|after| bounces >= after) && !is_last {
             // As likely for all parts of a path, or those of its dim bands would be noise.
-            let before = &workspace.now.carried.throughput[i * count..(i + 1) * count];
             let survival = before.iter().copied().fold(0.0, f64::max).min(0.95);
-            if workspace.number(Draw::Chance, k)[1] >= survival {
-                return;
+            if chance >= survival {
+                return false;
             }
-            throughput.iter_mut().for_each(|band| *band /= survival);
+            part.iter_mut().for_each(|band| *band /= survival);
         }
-        let normal = workspace.now.rays.hit(i).normal;
-        let departure = Departure {
-            ray: [boundary.interaction.anchor.leave(way.direction), way.direction],
-            way: Way { is_last, ..Way::CAMERA },
-            cone: self.cone_at_hit(step, &workspace.now, i),
-            media: boundary.crossing.map(|crossing| crossing.after(way.direction, normal)),
-        };
-        self.send(workspace, i, (departure, wavelength), throughput);
+        true
     }
 
-    /// Keeps one band of a path, chosen among those that carry anything, at as many times its throughput: at rough
-    /// boundaries, which scatter every wavelength into all directions. Its wavelength (nm), unless nothing is left.
-    pub(super) fn keep_one<R: Rays>(
-        &self,
-        workspace: &mut Workspace<R>,
-        (i, k): (usize, usize),
-    ) -> Option<f64> {
-        let (u, count) = (workspace.number(Draw::Choice, k)[0], self.count());
-        let carried = &mut workspace.now.carried;
-        let throughput = &mut carried.throughput[i * count..(i + 1) * count];
-        let live: Vec<usize> = (0..count).filter(|&k| throughput[k] > 0.0).collect();
+    /// Keeps one band of what a path carries, chosen by a number among those that carry anything, at as many times as
+    /// much: at rough boundaries, which scatter every wavelength into all directions. Its wavelength (nm), unless nothing
+    /// is left.
+    pub(super) fn keep_one(&self, u: f64, throughput: &mut [f64]) -> Option<f64> {
+        let live: Vec<usize> = (0..throughput.len()).filter(|&k| throughput[k] > 0.0).collect();
         let scaled = u * live.len() as f64;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "u is in 0..1")]
         let kept = *live.get(scaled as usize)?;
         for (k, band) in throughput.iter_mut().enumerate() {
             *band = if k == kept { *band * live.len() as f64 } else { 0.0 };
         }
-        let wavelength = self.ctx.spectral.wavelength_at(kept, scaled.fract());
-        carried.wavelengths.resize(carried.ray.len(), None);
-        carried.wavelengths[i] = Some(wavelength);
-        Some(wavelength)
+        Some(self.ctx.spectral.wavelength_at(kept, scaled.fract()))
     }
 }

@@ -1,9 +1,10 @@
-//! Light transport: one tracer, whatever the surfaces, the accelerator and the precision.
+//! Light transport: one tracer, whatever the surfaces, the lights, the bands, the accelerator and the precision.
 //!
 //! All paths of a batch take their next step together (`trace.rs`): closest hits of all, emission that they
 //! meet, then for each that goes on one light to ask (a shadow ray) and one direction to follow. Rays that ended are
-//! left out, so each batch that reaches the accelerator is full. The rays are in `rays.rs` as the accelerator takes
-//! them: in blocks of sixteen of single precision, or in batches of either precision.
+//! left out, so each batch that reaches the accelerator is full. Rays are in blocks of sixteen of either precision
+//! (`trace/lane.rs`): those of single precision are the accelerator's own packets, those of double precision are carried
+//! to its batches.
 //!
 //! # Sources
 //!
@@ -13,19 +14,11 @@
 //! * Many wavelengths on one path: Wilkie et al., "Hero Wavelength Spectral Sampling", 2014. Theirs keeps
 //!   one of them where a smooth boundary parts them; here all go on, each its way.
 
-mod ask;
 mod boundaries;
 mod dispersion;
-mod kernels;
+mod encounter;
 mod media;
-mod patch;
-mod paths;
-mod plain;
-mod rays;
 mod rules;
-mod scatter;
-mod shadows;
-mod surfaces;
 mod trace;
 
 use std::fmt::Debug;
@@ -35,12 +28,9 @@ use etendue_accel::Accel;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Geometry, HitPrecision, RayBatch};
 
-use self::patch::Patch;
-use self::paths::Workspace;
-use self::plain::PlainScratch;
-pub(crate) use self::plain::SIZES as PLAIN_SIZES;
-use self::rays::{Batch, Blocks};
 pub use self::rules::{Follow, Rules};
+pub(crate) use self::trace::SIZES;
+use self::trace::Workspace;
 use crate::bsdf::{Bsdf, Weights, metal};
 use crate::emitters::Emitters;
 use crate::lights::Lights;
@@ -96,16 +86,12 @@ pub struct Traits {
     pub has_alpha: bool,
     /// Some surface is a smooth pane that light passes straight ([`Material::is_pane`]).
     pub has_panes: bool,
-    /// Some surface scatters light in several ways, among which is chosen.
-    pub has_choice: bool,
     /// Media are told apart: some body absorbs light on its way through, or bodies may be in one another.
     pub has_media: bool,
     /// Some boundaries between bodies may not be there.
     pub has_nested: bool,
     /// Some glass parts wavelengths.
     pub has_dispersion: bool,
-    /// All surfaces scatter light as Lambert's law has it, or not at all.
-    pub is_matte: bool,
 }
 
 impl Traits {
@@ -117,13 +103,12 @@ impl Traits {
     /// Those of all placed surfaces.
     #[must_use]
     pub fn of(geometry: &Geometry, materials: &[Material], surfaces: &PlacedSurfaces) -> Self {
-        let mut traits = Self { is_matte: surfaces.are_matte(), ..Self::default() };
+        let mut traits = Self::default();
         let (mut has_sheets, mut has_bodies) = (false, false);
         for (i, placement) in (0..).zip(&geometry.placements) {
             let Some(material) = materials.get(placement.material as usize) else { continue };
             traits.has_alpha |= material.has_alpha();
             traits.has_panes |= material.is_pane();
-            traits.has_choice |= material.scattering.has_parts();
             traits.has_media |= material.absorption().is_some();
             traits.has_dispersion |= matches!(
                 &material.scattering,
@@ -211,6 +196,22 @@ fn below_one(x: f64) -> f32 {
     (x as f32).min(1.0 - f32::EPSILON / 2.0)
 }
 
+/// Use that a path makes of random numbers at each step.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Draw {
+    /// Choosing among the ways in which a surface scatters.
+    Choice,
+    /// Choosing a light and a place on it; or the band that stays where glass splits them.
+    Light,
+    /// The direction to follow.
+    Direction,
+    /// Deciding whether a surface is there, and whether a path goes on.
+    Chance,
+}
+
+/// Number of uses.
+pub(super) const DRAWS: u32 = 4;
+
 /// Statistics of a batch.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct RayStats {
@@ -233,10 +234,8 @@ impl AddAssign for RayStats {
 /// Memory of one thread, kept between batches.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    blocks: Workspace<Blocks>,
-    batches: Workspace<Batch>,
-    patch: Box<Patch>,
-    plain: PlainScratch,
+    single: Workspace<f32>,
+    double: Workspace<f64>,
 }
 
 /// Traces the camera's rays by `rules`.
@@ -257,7 +256,7 @@ fn trace_bands<const RGB: bool>(
     rules: Rules,
     ctx: &LightingContext<'_>,
     camera: &RaySamples<'_>,
-    Scratch { blocks, batches, patch, plain }: &mut Scratch,
+    Scratch { single, double }: &mut Scratch,
     out: &mut Vec<f64>,
 ) -> RayStats {
     out.clear();
@@ -269,15 +268,9 @@ fn trace_bands<const RGB: bool>(
         times: camera.rays.times(),
         tally: RayStats::default(),
     };
-    if let Some((surfaces, lights)) = tracing.plain() {
-        tracing.trace_plain(camera, (surfaces, &lights), (plain, blocks), out);
-        return tracing.tally;
-    }
-    match ctx.precision {
-        HitPrecision::Single if ctx.accel.blocks().is_some() => {
-            tracing.trace(camera, blocks, patch, out);
-        }
-        HitPrecision::Single | HitPrecision::Double => tracing.trace(camera, batches, patch, out),
+    match tracing.fits_single() {
+        true => tracing.trace::<f32>(camera, single, out),
+        false => tracing.trace::<f64>(camera, double, out),
     }
     tracing.tally
 }
@@ -294,6 +287,18 @@ struct Tracing<'a, const RGB: bool> {
 }
 
 impl<const RGB: bool> Tracing<'_, RGB> {
+    /// Tests whether the next surface that scatters a path is its last.
+    #[inline(always)]
+    pub(super) fn is_end(&self, bounces: u32) -> bool {
+        bounces + 1 >= self.rules.bounces
+    }
+
+    /// The same unless it is specular.
+    #[inline(always)]
+    pub(super) fn is_end_unless_specular(&self, bounces: u32) -> bool {
+        self.is_end(bounces) || self.rules.follow == Follow::Single
+    }
+
     /// Number of bands.
     #[inline(always)]
     fn count(&self) -> usize {
@@ -304,15 +309,6 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     #[inline(always)]
     fn band(&self, tint: &Tint, k: usize) -> f64 {
         if RGB { tint.color[k] } else { self.ctx.spectral.tint(tint, k) }
-    }
-
-    /// Multiplies light in all bands by a colour, with its curve.
-    #[inline(always)]
-    fn tinted(&self, tint: &Tint, light: &mut [f64]) {
-        match RGB {
-            true => light.iter_mut().zip(&tint.color).for_each(|(band, part)| *band *= part),
-            false => self.ctx.spectral.times(tint, light),
-        }
     }
 
     /// The light of band `k` that met several facets of a colour, which return `mean` of all light where they reflect all

@@ -1,471 +1,444 @@
-//! The steps of all paths of a batch: closest hits, the light that they meet, and what goes on.
+//! The steps of all paths of a batch, on blocks of sixteen whose numbers stay in registers between the hit and the rays
+//! that leave it, by one source for both precisions ([`Lane`]). Facets are worked out in double precision, and what is
+//! neither matte nor of facets nor smooth is hit by hit, by [`crate::bsdf::Bsdf`].
 //!
-//! What is looked up for a hit is gathered first, arithmetic is done on local arrays by the [`kernels`] and, for
-//! sheets of facets, by [`crate::bsdf::sheets`], and what goes on is put side by side in new blocks. Where surfaces are
-//! of several kinds, hits of one kind are put side by side first. Those of other kinds than matte, sheets and smooth
-//! ones are worked out one by one, by [`crate::bsdf::Bsdf`], within the same stages.
+//! Both precisions have the same random numbers by use: pictures are the same up to the roundings of single precision.
 
-use etendue_geometry::PlacedTriangle;
-use etendue_geometry::glam::DVec3;
+mod ask;
+mod choose;
+mod compaction;
+mod depart;
+mod facets;
+mod kernel;
+mod lamps;
+mod lane;
+mod light;
+mod parting;
+mod passing;
+mod single;
+mod sky;
+mod surfaces;
+mod varied;
 
+use std::ops::RangeInclusive;
+
+use etendue_geometry::block::{Floats as Row, LANES};
+use etendue_geometry::{HitPrecision, RayBlocks};
+
+use self::choose::ChosenLamps;
+use self::facets::BlockFacets;
+use self::kernel::{Leaving, Numbers, leave_blocks};
+use self::lamps::Lights;
+use self::lane::{Batch, Lane, Query, RayEnds};
+use self::light::EmitterQuery;
+use self::passing::Passing;
+use self::single::SingleHits;
+use self::surfaces::{Surfaces, Varied};
 use super::media::Media;
-use super::patch::Patch;
-use super::paths::{Carried, DRAWS, Draw, KINDS, Passage, Paths, Step, Way, Workspace};
-use super::rays::{RayHit, Rays};
-use super::{Follow, LightingContext, RaySamples, Tracing, kernels};
-use crate::bsdf::Bsdf;
-use crate::footprint::{Cone, Footprint};
-use crate::light_sampler::Receiver;
-use crate::placed::{PlacedSurface, SurfaceKind};
-use crate::reference::SurfacePoint;
-use crate::{LANES, Scattering, Tint};
+use super::{DRAWS, Draw};
+use super::{LightingContext, RaySamples, Tracing};
+use crate::emitters::Emitters;
+use crate::lights::LightBounds;
 
-/// The most surfaces that a path meets: those that let it pass count, and may be many.
-const MOST_STEPS: u32 = 4096;
+/// Hits of single precision are beside an edge of their triangle where their least barycentric weight is below this: only
+/// triangles that are less than some hundred of the bounds of [`spawn`](crate::spawn) high have others as near
+/// to one, and a mesh of those has no sharp corners that it can resolve.
+const BESIDE: f64 = 1.0 / 256.0;
 
-/// A surface that a path met by itself.
-pub(super) struct Encounter {
-    pub(super) hit: RayHit,
-    /// The ray's start (m) and its unit direction.
-    pub(super) ray: (DVec3, DVec3),
-    /// Point where the path left the last surface that scattered it, as lights were chosen for it.
-    pub(super) receiver: Receiver,
+/// Single precision holds squares of lengths, and densities over areas, of scenes between these sizes (m).
+pub(crate) const SIZES: [f64; 2] = [1e-6, 1e9];
+
+/// The least area of a lamp over the square of the scene's size that it holds.
+const LEAST_AREA: f64 = 1e-12;
+
+/// Largest bands of lights whose light single precision holds, however near or far they are (W/sr, W/m² or
+/// W/(m² sr)).
+const BRIGHTNESS: RangeInclusive<f64> = 1e-12..=1e18;
+
+/// What sixteen and more paths carry, a column a number; behind the last there is room for a block.
+#[derive(Debug, Default)]
+pub(super) struct Columns<F> {
+    pub(super) len: usize,
+    pub(super) ray: Vec<u32>,
+    /// Density (1/sr) of the direction, unused of the camera's.
+    pub(super) pdf: Vec<F>,
+    /// By band.
+    pub(super) throughput: Vec<Vec<F>>,
+    /// The normal of the surface that each left, where there are many lamps; unused of the camera's.
+    pub(super) normal: [Vec<F>; 3],
+    /// The chance with which the sky was chosen there; unused of the camera's, and without a sky.
+    pub(super) sky_chance: Vec<F>,
+    /// What each stands for where it starts, if that is more than a point: a width (m), and by how much that grows per
+    /// length. Unused of the camera's, and where no surface is smooth or all are alike all over.
+    pub(super) cone: [Vec<F>; 2],
+    /// [`SPECULAR`] and [`LAST`]; empty where no surface is smooth.
+    pub(super) flags: Vec<u32>,
+    /// The media that each is in; empty where they do not count.
+    pub(super) media: Vec<Media>,
+    /// The wavelength (nm) of the one band left, after a glass has parted them; empty where none does.
+    pub(super) wavelengths: Vec<Option<f64>>,
 }
 
-impl Encounter {
-    /// Tests whether it is the front of the triangle that was met.
-    pub(super) fn is_front(&self) -> bool {
-        self.hit.normal.dot(self.ray.1) <= 0.0
+/// A path came by a mirror or a smooth boundary: no light was asked in its stead.
+const SPECULAR: u32 = 1;
+
+/// A path looks for light and goes no farther.
+const LAST: u32 = 2;
+
+/// Rays that leave a block's hits, a column a number, with room for a block behind the last.
+#[derive(Debug, Default)]
+pub(super) struct RayColumns<F> {
+    pub(super) len: usize,
+    pub(super) start: [Vec<F>; 3],
+    pub(super) along: [Vec<F>; 3],
+    pub(super) reach: Vec<F>,
+    /// The block's lane that each leaves, counted from the first block.
+    pub(super) left: Vec<u32>,
+    /// The lamp that each is sent to.
+    pub(super) lamp: Vec<u32>,
+    /// The triangles that each leaves and ends on; empty where nothing asks for them.
+    ends: Vec<RayEnds>,
+    pub(super) carried: Columns<F>,
+}
+
+/// Memory of one thread, kept between batches.
+#[derive(Debug, Default)]
+pub(super) struct Workspace<F> {
+    rays: RayBlocks<F>,
+    carried: Columns<F>,
+    shadows: RayColumns<F>,
+    next: RayColumns<F>,
+    /// Last directions that ask what shines first.
+    last: RayColumns<F>,
+    shadow_rays: RayBlocks<F>,
+    numbers: [[Vec<F>; 2]; DRAWS as usize],
+    chosen: ChosenLamps<F>,
+    /// Hits on what shines, and rays that met nothing.
+    seen: Vec<u32>,
+    missed: Vec<u32>,
+    facets: BlockFacets<F>,
+    colors: Vec<Row<F>>,
+    shares: Vec<Row<F>>,
+    singles: SingleHits,
+    varied: Varied,
+    passing: Passing<F>,
+    query: EmitterQuery,
+    /// Light of one hit by band.
+    light: Vec<f64>,
+    batch: Batch,
+    /// When rays are (s from the frame's time), where that counts.
+    times: Vec<f64>,
+}
+
+impl<F: Lane> Columns<F> {
+    /// How many bands there are.
+    #[inline(always)]
+    pub(super) fn count<const RGB: bool>(&self) -> usize {
+        if RGB { 3 } else { self.throughput.len() }
+    }
+
+    /// The media that a path is in.
+    fn media_of(&self, i: usize) -> Media {
+        self.media.get(i).copied().unwrap_or(Media::NONE)
+    }
+
+    /// The wavelength (nm) of a path that has but one band.
+    fn wavelength_of(&self, i: usize) -> Option<f64> {
+        self.wavelengths.get(i).copied().flatten()
+    }
+
+    /// Makes room for at least so many of so many bands; whether surfaces may be smooth.
+    fn reserve(&mut self, (len, count): (usize, usize), are_smooth: bool) {
+        self.throughput.resize(count, Vec::new());
+        let len = len.next_multiple_of(LANES) + LANES;
+        if are_smooth {
+            grow(&mut self.flags, len);
+        } else {
+            self.flags.clear();
+        }
+        grow(&mut self.ray, len);
+        grow(&mut self.pdf, len);
+        grow(&mut self.sky_chance, len);
+        let rows = self.throughput.iter_mut().chain(&mut self.normal).chain(&mut self.cone);
+        rows.for_each(|row| grow(row, len));
     }
 }
 
-impl<const RGB: bool> Tracing<'_, RGB> {
+/// Makes a column at least so long.
+fn grow<T: Copy + Default>(column: &mut Vec<T>, len: usize) {
+    if column.len() < len {
+        column.resize(len, T::default());
+    }
+}
+
+impl<F: Lane> RayColumns<F> {
+    fn restart(&mut self, most: (usize, usize), are_smooth: bool) {
+        self.len = 0;
+        self.carried.media.clear();
+        self.carried.wavelengths.clear();
+        self.reserve(most, are_smooth);
+    }
+
+    /// Makes room for so many of so many bands in all; whether surfaces may be smooth.
+    fn reserve(&mut self, most: (usize, usize), are_smooth: bool) {
+        self.carried.reserve(most, are_smooth);
+        let len = self.carried.ray.len();
+        for axis in self.start.iter_mut().chain(&mut self.along) {
+            grow(axis, len);
+        }
+        grow(&mut self.reach, len);
+        grow(&mut self.left, len);
+        grow(&mut self.lamp, len);
+    }
+
+    /// Appends a ray to an emitter along a unit direction, as far as that (m), which starts as one of others does; its
+    /// number, by which its light is put.
+    fn push(&mut self, (other, of): (&Self, usize), along: ([F; 3], F), lamp: u32) -> usize {
+        let to = self.len;
+        for axis in 0..3 {
+            self.start[axis][to] = other.start[axis][of];
+            self.along[axis][to] = along.0[axis];
+        }
+        (self.reach[to], self.lamp[to], self.left[to]) = (along.1, lamp, other.left[of]);
+        self.carried.ray[to] = other.carried.ray[of];
+        self.len += 1;
+        to
+    }
+
+    /// Puts a last direction in the place of another.
+    fn copy_within(&mut self, from: usize, to: usize) {
+        let Columns { ray, pdf, throughput, normal, sky_chance, .. } = &mut self.carried;
+        let columns = self.start.iter_mut().chain(&mut self.along).chain(throughput).chain(normal);
+        columns.chain([pdf, sky_chance]).for_each(|column| column[to] = column[from]);
+        (self.left[to], ray[to]) = (self.left[from], ray[from]);
+    }
+
+    /// The rays as blocks, which are refilled.
+    fn pack(&self, blocks: &mut RayBlocks<F>) {
+        blocks.refill(self.len, |block, start, count| {
+            let run = start..start + LANES;
+            for axis in 0..3 {
+                block.origin[axis].copy_from_slice(&self.start[axis][run.clone()]);
+                block.direction[axis].copy_from_slice(&self.along[axis][run.clone()]);
+            }
+            block.t_max[..count].copy_from_slice(&self.reach[start..start + count]);
+        });
+    }
+}
+
+impl<'a, const RGB: bool> Tracing<'a, RGB> {
+    /// Tests whether single precision holds all numbers of the scene, whose hits are of it.
+    pub(super) fn fits_single(&self) -> bool {
+        let &LightingContext { accel, lights, placed, precision, .. } = self.ctx;
+        let Some(blocks) = accel.blocks().filter(|_| precision == HitPrecision::Single) else {
+            return false;
+        };
+        let &LightBounds { least_area, farthest, brightest, .. } = lights.bounds();
+        let least = LEAST_AREA * placed.size().powi(2);
+        let are_near = 2.0 * (farthest + blocks.origin().abs().max_element()) < SIZES[1];
+        let is_held = brightest == 0.0 || BRIGHTNESS.contains(&brightest);
+        placed.fits_single() && least_area > least && are_near && is_held
+    }
+
+    /// The surfaces of the scene.
+    fn surfaces<F: Lane>(&self) -> Surfaces<'a, F> {
+        let &LightingContext { placed, scene, precision, .. } = self.ctx;
+        // What is worked out in single precision is rounded as often again: points, normals and starts.
+        let roundings = self.ctx.roundings() * if F::HAS_ENDS { 1.0 } else { 2.0 };
+        let beside = match precision {
+            HitPrecision::Single => BESIDE,
+            HitPrecision::Double => -1.0,
+        };
+        Surfaces {
+            all: placed.table(),
+            placed,
+            geometry: scene.geometry,
+            varied: Varied::NONE,
+            roundings: F::of(roundings),
+            beside: F::of(beside),
+        }
+    }
+
     /// Traces the camera's rays.
-    pub(super) fn trace<R: Rays>(
+    pub(super) fn trace<F: Lane>(
         &mut self,
         camera: &RaySamples<'_>,
-        workspace: &mut Workspace<R>,
-        patch: &mut Patch,
+        workspace: &mut Workspace<F>,
         out: &mut [f64],
     ) {
-        workspace.radiance.resize(self.count(), 0.0);
-        self.start(camera, &mut workspace.now);
+        let accel = self.ctx.accel;
+        let surfaces = self.surfaces::<F>();
+        let lights = &Lights::new(self.ctx.lights, F::origin(accel), self.count());
+        F::convert(accel, camera.rays, &mut workspace.rays);
+        let are_smooth = surfaces.all.are_smooth;
+        start(camera, self.count(), are_smooth, &mut workspace.carried);
+        workspace.carried.media = self.media_at_origins(camera.rays);
+        workspace.next.ends.clear();
         let mut coherent = camera.rays.coherent;
-        for number in 0..MOST_STEPS {
-            if workspace.now.rays.len() == 0 {
+        let mut is_scattered = true;
+        for number in 0..=self.rules.bounces {
+            let len = workspace.rays.len();
+            if len == 0 {
                 break;
             }
-            let step = Step {
-                camera,
-                number,
-                asks_emitters: self.asks_emitters(),
-                is_mixed: !self.ctx.traits.is_matte,
-            };
-            self.find_hits(workspace, coherent);
-            self.meet(&step, workspace, out);
-            if workspace.alive.is_empty() {
-                break;
+            self.times_of::<F>(workspace.carried.ray[..len].iter().copied(), &mut workspace.times);
+            let query = Query { times: &workspace.times, ends: &workspace.next.ends, coherent };
+            F::closest(self.ctx, &mut workspace.rays, query, &mut workspace.batch);
+            self.tally.rays += len as u64;
+            self.pass((camera, number), workspace, out);
+            is_scattered &= number < self.rules.bounces;
+            self.leave((camera, number), (surfaces, lights), is_scattered, workspace);
+            self.carry_cones((camera, number), surfaces.all, workspace);
+            self.meet((camera, number), workspace, out);
+            self.add_sky((camera, number), lights, workspace, out);
+            if let Some(emitters) = self.asked_emitters() {
+                self.ask_emitters(emitters, lights, workspace);
             }
-            self.draw(&step, workspace);
-            workspace.onward.next.restart(self.ctx);
-            workspace.onward.last.clear();
-            workspace.onward.of_last.clear();
-            workspace.shadows.restart(self.ctx);
-            if step.is_mixed {
-                self.step_kinds(&step, workspace, patch);
-            } else {
-                self.step_matte(&step, workspace, patch);
+            let Workspace { rays, singles, carried, shadows, next, .. } = &mut *workspace;
+            for leaving in [shadows, next] {
+                self.carry_media((rays, singles), carried, leaving);
             }
-            // From neighbouring places to lights: as coherent as what they start from.
-            self.light(workspace, coherent, out);
-            self.ask_emitters(&step, workspace, out);
-            std::mem::swap(&mut workspace.now, &mut workspace.onward.next);
+            self.light(workspace, lights, (number, coherent), out);
+            // Last directions that do not ask what shines are followed as the others are.
+            is_scattered &= !self.is_end_unless_specular(number) || are_smooth;
+            self.find_ends_of_paths(workspace);
+            workspace.next.pack(&mut workspace.rays);
+            std::mem::swap(&mut workspace.carried, &mut workspace.next.carried);
+            workspace.carried.len = workspace.next.len;
             coherent = false;
         }
     }
 
-    /// The camera's rays as paths.
-    fn start<R: Rays>(&self, camera: &RaySamples<'_>, paths: &mut Paths<R>) {
-        paths.carried.clear();
-        paths.rays.take(self.ctx, camera.rays);
-        let Carried { ray, ways, throughput, media, .. } = &mut paths.carried;
-        *media = self.media_at_origins(camera.rays);
-        for i in 0..camera.rays.len() {
-            ray.push(u32::try_from(i).unwrap_or(u32::MAX));
-            ways.push(Way::CAMERA);
-            let bands = 0..self.count();
-            throughput.extend(bands.map(|k| f64::from(u8::from(camera.bands.contains(&k)))));
-        }
-    }
-
-    /// Finds the closest hit of each path, and takes what media absorb on the way.
-    fn find_hits<R: Rays>(&mut self, workspace: &mut Workspace<R>, coherent: bool) {
-        let Workspace { now, placements, coincident, .. } = workspace;
-        if !self.times.is_empty() {
-            now.rays.set_times(now.carried.ray.iter().map(|&ray| self.times[ray as usize]));
-        }
-        now.rays.closest(self.ctx, coherent);
-        now.rays.placements(placements);
-        self.tally.rays += now.rays.len() as u64;
-        if self.ctx.traits.has_media {
-            self.absorb(now);
-        }
-        self.find_coincident(&now.rays, coincident);
-    }
-
-    /// As what the hits of a surface are worked on in this scene.
-    #[inline(always)]
-    fn kind_of(&self, placed: &PlacedSurface) -> SurfaceKind {
-        let traits = &self.ctx.traits;
-        let parts_media = traits.has_media || traits.has_dispersion;
-        match placed.kind {
-            SurfaceKind::Smooth if parts_media && !placed.is_opaque => SurfaceKind::Other,
-            kind => kind,
-        }
-    }
-
-    /// Adds the light that paths met by themselves, and lists those that go on.
-    fn meet<R: Rays>(&mut self, step: &Step<'_>, workspace: &mut Workspace<R>, out: &mut [f64]) {
-        let Workspace { now, placements, kinds, alive, missed, asked, radiance, .. } = workspace;
-        let LightingContext { lights, spectral, scene, .. } = self.ctx;
+    /// Notes the rays that leave the hits of a step, where these scatter light.
+    fn leave<F: Lane>(
+        &self,
+        (camera, number): (&RaySamples<'_>, u32),
+        (surfaces, lights): (Surfaces<'_, F>, &Lights<'_, F>),
+        is_scattered: bool,
+        workspace: &mut Workspace<F>,
+    ) {
+        let (len, all) = (workspace.rays.len(), surfaces.all);
+        // Last directions may become rays to the sky.
         let count = self.count();
-        alive.clear();
-        kinds.iter_mut().for_each(Vec::clear);
-        missed.clear();
-        let sky = lights.sky.as_ref();
-        let Carried { ray, ways, throughput, .. } = &now.carried;
-        let carried = |i: usize| &throughput[i * count..(i + 1) * count];
-        for ((number, i), &placement) in (0_u32..).zip(0..).zip(&*placements) {
-            let bounces = now.bounces(step.number, i);
-            let Some(placed) = self.ctx.placed.get(placement) else {
-                if sky.is_some_and(|sky| sky.visible || bounces > 0) {
-                    missed.push(number);
-                }
-                continue;
-            };
-            // A last ray goes on only where the surface that it met may not be there.
-            let scatters = !ways[i].is_last && bounces < self.rules.bounces;
-            if scatters || placed.may_vanish() {
-                let kind = self.kind_of(placed);
-                match KINDS.iter().position(|&own| own == kind) {
-                    Some(kind) if step.is_mixed => kinds[kind].push(number),
-                    Some(_) => alive.push(ray[i]),
-                    None => {}
-                }
+        workspace.shadows.restart((2 * len, count), all.are_smooth);
+        workspace.next.restart((len, count), all.are_smooth);
+        workspace.last.restart((len, count), all.are_smooth);
+        workspace.seen.clear();
+        workspace.missed.clear();
+        let is_last = self.is_end_unless_specular(number);
+        // Nobody comes upon points.
+        let goes_on = !is_last || self.ctx.lights.is_hittable();
+        let roulette = !is_last && self.rules.roulette.is_some_and(|after| number + 1 >= after);
+        if is_scattered {
+            let needs = [goes_on || all.are_smooth, roulette, all.are_rich()];
+            self.draw(camera, number, needs, workspace);
+            self.look_up_varied((camera, number), surfaces, workspace);
+            // Behind the paths of glass that parts wavelengths.
+            workspace.next.reserve((workspace.next.len + len, count), all.are_smooth);
+            if lights.are_many() && !self.ctx.lights.is_dark() {
+                self.choose_lamps((surfaces, lights), workspace);
             }
-            if !placed.is_seen {
-                continue;
-            }
-            let ends = (now.rays.origin(i), now.rays.direction(i));
-            let receiver = ways[i].receiver(now.from(i));
-            let encounter = Encounter { hit: now.rays.hit(i), ray: ends, receiver };
-            let footprint = || self.footprint(step, now, i);
-            let Some(weight) = self.light_of_hit(&encounter, ways[i], footprint, radiance) else {
-                continue;
-            };
-            radiance.iter_mut().zip(carried(i)).for_each(|(r, t)| *r *= t * weight);
-            let group = || lights.group_of_placement(scene, encounter.hit.id[0]);
-            self.add(radiance, self.parts.row(ray[i], bounces, group), out);
         }
-        let wanted = missed.iter().map(|&i| {
-            let i = i as usize;
-            // The camera's rays are not all traced: those that cannot hit anything are other ones in blocks.
-            if step.number == 0 {
-                return (None, step.camera.rays.direction(i));
-            }
-            let receiver = (!ways[i].is_specular).then(|| ways[i].receiver(now.from(i)));
-            (receiver, now.rays.direction(i))
-        });
-        lights.environment(spectral, wanted, asked, radiance, |number, of_sky, light| {
-            let i = missed[number] as usize;
-            let weight = ways[i].weight_against(of_sky);
-            light.iter_mut().zip(carried(i)).for_each(|(r, t)| *r *= t * weight);
-            let bounces = now.bounces(step.number, i);
-            self.add(light, self.parts.row(ray[i], bounces, || lights.group_of_sky()), out);
-        });
-        if step.is_mixed {
-            alive.extend(kinds.iter().flatten().map(|&i| ray[i as usize]));
-        }
-    }
-
-    /// Cone that path `i` stands for where it hit, as wide as there; a point where it was scattered by chance.
-    pub(super) fn cone_at_hit<R: Rays>(
-        &self,
-        step: &Step<'_>,
-        now: &Paths<R>,
-        i: usize,
-    ) -> Option<Cone> {
-        let t = now.rays.t(i);
-        if step.number > 0 {
-            return Some((*now.carried.cones.get(i)?)?.after(t));
-        }
-        let hit = now.rays.origin(i) + now.rays.direction(i) * t;
-        // A block's ray may start nearer.
-        let (origin, direction) = (step.camera.rays.origin(i), step.camera.rays.direction(i));
-        let cone = self.ctx.scene.view.cone(direction)?;
-        Some(cone.after((hit - origin).dot(direction)))
-    }
-
-    /// Footprint of path `i` where it hit.
-    pub(super) fn footprint<R: Rays>(
-        &self,
-        step: &Step<'_>,
-        now: &Paths<R>,
-        i: usize,
-    ) -> Option<Footprint> {
-        let Cone { width, .. } = self.cone_at_hit(step, now, i)?;
-        let direction = match step.number {
-            0 => step.camera.rays.direction(i),
-            _ => now.rays.direction(i),
+        let surfaces = Surfaces { varied: &workspace.varied, ..surfaces };
+        let asks_lights = !self.ctx.lights.is_dark();
+        let chosen = (asks_lights && lights.are_many()).then_some(&workspace.chosen);
+        let emitters = self.asked_emitters().map(|emitters| emitters.sphere::<F>(lights.origin));
+        let (asks_emitters, drawn) = (emitters.is_some(), &workspace.numbers);
+        let numbers = Numbers {
+            is_scattered,
+            goes_on,
+            roulette,
+            is_last,
+            asks_lights,
+            asks_emitters,
+            drawn,
+            chosen,
         };
-        Some(Footprint { direction, width })
+        let has_environment = self.ctx.lights.has_environment();
+        let leaving = Leaving {
+            shadows: &mut workspace.shadows,
+            next: &mut workspace.next,
+            last: &mut workspace.last,
+            seen: &mut workspace.seen,
+            missed: has_environment.then_some(&mut workspace.missed),
+            facets: &mut workspace.facets,
+            singles: &mut workspace.singles,
+            colors: &mut workspace.colors,
+            shares: &mut workspace.shares,
+        };
+        let sphere = emitters.filter(|_| is_last && !has_environment);
+        let is_rich = all.are_rich() || self.ctx.lights.has_others();
+        let leave = match (all.are_tilted, is_rich) {
+            (false, false) => leave_blocks::<F, false, false, RGB>,
+            (false, true) => leave_blocks::<F, false, true, RGB>,
+            (true, false) => leave_blocks::<F, true, false, RGB>,
+            (true, true) => leave_blocks::<F, true, true, RGB>,
+        };
+        let paths = (workspace.rays.blocks(), &workspace.carried);
+        leave((self, surfaces, lights), paths, (numbers, sphere), leaving);
     }
 
-    /// The light of a surface that was met, and its weight against having asked for it; `None` if there is none.
-    pub(super) fn light_of_hit(
+    /// When a ray of the camera is (s from the frame's time).
+    #[inline(always)]
+    fn time_of(&self, ray: u32) -> f64 {
+        self.times.get(ray as usize).copied().unwrap_or(0.0)
+    }
+
+    /// The times of some rays of the camera, where that counts; else none.
+    fn times_of<F: Lane>(&self, rays: impl Iterator<Item = u32>, times: &mut Vec<f64>) {
+        times.clear();
+        if !self.times.is_empty() && F::has_times(self.ctx.accel) {
+            times.extend(rays.map(|ray| self.time_of(ray)));
+        }
+    }
+
+    /// The emitters that last directions ask before they ask the scene. Through surfaces that are partly there they have
+    /// to be followed.
+    fn asked_emitters(&self) -> Option<&'a Emitters> {
+        self.ctx.emitters.filter(|_| !self.ctx.traits.may_pass())
+    }
+
+    /// Draws what a step needs for all lanes.
+    fn draw<F: Lane>(
         &self,
-        encounter: &Encounter,
-        way: Way,
-        footprint: impl Fn() -> Option<Footprint>,
-        radiance: &mut [f64],
-    ) -> Option<f64> {
-        let LightingContext { lights, scene, spectral, .. } = self.ctx;
-        let Encounter { hit, ray: (origin, direction), receiver } = encounter;
-        let is_front = encounter.is_front();
-        let weight = |pdf: f64| way.weight_against(if pdf.is_finite() { pdf } else { 0.0 });
-        if let Some(index) = lights.index_of(hit.id)
-            && let Some((area_light, bands)) = lights.plain_triangle(index, self.count())
-        {
-            if !is_front && !area_light.two_sided {
-                return None;
-            }
-            radiance.copy_from_slice(bands);
-            if way.is_specular {
-                return Some(1.0);
-            }
-            let cosine = direction.dot(area_light.shape.normal).abs();
-            let distance = hit.t + (*origin - receiver.point).length();
-            let density = distance * distance / (cosine * area_light.shape.area);
-            return Some(weight(lights.chance(receiver, index) * density));
-        }
-        let placement = scene.geometry.placements.get(hit.id[0] as usize)?;
-        let [u, v] = hit.weights;
-        let corner = SurfacePoint::corner(scene.geometry, placement, hit.id[1] as usize);
-        let (weights, footprint) = ([1.0 - u - v, u, v], footprint());
-        let point = SurfacePoint { weights, time: hit.time, footprint, ..corner };
-        let material = scene.material(&point)?;
-        if material.scattering == Scattering::Unlit {
-            let (tint, alpha) = scene.base_tint(spectral, material, &point);
-            spectral.spread_tint(&tint, radiance);
-            let is_there = is_front || !material.one_sided;
-            return (way.is_specular && is_there).then(|| material.alpha.opacity(alpha));
-        }
-        if !lights.emitted(scene, spectral, &point, is_front, radiance) {
-            return None;
-        }
-        let pdf = lights.pdf_of_surface(scene, hit.id[0], &point, receiver, *direction);
-        Some(weight(pdf))
-    }
-
-    /// Draws what this step needs for all paths that go on.
-    fn draw<R: Rays>(&self, step: &Step<'_>, workspace: &mut Workspace<R>) {
-        let LightingContext { lights, traits, .. } = self.ctx;
-        // Paths that passed surfaces have been scattered less often.
-        let [least, most] = if traits.may_pass() { [0, step.number] } else { [step.number; 2] };
-        let follows = self.rules.follow == Follow::All && !self.is_end(least);
-        let roulette = self.rules.roulette.is_some_and(|after| most + 1 >= after);
-        for draw in Draw::ALL {
-            let needs = match draw {
-                Draw::Choice => traits.has_choice,
-                Draw::Light => {
-                    lights.are_several() || lights.are_extended() || traits.has_dispersion
-                }
-                Draw::Direction => follows || lights.is_hittable() || traits.has_choice,
-                Draw::Chance => (roulette && !self.is_end(least)) || traits.has_alpha,
-            };
-            let drawn = &mut workspace.drawn[draw as usize];
-            drawn.clear();
+        camera: &RaySamples<'_>,
+        number: u32,
+        [goes_on, roulette, has_choice]: [bool; 3],
+        workspace: &mut Workspace<F>,
+    ) {
+        let rays = &workspace.carried.ray[..workspace.rays.len()];
+        let padded = rays.len().next_multiple_of(LANES);
+        for (draw, needs) in [
+            (Draw::Choice, has_choice),
+            (Draw::Light, true),
+            (Draw::Direction, goes_on),
+            (Draw::Chance, roulette),
+        ] {
             if needs {
-                let pair = step.number * DRAWS + draw as u32;
-                step.camera.samples.squares_of_pair(&workspace.alive, pair, drawn);
+                let drawn = &mut workspace.numbers[draw as usize];
+                F::draw(camera, rays, number * DRAWS + draw as u32, drawn);
+                drawn.iter_mut().for_each(|half| half.resize(padded, F::of(0.5)));
             }
         }
     }
+}
 
-    /// Tests whether the next surface that scatters a path is its last.
-    #[inline(always)]
-    pub(super) fn is_end(&self, bounces: u32) -> bool {
-        bounces + 1 >= self.rules.bounces
+/// The camera's rays as paths.
+fn start<F: Lane>(
+    camera: &RaySamples<'_>,
+    count: usize,
+    are_smooth: bool,
+    carried: &mut Columns<F>,
+) {
+    let len = camera.rays.len();
+    carried.reserve((len, count), are_smooth);
+    carried.flags.fill(SPECULAR);
+    carried.len = len;
+    carried.wavelengths.clear();
+    for (number, ray) in (0..).zip(&mut carried.ray) {
+        *ray = number;
     }
-
-    /// The same unless it is specular.
-    #[inline(always)]
-    pub(super) fn is_end_unless_specular(&self, bounces: u32) -> bool {
-        self.is_end(bounces) || self.rules.follow == Follow::Single
-    }
-
-    /// The step of all paths where all surfaces are matte: hits stay where they are, among those of paths that end.
-    fn step_matte<R: Rays>(
-        &self,
-        step: &Step<'_>,
-        workspace: &mut Workspace<R>,
-        patch: &mut Patch,
-    ) {
-        let (mut alive, len) = (0, workspace.now.rays.len());
-        for first in (0..len).step_by(LANES) {
-            let run = first..len.min(first + LANES);
-            workspace.now.rays.unpack_run(patch, run.clone());
-            patch.colors.resize(patch.count, Tint::BLACK);
-            workspace.picked.clear();
-            for (lane, i) in run.enumerate() {
-                let placed = self.ctx.placed.get(workspace.placements[i]);
-                let is_matte = |placed: &&PlacedSurface| placed.kind == SurfaceKind::Matte;
-                let Some(placed) = placed.filter(is_matte) else { continue };
-                if workspace.now.carried.ways[i].is_last {
-                    continue;
-                }
-                self.look_up_matte(step, &workspace.now, patch, (i, lane), placed);
-                patch.path.push((i, alive));
-                workspace.picked.push(lane);
-                alive += 1;
-            }
-            self.step_patch(step, workspace, patch, SurfaceKind::Matte);
-        }
-    }
-
-    /// The step of all paths where surfaces are of several kinds: those of one side by side.
-    fn step_kinds<R: Rays>(
-        &self,
-        step: &Step<'_>,
-        workspace: &mut Workspace<R>,
-        patch: &mut Patch,
-    ) {
-        workspace.smooth.clear();
-        let mut alive = 0;
-        for (number, kind) in KINDS.into_iter().enumerate() {
-            let paths = std::mem::take(&mut workspace.kinds[number]);
-            for chunk in paths.chunks(LANES) {
-                let numbered = (alive..).zip(chunk).map(|(k, &i)| (i as usize, k));
-                alive += chunk.len();
-                self.step_side_by_side(step, workspace, patch, (kind, numbered));
-            }
-            workspace.kinds[number] = paths;
-        }
-        let smooth = std::mem::take(&mut workspace.smooth);
-        for chunk in smooth.chunks(LANES) {
-            let own = (SurfaceKind::Other, chunk.iter().copied());
-            self.step_side_by_side(step, workspace, patch, own);
-        }
-        workspace.smooth = smooth;
-    }
-
-    /// The step of paths that met surfaces of one kind, at most as many as a patch has lanes: their numbers, and
-    /// which of those that go on they are.
-    fn step_side_by_side<R: Rays>(
-        &self,
-        step: &Step<'_>,
-        workspace: &mut Workspace<R>,
-        patch: &mut Patch,
-        (kind, paths): (SurfaceKind, impl Iterator<Item = (usize, usize)> + Clone),
-    ) {
-        let Workspace { now, side_by_side, picked, .. } = workspace;
-        now.rays.unpack_picked(patch, side_by_side, paths.clone().map(|(i, _)| i));
-        patch.colors.resize(patch.count, Tint::BLACK);
-        picked.clear();
-        for (lane, (i, k)) in paths.enumerate() {
-            let now = &workspace.now;
-            let Some(placed) = self.ctx.placed.get(workspace.placements[i]) else { continue };
-            match kind {
-                SurfaceKind::Black => continue,
-                SurfaceKind::Matte => self.look_up_matte(step, now, patch, (i, lane), placed),
-                SurfaceKind::Sheet => {
-                    if !self.look_up_sheet(step, now, patch, (i, lane), placed) {
-                        workspace.smooth.push((i, k));
-                        continue;
-                    }
-                }
-                SurfaceKind::Smooth => self.look_up_smooth(step, now, patch, (i, lane), placed),
-                SurfaceKind::Other => {
-                    if !self.look_up_other(step, workspace, patch, ((i, k), lane), placed) {
-                        continue;
-                    }
-                }
-            }
-            patch.path.push((i, k));
-            workspace.picked.push(lane);
-        }
-        self.step_patch(step, workspace, patch, kind);
-    }
-
-    /// The step of the hits that were picked of a patch, all of one kind.
-    fn step_patch<R: Rays>(
-        &self,
-        step: &Step<'_>,
-        workspace: &mut Workspace<R>,
-        patch: &mut Patch,
-        kind: SurfaceKind,
-    ) {
-        if workspace.picked.is_empty() {
-            return;
-        }
-        let roundings = self.ctx.roundings();
-        kernels::measure(patch, roundings);
-        if patch.is_tilted {
-            kernels::bend(patch);
-        }
-        if kind == SurfaceKind::Sheet {
-            patch.sheets.view(&patch.seen.shading, &patch.seen.direction);
-        }
-        let is_delta = |bsdf: &Bsdf| bsdf.is_delta();
-        // What scatters light of single directions asks none.
-        let asks = match kind {
-            SurfaceKind::Matte | SurfaceKind::Sheet => true,
-            SurfaceKind::Black | SurfaceKind::Smooth => false,
-            SurfaceKind::Other => !patch.bsdfs.iter().all(is_delta),
-        };
-        if asks && !self.ctx.lights.is_dark() {
-            self.choose_lights(workspace, patch);
-            kernels::aim(patch, roundings);
-            self.ask_lights(step, workspace, patch, kind);
-        }
-        self.scatter(step, workspace, patch, kind);
-    }
-
-    /// A path that goes straight on, as the surface that it met is not there, from `start` (m) beside the triangles
-    /// in that place; into `media`, where it parts any.
-    pub(super) fn pass<R: Rays>(
-        &self,
-        step: &Step<'_>,
-        workspace: &mut Workspace<R>,
-        i: usize,
-        (start, ends): (DVec3, [PlacedTriangle; 2]),
-        media: Option<Media>,
-    ) {
-        let Workspace { now, onward, .. } = workspace;
-        let cone = self.cone_at_hit(step, now, i);
-        let surfaces = now.carried.passages.get(i).map_or(0, |passage| passage.surfaces);
-        let passage = Passage { surfaces: surfaces + 1, from: Some(now.from(i)) };
-        onward.next.rays.push([start, now.rays.direction(i)], f64::INFINITY, || ends);
-        let to = &mut onward.next.carried;
-        to.ray.push(now.carried.ray[i]);
-        to.ways.push(now.carried.ways[i]);
-        to.cones.push(cone);
-        to.passages.push(passage);
-        let bands = i * self.count()..(i + 1) * self.count();
-        to.throughput.extend_from_slice(&now.carried.throughput[bands]);
-        self.push_own(now, to, i);
-        if let (Some(media), Some(own)) = (media, to.media.last_mut()) {
-            *own = media;
-        }
-    }
-
-    /// The media and the wavelength of path `i`, where they count.
-    pub(super) fn push_own<R: Rays>(&self, now: &Paths<R>, to: &mut Carried, i: usize) {
-        if self.ctx.traits.has_media {
-            to.media.push(now.carried.media_of(i));
-        }
-        if self.ctx.traits.has_dispersion {
-            to.wavelengths.push(now.carried.wavelength_of(i));
-        }
+    for (k, band) in carried.throughput.iter_mut().enumerate() {
+        band.fill(if camera.bands.contains(&k) { F::ONE } else { F::ZERO });
     }
 }

@@ -196,3 +196,49 @@ fn light_within_a_body_is_absorbed_on_its_way_to_the_wall() {
         }
     }
 }
+
+/// What stands between a wall of radiance 1 and its viewer, and between a point and a floor: sheets that are partly there,
+/// which each take their share of what is left, and bodies of the index of air, which tint at both boundaries.
+#[test]
+fn surfaces_that_light_passes_take_their_shares_one_by_one() {
+    let materials = r#""lamp": {"type": "emissive", "radiance": [1, 1, 1]},
+        "floor": {"type": "matte", "color": [0.5, 0.5, 0.5]},
+        "veil": {"type": "gltf", "color": [0, 0, 0], "metallic": 1, "opacity": 0.4},
+        "tinted": {"type": "dielectric", "ior": 1.0, "color": [0.5, 0.5, 0.5]}"#;
+    let veil = |z: f64| {
+        format!(
+            r#"{{"shape": "rectangle", "width": 2, "height": 2, "material": "veil", "transform": {{"translate": [0, 0, {z}]}}}}"#
+        )
+    };
+    let floor = r#"{"shape": "rectangle", "width": 9, "height": 9, "material": "floor"}"#;
+    let point = r#"{"type": "point", "at": [0, 0, 6], "intensity": [36, 36, 36]}"#;
+    let body = block([2.0, 2.0, 0.3], 1.0, "tinted");
+    for (name, between, share) in [
+        ("a veil", veil(1.0), 0.6),
+        ("four veils", [1.0, 1.5, 2.0, 3.5].map(veil).join(", "), 0.6_f64.powi(4)),
+        ("a tinted body", body.clone(), 0.25),
+        ("a veil and a tinted body", format!("{}, {body}", veil(2.0)), 0.15),
+    ] {
+        let seen = format!(
+            r#""lights": [], "objects": [{between}, {LAMP}], "materials": {{{materials}}}"#
+        );
+        let lit = format!(
+            r#""lights": [{point}], "objects": [{between}, {floor}], "materials": {{{materials}}}"#
+        );
+        for way in ways() {
+            let shown =
+                mean(&picture(load(&patch("direct", 256, [0.0, 0.0, 5.0], [0.0; 3], &seen)), way));
+            // Of 16 384 paths, each of which comes through or does not.
+            let noise = 4.0 * (share * (1.0 - share) / 16384.0).sqrt();
+            assert!((shown - share).abs() <= noise, "{name}, {way:?}: {shown}, not {share}");
+            // Rays to a point are dimmed by what is there of each, without chance. The patch is as large as a pixel.
+            let shown =
+                mean(&picture(load(&patch("direct", 4, [8.0, 0.0, 4.0], [0.0; 3], &lit)), way));
+            let known = 0.5 * std::f64::consts::FRAC_1_PI * share;
+            assert!(
+                (shown / known - 1.0).abs() < 1e-5,
+                "{name}, lit, {way:?}: {shown}, not {known}"
+            );
+        }
+    }
+}

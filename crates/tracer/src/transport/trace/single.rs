@@ -7,27 +7,33 @@ use etendue_geometry::glam::DVec3;
 
 use super::facets::BsdfSamples;
 use super::kernel::{Hits, Mask, round, single};
+use super::lane::{Lane, wide};
 use super::surfaces::Found;
 use crate::bsdf::{Bsdf, Weights};
 use crate::sampling::power_heuristic;
 use crate::transport::Tracing;
+use crate::transport::media::Crossing;
 
 /// Hits that are worked out one by one, in the order of their lanes.
 #[derive(Debug, Default)]
 pub(super) struct SingleHits {
     hits: Vec<SingleHit>,
     /// What goes to the viewer of the light that was asked, or of what was scattered by chance, `[hit][band]`.
-    shares: Vec<f32>,
+    shares: Vec<f64>,
 }
 
 /// A hit that is worked out by itself.
 #[derive(Debug, Clone, Copy)]
-struct SingleHit {
+pub(super) struct SingleHit {
     /// Counted from the first block.
-    lane: u32,
-    bsdf: Bsdf,
+    pub(super) lane: u32,
+    pub(super) bsdf: Bsdf,
     /// Light may pass the surface.
-    passes: bool,
+    pub(super) passes: bool,
+    /// The media on its sides, where they count.
+    pub(super) crossing: Option<Crossing>,
+    /// It has sent all paths that leave it, as glass that parts wavelengths does.
+    pub(super) is_parted: bool,
 }
 
 impl SingleHits {
@@ -40,8 +46,14 @@ impl SingleHits {
     }
 
     /// Appends the hit of a lane, behind those before it.
-    pub(super) fn push(&mut self, lane: u32, bsdf: Bsdf, passes: bool) {
-        self.hits.push(SingleHit { lane, bsdf, passes });
+    pub(super) fn push(&mut self, hit: SingleHit) {
+        self.hits.push(hit);
+    }
+
+    /// The media on the sides of a lane's boundary.
+    pub(super) fn crossing(&self, lane: usize) -> Option<Crossing> {
+        let place = self.hits.binary_search_by_key(&lane, |own| own.lane as usize);
+        self.hits[place.ok()?].crossing
     }
 
     /// Those of the block whose first lane that is, by their numbers, each with its lane in the block.
@@ -54,9 +66,12 @@ impl SingleHits {
 
     /// Says of a block's lanes what hits have that is known before they are measured.
     #[inline(never)]
-    pub(super) fn mark(&self, first: usize, found: &mut Found) {
+    pub(super) fn mark<F: Lane>(&self, first: usize, found: &mut Found<F>) {
         for (number, lane) in self.of_block(first) {
-            let SingleHit { bsdf, passes, .. } = &self.hits[number];
+            let SingleHit { bsdf, passes, is_parted, .. } = &self.hits[number];
+            if *is_parted {
+                (found.scatters[lane], found.single[lane]) = (0, 0);
+            }
             if bsdf.is_delta() {
                 found.delta[lane] = u32::MAX;
             }
@@ -68,7 +83,7 @@ impl SingleHits {
 
     /// Gives the hits of a block the normals by which lights are chosen for them: zero where light comes from both sides.
     #[inline(never)]
-    pub(super) fn put_normals(&self, first: usize, bent: &mut [Row; 3]) {
+    pub(super) fn put_normals<F: Lane>(&self, first: usize, bent: &mut [Row<F>; 3]) {
         for (number, lane) in self.of_block(first) {
             let normal = single(self.hits[number].bsdf.receiving_normal());
             for axis in 0..3 {
@@ -80,12 +95,12 @@ impl SingleHits {
     /// What hits turn to the viewer of light from unit directions that were chosen with a density (1/sr), in their lanes
     /// of `value`. How much of it in each band [`Self::in_band`] says.
     #[inline(never)]
-    pub(super) fn reflect<const RGB: bool>(
+    pub(super) fn reflect<F: Lane, const RGB: bool>(
         &mut self,
         tracing: &Tracing<'_, RGB>,
-        (found, first): (&Found, usize),
-        (toward, pdf, is_delta): (&[Row; 3], &Row, &Row),
-        value: &mut Row,
+        (found, first): (&Found<F>, usize),
+        (toward, pdf, is_delta): (&[Row<F>; 3], &Row<F>, &Row<F>),
+        value: &mut Row<F>,
     ) {
         let own: Vec<(usize, usize)> = self.of_block(first).collect();
         for (number, lane) in own {
@@ -94,13 +109,14 @@ impl SingleHits {
             }
             let bsdf = self.hits[number].bsdf;
             let toward = at(toward, lane).normalize();
-            let (weights, density) = match pdf[lane] < f32::INFINITY {
+            let (weights, density) = match pdf[lane] < F::INFINITY {
                 true => bsdf.evaluate(toward),
                 false => (Weights::default(), 0.0),
             };
-            let pdf = f64::from(pdf[lane]);
-            let balance = if is_delta[lane] > 0.0 { 1.0 } else { power_heuristic(pdf, density) };
-            value[lane] = if weights.is_zero() { 0.0 } else { round(balance / pdf) };
+            let pdf = wide(pdf[lane]);
+            let balance =
+                if wide(is_delta[lane]) > 0.0 { 1.0 } else { power_heuristic(pdf, density) };
+            value[lane] = if weights.is_zero() { F::ZERO } else { round(balance / pdf) };
             self.put_shares(tracing, number, (&bsdf, weights));
         }
     }
@@ -108,12 +124,12 @@ impl SingleHits {
     /// Puts the directions in which hits send the paths in place of what is there; those that only the surface can give
     /// are marked. How much goes on in each band [`Self::in_band`] says.
     #[inline(never)]
-    pub(super) fn scatter<const RGB: bool>(
+    pub(super) fn scatter<F: Lane, const RGB: bool>(
         &mut self,
         tracing: &Tracing<'_, RGB>,
-        (found, first): (&Found, usize),
-        (hits, choice, square): (&Hits, &Row, &[Row; 2]),
-        (left, specular): (&mut BsdfSamples, &mut Mask),
+        (found, first): (&Found<F>, usize),
+        (hits, choice, square): (&Hits<F>, &Row<F>, &[Row<F>; 2]),
+        (left, specular): (&mut BsdfSamples<F>, &mut Mask),
     ) {
         let own: Vec<(usize, usize)> = self.of_block(first).collect();
         for (number, lane) in own {
@@ -122,8 +138,8 @@ impl SingleHits {
             }
             left.goes[lane] = 0;
             let bsdf = self.hits[number].bsdf;
-            let square = [square[0][lane], square[1][lane]].map(f64::from);
-            let Some(sample) = bsdf.sample(f64::from(choice[lane]), square) else { continue };
+            let square = [square[0][lane], square[1][lane]].map(wide);
+            let Some(sample) = bsdf.sample(wide(choice[lane]), square) else { continue };
             let (along, normal) = (single(sample.direction), at(&hits.normal, lane));
             let is_behind = sample.direction.dot(normal) < 0.0;
             let side = if is_behind { -hits.error[lane] } else { hits.error[lane] };
@@ -133,7 +149,7 @@ impl SingleHits {
                 left.along[axis][lane] = along[axis];
             }
             // What is denser than single precision holds is as good as specular against any light.
-            left.pdf[lane] = round(sample.pdf).min(f32::MAX);
+            left.pdf[lane] = round(sample.pdf.min(wide(F::MAX)));
             left.goes[lane] = u32::MAX;
             specular[lane] = if sample.is_specular { u32::MAX } else { 0 };
             self.put_shares(tracing, number, (&bsdf, sample.weights));
@@ -152,26 +168,26 @@ impl SingleHits {
             self.shares.resize(end, 0.0);
         }
         for (k, share) in self.shares[number * count..end].iter_mut().enumerate() {
-            *share = round(tracing.in_band(bsdf, weights, k));
+            *share = tracing.in_band(bsdf, weights, k);
         }
     }
 
     /// Puts a band, of so many, of what hits were last asked in place of what is there.
     #[inline(never)]
-    pub(super) fn in_band(
+    pub(super) fn in_band<F: Lane>(
         &self,
-        (found, first): (&Found, usize),
+        (found, first): (&Found<F>, usize),
         (band, count): (usize, usize),
-        share: &mut Row,
+        share: &mut Row<F>,
     ) {
         for (number, lane) in self.of_block(first) {
             if found.single[lane] != 0 {
-                share[lane] = self.shares.get(number * count + band).copied().unwrap_or(0.0);
+                share[lane] = round(self.shares.get(number * count + band).copied().unwrap_or(0.0));
             }
         }
     }
 }
 
-fn at(axes: &[Row; 3], lane: usize) -> DVec3 {
+fn at<F: Lane>(axes: &[Row<F>; 3], lane: usize) -> DVec3 {
     DVec3::new(axes[0][lane].into(), axes[1][lane].into(), axes[2][lane].into())
 }

@@ -1,4 +1,4 @@
-//! One step of a plain scene's paths: what is looked up for sixteen hits first, then arithmetic on their rows, then
+//! One step of all paths: what is looked up for sixteen hits first, then arithmetic on their rows, then
 //! the rays that leave them side by side.
 #![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
@@ -9,35 +9,29 @@ use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::glam::DVec3;
 
 use super::ask::{ask, send};
+use super::choose::ChosenLamps;
 use super::compaction::{Compaction, Instructions};
 use super::depart::{BlockPaths, depart, end_some, keep_those_that_may_meet, scatter};
 use super::facets::BlockFacets;
-use super::lamps::{ChosenLamps, Lights, OtherPlaces, place, place_on_chosen};
+use super::lamps::{Lights, OtherPlaces, place, place_on_chosen};
+use super::lane::Lane;
 use super::single::SingleHits;
 use super::surfaces::{Found, Surfaces, bend};
 use super::{Columns, LAST, RayColumns};
 use crate::light_tree::Choices;
-use crate::transport::paths::{DRAWS, Draw};
-use crate::transport::{Tracing, kernels, patch};
+use crate::transport::Tracing;
+use crate::transport::{DRAWS, Draw};
 
-/// Roundings of a hit and of the rays that leave it: those of [`crate::spawn`] in single precision, and as many
-/// again of the point, of the normal and of the start, which are of single precision, too.
-pub(super) const ROUNDINGS: f32 = 12.0 * f32::EPSILON;
-
-/// [`kernels::BACK`] and [`patch::BESIDE`], which single precision holds.
-#[expect(clippy::cast_possible_truncation, reason = "a power of two")]
-const BACK: f32 = kernels::BACK as f32;
-#[expect(clippy::cast_possible_truncation, reason = "a power of two")]
-const BESIDE: f32 = patch::BESIDE as f32;
+/// How far rays that leave hits of f32 beside an edge start back, over the bound of [`crate::spawn`], which
+/// counts more roundings for safety than these two: of the hit, and of the origin of the ray that leaves it.
+const BACK: f64 = 0.25;
 
 /// Bits that are all set in lanes of which something holds, and 0 in the others: rows of `bool` are worked out one by
 /// one.
 pub(super) type Mask = [u32; LANES];
 
-pub(super) const ZERO: Row = [0.0; LANES];
-
 /// What a step does, and its random numbers by use, a number a lane.
-pub(super) struct Numbers<'a> {
+pub(super) struct Numbers<'a, F> {
     pub(super) is_scattered: bool,
     pub(super) goes_on: bool,
     pub(super) roulette: bool,
@@ -45,48 +39,50 @@ pub(super) struct Numbers<'a> {
     /// shines is asked for that light first.
     pub(super) is_last: bool,
     pub(super) asks_emitters: bool,
-    pub(super) drawn: &'a [[Vec<f32>; 2]; DRAWS as usize],
+    /// Anything shines.
+    pub(super) asks_lights: bool,
+    pub(super) drawn: &'a [[Vec<F>; 2]; DRAWS as usize],
     /// What lanes chose where each chooses by itself; what is left of the number that chose is drawn.
-    pub(super) chosen: Option<&'a ChosenLamps>,
+    pub(super) chosen: Option<&'a ChosenLamps<F>>,
 }
 
 /// Where rays go that leave hits.
-pub(super) struct Leaving<'a> {
-    pub(super) shadows: &'a mut RayColumns,
-    pub(super) next: &'a mut RayColumns,
+pub(super) struct Leaving<'a, F> {
+    pub(super) shadows: &'a mut RayColumns<F>,
+    pub(super) next: &'a mut RayColumns<F>,
     /// Last directions that ask what shines first.
-    pub(super) last: &'a mut RayColumns,
+    pub(super) last: &'a mut RayColumns<F>,
     pub(super) seen: &'a mut Vec<u32>,
     /// Rays that met nothing, if that is asked for.
     pub(super) missed: Option<&'a mut Vec<u32>>,
-    pub(super) facets: &'a mut BlockFacets,
+    pub(super) facets: &'a mut BlockFacets<F>,
     pub(super) singles: &'a mut SingleHits,
     /// Room for a block's colours, and for what they leave of light, by band, where bands are not red, green and blue.
-    pub(super) colors: &'a mut Vec<Row>,
-    pub(super) shares: &'a mut Vec<Row>,
+    pub(super) colors: &'a mut Vec<Row<F>>,
+    pub(super) shares: &'a mut Vec<Row<F>>,
 }
 
 /// A sphere around all that shines, relative to the blocks' origin: its centre and its radius (m).
-pub(super) type Sphere = ([f32; 3], f32);
+pub(super) type Sphere<F> = ([F; 3], F);
 
 /// The hits of a block.
-pub(super) struct Hits {
-    pub(super) point: [Row; 3],
-    pub(super) normal: [Row; 3],
+pub(super) struct Hits<F> {
+    pub(super) point: [Row<F>; 3],
+    pub(super) normal: [Row<F>; 3],
     /// The normals of meshes that light is scattered about, on the viewer's side, where there are any.
-    pub(super) bent: [Row; 3],
-    pub(super) error: Row,
-    pub(super) back: [Row; 3],
+    pub(super) bent: [Row<F>; 3],
+    pub(super) error: Row<F>,
+    pub(super) back: [Row<F>; 3],
     /// Lanes whose surfaces light may pass, so that rays to lights may leave them on either side.
     pub(super) passed: Mask,
     /// Lanes that see the front.
     pub(super) front: Mask,
 }
 
-impl Hits {
+impl<F: Lane> Hits<F> {
     /// The normals that light is scattered about.
     #[inline(always)]
-    pub(super) fn shading<const TILTED: bool>(&self) -> &[Row; 3] {
+    pub(super) fn shading<const TILTED: bool>(&self) -> &[Row<F>; 3] {
         if TILTED { &self.bent } else { &self.normal }
     }
 }
@@ -94,11 +90,11 @@ impl Hits {
 /// The points of some blocks, where surfaces scatter light, that choose among many lamps by a number a lane; their lanes
 /// go to `asking` and, unless that is empty, their places from the origin to `points`, which have room for all.
 #[multiversion::multiversion(targets = "simd")]
-pub(super) fn ask_for_lamps<const TILTED: bool, const RICH: bool>(
-    (surfaces, origin, singles): (Surfaces<'_>, DVec3, &SingleHits),
-    (blocks, carried): (&[RayBlock], &Columns),
-    numbers: &[f32],
-    (choices, asking, points): (&mut Choices, &mut [u32], &mut [Vec<f32>; 3]),
+pub(super) fn ask_for_lamps<F: Lane, const TILTED: bool, const RICH: bool>(
+    (surfaces, origin, singles): (Surfaces<'_, F>, DVec3, &SingleHits),
+    (blocks, carried): (&[RayBlock<F>], &Columns<F>),
+    numbers: &[F],
+    (choices, asking, points): (&mut Choices, &mut [u32], &mut [Vec<F>; 3]),
 ) {
     let instructions = Instructions::of_machine();
     for (number, block) in blocks.iter().enumerate() {
@@ -112,8 +108,8 @@ pub(super) fn ask_for_lamps<const TILTED: bool, const RICH: bool>(
                 singles.mark(first, &mut found);
             }
         }
-        let own: &Row = numbers[first..first + LANES].try_into().unwrap_or(&ZERO);
-        let mut hits = measure(block, &found, [0.0; 3]);
+        let own: Row<F> = numbers[first..first + LANES].try_into().unwrap_or([F::ZERO; LANES]);
+        let mut hits = measure(surfaces, block, &found, [F::ZERO; 3]);
         if RICH && TILTED && found.single != [0; LANES] {
             singles.put_normals(first, &mut hits.bent);
         }
@@ -124,27 +120,33 @@ pub(super) fn ask_for_lamps<const TILTED: bool, const RICH: bool>(
                 wanted.put(&hits.point[axis], &mut points[axis], at);
             }
         }
-        choices.push_some((&hits.point, origin), hits.shading::<TILTED>(), own, |row, to| {
-            wanted.put(row, to, 0);
-            wanted.count
-        });
+        choices.push_some(
+            (&hits.point, origin),
+            hits.shading::<TILTED>(),
+            &own,
+            |row, to| {
+                wanted.put(row, to, 0);
+                wanted.count
+            },
+            |row, to| wanted.put(row, to, 0),
+        );
     }
 }
 
 /// A step of all paths of some blocks: lists those that met what shines, and notes the rays that leave. Scenes are `RICH`
 /// in which some surface is not matte or not alike all over, or some light needs more than its place.
 #[multiversion::multiversion(targets = "simd")]
-pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool>(
-    (tracing, surfaces, lights): (&Tracing<'_, RGB>, Surfaces<'_>, &Lights<'_>),
-    (blocks, carried): (&[RayBlock], &Columns),
-    (numbers, sphere): (Numbers<'_>, Option<Sphere>),
-    mut leaving: Leaving<'_>,
+pub(super) fn leave_blocks<F: Lane, const TILTED: bool, const RICH: bool, const RGB: bool>(
+    (tracing, surfaces, lights): (&Tracing<'_, RGB>, Surfaces<'_, F>, &Lights<'_, F>),
+    (blocks, carried): (&[RayBlock<F>], &Columns<F>),
+    (numbers, sphere): (Numbers<'_, F>, Option<Sphere<F>>),
+    mut leaving: Leaving<'_, F>,
 ) {
     // Blocks' coordinates are those of the world less their origin, whose roundings count as well.
-    let offset = single(lights.origin).map(|axis| 2.0 * axis.abs());
+    let offset = single::<F>(lights.origin).map(|axis| F::of(2.0) * axis.abs());
     let instructions = Instructions::of_machine();
     for rows in [&mut *leaving.colors, &mut *leaving.shares] {
-        rows.resize(if RGB { 0 } else { carried.throughput.len() }, ZERO);
+        rows.resize(if RGB { 0 } else { carried.throughput.len() }, [F::ZERO; LANES]);
     }
     for (number, block) in blocks.iter().enumerate() {
         let first = number * LANES;
@@ -168,13 +170,14 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
         if !numbers.is_scattered || found.scatters == [0; LANES] {
             continue;
         }
-        let mut hits = measure(block, &found, offset);
+        let mut hits = measure(surfaces, block, &found, offset);
         let has_singles = RICH && TILTED && found.single != [0; LANES];
         if has_singles {
             leaving.singles.put_normals(first, &mut hits.bent);
         }
         let run = first..first + LANES;
-        let row = |column: &[f32]| -> Row { column[run.clone()].try_into().unwrap_or(ZERO) };
+        let row =
+            |column: &[F]| -> Row<F> { column[run.clone()].try_into().unwrap_or([F::ZERO; LANES]) };
         let square = |draw: Draw| {
             let [first, second] = &numbers.drawn[draw as usize];
             [row(first), row(second)]
@@ -194,7 +197,8 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
         let others = RICH.then(|| {
             OtherPlaces::of::<TILTED>(numbers.chosen, &hits, (&light, first), &mut places)
         });
-        let mut asked = ask::<TILTED, RICH>((&places, others.as_ref(), offset), &hits);
+        let mut asked =
+            ask::<F, TILTED, RICH>((&places, others.as_ref()), (offset, surfaces.roundings), &hits);
         let has_sheets = RICH && found.sheets != [0; LANES];
         if has_sheets {
             let toward = (&asked.toward, &asked.pdf, &places.is_delta);
@@ -204,10 +208,14 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
             let toward = (&asked.toward, &asked.pdf, &places.is_delta);
             leaving.singles.reflect(tracing, (&found, first), toward, &mut asked.value);
         }
-        let asks = if RICH { found.asks() } else { found.scatters };
+        let asks = match (numbers.asks_lights, RICH) {
+            (false, _) => [0; LANES],
+            (true, true) => found.asks(),
+            (true, false) => found.scatters,
+        };
         // Rows are worked out in locals: closures for them, and rows that change in place, go through memory.
-        let (mut three, bands) = ([ZERO; 3], carried.count::<RGB>());
-        let shares: &mut [Row] = if RGB { &mut three } else { leaving.shares };
+        let (mut three, bands) = ([[F::ZERO; LANES]; 3], carried.count::<RGB>());
+        let shares: &mut [Row<F>] = if RGB { &mut three } else { leaving.shares };
         for band in 0..bands {
             let (mut share, arrived) = (colors[band], row(&carried.throughput[band]));
             if has_sheets {
@@ -227,12 +235,13 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
             }
             shares[band] = share;
         }
-        send(&asked, &places, (&asks, &ray, shares), (instructions, leaving.shadows));
+        let toward = (&asks, [&ray, &lanes], &*shares);
+        send::<F, RICH>(&asked, &places, toward, (instructions, leaving.shadows));
         if !numbers.goes_on && !has_singles && (!RICH || found.smooth == [0; LANES]) {
             continue;
         }
         let mut specular = found.smooth;
-        let mut left = scatter::<TILTED>(&hits, square(Draw::Direction));
+        let mut left = scatter::<F, TILTED>(&hits, square(Draw::Direction));
         for i in 0..LANES {
             left.goes[i] &= found.scatters[i];
         }
@@ -256,10 +265,11 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
             }
         }
         if let Some(sphere) = &sphere {
-            keep_those_that_may_meet(sphere, (&left.start, &left.along), &specular, &mut left.goes);
+            let rays = (&left.start, &left.along);
+            keep_those_that_may_meet((sphere, surfaces.roundings), rays, &specular, &mut left.goes);
         }
-        let mut three = [ZERO; 3];
-        let throughput: &mut [Row] = if RGB { &mut three } else { leaving.shares };
+        let mut three = [[F::ZERO; LANES]; 3];
+        let throughput: &mut [Row<F>] = if RGB { &mut three } else { leaving.shares };
         for band in 0..bands {
             let (mut passed, arrived) = (colors[band], row(&carried.throughput[band]));
             if has_facets {
@@ -279,13 +289,13 @@ pub(super) fn leave_blocks<const TILTED: bool, const RICH: bool, const RGB: bool
         let departing = BlockPaths { throughput, ray, lanes, specular, sky_chance };
         let shading = numbers.chosen.is_some().then(|| hits.shading::<TILTED>());
         let to = (&mut *leaving.next, &mut *leaving.last);
-        depart::<RICH>((&left, shading), &departing, &numbers, (instructions, to));
+        depart::<F, RICH>((&left, shading), &departing, &numbers, (instructions, to));
     }
 }
 
 /// Leaves out the surfaces that paths met which only look for light.
 #[inline(always)]
-fn leave_out(found: &mut Found, carried: &Columns, first: usize) {
+fn leave_out<F: Lane>(found: &mut Found<F>, carried: &Columns<F>, first: usize) {
     let Some(flags) = carried.flags.get(first..first + LANES) else { return };
     for i in 0..LANES {
         let goes_on = if flags[i] & LAST == 0 { u32::MAX } else { 0 };
@@ -311,23 +321,29 @@ fn lanes_from(first: usize) -> [u32; LANES] {
     lanes
 }
 
-/// Points, their errors, and normals on the viewer's side, as [`super::super::kernels::measure`] has them.
+/// Points, their errors, and normals on the viewer's side.
 #[inline(always)]
-fn measure(block: &RayBlock, found: &Found, offset: [f32; 3]) -> Hits {
+fn measure<F: Lane>(
+    Surfaces { roundings, beside, .. }: Surfaces<'_, F>,
+    block: &RayBlock<F>,
+    found: &Found<F>,
+    offset: [F; 3],
+) -> Hits<F> {
     let magnitudes = &found.magnitudes;
     let [x, y, z] = &block.normal;
     let [dx, dy, dz] = &block.direction;
-    let (mut normal, mut front) = ([ZERO; 3], [0; LANES]);
+    let (mut normal, mut front) = ([[F::ZERO; LANES]; 3], [0; LANES]);
     for i in 0..LANES {
         let squared = x[i] * x[i] + y[i] * y[i] + z[i] * z[i];
         let along = x[i] * dx[i] + y[i] * dy[i] + z[i] * dz[i];
-        front[i] = mask(along <= 0.0);
-        let scale = if along <= 0.0 { 1.0 } else { -1.0 } / squared.sqrt();
+        front[i] = mask(along <= F::ZERO);
+        let scale = if along <= F::ZERO { F::ONE } else { -F::ONE } / squared.sqrt();
         normal[0][i] = x[i] * scale;
         normal[1][i] = y[i] * scale;
         normal[2][i] = z[i] * scale;
     }
-    let (mut point, mut error, mut most) = ([ZERO; 3], ZERO, ZERO);
+    let (mut point, mut error, mut most) =
+        ([[F::ZERO; LANES]; 3], [F::ZERO; LANES], [F::ZERO; LANES]);
     for axis in 0..3 {
         let (start, direction) = (&block.origin[axis], &block.direction[axis]);
         for i in 0..LANES {
@@ -338,14 +354,14 @@ fn measure(block: &RayBlock, found: &Found, offset: [f32; 3]) -> Hits {
             most[i] = if size > most[i] { size } else { most[i] };
         }
     }
-    let mut back = [ZERO; 3];
+    let mut back = [[F::ZERO; LANES]; 3];
     for i in 0..LANES {
-        error[i] *= ROUNDINGS;
+        error[i] *= roundings;
         let (u, v) = (block.u[i], block.v[i]);
-        let (rest, least) = (1.0 - u - v, if u < v { u } else { v });
+        let (rest, least) = (F::ONE - u - v, if u < v { u } else { v });
         let least = if rest < least { rest } else { least };
-        let is_beside = (least < BESIDE) & (found.passed[i] == 0);
-        let amount = if is_beside { BACK * ROUNDINGS * most[i] } else { 0.0 };
+        let is_beside = (least < beside) & (found.passed[i] == 0);
+        let amount = if is_beside { F::of(BACK) * roundings * most[i] } else { F::ZERO };
         let across = normal[0][i] * dx[i] + normal[1][i] * dy[i] + normal[2][i] * dz[i];
         back[0][i] = (normal[0][i] * across - dx[i]) * amount;
         back[1][i] = (normal[1][i] * across - dy[i]) * amount;
@@ -357,13 +373,15 @@ fn measure(block: &RayBlock, found: &Found, offset: [f32; 3]) -> Hits {
     };
     Hits { point, normal, bent, error, back, passed: found.passed, front }
 }
+
+/// A vector, rounded to the precision of lanes.
 #[inline(always)]
-pub(super) fn single(v: DVec3) -> [f32; 3] {
-    [round(v.x), round(v.y), round(v.z)]
+pub(super) fn single<F: Lane>(v: DVec3) -> [F; 3] {
+    [F::of(v.x), F::of(v.y), F::of(v.z)]
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "rounding to single precision is the purpose")]
+/// A number, rounded likewise.
 #[inline(always)]
-pub(super) fn round(x: f64) -> f32 {
-    x as f32
+pub(super) fn round<F: Lane>(x: f64) -> F {
+    F::of(x)
 }

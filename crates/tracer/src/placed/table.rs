@@ -1,26 +1,29 @@
-//! Surfaces in single precision: matte, sheets of facets, mirrors and smooth glass. What is not alike all over, as
-//! textures have it, is looked up where it is hit.
+//! A table of what is looked up for each hit, in single precision, by placement. What is not alike all over, as textures
+//! have it, is looked up where it is hit.
 
 use etendue_geometry::glam::DMat3;
 use etendue_geometry::{Geometry, Mesh, Placement};
 
-use super::{PlacedSurface, SurfaceKind, plain_tint};
+use super::{PlacedSurface, plain_tint};
 use crate::shading::SheetSurface;
+use crate::transport::Traits;
 use crate::{Conductor, ConductorId, Material, Scattering, Spectral};
 
-/// The surfaces of a scene by their placements, where each is of one of these kinds and wholly there.
-#[derive(Debug, Clone)]
-pub(crate) struct PlainSurfaces {
+/// The surfaces of a scene by their placements.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SurfaceTable {
     /// Behind the last one that is not there.
-    pub(crate) all: Vec<PlainSurface>,
+    pub(crate) all: Vec<SurfaceRow>,
     /// Their facets, by material; empty where all are matte.
-    pub(crate) facets: Vec<PlainFacets>,
+    pub(crate) facets: Vec<Facets>,
     /// Some scatter light about other normals than those of their triangles.
     pub(crate) are_tilted: bool,
     /// Some are mirrors or boundaries of smooth glass.
     pub(crate) are_smooth: bool,
     /// Some are not alike all over.
     pub(crate) are_varied: bool,
+    /// How much of some paths see counts behind mirrors and smooth boundaries, too.
+    pub(crate) carry_cones: bool,
     /// The colours of materials that are alike all over, `[material][band]`; 0 of others. Of measured metals what they
     /// reflect face on. Empty where bands are red, green and blue.
     colors: Vec<f32>,
@@ -31,7 +34,7 @@ pub(crate) struct PlainSurfaces {
 
 /// A surface that scatters light, or only shines.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct PlainSurface {
+pub(crate) struct SurfaceRow {
     /// Red, green and blue; of a measured metal what it reflects face on. Unused where bands are others.
     pub(crate) color: [f32; 3],
     /// [`PlacedSurface::magnitudes`] (m).
@@ -39,7 +42,7 @@ pub(crate) struct PlainSurface {
     /// Index of its material.
     pub(crate) material: u32,
     pub(crate) is_there: bool,
-    pub(crate) kind: PlainKind,
+    pub(crate) kind: SurfaceKind,
     pub(crate) shines: bool,
     /// Its colour, its facets or its normals are those of the place where it is hit; its facets are, and its normals, as
     /// where they are mapped or move.
@@ -50,24 +53,40 @@ pub(crate) struct PlainSurface {
     pub(crate) turn: Option<[[f32; 3]; 3]>,
 }
 
-/// How a plain surface scatters light.
+/// As what the hits of a surface are worked on, where it is there.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) enum PlainKind {
-    /// Not at all.
+pub(crate) enum SurfaceKind {
+    /// It scatters nothing.
     #[default]
     Black,
+    /// Lambert's.
     Matte,
-    /// [`SurfaceKind::Sheet`].
+    /// A sheet of facets over a matte base ([`crate::bsdf::sheets`]): rough metal, and glTF's surfaces without
+    /// more over them.
     Sheet,
-    /// [`SurfaceKind::Smooth`].
+    /// A mirror, or a smooth boundary of glass.
     Smooth,
     /// Of any other kind, or a sheet smoother than [`LEAST_ALPHA`]: worked out hit by hit.
     Other,
 }
 
+impl SurfaceKind {
+    fn of(scattering: &Scattering) -> Self {
+        match scattering {
+            Scattering::Black | Scattering::Unlit => Self::Black,
+            Scattering::Matte => Self::Matte,
+            Scattering::Metal { roughness, .. } if *roughness > 0.0 => Self::Sheet,
+            Scattering::Gltf(surface) if surface.is_bare_sheet() => Self::Sheet,
+            Scattering::Mirror | Scattering::Metal { .. } => Self::Smooth,
+            Scattering::Dielectric(glass) if glass.roughness == 0.0 => Self::Smooth,
+            Scattering::Dielectric(_) | Scattering::Gltf(_) => Self::Other,
+        }
+    }
+}
+
 /// What a sheet of facets has, or a smooth surface, as [`crate::bsdf::sheets::Sheets`] takes it.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct PlainFacets {
+pub(crate) struct Facets {
     /// The square of the roughness, and the share of metal.
     pub(crate) alpha: f64,
     pub(crate) metallic: f64,
@@ -90,7 +109,7 @@ pub(crate) struct PlainFacets {
 /// The least square of a roughness whose densities, and directions within whose highlights, single precision holds.
 pub(crate) const LEAST_ALPHA: f64 = 1e-6;
 
-impl PlainSurfaces {
+impl SurfaceTable {
     /// Tests whether some are not matte, or not alike all over.
     pub(crate) fn are_rich(&self) -> bool {
         !self.facets.is_empty() || self.are_varied
@@ -115,31 +134,38 @@ impl PlainSurfaces {
         self.facet_bands.get(first..first + self.count).unwrap_or_default()
     }
 
-    /// `None` if one is not plain.
+    /// Those of a scene.
     pub(super) fn of(
         placed: &[Option<PlacedSurface>],
         (geometry, materials): (&Geometry, &[Material]),
-        spectral: &Spectral,
-    ) -> Option<Self> {
+        (spectral, traits): (&Spectral, &Traits),
+    ) -> Self {
         // Many copies are of few materials.
         let mut all = Vec::with_capacity(placed.len() + 1);
         for (placed, placement) in placed.iter().zip(&geometry.placements) {
-            let material = materials.get(placement.material as usize)?;
-            let mesh = geometry.mesh_of(placement);
-            all.push(PlainSurface::of(placed.as_ref()?, material, (placement, mesh), spectral)?);
+            let material = materials.get(placement.material as usize);
+            let placement = (placement, geometry.mesh_of(placement));
+            all.push(match (placed, material) {
+                (Some(placed), Some(material)) => {
+                    SurfaceRow::of(placed, material, placement, (spectral, traits))
+                }
+                _ => SurfaceRow::default(),
+            });
         }
         let mut facets: Vec<_> =
-            materials.iter().map(|material| PlainFacets::of(material, spectral)).collect();
-        let has = |kind| all.iter().any(|own: &PlainSurface| own.kind == kind);
-        let (has_smooth, has_sheets) = (has(PlainKind::Smooth), has(PlainKind::Sheet));
+            materials.iter().map(|material| Facets::of(material, spectral)).collect();
+        let has = |kind| all.iter().any(|own: &SurfaceRow| own.kind == kind);
+        let (has_smooth, has_sheets) = (has(SurfaceKind::Smooth), has(SurfaceKind::Sheet));
         if !has_smooth && !has_sheets {
             facets.clear();
         }
         // What is worked out by itself may be smooth, and has normals of its own.
-        let has_others = has(PlainKind::Other) || all.iter().any(|own| own.has_own_facets);
+        let has_others = has(SurfaceKind::Other) || all.iter().any(|own| own.has_own_facets);
         let are_smooth = has_smooth || has_others;
         let are_tilted = has_others || all.iter().any(|surface| surface.turn.is_some());
         let are_varied = all.iter().any(|surface| surface.is_varied);
+        let has_alpha = materials.iter().any(Material::has_alpha);
+        let carry_cones = are_smooth && (are_varied || has_alpha);
         let count = spectral.count();
         let (mut colors, mut facet_bands) = (Vec::new(), Vec::new());
         for material in materials.iter().filter(|_| !spectral.is_rgb()) {
@@ -148,31 +174,35 @@ impl PlainSurfaces {
                 facet_bands.extend((0..count).map(|k| bands_of_facets(material, spectral, k)));
             }
         }
-        all.push(PlainSurface::default());
-        Some(Self { all, facets, are_tilted, are_smooth, are_varied, colors, facet_bands, count })
+        all.push(SurfaceRow::default());
+        Self {
+            all,
+            facets,
+            are_tilted,
+            are_smooth,
+            are_varied,
+            carry_cones,
+            colors,
+            facet_bands,
+            count,
+        }
     }
 }
 
-impl PlainSurface {
-    /// `None` of a surface of another kind.
+impl SurfaceRow {
     fn of(
         placed: &PlacedSurface,
         material: &Material,
         (placement, mesh): (&Placement, &Mesh),
-        spectral: &Spectral,
-    ) -> Option<Self> {
-        let kind = match placed.kind {
-            SurfaceKind::Black => PlainKind::Black,
-            SurfaceKind::Matte => PlainKind::Matte,
-            SurfaceKind::Sheet => PlainKind::Sheet,
-            SurfaceKind::Smooth => PlainKind::Smooth,
-            SurfaceKind::Other => PlainKind::Other,
+        (spectral, traits): (&Spectral, &Traits),
+    ) -> Self {
+        let parts_media = traits.has_media || traits.has_dispersion;
+        let kind = match SurfaceKind::of(&material.scattering) {
+            // What media there are on its sides is known where it is hit.
+            SurfaceKind::Smooth if parts_media && !placed.is_opaque => SurfaceKind::Other,
+            kind => kind,
         };
-        let is_unlit = material.scattering == Scattering::Unlit;
-        if placed.has_alpha || placed.may_vanish() || is_unlit {
-            return None;
-        }
-        let scatters = kind != PlainKind::Black;
+        let scatters = kind != SurfaceKind::Black;
         let is_tilted = scatters && placed.is_tilted;
         let moves = placement.motion.is_some() || mesh.steps.is_some();
         let is_mapped = is_tilted && (moves || material.normal_map.is_some());
@@ -185,31 +215,32 @@ impl PlainSurface {
         let turn = is_tilted.then(rows);
         let has_own_facets = match &material.scattering {
             Scattering::Gltf(surface) => {
-                kind == PlainKind::Sheet && surface.plain_sheet(spectral).is_none()
+                kind == SurfaceKind::Sheet && surface.plain_sheet(spectral).is_none()
             }
             _ => false,
         };
-        let is_resolved =
-            has_own_facets || PlainFacets::of(material, spectral).alpha >= LEAST_ALPHA;
-        let kind = if kind == PlainKind::Sheet && !is_resolved { PlainKind::Other } else { kind };
+        let is_resolved = has_own_facets || Facets::of(material, spectral).alpha >= LEAST_ALPHA;
+        let kind =
+            if kind == SurfaceKind::Sheet && !is_resolved { SurfaceKind::Other } else { kind };
         let is_known = measured(material).is_some() || placed.color.is_some();
-        let is_varied = !is_known || is_mapped || has_own_facets || kind == PlainKind::Other;
+        let is_varied = !is_known || is_mapped || has_own_facets || kind == SurfaceKind::Other;
         let color = match spectral.is_rgb() && scatters && is_known {
             true => [0, 1, 2].map(|k| face_on(material, spectral, k)),
             false => [0.0; 3],
         };
-        Some(Self {
+        Self {
             color: color.map(single),
             magnitudes: placed.magnitudes.to_array().map(single),
             material: placement.material,
             is_there: true,
             kind,
-            shines: placed.is_seen,
+            // What may not be there is met before it is known whether it is.
+            shines: placed.is_seen && !placed.may_vanish(),
             is_varied: scatters && is_varied,
             has_own_facets,
             is_mapped,
             turn,
-        })
+        }
     }
 }
 
@@ -242,7 +273,7 @@ fn bands_of_facets(material: &Material, spectral: &Spectral, band: usize) -> [f6
     [highlight.map_or(1.0, |tint| spectral.tint(&tint, band)), dip]
 }
 
-impl PlainFacets {
+impl Facets {
     /// Those of a material; of what is not alike all over none.
     fn of(material: &Material, spectral: &Spectral) -> Self {
         let base = plain_tint(&material.base_color, spectral);

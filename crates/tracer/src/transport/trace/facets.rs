@@ -5,7 +5,8 @@
 use etendue_geometry::RayBlock;
 use etendue_geometry::block::{Floats as Row, LANES};
 
-use super::kernel::{Hits, Mask, ZERO, mask, round};
+use super::kernel::{Hits, Mask, mask, round};
+use super::lane::Lane;
 use super::surfaces::{Found, Surfaces};
 use crate::bsdf::Weights;
 use crate::bsdf::metal::{mean_reflectance, multiple};
@@ -16,7 +17,7 @@ type Wide = [f64; LANES];
 
 /// The facets of a block's hits, kept for the next block.
 #[derive(Debug, Default)]
-pub(super) struct BlockFacets {
+pub(super) struct BlockFacets<F> {
     sheets: Box<Sheets<LANES>>,
     smooth: Box<Smooth<LANES>>,
     normal: [Wide; 3],
@@ -24,7 +25,7 @@ pub(super) struct BlockFacets {
     direction: [Wide; 3],
     bands: Vec<FacetBand>,
     /// Of what was scattered by chance what goes on, by band.
-    scattered: Vec<Row>,
+    scattered: Vec<Row<F>>,
 }
 
 /// A band of a block's facets.
@@ -38,24 +39,24 @@ struct FacetBand {
 }
 
 /// The rays that leave a block's hits by chance, and what they carry.
-pub(super) struct BsdfSamples {
-    pub(super) start: [Row; 3],
-    pub(super) along: [Row; 3],
-    pub(super) pdf: Row,
+pub(super) struct BsdfSamples<F> {
+    pub(super) start: [Row<F>; 3],
+    pub(super) along: [Row<F>; 3],
+    pub(super) pdf: Row<F>,
     pub(super) goes: Mask,
 }
 
-impl BlockFacets {
+impl<F: Lane> BlockFacets<F> {
     /// Takes the facets of a block's hits as they are seen, with normals that light is scattered about and colours by
     /// band.
     #[inline(always)]
     pub(super) fn see<const RGB: bool>(
         &mut self,
-        surfaces: Surfaces<'_>,
-        (block, first, found): (&RayBlock, usize, &Found),
-        (hits, shading, colors): (&Hits, &[Row; 3], &[Row]),
+        surfaces: Surfaces<'_, F>,
+        (block, first, found): (&RayBlock<F>, usize, &Found<F>),
+        (hits, shading, colors): (&Hits<F>, &[Row<F>; 3], &[Row<F>]),
     ) {
-        see::<RGB>(self, surfaces, (block, first, found), (hits, shading, colors));
+        see::<F, RGB>(self, surfaces, (block, first, found), (hits, shading, colors));
     }
 
     /// What sheets turn to the viewer of light that comes from unit directions which were chosen with a density (1/sr):
@@ -64,8 +65,8 @@ impl BlockFacets {
     pub(super) fn reflect(
         &mut self,
         lanes: &Mask,
-        (toward, pdf, is_delta): (&[Row; 3], &Row, &Row),
-        value: &mut Row,
+        (toward, pdf, is_delta): (&[Row<F>; 3], &Row<F>, &Row<F>),
+        value: &mut Row<F>,
     ) {
         reflect(self, lanes, (toward, pdf, is_delta), value);
     }
@@ -75,10 +76,10 @@ impl BlockFacets {
     #[inline(always)]
     pub(super) fn scatter(
         &mut self,
-        found: &Found,
-        hits: &Hits,
-        (choice, square): (&Row, &[Row; 2]),
-        scattered: &mut BsdfSamples,
+        found: &Found<F>,
+        hits: &Hits<F>,
+        (choice, square): (&Row<F>, &[Row<F>; 2]),
+        scattered: &mut BsdfSamples<F>,
     ) {
         if found.sheets != [0; LANES] {
             scatter_sheets(self, &found.sheets, (choice, square), scattered);
@@ -87,7 +88,7 @@ impl BlockFacets {
             scatter_smooth(self, (&found.smooth, hits), choice, scattered);
         }
         let mut shares = std::mem::take(&mut self.scattered);
-        shares.resize(self.bands.len(), ZERO);
+        shares.resize(self.bands.len(), [F::ZERO; LANES]);
         for (band, share) in shares.iter_mut().enumerate() {
             if found.sheets != [0; LANES] {
                 self.sheets_in_band(&found.sheets, band, share);
@@ -101,7 +102,7 @@ impl BlockFacets {
 
     /// Puts a band of what [`Self::scatter`] passes on in place of what is there.
     #[inline(always)]
-    pub(super) fn in_band(&self, found: &Found, band: usize, share: &mut Row) {
+    pub(super) fn in_band(&self, found: &Found<F>, band: usize, share: &mut Row<F>) {
         for i in 0..LANES {
             let is_own = found.sheets[i] | found.smooth[i] != 0;
             share[i] = if is_own { self.scattered[band][i] } else { share[i] };
@@ -110,18 +111,18 @@ impl BlockFacets {
 
     /// Puts a band of what sheets were last asked in place of what is there.
     #[inline(always)]
-    pub(super) fn sheets_in_band(&self, lanes: &Mask, band: usize, share: &mut Row) {
+    pub(super) fn sheets_in_band(&self, lanes: &Mask, band: usize, share: &mut Row<F>) {
         for i in 0..LANES {
-            let own = self.bands[band].of(self.sheets.weights(i), i);
+            let own = round(self.bands[band].of(self.sheets.weights(i), i));
             share[i] = if lanes[i] != 0 { own } else { share[i] };
         }
     }
 
     /// The same of smooth surfaces.
     #[inline(always)]
-    fn smooth_in_band(&self, lanes: &Mask, band: usize, share: &mut Row) {
+    fn smooth_in_band(&self, lanes: &Mask, band: usize, share: &mut Row<F>) {
         for i in 0..LANES {
-            let own = self.bands[band].of(self.smooth.weights(i), i);
+            let own = round(self.bands[band].of(self.smooth.weights(i), i));
             share[i] = if lanes[i] != 0 { own } else { share[i] };
         }
     }
@@ -130,31 +131,31 @@ impl BlockFacets {
 impl FacetBand {
     /// What a lane has of light.
     #[inline(always)]
-    fn of(&self, value: Weights, lane: usize) -> f32 {
+    fn of(&self, value: Weights, lane: usize) -> f64 {
         let sum = value.white
             + value.base * self.base[lane]
             + value.highlight * self.highlight[lane]
             + value.dip * self.dip[lane]
             + value.deep * self.deep[lane];
-        round(if sum > 0.0 { sum } else { 0.0 })
+        if sum > 0.0 { sum } else { 0.0 }
     }
 }
 
 #[inline(always)]
-fn widen(rows: &[Row; 3], to: &mut [Wide; 3]) {
+fn widen<F: Lane>(rows: &[Row<F>; 3], to: &mut [Wide; 3]) {
     for axis in 0..3 {
         for i in 0..LANES {
-            to[axis][i] = f64::from(rows[axis][i]);
+            to[axis][i] = rows[axis][i].into();
         }
     }
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn see<const RGB: bool>(
-    facets: &mut BlockFacets,
-    surfaces: Surfaces<'_>,
-    (block, first, found): (&RayBlock, usize, &Found),
-    (hits, shading, colors): (&Hits, &[Row; 3], &[Row]),
+fn see<F: Lane, const RGB: bool>(
+    facets: &mut BlockFacets<F>,
+    surfaces: Surfaces<'_, F>,
+    (block, first, found): (&RayBlock<F>, usize, &Found<F>),
+    (hits, shading, colors): (&Hits<F>, &[Row<F>; 3], &[Row<F>]),
 ) {
     widen(&hits.normal, &mut facets.normal);
     widen(shading, &mut facets.shading);
@@ -164,7 +165,7 @@ fn see<const RGB: bool>(
     bands.resize(count, FacetBand::default());
     for (band, color) in bands.iter_mut().zip(colors) {
         for i in 0..LANES {
-            band.base[i] = f64::from(color[i]);
+            band.base[i] = color[i].into();
         }
     }
     // What lanes of other surfaces hold is of no use, and a number.
@@ -223,17 +224,17 @@ fn see<const RGB: bool>(
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn reflect(
-    facets: &mut BlockFacets,
+fn reflect<F: Lane>(
+    facets: &mut BlockFacets<F>,
     lanes: &Mask,
-    (toward, pdf, is_delta): (&[Row; 3], &Row, &Row),
-    value: &mut Row,
+    (toward, pdf, is_delta): (&[Row<F>; 3], &Row<F>, &Row<F>),
+    value: &mut Row<F>,
 ) {
     let mut wide = [[0.0; LANES]; 3];
     widen(toward, &mut wide);
     let (mut of_pdf, mut of_delta, mut found) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
     for i in 0..LANES {
-        (of_pdf[i], of_delta[i]) = (f64::from(pdf[i]), f64::from(is_delta[i]));
+        (of_pdf[i], of_delta[i]) = (pdf[i].into(), is_delta[i].into());
     }
     let asked = (&wide, &of_pdf, &of_delta);
     facets.sheets.reflect([&facets.normal, &facets.shading], asked, &mut found);
@@ -243,16 +244,16 @@ fn reflect(
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn scatter_sheets(
-    facets: &mut BlockFacets,
+fn scatter_sheets<F: Lane>(
+    facets: &mut BlockFacets<F>,
     lanes: &Mask,
-    (choice, square): (&Row, &[Row; 2]),
-    scattered: &mut BsdfSamples,
+    (choice, square): (&Row<F>, &[Row<F>; 2]),
+    scattered: &mut BsdfSamples<F>,
 ) {
     let (mut choices, mut squares) = ([0.0; LANES], [[0.0; 2]; LANES]);
     for i in 0..LANES {
-        choices[i] = f64::from(choice[i]);
-        squares[i] = [f64::from(square[0][i]), f64::from(square[1][i])];
+        choices[i] = choice[i].into();
+        squares[i] = [square[0][i].into(), square[1][i].into()];
     }
     let (mut along, mut pdf) = ([[0.0; LANES]; 3], [0.0; LANES]);
     let normals = [&facets.normal, &facets.shading];
@@ -268,21 +269,21 @@ fn scatter_sheets(
         let is_own = lanes[i] != 0;
         let density = round(pdf[i]);
         scattered.pdf[i] = if is_own { density } else { scattered.pdf[i] };
-        let goes = mask((density > 0.0) & (density <= f32::MAX));
+        let goes = mask((density > F::ZERO) & (density <= F::MAX));
         scattered.goes[i] = if is_own { goes } else { scattered.goes[i] };
     }
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn scatter_smooth(
-    facets: &mut BlockFacets,
-    (lanes, hits): (&Mask, &Hits),
-    choice: &Row,
-    scattered: &mut BsdfSamples,
+fn scatter_smooth<F: Lane>(
+    facets: &mut BlockFacets<F>,
+    (lanes, hits): (&Mask, &Hits<F>),
+    choice: &Row<F>,
+    scattered: &mut BsdfSamples<F>,
 ) {
     let mut choices = [0.0; LANES];
     for i in 0..LANES {
-        choices[i] = f64::from(choice[i]);
+        choices[i] = choice[i].into();
     }
     let (mut along, mut goes) = ([[0.0; LANES]; 3], [0.0; LANES]);
     let normals = [&facets.normal, &facets.shading];
@@ -296,7 +297,7 @@ fn scatter_smooth(
             row[i] = if is_own { along } else { row[i] };
             let side = if smooth.refracts[i] > 0.0 { -hits.error[i] } else { hits.error[i] };
             // Rays that pass a surface leave it on the other side.
-            let back = if smooth.eta[i] > 0.0 { 0.0 } else { hits.back[axis][i] };
+            let back = if smooth.eta[i] > 0.0 { F::ZERO } else { hits.back[axis][i] };
             let start = hits.point[axis][i] + (hits.normal[axis][i] * side + back);
             let row = &mut scattered.start[axis];
             row[i] = if is_own { start } else { row[i] };

@@ -1,40 +1,66 @@
 //! Single and double precision, for formulas that are written once for both.
 
-use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub};
+use std::fmt::Debug;
+use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
-use etendue_geometry::disk;
+use crate::disk;
 
 /// A number of either precision.
-pub(crate) trait Float:
+pub trait Float:
     Copy
+    + Default
+    + Debug
+    + Send
+    + Sync
+    + 'static
     + PartialOrd
     + From<f32>
+    + Into<f64>
     + Add<Output = Self>
     + Sub<Output = Self>
     + Mul<Output = Self>
     + Div<Output = Self>
     + Neg<Output = Self>
     + AddAssign
+    + SubAssign
     + MulAssign
+    + DivAssign
 {
+    /// 0.
     const ZERO: Self;
+    /// 1.
+    const ONE: Self;
+    /// Infinity.
+    const INFINITY: Self;
+    /// The largest finite number.
+    const MAX: Self;
+    /// Twice the largest relative error of rounding.
+    const EPSILON: Self;
     /// The largest number below 1.
     const ONE_BELOW: Self;
 
     /// A number of double precision, rounded to this one's.
     fn of(x: f64) -> Self;
 
+    /// Square root.
+    #[must_use]
     fn sqrt(self) -> Self;
 
+    /// Absolute value.
+    #[must_use]
     fn abs(self) -> Self;
 
+    /// The absolute value with another's sign.
+    #[must_use]
     fn copysign(self, sign: Self) -> Self;
 
     /// The nearest whole number, of a number of at least −2²² and at most 2²² (2⁵⁰ in double precision), and its last
     /// bits.
+    #[must_use]
     fn nearest(self) -> (Self, u32);
 
     /// Sine and cosine of an angle (rad) of at most π/4.
+    #[must_use]
     fn small_sine_cosine(self) -> (Self, Self);
 }
 
@@ -60,7 +86,11 @@ macro_rules! own_functions {
 
 impl Float for f64 {
     const ZERO: Self = 0.0;
-    const ONE_BELOW: Self = crate::sampling::ONE_BELOW;
+    const ONE: Self = 1.0;
+    const INFINITY: Self = Self::INFINITY;
+    const MAX: Self = Self::MAX;
+    const EPSILON: Self = Self::EPSILON;
+    const ONE_BELOW: Self = 1.0 - Self::EPSILON / 2.0;
 
     #[inline(always)]
     fn of(x: f64) -> Self {
@@ -86,6 +116,10 @@ impl Float for f64 {
 
 impl Float for f32 {
     const ZERO: Self = 0.0;
+    const ONE: Self = 1.0;
+    const INFINITY: Self = Self::INFINITY;
+    const MAX: Self = Self::MAX;
+    const EPSILON: Self = Self::EPSILON;
     const ONE_BELOW: Self = 1.0 - Self::EPSILON / 2.0;
 
     #[inline(always)]

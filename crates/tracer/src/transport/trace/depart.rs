@@ -1,37 +1,41 @@
 //! Paths that leave hits: their directions by matte surfaces, those that end, and what the others carry.
 #![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
-use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
+use std::f64::consts::{FRAC_1_PI, FRAC_PI_4};
 use std::hint::select_unpredictable;
 
 use etendue_geometry::block::{Floats as Row, LANES};
 
 use super::compaction::{Compaction, Instructions};
 use super::facets::BsdfSamples;
-use super::kernel::{Hits, Mask, Numbers, ROUNDINGS, Sphere, ZERO, mask};
+use super::kernel::{Hits, Mask, Numbers, Sphere, mask};
+use super::lane::Lane;
 use super::{LAST, RayColumns, SPECULAR};
-use crate::float::Float;
 
 /// Leaves out paths that carry nothing and, by roulette, some of those that carry little of their largest band.
 #[inline(always)]
-pub(super) fn end_some(throughput: &mut [Row], goes: &mut Mask, roulette: Option<[Row; 2]>) {
-    let mut most = ZERO;
+pub(super) fn end_some<F: Lane>(
+    throughput: &mut [Row<F>],
+    goes: &mut Mask,
+    roulette: Option<[Row<F>; 2]>,
+) {
+    let mut most = [F::ZERO; LANES];
     for band in &*throughput {
         for i in 0..LANES {
             most[i] = if band[i] > most[i] { band[i] } else { most[i] };
         }
     }
     for i in 0..LANES {
-        goes[i] &= mask(most[i] > 0.0);
+        goes[i] &= mask(most[i] > F::ZERO);
     }
     let Some([_, chance]) = roulette else { return };
-    let mut more = [1.0; LANES];
+    let mut more = [F::ONE; LANES];
     for i in 0..LANES {
         // Its root: where few paths come this far, ending them saves little and leaves noise.
         let root = most[i].sqrt();
-        let survival = if root < 1.0 { root } else { 1.0 };
+        let survival = if root < F::ONE { root } else { F::ONE };
         goes[i] &= mask(chance[i] < survival);
-        more[i] = if survival > 0.0 { 1.0 / survival } else { 0.0 };
+        more[i] = if survival > F::ZERO { F::ONE / survival } else { F::ZERO };
     }
     for band in throughput {
         for i in 0..LANES {
@@ -41,23 +45,23 @@ pub(super) fn end_some(throughput: &mut [Row], goes: &mut Mask, roulette: Option
 }
 
 /// What the paths of a block carry that leave its hits.
-pub(super) struct BlockPaths<'a> {
+pub(super) struct BlockPaths<'a, F> {
     /// By band.
-    pub(super) throughput: &'a [Row],
+    pub(super) throughput: &'a [Row<F>],
     pub(super) ray: [u32; LANES],
     pub(super) lanes: [u32; LANES],
     /// Those whose directions only their surfaces can give.
     pub(super) specular: Mask,
-    pub(super) sky_chance: Option<Row>,
+    pub(super) sky_chance: Option<Row<F>>,
 }
 
 /// Notes the paths that leave a block's hits.
 #[inline(always)]
-pub(super) fn depart<const RICH: bool>(
-    (left, shading): (&BsdfSamples, Option<&[Row; 3]>),
-    departing: &BlockPaths<'_>,
-    numbers: &Numbers<'_>,
-    (instructions, (next, last)): (Instructions, (&mut RayColumns, &mut RayColumns)),
+pub(super) fn depart<F: Lane, const RICH: bool>(
+    (left, shading): (&BsdfSamples<F>, Option<&[Row<F>; 3]>),
+    departing: &BlockPaths<'_, F>,
+    numbers: &Numbers<'_, F>,
+    (instructions, (next, last)): (Instructions, (&mut RayColumns<F>, &mut RayColumns<F>)),
 ) {
     let ends_apart = numbers.is_last && numbers.asks_emitters;
     let (mut rough, mut specular) = (left.goes, left.goes);
@@ -81,7 +85,12 @@ pub(super) fn depart<const RICH: bool>(
 
 /// Notes which paths are specular, and so much of the others.
 #[inline(always)]
-fn put_flags(departing: &BlockPaths<'_>, going: Compaction, of_rough: u32, to: &mut RayColumns) {
+fn put_flags<F: Lane>(
+    departing: &BlockPaths<'_, F>,
+    going: Compaction,
+    of_rough: u32,
+    to: &mut RayColumns<F>,
+) {
     let mut flags = [of_rough; LANES];
     for i in 0..LANES {
         flags[i] = if departing.specular[i] != 0 { SPECULAR } else { of_rough };
@@ -91,11 +100,11 @@ fn put_flags(departing: &BlockPaths<'_>, going: Compaction, of_rough: u32, to: &
 
 /// Notes paths, and how they came to their directions.
 #[inline(always)]
-fn put(
-    (left, shading): (&BsdfSamples, Option<&[Row; 3]>),
-    departing: &BlockPaths<'_>,
+fn put<F: Lane>(
+    (left, shading): (&BsdfSamples<F>, Option<&[Row<F>; 3]>),
+    departing: &BlockPaths<'_, F>,
     going: Compaction,
-    to: &mut RayColumns,
+    to: &mut RayColumns<F>,
 ) {
     let at = to.len;
     for axis in 0..3 {
@@ -115,21 +124,24 @@ fn put(
     }
     going.put(&left.pdf, &mut to.carried.pdf, at);
     going.put(&departing.ray, &mut to.carried.ray, at);
-    going.put(&[f32::INFINITY; LANES], &mut to.reach, at);
+    going.put(&[F::INFINITY; LANES], &mut to.reach, at);
     going.put(&departing.lanes, &mut to.left, at);
     to.len += going.count;
 }
 
 /// Where rays of matte surfaces start (m), their unit directions about the shading normals with density cos θ / π (1/sr),
-/// that density, and whether there is one, as [`super::super::kernels::scatter`] has them.
+/// that density, and whether there is one.
 #[inline(always)]
-pub(super) fn scatter<const TILTED: bool>(hits: &Hits, square: [Row; 2]) -> BsdfSamples {
+pub(super) fn scatter<F: Lane, const TILTED: bool>(
+    hits: &Hits<F>,
+    square: [Row<F>; 2],
+) -> BsdfSamples<F> {
     let (along, pdf) = cosine_directions(hits.shading::<TILTED>(), &square);
     let [gx, gy, gz] = &hits.normal;
-    let (mut start, mut goes) = ([ZERO; 3], [0; LANES]);
+    let (mut start, mut goes) = ([[F::ZERO; LANES]; 3], [0; LANES]);
     for i in 0..LANES {
         let above = along[0][i] * gx[i] + along[1][i] * gy[i] + along[2][i] * gz[i];
-        goes[i] = mask((above > 0.0) & (pdf[i] > 0.0));
+        goes[i] = mask((above > F::ZERO) & (pdf[i] > F::ZERO));
     }
     for axis in 0..3 {
         for i in 0..LANES {
@@ -142,52 +154,56 @@ pub(super) fn scatter<const TILTED: bool>(hits: &Hits, square: [Row; 2]) -> Bsdf
 
 /// Unit directions about normals with density cos θ / π (1/sr), and that density.
 #[inline(always)]
-pub(super) fn cosine_directions([nx, ny, nz]: &[Row; 3], [u, v]: &[Row; 2]) -> ([Row; 3], Row) {
-    let (mut along, mut pdf, mut a, mut b) = ([ZERO; 3], ZERO, ZERO, ZERO);
+pub(super) fn cosine_directions<F: Lane>(
+    [nx, ny, nz]: &[Row<F>; 3],
+    [u, v]: &[Row<F>; 2],
+) -> ([Row<F>; 3], Row<F>) {
+    let (mut along, mut pdf, mut a, mut b) =
+        ([[F::ZERO; LANES]; 3], [F::ZERO; LANES], [F::ZERO; LANES], [F::ZERO; LANES]);
     for i in 0..LANES {
         [a[i], b[i]] = disk_point([u[i], v[i]]);
     }
     for i in 0..LANES {
         let (x, y, z, a, b) = (nx[i], ny[i], nz[i], a[i], b[i]);
-        let rest = 1.0 - a * a - b * b;
-        let c = if rest > 0.0 { rest } else { 0.0 }.sqrt();
+        let rest = F::ONE - a * a - b * b;
+        let c = if rest > F::ZERO { rest } else { F::ZERO }.sqrt();
         // Duff et al., "Building an Orthonormal Basis, Revisited", 2017.
-        let sign = if z < 0.0 { -1.0 } else { 1.0 };
-        let f = -1.0 / (sign + z);
+        let sign = if z < F::ZERO { -F::ONE } else { F::ONE };
+        let f = -F::ONE / (sign + z);
         let g = x * y * f;
-        let dx = (1.0 + sign * x * x * f) * a + g * b + x * c;
+        let dx = (F::ONE + sign * x * x * f) * a + g * b + x * c;
         let dy = sign * g * a + (sign + y * y * f) * b + y * c;
         let dz = z * c - sign * x * a - y * b;
-        let inverse = 1.0 / (dx * dx + dy * dy + dz * dz).sqrt();
+        let inverse = F::ONE / (dx * dx + dy * dy + dz * dz).sqrt();
         along[0][i] = dx * inverse;
         along[1][i] = dy * inverse;
         along[2][i] = dz * inverse;
-        pdf[i] = c * FRAC_1_PI;
+        pdf[i] = c * F::of(FRAC_1_PI);
     }
     (along, pdf)
 }
 
 /// A point of the unit square on the unit disk, as [`etendue_geometry::disk::point`] has it.
 #[inline(always)]
-fn disk_point([u, v]: [f32; 2]) -> [f32; 2] {
-    let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
+fn disk_point<F: Lane>([u, v]: [F; 2]) -> [F; 2] {
+    let (a, b) = (F::of(2.0) * u - F::ONE, F::of(2.0) * v - F::ONE);
     let flat = a.abs() > b.abs();
     let (radius, other) = (select_unpredictable(flat, a, b), select_unpredictable(flat, b, a));
-    let ratio = if radius == 0.0 { 0.0 } else { other / radius };
-    let (sine, cosine) = (FRAC_PI_4 * ratio).small_sine_cosine();
+    let ratio = if radius == F::ZERO { F::ZERO } else { other / radius };
+    let (sine, cosine) = (F::of(FRAC_PI_4) * ratio).small_sine_cosine();
     let (near, far) = (radius * cosine, radius * sine);
     [select_unpredictable(flat, near, far), select_unpredictable(flat, far, near)]
 }
 
 /// Leaves out rays that meet nothing of a sphere for sure, but for those of some lanes.
 #[inline(always)]
-pub(super) fn keep_those_that_may_meet(
-    (centre, radius): &Sphere,
-    (start, along): (&[Row; 3], &[Row; 3]),
+pub(super) fn keep_those_that_may_meet<F: Lane>(
+    ((centre, radius), roundings): (&Sphere<F>, F),
+    (start, along): (&[Row<F>; 3], &[Row<F>; 3]),
     others: &Mask,
     goes: &mut Mask,
 ) {
-    let (mut foot, mut squared) = (ZERO, ZERO);
+    let (mut foot, mut squared) = ([F::ZERO; LANES], [F::ZERO; LANES]);
     for axis in 0..3 {
         for i in 0..LANES {
             let way = centre[axis] - start[axis][i];
@@ -195,13 +211,13 @@ pub(super) fn keep_those_that_may_meet(
             squared[i] += way * way;
         }
     }
-    let within = radius * radius;
+    let within = *radius * *radius;
     for i in 0..LANES {
-        let is_ahead = (foot[i] >= 0.0) | (squared[i] <= within);
+        let is_ahead = (foot[i] >= F::ZERO) | (squared[i] <= within);
         // Roundings of what is subtracted.
-        let slack = ROUNDINGS * squared[i];
+        let slack = roundings * squared[i];
         let is_near = squared[i] - foot[i] * foot[i] <= within + slack;
-        goes[i] &= mask((*radius >= 0.0) & is_ahead & is_near) | others[i];
+        goes[i] &= mask((*radius >= F::ZERO) & is_ahead & is_near) | others[i];
     }
 }
 

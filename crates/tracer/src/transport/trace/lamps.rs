@@ -1,41 +1,39 @@
-//! The lights of a plain scene in single precision, and places that are chosen on them.
+//! The lights of a scene in the precision of lanes, and places that are chosen on them.
 #![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
-use std::f32::consts::FRAC_1_PI;
+use std::f64::consts::FRAC_1_PI;
 use std::hint::select_unpredictable;
 
 use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::glam::DVec3;
 
+use super::choose::ChosenLamps;
 use super::depart::cosine_directions;
-use super::kernel::{Hits, ZERO, round, single};
-use super::sky::PlainSky;
+use super::kernel::{Hits, round, single};
+use super::lane::{Lane, wide};
+use super::sky::SkyView;
 use crate::area_light::AreaLight;
-use crate::light_tree::Choices;
 use crate::lights;
 use crate::reference::SceneView;
-use crate::sampling::{GridCell, sphere_direction};
-
-/// The largest number below 1.
-const ONE_BELOW: f32 = 1.0 - f32::EPSILON / 2.0;
+use crate::sampling::sphere_direction;
 
 /// A triangle that shines, or a point, relative to the blocks' origin (m).
 #[derive(Debug, Clone, Copy, Default)]
-struct Lamp {
-    corner: [f32; 3],
-    edges: [[f32; 3]; 2],
-    normal: [f32; 3],
-    magnitudes: [f32; 3],
+struct Lamp<F> {
+    corner: [F; 3],
+    edges: [[F; 3]; 2],
+    normal: [F; 3],
+    magnitudes: [F; 3],
     /// m²; 1 of a point, whose density is that of its choice.
-    area: f32,
+    area: F,
     /// 1 where it holds.
-    two_sided: f32,
-    is_point: f32,
+    two_sided: F,
+    is_point: F,
 }
 
-impl Lamp {
+impl<F: Lane> Lamp<F> {
     fn point(at: DVec3, origin: DVec3) -> Self {
-        Self { corner: single(at - origin), area: 1.0, is_point: 1.0, ..Self::default() }
+        Self { corner: single(at - origin), area: F::ONE, is_point: F::ONE, ..Self::default() }
     }
 
     fn triangle(own: &AreaLight, origin: DVec3) -> Self {
@@ -46,22 +44,22 @@ impl Lamp {
             normal: single(own.shape.normal),
             magnitudes: single(own.magnitudes),
             area: round(own.shape.area),
-            two_sided: f32::from(u8::from(own.two_sided)),
-            is_point: 0.0,
+            two_sided: flag(own.two_sided),
+            is_point: F::ZERO,
         }
     }
 }
 
-/// The lamps of a plain scene.
+/// The lights of a scene.
 #[derive(Debug)]
-pub(in crate::transport) struct Lights<'a> {
+pub(in crate::transport) struct Lights<'a, F> {
     all: &'a lights::Lights,
     /// All of them, and the sum of the chances of all before each with 1 at the end, where they are few points and
     /// triangles that are alike from everywhere; else each point chooses among all ([`lights::Lights::pick`]).
-    few: Vec<Lamp>,
+    few: Vec<Lamp<F>>,
     few_bands: Vec<f64>,
-    below: Vec<f32>,
-    pub(super) sky: Option<PlainSky<'a>>,
+    below: Vec<F>,
+    pub(super) sky: Option<SkyView<'a>>,
     /// All are far away.
     pub(super) are_far: bool,
     /// What blocks' coordinates are relative to (m).
@@ -70,11 +68,11 @@ pub(in crate::transport) struct Lights<'a> {
     ones: Vec<f64>,
 }
 
-impl<'a> Lights<'a> {
+impl<'a, F: Lane> Lights<'a, F> {
     pub(super) fn new(all: &'a lights::Lights, origin: DVec3, count: usize) -> Self {
         let (few, few_bands) = (Vec::new(), Vec::new());
-        let sky = PlainSky::of(all, count);
-        let are_far = all.plain_lights().is_some_and(|bounds| bounds.are_far);
+        let sky = SkyView::of(all, count);
+        let are_far = all.bounds().are_far;
         let (below, ones) = (Vec::new(), vec![1.0; count]);
         let mut own = Self { all, few, few_bands, below, sky, are_far, origin, ones };
         if let Some(below) = all.few().filter(|_| !all.has_others()) {
@@ -92,9 +90,9 @@ impl<'a> Lights<'a> {
     }
 
     #[inline(always)]
-    fn lamp(&self, number: usize) -> Lamp {
+    fn lamp(&self, number: usize) -> Lamp<F> {
         if number >= SKY as usize {
-            return Lamp { area: 1.0, ..Lamp::default() };
+            return Lamp { area: F::ONE, ..Lamp::default() };
         }
         match self.all.plain_light(number) {
             Some(lights::PlainLight::Point(at)) => Lamp::point(at, self.origin),
@@ -137,119 +135,45 @@ pub(super) const OTHER: u32 = 1 << 31;
 /// The number of a sky that is alike all over.
 pub(super) const SKY: u32 = 1 << 30;
 
-/// Lights that are chosen by where paths are: for points side by side, and by lane.
-#[derive(Debug, Default)]
-pub(in crate::transport) struct ChosenLamps {
-    pub(super) choices: Choices,
-    /// The lane of each choice.
-    pub(super) asking: Vec<u32>,
-    /// Where each is that chooses, from the blocks' origin (m); empty where no light is [`OTHER`].
-    pub(super) points: [Vec<f32>; 3],
-    pub(super) lamp: Vec<u32>,
-    /// 0 where none was chosen.
-    pub(super) chance: Vec<f32>,
-    /// Of [`OTHER`] lights: where they are from the blocks' origin (m), or unit directions to them, their density, and
-    /// their radiance.
-    pub(super) place: [Vec<f32>; 3],
-    pub(super) density: Vec<f32>,
-    radiance: Vec<Vec<f32>>,
-    /// That of one light, by band.
-    pub(super) light: Vec<f64>,
-    pub(super) is_far: Vec<f32>,
-    pub(super) is_delta: Vec<f32>,
-    /// The lanes that chose the sky's image with which chances, by which squares, and the patches of the image.
-    pub(super) of_sky: Vec<(u32, f32)>,
-    pub(super) squares: Vec<[f64; 2]>,
-    pub(super) cells: Vec<GridCell>,
-    /// With which the sky is chosen in each lane; empty without one.
-    pub(super) sky_chance: Vec<f32>,
-}
-
-/// A place on a light of any kind, or a direction to it.
-pub(super) struct OtherPlace {
-    pub(super) light: u32,
-    /// From the blocks' origin (m), or unit.
-    pub(super) place: [f32; 3],
-    pub(super) is_far: bool,
-    pub(super) is_delta: bool,
-    /// As [`crate::target::Target::density`].
-    pub(super) density: f32,
-}
-
-impl ChosenLamps {
-    /// Empties it for so many lanes and bands, of which some may choose other lights, the sky among them.
-    pub(super) fn restart(
-        &mut self,
-        (room, count): (usize, usize),
-        [has_others, has_sky]: [bool; 2],
-    ) {
-        let Self { lamp, chance, density, place, radiance, is_far, is_delta, .. } = self;
-        self.light.resize(count, 0.0);
-        radiance.resize(count, Vec::new());
-        lamp.clear();
-        lamp.resize(room, 0);
-        chance.clear();
-        chance.resize(room, 0.0);
-        self.asking.resize(room, 0);
-        if has_others {
-            let rows = place.iter_mut().chain(radiance).chain(&mut self.points);
-            rows.chain([density, is_far, is_delta]).for_each(|row| row.resize(room, 0.0));
-        }
-        self.sky_chance.resize(if has_sky { room } else { 0 }, 0.0);
-        self.of_sky.clear();
-        self.squares.clear();
-    }
-
-    /// Notes what a lane chose, which brings so much of each band.
-    #[inline(always)]
-    pub(super) fn put(&mut self, lane: usize, own: &OtherPlace, radiance: &[f64]) {
-        self.lamp[lane] = OTHER | own.light;
-        for axis in 0..3 {
-            self.place[axis][lane] = own.place[axis];
-        }
-        for (row, band) in self.radiance.iter_mut().zip(radiance) {
-            row[lane] = round(*band);
-        }
-        self.density[lane] = own.density;
-        self.is_far[lane] = f32::from(u8::from(own.is_far));
-        self.is_delta[lane] = f32::from(u8::from(own.is_delta));
-    }
+/// The light that a ray is sent to, by its number among all but [`SKY`].
+pub(super) fn number_of_light(lamp: u32) -> usize {
+    (lamp & !OTHER) as usize
 }
 
 /// Places on lights, one for each of sixteen points. Flags are 1 where they hold, else 0.
-pub(super) struct Places {
+pub(super) struct Places<F> {
     /// From the point (m).
-    pub(super) way: [Row; 3],
-    pub(super) normal: [Row; 3],
+    pub(super) way: [Row<F>; 3],
+    pub(super) normal: [Row<F>; 3],
     /// What its own numbers add to the rounding of the place (m).
-    pub(super) magnitudes: [Row; 3],
+    pub(super) magnitudes: [Row<F>; 3],
     /// Of the place (1/m²), of the direction (1/sr).
-    pub(super) density: Row,
-    pub(super) two_sided: Row,
+    pub(super) density: Row<F>,
+    pub(super) two_sided: Row<F>,
     /// No direction comes upon it by chance.
-    pub(super) is_delta: Row,
+    pub(super) is_delta: Row<F>,
     pub(super) lamp: [u32; LANES],
 }
 
 /// What places on lights have beyond those on triangles and on points that shine alike to all sides.
 #[derive(Debug)]
-pub(super) struct OtherPlaces {
+pub(super) struct OtherPlaces<F> {
     /// It is a direction.
-    pub(super) is_far: Row,
+    pub(super) is_far: Row<F>,
     /// It shines to the side of its normal alone, as triangles do, unless they shine to both.
-    pub(super) has_side: Row,
+    pub(super) has_side: Row<F>,
     has_others: bool,
 }
 
-impl Places {
+impl<F: Lane> Places<F> {
     fn nowhere() -> Self {
         Self {
-            way: [ZERO; 3],
-            normal: [ZERO; 3],
-            magnitudes: [ZERO; 3],
-            density: ZERO,
-            two_sided: ZERO,
-            is_delta: ZERO,
+            way: [[F::ZERO; LANES]; 3],
+            normal: [[F::ZERO; LANES]; 3],
+            magnitudes: [[F::ZERO; LANES]; 3],
+            density: [F::ZERO; LANES],
+            two_sided: [F::ZERO; LANES],
+            is_delta: [F::ZERO; LANES],
             lamp: [0; LANES],
         }
     }
@@ -257,17 +181,18 @@ impl Places {
 
 /// Places on the lamps that sixteen points chose, by what was left of the numbers that chose them and others.
 #[inline(always)]
-pub(super) fn place_on_chosen(
-    (lights, chosen): (&Lights<'_>, &ChosenLamps),
-    points: &[Row; 3],
-    (square, first): (&[Row; 2], usize),
-) -> Places {
+pub(super) fn place_on_chosen<F: Lane>(
+    (lights, chosen): (&Lights<'_, F>, &ChosenLamps<F>),
+    points: &[Row<F>; 3],
+    (square, first): (&[Row<F>; 2], usize),
+) -> Places<F> {
     let run = first..first + LANES;
     let lamps: &[u32; LANES] = chosen.lamp[run.clone()].try_into().unwrap_or(&[0; LANES]);
-    let chance: &Row = chosen.chance[run.clone()].try_into().unwrap_or(&ZERO);
+    let chance: Row<F> = chosen.chance[run.clone()].try_into().unwrap_or([F::ZERO; LANES]);
     let mut places = Places { lamp: *lamps, ..Places::nowhere() };
     // What there is in memory of each.
-    let (mut corner, mut edges, mut area) = ([ZERO; 3], [[ZERO; 3]; 2], ZERO);
+    let (mut corner, mut edges, mut area) =
+        ([[F::ZERO; LANES]; 3], [[[F::ZERO; LANES]; 3]; 2], [F::ZERO; LANES]);
     for i in 0..LANES {
         let lamp = lights.lamp(lamps[i] as usize);
         for axis in 0..3 {
@@ -293,20 +218,20 @@ pub(super) fn place_on_chosen(
     places
 }
 
-impl OtherPlaces {
+impl<F: Lane> OtherPlaces<F> {
     /// Puts the places and directions of lanes that chose other lights in place of what is there.
     #[inline(always)]
     pub(super) fn of<const TILTED: bool>(
-        chosen: Option<&ChosenLamps>,
-        hits: &Hits,
-        (square, first): (&[Row; 2], usize),
-        places: &mut Places,
+        chosen: Option<&ChosenLamps<F>>,
+        hits: &Hits<F>,
+        (square, first): (&[Row<F>; 2], usize),
+        places: &mut Places<F>,
     ) -> Self {
-        let mut has_side = ZERO;
+        let mut has_side = [F::ZERO; LANES];
         for i in 0..LANES {
-            has_side[i] = 1.0 - places.is_delta[i];
+            has_side[i] = F::ONE - places.is_delta[i];
         }
-        let mut others = Self { is_far: ZERO, has_side, has_others: false };
+        let mut others = Self { is_far: [F::ZERO; LANES], has_side, has_others: false };
         let Some(chosen) = chosen else { return others };
         let (mut is_other, mut is_sky) = (false, false);
         for i in 0..LANES {
@@ -319,8 +244,8 @@ impl OtherPlaces {
             others.take_others(chosen, &hits.point, run.clone(), places);
         }
         if is_sky {
-            let chance = chosen.chance[run].try_into().unwrap_or(&ZERO);
-            others.take_sky(chance, hits.shading::<TILTED>(), square, places);
+            let chance: Row<F> = chosen.chance[run].try_into().unwrap_or([F::ZERO; LANES]);
+            others.take_sky(&chance, hits.shading::<TILTED>(), square, places);
         }
         others
     }
@@ -329,21 +254,21 @@ impl OtherPlaces {
     #[inline(always)]
     fn take_sky(
         &mut self,
-        chance: &Row,
-        shading: &[Row; 3],
-        square: &[Row; 2],
-        places: &mut Places,
+        chance: &Row<F>,
+        shading: &[Row<F>; 3],
+        square: &[Row<F>; 2],
+        places: &mut Places<F>,
     ) {
         let (mut directions, mut density) = cosine_directions(shading, square);
         for i in 0..LANES {
             // To where light comes from both sides any direction is as likely.
-            if shading[0][i] == 0.0 && shading[1][i] == 0.0 && shading[2][i] == 0.0 {
-                let square = [square[0][i], square[1][i]].map(f64::from);
+            if shading[0][i] == F::ZERO && shading[1][i] == F::ZERO && shading[2][i] == F::ZERO {
+                let square = [square[0][i], square[1][i]].map(wide);
                 let direction = single(sphere_direction(square));
                 for axis in 0..3 {
                     directions[axis][i] = direction[axis];
                 }
-                density[i] = 0.25 * FRAC_1_PI;
+                density[i] = F::of(0.25 * FRAC_1_PI);
             }
         }
         for i in 0..LANES {
@@ -353,8 +278,8 @@ impl OtherPlaces {
                 *way = if is_own { directions[axis][i] } else { *way };
             }
             places.density[i] = if is_own { chance[i] * density[i] } else { places.density[i] };
-            self.is_far[i] = if is_own { 1.0 } else { self.is_far[i] };
-            self.has_side[i] = if is_own { 0.0 } else { self.has_side[i] };
+            self.is_far[i] = if is_own { F::ONE } else { self.is_far[i] };
+            self.has_side[i] = if is_own { F::ZERO } else { self.has_side[i] };
         }
     }
 
@@ -362,15 +287,15 @@ impl OtherPlaces {
     #[inline(always)]
     pub(super) fn radiance(
         &self,
-        (chosen, first): (&ChosenLamps, usize),
+        (chosen, first): (&ChosenLamps<F>, usize),
         lamps: &[u32; LANES],
         band: usize,
-    ) -> Row {
-        let mut radiance = [1.0; LANES];
+    ) -> Row<F> {
+        let mut radiance = [F::ONE; LANES];
         if self.has_others {
             let own = &chosen.radiance[band][first..first + LANES];
             for i in 0..LANES {
-                radiance[i] = if lamps[i] >= OTHER { own[i] } else { 1.0 };
+                radiance[i] = if lamps[i] >= OTHER { own[i] } else { F::ONE };
             }
         }
         radiance
@@ -380,41 +305,79 @@ impl OtherPlaces {
     #[inline(always)]
     fn take_others(
         &mut self,
-        chosen: &ChosenLamps,
-        points: &[Row; 3],
+        chosen: &ChosenLamps<F>,
+        points: &[Row<F>; 3],
         run: std::ops::Range<usize>,
-        places: &mut Places,
+        places: &mut Places<F>,
     ) {
-        let row = |column: &[f32]| -> Row { column[run.clone()].try_into().unwrap_or(ZERO) };
+        let row =
+            |column: &[F]| -> Row<F> { column[run.clone()].try_into().unwrap_or([F::ZERO; LANES]) };
         let (density, is_far) = (row(&chosen.density), row(&chosen.is_far));
         let is_delta = row(&chosen.is_delta);
         for axis in 0..3 {
             let place = row(&chosen.place[axis]);
             for i in 0..LANES {
                 let is_own = places.lamp[i] >= OTHER;
-                let way = if is_far[i] > 0.0 { place[i] } else { place[i] - points[axis][i] };
+                let way = if is_far[i] > F::ZERO { place[i] } else { place[i] - points[axis][i] };
                 places.way[axis][i] = if is_own { way } else { places.way[axis][i] };
-                places.normal[axis][i] = if is_own { 0.0 } else { places.normal[axis][i] };
-                places.magnitudes[axis][i] = if is_own { 0.0 } else { places.magnitudes[axis][i] };
+                places.normal[axis][i] = if is_own { F::ZERO } else { places.normal[axis][i] };
+                places.magnitudes[axis][i] =
+                    if is_own { F::ZERO } else { places.magnitudes[axis][i] };
             }
         }
         for i in 0..LANES {
             let is_own = places.lamp[i] >= OTHER;
             places.density[i] = if is_own { density[i] } else { places.density[i] };
             places.is_delta[i] = if is_own { is_delta[i] } else { places.is_delta[i] };
-            self.is_far[i] = if is_own { is_far[i] } else { 0.0 };
-            self.has_side[i] = if is_own { 0.0 } else { self.has_side[i] };
+            self.is_far[i] = if is_own { is_far[i] } else { F::ZERO };
+            self.has_side[i] = if is_own { F::ZERO } else { self.has_side[i] };
+        }
+        if !chosen.has_side.is_empty() {
+            self.take_sides(chosen, run, places);
+        }
+    }
+
+    /// Takes the sides of places on triangles among them.
+    #[inline(always)]
+    fn take_sides(
+        &mut self,
+        chosen: &ChosenLamps<F>,
+        run: std::ops::Range<usize>,
+        places: &mut Places<F>,
+    ) {
+        let row =
+            |column: &[F]| -> Row<F> { column[run.clone()].try_into().unwrap_or([F::ZERO; LANES]) };
+        let (has_side, two_sided) = (row(&chosen.has_side), row(&chosen.two_sided));
+        let takes = |lamp: u32, has_side: F| (lamp >= OTHER) & (has_side > F::ZERO);
+        for axis in 0..3 {
+            let (normal, magnitudes) = (row(&chosen.normal[axis]), row(&chosen.magnitudes[axis]));
+            let (normals, more) = (&mut places.normal[axis], &mut places.magnitudes[axis]);
+            for i in 0..LANES {
+                let is_own = takes(places.lamp[i], has_side[i]);
+                normals[i] = if is_own { normal[i] } else { normals[i] };
+                more[i] = if is_own { magnitudes[i] } else { more[i] };
+            }
+        }
+        for i in 0..LANES {
+            let is_own = takes(places.lamp[i], has_side[i]);
+            places.two_sided[i] = if is_own { two_sided[i] } else { places.two_sided[i] };
+            self.has_side[i] = if is_own { F::ONE } else { self.has_side[i] };
         }
     }
 }
 
+/// 1 where something holds, else 0.
+pub(super) fn flag<F: Lane>(holds: bool) -> F {
+    if holds { F::ONE } else { F::ZERO }
+}
+
 /// Weights of the second and third corner by squares, uniform over triangles.
 #[inline(always)]
-fn corner_weights([u, v]: &[Row; 2]) -> [Row; 2] {
-    let (mut second, mut third) = (ZERO, ZERO);
+fn corner_weights<F: Lane>([u, v]: &[Row<F>; 2]) -> [Row<F>; 2] {
+    let (mut second, mut third) = ([F::ZERO; LANES], [F::ZERO; LANES]);
     for i in 0..LANES {
         let root = u[i].sqrt();
-        second[i] = root * (1.0 - v[i]);
+        second[i] = root * (F::ONE - v[i]);
         third[i] = v[i] * root;
     }
     [second, third]
@@ -422,12 +385,16 @@ fn corner_weights([u, v]: &[Row; 2]) -> [Row; 2] {
 
 /// Chooses one of few lamps for each of sixteen points, and a place on it.
 #[inline(always)]
-pub(super) fn place(lights: &Lights<'_>, points: &[Row; 3], [mut u, v]: [Row; 2]) -> Places {
+pub(super) fn place<F: Lane>(
+    lights: &Lights<'_, F>,
+    points: &[Row<F>; 3],
+    [mut u, v]: [Row<F>; 2],
+) -> Places<F> {
     let mut places = Places::nowhere();
     let below = &*lights.below;
-    let mut chance = [1.0; LANES];
+    let mut chance = [F::ONE; LANES];
     if lights.few.len() > 1 {
-        let (mut start, mut end) = (ZERO, [1.0; LANES]);
+        let (mut start, mut end) = ([F::ZERO; LANES], [F::ONE; LANES]);
         for (number, of_lamp) in (0_u32..).zip(below.windows(2)) {
             let (from, to) = (of_lamp[0], of_lamp[1]);
             for i in 0..LANES {
@@ -440,8 +407,8 @@ pub(super) fn place(lights: &Lights<'_>, points: &[Row; 3], [mut u, v]: [Row; 2]
         for i in 0..LANES {
             chance[i] = end[i] - start[i];
             let rest = (u[i] - start[i]) / chance[i];
-            let rest = if rest > 0.0 { rest } else { 0.0 };
-            u[i] = if rest < ONE_BELOW { rest } else { ONE_BELOW };
+            let rest = if rest > F::ZERO { rest } else { F::ZERO };
+            u[i] = if rest < F::ONE_BELOW { rest } else { F::ONE_BELOW };
         }
     }
     let [second, third] = corner_weights(&[u, v]);
@@ -460,7 +427,7 @@ pub(super) fn place(lights: &Lights<'_>, points: &[Row; 3], [mut u, v]: [Row; 2]
                 magnitudes[i] = select_unpredictable(is_own, magnitude, magnitudes[i]);
             }
         }
-        let (inverse, two_sided) = (1.0 / lamp.area, lamp.two_sided);
+        let (inverse, two_sided) = (F::ONE / lamp.area, lamp.two_sided);
         let is_point = lamp.is_point;
         for i in 0..LANES {
             let is_own = places.lamp[i] == number;

@@ -1,22 +1,24 @@
-//! Light of the sky in plain scenes.
+//! Light of the sky.
 #![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
-use std::f32::consts::FRAC_1_PI;
+use std::f64::consts::FRAC_1_PI;
 
 use etendue_geometry::block::{Floats as Row, LANES, vector};
 use etendue_geometry::glam::DMat3;
 
-use super::kernel::{ZERO, round, single};
-use super::lamps::{ChosenLamps, Lights, OTHER, OtherPlace};
-use super::{Columns, PlainScratch, RayColumns, SPECULAR};
+use super::choose::{ChosenLamps, OtherPlace};
+use super::kernel::{round, single};
+use super::lamps::{Lights, OTHER};
+use super::lane::{Lane, wide};
+use super::{Columns, RayColumns, SPECULAR, Workspace};
 use crate::Spectral;
-use crate::environment::{EnvironmentMap, MapLookup, MapSampler};
+use crate::environment::{EnvironmentMap, MapLookup, MapSampler, place};
 use crate::sampling::GridCell;
 use crate::transport::{RaySamples, Tracing};
 
-/// The sky of a plain scene.
+/// The sky of a scene.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct PlainSky<'a> {
+pub(super) struct SkyView<'a> {
     /// Which of the lights it is.
     pub(super) index: usize,
     pub(super) map: Option<(&'a EnvironmentMap, &'a MapSampler)>,
@@ -24,30 +26,36 @@ pub(super) struct PlainSky<'a> {
     /// Radiance where its image has 1.
     pub(super) bands: &'a [f64],
     visible: bool,
+    /// All lights, where the bands are not those of its colours.
+    of_spectra: Option<&'a crate::lights::Lights>,
 }
 
 /// What paths that met the sky brought there, side by side.
-struct SkyHits {
-    direction: [Row; 3],
+struct SkyHits<F> {
+    direction: [Row<F>; 3],
     /// Density (1/sr) of the direction, and the chance with which the sky was asked where it began; 1 and 0 where no
     /// light was asked in its stead.
-    pdf: Row,
-    chance: Row,
+    pdf: Row<F>,
+    chance: Row<F>,
     /// Of the surface that they left.
-    normal: [Row; 3],
+    normal: [Row<F>; 3],
 }
 
-impl SkyHits {
-    const NOTHING: Self =
-        Self { direction: [ZERO; 3], pdf: [1.0; LANES], chance: ZERO, normal: [ZERO; 3] };
+impl<F: Lane> SkyHits<F> {
+    const NOTHING: Self = Self {
+        direction: [[F::ZERO; LANES]; 3],
+        pdf: [F::ONE; LANES],
+        chance: [F::ZERO; LANES],
+        normal: [[F::ZERO; LANES]; 3],
+    };
 
     /// Takes a path, which left a surface where the sky may have been asked, too.
     #[inline(always)]
     fn put(
         &mut self,
         i: usize,
-        (carried, own): (&Columns, usize),
-        direction: [f32; 3],
+        (carried, own): (&Columns<F>, usize),
+        direction: [F; 3],
         was_asked: bool,
     ) {
         for axis in 0..3 {
@@ -62,7 +70,7 @@ impl SkyHits {
     }
 }
 
-impl<'a> PlainSky<'a> {
+impl<'a> SkyView<'a> {
     /// That of all lights.
     pub(super) fn of(lights: &'a crate::lights::Lights, count: usize) -> Option<Self> {
         let sky = lights.sky.as_ref()?;
@@ -72,41 +80,65 @@ impl<'a> PlainSky<'a> {
             world_from_map: sky.world_from_map,
             bands: lights.bands_of(sky.index, count),
             visible: sky.visible,
+            of_spectra: (!sky.is_of_colors()).then_some(lights),
         })
+    }
+
+    /// The light that comes where its image has a colour, in all bands: of a sky of spectra by the place on its image.
+    #[inline(always)]
+    fn light<const RGB: bool>(
+        &self,
+        spectral: &Spectral,
+        (color, at): ([f64; 3], impl FnOnce() -> [f64; 2]),
+        light: &mut [f64],
+    ) {
+        if !RGB && let Some(lights) = self.of_spectra {
+            return lights.spread_sky(spectral, (at(), &color.map(wide)), light);
+        }
+        // How many there are of red, green and blue is known when the program is compiled.
+        let bands = if RGB { 3 } else { light.len() };
+        for (k, band) in light[..bands].iter_mut().enumerate() {
+            *band = self.band::<RGB>(spectral, color, k);
+        }
+    }
+
+    /// The place on its image of a lane's direction.
+    fn place_of<F: Lane>(&self, directions: &[Row<F>; 3], lane: usize) -> [f64; 2] {
+        place(self.world_from_map.transpose() * vector(directions, lane).normalize())
     }
 
     /// A band of the light that comes where its image has a colour, of 1 without one.
     #[inline(always)]
-    fn band<const RGB: bool>(&self, spectral: &Spectral, color: [f32; 3], band: usize) -> f64 {
+    fn band<const RGB: bool>(&self, spectral: &Spectral, color: [f64; 3], band: usize) -> f64 {
         let own = match (RGB, self.map) {
             (_, None) => 1.0,
-            (true, _) => f64::from(color[band]),
-            (false, _) => spectral.band(&color.map(f64::from), band),
+            (true, _) => color[band],
+            (false, _) => spectral.band(&color, band),
         };
         own * self.bands[band]
     }
 }
 
 /// The colours of a sky's image along the ways that paths arrived by, and their weights against having been asked.
-struct SkyLight {
-    color: [Row; 3],
-    weight: Row,
+struct SkyLight<F> {
+    color: [Row<F>; 3],
+    weight: Row<F>,
 }
 
-impl SkyLight {
+impl<F: Lane> SkyLight<F> {
     #[inline(always)]
-    fn color(&self, lane: usize) -> [f32; 3] {
+    fn color(&self, lane: usize) -> [F; 3] {
         [self.color[0][lane], self.color[1][lane], self.color[2][lane]]
     }
 }
 
 /// Vectors carried by a rotation, row by row.
 #[inline(always)]
-fn turned(rows: DMat3, [x, y, z]: &[Row; 3]) -> [Row; 3] {
-    let mut turned = [ZERO; 3];
+fn turned<F: Lane>(rows: DMat3, [x, y, z]: &[Row<F>; 3]) -> [Row<F>; 3] {
+    let mut turned = [[F::ZERO; LANES]; 3];
     for axis in 0..3 {
         let row = rows.row(axis);
-        let [a, b, c] = [round(row.x), round(row.y), round(row.z)];
+        let [a, b, c] = single::<F>(row);
         for i in 0..LANES {
             turned[axis][i] = a * x[i] + b * y[i] + c * z[i];
         }
@@ -115,43 +147,43 @@ fn turned(rows: DMat3, [x, y, z]: &[Row; 3]) -> [Row; 3] {
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn light_of(sky: &PlainSky<'_>, arrived: &SkyHits, light: &mut SkyLight) {
-    let (mut density, mut color) = (ZERO, [[1.0; LANES]; 3]);
+fn light_of<F: Lane>(sky: &SkyView<'_>, arrived: &SkyHits<F>, light: &mut SkyLight<F>) {
+    let (mut density, mut color) = ([F::ZERO; LANES], [[F::ONE; LANES]; 3]);
     match sky.map {
         Some((map, sampler)) => {
             let own = turned(sky.world_from_map.transpose(), &arrived.direction);
-            let lit: MapLookup<f32, LANES> = sampler.in_directions(map, own);
+            let lit: MapLookup<F, LANES> = sampler.in_directions(map, own);
             (density, color) = (lit.densities, lit.colors);
         }
         None => {
             for i in 0..LANES {
-                let (mut cosine, mut is_one_sided) = (0.0, false);
+                let (mut cosine, mut is_one_sided) = (F::ZERO, false);
                 for axis in 0..3 {
                     cosine += arrived.normal[axis][i] * arrived.direction[axis][i];
-                    is_one_sided |= arrived.normal[axis][i] != 0.0;
+                    is_one_sided |= arrived.normal[axis][i] != F::ZERO;
                 }
-                let shown = if cosine > 0.0 { cosine } else { 0.0 };
-                density[i] = if is_one_sided { shown } else { 0.25 } * FRAC_1_PI;
+                let shown = if cosine > F::ZERO { cosine } else { F::ZERO };
+                density[i] = if is_one_sided { shown } else { F::of(0.25) } * F::of(FRAC_1_PI);
             }
         }
     }
     light.color = color;
     for i in 0..LANES {
         let ratio = arrived.chance[i] * density[i] / arrived.pdf[i];
-        light.weight[i] = 1.0 / (1.0 + ratio * ratio);
+        light.weight[i] = F::ONE / (F::ONE + ratio * ratio);
     }
 }
 
-fn number_of(sky: &PlainSky<'_>) -> u32 {
+fn number_of(sky: &SkyView<'_>) -> u32 {
     u32::try_from(sky.index).unwrap_or_default()
 }
 
 /// Directions to the sky's image in the patches that lanes chose.
 #[multiversion::multiversion(targets = "simd")]
-pub(super) fn place_on_sky<const RGB: bool>(
-    sky: &PlainSky<'_>,
+pub(super) fn place_on_sky<F: Lane, const RGB: bool>(
+    sky: &SkyView<'_>,
     spectral: &Spectral,
-    chosen: &mut ChosenLamps,
+    chosen: &mut ChosenLamps<F>,
 ) {
     let Some((map, sampler)) = sky.map else { return };
     let (cells, mut radiance) =
@@ -159,20 +191,18 @@ pub(super) fn place_on_sky<const RGB: bool>(
     for (number, run) in cells.chunks(LANES).enumerate() {
         let mut patches = [GridCell::default(); LANES];
         patches[..run.len()].copy_from_slice(run);
-        let lit: MapLookup<f32, LANES> = sampler.in_patches(map, &patches);
+        let lit: MapLookup<F, LANES> = sampler.in_patches(map, &patches);
         let directions = turned(sky.world_from_map, &lit.directions);
         for i in 0..run.len() {
             let (lane, chance) = chosen.of_sky[number * LANES + i];
             let density = lit.densities[i] * chance;
-            if density > 0.0 {
-                let axis = |rows: &[Row; 3]| [rows[0][i], rows[1][i], rows[2][i]];
+            if density > F::ZERO {
+                let axis = |rows: &[Row<F>; 3]| [rows[0][i], rows[1][i], rows[2][i]];
                 let (is_far, is_delta) = (true, false);
                 let (light, place) = (number_of(sky), axis(&directions));
-                let own = OtherPlace { light, place, is_far, is_delta, density };
-                let color = axis(&lit.colors);
-                for (k, band) in radiance.iter_mut().enumerate() {
-                    *band = sky.band::<RGB>(spectral, color, k);
-                }
+                let own = OtherPlace { light, place, is_far, is_delta, density, side: None };
+                let at = || [lit.places[0][i], lit.places[1][i]].map(wide);
+                sky.light::<RGB>(spectral, (axis(&lit.colors).map(wide), at), &mut radiance);
                 chosen.put(lane as usize, &own, &radiance);
             }
         }
@@ -182,53 +212,58 @@ pub(super) fn place_on_sky<const RGB: bool>(
 
 impl<const RGB: bool> Tracing<'_, RGB> {
     /// Adds the light of the sky that paths met.
-    pub(super) fn add_sky_plain(
+    pub(super) fn add_sky<F: Lane>(
         &mut self,
         (camera, number): (&RaySamples<'_>, u32),
-        lights: &Lights<'_>,
-        plain: &PlainScratch,
+        lights: &Lights<'_, F>,
+        workspace: &Workspace<F>,
         out: &mut [f64],
     ) {
         let Some(sky) = lights.sky.filter(|sky| sky.visible || number > 0) else { return };
-        let (flags, throughput) = (&plain.carried.flags, &plain.carried.throughput);
-        let (mut lit, mut light) = (SkyLight { color: [ZERO; 3], weight: ZERO }, Vec::new());
+        let (flags, throughput) = (&workspace.carried.flags, &workspace.carried.throughput);
+        let (mut lit, mut light) =
+            (SkyLight { color: [[F::ZERO; LANES]; 3], weight: [F::ZERO; LANES] }, Vec::new());
         light.resize(self.count(), 0.0);
-        for missed in plain.missed.chunks(LANES) {
+        for missed in workspace.missed.chunks(LANES) {
             let mut arrived = SkyHits::NOTHING;
             for (i, &own) in missed.iter().enumerate() {
                 let own = own as usize;
                 // The camera's rays are not all traced: those that cannot hit anything are other ones in blocks.
                 let direction = match number {
                     0 => camera.rays.direction(own),
-                    _ => vector(&plain.rays.blocks()[own / LANES].direction, own % LANES),
+                    _ => vector(&workspace.rays.blocks()[own / LANES].direction, own % LANES),
                 };
                 let is_specular = flags.get(own).is_some_and(|flags| flags & SPECULAR != 0);
                 let was_asked = number > 0 && !is_specular;
-                arrived.put(i, (&plain.carried, own), single(direction), was_asked);
+                arrived.put(i, (&workspace.carried, own), single(direction), was_asked);
             }
             light_of(&sky, &arrived, &mut lit);
             for (i, &own) in missed.iter().enumerate() {
                 let own = own as usize;
+                let at = || sky.place_of(&arrived.direction, i);
+                sky.light::<RGB>(self.ctx.spectral, (lit.color(i).map(wide), at), &mut light);
                 for (k, band) in light.iter_mut().enumerate() {
-                    let carried = f64::from(throughput[k][own] * lit.weight[i]);
-                    *band = carried * sky.band::<RGB>(self.ctx.spectral, lit.color(i), k);
+                    *band *= wide(throughput[k][own] * lit.weight[i]);
                 }
                 let group = || self.ctx.lights.group_of_sky();
-                let row = self.parts.row(plain.carried.ray[own], number, group);
+                let row = self.parts.row(workspace.carried.ray[own], number, group);
                 self.add(&light, row, out);
             }
         }
     }
 }
 
-/// Makes last directions rays to the sky, where nothing else shines: they bring its light unless something is in between.
-pub(super) fn ask_sky<const RGB: bool>(
-    sky: &PlainSky<'_>,
+/// Makes last directions that meet nothing else that shines rays to the sky: they bring its light unless something is in between.
+pub(super) fn ask_sky<F: Lane, const RGB: bool>(
+    sky: &SkyView<'_>,
     spectral: &Spectral,
-    last: &mut RayColumns,
-    shadows: &mut RayColumns,
+    last: &mut RayColumns<F>,
+    shadows: &mut RayColumns<F>,
 ) {
-    let mut lit = SkyLight { color: [ZERO; 3], weight: ZERO };
+    let mut lit = SkyLight { color: [[F::ZERO; LANES]; 3], weight: [F::ZERO; LANES] };
+    let bands = shadows.carried.count::<RGB>();
+    let (mut three, mut more) = ([0.0; 3], if RGB { Vec::new() } else { vec![0.0; bands] });
+    let light: &mut [f64] = if RGB { &mut three } else { &mut more };
     for first in (0..last.len).step_by(LANES) {
         let mut arrived = SkyHits::NOTHING;
         let count = LANES.min(last.len - first);
@@ -243,14 +278,16 @@ pub(super) fn ask_sky<const RGB: bool>(
                 shadows.start[axis][to] = last.start[axis][from];
                 shadows.along[axis][to] = last.along[axis][from];
             }
-            for band in 0..shadows.carried.count::<RGB>() {
-                let carried = f64::from(last.carried.throughput[band][from] * lit.weight[i]);
-                let light = carried * sky.band::<RGB>(spectral, lit.color(i), band);
-                shadows.carried.throughput[band][to] = round(light);
+            let at = || sky.place_of(&arrived.direction, i);
+            sky.light::<RGB>(spectral, (lit.color(i).map(wide), at), light);
+            for band in 0..bands {
+                let carried = wide(last.carried.throughput[band][from] * lit.weight[i]);
+                shadows.carried.throughput[band][to] = round(carried * light[band]);
             }
-            shadows.reach[to] = f32::INFINITY;
+            shadows.reach[to] = F::INFINITY;
             shadows.lamp[to] = number_of(sky) | OTHER;
             shadows.carried.ray[to] = last.carried.ray[from];
+            shadows.left[to] = last.left[from];
             shadows.len += 1;
         }
     }

@@ -6,18 +6,23 @@ use std::hint::select_unpredictable;
 use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::{Geometry, RayBlock};
 
-use super::kernel::{Mask, ZERO, mask};
-use crate::placed::{PlainFacets, PlainKind, PlainSurfaces};
+use super::kernel::{Mask, mask};
+use super::lane::Lane;
+use crate::placed::{Facets, PlacedSurfaces, SurfaceKind, SurfaceRow, SurfaceTable};
+use crate::surface::LEAST_ELEVATION;
 
-#[expect(clippy::cast_possible_truncation, reason = "single precision is enough for it")]
-const LEAST_ELEVATION: f32 = crate::surface::LEAST_ELEVATION as f32;
-
-/// The surfaces of a plain scene, and where their meshes are.
+/// The surfaces of a scene, and where their meshes are.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::transport) struct Surfaces<'a> {
-    pub(super) all: &'a PlainSurfaces,
+pub(in crate::transport) struct Surfaces<'a, F> {
+    pub(super) all: &'a SurfaceTable,
+    pub(super) placed: &'a PlacedSurfaces,
     pub(super) geometry: &'a Geometry,
     pub(super) varied: &'a Varied,
+    /// Bound on the error of a hit, and of what leaves it, relative to the numbers that it is worked out of.
+    pub(super) roundings: F,
+    /// Hits are beside an edge of their triangle where their least barycentric weight is below this
+    /// ([`super::BESIDE`]).
+    pub(super) beside: F,
 }
 
 /// What surfaces that are not alike all over have, by lane; empty where all are.
@@ -43,44 +48,58 @@ pub(super) struct TextureLookup {
     pub(super) color: [f32; 3],
     pub(super) base_peak: f64,
     /// About which light is scattered, of any length and side, where normals are mapped.
-    pub(super) normal: [f32; 3],
+    pub(super) normal: [f64; 3],
     /// Where these are not alike all over.
-    pub(super) facets: PlainFacets,
+    pub(super) facets: Facets,
     /// It is worked out by itself.
     pub(super) is_single: bool,
 }
 
-impl Surfaces<'_> {
+impl<F: Lane> Surfaces<'_, F> {
+    /// What a placement's own numbers add to the rounding of a hit (m), which single precision need not hold.
+    #[inline(always)]
+    fn magnitudes(&self, placement: u32, surface: &SurfaceRow) -> [F; 3] {
+        if F::HAS_ENDS {
+            let placed = self.placed.get(placement);
+            return placed.map_or([F::ZERO; 3], |placed| placed.magnitudes.to_array().map(F::of));
+        }
+        surface.magnitudes.map(F::from)
+    }
+
     /// The normal of a mesh's corners where a lane hit one of its triangles, in the world, of any length and side; zero
     /// of a mesh without.
     #[inline(always)]
-    fn mesh_normal(&self, block: &RayBlock, lane: usize, turn: &[[f32; 3]; 3]) -> [f32; 3] {
+    fn mesh_normal(&self, block: &RayBlock<F>, lane: usize, turn: &[[f32; 3]; 3]) -> [F; 3] {
         let Some(placement) = self.geometry.placements.get(block.placement[lane] as usize) else {
-            return [0.0; 3];
+            return [F::ZERO; 3];
         };
         let mesh = self.geometry.mesh_of(placement);
-        let Some(normals) = &mesh.normals else { return [0.0; 3] };
+        let Some(normals) = &mesh.normals else { return [F::ZERO; 3] };
         let [a, b, c] = mesh.triangles[block.triangle[lane] as usize];
         let [a, b, c] = [a, b, c].map(|corner| normals.get(corner as usize));
         let (u, v) = (block.u[lane], block.v[lane]);
-        let mut own = [0.0; 3];
+        let mut own = [F::ZERO; 3];
         for k in 0..3 {
-            own[k] = (1.0 - u - v) * a[k] + u * b[k] + v * c[k];
+            let [a, b, c] = [a[k], b[k], c[k]].map(F::from);
+            own[k] = (F::ONE - u - v) * a + u * b + v * c;
         }
         let [x, y, z] = turn;
-        let along = |row: &[f32; 3]| row[0] * own[0] + row[1] * own[1] + row[2] * own[2];
+        let along = |row: &[f32; 3]| {
+            let [x, y, z] = row.map(F::from);
+            x * own[0] + y * own[1] + z * own[2]
+        };
         [along(x), along(y), along(z)]
     }
 }
 
 /// What is looked up for the hits of a block.
 #[derive(Debug)]
-pub(super) struct Found {
+pub(super) struct Found<F> {
     /// Red, green and blue; or what has each lane's bands: its material, or with the bit [`VARIED`] itself, counted from
     /// the first block.
-    color: [Row; 3],
+    color: [Row<F>; 3],
     source: [u32; LANES],
-    pub(super) magnitudes: [Row; 3],
+    pub(super) magnitudes: [Row<F>; 3],
     pub(super) scatters: Mask,
     /// Those that scatter light which are sheets of facets, and which are smooth.
     pub(super) sheets: Mask,
@@ -91,17 +110,18 @@ pub(super) struct Found {
     pub(super) delta: Mask,
     pub(super) passed: Mask,
     /// The normals of meshes, of any length and side, where some lane has one; else zero.
-    pub(super) tilted: Option<[Row; 3]>,
+    pub(super) tilted: Option<[Row<F>; 3]>,
 }
 
 /// The bit of lanes whose colours are looked up.
 const VARIED: u32 = 1 << 31;
 
-impl Found {
+impl<F: Lane> Found<F> {
+    /// Nothing yet.
     pub(super) const NOTHING: Self = Self {
-        color: [ZERO; 3],
+        color: [[F::ZERO; LANES]; 3],
         source: [0; LANES],
-        magnitudes: [ZERO; 3],
+        magnitudes: [[F::ZERO; LANES]; 3],
         scatters: [0; LANES],
         sheets: [0; LANES],
         smooth: [0; LANES],
@@ -115,9 +135,9 @@ impl Found {
     #[inline(always)]
     pub(super) fn colors<'b, const RGB: bool>(
         &'b self,
-        surfaces: Surfaces<'_>,
-        rows: &'b mut [Row],
-    ) -> &'b [Row] {
+        surfaces: Surfaces<'_, F>,
+        rows: &'b mut [Row<F>],
+    ) -> &'b [Row<F>] {
         if RGB {
             return &self.color;
         }
@@ -129,7 +149,7 @@ impl Found {
                 _ => surfaces.varied.colors.get(first..first + count).unwrap_or_default(),
             };
             for (row, band) in rows.iter_mut().zip(own) {
-                row[lane] = *band;
+                row[lane] = F::from(*band);
             }
         }
         rows
@@ -156,8 +176,8 @@ impl Found {
     #[inline(always)]
     pub(super) fn look_up<const TILTED: bool, const RICH: bool, const RGB: bool>(
         &mut self,
-        surfaces: Surfaces<'_>,
-        (block, first, count): (&RayBlock, usize, usize),
+        surfaces: Surfaces<'_, F>,
+        (block, first, count): (&RayBlock<F>, usize, usize),
         (mut meets, mut misses): (impl FnMut(usize), impl FnMut(usize)),
     ) {
         let all = &*surfaces.all.all;
@@ -169,26 +189,27 @@ impl Found {
             if RGB {
                 let color = varied.map_or(&surface.color, |varied| &varied.color);
                 for band in 0..3 {
-                    self.color[band][lane] = color[band];
+                    self.color[band][lane] = F::from(color[band]);
                 }
             } else if lane < count {
                 #[expect(clippy::cast_possible_truncation, reason = "a batch has few")]
                 let own = (first + lane) as u32 | VARIED;
                 self.source[lane] = if varied.is_some() { own } else { surface.material };
             }
+            let magnitudes = surfaces.magnitudes(block.placement[lane], surface);
             for axis in 0..3 {
-                self.magnitudes[axis][lane] = surface.magnitudes[axis];
+                self.magnitudes[axis][lane] = magnitudes[axis];
             }
             let is_hit = surface.is_there & (lane < count);
-            let scatters = (surface.kind != PlainKind::Black) & is_hit;
+            let scatters = (surface.kind != SurfaceKind::Black) & is_hit;
             self.scatters[lane] = mask(scatters);
             if RICH {
-                let is_single = surface.kind == PlainKind::Other
+                let is_single = surface.kind == SurfaceKind::Other
                     || varied.is_some_and(|varied| varied.is_single);
                 self.single[lane] = mask(is_single & is_hit);
-                let is_sheet = (surface.kind == PlainKind::Sheet) & !is_single;
+                let is_sheet = (surface.kind == SurfaceKind::Sheet) & !is_single;
                 self.sheets[lane] = mask(is_sheet & is_hit);
-                self.smooth[lane] = mask((surface.kind == PlainKind::Smooth) & is_hit);
+                self.smooth[lane] = mask((surface.kind == SurfaceKind::Smooth) & is_hit);
             }
             if surface.shines & is_hit {
                 meets(lane);
@@ -201,10 +222,10 @@ impl Found {
             }
             if let Some(turn) = &surface.turn {
                 let normal = match varied.filter(|_| surface.is_mapped) {
-                    Some(varied) => varied.normal,
+                    Some(varied) => varied.normal.map(F::of),
                     None => surfaces.mesh_normal(block, lane, turn),
                 };
-                let tilted = self.tilted.get_or_insert([ZERO; 3]);
+                let tilted = self.tilted.get_or_insert([[F::ZERO; LANES]; 3]);
                 (tilted[0][lane], tilted[1][lane], tilted[2][lane]) = normal.into();
             }
         }
@@ -214,10 +235,15 @@ impl Found {
 /// Normals that light is scattered about, of the meshes' own, as [`crate::surface::facing`] bends them; the triangle's,
 /// which faces the viewer, where there is none.
 #[inline(always)]
-pub(super) fn bend(tilted: &[Row; 3], normal: &[Row; 3], direction: &[Row; 3]) -> [Row; 3] {
-    let (mut shading, mut squared, mut along) = ([ZERO; 3], ZERO, ZERO);
+pub(super) fn bend<F: Lane>(
+    tilted: &[Row<F>; 3],
+    normal: &[Row<F>; 3],
+    direction: &[Row<F>; 3],
+) -> [Row<F>; 3] {
+    let (mut shading, mut squared, mut along) =
+        ([[F::ZERO; LANES]; 3], [F::ZERO; LANES], [F::ZERO; LANES]);
     // Squares of what is as long as a file has it may be too small or too large.
-    let (mut unit, mut largest) = (*tilted, ZERO);
+    let (mut unit, mut largest) = (*tilted, [F::ZERO; LANES]);
     for row in tilted {
         for i in 0..LANES {
             let size = row[i].abs();
@@ -233,41 +259,42 @@ pub(super) fn bend(tilted: &[Row; 3], normal: &[Row; 3], direction: &[Row; 3]) -
     }
     for i in 0..LANES {
         // Some files' normals point inwards; the triangle's winding decides.
-        let scale = if along[i] < 0.0 { -1.0 } else { 1.0 } / squared[i].sqrt();
-        let has = (squared[i] > 0.0) & (squared[i] <= f32::MAX);
+        let scale = if along[i] < F::ZERO { -F::ONE } else { F::ONE } / squared[i].sqrt();
+        let has = (squared[i] > F::ZERO) & (squared[i] <= F::MAX);
         for axis in 0..3 {
             let own = unit[axis][i] * scale;
             shading[axis][i] = select_unpredictable(has, own, normal[axis][i]);
         }
     }
-    let dot = |a: &[Row; 3], b: &[Row; 3], i: usize| {
+    let dot = |a: &[Row<F>; 3], b: &[Row<F>; 3], i: usize| {
         a[0][i] * b[0][i] + a[1][i] * b[1][i] + a[2][i] * b[2][i]
     };
-    let mut bent = [ZERO; 3];
+    let mut bent = [[F::ZERO; LANES]; 3];
     for i in 0..LANES {
         let cosine = -dot(&shading, direction, i);
-        let (mut above, slope) = (0.0, dot(&shading, normal, i));
-        let (mut mirrored, mut half) = ([0.0; 3], [0.0; 3]);
+        let (mut above, slope) = (F::ZERO, dot(&shading, normal, i));
+        let (mut mirrored, mut half) = ([F::ZERO; 3], [F::ZERO; 3]);
         for axis in 0..3 {
-            mirrored[axis] = 2.0 * cosine * shading[axis][i] + direction[axis][i];
+            mirrored[axis] = F::of(2.0) * cosine * shading[axis][i] + direction[axis][i];
             above += normal[axis][i] * mirrored[axis];
         }
-        let lacking = -LEAST_ELEVATION * dot(normal, direction, i) - above;
-        let (mut length, lift) = (0.0, lacking / slope);
+        let lacking = -F::of(LEAST_ELEVATION) * dot(normal, direction, i) - above;
+        let (mut length, lift) = (F::ZERO, lacking / slope);
         for axis in 0..3 {
             mirrored[axis] += shading[axis][i] * lift;
             length += mirrored[axis] * mirrored[axis];
         }
-        let (inverse, mut size) = (1.0 / length.sqrt(), 0.0);
+        let (inverse, mut size) = (F::ONE / length.sqrt(), F::ZERO);
         for axis in 0..3 {
             half[axis] = mirrored[axis] * inverse - direction[axis][i];
             size += half[axis] * half[axis];
         }
-        let inverse = 1.0 / size.sqrt();
-        let bends = (lacking > 0.0) & (slope > 0.0) & (inverse > 0.0) & (inverse <= f32::MAX);
+        let inverse = F::ONE / size.sqrt();
+        let bends =
+            (lacking > F::ZERO) & (slope > F::ZERO) & (inverse > F::ZERO) & (inverse <= F::MAX);
         for axis in 0..3 {
             let own = select_unpredictable(bends, half[axis] * inverse, shading[axis][i]);
-            bent[axis][i] = select_unpredictable(cosine > 0.0, own, normal[axis][i]);
+            bent[axis][i] = select_unpredictable(cosine > F::ZERO, own, normal[axis][i]);
         }
     }
     bent

@@ -73,8 +73,8 @@ impl Compaction {
     }
 }
 
-/// A number of 32 bits.
-pub(super) trait Word: Copy {
+/// A number that can be put side by side.
+pub(in crate::transport) trait Word: Copy {
     /// The lanes of a mask side by side, and 0 behind them.
     #[cfg(target_arch = "x86_64")]
     fn compress(simd: pulp::x86::V4, bits: u16, row: [Self; LANES]) -> [Self; LANES];
@@ -93,6 +93,23 @@ impl Word for u32 {
     #[inline(always)]
     fn compress(simd: pulp::x86::V4, bits: u16, row: [Self; LANES]) -> [Self; LANES] {
         pulp::cast(simd.avx512f._mm512_maskz_compress_epi32(bits, pulp::cast(row)))
+    }
+}
+
+impl Word for f64 {
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn compress(simd: pulp::x86::V4, bits: u16, row: [Self; LANES]) -> [Self; LANES] {
+        let [low, high]: [[Self; LANES / 2]; 2] = pulp::cast(row);
+        let [of_low, of_high] = bits.to_le_bytes();
+        let halves = [(of_low, low), (of_high, high)].map(|(bits, half)| -> [Self; LANES / 2] {
+            pulp::cast(simd.avx512f._mm512_maskz_compress_pd(bits, pulp::cast(half)))
+        });
+        let mut whole = [0.0; LANES];
+        whole[..LANES / 2].copy_from_slice(&halves[0]);
+        let first = of_low.count_ones() as usize;
+        whole[first..first + LANES / 2].copy_from_slice(&halves[1]);
+        whole
     }
 }
 

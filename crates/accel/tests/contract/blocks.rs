@@ -1,0 +1,160 @@
+//! Rays in blocks: what they meet is what batches of single precision meet.
+
+use std::sync::Arc;
+
+#[cfg(feature = "embree")]
+use etendue_accel::{Accel, Embree};
+use etendue_accel::{BuildOptions, Exact};
+use etendue_geometry::block::LANES;
+use etendue_geometry::glam::DVec3;
+#[cfg(feature = "embree")]
+use etendue_geometry::{HitPrecision, RayBlock};
+use etendue_geometry::{MISS, Mesh, RayBatch, RayBlocks, Transform};
+
+use super::meshes::{Random, at, mesh, placed, soup};
+use super::{closest, each, is_at_edge};
+
+/// A decal and a box on a floor, in both orders, with and without more triangles than are tested without a tree: what
+/// lies in the floor's plane is told by the rule in blocks of rays, too.
+#[test]
+fn surfaces_in_one_plane_follow_the_rule_in_blocks() {
+    let square = |size: f32, at: [f32; 2]| {
+        let corner = |x: f32, z: f32| [at[0] + x * size, 0.0, at[1] + z * size];
+        let corners = [corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)];
+        mesh("square", &corners, vec![[0, 1, 2], [0, 2, 3]])
+    };
+    let floor = || square(2.0, [0.0, 0.0]);
+    let others =
+        || [square(0.4, [0.7, 0.6]), cube_on_floor([-0.8, -0.5]), cube_on_floor([0.3, -1.1])];
+    let mut compared = 0;
+    for (floor_first, crowded) in [(true, false), (false, false), (true, true), (false, true)] {
+        let mut meshes: Vec<Mesh> = others().into();
+        meshes.insert(if floor_first { 0 } else { meshes.len() }, floor());
+        let mut placements: Vec<_> =
+            (0..meshes.len() as u32).map(|mesh| placed(mesh, Transform::IDENTITY)).collect();
+        if crowded {
+            placements.push(placed(meshes.len() as u32, Transform::IDENTITY));
+            meshes.push(soup(200, 0.05, 3));
+        }
+        if floor_first || !crowded {
+            // A copy in the very same place, of which the last counts: of many triangles, an instance.
+            placements.push(placements[0].clone());
+        }
+        let geometry = at(meshes, placements);
+        let mut random = Random(19);
+        let mut batch = RayBatch::default();
+        for k in 0..4096 {
+            let mut from = 1.8 * random.cube();
+            // From above, from below, and from within the boxes.
+            from.y = [2.0, -1.5, 0.3][k % 3];
+            let down = DVec3::new(0.0, if k % 3 == 1 { 1.0 } else { -1.0 }, 0.0);
+            batch.push(from, (down + 0.4 * random.cube()).normalize());
+        }
+        let truth = closest(
+            &Exact::build(Arc::clone(&geometry), &BuildOptions::default()).unwrap(),
+            &batch,
+        );
+        for (name, accel) in each(&geometry) {
+            let Some(blocks) = accel.blocks() else { continue };
+            compared += 1;
+            let mut rays = RayBlocks::default();
+            blocks.convert(&batch, &mut rays);
+            blocks.closest_of_blocks(rays.blocks_mut(), &[], false);
+            for i in 0..batch.len() {
+                let (block, lane) = (&rays.blocks()[i / LANES], i % LANES);
+                let own = [block.placement[lane], block.triangle[lane]];
+                let due = [truth.placement[i], truth.triangle[i]];
+                let at_edge =
+                    own[0] != MISS && due[0] != MISS && is_at_edge(&geometry, &batch, &truth, i);
+                let both = truth.is_hit(i) == (own[0] != MISS);
+                assert!(
+                    own == due || at_edge,
+                    "{name} {floor_first} {crowded}: {own:?} {due:?}, {both}"
+                );
+                if own == due && truth.is_hit(i) {
+                    let [t, u, v] = [block.t_max, block.u, block.v].map(|row| f64::from(row[lane]));
+                    assert!((t - truth.t[i]).abs() < 1e-5, "{name}: {t} {}", truth.t[i]);
+                    // Of edges of 0.05 m and more.
+                    let off = (u - truth.u[i]).abs() + (v - truth.v[i]).abs();
+                    assert!(off < 1e-3, "{name}: {off}");
+                    let normal = DVec3::from(block.normal.map(|axis| f64::from(axis[lane])));
+                    assert!(normal.normalize().distance(truth.normal(i)) < 1e-5, "{name}");
+                }
+            }
+        }
+    }
+    assert!(compared >= if cfg!(feature = "embree") { 6 } else { 2 }, "{compared}");
+}
+
+/// A box of 0.6 m that stands on y = 0.
+fn cube_on_floor([x, z]: [f32; 2]) -> Mesh {
+    let corners: Vec<[f32; 3]> = (0..8)
+        .map(|k| {
+            let side = |bit: u32| if k >> bit & 1 == 1 { 0.3 } else { -0.3 };
+            [x + side(0), side(1) + 0.3, z + side(2)]
+        })
+        .collect();
+    let quads =
+        [[0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    mesh("box", &corners, triangles)
+}
+
+/// Many placements of few meshes, which Embree has as instances, are met in blocks as in batches: ray by ray and in
+/// packets that keep together, in the compact mode, too. Some are mirror images, and one of those is used once.
+#[cfg(feature = "embree")]
+#[test]
+fn instances_are_met_in_blocks_as_in_batches() {
+    let mut random = Random(29);
+    let mut geometry = (*super::instances(&mut random, 40)).clone();
+    let mirrored = DVec3::new(0.3, -0.4, 0.3);
+    let mirror = Transform::from_trs(DVec3::splat(0.6), random.rotation(), mirrored);
+    geometry.placements.push(placed(geometry.meshes.len() as u32, mirror));
+    geometry.meshes.push(super::blob(6));
+    let geometry = Arc::new(geometry);
+    for (compact, coherent) in [(false, false), (false, true), (true, false), (true, true)] {
+        let options = BuildOptions { compact, ..BuildOptions::default() };
+        let accel = Embree::build(Arc::clone(&geometry), &options).unwrap();
+        let mut batch = super::rays(6000, DVec3::ZERO, 1.0, 37).with_coherence(coherent);
+        batch.precision = HitPrecision::Single;
+        let due = closest(&accel, &batch);
+        let mut due_blocked = Vec::new();
+        accel.occluded(&batch, &mut due_blocked);
+        let blocks = accel.blocks().expect("Embree takes blocks of every scene");
+        let mut rays = RayBlocks::default();
+        blocks.convert(&batch, &mut rays);
+        let start = |block: &RayBlock, lane: usize| {
+            blocks.origin() + DVec3::from(block.origin.map(|axis| f64::from(axis[lane])))
+        };
+        let mut shadows = rays.clone();
+        blocks.closest_of_blocks(rays.blocks_mut(), &[], coherent);
+        blocks.occluded_of_blocks(shadows.blocks_mut(), &[], coherent);
+        let (mut met, mut differ) = (vec![false; geometry.placements.len()], 0);
+        for (i, &due_blocked) in due_blocked.iter().enumerate() {
+            let context = format!("compact {compact}, coherent {coherent}: ray {i}");
+            let (block, lane) = (&rays.blocks()[i / LANES], i % LANES);
+            let is_blocked = shadows.blocks()[i / LANES].is_blocked(lane);
+            let own = [block.placement[lane], block.triangle[lane]];
+            if own != [due.placement[i], due.triangle[i]] || is_blocked != due_blocked {
+                differ += 1;
+                continue;
+            }
+            if !due.is_hit(i) {
+                continue;
+            }
+            met[own[0] as usize] = true;
+            let t = (start(block, lane) - batch.origin(i)).length() + f64::from(block.t_max[lane]);
+            assert!((t - due.t[i]).abs() < 1e-5, "{context}: {t}, not {}", due.t[i]);
+            let weights = [block.u, block.v].map(|row| f64::from(row[lane]));
+            let off = (weights[0] - due.u[i]).abs() + (weights[1] - due.v[i]).abs();
+            assert!(off < 1e-3, "{context}: {off}");
+            let normal = DVec3::from(block.normal.map(|axis| f64::from(axis[lane])));
+            assert!(normal.normalize().distance(due.normal(i)) < 1e-5, "{context}: {normal}");
+        }
+        // Packets round in another order than rays one by one.
+        assert!(differ <= 6, "compact {compact}, coherent {coherent}: {differ} differ");
+        let count = met.iter().filter(|&&met| met).count();
+        assert!(count >= 38, "{count} of {} placements are met", met.len());
+        assert!(met.last() == Some(&true), "the mirror image that is used once is met");
+    }
+}
