@@ -262,7 +262,7 @@ pub(crate) fn settle(
             continue;
         }
         hits.placement[i] = coplanar.last(hits.placement[i]);
-        if !coplanar.has_others(hits.placement[i]) {
+        if !coplanar.has_others([hits.placement[i], hits.triangle[i]]) {
             continue;
         }
         let own = [hits.placement[i], hits.triangle[i]];
@@ -294,7 +294,7 @@ pub(crate) fn settle_blocks(
                 continue;
             }
             block.placement[lane] = coplanar.last(block.placement[lane]);
-            if !coplanar.has_others(block.placement[lane]) {
+            if !coplanar.has_others([block.placement[lane], block.triangle[lane]]) {
                 continue;
             }
             let query = Query {

@@ -17,6 +17,7 @@ use etendue_render::output::conventions::{KITTI_DEPTH, TUM_DEPTH};
 use etendue_render::output::{Outputs, sidecar};
 use etendue_scene::file::SamplesSpec;
 use etendue_scene::{Frame, RigCamera, Scene};
+use etendue_tracer::LayerSpec;
 use serde_json::{Map, Value, json};
 
 use crate::{Error, FramePattern, rendering};
@@ -95,7 +96,7 @@ impl Dataset {
                 camera: scene.camera.opencv(),
                 world_from_camera: matrix.transpose().to_cols_array_2d(),
                 picture: of("picture", "png"),
-                depth: of("Depth", "npy"),
+                depth: of(&LayerSpec::Depth.row().name, "npy"),
                 files,
                 scene_hash: scene.hash()?.to_string(),
                 seed: scene.render.seed,

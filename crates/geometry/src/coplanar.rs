@@ -33,8 +33,8 @@ const MOST_VISITS: usize = 1 << 23;
 #[derive(Debug, Clone, Default)]
 pub struct Coplanar {
     others: BTreeMap<PlacedTriangle, Overlapping>,
-    /// True if any triangle of a placement has others over it.
-    has_others: Vec<bool>,
+    /// By placement a bit a triangle: it has others over it. Empty where none has.
+    covered: Vec<Vec<u64>>,
     /// The last placement of the same mesh in the very same place, by placement; empty where no two are.
     last: Vec<u32>,
 }
@@ -167,8 +167,14 @@ impl Coplanar {
         }
         found.others.values_mut().for_each(|others| others.settle(geometry, apart));
         if !found.others.is_empty() {
-            found.has_others = vec![false; geometry.placements.len()];
-            found.others.keys().for_each(|id| found.has_others[id[0] as usize] = true);
+            found.covered = vec![Vec::new(); geometry.placements.len()];
+            for &[placement, triangle] in found.others.keys() {
+                let own = &mut found.covered[placement as usize];
+                let count =
+                    geometry.mesh_of(&geometry.placements[placement as usize]).triangles.len();
+                own.resize(count.div_ceil(64), 0);
+                own[triangle as usize / 64] |= 1 << (triangle % 64);
+            }
         }
         found
     }
@@ -233,11 +239,13 @@ impl Coplanar {
         self.last.get(placement as usize).copied().unwrap_or(placement)
     }
 
-    /// True if any triangle of a placement has others over it.
+    /// True if a triangle has others over it.
     #[must_use]
     #[inline]
-    pub fn has_others(&self, placement: u32) -> bool {
-        self.has_others.get(placement as usize).is_some_and(|&has| has)
+    pub fn has_others(&self, [placement, triangle]: PlacedTriangle) -> bool {
+        let own = self.covered.get(placement as usize);
+        let bits = own.and_then(|own| own.get(triangle as usize / 64));
+        bits.is_some_and(|bits| bits >> (triangle % 64) & 1 != 0)
     }
 
     /// The triangles that lie over one, and of them those that may come within `slack` of `point` (m).
@@ -247,8 +255,8 @@ impl Coplanar {
         point: DVec3,
         slack: f64,
     ) -> impl Iterator<Item = PlacedTriangle> {
-        let others = Some(id[0]).filter(|&own| self.has_others(own));
-        let others = others.and_then(|_| self.others.get(&id));
+        let others = Some(id).filter(|&own| self.has_others(own));
+        let others = others.and_then(|own| self.others.get(&own));
         others.into_iter().flat_map(move |others| {
             let &Overlapping { ref all, ref boxes, axis, widest } = others;
             let at = point[axis];

@@ -45,7 +45,7 @@ pub use coplanar::Coplanar;
 pub use float::Float;
 pub use hermite::Interpolation;
 pub use joint::{Between, Joint, Link, Track};
-pub use mesh::{Buffer, Mesh, Positions, Vertices};
+pub use mesh::{Buffer, Mesh, Positions, Tangents, Vertices};
 pub use motion::{Motion, MotionError, Steady, Sweep};
 pub use steps::{Moment, Steps, StepsError};
 pub use transform::Transform;

@@ -130,6 +130,15 @@ impl Positions {
     }
 }
 
+/// Tangents of a mesh's corners (glTF 2.0, section 3.7.2.1).
+#[derive(Debug, Clone)]
+pub struct Tangents {
+    /// The set of texture coordinates along whose u they run.
+    pub set: usize,
+    /// A unit vector a corner, and on which side of it the bitangent is: the normal's product with it, times 1 or −1.
+    pub corners: Vertices<4>,
+}
+
 /// A triangle mesh in its own frame. Every index in `triangles` is less than the number of
 /// positions, and every position that a triangle uses is finite: loaders see to both.
 #[derive(Debug, Clone)]
@@ -146,6 +155,8 @@ pub struct Mesh {
     pub uvs: Vec<Vertices<2>>,
     /// Linear colour a corner (RGBA, 0..=1).
     pub colors: Option<Vertices<4>>,
+    /// Tangents a corner, when the file has them; of meshes of one shape alone.
+    pub tangents: Option<Tangents>,
     /// The box of all triangles that have an area (m): what is a point or a line is not drawn, and sets no
     /// frame.
     pub bounds: Bounds,
@@ -179,6 +190,7 @@ impl Mesh {
             normals: None,
             uvs: Vec::new(),
             colors: None,
+            tangents: None,
             bounds,
             degenerate,
             steps: None,
@@ -251,6 +263,7 @@ impl Mesh {
             && self.name == other.name
             && same(self.normals.as_ref(), other.normals.as_ref())
             && same(self.colors.as_ref(), other.colors.as_ref())
+            && same(self.tangent_corners(), other.tangent_corners())
             && self.uvs.len() == other.uvs.len()
             && self.uvs.iter().zip(&other.uvs).all(|(own, other)| own.is_same(other))
     }
@@ -308,9 +321,14 @@ impl Mesh {
         };
         let normals = self.normals.as_ref().map_or(0, |normals| normals.floats().heap_bytes());
         let colors = self.colors.as_ref().map_or(0, |colors| colors.floats().heap_bytes());
+        let tangents = self.tangent_corners().map_or(0, |own| own.floats().heap_bytes());
         let uvs: usize = self.uvs.iter().map(|uvs| uvs.floats().heap_bytes()).sum();
         let steps = self.steps.as_ref().map_or(0, |steps| steps.heap_bytes());
-        positions + self.triangles.heap_bytes() + normals + uvs + colors + steps
+        positions + self.triangles.heap_bytes() + normals + uvs + colors + tangents + steps
+    }
+
+    fn tangent_corners(&self) -> Option<&Vertices<4>> {
+        self.tangents.as_ref().map(|tangents| &tangents.corners)
     }
 }
 

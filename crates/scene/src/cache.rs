@@ -189,7 +189,9 @@ fn digest_of(mesh: &Mesh) -> u128 {
     let normals = mesh.normals.iter().flat_map(|n| (0..n.len()).flat_map(|i| n.get(i)));
     let uvs = mesh.uvs.iter().flat_map(|u| (0..u.len()).flat_map(|i| u.get(i)));
     let colors = mesh.colors.iter().flat_map(|c| (0..c.len()).flat_map(|i| c.get(i)));
-    for value in normals.chain(uvs).chain(colors) {
+    let tangents = mesh.tangents.iter().map(|tangents| &tangents.corners);
+    let tangents = tangents.flat_map(|t| (0..t.len()).flat_map(|i| t.get(i)));
+    for value in normals.chain(uvs).chain(colors).chain(tangents) {
         hash.update(&value.to_le_bytes());
     }
     hash.digest128()

@@ -463,6 +463,17 @@ impl<'a> SurfacePoint<'a> {
         Some(a? * self.weights[0] + b? * self.weights[1] + c? * self.weights[2])
     }
 
+    /// Directions in the world of the mesh's own tangent along a set of texture coordinates, and of its bitangent (glTF
+    /// 2.0, section 3.7.2.1). `None` where the mesh has none.
+    pub(crate) fn tangent_axes(&self, set: usize) -> Option<[DVec3; 2]> {
+        let tangents = self.mesh.tangents.as_ref().filter(|tangents| tangents.set == set)?;
+        let [x, y, z, side] = self.mix(&tangents.corners);
+        let tangent = DVec3::new(x, y, z);
+        let bitangent = self.local_normal()?.cross(tangent) * side;
+        let is_told = tangent != DVec3::ZERO && bitangent != DVec3::ZERO;
+        is_told.then(|| [tangent, bitangent].map(|axis| self.linear() * axis))
+    }
+
     /// Change of the world's places along the texture coordinates of a set: the directions of
     /// growing u and of growing v. `None` where they do not tell.
     #[must_use]

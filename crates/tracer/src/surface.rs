@@ -114,12 +114,16 @@ impl SurfacePoint<'_> {
     }
 
     /// Unit vectors at right angles to `normal` and each other: towards growing u of a set, and towards falling
-    /// v.
+    /// v, or as the mesh's own tangents have it.
     pub(crate) fn tangents(&self, set: usize, normal: DVec3) -> Option<[DVec3; 2]> {
-        let [along_u, along_v] = self.texture_axes(set)?;
-        let tangent = (along_u - normal * normal.dot(along_u)).try_normalize()?;
-        let across = normal.cross(tangent);
-        Some([tangent, if across.dot(along_v) > 0.0 { -across } else { across }])
+        let axes = self.tangent_axes(set).or_else(|| {
+            let [along_u, along_v] = self.texture_axes(set)?;
+            Some([along_u, -along_v])
+        });
+        let [along, across] = axes?;
+        let tangent = (along - normal * normal.dot(along)).try_normalize()?;
+        let bitangent = normal.cross(tangent);
+        Some([tangent, if bitangent.dot(across) < 0.0 { -bitangent } else { bitangent }])
     }
 }
 
@@ -151,7 +155,50 @@ pub(crate) fn facing(normal: DVec3, geometric: DVec3, wo: DVec3) -> DVec3 {
 
 #[cfg(test)]
 mod tests {
+    use etendue_geometry::{Geometry, Mesh, Placement, Positions, Tangents, Transform, Vertices};
+
     use super::*;
+
+    /// A triangle in the plane z = 0 whose u grows along +x and whose v falls along +y, with tangents.
+    fn triangle(tangent: [f32; 4], linear: DMat3) -> Geometry {
+        let positions = Vertices::from_arrays(&[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+        let mut mesh = Mesh::new("", Positions::F32(positions), vec![[0, 1, 2]].into());
+        mesh.normals = Some(Vertices::from_arrays(&[[0.0, 0.0, 1.0]; 3]));
+        mesh.uvs = vec![Vertices::from_arrays(&[[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]]); 2];
+        let corners = Vertices::from_arrays(&[tangent; 3]);
+        mesh.tangents = Some(Tangents { set: 1, corners });
+        let placement = Placement {
+            mesh: 0,
+            object: 0,
+            instance: 0,
+            node: 0,
+            material: 0,
+            world_from_mesh: Transform { linear, ..Transform::IDENTITY },
+            motion: None,
+        };
+        Geometry { meshes: vec![mesh], placements: vec![placement] }
+    }
+
+    #[test]
+    fn tangents_are_the_meshs_own_or_follow_from_texture_coordinates() {
+        let mirrored = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
+        for (tangent, linear, own) in [
+            ([1.0, 0.0, 0.0, 1.0], DMat3::IDENTITY, [DVec3::X, DVec3::Y]),
+            ([0.0, 1.0, 0.0, 1.0], DMat3::IDENTITY, [DVec3::Y, -DVec3::X]),
+            ([0.0, 1.0, 0.0, -1.0], DMat3::IDENTITY, [DVec3::Y, DVec3::X]),
+            ([1.0, 0.0, 0.0, 1.0], mirrored, [-DVec3::X, DVec3::Y]),
+            ([1.0, 0.0, 0.0, -1.0], mirrored, [-DVec3::X, -DVec3::Y]),
+            // Tangents that are none.
+            ([0.0, 0.0, 0.0, 1.0], DMat3::IDENTITY, [DVec3::X, DVec3::Y]),
+        ] {
+            let geometry = triangle(tangent, linear);
+            let point = SurfacePoint::corner(&geometry, &geometry.placements[0], 0);
+            assert_eq!(point.tangents(1, DVec3::Z), Some(own), "{tangent:?}");
+            // The other set's are those of its coordinates.
+            let derived = [linear * DVec3::X, DVec3::Y];
+            assert_eq!(point.tangents(0, DVec3::Z), Some(derived), "{tangent:?}");
+        }
+    }
 
     #[test]
     fn bent_normals_mirror_outwards() {

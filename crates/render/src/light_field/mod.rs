@@ -262,7 +262,7 @@ fn central_depth(
     let scene = shown_to(scene, central, vec![LayerSpec::Depth]);
     let plan = Plan::new(&scene, Outputs { npy: true, ..outputs });
     let picture = render(&scene, &plan, accel, images, Vec::new(), &progress)?.picture;
-    let layer = picture.layer("Depth").and_then(|layer| layer.channels.first());
+    let layer = picture.layer_of(LayerSpec::Depth).and_then(|layer| layer.channels.first());
     let values = layer.map(|channel| &channel.values);
     Ok(values.map_or_else(Vec::new, |values| (0..values.len()).map(|i| values.at(i)).collect()))
 }

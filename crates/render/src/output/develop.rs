@@ -11,6 +11,7 @@
 //!   Neubelt, *Baking Lab*, 2016.
 
 use etendue_scene::file::{Exposure, RenderSpec, ToneMap};
+use etendue_tracer::LayerSpec;
 use serde_json::{Value, json};
 
 use super::look::{ColourType, LayerImage, srgb, unit};
@@ -102,7 +103,7 @@ impl Development {
         };
         let note = format!("sRGB; {}", self.in_words());
         // Without alpha: colour, or grey of one channel.
-        let alpha = picture.layer("Alpha").and_then(|layer| layer.channels.first());
+        let alpha = picture.layer_of(LayerSpec::Alpha).and_then(|layer| layer.channels.first());
         let Some(alpha) = alpha.filter(|_| self.alpha) else {
             return match planes.len() {
                 3 => {
@@ -116,7 +117,7 @@ impl Development {
         };
         // With it: light without the backdrop, over the share that the subject has.
         let backdrop: Vec<&Values> = picture
-            .layer("Backdrop")
+            .layer_of(LayerSpec::Backdrop)
             .map(|layer| layer.channels.iter().map(|channel| &channel.values).collect())
             .unwrap_or_default();
         let rgba = |i| {

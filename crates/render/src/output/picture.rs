@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use serde_json::Value;
 
 use etendue_image::cube::emission_channel;
+use etendue_tracer::LayerSpec;
 
 use super::look::lacks;
 use super::{Development, Look, OutputError, PictureError};
@@ -318,6 +319,12 @@ impl Picture {
     #[must_use]
     pub fn layer(&self, name: &str) -> Option<&Layer> {
         self.layers.iter().find(|layer| layer.name == name)
+    }
+
+    /// A layer of one plane or a set of planes that has a file name of its own.
+    #[must_use]
+    pub fn layer_of(&self, layer: LayerSpec) -> Option<&Layer> {
+        self.layer(&layer.row().name)
     }
 
     /// The layer called `name`, or an error that says which there are.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use bytemuck::AnyBitPattern;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Bounds, Buffer, Mesh, Positions, Vertices, is_degenerate};
+use etendue_geometry::{Bounds, Buffer, Mesh, Positions, Tangents, Vertices, is_degenerate};
 use rayon::prelude::*;
 
 use super::{Note, NoteKind, Options, Refusal, Strictness, error};
@@ -26,6 +26,7 @@ pub(super) struct MeshCandidate {
     pub normals: Option<Vertices<3>>,
     pub uvs: Vec<Vertices<2>>,
     pub colors: Option<Vertices<4>>,
+    pub tangents: Option<Tangents>,
 }
 
 /// A mesh that passed.
@@ -73,6 +74,12 @@ pub(super) fn admit(
             .map(|v| gate.finite(v, "texture coordinate", 0.0))
             .collect::<Result<_, _>>()?,
         colors: candidate.colors.map(|v| gate.finite(v, "vertex colour", 1.0)).transpose()?,
+        tangents: match candidate.tangents {
+            Some(Tangents { set, corners }) => {
+                Some(Tangents { set, corners: gate.finite(corners, "tangent", 0.0)? })
+            }
+            None => None,
+        },
         name: candidate.name,
         positions: candidate.positions,
         triangles,

@@ -89,6 +89,7 @@ impl Globe {
             normals,
             uvs,
             colors: None,
+            tangents: None,
             bounds,
             degenerate,
             steps: None,

@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use etendue_geometry::glam::{DVec2, DVec3};
 use etendue_geometry::{Bounds, Geometry, Placement};
 use etendue_scene::import::{Import, Options, Wanted, import};
 
@@ -77,6 +78,40 @@ fn gltf_assets_have_their_triangles_and_boxes() {
         assert_eq!(has, triangles, "{path}");
         assert_box(path, bounds, printed);
     }
+}
+
+/// Tangents of a file run along growing u of its texture coordinates, and bitangents along falling v: the program that
+/// wrote them is the reference, but at seams and where it averaged.
+#[test]
+fn tangents_run_along_texture_coordinates() {
+    let Some(folder) = test_data() else { return };
+    let import = load(&folder.join("gltf/Avocado/Avocado.gltf"));
+    let (mut along, mut across, mut count) = (0, 0, 0);
+    for mesh in &import.meshes {
+        let tangents = mesh.tangents.as_ref().expect("the file has them");
+        let normals = mesh.normals.as_ref().unwrap();
+        for (number, triangle) in mesh.triangles.iter().enumerate() {
+            let [p, q, r] = mesh.corners(number);
+            let uv = triangle
+                .map(|i| DVec2::from(mesh.uvs[tangents.set].get(i as usize).map(f64::from)));
+            let (first, second) = (uv[1] - uv[0], uv[2] - uv[0]);
+            let area = first.perp_dot(second);
+            let along_u = ((q - p) * second.y - (r - p) * first.y) / area;
+            let along_v = ((r - p) * first.x - (q - p) * second.x) / area;
+            for corner in triangle.map(|i| i as usize) {
+                let [x, y, z, side] = tangents.corners.get(corner).map(f64::from);
+                let tangent = DVec3::new(x, y, z);
+                let bitangent =
+                    DVec3::from(normals.get(corner).map(f64::from)).cross(tangent) * side;
+                // Within 37 degrees.
+                along += usize::from(tangent.dot(along_u) > 0.8 * along_u.length());
+                across += usize::from(-bitangent.dot(along_v) > 0.8 * along_v.length());
+                count += 1;
+            }
+        }
+    }
+    println!("{along} and {across} of {count}");
+    assert!(along * 10 > count * 9 && across * 10 > count * 9, "{along} {across} of {count}");
 }
 
 const OBJ: [(&str, u64); 14] = [

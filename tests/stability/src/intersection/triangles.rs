@@ -312,6 +312,7 @@ fn in_a_hole(folder: &std::path::Path, triangles: u64) -> Result<Arc<Geometry>> 
         normals: None,
         uvs: Vec::new(),
         colors: None,
+        tangents: None,
         bounds: Bounds { min: DVec3::NEG_ONE, max: DVec3::ONE },
         degenerate: 0,
         steps: None,

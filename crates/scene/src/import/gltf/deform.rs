@@ -27,6 +27,8 @@ const WEIGHTS_OFF: f64 = 2e-3;
 pub(super) struct PrimitiveCorners {
     pub positions: Positions,
     pub normals: Option<Vertices<3>>,
+    /// True if they are not those of the file.
+    pub is_deformed: bool,
     /// True if a skin placed the corners in the model's frame, and its node no longer does.
     pub skinned: bool,
     /// True if the skin turned the triangles inside out.
@@ -58,6 +60,7 @@ impl PrimitiveReader<'_> {
             return Ok(PrimitiveCorners {
                 positions,
                 normals,
+                is_deformed: false,
                 skinned: false,
                 mirrored: false,
                 deformer: None,
@@ -97,6 +100,7 @@ impl PrimitiveReader<'_> {
         Ok(PrimitiveCorners {
             positions: precise_enough(&points),
             normals,
+            is_deformed: true,
             skinned,
             mirrored,
             deformer,

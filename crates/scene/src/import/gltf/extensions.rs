@@ -42,6 +42,7 @@ fn support(name: &str) -> Option<Support> {
         | "KHR_materials_emissive_strength"
         | "KHR_materials_specular"
         | "KHR_materials_sheen"
+        | "KHR_materials_anisotropy"
         | "EXT_meshopt_compression"
         | "KHR_meshopt_compression"
         | "KHR_draco_mesh_compression"
@@ -55,9 +56,6 @@ fn support(name: &str) -> Option<Support> {
         ),
         "KHR_materials_clearcoat" => {
             Support::As("coats follow the normals of what is beneath them")
-        }
-        "KHR_materials_anisotropy" => {
-            Support::As("the grain follows the texture coordinates, not the tangents of vertices")
         }
         "KHR_materials_volume" => Support::As(
             "surfaces that are clear all over and have a thickness are bodies of glass; light passes \

@@ -1,6 +1,6 @@
 //! One primitive on its way in: its attributes and triangles, and what was noted of it.
 
-use etendue_geometry::{Buffer, Vertices};
+use etendue_geometry::{Buffer, Tangents, Vertices};
 use gltf::json;
 use json::mesh::{Mode, Primitive, Semantic};
 use json::validation::Checked;
@@ -84,6 +84,19 @@ impl<'a> PrimitiveReader<'a> {
             }
         }
         Ok(sets)
+    }
+
+    /// Tangents, along the texture coordinates by which the primitive's material maps normals.
+    pub(super) fn tangents(
+        &mut self,
+        positions: &Vertices<3>,
+    ) -> Result<Option<Tangents>, Refusal> {
+        let corners = self.vertex_data(&Semantic::Tangents, 0.0, positions)?;
+        let materials = &self.reader.document.root.materials;
+        let material = self.primitive.material.and_then(|index| materials.get(index.value()));
+        let map = material.and_then(|material| material.normal_texture.as_ref());
+        let set = map.map_or(0, |map| map.tex_coord as usize);
+        Ok(corners.map(|corners| Tangents { set, corners }))
     }
 
     fn accessor(&self, semantic: &Semantic) -> Result<Option<(Accessor<'a>, String)>, Refusal> {

@@ -209,8 +209,14 @@ fn read(
     let uvs = if wanted.uvs { part.uvs(&positions)? } else { Vec::new() };
     let colors =
         if wanted.colors { part.vertex_data(&Semantic::Colors(0), 1.0, &positions)? } else { None };
-    let PrimitiveCorners { positions, normals, skinned, mirrored, deformer } =
+    let tangents = match &normals {
+        Some(_) if wanted.uvs => part.tangents(&positions)?,
+        _ => None,
+    };
+    let PrimitiveCorners { positions, normals, is_deformed, skinned, mirrored, deformer } =
         part.deformed(shape, skin, positions, normals)?;
+    // Those of other shapes follow from the texture coordinates, as in files without tangents.
+    let tangents = tangents.filter(|_| !is_deformed);
     let triangles = if mirrored { turned_over(&triangles) } else { triangles };
     let (mut copied, mut mapped) = cost(&triangles, triangles.len());
     let mut add = |(c, m): (u64, u64)| {
@@ -223,9 +229,18 @@ fn read(
     });
     normals.iter().for_each(|v| add(cost(v.floats(), v.len() * 3)));
     uvs.iter().for_each(|v| add(cost(v.floats(), v.len() * 2)));
-    colors.iter().for_each(|v| add(cost(v.floats(), v.len() * 4)));
-    let candidate =
-        MeshCandidate { name, place: part.place, positions, triangles, normals, uvs, colors };
+    let of_four = colors.iter().chain(tangents.as_ref().map(|tangents| &tangents.corners));
+    of_four.for_each(|v| add(cost(v.floats(), v.len() * 4)));
+    let candidate = MeshCandidate {
+        name,
+        place: part.place,
+        positions,
+        triangles,
+        normals,
+        uvs,
+        colors,
+        tangents,
+    };
     let admitted = admit(candidate, reader.file, reader.options)?;
     Ok(Some(Read { skinned, admitted, deformer, copied, mapped, notes: part.notes }))
 }

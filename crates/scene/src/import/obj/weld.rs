@@ -71,6 +71,7 @@ impl<'a> Welder<'a> {
                 normals: None,
                 uvs: Vec::new(),
                 colors: opaque(pool.colors.iter()),
+                tangents: None,
             });
         }
         let index = |chunk: &Chunk, kind: usize, corner: usize| {
@@ -90,6 +91,7 @@ impl<'a> Welder<'a> {
             normals: has_normals.then(|| pick(&keys, VN, &pool.normals)),
             uvs: if has_uvs { vec![pick(&keys, VT, &pool.uvs)] } else { Vec::new() },
             colors: opaque(keys.iter().filter_map(|key| pool.colors.get(key[V] as usize))),
+            tangents: None,
         })
     }
 

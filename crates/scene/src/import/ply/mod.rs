@@ -71,6 +71,7 @@ pub(super) fn import(
         normals: vertices.normals,
         uvs: vertices.uvs.into_iter().collect(),
         colors: vertices.colors,
+        tangents: None,
     };
     let admitted = admit::admit(candidate, path, options)?;
     import.stats.dropped = admitted.dropped;

@@ -140,19 +140,24 @@ impl Lane for f64 {
         query: Query<'_>,
         batch: &mut Batch,
     ) {
-        let from = batch.take(ctx.precision, blocks, query);
+        batch.take(ctx.precision, blocks, query);
         batch.hits.detail = Detail::Surface;
         ctx.accel.closest(&batch.rays, &mut batch.hits);
-        let hits = &batch.hits;
-        for (k, i) in from.enumerate() {
-            let (block, lane) = (&mut blocks.blocks_mut()[i / LANES], i % LANES);
-            (block.placement[lane], block.triangle[lane]) = (hits.placement[k], hits.triangle[k]);
-            if hits.placement[k] == MISS {
-                continue;
+        let (hits, len) = (&batch.hits, blocks.len());
+        for (number, block) in blocks.blocks_mut().iter_mut().enumerate() {
+            let run = number * LANES..len.min((number + 1) * LANES);
+            let count = run.len();
+            block.placement[..count].copy_from_slice(&hits.placement[run.clone()]);
+            block.triangle[..count].copy_from_slice(&hits.triangle[run.clone()]);
+            block.u[..count].copy_from_slice(&hits.u[run.clone()]);
+            block.v[..count].copy_from_slice(&hits.v[run.clone()]);
+            for (axis, normals) in block.normal.iter_mut().zip(&hits.normal) {
+                axis[..count].copy_from_slice(&normals[run.clone()]);
             }
-            (block.t_max[lane], block.u[lane], block.v[lane]) = (hits.t[k], hits.u[k], hits.v[k]);
-            for (axis, normal) in block.normal.iter_mut().zip(hits.normal(k).to_array()) {
-                axis[lane] = normal;
+            for (t_max, (&t, &placement)) in
+                block.t_max.iter_mut().zip(hits.t[run.clone()].iter().zip(&hits.placement[run]))
+            {
+                *t_max = if placement == MISS { *t_max } else { t };
             }
         }
     }
@@ -163,9 +168,9 @@ impl Lane for f64 {
         query: Query<'_>,
         batch: &mut Batch,
     ) {
-        let from = batch.take(ctx.precision, blocks, query);
+        batch.take(ctx.precision, blocks, query);
         ctx.accel.occluded(&batch.rays, &mut batch.blocked);
-        for i in from.filter(|&i| batch.blocked[i]) {
+        for i in (0..blocks.len()).filter(|&i| batch.blocked[i]) {
             blocks.blocks_mut()[i / LANES].t_max[i % LANES] = -Self::INFINITY;
         }
     }
@@ -181,33 +186,33 @@ impl Lane for f64 {
 }
 
 impl Batch {
-    /// Takes rays of blocks to be hit in some precision; the numbers of all.
+    /// Takes rays of blocks to be hit in some precision.
     fn take(
         &mut self,
         precision: HitPrecision,
         blocks: &RayBlocks<f64>,
         Query { times, ends, coherent }: Query<'_>,
-    ) -> std::ops::Range<usize> {
+    ) {
         let rays = &mut self.rays;
-        rays.clear();
+        rays.reset(blocks.len());
         rays.from_surface = !ends.is_empty();
         rays.precision = precision;
         rays.coherent = coherent;
-        for i in 0..blocks.len() {
-            let (block, lane) = (&blocks.blocks()[i / LANES], i % LANES);
-            let at =
-                |axes: &[[f64; LANES]; 3]| DVec3::new(axes[0][lane], axes[1][lane], axes[2][lane]);
-            let (origin, direction) = (at(&block.origin), at(&block.direction));
-            let limits = [block.t_min[lane], block.t_max[lane]];
-            match (precision, ends.get(i)) {
-                (HitPrecision::Double, Some(own)) => {
-                    rays.push_between_triangles(origin, direction, limits, *own);
-                }
-                _ => rays.push_between(origin, direction, limits[0], limits[1]),
+        let own = rays.arrays_mut();
+        for (number, block) in blocks.blocks().iter().enumerate() {
+            let run = number * LANES..blocks.len().min((number + 1) * LANES);
+            let count = run.len();
+            for axis in 0..3 {
+                own.origins[axis][run.clone()].copy_from_slice(&block.origin[axis][..count]);
+                own.directions[axis][run.clone()].copy_from_slice(&block.direction[axis][..count]);
             }
+            own.t_min[run.clone()].copy_from_slice(&block.t_min[..count]);
+            own.t_max[run].copy_from_slice(&block.t_max[..count]);
+        }
+        if precision == HitPrecision::Double && !ends.is_empty() {
+            rays.end_on_triangles(ends.iter().copied());
         }
         rays.set_times(times.iter().copied());
-        0..blocks.len()
     }
 }
 
