@@ -86,15 +86,20 @@ impl Choices {
     ) {
         let Extent { centre, scale, .. } = self.extent;
         let (at, mut count, mut wide) = (self.len, 0, [0.0; LANES]);
-        let (mut local, mut normal) = ([0.0; LANES], [0.0; LANES]);
+        let (mut told, mut normal) = ([[0.0; LANES]; 3], [0.0; LANES]);
         for axis in 0..3 {
             let offset = origin[axis] - centre[axis];
             for i in 0..LANES {
                 let point: f64 = points[axis][i].into();
-                local[i] = node::local((point + offset) * scale);
+                told[axis][i] = (point + offset) * scale;
+            }
+        }
+        let local = node::local(told);
+        for axis in 0..3 {
+            for i in 0..LANES {
                 normal[i] = f32::of(normals[axis][i].into());
             }
-            compress(&local, &mut self.local[axis][at..at + LANES]);
+            compress(&local[axis], &mut self.local[axis][at..at + LANES]);
             count = compress(&normal, &mut self.normal[axis][at..at + LANES]);
         }
         for i in 0..LANES {

@@ -24,8 +24,9 @@ const FAR: f32 = 256.0;
 /// Sums of eight of these are finite, and so are their squares in double.
 const MOST_IMPORTANCE: f32 = 1e30;
 
-/// Points are looked at no farther out than so many extents of all lights: squares and their inverses stay numbers.
-const FARTHEST: f64 = 1e6;
+/// Points are looked at no farther out than so many extents of all lights, in their own direction: squares and their
+/// inverses stay numbers.
+const FARTHEST: f64 = 1e15;
 
 /// Share of the largest cosine that any light of a branch may have, in what is taken for all of them; the rest is that
 /// of the branch's centre. What can bring light keeps this share of each of its two bounds.
@@ -104,7 +105,9 @@ impl Extent {
     }
 
     pub(super) fn local(&self, point: DVec3) -> Vec3 {
-        ((point - self.centre) * self.scale).to_array().map(local).into()
+        let at = (point - self.centre) * self.scale;
+        let [[x], [y], [z]] = local([[at.x], [at.y], [at.z]]);
+        Vec3::new(x, y, z)
     }
 
     #[inline(always)]
@@ -116,10 +119,22 @@ impl Extent {
     }
 }
 
-/// A coordinate of a point, in extents of all lights.
+/// Points in extents of all lights, none of them too far.
 #[inline(always)]
-pub(super) fn local(x: f64) -> f32 {
-    single(x.clamp(-FARTHEST, FARTHEST))
+pub(super) fn local<const N: usize>(points: [[f64; N]; 3]) -> [[f32; N]; 3] {
+    let (mut shrink, mut local) = ([1.0; N], [[0.0; N]; 3]);
+    for axis in &points {
+        for k in 0..N {
+            let most = FARTHEST / axis[k].abs();
+            shrink[k] = if most < shrink[k] { most } else { shrink[k] };
+        }
+    }
+    for axis in 0..3 {
+        for k in 0..N {
+            local[axis][k] = single(points[axis][k] * shrink[k]);
+        }
+    }
+    local
 }
 
 #[inline(always)]

@@ -5,7 +5,7 @@ use etendue_scene::Scene;
 use etendue_tracer::{ClearSky, Paint};
 
 use super::{TRACERS, assert_shows, check, patch, picture, ways};
-use crate::steps::{self, load, load_in};
+use crate::steps::{self, load, load_in, mean};
 
 /// A Lambert plane under a point light, ρ I cos θ / (π d²), and under the sun, ρ E cos θ / π: without
 /// noise.
@@ -306,4 +306,38 @@ fn sparkles_are_told() {
     // The same lamp, lost in the light of a sky.
     let even = notes(r#"{"type": "environment", "radiance": [1000, 1000, 1000]}"#);
     assert!(!even.iter().any(|note| note.starts_with("sparkles")), "{even:?}");
+}
+
+/// A projector beside a sky that moves next to nothing while the shutter is open lights what it lights at rest: how far lights
+/// reach, by which places choose among them, may be any share of the way to these. A ninth of all light was lost once.
+#[test]
+fn lights_that_reach_next_to_nowhere_are_chosen_from_afar() {
+    let scene = |motion: &str| {
+        format!(
+            r#"{{"etendue": 1,
+                "camera": {{"type": "pinhole", "fov": 40, "pose": {{"from": [0, 2, 4], "look_at": [0, 0.2, 0]}},
+                    "sensor": {{"resolution": [24, 18]}}, "shutter": {{"type": "global", "exposure": 0.1}}}},
+                "tracer": {{"type": "direct"}},
+                "objects": [{{"shape": "rectangle", "width": 6, "height": 6, "material": "floor",
+                    "transform": {{"rotate": [1, 0, 0, -90]}}}}],
+                "materials": {{"floor": {{"type": "matte", "color": [0.6, 0.6, 0.6]}}}},
+                "lights": [{{"type": "projector", "at": [-1.5, 2.5, 0.3], "look_at": [0, 0.3, 0], "fov": 60,
+                        "image": [0.5, 0.5, 0.5], "aspect": 1, "intensity": [9, 9, 9]{motion}}},
+                    {{"type": "environment", "radiance": [0.3, 0.3, 0.3]}}],
+                "render": {{"samples": 256}}}}"#
+        )
+    };
+    for way in ways() {
+        let known = mean(&picture(load(&scene("")), way));
+        for exponent in [-14, -9, -6, -3] {
+            let motion =
+                format!(r#", "motion": {{"type": "velocity", "velocity": [1e{exponent}, 0, 0]}}"#);
+            let shown = mean(&picture(load(&scene(&motion)), way));
+            // Noise of 432 pixels of 256 samples, of which each is off by a few percent.
+            assert!(
+                (shown / known - 1.0).abs() < 0.005,
+                "1e{exponent} m/s, {way:?}: {shown}, not {known}"
+            );
+        }
+    }
 }

@@ -242,3 +242,49 @@ fn surfaces_that_light_passes_take_their_shares_one_by_one() {
         }
     }
 }
+
+/// A lamp behind a sheet that is not there, or a body of air, is as bright as without it: at any distance from it, tilted, and
+/// through it. The same random numbers are drawn, so that roundings alone differ; a lamp hidden by its own surface, which
+/// rays end on, would take a tenth and more.
+#[test]
+fn what_is_not_there_takes_nothing_of_lamps() {
+    let materials = r#""lamp": {"type": "emissive", "radiance": [3, 3, 3], "two_sided": true},
+        "floor": {"type": "matte", "color": [0.5, 0.5, 0.5]},
+        "none": {"type": "gltf", "color": [0, 0, 0], "opacity": 0},
+        "air": {"type": "dielectric", "ior": 1.0}"#;
+    let sheet = |z: f64, tilt: f64| {
+        format!(
+            r#", {{"shape": "rectangle", "width": 3, "height": 3, "material": "none",
+                "transform": {{"translate": [0.8, 0.1, {z}], "rotate": [1, 0.3, 0, {tilt}]}}}}"#
+        )
+    };
+    let ball = r#", {"shape": "sphere", "radius": 0.6, "material": "air", "transform": {"translate": [0.9, 0.3, 1.2]}}"#;
+    let seen = |between: &str, tracer: &str| {
+        let rest = format!(
+            r#""lights": [], "materials": {{{materials}}}, "objects": [
+                {{"shape": "rectangle", "width": 9, "height": 9, "material": "floor"}},
+                {{"shape": "disk", "radius": 0.5, "triangles": 16, "material": "lamp",
+                    "transform": {{"translate": [0.9, 0.2, 1.1]}}}}{between}]"#
+        );
+        load(&patch(tracer, 64, [-3.0, 0.5, 2.5], [0.0; 3], &rest))
+    };
+    let near = [1.0995, 1.07, 1.0, 0.8].map(|z| (format!("at {z} m"), sheet(z, 0.0)));
+    let others = [
+        ("two".to_owned(), sheet(1.05, 0.0) + &sheet(0.9, 0.0)),
+        ("tilted".to_owned(), sheet(0.9, 20.0)),
+        ("through it".to_owned(), sheet(1.1, 20.0)),
+        ("a body of air".to_owned(), ball.to_owned()),
+    ];
+    for tracer in ["direct", "path"] {
+        for way in ways() {
+            let known = mean(&picture(seen("", tracer), way));
+            for (name, between) in near.iter().chain(&others) {
+                let shown = mean(&picture(seen(between, tracer), way));
+                assert!(
+                    (shown / known - 1.0).abs() < 1e-4,
+                    "{name}, {tracer}, {way:?}: {shown}, not {known}"
+                );
+            }
+        }
+    }
+}

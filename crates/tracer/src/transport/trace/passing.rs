@@ -38,8 +38,8 @@ pub(super) struct Passing<F> {
     behind: RayBlocks<F>,
     ends: Vec<RayEnds>,
     open: Vec<u32>,
-    /// How far rays to lights go (m), and their light, `[ray][band]`.
-    reaches: Vec<F>,
+    /// Where rays to lights end (m), none of those to lights far away, and their light, `[ray][band]`.
+    targets: Vec<Option<DVec3>>,
     light: Vec<f64>,
 }
 
@@ -285,7 +285,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     ) {
         let (count, origin) = (self.count(), F::origin(self.ctx.accel));
         let Workspace { shadows, shadow_rays, times, passing, batch, .. } = workspace;
-        let Passing { open, behind, reaches, light, ends, .. } = passing;
+        let Passing { open, behind, targets, light, ends, .. } = passing;
         ends.clone_from(&shadows.ends);
         light.clear();
         for i in 0..shadows.len {
@@ -295,9 +295,15 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         }
         open.clear();
         open.extend(0..u32::try_from(shadows.len).unwrap_or(u32::MAX));
+        // Rays go on to where they were sent, just before their light: what each surface moves them by would else add up.
+        targets.clear();
+        targets.extend((0..shadows.len).map(|i| {
+            let (block, lane, reach) =
+                (&shadow_rays.blocks()[i / LANES], i % LANES, wide(shadows.reach[i]));
+            let along = vector(&block.direction, lane);
+            reach.is_finite().then(|| origin + vector(&block.origin, lane) + along * reach)
+        }));
         for layer in 0..MOST_LAYERS {
-            reaches.clear();
-            reaches.extend(shadow_rays.blocks().iter().flat_map(|block| block.t_max));
             self.times_of::<F>(open.iter().map(|&i| shadows.carried.ray[i as usize]), times);
             let query = Query { times, ends, coherent: coherent && layer == 0 };
             F::closest(self.ctx, shadow_rays, query, batch);
@@ -326,9 +332,12 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                         let is_alone = coplanar == [MISS; 2];
                         ends.push([block_hit.0.id, if is_alone { target } else { coplanar }]);
 
-                        let (from, along) = block_hit.1;
-                        let left = wide(reaches[k]) - (start - from).length();
-                        behind.push(single(start - origin), single(along), round(left.max(0.0)));
+                        let (_, along) = block_hit.1;
+                        let (along, left) = match targets[i] {
+                            Some(target) => way_to(target, start, along),
+                            None => (along, f64::INFINITY),
+                        };
+                        behind.push(single(start - origin), single(along), round(left));
                         open[still] = open[k];
                         still += 1;
                     }
@@ -409,6 +418,13 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         }
         light.iter().any(|band| *band > 0.0)
     }
+}
+
+/// The unit direction and the length of what is left of a ray to its target from where it goes on; none where it is there.
+fn way_to(target: DVec3, start: DVec3, along: DVec3) -> (DVec3, f64) {
+    let left = (target - start).length();
+    let ahead = (target - start).dot(along);
+    if ahead > 0.0 { ((target - start) / left, left) } else { (along, 0.0) }
 }
 
 /// What is left of a number in 0..1 that decided whether a surface of some opacity is there: again in 0..1, alike all
