@@ -31,7 +31,7 @@ pub fn thread_time() -> f64 {
 pub enum Query {
     /// The closest hit, with its normal.
     Closest,
-    /// Whether there is any.
+    /// True if there is any.
     Occluded,
 }
 

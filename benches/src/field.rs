@@ -24,7 +24,7 @@ pub struct Field {
     pub exact: Option<Exact>,
 }
 
-/// Whether the reference takes part: it needs much memory and time on heavy scenes.
+/// Part that the reference takes: it needs much memory and time on heavy scenes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reference {
     /// It does.
@@ -80,7 +80,7 @@ impl Rays {
         Self { packets, scattered, singles: Single::of(&batches), query, batches }
     }
 
-    /// Whether packets are of use.
+    /// True if packets are of use.
     #[must_use]
     pub fn are_coherent(&self) -> bool {
         !self.packets.is_empty()

@@ -22,6 +22,7 @@ mod embree;
 mod exact;
 mod few;
 mod moving;
+mod name;
 mod nearest;
 mod parts;
 #[cfg(feature = "embree")]
@@ -54,6 +55,7 @@ pub use embree::limit;
 pub use embree::{Version, version as embree_version};
 pub use exact::Exact;
 pub use moving::{Build, build_moving};
+pub use name::AccelName;
 pub use parts::check_scale;
 
 /// Answers nearest-hit and visibility queries about one scene. Built once, then only read.

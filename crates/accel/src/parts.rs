@@ -187,7 +187,7 @@ fn baked_reach(geometry: &Geometry, placement: &Placement, frame: PartFrame) -> 
     (norm(&transform.linear) * local + offset) * frame.scale
 }
 
-/// Whether a placed mesh's typical triangle is large against what f32 resolves in `frame`.
+/// True if a placed mesh's typical triangle is large against what f32 resolves in `frame`.
 fn is_coarse(geometry: &Geometry, placement: &Placement, frame: PartFrame) -> bool {
     let triangles = geometry.mesh_of(placement).triangles.len() as f64;
     let size = geometry.loose_bounds_of(placement).diagonal() / triangles.sqrt();

@@ -20,28 +20,23 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 #[cfg(feature = "embree")]
 use etendue_accel::Embree;
-use etendue_accel::{Accel, BuildError, BuildOptions, Bvh, Exact, watertight};
+use etendue_accel::{Accel, AccelName, BuildError, BuildOptions, Bvh, Exact, watertight};
 use etendue_geometry::glam::{DQuat, DVec3};
 use etendue_geometry::{Detail, Geometry, HitBatch, MISS, RayBatch, Transform};
 use meshes::{Random, at, blob, mesh, placed, rays, scene, soup};
 
-type Build = fn(Arc<Geometry>, &BuildOptions) -> Result<Box<dyn Accel>, BuildError>;
-
-/// All backends, by name.
-const BACKENDS: &[(&str, Build)] = &[
-    ("exact", |geometry, options| Ok(Box::new(Exact::build(geometry, options)?))),
-    ("bvh", |geometry, options| Ok(Box::new(Bvh::build(geometry, options)?))),
-    #[cfg(feature = "embree")]
-    ("embree", |geometry, options| Ok(Box::new(Embree::build(geometry, options)?))),
-];
+/// All backends, the reference first.
+fn backends() -> impl Iterator<Item = AccelName> {
+    AccelName::built().rev()
+}
 
 /// Each backend over `geometry`.
 fn each(geometry: &Arc<Geometry>) -> Vec<(&'static str, Box<dyn Accel>)> {
     let options = BuildOptions::default();
-    let build = |&(name, build): &(&'static str, Build)| {
-        (name, build(Arc::clone(geometry), &options).expect("the scene is sound"))
+    let build = |name: AccelName| {
+        (name.name(), name.build(Arc::clone(geometry), &options).expect("the scene is sound"))
     };
-    BACKENDS.iter().map(build).collect()
+    backends().map(build).collect()
 }
 
 fn closest(accel: &dyn Accel, rays: &RayBatch) -> HitBatch {
@@ -381,15 +376,16 @@ fn builds_do_not_depend_on_threads() {
 #[test]
 fn memory_limits_and_progress_are_heeded() {
     let geometry = scene(vec![soup(20_000, 0.1, 12)]);
-    for (name, build) in BACKENDS {
+    for accel in backends() {
+        let name = accel.name();
         let tight = BuildOptions { memory_limit: Some(10_000), ..BuildOptions::default() };
-        let refused = build(Arc::clone(&geometry), &tight);
+        let refused = accel.build(Arc::clone(&geometry), &tight);
         assert!(matches!(refused, Err(BuildError::MemoryLimit { .. })), "{name}");
         let roomy = BuildOptions { memory_limit: Some(1 << 30), ..BuildOptions::default() };
-        assert!(build(Arc::clone(&geometry), &roomy).is_ok(), "{name}");
+        assert!(accel.build(Arc::clone(&geometry), &roomy).is_ok(), "{name}");
 
         let stop = BuildOptions { progress: Some(Arc::new(|_| false)), ..BuildOptions::default() };
-        let stopped = build(Arc::clone(&geometry), &stop);
+        let stopped = accel.build(Arc::clone(&geometry), &stop);
         assert!(matches!(stopped, Err(BuildError::Stopped)), "{name}");
 
         let calls = Arc::new(AtomicUsize::new(0));
@@ -402,7 +398,7 @@ fn memory_limits_and_progress_are_heeded() {
             })),
             ..BuildOptions::default()
         };
-        let built = build(Arc::clone(&geometry), &watched).expect("nothing stops it");
+        let built = accel.build(Arc::clone(&geometry), &watched).expect("nothing stops it");
         assert!(calls.load(Ordering::Relaxed) > 0, "{name}");
         assert!(built.report().bytes > 0, "{name}");
     }

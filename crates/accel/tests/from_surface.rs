@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use etendue_accel::{Accel, BuildOptions, Bvh, Exact};
+use etendue_accel::{Accel, AccelName, BuildOptions};
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{
     Detail, Geometry, HitBatch, MISS, Mesh, Positions, RayBatch, Transform, Vertices,
@@ -21,12 +21,7 @@ fn cube() -> Mesh {
 
 fn backends(geometry: &Arc<Geometry>) -> Vec<Box<dyn Accel>> {
     let options = BuildOptions::default();
-    vec![
-        Box::new(Bvh::build(Arc::clone(geometry), &options).unwrap()),
-        Box::new(Exact::build(Arc::clone(geometry), &options).unwrap()),
-        #[cfg(feature = "embree")]
-        Box::new(etendue_accel::Embree::build(Arc::clone(geometry), &options).unwrap()),
-    ]
+    AccelName::built().map(|name| name.build(Arc::clone(geometry), &options).unwrap()).collect()
 }
 
 /// From points a few roundings inside of a cube's faces, edges and corners in all directions: rays

@@ -4,7 +4,7 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
-use etendue_accel::{Accel, BuildError, BuildOptions, Bvh, Exact, Quality};
+use etendue_accel::{Accel, AccelName, BuildError, BuildOptions, Exact, Quality};
 use etendue_geometry::{Detail, Geometry, HitBatch, RayBatch};
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -19,88 +19,71 @@ use crate::{BenchError, Progress};
 const LEAST: f64 = 0.01;
 
 /// What finds the hits, and how carefully.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum Method {
-    /// Embree without its robust mode and without f64: its own fastest.
-    EmbreeFast,
-    /// The same with hits solved again in f64.
-    EmbreeFastRefined,
-    /// Embree's robust mode, distances in f32.
-    EmbreeRobust,
-    /// Robust, hits solved again in f64 and looked at again where suspicious: what renders use.
-    EmbreeRefined,
-    /// The pure-Rust tree.
-    Bvh,
-    /// The f64 reference.
-    Exact,
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Method {
+    /// The accelerator.
+    pub accel: AccelName,
+    /// Watertight ([`BuildOptions::robust`]).
+    pub robust: bool,
+    /// Hits are solved in f64 ([`BuildOptions::refine`]).
+    pub refine: bool,
 }
 
 impl Method {
-    /// Those that this program was built with; the reference is the last.
+    /// Embree without its robust mode and without f64: its own fastest.
+    pub const EMBREE_FAST: Self = Self { robust: false, refine: false, ..Self::EMBREE_REFINED };
+    /// Embree's robust mode, distances in f32.
+    pub const EMBREE_ROBUST: Self = Self { refine: false, ..Self::EMBREE_REFINED };
+    /// Robust, hits solved again in f64 and looked at again where suspicious: what renders use.
+    pub const EMBREE_REFINED: Self = Self::whole(AccelName::Embree);
+    /// The pure-Rust tree.
+    pub const BVH: Self = Self::whole(AccelName::Bvh);
+    /// The f64 reference.
+    pub const EXACT: Self = Self::whole(AccelName::Exact);
+
+    /// An accelerator as renders use it.
+    const fn whole(accel: AccelName) -> Self {
+        Self { accel, robust: true, refine: true }
+    }
+
+    /// Those that this program was built with, each accelerator in all its modes; the reference is the last.
     #[must_use]
-    pub fn all() -> &'static [Self] {
-        if cfg!(feature = "embree") {
-            &[
-                Self::EmbreeFast,
-                Self::EmbreeFastRefined,
-                Self::EmbreeRobust,
-                Self::EmbreeRefined,
-                Self::Bvh,
-                Self::Exact,
-            ]
-        } else {
-            &[Self::Bvh, Self::Exact]
-        }
+    pub fn all() -> Vec<Self> {
+        let modes = |accel: AccelName| {
+            let all = [[false, false], [false, true], [true, false], [true, true]];
+            // Those of f64 alone have one.
+            let own = if accel.has_single() { &all[..] } else { &all[3..] };
+            own.iter()
+                .map(move |&[robust, refine]| Self { accel, robust, refine })
+                .collect::<Vec<_>>()
+        };
+        AccelName::built().flat_map(modes).collect()
     }
 
     /// As tables and charts write it.
     #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::EmbreeFast => "embree fast",
-            Self::EmbreeFastRefined => "embree fast + f64",
-            Self::EmbreeRobust => "embree robust",
-            Self::EmbreeRefined => "embree robust + f64",
-            Self::Bvh => "bvh",
-            Self::Exact => "exact",
+    pub fn name(self) -> String {
+        let accel = self.accel.name();
+        if !self.accel.has_single() {
+            return accel.to_owned();
         }
+        let mode = if self.robust { "robust" } else { "fast" };
+        format!("{accel} {mode}{}", if self.refine { " + f64" } else { "" })
     }
 
     /// Builds its structure.
     ///
     /// # Errors
     ///
-    /// As the accelerator's own build; [`BuildError::Library`] for Embree where it was left out.
+    /// As [`AccelName::build`].
     pub fn build(
         self,
         geometry: &Arc<Geometry>,
         options: &BuildOptions,
     ) -> Result<Box<dyn Accel>, BuildError> {
-        let geometry = Arc::clone(geometry);
-        let robust = matches!(self, Self::EmbreeRobust | Self::EmbreeRefined);
-        let refine = matches!(self, Self::EmbreeFastRefined | Self::EmbreeRefined);
-        Ok(match self {
-            Self::Bvh => Box::new(Bvh::build(geometry, options)?),
-            Self::Exact => Box::new(Exact::build(geometry, options)?),
-            Self::EmbreeFast
-            | Self::EmbreeFastRefined
-            | Self::EmbreeRobust
-            | Self::EmbreeRefined => {
-                embree(geometry, &BuildOptions { robust, refine, ..options.clone() })?
-            }
-        })
+        let Self { accel, robust, refine } = self;
+        accel.build(Arc::clone(geometry), &BuildOptions { robust, refine, ..options.clone() })
     }
-}
-
-#[cfg(feature = "embree")]
-fn embree(geometry: Arc<Geometry>, options: &BuildOptions) -> Result<Box<dyn Accel>, BuildError> {
-    Ok(Box::new(etendue_accel::Embree::build(geometry, options)?))
-}
-
-#[cfg(not(feature = "embree"))]
-fn embree(_: Arc<Geometry>, _: &BuildOptions) -> Result<Box<dyn Accel>, BuildError> {
-    let message = "this program was built without Embree".to_owned();
-    Err(BuildError::Library { call: "Embree", message })
 }
 
 /// Extent of the measurement.
@@ -134,7 +117,7 @@ impl Effort {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AcceleratorMeasurement {
     /// The accelerator and its mode, as [`Method::name`] writes it.
-    pub method: &'static str,
+    pub method: String,
     /// As the accelerator writes itself, with its version.
     pub backend: String,
     /// Rays a batch.

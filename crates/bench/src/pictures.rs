@@ -1,12 +1,12 @@
 //! A scene's picture at any number of samples, and how far it is from another.
 
-use etendue_accel::Accel;
+use etendue_accel::{Accel, AccelName};
 use etendue_camera::{Camera, Sampler};
 use etendue_geometry::HitPrecision;
 use etendue_render::output::{Outputs, Picture};
-use etendue_render::{Images, Plan, RenderError, accelerators};
+use etendue_render::{Images, Plan, RenderError};
 use etendue_scene::Scene;
-use etendue_scene::file::{AccelName, LightPrecision, SamplesSpec};
+use etendue_scene::file::{LightPrecision, SamplesSpec};
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 
@@ -84,8 +84,8 @@ impl<'a> Studio<'a> {
     #[must_use]
     pub fn precision(&self) -> Option<HitPrecision> {
         let plan = Plan::new(&self.scene, OUTPUTS);
-        let accel = self.scene.render.accel.unwrap_or(accelerators()[0]);
-        let has_both = accel == AccelName::Embree && plan.layers.contains(&LayerSpec::Radiance);
+        let accel = self.scene.render.accel.unwrap_or_else(AccelName::best);
+        let has_both = accel.has_single() && plan.layers.contains(&LayerSpec::Radiance);
         has_both.then_some(plan.light_precision)
     }
 

@@ -44,7 +44,7 @@ fn aimed(geometry: &Geometry) -> Rays {
 fn measured(place: DVec3) -> Vec<AcceleratorMeasurement> {
     let geometry = blob(place);
     let effort = Effort {
-        methods: Method::all().to_vec(),
+        methods: Method::all(),
         widths: vec![RENDER_WIDTH],
         threads: vec![1],
         rounds: 1,
@@ -76,21 +76,21 @@ fn on_chart(findings: &[AcceleratorMeasurement], chart: &str, method: Method) ->
 fn without_robustness_rays_leak_and_the_chart_shows_it() {
     let findings = measured(DVec3::ZERO);
     let of = |method: Method| findings.iter().find(|f| f.method == method.name()).unwrap();
-    let exact = &of(Method::Exact).errors;
+    let exact = &of(Method::EXACT).errors;
     let rays = exact.rays;
     assert!(rays > 50_000 && exact.hits == rays, "{exact:?}");
-    for method in [Method::EmbreeRefined, Method::Bvh, Method::Exact] {
+    for method in [Method::EMBREE_REFINED, Method::BVH, Method::EXACT] {
         assert_eq!(of(method).errors.missed, 0, "{} is watertight", method.name());
     }
     // Aimed at edges and corners, about six rays of a thousand slip through, by Embree 3.13.
-    let fast = &of(Method::EmbreeFast).errors;
+    let fast = &of(Method::EMBREE_FAST).errors;
     assert!(fast.missed * 1000 > rays, "{} of {rays} rays leak", fast.missed);
     let height = |method| on_chart(&findings, "accelerators-hits", method);
     assert!(
-        height(Method::EmbreeFast) > 10.0 * height(Method::EmbreeRefined),
+        height(Method::EMBREE_FAST) > 10.0 * height(Method::EMBREE_REFINED),
         "{} {}",
-        height(Method::EmbreeFast),
-        height(Method::EmbreeRefined)
+        height(Method::EMBREE_FAST),
+        height(Method::EMBREE_REFINED)
     );
 }
 
@@ -99,8 +99,8 @@ fn without_refinement_digits_are_lost_and_the_chart_shows_it() {
     let findings = measured(DVec3::new(1000.0, 0.0, 0.0));
     let height = |method| on_chart(&findings, "accelerators-depth", method);
     // Single precision has 2⁻²⁴ of the distance at best, double a few 2⁻⁵³ over the cosine.
-    assert!(height(Method::EmbreeRefined) < 1e-13, "{}", height(Method::EmbreeRefined));
-    for broken in [Method::EmbreeRobust, Method::EmbreeFast] {
+    assert!(height(Method::EMBREE_REFINED) < 1e-13, "{}", height(Method::EMBREE_REFINED));
+    for broken in [Method::EMBREE_ROBUST, Method::EMBREE_FAST] {
         assert!(height(broken) > 1e-8, "{}: {}", broken.name(), height(broken));
     }
 }
@@ -109,7 +109,7 @@ fn without_refinement_digits_are_lost_and_the_chart_shows_it() {
 fn a_stop_is_heeded() {
     let geometry = blob(DVec3::ZERO);
     let effort = Effort {
-        methods: vec![Method::Bvh],
+        methods: vec![Method::BVH],
         widths: vec![16],
         threads: vec![1],
         rounds: 3,

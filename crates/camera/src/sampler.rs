@@ -186,6 +186,21 @@ impl SampleKeys {
         }
     }
 
+    /// [`PixelSamples::square`] of one pair of dimensions for each of all samples: `out` is refilled.
+    pub fn squares_of_all(&self, pair: u32, out: &mut Vec<[f64; 2]>) {
+        let (first, shift) = set_of_pair(pair);
+        if !self.samples.is_empty() {
+            squares_of_pair(self.samples.iter().copied(), pair, out);
+        } else if shift == 0 {
+            out.resize(self.keys.len(), [0.0; 2]);
+            sobol::points(&self.keys, first, out);
+        } else {
+            let keys: Vec<SobolKey> = self.keys.iter().map(|key| key.shifted(shift)).collect();
+            out.resize(keys.len(), [0.0; 2]);
+            sobol::points(&keys, first, out);
+        }
+    }
+
     /// [`PixelSamples::square`] of one pair of dimensions for each of some samples, by their numbers: `out` is
     /// refilled.
     pub fn squares_of_pair(&self, picked: &[u32], pair: u32, out: &mut Vec<[f64; 2]>) {
@@ -396,10 +411,12 @@ mod tests {
             let mut keys = SampleKeys::default();
             keys.refill(samples.clone());
             let picked: Vec<u32> = (0..200).rev().step_by(3).collect();
-            for pair in [0, 3, 200] {
+            for pair in [0, 1, 3, 200] {
                 squares_of_pair(samples.clone(), pair, &mut out);
                 let one_by_one = samples.clone().map(|(pixel, i)| pixel.square(i, pair));
                 assert_eq!(out, one_by_one.collect::<Vec<_>>(), "{sampler:?} pair {pair}");
+                keys.squares_of_all(pair, &mut own);
+                assert_eq!(out, own, "{sampler:?} pair {pair}");
                 keys.squares_of_pair(&picked, pair, &mut own);
                 out = picked.iter().map(|&number| out[number as usize]).collect();
                 assert_eq!(out, own, "{sampler:?} pair {pair}");

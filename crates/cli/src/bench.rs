@@ -132,7 +132,7 @@ fn accelerators(
     if arguments.scattered {
         let options =
             BuildOptions { memory_limit: arguments.memory_limit, ..BuildOptions::default() };
-        let accel = Method::Bvh.build(&scene.geometry, &options).map_err(BenchError::from)?;
+        let accel = Method::BVH.build(&scene.geometry, &options).map_err(BenchError::from)?;
         rays = rays.scattered(&*accel);
         if rays.is_empty() {
             let why = "--scattered: the camera sees nothing that rays could scatter from";
@@ -143,7 +143,7 @@ fn accelerators(
     }
     // What is measured of each method.
     let effort = accelerators::Effort {
-        methods: Method::all().to_vec(),
+        methods: Method::all(),
         widths: sorted(arguments.batches.as_deref().unwrap_or(BATCHES[quick])),
         threads: match &arguments.threads {
             Some(threads) => sorted(threads),

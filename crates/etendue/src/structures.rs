@@ -6,11 +6,11 @@
 
 use std::sync::Arc;
 
+use etendue_accel::AccelName;
 use etendue_accel::{Accel, BuildOptions};
 use etendue_geometry::{Geometry, HitPrecision};
 use etendue_render::{Plan, RenderError, Unseen};
 use etendue_scene::Scene;
-use etendue_scene::file::AccelName;
 
 /// The structures that were built last.
 #[derive(Debug, Default)]

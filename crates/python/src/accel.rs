@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use etendue_accel::BuildOptions;
+use etendue_accel::{AccelName, BuildOptions};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Detail, Geometry, HitBatch, Mesh, Placement, RayBatch, Transform};
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
@@ -54,15 +54,9 @@ impl Accel {
                 progress: Some(stop.heeded()),
                 ..BuildOptions::default()
             };
-            let geometry = Arc::clone(&geometry);
-            let built: Box<dyn etendue_accel::Accel> = match backend {
-                #[cfg(feature = "embree")]
-                "embree" => Box::new(etendue_accel::Embree::build(geometry, &options)?),
-                "bvh" => Box::new(etendue_accel::Bvh::build(geometry, &options)?),
-                "exact" => Box::new(etendue_accel::Exact::build(geometry, &options)?),
-                other => return Err(Unbuilt::Unknown(other.to_owned())),
-            };
-            Ok(built)
+            let name = AccelName::named(backend).filter(|name| name.is_built());
+            let name = name.ok_or_else(|| Unbuilt::Unknown(backend.to_owned()))?;
+            Ok(name.build(Arc::clone(&geometry), &options)?)
         };
         let built = interruptible(py, threads, &stop, build)?;
         let accel = built.map_err(|error: Unbuilt| refused(error.words()))?;
@@ -198,7 +192,10 @@ impl Unbuilt {
     fn words(&self) -> String {
         match self {
             Self::Build(error) => in_python(&error.to_string()),
-            Self::Unknown(name) => format!("no accelerator \"{name}\"; known: embree, bvh, exact"),
+            Self::Unknown(name) => {
+                let known: Vec<_> = AccelName::built().map(AccelName::name).collect();
+                format!("no accelerator \"{name}\"; known: {}", known.join(", "))
+            }
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use etendue_camera::{CameraRays, LensCamera, PixelSamples, squares_of_pair};
+use etendue_camera::{CameraRays, LensCamera};
 use etendue_tracer::layer::RaySource;
 
 use crate::film::{PlaneRows, Strip};
@@ -215,16 +215,13 @@ impl Adding<'_> {
     /// Refills the batch with the samples of `runs`. A camera without a lens looks at places alone.
     fn place(&self, tile: Tile, runs: &[SampleRun], memory: &mut Memory) {
         let Memory { numbers, film, .. } = memory;
-        let numbers: &mut Vec<(PixelSamples, u32)> = &mut numbers.samples;
-        numbers.clear();
         // The numbers of all samples of these pixels.
         let pixel = |run: &SampleRun| [tile.left + run.pixel.0, tile.top + run.pixel.1];
-        for run in runs {
-            self.sampling.extend(pixel(run), run, numbers);
-        }
-        let count = numbers.len();
+        numbers
+            .refill(|all| runs.iter().for_each(|run| self.sampling.extend(pixel(run), run, all)));
+        let count = numbers.samples.len();
         // Their places on the sensor, in the pupil, and in the spectrum.
-        let draw = |pair, out: &mut Vec<_>| squares_of_pair(numbers.iter().copied(), pair, out);
+        let draw = |pair, out: &mut Vec<_>| numbers.draw(pair, out);
         film.clear();
         let mut places = Vec::new();
         draw(0, &mut places);
@@ -266,7 +263,7 @@ impl Adding<'_> {
         let Some(shutter) = camera.shutter() else { return };
         let rows = film.rows.iter().map(|row| row.floor() + 0.5);
         if camera.is_timed() {
-            squares_of_pair(numbers.iter().copied(), TIME_PAIR, &mut places);
+            draw(TIME_PAIR, &mut places);
             let moments =
                 rows.clone().zip(&places).map(|(row, place)| shutter.moment(row, place[0]));
             film.times.extend(moments);

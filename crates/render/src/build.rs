@@ -2,14 +2,12 @@
 
 use std::sync::Arc;
 
-use etendue_accel::{Accel, BuildError, BuildOptions, build_moving, check_scale};
+use etendue_accel::{Accel, AccelName, BuildOptions, build_moving, check_scale};
 use etendue_geometry::Geometry;
 use etendue_scene::Scene;
-use etendue_scene::file::AccelName;
 
 use crate::error::RenderError;
 use crate::plan::{Plan, Unseen};
-use crate::precision::accelerators;
 
 /// Options of a build of the structure over `scene`.
 fn options_for(scene: &Scene, plan: &Plan, options: &BuildOptions) -> BuildOptions {
@@ -65,22 +63,14 @@ pub(crate) fn build_over(
     options: &BuildOptions,
 ) -> Result<Box<dyn Accel>, RenderError> {
     let options = options_for(scene, plan, options);
-    let name = scene.render.accel.unwrap_or(accelerators()[0]);
+    let name = scene.render.accel.unwrap_or_else(AccelName::best);
     if options.isa.is_some() && name != AccelName::Embree {
         return Err(RenderError::NotEmbree);
     }
-    if cfg!(not(feature = "embree")) && name == AccelName::Embree {
+    if !name.is_built() {
         return Err(RenderError::Absent("Embree"));
     }
-    let one = |geometry, options: &BuildOptions| -> Result<Box<dyn Accel>, BuildError> {
-        Ok(match name {
-            #[cfg(feature = "embree")]
-            AccelName::Embree => Box::new(etendue_accel::Embree::build(geometry, options)?),
-            AccelName::Exact => Box::new(etendue_accel::Exact::build(geometry, options)?),
-            _ => Box::new(etendue_accel::Bvh::build(geometry, options)?),
-        })
-    };
-    Ok(build_moving(geometry, &options, &one)?)
+    Ok(build_moving(geometry, &options, &|geometry, options| name.build(geometry, options))?)
 }
 
 /// As [`build`], after `before` was built for the same scene, of which parts have changed since: what of

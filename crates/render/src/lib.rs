@@ -66,7 +66,6 @@ pub use film_file::{FilmError, FilmFile, FilmHeader, Identity};
 pub use images::Images;
 pub use other_frame::FollowedFrame;
 pub use plan::{Plan, Unseen};
-pub use precision::accelerators;
 pub use render::{
     Film, Prepared, Progress, RenderState, Rendered, finish, render, sample_set, trace,
 };

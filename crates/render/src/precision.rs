@@ -1,24 +1,15 @@
 //! Precision of the hits of light paths: in f32 where what that misplaces is lost in the picture's
 //! noise and under its smallest things, in f64 where it is not.
 
+use etendue_accel::AccelName;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, HitPrecision, RayBatch};
 use etendue_scene::Scene;
-use etendue_scene::file::{AccelName, LightPrecision};
+use etendue_scene::file::LightPrecision;
 use etendue_tracer::spawn::roundings;
 
 use crate::gaps::{CrossedSurfaces, Gap, crossed_surfaces};
 use crate::tolerance::hidden_offset;
-
-/// The accelerators that this program was built with, the best first.
-#[must_use]
-pub fn accelerators() -> &'static [AccelName] {
-    if cfg!(feature = "embree") {
-        &[AccelName::Embree, AccelName::Bvh, AccelName::Exact]
-    } else {
-        &[AccelName::Bvh, AccelName::Exact]
-    }
-}
 
 /// A pixel must be so many times as wide as f32 rounds the camera's rays by, or its rays fall beside it: a
 /// start and a direction, along two axes each, are rounded by half a unit in the last place.
@@ -36,7 +27,7 @@ pub(crate) fn light_precision(scene: &Scene, samples: u32) -> (HitPrecision, Str
         }
         LightPrecision::Auto => {}
     }
-    if scene.render.accel.unwrap_or(accelerators()[0]) != AccelName::Embree {
+    if !scene.render.accel.unwrap_or_else(AccelName::best).has_single() {
         return (HitPrecision::Double, "the accelerator works in f64".to_owned());
     }
     // By how much f32 misplaces rays, against the smallest triangle and what noise hides.

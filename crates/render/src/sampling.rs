@@ -1,6 +1,7 @@
 //! Sampling of pixels: in which passes, by which random numbers, what is averaged, and the memory
 //! that a thread needs for it.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use etendue_camera::{
@@ -17,13 +18,16 @@ use crate::tile::RayCounts;
 /// Samples of the first pass: they fill the batches of a tile.
 const FIRST_PASS: u32 = 4;
 
+/// Samples of a pixel that are worked on side by side: what follows the first pass has them whole.
+const SIDE_BY_SIDE: u32 = 16;
+
 /// The most samples of a pass.
 const LONGEST_PASS: u32 = 1024;
 
 /// Longest pass where what a render has so far is kept on disk after passes.
 const LONGEST_KEPT_PASS: u32 = 16;
 
-/// A pass is no longer than this share of all: what a stopped render loses.
+/// A pass is no longer than this share of all: what a stopped render loses; or than [`SIDE_BY_SIDE`].
 const SHARE_OF_PASS: u32 = 8;
 
 /// Pairs of random numbers that the camera uses before light does: place in the pixel, place in the
@@ -36,10 +40,11 @@ pub(crate) const TIME_PAIR: u32 = u32::MAX;
 /// The pair of random numbers by which carriers diffuse.
 pub(crate) const DIFFUSION_PAIR: u32 = u32::MAX - 1;
 
-/// The passes of `samples` a pixel: the first has few, so that there is soon something to see, and
-/// each takes as many as all before it until they are a small share of all.
+/// The passes of `samples` a pixel: the first has few, so that there is soon something to see, the second fills
+/// what is worked on side by side, and each other takes as many as all before it until they are a small share of all.
 pub(crate) fn passes(samples: u32) -> Vec<Range<u32>> {
-    up_to(samples, (samples / SHARE_OF_PASS).clamp(FIRST_PASS, LONGEST_PASS))
+    let share = (samples / SHARE_OF_PASS).next_multiple_of(SIDE_BY_SIDE);
+    up_to(samples, share.clamp(SIDE_BY_SIDE, LONGEST_PASS))
 }
 
 /// Shorter passes, after each of which a render can be kept on disk.
@@ -51,7 +56,11 @@ fn up_to(samples: u32, longest: u32) -> Vec<Range<u32>> {
     let mut passes = Vec::new();
     let mut start = 0;
     while start < samples {
-        let length = start.clamp(FIRST_PASS, longest);
+        let length = match start {
+            0 => FIRST_PASS,
+            FIRST_PASS => SIDE_BY_SIDE - FIRST_PASS,
+            _ => start.min(longest),
+        };
         let left = samples - start;
         // What would be left for a short pass is done by this one.
         let length = if left < length + length / 2 { left } else { length };
@@ -160,26 +169,48 @@ pub(crate) struct SampleNumbers {
     pub(crate) samples: Vec<(PixelSamples, u32)>,
     /// The sample of each ray.
     pub(crate) of_ray: Vec<u32>,
-    /// By ray.
+    /// Each sample has a ray, in order.
+    is_straight: bool,
+    /// By sample.
     keys: SampleKeys,
 }
 
 impl SampleNumbers {
+    /// Makes the samples those that `fill` appends to none.
+    pub(crate) fn refill(&mut self, fill: impl FnOnce(&mut Vec<(PixelSamples, u32)>)) {
+        self.samples.clear();
+        fill(&mut self.samples);
+        self.keys.refill(self.samples.iter().copied());
+    }
+
+    /// A pair of random numbers of each sample of the film.
+    pub(crate) fn draw(&self, pair: u32, out: &mut Vec<[f64; 2]>) {
+        self.keys.squares_of_all(pair, out);
+    }
+
     /// Makes the rays those of so many samples of the film, by their numbers.
     pub(crate) fn set_rays(&mut self, of_ray: &[u32]) {
         self.of_ray.clear();
         self.of_ray.extend_from_slice(of_ray);
-        self.keys.refill(self.of_ray.iter().map(|&sample| self.samples[sample as usize]));
+        self.is_straight = (0..).zip(of_ray).all(|(ray, &sample)| ray == sample);
+    }
+
+    /// The samples of some rays.
+    fn samples_of<'a>(&self, rays: &'a [u32]) -> Cow<'a, [u32]> {
+        match self.is_straight {
+            true => Cow::Borrowed(rays),
+            false => rays.iter().map(|&ray| self.of_ray[ray as usize]).collect(),
+        }
     }
 }
 
 impl Samples for SampleNumbers {
     fn squares_of_pair(&self, rays: &[u32], pair: u32, out: &mut Vec<[f64; 2]>) {
-        self.keys.squares_of_pair(rays, CAMERA_PAIRS + pair, out);
+        self.keys.squares_of_pair(&self.samples_of(rays), CAMERA_PAIRS + pair, out);
     }
 
     fn floats_of_pair(&self, rays: &[u32], pair: u32, out: &mut [Vec<f32>; 2]) {
-        self.keys.floats_of_pair(rays, CAMERA_PAIRS + pair, out);
+        self.keys.floats_of_pair(&self.samples_of(rays), CAMERA_PAIRS + pair, out);
     }
 }
 
@@ -195,11 +226,12 @@ mod tests {
             assert_eq!(passes.last().unwrap().end, samples);
             assert!(passes.windows(2).all(|pair| pair[0].end == pair[1].start), "{passes:?}");
             // Half of a pass more is the most that the last takes.
-            let most = (samples / SHARE_OF_PASS).max(FIRST_PASS) * 3 / 2;
+            let most = (samples / SHARE_OF_PASS).next_multiple_of(SIDE_BY_SIDE);
+            let most = most.max(SIDE_BY_SIDE) * 3 / 2;
             assert!(passes.iter().all(|pass| pass.end - pass.start <= most), "{passes:?}");
             assert!(samples < 6 || passes[0].end == FIRST_PASS, "{passes:?}");
         }
-        assert_eq!((passes(5).len(), passes(64).len()), (1, 9));
-        assert_eq!(passes(256)[..4], [0..4, 4..8, 8..16, 16..32]);
+        assert_eq!((passes(5).len(), passes(64).len()), (1, 5));
+        assert_eq!(passes(256)[..5], [0..4, 4..16, 16..32, 32..64, 64..96]);
     }
 }

@@ -32,11 +32,11 @@ const WRONG: &str = "\
 
 /// What is drawn: a name, the method, and whether the scene reaches to the origin.
 const SHOWN: [(&str, Method, bool); 5] = [
-    ("f32, the object alone", Method::EmbreeRobust, false),
-    ("f64, the object alone", Method::EmbreeRefined, false),
-    ("f32, scene from the origin on", Method::EmbreeRobust, true),
-    ("f64, scene from the origin on", Method::EmbreeRefined, true),
-    ("bvh, scene from the origin on", Method::Bvh, true),
+    ("f32, the object alone", Method::EMBREE_ROBUST, false),
+    ("f64, the object alone", Method::EMBREE_REFINED, false),
+    ("f32, scene from the origin on", Method::EMBREE_ROBUST, true),
+    ("f64, scene from the origin on", Method::EMBREE_REFINED, true),
+    ("bvh, scene from the origin on", Method::BVH, true),
 ];
 
 pub(crate) fn measure(effort: Effort, page: &mut Page) -> anyhow::Result<()> {

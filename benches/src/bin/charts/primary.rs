@@ -122,7 +122,7 @@ fn accelerators(
     let is_heavy = geometry.triangles_unique() > HEAVY;
     let rounds = if is_heavy { effort.rounds().min(3) } else { effort.rounds() };
     let effort = accelerators::Effort {
-        methods: Method::all().to_vec(),
+        methods: Method::all(),
         widths: vec![RENDER_WIDTH],
         threads,
         rounds,

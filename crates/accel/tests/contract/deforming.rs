@@ -3,14 +3,14 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use etendue_accel::{Accel, BuildError, BuildOptions, build_moving};
+use etendue_accel::{Accel, AccelName, BuildError, BuildOptions, Exact, build_moving};
 use etendue_geometry::glam::{DQuat, DVec3};
 use etendue_geometry::{
     Geometry, MISS, Mesh, Motion, Placement, Positions, RayBatch, Steady, Steps, Transform,
 };
 
 use super::meshes::{Random, at, blob, placed, rays, soup};
-use super::{BACKENDS, closest};
+use super::{backends, closest};
 
 const EXPOSURE: [f64; 2] = [-0.1, 0.9];
 const TIMES: [f64; 4] = [-0.1, 0.2, 0.21, 0.9];
@@ -81,10 +81,12 @@ fn frozen(geometry: &Geometry, time: f64) -> Arc<Geometry> {
 
 fn each(geometry: &Arc<Geometry>) -> Vec<(&'static str, Box<dyn Accel>)> {
     let options = BuildOptions { exposure: EXPOSURE, ..BuildOptions::default() };
-    let build = |&(name, build): &(&'static str, _)| {
-        (name, build_moving(Arc::clone(geometry), &options, &build).expect("the scene is sound"))
+    let build = |accel: AccelName| {
+        let one = |geometry, options: &BuildOptions| accel.build(geometry, options);
+        let built = build_moving(Arc::clone(geometry), &options, &one);
+        (accel.name(), built.expect("the scene is sound"))
     };
-    BACKENDS.iter().map(build).collect()
+    backends().map(build).collect()
 }
 
 #[test]
@@ -106,8 +108,7 @@ fn shapes_are_those_of_still_meshes_at_each_time() {
         };
         let mut batch = rays(300, DVec3::ZERO, 1.0, 200 + number);
         let still = frozen(&geometry, time);
-        let truth =
-            closest(&*BACKENDS[0].1(still, &BuildOptions::default()).expect("sound"), &batch);
+        let truth = closest(&Exact::build(still, &BuildOptions::default()).expect("sound"), &batch);
         batch.set_times(vec![time; batch.len()]);
         for (name, accel) in &accels {
             let hits = closest(&**accel, &batch);
@@ -204,8 +205,10 @@ fn boxes_over_the_limit_of_memory_are_refused() {
     let geometry = at(vec![deforming(blob(10))], vec![carried(0, Motion::default())]);
     let options =
         BuildOptions { exposure: EXPOSURE, memory_limit: Some(20_000), ..BuildOptions::default() };
-    for (name, build) in BACKENDS {
-        let refused = build_moving(Arc::clone(&geometry), &options, build);
+    for accel in backends() {
+        let name = accel.name();
+        let one = |geometry, options: &BuildOptions| accel.build(geometry, options);
+        let refused = build_moving(Arc::clone(&geometry), &options, &one);
         let refused = refused.map(|accel| accel.report().bytes);
         assert!(matches!(refused, Err(BuildError::MemoryLimit { .. })), "{name}: {refused:?}");
     }

@@ -12,12 +12,13 @@ const QUALITIES: [Quality; 3] = [Quality::Low, Quality::Medium, Quality::High];
 /// Every backend and quality over `geometry` finds, or refuses in words, what `exact` does; rays are
 /// aimed at the middles of triangles.
 fn assert_survives(geometry: &Arc<Geometry>, rays: &RayBatch, what: &str) {
-    for (name, build) in BACKENDS {
+    for own in backends() {
+        let name = own.name();
         for quality in QUALITIES {
             for (compact, robust) in [(false, true), (true, true), (false, false)] {
                 let options =
                     BuildOptions { quality, compact, robust, threads: 2, ..Default::default() };
-                match build(Arc::clone(geometry), &options) {
+                match own.build(Arc::clone(geometry), &options) {
                     Ok(accel) => assert_only_areas_are_hit(geometry, &*accel, rays, what),
                     Err(BuildError::Scale { .. }) => {}
                     Err(error) => panic!("{what}, {name}, {quality:?}: {error}"),
@@ -168,8 +169,9 @@ fn scenes_that_no_number_holds_are_refused_by_every_backend() {
     for scale in [1e154, 1e300, 1e-150, 1e-300] {
         let place = Transform::from_trs(DVec3::ZERO, DQuat::IDENTITY, DVec3::splat(scale));
         let geometry = at(vec![blob(4)], vec![placed(0, place)]);
-        for (name, build) in BACKENDS {
-            let built = build(Arc::clone(&geometry), &BuildOptions::default());
+        for accel in backends() {
+            let name = accel.name();
+            let built = accel.build(Arc::clone(&geometry), &BuildOptions::default());
             assert!(matches!(built, Err(BuildError::Scale { .. })), "{name}, {scale:e}");
         }
     }

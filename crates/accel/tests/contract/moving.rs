@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use etendue_accel::{Accel, BuildOptions, build_moving};
+use etendue_accel::{Accel, AccelName, BuildOptions, Exact, build_moving};
 use etendue_geometry::block::LANES;
 use etendue_geometry::glam::{DMat3, DQuat, DVec3};
 use etendue_geometry::{
@@ -12,7 +12,7 @@ use etendue_geometry::{
 };
 
 use super::meshes::{Random, at, blob, mesh, placed, rays, scene, soup};
-use super::{BACKENDS, closest};
+use super::{backends, closest};
 
 const EXPOSURE: [f64; 2] = [-0.1, 0.9];
 
@@ -25,10 +25,12 @@ fn moved(mesh: u32, motion: Motion) -> Placement {
 
 fn each_moving(geometry: &Arc<Geometry>) -> Vec<(&'static str, Box<dyn Accel>)> {
     let options = BuildOptions { exposure: EXPOSURE, ..BuildOptions::default() };
-    let build = |&(name, build): &(&'static str, _)| {
-        (name, build_moving(Arc::clone(geometry), &options, &build).expect("the scene is sound"))
+    let build = |accel: AccelName| {
+        let one = |geometry, options: &BuildOptions| accel.build(geometry, options);
+        let built = build_moving(Arc::clone(geometry), &options, &one);
+        (accel.name(), built.expect("the scene is sound"))
     };
-    BACKENDS.iter().map(build).collect()
+    backends().map(build).collect()
 }
 
 /// The scene with all that moves where it is at `time`.
@@ -93,8 +95,7 @@ fn moving_bodies_are_still_ones_at_each_time() {
         };
         let mut batch = rays(300, DVec3::ZERO, 1.0, 100 + number);
         let still = frozen(&geometry, time);
-        let truth =
-            closest(&*BACKENDS[0].1(still, &BuildOptions::default()).expect("sound"), &batch);
+        let truth = closest(&Exact::build(still, &BuildOptions::default()).expect("sound"), &batch);
         batch.set_times(vec![time; batch.len()]);
         for (name, accel) in &accels {
             for coherent in [false, true] {
@@ -153,10 +154,11 @@ fn each_ray_of_a_batch_has_its_own_time() {
 #[test]
 fn without_motion_in_the_exposure_the_backend_is_as_it_was() {
     let geometry = bodies();
-    for (name, build) in BACKENDS {
-        let options = BuildOptions::default();
-        let plain = build(Arc::clone(&geometry), &options).expect("sound").report();
-        let same = build_moving(Arc::clone(&geometry), &options, build).expect("sound").report();
+    for accel in backends() {
+        let (name, options) = (accel.name(), BuildOptions::default());
+        let one = |geometry, options: &BuildOptions| accel.build(geometry, options);
+        let plain = one(Arc::clone(&geometry), &options).expect("sound").report();
+        let same = build_moving(Arc::clone(&geometry), &options, &one).expect("sound").report();
         assert_eq!((plain.backend, plain.bytes), (same.backend, same.bytes), "{name}");
     }
 }
@@ -330,7 +332,7 @@ fn many_bodies_that_move_are_each_where_they_are() {
             let mut batch = rays(300, DVec3::ZERO, 1.0, 300 + u64::from(number));
             let still = frozen(&geometry, time);
             let truth =
-                closest(&*BACKENDS[0].1(still, &BuildOptions::default()).expect("sound"), &batch);
+                closest(&Exact::build(still, &BuildOptions::default()).expect("sound"), &batch);
             batch.set_times(vec![time; batch.len()]);
             let hits = closest(&*accel, &batch);
             let mut blocked = Vec::new();

@@ -107,8 +107,8 @@ fn batch_widths(findings: &[AcceleratorMeasurement]) -> Chart {
 }
 
 /// The methods in their order.
-fn methods(findings: &[AcceleratorMeasurement]) -> Vec<&'static str> {
-    let mut methods: Vec<&str> = findings.iter().map(|finding| finding.method).collect();
+fn methods(findings: &[AcceleratorMeasurement]) -> Vec<&str> {
+    let mut methods: Vec<&str> = findings.iter().map(|finding| finding.method.as_str()).collect();
     methods.dedup();
     methods
 }

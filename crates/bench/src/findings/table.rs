@@ -23,7 +23,7 @@ fn accelerator(finding: &accelerators::AcceleratorMeasurement) -> Vec<(&'static 
     let shown_rate = |rate: f64| Cell::number(rate, format!("{rate:.2}"));
     // Hidden columns are in the CSV alone.
     vec![
-        ("method", Cell::word(finding.method)),
+        ("method", Cell::word(finding.method.as_str())),
         ("backend", Cell::hidden(&finding.backend)),
         ("batch", Cell::count(finding.width as u64)),
         ("threads", Cell::count(finding.threads as u64)),

@@ -305,7 +305,7 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
         self.entries.iter().filter(|entry| !entry.is_out).count() > 2
     }
 
-    /// Whether anybody left needs more than so many samples.
+    /// True if anybody left needs more than so many samples.
     fn is_undecided(&self, samples: u32) -> bool {
         let entries = self.entries.iter().filter(|entry| !entry.is_out);
         let mut forecasts = entries.filter_map(|entry| self.forecast_of(entry));

@@ -1,10 +1,10 @@
 //! Values of arguments from their words, or what would have been one.
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use etendue_accel::AccelName;
 use etendue_bench::tolerance::Tolerance;
 use etendue_geometry::units::Dimension;
 use etendue_optics::train::Focus;
-use etendue_scene::file::AccelName;
 use etendue_tracer::LayerSpec;
 
 /// More threads than any machine has cores only make a machine unusable.
@@ -58,7 +58,7 @@ pub(super) fn layer(name: &str) -> Result<String, String> {
 /// The accelerators' names, with what each is.
 pub(super) fn accelerators() -> PossibleValuesParser {
     PossibleValuesParser::new(
-        AccelName::ALL.map(|(_, [name, words])| PossibleValue::new(name).help(words)),
+        AccelName::ALL.map(|own| PossibleValue::new(own.name()).help(own.description())),
     )
 }
 

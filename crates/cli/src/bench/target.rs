@@ -1,12 +1,13 @@
 //! `etendue bench --target`: which settings reach a given error of what the sensor records soonest.
 
 use etendue::{Denoiser, Options, Outputs, Progress, Rendering, Session};
+use etendue_accel::AccelName;
 use etendue_bench::target::{
     Change, Effort, Outcome, RULES, Run, SAMPLES, Target, WholeRun, measure, rendered_with,
 };
-use etendue_render::{accelerators, denoise};
+use etendue_render::denoise;
 use etendue_scene::Scene;
-use etendue_scene::file::{AccelName, AccuracySpec, SceneFile, TracerSpec};
+use etendue_scene::file::{AccuracySpec, SceneFile, TracerSpec};
 use etendue_tracer::LayerSpec;
 
 use crate::arguments::BenchArguments;
@@ -173,7 +174,7 @@ pub(super) fn axes(scene: &Scene) -> Vec<Vec<Change>> {
         name: name.to_owned(),
         settings: vec![(path.to_owned(), value.to_owned())],
     };
-    let is_embree = scene.render.accel.unwrap_or(accelerators()[0]) == AccelName::Embree;
+    let is_embree = scene.render.accel.unwrap_or_else(AccelName::best) == AccelName::Embree;
     let mut axes = vec![
         vec![
             change("independent samples", "render.sampler", "\"independent\""),

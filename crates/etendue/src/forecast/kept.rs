@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use etendue_accel::AccelName;
 use etendue_files::{SOFTWARE, Transaction};
 use serde::{Deserialize, Serialize};
 
@@ -94,7 +95,7 @@ fn machine() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let line = text.lines().find(|line| line.starts_with("model name"));
     let processor = line.and_then(|line| line.split_once(':')).map_or("", |(_, name)| name.trim());
-    let backend = etendue_render::accelerators()[0];
+    let backend = AccelName::best();
     let kind = if cfg!(debug_assertions) { ", debug" } else { "" };
     format!("{processor}, {} threads, {SOFTWARE}, {backend:?}{kind}", rayon::current_num_threads())
 }

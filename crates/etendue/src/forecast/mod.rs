@@ -52,7 +52,7 @@ pub struct TimeForecast {
     pub output: f64,
     /// All of it.
     pub total: f64,
-    /// Whether parts of the picture were traced, or rays were only counted.
+    /// True if parts of the picture were traced; else rays were only counted.
     pub is_piloted: bool,
 }
 

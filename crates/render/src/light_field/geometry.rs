@@ -46,7 +46,7 @@ pub(super) struct LightFieldGeometry {
     centres_by_color_px: Option<[Vec<Vec<[f64; 2]>>; 3]>,
     /// How far these are from `centres_px` at most.
     color_centres_apart_px: f64,
-    /// Whether red, green and blue views are sampled each at its own centres.
+    /// True if red, green and blue views are sampled each at its own centres.
     views_by_color: bool,
     /// The centroids of the light of the same images before a uniform light, which cos⁴ and vignetting
     /// move away from the chief rays.

@@ -89,7 +89,7 @@ pub struct ModelError {
     pub colour: Worst,
     /// The difference of a pixel's light in a band, as a share of that on the axis.
     pub light: Worst,
-    /// Whether it stays within the tolerance.
+    /// True if it stays within the tolerance.
     pub is_within: bool,
     /// The time of a sample of a pixel (s); `null` without a picture to time.
     pub seconds_a_sample: Option<f64>,

@@ -4,8 +4,9 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use etendue_accel::AccelName;
 use etendue_render::output::{Outputs, Picture, Values};
-use etendue_render::{Plan, RenderError, Rendered, SoFar, Watch, accelerators, render};
+use etendue_render::{Plan, RenderError, Rendered, SoFar, Watch, render};
 use etendue_scene::Scene;
 
 use crate::steps::{load, prepare};
@@ -73,7 +74,7 @@ fn one_pass_and_many_give_the_same_picture_to_the_bit() {
         scene(PATH, lens, 12, "sobol"),
     ];
     for (k, mut scene) in scenes.into_iter().enumerate() {
-        for &accel in accelerators() {
+        for accel in AccelName::built() {
             scene.render.accel = Some(accel);
             let samples = scene.render.samples.most();
             let single: Vec<_> = std::iter::once(0..samples).collect();
@@ -117,18 +118,18 @@ impl Watch for StopAfter {
 fn a_stopped_picture_is_that_of_fewer_samples() {
     for tracer in [r#"{"type": "flat"}"#, PATH] {
         let whole = scene(tracer, PINHOLE, 256, "sobol");
-        let stop = StopAfter { samples: 8, seen: AtomicU32::new(0) };
+        let stop = StopAfter { samples: 16, seen: AtomicU32::new(0) };
         let stopped = rendered(&whole, None, &stop).unwrap();
-        let fewer = rendered(&scene(tracer, PINHOLE, 8, "sobol"), None, &|_: f64| true).unwrap();
-        assert_eq!((stopped.samples, fewer.samples), (8, 8));
+        let fewer = rendered(&scene(tracer, PINHOLE, 16, "sobol"), None, &|_: f64| true).unwrap();
+        assert_eq!((stopped.samples, fewer.samples), (16, 16));
         assert_eq!(bits(&stopped.picture), bits(&fewer.picture), "{tracer}");
         let header = |picture: &Picture, wanted: &str| {
             let entry = picture.header().iter().find(|(key, _)| key == wanted);
             entry.map(|(_, text)| text.clone())
         };
         let partial = header(&stopped.picture, "partial");
-        assert_eq!(partial.as_deref(), Some("stopped after 8 of 256 samples a pixel"));
-        assert_eq!(header(&stopped.picture, "samples").as_deref(), Some("8"));
+        assert_eq!(partial.as_deref(), Some("stopped after 16 of 256 samples a pixel"));
+        assert_eq!(header(&stopped.picture, "samples").as_deref(), Some("16"));
         assert_eq!(header(&fewer.picture, "partial"), None);
     }
 }

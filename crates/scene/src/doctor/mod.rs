@@ -34,7 +34,7 @@ pub struct Diagnosis {
     pub placements: usize,
     /// The tight box around everything in world space (m); null when there is no triangle.
     pub bounds: Option<BoxExtent>,
-    /// Whether the size looks like metres, and what to do when not.
+    /// Judgement of whether the size looks like metres, and the remedy.
     pub units: Units,
     /// The objects, by the numbers of `Id.object`.
     pub objects: Vec<ObjectReport>,
@@ -76,10 +76,10 @@ pub struct BoxExtent {
     pub max: [f64; 3],
 }
 
-/// Whether coordinates look like metres.
+/// Judgement of the unit of coordinates.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Units {
-    /// Whether the longest side is between a millimetre and a kilometre.
+    /// True if the longest side is between a millimetre and a kilometre.
     pub plausible: bool,
     /// What is assumed, and what to do when it is wrong.
     pub remark: String,

@@ -44,8 +44,8 @@ pub use samples::{
     LEAST_SAMPLES, RelativeErrorSpec, SETS, SamplesSpec, SensorNoiseSpec, TimeSpec, Until,
 };
 pub use settings::{
-    AccelName, Auto, BuildQuality, Exposure, LightPrecision, LightRow, PlanSpec, RenderSpec,
-    ToneMap, TracerRow, TracerSpec,
+    Auto, BuildQuality, Exposure, LightPrecision, LightRow, PlanSpec, RenderSpec, ToneMap,
+    TracerRow, TracerSpec,
 };
 pub use spec::{FormatVersion, SceneSpec, scene_schema};
 pub use tolerance::{DisplacementSpec, ShareSpec, ToleranceSpec};

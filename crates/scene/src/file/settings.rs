@@ -1,5 +1,6 @@
 //! Settings of a scene's picture, and of how it is rendered.
 
+use etendue_accel::AccelName;
 use etendue_camera::sampler::Sampler;
 use etendue_geometry::units::Seconds;
 use etendue_tracer::{LayerSpec, Rules};
@@ -205,15 +206,12 @@ pub enum BuildQuality {
 impl PlanSpec {
     /// Contradiction with something else of these, or the accelerator that the scene names: the key, and why.
     pub(super) fn contradiction(&self, accel: Option<AccelName>) -> Option<(&'static str, String)> {
-        let of_f64 = match accel {
-            Some(AccelName::Bvh) => Some("`bvh`"),
-            Some(AccelName::Exact) => Some("`exact`"),
-            Some(AccelName::Embree) | None => None,
-        };
-        match (self.refine, of_f64) {
-            (Some(false), Some(name)) => {
-                let why =
-                    format!("{name} works in f64 alone\nhint: leave this out, or take `embree`");
+        match (self.refine, accel.filter(|accel| !accel.has_single())) {
+            (Some(false), Some(accel)) => {
+                let why = format!(
+                    "`{}` works in f64 alone\nhint: leave this out, or take `embree`",
+                    accel.name()
+                );
                 return Some(("refine", why));
             }
             (Some(false), None) if self.light_precision == LightPrecision::Double => {
@@ -335,39 +333,6 @@ impl Default for RenderSpec {
             exposure,
             tone_map,
             alpha,
-        }
-    }
-}
-
-/// The accelerators by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum AccelName {
-    /// Intel's Embree.
-    Embree,
-    /// Pure Rust.
-    Bvh,
-    /// The f64 reference.
-    Exact,
-}
-
-impl AccelName {
-    /// Names of all accelerators in scenes and commands, each with a description.
-    pub const ALL: [(Self, [&str; 2]); 3] = [
-        (Self::Embree, ["embree", "Intel's Embree"]),
-        (Self::Bvh, ["bvh", "Pure Rust"]),
-        (Self::Exact, ["exact", "The f64 reference: slow and right"]),
-    ];
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn accelerators_are_called_as_scenes_write_them() {
-        for (accel, [name, _]) in AccelName::ALL {
-            assert_eq!(serde_json::to_value(accel).unwrap(), name);
         }
     }
 }

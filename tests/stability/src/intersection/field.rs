@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::ops::Add;
 use std::sync::Arc;
 
-use etendue_accel::{Accel, BuildError, BuildOptions, Bvh, Embree, Exact};
+use etendue_accel::{Accel, AccelName, BuildError, BuildOptions};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::units::Metres;
 use etendue_geometry::{
@@ -18,22 +18,29 @@ use rayon::prelude::*;
 /// Rays in a batch, as a render has them.
 pub(super) const BATCH: usize = 256;
 
-type Build = fn(Arc<Geometry>) -> Result<Box<dyn Accel>, BuildError>;
+type Build = Box<dyn Fn(Arc<Geometry>) -> Result<Box<dyn Accel>, BuildError>>;
 
 /// All backends in their default modes.
-pub(super) const BACKENDS: [(&str, Build); 3] =
-    [("embree", embree), ("bvh", bvh), ("exact", exact)];
+pub(super) fn backends() -> impl Iterator<Item = (&'static str, Build)> {
+    AccelName::ALL.into_iter().map(|name| -> (_, Build) {
+        (name.name(), Box::new(move |geometry| built(name, geometry)))
+    })
+}
+
+fn built(name: AccelName, geometry: Arc<Geometry>) -> Result<Box<dyn Accel>, BuildError> {
+    name.build(geometry, &BuildOptions::default())
+}
 
 pub(super) fn embree(geometry: Arc<Geometry>) -> Result<Box<dyn Accel>, BuildError> {
-    Ok(Box::new(Embree::build(geometry, &BuildOptions::default())?))
+    built(AccelName::Embree, geometry)
 }
 
 pub(super) fn bvh(geometry: Arc<Geometry>) -> Result<Box<dyn Accel>, BuildError> {
-    Ok(Box::new(Bvh::build(geometry, &BuildOptions::default())?))
+    built(AccelName::Bvh, geometry)
 }
 
 pub(super) fn exact(geometry: Arc<Geometry>) -> Result<Box<dyn Accel>, BuildError> {
-    Ok(Box::new(Exact::build(geometry, &BuildOptions::default())?))
+    built(AccelName::Exact, geometry)
 }
 
 /// A closed surface with hills, of mean radius 1, seen whole from its centre.

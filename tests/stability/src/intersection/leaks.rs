@@ -7,7 +7,7 @@ use etendue_geometry::{Detail, HitBatch, Mesh, RayBatch, Transform};
 use fastrand::Rng;
 use rayon::prelude::*;
 
-use super::field::{BACKENDS, BATCH, at, blob, direction, grouped};
+use super::field::{BATCH, at, backends, blob, direction, grouped};
 use crate::{Case, Outcome, Scale};
 
 pub(super) const DEFAULT: Case = Case {
@@ -139,7 +139,7 @@ fn default_modes(
     // Twelve rays a triangle, three places, packets and single rays. A mesh placed twice is an
     // instance, which is another way through Embree.
     let (once, instance) = (blob(triangles)?, blob(1_000)?);
-    for (name, build) in BACKENDS {
+    for (name, build) in backends() {
         let (mut leaks, mut rays) = (0, 0);
         for (seed, place) in (101..).zip(places()) {
             for (mesh, copies) in [(&once, 1), (&instance, 2)] {

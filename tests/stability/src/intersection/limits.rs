@@ -9,7 +9,7 @@ use etendue_geometry::{Geometry, Transform};
 use fastrand::Rng;
 
 use super::field::{
-    BACKENDS, Difference, Rays, blob, bvh, closest, cube, embree, exact, grouped, in_cube, inwards,
+    Difference, Rays, backends, blob, bvh, closest, cube, embree, exact, grouped, in_cube, inwards,
     loose, placed, scene,
 };
 use crate::{Case, Outcome, Scale};
@@ -108,7 +108,7 @@ fn beside_a_wall(scale: Scale) -> Result<Outcome> {
     let geometry = scene(vec![cube()?]);
     let mut random = Rng::with_seed(23);
     let decades = [3, 5, 6, 7, 9, 12];
-    let mut told = vec![String::new(); BACKENDS.len()];
+    let mut told = vec![String::new(); backends().count()];
     for decade in decades {
         let near = 10_f64.powi(-decade);
         let mut rays = Rays::default();
@@ -120,7 +120,7 @@ fn beside_a_wall(scale: Scale) -> Result<Outcome> {
             rays.push(DVec3::new(1.0 - near, up - 1.0, z), DVec3::new(way.x, way.y.abs(), way.z));
         }
         rays.set_from_surface();
-        for ((name, build), told) in BACKENDS.into_iter().zip(&mut told) {
+        for ((name, build), told) in backends().zip(&mut told) {
             let accel = build(geometry.clone())?;
             let mut lost = 0;
             for rays in &rays.batches {
@@ -133,7 +133,7 @@ fn beside_a_wall(scale: Scale) -> Result<Outcome> {
             *told += &format!(" {share:.2} % at 1e-{decade} m,");
         }
     }
-    for ((name, _), told) in BACKENDS.into_iter().zip(told) {
+    for ((name, _), told) in backends().zip(told) {
         outcome.measured(format!("{name} loses{}", told.trim_end_matches(',')));
     }
     Ok(outcome)

@@ -5,7 +5,7 @@ use etendue_geometry::Transform;
 use etendue_geometry::glam::{DMat3, DQuat, DVec3};
 
 use super::field::{
-    BACKENDS, Difference, Rays, at, blob, closest, direction, exact, grouped, inwards, scene,
+    Difference, Rays, at, backends, blob, closest, direction, exact, grouped, inwards, scene,
 };
 use crate::{Case, Outcome, Scale};
 
@@ -59,7 +59,7 @@ fn far(scale: Scale) -> Result<Outcome> {
             }
         }
         let mut told = format!("{distance:.0e} m:");
-        for (name, build) in BACKENDS {
+        for (name, build) in backends() {
             let accel = build(at(mesh.clone(), &[there]))?;
             let (mut error, mut wrong) = (0.0_f64, 0);
             for (here, away) in here.batches.iter().zip(&away.batches) {
@@ -89,7 +89,7 @@ fn sizes(scale: Scale) -> Result<Outcome> {
         let place = Transform::from_trs(DVec3::ZERO, DQuat::IDENTITY, DVec3::splat(size));
         let rays = inwards(scale.pick(5_000, 500_000), 0.6, &place, 47);
         let mut told = format!("{size:.0e} m:");
-        for (name, build) in BACKENDS {
+        for (name, build) in backends() {
             let mut all = Difference::default();
             for copies in [1, 2] {
                 let geometry = at(mesh.clone(), &vec![place; copies]);
@@ -110,7 +110,7 @@ fn twice(scale: Scale) -> Result<Outcome> {
     let place = Transform::from_trs(DVec3::X, DQuat::from_rotation_y(0.3), DVec3::splat(0.7));
     let geometry = at(blob(2_000)?, &[place; 3]);
     let rays = inwards(scale.pick(10_000, 1_000_000), 0.5, &place, 61);
-    for (name, build) in BACKENDS {
+    for (name, build) in backends() {
         let accel = build(geometry.clone())?;
         let mut earlier = 0;
         for rays in &rays.batches {
@@ -128,7 +128,7 @@ fn mirrored(scale: Scale) -> Result<Outcome> {
     let mesh = blob(2_000)?;
     let scales = [[-1.0, 1.0, 1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, -1.0], [1.0, -2.0, 0.5]];
     let mut random = fastrand::Rng::with_seed(73);
-    for (name, build) in BACKENDS {
+    for (name, build) in backends() {
         let mut all = Difference::default();
         let mut backs = 0;
         for stretch in scales {

@@ -14,7 +14,7 @@ use etendue_scene::import::{self, Wanted};
 use fastrand::Rng;
 
 use super::field::{
-    BACKENDS, Difference, Rays, at, blob, bvh, closest, direction, embree, exact, grouped, in_cube,
+    Difference, Rays, at, backends, blob, bvh, closest, direction, embree, exact, grouped, in_cube,
     inwards, loose, mesh, placed, scene,
 };
 use crate::{Case, Outcome, Scale};
@@ -171,7 +171,7 @@ fn without_area(scale: Scale) -> Result<Outcome> {
     let truth = exact(scene(vec![sound]))?;
     let mut rays = inwards(scale.pick(10_000, 1_000_000), 0.8, &Transform::IDENTITY, 61);
     let mut outcome = Outcome::default();
-    for (name, build) in BACKENDS {
+    for (name, build) in backends() {
         let accel = build(littered.clone())?;
         let mut all = Difference::default();
         for coherent in [false, true] {
@@ -205,7 +205,7 @@ fn not_finite(_: Scale) -> Result<Outcome> {
     let mut rays = Rays::default();
     rays.push(DVec3::new(0.0, 0.0, 3.0), DVec3::NEG_Z);
     rays.push(DVec3::new(5.0, 0.0, 3.0), DVec3::NEG_Z);
-    for (name, build) in BACKENDS {
+    for (name, build) in backends() {
         let hits = closest(&*build(geometry.clone())?, &rays.batches[0]);
         outcome.must(hits.t[0] == 3.0 && !hits.is_hit(1), || format!("{name}: {:?}", hits.t));
     }
@@ -285,7 +285,7 @@ fn one(_: Scale) -> Result<Outcome> {
     let mut asked = 0;
     for geometry in cases {
         let truth = exact(geometry.clone())?;
-        for (name, build) in BACKENDS {
+        for (name, build) in backends() {
             let accel = build(geometry.clone())?;
             for count in [0, 1, 7, 16, 17, 300] {
                 let rays = inwards(count, 1.0, &Transform::IDENTITY, 79);

@@ -1,8 +1,9 @@
 //! Tests of what no picture may do: show what is no number, light where none can be, or the scale of its scene.
 
+use etendue_accel::AccelName;
 use etendue_render::output::{Outputs, Values};
 use etendue_render::{Plan, render};
-use etendue_scene::file::{AccelName, LightPrecision};
+use etendue_scene::file::LightPrecision;
 use etendue_tracer::Paint;
 
 use super::{TRACERS, patch, picture, ways};

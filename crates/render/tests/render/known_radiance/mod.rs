@@ -12,9 +12,9 @@ mod one_plane;
 mod surfaces;
 mod thin;
 
-use etendue_render::accelerators;
+use etendue_accel::AccelName;
 use etendue_scene::Scene;
-use etendue_scene::file::{AccelName, LightPrecision};
+use etendue_scene::file::LightPrecision;
 
 use crate::steps::{self, channels, load};
 
@@ -25,9 +25,9 @@ type Way = (AccelName, LightPrecision);
 
 /// All accelerators in f64, and Embree in f32, which the others do not have.
 fn ways() -> Vec<Way> {
-    let double = accelerators().iter().map(|&accel| (accel, LightPrecision::Double));
-    let single = accelerators().iter().filter(|&&accel| accel == AccelName::Embree);
-    double.chain(single.map(|&accel| (accel, LightPrecision::Single))).collect()
+    let double = AccelName::built().map(|accel| (accel, LightPrecision::Double));
+    let single = AccelName::built().filter(|accel| accel.has_single());
+    double.chain(single.map(|accel| (accel, LightPrecision::Single))).collect()
 }
 
 /// All pixels' red.

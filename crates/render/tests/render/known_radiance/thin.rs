@@ -1,9 +1,10 @@
 //! Thin bodies, walls and gaps that light goes through, wherever they are: f32 where the plan takes it shows what f64 does.
 
+use etendue_accel::AccelName;
 use etendue_geometry::HitPrecision;
 use etendue_render::Plan;
 use etendue_render::output::Outputs;
-use etendue_scene::file::{AccelName, LightPrecision};
+use etendue_scene::file::LightPrecision;
 
 use super::{picture, ways};
 use crate::steps::{load, mean};
