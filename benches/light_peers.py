@@ -24,7 +24,9 @@ The bound: `benchmarks light-rays` has the same picture rendered with a clock ar
 
 import json
 import os
+import re
 import resource
+import shutil
 import statistics
 import subprocess
 import tempfile
@@ -61,6 +63,18 @@ LENS = "Cornell box, path of 5 bounces, through the double Gauss"
 SHARED = f"{LENS}, without dispersion"
 ALL = [*GOALS, LENS, SHARED]
 LENS_GOAL = 1.6
+# What the code does, by words in the symbols of a profile: the first that fits counts.
+STAGES = {
+    "accelerator": "libembree|libtbb|etendue_accel",
+    "random numbers": "sobol|sampler::",
+    "camera": "etendue_camera|etendue_optics",
+    "sums of pixels": "etendue_render",
+    "skies": "trace::sky|environment|GridDistribution|EnvironmentSampler",
+    "lights": "trace::lamps|trace::choose|light_tree|light_sampler|etendue_tracer::lights",
+    "rough, smooth and layered surfaces": "trace::facets|trace::single|etendue_tracer::bsdf",
+    "textures": "texture|etendue_image|footprint|trace::varied|SurfacePoint",
+    "steps of paths": "etendue_tracer|etendue_geometry::block",
+}
 
 
 def lamp_rows():
@@ -244,6 +258,25 @@ def bound(folder, job):
     return {key: statistics.median(run[key] for run in runs) for key in runs[0]}
 
 
+def profile(folder, job):
+    """Shares of a render's processor time by what the code does, by `perf`; empty without it."""
+    if not shutil.which("perf"):
+        return {}
+    path, data = Path(folder) / "scene.json", Path(folder) / "perf.data"
+    path.write_text(json.dumps(files_of(job, folder)))
+    render = [program.built("etendue"), "render", path, "-o", Path(folder) / "out", "--outputs", "npy", "--quiet",
+              "--samples", str(2 * SAMPLES)]
+    record = ["perf", "record", "-F", "1999", "-e", "cpu-clock", "-o", data, "--", *render]
+    subprocess.run(record, check=True, capture_output=True)
+    report = ["perf", "report", "-i", data, "--stdio", "--sort", "dso,symbol"]
+    found = subprocess.run(report, check=True, capture_output=True, text=True).stdout
+    shares = dict.fromkeys([*STAGES, "the rest"], 0.0)
+    for share, symbol in re.findall(r"^ +([0-9.]+)% +(.*)$", found, re.MULTILINE):
+        stages = (stage for stage, words in STAGES.items() if re.search(words, symbol))
+        shares[next(stages, "the rest")] += float(share)
+    return shares
+
+
 def against(arguments, folder):
     """Two builds of etendue in turns: a line a job."""
     import numpy as np
@@ -300,12 +333,46 @@ def measure(arguments, folder):
             "mean": {title: float(np.mean(pair)) for title, pair in pictures.items()},
             "rays": report["rays"],
             "bound": bound(folder, job),
+            "profile": profile(folder, job),
         }
         # After each job, so that a run that is stopped leaves what it has.
         arguments.output.write_text(page(results, remarks, arguments))
+    if not shutil.which("perf"):
+        remarks.append("`perf` is not installed, so there are no profiles.")
     for process in {process for process, _ in others.values()}:
         process.end()
     return results, remarks
+
+
+def profiles(results):
+    """What the time goes to, by job, and what is left for it where a goal is missed."""
+    if not any(result["profile"] for result in results.values()):
+        return []
+    short = lambda job: job[0].upper() + job[1:]
+    lines = ["", "## Where the time goes", "", "Shares of the processor time of whole renders of twice the samples, by "
+             "`perf` (percent).", "", f"| job | {' | '.join([*STAGES, 'the rest'])} |",
+             "|---" * (len(STAGES) + 2) + "|"]
+    for job, result in results.items():
+        if result["profile"]:
+            lines.append(f"| {short(job)} | " + " | ".join(f"{share:.0f}" for share in result["profile"].values()) + " |")
+    lines += ["", "## Why goals are missed", "", "Seconds at the same samples: what the goal leaves for all but the "
+              "accelerator, what that takes, and the largest parts of it.", "",
+              "| job | left by the goal | taken | most of it |", "|---|---|---|---|"]
+    for job, (same, _) in GOALS.items():
+        result = results.get(job)
+        titles = [t for t in result["seconds"] if "Mitsuba" in t] if result else []
+        if not titles or not result["profile"]:
+            continue
+        middle = {title: statistics.median(all) for title, all in result["seconds"].items()}
+        best, own, robust = min(middle[t] for t in titles), middle["etendue"], result["bound"]["robust"]
+        if best / own >= same:
+            continue
+        parts = sorted(list(result["profile"].items())[1:-1], key=lambda part: -part[1])[:3]
+        largest = ", ".join(f"{stage} {share / 100 * own:.2f}" for stage, share in parts)
+        left = best / same - robust
+        left = f"{left:.2f}" if left > 0 else "nothing: the accelerator alone takes longer"
+        lines.append(f"| {short(job)} | {left} | {own - robust:.2f} | {largest} |")
+    return lines
 
 
 def page(results, remarks, arguments):
@@ -343,7 +410,7 @@ def page(results, remarks, arguments):
         limit = result["bound"]
         lines += ["", f"The accelerator: {limit['robust']:.2f} s of it ({limit['robust'] / own:.0%}), "
                   f"{limit['fast']:.2f} s in its fast mode, for {result['rays']} rays.", ""]
-    lines += goals(results) + [""] + [f"- {remark}" for remark in remarks]
+    lines += goals(results) + profiles(results) + [""] + [f"- {remark}" for remark in remarks]
     wrapped = [line if line.startswith(("|", "#")) else textwrap.fill(line, 120) for line in lines]
     return "\n".join(wrapped).rstrip() + "\n"
 

@@ -24,7 +24,7 @@ impl PixelBlock {
         self.width as usize * self.height as usize
     }
 
-    /// Whether there is no pixel.
+    /// True if there is no pixel.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.width == 0 || self.height == 0

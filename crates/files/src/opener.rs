@@ -17,7 +17,7 @@ const LONGEST_PATH: usize = 4096;
 /// The most bytes of a file that this program has written itself, and reads again.
 pub const MOST_OWN_BYTES: u64 = 1 << 30;
 
-/// Whether a scene may read files outside its own folder.
+/// Reach of a scene: its own folder, or files outside it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Reach {
     /// No: also not through links.
@@ -230,7 +230,7 @@ enum FolderEscape {
     Upwards,
 }
 
-/// Whether a path climbs above where it starts, judged by its text.
+/// True if a path climbs above where it starts, judged by its text.
 fn leaves(path: &Path) -> Option<FolderEscape> {
     let mut depth = 0_i64;
     for component in path.components() {

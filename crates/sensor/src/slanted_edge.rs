@@ -55,7 +55,7 @@ pub struct SlantedEdge {
     /// The edge's angle from the column or row that it is nearest to (degrees), positive clockwise for an
     /// upright edge in a picture whose rows go down.
     pub angle: f64,
-    /// Whether it is nearer to upright than to level.
+    /// True if it is nearer to upright than to level.
     pub is_upright: bool,
     /// Where it crosses the region's middle line (pixels from the region's corner).
     pub position: f64,

@@ -61,7 +61,7 @@ impl Light {
         Stand(self.motion.as_ref().map(|motion| motion.at(time)))
     }
 
-    /// Whether it moves between two times (s from the frame's time).
+    /// True if it moves between two times (s from the frame's time).
     #[must_use]
     pub fn moves_within(&self, span: [f64; 2]) -> bool {
         self.motion.as_ref().is_some_and(|motion| motion.moves_within(span))

@@ -32,7 +32,7 @@ pub(crate) struct Receiver {
 }
 
 impl Receiver {
-    /// Whether it gets light from one side alone.
+    /// True if it gets light from one side alone.
     #[inline(always)]
     pub(crate) fn is_one_sided(&self) -> bool {
         self.normal != DVec3::ZERO
@@ -106,12 +106,12 @@ impl LightSampler {
         is_few.then(|| self.others.below())
     }
 
-    /// Whether there is nothing to choose from.
+    /// True if there is nothing to choose from.
     pub(crate) fn is_empty(&self) -> bool {
         self.others.is_empty() && self.tree.is_none()
     }
 
-    /// Whether there is more than one to choose from.
+    /// True if there is more than one to choose from.
     #[cfg(test)]
     pub(crate) fn are_several(&self) -> bool {
         self.others.len() > 1 || self.tree.is_some()

@@ -253,19 +253,19 @@ impl Lights {
         }
     }
 
-    /// Whether there is nothing to choose from.
+    /// True if there is nothing to choose from.
     #[must_use]
     pub fn is_dark(&self) -> bool {
         self.sampler.is_empty()
     }
 
-    /// Whether a ray that nobody aimed may come upon a light: not upon points and parallel light.
+    /// True if a ray that nobody aimed may come upon a light: not upon points and parallel light.
     #[must_use]
     pub fn is_hittable(&self) -> bool {
         self.sky.is_some() || !self.triangles.is_empty()
     }
 
-    /// Whether light comes from where nothing is.
+    /// True if light comes from where nothing is.
     #[must_use]
     pub fn has_environment(&self) -> bool {
         self.sky.is_some()
@@ -278,7 +278,7 @@ impl Lights {
         self.groups.parts()
     }
 
-    /// Whether any of them changes with time.
+    /// True if any of them changes with time.
     #[must_use]
     pub fn are_modulated(&self) -> bool {
         self.parts().iter().any(|(_, modulation)| modulation.is_some())

@@ -52,7 +52,7 @@ pub(crate) struct PlacedSurface {
 }
 
 impl PlacedSurface {
-    /// Whether rays may pass it as if it were not there.
+    /// True if rays may pass it as if it were not there.
     pub(crate) fn may_vanish(&self) -> bool {
         self.has_alpha || self.body.is_some_and(|body| body.may_vanish)
     }

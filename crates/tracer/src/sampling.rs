@@ -158,7 +158,7 @@ impl DiscreteDistribution {
         self.guide.len()
     }
 
-    /// Whether there is no index.
+    /// True if there is no index.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.guide.is_empty()

@@ -56,7 +56,7 @@ pub struct Texture {
     pub wrap: [Wrap; 2],
     /// How texels are read.
     pub filter: Filter,
-    /// Whether the scene file itself names it, and not one of its models.
+    /// True if the scene file itself names it, and not one of its models.
     pub named_by_scene: bool,
 }
 
@@ -114,7 +114,7 @@ pub enum ImageError {
 }
 
 impl ImageError {
-    /// Whether the image is larger than it may be, rather than broken.
+    /// True if the image is larger than it may be, rather than broken.
     #[must_use]
     pub fn is_too_large(&self) -> bool {
         matches!(
@@ -209,7 +209,7 @@ impl Image {
         }
     }
 
-    /// Whether this is [`Self::missing`], which is to be seen where it is a colour and to be left
+    /// True if this is [`Self::missing`], which is to be seen where it is a colour and to be left
     /// out where it is anything else.
     #[must_use]
     pub fn stands_in(&self) -> bool {

@@ -33,7 +33,7 @@ pub(super) struct BandInterpolation {
     /// By band and by wavelength that it is drawn from.
     pub(super) bands: Vec<Vec<NodeWeights>>,
     pub(super) next: NextTerm,
-    /// Whether glass takes light.
+    /// True if glass takes light.
     pub(super) has_losses: bool,
     /// From where a ray leaves the lens to where one starts that comes back (mm).
     pub(super) lead: f64,

@@ -30,9 +30,9 @@ pub struct Planes {
     pub image_z: f64,
     /// The paraxial magnification; `null` for an object at infinity.
     pub magnification: Option<f64>,
-    /// Whether the beams' middles run along the axis on the object's side.
+    /// True if the beams' middles run along the axis on the object's side.
     pub is_object_telecentric: bool,
-    /// Whether they do on the image's side.
+    /// True if they do on the image's side.
     pub is_image_telecentric: bool,
 }
 

@@ -154,7 +154,7 @@ impl MapSampler {
         }
     }
 
-    /// Whether the cells are the texels of a map of colours.
+    /// True if the cells are the texels of a map of colours.
     fn is_of_texels(&self) -> bool {
         self.cells.bright.is_empty()
     }

@@ -115,7 +115,7 @@ impl Axes {
         self.origin
     }
 
-    /// Whether it is turned about its own axis, which two tilts do not say.
+    /// True if it is turned about its own axis, which two tilts do not say.
     pub(super) fn is_turned(&self) -> bool {
         let [about_x, about_y] = self.placed().tilt.map(f64::to_radians);
         let two = DMat3::from_rotation_x(about_x) * DMat3::from_rotation_y(about_y);

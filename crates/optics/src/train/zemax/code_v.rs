@@ -151,7 +151,7 @@ impl ZemaxSheet {
         Ok(sheet)
     }
 
-    /// Whether a command of the whole system is understood.
+    /// True if a command of the whole system is understood.
     fn header(&mut self, word: &str, command: &CodeVCommand<'_>) -> Result<bool, ZemaxError> {
         let aperture = |value: f64, aperture: fn(f64) -> Aperture| {
             let why = || command.error(format!("{value} must be positive"));
@@ -271,7 +271,7 @@ pub(super) fn hyphened(name: &str, makers: &[&str]) -> String {
 }
 
 impl CodeVSurface {
-    /// Whether a command of a surface is understood.
+    /// True if a command of a surface is understood.
     fn read(&mut self, word: &str, command: &CodeVCommand<'_>) -> Result<bool, ZemaxError> {
         if NOT_TAKEN.contains(&word) {
             return Err(command.error(

@@ -84,7 +84,7 @@ impl<'a, F: Lane> Lights<'a, F> {
         own
     }
 
-    /// Whether each point chooses among all by where it is.
+    /// True if each point chooses among all by where it is.
     pub(super) fn are_many(&self) -> bool {
         self.few.is_empty()
     }
