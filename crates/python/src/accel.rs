@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use etendue_accel::{AccelName, BuildOptions};
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Detail, Geometry, HitBatch, Mesh, Placement, RayBatch, Transform};
+use etendue_geometry::{Detail, Geometry, HitBatch, Mesh, RayBatch, Transform};
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -36,17 +36,7 @@ impl Accel {
     ) -> PyResult<Self> {
         let (vertices, faces) = (triples("vertices", &vertices)?, triples("faces", &faces)?);
         let mesh = Mesh::from_arrays("mesh", &vertices, &faces).map_err(refused)?;
-        let world_from_mesh = Transform::IDENTITY;
-        let placement = Placement {
-            mesh: 0,
-            object: 0,
-            instance: 0,
-            node: 0,
-            material: 0,
-            world_from_mesh,
-            motion: None,
-        };
-        let geometry = Arc::new(Geometry { meshes: vec![mesh], placements: vec![placement] });
+        let geometry = Arc::new(Geometry::alone(mesh, Transform::IDENTITY));
         let stop = StopSignal::default();
         let build = || {
             let options = BuildOptions {

@@ -155,7 +155,7 @@ pub(crate) fn facing(normal: DVec3, geometric: DVec3, wo: DVec3) -> DVec3 {
 
 #[cfg(test)]
 mod tests {
-    use etendue_geometry::{Geometry, Mesh, Placement, Positions, Tangents, Transform, Vertices};
+    use etendue_geometry::{Geometry, Mesh, Positions, Tangents, Transform, Vertices};
 
     use super::*;
 
@@ -167,16 +167,7 @@ mod tests {
         mesh.uvs = vec![Vertices::from_arrays(&[[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]]); 2];
         let corners = Vertices::from_arrays(&[tangent; 3]);
         mesh.tangents = Some(Tangents { set: 1, corners });
-        let placement = Placement {
-            mesh: 0,
-            object: 0,
-            instance: 0,
-            node: 0,
-            material: 0,
-            world_from_mesh: Transform { linear, ..Transform::IDENTITY },
-            motion: None,
-        };
-        Geometry { meshes: vec![mesh], placements: vec![placement] }
+        Geometry::alone(mesh, Transform { linear, ..Transform::IDENTITY })
     }
 
     #[test]

@@ -73,7 +73,7 @@ impl Choices {
         self.len += 1;
     }
 
-    /// Appends some of sixteen points, told from `origin` (m), with their normals and the numbers by which they choose:
+    /// Appends some of sixteen points, relative to `origin` (m), with their normals and the numbers by which they choose:
     /// `compress` puts those that are wanted of a row side by side, and says how many they are.
     #[inline(always)]
     pub(crate) fn push_some<F: Float>(
@@ -86,15 +86,15 @@ impl Choices {
     ) {
         let Extent { centre, scale, .. } = self.extent;
         let (at, mut count, mut wide) = (self.len, 0, [0.0; LANES]);
-        let (mut told, mut normal) = ([[0.0; LANES]; 3], [0.0; LANES]);
+        let (mut scaled, mut normal) = ([[0.0; LANES]; 3], [0.0; LANES]);
         for axis in 0..3 {
             let offset = origin[axis] - centre[axis];
             for i in 0..LANES {
                 let point: f64 = points[axis][i].into();
-                told[axis][i] = (point + offset) * scale;
+                scaled[axis][i] = (point + offset) * scale;
             }
         }
-        let local = node::local(told);
+        let local = node::local(scaled);
         for axis in 0..3 {
             for i in 0..LANES {
                 normal[i] = f32::of(normals[axis][i].into());

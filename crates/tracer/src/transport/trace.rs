@@ -43,7 +43,7 @@ use crate::lights::LightBounds;
 /// Hits of single precision are beside an edge of their triangle where their least barycentric weight is below this: only
 /// triangles that are less than some hundred of the bounds of [`spawn`](crate::spawn) high have others as near
 /// to one, and a mesh of those has no sharp corners that it can resolve.
-const BESIDE: f64 = 1.0 / 256.0;
+const EDGE_WEIGHT: f64 = 1.0 / 256.0;
 
 /// Single precision holds squares of lengths, and densities over areas, of scenes between these sizes (m).
 pub(crate) const SIZES: [f64; 2] = [1e-6, 1e9];
@@ -245,8 +245,8 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         let &LightingContext { placed, scene, precision, .. } = self.ctx;
         // What is worked out in single precision is rounded as often again: points, normals and starts.
         let roundings = self.ctx.roundings() * if F::HAS_ENDS { 1.0 } else { 2.0 };
-        let beside = match precision {
-            HitPrecision::Single => BESIDE,
+        let edge_weight = match precision {
+            HitPrecision::Single => EDGE_WEIGHT,
             HitPrecision::Double => -1.0,
         };
         Surfaces {
@@ -255,7 +255,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             geometry: scene.geometry,
             varied: Varied::NONE,
             roundings: F::of(roundings),
-            beside: F::of(beside),
+            edge_weight: F::of(edge_weight),
         }
     }
 

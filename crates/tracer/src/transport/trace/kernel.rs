@@ -324,7 +324,7 @@ fn lanes_from(first: usize) -> [u32; LANES] {
 /// Points, their errors, and normals on the viewer's side.
 #[inline(always)]
 fn measure<F: Lane>(
-    Surfaces { roundings, beside, .. }: Surfaces<'_, F>,
+    Surfaces { roundings, edge_weight, .. }: Surfaces<'_, F>,
     block: &RayBlock<F>,
     found: &Found<F>,
     offset: [F; 3],
@@ -360,8 +360,8 @@ fn measure<F: Lane>(
         let (u, v) = (block.u[i], block.v[i]);
         let (rest, least) = (F::ONE - u - v, if u < v { u } else { v });
         let least = if rest < least { rest } else { least };
-        let is_beside = (least < beside) & (found.passed[i] == 0);
-        let amount = if is_beside { F::of(BACK) * roundings * most[i] } else { F::ZERO };
+        let is_at_edge = (least < edge_weight) & (found.passed[i] == 0);
+        let amount = if is_at_edge { F::of(BACK) * roundings * most[i] } else { F::ZERO };
         let across = normal[0][i] * dx[i] + normal[1][i] * dy[i] + normal[2][i] * dz[i];
         back[0][i] = (normal[0][i] * across - dx[i]) * amount;
         back[1][i] = (normal[1][i] * across - dy[i]) * amount;

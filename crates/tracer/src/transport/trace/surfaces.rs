@@ -21,8 +21,8 @@ pub(in crate::transport) struct Surfaces<'a, F> {
     /// Bound on the error of a hit, and of what leaves it, relative to the numbers that it is worked out of.
     pub(super) roundings: F,
     /// Hits are beside an edge of their triangle where their least barycentric weight is below this
-    /// ([`super::BESIDE`]).
-    pub(super) beside: F,
+    /// ([`super::EDGE_WEIGHT`]).
+    pub(super) edge_weight: F,
 }
 
 /// What surfaces that are not alike all over have, by lane; empty where all are.
