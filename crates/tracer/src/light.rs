@@ -171,6 +171,8 @@ pub enum LightKind {
         along: DVec3,
         /// Cosine of the half-angle of the disk that it comes from; 1 of parallel light.
         cos_radius: f64,
+        /// The camera sees the disk where nothing is in the way, as mirrors and glass do.
+        visible: bool,
     },
     /// A point that throws an image, with an axial intensity.
     Projector(Box<Projector>),

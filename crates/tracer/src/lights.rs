@@ -4,6 +4,7 @@ mod environment;
 mod plain;
 
 use std::borrow::Cow;
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use etendue_geometry::glam::DVec3;
@@ -44,6 +45,8 @@ pub struct Lights {
     area_light_bands: Vec<f64>,
     bounds: LightBounds,
     groups: Groups,
+    /// The lights that are disks far away, such as the sun's.
+    disks: Vec<usize>,
 }
 
 /// The spectrum of what a surface gives off, in bands.
@@ -162,6 +165,8 @@ impl Lights {
             lights.iter().map(|light| part(light.group, &light.modulation)),
             scene.materials.iter().map(of_material),
         );
+        let is_disk = |light: &Light| matches!(light.kind, LightKind::Directional { cos_radius, .. } if cos_radius < 1.0);
+        let disks = (0..lights.len()).filter(|&index| is_disk(&lights[index])).collect();
         let lights = lights.to_vec();
         let (area_lights, area_light_bands) = Default::default();
         let mut all = Self {
@@ -176,6 +181,7 @@ impl Lights {
             area_light_bands,
             bounds: LightBounds::NOTHING,
             groups,
+            disks,
         };
         all.prepare_area_lights(scene, spectral);
         all.bounds = all.bound(scene, span);
@@ -271,6 +277,32 @@ impl Lights {
         self.sky.is_some()
     }
 
+    /// True if some light is a disk far away.
+    pub(crate) fn has_disks(&self) -> bool {
+        !self.disks.is_empty()
+    }
+
+    /// The disks far away that lie in a unit direction at a time (s from the frame's time), of which the camera itself
+    /// sees those that are visible: the number of each light, and its radiance where its bands are 1 (1/sr).
+    pub(crate) fn disks_in(
+        &self,
+        direction: DVec3,
+        time: f64,
+        by_camera: bool,
+    ) -> impl Iterator<Item = (usize, f64)> {
+        self.disks.iter().filter_map(move |&index| {
+            let light = &self.lights[index];
+            let LightKind::Directional { along, cos_radius, visible } = light.kind else {
+                return None;
+            };
+            // Half the square of the chord, which narrow disks need whole.
+            let apart = 0.5 * (direction + light.stand(time).direction(along)).length_squared();
+            let short = 1.0 - cos_radius;
+            let is_seen = (visible || !by_camera) && apart <= short;
+            is_seen.then(|| (index, (TAU * short).recip()))
+        })
+    }
+
     /// What of their light can be told apart, by the numbers of [`crate::transport::Parts::Groups`]: the lights of
     /// one group that change with time alike.
     #[must_use]
@@ -347,7 +379,7 @@ impl Lights {
                 let place = Target::bare(TargetKind::Point, stand.point(measured.at), chance);
                 (intensity > 0.0).then_some(place)
             }
-            &LightKind::Directional { along, cos_radius } => {
+            &LightKind::Directional { along, cos_radius, .. } => {
                 let toward = Frame::around(-stand.direction(along))
                     .world(cone_direction(square, cos_radius));
                 Some(Target::bare(TargetKind::Parallel, toward, chance))

@@ -146,7 +146,7 @@ fn octaves(scene: &Scene, nearest: f64) -> Vec<u32> {
         let bounds = scene.geometry.loose_bounds_of(placement);
         let own = (eye.clamp(bounds.min, bounds.max) - eye).length();
         let shadow = |light: &Light| match light.kind {
-            LightKind::Directional { along, cos_radius } => {
+            LightKind::Directional { along, cos_radius, .. } => {
                 Some(shadow_distance(eye, &bounds, along, cos_radius))
             }
             _ => None,

@@ -214,8 +214,8 @@ impl ImportedLight {
             LightKind::Spot { cos_outer, cos_inner, .. } => {
                 LightKind::Spot { at, axis: along()?, cos_outer, cos_inner }
             }
-            LightKind::Directional { cos_radius, .. } => {
-                LightKind::Directional { along: along()?, cos_radius }
+            LightKind::Directional { cos_radius, visible, .. } => {
+                LightKind::Directional { along: along()?, cos_radius, visible }
             }
             kind @ (LightKind::Projector(_)
             | LightKind::Goniometric(_)

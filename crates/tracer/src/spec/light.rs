@@ -90,7 +90,7 @@ pub enum LightSpec {
         #[schemars(range(min = 0.0))]
         lux: Option<f64>,
         /// Diameter of the disk that it comes from, as seen from the scene (degrees; the sun's is 0.53).
-        /// Shadows have soft edges by it; no ray of the camera meets the disk.
+        /// Shadows have soft edges by it; mirrors and smooth glass show the disk, the camera itself does not see it.
         #[serde(default)]
         #[schemars(range(min = 0.0, max = 90.0))]
         angle: f64,
@@ -327,6 +327,7 @@ impl LightSpec {
             Self::Directional { direction, angle, .. } => LightKind::Directional {
                 along: unit("direction", DVec3::from(*direction))?,
                 cos_radius: (0.5 * angle).to_radians().cos(),
+                visible: false,
             },
             Self::Goniometric { at, file, direction, rotate, .. } => {
                 let below = unit("direction", DVec3::from(*direction))?;
@@ -487,6 +488,7 @@ fn shining(
     let disk = LightKind::Directional {
         along: -(turn * sky.toward_sun()),
         cos_radius: (0.5 * SUN_DIAMETER).to_radians().cos(),
+        visible,
     };
     let sun = Light {
         spectrum: sky.sun_spectrum().scaled(scale).ok().map(Arc::new),

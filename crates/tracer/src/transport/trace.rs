@@ -71,7 +71,7 @@ pub(super) struct Columns<F> {
     /// What each stands for where it starts, if that is more than a point: a width (m), and by how much that grows per
     /// length. Unused of the camera's, and where no surface is smooth or all are alike all over.
     pub(super) cone: [Vec<F>; 2],
-    /// [`SPECULAR`] and [`LAST`]; empty where no surface is smooth.
+    /// [`SPECULAR`], [`LAST`] and [`SCATTERED`]; empty where no surface is smooth.
     pub(super) flags: Vec<u32>,
     /// The media that each is in; empty where they do not count.
     pub(super) media: Vec<Media>,
@@ -84,6 +84,9 @@ const SPECULAR: u32 = 1;
 
 /// A path looks for light and goes no farther.
 const LAST: u32 = 2;
+
+/// A path came by some surface that is neither a mirror nor a smooth boundary.
+const SCATTERED: u32 = 4;
 
 /// Rays that leave a block's hits, a column a number, with room for a block behind the last.
 #[derive(Debug, Default)]
@@ -291,6 +294,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             self.carry_cones((camera, number), surfaces.all, workspace);
             self.meet((camera, number), workspace, out);
             self.add_sky((camera, number), lights, workspace, out);
+            self.add_disks((camera, number), workspace, out);
             if let Some(emitters) = self.asked_emitters() {
                 self.ask_emitters(emitters, lights, workspace);
             }
@@ -354,13 +358,14 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             drawn,
             chosen,
         };
-        let has_environment = self.ctx.lights.has_environment();
+        let (has_environment, has_disks) =
+            (self.ctx.lights.has_environment(), self.ctx.lights.has_disks());
         let leaving = Leaving {
             shadows: &mut workspace.shadows,
             next: &mut workspace.next,
             last: &mut workspace.last,
             seen: &mut workspace.seen,
-            missed: has_environment.then_some(&mut workspace.missed),
+            missed: (has_environment || has_disks).then_some(&mut workspace.missed),
             facets: &mut workspace.facets,
             singles: &mut workspace.singles,
             colors: &mut workspace.colors,

@@ -341,3 +341,84 @@ fn lights_that_reach_next_to_nowhere_are_chosen_from_afar() {
         }
     }
 }
+
+/// The middle 20° of what a camera sees by way of `objects` with two materials, under light from a disk 10° across
+/// straight ahead.
+fn before_a_disk(tracer: &str, objects: &str, lights: &str) -> String {
+    format!(
+        r#"{{"etendue": 1, "tracer": {{"type": "{tracer}"}},
+        "camera": {{"type": "pinhole", "fov": 20, "pose": {{"from": [1, 0, 3], "look_at": [0, 0, 0]}},
+            "sensor": {{"resolution": [64, 64]}}}},
+        "render": {{"samples": 64}}, "lights": [{lights}], "objects": [{objects}],
+        "materials": {{"mirror": {{"type": "mirror", "color": [0.7, 0.7, 0.7]}},
+            "pane": {{"type": "gltf", "color": [1, 1, 1], "transmission": 1, "roughness": 0, "ior": 1.5}},
+            "glass": {{"type": "dielectric", "ior": 1.5}},
+            "matte": {{"type": "matte", "color": [0.5, 0.5, 0.5]}}}}}}"#
+    )
+}
+
+/// A disk far away of half-angle r and irradiance E has the radiance E / (2π (1 − cos r)), and in the middle of a picture
+/// f across the share π tan² r / (4 tan² (f/2)) of it. Mirrors, panes and glass show it, but not to surfaces that scatter
+/// light, which ask for it; the camera sees the sun of a clear sky alone.
+#[test]
+fn mirrors_and_glass_show_the_disk_of_the_sun() {
+    use std::f64::consts::PI;
+    let share = PI * 5_f64.to_radians().tan().powi(2) / (4.0 * 10_f64.to_radians().tan().powi(2));
+    let radiance = 2.0 / (2.0 * PI * (1.0 - 5_f64.to_radians().cos()));
+    let disk = |along: &str| {
+        format!(
+            r#"{{"type": "directional", "direction": {along}, "irradiance": [2, 2, 2], "angle": 10}}"#
+        )
+    };
+    let (ahead, mirrored) = (disk("[1, 0, 3]"), disk("[1, 0, -3]"));
+    let plane = |material: &str| {
+        format!(r#"{{"shape": "rectangle", "width": 9, "height": 9, "material": "{material}"}}"#)
+    };
+    let slab = r#"{"shape": "box", "size": [90, 90, 0.2], "material": "glass"}"#;
+    // Of the pane the first surface alone, as it has no thickness; of the slab all reflections within.
+    let (reflected, _) = etendue_tracer::bsdf::fresnel::dielectric(3.0 / 10_f64.sqrt(), 1.5);
+    let slab_passes = (1.0 - reflected) / (1.0 + reflected);
+    for (name, objects, light, passed) in [
+        ("nothing", String::new(), &ahead, 0.0),
+        ("mirror", plane("mirror"), &mirrored, 0.7),
+        ("pane", plane("pane"), &ahead, 1.0 - reflected),
+        ("slab", slab.to_owned(), &ahead, slab_passes),
+    ] {
+        for way in ways() {
+            let pixels = picture(load(&before_a_disk("path", &objects, light)), way);
+            // The 1250 pixels of the disk have 120 at its rim, of which 64 samples miss 0.02 at most by chance; a tenth
+            // of them, at most, are reflected at random by glass.
+            let (found, known) = (mean(&pixels), radiance * share * passed);
+            assert!((found - known).abs() <= 3e-3 * known, "{name}, {way:?}: {found}, not {known}");
+        }
+    }
+    // A matte wall before a mirror, which sees the sun in it alone: nobody asks a mirror for light.
+    let wall = r#"{"shape": "rectangle", "width": 9, "height": 9, "material": "matte"},
+        {"shape": "rectangle", "width": 90, "height": 90, "material": "mirror",
+         "transform": {"translate": [0, 0, 9]}}"#;
+    let pixels = picture(load(&before_a_disk("path", wall, &disk("[0, 0, 1]"))), ways()[0]);
+    assert_eq!(mean(&pixels), 0.0);
+    // The camera's own sight: a clear sky's sun beyond its dome.
+    let mut seen = [true, false].map(|visible| {
+        [true, false].map(|shines| {
+            let sky = format!(
+                r#"{{"type": "sky", "sun": {{"elevation": 30, "shines": {shines}}}, "visible": {visible}}}"#
+            );
+            let scene = load(&before_a_disk("direct", "", &sky).replace(
+                r#""from": [1, 0, 3], "look_at": [0, 0, 0]"#,
+                &format!(r#""from": [0, 0, 0], "look_at": [0, 0.5, {}]"#, -(0.75_f64.sqrt())),
+            ).replace(r#""fov": 20"#, r#""fov": 2"#));
+            let sun = scene.lights.iter().find(|light| {
+                matches!(light.kind, etendue_tracer::LightKind::Directional { .. })
+            });
+            (mean(&picture(scene.clone(), ways()[0])), sun.map(|light| light.color[0]))
+        })
+    });
+    let [[(whole, sun), (dome, _)], [(hidden, _), (nothing, _)]] = &mut seen;
+    let half: f64 = (0.5_f64 * 0.533).to_radians();
+    let share = PI * half.tan().powi(2) / (4.0 * 1_f64.to_radians().tan().powi(2));
+    let known = sun.unwrap() / (2.0 * PI * (1.0 - half.cos())) * share;
+    // The disk has 230 pixels, 54 of them at its rim.
+    assert!((*whole - *dome - known).abs() <= 5e-3 * known, "{whole}, {dome}, {known}");
+    assert_eq!([*hidden, *nothing], [0.0; 2]);
+}

@@ -106,7 +106,9 @@ pub(super) fn placed(
     }
     let kind = match (written.kind.as_str(), written.spot) {
         ("point", _) => LightKind::Point(DVec3::ZERO),
-        ("directional", _) => LightKind::Directional { along: DVec3::NEG_Z, cos_radius: 1.0 },
+        ("directional", _) => {
+            LightKind::Directional { along: DVec3::NEG_Z, cos_radius: 1.0, visible: false }
+        }
         ("spot", Some(cone)) => LightKind::Spot {
             at: DVec3::ZERO,
             axis: DVec3::NEG_Z,

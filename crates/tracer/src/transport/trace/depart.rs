@@ -10,7 +10,7 @@ use super::compaction::{Compaction, Instructions};
 use super::facets::BsdfSamples;
 use super::kernel::{Hits, Mask, Numbers, Sphere, mask};
 use super::lane::Lane;
-use super::{LAST, RayColumns, SPECULAR};
+use super::{LAST, RayColumns, SCATTERED, SPECULAR};
 
 /// Leaves out paths that carry nothing and, by roulette, some of those that carry little of their largest band.
 #[inline(always)]
@@ -49,6 +49,8 @@ pub(super) struct BlockPaths<'a, F> {
     /// By band.
     pub(super) throughput: &'a [Row<F>],
     pub(super) ray: [u32; LANES],
+    /// With which they arrived.
+    pub(super) flags: [u32; LANES],
     pub(super) lanes: [u32; LANES],
     /// Those whose directions only their surfaces can give.
     pub(super) specular: Mask,
@@ -91,9 +93,10 @@ fn put_flags<F: Lane>(
     of_rough: u32,
     to: &mut RayColumns<F>,
 ) {
-    let mut flags = [of_rough; LANES];
+    let mut flags = [0; LANES];
     for i in 0..LANES {
-        flags[i] = if departing.specular[i] != 0 { SPECULAR } else { of_rough };
+        let own = if departing.specular[i] != 0 { SPECULAR } else { of_rough | SCATTERED };
+        flags[i] = own | (departing.flags[i] & SCATTERED);
     }
     going.put(&flags, &mut to.carried.flags, to.len);
 }

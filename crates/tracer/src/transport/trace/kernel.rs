@@ -286,7 +286,9 @@ pub(super) fn leave_blocks<F: Lane, const TILTED: bool, const RICH: bool, const 
         end_some(throughput, &mut left.goes, numbers.roulette.then(|| square(Draw::Chance)));
         let sky_chance = numbers.chosen.filter(|chosen| RICH && !chosen.sky_chance.is_empty());
         let sky_chance = sky_chance.map(|chosen| row(&chosen.sky_chance));
-        let departing = BlockPaths { throughput, ray, lanes, specular, sky_chance };
+        let flags = carried.flags.get(run.clone()).and_then(|flags| flags.try_into().ok());
+        let flags = flags.unwrap_or([0; LANES]);
+        let departing = BlockPaths { throughput, ray, flags, lanes, specular, sky_chance };
         let shading = numbers.chosen.is_some().then(|| hits.shading::<TILTED>());
         let to = (&mut *leaving.next, &mut *leaving.last);
         depart::<F, RICH>((&left, shading), &departing, &numbers, (instructions, to));

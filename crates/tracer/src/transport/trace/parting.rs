@@ -6,7 +6,7 @@ use etendue_geometry::block::LANES;
 use super::kernel::{round, single};
 use super::lane::{Lane, wide};
 use super::single::{SingleHit, SingleHits};
-use super::{SPECULAR, Workspace};
+use super::{SCATTERED, SPECULAR, Workspace};
 use crate::Scattering;
 use crate::transport::Draw;
 use crate::transport::dispersion::Boundary;
@@ -93,7 +93,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             next.reach[to] = F::INFINITY;
             next.left[to] = u32::try_from(lane).unwrap_or(u32::MAX);
             next.carried.ray[to] = carried.ray[lane];
-            next.carried.flags[to] = SPECULAR;
+            next.carried.flags[to] = SPECULAR | (carried.flags[lane] & SCATTERED);
             for (column, band) in next.carried.throughput.iter_mut().zip(part) {
                 column[to] = round(*band);
             }

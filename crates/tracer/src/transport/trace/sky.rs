@@ -3,14 +3,15 @@
 
 use std::f64::consts::FRAC_1_PI;
 
+use etendue_geometry::RayBlocks;
 use etendue_geometry::block::{Floats as Row, LANES, vector};
-use etendue_geometry::glam::DMat3;
+use etendue_geometry::glam::{DMat3, DVec3};
 
 use super::choose::{ChosenLamps, OtherPlace};
 use super::kernel::{round, single};
 use super::lamps::{Lights, OTHER};
 use super::lane::{Lane, wide};
-use super::{Columns, RayColumns, SPECULAR, Workspace};
+use super::{Columns, RayColumns, SCATTERED, SPECULAR, Workspace};
 use crate::Spectral;
 use crate::environment::{EnvironmentMap, MapLookup, MapSampler, place};
 use crate::sampling::GridCell;
@@ -211,6 +212,39 @@ pub(super) fn place_on_sky<F: Lane, const RGB: bool>(
 }
 
 impl<const RGB: bool> Tracing<'_, RGB> {
+    /// Adds the light of disks far away, such as the sun's, to which the camera or mirrors and smooth boundaries alone led
+    /// paths: surfaces that scatter light ask for theirs.
+    pub(super) fn add_disks<F: Lane>(
+        &mut self,
+        (camera, number): (&RaySamples<'_>, u32),
+        workspace: &mut Workspace<F>,
+        out: &mut [f64],
+    ) {
+        let Workspace { missed, rays, carried, light, .. } = workspace;
+        if !self.ctx.lights.has_disks() || (number > 0 && carried.flags.is_empty()) {
+            return;
+        }
+        let count = self.count();
+        for &own in &*missed {
+            let own = own as usize;
+            if number > 0 && carried.flags[own] & SCATTERED != 0 {
+                continue;
+            }
+            let direction = direction_of((camera, number), rays, own).normalize();
+            let time = self.time_of(carried.ray[own]);
+            for (index, radiance) in self.ctx.lights.disks_in(direction, time, number == 0) {
+                let throughput = carried.throughput.iter().map(|band| radiance * wide(band[own]));
+                let bands = self.ctx.lights.bands_of(index, count);
+                light.clear();
+                light.extend(throughput.zip(bands).map(|(passed, band)| passed * band));
+                let number_of_light = u32::try_from(index).unwrap_or_default();
+                let group = || self.ctx.lights.group_of_any(&self.ctx.scene, number_of_light);
+                let row = self.parts.row(carried.ray[own], number, group);
+                self.add(light, row, out);
+            }
+        }
+    }
+
     /// Adds the light of the sky that paths met.
     pub(super) fn add_sky<F: Lane>(
         &mut self,
@@ -228,11 +262,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let mut arrived = SkyHits::NOTHING;
             for (i, &own) in missed.iter().enumerate() {
                 let own = own as usize;
-                // The camera's rays are not all traced: those that cannot hit anything are other ones in blocks.
-                let direction = match number {
-                    0 => camera.rays.direction(own),
-                    _ => vector(&workspace.rays.blocks()[own / LANES].direction, own % LANES),
-                };
+                let direction = direction_of((camera, number), &workspace.rays, own);
                 let is_specular = flags.get(own).is_some_and(|flags| flags & SPECULAR != 0);
                 let was_asked = number > 0 && !is_specular;
                 arrived.put(i, (&workspace.carried, own), single(direction), was_asked);
@@ -250,6 +280,20 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 self.add(&light, row, out);
             }
         }
+    }
+}
+
+/// The direction of a path that met nothing. The camera's rays are not all traced: those that cannot hit anything are other
+/// ones in blocks.
+#[inline(always)]
+fn direction_of<F: Lane>(
+    (camera, number): (&RaySamples<'_>, u32),
+    rays: &RayBlocks<F>,
+    own: usize,
+) -> DVec3 {
+    match number {
+        0 => camera.rays.direction(own),
+        _ => vector(&rays.blocks()[own / LANES].direction, own % LANES),
     }
 }
 
