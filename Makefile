@@ -6,7 +6,7 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render install view dist release portable-wheel test test-embree4 test-window test-slurm test-denoise test-aarch64 check-platforms python bench bench-peers bench-python bench-workers bench-light bench-cycles bench-lens lens-waves bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-diffraction bench-aspheres bench-bands bench-time bench-gaps bench-decisions bench-window docs-figures docs-charts \
+.PHONY: help setup render install view dist release portable-wheel test test-embree4 test-window test-slurm test-denoise test-aarch64 check-platforms python bench bench-peers bench-python bench-workers bench-light agreement bench-cycles bench-lens lens-waves bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-diffraction bench-aspheres bench-bands bench-time bench-gaps bench-decisions bench-window docs-figures docs-charts \
 	docs-stability docs-time docs-window generated gallery spectra light-fields fingerprints fuzz fuzz-smoke fuzz-seeds sanitize clean
 
 help:
@@ -31,6 +31,7 @@ help:
 	@echo "make bench-python  rays from Python against Rust, Open3D and embreex; frames against their rays"
 	@echo "make bench-workers  frames from Python by one worker process, by two and by sixteen"
 	@echo "make bench-light   light against Mitsuba 3, from PyPI; writes docs/measurements/benchmarks-light.md"
+	@echo "make agreement     pictures of light against Mitsuba 3's, from PyPI; writes docs/measurements/agreement.md"
 	@echo "make bench-cycles  light against Blender's Cycles, from PyPI; writes docs/measurements/benchmarks-cycles.md"
 	@echo "make bench-sensor  time one exposure against numpy, prysm and emva1288, from PyPI"
 	@echo "make bench-limits  scenes and pictures as large as most machines take; writes docs/measurements/limits.md"
@@ -147,6 +148,11 @@ bench-workers:
 bench-light: setup
 	cargo build --release -p etendue-cli -p etendue-benches
 	scripts/bench-peers.sh light_peers.py $(ARGS)
+
+# Fails where pictures differ by more than their noise. ARGS='--scenes "mirror"' compares some of them.
+agreement: setup
+	cargo build --release -p etendue-cli -p etendue-benches
+	scripts/bench-peers.sh light_agreement.py $(ARGS)
 
 bench-cycles: setup
 	cargo build --release -p etendue-cli -p etendue-benches

@@ -25,7 +25,7 @@ JOBS = ["Cornell box, direct", "Cornell box, path of 5 bounces", "100 point ligh
 
 
 def read_ply(path):
-    """Points and triangles of a file that `light_scenes.write_ply` wrote."""
+    """Points and triangles of a file that `light_meshes.write_ply` wrote."""
     import numpy as np
 
     data = path.read_bytes()
@@ -53,7 +53,7 @@ class Cycles:
 
         bpy = self.bpy
         bpy.ops.wm.read_factory_settings(use_empty=True)
-        scene = light_peers.files_of(job, self.folder)
+        scene = light_scenes.scene_of(job, self.folder)
         blender = bpy.context.scene
         # Nothing but what light does.
         blender.render.engine = "CYCLES"

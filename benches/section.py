@@ -20,10 +20,15 @@ def machine():
     if "model name" in fields:
         family, number = fields.get("cpu family", "?"), fields.get("model", "?")
         model = f"{fields['model name']} (family {family}, model {number})"
-    commit = subprocess.run(
-        ["git", "describe", "--always", "--dirty"], capture_output=True, text=True
-    ).stdout.strip()
-    return f"{model}; etendue at commit {commit or 'unknown'}; Python {platform.python_version()}"
+    return f"{model}; etendue at commit {commit()}; Python {platform.python_version()}"
+
+
+def commit():
+    """The commit that is checked out, and whether anything but documents was changed since."""
+    git = lambda *words: subprocess.run(["git", "-C", Path(__file__).parent, *words], capture_output=True,
+                                        text=True).stdout.strip()
+    changes = git("status", "--porcelain", "--", ":/", ":(top,exclude)docs")
+    return (git("rev-parse", "--short", "HEAD") or "unknown") + (" with changes" if changes else "")
 
 
 def spread(values, digits=1):

@@ -38,7 +38,7 @@ PATH=$PATH:/usr/sbin:/sbin
 python3 -c "import ensurepip, venv" 2>/dev/null || need "for the programs' own folder" python3-venv
 case $script in
 peers.py) need_open3d && need_mitsuba ;;
-light_peers.py) need_mitsuba ;;
+light_peers.py | light_agreement.py) need_mitsuba ;;
 cycles_peers.py) need_blender ;;
 python_peers.py) need_open3d ;;
 esac

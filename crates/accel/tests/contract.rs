@@ -10,6 +10,8 @@ mod blocks;
 mod deforming;
 #[path = "contract/degenerate.rs"]
 mod degenerate;
+#[path = "contract/leaks.rs"]
+mod leaks;
 #[path = "contract/meshes.rs"]
 mod meshes;
 #[path = "contract/moving.rs"]

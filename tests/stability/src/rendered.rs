@@ -2,12 +2,14 @@
 
 use anyhow::{Context, Result, ensure};
 use etendue_accel::BuildOptions;
+use etendue_geometry::{HitPrecision, Mesh};
 use etendue_render::output::Outputs;
 use etendue_render::{Images, Plan, build, plan, render};
-use etendue_scene::file::SceneFile;
+use etendue_scene::file::{LightPrecision, SceneFile};
 use etendue_scene::{LoadOptions, Scene};
 use serde_json::Value;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A scene file's text in a folder of its own, or beside the images that it names.
 pub(crate) fn load(folder: &Path, text: &str) -> Result<Scene> {
@@ -17,9 +19,16 @@ pub(crate) fn load(folder: &Path, text: &str) -> Result<Scene> {
     Ok(file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default())?)
 }
 
+/// The scene of a text that names no files.
+pub(crate) fn scene(text: &str) -> Result<Scene> {
+    load(tempfile::tempdir()?.path(), text)
+}
+
 /// Red of all pixels.
 #[derive(Debug)]
 pub(crate) struct Pixels {
+    /// Of the hits of light.
+    pub(crate) precision: HitPrecision,
     pub(crate) values: Vec<f64>,
     /// The variance that the program tells of each, where the scene asks for that layer.
     pub(crate) variances: Vec<f64>,
@@ -45,13 +54,35 @@ impl Pixels {
         let values = first_channel(layers.first().context("a picture has a layer")?)?;
         let variance = layers.iter().find(|layer| layer.name == "Variance");
         let variances = variance.map(first_channel).transpose()?.unwrap_or_default();
-        Ok(Self { values, variances, not_finite: done.light.not_finite, notes: done.notes })
+        let precision = plan.light_precision;
+        let not_finite = done.light.not_finite;
+        Ok(Self { precision, values, variances, not_finite, notes: done.notes })
     }
 
     /// Of the scene in `text`.
     pub(crate) fn read(text: &str) -> Result<Self> {
-        let folder = tempfile::tempdir()?;
-        Self::of(&load(folder.path(), text)?)
+        Self::of(&scene(text)?)
+    }
+
+    /// Of `scene` with hits in f64 and, whatever the plan would take, in f32.
+    pub(crate) fn in_both(mut scene: Scene) -> Result<[Self; 2]> {
+        let mut of = |precision| {
+            scene.plan.light_precision = precision;
+            Self::of(&scene)
+        };
+        Ok([of(LightPrecision::Double)?, of(LightPrecision::Single)?])
+    }
+
+    /// Of `scene` with hits in f64 and, where the plan takes that, in f32: for regimes that f32 does not hold.
+    pub(crate) fn where_planned(mut scene: Scene) -> Result<Vec<Self>> {
+        scene.plan.light_precision = LightPrecision::Double;
+        let double = Self::of(&scene)?;
+        scene.plan.light_precision = LightPrecision::Auto;
+        let planned = Self::of(&scene)?;
+        Ok(match planned.precision {
+            HitPrecision::Single => vec![double, planned],
+            HitPrecision::Double => vec![double],
+        })
     }
 
     pub(crate) fn mean(&self) -> f64 {
@@ -74,6 +105,37 @@ impl Pixels {
     pub(crate) fn are_sound(&self) -> bool {
         self.not_finite == 0 && self.values.iter().all(|v| v.is_finite())
     }
+}
+
+/// The one of some pictures whose mean is the farthest from what it should be.
+pub(crate) fn farthest(pictures: &[Pixels], known: f64) -> Result<&Pixels> {
+    let off = |picture: &Pixels| (picture.mean() - known).abs();
+    pictures.iter().max_by(|a, b| off(a).total_cmp(&off(b))).context("a picture")
+}
+
+/// Divides each triangle of a scene into `n`² alike. Neighbours still share corners to the bit where `n` is a power of
+/// two and the corners are those of boxes of such sides: single precision holds all of them.
+pub(crate) fn divide(scene: &mut Scene, n: u32) -> Result<()> {
+    for mesh in &mut Arc::make_mut(&mut scene.geometry).meshes {
+        let (mut corners, mut triangles) = (Vec::new(), Vec::new());
+        for whole in 0..mesh.triangles.len() {
+            let [a, b, c] = mesh.corners(whole);
+            let mut corner = |i: u32, j: u32| {
+                let [along, across] = [i, j].map(|k| f64::from(k) / f64::from(n));
+                corners.push((a + (b - a) * along + (c - a) * across).to_array());
+                u32::try_from(corners.len() - 1)
+            };
+            for (i, j) in (0..n).flat_map(|i| (0..n - i).map(move |j| (i, j))) {
+                triangles.push([corner(i, j)?, corner(i + 1, j)?, corner(i, j + 1)?]);
+                if i + j + 1 < n {
+                    triangles.push([corner(i + 1, j)?, corner(i + 1, j + 1)?, corner(i, j + 1)?]);
+                }
+            }
+        }
+        let name = mesh.name.clone();
+        *mesh = Mesh::from_arrays(name, &corners, &triangles).map_err(anyhow::Error::msg)?;
+    }
+    Ok(())
 }
 
 /// 8 × 8 pixels of a tiny patch around `at`, seen from `from`, and the `rest` of the scene.

@@ -5,5 +5,6 @@ mod imu;
 mod lens_camera;
 mod light_field;
 mod opencv_fit;
+mod sampler;
 mod shutter;
 mod unprojection;

@@ -1,5 +1,6 @@
 //! Light in blocks of rays against light in batches: the same paths by two ways, whose random numbers are the same.
 
+mod bands;
 mod shining;
 
 use std::path::Path;
@@ -11,7 +12,7 @@ use etendue_render::Plan;
 use etendue_render::output::Outputs;
 use etendue_scene::Scene;
 use etendue_spectrum::{Bands, Grid};
-use etendue_tracer::material::{Alpha, NormalMap};
+use etendue_tracer::material::NormalMap;
 use etendue_tracer::texture::Encoding;
 use etendue_tracer::{Scattering, TextureUse};
 
@@ -479,30 +480,5 @@ fn plain_scenes_that_move_are_the_same_in_single_precision() {
             }
             compare_plain(&format!("plain and moving, {name}, {ball}"), &scene, &LAYERS);
         }
-    }
-}
-
-#[test]
-fn a_lamp_that_is_half_there_shines_half_as_much() {
-    let folder = tempfile::tempdir().unwrap();
-    save_waves(folder.path(), 0);
-    let lit = |radiance: f64, factor: f64| {
-        let lamp = LAMP.replace("\"lamp\"", "\"shining\"");
-        let text = room(r#"{"type": "path", "max_bounces": 1}"#, "", &lamp, "sphere");
-        let shining = format!(
-            r#""shining": {{"type": "emissive", "radiance": [{radiance}, 1, 0.5]}}, "lamp""#
-        );
-        let mut scene = load_in(folder.path(), &text.replacen("\"lamp\"", &shining, 1));
-        let shining = scene.materials.iter_mut().find(|material| material.name == "shining");
-        shining.unwrap().alpha = if factor < 1.0 { Alpha::Blend { factor } } else { Alpha::Opaque };
-        let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
-        let (accel, images) = prepare(&scene, &plan);
-        let done = trace(&scene, &plan, &*accel, &images);
-        channels(&done.picture, "")[0].iter().sum::<f64>()
-    };
-    for factor in [0.5, 0.1] {
-        let [whole, partly] = [lit(9.0 * factor, 1.0), lit(9.0, factor)];
-        // 37 thousand samples, of which each that finds the lamp is off by less than what it finds.
-        assert!((partly / whole - 1.0).abs() < 0.01, "{factor}: {partly} {whole}");
     }
 }

@@ -9,7 +9,7 @@ use etendue_spectrum::colorchecker::PATCHES;
 use etendue_spectrum::{Bands, Grid};
 use serde_json::{Value, json};
 
-use crate::steps::{channels, load_json, rendered};
+use crate::steps::{channels, load_json, plans, rendered};
 
 pub(crate) fn scenes() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes")
@@ -70,27 +70,36 @@ fn thirty_one_bands_hold_the_reflectances_of_all_patches() {
     scene["lights"][0]["illuminant"] = json!("equal_energy");
     scene["camera"]["sensor"]["resolution"] = json!([96, 64]);
     let loaded = load_json(&scenes(), scene);
-    let (bands, light) = seen(&loaded, &middles([96, 64]));
-    assert_eq!(bands.count(), 31);
-    let grid = Grid::equal(400.0, 700.0, 31).unwrap();
-    let (mut sum, mut matrix) = (0.0, vec![Vec::new(); 24]);
-    for ((patch, row), light) in PATCHES.iter().zip(&mut matrix).zip(light) {
-        for (band, value) in grid.bands().zip(light) {
-            // Irradiance π on a matte surface shows its reflectance.
-            sum += (value - patch.mean(band.from, band.to)).powi(2);
-            row.push(value);
+    for (bands, light) in seen_in_each_precision(&loaded, &middles([96, 64])) {
+        assert_eq!(bands.count(), 31);
+        let grid = Grid::equal(400.0, 700.0, 31).unwrap();
+        let (mut sum, mut matrix) = (0.0, vec![Vec::new(); 24]);
+        for ((patch, row), light) in PATCHES.iter().zip(&mut matrix).zip(light) {
+            for (band, value) in grid.bands().zip(light) {
+                // Irradiance π on a matte surface shows its reflectance.
+                sum += (value - patch.mean(band.from, band.to)).powi(2);
+                row.push(value);
+            }
         }
+        let rms = (sum / (24.0 * 31.0)).sqrt();
+        assert!(rms < 1e-6, "f32 keeps seven digits: {rms}");
+        let values = singular_values(matrix);
+        let held = values.iter().filter(|&&value| value > 1e-3 * values[0]).count();
+        assert_eq!(held, 14, "{values:?}");
     }
-    let rms = (sum / (24.0 * 31.0)).sqrt();
-    assert!(rms < 1e-6, "f32 keeps seven digits: {rms}");
-    let values = singular_values(matrix);
-    let held = values.iter().filter(|&&value| value > 1e-3 * values[0]).count();
-    assert_eq!(held, 14, "{values:?}");
 }
 
 /// The bands and a picture's values in them, of pixels in each patch: `[patch][band]`.
 pub(crate) fn seen(scene: &Scene, pixels: &[usize]) -> (Bands, Vec<Vec<f64>>) {
-    let plan = Plan::new(scene, Outputs::from_list("exr").unwrap());
+    seen_by(scene, Plan::new(scene, Outputs::from_list("exr").unwrap()), pixels)
+}
+
+/// The same with hits in each precision, f64 first.
+fn seen_in_each_precision(scene: &Scene, pixels: &[usize]) -> Vec<(Bands, Vec<Vec<f64>>)> {
+    plans(scene).into_iter().map(|plan| seen_by(scene, plan, pixels)).collect()
+}
+
+fn seen_by(scene: &Scene, plan: Plan, pixels: &[usize]) -> (Bands, Vec<Vec<f64>>) {
     let count = plan.bands.count();
     let done = rendered(scene, &plan);
     let of = |pixel: &usize| match &done.band_film {
@@ -194,18 +203,19 @@ fn patches_have_their_colours_under_every_lamp() {
         let scene = load_json(&scenes(), scene);
         // The corner of the picture is white.
         let pixels: Vec<usize> = middles([96, 64]).into_iter().chain([0]).collect();
-        let (bands, light) = seen(&scene, &pixels);
-        let xyz: Vec<[f64; 3]> = light
-            .iter()
-            .map(|light| counted(&scene, (&bands, light)).try_into().unwrap())
-            .collect();
-        let mut worst = 0.0f64;
-        for (row, found) in of_light.iter().zip(&xyz) {
-            let known: [f64; 3] = std::array::from_fn(|k| row[k + 2].parse().unwrap());
-            worst = worst.max(delta_e(lab(*found, xyz[24]), known));
+        for (bands, light) in seen_in_each_precision(&scene, &pixels) {
+            let xyz: Vec<[f64; 3]> = light
+                .iter()
+                .map(|light| counted(&scene, (&bands, light)).try_into().unwrap())
+                .collect();
+            let mut worst = 0.0f64;
+            for (row, found) in of_light.iter().zip(&xyz) {
+                let known: [f64; 3] = std::array::from_fn(|k| row[k + 2].parse().unwrap());
+                worst = worst.max(delta_e(lab(*found, xyz[24]), known));
+            }
+            println!("{name}: {worst:.4} in {} bands", bands.count());
+            assert!(worst <= 0.1, "{name}: {worst} in {} bands", bands.count());
         }
-        println!("{name}: {worst:.4} in {} bands", bands.count());
-        assert!(worst <= 0.1, "{name}: {worst} in {} bands", bands.count());
     }
 }
 
@@ -245,12 +255,13 @@ fn electrons_of_lines_and_notches_are_counted() {
                 "render": { "samples": 1 }
             }),
         );
-        let (bands, light) = seen(&scene, &[5]);
-        // Electrons a second.
-        let found = 0.01 * counted(&scene, (&bands, &light[0]))[0];
-        let off = found / case["electrons"].as_f64().unwrap() - 1.0;
-        println!("{}: {off:.1e} in {} bands", case["name"], bands.count());
-        assert!(off.abs() < 1e-3, "{}: {off} in {} bands", case["name"], bands.count());
+        for (bands, light) in seen_in_each_precision(&scene, &[5]) {
+            // Electrons a second.
+            let found = 0.01 * counted(&scene, (&bands, &light[0]))[0];
+            let off = found / case["electrons"].as_f64().unwrap() - 1.0;
+            println!("{}: {off:.1e} in {} bands", case["name"], bands.count());
+            assert!(off.abs() < 1e-3, "{}: {off} in {} bands", case["name"], bands.count());
+        }
     }
 }
 
@@ -291,23 +302,26 @@ fn cubes_and_checkers_of_curves_are_seen_band_by_band() {
     };
     let bands = json!([400, 500, 600, 700, 800]);
     let cube = json!({ "cube": "two.npy", "bands": bands, "filter": "nearest" });
-    let (_, light) = seen(&load_json(folder.path(), scene(cube)), &[4, 7]);
+    let of_cube = load_json(folder.path(), scene(cube));
     // The means over a band of straight lines between the bands' middles: half of a slope's step is outside.
     let means = |v: [f32; 4]| -> Vec<f64> {
         let v = v.map(f64::from);
         let at = |i: usize, k: isize| v[(i as isize + k).clamp(0, 3) as usize];
         (0..4).map(|i| 0.75 * v[i] + 0.125 * (at(i, -1) + at(i, 1))).collect()
     };
-    for (found, expected) in light.iter().zip([means(left), means(right)]) {
-        for (found, expected) in found.iter().zip(expected) {
-            // Texels and films are f32.
-            assert!((found - expected).abs() < 1e-6, "{light:?}");
+    for (_, light) in seen_in_each_precision(&of_cube, &[4, 7]) {
+        for (found, expected) in light.iter().zip([means(left), means(right)]) {
+            for (found, expected) in found.iter().zip(expected) {
+                // Texels and films are f32.
+                assert!((found - expected).abs() < 1e-6, "{light:?}");
+            }
         }
     }
     let square = |from: f64, to: f64| json!({ "curve": [[400, from], [800, to]] });
     let checker = json!({ "checker": [square(0.0, 0.8), square(0.9, 0.5)], "squares": 2 });
-    let (_, light) = seen(&load_json(folder.path(), scene(checker)), &[0, 3]);
-    for found in light {
+    let of_checker = load_json(folder.path(), scene(checker));
+    let both = seen_in_each_precision(&of_checker, &[0, 3]);
+    for found in both.into_iter().flat_map(|(_, light)| light) {
         // A pixel sees both squares, mixed alike in every band.
         let of = |share: f64, band: usize| {
             let [a, b] = [[0.1, 0.85], [0.3, 0.75], [0.5, 0.65], [0.7, 0.55]][band];
@@ -356,9 +370,10 @@ fn other_surfaces_have_their_curves_too() {
     ];
     for (material, objects, expected) in cases {
         let scene = load_json(folder.path(), scene(material.clone(), objects.clone()));
-        let (_, light) = seen(&scene, &[5]);
-        for (found, expected) in light[0].iter().zip(expected) {
-            assert!((found - expected).abs() < 1e-5, "{material}: {light:?}");
+        for (_, light) in seen_in_each_precision(&scene, &[5]) {
+            for (found, expected) in light[0].iter().zip(expected) {
+                assert!((found - expected).abs() < 1e-5, "{material}: {light:?}");
+            }
         }
     }
 }

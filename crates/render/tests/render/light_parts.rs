@@ -3,7 +3,7 @@
 use etendue_render::output::Picture;
 use etendue_tracer::{Emission, LayerSpec, LightGroup};
 
-use crate::steps::{channels, glow, load, picture, read};
+use crate::steps::{channels, glow, load, pictures, read};
 
 fn refusal(text: &str) -> String {
     read(tempfile::tempdir().unwrap().path(), text).unwrap_err().to_string()
@@ -30,10 +30,12 @@ fn a_closed_furnace_in_parts() {
                 "materials": {{"wall": {{"type": "matte", "color": [0.6, 0.6, 0.6]}}}}}}"#
         ));
         scene.materials[0].emission = Some(glow());
-        let picture = picture(&scene);
-        for (layer, known) in [("Direct", 1.6), ("Indirect", indirect)] {
-            let [mean, bound] = mean(&picture, layer);
-            assert!((mean - known).abs() <= bound, "{tracer}, {layer}: {mean}, not {known}");
+        for (precision, picture) in pictures(&scene) {
+            for (layer, known) in [("Direct", 1.6), ("Indirect", indirect)] {
+                let [mean, bound] = mean(&picture, layer);
+                let name = format!("{tracer}, {layer}, {precision:?}");
+                assert!((mean - known).abs() <= bound, "{name}: {mean}, not {known}");
+            }
         }
     }
 }
@@ -68,22 +70,25 @@ fn the_parts_are_the_picture_and_leave_it_as_it_is() {
     let bands = r#"{"type": "multispectral", "resolution": [24, 16],
         "bands": {"from": 400, "to": 700, "count": 7}}"#;
     for sensor in [plain, bands] {
-        let parts =
-            picture(&load(&room(r#"["indirect", "direct", "flat", "light_groups"]"#, sensor)));
-        let whole = values(&parts, "");
-        let (direct, indirect) = (values(&parts, "Direct"), values(&parts, "Indirect"));
-        assert!(direct.iter().sum::<f64>() > 0.0 && indirect.iter().sum::<f64>() > 0.0);
-        let groups = ["Light.key", "Light.lamp", "Light.other"].map(|layer| values(&parts, layer));
-        assert!(groups.iter().all(|group| group.iter().sum::<f64>() > 0.0));
-        for (i, whole) in whole.iter().enumerate() {
-            // All are f32, and colours of bands are differences of them.
-            let bound = 4.0 * f64::from(f32::EPSILON) * whole.abs() + 1e-6;
-            assert!((direct[i] + indirect[i] - whole).abs() <= bound, "pixel {i}: {whole}");
-            let sum: f64 = groups.iter().map(|group| group[i]).sum();
-            assert!((sum - whole).abs() <= bound, "pixel {i}: {sum}, not {whole}");
+        let [in_parts, alone] = [r#"["indirect", "direct", "flat", "light_groups"]"#, "[]"]
+            .map(|layers| pictures(&load(&room(layers, sensor))));
+        for ((precision, parts), (_, alone)) in in_parts.iter().zip(&alone) {
+            let whole = values(parts, "");
+            let (direct, indirect) = (values(parts, "Direct"), values(parts, "Indirect"));
+            assert!(direct.iter().sum::<f64>() > 0.0 && indirect.iter().sum::<f64>() > 0.0);
+            let groups =
+                ["Light.key", "Light.lamp", "Light.other"].map(|layer| values(parts, layer));
+            assert!(groups.iter().all(|group| group.iter().sum::<f64>() > 0.0));
+            for (i, whole) in whole.iter().enumerate() {
+                // All are f32, and colours of bands are differences of them.
+                let bound = 4.0 * f64::from(f32::EPSILON) * whole.abs() + 1e-6;
+                let name = format!("pixel {i}, {precision:?}");
+                assert!((direct[i] + indirect[i] - whole).abs() <= bound, "{name}: {whole}");
+                let sum: f64 = groups.iter().map(|group| group[i]).sum();
+                assert!((sum - whole).abs() <= bound, "{name}: {sum}, not {whole}");
+            }
+            assert_eq!(values(alone, ""), whole, "{sensor}, {precision:?}");
         }
-        let alone = picture(&load(&room("[]", sensor)));
-        assert_eq!(values(&alone, ""), whole, "{sensor}");
     }
 }
 
@@ -102,7 +107,7 @@ fn mean(picture: &Picture, layer: &str) -> [f64; 2] {
 #[test]
 fn each_group_is_the_picture_under_its_lights_alone() {
     for tracer in ["direct", "path"] {
-        let picture = picture(&load(&format!(
+        let scene = load(&format!(
             r#"{{"etendue": 1, "tracer": {{"type": "{tracer}"}}, "layers": ["light_groups"],
                 "camera": {{"type": "orthographic", "height": 1e-3,
                     "pose": {{"from": [0, 5, 0.01], "look_at": [0, 0, 0]}},
@@ -114,13 +119,17 @@ fn each_group_is_the_picture_under_its_lights_alone() {
                 "materials": {{"floor": {{"type": "matte", "color": [0.5, 0.5, 0.5]}}}},
                 "objects": [{{"shape": "rectangle", "width": 40, "height": 40, "material": "floor",
                     "transform": {{"rotate": [1, 0, 0, -90]}}}}]}}"#
-        )));
+        ));
         let pi = std::f64::consts::PI;
-        for (layer, known) in
-            [("Light.sky", 0.4), ("Light.key", 0.5 * 6.0 / (4.0 * pi)), ("Light.other", 1.0 / pi)]
-        {
-            let [mean, bound] = mean(&picture, layer);
-            assert!((mean - known).abs() <= bound, "{tracer}, {layer}: {mean}, not {known}");
+        let key = 0.5 * 6.0 / (4.0 * pi);
+        for (precision, picture) in pictures(&scene) {
+            for (layer, known) in
+                [("Light.sky", 0.4), ("Light.key", key), ("Light.other", 1.0 / pi)]
+            {
+                let [mean, bound] = mean(&picture, layer);
+                let name = format!("{tracer}, {layer}, {precision:?}");
+                assert!((mean - known).abs() <= bound, "{name}: {mean}, not {known}");
+            }
         }
     }
 }
@@ -141,15 +150,17 @@ fn surfaces_that_shine_have_groups() {
     let walls = LightGroup::try_from("walls".to_owned()).unwrap();
     scene.materials[0].emission = Some(Emission { group: Some(walls), ..glow() });
     scene.layers.push(LayerSpec::LightGroup { group: walls });
-    let picture = picture(&scene);
-    let [found, bound] = mean(&picture, "Light.walls");
-    assert!((found - 2.5).abs() <= bound, "{found}");
-    assert_eq!(mean(&picture, "Light.other")[0], 0.0);
-    let whole = values(&picture, "");
-    let parts = ["Light.walls", "Light.key"].map(|layer| values(&picture, layer));
-    for (i, whole) in whole.iter().enumerate() {
-        // Three numbers in f32.
-        assert!((parts[0][i] + parts[1][i] - whole).abs() <= 1e-6 * whole, "pixel {i}");
+    for (precision, picture) in pictures(&scene) {
+        let [found, bound] = mean(&picture, "Light.walls");
+        assert!((found - 2.5).abs() <= bound, "{precision:?}: {found}");
+        assert_eq!(mean(&picture, "Light.other")[0], 0.0, "{precision:?}");
+        let whole = values(&picture, "");
+        let parts = ["Light.walls", "Light.key"].map(|layer| values(&picture, layer));
+        for (i, whole) in whole.iter().enumerate() {
+            // Three numbers in f32.
+            let off = (parts[0][i] + parts[1][i] - whole).abs();
+            assert!(off <= 1e-6 * whole, "{precision:?}: pixel {i}");
+        }
     }
 }
 

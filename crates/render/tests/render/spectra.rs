@@ -3,20 +3,17 @@
 
 use etendue_geometry::glam::DVec3;
 use etendue_render::Plan;
-use etendue_render::output::Outputs;
 use etendue_scene::Scene;
 use etendue_spectrum::{Bands, Curve, Grid};
 use etendue_tracer::ClearSky;
 use serde_json::{Value, json};
 
-use crate::steps::{channels, load_json, rendered};
+use crate::steps::{channels, load_json, plans, rendered};
 
-/// Mean electrons a second of each channel of the scene's sensor, in these bands.
-fn electrons(scene: &Scene, bands: Bands) -> Vec<f64> {
-    let mut plan = Plan::new(scene, Outputs::from_list("exr").unwrap());
-    plan.bands = bands.clone();
-    let done = rendered(scene, &plan);
-    let count = bands.count();
+/// Mean electrons a second of each channel of the scene's sensor, in the bands of a plan.
+fn electrons(scene: &Scene, plan: &Plan) -> Vec<f64> {
+    let done = rendered(scene, plan);
+    let count = plan.bands.count();
     let means: Vec<f64> = match &done.band_film {
         Some(film) => {
             let pixels = film.values.len() / count;
@@ -28,24 +25,29 @@ fn electrons(scene: &Scene, bands: Bands) -> Vec<f64> {
             channels(&done.picture, "").into_iter().map(mean).collect()
         }
     };
-    let sensor = scene.sensor.clone().unwrap().in_bands(bands).unwrap();
+    let sensor = scene.sensor.clone().unwrap().in_bands(plan.bands.clone()).unwrap();
     let channel = |c: usize| -> f64 {
         sensor.electrons_per_unit(c).iter().zip(&means).map(|(e, mean)| e * mean).sum()
     };
     (0..sensor.channels().len()).map(channel).collect()
 }
 
-/// The worst of how far electrons in the plan's bands are from those in bands of a nanometre.
+/// The worst of how far electrons in the plan's bands are from those in bands of a nanometre, in each precision; and how
+/// many bands the plan has.
 fn worst(text: &Value) -> (f64, usize) {
     let folder = tempfile::tempdir().unwrap();
     let scene = load_json(folder.path(), text.clone());
-    let chosen = Plan::new(&scene, Outputs::from_list("exr").unwrap()).bands;
-    let [from, to] = chosen.range();
-    let exact = electrons(&scene, Bands::Spectral(Grid::of_width(from, to, 1.0).unwrap()));
-    let found = electrons(&scene, chosen.clone());
-    let off = found.iter().zip(&exact).map(|(found, exact)| (found / exact - 1.0).abs());
-    assert!(exact.iter().all(|&e| e > 0.0), "{exact:?}");
-    (off.fold(0.0, f64::max), chosen.count())
+    let (mut worst, mut count) = (0.0, 0);
+    for plan in plans(&scene) {
+        let [from, to] = plan.bands.range();
+        let fine = Bands::Spectral(Grid::of_width(from, to, 1.0).unwrap());
+        let exact = electrons(&scene, &Plan { bands: fine, ..plan.clone() });
+        let found = electrons(&scene, &plan);
+        let off = found.iter().zip(&exact).map(|(found, exact)| (found / exact - 1.0).abs());
+        assert!(exact.iter().all(|&e| e > 0.0), "{:?}: {exact:?}", plan.light_precision);
+        (worst, count) = (off.fold(worst, f64::max), plan.bands.count());
+    }
+    (worst, count)
 }
 
 fn silicon() -> Value {
@@ -242,8 +244,9 @@ fn shares(of: &[f64]) -> Vec<f64> {
 #[test]
 fn a_clear_sky_and_its_sun_have_the_spectra_of_their_authors() {
     let sky = ClearSky::new(3.0, 45.0, 0.2, true).unwrap();
-    let own = |scene: &Scene| {
-        electrons(scene, Plan::new(scene, Outputs::from_list("exr").unwrap()).bands)
+    // By precision.
+    let own = |scene: &Scene| -> Vec<Vec<f64>> {
+        plans(scene).iter().map(|plan| electrons(scene, plan)).collect()
     };
     let expected = |spectrum: &Curve| -> Vec<f64> {
         (0..8).map(|k| photons(spectrum, 400.0 + 40.0 * f64::from(k))).collect()
@@ -256,9 +259,11 @@ fn a_clear_sky_and_its_sun_have_the_spectra_of_their_authors() {
                           "transform": { "translate": [0, -50, 0] } }]);
     let found = own(&under_a_sky(&camera, &behind, true, 1));
     let known = expected(&sky.dome_spectrum(DVec3::from(toward).normalize()));
-    for (found, known) in shares(&found).iter().zip(shares(&known)) {
-        // What bands are to lose at most, and what a map of 0.35 degrees a texel does.
-        assert!((found / known - 1.0).abs() < 2e-3, "{found} is not {known}");
+    for found in found {
+        for (found, known) in shares(&found).iter().zip(shares(&known)) {
+            // What bands are to lose at most, and what a map of 0.35 degrees a texel does.
+            assert!((found / known - 1.0).abs() < 2e-3, "{found} is not {known}");
+        }
     }
     // A floor in the sun less the same in the shade.
     let camera = json!({
@@ -268,9 +273,11 @@ fn a_clear_sky_and_its_sun_have_the_spectra_of_their_authors() {
                          "transform": { "rotate": [1, 0, 0, -90] } }]);
     let [lit, shaded] =
         [true, false].map(|shines| own(&under_a_sky(&camera, &floor, shines, 4096)));
-    let sun: Vec<f64> = lit.iter().zip(&shaded).map(|(lit, shaded)| lit - shaded).collect();
-    for (found, known) in shares(&sun).iter().zip(shares(&expected(&sky.sun_spectrum()))) {
-        // The noise of 65536 samples, of which most is that of all bands.
-        assert!((found / known - 1.0).abs() < 1e-2, "{found} is not {known}");
+    for (lit, shaded) in lit.iter().zip(&shaded) {
+        let sun: Vec<f64> = lit.iter().zip(shaded).map(|(lit, shaded)| lit - shaded).collect();
+        for (found, known) in shares(&sun).iter().zip(shares(&expected(&sky.sun_spectrum()))) {
+            // The noise of 65536 samples, of which most is that of all bands.
+            assert!((found / known - 1.0).abs() < 1e-2, "{found} is not {known}");
+        }
     }
 }

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use etendue_accel::{Accel, BuildOptions};
+use etendue_accel::{Accel, AccelName, BuildOptions};
 use etendue_files::Opener;
+use etendue_geometry::HitPrecision;
 use etendue_render::output::{Outputs, Picture};
 use etendue_render::{Images, Plan, Rendered, build, plan, render};
 use etendue_scene::file::SceneFile;
@@ -72,6 +73,21 @@ pub(crate) fn rendered(scene: &Scene, plan: &Plan) -> Rendered {
 /// The picture of light alone.
 pub(crate) fn picture(scene: &Scene) -> Picture {
     rendered(scene, &Plan::new(scene, Outputs::from_list("exr").unwrap())).picture
+}
+
+/// The plan of a scene that names no accelerator, by the precision of the hits of its light: in f64, and in f32 where
+/// the accelerator that is taken finds hits in that.
+pub(crate) fn plans(scene: &Scene) -> Vec<Plan> {
+    let plan = Plan::new(scene, Outputs::from_list("exr").unwrap());
+    let single = AccelName::best().has_single().then_some(HitPrecision::Single);
+    let precisions = [HitPrecision::Double].into_iter().chain(single);
+    precisions.map(|light_precision| Plan { light_precision, ..plan.clone() }).collect()
+}
+
+/// The pictures of light alone by each of [`plans`], with the precision.
+pub(crate) fn pictures(scene: &Scene) -> Vec<(HitPrecision, Picture)> {
+    let pictured = |plan: &Plan| (plan.light_precision, rendered(scene, plan).picture);
+    plans(scene).iter().map(pictured).collect()
 }
 
 /// The values of each channel of a layer, "" being the picture itself.

@@ -7,7 +7,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_tracer::ClearSky;
 use serde_json::json;
 
-use crate::rendered::{Pixels, electrons_of_channels, load, patch};
+use crate::rendered::{Pixels, electrons_of_channels, farthest, load, patch, scene};
 use crate::sampling::SAMPLERS;
 use crate::{Case, Outcome, Scale};
 
@@ -105,12 +105,15 @@ fn in_a_floor(_: Scale) -> Result<Outcome> {
             for tracer in ["direct", "path"] {
                 let eye = [[at + 0.1, at + 0.2, at + 2.0], [at + 0.1, at + 0.13, at]];
                 let tracer = format!(r#"{{"type": "{tracer}"}}"#);
-                let seen = Pixels::read(&patch(&tracer, 4, eye, &rest))?;
-                let off = seen.values.iter().map(|v| (v - known).abs()).fold(0.0, f64::max);
-                // What shines along its own plane is a rounding of nothing: 10⁻⁷ at both ends of a ray, over the
-                // squared distance, which may be millimetres.
-                outcome.must(off <= 1e-6, || format!("{name} at {at} m, {tracer}: {off}"));
-                worst = worst.max(off);
+                for seen in Pixels::in_both(scene(&patch(&tracer, 4, eye, &rest))?)? {
+                    let off = seen.values.iter().map(|v| (v - known).abs()).fold(0.0, f64::max);
+                    // What shines along its own plane is a rounding of nothing: 10⁻⁷ at both ends of a ray, over the
+                    // squared distance, which may be millimetres.
+                    outcome.must(off <= 1e-6, || {
+                        format!("{name} at {at} m, {tracer}, {:?}: {off}", seen.precision)
+                    });
+                    worst = worst.max(off);
+                }
             }
         }
     }
@@ -125,9 +128,13 @@ fn sky_spectrum(scale: Scale) -> Result<Outcome> {
     for &(turbidity, elevation) in skies {
         let sky = ClearSky::new(turbidity, elevation, 0.2, false).context("a sky")?;
         let mut worst = 0.0_f64;
-        for toward in [[0.2, 0.9, 0.4], [0.5, 0.4, 0.7]] {
+        let seen = [[0.2, 0.9, 0.4], [0.5, 0.4, 0.7]]
+            .into_iter()
+            .flat_map(|toward| ["double", "single"].map(|precision| (toward, precision)));
+        for (toward, precision) in seen {
             let text = json!({
                 "etendue": 1, "tracer": { "type": "direct" }, "render": { "samples": 1 },
+                "plan": { "light_precision": precision },
                 "camera": {
                     "type": "orthographic", "height": 0.5,
                     "pose": { "from": [0, 0, 0], "look_at": toward },
@@ -180,17 +187,21 @@ fn on_a_surface(scale: Scale) -> Result<Outcome> {
             gap / 2.0,
             scale.pick(256, 16_384)
         );
-        let seen = Pixels::read(&text)?;
+        let both = Pixels::in_both(scene(&text)?)?;
         let known = 0.8 * 5.0 * form_factor(gap);
-        let (mean, error) = (seen.mean(), seen.standard_error());
-        outcome.must(seen.are_sound(), || format!("at {gap} m: not finite"));
-        // The patch is 10⁻² of the gap wide, of which the form factor knows the square.
-        let bound = 4.0 * error + 1e-4 * known;
-        let holds = (mean - known).abs() <= bound;
-        outcome.must(holds, || format!("at {gap} m: {mean} ± {error}, not {known}"));
-        outcome.must(seen.most() <= 1.5 * mean, || format!("at {gap} m: {}", seen.most()));
-        let off = mean / known - 1.0;
-        outcome.measured(format!("{gap:.0e} m: {off:+.1e} off, ± {:.0e}", error / known));
+        for seen in &both {
+            let at = format!("at {gap} m, {:?}", seen.precision);
+            let (mean, error) = (seen.mean(), seen.standard_error());
+            outcome.must(seen.are_sound(), || format!("{at}: not finite"));
+            // The patch is 10⁻² of the gap wide, of which the form factor knows the square.
+            let bound = 4.0 * error + 1e-4 * known;
+            let holds = (mean - known).abs() <= bound;
+            outcome.must(holds, || format!("{at}: {mean} ± {error}, not {known}"));
+            outcome.must(seen.most() <= 1.5 * mean, || format!("{at}: {}", seen.most()));
+        }
+        let seen = farthest(&both, known)?;
+        let (off, error) = (seen.mean() / known - 1.0, seen.standard_error() / known);
+        outcome.measured(format!("{gap:.0e} m: {off:+.1e} off, ± {error:.0e}"));
     }
     Ok(outcome)
 }
@@ -204,14 +215,19 @@ fn point_on_a_surface(_: Scale) -> Result<Outcome> {
             "materials": {{"m": {{"type": "matte", "color": [0.5, 0.5, 0.5]}}}}"#
         );
         let eye = [[1.0, 0.5, 3.0], [0.0; 3]];
-        let seen = Pixels::read(&patch(r#"{"type": "direct"}"#, 64, eye, &rest))?;
-        outcome.must(seen.are_sound(), || format!("at {height:e} m: not finite"));
-        let mean = seen.mean();
-        if height == 1.0 {
-            let off = mean / (0.5 / PI) - 1.0;
-            outcome.must(off.abs() <= 1e-6, || format!("at 1 m: {off:e} off"));
+        let both = Pixels::in_both(scene(&patch(r#"{"type": "direct"}"#, 64, eye, &rest))?)?;
+        for seen in &both {
+            let at = format!("at {height:e} m, {:?}", seen.precision);
+            outcome.must(seen.are_sound(), || format!("{at}: not finite"));
+            let mean = seen.mean();
+            if height == 1.0 {
+                let off = mean / (0.5 / PI) - 1.0;
+                outcome.must(off.abs() <= 1e-6, || format!("{at}: {off:e} off"));
+            }
+            outcome.must(height >= 0.0 || mean == 0.0, || format!("{at}, under the floor: {mean}"));
         }
-        outcome.must(height >= 0.0 || mean == 0.0, || format!("under the floor: {mean}"));
+        // The brighter one.
+        let mean = farthest(&both, 0.0)?.mean();
         outcome.measured(format!("{height:.0e} m: {mean:.1e}"));
     }
     Ok(outcome)
@@ -236,14 +252,19 @@ fn touching(scale: Scale) -> Result<Outcome> {
             away / 10.0,
             scale.pick(256, 16_384)
         );
-        let seen = Pixels::read(&text)?;
-        outcome.must(seen.are_sound(), || format!("at {away:e} m: not finite"));
-        let (mean, error) = (seen.mean(), seen.standard_error());
+        // Nearer than f32 tells from the corner the plan takes f64.
+        let all = Pixels::where_planned(scene(&text)?)?;
         let known = 0.8 * 5.0 / 2.0;
-        let holds = (mean - known).abs() <= 4.0 * error + 0.01 * known;
-        outcome.must(holds, || format!("at {away:e} m: {mean} ± {error}, not {known}"));
-        let off = mean / known - 1.0;
-        outcome.measured(format!("{away:.0e} m: {off:+.1e} off, ± {:.0e}", error / known));
+        for seen in &all {
+            let at = format!("at {away:e} m, {:?}", seen.precision);
+            outcome.must(seen.are_sound(), || format!("{at}: not finite"));
+            let (mean, error) = (seen.mean(), seen.standard_error());
+            let holds = (mean - known).abs() <= 4.0 * error + 0.01 * known;
+            outcome.must(holds, || format!("{at}: {mean} ± {error}, not {known}"));
+        }
+        let seen = farthest(&all, known)?;
+        let (off, error) = (seen.mean() / known - 1.0, seen.standard_error() / known);
+        outcome.measured(format!("{away:.0e} m: {off:+.1e} off, ± {error:.0e}"));
     }
     Ok(outcome)
 }
@@ -281,14 +302,19 @@ fn one_bright_pixel(scale: Scale) -> Result<Outcome> {
             let samples = scale.pick(1_024, 16_384);
             let tracer_spec = format!(r#"{{"type": "{tracer}"}}"#);
             let text = patch(&tracer_spec, samples, eye, rest);
-            let seen = Pixels::of(&load(folder.path(), &text)?)?;
-            let (mean, error) = (seen.mean(), seen.standard_error());
-            outcome.must(seen.are_sound(), || format!("{tracer}, {width}: not finite"));
-            let holds = (mean - known).abs() <= 4.0 * error + 1e-5 * known;
-            outcome.must(holds, || format!("{tracer}, {width}: {mean} ± {error}, not {known}"));
-            let spread = 8.0 * error / known;
-            outcome.must(spread <= 0.1, || format!("{tracer}, {width}: pixels differ by {spread}"));
-            let off = mean / known - 1.0;
+            let both = Pixels::in_both(load(folder.path(), &text)?)?;
+            let spread = |seen: &Pixels| 8.0 * seen.standard_error() / known;
+            for seen in &both {
+                let at = format!("{tracer}, {width}, {:?}", seen.precision);
+                let (mean, error) = (seen.mean(), seen.standard_error());
+                outcome.must(seen.are_sound(), || format!("{at}: not finite"));
+                let holds = (mean - known).abs() <= 4.0 * error + 1e-5 * known;
+                outcome.must(holds, || format!("{at}: {mean} ± {error}, not {known}"));
+                let spread = spread(seen);
+                outcome.must(spread <= 0.1, || format!("{at}: pixels differ by {spread}"));
+            }
+            let seen = farthest(&both, known)?;
+            let (off, spread) = (seen.mean() / known - 1.0, spread(seen));
             outcome.measured(format!(
                 "{tracer}, {width} columns: {off:+.1e} off, pixels ± {spread:.0e}"
             ));
@@ -325,13 +351,18 @@ fn small_sun(scale: Scale) -> Result<Outcome> {
             let text = patch(r#"{"type": "direct"}"#, scale.pick(1_024, 16_384), eye, rest);
             let sampler = format!(r#""render": {{"sampler": "{name}", "#);
             let text = text.replace(r#""render": {"#, &sampler);
-            let seen = Pixels::of(&load(folder.path(), &text)?)?;
-            let (mean, error) = (seen.mean(), seen.standard_error());
-            // The image is kept in f32, and the sun's edges are summed in a thousand steps.
-            let holds = (mean - known).abs() <= 4.0 * error + 1e-5 * known;
-            outcome.must(holds, || format!("{name}, {width}: {mean} ± {error}, not {known}"));
-            outcome.must(error <= 2e-3 * known, || format!("{name}, {width}: ± {error}"));
-            off.push(format!("{name} {:+.1e} ± {:.0e}", mean / known - 1.0, error / known));
+            let both = Pixels::in_both(load(folder.path(), &text)?)?;
+            for seen in &both {
+                let at = format!("{name}, {width}, {:?}", seen.precision);
+                let (mean, error) = (seen.mean(), seen.standard_error());
+                // The image is kept in f32, and the sun's edges are summed in a thousand steps.
+                let holds = (mean - known).abs() <= 4.0 * error + 1e-5 * known;
+                outcome.must(holds, || format!("{at}: {mean} ± {error}, not {known}"));
+                outcome.must(error <= 2e-3 * known, || format!("{at}: ± {error}"));
+            }
+            let seen = farthest(&both, known)?;
+            let (by, error) = (seen.mean() / known - 1.0, seen.standard_error() / known);
+            off.push(format!("{name} {by:+.1e} ± {error:.0e}"));
         }
         outcome.measured(format!("{width} columns: {}", off.join(", ")));
     }

@@ -7,7 +7,7 @@ use etendue_render::output::Outputs;
 use etendue_scene::Scene;
 use etendue_scene::file::LightPrecision;
 
-use crate::rendered::{Pixels, load};
+use crate::rendered::{Pixels, divide, scene};
 use crate::{Case, Outcome, Scale};
 
 pub(super) const DARK_BOX: Case = Case {
@@ -34,12 +34,6 @@ pub(super) const CORNER: Case = Case {
 /// How far away the scenes are (m), and the words for it.
 const AWAY: [(f64, &str); 4] = [(0.0, "origin"), (1e3, "10³ m"), (1e6, "10⁶ m"), (1e9, "10⁹ m")];
 
-/// The picture with hits of that precision.
-fn seen(scene: &mut Scene, precision: LightPrecision) -> Result<Pixels> {
-    scene.plan.light_precision = precision;
-    Pixels::of(scene)
-}
-
 /// Whether the plan, when it is free to choose, takes f32.
 fn takes_single(scene: &mut Scene) -> Result<bool> {
     scene.plan.light_precision = LightPrecision::Auto;
@@ -47,15 +41,11 @@ fn takes_single(scene: &mut Scene) -> Result<bool> {
     Ok(Plan::new(scene, outputs).light_precision == HitPrecision::Single)
 }
 
-fn scene(text: &str) -> Result<Scene> {
-    load(tempfile::tempdir()?.path(), text)
-}
-
 fn dark_box(scale: Scale) -> Result<Outcome> {
     let mut outcome = Outcome::default();
     for (far, place) in AWAY {
         let at = |x: f64, y: f64, z: f64| [x + far, y + far, z + far];
-        let mut scene = scene(&format!(
+        let text = format!(
             r#"{{"etendue": 1, "tracer": {{"type": "path", "max_bounces": 5}},
             "camera": {{"type": "pinhole", "fov": 100,
                 "pose": {{"from": {:?}, "look_at": {:?}}}, "sensor": {{"resolution": [64, 64]}}}},
@@ -70,20 +60,33 @@ fn dark_box(scale: Scale) -> Result<Outcome> {
             at(-0.75, -0.75, -0.75),
             // Five bounces and as many rays to the sky.
             scale.pick(4, 256),
-        ))?;
-        let single = takes_single(&mut scene)?;
-        let lit = |pixels: &Pixels| pixels.values.iter().filter(|value| **value != 0.0).count();
-        let [double, forced] =
-            [LightPrecision::Double, LightPrecision::Single].map(|p| seen(&mut scene, p));
-        let [double, forced] = [lit(&double?), lit(&forced?)];
-        outcome.must(double == 0, || format!("{place}: {double} pixels are lit in f64"));
-        outcome.must(!single || forced == 0, || format!("{place}: {forced} pixels are lit in f32"));
-        let choice = if single { "f32" } else { "f64" };
+        );
+        // Of few triangles, which are traced without a tree, and of many: the worse of both is told.
+        let (mut double, mut forced, mut all_single) = (0, 0, true);
+        for parts in [1, 4] {
+            let mut scene = scene(&text)?;
+            divide(&mut scene, parts)?;
+            let single = takes_single(&mut scene)?;
+            let [in_double, in_single] = Pixels::in_both(scene)?.map(|pixels| lit(&pixels));
+            let what = format!("{place}, {} triangles", 24 * parts * parts);
+            outcome.must(in_double == 0, || format!("{what}: {in_double} pixels are lit in f64"));
+            outcome.must(!single || in_single == 0, || {
+                format!("{what}: {in_single} pixels are lit in f32")
+            });
+            (double, forced) = (in_double.max(double), in_single.max(forced));
+            all_single &= single;
+        }
+        let choice = if all_single { "f32" } else { "f64" };
         outcome.measured(format!(
             "{place}: {double} pixels lit in f64, {forced} in f32 (plan: {choice})"
         ));
     }
     Ok(outcome)
+}
+
+/// Number of pixels that are not quite dark.
+fn lit(pixels: &Pixels) -> usize {
+    pixels.values.iter().filter(|value| **value != 0.0).count()
 }
 
 fn corner(scale: Scale) -> Result<Outcome> {
@@ -110,8 +113,7 @@ fn corner(scale: Scale) -> Result<Outcome> {
                 scale.pick(16, 1_024),
             ))?;
             let single = takes_single(&mut scene)?;
-            let double = seen(&mut scene, LightPrecision::Double)?;
-            let forced = seen(&mut scene, LightPrecision::Single)?;
+            let [double, forced] = Pixels::in_both(scene)?;
             outcome.must(double.are_sound() && forced.are_sound(), || "not finite".to_owned());
             let off = forced.mean() / double.mean() - 1.0;
             outcome.must(!single || off.abs() <= 1e-3, || {

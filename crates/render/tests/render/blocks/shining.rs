@@ -1,7 +1,11 @@
-//! Surfaces that shine unevenly, in blocks of rays and in batches.
+//! Surfaces that shine unevenly or are partly there, in blocks of rays and in batches.
 
-use super::{BANDS, LAMP, POINTS, compare_plain, on_floor, room_of, save_cube, save_waves};
-use crate::steps::load_in;
+use etendue_render::Plan;
+use etendue_render::output::Outputs;
+use etendue_tracer::material::Alpha;
+
+use super::{BANDS, LAMP, POINTS, compare_plain, on_floor, room, room_of, save_cube, save_waves};
+use crate::steps::{channels, load_in, prepare, trace};
 
 /// Scenes of surfaces that shine unevenly, or are too many to be kept ready, are the same in blocks and batches, as they
 /// are seen and as they give light.
@@ -49,5 +53,30 @@ fn plain_surfaces_that_shine_unevenly_are_the_same_in_single_precision() {
             let scene = load_in(folder.path(), &on_floor(ball, text));
             compare_plain(&format!("plain and uneven, {name}, {ball}"), &scene, &[""]);
         }
+    }
+}
+
+#[test]
+fn a_lamp_that_is_half_there_shines_half_as_much() {
+    let folder = tempfile::tempdir().unwrap();
+    save_waves(folder.path(), 0);
+    let lit = |radiance: f64, factor: f64| {
+        let lamp = LAMP.replace("\"lamp\"", "\"shining\"");
+        let text = room(r#"{"type": "path", "max_bounces": 1}"#, "", &lamp, "sphere");
+        let shining = format!(
+            r#""shining": {{"type": "emissive", "radiance": [{radiance}, 1, 0.5]}}, "lamp""#
+        );
+        let mut scene = load_in(folder.path(), &text.replacen("\"lamp\"", &shining, 1));
+        let shining = scene.materials.iter_mut().find(|material| material.name == "shining");
+        shining.unwrap().alpha = if factor < 1.0 { Alpha::Blend { factor } } else { Alpha::Opaque };
+        let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
+        let (accel, images) = prepare(&scene, &plan);
+        let done = trace(&scene, &plan, &*accel, &images);
+        channels(&done.picture, "")[0].iter().sum::<f64>()
+    };
+    for factor in [0.5, 0.1] {
+        let [whole, partly] = [lit(9.0 * factor, 1.0), lit(9.0, factor)];
+        // 37 thousand samples, of which each that finds the lamp is off by less than what it finds.
+        assert!((partly / whole - 1.0).abs() < 0.01, "{factor}: {partly} {whole}");
     }
 }

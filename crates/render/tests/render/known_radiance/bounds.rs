@@ -6,7 +6,7 @@ use etendue_render::{Plan, render};
 use etendue_scene::file::LightPrecision;
 use etendue_tracer::Paint;
 
-use super::{TRACERS, patch, picture, ways};
+use super::{TRACERS, divide, patch, picture, ways};
 use crate::steps::{load, prepare};
 
 /// Radiance that is no number is left out and counted, and the picture has numbers only.
@@ -42,9 +42,21 @@ fn what_is_not_finite_is_counted_and_left_out() {
 /// A closed box in a blinding sky is dark inside: exactly.
 #[test]
 fn no_light_leaks_into_a_closed_box() {
+    assert_dark_inside(1);
+}
+
+/// Nor where it has more than the 64 triangles that are traced without a tree: by the accelerator itself, through edges
+/// and corners all over its faces.
+#[test]
+fn no_light_leaks_into_a_closed_box_of_many_triangles() {
+    assert_dark_inside(8);
+}
+
+/// That a closed box is dark whose triangles are each divided into `n`².
+fn assert_dark_inside(n: u32) {
     for tracer in TRACERS {
         for way in ways() {
-            let scene = load(&format!(
+            let mut scene = load(&format!(
                 r#"{{"etendue": 1, "tracer": {{"type": "{tracer}"}},
                 "camera": {{"type": "pinhole", "fov": 100,
                     "pose": {{"from": [0.3, 0.1, 0.2], "look_at": [-1, -1, -1]}},
@@ -59,6 +71,8 @@ fn no_light_leaks_into_a_closed_box() {
                 // Paths of f32 alone: three million rays.
                 if tracer == "path" && way.1 == LightPrecision::Single { 64 } else { 16 }
             ));
+            divide(&mut scene, n);
+            assert_eq!(scene.geometry.triangles(), 24 * u64::from(n * n));
             let lit = picture(scene, way).iter().filter(|&&p| p != 0.0).count();
             assert_eq!(lit, 0, "{tracer} {way:?}");
         }

@@ -12,7 +12,10 @@ mod one_plane;
 mod surfaces;
 mod thin;
 
+use std::sync::Arc;
+
 use etendue_accel::AccelName;
+use etendue_geometry::Mesh;
 use etendue_scene::Scene;
 use etendue_scene::file::LightPrecision;
 
@@ -74,5 +77,28 @@ fn check(
             let pixels = picture(scene, way);
             assert_shows(&format!("{name}, {tracer}, {way:?}"), &pixels, known(tracer), bias);
         }
+    }
+}
+
+/// Divides each triangle of a scene into `n`² alike. Neighbours still share corners to the bit where `n` is a power of
+/// two and the corners are those of boxes of such sides: single precision holds all of them.
+fn divide(scene: &mut Scene, n: u32) {
+    for mesh in &mut Arc::make_mut(&mut scene.geometry).meshes {
+        let (mut corners, mut triangles) = (Vec::new(), Vec::new());
+        for whole in 0..mesh.triangles.len() {
+            let [a, b, c] = mesh.corners(whole);
+            let mut corner = |i: u32, j: u32| {
+                let [along, across] = [i, j].map(|k| f64::from(k) / f64::from(n));
+                corners.push((a + (b - a) * along + (c - a) * across).to_array());
+                u32::try_from(corners.len() - 1).unwrap()
+            };
+            for (i, j) in (0..n).flat_map(|i| (0..n - i).map(move |j| (i, j))) {
+                triangles.push([corner(i, j), corner(i + 1, j), corner(i, j + 1)]);
+                if i + j + 1 < n {
+                    triangles.push([corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)]);
+                }
+            }
+        }
+        *mesh = Mesh::from_arrays(mesh.name.clone(), &corners, &triangles).unwrap();
     }
 }

@@ -2,22 +2,26 @@
 
 use etendue_scene::Scene;
 
-use super::{assert_shows, check, patch, picture, ways};
+use super::{assert_shows, check, divide, patch, picture, ways};
 use crate::steps::{glow, load};
 
 /// Inside of a closed box whose walls shine by 1 and return ρ: 1 + ρ + ρ² + … = 1/(1 − ρ), and 1 + ρ
-/// after one bounce.
+/// after one bounce; of few triangles, and of more than are traced without a tree.
 #[test]
 fn a_closed_furnace() {
-    for albedo in [0.2, 0.6] {
+    for (albedo, parts) in [(0.2, 1), (0.6, 1), (0.6, 4)] {
         let rest = format!(
             r#""lights": [],
             "objects": [{{"shape": "box", "size": [2, 2, 2], "material": "wall"}}],
             "materials": {{"wall": {{"type": "matte", "color": [{albedo}, {albedo}, {albedo}]}}}}"#
         );
-        let shine = |scene: &mut Scene| scene.materials[0].emission = Some(glow());
+        let shine = |scene: &mut Scene| {
+            divide(scene, parts);
+            scene.materials[0].emission = Some(glow());
+        };
         let eye = [[0.2, 0.1, 0.3], [-0.5, -1.0, 0.2]];
-        check("furnace", 64, eye, &rest, shine, 0.0, |tracer| match tracer {
+        let name = format!("furnace of {} triangles", 12 * parts * parts);
+        check(&name, 64, eye, &rest, shine, 0.0, |tracer| match tracer {
             "path" => 1.0 / (1.0 - albedo),
             _ => 1.0 + albedo,
         });
