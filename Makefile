@@ -46,7 +46,7 @@ help:
 	@echo "make bench-gaps    what finding the thinnest gap of a million triangles takes; writes a part of docs/measurements/costs.md"
 	@echo "make bench-window  how soon and how often the window shows pictures; writes a part of docs/measurements/costs.md"
 	@echo "make bench-decisions  what decisions of the plan save, each against the fuller model, and what overriding it by hand would"
-	@echo "make generated     schemas, tables of keys, the pages of the command line and of the Python package, as these write them"
+	@echo "make generated     schemas, tables of keys and presets, the pages of the command line and of the Python package, as these write them"
 	@echo "make gallery       render the pictures of docs/guide/gallery.md, and write there what they took"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
 	@echo "make docs-window   screenshots of six states of the window, into docs/images/window"
@@ -77,9 +77,7 @@ view: setup
 
 test-window:
 	@scripts/setup.sh test
-	@scripts/test-window.sh
-	@scripts/window-states.sh
-	@scripts/test-wayland.sh
+	@scripts/window.sh x11 states wayland
 
 test:
 	@scripts/setup.sh test
@@ -177,37 +175,23 @@ bench-limits: setup
 bench-sampling: setup
 	cargo run --release -p etendue-benches --bin sampling -- $(ARGS)
 
+# What was forecast of the example scenes, and what they took. ARGS are those of benches/forecasts.py.
 bench-forecast: setup
 	cargo build --release -p etendue-cli
-	python3 benches/forecast.py $(ARGS)
+	python3 benches/forecasts.py time $(ARGS)
 
 bench-memory: setup
 	cargo build --release -p etendue-cli
-	python3 benches/memory.py $(ARGS)
+	python3 benches/forecasts.py memory $(ARGS)
 
-bench-masks: setup
+# The tables of benches/costs.py, by their names.
+bench-masks bench-diffraction bench-aspheres bench-bands: setup
 	cargo build --release -p etendue-cli
-	python3 benches/masks.py $(ARGS)
+	python3 benches/costs.py $(@:bench-%=%) $(ARGS)
 
-bench-diffraction: setup
-	cargo build --release -p etendue-cli
-	python3 benches/diffraction.py $(ARGS)
-
-bench-aspheres: setup
-	cargo build --release -p etendue-cli
-	python3 benches/aspheres.py $(ARGS)
-
-bench-bands: setup
-	cargo build --release -p etendue-cli
-	python3 benches/bands.py $(ARGS)
-
-bench-time: setup
+bench-time bench-gaps: setup
 	cargo build --release -p etendue-cli -p etendue-benches
-	python3 benches/motion.py $(ARGS)
-
-bench-gaps: setup
-	cargo build --release -p etendue-cli -p etendue-benches
-	python3 benches/gap_probes.py $(ARGS)
+	python3 benches/costs.py $(@:bench-%=%) $(ARGS)
 
 bench-decisions: setup
 	cargo build --release -p etendue-cli
@@ -266,7 +250,7 @@ spectra: setup
 # The pictures of docs/reference/window.md: six states, as their test reaches them.
 docs-window:
 	@scripts/setup.sh test
-	RESOLUTION=[480,320] SAMPLES=4 scripts/window-states.sh
+	RESOLUTION=[480,320] SAMPLES=4 scripts/window.sh states
 	install -D -m 644 -t docs/images/window $(foreach state,start broken heavy layers remove sensor,out/window/state-$(state).png)
 
 # The Python of docs/how-to/light-fields.md and its pictures, and plenopticam's views against ours. ARGS go to the render.

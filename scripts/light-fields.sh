@@ -33,10 +33,10 @@ fi
 
 sed -n '/^```python$/,/^```$/{/^```/d;p}' docs/how-to/light-fields.md >"$out/page.py"
 (cd "$out" && "$venv/bin/python" page.py)
-"$venv/bin/python" scripts/light_field_pictures.py "$out" "$images"
-"$venv/bin/python" scripts/light_field_patches.py "$ETENDUE" "$out/patches"
+"$venv/bin/python" scripts/light_fields.py pictures "$out" "$images"
+"$venv/bin/python" scripts/light_fields.py patches "$ETENDUE" "$out/patches"
 if "$venv/bin/python" -c "import plenopticam" 2>/dev/null || [ -d "$venv"/lib/python3*/site-packages/plenopticam ]; then
-    "$venv/bin/python" scripts/light_field_opinion.py "$out/out"
+    "$venv/bin/python" scripts/light_fields.py views "$out/out"
 else
     echo "plenopticam: passed over, it does not install here"
 fi

@@ -74,8 +74,7 @@ step "light fields: the page, and another decoder's opinion"
 IMAGES=target/light-field-images scripts/light-fields.sh --samples 32 --quiet
 
 step "window"
-scripts/test-window.sh
-scripts/test-wayland.sh
+scripts/window.sh x11 wayland
 
 step "Open Image Denoise, for the tests that denoise"
 ETENDUE_OIDN=$(scripts/oidn.sh)

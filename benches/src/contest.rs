@@ -1,4 +1,4 @@
-//! Who is timed, on which clock, and in which order.
+//! Contestants: who is timed, on which clock, and in which order.
 //!
 //! * Contestants take turns ([`etendue_bench::timing`]).
 //! * Tracing is timed on the processor clock of the thread that traces, which other processes on the
@@ -26,7 +26,7 @@ pub fn thread_time() -> f64 {
     now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
 }
 
-/// What is asked of each ray.
+/// Question that is asked of each ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Query {
     /// The closest hit, with its normal.
@@ -42,18 +42,18 @@ pub type Worker<'a> = Box<dyn FnMut(usize) -> f64 + 'a>;
 pub trait Contestant: Sync {
     /// Rays in all.
     fn rays(&self) -> usize;
-    /// What one thread works with.
+    /// Worker of one thread.
     fn worker(&self) -> Worker<'_>;
 }
 
 /// An accelerator of ours.
 #[derive(Debug, Clone, Copy)]
 pub struct Ours<'a> {
-    /// What traces.
+    /// Caster of the rays.
     pub accel: &'a dyn Accel,
     /// The rays, [`BATCH`] a batch.
     pub batches: &'a [RayBatch],
-    /// What is asked.
+    /// Question of each ray.
     pub query: Query,
 }
 
@@ -94,11 +94,11 @@ fn touch(rays: &RayBatch) {
 /// Embree's bare loop over packets.
 #[derive(Debug, Clone, Copy)]
 pub struct LimitPackets<'a> {
-    /// What traces.
+    /// Caster of the rays.
     pub scene: &'a BareScene,
     /// The rays.
     pub packets: &'a [RayHit16],
-    /// What is asked.
+    /// Question of each ray.
     pub query: Query,
 }
 
@@ -126,11 +126,11 @@ impl Contestant for LimitPackets<'_> {
 /// Embree's bare loop over single rays.
 #[derive(Debug, Clone, Copy)]
 pub struct LimitSingles<'a> {
-    /// What traces.
+    /// Caster of the rays.
     pub scene: &'a BareScene,
     /// The rays.
     pub singles: &'a [Single],
-    /// What is asked.
+    /// Question of each ray.
     pub query: Query,
 }
 

@@ -1,4 +1,4 @@
-//! How heavy the meshes are and how often everything is timed: what every measurement is told.
+//! The effort of every measurement: the sizes of meshes, and the number of rounds.
 
 use clap::Args;
 
@@ -14,7 +14,7 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// How often everything is timed.
+    /// Number of times that everything is timed.
     #[must_use]
     pub fn rounds(self) -> usize {
         self.rounds.into()

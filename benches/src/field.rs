@@ -12,7 +12,7 @@ use etendue_accel::limit::{BareScene, Mode, RayHit16, Single};
 /// The structures of every contestant over one geometry.
 #[derive(Debug)]
 pub struct Field {
-    /// What is traced.
+    /// Scene that is traced.
     pub geometry: Arc<Geometry>,
     /// Embree, bare.
     pub limit: BareScene,
@@ -66,7 +66,7 @@ pub struct Rays {
     pub packets: Vec<RayHit16>,
     /// As the other bare loop takes them.
     pub singles: Vec<Single>,
-    /// What is asked of them.
+    /// Question that is asked of them.
     pub query: Query,
 }
 

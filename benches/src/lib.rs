@@ -1,5 +1,5 @@
 #![forbid(unsafe_code)]
-//! What the benchmarks share: meshes, rays, the contestants, and how they are timed.
+//! Parts that the benchmarks share: meshes, rays, the contestants, and how they are timed.
 //!
 //! **The limit** is Embree called directly, a bare loop over prepared records with nothing of ours
 //! in between ([`etendue_accel::limit`]). Everything else is given as a ratio to it, measured in the same run, the

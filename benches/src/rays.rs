@@ -21,9 +21,9 @@ const TILES_PER_SAMPLED: u32 = 16;
 /// A pinhole camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
-    /// Where it stands (m).
+    /// Place where it stands (m).
     pub from: DVec3,
-    /// What it looks at (m).
+    /// Point that it looks at (m).
     pub look_at: DVec3,
     /// Full vertical field of view (degrees).
     pub fov: f64,

@@ -1,5 +1,5 @@
 //! `motion ROUNDS STILL MOVING`: what motion costs the caster of rays, and what it costs Embree's own motion blur, for
-//! `benches/motion.py`. The scenes are a room of 2 m that its camera sees from (0, 1, 4.9) m, one whose things stand
+//! `benches/costs.py time`. The scenes are a room of 2 m that its camera sees from (0, 1, 4.9) m, one whose things stand
 //! and one in which they move. All trace the same rays, those of the moving scene at times of its exposure: samples of
 //! the camera, directions from where those hit, and rays from there to a lamp. For each kind of rays a line is printed:
 //! its name, the ratios of each round of ours, and those of Embree.

@@ -306,13 +306,13 @@ impl fmt::Debug for Bvh {
 
 /// A placement with what the exact test needs of it.
 #[derive(Clone, Copy)]
-struct Placed<'a> {
+struct ExactPlacement<'a> {
     placement: u32,
     view: PlacementView<'a>,
     mesh: &'a Mesh,
 }
 
-impl<'a> Placed<'a> {
+impl<'a> ExactPlacement<'a> {
     #[inline(always)]
     fn new(bvh: &'a Bvh, placement: u32) -> Self {
         let place = &bvh.geometry.placements[placement as usize];
@@ -325,7 +325,7 @@ impl<'a> Placed<'a> {
 struct PlacedTriangles<'a> {
     bvh: &'a Bvh,
     /// The placement, where there is but one.
-    only: Option<Placed<'a>>,
+    only: Option<ExactPlacement<'a>>,
     units: Option<LeafUnits>,
 }
 
@@ -334,8 +334,8 @@ impl<'a> PlacedTriangles<'a> {
     fn new(bvh: &'a Bvh, instance: &PartInstance) -> Self {
         let shape = &bvh.parts[instance.part as usize];
         let only = match shape.owner {
-            TriangleOwner::Placement(placement) => Some(Placed::new(bvh, placement)),
-            TriangleOwner::Instance => Some(Placed::new(bvh, instance.placement)),
+            TriangleOwner::Placement(placement) => Some(ExactPlacement::new(bvh, placement)),
+            TriangleOwner::Instance => Some(ExactPlacement::new(bvh, instance.placement)),
             TriangleOwner::Leaf => None,
         };
         Self { bvh, only, units: shape.units }
@@ -343,11 +343,16 @@ impl<'a> PlacedTriangles<'a> {
 
     /// Triangle `i` of the `n` in a leaf with these numbers, and its placement.
     #[inline(always)]
-    fn get(&self, numbers: &LeafNumbers, n: usize, i: usize) -> Option<(Placed<'a>, Triangle)> {
+    fn get(
+        &self,
+        numbers: &LeafNumbers,
+        n: usize,
+        i: usize,
+    ) -> Option<(ExactPlacement<'a>, Triangle)> {
         let number = numbers.get(9 * n + i)?.to_bits();
         let placed = match self.only {
             Some(placed) => placed,
-            None => Placed::new(self.bvh, numbers.get(10 * n + i)?.to_bits()),
+            None => ExactPlacement::new(self.bvh, numbers.get(10 * n + i)?.to_bits()),
         };
         let corners = match self.units {
             Some(units) => units.corners(numbers, n, i),

@@ -172,7 +172,7 @@ impl Embree {
         recheck::lonely_misses(missed, hits.len(), could_hit, suspects);
         let mut rechecked = suspects.len() as u64;
         if !suspects.is_empty() {
-            self.ask_beside(rays, hits, rays32, again, found, suspects);
+            self.ask_shifted(rays, hits, rays32, again, found, suspects);
         }
         // What is in doubt after that is decided exactly.
         suspects.append(doubtful);
@@ -205,7 +205,7 @@ impl Embree {
     }
 
     /// A cheap second opinion, from one ray beside each suspect: drops those that it confirms.
-    fn ask_beside(
+    fn ask_shifted(
         &self,
         rays: &RayBatch,
         hits: &HitBatch,
@@ -237,9 +237,9 @@ impl Embree {
         });
     }
 
-    /// As [`Self::ask_beside`], for rays of which it was only asked whether they hit anything, and
+    /// As [`Self::ask_shifted`], for rays of which it was only asked whether they hit anything, and
     /// that did not: by two rays on different sides of each, because nothing else betrays a leak.
-    fn ask_beside_for_any(
+    fn ask_shifted_for_any(
         &self,
         rays: &RayBatch,
         rays32: &Rays32,
@@ -319,18 +319,18 @@ impl Embree {
         if is_neighbour {
             return search.nearest;
         }
-        let mut beside = 0;
+        let mut missed = 0;
         for turn in 0..TURNS {
             let shifts = recheck::bundle(rays.direction(i), rays32.blur(i, t), turn);
-            search.beside = 0;
+            search.missed = 0;
             self.look_with(&shifts, rays32, i, again, &mut search, found);
             if search.nearest.placement != MISS {
                 return search.nearest;
             }
-            beside += search.beside.count_ones();
+            missed += search.missed.count_ones();
         }
         // Triangles on nearly all sides, and none is hit: no outline, but a corner where slivers meet.
-        if beside >= recheck::MOSTLY_SURROUNDED * TURNS
+        if missed >= recheck::MOSTLY_SURROUNDED * TURNS
             && let Some(corner) = search.nearest_corner()
         {
             let shifts = recheck::away_from(corner, rays.direction(i), rays32.blur(i, t));
@@ -363,15 +363,16 @@ fn widen(found: &FoundHits, advance: &[f64], hits: &mut HitBatch) {
     let n = hits.t.len();
     let HitBatch { detail, t, placement, u, v, normal, .. } = hits;
     let placement = &placement[..n];
-    for (((t, &near), &ahead), &met) in t.iter_mut().zip(&found.t).zip(advance).zip(placement) {
-        *t = if met == MISS { f64::INFINITY } else { f64::from(near) + ahead };
+    for (((t, &near), &ahead), &placement) in t.iter_mut().zip(&found.t).zip(advance).zip(placement)
+    {
+        *t = if placement == MISS { f64::INFINITY } else { f64::from(near) + ahead };
     }
     if *detail == Detail::Distance {
         return;
     }
     for (out, weights) in [u, v].into_iter().zip(&found.weights) {
-        for ((out, &weight), &met) in out.iter_mut().zip(weights).zip(placement) {
-            *out = if met == MISS { 0.0 } else { f64::from(weight.clamp(0.0, 1.0)) };
+        for ((out, &weight), &placement) in out.iter_mut().zip(weights).zip(placement) {
+            *out = if placement == MISS { 0.0 } else { f64::from(weight.clamp(0.0, 1.0)) };
         }
     }
     let [x, y, z] = normal.each_mut().map(|axis| &mut axis[..n]);
@@ -459,7 +460,7 @@ impl Accel for Embree {
             suspects.clear();
             recheck::lonely_misses(|i| !blocked[i], blocked.len(), could_hit, suspects);
             suspects.retain(|i| doubtful.binary_search(i).is_err());
-            self.ask_beside_for_any(rays, rays32, again, suspects);
+            self.ask_shifted_for_any(rays, rays32, again, suspects);
             self.decide_occlusion(rays, rays32, again, found, suspects, blocked);
             doubtful.append(suspects);
             let corrected = doubtful.iter().filter(|&&i| blocked[i as usize]).count() as u64;

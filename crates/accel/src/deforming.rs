@@ -27,7 +27,7 @@ use crate::{Accel, BuildError, BuildOptions, BuildReport, BuildWatch, Quality};
 const LEAF: LeafSize = LeafSize { most: 4, block: 1 };
 
 /// The structure of one mesh with steps.
-pub(crate) struct Deforming {
+pub(crate) struct DeformingMesh {
     geometry: Arc<Geometry>,
     steps: Arc<Steps>,
     nodes: Vec<BinaryNode>,
@@ -38,7 +38,7 @@ pub(crate) struct Deforming {
     time: Duration,
 }
 
-impl Deforming {
+impl DeformingMesh {
     /// The structure of a mesh with these steps.
     ///
     /// # Errors
@@ -147,7 +147,7 @@ fn test(query: &Query, triangle: &Triangle) -> Option<Hit> {
     query.test(&PlacementView::new(&Transform::IDENTITY), triangle.corners)
 }
 
-impl Accel for Deforming {
+impl Accel for DeformingMesh {
     fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
         hits.reset(rays.len());
         let mut stack = Vec::with_capacity(MAX_DEPTH);
@@ -189,9 +189,9 @@ impl Accel for Deforming {
     }
 }
 
-impl fmt::Debug for Deforming {
+impl fmt::Debug for DeformingMesh {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Deforming")
+        f.debug_struct("DeformingMesh")
             .field("nodes", &self.nodes.len())
             .field("steps", &self.steps.times().len())
             .finish_non_exhaustive()

@@ -30,7 +30,7 @@ use etendue_geometry::{Geometry, Mesh, Placement, Transform};
 use self::device::Device;
 use self::shape::EmbreeGeometry;
 use crate::{BuildError, BuildOptions, Quality, single};
-use shape::{InstanceKind, Instanced};
+use shape::{InstanceChoice, InstanceKind};
 
 pub use self::device::{Version, version};
 pub(crate) use self::filter::{ExactFilter, NearestSearch};
@@ -187,7 +187,7 @@ impl CommittedScene {
             None => Arc::new(Device::new(options)?),
         };
         let mut copied_bytes = 0;
-        let instanced = Instanced::of(&geometry, origin, before.is_some());
+        let instanced = InstanceChoice::of(&geometry, origin, before.is_some());
         let mut shared: Vec<Option<Arc<SceneHandle>>> = Vec::with_capacity(geometry.meshes.len());
         for (index, (mesh, &wanted)) in geometry.meshes.iter().zip(&instanced.meshes).enumerate() {
             // While both geometries live, buffers of one address are one buffer, which the new geometry
@@ -278,7 +278,7 @@ impl CommittedScene {
 
 /// [`CommittedScene::turns`]: an instance's normal is its mesh's own; one that was baked into a mirror image is of
 /// the wrong side.
-fn turns(geometry: &Geometry, instanced: &Instanced) -> Option<Vec<DMat3>> {
+fn turns(geometry: &Geometry, instanced: &InstanceChoice) -> Option<Vec<DMat3>> {
     let turn = |(placement, kind): (&Placement, &InstanceKind)| {
         let transform = &placement.world_from_mesh;
         match kind {

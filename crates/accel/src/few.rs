@@ -178,13 +178,12 @@ impl FewTriangles {
             for lane in 0..LANES {
                 if nearest.doubts[lane] != 0 {
                     if let Some(hit) = edges::closest(self, block, lane) {
-                        let own = (hit.number, round(hit.t), hit.weights.map(round));
-                        self.note(block, lane, own);
+                        self.note(block, lane, hit.number, round(hit.t), hit.weights.map(round));
                     }
                 } else if let Some(face) = self.faces.get(nearest.face[lane] as usize) {
                     let [x, y] = &nearest.place;
                     let (number, weights) = face.at([x[lane], y[lane]]);
-                    self.note(block, lane, (number, nearest.t[lane], weights));
+                    self.note(block, lane, number, nearest.t[lane], weights);
                 }
             }
         }
@@ -192,7 +191,7 @@ impl FewTriangles {
 
     /// Tells a block what a ray hit: the triangle's number in the list, its distance (m) and weights.
     #[inline(always)]
-    fn note(&self, block: &mut RayBlock, lane: usize, (number, t, [u, v]): (usize, f32, [f32; 2])) {
+    fn note(&self, block: &mut RayBlock, lane: usize, number: usize, t: f32, [u, v]: [f32; 2]) {
         let Some(hit) = self.named.get(number) else { return };
         (block.t_max[lane], block.u[lane], block.v[lane]) = (t, u, v);
         (block.placement[lane], block.triangle[lane]) = (hit.placement, hit.triangle);
@@ -235,9 +234,9 @@ mod tests {
     }
 
     fn direction(k: u32) -> DVec3 {
-        let (up, around) = (spread(k, 0.618_034), 2.399_963 * f64::from(k));
+        let (up, azimuth) = (spread(k, 0.618_034), 2.399_963 * f64::from(k));
         let r = (1.0 - up * up).sqrt();
-        DVec3::new(r * around.cos(), up, r * around.sin())
+        DVec3::new(r * azimuth.cos(), up, r * azimuth.sin())
     }
 
     fn mesh(corners: &[[f32; 3]], triangles: Vec<[u32; 3]>) -> Mesh {

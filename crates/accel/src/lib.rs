@@ -225,7 +225,7 @@ pub enum BuildError {
     /// The machine has no more memory to give. What was built so far is freed, but for the handle of a
     /// scene of Embree's.
     #[error(
-        "the machine has too little free memory for the {backend} structure ({call}); end other \
+        "the machine has too little free memory for the {backend} structure ({call})\nhint: end other \
          programs, or place fewer or lighter meshes"
     )]
     OutOfMemory {
@@ -248,7 +248,7 @@ pub enum BuildError {
     },
     /// A scene so large or so small that no backend tells its parts apart.
     #[error(
-        "the scene measures {extent:.1e} m, and accelerators hold {least:.0e} to {most:.0e} m; scale its \
+        "the scene measures {extent:.1e} m, and accelerators hold {least:.0e} to {most:.0e} m\nhint: scale its \
          objects, or leave out what stands far from the others"
     )]
     Scale {

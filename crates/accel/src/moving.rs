@@ -7,6 +7,7 @@
 //! hits are as exact as those of a body that stands at the place where it is at the ray's time.
 
 mod blocks;
+mod body;
 
 use std::borrow::Cow;
 use std::fmt;
@@ -15,11 +16,12 @@ use std::time::Instant;
 
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{
-    Bounds, Detail, Geometry, HitBatch, HitPrecision, MISS, Mesh, Motion, PlacedTriangle,
-    Positions, RayBatch, Transform, Vertices,
+    Bounds, Detail, Geometry, HitBatch, HitPrecision, MISS, Mesh, PlacedTriangle, Positions,
+    RayBatch, Transform, Vertices,
 };
 
-use crate::deforming::Deforming;
+use self::body::{BodyHit, BodyRays, MovingPlacement};
+use crate::deforming::DeformingMesh;
 use crate::exact::Boxes;
 use crate::parts::{LocalRay, outward};
 use crate::single::F32Frame;
@@ -43,12 +45,12 @@ pub fn build_moving(
     let moves = geometry.moving_within(options.exposure).next().is_some();
     match moves {
         false => build(geometry, options),
-        true => Ok(Box::new(Moving::build(&geometry, options, build)?)),
+        true => Ok(Box::new(MovingScene::build(&geometry, options, build)?)),
     }
 }
 
 /// A structure whose bodies move.
-struct Moving {
+struct MovingScene {
     still: Box<dyn Accel>,
     /// One for each mesh that moves.
     shapes: Vec<Box<dyn Accel>>,
@@ -66,20 +68,6 @@ struct Moving {
     report: BuildReport,
 }
 
-/// A placement that moves.
-#[derive(Debug)]
-struct MovingPlacement {
-    placement: u32,
-    shape: usize,
-    motion: Arc<Motion>,
-    /// Bounds of the body while the shutter is open (m, world).
-    swept: Bounds,
-    /// The box of its mesh, in its frame (m).
-    local: Bounds,
-    /// Its mesh changes its shape, so that its structure wants times.
-    deforms: bool,
-}
-
 /// Rays of a body, in its frame.
 #[derive(Default)]
 struct RaysInFrame {
@@ -94,7 +82,7 @@ struct RaysInFrame {
 /// distance, are one: as in the rule of surfaces in one plane.
 const ONE_PLACE: f64 = 64.0 * f64::EPSILON;
 
-impl Moving {
+impl MovingScene {
     fn build(
         geometry: &Arc<Geometry>,
         options: &BuildOptions,
@@ -123,7 +111,7 @@ impl Moving {
                 Some(shape) => shape,
                 None => {
                     shapes.push(match &mesh.steps {
-                        Some(steps) => Box::new(Deforming::build(mesh, steps, options)?),
+                        Some(steps) => Box::new(DeformingMesh::build(mesh, steps, options)?),
                         None => {
                             let alone = Geometry::alone(mesh.clone(), Transform::IDENTITY);
                             build(Arc::new(alone), options)?
@@ -210,10 +198,16 @@ impl Moving {
         near
     }
 
-    /// Carries those of the rays `near` a body into its frame that meet it no farther than `t_max` says.
+    /// The pairs `near` by body.
+    fn by_body<'a>(&'a self, near: &'a [[u32; 2]]) -> impl Iterator<Item = BodyRays<'a>> {
+        let pairs = near.chunk_by(|a, b| a[0] == b[0]);
+        pairs.map(|near| BodyRays { body: &self.bodies[near[0][0] as usize], near })
+    }
+
+    /// Carries those of a body's rays into its frame that meet it no farther than `t_max` says.
     fn carry(
         &self,
-        (body, near): (&MovingPlacement, &[[u32; 2]]),
+        own: &BodyRays<'_>,
         rays: &RayBatch,
         t_max: impl Fn(usize) -> Option<f64>,
         carried: &mut RaysInFrame,
@@ -225,7 +219,8 @@ impl Moving {
         carried.rays.precision = HitPrecision::Double;
         carried.from.clear();
         let [open, close] = self.exposure;
-        for i in near.iter().map(|&[_, ray]| ray as usize) {
+        let body = own.body;
+        for i in own.numbers() {
             let Some(t_max) = t_max(i) else { continue };
             let (origin, direction, time) = (rays.origin(i), rays.direction(i), rays.time(i));
             let limits = [rays.t_min()[i], t_max];
@@ -251,11 +246,12 @@ impl Moving {
                     carried.rays.push_between(start, turned / stretch, limits[0], limits[1]);
                 }
                 Some(ends) => {
-                    let own = |[placement, triangle]: [u32; 2]| match placement == body.placement {
-                        true => [0, triangle],
-                        false => [MISS; 2],
-                    };
-                    let ends = ends[i].map(own);
+                    let in_frame =
+                        |[placement, triangle]: [u32; 2]| match placement == body.placement {
+                            true => [0, triangle],
+                            false => [MISS; 2],
+                        };
+                    let ends = ends[i].map(in_frame);
                     carried.rays.push_between_triangles(start, turned / stretch, limits, ends);
                 }
             }
@@ -294,7 +290,7 @@ fn meets(bounds: Bounds, origin: DVec3, direction: DVec3, limits: [f64; 2]) -> b
     span(bounds, origin, direction, limits).is_some()
 }
 
-/// From where to where a ray is in a box within `limits` (m), rounding in favour of longer.
+/// Ends of the part of a ray in a box within `limits` (m), rounding in favour of longer.
 fn span(
     bounds: Bounds,
     origin: DVec3,
@@ -319,15 +315,6 @@ fn span(
     (near <= far + ONE_PLACE * (size + far.abs())).then_some([near, far])
 }
 
-/// Hit of a ray on a body, in the world.
-struct BodyHit {
-    t: f64,
-    triangle: u32,
-    weights: [f64; 2],
-    /// Unit, on the front.
-    normal: DVec3,
-}
-
 /// Distance up to which ray `i`, whose hit is in `hits`, looks: as far as what is in the same place.
 fn reach(rays: &RayBatch, hits: &HitBatch, i: usize, one_place: f64) -> f64 {
     let t = hits.t[i].min(rays.t_max()[i]);
@@ -335,27 +322,28 @@ fn reach(rays: &RayBatch, hits: &HitBatch, i: usize, one_place: f64) -> f64 {
     if t.is_nan() { f64::INFINITY } else { t.min(rays.t_max()[i]) }
 }
 
-impl Moving {
+impl MovingScene {
     /// Puts bodies into hits that are nearer than what those have.
     fn closest_of_bodies(&self, rays: &RayBatch, hits: &mut HitBatch) {
         let mut carried = RaysInFrame::default();
         carried.hits.detail = hits.detail;
         let near = self.near(rays, |i| Some(reach(rays, hits, i, ONE_PLACE)));
-        for near in near.chunk_by(|a, b| a[0] == b[0]) {
-            let body = &self.bodies[near[0][0] as usize];
-            self.closest_of_body((body, near), rays, hits, (ONE_PLACE, &mut carried));
+        for own in self.by_body(&near) {
+            self.closest_of_body(&own, rays, hits, ONE_PLACE, &mut carried);
         }
     }
 
-    /// Finds the closest hits on one body, for the rays `near` it.
+    /// Finds the closest hits on one body; distances that differ by the share `one_place` are one.
     fn closest_of_body(
         &self,
-        (body, near): (&MovingPlacement, &[[u32; 2]]),
+        own: &BodyRays<'_>,
         rays: &RayBatch,
         hits: &mut HitBatch,
-        (one_place, carried): (f64, &mut RaysInFrame),
+        one_place: f64,
+        carried: &mut RaysInFrame,
     ) {
-        self.carry((body, near), rays, |i| Some(reach(rays, hits, i, one_place)), carried);
+        let body = own.body;
+        self.carry(own, rays, |i| Some(reach(rays, hits, i, one_place)), carried);
         if carried.from.is_empty() {
             return;
         }
@@ -365,9 +353,13 @@ impl Moving {
             if !found.is_hit(k) {
                 continue;
             }
+            let t = found.t[k] / stretch;
+            if !body.is_nearest(rays, hits, i, t, one_place) {
+                continue;
+            }
             let has_surface = hits.detail == Detail::Surface;
-            let hit = || BodyHit {
-                t: found.t[k] / stretch,
+            let hit = BodyHit {
+                t,
                 triangle: found.triangle[k],
                 weights: if has_surface { [found.u[k], found.v[k]] } else { [0.0; 2] },
                 normal: match has_surface {
@@ -375,36 +367,7 @@ impl Moving {
                     false => DVec3::ZERO,
                 },
             };
-            self.offer(body, rays, hits, (i, found.t[k] / stretch, one_place), hit);
-        }
-    }
-
-    /// Takes a hit on a body at a distance if it is nearer than what ray `i` has, or later in the same place.
-    fn offer(
-        &self,
-        body: &MovingPlacement,
-        rays: &RayBatch,
-        hits: &mut HitBatch,
-        (i, t, one_place): (usize, f64, f64),
-        hit: impl FnOnce() -> BodyHit,
-    ) {
-        let size = t.abs().max(rays.origin(i).abs().max_element());
-        let known = hits.placement[i];
-        let is_nearer = match hits.is_hit(i) {
-            false => true,
-            true if body.placement > known => t <= hits.t[i] + one_place * size,
-            true => t < hits.t[i] - one_place * size,
-        };
-        if !is_nearer {
-            return;
-        }
-        let BodyHit { t, triangle, weights, normal } = hit();
-        (hits.t[i], hits.placement[i], hits.triangle[i]) = (t, body.placement, triangle);
-        if hits.detail == Detail::Surface {
-            [hits.u[i], hits.v[i]] = weights;
-            for axis in 0..3 {
-                hits.normal[axis][i] = normal[axis];
-            }
+            hit.put(hits, i, body.placement);
         }
     }
 
@@ -412,33 +375,32 @@ impl Moving {
     fn occluded_by_bodies(&self, rays: &RayBatch, blocked: &mut [bool]) {
         let mut carried = RaysInFrame::default();
         let near = self.near(rays, |i| (!blocked[i]).then(|| rays.t_max()[i]));
-        for near in near.chunk_by(|a, b| a[0] == b[0]) {
-            let body = &self.bodies[near[0][0] as usize];
-            self.occluded_by_body((body, near), rays, blocked, &mut carried);
+        for own in self.by_body(&near) {
+            self.occluded_by_body(&own, rays, blocked, &mut carried);
         }
     }
 
-    /// Tests for occlusion by one body, for the rays `near` it.
+    /// Tests for occlusion by one body.
     fn occluded_by_body(
         &self,
-        (body, near): (&MovingPlacement, &[[u32; 2]]),
+        own: &BodyRays<'_>,
         rays: &RayBatch,
         blocked: &mut [bool],
         carried: &mut RaysInFrame,
     ) {
         let reach = |i: usize| (!blocked[i]).then(|| rays.t_max()[i]);
-        self.carry((body, near), rays, reach, carried);
+        self.carry(own, rays, reach, carried);
         if carried.from.is_empty() {
             return;
         }
-        self.shapes[body.shape].occluded(&carried.rays, &mut carried.blocked);
+        self.shapes[own.body.shape].occluded(&carried.rays, &mut carried.blocked);
         for (&(i, ..), &is_blocked) in carried.from.iter().zip(&carried.blocked) {
             blocked[i] |= is_blocked;
         }
     }
 }
 
-impl Accel for Moving {
+impl Accel for MovingScene {
     fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
         self.still.closest(&self.with_still_ends(rays), hits);
         hits.set_times(rays.times());
@@ -467,9 +429,9 @@ impl Accel for Moving {
     }
 }
 
-impl fmt::Debug for Moving {
+impl fmt::Debug for MovingScene {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Moving")
+        f.debug_struct("MovingScene")
             .field("still", &self.still)
             .field("bodies", &self.bodies)
             .finish_non_exhaustive()

@@ -51,7 +51,7 @@ impl AccelName {
         }
     }
 
-    /// What it is.
+    /// Its kind.
     #[must_use]
     pub const fn description(self) -> &'static str {
         match self {

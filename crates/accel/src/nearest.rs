@@ -56,7 +56,7 @@ impl Query {
         match watertight::intersect(a, b, c, self.direction) {
             Some(hit) if hit.t >= self.t_min && hit.t <= self.t_max => Verdict::Hit(hit),
             Some(_) => Verdict::OutOfRange,
-            None => Verdict::Beside,
+            None => Verdict::Miss,
         }
     }
 }
@@ -70,7 +70,7 @@ pub(crate) enum Verdict {
     /// Its line does, nearer or farther than counts.
     OutOfRange,
     /// Its line passes beside it.
-    Beside,
+    Miss,
 }
 
 /// A placement's transform, applied as [`Transform::point_from`] does but once for all corners.
@@ -210,9 +210,9 @@ fn unit(v: DVec3) -> DVec3 {
 /// one: 64 units in f64's last place, more than a hit's own roundings.
 const ONE_PLACE: f64 = 64.0 * f64::EPSILON;
 
-/// By how much (of the largest coordinate of a ray's origin and a distance) a hit of single precision may be beside
+/// Greatest distance (of the largest coordinate of a ray's origin and a distance) of a hit of single precision from
 /// its place: some of its roundings.
-const BESIDE: f64 = 16.0 * f32::EPSILON as f64;
+const HIT_ERROR: f64 = 16.0 * f32::EPSILON as f64;
 
 /// Hit that [`crate::Accel`]'s rule puts in the place of a hit at `t` (m) on `own`, where other triangles of its plane
 /// are; `None` where it stays. Of `ends`, which the ray leaves or ends on, none counts.
@@ -220,7 +220,8 @@ fn later(
     coplanar: &Coplanar,
     geometry: &Geometry,
     query: &Query,
-    (own, t): (PlacedTriangle, f64),
+    own: PlacedTriangle,
+    t: f64,
     ends: Option<[PlacedTriangle; 2]>,
 ) -> Option<(watertight::Hit, Triangle)> {
     let test = |[placement, number]: PlacedTriangle| {
@@ -228,7 +229,7 @@ fn later(
         let place = &geometry.placements[placement as usize].world_from_mesh;
         Some((query.test(&PlacementView::new(place), triangle.corners)?, triangle))
     };
-    let slack = BESIDE * t.abs().max(query.origin.abs().max_element());
+    let slack = HIT_ERROR * t.abs().max(query.origin.abs().max_element());
     let near = coplanar.others_near(own, query.origin + query.direction * t, slack);
     let spared = |id: &PlacedTriangle| !ends.is_some_and(|ends| ends.contains(id));
     let hits: Vec<_> = near.filter(spared).filter_map(test).collect();
@@ -268,8 +269,8 @@ pub(crate) fn settle(
         let own = [hits.placement[i], hits.triangle[i]];
         let Some(query) = Query::of(rays, i) else { continue };
         let ends = rays.endpoint_triangles().map(|ends| ends[i]);
-        let found = (own, hits.t[i]);
-        let Some((hit, triangle)) = later(coplanar, geometry, &query, found, ends) else {
+        let found = later(coplanar, geometry, &query, own, hits.t[i], ends);
+        let Some((hit, triangle)) = found else {
             continue;
         };
         let mut settled = Nearest::none(f64::INFINITY);
@@ -304,8 +305,8 @@ pub(crate) fn settle_blocks(
                 t_max: f64::INFINITY,
             };
             let own = [block.placement[lane], block.triangle[lane]];
-            let found = (own, f64::from(block.t_max[lane]));
-            let Some((hit, triangle)) = later(coplanar, geometry, &query, found, None) else {
+            let t = f64::from(block.t_max[lane]);
+            let Some((hit, triangle)) = later(coplanar, geometry, &query, own, t, None) else {
                 continue;
             };
             (block.placement[lane], block.triangle[lane]) = (triangle.placement, triangle.number);

@@ -29,7 +29,7 @@ pub(crate) use self::part::{Blas, Members, MeshTriangles};
 pub(crate) struct Layout {
     pub(crate) parts: Vec<Blas>,
     pub(crate) instances: Vec<PartInstance>,
-    /// Where the whole scene lies, parallel to the world.
+    /// Instance of the whole scene, parallel to the world.
     pub(crate) world: PartInstance,
     pub(crate) world_frame: PartFrame,
 }
@@ -68,7 +68,7 @@ const BAKED_RESOLUTION: f64 = 64.0;
 
 impl Layout {
     pub(crate) fn new(geometry: &Geometry, baking: Baking) -> Self {
-        let world_frame = PartFrame::around(geometry.loose_bounds());
+        let world_frame = PartFrame::of(geometry.loose_bounds());
         let uses = geometry.uses();
         let mut layout = Self {
             parts: Vec::new(),
@@ -90,7 +90,7 @@ impl Layout {
                 baked.push(i);
                 continue;
             }
-            let frame = PartFrame::around(mesh.bounds);
+            let frame = PartFrame::of(mesh.bounds);
             let Some(instance) = PartInstance::placed(placement, i, frame, mesh.bounds) else {
                 layout.bake(geometry, vec![i]);
                 continue;
@@ -165,7 +165,7 @@ impl Layout {
     fn bake(&mut self, geometry: &Geometry, placements: Vec<u32>) {
         let members = || placements.iter().map(|&i| &geometry.placements[i as usize]);
         let bounds = members().fold(Bounds::EMPTY, |all, p| all.union(geometry.loose_bounds_of(p)));
-        let frame = PartFrame::around(bounds);
+        let frame = PartFrame::of(bounds);
         let reach = members().map(|p| baked_reach(geometry, p, frame)).fold(0.0, f64::max);
         let part = index(self.parts.len());
         self.parts.push(Blas { frame, members: Members::Baked(placements) });
@@ -205,7 +205,7 @@ pub(crate) struct PartFrame {
 impl PartFrame {
     /// A frame in which `bounds` lies within about −1..1. The origin stays where it is unless it is
     /// far away, because f32 coordinates stay exact then.
-    pub(crate) fn around(bounds: Bounds) -> Self {
+    pub(crate) fn of(bounds: Bounds) -> Self {
         if bounds.is_empty() {
             return Self { origin: DVec3::ZERO, scale: 1.0 };
         }

@@ -178,8 +178,7 @@ impl EndTriangles {
         self.triangle.extend(triangles.iter().map(|[left, _]| left[1]));
         for start in (0..rays.len()).step_by(LANES) {
             let range = start..rays.len().min(start + LANES);
-            let ids = (&self.placement[..], &self.triangle[..]);
-            lanes.gather(geometry, rays, ids, range.clone());
+            lanes.gather(geometry, rays, &self.placement, &self.triangle, range.clone());
             measure(lanes, rays32, range.clone(), &mut self.clear);
             for i in range {
                 let clear = self.clear.0[i - start];

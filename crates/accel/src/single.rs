@@ -66,7 +66,7 @@ impl F32Frame {
     }
 
     /// The frame of a box with this origin (m, world); `None` where that is too far away.
-    pub(crate) fn around(bounds: Bounds, origin: DVec3) -> Option<Self> {
+    pub(crate) fn near(bounds: Bounds, origin: DVec3) -> Option<Self> {
         let radius = 0.5 * bounds.diagonal();
         let is_near = (bounds.centre() - origin).length() <= NEAR * radius;
         (radius > 0.0 && is_near).then(|| Self::relative(bounds, origin))
@@ -120,7 +120,7 @@ impl Rays32 {
         BLUR * (size + t.max(0.0))
     }
 
-    /// By how much (m) single precision's distance `t` (m, likewise) may be off. What counts at a limit
+    /// Greatest error (m) of single precision's distance `t` (m, likewise). What counts at a limit
     /// of a ray within this is decided in f64.
     pub(crate) fn slack(&self, i: usize, t: f64) -> f64 {
         SLOPE * self.blur(i, t)

@@ -114,8 +114,7 @@ pub(crate) fn solve(
     let mut start = 0;
     while start < rays.len() {
         let count = LANES.min(rays.len() - start);
-        let met = (&hits.placement[..], &hits.triangle[..]);
-        lanes.gather(geometry, rays, met, start..start + count);
+        lanes.gather(geometry, rays, &hits.placement, &hits.triangle, start..start + count);
         measure(lanes, hits.detail == Detail::Surface);
         let seen = scatter(rays, hits, start, count, lanes, solved);
         solved.all_valid &= seen.all_valid;
@@ -147,7 +146,8 @@ impl ChunkTriangles {
         &mut self,
         geometry: &Geometry,
         rays: &RayBatch,
-        (placements, triangles): (&[u32], &[u32]),
+        placements: &[u32],
+        triangles: &[u32],
         range: Range<usize>,
     ) {
         for axis in 0..3 {
@@ -176,14 +176,15 @@ impl ChunkTriangles {
         placement: &Placement,
         mesh: &Mesh,
         rays: &RayBatch,
-        met: &[u32],
+        numbers: &[u32],
         first: usize,
         run: Range<usize>,
     ) {
         let here = run.start - first..run.end - first;
         let triangles: &[[u32; 3]] = &mesh.triangles;
         // One kind of memory at a time: the processor fetches as many ahead as it can.
-        for (indices, &triangle) in self.indices[here.clone()].iter_mut().zip(&met[run.clone()]) {
+        for (indices, &triangle) in self.indices[here.clone()].iter_mut().zip(&numbers[run.clone()])
+        {
             *indices = triangles[triangle as usize];
         }
         let narrow = match &mesh.positions {

@@ -156,7 +156,7 @@ fn is_at_edge(geometry: &Geometry, rays: &RayBatch, truth: &HitBatch, i: usize) 
     })
 }
 
-/// By how much (m) a distance may differ from `t`.
+/// Greatest difference (m) of a distance from `t`.
 fn tolerance(name: &str, same_triangle: bool, rays: &RayBatch, i: usize, t: f64) -> f64 {
     // A backend may sum in another order: 1e-12 is what the contract promises.
     let digits = 1e-12 * t.abs();

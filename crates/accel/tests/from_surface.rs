@@ -34,7 +34,7 @@ fn rays_neither_stick_nor_leak() {
         // What a spawned ray is off by: 32 roundings of the numbers involved.
         let off = 32.0 * f64::EPSILON * 3.0 * (scale + far);
         let mut rays = RayBatch::default().from_surfaces();
-        let mut told_rays = rays.clone();
+        let mut ending_rays = rays.clone();
         let mut inward = Vec::new();
         let golden = 2.399_963_229_728_653;
         for k in 0..4000_u32 {
@@ -46,23 +46,23 @@ fn rays_neither_stick_nor_leak() {
             let z = if k % 3 == 1 { near - 1.0 } else { 1.9 * (share * 57.1).fract() - 0.95 };
             let side = if k % 2 == 0 { 1.0 } else { -1.0 };
             let up = 1.0 - (share * 91.3).fract();
-            let around = f64::from(k) * golden;
+            let azimuth = f64::from(k) * golden;
             let r = (1.0 - up * up).sqrt();
-            let direction = DVec3::new(r * around.cos(), side * up, r * around.sin()).normalize();
+            let direction = DVec3::new(r * azimuth.cos(), side * up, r * azimuth.sin()).normalize();
             let origin =
                 DVec3::splat(far) + DVec3::new(x, -1.0, z) * scale + DVec3::Y * (side * off);
             rays.push(origin, direction);
             let limits = [0.0, f64::INFINITY];
             // The floor is triangles 4 and 5, on both sides of its diagonal.
             let leaves = [[0, if x > z { 4 } else { 5 }], [MISS; 2]];
-            told_rays.push_between_triangles(origin, direction, limits, leaves);
+            ending_rays.push_between_triangles(origin, direction, limits, leaves);
             inward.push(side > 0.0);
         }
         for accel in backends(&geometry) {
             let name = accel.report().backend;
             // In packets or not, told which triangle each ray leaves or not.
-            for (coherent, told) in [(false, false), (true, false), (false, true), (true, true)] {
-                let rays = if told { &told_rays } else { &rays };
+            for (coherent, ending) in [(false, false), (true, false), (false, true), (true, true)] {
+                let rays = if ending { &ending_rays } else { &rays };
                 let rays = rays.clone().with_coherence(coherent);
                 let mut hits = HitBatch::new(Detail::Surface);
                 accel.closest(&rays, &mut hits);

@@ -18,7 +18,7 @@ use crate::{BenchError, Progress};
 /// Timing goes on for at least so long (s), however few the rays.
 const LEAST: f64 = 0.01;
 
-/// What finds the hits, and how carefully.
+/// Accelerator that finds the hits, and its options.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Method {
     /// The accelerator.
@@ -113,7 +113,7 @@ impl Effort {
     }
 }
 
-/// What was measured of one accelerator at one batch width and number of threads.
+/// Measurement of one accelerator at one batch width and number of threads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AcceleratorMeasurement {
     /// The accelerator and its mode, as [`Method::name`] writes it.
@@ -191,7 +191,8 @@ fn reference(geometry: &Arc<Geometry>, rays: &Rays, effort: &Effort) -> Result<H
 fn pools(threads: &[usize]) -> Result<Vec<ThreadPool>, BenchError> {
     let pool = |&threads: &usize| {
         let built = ThreadPoolBuilder::new().num_threads(threads).build();
-        built.map_err(|error| BenchError::Threads { threads, why: error.to_string() })
+        let fewer = "hint: ask for fewer with --threads";
+        built.map_err(|error| BenchError::Refused(format!("{threads} threads: {error}\n{fewer}")))
     };
     threads.iter().map(pool).collect()
 }

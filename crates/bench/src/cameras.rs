@@ -18,24 +18,24 @@ use etendue_scene::file::LightPrecision;
 use serde::Serialize;
 
 use crate::pictures::{Studio, opened};
-use crate::samplers::{Converged, Effort, SamplerTrial, take_pictures};
+use crate::samplers::{ConvergedPicture, Effort, PictureSettings, SamplerTrial, take_pictures};
 use crate::timing::TimeSpread;
 use crate::{BenchError, Progress};
 
-/// What was measured of one scene.
+/// Measurements of the models of one scene's lens.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cameras {
     /// Columns and rows of the pictures.
     pub resolution: [u32; 2],
     /// The picture through the full train that others are compared with.
-    pub converged: Converged,
+    pub converged: ConvergedPicture,
     /// Each model × number of samples.
     pub findings: Vec<ModelMeasurement>,
     /// Models that there are not of this lens, and why.
     pub notes: Vec<String>,
 }
 
-/// What was measured of one model at one number of samples.
+/// Measurement of one model at one number of samples.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelMeasurement {
     /// `pinhole`, `thin`, `thick` or `full`.
@@ -67,11 +67,15 @@ pub fn measure(
     studio.fit(all, effort.seconds)?;
     let full = studio.camera().clone();
     let (models, notes) = models(&full)?;
-    let converged = Converged::render(studio, &full, effort.converged)?;
+    let converged = ConvergedPicture::render(studio, &full, effort.converged)?;
     let mut entries: Vec<SamplerTrial<usize>> =
         (0..models.len()).flat_map(|model| SamplerTrial::each(model, &effort.counts)).collect();
-    let way = |of: &usize| (&models[*of].1, (Sampler::Sobol, LightPrecision::Auto));
-    take_pictures(studio, &mut entries, (effort, &converged, all), &way, progress)?;
+    let settings = |of: &usize| PictureSettings {
+        camera: &models[*of].1,
+        sampler: Sampler::Sobol,
+        precision: LightPrecision::Auto,
+    };
+    take_pictures(studio, &mut entries, effort, &converged, all, &settings, progress)?;
     let finding = |entry: &SamplerTrial<usize>| {
         let rmse = entry.rmse();
         Some(ModelMeasurement {
@@ -102,8 +106,8 @@ pub fn models(full: &Camera) -> Result<(Vec<LensModel>, Vec<String>), BenchError
     let mut models = Vec::new();
     for model in found.models {
         match opened(&model.camera) {
-            Ok(camera) => models.push((model.name, camera)),
-            Err(why) => notes.push(format!("no `{}` model of this lens: {why}", model.name)),
+            Ok(camera) => models.push((model.kind.name(), camera)),
+            Err(why) => notes.push(format!("no `{}` model of this lens: {why}", model.kind)),
         }
     }
     models.push(("full", full.clone()));

@@ -9,15 +9,15 @@ use serde::Serialize;
 
 use crate::accelerators;
 use crate::cameras::Cameras;
-use crate::samplers::{Converged, Samplers};
+use crate::samplers::{ConvergedPicture, Samplers};
 use crate::target::Target;
 
-/// What was measured, and on what.
+/// All that was measured, and on what.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Findings {
     /// The machine, one line a fact.
     pub machine: Vec<String>,
-    /// What was traced, one line a fact.
+    /// Facts of what was traced, a line each.
     pub scene: Vec<String>,
     /// Times that each was timed.
     pub rounds: usize,
@@ -27,9 +27,9 @@ pub struct Findings {
     pub samplers: Option<Samplers>,
     /// Each model of the lens × number of samples, where the camera has one.
     pub cameras: Option<Cameras>,
-    /// Which settings reach a given error soonest, where that was asked for.
+    /// Settings that reach a given error soonest, where that was asked for.
     pub target: Option<Target>,
-    /// What was left out or stands in for something, and why.
+    /// Notes on what was left out or stands in for something, and why.
     pub notes: Vec<String>,
 }
 
@@ -100,7 +100,10 @@ impl Findings {
             );
             tables.push((title, table::accelerators(&self.accelerators)));
         }
-        let pictures = |what: &str, [width, height]: [u32; 2], converged: &Converged, of: &str| {
+        let pictures = |what: &str,
+                        [width, height]: [u32; 2],
+                        converged: &ConvergedPicture,
+                        of: &str| {
             format!(
                 "{what}: pictures of {width} x {height} pixels against {of} of {} samples, whose own \
                  error is {:.1e} of its mean.",

@@ -33,7 +33,7 @@ const ON_EDGE: f64 = 1e-9;
 /// Beside an edge that is hit, its triangles are in one place to the accuracy of distances in f32.
 const TIE_ON_EDGE: f64 = 1e-4;
 
-/// What hits get wrong.
+/// Errors of hits, by their kind.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HitErrors {
     /// Rays that were compared.

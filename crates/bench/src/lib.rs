@@ -41,14 +41,6 @@ pub enum BenchError {
     /// A structure could not be built.
     #[error(transparent)]
     Build(#[from] BuildError),
-    /// Threads could not be had.
-    #[error("{threads} threads: {why}\nhint: ask for fewer with --threads")]
-    Threads {
-        /// Number of threads that were asked for.
-        threads: usize,
-        /// The system's word.
-        why: String,
-    },
     /// The scene has layers and no picture.
     #[error(
         "the scene has no `tracer`, so there is no picture to compare\nhint: name one, such as facing"
@@ -63,7 +55,7 @@ pub enum BenchError {
     /// A chart could not be turned into pixels; a fault of this program.
     #[error("a chart cannot be drawn as PNG: {0}")]
     Drawing(String),
-    /// The scene itself cannot be rendered.
+    /// The scene itself cannot be rendered, or not by so many threads.
     #[error("{0}")]
     Refused(String),
     /// The caller asked to stop.

@@ -157,7 +157,7 @@ impl<'a> Studio<'a> {
 /// When no light gets through the lens.
 pub fn opened(camera: &Camera) -> Result<Camera, BenchError> {
     let opened = camera.opened(&Bands::Rgb);
-    opened.map_err(|error| BenchError::Render(RenderError::Camera(error.why)))
+    opened.map_err(|error| BenchError::Render(RenderError::camera(error.why)))
 }
 
 /// In double precision.

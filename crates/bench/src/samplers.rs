@@ -23,20 +23,20 @@ pub struct Effort {
     pub seconds: f64,
 }
 
-/// What was measured of one scene.
+/// Measurements of all samplers on one scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Samplers {
     /// Columns and rows of the pictures.
     pub resolution: [u32; 2],
     /// The picture that others are compared with.
-    pub converged: Converged,
+    pub converged: ConvergedPicture,
     /// Each sampler × number of samples.
     pub findings: Vec<SamplerMeasurement>,
 }
 
 /// The picture that others are compared with: the mean of two of half the samples.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Converged {
+pub struct ConvergedPicture {
     /// Samples a pixel.
     pub samples: u32,
     /// The mean of its values.
@@ -47,7 +47,7 @@ pub struct Converged {
     pub(crate) values: Vec<f64>,
 }
 
-/// What was measured of one sampler at one number of samples.
+/// Measurement of one sampler at one number of samples.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SamplerMeasurement {
     /// The point set, as a scene file writes it, and the precision of hits where it is not the plan's.
@@ -108,11 +108,15 @@ pub fn measure(
     let all = f64::from(effort.converged) + own * (rounds * contestants.len()) as f64;
     studio.fit(all, effort.seconds)?;
     let camera = studio.camera().clone();
-    let converged = Converged::render(studio, &camera, effort.converged)?;
+    let converged = ConvergedPicture::render(studio, &camera, effort.converged)?;
     let mut entries: Vec<SamplerTrial<Contestant>> =
         contestants.iter().flat_map(|&who| SamplerTrial::each(who, &effort.counts)).collect();
-    let way = |of: &Contestant| (&camera, (of.sampler, of.precision));
-    take_pictures(studio, &mut entries, (effort, &converged, all), &way, progress)?;
+    let settings = |of: &Contestant| PictureSettings {
+        camera: &camera,
+        sampler: of.sampler,
+        precision: of.precision,
+    };
+    take_pictures(studio, &mut entries, effort, &converged, all, &settings, progress)?;
     let finding = |entry: &SamplerTrial<Contestant>| {
         let rmse = entry.rmse();
         Some(SamplerMeasurement {
@@ -128,15 +132,21 @@ pub fn measure(
 }
 
 /// Settings of a contestant's picture: its camera, its point set, and the precision of hits.
-pub(crate) type Way<'a> = (&'a Camera, (Sampler, LightPrecision));
+pub(crate) struct PictureSettings<'a> {
+    pub(crate) camera: &'a Camera,
+    pub(crate) sampler: Sampler,
+    pub(crate) precision: LightPrecision,
+}
 
 /// Renders all entries in turn, round after round, to `all` samples a pixel with those of the converged
 /// picture.
 pub(crate) fn take_pictures<'a, T: Clone>(
     studio: &mut Studio<'_>,
     entries: &mut [SamplerTrial<T>],
-    (effort, converged, all): (&Effort, &Converged, f64),
-    way: &dyn Fn(&T) -> Way<'a>,
+    effort: &Effort,
+    converged: &ConvergedPicture,
+    all: f64,
+    settings: &dyn Fn(&T) -> PictureSettings<'a>,
     progress: Progress<'_>,
 ) -> Result<(), BenchError> {
     let mut done = f64::from(effort.converged);
@@ -146,15 +156,15 @@ pub(crate) fn take_pictures<'a, T: Clone>(
                 return Err(BenchError::Stopped);
             }
             let entry = &mut entries[who];
-            let (camera, how) = way(&entry.of);
-            entry.take(studio, camera, how, round, converged)?;
+            let own = settings(&entry.of);
+            entry.take(studio, &own, round, converged)?;
             done += f64::from(entry.samples);
         }
     }
     Ok(())
 }
 
-impl Converged {
+impl ConvergedPicture {
     pub(crate) fn render(
         studio: &mut Studio<'_>,
         camera: &Camera,
@@ -196,11 +206,11 @@ impl<T: Clone> SamplerTrial<T> {
     pub(crate) fn take(
         &mut self,
         studio: &mut Studio<'_>,
-        camera: &Camera,
-        (sampler, precision): (Sampler, LightPrecision),
+        settings: &PictureSettings<'_>,
         round: usize,
-        converged: &Converged,
+        converged: &ConvergedPicture,
     ) -> Result<(), BenchError> {
+        let &PictureSettings { camera, sampler, precision } = settings;
         let sampling = PointSet { samples: self.samples, sampler, seed: round as u64, precision };
         let taken = studio.take(camera, sampling)?;
         self.seconds.0.push(taken.seconds);

@@ -50,7 +50,7 @@ fn compared_in(
 }
 
 fn model<'a>(all: &'a Comparison, name: &str) -> &'a ModelError {
-    all.models.iter().find(|finding| finding.model == name).unwrap()
+    all.models.iter().find(|finding| finding.model.name() == name).unwrap()
 }
 
 fn thin_lens() -> Value {
@@ -89,7 +89,7 @@ fn a_pinhole_lacks_the_blur_and_falloff_of_a_thin_lens_and_nothing_else() {
         let own = model(&all, name);
         assert!(own.blur.value < 1e-9 && own.light.value < 1e-9 && own.is_within, "{own:?}");
     }
-    assert_eq!((all.cheapest, all.depths.len()), ("thin", 2));
+    assert_eq!((all.cheapest.name(), all.depths.len()), ("thin", 2));
     assert!(all.models.iter().all(|m| m.seconds_a_sample.is_some()));
 }
 
@@ -105,14 +105,15 @@ fn small_near_things_are_seen() {
             .unwrap();
         assert!((all.depths[0] - 0.6).abs() < 0.005, "{place:?}: {:?}", all.depths);
         // A pinhole is within it for the wall alone.
-        assert_eq!(all.cheapest, "thin", "{place:?}");
+        assert_eq!(all.cheapest.name(), "thin", "{place:?}");
     }
 }
 
 #[test]
 fn the_tolerance_decides_which_model_is_the_cheapest() {
-    let cheapest =
-        |pixels, light| compared(&thin_lens(), Tolerance { pixels, light }).unwrap().cheapest;
+    let cheapest = |pixels, light| {
+        compared(&thin_lens(), Tolerance { pixels, light }).unwrap().cheapest.name()
+    };
     // The blur is 0.31 pixels and the corners lack 26 % of the light.
     assert_eq!(cheapest(0.3, None), "thin");
     assert_eq!(cheapest(0.35, None), "pinhole");

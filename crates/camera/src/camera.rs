@@ -426,7 +426,7 @@ impl Camera {
         landings: &mut BandLandings,
     ) {
         let lens = self.lens().expect("bands share rays behind lenses");
-        lens.sample_band_rays((&self.pose, self.resolution()), samples, out, landings);
+        lens.sample_band_rays(&self.pose, self.resolution(), samples, out, landings);
         self.carry_samples(samples, out);
     }
 

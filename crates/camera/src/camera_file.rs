@@ -12,11 +12,11 @@ use crate::{
 /// A camera's projection and pose in OpenCV's convention: x right, y down, z forward, metres.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CameraFile {
-    /// How points are projected; decides which of `k` and `orthographic` is there.
+    /// Projection of points; decides which of `k` and `orthographic` is there.
     pub projection: ProjectionName,
     /// Columns and rows.
     pub resolution: [u32; 2],
-    /// What `k`'s principal point is counted from: as the scene gave it, else the centre of the top
+    /// Origin of `k`'s principal point: as the scene gave it, else the centre of the top
     /// left pixel, as OpenCV does.
     pub pixel_origin: PixelOrigin,
     /// The matrix K by rows (pixels); `null` for parallel rays, which have none.
@@ -50,14 +50,14 @@ pub struct CameraFile {
 /// When the rows of a picture are seen, and from where: times are in s since the frame's shutter opened.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ShutterFile {
-    /// Which rows are open when.
+    /// Times at which rows are open.
     #[serde(rename = "type")]
     pub kind: ShutterKind,
-    /// Which way rows are read out.
+    /// Direction in which rows are read out.
     pub readout: Readout,
     /// From one row's readout to the next one's (s).
     pub line_time_s: f64,
-    /// How long the row that is read out first is open (s).
+    /// Time for which the row that is read out first is open (s).
     pub exposure_s: f64,
     /// The moment of a row's exposure at which data layers see it.
     pub truth_at: TruthAt,
@@ -67,12 +67,12 @@ pub struct ShutterFile {
     /// the frame it is empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub camera_from_world_of_rows: Vec<[[f64; 4]; 4]>,
-    /// How the camera moves in the pose of the frame; absent where it stands still.
+    /// Motion of the camera in the pose of the frame; absent where it stands still.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity: Option<VelocityFile>,
 }
 
-/// How a camera moves, along its own axes (OpenCV's).
+/// Motion of a camera, along its own axes (OpenCV's).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct VelocityFile {
     /// Its velocity (m/s).
@@ -81,10 +81,10 @@ pub struct VelocityFile {
     pub angular_rad_s: [f64; 3],
 }
 
-/// What is known of a camera's lens.
+/// Facts about a camera's lens.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LensFacts {
-    /// What `K` is.
+    /// Meaning of `K`.
     pub k_is: String,
     /// The design wavelength (nm), for which the other numbers are.
     pub wavelength_nm: f64,
@@ -105,7 +105,7 @@ pub struct LensFacts {
     pub pupil_solid_angle_sr: f64,
 }
 
-/// How points are projected.
+/// Projection of points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ProjectionName {
@@ -131,12 +131,12 @@ pub struct DistortionFile {
     pub coefficients: Vec<f64>,
 }
 
-/// What stands in for K when rays are parallel.
+/// Numbers in the place of K when rays are parallel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OrthographicFile {
     /// A pixel's side in the world (m).
     pub metres_per_pixel: f64,
-    /// Where the axis meets the sensor (pixels, counted from `pixel_origin`).
+    /// Intersection of the axis with the sensor (pixels, counted from `pixel_origin`).
     pub principal_point: [f64; 2],
 }
 

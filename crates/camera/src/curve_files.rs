@@ -47,7 +47,8 @@ fn curve_of(
     read: &mut dyn FnMut(&str) -> Result<String, String>,
 ) -> Result<Curve, CurveFault> {
     let spec: CurveSpec = serde_json::from_value(value.clone()).map_err(|_| {
-        let why = "is no curve: give { \"file\": \"x.csv\", \"column\": \"name\", \"scale\": 1 }";
+        let why =
+            "is no curve\nhint: give { \"file\": \"x.csv\", \"column\": \"name\", \"scale\": 1 }";
         CurveFault { key: String::new(), why: why.to_owned() }
     })?;
     spec.resolve(read)

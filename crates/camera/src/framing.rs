@@ -154,7 +154,7 @@ fn flat_axis(bounds: Bounds) -> Option<usize> {
     (size[middle] > 0.0 && size[thin] < FLAT[thin] * size[middle]).then_some(thin)
 }
 
-/// From where to look at a box, and which way is up: from the front right above, or face on when it
+/// Direction from which to look at a box, and the one that is up: from the front right above, or face on when it
 /// is flat.
 fn usual(bounds: Bounds) -> (DVec3, DVec3) {
     let towards = flat_axis(bounds).map_or(THREE_QUARTER, |axis| DVec3::AXES[axis]);

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::CameraError;
 use etendue_geometry::units::Micrometres;
 
-/// Where pixel coordinates are counted from. A file must say which: half a pixel lies between them.
+/// Origin of pixel coordinates. A file must say which: half a pixel lies between them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PixelOrigin {
@@ -48,7 +48,7 @@ pub struct IntrinsicsSpec {
     /// The skew of the pixel grid, K's second entry.
     #[serde(default)]
     pub skew: f64,
-    /// What `cx` and `cy` are counted from.
+    /// Origin of `cx` and `cy`.
     pub pixel_origin: PixelOrigin,
 }
 

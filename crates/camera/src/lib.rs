@@ -68,4 +68,11 @@ impl CameraError {
     pub fn new(at: impl Into<String>, why: impl Into<String>) -> Self {
         Self { at: at.into(), why: why.into() }
     }
+
+    /// The same error of what is written under `key`: its own key stands behind that.
+    #[must_use]
+    pub fn under(self, key: &str) -> Self {
+        let dot = if self.at.is_empty() || self.at.starts_with('[') { "" } else { "." };
+        Self { at: format!("{key}{dot}{}", self.at), ..self }
+    }
 }

@@ -14,7 +14,7 @@ use etendue_geometry::units::Seconds;
 /// A rotation by less than this (radians) has no axis that is known.
 const NO_TURN: f64 = 1e-9;
 
-/// How a camera moves, as the scene file writes it.
+/// Motion of a camera, as the scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum CameraMotionSpec {
@@ -37,7 +37,7 @@ pub enum CameraMotionSpec {
         poses: Vec<PoseSpec>,
         /// When the camera is there (s, in the scene's clock), increasing.
         times: Vec<Seconds>,
-        /// How its place runs between two poses.
+        /// Interpolation of its place between two poses.
         #[serde(default)]
         translation: Interpolation,
         /// Whole turns that are added to the shorter rotation from each pose to the next, about the same axis; none
@@ -198,10 +198,7 @@ impl CameraMotionSpec {
                     return fault("revolutions", why);
                 }
                 let build = |(i, pose): (usize, &PoseSpec)| {
-                    pose.build().map_err(|error| {
-                        let key = error.at.strip_prefix("pose").unwrap_or(&error.at);
-                        CameraError::new(format!("motion.poses[{i}]{key}"), error.why)
-                    })
+                    pose.build().map_err(|error| error.under(&format!("motion.poses[{i}]")))
                 };
                 let poses: Vec<Pose> =
                     poses.iter().enumerate().map(build).collect::<Result<_, _>>()?;

@@ -36,16 +36,16 @@ pub struct PinholeSpec {
     /// Lens distortion, beside `intrinsics`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distortion: Option<DistortionSpec>,
-    /// How light falls off from the axis; it does not when absent.
+    /// Falloff of light from the axis; none when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub falloff: Option<FalloffSpec>,
-    /// Where the camera stands; when absent, the whole scene is framed.
+    /// Pose of the camera; when absent, the whole scene is framed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose: Option<PoseSpec>,
     /// When rows are open to light; all together, for as long as the sensor exposes, when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shutter: Option<ShutterSpec>,
-    /// How the camera moves; it stands still when absent.
+    /// Motion of the camera; it stands still when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<CameraMotionSpec>,
     /// The grid of pixels.
@@ -100,7 +100,7 @@ impl PinholeSpec {
         let pinhole = Pinhole { intrinsics, distortion, falloff: self.falloff, pixel_origin };
         // Without a pose the whole subject is framed.
         let pose = match &self.pose {
-            Some(pose) => pose.build()?,
+            Some(pose) => pose.build().map_err(|error| error.under("pose"))?,
             None => framing::perspective(subject(), pinhole.reach(self.sensor.resolution)),
         };
         Ok((pose, pinhole))
@@ -235,18 +235,18 @@ fn aim_straight(
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OrthographicSpec {
-    /// How much of the world the picture is high (m); the pixels are square. When absent, the whole
+    /// Height of the picture in the world (m); the pixels are square. When absent, the whole
     /// scene fits in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height: Option<Metres>,
-    /// Where the camera stands: rays start in the plane through it across its axis. When absent,
+    /// Pose of the camera: rays start in the plane through it across its axis. When absent,
     /// the whole scene is framed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose: Option<PoseSpec>,
     /// When rows are open to light; all together, for as long as the sensor exposes, when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shutter: Option<ShutterSpec>,
-    /// How the camera moves; it stands still when absent.
+    /// Motion of the camera; it stands still when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<CameraMotionSpec>,
     /// The grid of pixels.
@@ -276,7 +276,8 @@ impl OrthographicSpec {
             return Err(CameraError::new("height", why));
         }
         let aspect = self.sensor.aspect();
-        let given = self.pose.as_ref().map(PoseSpec::build).transpose()?;
+        let given = self.pose.as_ref().map(PoseSpec::build).transpose();
+        let given = given.map_err(|error| error.under("pose"))?;
         let (pose, height) = match (given, self.height) {
             (Some(pose), Some(Metres(height))) => (pose, height),
             (Some(pose), None) => (pose, framing::orthographic_height(subject(), &pose, aspect)),

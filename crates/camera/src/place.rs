@@ -92,13 +92,13 @@ impl Camera {
         (last < ROUNDING).then(|| at.to_array())
     }
 
-    /// By how much (m, right and up) ray `i` passes `point` by, in the plane across the axis.
+    /// Distance (m, right and up) at which ray `i` passes `point`, in the plane across the axis.
     fn misses_by(&self, rays: &RayBatch, i: usize, point: DVec3) -> Option<DVec2> {
         let pose = self.pose();
         let (direction, to_point) = (rays.direction(i), point - rays.origin(i));
         let (along, depth) = (direction.dot(pose.forward()), to_point.dot(pose.forward()));
-        let beside = direction * (depth / along) - to_point;
+        let offset = direction * (depth / along) - to_point;
         (along > 0.0 && depth > 0.0)
-            .then(|| DVec2::new(beside.dot(pose.right()), beside.dot(pose.up())))
+            .then(|| DVec2::new(offset.dot(pose.right()), offset.dot(pose.up())))
     }
 }

@@ -31,7 +31,7 @@ impl Convention {
     }
 }
 
-/// Which way a given pose maps points.
+/// Direction in which a given pose maps points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Maps {
@@ -51,7 +51,7 @@ pub enum PoseSpec {
         from: [f64; 3],
         /// The point in the middle of the picture (m).
         look_at: [f64; 3],
-        /// What is up in the picture; +Y when absent.
+        /// Direction that is up in the picture; +Y when absent.
         #[serde(default = "default_up")]
         up: [f64; 3],
     },
@@ -59,7 +59,7 @@ pub enum PoseSpec {
     Matrix {
         /// Four rows; the last is `[0, 0, 0, 1]`.
         matrix: [[f64; 4]; 4],
-        /// Which way the matrix maps.
+        /// Direction in which the matrix maps.
         maps: Maps,
         /// The camera's axes.
         convention: Convention,
@@ -70,7 +70,7 @@ pub enum PoseSpec {
         quaternion: [f64; 4],
         /// The translation, applied after the rotation (m).
         translation: [f64; 3],
-        /// Which way they map.
+        /// Direction in which they map.
         maps: Maps,
         /// The camera's axes.
         convention: Convention,
@@ -194,33 +194,33 @@ impl PoseSpec {
     /// # Errors
     ///
     /// When a number is not finite, the view has no direction, up lies along it, or a matrix does
-    /// not rotate rigidly.
+    /// not rotate rigidly; the error's key is one of the pose's own.
     pub fn build(&self) -> Result<Pose, CameraError> {
         let pose = match self {
             Self::LookAt { from, look_at, up } => Self::build_look_at(*from, *look_at, *up)?,
             Self::Matrix { matrix, maps, convention } => {
                 let (rotation, translation) = rigid_parts(matrix)?;
                 Pose::from_rigid(rotation, translation, *maps, *convention)
-                    .ok_or_else(|| CameraError::new("pose.matrix", "the matrix is singular"))?
+                    .ok_or_else(|| CameraError::new("matrix", "the matrix is singular"))?
             }
             Self::Quaternion { quaternion, translation, maps, convention } => {
                 let rotation = DQuat::from_array(*quaternion);
                 let length = rotation.length();
                 if !(length.is_finite() && length > 1e-9) {
                     return Err(CameraError::new(
-                        "pose.quaternion",
+                        "quaternion",
                         format!("{quaternion:?} has no direction; no rotation is [0, 0, 0, 1]"),
                     ));
                 }
                 let rotation = DMat3::from_quat(rotation.normalize());
                 Pose::from_rigid(rotation, DVec3::from_array(*translation), *maps, *convention)
-                    .ok_or_else(|| CameraError::new("pose", "the rotation is singular"))?
+                    .ok_or_else(|| CameraError::new("", "the rotation is singular"))?
             }
         };
         if pose.is_finite() {
             Ok(pose)
         } else {
-            Err(CameraError::new("pose", "a number is too large or not finite"))
+            Err(CameraError::new("", "a number is too large or not finite"))
         }
     }
 
@@ -228,14 +228,14 @@ impl PoseSpec {
         let fault = |at: &str, why: String| Err(CameraError::new(at, why));
         let (from, at, up) = (DVec3::from(from), DVec3::from(at), DVec3::from(up));
         if !(from.is_finite() && at.is_finite() && up.is_finite()) {
-            return fault("pose", "a number is not finite".to_owned());
+            return fault("", "a number is not finite".to_owned());
         }
         if !(at - from).length().is_finite() {
-            return fault("pose", "a number is too large".to_owned());
+            return fault("", "a number is too large".to_owned());
         }
         if unit(at - from).is_none() {
             return fault(
-                "pose.look_at",
+                "look_at",
                 "is the same point as `from`, so the camera looks nowhere\nhint: move one of them"
                     .to_owned(),
             );
@@ -243,10 +243,10 @@ impl PoseSpec {
         match Pose::look_at(from, at, up) {
             Some(pose) => Ok(pose),
             None if unit(up).is_none() => {
-                fault("pose.up", "has no length; +Y up is [0, 1, 0]".to_owned())
+                fault("up", "has no length; +Y up is [0, 1, 0]".to_owned())
             }
             None => fault(
-                "pose.up",
+                "up",
                 "lies along the view from `from` to `look_at`, so the picture has no upright\
                  \nhint: choose another, such as [0, 0, -1]"
                     .to_owned(),
@@ -273,7 +273,7 @@ fn unit(v: DVec3) -> Option<DVec3> {
 
 /// The rotation and translation of a rigid matrix given by rows.
 fn rigid_parts(rows: &[[f64; 4]; 4]) -> Result<(DMat3, DVec3), CameraError> {
-    let fault = |why: String| Err(CameraError::new("pose.matrix", why));
+    let fault = |why: String| Err(CameraError::new("matrix", why));
     if !rows.iter().flatten().all(|x| x.is_finite()) {
         return fault("a number is not finite".to_owned());
     }
@@ -348,9 +348,9 @@ mod tests {
     fn degenerate_views_are_refused_by_name() {
         let error = |json| read(json).unwrap_err();
         let same = error(r#"{"from": [1, 2, 3], "look_at": [1, 2, 3]}"#);
-        assert_eq!(same.at, "pose.look_at");
+        assert_eq!(same.at, "look_at");
         let along = error(r#"{"from": [0, 5, 0], "look_at": [0, 0, 0]}"#);
-        assert_eq!(along.at, "pose.up");
+        assert_eq!(along.at, "up");
         assert!(along.why.contains("[0, 0, -1]"), "{along}");
         let none = error(r#"{"from": [0, 5, 0], "look_at": [1, 0, 0], "up": [0, 0, 0]}"#);
         assert!(none.why.contains("no length"), "{none}");
@@ -358,7 +358,7 @@ mod tests {
             r#"{"quaternion": [0,0,0,0], "translation": [0,0,0], "maps": "world_from_camera",
                 "convention": "gltf"}"#,
         );
-        assert_eq!(zero.at, "pose.quaternion");
+        assert_eq!(zero.at, "quaternion");
     }
 
     #[test]

@@ -229,7 +229,7 @@ impl SampleKeys {
             return;
         }
         let (first, shift) = set_of_pair(pair);
-        sobol::floats((&self.keys, shift), picked, first, [x, y]);
+        sobol::floats(&self.keys, shift, picked, first, [x, y]);
     }
 }
 

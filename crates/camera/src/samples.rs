@@ -37,7 +37,7 @@ impl PixelBlock {
     }
 }
 
-/// Where a batch of samples lies: on the film, in the pupil, and at which wavelength. The arrays have
+/// Places of a batch of samples: on the film, in the pupil, and among wavelengths. The arrays have
 /// one entry a sample.
 #[derive(Debug, Clone, Default)]
 pub struct FilmSamples {

@@ -12,24 +12,24 @@ use etendue_geometry::units::Seconds;
 /// The longest code (chips), and the most intervals of a list.
 const MOST_INTERVALS: usize = 4096;
 
-/// By how much of an exposure a code may be longer, in rounding of its chips.
+/// Share of an exposure by which a code may be longer, in rounding of its chips.
 const ROUNDING: f64 = 1e-9;
 
 /// A shutter as the scene file writes it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ShutterSpec {
-    /// Which rows are open when.
+    /// Times at which rows are open.
     #[serde(rename = "type")]
     pub kind: ShutterKind,
-    /// How long a row is open (s). When absent, as long as the sensor exposes; without such a sensor no time at all,
+    /// Time for which a row is open (s). When absent, as long as the sensor exposes; without such a sensor no time at all,
     /// so that each row sees one instant.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exposure: Option<Seconds>,
     /// From one row to the next that is read out (s), of `rolling` and `global_reset`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line_time: Option<Seconds>,
-    /// Which way the rows are read out.
+    /// Direction in which the rows are read out.
     pub readout: Readout,
     /// The intervals `[from, to]` of the exposure in which light is let through (s from its start), in order; all of
     /// it when absent.
@@ -38,14 +38,14 @@ pub struct ShutterSpec {
     /// Instead of `open`: a code of 1 (open) and 0 (closed), each for a chip's time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub code: Option<String>,
-    /// How long a chip of `code` is (s); the exposure over the code's length when absent.
+    /// Length of a chip of `code` (s); the exposure over the code's length when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chip: Option<Seconds>,
-    /// At which moment of its row's exposure data layers see a pixel.
+    /// Moment of its row's exposure at which data layers see a pixel.
     pub truth_at: TruthAt,
 }
 
-/// Which rows are open when.
+/// Times at which rows are open.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ShutterKind {
@@ -58,7 +58,7 @@ pub enum ShutterKind {
     GlobalReset,
 }
 
-/// Which way rows are read out.
+/// Direction in which rows are read out.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Readout {
@@ -279,7 +279,7 @@ impl Shutter {
         self.readout
     }
 
-    /// At which moment of its row's exposure data layers see a pixel.
+    /// Moment of its row's exposure at which data layers see a pixel.
     #[must_use]
     pub fn truth_at(&self) -> TruthAt {
         self.truth_at

@@ -58,10 +58,16 @@ pub(crate) fn points(keys: &[SobolKey], first: usize, out: &mut [[f64; 2]]) {
     scrambled(keys, first, &DIRECTIONS, out);
 }
 
-/// The points of those of `keys` that are picked, of scramblings shifted by so much, to 24 bits in two columns as long
+/// The points of those of `keys` that are picked, of scramblings shifted by `shift`, to 24 bits in two columns as long
 /// as `picked`.
-pub(crate) fn floats(keys: (&[SobolKey], u32), picked: &[u32], first: usize, out: [&mut [f32]; 2]) {
-    scrambled_floats(keys, picked, first, &DIRECTIONS, out);
+pub(crate) fn floats(
+    keys: &[SobolKey],
+    shift: u32,
+    picked: &[u32],
+    first: usize,
+    out: [&mut [f32]; 2],
+) {
+    scrambled_floats(keys, shift, picked, first, &DIRECTIONS, out);
 }
 
 /// The first 24 bits of a number below 1.
@@ -100,7 +106,8 @@ fn scrambled(
 
 #[multiversion::multiversion(targets = "simd")]
 fn scrambled_floats(
-    (keys, shift): (&[SobolKey], u32),
+    keys: &[SobolKey],
+    shift: u32,
     picked: &[u32],
     first: usize,
     directions: &[[u32; BITS]; DIMENSIONS],
@@ -310,10 +317,10 @@ mod tests {
         for first in [0, 2] {
             points(&keys, first, &mut out);
             for k in 0..2 {
-                let mut met =
+                let mut cells =
                     out.iter().map(|point| (point[k] * 64.0) as usize).collect::<Vec<_>>();
-                met.sort_unstable();
-                assert_eq!(met, (0..64).collect::<Vec<_>>(), "{first} {k}");
+                cells.sort_unstable();
+                assert_eq!(cells, (0..64).collect::<Vec<_>>(), "{first} {k}");
             }
         }
     }

@@ -320,7 +320,7 @@ impl Drawing<'_> {
         for (i, series) in self.chart.series.iter().enumerate() {
             let places = self.places(i);
             for (place, _) in &places {
-                obstacles.push(Obstacle { area: LabelArea::around(*place, 5.0), weight: 3.0 });
+                obstacles.push(Obstacle { area: LabelArea::square_at(*place, 5.0), weight: 3.0 });
             }
             if series.joined {
                 along(&places, &mut obstacles);
@@ -371,7 +371,7 @@ fn along(places: &[([f64; 2], Mark)], obstacles: &mut Vec<Obstacle>) {
         while done < length {
             let share = done / length;
             let at = [0, 1].map(|k| from[k] + share * (to[k] - from[k]));
-            obstacles.push(Obstacle { area: LabelArea::around(at, 3.0), weight: 1.0 });
+            obstacles.push(Obstacle { area: LabelArea::square_at(at, 3.0), weight: 1.0 });
             done += STEP;
         }
     }

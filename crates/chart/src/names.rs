@@ -17,8 +17,8 @@ impl LabelArea {
         width.max(0.0) * height.max(0.0)
     }
 
-    /// A square around a place.
-    pub(crate) fn around([x, y]: [f64; 2], reach: f64) -> Self {
+    /// A square with a place in its middle.
+    pub(crate) fn square_at([x, y]: [f64; 2], reach: f64) -> Self {
         Self { left: x - reach, top: y - reach, right: x + reach, bottom: y + reach }
     }
 
@@ -77,9 +77,9 @@ pub(crate) fn place(
     let mut places = Vec::new();
     for (name, points) in names {
         let width = LETTER * name.chars().count() as f64 + 4.0;
-        let candidates = points
-            .iter()
-            .flat_map(|&point| REACHES.iter().flat_map(move |&reach| around(point, reach, width)));
+        let candidates = points.iter().flat_map(|&point| {
+            REACHES.iter().flat_map(move |&reach| places_near(point, reach, width))
+        });
         let best = candidates
             .filter(|(area, _)| area.is_inside(page))
             .map(|(area, point)| (cost(&area, point, &taken, obstacles), area, point))
@@ -95,7 +95,11 @@ pub(crate) fn place(
 }
 
 /// Places of a name of `width` at a distance of `reach` around `point`.
-fn around(point: [f64; 2], reach: f64, width: f64) -> impl Iterator<Item = (LabelArea, [f64; 2])> {
+fn places_near(
+    point: [f64; 2],
+    reach: f64,
+    width: f64,
+) -> impl Iterator<Item = (LabelArea, [f64; 2])> {
     (0..16).map(move |k| {
         let angle = std::f64::consts::TAU * f64::from(k) / 16.0;
         let (x, y) = (point[0] + reach * angle.cos(), point[1] - reach * angle.sin());
@@ -125,7 +129,7 @@ mod tests {
         let names: Vec<(&str, Vec<[f64; 2]>)> =
             (0..12).map(|i| ("embree robust + f64", vec![at(i)])).collect();
         let obstacles: Vec<Obstacle> = (0..12)
-            .map(|i| Obstacle { area: LabelArea::around(at(i), 4.0), weight: 2.0 })
+            .map(|i| Obstacle { area: LabelArea::square_at(at(i), 4.0), weight: 2.0 })
             .collect();
         let placed: Vec<PlacedName> =
             place(&names, &obstacles, &page).into_iter().flatten().collect();

@@ -202,7 +202,7 @@ pub(crate) struct SceneArguments {
         help = format!("Layers to write: {}", LayerSpec::NAMES.join(", "))
     )]
     pub(crate) layers: Option<Vec<String>>,
-    /// Which axis points up in OBJ and PLY files, which do not say
+    /// Axis that points up in OBJ and PLY files, which do not say
     #[arg(long, value_name = "AXIS", value_enum)]
     pub(crate) up: Option<UpArgument>,
     /// Samples per pixel of the picture; data layers take the pixel's centre
@@ -214,7 +214,7 @@ pub(crate) struct SceneArguments {
     /// The accelerator that finds the hits
     #[arg(long, value_parser = parse::accelerators())]
     pub(crate) accel: Option<String>,
-    /// What the picture may be off by, such as "0.5 px, 2 %": what is cheapest within it is taken of the lens and
+    /// Error that a picture may have, such as "0.5 px, 2 %": what is cheapest within it is taken of the lens and
     /// of the bounces of light. With `plan --models` the share of light may be left out, and is not judged then
     #[arg(long, value_name = "PIXELS, SHARE", value_parser = parse::tolerance)]
     pub(crate) tolerance: Option<Tolerance>,
@@ -374,7 +374,7 @@ pub(crate) struct MergeArguments {
     /// All shares of one render
     #[arg(value_name = "SHARE", required = true)]
     pub(crate) shares: Vec<PathBuf>,
-    /// Where the scene is now, if not where the shares found it
+    /// Place of the scene now, if not where the shares found it
     #[arg(long, value_name = "SCENE|MODEL")]
     pub(crate) scene: Option<PathBuf>,
     /// Write times, rays, memory and fingerprints as JSON

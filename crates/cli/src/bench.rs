@@ -23,7 +23,7 @@ use etendue_scene::file::SceneFile;
 use crate::arguments::{BenchArguments, PartArgument, SceneArguments};
 use crate::fault::{Fault, print_text};
 use crate::progress::{Phases, say};
-use crate::{render, stop};
+use crate::{job, stop};
 
 /// All of a run, and of a quick one.
 const ROUNDS: [usize; 2] = [5, 3];
@@ -58,7 +58,7 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
         false => arguments.scene.clone(),
     };
     let options =
-        Options { memory_limit: arguments.memory_limit, ..render::options(&scene_arguments) };
+        Options { memory_limit: arguments.memory_limit, ..job::options(&scene_arguments) };
     let mut session = Session::open_with(&scene_arguments.scene, options)?;
     let progress = phases.progress(false);
     let scene = session.scene(&progress)?;
@@ -81,12 +81,12 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
     }
     if has_pictures {
         let (scene, accel) = session.scene_and_accel(&progress)?;
-        pictures(arguments, (scene, accel), phases, &mut findings)?;
+        pictures(arguments, scene, accel, phases, &mut findings)?;
     }
     if let Some(target) = arguments.target {
         let mut axes = target::axes(session.scene(&progress)?);
         axes.extend(target::sweeps(&arguments.sweep, session.file())?);
-        let found = target::race(arguments, target, (session.scene(&progress)?, phases), &axes)?;
+        let found = target::race(arguments, target, session.scene(&progress)?, phases, &axes)?;
         findings.notes.extend(found.notes.iter().cloned());
         findings.target = Some(found);
     }
@@ -180,7 +180,8 @@ fn with_picture(
 /// The samplers, and the models of the lens when there is one.
 fn pictures(
     arguments: &BenchArguments,
-    (scene, accel): (&Scene, &dyn Accel),
+    scene: &Scene,
+    accel: &dyn Accel,
     phases: Phases,
     findings: &mut Findings,
 ) -> Result<(), Fault> {

@@ -13,7 +13,7 @@ use etendue_scene::{LoadOptions, Start, Wanted};
 use serde::Serialize;
 
 use crate::arguments::CheckArguments;
-use crate::fault::{Fault, Versioned, print_json, print_text};
+use crate::fault::{Fault, VersionedReport, print_json, print_text};
 
 pub(crate) fn run(arguments: &CheckArguments) -> Result<(), Fault> {
     let options = &arguments.scene;
@@ -40,7 +40,7 @@ pub(crate) fn run(arguments: &CheckArguments) -> Result<(), Fault> {
         diagnosis.findings.extend(frames.notes.iter().map(Finding::from));
     }
     match arguments.json {
-        true => print_json(&Versioned::new(&Checked { diagnosis, time })),
+        true => print_json(&VersionedReport::new(&CheckReport { diagnosis, time })),
         false => {
             let mut list = diagnosis.table();
             list.put("time", format!("{} ({})", Span(time.total), time.stages()));
@@ -51,7 +51,7 @@ pub(crate) fn run(arguments: &CheckArguments) -> Result<(), Fault> {
 
 /// A diagnosis, and how long a render will take.
 #[derive(Serialize)]
-struct Checked {
+struct CheckReport {
     #[serde(flatten)]
     diagnosis: Diagnosis,
     time: TimeForecast,

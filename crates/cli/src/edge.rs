@@ -18,9 +18,9 @@ use crate::progress::say;
 const DRAWING: &str = "edge.svg";
 const TABLE: &str = "edge.csv";
 
-/// What was measured, for machines.
+/// Measurements of an image's edges, for machines.
 #[derive(Debug, Serialize)]
-struct Measured {
+struct EdgeMeasurement {
     version: u32,
     image: String,
     /// Left column, top row, width and height.
@@ -73,8 +73,14 @@ pub(crate) fn run(arguments: &EdgeArguments) -> Result<(), Fault> {
         let mtf50_mm = edge.mtf50.and_then(a_millimetre);
         channels.push(MeasuredChannel { channel, edge, mtf50_mm });
     }
-    let measured =
-        Measured { version: 1, image: name, region, lattice, pitch: arguments.pitch, channels };
+    let measured = EdgeMeasurement {
+        version: 1,
+        image: name,
+        region,
+        lattice,
+        pitch: arguments.pitch,
+        channels,
+    };
     write(&measured, arguments)?;
     if arguments.json {
         return print_json(&measured);
@@ -103,7 +109,7 @@ fn planes(still: &Still, arguments: &EdgeArguments) -> Result<Vec<(String, Vec<f
     Ok(channels.collect())
 }
 
-fn table(measured: &Measured) -> Table {
+fn table(measured: &EdgeMeasurement) -> Table {
     let number = |value: Option<f64>, digits: usize| {
         value.map_or_else(Cell::none, |value| Cell::number(value, format!("{value:.digits$}")))
     };
@@ -129,7 +135,7 @@ fn table(measured: &Measured) -> Table {
 }
 
 /// Writes the drawing and the table, where a folder is named.
-fn write(measured: &Measured, arguments: &EdgeArguments) -> Result<(), Fault> {
+fn write(measured: &EdgeMeasurement, arguments: &EdgeArguments) -> Result<(), Fault> {
     let Some(folder) = &arguments.output else { return Ok(()) };
     let paths = [DRAWING, TABLE].map(|name| folder.join(name));
     let inputs = [arguments.image.clone()];
@@ -145,7 +151,7 @@ fn write(measured: &Measured, arguments: &EdgeArguments) -> Result<(), Fault> {
     Ok(())
 }
 
-fn csv(measured: &Measured) -> String {
+fn csv(measured: &EdgeMeasurement) -> String {
     let mut text = "cycles_a_pixel".to_owned();
     for channel in &measured.channels {
         let _ = write!(text, ",{}", channel.channel);
@@ -162,7 +168,7 @@ fn csv(measured: &Measured) -> String {
     text
 }
 
-fn drawing(measured: &Measured) -> String {
+fn drawing(measured: &EdgeMeasurement) -> String {
     let curve = |(number, channel): (usize, &MeasuredChannel)| Series {
         colour: number % 7,
         ..Series::curve(channel.channel.clone(), channel.edge.modulation.clone())

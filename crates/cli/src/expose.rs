@@ -57,7 +57,7 @@ pub(crate) fn run(arguments: &ExposeArguments) -> Result<(), Fault> {
         }
     };
     let all = images.iter().map(open);
-    let written = write_frames(all, &arguments.output, outputs, (&progress, &mut report));
+    let written = write_frames(all, &arguments.output, outputs, &progress, &mut report);
     drop(progress);
     if written.is_err() && folder_is_new {
         // Goes only when nothing was written into it.

@@ -97,16 +97,16 @@ pub(crate) fn print_json(value: &impl serde::Serialize) -> Result<(), Fault> {
     print_raw(&printable_json(&json))
 }
 
-/// What a program reads, with the version of its keys: a key that goes, or means something else, makes the next
+/// Output that a program reads, with the version of its keys: a key that goes, or means something else, makes the next
 /// one.
 #[derive(serde::Serialize)]
-pub(crate) struct Versioned<'a, T> {
+pub(crate) struct VersionedReport<'a, T> {
     version: u32,
     #[serde(flatten)]
     value: &'a T,
 }
 
-impl<'a, T> Versioned<'a, T> {
+impl<'a, T> VersionedReport<'a, T> {
     pub(crate) fn new(value: &'a T) -> Self {
         Self { version: 1, value }
     }

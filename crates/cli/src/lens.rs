@@ -11,7 +11,7 @@ use etendue_scene::escape::one_line;
 use etendue_scene::file::{ReadLens, read_lens_at, trace_rays};
 
 use crate::arguments::LensArguments;
-use crate::fault::{Fault, Versioned, print_json, print_json_line, print_text};
+use crate::fault::{Fault, VersionedReport, print_json, print_json_line, print_text};
 use crate::opencv;
 use crate::progress::say;
 use crate::psf;
@@ -57,7 +57,7 @@ pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
             warn(&traced.out_of_range, arguments)?;
             match arguments.json {
                 // On one line: there may be millions of them.
-                true => print_json_line(&Versioned::new(&traced)),
+                true => print_json_line(&VersionedReport::new(&traced)),
                 false => print_text(&traced.to_string()),
             }
         }
@@ -97,19 +97,22 @@ fn report(lens: &ReadLens, arguments: &LensArguments, to: &Transaction) -> Resul
         false => None,
     };
     if let Some(folder) = &arguments.output {
-        draw(&lens.train, &report, (to, folder), arguments.quiet)?;
+        draw(&lens.train, &report, to, folder, arguments.quiet)?;
     }
     if arguments.psf {
         psf::write(lens, &report, arguments, to)?;
     }
     if let Some(waves) = &waves {
-        waves::write((&lens.train, &report), waves, arguments, to)?;
+        waves::write(&lens.train, &report, waves, arguments, to)?;
     }
     if arguments.json {
         warn(&report.out_of_range, arguments)?;
         match &waves {
-            Some(waves) => print_json(&Versioned::new(&waves::With { report: &report, waves })),
-            None => print_json(&Versioned::new(&report)),
+            Some(waves) => print_json(&VersionedReport::new(&waves::ReportWithWaves {
+                report: &report,
+                waves,
+            })),
+            None => print_json(&VersionedReport::new(&report)),
         }
     } else {
         if arguments.strict {
@@ -134,7 +137,8 @@ const DRAWINGS: [&str; 3] = ["layout.svg", "spots.svg", "illumination.svg"];
 fn draw(
     train: &OpticalTrain,
     report: &LensReport,
-    (to, folder): (&Transaction, &Path),
+    to: &Transaction,
+    folder: &Path,
     quiet: bool,
 ) -> Result<(), Fault> {
     let pictures = [

@@ -8,6 +8,7 @@ mod check;
 mod edge;
 mod expose;
 mod fault;
+mod job;
 mod lens;
 mod matching;
 mod merge;
@@ -128,8 +129,6 @@ pub(crate) fn print_completions(shell: Shell) -> Result<(), Fault> {
 
 #[cfg(feature = "window")]
 pub(crate) fn view(arguments: &ViewArguments) -> Result<(), Fault> {
-    use etendue_window::WindowError;
-
     let options = etendue::Options {
         settings: arguments.settings.clone(),
         reach: match arguments.allow_outside {
@@ -140,16 +139,16 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<(), Fault> {
     };
     if let Some(path) = &arguments.scene {
         // What cannot be opened at all is told where the command was given.
-        etendue::Viewed::open(path, options.clone())?;
+        etendue::ViewedFile::open(path, options.clone())?;
     }
     etendue_window::run(arguments.scene.clone(), options)
-        .map_err(|error: WindowError| Fault::refused(error.to_string()))
+        .map_err(|refusal| Fault::Refused(refusal.into()))
 }
 
 #[cfg(not(feature = "window"))]
 pub(crate) fn view(_: &ViewArguments) -> Result<(), Fault> {
     Err(Fault::refused(
-        "this etendue was built without the window: build it with \
+        "this etendue was built without the window\nhint: build it with \
          `cargo build --release -p etendue-cli --features window`, or run `make view`; without a window \
          there is `etendue render`",
     ))

@@ -53,7 +53,7 @@ pub(crate) fn run(arguments: &MatchArguments) -> Result<(), Fault> {
     };
     let mut session = Session::open_with(&arguments.scene, options)?;
     let progress = Phases::new(arguments.quiet || arguments.json).progress(false);
-    let found = match_photo(&mut session, (&arguments.photo, &photo), &progress)?;
+    let found = match_photo(&mut session, &arguments.photo, &photo, &progress)?;
     drop(progress);
     let mut inputs = session.inputs();
     inputs.push(arguments.photo.clone());

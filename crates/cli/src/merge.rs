@@ -8,8 +8,8 @@ use serde_json::{Value, json};
 
 use crate::arguments::{Cli, Command, MergeArguments, RenderArguments};
 use crate::fault::{Fault, print_text};
+use crate::job;
 use crate::progress::Phases;
-use crate::render;
 
 /// Renders a share of the picture into its file in the folder.
 pub(crate) fn render_shard(
@@ -28,12 +28,12 @@ pub(crate) fn render_shard(
     let stem = format!("{what}-{}", shard.to_string().replace('/', "-of-"));
     let path = folder.join(format!("{stem}.film"));
     let name = format!("{stem}.checkpoint.film");
-    let checkpoint = render::keep(arguments, session, folder, &name);
+    let checkpoint = job::keep(arguments, session, folder, &name);
     session.scene(progress)?;
     places::keep_apart(&session.inputs(), std::slice::from_ref(&path))?;
     session.render_shard(shard, &path, &origin()?, progress)?;
     print_text(&path.display().to_string())?;
-    checkpoint.map_or(Ok(()), render::remove)
+    checkpoint.map_or(Ok(()), job::remove)
 }
 
 /// Call of this command, for `etendue merge`.
@@ -47,15 +47,15 @@ fn origin() -> Result<Value, Fault> {
 pub(crate) fn run(arguments: &MergeArguments) -> Result<(), Fault> {
     let shares = Shares::read(&arguments.shares)?;
     let asked = as_asked(arguments, &shares)?;
-    render::carry_out(&asked, |outputs| {
+    job::carry_out(&asked, |outputs| {
         places::folder(&asked.output)?;
-        let mut session = render::open(&asked, outputs)?;
+        let mut session = job::open(&asked, outputs)?;
         let progress = Phases::new(asked.quiet).progress(!asked.quiet);
         let results = session.check_place(&asked.output, &[], &progress)?;
         places::keep_apart(&arguments.shares, &results)?;
-        render::check_report_path(&asked, &session, &results)?;
+        job::check_report_path(&asked, &session, &results)?;
         let rendering = session.merge(&shares, &progress)?;
-        render::write(&asked, &rendering, outputs, progress)
+        job::write(&asked, &rendering, outputs, progress)
     })
 }
 

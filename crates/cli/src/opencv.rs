@@ -9,7 +9,7 @@ use etendue_render::output::sidecar;
 use etendue_scene::file::ReadLens;
 
 use crate::arguments::LensArguments;
-use crate::fault::{Fault, Versioned, print_json, print_text};
+use crate::fault::{Fault, VersionedReport, print_json, print_text};
 use crate::progress::say;
 
 /// The file that holds a fit.
@@ -38,12 +38,16 @@ pub(crate) fn fit(
     if let Some(folder) = &arguments.output {
         etendue::places::folder(folder)?;
         let path = folder.join(FILE);
-        sidecar::write_json(to, &path, &Versioned::new(&fit))?;
+        sidecar::write_json(to, &path, &VersionedReport::new(&fit))?;
         if !arguments.quiet {
             say(&format!("wrote {}", path.display()));
         }
     }
-    if arguments.json { print_json(&Versioned::new(&fit)) } else { print_text(&fit.to_string()) }
+    if arguments.json {
+        print_json(&VersionedReport::new(&fit))
+    } else {
+        print_text(&fit.to_string())
+    }
 }
 
 /// The scene's camera, or the lens with a picture in its image circle.

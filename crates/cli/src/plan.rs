@@ -6,9 +6,9 @@ use etendue_render::check_extent;
 use etendue_report::{Decision, DecisionKind, DecisionValue, Tabled};
 
 use crate::arguments::{PlanArguments, SceneArguments};
-use crate::fault::{Fault, Versioned, print_json, print_text};
+use crate::fault::{Fault, VersionedReport, print_json, print_text};
+use crate::job::{options, verified};
 use crate::progress::{Phases, say};
-use crate::render::{options, verified};
 use crate::stop;
 
 pub(crate) fn run(arguments: &PlanArguments) -> Result<(), Fault> {
@@ -50,13 +50,13 @@ fn compare_models(arguments: &PlanArguments) -> Result<(), Fault> {
     let mut session = Session::open_with(&arguments.scene.scene, options(&own))?;
     let (scene, accel) = session.scene_and_accel(&phases.progress(false))?;
     let progress = phases.begin("models");
-    let told = |share| progress(share);
+    let goes_on = |share| progress(share);
     let of_scene = scene
         .tolerance
         .map(|spec| Tolerance { pixels: spec.displacement.0, light: Some(spec.light.0) });
     let by_itself = Tolerance { pixels: 0.5, light: None };
     let judged = arguments.scene.tolerance.or(of_scene).unwrap_or(by_itself);
-    let compared = tolerance::compare(scene, accel, judged, &told).map_err(|error| {
+    let compared = tolerance::compare(scene, accel, judged, &goes_on).map_err(|error| {
         match Fault::from(error) {
             Fault::Refused(why) => {
                 Fault::refused(format!("{}: {why}", arguments.scene.scene.display()))
@@ -65,7 +65,7 @@ fn compare_models(arguments: &PlanArguments) -> Result<(), Fault> {
         }
     })?;
     if arguments.json {
-        print_json(&Versioned::new(&compared))
+        print_json(&VersionedReport::new(&compared))
     } else {
         print_text(&compared.to_string())
     }

@@ -70,7 +70,7 @@ impl Phases {
     /// `said`: each once, however many frames there are of which it is true.
     pub(crate) fn progress(self, says_notes: bool) -> etendue::Progress {
         let shown: Mutex<Option<(Phase, Progress)>> = Mutex::default();
-        let told = move |phase: Phase, share: f64| {
+        let on_phase = move |phase: Phase, share: f64| {
             let mut shown = shown.lock().unwrap_or_else(PoisonError::into_inner);
             if shown.as_ref().is_none_or(|(of, _)| *of != phase) {
                 // The old bar goes before the new one comes.
@@ -87,7 +87,7 @@ impl Phases {
                 say(&format!("note: {note}"));
             }
         };
-        etendue::Progress::new(told).with_notes(note)
+        etendue::Progress::new(on_phase).with_notes(note)
     }
 
     /// Begins a phase. The function is told the share done and answers whether to go on; the bar

@@ -35,7 +35,7 @@ const MOST_BYTES: usize = 1 << 30;
 /// The most waves that Huygens' sums add up: some minutes.
 const MOST_TERMS: f64 = 2e10;
 
-/// What the arrays are.
+/// Description of the arrays.
 #[derive(Debug, Serialize)]
 struct Meaning {
     version: u32,
@@ -84,7 +84,9 @@ pub(crate) fn write(
     let asked = match arguments.psf_size {
         Some(size) if size % 2 == 1 => Some(size as usize / 2),
         Some(size) => {
-            return Err(refused(format!("--psf-size {size} has no middle: give an odd number")));
+            return Err(refused(format!(
+                "--psf-size {size} has no middle\nhint: give an odd number"
+            )));
         }
         None => None,
     };
@@ -95,7 +97,7 @@ pub(crate) fn write(
         let bytes = count.saturating_mul(side * side * size_of::<f32>());
         match bytes > MOST_BYTES {
             true => Err(refused(format!(
-                "{count} functions of {side} x {side} cells take {} MiB, and 1024 are the most: give \
+                "{count} functions of {side} x {side} cells take {} MiB, and 1024 are the most\nhint: give \
                  a smaller --psf-size, a larger --psf-pitch, or fewer fields",
                 bytes >> 20
             ))),
@@ -117,7 +119,7 @@ pub(crate) fn write(
     let side = check(half)?;
     let cropped: Vec<Vec<f32>> = match arguments.huygens {
         false => spreads.iter().map(|spread| cropped(spread, half)).collect(),
-        true => by_huygens(&points, side, (pitch, finest)).map_err(refused)?,
+        true => by_huygens(&points, side, pitch, finest).map_err(refused)?,
     };
     let held = cropped.iter().map(|plane| plane.iter().map(|&v| f64::from(v)).sum()).collect();
     let meaning = Meaning {
@@ -183,7 +185,7 @@ fn points(
     for &depth in depths {
         for &field in fields {
             for &nm in wavelengths {
-                let point = point(lens, report, sensor_z, (depth, field, nm)).map_err(|error| {
+                let point = point(lens, report, sensor_z, depth, field, nm).map_err(|error| {
                     let at = depth.map_or("infinity".to_owned(), |mm| format!("{mm} mm"));
                     format!("field {field}, {nm} nm, {at}: {error}")
                 })?;
@@ -198,7 +200,9 @@ fn point(
     lens: &ReadLens,
     report: &LensReport,
     sensor_z: f64,
-    (depth, field, nm): (Option<f64>, f64, f64),
+    depth: Option<f64>,
+    field: f64,
+    nm: f64,
 ) -> Result<PointField, AnalysisError> {
     let at = lens.train.at(nm)?;
     let pupil = report.paraxial.entrance_pupil.z.unwrap_or(0.0);
@@ -219,12 +223,13 @@ fn point(
 fn by_huygens(
     points: &[PointField],
     side: usize,
-    (pitch, finest): (f64, f64),
+    pitch: f64,
+    finest: f64,
 ) -> Result<Vec<Vec<f32>>, String> {
     if pitch > finest / 3.0 * (1.0 + 1e-9) {
         return Err(format!(
             "--huygens takes the light in the middle of each cell, and cells of {} um are wider than a \
-             third of the finest detail; give --psf-pitch \"{:.3} um\" or less",
+             third of the finest detail\nhint: give --psf-pitch \"{:.3} um\" or less",
             1e3 * pitch,
             1e3 * finest / 3.0
         ));

@@ -10,8 +10,8 @@ use etendue_render::output::{Outputs, sidecar};
 
 use crate::arguments::RenderArguments;
 use crate::fault::{Fault, print_text};
+use crate::job::{check_report_path, keep, partial_note, refuse_result, remove};
 use crate::progress::say;
-use crate::render::{check_report_path, keep, partial_note, refuse_result, remove};
 
 pub(crate) fn render(
     arguments: &RenderArguments,
@@ -31,18 +31,18 @@ pub(crate) fn render(
     let pattern = arguments.pattern.clone().unwrap_or_default();
     // All names are known before the first frame is written.
     let is_no_result = |results: &[PathBuf]| refuse_result(arguments, results);
-    session.check_frames((out, &pattern), wanted, progress, is_no_result)?;
+    session.check_frames(out, &pattern, wanted, progress, is_no_result)?;
     check_report_path(arguments, session, &[])?;
     let mut ledger = Ledger::open(out, "render");
     ledger.list_below(frames.iter().map(|frame| pattern.list_of(frame.number)));
-    keep_exposure(arguments, session, (frames, wanted), &pattern, progress)?;
+    keep_exposure(arguments, session, frames, wanted, &pattern, progress)?;
     let mut dataset = Dataset::default();
     let mut files = Vec::new();
     let mut reports = Vec::new();
     let mut skipped = 0;
     for (done, frame) in (1..).zip(wanted) {
         session.show(frame)?;
-        if arguments.resume && session.is_complete((out, &pattern), frame.number, progress)? {
+        if arguments.resume && session.is_complete(out, &pattern, frame.number, progress)? {
             skipped += 1;
             if let Some(own) = pattern.own_folder(frame.number) {
                 // A kill while its manifest was written anew leaves a part of that. What cannot be removed is
@@ -57,7 +57,7 @@ pub(crate) fn render(
         let results = session.check_place(&folder.0, &[], progress)?;
         let results = results.iter().filter_map(|path| path.strip_prefix(&folder.0).ok()?.to_str());
         let names: Vec<String> = results.map(str::to_owned).collect();
-        pattern.keep_apart(out, frame.number, (&session.inputs(), &names))?;
+        pattern.keep_apart(out, frame.number, &session.inputs(), &names)?;
         let checkpoint = keep(arguments, session, out, &checkpoint_of(frame));
         let rendering = session.render(progress)?;
         if let Some(partial) = partial_note(&rendering, true)? {
@@ -66,7 +66,7 @@ pub(crate) fn render(
         if reports.is_empty() {
             ledger.save()?;
         }
-        let written = pattern.write(&rendering, out, frame.number, (outputs, progress))?;
+        let written = pattern.write(&rendering, out, frame.number, outputs, progress)?;
         checkpoint.map_or(Ok(()), remove)?;
         dataset.add(frame, rendering.scene(), &pattern, outputs)?;
         files.extend(written.files.iter().cloned());
@@ -81,15 +81,15 @@ pub(crate) fn render(
     for frame in frames.iter().filter(|frame| !range.contains(&frame.number)) {
         if pattern.is_begun(out, frame.number) {
             session.show(frame)?;
-            if session.is_complete((out, &pattern), frame.number, progress)? {
+            if session.is_complete(out, &pattern, frame.number, progress)? {
                 dataset.add(frame, session.scene(progress)?, &pattern, outputs)?;
             }
         }
     }
     let gone = pattern.remove_from(out, frames.len());
     let inputs = session.inputs();
-    let beside = places::recorded(ledger, &inputs, |to| dataset.write(to, out))?;
-    files.extend(beside);
+    let of_dataset = places::recorded(ledger, &inputs, |to| dataset.write(to, out))?;
+    files.extend(of_dataset);
     if !arguments.quiet {
         dataset.notes().iter().for_each(|note| say(&format!("note: {note}")));
     }
@@ -107,7 +107,8 @@ pub(crate) fn render(
 fn keep_exposure(
     arguments: &RenderArguments,
     session: &mut Session,
-    (frames, wanted): (&[Frame], &[Frame]),
+    frames: &[Frame],
+    wanted: &[Frame],
     pattern: &FramePattern,
     progress: &Progress,
 ) -> Result<(), Fault> {
@@ -119,7 +120,7 @@ fn keep_exposure(
         return Ok(());
     }
     let out = &arguments.output;
-    let is_there = session.is_complete((out, pattern), first.number, progress)?;
+    let is_there = session.is_complete(out, pattern, first.number, progress)?;
     if start.number == first.number && !(arguments.resume && is_there) {
         return Ok(());
     }

@@ -6,7 +6,7 @@ use etendue::places;
 use etendue_files::Transaction;
 use etendue_optics::analysis::AnalysisError;
 use etendue_optics::analysis::conjugate::{Conjugate, with_numerical_aperture};
-use etendue_optics::analysis::report::{Taken, WaveInquiry, WaveReport, figures, page};
+use etendue_optics::analysis::report::{PremiseSources, WaveInquiry, WaveReport, figures, page};
 use etendue_optics::analysis::wavefront::Cells;
 use etendue_optics::train::{Focus, FocusError, LensReport, OpticalTrain, drawing};
 use etendue_scene::escape::one_line;
@@ -43,7 +43,7 @@ const EYEPIECE: f64 = 1000.0;
 
 /// A report with what the lens does in waves.
 #[derive(Debug, Serialize)]
-pub(crate) struct With<'a> {
+pub(crate) struct ReportWithWaves<'a> {
     #[serde(flatten)]
     pub(crate) report: &'a LensReport,
     pub(crate) waves: &'a WaveReport,
@@ -149,7 +149,7 @@ pub(crate) fn analyse(
         is_afocal: arguments.afocal,
         cells: arguments.cells.map_or(Cells::Needed, Cells::Given),
         frequencies: frequencies(arguments)?,
-        taken: Taken {
+        taken: PremiseSources {
             fields: of_fields,
             wavelengths: of_wavelengths,
             weights: of_weights,
@@ -201,7 +201,8 @@ pub(crate) fn wavelengths(
 
 /// Writes figures and tables into the folder, and the page.
 pub(crate) fn write(
-    (train, report): (&OpticalTrain, &LensReport),
+    train: &OpticalTrain,
+    report: &LensReport,
     waves: &WaveReport,
     arguments: &LensArguments,
     to: &Transaction,

@@ -155,7 +155,7 @@ impl Dataset {
             })
         };
         let shots = self.entries.iter().map(shot).collect::<Result<Vec<_>, Error>>()?;
-        Ok(annotations::write_sets(&shots, &self.models, (to, folder), outputs)?)
+        Ok(annotations::write_sets(&shots, &self.models, to, folder, outputs)?)
     }
 
     /// Notes for the user on what the formats of others have no place for.

@@ -9,7 +9,7 @@ use etendue_render::output::Outputs;
 use etendue_sensor::{Exposure, RawImage};
 
 use crate::progress::Phase;
-use crate::{Error, FramePattern, Progress, Written, places};
+use crate::{Error, FramePattern, Progress, WrittenFiles, places};
 
 /// A picture of light on a sensor.
 #[derive(Debug, Clone)]
@@ -73,28 +73,29 @@ impl ExposedImage {
         folder: &Path,
         outputs: Outputs,
         progress: &Progress,
-    ) -> Result<Written, Error> {
+    ) -> Result<WrittenFiles, Error> {
         let one = std::iter::once(Ok((None, self.clone())));
-        write_frames(one, folder, outputs, (progress, &mut |_, _| ()))
+        write_frames(one, folder, outputs, progress, &mut |_, _| ())
     }
 
     fn write_into(
         &self,
-        to: (&Transaction, &Path),
+        to: &Transaction,
+        folder: &Path,
         outputs: Outputs,
         goes_on: &dyn Fn(f64) -> bool,
-    ) -> Result<Written, Error> {
+    ) -> Result<WrittenFiles, Error> {
         let names = expose::files_of(self.light.sensor()).into_iter().chain([MANIFEST.to_owned()]);
-        let results: Vec<PathBuf> = names.map(|name| to.1.join(name)).collect();
+        let results: Vec<PathBuf> = names.map(|name| folder.join(name)).collect();
         places::keep_apart(&self.inputs, &results)?;
-        let exposed = expose::write(&self.light, to, outputs, goes_on)?;
+        let exposed = expose::write(&self.light, (to, folder), outputs, goes_on)?;
         let notes = self.notes.iter().cloned().chain(exposed.notes).collect();
-        Ok(Written { files: exposed.files, notes, time: Duration::ZERO })
+        Ok(WrittenFiles { files: exposed.files, notes, time: Duration::ZERO })
     }
 }
 
 /// Writes exposed pictures, each read when its turn comes, into `folder`: those with a number of a frame into
-/// `frames/NUMBER` there, as a render's frames. Progress is of all of them; `told` gets each frame's number, if it has
+/// `frames/NUMBER` there, as a render's frames. Progress is of all of them; `on_frame` gets each frame's number, if it has
 /// one, and the time that it took.
 ///
 /// # Errors
@@ -104,15 +105,16 @@ pub fn write_frames(
     images: impl Iterator<Item = Result<(Option<u32>, ExposedImage), Error>>,
     folder: &Path,
     outputs: Outputs,
-    (progress, told): (&Progress, &mut dyn FnMut(Option<u32>, Duration)),
-) -> Result<Written, Error> {
+    progress: &Progress,
+    on_frame: &mut dyn FnMut(Option<u32>, Duration),
+) -> Result<WrittenFiles, Error> {
     let start = Instant::now();
     let count = images.size_hint().1.unwrap_or(1).max(1) as f64;
     places::folder(folder)?;
     let pattern = FramePattern::default();
     let mut made = Vec::new();
     let done = places::recorded(Ledger::open(folder, "expose"), &[], |to| {
-        let mut all = Written::default();
+        let mut all = WrittenFiles::default();
         let mut begun = Instant::now();
         for (done, image) in images.enumerate() {
             let (frame, image) = image?;
@@ -127,8 +129,8 @@ pub fn write_frames(
             };
             let share = |own: f64| (done as f64 + own) / count;
             let goes_on = |own| progress.goes_on(Phase::Expose, share(own));
-            let written = image.write_into((to, &own), outputs, &goes_on)?;
-            told(frame, begun.elapsed());
+            let written = image.write_into(to, &own, outputs, &goes_on)?;
+            on_frame(frame, begun.elapsed());
             begun = Instant::now();
             all.files.extend(written.files);
             // Of many frames much is true.

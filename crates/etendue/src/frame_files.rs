@@ -12,7 +12,7 @@ use etendue_render::output::{Outputs, sidecar};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::{Error, Progress, Rendering, Written, dataset, places};
+use crate::{Error, Progress, Rendering, WrittenFiles, dataset, places};
 
 /// Names of the files of frames: `{frame}` stands for the frame's number in six digits, `{layer}` for the
 /// layer's name, and the ending follows.
@@ -23,7 +23,7 @@ pub struct FramePattern {
     folder: Option<String>,
 }
 
-/// What a complete frame is known by, where its files lie among those of others.
+/// Record by which a complete frame is known, where its files lie among those of others.
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Record {
     /// Entries of its files' headers.
@@ -141,7 +141,8 @@ impl FramePattern {
         &self,
         out: &Path,
         number: usize,
-        (inputs, names): (&[PathBuf], &[String]),
+        inputs: &[PathBuf],
+        names: &[String],
     ) -> Result<Vec<PathBuf>, Error> {
         let places = names.iter().map(|name| out.join(self.place(number, name)));
         let record = self.folder.is_none().then(|| record_of(out, number));
@@ -161,8 +162,9 @@ impl FramePattern {
         rendering: &Rendering,
         out: &Path,
         number: usize,
-        (outputs, progress): (Outputs, &Progress),
-    ) -> Result<Written, Error> {
+        outputs: Outputs,
+        progress: &Progress,
+    ) -> Result<WrittenFiles, Error> {
         let folder = out.join(self.folder(number));
         places::folder(&folder)?;
         let mut written = rendering.write_frame(&folder, outputs, progress)?;
@@ -172,7 +174,7 @@ impl FramePattern {
             // Until the new record is there, the frame is not complete.
             let _ = fs::remove_file(&record);
             let inputs = &rendering.scene.inputs;
-            let files = self.take_to_places(out, number, (&written.files, inputs))?;
+            let files = self.take_to_places(out, number, &written.files, inputs)?;
             for (old, _) in before.files.iter().filter(|old| files.iter().all(|new| new.0 != old.0))
             {
                 let _ = fs::remove_file(out.join(old));
@@ -210,7 +212,8 @@ impl FramePattern {
         &self,
         out: &Path,
         number: usize,
-        (files, inputs): (&[PathBuf], &[PathBuf]),
+        files: &[PathBuf],
+        inputs: &[PathBuf],
     ) -> Result<Vec<(String, u64)>, WriteError> {
         let folder = out.join(self.folder(number));
         let to = Transaction::new().keeping(inputs);

@@ -9,6 +9,7 @@ use etendue_geometry::{Detail, HitBatch, RayBatch};
 use etendue_report::Decision;
 use etendue_scene::Scene;
 
+use crate::session::PreparedScene;
 use crate::{Error, Progress, Session, Viewpoint};
 
 /// A scene with the structure over it, to be asked from any thread while the session goes on.
@@ -48,7 +49,7 @@ impl Session {
     /// As [`Self::prepare`].
     pub fn inspector(&mut self, progress: &Progress) -> Result<Inspector, Error> {
         self.prepare(progress)?;
-        let (scene, accel, _) = self.prepared()?;
+        let PreparedScene { scene, accel, .. } = self.prepared()?;
         let decisions = Arc::from(&*self.plan(progress)?.decisions);
         Ok(Inspector { scene, accel, decisions })
     }

@@ -24,12 +24,12 @@ pub struct LensView {
     /// The lens cut along its axis.
     pub section: Section,
     /// Lens and its planes, for the curves in waves.
-    pub(crate) in_focus: InFocus,
+    pub(crate) in_focus: FocusedTrain,
 }
 
 /// A lens with its planes.
 #[derive(Debug, Clone)]
-pub(crate) struct InFocus {
+pub(crate) struct FocusedTrain {
     pub(crate) train: OpticalTrain,
     /// z of the point that depths are counted from (mm).
     pub(crate) origin: f64,
@@ -55,7 +55,7 @@ impl Inspector {
         let report = LensReport::new(train, &Inquiry { focus, ..Inquiry::default() })
             .map_err(|error| refused(error.to_string()))?;
         let section = Section::new(train, &report).map_err(|error| refused(error.to_string()))?;
-        let in_focus = InFocus {
+        let in_focus = FocusedTrain {
             train: train.clone(),
             origin: focused.origin(),
             distance: focused.object_distance(),

@@ -45,7 +45,7 @@ impl LensView {
     /// When no field has light, or a glass no index.
     pub fn waves(&self) -> Result<LensWaves, Error> {
         let refused = |error: AnalysisError| Error::Refused(format!("camera.lens: {error}"));
-        let lens_view::InFocus { train, origin, distance, image_z } = &self.in_focus;
+        let lens_view::FocusedTrain { train, origin, distance, image_z } = &self.in_focus;
         let at = train.at(train.wavelength()).map_err(|error| refused(error.into()))?;
         let mut found = LensWaves { wavelength: at.wavelength(), limit: 0.0, fields: Vec::new() };
         let mut dark = None;

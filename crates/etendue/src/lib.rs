@@ -7,7 +7,7 @@
 //! |---|---|
 //! | [`Session`] | a scene, opened once, changed and rendered often |
 //! | [`Rendering`] | layers as arrays, the sensor's images, files of them, the report |
-//! | [`Viewed`], [`Still`] | a file to look at, by what it is: a scene, a model, a lens, an image |
+//! | [`ViewedFile`], [`Still`] | a file to look at, by what it is: a scene, a model, a lens, an image |
 //! | [`LightImage`], [`ExposedImage`] | a picture of light from elsewhere, and what a sensor makes of it |
 //! | [`Preview`], [`Screen`], [`Viewpoint`], [`Inspector`] | what a window needs: pictures soon, shown, moved about and asked |
 //! | [`Frame`], [`Dataset`] | the pictures of a scene that has `frames`, and what others read of them |
@@ -63,7 +63,7 @@ pub use etendue_render::output::{
 };
 pub use etendue_render::tolerance::Verified;
 pub use etendue_render::{Checkpoint, Plan, Report, Shard, ShardBy, SoFar};
-pub use etendue_report::{Decision, DecisionKind, DecisionValue, Saving, Tabled};
+pub use etendue_report::{Decision, DecisionKind, DecisionValue, Refusal, Saving, Tabled};
 pub use etendue_scene::file::scene_schema;
 pub use etendue_scene::{Frame, RigCamera, Scene, ScenePath, Strictness};
 pub use exposed_image::{ExposedImage, write_frames};
@@ -77,10 +77,10 @@ pub use options::Options;
 pub use photo_match::{PhotoMatch, RawPhoto, match_photo};
 pub use preview::{Preview, Roughness};
 pub use progress::{Phase, Progress};
-pub use rendering::{Rendering, Written};
+pub use rendering::{Rendering, WrittenFiles};
 pub use session::{MeshAttributes, Session, read_glasses};
 pub use shares::Shares;
-pub use still::{Still, Viewed};
+pub use still::{Still, ViewedFile};
 pub use viewpoint::Viewpoint;
 
 /// The layers by the names that scenes give them.

@@ -260,7 +260,7 @@ impl LightImage {
         let (sidecar, json) = ImageMetadata::of_array(path).unzip();
         let sidecar = sidecar.unwrap_or_default();
         let inputs = [path.to_owned()].into_iter().chain(json).collect();
-        Self::of_numbers((path, inputs), array, wavelengths, sidecar)
+        Self::of_numbers(path, inputs, array, wavelengths, sidecar)
     }
 
     /// Values of `[row][column]`, `[row][column][red, green, blue]` or, with `wavelengths` (nm), `[row][column][band]`.
@@ -274,12 +274,13 @@ impl LightImage {
         array: npy::Array,
         wavelengths: Option<&[f64]>,
     ) -> Result<Self, Error> {
-        Self::of_numbers((name, Vec::new()), array, wavelengths, ImageMetadata::default())
+        Self::of_numbers(name, Vec::new(), array, wavelengths, ImageMetadata::default())
             .map_err(|why| refused(name, why))
     }
 
     fn of_numbers(
-        (path, inputs): (&Path, Vec<PathBuf>),
+        path: &Path,
+        inputs: Vec<PathBuf>,
         array: npy::Array,
         wavelengths: Option<&[f64]>,
         sidecar: ImageMetadata,
@@ -316,7 +317,7 @@ impl LightImage {
             }
             (None, _) => {
                 return Err(format!(
-                    "has {depth} values a pixel and does not say at which wavelengths: give them (nm), as \
+                    "has {depth} values a pixel and does not say at which wavelengths\nhint: give them (nm), as \
                      --wavelengths 400,410,…"
                 ));
             }
@@ -375,7 +376,7 @@ impl LightImage {
             _ => Err(refused(
                 folder,
                 format!(
-                    "has pictures of several kinds in it (.{}): give each kind a folder",
+                    "has pictures of several kinds in it (.{})\nhint: give each kind a folder",
                     kinds.join(", .")
                 ),
             )),
@@ -416,7 +417,7 @@ fn film(axis: &cube::BandAxis, values: Vec<f32>) -> Result<BandFilm, String> {
 /// The ENVI cube of which `path` is one of the two files, and both.
 pub(crate) fn read_envi(path: &Path, limits: Limits) -> Result<(Cube, Vec<PathBuf>), Error> {
     let partner = |names: Vec<PathBuf>| Ok(names.into_iter().find(|name| name.is_file()));
-    etendue_scene::read_envi((path, path), limits, partner)
+    etendue_scene::read_envi(path, path, limits, partner)
         .map_err(|fault| refused(&fault.path, fault.why))
 }
 

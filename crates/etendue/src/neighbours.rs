@@ -8,7 +8,7 @@ use etendue_camera::TruthAt;
 use etendue_render::FollowedFrame;
 use etendue_scene::{Frame, Scene};
 use etendue_tracer::LayerSpec;
-use etendue_tracer::layer::{Along, FrameStep, RowMoment};
+use etendue_tracer::layer::{FrameStep, RowMoment, StepAxis};
 
 use crate::Error;
 
@@ -41,7 +41,7 @@ pub(crate) fn moments(scene: &Scene) -> Vec<Neighbour> {
 }
 
 /// The frames that are these steps away from frame `number`, as far as there are such.
-pub(crate) fn around<'f>(
+pub(crate) fn in_steps<'f>(
     frames: &'f [Frame],
     number: usize,
     steps: &BTreeSet<FrameStep>,
@@ -55,9 +55,11 @@ pub(crate) fn around<'f>(
 fn target(frame: &Frame, step: FrameStep) -> Option<usize> {
     let Some(rig) = &frame.rig else { return step.from(frame.number) };
     let (moment, camera) = match step.along() {
-        Along::Frames => (step.from(rig.moment)?, rig.camera),
-        Along::Cameras => (rig.moment, step.from(rig.camera).filter(|camera| *camera < rig.count)?),
-        Along::Exposure => return None,
+        StepAxis::Frames => (step.from(rig.moment)?, rig.camera),
+        StepAxis::Cameras => {
+            (rig.moment, step.from(rig.camera).filter(|camera| *camera < rig.count)?)
+        }
+        StepAxis::Exposure => return None,
     };
     moment.checked_mul(rig.count)?.checked_add(camera)
 }
@@ -67,8 +69,8 @@ pub(crate) fn refuse_far(scene: &Scene, frames: &[Frame]) -> Result<(), Error> {
     let rig = frames.first().and_then(|frame| frame.rig.as_ref());
     let extent = |step: &FrameStep| match (rig, step.along()) {
         (None, _) => (frames.len(), "the scene's frames"),
-        (Some(rig), Along::Frames) => (frames.len() / rig.count, "the rig's moments"),
-        (Some(rig), Along::Cameras | Along::Exposure) => (rig.count, "the rig's cameras"),
+        (Some(rig), StepAxis::Frames) => (frames.len() / rig.count, "the rig's moments"),
+        (Some(rig), StepAxis::Cameras | StepAxis::Exposure) => (rig.count, "the rig's cameras"),
     };
     let is_far = |step: &FrameStep| {
         step.moment().is_none() && step.count().unsigned_abs() as usize >= extent(step).0
@@ -77,7 +79,7 @@ pub(crate) fn refuse_far(scene: &Scene, frames: &[Frame]) -> Result<(), Error> {
         Some(step) => {
             let (count, what) = extent(&step);
             Err(Error::Refused(format!(
-                "{}: layers: `to`: {} leads out of {what}, which are 0..{count}, from each of them: name a \
+                "{}: layers: `to`: {} leads out of {what}, which are 0..{count}, from each of them\nhint: name a \
                  nearer one, or leave the layer out",
                 scene.path.display(),
                 step.count()
@@ -117,9 +119,9 @@ impl Neighbour {
     pub(crate) fn header(&self) -> Result<(String, String), Error> {
         let way = if self.step.count() > 0 { "on" } else { "back" };
         let along = match self.step.along() {
-            Along::Frames => "",
-            Along::Cameras => "camera_",
-            Along::Exposure => "exposure_",
+            StepAxis::Frames => "",
+            StepAxis::Cameras => "camera_",
+            StepAxis::Exposure => "exposure_",
         };
         let key = format!("scene_hash_{along}{}_{way}", self.step.count().unsigned_abs());
         Ok((key, self.scene.hash()?.to_string()))

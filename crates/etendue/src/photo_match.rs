@@ -43,7 +43,7 @@ impl RawPhoto {
         let raster = etendue_image::decode(&bytes, Limits::default()).map_err(|error| {
             refuse(format!("{error}\nhint: give a DNG, or a PNG of raw numbers"))
         })?;
-        let developed = "is a developed picture, gamma-encoded: give the camera's raw numbers, as a DNG or a grey PNG of 16 bits";
+        let developed = "is a developed picture, gamma-encoded\nhint: give the camera's raw numbers, as a DNG or a grey PNG of 16 bits";
         match (raster.size(), raster.channels(), raster.into_samples()) {
             (size, 1, Samples::U16(numbers)) => {
                 Ok(Self { size, numbers, white: None, exposure: None })
@@ -90,7 +90,8 @@ fn beyond_the_fit(spec: &SensorSpec) -> Option<&'static str> {
 /// When the scene has no raw sensor, and as the fit: of another size, clipped, not linear, too few levels of light.
 pub fn match_photo(
     session: &mut Session,
-    (path, photo): (&Path, &RawPhoto),
+    path: &Path,
+    photo: &RawPhoto,
     progress: &Progress,
 ) -> Result<PhotoMatch, Error> {
     let of_scene = format!("{}: ", session.file().path().display());
@@ -112,11 +113,11 @@ pub fn match_photo(
         }
         let size = sensor.resolution().map(|side| side as usize);
         if size != photo.size {
-            let why = MatchError::Size { photo: photo.size, sensor: size };
+            let why = MatchError::size(photo.size, size);
             return Err(Error::Refused(format!("{}: {why}", path.display())));
         }
         if sensor.depth() != 1 {
-            let why = MatchError::NotRaw(sensor.depth());
+            let why = MatchError::not_raw(sensor.depth());
             return Err(Error::Refused(format!("{of_scene}{why}")));
         }
     }

@@ -11,6 +11,7 @@ use etendue_scene::Scene;
 use etendue_scene::file::SamplesSpec;
 use etendue_sensor::RawImage;
 
+use crate::session::PreparedScene;
 use crate::{Error, Progress, Rendering, Session};
 
 /// Roughness of a preview.
@@ -179,7 +180,7 @@ impl Session {
             return Ok(Preview::finished(rendering, start.elapsed()));
         }
         self.prepare(progress)?;
-        let (scene, accel, images) = self.prepared()?;
+        let PreparedScene { scene, accel, images } = self.prepared()?;
         let mut scene = Scene::clone(&scene);
         scene.camera = scene.camera.coarser(rough.factor);
         let resolution = scene.camera.resolution();
@@ -190,8 +191,8 @@ impl Session {
         }
         let plan = Plan::new(&scene, self.outputs());
         let prepared = Prepared { accel: &*accel, images: &images, others: &[] };
-        let (start, course) = (Instant::now(), etendue_render::RenderState::default());
-        let film = etendue_render::trace(&scene, &plan, prepared, &[], &course, progress)?;
+        let (start, state) = (Instant::now(), etendue_render::RenderState::default());
+        let film = etendue_render::trace(&scene, &plan, prepared, &[], &state, progress)?;
         let rendered = etendue_render::finish(&scene, &plan, film, Vec::new(), Some(&*accel))?;
         let time = start.elapsed();
         let light = SensorLight::new(&scene, (&rendered.picture, rendered.band_film))?.ok();

@@ -69,17 +69,17 @@ impl fmt::Debug for Progress {
 }
 
 impl Progress {
-    /// Nobody is told; [`Self::cancel`] stops.
+    /// Progress of which nobody hears; [`Self::cancel`] stops.
     #[must_use]
     pub fn none() -> Self {
         Self::default()
     }
 
-    /// `told` is called with the phase and the share of it that is done (0..=1), now and then and from
+    /// Calls `on_phase` with the phase and the share of it that is done (0..=1), now and then and from
     /// many threads; answering `false` stops.
     #[must_use]
-    pub fn new(told: impl Fn(Phase, f64) -> bool + Send + Sync + 'static) -> Self {
-        Self { on_phase: Some(Arc::new(told)), ..Self::default() }
+    pub fn new(on_phase: impl Fn(Phase, f64) -> bool + Send + Sync + 'static) -> Self {
+        Self { on_phase: Some(Arc::new(on_phase)), ..Self::default() }
     }
 
     /// Shows the picture so far to `look` after each pass over its pixels but the last.
@@ -110,13 +110,13 @@ impl Progress {
 
     /// Reports, and answers whether to go on.
     pub(crate) fn goes_on(&self, phase: Phase, share: f64) -> bool {
-        let told = self.on_phase.as_ref().is_none_or(|told| told(phase, share));
-        told && !self.is_cancelled()
+        let goes_on = self.on_phase.as_ref().is_none_or(|on_phase| on_phase(phase, share));
+        goes_on && !self.is_cancelled()
     }
 
     pub(crate) fn note(&self, note: &str) {
-        if let Some(told) = &self.on_note {
-            told(note);
+        if let Some(on_note) = &self.on_note {
+            on_note(note);
         }
     }
 

@@ -55,7 +55,7 @@ enum PictureScope {
 
 /// Files that were written.
 #[derive(Debug, Clone, Default)]
-pub struct Written {
+pub struct WrittenFiles {
     /// The files, in the order in which they were written.
     pub files: Vec<PathBuf>,
     /// Notes for the user on the files.
@@ -67,9 +67,11 @@ pub struct Written {
 impl Rendering {
     pub(crate) fn new(
         scene: Arc<Scene>,
-        (picture, band_film): (Picture, Option<BandFilm>),
+        picture: Picture,
+        band_film: Option<BandFilm>,
         traced: Option<(Arc<dyn Accel>, Arc<Images>)>,
-        (report, fingerprints): (Report, Vec<(String, String)>),
+        report: Report,
+        fingerprints: Vec<(String, String)>,
     ) -> Result<Self, Error> {
         let (light, idle_notes) = match SensorLight::new(&scene, (&picture, band_film))? {
             Ok(light) => (Some(light), Vec::new()),
@@ -207,7 +209,7 @@ impl Rendering {
     /// # Errors
     ///
     /// When the folder cannot be written to, or a file of the scene would be overwritten.
-    pub fn write(&self, folder: impl AsRef<Path>, outputs: Outputs) -> Result<Written, Error> {
+    pub fn write(&self, folder: impl AsRef<Path>, outputs: Outputs) -> Result<WrittenFiles, Error> {
         places::folder(folder.as_ref())?;
         self.write_with(folder.as_ref(), outputs, &Progress::none())
     }
@@ -222,7 +224,7 @@ impl Rendering {
         folder: &Path,
         outputs: Outputs,
         progress: &Progress,
-    ) -> Result<Written, Error> {
+    ) -> Result<WrittenFiles, Error> {
         self.write_part(folder, outputs, PictureScope::Whole, progress)
     }
 
@@ -232,7 +234,7 @@ impl Rendering {
         folder: &Path,
         outputs: Outputs,
         progress: &Progress,
-    ) -> Result<Written, Error> {
+    ) -> Result<WrittenFiles, Error> {
         self.write_part(folder, outputs, PictureScope::Frame, progress)
     }
 
@@ -242,7 +244,7 @@ impl Rendering {
         outputs: Outputs,
         part: PictureScope,
         progress: &Progress,
-    ) -> Result<Written, Error> {
+    ) -> Result<WrittenFiles, Error> {
         let start = Instant::now();
         // Results must not be written over inputs.
         let names = self.picture.layers().iter().map(|layer| layer.name.clone());
@@ -252,7 +254,7 @@ impl Rendering {
         // Layers, exposures and the light field's set, recorded in the folder's manifest.
         let mut written =
             places::recorded(Ledger::open(folder, "render"), &self.scene.inputs, |to| {
-                let (mut files, mut notes) = self.write_layers((to, folder), outputs, progress)?;
+                let (mut files, mut notes) = self.write_layers(to, folder, outputs, progress)?;
                 notes.extend(self.idle_notes.iter().cloned());
                 if let Some(light) = &self.light {
                     let goes_on = |share| progress.goes_on(Phase::Expose, share);
@@ -260,11 +262,11 @@ impl Rendering {
                     files.extend(exposed.files);
                     notes.extend(exposed.notes);
                 }
-                let set = self.write_light_field((to, folder), outputs, progress)?;
+                let set = self.write_light_field(to, folder, outputs, progress)?;
                 files.extend(set.files);
                 notes.extend(set.notes);
-                files.extend(self.write_annotations((to, folder), outputs, part, progress)?);
-                Ok::<_, Error>(Written { files, notes, time: Duration::ZERO })
+                files.extend(self.write_annotations(to, folder, outputs, part, progress)?);
+                Ok::<_, Error>(WrittenFiles { files, notes, time: Duration::ZERO })
             })?;
         // A whole picture takes the place of a partial one.
         if self.partial().is_none() {
@@ -277,7 +279,7 @@ impl Rendering {
 
     /// The report with the files that were written, as `--report` has it.
     #[must_use]
-    pub fn report_of(&self, written: &Written) -> Report {
+    pub fn report_of(&self, written: &WrittenFiles) -> Report {
         let mut report = self.report.clone();
         report.seconds.write = seconds(written.time);
         report.seconds.total += report.seconds.write;
@@ -289,20 +291,22 @@ impl Rendering {
     /// Writes what a light-field camera leaves beside its picture; nothing of others.
     fn write_light_field(
         &self,
-        to: (&Transaction, &Path),
+        to: &Transaction,
+        folder: &Path,
         outputs: Outputs,
         progress: &Progress,
     ) -> Result<LightFieldSet, Error> {
         let Some((accel, images)) = &self.traced else { return Ok(LightFieldSet::default()) };
         let rendering = light_field::RenderedScene { scene: &self.scene, accel: &**accel, images };
         let goes_on = |share| progress.goes_on(Phase::LightField, share);
-        Ok(light_field::write(rendering, &self.picture, to, outputs, &goes_on)?)
+        Ok(light_field::write(rendering, &self.picture, (to, folder), outputs, &goes_on)?)
     }
 
     /// Writes what tells the scene's copies apart, and names by their shares of pixels.
     fn write_annotations(
         &self,
-        (to, folder): (&Transaction, &Path),
+        to: &Transaction,
+        folder: &Path,
         outputs: Outputs,
         part: PictureScope,
         progress: &Progress,
@@ -324,7 +328,7 @@ impl Rendering {
         let goes_on = |share| progress.goes_on(Phase::Annotate, share);
         if outputs.cryptomatte {
             let path = folder.join(CRYPTOMATTE);
-            annotations::write_cryptomatte(&self.scene, &*accel, (to, &path), &goes_on)?;
+            annotations::write_cryptomatte(&self.scene, &*accel, to, &path, &goes_on)?;
             files.push(path);
         }
         if !outputs.annotates() {
@@ -354,7 +358,7 @@ impl Rendering {
                     picture: Source::Picture(&self.picture),
                     depth: Source::Numbers(&depth),
                 };
-                files.extend(annotations::write_sets(&[shot], &models, (to, folder), outputs)?);
+                files.extend(annotations::write_sets(&[shot], &models, to, folder, outputs)?);
             }
         }
         Ok(files)
@@ -363,7 +367,8 @@ impl Rendering {
     /// The files of layers, and what a user should know of them.
     fn write_layers(
         &self,
-        (to, folder): (&Transaction, &Path),
+        to: &Transaction,
+        folder: &Path,
         outputs: Outputs,
         progress: &Progress,
     ) -> Result<(Vec<PathBuf>, Vec<String>), Error> {
@@ -395,7 +400,7 @@ impl Rendering {
         sidecar::write_json(to, &place("camera.json".to_owned()), &camera.opencv())?;
         sidecar::write(to, &place("layers.json".to_owned()), picture)?;
         if let Some(imu) = &self.scene.render.imu {
-            notes.extend(imu::write((to, &place(IMU.to_owned())), &self.scene, imu)?);
+            notes.extend(imu::write(to, &place(IMU.to_owned()), &self.scene, imu)?);
         }
         Ok((files, notes))
     }

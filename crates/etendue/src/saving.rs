@@ -42,7 +42,7 @@ impl Session {
             && !is_same_folder(path.parent(), &folder)
         {
             return Err(Error::Refused(format!(
-                "{}: the scene names files, such as {}, and finds them from its own folder: save it in {}",
+                "{}: the scene names files, such as {}, and finds them from its own folder\nhint: save it in {}",
                 path.display(),
                 named.display(),
                 folder.display()

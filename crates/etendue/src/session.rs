@@ -74,7 +74,11 @@ pub struct Session {
 }
 
 /// A scene, the structure over it, and its images.
-pub(crate) type Ready = (Arc<Scene>, Arc<dyn Accel>, Arc<Images>);
+pub(crate) struct PreparedScene {
+    pub(crate) scene: Arc<Scene>,
+    pub(crate) accel: Arc<dyn Accel>,
+    pub(crate) images: Arc<Images>,
+}
 
 /// The scene as it is now: while its picture is rendered, the one in its place.
 struct LoadedScene {
@@ -86,14 +90,14 @@ struct LoadedScene {
     /// Other frames that it is compared with.
     neighbours: Vec<Neighbour>,
     /// State of the images of this scene: whether they are decoded, and how much of them.
-    decoded: Decoded,
+    decoded: DecodedImages,
     /// Coarser scene that is rendered in its place, once that was looked for.
     coarse: Option<CoarseScene>,
 }
 
 /// State of a scene's images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Decoded {
+enum DecodedImages {
     /// Nothing yet.
     Nothing,
     /// All of those that are looked at.
@@ -281,7 +285,8 @@ impl Session {
     /// As [`Self::scene`].
     pub fn is_complete(
         &mut self,
-        (out, pattern): (&Path, &FramePattern),
+        out: &Path,
+        pattern: &FramePattern,
         number: usize,
         progress: &Progress,
     ) -> Result<bool, Error> {
@@ -364,7 +369,8 @@ impl Session {
     /// When one does; the message names it. Those of `also`, and as [`Self::scene`].
     pub fn check_frames<E: From<Error>>(
         &mut self,
-        (out, pattern): (&Path, &FramePattern),
+        out: &Path,
+        pattern: &FramePattern,
         frames: &[Frame],
         progress: &Progress,
         also: impl Fn(&[PathBuf]) -> Result<(), E>,
@@ -377,9 +383,9 @@ impl Session {
             values.flat_map(texts_of).for_each(|word| drop(folder.find(word)));
         }
         let inputs = self.opener.found();
-        let beside: Vec<PathBuf> = Dataset::file_names().map(|name| out.join(name)).collect();
-        places::keep_apart(&inputs, &beside)?;
-        also(&beside)?;
+        let of_dataset: Vec<PathBuf> = Dataset::file_names().map(|name| out.join(name)).collect();
+        places::keep_apart(&inputs, &of_dataset)?;
+        also(&of_dataset)?;
         let (outputs, loaded) = (self.options.outputs, self.loaded()?);
         let common = file_names(&loaded.scene, &loaded.plan, outputs);
         for frame in frames {
@@ -389,7 +395,7 @@ impl Session {
                 let layers = rendering::layer_names(&shown.spec);
                 names.extend(layers.flat_map(|layer| rendering::layer_files(&layer, outputs)));
             }
-            also(&pattern.keep_apart(out, frame.number, (&inputs, &names))?)?;
+            also(&pattern.keep_apart(out, frame.number, &inputs, &names)?)?;
         }
         Ok(())
     }

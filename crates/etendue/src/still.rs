@@ -1,4 +1,4 @@
-//! What a file is that somebody wants to look at; an image file by itself: its layers, how each is shown, and the values of its pixels.
+//! Files that somebody wants to look at, by what they are; an image file by itself: its layers, how each is shown, and the values of its pixels.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use crate::{Error, Options, Session};
 
 /// A file that was opened to be looked at, by what it is.
 #[derive(Debug)]
-pub enum Viewed {
+pub enum ViewedFile {
     /// A scene.
     Scene(Box<Session>),
     /// A model, in a scene that frames it.
@@ -28,7 +28,7 @@ pub enum Viewed {
     Image(Box<Still>),
 }
 
-impl Viewed {
+impl ViewedFile {
     /// Opens the file at `path`: images and Zemax files are told by their endings, lens files by what is in
     /// them, all others as by [`Session::open_with`]. Settings are of scenes, models and lenses.
     ///
@@ -294,7 +294,7 @@ fn meaning(text: Option<&String>) -> Vec<(String, String)> {
     unit.map(|unit| ("unit".to_owned(), unit.to_owned())).into_iter().collect()
 }
 
-/// How a layer of this name is shown, by the table of layers; other programs' layers are told by their channels.
+/// Look of a layer of this name, by the table of layers; other programs' layers are told by their channels.
 fn look_by_name(name: &str) -> Option<Look> {
     if name.starts_with(SPECTRUM) || name == REFLECTANCE {
         return Some(Look::Cube);

@@ -16,12 +16,12 @@ use etendue_scene::Scene;
 #[derive(Debug, Default)]
 pub(crate) struct Structures {
     /// The latest first.
-    built: Vec<Built>,
+    built: Vec<BuiltStructure>,
 }
 
 /// A structure, and what it was built over.
 #[derive(Debug, Clone)]
-struct Built {
+struct BuiltStructure {
     accel: Arc<dyn Accel>,
     geometry: Arc<Geometry>,
     name: Option<AccelName>,
@@ -52,7 +52,7 @@ fn serves(lacks: Option<&Unseen>, unseen: Option<&Unseen>) -> bool {
 impl Structures {
     /// True if `accel` has all of the surfaces of its scene.
     pub(crate) fn is_whole(&self, accel: &Arc<dyn Accel>) -> bool {
-        let is_own = |built: &&Built| Arc::ptr_eq(&built.accel, accel);
+        let is_own = |built: &&BuiltStructure| Arc::ptr_eq(&built.accel, accel);
         self.built.iter().find(is_own).is_none_or(|built| built.unseen.is_none())
     }
 
@@ -63,8 +63,9 @@ impl Structures {
         plan: &Plan,
         unseen: Option<&Unseen>,
     ) -> Option<Arc<dyn Accel>> {
-        let is_own = |built: &Built| built.is_new && built.accel.report().quality == plan.quality;
-        let will_do = |built: &&Built| {
+        let is_own =
+            |built: &BuiltStructure| built.is_new && built.accel.report().quality == plan.quality;
+        let will_do = |built: &&BuiltStructure| {
             built.is_over(scene)
                 && serves(built.unseen.as_ref(), unseen)
                 && built.refine == plan.refine
@@ -84,9 +85,9 @@ impl Structures {
     ) -> Result<Arc<dyn Accel>, RenderError> {
         let name = scene.render.accel;
         let unseen = unseen.filter(|_| !self.built.iter().any(|built| built.is_over(scene)));
-        let is_alike = |built: &&Built| built.name == name && built.refine == plan.refine;
-        let is_whole = |built: &&Built| built.unseen.is_none() && unseen.is_none();
-        let fits = |built: &&Built| is_alike(built) && is_whole(built) && !wants_new(plan);
+        let is_alike = |built: &&BuiltStructure| built.name == name && built.refine == plan.refine;
+        let is_whole = |built: &&BuiltStructure| built.unseen.is_none() && unseen.is_none();
+        let fits = |built: &&BuiltStructure| is_alike(built) && is_whole(built) && !wants_new(plan);
         let before = self.built.iter().find(fits);
         let is_new = before.is_none();
         let accel = match unseen {
@@ -98,7 +99,8 @@ impl Structures {
         let (refine, exposure) = (plan.refine, scene.camera.exposure_span());
         let unseen = unseen.cloned();
         let accel_too = Arc::clone(&accel);
-        let built = Built { accel: accel_too, geometry, name, refine, exposure, is_new, unseen };
+        let built =
+            BuiltStructure { accel: accel_too, geometry, name, refine, exposure, is_new, unseen };
         self.built.insert(0, built);
         Ok(accel)
     }
@@ -109,7 +111,7 @@ impl Structures {
     }
 }
 
-impl Built {
+impl BuiltStructure {
     fn is_over(&self, scene: &Scene) -> bool {
         self.name == scene.render.accel
             && (self.exposure == scene.camera.exposure_span() || !scene.geometry.moves())

@@ -42,7 +42,7 @@ impl Book {
     }
 }
 
-/// What tells whether a file is as it was written.
+/// Fingerprint that tells whether a file is as it was written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Print {
     bytes: u64,

@@ -32,7 +32,7 @@ const MOST_VISITS: usize = 1 << 23;
 /// For each triangle the others in its plane that lie over it, of other placements.
 #[derive(Debug, Clone, Default)]
 pub struct Coplanar {
-    others: BTreeMap<PlacedTriangle, Overlapping>,
+    others: BTreeMap<PlacedTriangle, Overlaps>,
     /// By placement a bit a triangle: it has others over it. Empty where none has.
     covered: Vec<Vec<u64>>,
     /// The last placement of the same mesh in the very same place, by placement; empty where no two are.
@@ -41,7 +41,7 @@ pub struct Coplanar {
 
 /// The triangles over one.
 #[derive(Debug, Clone, Default)]
-struct Overlapping {
+struct Overlaps {
     all: Vec<PlacedTriangle>,
     /// The box of each (m), as much larger as planes may be apart.
     boxes: Vec<Bounds>,
@@ -50,7 +50,7 @@ struct Overlapping {
     widest: f64,
 }
 
-impl Overlapping {
+impl Overlaps {
     /// Puts the triangles, whose planes may be so far apart (m), in order, each once.
     fn settle(&mut self, geometry: &Geometry, apart: f64) {
         self.all.sort_unstable();
@@ -258,7 +258,7 @@ impl Coplanar {
         let others = Some(id).filter(|&own| self.has_others(own));
         let others = others.and_then(|own| self.others.get(&own));
         others.into_iter().flat_map(move |others| {
-            let &Overlapping { ref all, ref boxes, axis, widest } = others;
+            let &Overlaps { ref all, ref boxes, axis, widest } = others;
             let at = point[axis];
             let first = boxes.partition_point(|own| own.min[axis] + widest + slack < at);
             let near = boxes[first..].iter().take_while(move |own| own.min[axis] - slack <= at);

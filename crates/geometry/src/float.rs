@@ -64,7 +64,7 @@ pub trait Float:
     fn small_sine_cosine(self) -> (Self, Self);
 }
 
-/// What both precisions have by these names.
+/// Declares what both precisions have by these names.
 macro_rules! own_functions {
     () => {
         #[inline(always)]

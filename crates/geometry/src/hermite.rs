@@ -8,7 +8,7 @@ use glam::{DQuat, DVec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How a place runs between two points.
+/// Interpolation of a place between two points.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Interpolation {
@@ -135,16 +135,16 @@ pub(crate) fn turned(a: DQuat, b: DQuat, s: f64) -> DQuat {
 mod tests {
     use super::*;
 
-    struct Thrown(Vec<f64>);
+    struct Throw(Vec<f64>);
 
-    impl Thrown {
+    impl Throw {
         fn at(time: f64) -> DVec3 {
             DVec3::new(1.0, 2.0, -3.0) + DVec3::new(4.0, -1.0, 0.5) * time
                 - DVec3::new(0.3, 4.9, -2.0) * (time * time)
         }
     }
 
-    impl Points for Thrown {
+    impl Points for Throw {
         fn count(&self) -> usize {
             self.0.len()
         }
@@ -160,7 +160,7 @@ mod tests {
     #[test]
     fn points_of_a_parabola_give_that_parabola() {
         for times in [vec![0.0, 0.3, 1.0], vec![-1.0, -0.9, 0.2, 0.5, 2.0]] {
-            let points = Thrown(times);
+            let points = Throw(times);
             for i in 0..points.count() - 1 {
                 let [from, to] = [points.time(i), points.time(i + 1)];
                 let way = Way {
@@ -173,7 +173,7 @@ mod tests {
                     let velocity = DVec3::new(4.0, -1.0, 0.5) - DVec3::new(0.6, 9.8, -4.0) * time;
                     let acceleration = -DVec3::new(0.6, 9.8, -4.0);
                     // Roundings of numbers of some tens, over times of a tenth.
-                    assert!((points.place(i) + way.at(s) - Thrown::at(time)).length() < 1e-13);
+                    assert!((points.place(i) + way.at(s) - Throw::at(time)).length() < 1e-13);
                     assert!((way.velocity(s) - velocity).length() < 1e-12, "{i} {s}");
                     assert!((way.acceleration(s) - acceleration).length() < 1e-10, "{i} {s}");
                     assert!(way.velocity(s).length() <= way.fastest() * (1.0 + 1e-14));
@@ -184,7 +184,7 @@ mod tests {
 
     #[test]
     fn two_points_are_a_line() {
-        let points = Thrown(vec![0.0, 2.0]);
+        let points = Throw(vec![0.0, 2.0]);
         let line = slopes(&points, 0, Interpolation::Linear);
         assert_eq!(slopes(&points, 0, Interpolation::Cubic), line);
     }

@@ -47,7 +47,7 @@ pub use hermite::Interpolation;
 pub use joint::{Between, Joint, Link, Track};
 pub use mesh::{Buffer, Mesh, Positions, Tangents, Vertices};
 pub use motion::{Motion, MotionError, Steady, Sweep};
-pub use steps::{Moment, Steps, StepsError};
+pub use steps::{Moment, Steps};
 pub use transform::Transform;
 pub use world::{AreaTest, Bounds, Geometry, Placement, is_degenerate};
 

@@ -203,7 +203,7 @@ impl Motion {
         Self { inner: Transform::IDENTITY, ..all }
     }
 
-    /// From when until when its frames have keys (s), where they have any.
+    /// Span of time in which its frames have keys (s), where they have any.
     #[must_use]
     pub fn played_span(&self) -> Option<[f64; 2]> {
         let times = || self.links.iter().flat_map(Link::times);
@@ -222,7 +222,7 @@ impl Motion {
         if self.keys.is_empty() { inner } else { self.key_at(time).transform().then_inner(&inner) }
     }
 
-    /// From when to when it moves (s): infinite for a steady motion.
+    /// Span of time in which it moves (s): infinite for a steady motion.
     #[must_use]
     pub fn span(&self) -> [f64; 2] {
         let is_steady = self.steady.is_some_and(|steady| steady.moves());

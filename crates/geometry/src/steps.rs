@@ -1,5 +1,6 @@
 //! A mesh that changes its shape while the shutter is open: its corners at some times, and straight lines between them.
 
+use etendue_report::Refusal;
 use glam::DVec3;
 
 use crate::{Bounds, Vertices};
@@ -13,34 +14,6 @@ pub struct Steps {
     /// Of each time; none where the mesh has none.
     normals: Vec<Vertices<3>>,
     bounds: Bounds,
-}
-
-/// Error of shapes that make no steps.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum StepsError {
-    /// No time, or not one list of corners, and of normals if any, for each.
-    #[error(
-        "{times} times, {corners} lists of corners and {normals} of normals\nhint: give one of each for each time"
-    )]
-    Count {
-        /// Times.
-        times: usize,
-        /// Lists of corners.
-        corners: usize,
-        /// Lists of normals.
-        normals: usize,
-    },
-    /// Times that do not grow, or one that is not finite.
-    #[error("time {0} is not finite or not after the one before it; sort the times")]
-    Order(usize),
-    /// Lists of different lengths, or shorter than what triangles name.
-    #[error(
-        "the shape at time {0} has not all corners\nhint: give each shape as many as the first has"
-    )]
-    Corners(usize),
-    /// A corner of a triangle that is not finite.
-    #[error("a corner of a triangle is not finite at time {0}")]
-    NotFinite(usize),
 }
 
 /// A time between two steps.
@@ -60,21 +33,23 @@ impl Steps {
     ///
     /// # Errors
     ///
-    /// [`StepsError`], when times do not grow, a list is missing or too short, or a corner is not finite.
+    /// When times do not grow, a list is missing or too short, or a corner is not finite.
     pub fn new(
         times: Vec<f64>,
         corners: Vec<Vec<[f64; 3]>>,
         normals: Vec<Vertices<3>>,
         triangles: &[[u32; 3]],
-    ) -> Result<Self, StepsError> {
+    ) -> Result<Self, Refusal> {
         let has_normals = normals.is_empty() || normals.len() == times.len();
         if times.is_empty() || corners.len() != times.len() || !has_normals {
             let (times, corners, normals) = (times.len(), corners.len(), normals.len());
-            return Err(StepsError::Count { times, corners, normals });
+            let why = format!("{times} times, {corners} lists of corners and {normals} of normals");
+            return Err(Refusal::new(why).hint("give one of each for each time"));
         }
         let follows = |i: usize| times[i].is_finite() && (i == 0 || times[i - 1] < times[i]);
         if let Some(wrong) = (0..times.len()).find(|&i| !follows(i)) {
-            return Err(StepsError::Order(wrong));
+            let why = format!("time {wrong} is not finite or not after the one before it");
+            return Err(Refusal::new(why).hint("sort the times"));
         }
         let most =
             triangles.as_flattened().iter().copied().max().map_or(0, |most| most as usize + 1);
@@ -82,12 +57,14 @@ impl Steps {
         for (i, shape) in corners.iter().enumerate() {
             let fits = shape.len() >= most && shape.len() == corners[0].len();
             if !fits || normals.get(i).is_some_and(|normals| normals.len() != shape.len()) {
-                return Err(StepsError::Corners(i));
+                let why = format!("the shape at time {i} has not all corners");
+                return Err(Refusal::new(why).hint("give each shape as many as the first has"));
             }
             for &corner in triangles.as_flattened() {
                 let corner = DVec3::from(shape[corner as usize]);
                 if !corner.is_finite() {
-                    return Err(StepsError::NotFinite(i));
+                    let why = format!("a corner of a triangle is not finite at time {i}");
+                    return Err(why.into());
                 }
                 bounds.include(corner);
             }
@@ -177,11 +154,15 @@ mod tests {
     #[test]
     fn what_makes_no_steps_is_refused() {
         let new = |times: &[f64], shapes: Vec<Vec<[f64; 3]>>| {
-            Steps::new(times.to_vec(), shapes, Vec::new(), &TRIANGLE).expect_err("unsound")
+            let steps = Steps::new(times.to_vec(), shapes, Vec::new(), &TRIANGLE);
+            steps.expect_err("unsound").why().to_owned()
         };
-        assert!(matches!(new(&[], Vec::new()), StepsError::Count { .. }));
-        assert_eq!(new(&[0.0, 0.0], vec![shape(0.0); 2]), StepsError::Order(1));
-        assert_eq!(new(&[0.0], vec![shape(0.0)[..2].to_vec()]), StepsError::Corners(0));
-        assert_eq!(new(&[0.0, 1.0], vec![shape(0.0), shape(f64::NAN)]), StepsError::NotFinite(1));
+        assert_eq!(new(&[], Vec::new()), "0 times, 0 lists of corners and 0 of normals");
+        let order = new(&[0.0, 0.0], vec![shape(0.0); 2]);
+        assert_eq!(order, "time 1 is not finite or not after the one before it");
+        let corners = new(&[0.0], vec![shape(0.0)[..2].to_vec()]);
+        assert_eq!(corners, "the shape at time 0 has not all corners");
+        let broken = new(&[0.0, 1.0], vec![shape(0.0), shape(f64::NAN)]);
+        assert_eq!(broken, "a corner of a triangle is not finite at time 1");
     }
 }

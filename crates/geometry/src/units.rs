@@ -7,6 +7,7 @@
 use std::borrow::Cow;
 use std::fmt;
 
+use etendue_report::Refusal;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Error as _, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -57,44 +58,6 @@ const TIMES: &[Unit] = &[
     ("min", 60.0, 1.0),
 ];
 
-/// Error of a string that is not a quantity.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum QuantityError {
-    /// No number in front.
-    #[error("\"{text}\" does not start with a number\nhint: write for example \"{example}\"")]
-    NoNumber {
-        /// The string.
-        text: String,
-        /// One that would do.
-        example: String,
-    },
-    /// A number and nothing behind it.
-    #[error("\"{text}\" has no unit\nhint: write \"{text} {unit}\", or the number without quotes")]
-    NoUnit {
-        /// The string.
-        text: String,
-        /// The unit of a bare number.
-        unit: String,
-    },
-    /// A unit that is not in the table.
-    #[error("\"{text}\": unknown unit `{unit}`, known: {}", known.join(", "))]
-    UnknownUnit {
-        /// The string.
-        text: String,
-        /// Its unit.
-        unit: String,
-        /// The units of this dimension.
-        known: Vec<&'static str>,
-    },
-    /// Infinite or not a number.
-    #[error("\"{text}\" is not a finite number")]
-    NotFinite {
-        /// The string.
-        text: String,
-    },
-}
-
 impl Dimension {
     fn units(self) -> &'static [Unit] {
         match self {
@@ -125,19 +88,17 @@ impl Dimension {
     /// # Errors
     ///
     /// When the number or the unit is missing, unknown or not finite.
-    pub fn parse(self, text: &str, target: &str) -> Result<f64, QuantityError> {
+    pub fn parse(self, text: &str, target: &str) -> Result<f64, Refusal> {
         let trimmed = text.trim();
         // A number, and a unit that this quantity has.
         let (number, unit) = split_number(trimmed);
         let Ok(value) = number.parse::<f64>() else {
-            let example = format!("50 {target}");
-            return Err(QuantityError::NoNumber { text: text.to_owned(), example });
+            let why = format!("\"{text}\" does not start with a number");
+            return Err(Refusal::new(why).hint(format!("write for example \"50 {target}\"")));
         };
         if unit.is_empty() {
-            return Err(QuantityError::NoUnit {
-                text: trimmed.to_owned(),
-                unit: target.to_owned(),
-            });
+            let remedy = format!("write \"{trimmed} {target}\", or the number without quotes");
+            return Err(Refusal::new(format!("\"{trimmed}\" has no unit")).hint(remedy));
         }
         let of = |name: &str| self.units().iter().find(|(known, ..)| *known == name);
         let (Some(&(_, up, down)), Some(&(_, target_up, target_down))) = (of(unit), of(target))
@@ -149,18 +110,15 @@ impl Dimension {
                 .filter(|name| name.is_ascii())
                 .collect();
             known.sort_unstable();
-            return Err(QuantityError::UnknownUnit {
-                text: text.to_owned(),
-                unit: unit.to_owned(),
-                known,
-            });
+            let known = known.join(", ");
+            return Err(format!("\"{text}\": unknown unit `{unit}`, known: {known}").into());
         };
         // From one unit to the other by whole numbers, which rounds once.
         let scaled = rescale(value, up * target_down, down * target_up);
         if scaled.is_finite() {
             Ok(scaled)
         } else {
-            Err(QuantityError::NotFinite { text: text.to_owned() })
+            Err(format!("\"{text}\" is not a finite number").into())
         }
     }
 }

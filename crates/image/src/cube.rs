@@ -347,7 +347,7 @@ impl Cube {
             Some(edges) => BandAxis::between(edges),
             None => BandAxis::new(middles, None),
         };
-        let axis = axis.map_err(DecodeError::Cube)?;
+        let axis = axis.map_err(DecodeError::Refused)?;
         let [columns, rows] = channels.size;
         let mut values = room::<f32>(columns * rows * planes.len())?;
         for i in 0..columns * rows {
@@ -433,8 +433,8 @@ mod tests {
         };
         assert_eq!(edges(&[405.0, 415.0, 430.0], None).unwrap(), [400.0, 410.0, 422.5, 437.5]);
         // Bands of unequal widths that meet.
-        let met = edges(&[405.0, 420.0, 440.0], Some(&[10.0, 20.0, 20.0]));
-        assert_eq!(met.unwrap(), [400.0, 410.0, 430.0, 450.0]);
+        let touching = edges(&[405.0, 420.0, 440.0], Some(&[10.0, 20.0, 20.0]));
+        assert_eq!(touching.unwrap(), [400.0, 410.0, 430.0, 450.0]);
         // Filters with gaps between them.
         let apart = edges(&[450.0, 550.0], Some(&[10.0, 10.0]));
         assert_eq!(apart.unwrap(), [400.0, 500.0, 600.0]);

@@ -154,7 +154,7 @@ impl Header {
     ///
     /// When it is none, or leaves open where the numbers are; the message goes on after the file's name.
     pub fn parse(bytes: &[u8]) -> Result<Self, DecodeError> {
-        Self::read(bytes).map_err(DecodeError::Cube)
+        Self::read(bytes).map_err(DecodeError::Refused)
     }
 
     fn read(bytes: &[u8]) -> Result<Self, String> {
@@ -228,7 +228,7 @@ impl Header {
         let end = promised.and_then(|bytes| bytes.checked_add(self.offset));
         let numbers = end.and_then(|end| data.get(self.offset..end)).ok_or_else(|| {
             let bands = self.bands;
-            DecodeError::Cube(format!(
+            DecodeError::Refused(format!(
                 "promises {columns} samples x {rows} lines x {bands} bands of {} bytes behind the first {}, and the \
                  file of numbers has {} bytes: it is cut off, or of another header",
                 self.number.bytes(),
@@ -240,9 +240,9 @@ impl Header {
         limits.of(data).judge([wide, high], 4 * self.bands as u64)?;
         // Bands that the file itself calls bad are left out.
         let mut notes = Vec::new();
-        let (kept, axis) = self.axis(&mut notes).map_err(DecodeError::Cube)?;
-        let scale = self.scale().map_err(DecodeError::Cube)?;
-        let ignored = self.one("data ignore value").map_err(DecodeError::Cube)?;
+        let (kept, axis) = self.axis(&mut notes).map_err(DecodeError::Refused)?;
+        let scale = self.scale().map_err(DecodeError::Refused)?;
+        let ignored = self.one("data ignore value").map_err(DecodeError::Refused)?;
         // The file's numbers are those of f32 that are nearest to what the header writes.
         #[expect(clippy::cast_possible_truncation, reason = "that is what is meant")]
         let ignored = match self.number {
@@ -371,7 +371,7 @@ impl Header {
     }
 }
 
-/// What numbers are multiplied by, and what is added to them, a band each.
+/// Factors of numbers, and what is added to them, a band each.
 struct BandScaling {
     /// The number of a reflectance of 1.
     white: Option<f64>,

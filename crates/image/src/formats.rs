@@ -62,7 +62,7 @@ pub(crate) fn decode_exr(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeE
         names.all(|other| *other == *"A").then_some(name)
     };
     let found = flat().find_map(|header| Some((header, lone(header)?)));
-    let (header, name) = found.ok_or(DecodeError::Channels)?;
+    let (header, name) = found.ok_or_else(DecodeError::no_color)?;
     grey(bytes, header, &name, limits)
 }
 
@@ -162,7 +162,8 @@ pub(crate) fn exr_channels(bytes: &[u8], limits: Limits) -> Result<ExrChannels, 
     // The header is judged before anything is decoded.
     let about = MetaData::read_from_buffered(Cursor::new(bytes), false)?;
     judge_blocks(&about, limits)?;
-    let header = about.headers.iter().find(|header| !header.deep).ok_or(DecodeError::Channels)?;
+    let header =
+        about.headers.iter().find(|header| !header.deep).ok_or_else(DecodeError::no_color)?;
     let side = [header.layer_size.x(), header.layer_size.y()].map(|side| side as u64);
     let channels = header.channels.list.len();
     let texels = limits.judge(side, 4 * channels as u64)?;
@@ -215,12 +216,16 @@ pub(crate) fn decode_radiance(bytes: &[u8], limits: Limits) -> Result<Raster, De
     let scales = [("EXPOSURE", exposure), ("COLORCORR", r), ("COLORCORR", g), ("COLORCORR", b)];
     for (name, value) in scales {
         if !(value > 0.0 && value.is_finite()) {
-            return Err(DecodeError::Header { name, value });
+            return Err(DecodeError::Refused(format!(
+                "its header has {name} {value}, and a positive number is needed"
+            )));
         }
     }
     let raster = read(decoder, limits)?;
     let (size, channels) = (raster.size(), raster.channels());
-    let Samples::F32(mut values) = raster.into_samples() else { return Err(DecodeError::Channels) };
+    let Samples::F32(mut values) = raster.into_samples() else {
+        return Err(DecodeError::no_color());
+    };
     let scales = [r, g, b].map(|c| c * exposure);
     if scales != [1.0; 3] {
         for texel in values.chunks_mut(channels) {

@@ -72,7 +72,7 @@ impl Limits {
     /// The number of texels of an image of `width` × `height`, each of which takes `texel` bytes.
     fn judge(self, [width, height]: [u64; 2], texel: u64) -> Result<usize, DecodeError> {
         if width == 0 || height == 0 {
-            return Err(DecodeError::Empty { width, height });
+            return Err(DecodeError::Refused(format!("it has {width} x {height} texels")));
         }
         if width > MOST_SIDE || height > MOST_SIDE {
             return Err(DecodeError::Side { width, height });
@@ -82,7 +82,12 @@ impl Limits {
             return Err(DecodeError::Size { width, height, bytes, most: self.bytes });
         }
         if bytes > MADE_OF_NOTHING.saturating_add(self.file.saturating_mul(MADE_PER_BYTE)) {
-            return Err(DecodeError::Proportion { width, height, bytes, file: self.file });
+            return Err(DecodeError::Refused(format!(
+                "it has {width} x {height} texels, which take {:.2} GB decoded, out of all proportion to the {} \
+                 bytes of the file: make it smaller",
+                giga(bytes),
+                self.file
+            )));
         }
         usize::try_from(width * height).map_err(|_| DecodeError::Memory { bytes })
     }
@@ -92,14 +97,6 @@ impl Limits {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DecodeError {
-    /// It has no texel.
-    #[error("it has {width} x {height} texels")]
-    Empty {
-        /// Columns.
-        width: u64,
-        /// Rows.
-        height: u64,
-    },
     /// It is too wide or too high.
     #[error(
         "it has {width} x {height} texels, and {MOST_SIDE} a side are the most: make it smaller"
@@ -128,22 +125,6 @@ pub enum DecodeError {
         /// Bytes that it may take.
         most: u64,
     },
-    /// It takes far more memory than its file.
-    #[error(
-        "it has {width} x {height} texels, which take {:.2} GB decoded, out of all proportion to the {file} \
-         bytes of the file: make it smaller",
-        giga(*bytes)
-    )]
-    Proportion {
-        /// Columns.
-        width: u64,
-        /// Rows.
-        height: u64,
-        /// Bytes that it takes.
-        bytes: u64,
-        /// Bytes of the file.
-        file: u64,
-    },
     /// The system has less memory than it takes.
     #[error("it takes {:.2} GB decoded, and the system has less: make it smaller", giga(*bytes))]
     Memory {
@@ -159,28 +140,24 @@ pub enum DecodeError {
     /// It is a JPEG file without an end, of which the decoder makes up the rest.
     #[error("it is cut off: a JPEG ends with a marker of its own, which is not there")]
     Cut,
-    /// The decoder gave up with a panic.
-    #[error("its decoder failed: the file is damaged, or of a kind that it does not know")]
-    Panic,
-    /// It is an EXR file without the channels of a colour.
-    #[error(
-        "it has no channels R, G and B, nor Y, nor a single one (multi-part and deep data are not read)"
-    )]
-    Channels,
-    /// It is coloured in a way that is not read.
-    #[error("its texels are {0:?}, which is not read")]
-    Texels(ColorType),
-    /// A cube whose header and numbers make no sense: the sentence goes on after the file's name.
+    /// Anything else: the sentence goes on after the file's name.
     #[error("{0}")]
-    Cube(String),
-    /// A header that scales all values by no positive number.
-    #[error("its header has {name} {value}, and a positive number is needed")]
-    Header {
-        /// The key.
-        name: &'static str,
-        /// Its value.
-        value: f32,
-    },
+    Refused(String),
+}
+
+impl DecodeError {
+    /// Error of an EXR file without the channels of a colour.
+    #[must_use]
+    pub fn no_color() -> Self {
+        let why = "it has no channels R, G and B, nor Y, nor a single one (multi-part and deep data are not read)";
+        Self::Refused(why.to_owned())
+    }
+
+    /// Error of a decoder that gave up with a panic.
+    fn panicked() -> Self {
+        let why = "its decoder failed: the file is damaged, or of a kind that it does not know";
+        Self::Refused(why.to_owned())
+    }
 }
 
 fn giga(bytes: u64) -> f64 {
@@ -208,7 +185,7 @@ pub fn decode(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeError> {
             None => Ok(raster),
         }
     };
-    catch_unwind(AssertUnwindSafe(decode)).unwrap_or(Err(DecodeError::Panic))
+    catch_unwind(AssertUnwindSafe(decode)).unwrap_or_else(|_| Err(DecodeError::panicked()))
 }
 
 /// The values of one channel of an EXR file, by rows.
@@ -245,7 +222,7 @@ pub fn is_exr(bytes: &[u8]) -> bool {
 /// When it is over `limits`, no EXR file, or broken.
 pub fn exr_channels(bytes: &[u8], limits: Limits) -> Result<ExrChannels, DecodeError> {
     let read = catch_unwind(AssertUnwindSafe(|| formats::exr_channels(bytes, limits.of(bytes))));
-    read.unwrap_or(Err(DecodeError::Panic))
+    read.unwrap_or_else(|_| Err(DecodeError::panicked()))
 }
 
 /// Bytes that an image takes when it is decoded, by its header alone; `None` where that is none that
@@ -311,7 +288,11 @@ fn read(decoder: impl ImageDecoder, limits: Limits) -> Result<Raster, DecodeErro
             Samples::U16(filled(decoder, count)?)
         }
         ColorType::Rgb32F | ColorType::Rgba32F => Samples::F32(filled(decoder, count)?),
-        other => return Err(DecodeError::Texels(other)),
+        other => {
+            return Err(DecodeError::Refused(format!(
+                "its texels are {other:?}, which is not read"
+            )));
+        }
     };
     Ok(Raster::new([width, height].map(|side| side as usize), channels, samples))
 }

@@ -45,11 +45,11 @@ impl Accel {
                 ..BuildOptions::default()
             };
             let name = AccelName::named(backend).filter(|name| name.is_built());
-            let name = name.ok_or_else(|| Unbuilt::Unknown(backend.to_owned()))?;
+            let name = name.ok_or_else(|| BuildFailure::Unknown(backend.to_owned()))?;
             Ok(name.build(Arc::clone(&geometry), &options)?)
         };
         let built = interruptible(py, threads, &stop, build)?;
-        let accel = built.map_err(|error: Unbuilt| refused(error.words()))?;
+        let accel = built.map_err(|error: BuildFailure| refused(error.words()))?;
         Ok(Self { accel, geometry })
     }
 
@@ -91,7 +91,7 @@ impl Accel {
         Ok(all)
     }
 
-    /// Whether anything is in the way of each ray, up to `t_max`.
+    /// True for each ray that has anything in its way, up to `t_max`.
     fn occluded<'py>(
         &self,
         py: Python<'py>,
@@ -112,7 +112,7 @@ impl Accel {
                     if stop.is_asked_for() {
                         return;
                     }
-                    rays.fill(k, coherent, (batch, lengths));
+                    rays.fill(k, coherent, batch, lengths);
                     self.accel.occluded(batch, blocked);
                     out.copy_from_slice(blocked);
                 },
@@ -122,7 +122,7 @@ impl Accel {
     }
 }
 
-/// What the rays of a call met.
+/// Hits of the rays of a call.
 struct HitArrays {
     /// In lengths of the directions as they came; `+inf` for a miss.
     t: Vec<f64>,
@@ -152,7 +152,7 @@ impl Accel {
                 if stop.is_asked_for() {
                     return;
                 }
-                rays.fill(k, coherent, (batch, lengths));
+                rays.fill(k, coherent, batch, lengths);
                 self.accel.closest(batch, hits);
                 u.copy_from_slice(&hits.u);
                 v.copy_from_slice(&hits.v);
@@ -167,18 +167,18 @@ impl Accel {
     }
 }
 
-enum Unbuilt {
+enum BuildFailure {
     Build(etendue_accel::BuildError),
     Unknown(String),
 }
 
-impl From<etendue_accel::BuildError> for Unbuilt {
+impl From<etendue_accel::BuildError> for BuildFailure {
     fn from(error: etendue_accel::BuildError) -> Self {
         Self::Build(error)
     }
 }
 
-impl Unbuilt {
+impl BuildFailure {
     fn words(&self) -> String {
         match self {
             Self::Build(error) => in_python(&error.to_string()),
@@ -223,7 +223,7 @@ impl<'a> RayArrays<'a> {
 
     /// Refills `batch` with the rays of batch `k`, of unit directions, and `lengths` with those that they came
     /// with. A ray that is not finite, or without direction, misses.
-    fn fill(&self, k: usize, coherent: bool, (batch, lengths): (&mut RayBatch, &mut Vec<f64>)) {
+    fn fill(&self, k: usize, coherent: bool, batch: &mut RayBatch, lengths: &mut Vec<f64>) {
         batch.clear();
         lengths.clear();
         batch.coherent = coherent;

@@ -27,7 +27,7 @@ pub(crate) fn raised(error: Error) -> PyErr {
     }
 }
 
-/// What the system said to a file, if that is at the root of `error`.
+/// The system's own error about a file, if that is at the root of `error`.
 fn system_error(error: &Error) -> Option<io::ErrorKind> {
     if let Error::Scene(scene) = error
         && scene.is_missing_file()
@@ -78,7 +78,7 @@ pub(crate) fn rows<const N: usize>(
     }
 }
 
-/// What is known at the vertices of a mesh, as an array (n, N); nothing where it is not.
+/// An attribute of the vertices of a mesh, as an array (n, N); nothing where it is not.
 pub(crate) fn of_vertices<'py, const N: usize>(
     py: Python<'py>,
     values: Option<&Vertices<N>>,

@@ -30,7 +30,7 @@ mod _core {
     use super::{has_embree, layer_key, version};
 }
 
-/// Whether Embree is built in.
+/// True if Embree is built in.
 #[pyfunction]
 fn has_embree() -> bool {
     cfg!(feature = "embree")

@@ -55,7 +55,8 @@ impl Session {
     fn work<T: Send>(
         &mut self,
         py: Python<'_>,
-        (threads, callback): (usize, Option<Py<PyAny>>),
+        threads: usize,
+        callback: Option<Py<PyAny>>,
         work: impl FnOnce(&mut etendue::Session, &Progress) -> Result<T, Error> + Send,
     ) -> PyResult<T> {
         let stop = StopSignal::default();
@@ -139,7 +140,7 @@ impl Session {
             normals: normals.as_deref(),
             colors: colors.as_deref(),
         };
-        self.session.insert_mesh_with(name, (&vertices, &faces), attributes).map_err(raised)
+        self.session.insert_mesh_with(name, &vertices, &faces, attributes).map_err(raised)
     }
 
     /// Makes the scene that which `json` says.
@@ -161,19 +162,19 @@ impl Session {
         let plan = |session: &mut etendue::Session, progress: &Progress| {
             session.plan(progress).map(ToString::to_string)
         };
-        self.work(py, (threads, None), plan).map(|plan| in_python(&plan))
+        self.work(py, threads, None, plan).map(|plan| in_python(&plan))
     }
 
     /// The number of frames; 0 for one picture.
     fn load_frames(&mut self, py: Python<'_>, threads: usize) -> PyResult<usize> {
-        let frames = self.work(py, (threads, None), etendue::Session::frames)?;
+        let frames = self.work(py, threads, None, etendue::Session::frames)?;
         self.frames = frames.unwrap_or_default();
         Ok(self.frames.len())
     }
 
     fn show(&mut self, py: Python<'_>, frame: usize, threads: usize) -> PyResult<()> {
         let frame = self.frames.get(frame).cloned().ok_or_else(|| refused("no such frame"))?;
-        self.work(py, (threads, None), |session, _| session.show(&frame))
+        self.work(py, threads, None, |session, _| session.show(&frame))
     }
 
     /// Renders without Python's lock; `callback` is called with the phase and the share done now and then.
@@ -185,7 +186,7 @@ impl Session {
         denoise: bool,
     ) -> PyResult<Rendering> {
         self.session.set_denoised(denoise);
-        let rendering = self.work(py, (threads, callback), etendue::Session::render)?;
+        let rendering = self.work(py, threads, callback, etendue::Session::render)?;
         Ok(Rendering { rendering, threads })
     }
 }
@@ -244,7 +245,7 @@ impl Rendering {
         layer.map(|layer| of_layer(py, layer, self.rendering.resolution())).transpose()
     }
 
-    /// What each layer means, as `layers.json` has it.
+    /// Meaning of a layer, as `layers.json` has it.
     fn meaning(&self, name: &str) -> Vec<(String, String)> {
         self.rendering.layer(name).map(|layer| layer.meaning.clone()).unwrap_or_default()
     }

@@ -12,7 +12,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::arrays::refused;
 
-/// How often Python is asked whether Ctrl-C was pressed, and shown progress (ms).
+/// Time after which Python is asked again whether Ctrl-C was pressed, and shown progress (ms).
 const LOOK: u64 = 50;
 
 /// A pool of `threads` threads (0 for all processors) for one piece of work. Threads do not survive a fork, so none
@@ -22,12 +22,12 @@ fn pool(threads: usize) -> PyResult<ThreadPool> {
     pool.map_err(|error| refused(format!("threads = {threads}: {error}")))
 }
 
-/// How many threads, of the number that is asked for, work that is done in `pieces` is worth.
+/// Number of threads, of the number that is asked for, that work in `pieces` is worth.
 pub(crate) fn threads_for(pieces: usize, threads: usize) -> usize {
     if pieces > 1 { threads } else { 1 }
 }
 
-/// What stops work, and the exception that did.
+/// Signal that stops work, and the exception that did.
 #[derive(Clone, Default)]
 pub(crate) struct StopSignal {
     stopped: Arc<AtomicBool>,

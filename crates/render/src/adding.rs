@@ -6,13 +6,13 @@ use etendue_camera::{CameraRays, LensCamera};
 use etendue_tracer::layer::RaySource;
 
 use crate::film::{PlaneRows, Strip};
-use crate::sampling::{Averaged, DIFFUSION_PAIR, Memory, SampleRun, Sampling, TIME_PAIR};
+use crate::sampling::{DIFFUSION_PAIR, Memory, SampleRun, SampledQuantity, Sampling, TIME_PAIR};
 use crate::sum::{Sum, add_run};
 use crate::tile::{TILE, Tile};
 use crate::watch::{Stopped, Watcher};
 
 /// The samples of a pixel, by its place in rows from the top: from those that it has to those that it is to have.
-pub(crate) type Wanted<'a> = &'a (dyn Fn(usize) -> Range<u32> + Sync);
+pub(crate) type SamplesByPixel<'a> = &'a (dyn Fn(usize) -> Range<u32> + Sync);
 
 /// Writes the means of a pixel of a strip; of one band those of all, where all are alike.
 pub(crate) fn put(strip: &mut Strip<'_>, index: usize, sums: &[Sum], bands: usize, samples: u32) {
@@ -44,12 +44,12 @@ pub(crate) enum Work<'a> {
     /// These of every pixel.
     Pass(&'a Range<u32>),
     /// Samples that each pixel wants, half of them of each set.
-    Wanted(Wanted<'a>),
+    Wanted(SamplesByPixel<'a>),
 }
 
 /// One pass of a strip.
 pub(crate) struct Adding<'a> {
-    pub(crate) what: &'a dyn Averaged,
+    pub(crate) what: &'a dyn SampledQuantity,
     pub(crate) sampling: Sampling,
     pub(crate) work: Work<'a>,
     pub(crate) watcher: &'a Watcher<'a>,

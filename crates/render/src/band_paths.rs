@@ -30,7 +30,8 @@ pub enum BandPaths {
 impl BandPaths {
     /// The choice for `scene` through `camera`, whose picture is of light in `bands` where it `is_lit`.
     pub(crate) fn of(
-        (scene, camera): (&Scene, &Camera),
+        scene: &Scene,
+        camera: &Camera,
         bands: &Bands,
         stopping: Stopping,
         is_lit: bool,

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use etendue_accel::{Accel, AccelName, BuildOptions, build_moving, check_scale};
 use etendue_geometry::Geometry;
+use etendue_report::Refusal;
 use etendue_scene::Scene;
 
 use crate::error::RenderError;
@@ -65,10 +66,14 @@ pub(crate) fn build_over(
     let options = options_for(scene, plan, options);
     let name = scene.render.accel.unwrap_or_else(AccelName::best);
     if options.isa.is_some() && name != AccelName::Embree {
-        return Err(RenderError::NotEmbree);
+        let why = "only Embree can be told an instruction set";
+        let remedy = "leave `--isa` out, or use `--accel embree`";
+        return Err(Refusal::new(why).hint(remedy).into());
     }
     if !name.is_built() {
-        return Err(RenderError::Absent("Embree"));
+        let why = "this program was built without Embree";
+        let remedy = "use `--accel bvh`, or build it with the feature";
+        return Err(Refusal::new(why).hint(remedy).into());
     }
     Ok(build_moving(geometry, &options, &|geometry, options| name.build(geometry, options))?)
 }

@@ -9,8 +9,9 @@ use etendue_files::Transaction;
 use etendue_optics::element::StatusCounts;
 use etendue_scene::Scene;
 
-use crate::film::{FilmLayer, filled};
+use crate::film::FilmLayer;
 use crate::film_file::{FilmError, FilmFile, Identity, Writing};
+use crate::memory::filled;
 use crate::samples::Averaging;
 use crate::shard::Shard;
 use crate::sum::Sum;
@@ -114,7 +115,7 @@ impl<'a> Keeper<'a> {
         let sums: Vec<&[Sum]> = averaged.iter().map(Averaging::sums).collect();
         // The render is worth more than its checkpoint: what is wrong is told in the end.
         state.fault = writing
-            .write((&self.files, &self.checkpoint.path), centres, &sums)
+            .write(&self.files, &self.checkpoint.path, centres, &sums)
             .err()
             .map(|error| format!("no checkpoint could be kept: {error}"));
         state.written = Instant::now();

@@ -3,12 +3,13 @@
 //! they are.
 
 use etendue_oidn::{Denoiser, Guides};
+use etendue_report::Refusal;
 use etendue_scene::Scene;
 use etendue_tracer::LayerSpec;
 
 use crate::RenderError;
 use crate::expose::{has_spectrum, three_planes};
-use crate::film::{NoMemory, filled};
+use crate::memory::{NoMemory, filled};
 pub use crate::output::DENOISED;
 use crate::output::{Channel, Layer, Look, Picture, Values};
 
@@ -28,10 +29,8 @@ pub fn fingerprint() -> (String, String) {
 ///
 /// When its picture is no light in red, green and blue.
 pub fn guide(scene: &mut Scene) -> Result<(), RenderError> {
-    let refused = |why: &str| {
-        let path = scene.path.display();
-        Err(RenderError::NotDenoised(format!("{path}: --denoise {why}")))
-    };
+    let refused =
+        |why: &str| Err(Refusal::new(format!("--denoise {why}")).at(scene.path.display()).into());
     if scene.picture != Some(LayerSpec::Radiance) {
         return refused(
             "takes away the noise of light, and the picture shows none: give the scene a `tracer` of light, \
@@ -62,9 +61,7 @@ pub fn denoised(picture: Picture, denoiser: &Denoiser) -> Result<Picture, Render
     let size = [picture.width(), picture.height()];
     let light = picture.layer("").and_then(woven).transpose()?;
     let mut light = light.ok_or_else(|| {
-        RenderError::NotDenoised(
-            "--denoise: the picture is no light in red, green and blue".to_owned(),
-        )
+        Refusal::new("the picture is no light in red, green and blue").at("--denoise")
     })?;
     let guide = |spec: LayerSpec| picture.layer(&spec.row().name).and_then(woven).transpose();
     let guides = match (guide(LayerSpec::MeanAlbedo)?, guide(LayerSpec::MeanNormal)?) {

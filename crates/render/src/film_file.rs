@@ -30,7 +30,7 @@ const MAGIC: &[u8] = b"etendue film 1\n";
 /// two films must agree in to be parts of one picture.
 pub type Identity = Vec<(String, String)>;
 
-/// What became of rays, as a file has it.
+/// Counts of rays by their ends, as a file has them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 struct FilmCounts {
     /// Wall time of the tracing.
@@ -82,17 +82,17 @@ impl From<FilmCounts> for RayCounts {
     }
 }
 
-/// What a file says of itself.
+/// Header of a file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FilmHeader {
     identity: Identity,
-    /// How the render was asked for, for whoever puts the shares together.
+    /// Request for the render, for whoever puts the shares together.
     pub origin: serde_json::Value,
     /// The share of the rows.
     pub shard: Shard,
     /// Samples that every pixel of them has.
     pub samples: u32,
-    /// How many samples the pixels have, where that differs.
+    /// Numbers of samples of the pixels, where those differ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sample_counts: Option<SampleCounts>,
     counts: FilmCounts,
@@ -135,7 +135,8 @@ pub(crate) struct Writing<'a> {
 impl Writing<'_> {
     pub(crate) fn write(
         &self,
-        (files, path): (&Transaction, &Path),
+        files: &Transaction,
+        path: &Path,
         layers: &[&FilmLayer],
         sums: &[&[Sum]],
     ) -> Result<(), OutputError> {
@@ -159,7 +160,7 @@ impl Writing<'_> {
         };
         // Both, and a hash of them at the end.
         Ok(files.write(path, |part| {
-            let mut file = Hashed { hash: Xxh3::new(), file: BufWriter::new(part) };
+            let mut file = HashingWriter { hash: Xxh3::new(), file: BufWriter::new(part) };
             let header = serde_json::to_vec(&header)?;
             file.write_all(MAGIC)?;
             file.write_all(&(header.len() as u64).to_le_bytes())?;
@@ -200,12 +201,12 @@ impl Writing<'_> {
 }
 
 /// Takes a fingerprint of what is written.
-struct Hashed<W> {
+struct HashingWriter<W> {
     hash: Xxh3,
     file: W,
 }
 
-impl<W: Write> Write for Hashed<W> {
+impl<W: Write> Write for HashingWriter<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let written = self.file.write(bytes)?;
         self.hash.update(&bytes[..written]);

@@ -10,9 +10,9 @@
 use etendue_geometry::glam::{DVec3, UVec3};
 use etendue_geometry::{Bounds, HitPrecision, Placement};
 use etendue_scene::Scene;
+use etendue_tracer::Material;
 use etendue_tracer::material::Alpha;
 use etendue_tracer::spawn::{magnitudes, roundings};
-use etendue_tracer::{Material, Scattering};
 
 /// The share of a placement's probed area up to which thin places are contacts.
 const CONTACT: f64 = 1e-3;
@@ -52,8 +52,7 @@ pub(crate) struct CrossedSurfaces {
 
 /// True if light goes through a surface.
 fn lets_pass(material: &Material) -> bool {
-    let is_body = matches!(material.scattering, Scattering::Dielectric(_));
-    is_body || material.is_pane() || matches!(material.alpha, Alpha::Blend { .. })
+    material.scattering.lets_pass() || matches!(material.alpha, Alpha::Blend { .. })
 }
 
 /// Distances by which rays start off surfaces in f32, by where those are.

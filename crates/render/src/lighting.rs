@@ -75,11 +75,11 @@ pub(crate) fn settle(
     }
     let spectral = Spectral::of(&Bands::Rgb, &scene.materials);
     // The scene by its own lights alone.
-    let seen = (&surroundings, scene.camera.exposure_span());
-    let lights = Lights::new(&lighting.lights, lighting.map.clone(), seen, &spectral)
-        .map_err(|error| RenderError::Lights(error.to_string()))?;
+    let (map, span) = (lighting.map.clone(), scene.camera.exposure_span());
+    let lights = Lights::new(&lighting.lights, map, &surroundings, span, &spectral)
+        .map_err(RenderError::lights)?;
     let placed = PlacedSurfaces::of(&scene.geometry, &scene.materials, &spectral);
-    let stage = LightingContext {
+    let ctx = LightingContext {
         accel,
         scene: surroundings,
         lights: &lights,
@@ -89,7 +89,7 @@ pub(crate) fn settle(
         placed: &placed,
         precision: HitPrecision::Single,
     };
-    let dark = dark_share(scene, tracer, stage, progress)?;
+    let dark = dark_share(scene, tracer, ctx, progress)?;
     if dark.share() <= DARK {
         return Ok(lighting);
     }
@@ -103,18 +103,18 @@ pub(crate) fn settle(
     Ok(lighting)
 }
 
-/// Share of what the camera sees that is black under the lights of `stage`.
+/// Share of what the camera sees that is black under the lights of `ctx`.
 fn dark_share(
     scene: &Scene,
     tracer: Rules,
-    stage: LightingContext<'_>,
+    ctx: LightingContext<'_>,
     progress: &(dyn Fn(f64) -> bool + Sync),
 ) -> Result<Losses, RenderError> {
     // A coarse picture of light alone.
     let [width, height] = scene.camera.resolution();
     let camera = scene.camera.coarser(width.max(height).div_ceil(SIDE));
     let camera = match camera.lens() {
-        Some(_) => camera.opened(&Bands::Rgb).map_err(|e| RenderError::Camera(e.why))?,
+        Some(_) => camera.opened(&Bands::Rgb).map_err(|e| RenderError::camera(e.why))?,
         None => camera,
     };
     let [width, height] = camera.resolution();
@@ -124,13 +124,13 @@ fn dark_share(
     let groups = camera.band_groups(&Bands::Rgb);
     let pass: Vec<_> = std::iter::once(0..SAMPLES).collect();
     let job = Job {
-        accel: stage.accel,
+        accel: ctx.accel,
         others: &[],
         camera: &camera,
         groups: groups.clone(),
-        surroundings: stage.scene,
+        surroundings: ctx.scene,
         detail: Detail::Distance,
-        precision: stage.precision,
+        precision: ctx.precision,
         sampling: Sampling {
             samples: SAMPLES,
             sampler: scene.render.sampler,
@@ -145,7 +145,7 @@ fn dark_share(
         shares: &[],
         keeper: None,
         light: Some(LightPass {
-            stage,
+            ctx,
             tracer,
             camera: &camera,
             groups,
@@ -154,7 +154,7 @@ fn dark_share(
             layers: vec![LayerSpec::Radiance],
         }),
         passes: &pass,
-        picture: &|_, _| Err(PictureError::Empty { what: "the look".to_owned() }),
+        picture: &|_, _| Err(PictureError::empty("the look")),
     };
     let watch = |_: f64| progress(0.0);
     let watcher = Watcher::new(&watch, job.rays(&film));
@@ -187,33 +187,33 @@ pub(crate) fn verdict(
     let clipped = losses(&|rgb| develop.clips(rgb));
     let auto = "`--set render.exposure=auto`, or a number of stops, mends picture.png; EXR and NPY \
                 keep the radiance as it is";
-    let mut told = Vec::new();
+    let mut notes = Vec::new();
     if zero.is_black() && 2 * unlit.lost >= zero.lost {
         // The studio stands around the scene.
         let mend = match scene.studio_if_dark || scene.lights.contains(&Light::STUDIO) {
             true => "`lights`, which in a closed room stand within it: the studio is outside",
             false => "`lights` in the scene, or leave out the key `lights` for a grey studio",
         };
-        told.push(format!(
+        notes.push(format!(
             "picture: {unlit} of what the camera sees sends no light at all: its materials are black, or no \
              light reaches it; name other `materials` or {mend}"
         ));
     } else if zero.is_black() || nearly_black.share() >= NEARLY_ALL {
         let black = if zero.is_black() { zero } else { nearly_black };
-        told.push(format!("picture: {black} of what the camera sees is black: {auto}"));
+        notes.push(format!("picture: {black} of what the camera sees is black: {auto}"));
     }
     if clipped.is_clipped() {
-        told.push(format!(
+        notes.push(format!(
             "picture: {clipped} of what the camera sees is clipped to white: {auto}"
         ));
     }
-    told.extend(clipped_previews(picture, &seen));
-    told
+    notes.extend(clipped_previews(picture, &seen));
+    notes
 }
 
 /// Notes on what the previews of layers of colour beside the picture clip at `seen` pixels.
 fn clipped_previews(picture: &Picture, seen: &[usize]) -> Vec<String> {
-    let beside = picture.layers().iter().filter(|layer| {
+    let previews = picture.layers().iter().filter(|layer| {
         let is_shown =
             LayerFile::of(&layer.name, Outputs { png: true, ..Outputs::NONE }).next().is_some();
         !layer.name.is_empty() && layer.look == Look::Color && is_shown
@@ -227,7 +227,7 @@ fn clipped_previews(picture: &Picture, seen: &[usize]) -> Vec<String> {
         };
         Losses::count(seen.iter().map(|&i| development.clips(color(i))))
     };
-    let told = beside.filter_map(|layer| {
+    let notes = previews.filter_map(|layer| {
         let clipped = clipped(layer);
         clipped.is_clipped().then(|| {
             format!(
@@ -236,7 +236,7 @@ fn clipped_previews(picture: &Picture, seen: &[usize]) -> Vec<String> {
             )
         })
     });
-    told.collect()
+    notes.collect()
 }
 
 /// Of a grid of pixels, those whose chief rays hit something.

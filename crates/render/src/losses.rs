@@ -79,8 +79,8 @@ mod tests {
             (of(99_999, 100_000), true, true, "over 99.9 %"),
             (of(7, 7), true, true, "100 %"),
         ] {
-            let told = (losses.is_clipped(), losses.is_black(), losses.to_string());
-            assert_eq!(told, (clipped, black, words.to_owned()), "{losses:?}");
+            let found = (losses.is_clipped(), losses.is_black(), losses.to_string());
+            assert_eq!(found, (clipped, black, words.to_owned()), "{losses:?}");
         }
     }
 }

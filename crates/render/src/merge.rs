@@ -5,6 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use etendue_files::Transaction;
 use etendue_optics::element::StatusCounts;
+use etendue_report::Refusal;
 use etendue_scene::Scene;
 
 use crate::Plan;
@@ -26,7 +27,8 @@ impl Film {
     /// When the file cannot be written.
     pub fn write(
         &self,
-        to: (&Transaction, &Path),
+        files: &Transaction,
+        path: &Path,
         identity: &Identity,
         origin: &serde_json::Value,
     ) -> Result<(), OutputError> {
@@ -46,7 +48,7 @@ impl Film {
             trace_time: self.trace_time,
             resolution: self.resolution,
         };
-        writing.write(to, &layers, &sums.iter().map(Vec::as_slice).collect::<Vec<_>>())
+        writing.write(files, path, &layers, &sums.iter().map(Vec::as_slice).collect::<Vec<_>>())
     }
 
     /// Puts the shares of a render's rows together.
@@ -62,7 +64,7 @@ impl Film {
     ) -> Result<Self, RenderError> {
         let resolution = scene.camera.resolution();
         let mut layers = empty_film(scene, plan)?;
-        must_be_whole(shares, identity).map_err(RenderError::Shares)?;
+        must_be_whole(shares, identity).map_err(Refusal::new)?;
         let counts = Mutex::new(RayCounts::default());
         // Each fills its own pixels, or adds its own samples.
         for share in shares {

@@ -27,7 +27,7 @@ pub struct FollowedFrame<'a> {
     camera: &'a Camera,
     geometry: &'a Geometry,
     accel: &'a dyn Accel,
-    /// What became of each placement of this frame, and its number there; `None` when all stand still.
+    /// Change of each placement of this frame, and its number there; `None` when all stand still.
     motions: Option<Vec<(PlacementChange, u32)>>,
 }
 
@@ -66,7 +66,7 @@ impl<'a> FollowedFrame<'a> {
             .is_some_and(|motions| motions.iter().any(|one| one.0 == PlacementChange::Gone))
     }
 
-    /// What becomes of a placement of this frame, and its number in the other one.
+    /// Change of a placement of this frame, and its number in the other one.
     fn motion(&self, number: u32) -> (PlacementChange, u32) {
         self.motions
             .as_ref()

@@ -6,7 +6,8 @@ use std::time::Instant;
 
 use crate::adaptive::{Adaptive, Rule};
 use crate::error::RenderError;
-use crate::film::{FilmLayer, NoMemory};
+use crate::film::FilmLayer;
+use crate::memory::NoMemory;
 use crate::samples::Averaging;
 use crate::sampling::Sampling;
 use crate::tile::RayCounts;

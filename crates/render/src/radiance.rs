@@ -8,7 +8,7 @@ use etendue_geometry::RayBatch;
 use etendue_tracer::transport::{Parts, RaySamples};
 use etendue_tracer::{LayerSpec, LightGroup, LightingContext, Modulation, Rules};
 
-use crate::sampling::{Averaged, Memory};
+use crate::sampling::{Memory, SampledQuantity};
 
 /// Samples that are traced together: enough that what is left of a batch after a few bounces still
 /// fills packets, and few enough that its arrays stay in the cache.
@@ -17,7 +17,7 @@ const BATCH: u32 = 1024;
 /// Inputs of tracing light; nothing of them changes on the way.
 #[derive(Debug)]
 pub(crate) struct LightPass<'a> {
-    pub(crate) stage: LightingContext<'a>,
+    pub(crate) ctx: LightingContext<'a>,
     pub(crate) tracer: Rules,
     /// The camera, opened for these bands.
     pub(crate) camera: &'a Camera,
@@ -58,8 +58,8 @@ impl LightPass<'_> {
     /// Multiplies the parts of each ray's light, `[ray][part][band]`, by the factors of lights that change with time:
     /// where rays have times those of then, else the means over the time for which the ray's row is open, exactly.
     fn modulate(&self, rays: &CameraRays, film: &FilmSamples, parts: &mut [f64]) {
-        let count = self.stage.spectral.count();
-        let groups = self.stage.lights.parts();
+        let count = self.ctx.spectral.count();
+        let groups = self.ctx.lights.parts();
         let (mut of, mut factors) = (f64::NAN, Vec::new());
         for (i, ray) in parts.chunks_exact_mut((1 + 2 * groups.len()) * count).enumerate() {
             // Rays of one row, without times, have the same.
@@ -103,8 +103,8 @@ impl LightPass<'_> {
 
     /// Adds up the parts of each ray's light, `[ray][part][band]`, that each layer counts.
     fn gather(&self, rays: &RayBatch, parts: &[f64], values: &mut Vec<f64>) {
-        let count = self.stage.spectral.count();
-        let groups = self.stage.lights.parts();
+        let count = self.ctx.spectral.count();
+        let groups = self.ctx.lights.parts();
         values.clear();
         for (number, ray) in parts.chunks_exact((1 + 2 * groups.len()) * count).enumerate() {
             for &layer in &self.layers {
@@ -151,7 +151,7 @@ fn counts(layer: LayerSpec, group: LightGroup) -> [bool; 2] {
     }
 }
 
-impl Averaged for LightPass<'_> {
+impl SampledQuantity for LightPass<'_> {
     fn camera(&self) -> &Camera {
         self.camera
     }
@@ -179,16 +179,16 @@ impl Averaged for LightPass<'_> {
     fn trace(&self, bands: &Range<usize>, memory: &mut Memory) {
         let Memory { rays, film, numbers, scratch, values, light_in_parts, traffic, .. } = memory;
         numbers.set_rays(&rays.sample);
-        let lights = self.stage.lights;
+        let lights = self.ctx.lights;
         let parts = match self.layers.len() > 1 || lights.are_modulated() {
             true => Parts::Groups(lights.parts().len()),
             false => Parts::Whole,
         };
-        let is_one_for_all = self.stage.spectral.count() != self.count;
-        let bands = if is_one_for_all { 0..self.stage.spectral.count() } else { bands.clone() };
+        let is_one_for_all = self.ctx.spectral.count() != self.count;
+        let bands = if is_one_for_all { 0..self.ctx.spectral.count() } else { bands.clone() };
         let samples = RaySamples { rays: &rays.rays, samples: numbers, bands, parts };
         let light = if parts == Parts::Whole { &mut *values } else { &mut *light_in_parts };
-        traffic.light += self.tracer.radiance(&self.stage, &samples, scratch, light);
+        traffic.light += self.tracer.radiance(&self.ctx, &samples, scratch, light);
         if lights.are_modulated() {
             self.modulate(rays, film, light_in_parts);
         }

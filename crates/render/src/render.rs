@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use etendue_accel::Accel;
 use etendue_camera::{Camera, LensCamera, PixelExtent};
 use etendue_optics::element::StatusCounts;
+use etendue_report::Refusal;
 use etendue_scene::Scene;
 use etendue_scene::file::{LightRow, SETS};
 use etendue_sensor::Sensor;
@@ -19,9 +20,10 @@ use etendue_tracer::{
 use crate::adaptive::{Rule, SampleCounts};
 use crate::checkpoint::{Checkpoint, Keeper};
 use crate::error::RenderError;
-use crate::film::{FilmLayer, NoMemory};
+use crate::film::FilmLayer;
 use crate::film_file::{FilmFile, Identity, must_be_whole};
 use crate::images::Images;
+use crate::memory::NoMemory;
 use crate::other_frame::FollowedFrame;
 use crate::output::{Development, Layer, Picture, PictureError};
 use crate::radiance::LightPass;
@@ -30,7 +32,7 @@ use crate::shard::Shard;
 use crate::stopping::Stopping;
 use crate::sum::Sum;
 use crate::tile::RayCounts;
-use crate::tiles::{Done, Job, SamplesTaken};
+use crate::tiles::{Job, JobResult, SamplesTaken};
 use crate::watch::{Watch, Watcher};
 use crate::{Plan, diffraction, expose, lighting, names};
 
@@ -91,14 +93,14 @@ impl RenderState<'_> {
     /// Refuses what cannot be kept, or put together.
     fn allows(&self, stopping: Stopping) -> Result<(), RenderError> {
         if !self.shares.is_empty() {
-            must_be_whole(self.shares, &self.identity).map_err(RenderError::Shares)?;
+            must_be_whole(self.shares, &self.identity).map_err(Refusal::new)?;
         }
         let is_kept = self.checkpoint.is_some();
         match stopping {
-            Stopping::Time(_) if is_kept || self.shard.is_some() => Err(RenderError::Timed),
-            _ if stopping.is_adaptive() && is_kept => Err(RenderError::Checkpoint),
+            Stopping::Time(_) if is_kept || self.shard.is_some() => Err(RenderError::timed()),
+            _ if stopping.is_adaptive() && is_kept => Err(RenderError::adaptive_checkpoint()),
             _ if stopping.is_adaptive() && self.shard.is_some_and(Shard::is_of_samples) => {
-                Err(RenderError::SampleShares)
+                Err(RenderError::adaptive_shares())
             }
             _ => Ok(()),
         }
@@ -165,16 +167,16 @@ fn light_of(
     let map = images.environment.clone();
     let found = lighting::settle(scene, map, rules, seen, &|share| watch.goes_on(share))?;
     notes.extend(found.note);
-    let seen = (&seen.1, scene.camera.exposure_span());
-    let lights = Lights::new(&found.lights, found.map, seen, spectral)
-        .map_err(|error| RenderError::Lights(error.to_string()))?;
+    let span = scene.camera.exposure_span();
+    let lights = Lights::new(&found.lights, found.map, &seen.1, span, spectral)
+        .map_err(RenderError::lights)?;
     Ok(Some((rules, lights)))
 }
 
 /// The camera opened for the wavelengths of data, and that of light for those of light.
 fn opened_cameras(scene: &Scene, plan: &Plan) -> Result<[Camera; 2], RenderError> {
     let open = |camera: &Camera, bands: &Bands| match plan.pupil {
-        true => camera.opened(bands).map_err(|e| RenderError::Camera(e.why)),
+        true => camera.opened(bands).map_err(|e| RenderError::camera(e.why)),
         false => Ok(camera.clone()),
     };
     let lit_by = plan.light_camera(scene);
@@ -192,7 +194,7 @@ fn opened_cameras(scene: &Scene, plan: &Plan) -> Result<[Camera; 2], RenderError
     Ok([camera, light_camera])
 }
 
-/// Traces what a `course` wants onto a film.
+/// Traces what a `state` wants onto a film.
 ///
 /// # Errors
 ///
@@ -202,10 +204,10 @@ pub fn trace(
     plan: &Plan,
     Prepared { accel, images, others }: Prepared<'_>,
     header: &[(String, String)],
-    course: &RenderState<'_>,
+    state: &RenderState<'_>,
     watch: &dyn Watch,
 ) -> Result<Film, RenderError> {
-    course.allows(plan.stopping)?;
+    state.allows(plan.stopping)?;
     let mut layers = empty_film(scene, plan)?;
     let start = Instant::now();
     let [camera, light_camera] = opened_cameras(scene, plan)?;
@@ -213,7 +215,7 @@ pub fn trace(
     let shared = shared.and_then(LensCamera::opened_paths);
     // Light that is spread as waves are is traced by itself.
     let whole = Prepared { accel, images, others };
-    let spread = diffraction::spread_light(scene, plan, whole, course, &light_camera, watch)?;
+    let spread = diffraction::spread_light(scene, plan, whole, state, &light_camera, watch)?;
     // Lights, the studio among them where all else leaves the scene dark.
     let surroundings = surroundings(scene, images, scene.render.samples.typical());
     let traced = if plan.alike { &Bands::Grey } else { &plan.bands };
@@ -228,7 +230,7 @@ pub fn trace(
     let emitters = lit.as_ref().and_then(|_| Emitters::of(&scene.geometry, &scene.materials));
     let placed = PlacedSurfaces::of(&scene.geometry, &scene.materials, &spectral);
     let light = lit.as_ref().map(|(rules, lights)| LightPass {
-        stage: LightingContext {
+        ctx: LightingContext {
             accel,
             scene: surroundings,
             lights,
@@ -247,8 +249,8 @@ pub fn trace(
     });
     // The passes, kept shorter where a checkpoint is written after each.
     let so_far = |layers: &[&FilmLayer], samples| so_far(scene, plan, header, layers, samples);
-    let shard = course.shard.unwrap_or(Shard::ALL);
-    let checkpoint = course.checkpoint.as_ref();
+    let shard = state.shard.unwrap_or(Shard::ALL);
+    let checkpoint = state.checkpoint.as_ref();
     let is_kept = checkpoint.is_some() && plan.samples > 1;
     let passes = if is_kept { short_passes(plan.samples) } else { plan.passes.clone() };
     let others: Vec<&dyn OtherFrame> = others.iter().map(|other| other as _).collect();
@@ -276,15 +278,16 @@ pub fn trace(
         passes: &passes,
         light,
         picture: &so_far,
-        shares: course.shares,
+        shares: state.shares,
         keeper: checkpoint
-            .map(|file| Keeper::new(file, &course.identity, (shard, plan.samples), scene)),
+            .map(|file| Keeper::new(file, &state.identity, (shard, plan.samples), scene)),
     };
     // What was traced, and what a user should know of it.
     let watcher = Watcher::new(watch, job.rays(&layers));
-    let Done { traffic: mut counts, passed, sums, centres } = job.run(&mut layers, &watcher)?;
+    let JobResult { traffic: mut counts, passed, sums, centres } =
+        job.run(&mut layers, &watcher)?;
     notes.extend(job.keeper.as_ref().and_then(Keeper::fault));
-    let trace_time = start.elapsed() + course.shares.iter().map(FilmFile::trace_time).sum();
+    let trace_time = start.elapsed() + state.shares.iter().map(FilmFile::trace_time).sum();
     drop(job);
     diffraction::put(&mut layers, spread, &mut counts, &mut notes);
     let (camera, resolution) = (Some(camera), scene.camera.resolution());
@@ -355,7 +358,7 @@ pub fn finish(
     if let (true, 0, Some(element)) =
         (statuses.total() > 0, statuses.exited, statuses.farthest_from_sensor())
     {
-        return Err(RenderError::Dark { element, losses: statuses.losses() });
+        return Err(RenderError::dark(element, &statuses.losses()));
     }
     notes.extend(sparkles.note_in_words());
     notes.extend(plan.not_as_asked.as_ref().map(|why| format!("samples: {why}")));

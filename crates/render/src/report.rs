@@ -27,7 +27,7 @@ pub struct Seconds {
 /// A decoded image and its memory.
 #[derive(Debug, Clone, Serialize)]
 pub struct ImageSize {
-    /// What the file calls it.
+    /// Name in the file.
     pub name: String,
     /// Columns and rows.
     pub resolution: [usize; 2],
@@ -35,7 +35,7 @@ pub struct ImageSize {
     pub bytes: u64,
 }
 
-/// What is written to `report.json`.
+/// Content of `report.json`.
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
     /// The program and its version.
@@ -62,7 +62,7 @@ pub struct Report {
     pub samples: u32,
     /// Samples a pixel that were asked for: more than it has when the render was stopped.
     pub samples_wanted: u32,
-    /// How many samples the pixels have, where they got them until an error was reached.
+    /// Numbers of samples of the pixels, where they got them until an error was reached.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sample_counts: Option<SampleCounts>,
     /// Wall time of each stage (s).
@@ -71,7 +71,7 @@ pub struct Report {
     pub rays: u64,
     /// Rays sent into the camera's lens from the sensor; 0 without a lens.
     pub lens_rays: u64,
-    /// Where rays ended inside the lens, as `vignetted at element 3: 12 %`, the greatest loss first;
+    /// Ends of rays inside the lens, as `vignetted at element 3: 12 %`, the greatest loss first;
     /// elements count from 0 on the object side.
     pub lens_losses: Vec<String>,
     /// Millions of rays a second of the tracing, layers included.
@@ -103,7 +103,7 @@ pub struct Report {
     pub peak_memory_bytes: u64,
     /// The part of it that is not backed by files: what cannot be given back under pressure.
     pub peak_private_bytes: u64,
-    /// What was dropped, ignored or missing.
+    /// Notes on what was dropped, ignored or missing.
     pub notes: Vec<String>,
     /// The files that were written.
     pub files: Vec<PathBuf>,

@@ -10,10 +10,11 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use crate::adding::{Adding, RowSums, Wanted, Work, put};
-use crate::film::{FilmLayer, NoMemory, filled, strips, take};
+use crate::adding::{Adding, RowSums, SamplesByPixel, Work, put};
+use crate::film::{FilmLayer, strips, take};
+use crate::memory::{NoMemory, filled};
 pub(crate) use crate::sampling::passes;
-use crate::sampling::{Averaged, Memory, Sampling};
+use crate::sampling::{Memory, SampledQuantity, Sampling};
 pub(crate) use crate::sum::BYTES_OF_SUM;
 use crate::sum::Sum;
 use crate::tile::{RayCounts, TILE};
@@ -21,7 +22,7 @@ use crate::watch::{Stopped, Watcher};
 
 /// Layers on their way: what is averaged, and the sums between passes.
 pub(crate) struct Averaging<'a> {
-    pub(crate) what: &'a dyn Averaged,
+    pub(crate) what: &'a dyn SampledQuantity,
     pub(crate) sampling: Sampling,
     pub(crate) layers: Vec<&'a mut FilmLayer>,
     /// `[pixel][set][layer][band]`; empty when there is one pass alone.
@@ -32,7 +33,7 @@ pub(crate) struct Averaging<'a> {
 
 impl<'a> Averaging<'a> {
     pub(crate) fn new(
-        what: &'a dyn Averaged,
+        what: &'a dyn SampledQuantity,
         sampling: Sampling,
         layers: Vec<&'a mut FilmLayer>,
         passes: usize,
@@ -62,7 +63,7 @@ impl<'a> Averaging<'a> {
     /// Adds the samples that are `wanted` of each pixel.
     pub(crate) fn add_wanted(
         &mut self,
-        wanted: Wanted<'_>,
+        wanted: SamplesByPixel<'_>,
         watcher: &Watcher<'_>,
         traffic: &Mutex<RayCounts>,
     ) -> Result<(), Stopped> {
@@ -186,15 +187,15 @@ impl<'a> Averaging<'a> {
     }
 }
 
-type Shared<T> = Mutex<Option<T>>;
+type StripSlot<T> = Mutex<Option<T>>;
 
 /// The sums of each strip; of nothing when none are kept.
 pub(crate) fn split<'s>(
     sums: &'s mut [Sum],
-    what: &dyn Averaged,
+    what: &dyn SampledQuantity,
     sets: usize,
     [width, height]: [u32; 2],
-) -> Vec<Shared<&'s mut [Sum]>> {
+) -> Vec<StripSlot<&'s mut [Sum]>> {
     let [count, bands] = what.shape();
     if sums.is_empty() {
         return (0..height.div_ceil(TILE)).map(|_| Mutex::new(None)).collect();

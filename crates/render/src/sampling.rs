@@ -120,7 +120,7 @@ impl Sampling {
 }
 
 /// Quantity averaged over the samples of a pixel: colours of surfaces, or light.
-pub(crate) trait Averaged: Sync {
+pub(crate) trait SampledQuantity: Sync {
     /// The camera, opened for these bands.
     fn camera(&self) -> &Camera;
     /// The bands that the camera sends separate ways.

@@ -5,7 +5,8 @@ use etendue_scene::serial::PixelShares;
 use etendue_tracer::LayerSpec;
 
 use crate::error::RenderError;
-use crate::film::{FilmLayer, filled};
+use crate::film::FilmLayer;
+use crate::memory::filled;
 use crate::output::Values;
 use crate::render::{Film, empty_film};
 use crate::{Plan, Shard};

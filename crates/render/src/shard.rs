@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::tile::TILE;
 
-/// What of a render is dealt out to its shares.
+/// Parts of a render that are dealt out to its shares.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ShardBy {

@@ -21,7 +21,7 @@ const FEW_OF: u64 = 1000 * HANDFUL as u64;
 pub(crate) struct Sparkles {
     samples: u64,
     total: f64,
-    /// What each brings over all others of its pixel, the brightest first.
+    /// Excess of each over all others of its pixel, the brightest first.
     brightest: Vec<f64>,
 }
 

@@ -69,6 +69,12 @@ fn add_run_of<const N: usize>(sums: &mut [Sum], values: &[f64], weights: &[f64])
     *sums = own;
 }
 
+/// The variance of the mean of two independent sets of one size, by the difference of their means: a quarter
+/// of its square.
+pub(crate) fn variance_of_mean(difference: f64) -> f64 {
+    0.25 * difference * difference
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

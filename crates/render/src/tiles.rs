@@ -9,18 +9,19 @@ use etendue_camera::{BandGroup, Camera, CameraRays};
 use etendue_geometry::{Detail, HitBatch, HitPrecision, RayBatch};
 use etendue_optics::element::StatusCounts;
 use etendue_tracer::layer::{Columns, LayerContext, OtherFrame};
-use etendue_tracer::{LayerSpec, SceneView, Traced};
+use etendue_tracer::{LayerSpec, SceneView, TracedBatch};
 use rayon::prelude::*;
 
 use crate::adaptive::{ChiefHit, Rule, SampleCounts};
 use crate::checkpoint::{Keeper, put_together};
 use crate::error::RenderError;
-use crate::film::{FilmLayer, NoMemory, Strip, filled, strips, take};
+use crate::film::{FilmLayer, Strip, strips, take};
 use crate::film_file::{FilmError, FilmFile};
+use crate::memory::{NoMemory, filled};
 use crate::output::{Picture, PictureError};
 use crate::radiance::LightPass;
 use crate::samples::Averaging;
-use crate::sampling::{Averaged, Memory, Sampling};
+use crate::sampling::{Memory, SampledQuantity, Sampling};
 use crate::sum::Sum;
 use crate::tile::{RayCounts, TILE, Tile};
 use crate::watch::{Stopped, Watcher};
@@ -65,7 +66,7 @@ pub(crate) struct Job<'a> {
 
 /// Part of a job that was done.
 #[derive(Debug)]
-pub(crate) struct Done {
+pub(crate) struct JobResult {
     pub(crate) traffic: RayCounts,
     pub(crate) passed: SamplesTaken,
     /// Of a share of the samples, the sums of what is averaged.
@@ -100,7 +101,7 @@ impl Job<'_> {
         &self,
         film: &mut [FilmLayer],
         watcher: &Watcher<'_>,
-    ) -> Result<Done, RenderError> {
+    ) -> Result<JobResult, RenderError> {
         let traffic = Mutex::new(RayCounts::default());
         let (mut of_sampling, film): (Vec<_>, Vec<_>) =
             film.iter_mut().partition(|layer| layer.spec.is_of_sampling());
@@ -141,7 +142,7 @@ impl Job<'_> {
         let traffic = traffic.into_inner().unwrap_or_else(PoisonError::into_inner);
         let sums = averaged.into_iter().map(|part| part.sums).filter(|_| shard.is_of_samples());
         let (sums, centres) = (sums.collect(), centre.iter().map(|layer| layer.spec).collect());
-        Ok(Done { traffic, passed, sums, centres })
+        Ok(JobResult { traffic, passed, sums, centres })
     }
 
     /// Puts what there is already, in shares or on disk, onto the film; returns how many samples
@@ -227,7 +228,7 @@ impl Job<'_> {
             batch.traced += batch.rays.len() as u64;
             let RayBuffers { rays, hits, columns, rows, places, values, .. } = &mut *batch;
             let mut seen =
-                LayerContext { places: [columns, rows], ..self.seen(Traced { rays, hits }) };
+                LayerContext { places: [columns, rows], ..self.seen(TracedBatch { rays, hits }) };
             if self.camera.rows_differ() {
                 let time = self.camera.truth_time(f64::from(tile.top) + 0.5);
                 let pose = self.camera.pose_at(time);
@@ -250,7 +251,7 @@ impl Job<'_> {
         let [width, height] = self.camera.resolution();
         let mut all = filled(ChiefHit::default(), width as usize * height as usize)?;
         let strips = all.par_chunks_mut((width * TILE) as usize).enumerate();
-        strips.filter(|(k, _)| self.sampling.shard.owns(*k)).for_each(|(k, met)| {
+        strips.filter(|(k, _)| self.sampling.shard.owns(*k)).for_each(|(k, strip_hits)| {
             let mut batch = RayBuffers::new(Detail::Surface);
             #[expect(clippy::cast_possible_truncation, reason = "a row of a picture")]
             let top = k as u32 * TILE;
@@ -258,16 +259,16 @@ impl Job<'_> {
                 batch.aim_at_centres(self.camera, tile, top);
                 self.accel.closest(&batch.rays, &mut batch.hits);
                 let RayBuffers { rays, hits, places, values, .. } = &mut batch;
-                LayerSpec::Albedo.fill(&self.seen(Traced { rays, hits }), values);
+                LayerSpec::Albedo.fill(&self.seen(TracedBatch { rays, hits }), values);
                 for (i, &at) in places.iter().enumerate().filter(|(i, _)| hits.t[*i].is_finite()) {
                     let distance = hits.t[i].max(f64::MIN_POSITIVE).ln();
                     let [colour, normal] = [&values[..3], &hits.normal[..]];
                     let numbers = colour.iter().chain(normal).map(|column| column[i]);
-                    for (met, number) in met[at as usize].iter_mut().zip(numbers.chain([distance]))
-                    {
+                    let chief_hit = &mut strip_hits[at as usize];
+                    for (value, number) in chief_hit.iter_mut().zip(numbers.chain([distance])) {
                         #[expect(clippy::cast_possible_truncation, reason = "how alike pixels are")]
                         let number = number as f32;
-                        *met = number;
+                        *value = number;
                     }
                 }
             }
@@ -275,9 +276,9 @@ impl Job<'_> {
         Ok(all)
     }
 
-    /// What layers are filled from.
-    fn seen<'b>(&'b self, traced: Traced<'b>) -> LayerContext<'b> {
-        let light = self.light.as_ref().map(|pass| pass.stage);
+    /// Context that layers are filled from.
+    fn seen<'b>(&'b self, traced: TracedBatch<'b>) -> LayerContext<'b> {
+        let light = self.light.as_ref().map(|pass| pass.ctx);
         LayerContext {
             scene: self.surroundings,
             traced,
@@ -294,7 +295,7 @@ struct Colors<'a> {
     layers: Vec<LayerSpec>,
 }
 
-impl Averaged for Colors<'_> {
+impl SampledQuantity for Colors<'_> {
     fn camera(&self) -> &Camera {
         self.job.camera
     }
@@ -324,7 +325,7 @@ impl Averaged for Colors<'_> {
         let count = 3 * self.layers.len();
         values.resize(rays.len() * count, 0.0);
         for (k, layer) in self.layers.iter().enumerate() {
-            layer.fill(&self.job.seen(Traced { rays, hits }), columns);
+            layer.fill(&self.job.seen(TracedBatch { rays, hits }), columns);
             for c in bands.clone() {
                 for (values, color) in values.chunks_mut(count).zip(&columns[c]) {
                     values[3 * k + c] = *color;

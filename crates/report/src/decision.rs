@@ -130,6 +130,13 @@ pub enum DecisionValue {
     Bytes(u64),
     /// A forecast of time (s).
     Seconds(f64),
+    /// A number that has a name.
+    Number {
+        /// The name.
+        name: &'static str,
+        /// The number.
+        value: f64,
+    },
     /// One of a few words, or several.
     Words(Cow<'static, str>),
 }
@@ -155,19 +162,20 @@ impl fmt::Display for DecisionValue {
             Self::Bits(bits) => write!(f, "{bits} bits"),
             Self::Bytes(bytes) => write!(f, "about {}", Size(*bytes)),
             Self::Seconds(seconds) => write!(f, "{}", Span(*seconds)),
+            Self::Number { name, value } => write!(f, "{name} {value}"),
             Self::Words(words) => f.write_str(words),
         }
     }
 }
 
-/// The value for programs: true or false, a count, bits, bytes, seconds, or the words.
+/// The value for programs: true or false, a count, bits, bytes, seconds, a number, or the words.
 impl Serialize for DecisionValue {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Switch(on) => serializer.serialize_bool(*on),
             Self::Count(count) | Self::Bytes(count) => serializer.serialize_u64(*count),
             Self::Bits(bits) => serializer.serialize_u32(*bits),
-            Self::Seconds(seconds) => serializer.serialize_f64(*seconds),
+            Self::Seconds(value) | Self::Number { value, .. } => serializer.serialize_f64(*value),
             Self::Words(words) => serializer.serialize_str(words),
         }
     }
@@ -300,13 +308,18 @@ impl Tabled<'_> {
 mod tests {
     use super::*;
 
-    fn decisions() -> [Decision; 3] {
+    fn decisions() -> [Decision; 4] {
         let left_out = Saving { bytes: 3 << 20, images: Some(2) };
         [
             Decision::new(DecisionKind::Textures, DecisionValue::Switch(false), "no layer")
                 .saving(Some(left_out)),
             Decision::new(DecisionKind::BuildQuality, "high", "the scene says so").forced(true),
             Decision::new(DecisionKind::Memory, DecisionValue::Bytes(1 << 20), "all"),
+            Decision::new(
+                DecisionKind::Accuracy,
+                DecisionValue::Number { name: "noise", value: 0.1 },
+                "set",
+            ),
         ]
     }
 
@@ -317,10 +330,11 @@ mod tests {
             Tabled(&decisions).text(),
             "materials and textures  off            no layer; saves 3.0 MiB of 2 images [plan.textures]\n\
              build quality           high           the scene says so [forced by plan.build_quality]\n\
-             memory                  about 1.0 MiB  all\n"
+             memory                  about 1.0 MiB  all\n\
+             accuracy                noise 0.1      set [accuracy]\n"
         );
         assert_eq!(
-            Tabled(&decisions[1..]).markdown(),
+            Tabled(&decisions[1..3]).markdown(),
             "| what | choice | because | saves | key |\n|---|---|---|---|---|\n\
              | build quality | high | the scene says so |  | `plan.build_quality` |\n\
              | memory | about 1.0 MiB | all |  |  |\n"
@@ -340,5 +354,7 @@ mod tests {
             (&"about 1.0 MiB".into(), &(1 << 20).into())
         );
         assert!(found[2]["key"].is_null() && found[1]["forced"] == true);
+        let number = serde_json::json!(["noise 0.1", 0.1]);
+        assert_eq!((&found[3]["choice"], &found[3]["value"]), (&number[0], &number[1]));
     }
 }

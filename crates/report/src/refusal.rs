@@ -70,6 +70,13 @@ impl Refusal {
         self
     }
 
+    /// Returns the refusal without its place.
+    #[must_use]
+    pub fn without_place(mut self) -> Self {
+        self.0.place.clear();
+        self
+    }
+
     /// Adds more words behind those that say why.
     #[must_use]
     pub fn and(mut self, words: &str) -> Self {
@@ -156,6 +163,10 @@ mod tests {
              \nhint: leave it out"
         );
         assert_eq!(Refusal::new("why").to_string(), "why");
+        assert_eq!(
+            Refusal::new("why").hint("do").at("a").without_place().to_string(),
+            "why\nhint: do"
+        );
         assert_eq!(Refusal::new("why").at("").at("b").at("a").to_string(), "a: b: why");
         assert_eq!(Refusal::from(outer.to_string()).remedy(), outer.remedy());
     }

@@ -19,7 +19,7 @@ use crate::{CameraOrigin, SceneError};
 /// meanwhile is read again.
 #[derive(Debug, Default)]
 pub struct Cache {
-    given: BTreeMap<String, Given>,
+    given: BTreeMap<String, GivenModel>,
     kept: Mutex<Vec<KeptModel>>,
     camera: Mutex<Option<KeptCamera>>,
     digests: Arc<Digests>,
@@ -27,7 +27,7 @@ pub struct Cache {
 
 /// A model that is in no file.
 #[derive(Debug, Clone)]
-struct Given {
+struct GivenModel {
     import: Import,
     digest: u128,
 }
@@ -100,7 +100,7 @@ impl Cache {
             stats,
             ..Import::default()
         };
-        self.given.insert(name.to_owned(), Given { import, digest });
+        self.given.insert(name.to_owned(), GivenModel { import, digest });
     }
 
     /// Names and meshes of the models in no file.

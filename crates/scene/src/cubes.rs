@@ -15,13 +15,14 @@ use etendue_tracer::{Cube, CubeKind};
 ///
 /// When a file is not there or holds no such cube; the message goes on after the name.
 pub(crate) fn read(
-    (spec, kind): (&CubeSpec, CubeKind),
+    spec: &CubeSpec,
+    kind: CubeKind,
     folder: &InputFolder,
 ) -> Result<(Cube, Vec<PathBuf>), String> {
     let path = folder.find(&spec.cube).map_err(not_found)?.path;
     let head = etendue_files::read_head(&path, 16).map_err(|error| error.to_string())?;
     if head.starts_with(b"\x93NUMPY") {
-        return Ok((array(&path, (spec, kind))?, vec![path]));
+        return Ok((array(&path, spec, kind)?, vec![path]));
     }
     let is_exr = etendue_image::is_exr(&head);
     if !is_exr && !envi::is_header(&head) && !envi::is_data(&path) {
@@ -34,16 +35,16 @@ pub(crate) fn read(
     }
     let (Picture { size, axis, values, quantity, .. }, files) = match is_exr {
         true => (exr(&path, kind)?, vec![path]),
-        false => envi_pair((&spec.cube, &path), folder)?,
+        false => envi_pair(&spec.cube, &path, folder)?,
     };
     if kind == CubeKind::Light && quantity == Quantity::Reflectance {
         return Err("holds what is reflected, which gives off no light".to_owned());
     }
-    Ok((Cube::new(kind, size, axis, values, (spec.wrap, spec.filter))?, files))
+    Ok((Cube::new(kind, size, axis, values, spec.wrap, spec.filter)?, files))
 }
 
 /// An array `[row][column][band]`.
-fn array(path: &Path, (spec, kind): (&CubeSpec, CubeKind)) -> Result<Cube, String> {
+fn array(path: &Path, spec: &CubeSpec, kind: CubeKind) -> Result<Cube, String> {
     let bands = spec.bands.as_ref().ok_or(
         "does not say at which wavelengths its bands are: give `bands`, their edges (nm) or \
          {\"from\": 400, \"to\": 700, \"count\": 31}",
@@ -59,7 +60,7 @@ fn array(path: &Path, (spec, kind): (&CubeSpec, CubeKind)) -> Result<Cube, Strin
     };
     let (shape, values) = npy::read_f32(map.bytes(), fits)?;
     let axis = BandAxis::between(bands.edges().to_vec())?;
-    Cube::new(kind, [shape[1], shape[0]], axis, values, (spec.wrap, spec.filter))
+    Cube::new(kind, [shape[1], shape[0]], axis, values, spec.wrap, spec.filter)
 }
 
 /// The reflectances or the light of an EXR file.
@@ -83,7 +84,8 @@ fn exr(path: &Path, kind: CubeKind) -> Result<Picture, String> {
 
 /// The ENVI cube of one of its two files, by its name as written and its path; and the paths of both.
 fn envi_pair(
-    (written, path): (&str, &Path),
+    written: &str,
+    path: &Path,
     folder: &InputFolder,
 ) -> Result<(Picture, Vec<PathBuf>), String> {
     let partner = |names: Vec<PathBuf>| {
@@ -96,7 +98,7 @@ fn envi_pair(
         }
         Ok(None)
     };
-    read_envi((Path::new(written), path), Limits::default(), partner).map_err(|fault| fault.why)
+    read_envi(Path::new(written), path, Limits::default(), partner).map_err(|fault| fault.why)
 }
 
 /// Why there is no cube: of which file it is said, and a sentence that goes on after its name.
@@ -116,7 +118,8 @@ pub struct EnviFault {
 /// When the other file is missing or may not be read, the header makes no sense, the cube is over `limits`, or there are
 /// fewer numbers than it promises.
 pub fn read_envi(
-    (written, path): (&Path, &Path),
+    written: &Path,
+    path: &Path,
     limits: Limits,
     partner: impl FnOnce(Vec<PathBuf>) -> Result<Option<PathBuf>, String>,
 ) -> Result<(Picture, Vec<PathBuf>), EnviFault> {

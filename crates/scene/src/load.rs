@@ -45,9 +45,9 @@ impl SceneFile {
         let fresh = Cache::default();
         let kept = options.cache.unwrap_or(&fresh);
         let folder = self.open_folder(&options.opener)?;
-        let mut own = self.named_materials((&folder, options.glasses), wanted)?;
+        let mut own = self.named_materials(&folder, options.glasses, wanted)?;
         let (textures, files) = (&mut own.textures, &mut own.files);
-        let lights = self.named_lights((&folder, options.glasses), wanted, (textures, files))?;
+        let lights = self.named_lights(&folder, options.glasses, wanted, textures, files)?;
         // What can be checked without the models is; a bad camera need not wait for them.
         let ahead = self.camera_ahead(&folder, options, kept)?;
         let size = ahead.camera.resolution();

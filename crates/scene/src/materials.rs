@@ -31,7 +31,8 @@ pub(crate) struct OwnMaterials {
 impl SceneFile {
     pub(crate) fn named_materials(
         &self,
-        (folder, glasses): (&InputFolder, &[AgfCatalogue]),
+        folder: &InputFolder,
+        glasses: &[AgfCatalogue],
         wanted: Wanted,
     ) -> Result<OwnMaterials, SceneError> {
         let mut own = OwnMaterials::default();
@@ -61,9 +62,11 @@ impl SceneFile {
     /// `textures`.
     pub(crate) fn named_lights(
         &self,
-        (folder, glasses): (&InputFolder, &[AgfCatalogue]),
+        folder: &InputFolder,
+        glasses: &[AgfCatalogue],
         wanted: Wanted,
-        (textures, files): (&mut Vec<Texture>, &mut Vec<PathBuf>),
+        textures: &mut Vec<Texture>,
+        files: &mut Vec<PathBuf>,
     ) -> Result<Option<Vec<Light>>, SceneError> {
         let Some(specs) = &self.spec.lights else { return Ok(None) };
         let mut lights: Vec<Light> = Vec::new();
@@ -154,7 +157,7 @@ impl Supply for MaterialSources<'_> {
         if !spec.repeat.iter().all(|r| r.is_finite() && *r != 0.0) {
             return Err(Fault::new("repeat", "is zero, which leaves no cube"));
         }
-        let (cube, files) = cubes::read((spec, kind), self.folder).map_err(fault)?;
+        let (cube, files) = cubes::read(spec, kind, self.folder).map_err(fault)?;
         self.files.extend(files);
         Ok(cube)
     }

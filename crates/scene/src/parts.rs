@@ -65,7 +65,7 @@ pub(crate) struct SceneParts {
 }
 
 impl SceneParts {
-    /// What the scene file itself declares, before any model is added.
+    /// Makes those that the scene file itself declares, before any model is added.
     pub(crate) fn new(
         materials: Vec<Material>,
         textures: Vec<Texture>,

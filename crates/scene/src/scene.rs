@@ -213,15 +213,15 @@ pub(crate) fn tight(vertices: WorldVertices<'_>) -> Bounds {
             bounds = bounds.union(exact(vertices, placement));
         }
     }
-    let beyond = |around: &Bounds, bounds: &Bounds| {
-        (bounds.min - around.min).max_element().max((around.max - bounds.max).max_element())
+    let beyond = |loose: &Bounds, bounds: &Bounds| {
+        (bounds.min - loose.min).max_element().max((loose.max - bounds.max).max_element())
     };
     let mut open: Vec<(f64, &Bounds, &Placement)> =
-        all.iter().map(|(around, p)| (beyond(around, &bounds), around, *p)).collect();
+        all.iter().map(|(loose, p)| (beyond(loose, &bounds), loose, *p)).collect();
     open.retain(|(beyond, ..)| *beyond > 0.0);
     open.sort_by(|(a, ..), (b, ..)| b.total_cmp(a));
-    for (_, around, placement) in open {
-        if beyond(around, &bounds) > 0.0 {
+    for (_, loose, placement) in open {
+        if beyond(loose, &bounds) > 0.0 {
             bounds = bounds.union(exact(vertices, placement));
         }
     }

@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::normal::{normal_cdf, normal_density};
 use crate::poisson::probability;
 
-/// How far the approximation is from the truth, in electrons, before the converter.
+/// Deviation of the approximation from the truth, in electrons, before the converter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Deviation {
     /// μ (e⁻).
@@ -18,7 +18,7 @@ pub struct Deviation {
     pub read_noise: f64,
     /// The largest difference of the two distribution functions (Kolmogorov's distance).
     pub distance: f64,
-    /// What clipping at 0 adds to the mean without a black level (e⁻), in truth.
+    /// Amount that clipping at 0 adds to the mean without a black level (e⁻), in truth.
     pub bias: f64,
     /// The same in the approximation.
     pub bias_of_normal: f64,

@@ -18,13 +18,14 @@ mod factor;
 
 pub use factor::{Factor, Times};
 
+use etendue_report::Refusal;
 use etendue_spectrum::{Bands, Curve, Grid, Outside, WeightedBands, rgb};
 
 use crate::response::{ColourFilter, Response, filters, photons_caught, sensitive_range};
 use crate::spec::{Radiometry, SensorKind};
 use crate::{Sensor, SensorError};
 use division::{Division, Nodes, RunningSums, cell_edges, product};
-use factor::{Product, Products};
+use factor::{DIM, Product, Products};
 
 /// By how much of themselves electrons may differ from an integration in steps of a nanometre.
 pub const TOLERANCE: f64 = 1e-3;
@@ -35,9 +36,6 @@ const MOST_NUMBERS: usize = 2_000_000;
 /// Parts of white: darker light need not be better than this part of it is, behind no colour, one and
 /// two. Two pure colours one behind the other are nearly black, and no surface's.
 const DARK: [f64; 4] = [1.0, 0.1, 1.0, 1.0];
-
-/// The part of white that bodies and metals leave of it, below which their light need not be better.
-const DIM: f64 = 0.003;
 
 /// The part of an error that bodies may show after the ways that are tried: it is largest between two of them.
 const BETWEEN: f64 = 0.94;
@@ -138,13 +136,19 @@ impl Sensor {
 fn lit_range(sensor: Option<[f64; 2]>, light: &Illumination) -> Result<[f64; 2], SensorError> {
     let Some(sensor) = sensor else {
         let why = "the sensor sees nothing at any wavelength";
-        return Err(SensorError::Missing { key: "quantum_efficiency", why });
+        return Err(SensorError::missing("quantum_efficiency", why));
     };
     let all = light.spectra.iter().map(Curve::range);
     let lit = all.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or([0.0, f64::INFINITY]);
     let [from, to] = [sensor[0].max(lit[0]), sensor[1].min(lit[1])];
     if from >= to {
-        return Err(SensorError::Dark { sensor, light: lit });
+        let ([a, b], [from, to]) = (sensor, lit);
+        let why = format!(
+            "the sensor sees {a}..={b} nm, the lights shine at {from}..={to} nm: the image would be black"
+        );
+        let remedy = "give a light the illuminant `a`, `equal_energy` or {\"black_body\": kelvin}, which reach \
+                      further, or the sensor a curve that reaches into the light";
+        return Err(Refusal::new(why).hint(remedy).at("quantum_efficiency").into());
     }
     Ok([from, to])
 }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use etendue_report::Refusal;
 use schemars::JsonSchema;
 use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -54,12 +55,13 @@ impl CfaSpec {
     pub fn two_by_two(word: &str) -> Result<Self, SensorError> {
         let letters: Vec<char> = word.chars().collect();
         if letters.len() != 4 {
-            return Err(SensorError::Pattern(format!(
+            let why = format!(
                 "`{word}` has {} letters; a pattern of two by two pixels has four, others are a \
                  list of rows or one of {}",
                 letters.len(),
                 Self::NAMED.map(|(name, _)| name).join(", ")
-            )));
+            );
+            return Err(Refusal::new(why).at("cfa").into());
         }
         Self::from_rows(letters.chunks(2).map(<[char]>::to_vec).collect())
     }
@@ -70,7 +72,7 @@ impl CfaSpec {
     ///
     /// When rows are empty, of different lengths, or more than 64 a side, or a letter is none.
     pub fn from_rows(rows: Vec<Vec<char>>) -> Result<Self, SensorError> {
-        let fault = |why: String| Err(SensorError::Pattern(why));
+        let fault = |why: String| Err(Refusal::new(why).at("cfa").into());
         let width = rows.first().map_or(0, Vec::len);
         if width == 0 || rows.len() > LONGEST_SIDE || width > LONGEST_SIDE {
             return fault(format!("a pattern has 1 to {LONGEST_SIDE} rows and columns"));

@@ -25,7 +25,7 @@ use std::sync::Arc;
 use crate::effects::{Defect, Effects};
 use crate::moments::PixelLaw;
 use crate::normal::{ln, pair};
-use crate::philox::{PhiloxKey, Site, Stage, unit32, unit52};
+use crate::philox::{DrawUse, PhiloxKey, Site, unit32, unit52};
 use crate::poisson::{FINISHED_TOGETHER, OpenPixel, PD_FROM, finish, first_try, small_means};
 use crate::spec::NoiseModel;
 
@@ -96,8 +96,8 @@ impl BlockPlace {
 
     /// The counter of what is the same in every frame.
     #[inline(always)]
-    fn fixed(self, i: usize, stage: Stage) -> [u32; 4] {
-        Site { frame: 0, ..self.site }.counter(self.at(i), stage, 0)
+    fn fixed(self, i: usize, draw_use: DrawUse) -> [u32; 4] {
+        Site { frame: 0, ..self.site }.counter(self.at(i), draw_use, 0)
     }
 }
 
@@ -184,7 +184,7 @@ impl Chain {
     /// Defect of the pixel of a column of a site.
     pub(crate) fn defect_at(&self, site: Site, column: u32) -> Option<Defect> {
         let place = BlockPlace { site, column };
-        let [.., word] = self.pattern.words(place.fixed(0, Stage::Pattern));
+        let [.., word] = self.pattern.words(place.fixed(0, DrawUse::Pattern));
         self.defect(unit32(word))
     }
 
@@ -208,7 +208,7 @@ fn deviates(
     units: &mut BlockValues,
 ) {
     for i in 0..BLOCK {
-        let counter = place.site.counter(place.at(i), Stage::Temporal, 0);
+        let counter = place.site.counter(place.at(i), DrawUse::Temporal, 0);
         let [a, b, c, d] = key.words(counter);
         [normals[0][i], normals[1][i]] = pair([a, b, c]);
         units[i] = unit32(d);
@@ -219,7 +219,7 @@ fn deviates(
 #[inline(always)]
 fn second_deviates(key: &PhiloxKey, place: BlockPlace, normals: &mut BlockValues) {
     for (i, normal) in normals.iter_mut().enumerate() {
-        let [a, b, c, _] = key.words(place.site.counter(place.at(i), Stage::Temporal, 0));
+        let [a, b, c, _] = key.words(place.site.counter(place.at(i), DrawUse::Temporal, 0));
         [_, *normal] = pair([a, b, c]);
     }
 }
@@ -232,7 +232,7 @@ const STUCK: f64 = 1e18;
 fn pattern(chain: &Chain, place: BlockPlace, mean: &mut BlockValues, offset: &mut BlockValues) {
     let mut chance = [0.0; BLOCK];
     for i in 0..BLOCK {
-        let [a, b, c, d] = chain.pattern.words(place.fixed(i, Stage::Pattern));
+        let [a, b, c, d] = chain.pattern.words(place.fixed(i, DrawUse::Pattern));
         let [response, dark] = pair([a, b, c]);
         mean[i] = photo_response(chain.prnu, response, mean[i]);
         offset[i] += chain.dsnu * dark;
@@ -242,7 +242,7 @@ fn pattern(chain: &Chain, place: BlockPlace, mean: &mut BlockValues, offset: &mu
     if share > 0.0 {
         for (i, mean) in mean.iter_mut().enumerate() {
             if chance[i] < share {
-                let words = chain.pattern.words(place.fixed(i, Stage::HotPixel));
+                let words = chain.pattern.words(place.fixed(i, DrawUse::HotPixel));
                 *mean -= extra * ln(unit52(words[0], words[1]));
             }
         }
@@ -281,7 +281,7 @@ fn listed_defects(
             Defect::Dead => mean[i] = 0.0,
             Defect::Stuck => offset[i] = STUCK,
             Defect::Hot => {
-                let words = chain.pattern.words(place.fixed(i, Stage::HotPixel));
+                let words = chain.pattern.words(place.fixed(i, DrawUse::HotPixel));
                 mean[i] -= chain.hot[1] * ln(unit52(words[0], words[1]));
             }
         }
@@ -292,7 +292,7 @@ fn listed_defects(
 #[inline(always)]
 fn uneven_dark_signal(chain: &Chain, place: BlockPlace, mean: &mut BlockValues) {
     for (i, mean) in mean.iter_mut().enumerate() {
-        let [a, b, c, _] = chain.pattern.words(place.fixed(i, Stage::DarkCurrent));
+        let [a, b, c, _] = chain.pattern.words(place.fixed(i, DrawUse::DarkCurrent));
         let [z, _] = pair([a, b, c]);
         *mean += chain.dark * (1.0 + chain.dcnu * z).max(0.0);
     }

@@ -44,7 +44,7 @@ pub enum DefectMap {
     List(Vec<ListedDefect>),
 }
 
-/// What is wrong with a pixel.
+/// Fault of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Defect {
@@ -67,7 +67,7 @@ pub struct ListedDefect {
     /// Its channel, of an image of several; all of them when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channel: Option<u16>,
-    /// What is wrong.
+    /// Its fault.
     pub kind: Defect,
 }
 
@@ -128,7 +128,7 @@ pub enum SecondReadout {
         /// Electrons that it can read (e⁻, > 0; default: the first's).
         #[serde(default, skip_serializing_if = "Option::is_none")]
         full_well: Option<f64>,
-        /// What no light reads as (DN; default: the first's).
+        /// Reading of no light (DN; default: the first's).
         #[serde(default, skip_serializing_if = "Option::is_none")]
         black_level: Option<f64>,
     },
@@ -222,7 +222,7 @@ impl AngularResponse {
     fn check(&self) -> Result<(), SensorError> {
         let key = "angular_response.curve";
         if self.curve.is_empty() {
-            return Err(SensorError::Missing { key, why: "give points [degrees, share]" });
+            return Err(SensorError::missing(key, "give points [degrees, share]"));
         }
         let first = self.curve[0][0];
         SensorError::unless(first == 0.0, key, first, "points that begin at 0 degrees")?;
@@ -360,7 +360,7 @@ impl Effects {
             spec.nonlinearity.is_some() || spec.blooming.is_some_and(|share| share > 0.0);
         if of_a_well && full_well.is_infinite() {
             let why = "nonlinearity and blooming count from the electrons that a pixel holds";
-            return Err(SensorError::Missing { key: "full_well", why });
+            return Err(SensorError::missing("full_well", why));
         }
         let nonlinearity = spec.nonlinearity.as_deref().map(Nonlinearity::new).transpose()?;
         let diffusion = spec.carrier_diffusion.map_or(0.0, |length| length.0);
@@ -385,7 +385,7 @@ impl Effects {
             Some(DefectMap::List(list)) => list.clone(),
             Some(DefectMap::File(_)) => {
                 let why = "files are read where the scene is\nhint: give the list of pixels";
-                return Err(SensorError::Misplaced { key: "defect_map", why });
+                return Err(SensorError::misplaced("defect_map", why));
             }
         };
         let count = listed.len();
@@ -403,7 +403,7 @@ impl Effects {
             if at.kind == Defect::Hot && spec.hot_pixels.is_none() {
                 let why = "the map has hot pixels, and nobody says how hot they are: give { \"share\": 0, \
                            \"dark_current\": 50 } (e⁻/s)";
-                return Err(SensorError::Missing { key: "hot_pixels", why });
+                return Err(SensorError::missing("hot_pixels", why));
             }
         }
         let place = |at: &ListedDefect| (at.row, at.column, at.channel);

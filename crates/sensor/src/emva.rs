@@ -21,6 +21,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use etendue_files::{Transaction, WriteError, prepare_folder};
+use etendue_report::Refusal;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use rayon::prelude::*;
@@ -130,15 +131,17 @@ impl Series {
     ///
     /// # Errors
     ///
-    /// [`SensorError::Steps`] for fewer than 20 steps, [`SensorError::BlindAt`] when the sensor does
-    /// not see the wavelength, others when it has no gain or no noise.
+    /// When there are fewer than 20 steps, or the sensor does not see the wavelength or has no gain or no noise.
     pub fn plan(sensor: &Sensor, options: &Options) -> Result<Self, SensorError> {
         if !(20..=10_000).contains(&options.steps) {
-            return Err(SensorError::Steps { steps: options.steps });
+            let steps = options.steps;
+            let why =
+                format!("{steps} exposure steps asked for: a characterisation needs 20 to 10000");
+            return Err(Refusal::new(why).into());
         }
         if sensor.noise() == NoiseModel::None {
             let why = "what has no noise cannot be characterised by it";
-            return Err(SensorError::Misplaced { key: "noise", why });
+            return Err(SensorError::misplaced("noise", why));
         }
         let light = options.light(sensor)?;
         let longest = longest_exposure(sensor, options.steps);
@@ -315,11 +318,14 @@ impl EvenLight {
     ) -> Result<Self, SensorError> {
         if !sensor.settings.counts {
             let why = "a characterisation counts electrons";
-            return Err(SensorError::Missing { key: "system_gain", why });
+            return Err(SensorError::missing("system_gain", why));
         }
         let efficiency = sensor.quantum_efficiency().at(wavelength).unwrap_or(0.0);
         if efficiency < LEAST_EFFICIENCY {
-            return Err(SensorError::BlindAt { wavelength });
+            let why = format!(
+                "the sensor has no quantum efficiency at {wavelength} nm: choose another --wavelength"
+            );
+            return Err(Refusal::new(why).into());
         }
         let [width, height] = sensor.resolution();
         let mut corner = sensor.clone().with_resolution([width.min(size[0]), height.min(size[1])]);
@@ -386,7 +392,7 @@ impl Sensor {
     ) -> Result<RawImage, SensorError> {
         if !self.settings.counts {
             let why = "electrons are counted";
-            return Err(SensorError::Missing { key: "system_gain", why });
+            return Err(SensorError::missing("system_gain", why));
         }
         let side = |side: usize| u32::try_from(side).unwrap_or(u32::MAX);
         let mut sensor = self.clone().with_resolution([side(width), side(height)]);

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use etendue_report::Refusal;
 use etendue_spectrum::CurveError;
 
 /// Error of a sensor that is refused, or cannot do what is asked.
@@ -20,92 +21,8 @@ pub enum SensorError {
         /// Description of valid values.
         demand: &'static str,
     },
-    /// A key that is needed here and absent.
-    Missing {
-        /// Name of the key.
-        key: &'static str,
-        /// Reason: what needs the key.
-        why: &'static str,
-    },
-    /// A key that means nothing here.
-    Misplaced {
-        /// Name of the key.
-        key: &'static str,
-        /// Reason.
-        why: &'static str,
-    },
-    /// A curve that is none, or leaves its bounds.
-    Curve {
-        /// Name of the key.
-        key: String,
-        /// Fault of the curve.
-        fault: CurveError,
-    },
-    /// The full well holds less than the converter can tell from nothing.
-    FullWell {
-        /// The full well (e⁻).
-        full_well: f64,
-        /// The gain (DN/e⁻).
-        gain: f64,
-    },
-    /// A setting of the amplifier that the sensor does not have.
-    UnknownIso {
-        /// Its number.
-        iso: f64,
-        /// Those that there are.
-        known: Vec<f64>,
-    },
-    /// A colour filter array that is not a rectangle of letters.
-    Pattern(String),
-    /// A channel of a multispectral sensor that cannot be called so.
-    Channel {
-        /// Index of the channel, counted from 0.
-        index: usize,
-        /// Description of the error in its name.
-        why: &'static str,
-    },
-    /// A letter of the colour filter array without a curve.
-    UnknownFilter {
-        /// The letter.
-        letter: char,
-    },
-    /// A channel that sees nothing of the spectral bands.
-    Blind {
-        /// Name of the key that holds the curve.
-        key: &'static str,
-        /// Name of the channel.
-        channel: String,
-        /// The range of the bands (nm).
-        bands: [f64; 2],
-    },
-    /// Light of which the sensor sees nothing.
-    Dark {
-        /// Range in which the sensor sees (nm).
-        sensor: [f64; 2],
-        /// Range in which the lights shine (nm).
-        light: [f64; 2],
-    },
-    /// A quantum efficiency of nothing at the wavelength of a characterisation.
-    BlindAt {
-        /// The wavelength (nm).
-        wavelength: f64,
-    },
-    /// A film that is not this sensor's.
-    Film {
-        /// Number of values of the film.
-        film: usize,
-        /// Columns.
-        width: usize,
-        /// Rows.
-        height: usize,
-        /// Bands of the sensor.
-        bands: usize,
-    },
-    /// A series that is too short to be characterised, or too long.
-    Steps {
-        /// Number of steps that were asked for.
-        steps: usize,
-    },
+    /// Anything else; its place is the key.
+    Refused(Refusal),
 }
 
 impl SensorError {
@@ -119,22 +36,51 @@ impl SensorError {
         if allowed { Ok(()) } else { Err(Self::Value { key, value, demand }) }
     }
 
+    /// Error of a key that is needed here and absent; `why` says what needs it.
+    pub(crate) fn missing(key: &str, why: &str) -> Self {
+        Refusal::new(format!("is missing: {why}")).at(key).into()
+    }
+
+    /// Error of a key that means nothing here.
+    #[must_use]
+    pub fn misplaced(key: &str, why: &str) -> Self {
+        Refusal::new(format!("is of no use here: {why}")).at(key).into()
+    }
+
+    /// Error of a curve that is none, or leaves its bounds.
+    pub(crate) fn curve(key: &str, fault: &CurveError) -> Self {
+        Refusal::new(fault.to_string()).at(key).into()
+    }
+
+    /// Error of a channel that sees nothing of the spectral bands, whose range is `from` to `to` (nm); `key` holds its
+    /// curve.
+    #[must_use]
+    pub fn blind(key: &str, channel: &str, [from, to]: [f64; 2]) -> Self {
+        let why = format!(
+            "the channel `{channel}` sees nothing of {from}..={to} nm, the wavelengths that are \
+             rendered: the image would be black"
+        );
+        let remedy = "give it a curve (in `filters`, or as `quantum_efficiency`) or `bands` that overlap; ideal r, g \
+                      and b pass visible light alone";
+        Refusal::new(why).hint(remedy).at(key).into()
+    }
+
+    /// Error of a film of `values` numbers, which is not of the sensor's width, height and number of bands.
+    pub(crate) fn film(values: usize, [width, height, bands]: [usize; 3]) -> Self {
+        let why = format!(
+            "the film has {values} values, {width} × {height} pixels of {bands} spectral bands need {}",
+            width * height * bands
+        );
+        Refusal::new(why).into()
+    }
+
     /// The key at fault inside of the sensor (`system_gain`, `filters.r`); empty when it is the
     /// sensor as a whole, or not the sensor.
     #[must_use]
     pub fn at(&self) -> &str {
         match self {
-            Self::Value { key, .. }
-            | Self::Missing { key, .. }
-            | Self::Misplaced { key, .. }
-            | Self::Blind { key, .. } => key,
-            Self::Curve { key, .. } => key,
-            Self::FullWell { .. } => "full_well",
-            Self::Dark { .. } => "quantum_efficiency",
-            Self::Pattern(_) | Self::UnknownFilter { .. } => "cfa",
-            Self::Channel { .. } => "channels",
-            Self::UnknownIso { .. } => "iso",
-            Self::BlindAt { .. } | Self::Film { .. } | Self::Steps { .. } => "",
+            Self::Value { key, .. } => key,
+            Self::Refused(refusal) => refusal.place(),
         }
     }
 
@@ -145,50 +91,7 @@ impl SensorError {
             Self::Value { value, demand, .. } => {
                 format!("expected {demand}, found {}", Readable(*value))
             }
-            Self::Missing { why, .. } => format!("is missing: {why}"),
-            Self::Misplaced { why, .. } => format!("is of no use here: {why}"),
-            Self::Curve { fault, .. } => fault.to_string(),
-            Self::FullWell { full_well, gain } => format!(
-                "{} e⁻ times the system_gain of {} DN/e⁻ is not half a digital number: every pixel \
-                 would be black; one of the two is too small",
-                Readable(*full_well),
-                Readable(*gain)
-            ),
-            Self::UnknownIso { iso, known } => {
-                let known: Vec<String> = known.iter().map(f64::to_string).collect();
-                format!(
-                    "there is no setting {}: sensor.iso_settings has {}",
-                    Readable(*iso),
-                    known.join(", ")
-                )
-            }
-            Self::Pattern(why) => why.clone(),
-            Self::Channel { index, why } => format!("the name of channel {index} {why}"),
-            Self::UnknownFilter { letter } => format!(
-                "names the filter `{letter}`, for which there is no curve: add it to `filters`, or \
-                 use r, g, b or w"
-            ),
-            Self::Blind { channel, bands: [from, to], .. } => format!(
-                "the channel `{channel}` sees nothing of {from}..={to} nm, the wavelengths that are \
-                 rendered: the image would be black\nhint: give it a curve (in `filters`, or as \
-                 `quantum_efficiency`) or `bands` that overlap; ideal r, g and b pass visible light alone"
-            ),
-            Self::Dark { sensor: [a, b], light: [from, to] } => format!(
-                "the sensor sees {a}..={b} nm, the lights shine at {from}..={to} nm: the image would be \
-                 black\nhint: give a light the illuminant `a`, `equal_energy` or {{\"black_body\": kelvin}}, \
-                 which reach further, or the sensor a curve that reaches into the light"
-            ),
-            Self::BlindAt { wavelength } => format!(
-                "the sensor has no quantum efficiency at {wavelength} nm: choose another --wavelength"
-            ),
-            Self::Film { film, width, height, bands } => format!(
-                "the film has {film} values, {width} × {height} pixels of {bands} spectral bands \
-                 need {}",
-                width * height * bands
-            ),
-            Self::Steps { steps } => {
-                format!("{steps} exposure steps asked for: a characterisation needs 20 to 10000")
-            }
+            Self::Refused(refusal) => refusal.clone().without_place().to_string(),
         }
     }
 }
@@ -204,8 +107,14 @@ impl fmt::Display for SensorError {
 
 impl std::error::Error for SensorError {}
 
+impl From<Refusal> for SensorError {
+    fn from(refusal: Refusal) -> Self {
+        Self::Refused(refusal)
+    }
+}
+
 /// A number as people write it: neither 300 digits nor 300 zeros.
-struct Readable(f64);
+pub(crate) struct Readable(pub(crate) f64);
 
 impl fmt::Display for Readable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -9,7 +9,7 @@ use crate::chain::{self, BLOCK, BlockPlace, BlockValues, Chain};
 use crate::effects::Effects;
 use crate::film::{Exposure, Film, InvalidValues};
 use crate::normal::pair;
-use crate::philox::{PhiloxKey, Site, Stage};
+use crate::philox::{DrawUse, PhiloxKey, Site};
 use crate::responsivity::Responsivity;
 use crate::spec::{NoiseModel, Radiometry};
 use crate::whole_frame::WholeFrame;
@@ -92,7 +92,7 @@ impl<'a> Exposing<'a> {
         }
         let (key, site) = self.key_and_site(0, lasting);
         (0..s.resolution[0])
-            .map(|column| sigma * one_normal(key, site, column, Stage::Column))
+            .map(|column| sigma * one_normal(key, site, column, DrawUse::Column))
             .collect()
     }
 
@@ -234,7 +234,7 @@ impl<'a> Exposing<'a> {
             return 0.0;
         }
         let (key, site) = self.key_and_site(row, lasting);
-        sigma * one_normal(key, site, 0, Stage::Row)
+        sigma * one_normal(key, site, 0, DrawUse::Row)
     }
 }
 
@@ -258,7 +258,7 @@ fn with_columns(of_row: f64, columns: &[f64], start: usize) -> BlockValues {
     offset
 }
 
-fn one_normal(key: &PhiloxKey, site: Site, column: u32, stage: Stage) -> f64 {
-    let [a, b, c, _] = key.words(site.counter(column, stage, 0));
+fn one_normal(key: &PhiloxKey, site: Site, column: u32, draw_use: DrawUse) -> f64 {
+    let [a, b, c, _] = key.words(site.counter(column, draw_use, 0));
     pair([a, b, c])[0]
 }

@@ -81,7 +81,7 @@ impl Sensor {
         let readings = readings([Some(self), second.as_ref()], shots);
         let Some(first) = readings.first() else {
             let why = "nothing to merge: name several exposures";
-            return Err(SensorError::Missing { key: "exposures", why }.into());
+            return Err(SensorError::missing("exposures", why).into());
         };
         // Which numbers count.
         let RawImage { width, height, depth, values, .. } = expose(first.sensor, first.shot)?;

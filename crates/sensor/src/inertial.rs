@@ -23,10 +23,10 @@ pub struct InertialNoiseSpec {
     /// Density of the white noise of specific forces (m/s²/√Hz).
     #[schemars(range(min = 0.0))]
     pub accel_density: f64,
-    /// How fast the bias of angular velocities walks (rad/s²/√Hz).
+    /// Random walk of the bias of angular velocities (rad/s²/√Hz).
     #[schemars(range(min = 0.0))]
     pub gyro_walk: f64,
-    /// How fast the bias of specific forces walks (m/s³/√Hz).
+    /// Random walk of the bias of specific forces (m/s³/√Hz).
     #[schemars(range(min = 0.0))]
     pub accel_walk: f64,
     /// The bias of angular velocities before the walk (rad/s).

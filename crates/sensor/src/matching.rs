@@ -22,6 +22,7 @@
 
 mod pixels;
 
+use etendue_report::Refusal;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -39,46 +40,60 @@ const NEARLY_SATURATED: f64 = 0.9;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MatchError {
-    /// A sensor of several numbers a pixel.
-    #[error(
-        "the scene's sensor has {0} numbers a pixel, and a raw photograph one: set camera.sensor.type to `raw`, with the photograph's `cfa`"
-    )]
-    NotRaw(usize),
-    /// A photograph of other columns and rows.
-    #[error("has {} x {} pixels, and the scene's sensor {} x {}: set camera.sensor.resolution to the photograph's", .photo[0], .photo[1], .sensor[0], .sensor[1])]
-    Size {
-        /// Columns and rows of the photograph.
-        photo: [usize; 2],
-        /// Of the sensor.
-        sensor: [usize; 2],
-    },
-    /// Too many pixels at an end of the scale.
-    #[error(
-        "is clipped: {share:.1} % of its pixels are at {level}, the {end} of its scale\nhint: {remedy}"
-    )]
-    Clipped {
-        /// Percent.
-        share: f64,
-        /// DN
-        level: f64,
-        /// End of the scale that is clipped.
-        end: &'static str,
-        /// Remedy of the error.
-        remedy: &'static str,
-    },
-    /// Numbers that do not go with the light.
-    #[error(
-        "is not linear in the scene's light: its numbers bend by {0:.0} % of the brightest; it is gamma-encoded or developed, or shows another scene\nhint: give the raw numbers, linearised"
-    )]
-    NotLinear(f64),
-    /// One level of light, or none.
-    #[error(
-        "shows too few levels of light to tell gain from noise and light from black: photograph a step chart, or a scene with dark and bright parts"
-    )]
-    OneLevel,
     /// A film that is not the sensor's.
     #[error(transparent)]
     Sensor(#[from] SensorError),
+    /// The photograph, or what the sensor is; whoever asked knows the place of either.
+    #[error(transparent)]
+    Refused(Refusal),
+}
+
+impl MatchError {
+    fn new(why: impl Into<String>, remedy: &str) -> Self {
+        Self::Refused(Refusal::new(why).hint(remedy))
+    }
+
+    /// Error of a sensor of several numbers a pixel.
+    #[must_use]
+    pub fn not_raw(numbers: usize) -> Self {
+        let why =
+            format!("the scene's sensor has {numbers} numbers a pixel, and a raw photograph one");
+        Self::new(why, "set camera.sensor.type to `raw`, with the photograph's `cfa`")
+    }
+
+    /// Error of a photograph of other columns and rows than the sensor's.
+    #[must_use]
+    pub fn size(photo: [usize; 2], sensor: [usize; 2]) -> Self {
+        let why = format!(
+            "has {} x {} pixels, and the scene's sensor {} x {}",
+            photo[0], photo[1], sensor[0], sensor[1]
+        );
+        Self::new(why, "set camera.sensor.resolution to the photograph's")
+    }
+
+    /// Error of a photograph of which a share (0..=1) of the pixels is at an end of the scale, `level` (DN).
+    fn clipped(share: f64, level: f64, end: &str, remedy: &str) -> Self {
+        let percent = 100.0 * share;
+        let why = format!(
+            "is clipped: {percent:.1} % of its pixels are at {level}, the {end} of its scale"
+        );
+        Self::new(why, remedy)
+    }
+
+    /// Error of numbers that do not go with the light: they bend by so many percent of the brightest.
+    fn not_linear(percent: f64) -> Self {
+        let why = format!(
+            "is not linear in the scene's light: its numbers bend by {percent:.0} % of the brightest; it is gamma-encoded or \
+             developed, or shows another scene"
+        );
+        Self::new(why, "give the raw numbers, linearised")
+    }
+
+    /// Error of one level of light, or none.
+    fn one_level() -> Self {
+        let why = "shows too few levels of light to tell gain from noise and light from black";
+        Self::new(why, "photograph a step chart, or a scene with dark and bright parts")
+    }
 }
 
 /// A number and its standard deviation.
@@ -100,14 +115,14 @@ pub struct ChannelLevel {
     pub level: Estimate,
 }
 
-/// What makes a simulation match a photograph.
+/// Parameters by which a simulation matches a photograph.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Matched {
     /// K (DN/e⁻).
     pub system_gain: Estimate,
     /// `σ_read` (e⁻).
     pub read_noise: Estimate,
-    /// What no light reads as, without the dark signal (DN).
+    /// Reading of no light, without the dark signal (DN).
     pub black_level: Estimate,
     /// The exposure time (s) at which the simulation has the photograph's electrons, in the channel that has the most.
     pub exposure: Estimate,
@@ -173,11 +188,11 @@ impl Sensor {
         photo: Photograph<'_>,
     ) -> Result<Matched, MatchError> {
         if self.depth() != 1 {
-            return Err(MatchError::NotRaw(self.depth()));
+            return Err(MatchError::not_raw(self.depth()));
         }
         let size = self.resolution().map(|side| side as usize);
         if photo.size != size || photo.numbers.len() != size[0] * size[1] {
-            return Err(MatchError::Size { photo: photo.size, sensor: size });
+            return Err(MatchError::size(photo.size, size));
         }
         let white = photo.white.unwrap_or_else(|| self.saturation_level());
         not_clipped(photo.numbers, white)?;
@@ -209,7 +224,7 @@ impl Sensor {
         let [width, height] = self.resolution().map(|side| side as usize);
         let bands = self.bands().count();
         if film.values.len() != width * height * bands {
-            return Err(SensorError::Film { film: film.values.len(), width, height, bands });
+            return Err(SensorError::film(film.values.len(), [width, height, bands]));
         }
         Ok(self.rows_of_electrons(film, exposure, |_| 0.0).flatten().collect())
     }

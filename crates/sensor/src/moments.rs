@@ -80,7 +80,7 @@ impl PixelLaw<'_> {
             return moments;
         }
         let pivot = quantised(self.level(mean.min(self.full_well)), self.white);
-        let mut sum = Shifted::default();
+        let mut sum = ShiftedMoments::default();
         match self.noise {
             NoiseModel::Poisson => self.over_poisson(mean, pivot, &mut sum),
             NoiseModel::Normal | NoiseModel::None => self.over_normal(mean, pivot, &mut sum),
@@ -118,7 +118,7 @@ impl PixelLaw<'_> {
     }
 
     /// The sum over Poisson electrons, outwards from the most probable count.
-    fn over_poisson(&self, mean: f64, pivot: f64, sum: &mut Shifted) {
+    fn over_poisson(&self, mean: f64, pivot: f64, sum: &mut ShiftedMoments) {
         if mean <= 0.0 {
             return self.add(1.0, 0.0, 0.0, pivot, sum);
         }
@@ -178,7 +178,7 @@ impl PixelLaw<'_> {
     }
 
     /// The sum over normal electrons, in cells of known mass, centroid and variance.
-    fn over_normal(&self, mean: f64, pivot: f64, sum: &mut Shifted) {
+    fn over_normal(&self, mean: f64, pivot: f64, sum: &mut ShiftedMoments) {
         let spread = mean.sqrt();
         let well = (self.full_well - mean) / spread;
         let is_straight = self.curve.is_none();
@@ -214,7 +214,7 @@ impl PixelLaw<'_> {
     }
 
     /// Adds a count of electrons with a variance of its own (e⁻²) and the read noise.
-    fn add(&self, weight: f64, electrons: f64, own: f64, pivot: f64, sum: &mut Shifted) {
+    fn add(&self, weight: f64, electrons: f64, own: f64, pivot: f64, sum: &mut ShiftedMoments) {
         let slope = self.curve.map_or(1.0, |curve| curve.slope(electrons / self.full_well));
         let sigma = self.gain * (self.read_noise * self.read_noise + slope * slope * own).sqrt();
         sum.add(weight, given(self.level(electrons), sigma, self.white, pivot));
@@ -223,9 +223,9 @@ impl PixelLaw<'_> {
 
 /// E[Q − pivot] and E[(Q − pivot)²].
 #[derive(Debug, Clone, Copy, Default)]
-struct Shifted([f64; 2]);
+struct ShiftedMoments([f64; 2]);
 
-impl Shifted {
+impl ShiftedMoments {
     fn add(&mut self, weight: f64, given: [f64; 2]) {
         for (sum, value) in self.0.iter_mut().zip(given) {
             *sum += weight * value;

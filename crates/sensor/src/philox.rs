@@ -43,7 +43,7 @@ impl PhiloxKey {
             serial as u32,
             (serial >> 32) as u32,
             0,
-            Stage::PhiloxKey as u32,
+            DrawUse::PhiloxKey as u32,
         ]);
         Self::new(a | b << 32)
     }
@@ -73,17 +73,17 @@ pub fn mixed_seed(seed: u64, identity: &[u8]) -> u64 {
         let word = u64::from_le_bytes(bytes);
         #[expect(clippy::cast_possible_truncation, reason = "the halves of a word")]
         let counter =
-            [word as u32, (word >> 32) as u32, part.len() as u32, Stage::PhiloxKey as u32];
+            [word as u32, (word >> 32) as u32, part.len() as u32, DrawUse::PhiloxKey as u32];
         let [a, b, ..] = PhiloxKey::new(mixed).words(counter);
         mixed = a | b << 32;
     }
     mixed
 }
 
-/// Use of a random number. Two stages never share a counter.
+/// Use of a random number. Two uses never share a counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
-pub(crate) enum Stage {
+pub(crate) enum DrawUse {
     /// The first try at electrons, and the read noise.
     Temporal = 1,
     /// Further tries at electrons.
@@ -96,7 +96,7 @@ pub(crate) enum Stage {
     Pattern = 5,
     /// Strength of a hot pixel.
     HotPixel = 6,
-    /// Keys of other sequences. It is no pixel's: stages of pixels stand in the highest bits.
+    /// Keys of other sequences. It is no pixel's: uses of pixels stand in the highest bits.
     PhiloxKey = 7,
     /// DCNU.
     DarkCurrent = 8,
@@ -114,10 +114,10 @@ pub(crate) struct Site {
 }
 
 impl Site {
-    /// The counter of a column; `draw` counts tries of one stage.
+    /// The counter of a column; `draw` counts tries of one use.
     #[inline(always)]
-    pub(crate) fn counter(self, column: u32, stage: Stage, draw: u16) -> [u32; 4] {
-        let place = (stage as u32) << 28 | u32::from(self.channel) << 16 | u32::from(draw);
+    pub(crate) fn counter(self, column: u32, draw_use: DrawUse, draw: u16) -> [u32; 4] {
+        let place = (draw_use as u32) << 28 | u32::from(self.channel) << 16 | u32::from(draw);
         [column, self.row, self.frame, place]
     }
 }
@@ -189,9 +189,9 @@ mod tests {
         let site = Site { row: 3, channel: 4095, frame: 9 };
         let other = Site { channel: 0, ..site };
         assert_ne!(
-            site.counter(7, Stage::Temporal, u16::MAX),
-            other.counter(7, Stage::Electrons, u16::MAX)
+            site.counter(7, DrawUse::Temporal, u16::MAX),
+            other.counter(7, DrawUse::Electrons, u16::MAX)
         );
-        const { assert!(MOST_CHANNELS << 16 <= 1 << 28, "a channel reaches into the stage") };
+        const { assert!(MOST_CHANNELS << 16 <= 1 << 28, "a channel reaches into the use") };
     }
 }

@@ -17,7 +17,7 @@
 //! * Small means: L. Devroye, "Non-Uniform Random Variate Generation", 1986, section X.3.3.
 
 use crate::normal::{exp, floor, ln, ln_1p};
-use crate::philox::{PhiloxKey, Site, Stage, unit32, unit52};
+use crate::philox::{DrawUse, PhiloxKey, Site, unit32, unit52};
 
 /// Mean from which algorithm PD holds.
 pub(crate) const PD_FROM: f64 = 10.0;
@@ -129,7 +129,7 @@ pub(crate) fn finish(
     let mut electrons = full_tests(open, key, site);
     for (n, open) in electrons.iter_mut().zip(open) {
         if open.mean < PD_FROM {
-            let [high, low, ..] = key.words(site.counter(open.column, Stage::Electrons, 0));
+            let [high, low, ..] = key.words(site.counter(open.column, DrawUse::Electrons, 0));
             *n = tail_of_small_mean(open.mean, (1.0 - TAIL) * unit52(high, low));
         } else if open.mean > UNCOUNTABLE {
             *n = (open.mean + open.mean.sqrt() * open.normal).round();
@@ -203,7 +203,7 @@ fn exponential_tries<const N: usize>(
     electrons: &mut [f64; N],
 ) {
     for i in 0..N {
-        let [sign, _, high, low] = key.words(site.counter(columns[i], Stage::Electrons, draw));
+        let [sign, _, high, low] = key.words(site.counter(columns[i], DrawUse::Electrons, draw));
         let exponential = -ln(unit52(high, low));
         let signed = 2.0 * unit32(sign) - 1.0;
         let t = 1.8 + exponential.copysign(signed);

@@ -11,6 +11,7 @@
 //! so 1 in all bands is 1 in that channel and less in others, as with white light on a real sensor.
 //! The grey value g = intensity·(2ᵇ − 1 − black) fixes μₑ = g/K, whatever the exposure time.
 
+use etendue_report::Refusal;
 use etendue_spectrum::{Band, Bands, Curve, Grid, PLANCK, SPEED_OF_LIGHT, VISIBLE, integral, rgb};
 
 use crate::philox::MOST_CHANNELS;
@@ -127,7 +128,7 @@ impl Response {
         settings: &SensorSettings,
         given: Option<Bands>,
     ) -> Result<Self, SensorError> {
-        let Filtered { names, filters, pattern } = filters(spec)?;
+        let FilterLayout { names, filters, pattern } = filters(spec)?;
         let bands = match given {
             Some(bands) => bands,
             None => fewest_bands(spec, settings, &filters)?,
@@ -136,7 +137,7 @@ impl Response {
             && !spec.bands.as_ref().is_some_and(|grid| divides(&bands, grid))
         {
             let why = "the bands of a multispectral sensor are the bands of its render";
-            return Err(SensorError::Misplaced { key: "bands", why });
+            return Err(SensorError::misplaced("bands", why));
         }
         // Ideal primaries are compared with an ideal primary, unless other filters show that a
         // primary is less than all light.
@@ -173,30 +174,30 @@ fn divides(bands: &Bands, edges: &Grid) -> bool {
 }
 
 /// The kinds of photosites, what stands before each, and which pixel has which.
-pub(crate) struct Filtered {
+pub(crate) struct FilterLayout {
     names: Vec<String>,
     pub(crate) filters: Vec<ColourFilter>,
     pattern: Option<Vec<Vec<usize>>>,
 }
 
 /// The filters of a sensor.
-pub(crate) fn filters(spec: &SensorSpec) -> Result<Filtered, SensorError> {
+pub(crate) fn filters(spec: &SensorSpec) -> Result<FilterLayout, SensorError> {
     match spec.kind {
         SensorKind::Raw => raw(spec),
         SensorKind::Rgb => {
             let named = |letter| filter(letter, spec.filters.as_ref());
             let filters = ['r', 'g', 'b'].map(named).into_iter().collect::<Result<_, _>>()?;
             let names = ["R", "G", "B"].map(String::from).into();
-            Ok(Filtered { names, filters, pattern: None })
+            Ok(FilterLayout { names, filters, pattern: None })
         }
         SensorKind::Multispectral => multispectral(spec),
     }
 }
 
-fn raw(spec: &SensorSpec) -> Result<Filtered, SensorError> {
+fn raw(spec: &SensorSpec) -> Result<FilterLayout, SensorError> {
     let Some(cfa) = &spec.cfa else {
         let pattern = Some(vec![vec![0]]);
-        return Ok(Filtered {
+        return Ok(FilterLayout {
             names: vec!["Y".into()],
             filters: vec![ColourFilter::Clear],
             pattern,
@@ -208,7 +209,7 @@ fn raw(spec: &SensorSpec) -> Result<Filtered, SensorError> {
         .map(|&letter| filter(letter, spec.filters.as_ref()))
         .collect::<Result<_, _>>()?;
     let names = letters.iter().map(|letter| letter.to_uppercase().collect()).collect();
-    Ok(Filtered { names, filters, pattern: Some(numbered(cfa, &letters)) })
+    Ok(FilterLayout { names, filters, pattern: Some(numbered(cfa, &letters)) })
 }
 
 /// The pattern with each letter replaced by its number.
@@ -221,12 +222,12 @@ fn numbered(cfa: &CfaSpec, letters: &[char]) -> Vec<Vec<usize>> {
     (0..rows).map(|row| (0..columns).map(|column| number(row, column)).collect()).collect()
 }
 
-fn multispectral(spec: &SensorSpec) -> Result<Filtered, SensorError> {
+fn multispectral(spec: &SensorSpec) -> Result<FilterLayout, SensorError> {
     // Channels with curves of their own.
     if let Some(channels) = spec.channels.as_ref().map(Channels::curves) {
         if channels.is_empty() {
             let why = "name one channel at least";
-            return Err(SensorError::Missing { key: "channels", why });
+            return Err(SensorError::missing("channels", why));
         }
         let demand = "4096 channels at most";
         let count = channels.len();
@@ -236,26 +237,32 @@ fn multispectral(spec: &SensorSpec) -> Result<Filtered, SensorError> {
             let name = channel.name.as_str();
             let fit = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
             if name.is_empty() || name.len() > 48 || !name.chars().all(fit) {
-                let why = "must be 1 to 48 letters, digits, underscores or hyphens";
-                return Err(SensorError::Channel { index, why });
+                return Err(misnamed(
+                    index,
+                    "must be 1 to 48 letters, digits, underscores or hyphens",
+                ));
             }
             if channels[..index].iter().any(|other| other.name == name) {
-                let why = "is taken by one before it";
-                return Err(SensorError::Channel { index, why });
+                return Err(misnamed(index, "is taken by one before it"));
             }
             let key = || format!("channels.{}", channel.name);
             filters.push(ColourFilter::Curve(transmission(&channel.curve, key)?));
         }
         let names = channels.iter().map(|channel| channel.name.clone()).collect();
-        return Ok(Filtered { names, filters, pattern: None });
+        return Ok(FilterLayout { names, filters, pattern: None });
     }
     // Or one channel a band.
     let Some(grid) = &spec.bands else {
         let why = "a multispectral sensor needs the edges of its bands (nm), or `channels`";
-        return Err(SensorError::Missing { key: "bands", why });
+        return Err(SensorError::missing("bands", why));
     };
     let filters = grid.bands().map(ColourFilter::Band).collect();
-    Ok(Filtered { names: Bands::Spectral(grid.clone()).names(), filters, pattern: None })
+    Ok(FilterLayout { names: Bands::Spectral(grid.clone()).names(), filters, pattern: None })
+}
+
+/// Error of the name of a channel.
+fn misnamed(index: usize, why: &str) -> SensorError {
+    Refusal::new(format!("the name of channel {index} {why}")).at("channels").into()
 }
 
 /// The filter of a letter: the user's curve, one of a named set, or an ideal one.
@@ -272,12 +279,18 @@ fn filter(letter: char, filters: Option<&Filters>) -> Result<ColourFilter, Senso
             .map_or(ColourFilter::Primary(k), |curve| ColourFilter::Curve(curve.clone()))),
         (Some(k), _) => Ok(ColourFilter::Primary(k)),
         (None, _) if letter.eq_ignore_ascii_case(&'w') => Ok(ColourFilter::Clear),
-        (None, _) => Err(SensorError::UnknownFilter { letter }),
+        (None, _) => {
+            let why = format!(
+                "names the filter `{letter}`, for which there is no curve: add it to `filters`, or \
+                 use r, g, b or w"
+            );
+            Err(Refusal::new(why).at("cfa").into())
+        }
     }
 }
 
 fn transmission(curve: &Curve, key: impl Fn() -> String) -> Result<Curve, SensorError> {
-    curve.clone().within(0.0, 1.0).map_err(|fault| SensorError::Curve { key: key(), fault })
+    curve.clone().within(0.0, 1.0).map_err(|fault| SensorError::curve(&key(), &fault))
 }
 
 /// The fewest bands that the sensor can tell apart.
@@ -294,11 +307,7 @@ fn fewest_bands(
         let coloured = filters.iter().any(|filter| *filter != ColourFilter::Clear);
         return Ok(if coloured { Bands::Rgb } else { Bands::Grey });
     }
-    let blind = || SensorError::Blind {
-        key: "quantum_efficiency",
-        channel: "all".into(),
-        bands: settings.efficiency.range(),
-    };
+    let blind = || SensorError::blind("quantum_efficiency", "all", settings.efficiency.range());
     let [from, to] = sensitive_range(&settings.efficiency, filters).ok_or_else(blind)?;
     // A curve may be given for more wavelengths than anybody renders.
     let width = BAND_WIDTH.max((to - from) / 1000.0);
@@ -324,7 +333,7 @@ fn channel(
                 "quantum_efficiency"
             }
         };
-        return Err(SensorError::Blind { key, channel: name, bands: bands.range() });
+        return Err(SensorError::blind(key, &name, bands.range()));
     }
     // Weighted bands stand for pieces of the light, not of white: colours are weighed without them.
     let mut primaries = match bands {

@@ -313,7 +313,7 @@ impl Sensor {
     ///
     /// # Errors
     ///
-    /// [`SensorError::Film`] when the film is not of the sensor's size and bands.
+    /// When the film is not of the sensor's size and bands.
     pub fn expose(
         &self,
         film: Film<'_>,
@@ -383,7 +383,7 @@ impl Sensor {
         let [width, height] = self.settings.resolution.map(|side| side as usize);
         let bands = self.response.bands.count();
         if film.values.len() != width * height * bands {
-            return Err(SensorError::Film { film: film.values.len(), width, height, bands });
+            return Err(SensorError::film(film.values.len(), [width, height, bands]));
         }
         Ok((width, height, self.depth()))
     }

@@ -3,9 +3,11 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use etendue_report::Refusal;
 use etendue_spectrum::Curve;
 
 use crate::effects::Effects;
+use crate::error::Readable;
 use crate::spec::{Filters, HotPixels, NoiseModel, Radiometry, SensorKind, SensorSpec};
 use crate::{CfaSpec, Model, SensorError};
 
@@ -71,7 +73,7 @@ pub(crate) struct SensorSettings {
     pub(crate) radiometry: Radiometry,
     /// Sensitivity beside that of the first read-out's photodiode, which is 1.
     pub(crate) sensitivity: f64,
-    /// Which read-out of the electrons it is.
+    /// Read-out of the electrons.
     pub(crate) readout: ReadoutPath,
     pub(crate) effects: Arc<Effects>,
     /// Notes for the user.
@@ -201,7 +203,7 @@ impl SensorSettings {
             .clone()
             .within(0.0, 1.0)
             .map(|_| ())
-            .map_err(|fault| SensorError::Curve { key: "quantum_efficiency".into(), fault })
+            .map_err(|fault| SensorError::curve("quantum_efficiency", &fault))
     }
 
     fn check_electrons(&self) -> Result<(), SensorError> {
@@ -252,7 +254,13 @@ impl SensorSettings {
         }
         if self.full_well * self.gain <= 0.5 {
             let Self { full_well, gain, .. } = *self;
-            return Err(SensorError::FullWell { full_well, gain });
+            let why = format!(
+                "{} e⁻ times the system_gain of {} DN/e⁻ is not half a digital number: every pixel \
+                 would be black; one of the two is too small",
+                Readable(full_well),
+                Readable(gain)
+            );
+            return Err(Refusal::new(why).at("full_well").into());
         }
         Ok(())
     }
@@ -277,25 +285,25 @@ impl SensorSettings {
             let readouts = if spec.second_readout.is_some() { 2.0 } else { 1.0 };
             if self.exposures.len() as f64 * frames * readouts < 2.0 {
                 let why = "sensor.hdr merges several: name their times, or a second_readout";
-                return Err(SensorError::Missing { key: "exposures", why });
+                return Err(SensorError::missing("exposures", why));
             }
             if self.radiometry == Radiometry::Digital {
                 let why = "with radiometry `digital` longer exposures have no more light\nhint: set `physical`";
-                return Err(SensorError::Misplaced { key: "hdr", why });
+                return Err(SensorError::misplaced("hdr", why));
             }
         }
         if spec.exposure.is_some() && spec.exposures.is_some() {
             let why = "sensor.exposures says it all";
-            return Err(SensorError::Misplaced { key: "exposure", why });
+            return Err(SensorError::misplaced("exposure", why));
         }
         if spec.auto_exposure.is_some() {
             if spec.exposure.is_some() || spec.exposures.is_some() {
                 let why = "sensor.exposure or sensor.exposures gives the time that it would meter";
-                return Err(SensorError::Misplaced { key: "auto_exposure", why });
+                return Err(SensorError::misplaced("auto_exposure", why));
             }
             if self.radiometry == Radiometry::Digital {
                 let why = "with radiometry `digital` longer exposures have no more light\nhint: set `physical`";
-                return Err(SensorError::Misplaced { key: "auto_exposure", why });
+                return Err(SensorError::misplaced("auto_exposure", why));
             }
         }
         Ok(())
@@ -306,25 +314,25 @@ impl SensorSettings {
         let raw = spec.kind == SensorKind::Raw;
         if spec.cfa.is_some() && !raw {
             let why = "only a `raw` sensor has a colour filter array";
-            return Err(SensorError::Misplaced { key: "cfa", why });
+            return Err(SensorError::misplaced("cfa", why));
         }
         if spec.filters.is_some() && spec.kind == SensorKind::Multispectral {
             let why = "a multispectral sensor has `channels`";
-            return Err(SensorError::Misplaced { key: "filters", why });
+            return Err(SensorError::misplaced("filters", why));
         }
         if spec.filters.is_some() && raw && spec.cfa.is_none() {
             let why = "name the pattern of filters in sensor.cfa";
-            return Err(SensorError::Missing { key: "cfa", why });
+            return Err(SensorError::missing("cfa", why));
         }
         if spec.channels.is_some() && spec.kind != SensorKind::Multispectral {
             let why = "only a `multispectral` sensor has channels";
-            return Err(SensorError::Misplaced { key: "channels", why });
+            return Err(SensorError::misplaced("channels", why));
         }
         if let Some(Filters::Curves(curves)) = &spec.filters {
             let named = spec.cfa.as_ref().map_or(vec!['r', 'g', 'b'], CfaSpec::letters);
             if curves.keys().any(|letter| !named.contains(letter)) {
                 let why = "it has a curve for a letter that no pixel has";
-                return Err(SensorError::Misplaced { key: "filters", why });
+                return Err(SensorError::misplaced("filters", why));
             }
         }
         let electrons = [
@@ -347,7 +355,7 @@ impl SensorSettings {
         if wants_electrons && !self.counts {
             let why = "noise, dark signal, full well and physical radiometry count electrons, and \
                 without the gain K (DN/e⁻) nobody knows how many there are";
-            return Err(SensorError::Missing { key: "system_gain", why });
+            return Err(SensorError::missing("system_gain", why));
         }
         Ok(())
     }
@@ -398,17 +406,17 @@ pub(crate) fn at_its_iso(spec: &SensorSpec) -> Result<Cow<'_, SensorSpec>, Senso
     let Some(all) = &spec.iso_settings else {
         if spec.iso.is_some() {
             let why = "sensor.iso names one of them";
-            return Err(SensorError::Missing { key: "iso_settings", why });
+            return Err(SensorError::missing("iso_settings", why));
         }
         return Ok(Cow::Borrowed(spec));
     };
     if spec.system_gain.is_some() {
         let why = "sensor.iso_settings has the gain of each setting";
-        return Err(SensorError::Misplaced { key: "system_gain", why });
+        return Err(SensorError::misplaced("system_gain", why));
     }
     let Some(first) = all.first() else {
         let why = "name one setting at least";
-        return Err(SensorError::Missing { key: "iso_settings", why });
+        return Err(SensorError::missing("iso_settings", why));
     };
     for (index, setting) in all.iter().enumerate() {
         within("iso_settings.iso", setting.iso, [1e-3, 1e9], "a number above 0 (1e-3 to 1e9)")?;
@@ -419,8 +427,13 @@ pub(crate) fn at_its_iso(spec: &SensorSpec) -> Result<Cow<'_, SensorSpec>, Senso
     }
     let iso = spec.iso.unwrap_or(first.iso);
     let Some(setting) = all.iter().find(|setting| setting.iso == iso) else {
-        let known = all.iter().map(|setting| setting.iso).collect();
-        return Err(SensorError::UnknownIso { iso, known });
+        let known: Vec<String> = all.iter().map(|setting| setting.iso.to_string()).collect();
+        let why = format!(
+            "there is no setting {}: sensor.iso_settings has {}",
+            Readable(iso),
+            known.join(", ")
+        );
+        return Err(Refusal::new(why).at("iso").into());
     };
     Ok(Cow::Owned(SensorSpec {
         system_gain: Some(setting.system_gain),

@@ -35,7 +35,7 @@ const FEWEST: usize = 16;
 /// A step under this share of the noise in the region's values is no edge.
 const CLEAR: f64 = 4.0;
 
-/// Which pixels count: all, or those of one colour of a mosaic.
+/// Pixels that count: all, or those of one colour of a mosaic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Lattice {
     /// Every so many columns and rows.
@@ -49,7 +49,7 @@ impl Lattice {
     pub const ALL: Self = Self { step: [1, 1], first: [0, 0] };
 }
 
-/// What a slanted edge tells.
+/// Measurements of a slanted edge.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SlantedEdge {
     /// The edge's angle from the column or row that it is nearest to (degrees), positive clockwise for an
@@ -57,7 +57,7 @@ pub struct SlantedEdge {
     pub angle: f64,
     /// True if it is nearer to upright than to level.
     pub is_upright: bool,
-    /// Where it crosses the region's middle line (pixels from the region's corner).
+    /// Place where it crosses the region's middle line (pixels from the region's corner).
     pub position: f64,
     /// Root mean square of the lines' centroids from the straight line (pixels).
     pub straightness: f64,
@@ -65,7 +65,7 @@ pub struct SlantedEdge {
     pub levels: [f64; 2],
     /// Michelson's contrast of these.
     pub contrast: f64,
-    /// How much the edge spread function goes beyond the levels, as a share of the step: sharpening.
+    /// Excess of the edge spread function over the levels, as a share of the step: sharpening.
     pub overshoot: f64,
     /// Distances from the edge (pixels) and the line spread function there (1/pixel).
     pub line_spread: Vec<[f64; 2]>,

@@ -18,7 +18,7 @@ use crate::{CfaSpec, Model};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SensorSpec {
-    /// What a pixel measures.
+    /// Quantities that a pixel measures.
     #[serde(rename = "type")]
     pub kind: SensorKind,
     /// A sensor of the trade, whose published figures fill in for absent keys.
@@ -43,7 +43,7 @@ pub struct SensorSpec {
     /// Settings of the amplifier that were measured one by one, as ISO speeds or conversion gains.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub iso_settings: Option<Vec<IsoSetting>>,
-    /// Which of `iso_settings` holds (default: the first).
+    /// The one of `iso_settings` that holds (default: the first).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub iso: Option<f64>,
     /// Standard deviation of the read-out, `σ_read`, before the amplifier (e⁻, ≥ 0; default 0).
@@ -58,16 +58,16 @@ pub struct SensorSpec {
     /// Warming by this much doubles the dark current (K, > 0; absent: it stays as it is).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dark_current_doubling: Option<f64>,
-    /// Where the dark current was measured (K; default 293.15).
+    /// Temperature at which the dark current was measured (K; default 293.15).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dark_current_temperature: Option<f64>,
-    /// How warm the sensor is (K, ≥ 0; default `dark_current_temperature`).
+    /// Temperature of the sensor (K, ≥ 0; default `dark_current_temperature`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature: Option<f64>,
     /// Electrons a pixel holds (e⁻, > 0; absent: only the converter saturates).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub full_well: Option<f64>,
-    /// What no light reads as (DN, 0 .. 2ᵇ − 1; default 0).
+    /// Reading of no light (DN, 0 .. 2ᵇ − 1; default 0).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub black_level: Option<f64>,
     /// Bits of the converter (1..=16; default 16).
@@ -111,8 +111,8 @@ pub struct SensorSpec {
     /// Pixels with which something is wrong, one by one: a picture of them, or a list.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub defect_map: Option<DefectMap>,
-    /// What is read of what a pixel collected, near saturation: points `[collected, read]` as shares of `full_well`,
-    /// ascending from 0 to 1 collected, that straight lines join (absent: all of it).
+    /// Share that is read of what a pixel collected, near saturation: points `[collected, read]` as shares of
+    /// `full_well`, ascending from 0 to 1 collected, that straight lines join (absent: all of it).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nonlinearity: Option<Vec<[f64; 2]>>,
     /// The share of the charge above `full_well` that flows into the neighbours of its column (0..=1; default 0).
@@ -148,13 +148,13 @@ pub struct SensorSpec {
     /// Also merge all exposures and read-outs to one picture of electrons a second (default false).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hdr: Option<bool>,
-    /// How electrons are drawn (default: `poisson` with a model or a gain, else `none`).
+    /// Law by which electrons are drawn (default: `poisson` with a model or a gain, else `none`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<NoiseModel>,
     /// Serial number: which copy of the sensor, hence which fixed pattern (default 0).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub serial: Option<u64>,
-    /// What the light means (default `digital`).
+    /// Meaning of the light (default `digital`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radiometry: Option<Radiometry>,
     /// Colour filter array of a `raw` sensor: `rggb` or another two-by-two word read row by row, or
@@ -172,7 +172,7 @@ pub struct SensorSpec {
     /// Channels of a `multispectral` sensor by curves instead of bands, or the name of a set.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channels: Option<Channels>,
-    /// How the preview of a `raw` sensor finds missing colours (default `malvar`).
+    /// Method by which the preview of a `raw` sensor finds missing colours (default `malvar`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub demosaic: Option<Method>,
     /// Also write the expected value and the variance of every pixel (default false).
@@ -190,7 +190,7 @@ impl SensorSpec {
     }
 }
 
-/// What a pixel measures.
+/// Quantities that a pixel measures.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SensorKind {
@@ -203,7 +203,7 @@ pub enum SensorKind {
     Multispectral,
 }
 
-/// How missing colours are found.
+/// Method by which missing colours are found.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
@@ -214,7 +214,7 @@ pub enum Method {
     Malvar,
 }
 
-/// How electrons are drawn.
+/// Law by which electrons are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NoiseModel {
@@ -228,7 +228,7 @@ pub enum NoiseModel {
     None,
 }
 
-/// What the light of a render means to the sensor.
+/// Meaning of the light of a render to the sensor.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Radiometry {
@@ -265,7 +265,7 @@ pub struct IsoSetting {
     /// Electrons a pixel holds (e⁻, > 0).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub full_well: Option<f64>,
-    /// What no light reads as (DN).
+    /// Reading of no light (DN).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub black_level: Option<f64>,
 }
@@ -274,7 +274,7 @@ pub struct IsoSetting {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelSpec {
-    /// What it is called in files.
+    /// Name in files.
     pub name: String,
     /// Its transmission (0..=1), which the quantum efficiency multiplies.
     pub curve: Curve,

@@ -176,7 +176,7 @@ struct EqualBands {
     from: f64,
     /// The long end of the last band (nm).
     to: f64,
-    /// How many bands.
+    /// Number of bands.
     count: usize,
 }
 

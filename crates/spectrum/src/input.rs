@@ -22,7 +22,7 @@ pub enum CurveSpec {
     Sum(Vec<CurveSource>),
 }
 
-/// Where a curve comes from.
+/// Source of a curve.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum CurveSource {
@@ -66,7 +66,7 @@ pub struct FileSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LampSpec {
-    /// Which.
+    /// The illuminant.
     pub illuminant: Illuminant,
     /// Multiplies the spectrum.
     #[serde(default = "one", skip_serializing_if = "is_one")]
@@ -77,7 +77,7 @@ pub struct LampSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LineSpec {
-    /// Where it is (nm).
+    /// Wavelength of the line (nm).
     pub line: f64,
     /// Its width at half of its height (nm, > 0): the line is a triangle.
     #[serde(default = "one")]

@@ -27,7 +27,7 @@ pub(crate) struct LightTriangle {
 }
 
 impl LightTriangle {
-    /// The triangle of a spot at its time; `None` without area.
+    /// The triangle of a point at its time; `None` without area.
     pub(crate) fn of(point: &SurfacePoint<'_>) -> Option<Self> {
         let place = &point.placement.world_from_mesh_at(point.time);
         let [a, b, c] = point.mesh.corners_at(point.triangle, point.time);
@@ -96,7 +96,8 @@ impl AreaLight {
 /// of a placement that moves, while it does; `None` without area.
 pub(crate) fn cluster(
     scene: &SceneView<'_>,
-    (id, time): ([u32; 2], f64),
+    id: [u32; 2],
+    time: f64,
     power: f64,
     way: Option<&AreaLightMotion<'_>>,
 ) -> Option<Cluster> {
@@ -164,7 +165,8 @@ impl<'a> AreaLightMotion<'a> {
 /// Power of an emissive triangle (W) at a time (s from the frame's time), by the paint at its middle and corners.
 pub(crate) fn triangle_power(
     scene: &SceneView<'_>,
-    (placement, triangle): (&Placement, usize),
+    placement: &Placement,
+    triangle: usize,
     material: &Material,
     time: f64,
 ) -> f64 {

@@ -9,7 +9,7 @@
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Bounds, Geometry, Mesh};
 
-use crate::{Ior, Material, Scattering};
+use crate::{Ior, Material};
 
 /// The largest share of a mesh's area that its oriented triangles may lack of a closed surface's, of which they cancel:
 /// what the rounding of coordinates to f32 leaves, and far less than a face that is missing.
@@ -36,7 +36,7 @@ pub(crate) fn bodies(geometry: &Geometry, materials: &[Material]) -> Vec<Option<
     let mut found: Vec<(f64, usize, Bounds)> = Vec::new();
     for (i, placement) in geometry.placements.iter().enumerate() {
         let material = materials.get(placement.material as usize);
-        if !material.is_some_and(|m| matches!(m.scattering, Scattering::Dielectric(_))) {
+        if !material.is_some_and(|material| material.scattering.is_body()) {
             continue;
         }
         let volume = enclosed[placement.mesh as usize]
@@ -51,15 +51,8 @@ pub(crate) fn bodies(geometry: &Geometry, materials: &[Material]) -> Vec<Option<
     let mut bodies = vec![None; geometry.placements.len()];
     let is_air = |placement: usize| {
         let material = materials.get(geometry.placements[placement].material as usize);
-        material.is_some_and(|material| match &material.scattering {
-            Scattering::Dielectric(glass) => glass.ior == Ior::Constant(1.0),
-            Scattering::Black
-            | Scattering::Matte
-            | Scattering::Unlit
-            | Scattering::Mirror
-            | Scattering::Metal { .. }
-            | Scattering::Gltf(_) => false,
-        })
+        let glass = material.and_then(|material| material.scattering.glass());
+        glass.is_some_and(|glass| glass.ior == Ior::Constant(1.0))
     };
     for ((rank, &(_, placement, bounds)), is_nested) in (0..).zip(&found).zip(nested) {
         let may_vanish = is_nested || is_air(placement);

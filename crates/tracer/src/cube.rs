@@ -57,7 +57,8 @@ impl Cube {
         size: [usize; 2],
         axis: BandAxis,
         values: Vec<f32>,
-        (wrap, filter): (Wrap, Filter),
+        wrap: Wrap,
+        filter: Filter,
     ) -> Result<Self, String> {
         let count = axis.len();
         if size.contains(&0) || values.len() != size[0] * size[1] * count {
@@ -98,7 +99,7 @@ impl Cube {
         let mut cube = Self { kind, size, axis, values, looks: Vec::new(), wrap, filter };
         let color = |part: &Curve| match kind {
             CubeKind::Reflectance => rgb::colour(&part.held_over(360.0, 830.0)),
-            // As of any lamp, before equal energy; none where it is invisible. Of a part it may well be negative.
+            // As of any light, before equal energy; none where it is invisible. Of a part it may well be negative.
             CubeKind::Light => rgb::colour(part),
         };
         let colors: Vec<Color> = cube.parts().iter().map(color).collect();
@@ -296,7 +297,8 @@ mod tests {
             [2, 1],
             axis.clone(),
             values,
-            (Wrap::ClampToEdge, Filter::Bilinear),
+            Wrap::ClampToEdge,
+            Filter::Bilinear,
         )
         .unwrap();
         // Flat stays flat in any bands, and means of straight lines are theirs.
@@ -314,15 +316,12 @@ mod tests {
     #[test]
     fn what_is_no_reflectance_is_refused_with_its_place() {
         let axis = axis(400.0, 700.0, 2);
-        let look = (Wrap::Repeat, Filter::Nearest);
-        let above =
-            Cube::new(CubeKind::Reflectance, [1, 2], axis.clone(), vec![0.5, 0.5, 0.5, 1.5], look)
-                .unwrap_err();
+        let cube = |values: Vec<f32>| {
+            let (wrap, filter) = (Wrap::Repeat, Filter::Nearest);
+            Cube::new(CubeKind::Reflectance, [1, 2], axis.clone(), values, wrap, filter)
+        };
+        let above = cube(vec![0.5, 0.5, 0.5, 1.5]).unwrap_err();
         assert!(above.contains("band 1 of row 1, column 0"), "{above}");
-        assert!(
-            Cube::new(CubeKind::Reflectance, [1, 2], axis, vec![0.5; 3], look)
-                .unwrap_err()
-                .contains("3 numbers")
-        );
+        assert!(cube(vec![0.5; 3]).unwrap_err().contains("3 numbers"));
     }
 }

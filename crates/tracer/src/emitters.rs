@@ -1,7 +1,7 @@
 //! Surfaces that shine, by themselves: a direction that is followed for its light alone asks these
 //! first, and the whole scene only where one of them is met.
 //!
-//! What a path adds is the same as if the whole scene were asked for its closest hit. Most such
+//! A path adds the same light as if the whole scene were asked for its closest hit. Most such
 //! directions meet no light, and those that do need a shadow ray, which is cheaper than a closest hit.
 
 use std::sync::Arc;
@@ -25,6 +25,15 @@ pub struct Emitters {
     /// A sphere around them (m): its centre, and its radius with room for rounding.
     centre: DVec3,
     radius: f64,
+}
+
+/// A sphere around all emissive surfaces.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct EmitterSphere<F> {
+    /// m.
+    pub(crate) centre: [F; 3],
+    /// m; below zero where nothing shines.
+    pub(crate) radius: F,
 }
 
 impl Emitters {
@@ -65,13 +74,13 @@ impl Emitters {
         self.accel.is_none()
     }
 
-    /// A sphere around them, about `origin` (m): its centre and its radius, with room for rounding.
-    pub(crate) fn sphere<F: Float>(&self, origin: DVec3) -> ([F; 3], F) {
+    /// A sphere around them, relative to `origin` (m), with room for rounding.
+    pub(crate) fn sphere<F: Float>(&self, origin: DVec3) -> EmitterSphere<F> {
         let centre = self.centre - origin;
         let epsilon: f64 = F::EPSILON.into();
         let room = 4.0 * epsilon * (centre.length() + self.radius);
         let radius = if self.radius >= 0.0 { self.radius + room } else { -1.0 };
-        (centre.to_array().map(F::of), F::of(radius))
+        EmitterSphere { centre: centre.to_array().map(F::of), radius: F::of(radius) }
     }
 
     /// The closest emissive surface along each ray, by the scene's numbers.

@@ -18,9 +18,9 @@ use crate::{Color, Cube};
 use etendue_geometry::Float;
 
 pub(crate) use sampler::MapLookup;
-pub use sampler::MapSampler;
 #[cfg(test)]
-pub(crate) use sampler::OnMap;
+pub(crate) use sampler::MapLookups;
+pub use sampler::MapSampler;
 
 /// The most cells of the grid that directions are chosen on, across and down.
 const CELLS: [usize; 2] = [2048, 1024];
@@ -64,7 +64,7 @@ impl EnvironmentMap {
         Ok(Self::new(raster.size(), (0..raster.len()).map(linear).collect()))
     }
 
-    /// What a cube of light from all directions looks like.
+    /// Look of a cube of light from all directions.
     #[must_use]
     pub fn of_cube(cube: &Cube) -> Self {
         Self::new(cube.size(), cube.looks().to_vec())
@@ -100,7 +100,7 @@ impl EnvironmentMap {
         self
     }
 
-    /// What lights a model that brings no light of its own: a bright grey sky, a darker floor, and a
+    /// The studio that lights a model which brings no light of its own: a bright grey sky, a darker floor, and a
     /// large soft lamp up on the left before the model.
     #[must_use]
     pub fn studio() -> Self {
@@ -161,7 +161,7 @@ impl EnvironmentMap {
         self.interpolated(&self.spectra, at)
     }
 
-    /// What texels of some bands have at a [`place`], `[row][column][band]`: each of `out`, which are as many as a
+    /// Looks up texels of some bands, `[row][column][band]`, at a [`place`]: each of `out`, which are as many as a
     /// texel has.
     pub(crate) fn bands_at(&self, texels: &[f32], [u, v]: [f64; 2], out: &mut [f64]) {
         let count = out.len();
@@ -189,7 +189,7 @@ impl EnvironmentMap {
 struct CornerTexels<const N: usize>([[[f32; N]; 3]; 4]);
 
 impl<const N: usize> CornerTexels<N> {
-    /// How bright each is.
+    /// Brightness of each.
     #[inline(always)]
     fn bright<F: Float>(&self) -> [[F; N]; 4] {
         let mut bright = [[F::ZERO; N]; 4];
@@ -227,7 +227,7 @@ fn mean<F: Float>([r, g, b]: [F; 3]) -> F {
 /// Places worked on side by side.
 const LANES: usize = 16;
 
-/// What four corners have between them: left and right above, and below.
+/// Value between four corners: left and right above, and below.
 #[inline(always)]
 fn between<F: Float>([a, b, c, d]: [F; 4], [across, down]: [F; 2]) -> F {
     let [left, right] = [a + (c - a) * down, b + (d - b) * down];
@@ -273,14 +273,14 @@ impl<F: Float, const N: usize> Corners<F, N> {
         Self { numbers, across, down, row }
     }
 
-    /// How far the places are from the first cell, across and down.
+    /// Distance of the places from the first cell, across and down.
     #[inline(always)]
     fn within(&self) -> [&[F; N]; 2] {
         [&self.across, &self.down]
     }
 }
 
-/// What a number of at least 0 has behind the point, and the whole number before it.
+/// Fraction of a number of at least 0, and the whole number before it.
 #[inline(always)]
 fn whole<F: Float>(x: F) -> (F, u32) {
     let (nearest, bits) = x.nearest();
@@ -351,7 +351,7 @@ mod tests {
         let n = 1_000;
         let at = |k: i32| (f64::from(k) + 0.5) / f64::from(n);
         let squares: Vec<_> = (0..n * n).map(|k| [at(k % n), at(k / n)]).collect();
-        let (mut chosen, mut sum) = (OnMap::default(), 0.0);
+        let (mut chosen, mut sum) = (MapLookups::default(), 0.0);
         sampler.sample(&map, &squares, &mut chosen);
         for ((&d, &[u, _]), &pdf) in
             chosen.directions.iter().zip(&chosen.places).zip(&chosen.densities)
@@ -372,7 +372,7 @@ mod tests {
         let at = |i: u32| (f64::from(i) + 0.5) / 200.0;
         let squares: Vec<_> = (0..40_000).map(|k| [at(k % 200), at(k / 200)]).collect();
         let whole = 4.0 * PI * sampler.mean;
-        let mut chosen = OnMap::default();
+        let mut chosen = MapLookups::default();
         sampler.sample(&map, &squares, &mut chosen);
         for ((&d, color), &pdf) in
             chosen.directions.iter().zip(&chosen.colors).zip(&chosen.densities)
@@ -385,7 +385,7 @@ mod tests {
         }
     }
 
-    /// What is looked up in lanes is what is looked up alone, at the poles, the seam, and for maps of a texel's
+    /// Lookups in lanes are lookups alone, at the poles, the seam, and for maps of a texel's
     /// width.
     #[test]
     fn lanes_are_lookups_one_by_one() {
@@ -402,7 +402,7 @@ mod tests {
             let sampler = sampler.unwrap_or_else(|| MapSampler::new(&map));
             let at = |k: u32, n: u32| (f64::from(k) + 0.5) / f64::from(n);
             let squares: Vec<_> = (0..500).map(|k| [at(k, 500), at(k % 23, 23)]).collect();
-            let mut chosen = OnMap::default();
+            let mut chosen = MapLookups::default();
             sampler.sample(&map, &squares, &mut chosen);
             for (k, &d) in chosen.directions.iter().enumerate() {
                 // Directions are as good as f64, and so is where they are between texels.
@@ -412,7 +412,7 @@ mod tests {
                     assert!((color - expected).abs() < 1e-9 * expected, "{d}: {color} {expected}");
                 }
             }
-            let mut asked = OnMap::default();
+            let mut asked = MapLookups::default();
             let axes = [DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z, DVec3::X];
             let seam = [1e-17, -1e-17, 0.0, -0.0].map(|x| DVec3::new(x, 0.0, 1.0));
             let others =

@@ -1,4 +1,4 @@
-//! How much of a surface a sample of the picture stands for: a cone around each ray, which is as wide
+//! Footprint on a surface that a sample of the picture stands for: a cone around each ray, which is as wide
 //! as its share of a pixel and grows with the way.
 //!
 //! # Sources

@@ -72,7 +72,7 @@ pub use material::{Color, Emission, Material, Paint, TextureScope};
 pub use modulation::{Clock, Modulation, ModulationSpec};
 pub use placed::PlacedSurfaces;
 pub use projector::Projector;
-pub use reference::{Needs, SceneView, SurfacePoint, Traced, View};
+pub use reference::{Needs, SceneView, SurfacePoint, TracedBatch, View};
 pub use scattering::{Absorption, Glass, Ior, Scattering};
 pub use spec::{LightMotionSpec, LightSpec, MaterialSpec};
 pub use spectral::Spectral;

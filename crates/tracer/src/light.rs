@@ -16,24 +16,24 @@ use crate::{ClearSky, Color, Cube, LightGroup, Modulation, TextureUse};
 /// A light of the scene, beside its emissive surfaces.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Light {
-    /// Where the light goes, in the frame of [`Self::motion`] where it has one.
+    /// Its kind with its geometry, in the frame of [`Self::motion`] where it has one.
     pub kind: LightKind,
-    /// How it moves, from that frame to the world, in the frame's clock; `None` when it stands still.
+    /// Its motion, from that frame to the world, in the frame's clock; `None` when it stands still.
     pub motion: Option<Arc<Motion>>,
     /// Radiant intensity, irradiance or radiance, by the kind: linear RGB.
     pub color: Color,
     /// The spectrum that the colour multiplies; equal energy when absent.
     pub illuminant: Option<Arc<Curve>>,
-    /// What it sends as a curve, which takes the place of colour and illuminant in bands of wavelengths.
+    /// Its light as a curve, which takes the place of colour and illuminant in bands of wavelengths.
     pub spectrum: Option<Arc<Curve>>,
     /// The group that it is of, if it names one.
     pub group: Option<LightGroup>,
-    /// How its strength changes with time, in the frame's clock; `None` when it does not.
+    /// Change of its strength with time, in the frame's clock; `None` when it does not change.
     pub modulation: Option<Arc<Modulation>>,
 }
 
 impl Light {
-    /// What lights a model that brings no light of its own.
+    /// The light of a model that brings none of its own.
     pub const STUDIO: Self = Self {
         kind: LightKind::Environment {
             image: EnvironmentImage::Studio,
@@ -55,10 +55,15 @@ impl Light {
         Self { kind, motion: None, color, illuminant, spectrum, group, modulation: None }
     }
 
-    /// Where it stands at a time (s from the frame's time).
+    /// Its pose at a time (s from the frame's time).
     #[inline(always)]
-    pub(crate) fn stand(&self, time: f64) -> Stand {
-        Stand(self.motion.as_ref().map(|motion| motion.at(time)))
+    pub(crate) fn pose(&self, time: f64) -> LightPose {
+        LightPose(self.motion.as_ref().map(|motion| motion.at(time)))
+    }
+
+    /// True if it is a disk far away, such as the sun's.
+    pub(crate) fn is_disk(&self) -> bool {
+        matches!(self.kind, LightKind::Directional { cos_radius, .. } if cos_radius < 1.0)
     }
 
     /// True if it moves between two times (s from the frame's time).
@@ -67,12 +72,12 @@ impl Light {
         self.motion.as_ref().is_some_and(|motion| motion.moves_within(span))
     }
 
-    /// Where it is and shines within `span` (s from the frame's time), with an intensity (W/sr); `None` of what is far
-    /// away.
+    /// Its cluster within `span` (s from the frame's time), with an intensity (W/sr); `None` of what is far away.
     pub(crate) fn cluster(
         &self,
         intensity: f64,
-        (scene, span): (&SceneView<'_>, [f64; 2]),
+        scene: &SceneView<'_>,
+        span: [f64; 2],
     ) -> Option<Cluster> {
         let own = self.kind.cluster(intensity, scene)?;
         let Some(motion) = &self.motion else { return Some(own) };
@@ -80,7 +85,7 @@ impl Light {
         if motion.turns_within(span) {
             return Some(Cluster { bounds, cone: PI, reach: FRAC_PI_2, ..own });
         }
-        Some(Cluster { bounds, axis: self.stand(span[0]).direction(own.axis), ..own })
+        Some(Cluster { bounds, axis: self.pose(span[0]).direction(own.axis), ..own })
     }
 
     /// Its intensity in the middle, or of what is measured the mean, over the three colours (W/sr).
@@ -124,11 +129,11 @@ impl Light {
     }
 }
 
-/// Where a light stands at some time, which may move.
+/// The pose of a light, which may move, at some time.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Stand(Option<Transform>);
+pub(crate) struct LightPose(Option<Transform>);
 
-impl Stand {
+impl LightPose {
     /// A point of its frame (m), in the world.
     #[inline(always)]
     pub(crate) fn point(&self, own: DVec3) -> DVec3 {
@@ -156,9 +161,9 @@ pub enum LightKind {
     Point(DVec3),
     /// A point (m) with an intensity in a cone.
     Spot {
-        /// Where it is (m).
+        /// Its position (m).
         at: DVec3,
-        /// Where it is aimed (unit).
+        /// Direction that it is aimed in (unit).
         axis: DVec3,
         /// Cosine of the half-angle outside of which it is dark.
         cos_outer: f64,
@@ -167,7 +172,7 @@ pub enum LightKind {
     },
     /// Light from afar, with an irradiance.
     Directional {
-        /// Where it goes (unit).
+        /// Direction in which it goes (unit).
         along: DVec3,
         /// Cosine of the half-angle of the disk that it comes from; 1 of parallel light.
         cos_radius: f64,
@@ -182,7 +187,7 @@ pub enum LightKind {
     Environment {
         /// Its image.
         image: EnvironmentImage,
-        /// What brings the image's directions into the world: its middle from −Z, its top from +Y.
+        /// The turn that brings the image's directions into the world: its middle from −Z, its top from +Y.
         turn: DMat3,
         /// The camera sees it where nothing is in the way.
         visible: bool,
@@ -204,7 +209,7 @@ impl LightKind {
         }
     }
 
-    /// Where it is (m), in its own frame; `None` of what is far away.
+    /// Its position (m), in its own frame; `None` of what is far away.
     pub(crate) fn place(&self) -> Option<DVec3> {
         match self {
             Self::Point(at) | Self::Spot { at, .. } => Some(*at),
@@ -214,7 +219,7 @@ impl LightKind {
         }
     }
 
-    /// Where it is and shines, with an intensity (W/sr); `None` of what is far away.
+    /// Its cluster, with an intensity (W/sr); `None` of what is far away.
     pub(crate) fn cluster(&self, intensity: f64, scene: &SceneView<'_>) -> Option<Cluster> {
         let (at, axis, cone, reach) = match self {
             Self::Point(at) => (*at, DVec3::Y, PI, FRAC_PI_2),
@@ -235,7 +240,7 @@ impl LightKind {
     }
 }
 
-/// Where an environment's image comes from.
+/// The source of an environment's image.
 #[derive(Debug, Clone, PartialEq)]
 pub enum EnvironmentImage {
     /// There is none: alike from all sides.

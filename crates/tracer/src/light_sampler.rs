@@ -1,4 +1,4 @@
-//! Which light is asked for a point.
+//! The choice of the light that is asked for a point.
 //!
 //! Lights far away are chosen by the irradiance of a surface that faces them (W/m², of the mean of the three
 //! colours): `E` of parallel light, `π L` of an environment. Among lights near by, one is chosen by what it may
@@ -37,6 +37,18 @@ impl Receiver {
     pub(crate) fn is_one_sided(&self) -> bool {
         self.normal != DVec3::ZERO
     }
+}
+
+/// A point that asks a light which it chose.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LightQuery {
+    pub(crate) receiver: Receiver,
+    /// s from the frame's time.
+    pub(crate) time: f64,
+    /// The light, and the chance with which it was chosen.
+    pub(crate) choice: Choice,
+    /// The numbers in 0..1 by which a place on it is chosen.
+    pub(crate) square: [f64; 2],
 }
 
 /// A light that may be chosen.
@@ -138,7 +150,7 @@ impl LightSampler {
     pub(crate) fn pick(&self, choices: &mut Choices) {
         let Some(tree) = &self.tree else {
             for number in 0..choices.len() {
-                choices.set(number, self.pick_other((choices.get(number).u, 1.0)));
+                choices.set(number, self.pick_other(choices.get(number).u, 1.0));
             }
             return;
         };
@@ -154,16 +166,16 @@ impl LightSampler {
                     choices.leave_to_tree(number, share, u / share);
                 } else {
                     let rest = ((u - share) / (1.0 - share)).min(ONE_BELOW);
-                    choices.set(number, self.pick_other((rest, 1.0 - share)));
+                    choices.set(number, self.pick_other(rest, 1.0 - share));
                 }
             }
         }
         tree.pick(choices);
     }
 
-    /// A choice by a number in 0..1 among the lights that are in no tree, of which this is the chance.
+    /// A choice by a number `u` in 0..1 among the lights that are in no tree, of which `share` is the chance.
     #[inline(always)]
-    pub(crate) fn pick_other(&self, (u, share): (f64, f64)) -> Choice {
+    pub(crate) fn pick_other(&self, u: f64, share: f64) -> Choice {
         let (light, rest, chance) = match self.others.len() {
             0 => (0, u, 0.0),
             1 => (0, u, 1.0),
@@ -223,7 +235,7 @@ mod tests {
 
     use super::*;
 
-    /// A lamp of one W/sr at the origin that shines along +Y.
+    /// A light of one W/sr at the origin that shines along +Y.
     fn facing_up() -> Candidate {
         let bounds = Bounds { min: DVec3::ZERO, max: DVec3::ZERO };
         let cluster =
@@ -283,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn a_few_lamps_alone_are_chosen_by_power_and_none_is_dark() {
+    fn a_few_lights_alone_are_chosen_by_power_and_none_is_dark() {
         let sampler = LightSampler::new(&[facing_up(), facing_up()], scene());
         assert_eq!(sampler.chance(&open(DVec3::NEG_Y), 0), 0.5);
         assert!(sampler.are_several() && !sampler.is_empty());

@@ -15,7 +15,7 @@ use crate::area_light::{self, AreaLight, AreaLightMotion, triangle_power};
 use crate::environment::EnvironmentMap;
 use crate::group::Groups;
 use crate::light::{EnvironmentImage, Light, LightKind, irradiance, power, spot_falloff};
-use crate::light_sampler::{Candidate, LightSampler, Receiver};
+use crate::light_sampler::{Candidate, LightQuery, LightSampler, Receiver};
 use crate::light_tree::Choices;
 use crate::material::Alpha;
 use crate::reference::{SceneView, SurfacePoint, squares_at};
@@ -89,7 +89,7 @@ impl EmissionBands {
 }
 
 impl Lights {
-    /// The lights of a scene whose emissive surfaces are those of `around`; `map` is the decoded
+    /// The lights of a scene whose emissive surfaces are those of `scene`; `map` is the decoded
     /// image of the environment, if it has one. Those that change with time are chosen by their mean over `span`, in
     /// which the camera sees light (s from the frame's time), and those that move by where they are within it.
     ///
@@ -99,7 +99,8 @@ impl Lights {
     pub fn new(
         lights: &[Light],
         map: Option<Arc<EnvironmentMap>>,
-        (scene, span): (&SceneView<'_>, [f64; 2]),
+        scene: &SceneView<'_>,
+        span: [f64; 2],
         spectral: &Spectral,
     ) -> Result<Self, NoOverlap> {
         let mean = |modulation: &Option<Arc<Modulation>>| {
@@ -121,7 +122,7 @@ impl Lights {
         let brightness = sky.as_ref().map_or(1.0, Sky::mean);
         let candidate = |light: &Light| {
             let mean = mean(&light.modulation);
-            match light.cluster(mean * light.intensity(), (scene, span)) {
+            match light.cluster(mean * light.intensity(), scene, span) {
                 Some(cluster) => Candidate::near(mean * power(light, scene), cluster),
                 None => Candidate::Far { irradiance: mean * irradiance(light, brightness) },
             }
@@ -141,13 +142,11 @@ impl Lights {
             let time = if way.is_some() { 0.5 * (span[0] + span[1]) } else { 0.0 };
             for triangle in 0..mesh.triangles.len() {
                 let id = [number, u32::try_from(triangle).unwrap_or(u32::MAX)];
-                let power = mean * triangle_power(scene, (placement, triangle), material, time);
-                candidates.push(
-                    match area_light::cluster(scene, (id, time), power, way.as_ref()) {
-                        Some(cluster) => Candidate::near(power, cluster),
-                        None => Candidate::Dark,
-                    },
-                );
+                let power = mean * triangle_power(scene, placement, triangle, material, time);
+                candidates.push(match area_light::cluster(scene, id, time, power, way.as_ref()) {
+                    Some(cluster) => Candidate::near(power, cluster),
+                    None => Candidate::Dark,
+                });
                 triangles.push(id);
             }
         }
@@ -165,8 +164,7 @@ impl Lights {
             lights.iter().map(|light| part(light.group, &light.modulation)),
             scene.materials.iter().map(of_material),
         );
-        let is_disk = |light: &Light| matches!(light.kind, LightKind::Directional { cos_radius, .. } if cos_radius < 1.0);
-        let disks = (0..lights.len()).filter(|&index| is_disk(&lights[index])).collect();
+        let disks = (0..lights.len()).filter(|&index| lights[index].is_disk()).collect();
         let lights = lights.to_vec();
         let (area_lights, area_light_bands) = Default::default();
         let mut all = Self {
@@ -296,14 +294,14 @@ impl Lights {
                 return None;
             };
             // Half the square of the chord, which narrow disks need whole.
-            let apart = 0.5 * (direction + light.stand(time).direction(along)).length_squared();
+            let apart = 0.5 * (direction + light.pose(time).direction(along)).length_squared();
             let short = 1.0 - cos_radius;
             let is_seen = (visible || !by_camera) && apart <= short;
             is_seen.then(|| (index, (TAU * short).recip()))
         })
     }
 
-    /// What of their light can be told apart, by the numbers of [`crate::transport::Parts::Groups`]: the lights of
+    /// Parts of their light that can be told apart, by the numbers of [`crate::transport::Parts::Groups`]: the lights of
     /// one group that change with time alike.
     #[must_use]
     pub fn parts(&self) -> &[(LightGroup, Option<Arc<Modulation>>)] {
@@ -339,53 +337,51 @@ impl Lights {
         &self.bands[light * count..(light + 1) * count]
     }
 
-    /// A place on a light that was [picked](Self::pick) with a chance, by a square, at a time (s from the frame's time);
-    /// its radiance (of a point its intensity) goes to `radiance`.
+    /// A place on a light that was [picked](Self::pick); its radiance (of a point its intensity) goes to `radiance`.
     #[inline(always)]
     pub(crate) fn place(
         &self,
         scene: &SceneView<'_>,
         spectral: &Spectral,
-        (receiver, time): (&Receiver, f64),
-        ((index, chance), square): ((usize, f64), [f64; 2]),
+        query: &LightQuery,
         radiance: &mut [f64],
     ) -> Option<Target> {
+        let LightQuery { receiver, choice, square, .. } = query;
+        let (index, chance) = (choice.light as usize, choice.chance);
         let Some(light) = self.lights.get(index) else {
-            let number = index - self.lights.len();
-            let area_light = (number, time);
-            return self.place_on_area_light(scene, spectral, area_light, square, chance, radiance);
+            return self.place_on_area_light(scene, spectral, query, radiance);
         };
         radiance.copy_from_slice(self.bands_of(index, radiance.len()));
-        let stand = light.stand(time);
+        let pose = light.pose(query.time);
         match &light.kind {
-            LightKind::Point(at) => Some(Target::bare(TargetKind::Point, stand.point(*at), chance)),
+            LightKind::Point(at) => Some(Target::bare(TargetKind::Point, pose.point(*at), chance)),
             &LightKind::Spot { at, axis, cos_outer, cos_inner } => {
-                let (at, axis) = (stand.point(at), stand.direction(axis));
+                let (at, axis) = (pose.point(at), pose.direction(axis));
                 let cosine = (receiver.point - at).try_normalize().map_or(-1.0, |d| d.dot(axis));
                 let factor = spot_falloff(cosine, cos_outer, cos_inner);
                 radiance.iter_mut().for_each(|band| *band *= factor);
                 (factor > 0.0).then(|| Target::bare(TargetKind::Point, at, chance))
             }
             LightKind::Projector(projector) => {
-                let color = projector.toward(scene, stand.seen(receiver.point))?;
+                let color = projector.toward(scene, pose.seen(receiver.point))?;
                 for (k, band) in radiance.iter_mut().enumerate() {
                     *band *= spectral.band(&color, k);
                 }
-                Some(Target::bare(TargetKind::Point, stand.point(projector.at), chance))
+                Some(Target::bare(TargetKind::Point, pose.point(projector.at), chance))
             }
             LightKind::Goniometric(measured) => {
-                let intensity = measured.toward(stand.seen(receiver.point));
+                let intensity = measured.toward(pose.seen(receiver.point));
                 radiance.iter_mut().for_each(|band| *band *= intensity);
-                let place = Target::bare(TargetKind::Point, stand.point(measured.at), chance);
+                let place = Target::bare(TargetKind::Point, pose.point(measured.at), chance);
                 (intensity > 0.0).then_some(place)
             }
             &LightKind::Directional { along, cos_radius, .. } => {
-                let toward = Frame::around(-stand.direction(along))
-                    .world(cone_direction(square, cos_radius));
+                let toward = Frame::around(-pose.direction(along))
+                    .world(cone_direction(*square, cos_radius));
                 Some(Target::bare(TargetKind::Parallel, toward, chance))
             }
             LightKind::Environment { image: EnvironmentImage::Constant, .. } => {
-                let (toward, density) = uniform_direction(receiver, square);
+                let (toward, density) = uniform_direction(receiver, *square);
                 Some(Target::bare(TargetKind::Far, toward, chance * density))
             }
             // Directions to an image are chosen side by side.
@@ -393,17 +389,17 @@ impl Lights {
         }
     }
 
-    /// A place on an emissive triangle.
+    /// The same of an emissive triangle.
     #[inline]
     fn place_on_area_light(
         &self,
         scene: &SceneView<'_>,
         spectral: &Spectral,
-        (number, time): (usize, f64),
-        square: [f64; 2],
-        chance: f64,
+        query: &LightQuery,
         radiance: &mut [f64],
     ) -> Option<Target> {
+        let &LightQuery { time, choice, square, .. } = query;
+        let number = choice.light as usize - self.lights.len();
         let area_light = self.area_light(scene, number, time)?;
         let [u, v] = triangle_point(square);
         let count = radiance.len();
@@ -424,7 +420,7 @@ impl Lights {
             place: [area_light.corner[0], area_light.corner[1], area_light.across([u, v])],
             normal: area_light.shape.normal,
             magnitudes: area_light.magnitudes,
-            density: chance / area_light.shape.area,
+            density: choice.chance / area_light.shape.area,
         })
     }
 
@@ -477,8 +473,8 @@ impl Lights {
         true
     }
 
-    /// The density (1/sr), chance included, with which [`Self::pick`] and [`Self::place`] give a point the direction to `spot`,
-    /// which was met by a ray along `direction` from the point.
+    /// The density (1/sr), chance included, with which [`Self::pick`] and [`Self::place`] give a receiver the direction to
+    /// `point`, which a ray along `direction` from the receiver hit.
     pub(crate) fn pdf_of_surface(
         &self,
         scene: &SceneView<'_>,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use etendue_spectrum::Curve;
 
-use crate::scattering::{Absorption, GltfSurface, Scattering};
+use crate::scattering::{Absorption, Scattering};
 use crate::texture::Encoding;
 use crate::{LightGroup, Modulation, SceneCube, SceneCurve, TextureUse};
 
@@ -201,8 +201,7 @@ impl Material {
     /// (`KHR_materials_transmission` without roughness).
     #[must_use]
     pub fn is_pane(&self) -> bool {
-        let passes = |surface: &GltfSurface| surface.transmission > 0.0 && surface.metallic < 1.0;
-        self.scattering.gltf().is_some_and(passes)
+        self.scattering.is_pane()
     }
 
     /// Absorption of light by the body behind its front.

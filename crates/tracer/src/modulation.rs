@@ -1,4 +1,4 @@
-//! How the strength of a light changes with time: flashes, lamps on mains, pulses of a driver, measured waveforms.
+//! Change of the strength of a light with time: flashes, lamps on mains, pulses of a driver, measured waveforms.
 //!
 //! A factor multiplies all that the light gives off. Its mean over an interval is exact: a sine's by the sum formula,
 //! `1 + d sinc(f T) sin 2π(f t_m + φ)` about the middle `t_m` of an interval of length T, that of a curve by trapezoids.
@@ -17,7 +17,7 @@ const MOST_POINTS: usize = 1 << 16;
 /// The highest frequency (Hz): a period of it is told apart from the next in f64 after a day.
 const HIGHEST: f64 = 1e9;
 
-/// How the strength of a light changes with time, as the scene file writes it: a factor, not below zero.
+/// Change of the strength of a light with time, as the scene file writes it: a factor, not below zero.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum ModulationSpec {
@@ -28,7 +28,7 @@ pub enum ModulationSpec {
         /// The curve from 0 to here repeats (s).
         #[serde(default, skip_serializing_if = "Option::is_none")]
         period: Option<Seconds>,
-        /// What its times count from.
+        /// The event that its times count from.
         #[serde(default = "of_frame")]
         clock: Clock,
     },
@@ -37,13 +37,13 @@ pub enum ModulationSpec {
         /// When it starts (s).
         #[serde(default)]
         start: Seconds,
-        /// How long it is on (s).
+        /// Time for which it is on (s).
         duration: Seconds,
         /// The factor while it is on.
         #[serde(default = "one")]
         #[schemars(range(min = 0.0))]
         factor: f64,
-        /// What its times count from.
+        /// The event that its times count from.
         #[serde(default = "of_frame")]
         clock: Clock,
     },
@@ -63,10 +63,10 @@ pub enum ModulationSpec {
         #[serde(default)]
         #[schemars(range(min = 0.0))]
         low: f64,
-        /// Where in its period it is at time 0 (turns).
+        /// Phase of its period at time 0 (turns).
         #[serde(default)]
         phase: f64,
-        /// What its times count from.
+        /// The event that its times count from.
         #[serde(default)]
         clock: Clock,
     },
@@ -74,20 +74,20 @@ pub enum ModulationSpec {
     Sine {
         /// Periods a second (Hz): of a lamp on the mains, twice that of the mains.
         frequency: f64,
-        /// How far it swings, 0 to 1.
+        /// Depth of its swing, 0 to 1.
         #[serde(default = "one")]
         #[schemars(range(min = 0.0, max = 1.0))]
         depth: f64,
-        /// Where in its period it is at time 0 (turns).
+        /// Phase of its period at time 0 (turns).
         #[serde(default)]
         phase: f64,
-        /// What its times count from.
+        /// The event that its times count from.
         #[serde(default)]
         clock: Clock,
     },
 }
 
-/// What times count from.
+/// The event that times count from.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Clock {

@@ -1,4 +1,4 @@
-//! What there is to know of each placement before any ray meets it: worked out once, looked up at each
+//! Properties of each placement that are known before any ray meets it: worked out once, looked up at each
 //! hit.
 
 mod table;
@@ -13,14 +13,14 @@ use crate::spawn::magnitudes;
 use crate::transport::Traits;
 use crate::{Material, Paint, Scattering, Spectral, Tint};
 
-/// What light has to know of the placements of a scene, by their numbers.
+/// Properties of the placements of a scene that light has to know, by their numbers.
 #[derive(Debug, Clone, Default)]
 pub struct PlacedSurfaces {
     /// `None` for a placement whose material there is none of.
     all: Vec<Option<PlacedSurface>>,
     /// The boundaries of bodies that lie over one another.
     pub(crate) touching: Coplanar,
-    /// What is looked up for each hit.
+    /// The table that is looked up for each hit.
     table: SurfaceTable,
     /// Single precision holds their places.
     fits_single: bool,
@@ -31,9 +31,9 @@ pub struct PlacedSurfaces {
 /// A placement as light meets it.
 #[derive(Debug, Clone)]
 pub(crate) struct PlacedSurface {
-    /// What its own numbers add to the rounding of a hit (m).
+    /// Magnitudes of its own numbers, which add to the rounding of a hit (m).
     pub(crate) magnitudes: DVec3,
-    /// What brings its mesh's normals into the world; `None` where nothing has to.
+    /// The matrix that brings its mesh's normals into the world; `None` where none has to.
     pub(crate) turn: Option<DMat3>,
     /// It shines, or shows itself without light.
     pub(crate) is_seen: bool,
@@ -43,7 +43,7 @@ pub(crate) struct PlacedSurface {
     pub(crate) is_opaque: bool,
     /// Its shading normal is not that of its triangles.
     pub(crate) is_tilted: bool,
-    /// What the body behind its front takes from light.
+    /// Absorption of light by the body behind its front.
     pub(crate) absorption: Option<Absorption>,
     /// The body that it encloses, of glass that is closed.
     pub(crate) body: Option<Body>,
@@ -83,9 +83,7 @@ impl PlacedSurfaces {
                 turn: (place.linear != DMat3::IDENTITY).then(|| place.normal_matrix()),
                 is_seen: material.emission.is_some() || material.scattering == Scattering::Unlit,
                 has_alpha: material.has_alpha(),
-                is_opaque: !material.has_alpha()
-                    && !material.is_pane()
-                    && !matches!(material.scattering, Scattering::Dielectric(_)),
+                is_opaque: !material.has_alpha() && !material.scattering.lets_pass(),
                 absorption: material.absorption(),
                 body,
                 is_tilted: material.normal_map.is_some() || mesh.normals.is_some(),
@@ -107,11 +105,11 @@ impl PlacedSurfaces {
         let table = SurfaceTable::default();
         let mut own = Self { all, touching, table, fits_single, size };
         let traits = Traits::of(geometry, materials, &own);
-        own.table = SurfaceTable::of(&own.all, (geometry, materials), (spectral, &traits));
+        own.table = SurfaceTable::of(&own.all, geometry, materials, spectral, &traits);
         own
     }
 
-    /// What is looked up for each hit.
+    /// The table that is looked up for each hit.
     pub(crate) fn table(&self) -> &SurfaceTable {
         &self.table
     }

@@ -9,7 +9,7 @@ use etendue_image::{DecodeError, Raster, Samples, room};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What happens to texture coordinates outside 0..=1.
+/// Treatment of texture coordinates outside 0..=1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Wrap {
@@ -104,7 +104,7 @@ impl Pyramid {
 impl Level {
     /// Keeps `means`, in 16 bits where they have an upper end.
     fn new(means: &Raster, is_float: bool) -> Result<Self, DecodeError> {
-        let Samples::F32(values) = means.samples() else { return Err(DecodeError::Channels) };
+        let Samples::F32(values) = means.samples() else { return Err(DecodeError::no_color()) };
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,

@@ -9,8 +9,8 @@ use etendue_geometry::{Geometry, HitBatch, MISS, Mesh, Placement, RayBatch, Vert
 use crate::material::Alpha;
 use crate::pyramid::mean_of_squares;
 use crate::{
-    Color, Footprint, Image, Ior, Material, NormalKind, Paint, Pixel, Scattering, SceneCurve,
-    Space, Spectral, TextureUse, Tint, TintSpectrum,
+    Color, Footprint, Image, Ior, Material, NormalKind, Paint, Pixel, SceneCurve, Space, Spectral,
+    TextureUse, Tint, TintSpectrum,
 };
 
 /// The frame that depths and camera-space vectors refer to.
@@ -58,7 +58,7 @@ pub struct SceneView<'a> {
 
 /// One batch's rays and what they hit.
 #[derive(Debug, Clone, Copy)]
-pub struct Traced<'a> {
+pub struct TracedBatch<'a> {
     /// The rays.
     pub rays: &'a RayBatch,
     /// Their hits.
@@ -69,7 +69,7 @@ impl SceneView<'_> {
     /// The point that ray `i` hit (m), `+inf` for a miss. In camera space nothing is lost far from
     /// the world's origin.
     #[must_use]
-    pub fn position(&self, traced: Traced<'_>, i: usize, space: Space) -> DVec3 {
+    pub fn position(&self, traced: TracedBatch<'_>, i: usize, space: Space) -> DVec3 {
         if !traced.hits.is_hit(i) {
             return DVec3::INFINITY;
         }
@@ -88,7 +88,13 @@ impl SceneView<'_> {
     /// A shading normal is turned together with the geometric one, so it is on the same side of the
     /// surface even where interpolation tilts it away from the viewer.
     #[must_use]
-    pub fn normal(&self, traced: Traced<'_>, i: usize, kind: NormalKind, space: Space) -> DVec3 {
+    pub fn normal(
+        &self,
+        traced: TracedBatch<'_>,
+        i: usize,
+        kind: NormalKind,
+        space: Space,
+    ) -> DVec3 {
         let geometric = traced.hits.normal(i);
         let side = if geometric.dot(traced.rays.direction(i)) > 0.0 { -1.0 } else { 1.0 };
         let normal = match kind {
@@ -103,12 +109,12 @@ impl SceneView<'_> {
 
     /// The file's vertex normals at hit `i`, interpolated, in world space; `None` without any.
     fn shading_normal(&self, hits: &HitBatch, i: usize) -> Option<DVec3> {
-        self.spot(hits, i)?.shading_normal(hits.normal(i))
+        self.point(hits, i)?.shading_normal(hits.normal(i))
     }
 
     /// Place of hit `i` on its mesh; `None` for a miss.
     #[must_use]
-    pub fn spot(&self, hits: &HitBatch, i: usize) -> Option<SurfacePoint<'_>> {
+    pub fn point(&self, hits: &HitBatch, i: usize) -> Option<SurfacePoint<'_>> {
         let placement = self.placement(hits, i)?;
         let (u, v) = (hits.u[i], hits.v[i]);
         let weights = [1.0 - u - v, u, v];
@@ -116,7 +122,7 @@ impl SceneView<'_> {
         Some(SurfacePoint { weights, time: hits.time(i), ..point })
     }
 
-    /// The material of a spot.
+    /// The material of a point.
     #[must_use]
     pub fn material(&self, point: &SurfacePoint<'_>) -> Option<&Material> {
         self.materials.get(point.placement.material as usize)
@@ -125,15 +131,8 @@ impl SceneView<'_> {
     /// The index of the glass of a placement; `None` of all else.
     pub(crate) fn index(&self, placement: u32) -> Option<&Ior> {
         let placement = self.geometry.placements.get(placement as usize)?;
-        match &self.materials.get(placement.material as usize)?.scattering {
-            Scattering::Dielectric(glass) => Some(&glass.ior),
-            Scattering::Black
-            | Scattering::Matte
-            | Scattering::Unlit
-            | Scattering::Mirror
-            | Scattering::Metal { .. }
-            | Scattering::Gltf(_) => None,
-        }
+        let material = self.materials.get(placement.material as usize)?;
+        Some(&material.scattering.glass()?.ior)
     }
 
     fn placement(&self, hits: &HitBatch, i: usize) -> Option<&Placement> {
@@ -154,17 +153,17 @@ impl SceneView<'_> {
     }
 
     /// Place that ray `i` of the camera hit, with its footprint; `None` for a miss.
-    fn seen(&self, traced: Traced<'_>, i: usize) -> Option<SurfacePoint<'_>> {
+    fn seen(&self, traced: TracedBatch<'_>, i: usize) -> Option<SurfacePoint<'_>> {
         let direction = traced.rays.direction(i);
         let cone = self.view.cone(direction).map(|cone| cone.after(traced.hits.t[i]));
         let footprint = cone.map(|cone| Footprint { direction, width: cone.width });
-        Some(SurfacePoint { footprint, ..self.spot(traced.hits, i)? })
+        Some(SurfacePoint { footprint, ..self.point(traced.hits, i)? })
     }
 
     /// Base colour without light at hit `i` of the camera's rays, averaged over their footprint;
     /// black for a miss.
     #[must_use]
-    pub fn flat(&self, traced: Traced<'_>, i: usize) -> Color {
+    pub fn flat(&self, traced: TracedBatch<'_>, i: usize) -> Color {
         let Some(point) = self.seen(traced, i) else { return [0.0; 3] };
         let Some(material) = self.material(&point) else { return [0.0; 3] };
         let [r, g, b, _] = self.base_color(material, &point);
@@ -174,7 +173,7 @@ impl SceneView<'_> {
     /// Base colour at the very point of hit `i`, black for a miss.
     #[must_use]
     pub fn albedo(&self, hits: &HitBatch, i: usize) -> Color {
-        let Some(point) = self.spot(hits, i) else { return [0.0; 3] };
+        let Some(point) = self.point(hits, i) else { return [0.0; 3] };
         let Some(material) = self.material(&point) else { return [0.0; 3] };
         let [r, g, b, _] = self.base_color(material, &point);
         [r, g, b]
@@ -189,12 +188,12 @@ impl SceneView<'_> {
     /// Texture coordinates of the first set at hit `i`; (0, 0) without any.
     #[must_use]
     pub fn first_uv(&self, hits: &HitBatch, i: usize) -> [f64; 2] {
-        self.spot(hits, i).map_or([0.0; 2], |point| point.uv(0))
+        self.point(hits, i).map_or([0.0; 2], |point| point.uv(0))
     }
 
     /// Base colour and alpha, vertex colours included.
     ///
-    /// Where alpha cuts holes there is no mean over a footprint: the mean of alpha against a cut-off
+    /// There is no mean over a footprint where alpha cuts holes: the mean of alpha against a cut-off
     /// is not the share that is cut.
     #[must_use]
     pub fn base_color(&self, material: &Material, point: &SurfacePoint<'_>) -> [f64; 4] {
@@ -289,20 +288,20 @@ impl SceneView<'_> {
         }
     }
 
-    /// The colour that a use of an image has at a spot, whatever its encoding: the magenta checker
+    /// The colour that a use of an image has at a point, whatever its encoding: the magenta checker
     /// where the image cannot be had, white where nobody asked for it.
     #[must_use]
     pub fn tint(&self, image: &TextureUse, point: &SurfacePoint<'_>) -> [f64; 4] {
         self.decoded(image).map_or([1.0; 4], |pixels| Self::over(pixels, image, point))
     }
 
-    /// Value of an image of data (a roughness, a share) at a spot; 1 without the image.
+    /// Value of an image of data (a roughness, a share) at a point; 1 without the image.
     #[must_use]
     pub fn texel(&self, image: &TextureUse, point: &SurfacePoint<'_>) -> [f64; 4] {
         self.lookup(image, point).unwrap_or([1.0; 4])
     }
 
-    /// Value of an image of data at a spot; `None` without the image.
+    /// Value of an image of data at a point; `None` without the image.
     #[must_use]
     pub fn lookup(&self, image: &TextureUse, point: &SurfacePoint<'_>) -> Option<[f64; 4]> {
         // Magenta is for looking at, not a roughness or a tilt.
@@ -314,7 +313,7 @@ impl SceneView<'_> {
         self.images.get(image.texture as usize)?.as_deref()
     }
 
-    /// The pixels of a use of an image, averaged over the spot's footprint.
+    /// The pixels of a use of an image, averaged over the point's footprint.
     fn over(pixels: &Image, image: &TextureUse, point: &SurfacePoint<'_>) -> [f64; 4] {
         let set = image.uv_set as usize;
         let [u, v] = point.uv(set);
@@ -329,7 +328,7 @@ impl SceneView<'_> {
     }
 
     /// Share of ambient light that reaches hit `i`.
-    pub(crate) fn unoccluded(&self, traced: Traced<'_>, i: usize) -> f64 {
+    pub(crate) fn unoccluded(&self, traced: TracedBatch<'_>, i: usize) -> f64 {
         let Some(point) = self.seen(traced, i) else { return 1.0 };
         let occlusion = self.material(&point).and_then(|material| material.occlusion.as_ref());
         let Some(occlusion) = occlusion else { return 1.0 };

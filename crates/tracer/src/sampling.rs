@@ -152,7 +152,7 @@ impl DiscreteDistribution {
         &self.below
     }
 
-    /// How many indices there are.
+    /// Number of indices.
     #[must_use]
     pub fn len(&self) -> usize {
         self.guide.len()
@@ -227,7 +227,7 @@ pub struct GridDistribution {
 pub struct GridCell {
     /// Its column and row.
     pub at: [u32; 2],
-    /// What is left of the numbers that chose them, in 0..1.
+    /// Rests of the numbers that chose them, in 0..1.
     pub rest: [f64; 2],
     between: [u32; 2],
 }

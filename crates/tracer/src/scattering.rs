@@ -1,4 +1,4 @@
-//! How materials scatter light, and by which model of a surface.
+//! Scattering of light by materials, and the models of surfaces for it.
 
 use etendue_spectrum::Curve;
 
@@ -38,16 +38,66 @@ impl Scattering {
         }
     }
 
-    /// Absorption of light by the body behind its front.
+    /// The glass of the body behind its front.
+    #[inline]
     #[must_use]
-    pub fn absorption(&self) -> Option<Absorption> {
+    pub fn glass(&self) -> Option<&Glass> {
         match self {
-            Self::Dielectric(glass) => glass.absorption.clone(),
+            Self::Dielectric(glass) => Some(glass),
             Self::Black
             | Self::Matte
             | Self::Unlit
             | Self::Mirror
             | Self::Metal { .. }
+            | Self::Gltf(_) => None,
+        }
+    }
+
+    /// True if it is the boundary of a body that light goes through.
+    #[inline]
+    #[must_use]
+    pub fn is_body(&self) -> bool {
+        self.glass().is_some()
+    }
+
+    /// True if it may be a smooth pane without thickness, which light passes straight
+    /// (`KHR_materials_transmission` without roughness).
+    #[must_use]
+    pub fn is_pane(&self) -> bool {
+        match self {
+            Self::Gltf(surface) => surface.transmission > 0.0 && surface.metallic < 1.0,
+            Self::Black
+            | Self::Matte
+            | Self::Unlit
+            | Self::Mirror
+            | Self::Metal { .. }
+            | Self::Dielectric(_) => false,
+        }
+    }
+
+    /// True if light may go through it: a body's boundary or a pane.
+    #[must_use]
+    pub fn lets_pass(&self) -> bool {
+        self.is_body() || self.is_pane()
+    }
+
+    /// Absorption of light by the body behind its front.
+    #[must_use]
+    pub fn absorption(&self) -> Option<Absorption> {
+        self.glass()?.absorption.clone()
+    }
+
+    /// The metal whose measured index it has.
+    #[inline]
+    #[must_use]
+    pub fn measured_metal(&self) -> Option<&Conductor> {
+        match self {
+            Self::Metal { named, .. } => named.as_ref(),
+            Self::Black
+            | Self::Matte
+            | Self::Unlit
+            | Self::Mirror
+            | Self::Dielectric(_)
             | Self::Gltf(_) => None,
         }
     }

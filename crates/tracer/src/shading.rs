@@ -1,4 +1,4 @@
-//! How a surface scatters light where it was met: from the numbers and textures of its material to a [`Bsdf`].
+//! Scattering of light by a surface where it was hit: from the numbers and textures of its material to a [`Bsdf`].
 
 use etendue_geometry::glam::DVec3;
 
@@ -27,19 +27,20 @@ pub(crate) struct SheetSurface {
 }
 
 impl SurfaceInteraction<'_> {
-    /// How it scatters light of the wavelength (nm).
+    /// Its scattering of light of the wavelength (nm).
     pub(crate) fn bsdf(&self, scene: &SceneView<'_>, spectral: &Spectral, wavelength: f64) -> Bsdf {
-        self.material.scattering.bsdf(self, scene, (spectral, wavelength))
+        self.material.scattering.bsdf(self, scene, spectral, wavelength)
     }
 }
 
 impl Scattering {
-    /// The model of it where it was interaction, for light of a wavelength (nm).
+    /// Its model at a hit, for light of a wavelength (nm).
     fn bsdf(
         &self,
         interaction: &SurfaceInteraction<'_>,
         scene: &SceneView<'_>,
-        (spectral, wavelength): (&Spectral, f64),
+        spectral: &Spectral,
+        wavelength: f64,
     ) -> Bsdf {
         let model = match self {
             Self::Black | Self::Unlit => Model::Black,
@@ -119,7 +120,7 @@ impl GltfSurface {
         }
     }
 
-    /// Its layers where it was interaction.
+    /// Its layers at a hit.
     fn bsdf(
         &self,
         interaction: &SurfaceInteraction<'_>,
@@ -174,11 +175,11 @@ impl GltfSurface {
             Some((along, _)) => Frame::along(shading, along),
             None => Frame::around(shading),
         };
-        Bsdf::turned(model, (geometric, frame), interaction.wo, [interaction.color(), highlight])
+        Bsdf::turned(model, geometric, frame, interaction.wo, [interaction.color(), highlight])
     }
 
-    /// Where the grain goes, and how strong it is; `None` where there is none, or where no texture coordinates
-    /// tell where.
+    /// Direction of the grain, and its strength; `None` where there is none, or where no texture coordinates
+    /// give a direction.
     fn grain(
         &self,
         interaction: &SurfaceInteraction<'_>,

@@ -17,7 +17,7 @@ use crate::spectral_sky::{self, Spectrum};
 /// The environment, ready to be asked.
 #[derive(Debug)]
 pub(crate) struct Sky {
-    /// Which of the lights it is.
+    /// Its number among all lights.
     pub(crate) index: usize,
     pub(crate) map: Option<(Arc<EnvironmentMap>, MapSampler)>,
     pub(crate) spectra: Spectra,
@@ -26,7 +26,7 @@ pub(crate) struct Sky {
     pub(crate) visible: bool,
 }
 
-/// What the bands of a sky are made of.
+/// The source of the bands of a sky.
 #[derive(Debug)]
 pub(crate) enum Spectra {
     /// Its colours.
@@ -55,7 +55,7 @@ impl Spectra {
         })
     }
 
-    /// What directions of `map` are chosen by: how bright it is in the bands, which need not be seen.
+    /// The sampler of directions of `map`: by its brightness in the bands, which need not be seen.
     fn sampler(&self, map: &EnvironmentMap, count: usize) -> MapSampler {
         let Self::Texels(texels) = self else { return MapSampler::new(map) };
         let mean = |texel: &[f32]| texel.iter().map(|v| f64::from(*v)).sum::<f64>() / count as f64;

@@ -1,4 +1,4 @@
-//! Where a ray that leaves a surface starts, by the hit's own error bound.
+//! Starts of rays that leave a surface, by the hit's own error bound.
 //!
 //! A hit is solved in f64 (or found in f32, with f32's ε), so the point `p = o + t d` misses its triangle's plane by a few roundings
 //! of the numbers that it was made from. Along the normal `n` these are at most

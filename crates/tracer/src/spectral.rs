@@ -134,7 +134,7 @@ impl Spectral {
             _ if self.is_rgb => one_by_one(light),
             TintSpectrum::White => times_color(rows, &tint.color, light),
             TintSpectrum::Curve { number, .. } => match known(number) {
-                Some(curve) => times_curve(rows, (&tint.color, curve), light),
+                Some(curve) => times_curve(rows, &tint.color, curve, light),
                 None => one_by_one(light),
             },
             TintSpectrum::Texel { .. } | TintSpectrum::Mixed { .. } => one_by_one(light),
@@ -222,11 +222,7 @@ fn times_color([red, green, blue]: [&[f64]; 3], color: &Color, light: &mut [f64]
 
 /// The same by a colour times a curve, of which there is a mean a band.
 #[multiversion::multiversion(targets = "simd")]
-fn times_curve(
-    [red, green, blue]: [&[f64]; 3],
-    (color, curve): (&Color, &[f64]),
-    light: &mut [f64],
-) {
+fn times_curve([red, green, blue]: [&[f64]; 3], color: &Color, curve: &[f64], light: &mut [f64]) {
     let [r, g, b] = *color;
     let bands = light.iter_mut().zip(red).zip(green).zip(blue).zip(curve);
     for ((((band, red), green), blue), mean) in bands {

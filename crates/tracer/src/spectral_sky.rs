@@ -94,7 +94,7 @@ impl SpectralSky {
         Self {
             parameters: std::array::from_fn(|k| std::array::from_fn(|p| parameter(k, p))),
             radiances: std::array::from_fn(|k| mixed(RADIANCES, COUNT, k)),
-            sun: solar_radiance((turbid, share), elevation),
+            sun: solar_radiance(turbid, share, elevation),
         }
     }
 
@@ -127,9 +127,10 @@ fn between(turbidity: f64) -> (usize, f64) {
     (below as usize, from_one - below)
 }
 
-/// Mean radiance of the sun's disk, W/(m² sr nm), at the elevation of its middle.
+/// Mean radiance of the sun's disk, W/(m² sr nm), at the elevation of its middle, between the turbidity of a number and
+/// the next, of which `share` is the share.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 44")]
-fn solar_radiance((turbid, share): (usize, f64), elevation: f64) -> Spectrum {
+fn solar_radiance(turbid: usize, share: f64, elevation: f64) -> Spectrum {
     let pieces = PIECES as f64;
     let piece = (pieces * (elevation / FRAC_PI_2).clamp(0.0, 1.0).cbrt()).floor().min(pieces - 1.0);
     let x = elevation - FRAC_PI_2 * (piece / pieces).powi(3);

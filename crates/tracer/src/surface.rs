@@ -7,6 +7,7 @@ use crate::material::NormalMap;
 use crate::placed::PlacedSurface;
 use crate::reference::{SceneView, SurfacePoint};
 use crate::spawn::Anchor;
+use crate::transport::RayHit;
 use crate::{Ior, LightingContext, Material, Tint};
 
 /// A hit seen from its ray.
@@ -27,14 +28,13 @@ pub(crate) struct SurfaceInteraction<'a> {
 }
 
 impl<'a> SurfaceInteraction<'a> {
-    /// The hit on a placement at a point, of a ray from `origin` (m) after the way `t` (m), where the triangle has
-    /// this unit normal on its front.
+    /// The hit of a ray on a placement, at a point of it.
     pub(crate) fn at(
         ctx: &'a LightingContext<'a>,
-        (own, point): (u32, SurfacePoint<'a>),
-        (origin, direction): (DVec3, DVec3),
-        (t, normal): (f64, DVec3),
+        point: SurfacePoint<'a>,
+        hit: &RayHit,
     ) -> Option<Self> {
+        let &RayHit { origin, direction, t, normal, id: [own, _], .. } = hit;
         let scene = &ctx.scene;
         let placed = ctx.placed.get(own)?;
         let material = scene.material(&point)?;

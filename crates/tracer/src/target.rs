@@ -1,4 +1,4 @@
-//! What is aimed at when a light is asked.
+//! Targets of rays to lights.
 
 use etendue_geometry::glam::DVec3;
 

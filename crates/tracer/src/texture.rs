@@ -12,7 +12,7 @@ use crate::pyramid::{Pyramid, bilinear};
 
 pub use crate::pyramid::Wrap;
 
-/// Where an image's bytes are, still encoded (PNG, JPEG, Radiance or EXR).
+/// Source of an image's bytes, still encoded (PNG, JPEG, Radiance or EXR).
 #[derive(Debug, Clone)]
 pub enum ImageSource {
     /// A file.
@@ -23,7 +23,7 @@ pub enum ImageSource {
     Missing,
 }
 
-/// How a lookup reads texels.
+/// Filter by which a lookup reads texels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Filter {
@@ -34,7 +34,7 @@ pub enum Filter {
     Nearest,
 }
 
-/// What the numbers of an image mean.
+/// Encoding of the numbers of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Encoding {
@@ -48,13 +48,13 @@ pub enum Encoding {
 /// An image with its sampler. Decoded only when the plan needs it, and once.
 #[derive(Debug, Clone)]
 pub struct Texture {
-    /// What the file calls it, for messages.
+    /// Its name in the file, for messages.
     pub name: String,
     /// The encoded image.
     pub source: ImageSource,
     /// Wrap modes along u and v.
     pub wrap: [Wrap; 2],
-    /// How texels are read.
+    /// Filter by which texels are read.
     pub filter: Filter,
     /// True if the scene file itself names it, and not one of its models.
     pub named_by_scene: bool,
@@ -65,11 +65,11 @@ pub struct Texture {
 pub struct TextureUse {
     /// Index into the scene's textures.
     pub texture: u32,
-    /// Which of the mesh's texture coordinate sets.
+    /// Number of one of the mesh's texture coordinate sets.
     pub uv_set: u32,
     /// `KHR_texture_transform`: rows of the 2×3 matrix that carries (u, v, 1).
     pub transform: [[f64; 3]; 2],
-    /// What the image's numbers are to this use.
+    /// Encoding of the image's numbers to this use.
     pub encoding: Encoding,
 }
 
@@ -106,7 +106,7 @@ pub enum ImageError {
     /// The bytes are no image that we read, or a broken one.
     #[error("cannot decode {name}: {source}")]
     Decode {
-        /// What the texture is called.
+        /// Name of the texture.
         name: String,
         /// Why.
         source: DecodeError,

@@ -12,8 +12,8 @@ use serde_json::Value;
 use crate::document::{Document, Edit, FirstScene, View};
 use crate::form::Form;
 use crate::panels::lens_curves::LensCurves;
-use crate::panels::light_field::{LightFieldPanel, Shows};
-use crate::state::{Asking, Listing, PictureCanvas, PixelQuery, ShownPicture, Tool};
+use crate::panels::light_field::{LightFieldPanel, LightFieldPart};
+use crate::state::{Listing, PathPrompt, PictureCanvas, PixelQuery, ShownPicture, Tool};
 use crate::worker::{Kind, News, ScreenPicture, Task, Wake, Wish, Worker};
 
 /// All of the window.
@@ -48,7 +48,7 @@ pub(crate) struct App {
     pub(crate) busy: Option<(&'static str, f64)>,
     /// The user has stopped what there was to do since the last wish.
     pub(crate) is_stopped: bool,
-    pub(crate) asking: Option<(Asking, String)>,
+    pub(crate) asking: Option<(PathPrompt, String)>,
     /// Entries to choose from, while a path is asked for.
     pub(crate) listing: Listing,
     /// The window's title.
@@ -209,7 +209,7 @@ impl App {
         }
         self.show_picture(ctx, shown);
         self.light_field.renew();
-        if self.light_field.shows != Shows::Raw {
+        if self.light_field.shows != LightFieldPart::Raw {
             self.show_light_field(ctx);
         }
     }
@@ -271,7 +271,7 @@ impl App {
         let folder =
             file.and_then(|path| path.parent()).filter(|folder| **folder != *Path::new(""));
         let folder = folder.map(|folder| folder.join("").display().to_string());
-        self.asking = Some((Asking::Open, folder.unwrap_or_default()));
+        self.asking = Some((PathPrompt::Open, folder.unwrap_or_default()));
     }
 
     pub(crate) fn open(&mut self, path: &Path) {
@@ -290,7 +290,7 @@ impl App {
         match document.is_scene {
             true => self.save_as(&own),
             // A model or a lens is no scene: a new file is made beside it.
-            false => self.asking = Some((Asking::SaveAs, own.display().to_string())),
+            false => self.asking = Some((PathPrompt::SaveAs, own.display().to_string())),
         }
     }
 

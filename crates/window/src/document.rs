@@ -1,6 +1,6 @@
 //! The scene that is edited: its values, and the way back to earlier ones.
 //!
-//! What of a scene is looked at.
+//! The view of a scene: what of it is looked at.
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -1,5 +1,5 @@
 //! The window, driven as by a user: events go in, and what it shows and says is looked at. Nothing is
-//! drawn; that is for a real window (`scripts/test-window.sh`).
+//! drawn; that is for a real window (`scripts/window.sh`).
 
 mod images;
 mod lenses;

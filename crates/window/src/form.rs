@@ -147,7 +147,7 @@ impl Form {
                 let choice = ui.selectable_label(now == Some(*name), *name);
                 mark(ui.ctx(), &format!("{place}={name}"), choice.rect);
                 if hint(choice, variant["description"].as_str()).clicked() {
-                    let object = self.changed_to(field.value, (tag, name), variant);
+                    let object = self.changed_to(field.value, tag, name, variant);
                     edits.push(Edit::set(field.pointer, object));
                 }
             }
@@ -160,7 +160,7 @@ impl Form {
     }
 
     /// An object of another kind, with what the two have in common, and what the new one has to have.
-    fn changed_to(&self, before: &Value, (tag, name): (&str, &str), variant: &Value) -> Value {
+    fn changed_to(&self, before: &Value, tag: &str, name: &str, variant: &Value) -> Value {
         let mut object = Map::new();
         object.insert(tag.to_owned(), json!(name));
         let known = variant["properties"].as_object();
@@ -185,7 +185,7 @@ impl Form {
         if let Some((tag, variants)) = variants(schema) {
             let first = variants.first();
             return first.map_or(Value::Null, |(name, variant)| {
-                self.changed_to(&Value::Null, (tag, name), variant)
+                self.changed_to(&Value::Null, tag, name, variant)
             });
         }
         if let Some(default) = schema.get("default").filter(|default| !default.is_null()) {

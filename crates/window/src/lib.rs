@@ -24,35 +24,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use eframe::{UserEvent, egui};
-use etendue::Options;
+use etendue::{Options, Refusal};
 use winit::event_loop::EventLoopBuilder;
 
 /// The window's first size (points).
 const SIZE: [f32; 2] = [1360.0, 860.0];
 
-/// Error of a window that cannot be opened.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum WindowError {
-    /// There is no screen to show it on.
-    #[error(
-        "there is no display to show a window on (neither DISPLAY nor WAYLAND_DISPLAY is set): over SSH, \
-         connect with X forwarding (ssh -X), or render to files with `etendue render`"
-    )]
-    NoDisplay,
-    /// Wayland is there, and what draws on it is not.
-    #[error(
-        "windows are drawn on Wayland by the library libwayland-egl.so.1, which is not here: install it \
-         (on Debian `apt install libwayland-egl1`), or render to files with `etendue render`"
-    )]
-    NoWaylandEgl,
-    /// The screen, or OpenGL on it, cannot be used.
-    #[error(
-        "the window cannot be opened: {0}; over SSH, connect with X forwarding (ssh -X), or render to \
-         files with `etendue render`"
-    )]
-    Display(String),
-}
+/// Remedies of a screen that shows no window.
+const OVER_SSH: &str =
+    "over SSH, connect with X forwarding (ssh -X), or render to files with `etendue render`";
 
 /// An X server is taken before Wayland where there are both: winit knows of files dropped on a window from X alone.
 #[cfg_attr(
@@ -71,16 +51,21 @@ fn prefer_x11(builder: &mut EventLoopBuilder<UserEvent>, has_x11: bool) {
 ///
 /// # Errors
 ///
-/// When there is no display, or it cannot show a window.
-pub fn run(path: Option<PathBuf>, options: Options) -> Result<(), WindowError> {
+/// When there is no display, what draws on it is not there, or it cannot show a window.
+pub fn run(path: Option<PathBuf>, options: Options) -> Result<(), Refusal> {
     let is_set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     let has_x11 = is_set("DISPLAY");
     if cfg!(target_os = "linux") && !has_x11 && !is_set("WAYLAND_DISPLAY") {
-        return Err(WindowError::NoDisplay);
+        let why =
+            "there is no display to show a window on (neither DISPLAY nor WAYLAND_DISPLAY is set)";
+        return Err(Refusal::new(why).hint(OVER_SSH));
     }
     #[cfg(target_os = "linux")]
     if !has_x11 && !wayland_sys::egl::is_lib_available() {
-        return Err(WindowError::NoWaylandEgl);
+        let why =
+            "windows are drawn on Wayland by the library libwayland-egl.so.1, which is not here";
+        let remedy = "install it (on Debian `apt install libwayland-egl1`), or render to files with `etendue render`";
+        return Err(Refusal::new(why).hint(remedy));
     }
     let viewport = egui::ViewportBuilder::default()
         .with_title("etendue")
@@ -99,6 +84,7 @@ pub fn run(path: Option<PathBuf>, options: Options) -> Result<(), WindowError> {
         let app = app::App::new(path, options, wake)?;
         Ok(Box::new(app) as Box<dyn eframe::App>)
     };
-    eframe::run_native("etendue", native, Box::new(make))
-        .map_err(|error| WindowError::Display(error.to_string()))
+    eframe::run_native("etendue", native, Box::new(make)).map_err(|error| {
+        Refusal::new(format!("the window cannot be opened: {error}")).hint(OVER_SSH)
+    })
 }

@@ -44,7 +44,7 @@ pub(crate) struct PixelQuery {
 
 /// A window in the window that asks for a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Asking {
+pub(crate) enum PathPrompt {
     Open,
     SaveAs,
     Render,

@@ -72,7 +72,7 @@ pub(crate) enum News {
     Refused(u64, String),
     /// A picture, rough or fine.
     Shown(Box<ScreenPicture>),
-    /// What is being done, and the share of it that is done.
+    /// Work that is being done, and the share of it that is done.
     Busy(&'static str, f64),
     /// Nothing is being done.
     Idle,
@@ -117,12 +117,12 @@ struct Desk {
 }
 
 #[derive(Debug, Default)]
-pub(crate) struct Shared {
+pub(crate) struct WorkerState {
     desk: Mutex<Desk>,
     bell: Condvar,
 }
 
-impl Shared {
+impl WorkerState {
     fn desk(&self) -> MutexGuard<'_, Desk> {
         self.desk.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -131,7 +131,7 @@ impl Shared {
 /// The thread, seen from the window.
 #[derive(Debug)]
 pub(crate) struct Worker {
-    shared: Arc<Shared>,
+    shared: Arc<WorkerState>,
     news: Receiver<News>,
     thread: Option<JoinHandle<()>>,
 }
@@ -141,10 +141,10 @@ pub(crate) type Wake = Arc<dyn Fn() + Send + Sync>;
 
 impl Worker {
     pub(crate) fn start(options: Options, wake: Wake) -> std::io::Result<Self> {
-        let shared = Arc::new(Shared::default());
+        let shared = Arc::new(WorkerState::default());
         let (to, news) = channel();
-        let teller = Teller { to, wake };
-        let mut studio = PreviewRenderer::new(options, teller, Arc::clone(&shared));
+        let sender = NewsSender { to, wake };
+        let mut studio = PreviewRenderer::new(options, sender, Arc::clone(&shared));
         let thread = std::thread::Builder::new()
             .name("render".to_owned())
             // Scenes are read by recursion.
@@ -197,13 +197,13 @@ impl Drop for Worker {
 
 /// Sends news to the window.
 #[derive(Clone)]
-pub(crate) struct Teller {
+pub(crate) struct NewsSender {
     to: Sender<News>,
     wake: Wake,
 }
 
-impl Teller {
-    fn tell(&self, news: News) {
+impl NewsSender {
+    fn send(&self, news: News) {
         // Nobody listens any more when the window is closing.
         let _ = self.to.send(news);
         (self.wake)();
@@ -211,7 +211,7 @@ impl Teller {
 
     fn fault(&self, error: &Error) {
         if !error.is_stopped() {
-            self.tell(News::Fault(error.message()));
+            self.send(News::Fault(error.message()));
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What libFuzzer's programs in `fuzz/` do with an input: the target, under the limit of time of
+//! The way from an input of libFuzzer's programs in `fuzz/` to the target, under the limit of time of
 //! [`run`](crate::run), on the clock of the processor. libFuzzer's own clock runs on while other
 //! programs have the machine.
 
@@ -11,7 +11,7 @@ use tempfile::TempDir;
 use crate::run::{MOST_TIME, processor_time};
 use crate::targets::named;
 
-/// Where targets put their files.
+/// Folder into which targets put their files.
 static FOLDER: LazyLock<TempDir> = LazyLock::new(|| {
     // libFuzzer's own hook ends the process for a panic that the reader makes an error of.
     drop(std::panic::take_hook());

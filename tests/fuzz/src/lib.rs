@@ -1,5 +1,5 @@
 #![forbid(unsafe_code)]
-//! What reads files, under inputs that nobody meant to write.
+//! Readers of files, under inputs that nobody meant to write.
 //!
 //! | module | idea |
 //! |---|---|

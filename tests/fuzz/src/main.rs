@@ -12,7 +12,7 @@ use anyhow::{Context, Result, bail};
 use etendue_fuzz::run::{self, Effort};
 use etendue_fuzz::targets::{TARGETS, Target, named};
 
-/// Where failing inputs are kept.
+/// Folder in which failing inputs are kept.
 const KEPT: &str = "out/fuzz";
 
 fn main() -> Result<ExitCode> {

@@ -26,12 +26,12 @@ pub const MOST_TIME: Duration = Duration::from_secs(5);
 /// The most time on the clock of one input.
 pub const MOST_WAIT: Duration = Duration::from_secs(120);
 
-/// What the child is to do.
+/// Work that the child is to do.
 #[derive(Debug, Clone, Copy)]
 pub struct Effort {
-    /// How long inputs are made, behind the seeds.
+    /// Time for which inputs are made, behind the seeds.
     pub time: Duration,
-    /// What chance starts from.
+    /// Seed of the random numbers.
     pub seed: u64,
 }
 
@@ -72,11 +72,11 @@ pub fn supervise(target: Target, effort: Effort, program: &Path) -> Result<Resul
 pub struct Failure {
     /// The input.
     pub input: Vec<u8>,
-    /// How the process ended, and its last words.
+    /// End of the process, and its last words.
     pub how: String,
 }
 
-/// Where the child keeps the input it is at.
+/// File in which the child keeps the input it is at.
 const CURRENT: &str = "current-input";
 
 /// Runs the seeds, and then changed ones until the time is over. Gives the number of inputs.

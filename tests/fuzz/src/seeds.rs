@@ -68,7 +68,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// What failed once.
+/// Inputs that failed once.
 fn found(target: &str) -> Vec<Vec<u8>> {
     files(&format!("tests/fuzz/found/{target}"), "")
 }

@@ -17,7 +17,7 @@ use etendue_tracer::{EnvironmentMap, ImageSource, Texture};
 /// A reader under test.
 #[derive(Debug, Clone, Copy)]
 pub struct Target {
-    /// What it is called: the name of its file in `fuzz/fuzz_targets`.
+    /// Its name: that of its file in `fuzz/fuzz_targets`.
     pub name: &'static str,
     /// Reads bytes, with a folder to put them in.
     pub run: fn(&[u8], &Path),
@@ -196,7 +196,7 @@ fn zmx(bytes: &[u8], folder: &Path) {
     let _ = read_lens(&write(folder, "lens.zmx", bytes), Reach::OwnFolder, &[]);
 }
 
-/// What `etendue lens` does, which takes a thousand times as long as reading the file.
+/// The work of `etendue lens`, which takes a thousand times as long as reading the file.
 fn report(path: &Path) {
     let Ok(lens) = read_lens(path, Reach::OwnFolder, &[]) else { return };
     let named = |list: Vec<f64>| (!list.is_empty()).then_some(list);

@@ -29,7 +29,7 @@ pub const METHOD: Method = Method {
     ],
 };
 
-/// Where the bright half of the pixel ends: samples left of it are bright.
+/// End of the bright half of the pixel: samples left of it are bright.
 const BRIGHT: f64 = 1e-5;
 
 /// A pixel of 1 m: a sheet in front of another, over the share [`BRIGHT`] of it on the left.

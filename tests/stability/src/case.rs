@@ -2,12 +2,12 @@
 
 use std::fmt;
 
-/// How much a case does.
+/// Amount of work of a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scale {
     /// Enough to fail when something is wrong: the tests, on every change.
     Quick,
-    /// What the page states.
+    /// That which the page states.
     Full,
 }
 
@@ -25,7 +25,7 @@ impl Scale {
 /// Cases of one method.
 #[derive(Debug)]
 pub struct Method {
-    /// What it is called on the page.
+    /// Its name on the page.
     pub name: &'static str,
     /// Its cases.
     pub cases: &'static [Case],
@@ -36,17 +36,17 @@ pub struct Method {
 pub struct Case {
     /// One word for tests and page, unlike any other of its method.
     pub name: &'static str,
-    /// Where the method is taken.
+    /// Regime that the method is taken to.
     pub regime: &'static str,
-    /// What must happen there. For a known limit, what still has to hold.
+    /// Condition that must hold there; for a known limit, that which still has to.
     pub must: &'static str,
-    /// Why it is no better, where it is not mended.
+    /// Reason for which it is no better, where it is not mended.
     pub limit: Option<&'static str>,
     /// Goes there. An error means that it could not even be tried.
     pub run: fn(Scale) -> anyhow::Result<Outcome>,
 }
 
-/// What a case found.
+/// Result of a case.
 #[derive(Debug, Default)]
 pub struct Outcome {
     measured: Vec<String>,
@@ -66,7 +66,7 @@ impl Outcome {
         }
     }
 
-    /// What did not hold.
+    /// Conditions that did not hold.
     #[must_use]
     pub fn violations(&self) -> &[String] {
         &self.violations

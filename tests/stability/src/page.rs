@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::{METHODS, Outcome, Scale};
 
-/// Where the page stands, whatever folder the program is run from.
+/// Path of the page, whatever folder the program is run from.
 pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/measurements/stability.md");
 
 const HEAD: &str = "\

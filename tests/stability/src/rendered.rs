@@ -34,7 +34,7 @@ pub(crate) struct Pixels {
     pub(crate) variances: Vec<f64>,
     /// Contributions that were not finite, and were left out.
     pub(crate) not_finite: u64,
-    /// What is said of them.
+    /// Notes on them.
     pub(crate) notes: Vec<String>,
 }
 
@@ -101,7 +101,7 @@ impl Pixels {
         self.values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Whether all numbers are, and none had to be left out.
+    /// True if all numbers are finite, and none had to be left out.
     pub(crate) fn are_sound(&self) -> bool {
         self.not_finite == 0 && self.values.iter().all(|v| v.is_finite())
     }

@@ -27,7 +27,7 @@ fn run(case: &Case) -> Result<(), Failed> {
     }
 }
 
-/// What differs from machine to machine, the measured cells, is not compared.
+/// Measured cells, which differ from machine to machine, are not compared.
 fn page_names_cases() -> Result<(), Failed> {
     let page = std::fs::read_to_string(page::PATH)?;
     let mut method = "";

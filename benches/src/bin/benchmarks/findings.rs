@@ -1,4 +1,4 @@
-//! What was measured.
+//! Findings: all that was measured.
 
 use std::collections::BTreeMap;
 
@@ -25,7 +25,7 @@ pub(crate) struct Contest {
     pub(crate) records: Vec<Record>,
 }
 
-/// Which table a contest belongs to.
+/// Table that a contest belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Part {
     Traversal,
@@ -41,7 +41,7 @@ impl Contest {
         self.records.iter().find(|record| record.who == who)
     }
 
-    /// How many times as fast as `other` `who` is.
+    /// Number of times that `who` is as fast as `other`.
     pub(crate) fn speed(&self, who: &str, other: &str) -> Option<f64> {
         Some(self.find(who)?.series.speed_against(&self.find(other)?.series))
     }

@@ -23,10 +23,10 @@ use crate::findings::{Contest, Findings, Part, Record};
 /// The contest's name, in place of a mesh's.
 pub(crate) const SCENE: &str = "first-light";
 
-/// What is compared.
+/// Title of the comparison.
 pub(crate) const QUESTION: &str = "bare loop and render loop";
 
-/// What is rendered, as the page shows it.
+/// Name of what is rendered, as the page shows it.
 pub(crate) const LIMIT: &str = "limit, packets";
 pub(crate) const DATA: &str = "depth and normal";
 pub(crate) const PICTURE: &str = "depth, normal and the facing picture";
@@ -34,7 +34,7 @@ pub(crate) const PICTURE: &str = "depth, normal and the facing picture";
 /// Packets that one task of the bare loop traces: four tiles' worth.
 const PACKETS: usize = 64;
 
-/// What a contestant on so many threads is called.
+/// Name of a contestant on so many threads.
 pub(crate) fn title(who: &str, threads: usize) -> String {
     match threads {
         1 => format!("{who}, 1 thread"),

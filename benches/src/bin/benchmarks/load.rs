@@ -11,7 +11,7 @@ use etendue_scene::import::{Options, Wanted, import};
 
 use crate::findings::{Contest, Findings, Part, Record};
 
-/// What else is timed.
+/// Name of the other program that is timed.
 pub(crate) const TOBJ: &str = "OBJ by the crate tobj";
 pub(crate) const READ: &str = "reading the GLB's bytes";
 

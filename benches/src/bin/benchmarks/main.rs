@@ -52,9 +52,9 @@ struct Arguments {
 enum Command {
     /// Write a blob as GLB, PLY and OBJ, and a scene for each
     Models {
-        /// Where to
+        /// Folder to write them into
         folder: PathBuf,
-        /// How heavy
+        /// Number of triangles
         #[arg(long, default_value_t = 1_000_000)]
         triangles: u64,
         /// Write these formats alone: glb, ply, obj

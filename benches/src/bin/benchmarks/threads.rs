@@ -14,7 +14,7 @@ pub(crate) const WALL: &str = "wall time";
 /// The contestants.
 const SHOWN: [&str; 3] = [names::LIMIT_PACKETS, names::EMBREE_PACKETS, names::BVH];
 
-/// What a contestant on so many threads is called.
+/// Name of a contestant on so many threads.
 pub(crate) fn title(name: &str, threads: usize, clock: &str) -> String {
     format!("{name}, {threads}, {clock}")
 }

@@ -101,7 +101,7 @@ impl Job {
         Ok((file as f64, numbers))
     }
 
-    /// What a process of its own holds after each stage.
+    /// Memory that a process of its own holds after each stage.
     fn memory(&self) -> anyhow::Result<Vec<(String, f64)>> {
         let output =
             Command::new(std::env::current_exe()?).arg(MEMORY).arg(self.scene()).output()?;

@@ -30,7 +30,7 @@ const WRONG: &str = "\
     Split a scene, or pick `bvh` or `exact`, when it spans more than some five hundred times the size of the objects \
     that are looked at. f64 measures what f32 has found; what f32 cannot tell apart, it does not find.";
 
-/// What is drawn: a name, the method, and whether the scene reaches to the origin.
+/// Lines that are drawn: a name, the method, and whether the scene reaches to the origin.
 const SHOWN: [(&str, Method, bool); 5] = [
     ("f32, the object alone", Method::EMBREE_ROBUST, false),
     ("f64, the object alone", Method::EMBREE_REFINED, false),

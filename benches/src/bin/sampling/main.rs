@@ -1,4 +1,4 @@
-//! What samples that stop where they are enough save, against the same number for every pixel: writes the
+//! Savings of samples that stop where they are enough, against the same number for every pixel: writes the
 //! measured part of `docs/measurements/sampling.md` with its chart and its map.
 //!
 //! The light of each scene is scaled so that a quarter of the sensor's full well is filled in 10 ms, in the
@@ -76,7 +76,7 @@ struct Arguments {
     planning: bool,
 }
 
-/// How much is measured.
+/// Amount of what is measured.
 struct Effort {
     pairs: u64,
     counts: &'static [u32],
@@ -343,7 +343,7 @@ fn map(docs: &Path, (name, study): (&str, &Study)) -> anyhow::Result<String> {
     ))
 }
 
-/// What planning costs beyond loading.
+/// Cost of planning beyond loading.
 fn planner((name, study): (&str, &Study)) -> String {
     let wanted = Wanted { samples: json!(64), exposure: SHOWN[0] };
     let scene = study.scene(&wanted, 0);

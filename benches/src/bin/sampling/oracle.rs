@@ -1,7 +1,7 @@
 //! The fewest samples with which the blocks of a picture are good enough, by somebody who knows beforehand how the
 //! variance of each falls.
 
-/// How fast variances fall with the number of samples: from not at all to that of what is smooth.
+/// Exponents by which variances fall with the number of samples: from not at all to that of what is smooth.
 const SLOPES: [f64; 2] = [-3.0, -0.3];
 
 /// The share of blocks that need not be good enough, and get the fewest.

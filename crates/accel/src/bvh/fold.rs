@@ -68,7 +68,7 @@ pub(super) fn fold(tree: &Tree, leaf: &impl WriteLeaf) -> Option<WideTree> {
 #[derive(Default)]
 struct Piece {
     cells: Vec<NodeChunk>,
-    /// Where its nodes begin.
+    /// First cells of its nodes.
     nodes: Vec<usize>,
     place: usize,
 }

@@ -255,7 +255,7 @@ impl<L: Arithmetic> TriangleTest<L> {
     }
 
     #[inline(always)]
-    fn decide(&self, l: L, [a, b, c]: [Sheared<L>; 3], far: L::F) -> TriangleLook<L> {
+    fn decide(&self, l: L, [a, b, c]: [ShearedPoint<L>; 3], far: L::F) -> TriangleLook<L> {
         let (u, v, w) = (edge(l, c, b), edge(l, a, c), edge(l, b, a));
         let sizes = l.add(l.add(size(l, a), size(l, b)), l.add(size(l, c), self.error));
         let error = l.mul(sizes, self.error);
@@ -278,11 +278,11 @@ impl<L: Arithmetic> TriangleTest<L> {
 
     /// Corners as the ray sees them.
     #[inline(always)]
-    fn shear(&self, l: L, [x, y, z]: [L::F; 3]) -> Sheared<L> {
+    fn shear(&self, l: L, [x, y, z]: [L::F; 3]) -> ShearedPoint<L> {
         let z = l.sub(z, self.origin[2]);
         let x = l.neg_mul_add(self.shear[0], z, l.sub(x, self.origin[0]));
         let y = l.neg_mul_add(self.shear[1], z, l.sub(y, self.origin[1]));
-        Sheared { x, y, z }
+        ShearedPoint { x, y, z }
     }
 }
 
@@ -300,7 +300,7 @@ pub(super) struct TriangleLook<L: Arithmetic> {
 
 /// Corners in the frame of which the ray is the z axis, but for the scale of z.
 #[derive(Clone, Copy)]
-struct Sheared<L: Arithmetic> {
+struct ShearedPoint<L: Arithmetic> {
     x: L::F,
     y: L::F,
     z: L::F,
@@ -368,11 +368,11 @@ impl<'a> LeafCorners<'a> {
 
 /// Twice the signed area of the origin and an edge from `p` to `q`.
 #[inline(always)]
-fn edge<L: Arithmetic>(l: L, p: Sheared<L>, q: Sheared<L>) -> L::F {
+fn edge<L: Arithmetic>(l: L, p: ShearedPoint<L>, q: ShearedPoint<L>) -> L::F {
     l.mul_sub(p.x, q.y, l.mul(p.y, q.x))
 }
 
 #[inline(always)]
-fn size<L: Arithmetic>(l: L, p: Sheared<L>) -> L::F {
+fn size<L: Arithmetic>(l: L, p: ShearedPoint<L>) -> L::F {
     l.add(l.abs(p.x), l.abs(p.y))
 }

@@ -99,20 +99,20 @@ pub(super) fn traverse<L: Lanes>(
             far_lanes = lanes.splat(far);
         } else {
             let Some(node) = node_at(cells, current) else { return };
-            let (mut met, near) = meet(lanes, node, test, far_lanes);
-            if met != 0 {
-                let slot = met.trailing_zeros() as usize & 7;
-                met &= met - 1;
-                if met == 0 {
+            let (mut children, near) = meet(lanes, node, test, far_lanes);
+            if children != 0 {
+                let slot = children.trailing_zeros() as usize & 7;
+                children &= children - 1;
+                if children == 0 {
                     current = Child(node[6].0[slot].to_bits());
                     continue;
                 }
                 let near = lanes.store(near);
                 let mut closest = entry(near[slot], node[6].0[slot]);
                 let base = height;
-                while met != 0 {
-                    let slot = met.trailing_zeros() as usize & 7;
-                    met &= met - 1;
+                while children != 0 {
+                    let slot = children.trailing_zeros() as usize & 7;
+                    children &= children - 1;
                     let other = entry(near[slot], node[6].0[slot]);
                     lanes.prefetch(cells, child(other).place());
                     let farther = closest.max(other);

@@ -154,7 +154,7 @@ pub(super) enum Arena {
     Empty,
     /// Mapped memory, which begins on a page.
     Mapped(MmapMut),
-    /// Where mapping failed.
+    /// Memory of the heap, where mapping failed.
     Heap(Vec<NodeChunk>),
 }
 

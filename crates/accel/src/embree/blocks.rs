@@ -8,7 +8,9 @@ use etendue_geometry::block::LANES;
 use etendue_geometry::{MISS, RayBlock};
 
 use super::CommittedScene;
-use super::trace::{Aligned, MOST_SPREAD, intersect_arguments, live_lanes, occluded_arguments};
+use super::trace::{
+    MOST_SPREAD, PacketAligned, intersect_arguments, live_lanes, occluded_arguments,
+};
 
 /// True if a [`RayBlock`] is a packet of the installed Embree as it stands: same rows, and room for all of them.
 const BLOCKS_ARE_PACKETS: bool = size_of::<sys::RTCRayHit16>() <= size_of::<RayBlock>()
@@ -48,7 +50,7 @@ impl CommittedScene {
                 self.closest_of_block(block, &mut arguments);
                 continue;
             }
-            let valid = Aligned(live_lanes::<LANES>(&block.t_max));
+            let valid = PacketAligned(live_lanes::<LANES>(&block.t_max));
             if !BLOCKS_ARE_PACKETS || valid.0 == [0; LANES] {
                 continue;
             }
@@ -103,7 +105,7 @@ impl CommittedScene {
                 self.occluded_of_block(block, &mut arguments);
                 continue;
             }
-            let valid = Aligned(live_lanes::<LANES>(&block.t_max));
+            let valid = PacketAligned(live_lanes::<LANES>(&block.t_max));
             if !BLOCKS_ARE_PACKETS || valid.0 == [0; LANES] {
                 continue;
             }

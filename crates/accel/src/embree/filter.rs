@@ -90,14 +90,14 @@ impl LaneHit<'_> {
     }
 
     /// Placement and triangle.
-    fn met(&self) -> [u32; 2] {
+    fn ids(&self) -> [u32; 2] {
         let instance = self.of_hit(HIT_INSTANCE);
         let placement = if instance == MISS { self.of_hit(HIT_GEOMETRY) } else { instance };
         [placement, self.of_hit(HIT_PRIMITIVE)]
     }
 
     fn triangle(&self, geometry: &Geometry) -> Triangle {
-        let [placement, triangle] = self.met();
+        let [placement, triangle] = self.ids();
         Triangle::of(geometry, placement, triangle)
     }
 }
@@ -141,14 +141,14 @@ impl<'a> ExactFilter<'a> {
     fn keeps(&mut self, hit: &LaneHit<'_>) -> bool {
         let i = hit.id();
         let ends = self.rays.endpoint_triangles();
-        if ends.is_some_and(|ends| ends[i].contains(&hit.met())) {
+        if ends.is_some_and(|ends| ends[i].contains(&hit.ids())) {
             return false;
         }
         let Some(query) = Query::of(self.rays, i) else { return false };
         match verdict(self.geometry, &query, &hit.triangle(self.geometry)) {
             Verdict::Hit(_) => true,
             Verdict::OutOfRange => false,
-            Verdict::Beside => {
+            Verdict::Miss => {
                 #[expect(clippy::cast_possible_truncation, reason = "batches are small")]
                 self.doubtful.push(i as u32);
                 false
@@ -201,7 +201,7 @@ pub(crate) struct NearestSearch<'a> {
     limit: f32,
     slack: f64,
     /// A bit for each ray of the bundle that met a triangle which the ray itself passes by.
-    pub(crate) beside: u32,
+    pub(crate) missed: u32,
     /// The corner of those that is nearest to the ray: its moment d × p.
     nearest_moment: DVec3,
 }
@@ -217,7 +217,7 @@ impl<'a> NearestSearch<'a> {
             advance,
             limit: f32::INFINITY,
             slack,
-            beside: 0,
+            missed: 0,
             nearest_moment: DVec3::INFINITY,
         }
     }
@@ -250,8 +250,8 @@ impl<'a> NearestSearch<'a> {
         let exact = match verdict(self.geometry, &self.query, &triangle) {
             Verdict::Hit(exact) => exact,
             Verdict::OutOfRange => return false,
-            Verdict::Beside => {
-                self.beside |= 1 << hit.id();
+            Verdict::Miss => {
+                self.missed |= 1 << hit.id();
                 self.note_corners(&triangle);
                 return false;
             }

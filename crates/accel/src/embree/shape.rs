@@ -262,7 +262,7 @@ pub(super) enum InstanceKind {
 }
 
 /// Treatment of each placement, and the meshes that get a scene of their own.
-pub(super) struct Instanced {
+pub(super) struct InstanceChoice {
     pub(super) placements: Vec<InstanceKind>,
     pub(super) meshes: Vec<bool>,
 }
@@ -279,7 +279,7 @@ const LEAST_STEPS: f64 = 4.0;
 /// few milliseconds.
 const LARGE: usize = 10_000;
 
-impl Instanced {
+impl InstanceChoice {
     /// For coordinates relative to `origin`. Where things `move`, large meshes that are used once are
     /// instances, too: what has not changed is then not built again.
     pub(super) fn of(geometry: &Geometry, origin: DVec3, moves: bool) -> Self {

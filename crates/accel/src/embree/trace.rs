@@ -324,18 +324,19 @@ macro_rules! packets {
                 arguments: &mut sys::RTCIntersectArguments,
                 found: &mut FoundHits,
             ) {
-                let mut query = Aligned(sys::$rayhit::default());
+                let mut query = PacketAligned(sys::$rayhit::default());
                 query.0.ray.mask = [u32::MAX; $width];
                 for start in (0..rays.len()).step_by($width) {
                     let count = $width.min(rays.len() - start);
-                    let valid = Aligned(live_lanes::<$width>(&rays.t_far[start..start + count]));
+                    let valid =
+                        PacketAligned(live_lanes::<$width>(&rays.t_far[start..start + count]));
                     fill_packet!(query.0.ray, rays, start, count, $width);
                     query.0.hit.geomID = [MISS; $width];
                     query.0.hit.primID = [MISS; $width];
                     query.0.hit.instID[0] = [MISS; $width];
                     if valid.0 != [0; $width] {
                         // SAFETY: the scene is committed; packet and mask have the C types' layout and
-                        // are aligned to 64 bytes by `Aligned`; lanes without a ray are masked off.
+                        // are aligned to 64 bytes by `PacketAligned`; lanes without a ray are masked off.
                         unsafe {
                             sys::$intersect(
                                 valid.0.as_ptr(),
@@ -370,7 +371,7 @@ macro_rules! packets {
                 arguments: &mut sys::RTCOccludedArguments,
                 blocked: &mut [bool],
             ) {
-                let mut query = Aligned(sys::$ray::default());
+                let mut query = PacketAligned(sys::$ray::default());
                 query.0.mask = [u32::MAX; $width];
                 let mut spread = *arguments;
                 spread.flags = sys::RTC_RAY_QUERY_FLAG_INCOHERENT;
@@ -383,7 +384,8 @@ macro_rules! packets {
                         }
                         continue;
                     }
-                    let valid = Aligned(live_lanes::<$width>(&rays.t_far[start..start + count]));
+                    let valid =
+                        PacketAligned(live_lanes::<$width>(&rays.t_far[start..start + count]));
                     if valid.0 == [0; $width] {
                         blocked[start..start + count].fill(false);
                         continue;
@@ -457,7 +459,7 @@ pub(super) fn live_lanes<const W: usize>(t_far: &[f32]) -> [i32; W] {
 
 /// The alignment of the widest packet, for all of them.
 #[repr(C, align(64))]
-pub(super) struct Aligned<T>(pub(super) T);
+pub(super) struct PacketAligned<T>(pub(super) T);
 
 packets!(closest4, occluded4, 4, RTCRayHit4, RTCRay4, rtcIntersect4, rtcOccluded4);
 packets!(closest8, occluded8, 8, RTCRayHit8, RTCRay8, rtcIntersect8, rtcOccluded8);

@@ -158,7 +158,7 @@ pub(super) struct BlockOcclusion {
     pub(super) doubts: [u32; LANES],
 }
 
-/// What is worked out once of a block's rays.
+/// Values that are worked out once of a block's rays.
 struct BlockRays {
     /// Farthest distances that count (m), finite.
     t_max: Floats,
@@ -186,7 +186,7 @@ impl BlockRays {
     }
 }
 
-/// Where a block's rays cross a face's plane.
+/// Crossings of a block's rays with a face's plane.
 struct FaceCrossing {
     /// Distances (m); infinity of rays that do not cross it between their ends.
     t: Floats,
@@ -197,15 +197,12 @@ struct FaceCrossing {
     blur: Floats,
 }
 
-/// Intersects rays with a face's plane; `None` where none does between its ends, which are finite.
+/// Intersects rays with a face's plane between their nearest distances and the farthest, `t_max`, which are finite;
+/// `None` where none crosses it.
 #[inline(always)]
-fn cross(
-    face: &Face,
-    (block, lines): (&RayBlock, &BlockRays),
-    (t_min, t_max): (&Floats, &Floats),
-) -> Option<FaceCrossing> {
+fn cross(face: &Face, block: &RayBlock, lines: &BlockRays, t_max: &Floats) -> Option<FaceCrossing> {
     let ([x, y, z], [dx, dy, dz]) = (&block.origin, &block.direction);
-    let [nx, ny, nz] = face.normal;
+    let (t_min, [nx, ny, nz]) = (&block.t_min, face.normal);
     let (mut t, mut blur) = ([0.0; LANES], [0.0; LANES]);
     let mut any = 0_u32;
     for i in 0..LANES {
@@ -290,8 +287,7 @@ pub(super) fn closest(few: &FewTriangles, block: &RayBlock, nearest: &mut Neares
             continue;
         }
         for (number, face) in (run.first..).zip(&few.faces[run.faces.clone()]) {
-            let ends = (&block.t_min, &t);
-            let Some(own) = cross(face, (block, &lines), ends) else { continue };
+            let Some(own) = cross(face, block, &lines, &t) else { continue };
             own.doubt(&mut doubts);
             for i in 0..LANES {
                 let counts = own.is_hit(i);
@@ -315,8 +311,7 @@ pub(super) fn occluded(few: &FewTriangles, block: &RayBlock, occlusion: &mut Blo
             continue;
         }
         for face in &few.faces[run.faces.clone()] {
-            let ends = (&block.t_min, &lines.t_max);
-            let Some(own) = cross(face, (block, &lines), ends) else { continue };
+            let Some(own) = cross(face, block, &lines, &lines.t_max) else { continue };
             own.doubt(&mut doubts);
             for i in 0..LANES {
                 hit[i] = select_unpredictable(own.is_hit(i), 1, hit[i]);

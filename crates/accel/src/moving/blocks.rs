@@ -5,14 +5,14 @@ use etendue_geometry::block::{LANES, vector};
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Bounds, Detail, HitBatch, MISS, RayBatch, RayBlock, RayBlocks};
 
-use super::{BodyHit, Moving, MovingPlacement, RaysInFrame, meets, reach, span, turned_normal};
+use super::{BodyHit, BodyRays, MovingScene, RaysInFrame, meets, reach, span, turned_normal};
 use crate::single::{F32Frame, Rays32, round};
 use crate::{Accel, BlockAccel};
 
 /// Distances that differ by no more than this share, where one of them is of single precision, are one.
 const ONE_PLACE: f64 = 8.0 * f32::EPSILON as f64;
 
-impl Moving {
+impl MovingScene {
     /// The frame of blocks around all that stands and all that moves, whose coordinates are those of what stands; `None`
     /// where that is not asked in blocks, or too far away for single precision.
     pub(super) fn frame_of_blocks(
@@ -21,7 +21,7 @@ impl Moving {
         swept: Bounds,
     ) -> Option<F32Frame> {
         let origin = still.blocks()?.origin();
-        F32Frame::around(standing.union(swept), origin)
+        F32Frame::near(standing.union(swept), origin)
     }
 
     /// Asks `ask` of the rays that count hits and may meet a body, with the block and the lane of each; those of `ends`
@@ -61,7 +61,7 @@ impl Moving {
     }
 }
 
-impl BlockAccel for Moving {
+impl BlockAccel for MovingScene {
     fn origin(&self) -> DVec3 {
         self.frame.map_or(DVec3::ZERO, |frame| frame.origin)
     }
@@ -91,18 +91,17 @@ impl BlockAccel for Moving {
                     hits.t[k] = f64::from(block.t_max[lane]);
                 }
             }
-            let (mut packed, mut carried) = (Packed::default(), RaysInFrame::default());
+            let (mut packed, mut carried) = (BlocksInFrame::default(), RaysInFrame::default());
             carried.hits.detail = Detail::Surface;
             let near = self.near(rays, |i| Some(reach(rays, &hits, i, ONE_PLACE)));
-            for near in near.chunk_by(|a, b| a[0] == b[0]) {
-                let body = &self.bodies[near[0][0] as usize];
+            for own in self.by_body(&near) {
+                let body = own.body;
                 let Some(shape) = self.shapes[body.shape].blocks() else {
-                    let more = (ONE_PLACE, &mut carried);
-                    self.closest_of_body((body, near), rays, &mut hits, more);
+                    self.closest_of_body(&own, rays, &mut hits, ONE_PLACE, &mut carried);
                     continue;
                 };
                 let far = |i: usize| Some(reach(rays, &hits, i, ONE_PLACE));
-                packed.fill((body, near), rays, shape.origin(), far);
+                packed.fill(&own, rays, shape.origin(), far);
                 shape.closest_of_blocks(packed.rays.blocks_mut(), &[], coherent);
                 for (k, &(i, stretch, ahead, linear)) in packed.from.iter().enumerate() {
                     let (block, lane) = (&packed.rays.blocks()[k / LANES], k % LANES);
@@ -110,14 +109,17 @@ impl BlockAccel for Moving {
                         continue;
                     }
                     let t = (ahead + f64::from(block.t_max[lane])) / stretch;
+                    if !body.is_nearest(rays, &hits, i, t, ONE_PLACE) {
+                        continue;
+                    }
                     let normal = vector(&block.normal, lane);
-                    let hit = || BodyHit {
+                    let hit = BodyHit {
                         t,
                         triangle: block.triangle[lane],
                         weights: [block.u[lane], block.v[lane]].map(f64::from),
                         normal: turned_normal(linear, normal),
                     };
-                    self.offer(body, rays, &mut hits, (i, t, ONE_PLACE), hit);
+                    hit.put(&mut hits, i, body.placement);
                 }
             }
             for (k, &(number, lane)) in lanes.iter().enumerate() {
@@ -138,16 +140,15 @@ impl BlockAccel for Moving {
             |_, _| false,
             |rays, lanes, blocks| {
                 let mut blocked = vec![false; rays.len()];
-                let (mut packed, mut carried) = (Packed::default(), RaysInFrame::default());
+                let (mut packed, mut carried) = (BlocksInFrame::default(), RaysInFrame::default());
                 let near = self.near(rays, |i| Some(rays.t_max()[i]));
-                for near in near.chunk_by(|a, b| a[0] == b[0]) {
-                    let body = &self.bodies[near[0][0] as usize];
-                    let Some(shape) = self.shapes[body.shape].blocks() else {
-                        self.occluded_by_body((body, near), rays, &mut blocked, &mut carried);
+                for own in self.by_body(&near) {
+                    let Some(shape) = self.shapes[own.body.shape].blocks() else {
+                        self.occluded_by_body(&own, rays, &mut blocked, &mut carried);
                         continue;
                     };
                     let far = |i: usize| (!blocked[i]).then(|| rays.t_max()[i]);
-                    packed.fill((body, near), rays, shape.origin(), far);
+                    packed.fill(&own, rays, shape.origin(), far);
                     shape.occluded_of_blocks(packed.rays.blocks_mut(), &[], coherent);
                     for (k, &(i, ..)) in packed.from.iter().enumerate() {
                         blocked[i] |= packed.rays.blocks()[k / LANES].is_blocked(k % LANES);
@@ -165,26 +166,27 @@ impl BlockAccel for Moving {
 
 /// Rays of a body in blocks, in its frame.
 #[derive(Default)]
-struct Packed {
+struct BlocksInFrame {
     rays: RayBlocks,
     /// Of each, which of the batch it is, how long its unit is in the body's frame, how far it starts ahead there (m), and
     /// what turns and stretches the frame.
     from: Vec<(usize, f64, f64, DMat3)>,
 }
 
-impl Packed {
-    /// Carries those of the rays `near` a body into its frame that meet its box, by coordinates relative to `origin` (m):
+impl BlocksInFrame {
+    /// Carries those of a body's rays into its frame that meet its box, by coordinates relative to `origin` (m):
     /// in f64, and then rounded where they enter the box, so that f32 has the body's own lengths alone.
     fn fill(
         &mut self,
-        (body, near): (&MovingPlacement, &[[u32; 2]]),
+        own: &BodyRays<'_>,
         rays: &RayBatch,
         origin: DVec3,
         t_max: impl Fn(usize) -> Option<f64>,
     ) {
         self.rays.clear();
         self.from.clear();
-        for i in near.iter().map(|&[_, ray]| ray as usize) {
+        let body = own.body;
+        for i in own.numbers() {
             let Some(t_max) = t_max(i) else { continue };
             let place = body.motion.at(rays.time(i));
             let inverse = place.linear.inverse();

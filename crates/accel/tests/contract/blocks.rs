@@ -129,7 +129,7 @@ fn instances_are_met_in_blocks_as_in_batches() {
         let mut shadows = rays.clone();
         blocks.closest_of_blocks(rays.blocks_mut(), &[], coherent);
         blocks.occluded_of_blocks(shadows.blocks_mut(), &[], coherent);
-        let (mut met, mut differ) = (vec![false; geometry.placements.len()], 0);
+        let (mut is_hit, mut differ) = (vec![false; geometry.placements.len()], 0);
         for (i, &due_blocked) in due_blocked.iter().enumerate() {
             let context = format!("compact {compact}, coherent {coherent}: ray {i}");
             let (block, lane) = (&rays.blocks()[i / LANES], i % LANES);
@@ -142,7 +142,7 @@ fn instances_are_met_in_blocks_as_in_batches() {
             if !due.is_hit(i) {
                 continue;
             }
-            met[own[0] as usize] = true;
+            is_hit[own[0] as usize] = true;
             let t = (start(block, lane) - batch.origin(i)).length() + f64::from(block.t_max[lane]);
             assert!((t - due.t[i]).abs() < 1e-5, "{context}: {t}, not {}", due.t[i]);
             let weights = [block.u, block.v].map(|row| f64::from(row[lane]));
@@ -153,8 +153,8 @@ fn instances_are_met_in_blocks_as_in_batches() {
         }
         // Packets round in another order than rays one by one.
         assert!(differ <= 6, "compact {compact}, coherent {coherent}: {differ} differ");
-        let count = met.iter().filter(|&&met| met).count();
-        assert!(count >= 38, "{count} of {} placements are met", met.len());
-        assert!(met.last() == Some(&true), "the mirror image that is used once is met");
+        let count = is_hit.iter().filter(|&&is_hit| is_hit).count();
+        assert!(count >= 38, "{count} of {} placements are hit", is_hit.len());
+        assert!(is_hit.last() == Some(&true), "the mirror image that is used once is hit");
     }
 }

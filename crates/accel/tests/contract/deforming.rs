@@ -94,7 +94,7 @@ fn shapes_are_those_of_still_meshes_at_each_time() {
     let geometry = scene();
     let accels = each(&geometry);
     let mut random = Random(78);
-    let (mut differ, mut count, mut met) = (0, 0, 0);
+    let (mut differ, mut count, mut reached) = (0, 0, 0);
     for number in 0..40 {
         let share = random.unit();
         let time = match number % 8 {
@@ -125,7 +125,7 @@ fn shapes_are_those_of_still_meshes_at_each_time() {
                 if ours.0 == MISS {
                     continue;
                 }
-                met += usize::from([1, 2, 3].contains(&ours.0));
+                reached += usize::from([1, 2, 3].contains(&ours.0));
                 // A few roundings, over the cosine of the least grazing ray.
                 assert!((hits.t[i] - truth.t[i]).abs() < 1e-9, "{name} at {time}: ray {i}");
                 assert!(hits.normal(i).distance(truth.normal(i)) < 1e-9, "{name} at {time}: {i}");
@@ -136,7 +136,7 @@ fn shapes_are_those_of_still_meshes_at_each_time() {
     }
     // Rays through edges go to either side by the last digit, and Embree's f32 loses some at outlines.
     assert!(differ * 2000 <= count, "{differ} of {count} rays differ");
-    assert!(met * 4 > count, "{met} of {count} rays meet what deforms");
+    assert!(reached * 4 > count, "{reached} of {count} rays meet what deforms");
 }
 
 #[test]

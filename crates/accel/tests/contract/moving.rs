@@ -83,7 +83,7 @@ fn moving_bodies_are_still_ones_at_each_time() {
     let geometry = bodies();
     let accels = each_moving(&geometry);
     let mut random = Random(77);
-    let (mut met, mut count) = (0, 0);
+    let (mut differ, mut count) = (0, 0);
     for number in 0..40 {
         // Within the exposure, at its ends, and before and after it.
         let share = random.cube().x;
@@ -111,7 +111,7 @@ fn moving_bodies_are_still_ones_at_each_time() {
                     );
                     // Rays through edges may go to either side, by the last digit.
                     if ours != theirs {
-                        met += 1;
+                        differ += 1;
                         continue;
                     }
                     assert_eq!(is_blocked, truth.is_hit(i), "{name} at {time}: ray {i}");
@@ -129,7 +129,7 @@ fn moving_bodies_are_still_ones_at_each_time() {
         }
     }
     // Embree's f32 loses rays within 2·10⁻⁶ of outlines.
-    assert!(met * 2000 <= count, "{met} of {count} rays differ");
+    assert!(differ * 2000 <= count, "{differ} of {count} rays differ");
 }
 
 #[test]
@@ -358,7 +358,7 @@ fn rays_in_blocks_meet_bodies_at_their_times() {
         2,
         Transform::from_trs(DVec3::new(0.2, 0.1, 0.0), DQuat::IDENTITY, DVec3::splat(0.05)),
     ));
-    let (mut compared, mut met, mut count) = (0, 0, 0);
+    let (mut compared, mut differ, mut count) = (0, 0, 0);
     for (geometry, away) in [(bodies(), 1.0), (bodies(), 60.0), (Arc::new(few), 20.0)] {
         for (name, accel) in each_moving(&geometry) {
             let Some(blocks) = accel.blocks() else { continue };
@@ -387,7 +387,7 @@ fn rays_in_blocks_meet_bodies_at_their_times() {
                 let own = [block.placement[lane], block.triangle[lane]];
                 count += 1;
                 if own != [due.placement[i], due.triangle[i]] {
-                    met += 1;
+                    differ += 1;
                     continue;
                 }
                 let is_blocked = shadows.blocks()[i / LANES].is_blocked(lane);
@@ -408,7 +408,7 @@ fn rays_in_blocks_meet_bodies_at_their_times() {
     let least = if cfg!(feature = "embree") { 3 } else { 1 };
     assert!(compared >= least, "{compared}");
     // Where two meet, and at outlines, single precision may take the other.
-    assert!(met * 200 <= count, "{met} of {count} rays differ");
+    assert!(differ * 200 <= count, "{differ} of {count} rays differ");
 }
 
 /// One more copy that moves takes some hundred bytes, of the structure and of the scene, whatever its mesh has.

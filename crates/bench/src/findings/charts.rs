@@ -2,11 +2,11 @@
 //! time and against the number of samples.
 use crate::accelerators::{AcceleratorMeasurement, RENDER_WIDTH};
 use crate::cameras::Cameras;
-use crate::samplers::{Converged, Samplers};
+use crate::samplers::{ConvergedPicture, Samplers};
 use crate::target::{AS_IT_IS, Target};
 use etendue_chart::{Axis, Chart, GREY, Mark, Point, Series, Stroke};
 
-/// What stands on a chart's axes for one finding.
+/// Number of one finding on a chart's axis.
 type Measure = fn(&AcceleratorMeasurement) -> Option<f64>;
 
 pub(super) fn accelerators(findings: &[AcceleratorMeasurement]) -> Vec<(&'static str, Chart)> {
@@ -226,7 +226,7 @@ pub(super) fn target(found: &Target) -> Chart {
 struct Pictures<'a> {
     rows: &'a [ChartRow],
     resolution: [u32; 2],
-    converged: &'a Converged,
+    converged: &'a ConvergedPicture,
     /// Name of what they are compared with.
     of: &'static str,
 }

@@ -74,7 +74,7 @@ pub(super) fn cameras(found: &Cameras) -> Table {
 
 /// Table of when each contender reaches the target.
 pub(super) fn contenders(found: &Target) -> Table {
-    let row = |own: &crate::target::Foretold| {
+    let row = |own: &crate::target::ContenderForecast| {
         let samples = own.samples.map_or_else(Cell::none, |samples| Cell::count(samples.into()));
         let seconds = |value: f64| Cell::number(value, format!("{value:.2}"));
         vec![

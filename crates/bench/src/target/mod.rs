@@ -1,4 +1,4 @@
-//! Which settings reach a given error of the sensor's picture soonest, by the time of the whole program.
+//! Settings that reach a given error of the sensor's picture soonest, by the time of the whole program.
 //!
 //! The scene as it is contends with itself under changes: one on every axis (accelerator, precision, sampler, …), and
 //! several together. All are rendered with few samples; of each is foretold when it will reach the target, the later
@@ -19,9 +19,9 @@ pub use self::race::measure;
 /// A change of the scene.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Change {
-    /// What it is called.
+    /// Its name.
     pub name: String,
-    /// What is set, as pairs of a path of the scene and JSON.
+    /// Settings, as pairs of a path of the scene and JSON.
     pub settings: Vec<(String, String)>,
 }
 
@@ -30,7 +30,7 @@ pub struct Change {
 pub struct Contender {
     /// Its changes by axis and number; none of the scene as it is.
     pub changes: Vec<(usize, usize)>,
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// All that is set.
     pub settings: Vec<(String, String)>,
@@ -76,7 +76,7 @@ pub fn rendered_with(settings: &[(String, String)], samples: u32) -> Vec<(String
     all
 }
 
-/// What the scene without changes is called.
+/// Name of the scene without changes.
 pub const AS_IT_IS: &str = "as the plan takes it";
 
 /// A render of the whole program that is wanted.
@@ -90,7 +90,7 @@ pub struct Run<'a> {
     pub seed: u64,
 }
 
-/// What became of it.
+/// Outcome of a render.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
     /// It was rendered.
@@ -104,7 +104,7 @@ pub enum Outcome {
 pub struct WholeRun {
     /// Loading, building, tracing and writing, in turn (s).
     pub stages: [f64; 4],
-    /// What the sensor records in the mean, above its black level: `[row][column][channel]`.
+    /// Mean numbers that the sensor records, above its black level: `[row][column][channel]`.
     pub values: Vec<f64>,
     /// Columns, rows and channels.
     pub shape: [usize; 3],
@@ -118,16 +118,16 @@ impl WholeRun {
     }
 }
 
-/// What is sought, and how long that may take.
+/// Error that is sought, and the time that it may take.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
     /// The error: the root of the mean squared difference to the converged picture, over its mean.
     pub target: f64,
-    /// What all renders together may take (s): about, since a render is not broken off.
+    /// Time that all renders together may take (s): about, since a render is not broken off.
     pub seconds: f64,
 }
 
-/// What was found.
+/// Result of the search.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Target {
     /// The error that is sought, as a share of the picture's mean.
@@ -139,15 +139,15 @@ pub struct Target {
     /// All that was rendered, in turn.
     pub renders: Vec<Render>,
     /// Every contender and when it reaches the target, the soonest first.
-    pub contenders: Vec<Foretold>,
+    pub contenders: Vec<ContenderForecast>,
     /// The soonest, rendered with as many samples as it needs.
-    pub verified: Option<Verified>,
+    pub verified: Option<Verification>,
     /// The scene as it is, the soonest and those next to it, each with what fits into the time of the soonest.
     pub equal_time: Vec<EqualTime>,
     /// Their pictures, behind the converged one.
     #[serde(skip)]
     pub strip: Option<Strip>,
-    /// What a user should know.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
@@ -169,24 +169,24 @@ pub struct Render {
     pub relative_mse: f64,
 }
 
-/// When a contender reaches the target.
+/// Forecast of when a contender reaches the target.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Foretold {
+pub struct ContenderForecast {
     /// Its name.
     pub name: String,
     /// Samples a pixel; `null` where no number is enough.
     pub samples: Option<u32>,
     /// The time of the whole program (s).
     pub seconds: Option<f64>,
-    /// How often it was rendered.
+    /// Number of times that it was rendered.
     pub renders: usize,
-    /// What is set, as pairs of a path of the scene and JSON.
+    /// Settings, as pairs of a path of the scene and JSON.
     pub settings: Vec<(String, String)>,
 }
 
 /// The soonest contender, rendered for itself.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Verified {
+pub struct Verification {
     /// Its name.
     pub name: String,
     /// Samples a pixel.
@@ -199,7 +199,7 @@ pub struct Verified {
     pub error: f64,
 }
 
-/// What settings give in the time that the soonest takes.
+/// Result of settings in the time that the soonest takes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EqualTime {
     /// Their name.
@@ -225,7 +225,7 @@ pub struct Strip {
     pub pictures: Vec<Vec<u8>>,
 }
 
-impl Verified {
+impl Verification {
     /// By which factor what was foretold is off, above 1.
     #[must_use]
     pub fn factor(&self) -> f64 {
@@ -234,7 +234,7 @@ impl Verified {
 }
 
 impl Target {
-    /// What was found, in a sentence or two.
+    /// Result in a sentence or two.
     #[must_use]
     pub fn verdict(&self) -> String {
         let Some(found) = &self.verified else {

@@ -6,7 +6,8 @@ mod forecast;
 use std::time::Instant;
 
 use super::{
-    Change, Contender, Effort, Foretold, Outcome, Render, Run, Target, Verified, WholeRun,
+    Change, Contender, ContenderForecast, Effort, Outcome, Render, Run, Target, Verification,
+    WholeRun,
 };
 use crate::pictures::{mean, mean_square};
 use crate::{BenchError, Progress};
@@ -32,7 +33,7 @@ const MOST_TRIES: usize = 6;
 /// By how much rounding may take an error over the target.
 const ROUNDING: f64 = 1e-9;
 
-/// What is known of a contender.
+/// Renders of a contender, and what follows of them.
 struct ContenderRecord {
     contender: Contender,
     points: Vec<TrialRender>,
@@ -49,7 +50,8 @@ struct ContenderRecord {
 /// Those of `program`; [`BenchError::Stopped`] when `progress` asks for it; [`BenchError::Refused`] when the scene
 /// itself is.
 pub fn measure<E: From<BenchError>>(
-    (axes, in_full): (&[Vec<Change>], &[(String, String)]),
+    axes: &[Vec<Change>],
+    in_full: &[(String, String)],
     effort: Effort,
     program: &mut dyn FnMut(Run<'_>) -> Result<Outcome, E>,
     progress: Progress<'_>,
@@ -314,8 +316,8 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
 
     /// Renders the soonest with what it needs, and again while that is not near the target. Of those within it, the
     /// soonest; or else the one that comes nearest.
-    fn verify(&mut self) -> Result<Option<Verified>, E> {
-        let mut best: Option<Verified> = None;
+    fn verify(&mut self) -> Result<Option<Verification>, E> {
+        let mut best: Option<Verification> = None;
         // More than any that was not enough.
         let mut too_few: Vec<(usize, u32)> = Vec::new();
         let most = NEAR_ENOUGH[1] * self.effort.target;
@@ -350,7 +352,7 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
             }
             let name = self.entries[who].contender.name.clone();
             let is_known =
-                |known: &&Verified| known.name == name && known.samples == forecast.samples;
+                |known: &&Verification| known.name == name && known.samples == forecast.samples;
             // The same again would tell nothing.
             if best.as_ref().filter(is_known).is_some() {
                 break;
@@ -358,7 +360,7 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
             let Some(point) = self.render(who, forecast.samples)? else { continue };
             let error = point.square.sqrt();
             let (samples, seconds, foretold) = (point.samples, point.seconds, forecast.seconds);
-            let found = Verified { name, samples, foretold, seconds, error };
+            let found = Verification { name, samples, foretold, seconds, error };
             let share = error / self.effort.target;
             if share > NEAR_ENOUGH[1] {
                 too_few.push((who, samples));
@@ -386,10 +388,10 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
         Ok(best)
     }
 
-    fn conclude(self, verified: Option<Verified>) -> Target {
+    fn conclude(self, verified: Option<Verification>) -> Target {
         let foretold = |entry: &ContenderRecord| {
             let forecast = self.forecast_of(entry);
-            Foretold {
+            ContenderForecast {
                 name: entry.contender.name.clone(),
                 samples: forecast.map(|forecast| forecast.samples),
                 seconds: forecast.map(|forecast| forecast.seconds),
@@ -397,8 +399,8 @@ impl<'a, E: From<BenchError>> Race<'a, E> {
                 settings: entry.contender.settings.clone(),
             }
         };
-        let mut contenders: Vec<Foretold> = self.entries.iter().map(foretold).collect();
-        let time = |foretold: &Foretold| foretold.seconds.unwrap_or(f64::INFINITY);
+        let mut contenders: Vec<ContenderForecast> = self.entries.iter().map(foretold).collect();
+        let time = |foretold: &ContenderForecast| foretold.seconds.unwrap_or(f64::INFINITY);
         contenders.sort_by(|a, b| time(a).total_cmp(&time(b)));
         let mut notes = self.notes;
         notes.dedup();
@@ -421,7 +423,7 @@ mod tests {
     use super::*;
     use crate::target::AS_IT_IS;
 
-    /// What a contender takes at first, what a sample takes (s), and the squared error of one sample and of all.
+    /// Time that a contender takes at first, and that a sample takes (s), and the squared error of one sample and of all.
     type Law = [f64; 4];
 
     /// A picture of mean 1 with just this squared error.
@@ -462,7 +464,7 @@ mod tests {
             let values = picture(variance / n + rest);
             Ok::<_, BenchError>(Outcome::Done(WholeRun { stages, values, shape: [8, 8, 1] }))
         };
-        measure((&changes, &[]), Effort { target, seconds: 1e9 }, &mut program, &|_| true).unwrap()
+        measure(&changes, &[], Effort { target, seconds: 1e9 }, &mut program, &|_| true).unwrap()
     }
 
     #[test]

@@ -16,6 +16,7 @@ use etendue_scene::Scene;
 use serde::Serialize;
 use serde_json::Value;
 
+use etendue_render::tolerance::lens_models::LensModelKind;
 use etendue_render::tolerance::{Field, FullView};
 pub use etendue_render::tolerance::{ModelError, Place, Tolerance, Worst};
 
@@ -26,7 +27,7 @@ use crate::{BenchError, Progress};
 /// All models of a lens against the full train.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// What they may be off by.
+    /// Errors that they may have.
     pub tolerance: Tolerance,
     /// The nearest and the farthest depth (m) that the camera sees; `null` for infinity.
     #[serde(serialize_with = "finite_or_null")]
@@ -38,12 +39,12 @@ pub struct Comparison {
     /// The keys of a scene that take each of these, in their order; `null` for the full train.
     pub scenes: Vec<Value>,
     /// The simplest that stays within the tolerance.
-    pub cheapest: &'static str,
-    /// How many times as fast as the full train that is, measured; `null` without a picture to time.
+    pub cheapest: LensModelKind,
+    /// Number of times that it is as fast as the full train, measured; `null` without a picture to time.
     pub saving: Option<f64>,
     /// The full train by rays, and by waves as `camera.diffraction` has them.
     pub waves: Vec<WaveFinding>,
-    /// What a user should know, in sentences.
+    /// Notes for the user, in sentences.
     pub notes: Vec<String>,
 }
 
@@ -74,13 +75,13 @@ pub fn compare(
     notes.extend(found.notes);
     let (mut findings, mut models, mut scenes) = (Vec::new(), Vec::new(), Vec::new());
     for model in found.models {
-        let mut finding = view.finding(model.name, &model.camera, tolerance)?;
+        let mut finding = view.finding(model.kind, &model.camera, tolerance)?;
         if model.lacks_mask {
             finding.is_within = false;
             notes.push(format!(
                 "`{}` has not the lens' mask, which is kept where it is alone, in the stop and upright: its blur is \
                  another",
-                model.name
+                model.kind
             ));
         }
         findings.push(finding);
@@ -108,7 +109,7 @@ pub fn compare(
         Err(error) => return Err(error),
     }
     let cheapest = findings.iter().find(|finding| finding.is_within);
-    let (cheapest, saving) = cheapest.map_or(("full", None), |f| (f.model, f.speed));
+    let (cheapest, saving) = cheapest.map_or((LensModelKind::Full, None), |f| (f.model, f.speed));
     Ok(Comparison {
         tolerance,
         depths: ends(&view.places),
@@ -125,7 +126,7 @@ pub fn compare(
 /// The camera of a model, opened for the bands of the picture.
 fn opened(plan: &Plan, camera: &Camera) -> Result<Camera, BenchError> {
     let opened = camera.opened(&plan.bands);
-    opened.map_err(|error| BenchError::Render(RenderError::Camera(error.why)))
+    opened.map_err(|error| BenchError::Render(RenderError::camera(error.why)))
 }
 
 /// The nearest and the farthest depth of all.

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use etendue_render::tolerance::lens_models::LensModelKind;
 use etendue_report::{Cell, Table};
 
 use super::{Comparison, ModelError, WaveFinding, Worst};
@@ -17,7 +18,7 @@ impl fmt::Display for Comparison {
         )?;
         write!(f, "{}", Table::of_rows(self.models.iter().map(cells).collect()))?;
         for (finding, scene) in self.models.iter().zip(&self.scenes) {
-            if finding.model != "full" {
+            if finding.model != LensModelKind::Full {
                 writeln!(f, "\n{}: {}; {scene} takes it", finding.model, where_it_misses(finding))?;
             }
         }
@@ -62,7 +63,7 @@ impl Comparison {
                 .to_owned(),
         };
         let saving = match self.saving {
-            Some(saving) if self.cheapest != "full" => {
+            Some(saving) if self.cheapest != LensModelKind::Full => {
                 format!("; its picture took 1/{saving:.2} of the full train's time here")
             }
             _ => String::new(),
@@ -79,7 +80,7 @@ fn cells(finding: &ModelError) -> Vec<(&'static str, Cell)> {
         value.map_or_else(Cell::none, |value| Cell::number(value, format!("{value:.decimals$}")))
     };
     vec![
-        ("model", Cell::word(*model)),
+        ("model", Cell::word(model.name())),
         ("chief ray (px)", pixels(chief_ray)),
         ("centroid (px)", pixels(centroid)),
         ("blur (px)", pixels(blur)),
@@ -105,7 +106,7 @@ fn of_waves(finding: &WaveFinding) -> Vec<(&'static str, Cell)> {
     ]
 }
 
-/// Where the greatest differences of a model are.
+/// Words for where the greatest differences of a model are.
 fn where_it_misses(finding: &ModelError) -> String {
     let place = |name: &str, worst: &Worst| {
         let [column, row] = worst.at;

@@ -60,7 +60,7 @@ pub(super) fn undistort_all(model: &BrownConrady, limit: f64, [x, y, z]: [&mut [
 }
 
 /// A map's value, and its derivatives by rows.
-type Mapped = ([f64; 2], [[f64; 2]; 2]);
+type MapValue = ([f64; 2], [[f64; 2]; 2]);
 
 impl BrownConrady {
     /// Residuals below this, relative to 1 + the target's size, are rounding.
@@ -71,7 +71,7 @@ impl BrownConrady {
 
     /// Distorted tangents, and their derivatives by x and y.
     #[inline(always)]
-    pub(super) fn distort(&self, [x, y]: [f64; 2]) -> Mapped {
+    pub(super) fn distort(&self, [x, y]: [f64; 2]) -> MapValue {
         let r2 = x * x + y * y;
         let top = 1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3));
         let bottom = 1.0 + r2 * (self.k4 + r2 * (self.k5 + r2 * self.k6));

@@ -41,7 +41,8 @@ impl LensCamera {
     /// When the camera was not opened, or its bands do not share rays ([`Self::opened_paths`]).
     pub(crate) fn sample_band_rays(
         &self,
-        (pose, resolution): (&Pose, [u32; 2]),
+        pose: &Pose,
+        resolution: [u32; 2],
         samples: &FilmSamples,
         out: &mut CameraRays,
         landings: &mut BandLandings,
@@ -55,7 +56,7 @@ impl LensCamera {
             let is_of_node = |u: f64| place_of(u, paths.nodes.len()) == node;
             let numbered = samples.leading.iter().zip(0..);
             let numbers = numbered.filter(|&(&u, _)| is_of_node(u)).map(|(_, i)| i);
-            let first = self.aim_samples((&opened.pupil, lens), samples, numbers, out);
+            let first = self.aim_samples(&opened.pupil, lens, samples, numbers, out);
             let before = &mut landings.before;
             before.clear();
             before.extend((0..out.in_lens.len()).map(|i| out.in_lens.throughput(i)));
@@ -70,15 +71,16 @@ impl LensCamera {
         landings.places.resize(paths.nodes.len() * count, [f64::NAN; 2]);
         landings.shares.resize(paths.nodes.len() * count, 0.0);
         for (node, lens) in paths.nodes.iter().enumerate() {
-            self.bring_back((node, lens), paths.lead, samples, out, landings);
+            self.bring_back(node, lens, paths.lead, samples, out, landings);
         }
-        self.land((paths, resolution), samples, out, landings);
+        self.land(paths, resolution, samples, out, landings);
     }
 
     /// Takes the rays of other leading wavelengths back through the lens, to where they land.
     fn bring_back(
         &self,
-        (node, lens): (usize, &MonochromaticTrain),
+        node: usize,
+        lens: &MonochromaticTrain,
         lead: f64,
         samples: &FilmSamples,
         out: &mut CameraRays,
@@ -113,7 +115,8 @@ impl LensCamera {
     /// Computes where each band's light of each ray lands, and its weight.
     fn land(
         &self,
-        (paths, resolution): (&BandInterpolation, [u32; 2]),
+        paths: &BandInterpolation,
+        resolution: [u32; 2],
         samples: &FilmSamples,
         out: &CameraRays,
         landings: &mut BandLandings,
@@ -125,13 +128,14 @@ impl LensCamera {
             4 => Self::land_between::<4>,
             _ => Self::land_between::<MOST_NODES>,
         };
-        land(self, (paths, resolution), samples, out, landings);
+        land(self, paths, resolution, samples, out, landings);
     }
 
     /// The same between so many nodes at most.
     fn land_between<const NODES: usize>(
         &self,
-        (paths, resolution): (&BandInterpolation, [u32; 2]),
+        paths: &BandInterpolation,
+        resolution: [u32; 2],
         samples: &FilmSamples,
         out: &CameraRays,
         landings: &mut BandLandings,
@@ -170,7 +174,7 @@ impl LensCamera {
                     (place, if paths.has_losses { passed * filters } else { *filters })
                 } else {
                     let from = [points[ray], directions[ray]];
-                    self.trace_back(paths.lead, (band, number), from)
+                    self.trace_back(paths.lead, band, number, from)
                 };
                 if passed > 0.0 && is_seen(place) {
                     #[expect(
@@ -185,13 +189,14 @@ impl LensCamera {
         }
     }
 
-    /// Where a ray that leaves the lens at a point (mm) in a direction lands at one of a band's wavelengths (pixels), and
+    /// Landing point of a ray that leaves the lens at a point (mm) in a direction, at one of a band's wavelengths (pixels), and
     /// the share of it that passes.
     #[inline(never)]
     fn trace_back(
         &self,
         lead: f64,
-        (band, number): (usize, usize),
+        band: usize,
+        number: usize,
         [point, direction]: [DVec3; 2],
     ) -> ([f64; 2], f64) {
         let opened = self.opened.as_ref().expect("the camera is opened before it is sampled");
@@ -301,7 +306,7 @@ mod tests {
                 let wavelengths = &paths.bands[band];
                 let number = place_of(u, wavelengths.len());
                 let from = [landings.points[ray], landings.directions[ray]];
-                let ([x, y], passed) = lens.trace_back(paths.lead, (band, number), from);
+                let ([x, y], passed) = lens.trace_back(paths.lead, band, number, from);
                 let is_seen = passed > 0.0 && x.min(y) >= 0.0 && x.max(y) < 256.0;
                 let own = match is_seen {
                     true => y.floor() * 256.0 + x.floor(),

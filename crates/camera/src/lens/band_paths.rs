@@ -165,17 +165,19 @@ impl LensCamera {
         for count in 1..=MOST_NODES.min(wavelengths.len()) {
             let chosen = index.nodes(&wavelengths, count);
             let landed = chosen.iter().map(land).collect::<Result<Vec<_>, _>>()?;
+            let nodes = NodeLandings { rays: &rays, landed: &landed };
             // One wavelength says nothing of what rims cut at others: with two and more it lies between.
             let next = match count {
                 1 => NextTerm::default(),
                 _ => {
                     let nm = index.farthest(&chosen);
-                    next_term(&index.weights(&chosen, nm), (&rays, &landed), &land(&nm)?)
+                    nodes.next_term(&index.weights(&chosen, nm), &land(&nm)?)
                 }
             };
             let weights_at = |nm: f64| (index.weights(&chosen, nm), index.next_weight(&chosen, nm));
-            let errors = |(nm, found): (&f64, &Landed)| {
-                error_of((&weights_at(*nm), &next), (&rays, &landed), found)
+            let errors = |(nm, found): (&f64, &Landings)| {
+                let (weights, of_next) = weights_at(*nm);
+                nodes.error(&weights, of_next, &next, found)
             };
             let errors = checks.iter().zip(&checked).map(errors);
             let [error, share] = errors.fold([0.0_f64; 2], |[a, b], [c, d]| [a.max(c), b.max(d)]);
@@ -238,7 +240,7 @@ impl LensCamera {
     }
 
     /// Landing points of rays of the scene at the wavelength of a lens.
-    fn landings(&self, lens: &MonochromaticTrain, rays: &[(DVec3, DVec3)], lead: f64) -> Landed {
+    fn landings(&self, lens: &MonochromaticTrain, rays: &[(DVec3, DVec3)], lead: f64) -> Landings {
         let mut back = LensRays::with_capacity(rays.len());
         for &(point, direction) in rays {
             back.push(point + direction * lead, -direction);
@@ -250,18 +252,18 @@ impl LensCamera {
             let lands = back.status(i) == RayStatus::Exited && pixel[0].is_finite();
             lands.then(|| (DVec2::from(pixel), back.throughput(i)))
         });
-        Landed { places: landed.collect(), pitch: film.pitch }
+        Landings { places: landed.collect(), pitch: film.pitch }
     }
 }
 
 /// Landing points of rays (pixels), and the share of each that passed; `None` for those that ended.
-struct Landed {
+struct Landings {
     places: Vec<Option<(DVec2, f64)>>,
     pitch: f64,
 }
 
 /// Greatest distance in rows or columns by which the places of a ray part (mm).
-fn parting(landed: &[Landed]) -> f64 {
+fn parting(landed: &[Landings]) -> f64 {
     let Some(first) = landed.first() else { return 0.0 };
     let part = |ray: usize| {
         let places = landed.iter().filter_map(|at| at.places[ray].map(|(place, _)| place));
@@ -274,44 +276,51 @@ fn parting(landed: &[Landed]) -> f64 {
     (0..first.places.len()).map(part).fold(0.0, f64::max) * first.pitch
 }
 
-/// Rays of the scene (point and direction, mm), and where they land at the nodes.
-type Nodes<'a> = (&'a [(DVec3, DVec3)], &'a [Landed]);
+/// Rays of the scene (point and direction, mm), and their landing points at the nodes.
+struct NodeLandings<'a> {
+    rays: &'a [(DVec3, DVec3)],
+    landed: &'a [Landings],
+}
 
-/// Places of a ray between nodes, and what the lens passes of it, by the nodes' weights.
-fn between(weights: &[f64; MOST_NODES], nodes: &[Landed], ray: usize) -> Option<(DVec2, f64)> {
-    let mut sum = (DVec2::ZERO, 0.0);
-    for (node, weight) in nodes.iter().zip(weights) {
-        let (place, share) = node.places[ray]?;
-        sum = (sum.0 + place * *weight, sum.1 + share * weight);
+impl NodeLandings<'_> {
+    /// Places of a ray between nodes, and what the lens passes of it, by the nodes' weights.
+    fn between(&self, weights: &[f64; MOST_NODES], ray: usize) -> Option<(DVec2, f64)> {
+        let mut sum = (DVec2::ZERO, 0.0);
+        for (node, weight) in self.landed.iter().zip(weights) {
+            let (place, share) = node.places[ray]?;
+            sum = (sum.0 + place * *weight, sum.1 + share * weight);
+        }
+        Some(sum)
     }
-    Some(sum)
-}
 
-/// Term by which rays land elsewhere than between the nodes, of those `found` where that is most.
-fn next_term(weights: &[f64; MOST_NODES], (rays, nodes): Nodes<'_>, found: &Landed) -> NextTerm {
-    let off = |ray: usize| {
-        let (place, _) = found.places[ray]?;
-        let (first, _) = nodes[0].places[ray]?;
-        Some((first, rays[ray].0, place - between(weights, nodes, ray)?.0))
-    };
-    NextTerm::fitted((0..rays.len()).filter_map(off))
-}
-
-/// Greatest error of interpolated places (pixels) and shares against those found.
-fn error_of(
-    ((weights, of_next), next): (&([f64; MOST_NODES], f64), &NextTerm),
-    (rays, nodes): Nodes<'_>,
-    found: &Landed,
-) -> [f64; 2] {
-    let mut errors = [0.0_f64; 2];
-    for (ray, found) in found.places.iter().enumerate() {
-        let (Some(sum), Some((place, share))) = (between(weights, nodes, ray), found) else {
-            continue;
+    /// Term by which rays land elsewhere than between the nodes, of those `found` where that is most.
+    fn next_term(&self, weights: &[f64; MOST_NODES], found: &Landings) -> NextTerm {
+        let off = |ray: usize| {
+            let (place, _) = found.places[ray]?;
+            let (first, _) = self.landed[0].places[ray]?;
+            Some((first, self.rays[ray].0, place - self.between(weights, ray)?.0))
         };
-        let first = nodes[0].places[ray].map_or(DVec2::ZERO, |(place, _)| place);
-        let more = DVec2::from(next.at(first.into(), rays[ray].0)) * *of_next;
-        errors[0] = errors[0].max((sum.0 + more).distance(*place));
-        errors[1] = errors[1].max((sum.1 - share).abs() / share);
+        NextTerm::fitted((0..self.rays.len()).filter_map(off))
     }
-    errors
+
+    /// Greatest error of interpolated places (pixels) and shares against those found; `of_next` is the weight of `next`.
+    fn error(
+        &self,
+        weights: &[f64; MOST_NODES],
+        of_next: f64,
+        next: &NextTerm,
+        found: &Landings,
+    ) -> [f64; 2] {
+        let mut errors = [0.0_f64; 2];
+        for (ray, found) in found.places.iter().enumerate() {
+            let (Some(sum), Some((place, share))) = (self.between(weights, ray), found) else {
+                continue;
+            };
+            let first = self.landed[0].places[ray].map_or(DVec2::ZERO, |(place, _)| place);
+            let more = DVec2::from(next.at(first.into(), self.rays[ray].0)) * of_next;
+            errors[0] = errors[0].max((sum.0 + more).distance(*place));
+            errors[1] = errors[1].max((sum.1 - share).abs() / share);
+        }
+        errors
+    }
 }

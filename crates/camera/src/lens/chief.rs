@@ -10,7 +10,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::focused::Focused;
+use super::focused::FocusedLens;
 use crate::CameraError;
 use etendue_optics::element::{Clip, Frame, Ray, RayStatus};
 use etendue_optics::train::pupil::{SlopeWindow, lit_radius};
@@ -59,7 +59,8 @@ impl ChiefTable {
     /// The direction from a place on the sensor (mm from its centre) to the stop's centre.
     pub(crate) fn direction(
         &self,
-        (train, frame): (&OpticalTrain, &Frame),
+        train: &OpticalTrain,
+        frame: &Frame,
         at: &MonochromaticTrain,
         film: DVec2,
     ) -> Option<DVec3> {
@@ -72,13 +73,14 @@ impl ChiefTable {
     /// nodes is right to a millionth of the way to the stop. Of others as [`Self::direction`].
     pub(crate) fn direction_nearly(
         &self,
-        lens: (&OpticalTrain, &Frame),
+        train: &OpticalTrain,
+        frame: &Frame,
         at: &MonochromaticTrain,
         film: DVec2,
     ) -> Option<DVec3> {
         match self.half_size {
             None => Some(self.nearly(film)?.extend(-1.0).normalize()),
-            Some(_) => self.direction(lens, at, film),
+            Some(_) => self.direction(train, frame, at, film),
         }
     }
 
@@ -175,11 +177,11 @@ pub struct LensletChiefs {
 
 impl LensletChiefs {
     /// Solves chief rays over the array; `None` when the camera does not look through lenslets.
-    pub(crate) fn new(focused: &Focused) -> Result<Option<Self>, CameraError> {
+    pub(crate) fn new(focused: &FocusedLens) -> Result<Option<Self>, CameraError> {
         Self::in_train(focused, focused.train())
     }
 
-    fn in_train(focused: &Focused, train: &OpticalTrain) -> Result<Option<Self>, CameraError> {
+    fn in_train(focused: &FocusedLens, train: &OpticalTrain) -> Result<Option<Self>, CameraError> {
         let Some(view) = train.behind_lenslets() else { return Ok(None) };
         let fault =
             |error: etendue_optics::glass::GlassError| CameraError::new("lens", error.to_string());
@@ -193,7 +195,7 @@ impl LensletChiefs {
     }
 
     /// Chief rays of light of a wavelength (nm), through a lens that stands where it is.
-    pub(crate) fn at(focused: &Focused, wavelength: f64) -> Result<Option<Self>, CameraError> {
+    pub(crate) fn at(focused: &FocusedLens, wavelength: f64) -> Result<Option<Self>, CameraError> {
         let fault =
             |error: etendue_optics::train::LensError| CameraError::new("lens", error.to_string());
         let train = focused.train().clone().with_wavelength(wavelength).map_err(fault)?;
@@ -215,7 +217,7 @@ impl LensletChiefs {
     /// the stop's middle.
     #[must_use]
     pub fn chief_slopes(&self, at: DVec2) -> Option<DVec2> {
-        let direction = self.table.direction((&self.view.main, &self.plane), &self.main, at)?;
+        let direction = self.table.direction(&self.view.main, &self.plane, &self.main, at)?;
         Some(-direction.truncate() / direction.z)
     }
 

@@ -16,7 +16,7 @@ const FARTHEST_PUPIL: f64 = 1e6;
 
 /// A lens with its sensor in place.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Focused {
+pub struct FocusedLens {
     train: OpticalTrain,
     paraxial: Paraxial,
     film: FilmGrid,
@@ -90,7 +90,7 @@ impl FilmGrid {
     }
 }
 
-impl Focused {
+impl FocusedLens {
     /// Sets the stop, puts the sensor where `focus` says and finds the size of its pixels.
     pub(crate) fn new(
         train: OpticalTrain,

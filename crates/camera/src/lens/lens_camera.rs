@@ -12,25 +12,28 @@
 use std::sync::Arc;
 
 use etendue_geometry::{RayBatch, RaysMut};
+use etendue_report::Refusal;
 use etendue_spectrum::{Bands, Curve, Outside, Spread};
 use glam::{DVec2, DVec3};
 
 use super::chief::{ChiefTable, ImageCircle, LensletChiefs};
-use super::focused::{Focused, View};
+use super::focused::{FocusedLens, View};
 use super::nodes::SharingLimits;
-use super::opened::{Opened, OpenedGroup, through_filters, uniform_filters};
+use super::opened::{OpenedGroup, OpenedLens, through_filters, uniform_filters};
 use super::traced_at::{BandGroup, TracedAt, grouped};
 
 use crate::{CameraError, Pose};
 use etendue_optics::element::{Clip, Ray, RayStatus, Reflection};
 use etendue_optics::train::analysis::projected_solid_angle;
-use etendue_optics::train::pupil::{Disk, SlopeWindow, blocked, without_dimming, without_filters};
-use etendue_optics::train::{ExitPupil, ExitPupilError, MonochromaticTrain, OpticalTrain, Side};
+use etendue_optics::train::pupil::{
+    Disk, SlopeWindow, blocked, dark_array, unbounded, without_dimming, without_filters,
+};
+use etendue_optics::train::{ExitPupil, MonochromaticTrain, OpticalTrain, Side};
 
 /// A lens with a sensor behind it.
 #[derive(Debug, Clone)]
 pub struct LensCamera {
-    pub(super) focused: Focused,
+    pub(super) focused: FocusedLens,
     design: MonochromaticTrain,
     chief: ChiefTable,
     /// The lenslets that the sensor looks through.
@@ -39,7 +42,7 @@ pub struct LensCamera {
     lit: ImageCircle,
     /// Projected solid angle of the unvignetted pupil seen from the axis (sr).
     pub(super) solid_angle: f64,
-    pub(super) opened: Option<Arc<Opened>>,
+    pub(super) opened: Option<Arc<OpenedLens>>,
     pub(super) traced_at: TracedAt,
     /// Spreading of light on the sensor.
     pub(super) spread: SpreadBy,
@@ -47,7 +50,7 @@ pub struct LensCamera {
     pub(super) sharing: SharingLimits,
 }
 
-/// By what light of a point is spread on the sensor.
+/// Means by which light of a point is spread on the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum SpreadBy {
     /// By rays of the whole pupil.
@@ -71,8 +74,8 @@ impl PartialEq for LensCamera {
 
 impl LensCamera {
     /// Solves chief rays and finds out whether there is light at all.
-    pub(crate) fn new(focused: Focused) -> Result<Self, CameraError> {
-        let dark = |error: ExitPupilError| CameraError::new("", error.to_string());
+    pub(crate) fn new(focused: FocusedLens) -> Result<Self, CameraError> {
+        let dark = |refusal: Refusal| CameraError::new("", refusal.to_string());
         let lenslets = LensletChiefs::new(&focused)?;
         // Chief rays of whole pictures go straight through arrays of lenslets.
         let unbent = focused.train().without_arrays();
@@ -89,7 +92,7 @@ impl LensCamera {
             .at(train.wavelength())
             .map_err(|fault| CameraError::new("", fault.to_string()))?;
         if train.elements().iter().all(|e| e.clear_radius() == f64::INFINITY) {
-            return Err(dark(ExitPupilError::Unbounded));
+            return Err(dark(unbounded()));
         }
         let half = focused.film().half_size();
         let frame = focused.film().frame;
@@ -102,7 +105,7 @@ impl LensCamera {
         if !lit_from(DVec2::ZERO) && !places.into_iter().flatten().any(lit_from) {
             let closed = train.elements().iter().any(|e| e.clear_radius() == 0.0);
             return Err(dark(match focused.train().first_array() {
-                Some(element) if !closed => ExitPupilError::Array { element },
+                Some(element) if !closed => dark_array(element),
                 _ => blocked(train, &clear, frame.vertex),
             }));
         }
@@ -127,7 +130,7 @@ impl LensCamera {
 
     /// The lens and its sensor.
     #[must_use]
-    pub fn focused(&self) -> &Focused {
+    pub fn focused(&self) -> &FocusedLens {
         &self.focused
     }
 
@@ -274,7 +277,7 @@ impl LensCamera {
     }
 
     /// The lens opened, of which `train` is as much as light of `bands` is to meet.
-    fn open(&self, bands: &Bands, train: &OpticalTrain) -> Result<Opened, CameraError> {
+    fn open(&self, bands: &Bands, train: &OpticalTrain) -> Result<OpenedLens, CameraError> {
         let fault = |why: String| CameraError::new("", why);
         for (i, element) in train.elements().iter().enumerate() {
             for curve in element.part.curves() {
@@ -285,10 +288,11 @@ impl LensCamera {
         }
         let (mut groups, mut measured) = (Vec::new(), Vec::new());
         for group in self.band_groups(bands) {
-            let Spread { wavelengths, overlap } = self.spread(bands, &group);
-            let lenses = through_filters(train, bands, group.bands.start, &wavelengths, overlap)
+            let spread = self.spread(bands, &group);
+            let lenses = through_filters(train, bands, group.bands.start, &spread)
                 .map_err(|error| fault(error.to_string()))?;
             // Between its ends and its middle the pupil changes as little as the index.
+            let wavelengths = &spread.wavelengths;
             let last = wavelengths.len() - 1;
             let mut few = vec![wavelengths[0], wavelengths[last / 2], wavelengths[last]];
             few.dedup();
@@ -303,7 +307,7 @@ impl LensCamera {
             groups.iter().flat_map(|g| &g.lenses).map(MonochromaticTrain::wavelength).collect();
         let pupil =
             if all.len() > measured.len() { pupil.aimed_at_mask(&clear, &all) } else { pupil };
-        Ok(Opened { bands: bands.clone(), groups, pupil, paths: None })
+        Ok(OpenedLens { bands: bands.clone(), groups, pupil, paths: None })
     }
 
     /// The wavelengths at which the rays of a group run: several for wide bands where the lens bends
@@ -396,11 +400,11 @@ impl LensCamera {
         let (direction, clip) = match &self.lenslets {
             Some(lenslets) => (lenslets.direction(start)?, Clip::On),
             None => {
-                let lens = (self.focused.train(), frame);
+                let (train, design) = (self.focused.train(), &self.design);
                 let direction = match self.spread {
                     // Samples of light are many, and no data.
-                    SpreadBy::Nothing => self.chief.direction_nearly(lens, &self.design, film)?,
-                    _ => self.chief.direction(lens, &self.design, film)?,
+                    SpreadBy::Nothing => self.chief.direction_nearly(train, frame, design, film)?,
+                    _ => self.chief.direction(train, frame, design, film)?,
                 };
                 (direction, Clip::Off)
             }
@@ -448,7 +452,7 @@ impl LensCamera {
 
 /// The pupil as seen from the axis with all filters and masks clear; from elsewhere when the axis is
 /// dark.
-fn unvignetted(train: &OpticalTrain, at: &MonochromaticTrain, focused: &Focused) -> f64 {
+fn unvignetted(train: &OpticalTrain, at: &MonochromaticTrain, focused: &FocusedLens) -> f64 {
     if let Some(view) = train.behind_lenslets() {
         return view.solid_angle(focused.sensor_z()) * at.index_before_sensor().powi(2);
     }

@@ -10,6 +10,7 @@
 //! | [`focused`] | a lens and its sensor: where pixels lie, and the paraxial camera of both |
 //! | [`chief`] | the chief rays of a whole sensor; which lenslet a place on the sensor belongs to; the part of the sensor that light reaches |
 //! | [`lens_camera`] | chief rays for data, and what is measured for pictures |
+//! | `keys` | what cameras with a lens have in common in a scene file |
 //! | `opened` | the same measured for the bands of a picture |
 //! | `nodes` | wavelengths that rays of all bands are traced at |
 //! | `implausible` | sizes that no camera has |
@@ -25,6 +26,7 @@ mod band_paths;
 pub mod chief;
 pub mod focused;
 mod implausible;
+pub(crate) mod keys;
 pub mod lens_camera;
 mod nodes;
 mod opened;
@@ -38,7 +40,7 @@ pub mod waves;
 pub use band_landings::BandLandings;
 pub use band_paths::SharedPaths;
 pub use chief::LensletChiefs;
-pub use focused::Focused;
+pub use focused::FocusedLens;
 pub use lens_camera::LensCamera;
 pub use nodes::SharingLimits;
 pub use source::{LensSource, PlacedSpec};

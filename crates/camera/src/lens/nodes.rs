@@ -24,9 +24,9 @@ impl SharingLimits {
 /// A wavelength between nodes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct NodeWeights {
-    /// What each node counts.
+    /// Weight of each node.
     pub(super) weights: [f64; MOST_NODES],
-    /// What the [`NextTerm`] counts.
+    /// Weight of the [`NextTerm`].
     pub(super) next: f64,
     /// Transmission of the filters.
     pub(super) filters: f64,

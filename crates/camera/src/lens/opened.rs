@@ -9,12 +9,12 @@ use super::nodes::{NextTerm, NodeWeights};
 
 /// The exit pupil measured at the wavelengths that are wanted.
 #[derive(Debug)]
-pub(super) struct Opened {
+pub(super) struct OpenedLens {
     pub(super) bands: Bands,
     /// In the order of [`LensCamera::band_groups`].
     pub(super) groups: Vec<OpenedGroup>,
     pub(super) pupil: ExitPupil,
-    /// How all bands share a ray; `None` where they do not.
+    /// Sharing of a ray by all bands; `None` where there is none.
     pub(super) paths: Option<BandInterpolation>,
 }
 
@@ -35,7 +35,7 @@ pub(super) struct BandInterpolation {
     pub(super) next: NextTerm,
     /// True if glass takes light.
     pub(super) has_losses: bool,
-    /// From where a ray leaves the lens to where one starts that comes back (mm).
+    /// Distance from a ray's place behind the lens to the start of one that comes back (mm).
     pub(super) lead: f64,
     /// Greatest distance by which places of a ray part: rows of pixels and their size (mm).
     pub(super) reach: f64,
@@ -49,7 +49,7 @@ impl OpenedGroup {
     }
 }
 
-/// In which of `count` equal parts of 0..1 a number lies.
+/// Index of the one of `count` equal parts of 0..1 in which a number lies.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -74,14 +74,12 @@ pub(super) fn through_filters(
     train: &OpticalTrain,
     bands: &Bands,
     band: usize,
-    wavelengths: &[f64],
-    overlap: f64,
+    spread: &Spread,
 ) -> Result<Vec<MonochromaticTrain>, GlassError> {
     let uniform = uniform_filters(train);
-    let passes =
-        |curve: &Curve, nm| passed(bands, (band, wavelengths, overlap), &uniform, curve, nm);
+    let passes = |curve: &Curve, nm| passed(bands, band, spread, &uniform, curve, nm);
     let lens = |&nm: &f64| train.at_with(nm, &|curve| passes(curve, nm));
-    wavelengths.iter().map(lens).collect()
+    spread.wavelengths.iter().map(lens).collect()
 }
 
 /// Transmission of a band, at each of its wavelengths, by all filters together that are the same all over.
@@ -89,22 +87,24 @@ pub(super) fn filtered(
     train: &OpticalTrain,
     bands: &Bands,
     band: usize,
-    Spread { wavelengths, overlap }: &Spread,
+    spread: &Spread,
 ) -> Vec<f64> {
     let uniform = uniform_filters(train);
     let all = || train.elements().iter().filter_map(|element| element.part.uniform_curve());
-    let passes = |curve, nm| passed(bands, (band, wavelengths, *overlap), &uniform, curve, nm);
-    wavelengths.iter().map(|&nm| all().map(|curve| passes(curve, nm)).product()).collect()
+    let passes = |curve, nm| passed(bands, band, spread, &uniform, curve, nm);
+    spread.wavelengths.iter().map(|&nm| all().map(|curve| passes(curve, nm)).product()).collect()
 }
 
 /// Transmission of a filter's curve for a band at one of its wavelengths (nm): see [`through_filters`].
 fn passed(
     bands: &Bands,
-    (band, wavelengths, overlap): (usize, &[f64], f64),
+    band: usize,
+    spread: &Spread,
     uniform: &[&Curve],
     curve: &Curve,
     nm: f64,
 ) -> f64 {
+    let Spread { wavelengths, overlap } = spread;
     let mean = bands.from_curve(curve, Outside::Held).map_or(0.0, |means| means[band]);
     if uniform.contains(&curve) {
         return mean * overlap.powf(1.0 / uniform.len().max(1) as f64);

@@ -23,7 +23,7 @@ impl LensCamera {
         for samples_of_lens in order.chunk_by(|a, b| a.0 == b.0) {
             let lens = &group.lenses[samples_of_lens[0].0];
             let numbers = samples_of_lens.iter().map(|&(_, i)| i);
-            self.trace_samples(pose, (&opened.pupil, lens), samples, numbers, out);
+            self.trace_samples(pose, &opened.pupil, lens, samples, numbers, out);
         }
         out.order = order;
         out.rays.coherent = true;
@@ -33,12 +33,13 @@ impl LensCamera {
     fn trace_samples(
         &self,
         pose: &Pose,
-        (pupil, lens): (&ExitPupil, &MonochromaticTrain),
+        pupil: &ExitPupil,
+        lens: &MonochromaticTrain,
         samples: &FilmSamples,
         numbers: impl Iterator<Item = u32>,
         out: &mut CameraRays,
     ) {
-        let first = self.aim_samples((pupil, lens), samples, numbers, out);
+        let first = self.aim_samples(pupil, lens, samples, numbers, out);
         lens.trace(Side::Sensor, Clip::On, &mut out.in_lens);
         out.statuses.add_all(&out.in_lens);
         self.leave(pose, first, out);
@@ -47,7 +48,8 @@ impl LensCamera {
     /// Starts rays for some of `samples`, which `out` names from the number on that is returned.
     pub(super) fn aim_samples(
         &self,
-        (pupil, lens): (&ExitPupil, &MonochromaticTrain),
+        pupil: &ExitPupil,
+        lens: &MonochromaticTrain,
         samples: &FilmSamples,
         numbers: impl Iterator<Item = u32>,
         out: &mut CameraRays,
@@ -69,7 +71,7 @@ impl LensCamera {
         let scale = 1.0 / self.solid_angle;
         let bundle = PupilSamples { scale, film: [x, y], squares: &out.squares };
         if !pupil.fill(&bundle, &mut out.in_lens) {
-            self.aim_one_by_one((pupil, lens), samples, first, out);
+            self.aim_one_by_one(pupil, lens, samples, first, out);
         }
         first
     }
@@ -78,7 +80,8 @@ impl LensCamera {
     /// where no light arrives.
     fn aim_one_by_one(
         &self,
-        (pupil, lens): (&ExitPupil, &MonochromaticTrain),
+        pupil: &ExitPupil,
+        lens: &MonochromaticTrain,
         samples: &FilmSamples,
         first: usize,
         out: &mut CameraRays,

@@ -20,7 +20,7 @@ use etendue_spectrum::CurveFault;
 /// The longest text that is read as a lens (bytes).
 const LONGEST: u64 = 16 << 20;
 
-/// Where a lens is written.
+/// Source of a lens.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum LensSource {
@@ -125,7 +125,7 @@ fn in_element(error: &LensError, key: &str, at: impl Fn(usize) -> String) -> Cam
 /// A part at a place of its own on a lens' axis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlacedSpec {
-    /// Where its vertex is on the axis (mm): from the lens' first vertex, negative in front of it.
+    /// Place of its vertex on the axis (mm): from the lens' first vertex, negative in front of it.
     pub at: Millimetres,
     /// The part and how it is mounted, as in a lens file but without `thickness`.
     #[serde(flatten)]
@@ -153,7 +153,7 @@ impl JsonSchema for PlacedSpec {
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         let mut at = generator.subschema_for::<Millimetres>();
-        let about = "Where its vertex is on the axis (mm): from the lens' first vertex, negative in \
+        let about = "Place of its vertex on the axis (mm): from the lens' first vertex, negative in \
                      front of it.";
         at.insert("description".to_owned(), about.into());
         let keys = Map::from_iter([("at".to_owned(), at.to_value())]);

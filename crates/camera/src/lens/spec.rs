@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::focused::{Focused, View, positive};
+use super::focused::{FocusedLens, View, positive};
+use super::keys::{is_zero, lens_camera_spec};
 use super::lens_camera::LensCamera;
 use super::source::{FocusDistance, LensSource, PlacedSpec, Setup, in_part};
 use crate::framing::{self, FieldExtent, Subject};
@@ -23,55 +24,41 @@ fn reach_behind(elements: &[PlacedSpec], rear: f64) -> f64 {
 /// Declares a camera by its own keys; those that all cameras with a lens have are added.
 macro_rules! camera_with_a_lens {
     ($(#[$about:meta])* pub struct $name:ident { $($(#[$attribute:meta])* pub $key:ident: $kind:ty,)* }) => {
-        $(#[$about])*
-        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-        #[serde(deny_unknown_fields)]
-        pub struct $name {
-            $($(#[$attribute])* pub $key: $kind,)*
-            /// Closes the stop to this f-number: focal length over the entrance pupil's diameter,
-            /// for an object at infinity.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
-            pub f_number: Option<f64>,
-            /// The distance of what is in focus (m, or "infinity"), along the axis from the entrance
-            /// pupil.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
-            pub focus_distance: Option<FocusDistance>,
-            /// Instead of `focus_distance`: from the lens' last vertex to the sensor (mm).
-            #[serde(default, skip_serializing_if = "Option::is_none")]
-            pub sensor_distance: Option<Millimetres>,
-            /// The vertical field of view (degrees), when it is to give the size of the pixels.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
-            pub fov: Option<Degrees>,
-            /// The height of all rows of the sensor (mm), when it is to give the size of the pixels.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
-            pub sensor_height: Option<Millimetres>,
-            /// Turns the sensor about the x axis and then about its own y axis (degrees),
-            /// right-handed around its centre: Scheimpflug's rule.
-            #[serde(default, skip_serializing_if = "is_zero")]
-            pub sensor_tilt: [Degrees; 2],
-            /// Moves the sensor across the axis by x and y (mm): shift.
-            #[serde(default, skip_serializing_if = "is_zero")]
-            pub sensor_decentre: [Millimetres; 2],
-            /// What glass takes from light; nothing when absent.
-            #[serde(default, skip_serializing_if = "is_zero")]
-            pub losses: LossesSpec,
-            /// Whether light of pictures is spread as waves are, by the lens' own point spread functions,
-            /// instead of as rays are.
-            #[serde(default, skip_serializing_if = "is_zero")]
-            pub diffraction: bool,
-            /// Where the entrance pupil stands; when absent, the whole scene is framed and what is
-            /// in its middle is in focus.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
-            pub pose: Option<PoseSpec>,
-            /// When rows are open to light; all together, for as long as the sensor exposes, when absent.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
-            pub shutter: Option<ShutterSpec>,
-            /// How the camera moves; it stands still when absent.
-            #[serde(default, skip_serializing_if = "Option::is_none")]
-            pub motion: Option<CameraMotionSpec>,
-            /// The grid of pixels.
-            #[serde(default)]
-            pub sensor: SensorSpec,
+        lens_camera_spec! {
+            $(#[$about])*
+            pub struct $name {
+                lens { $($(#[$attribute])* pub $key: $kind,)* }
+                focus {
+                    /// The distance of what is in focus (m, or "infinity"), along the axis from the entrance
+                    /// pupil.
+                    #[serde(default, skip_serializing_if = "Option::is_none")]
+                    pub focus_distance: Option<FocusDistance>,
+                    /// Instead of `focus_distance`: from the lens' last vertex to the sensor (mm).
+                    #[serde(default, skip_serializing_if = "Option::is_none")]
+                    pub sensor_distance: Option<Millimetres>,
+                    /// The vertical field of view (degrees), when it is to give the size of the pixels.
+                    #[serde(default, skip_serializing_if = "Option::is_none")]
+                    pub fov: Option<Degrees>,
+                    /// The height of all rows of the sensor (mm), when it is to give the size of the pixels.
+                    #[serde(default, skip_serializing_if = "Option::is_none")]
+                    pub sensor_height: Option<Millimetres>,
+                    /// Turns the sensor about the x axis and then about its own y axis (degrees),
+                    /// right-handed around its centre: Scheimpflug's rule.
+                    #[serde(default, skip_serializing_if = "is_zero")]
+                    pub sensor_tilt: [Degrees; 2],
+                    /// Moves the sensor across the axis by x and y (mm): shift.
+                    #[serde(default, skip_serializing_if = "is_zero")]
+                    pub sensor_decentre: [Millimetres; 2],
+                }
+                light {
+                    /// True if light of pictures is spread as waves are, by the lens' own point spread functions,
+                    /// instead of as rays are.
+                    #[serde(default, skip_serializing_if = "is_zero")]
+                    pub diffraction: bool,
+                }
+                /// The grid of pixels.
+                sensor
+            }
         }
 
         impl $name {
@@ -104,10 +91,6 @@ macro_rules! camera_with_a_lens {
             }
         }
     };
-}
-
-fn is_zero<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
 }
 
 /// Gives a camera whose lens is made by `train` the rest of what makes a camera.
@@ -213,9 +196,10 @@ fn focused_at<'a>(
     subject: impl FnOnce() -> Subject<'a>,
 ) -> Result<(Pose, LensCamera), CameraError> {
     let default = Focus::AsWritten;
-    let focused = Focused::new(train.clone(), setup, setup.focus.unwrap_or(default))?;
+    let focused = FocusedLens::new(train.clone(), setup, setup.focus.unwrap_or(default))?;
     if let Some(pose) = setup.pose {
-        return Ok((pose.build()?, LensCamera::new(focused)?));
+        let pose = pose.build().map_err(|error| error.under("pose"))?;
+        return Ok((pose, LensCamera::new(focused)?));
     }
     let subject = subject();
     let bounds = subject.bounds;
@@ -229,7 +213,7 @@ fn focused_at<'a>(
     let (mut pose, mut lens) = (pose, lens);
     for _ in 0..2 {
         let distance = (bounds.centre() - pose.position).dot(pose.forward());
-        let Ok(focused) = Focused::new(train.clone(), setup, Focus::Distance(distance)) else {
+        let Ok(focused) = FocusedLens::new(train.clone(), setup, Focus::Distance(distance)) else {
             break;
         };
         lens = LensCamera::new(focused)?;
@@ -253,7 +237,7 @@ fn frame(subject: Subject<'_>, lens: &LensCamera, setup: &Setup<'_>) -> Pose {
 }
 
 /// A part and its place on the axis (mm).
-type Placed = (f64, ElementSpec);
+type PlacedPart = (f64, ElementSpec);
 
 impl ThinLensCameraSpec {
     pub(crate) fn build<'a>(
@@ -277,7 +261,7 @@ impl ThinLensCameraSpec {
     /// The focal length (mm) that shows the rows of the sensor under the vertical field of view.
     fn focal_length_by_fov(&self, setup: &Setup<'_>) -> Result<f64, CameraError> {
         let Some(fov) = setup.fov else {
-            let why = "is missing: give this, or `fov`";
+            let why = "is missing\nhint: give this, or `fov`";
             return Err(CameraError::new("focal_length", why));
         };
         if !(fov > 0.0 && fov < 180.0) {
@@ -324,7 +308,8 @@ impl ThinLensCameraSpec {
         focal_length: f64,
         resolve: Resolve<'_>,
     ) -> Result<OpticalTrain, CameraError> {
-        thin_lens(focal_length, (self.aperture.as_ref(), self.f_number), &self.elements, resolve)
+        let aperture = self.aperture.as_ref();
+        thin_lens(focal_length, aperture, self.f_number, &self.elements, resolve)
     }
 }
 
@@ -332,7 +317,8 @@ impl ThinLensCameraSpec {
 /// its axis.
 pub(crate) fn thin_lens(
     focal_length: f64,
-    (aperture, f_number): (Option<&ApertureSpec>, Option<f64>),
+    aperture: Option<&ApertureSpec>,
+    f_number: Option<f64>,
     elements: &[PlacedSpec],
     resolve: Resolve<'_>,
 ) -> Result<OpticalTrain, CameraError> {
@@ -425,7 +411,7 @@ impl Thick {
     ) -> Result<OpticalTrain, CameraError> {
         let keys = ["front_radius", "rear_radius"];
         let surfaces = self.radii.into_iter().zip([Some(glass), None]);
-        let mut parts: Vec<Placed> = Vec::new();
+        let mut parts: Vec<PlacedPart> = Vec::new();
         for ((radius, glass), (at, key)) in
             surfaces.zip([0.0, self.thickness.0].into_iter().zip(keys))
         {
@@ -444,7 +430,7 @@ impl Thick {
 
 /// The lens of `own` parts and of those that are put on its axis besides.
 fn assemble(
-    own: Vec<Placed>,
+    own: Vec<PlacedPart>,
     besides: &[PlacedSpec],
     resolve: Resolve<'_>,
 ) -> Result<OpticalTrain, CameraError> {
@@ -484,6 +470,6 @@ pub(crate) fn alone(
         pose: None,
         sensor,
     };
-    let focused = Focused::new(train.clone(), &setup, focus)?;
+    let focused = FocusedLens::new(train.clone(), &setup, focus)?;
     Ok((Pose::IDENTITY, LensCamera::new(focused)?))
 }

@@ -1,4 +1,4 @@
-//! At which wavelengths the rays of bands run through a lens: each band's own, or one for a group of neighbours.
+//! Wavelengths at which the rays of bands run through a lens: each band's own, or one for a group of neighbours.
 
 use std::ops::Range;
 
@@ -9,11 +9,11 @@ use etendue_spectrum::Bands;
 pub struct BandGroup {
     /// The bands.
     pub bands: Range<usize>,
-    /// At which wavelength their rays run (nm): `None` when all bands are in one group.
+    /// Wavelength at which their rays run (nm): `None` when all bands are in one group.
     pub wavelength: Option<f64>,
 }
 
-/// At which wavelengths rays run.
+/// Wavelengths at which rays run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum TracedAt {
     /// Those of each band at its own.

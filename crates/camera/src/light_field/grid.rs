@@ -254,7 +254,7 @@ impl LightField {
             .own_cell(middle)
             .and_then(|cell| LensletGrid::grown(cell, view.array.lattice.grid, turn, fit))
             .ok_or_else(|| {
-                let why = "not one lenslet has its image whole on the sensor: give more pixels, a smaller \
+                let why = "not one lenslet has its image whole on the sensor\nhint: give more pixels, a smaller \
                            pitch, or fewer views";
                 fault("microlenses", why.to_owned())
             })?;

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::LightField;
 use crate::framing::Subject;
+use crate::lens::keys::{is_zero, lens_camera_spec};
 use crate::lens::source::{FocusDistance, PlacedSpec, Setup, in_camera};
 use crate::lens::spec::{place, thin_lens};
 use crate::lens::{LensCamera, LensSource};
@@ -24,66 +25,50 @@ use etendue_optics::glass::GlassSpec;
 use etendue_optics::train::{Focus, LensFile, OpticalTrain};
 use etendue_spectrum::Curve;
 
-/// A lens, lenslets and a sensor; or, as a reference, the views that these have.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LightFieldSpec {
-    /// The focal length of an ideal thin main lens (mm).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub focal_length: Option<Millimetres>,
-    /// Instead: a lens file's path, or the lens itself as such a file would have it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub lens: Option<LensSource>,
-    /// The opening in a thin main lens, a circle by `f_number` when absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub aperture: Option<ApertureSpec>,
-    /// Apertures, filters and other parts in front of a thin main lens and behind it.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub elements: Vec<PlacedSpec>,
-    /// Closes the stop to this f-number: focal length over the entrance pupil's diameter, for an object
-    /// at infinity.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub f_number: Option<f64>,
-    /// The distance of what the lenslets see sharp (m, or "infinity"), along the axis from the entrance
-    /// pupil; infinity when absent and the camera has a pose.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub focus_distance: Option<FocusDistance>,
-    /// The distance at which `refocused.*` is sharp (m, or "infinity"), along the axis from the entrance pupil: by
-    /// all views together, or of a focused camera by patches of the raw picture, where it is `focus_distance` when
-    /// absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub refocus_distance: Option<FocusDistance>,
-    /// The lenslets.
-    pub microlenses: MicrolensesSpec,
-    /// Views along each side of the light field; as many as the opening holds in a square when absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub views: Option<u32>,
-    /// From one view to the next on the sensor (pixels); 1 when absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub view_step: Option<f64>,
-    /// What glass takes from light; nothing when absent.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub losses: LossesSpec,
-    /// The height of all rows of the sensor (mm), instead of `sensor.pixel_pitch`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sensor_height: Option<Millimetres>,
-    /// Where the entrance pupil stands; when absent, the whole scene is framed and what is in its middle
-    /// is in focus.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub pose: Option<PoseSpec>,
-    /// When rows are open to light; all together, for as long as the sensor exposes, when absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub shutter: Option<ShutterSpec>,
-    /// How the camera moves; it stands still when absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub motion: Option<CameraMotionSpec>,
-    /// The grid of pixels of the sensor behind the lenslets.
-    #[serde(default)]
-    pub sensor: SensorSpec,
-}
-
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
+lens_camera_spec! {
+    /// A lens, lenslets and a sensor; or, as a reference, the views that these have.
+    pub struct LightFieldSpec {
+        lens {
+            /// The focal length of an ideal thin main lens (mm).
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub focal_length: Option<Millimetres>,
+            /// Instead: a lens file's path, or the lens itself as such a file would have it.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub lens: Option<LensSource>,
+            /// The opening in a thin main lens, a circle by `f_number` when absent.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub aperture: Option<ApertureSpec>,
+            /// Apertures, filters and other parts in front of a thin main lens and behind it.
+            #[serde(default, skip_serializing_if = "Vec::is_empty")]
+            pub elements: Vec<PlacedSpec>,
+        }
+        focus {
+            /// The distance of what the lenslets see sharp (m, or "infinity"), along the axis from the entrance
+            /// pupil; infinity when absent and the camera has a pose.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub focus_distance: Option<FocusDistance>,
+            /// The distance at which `refocused.*` is sharp (m, or "infinity"), along the axis from the entrance pupil: by
+            /// all views together, or of a focused camera by patches of the raw picture, where it is `focus_distance` when
+            /// absent.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub refocus_distance: Option<FocusDistance>,
+            /// The lenslets.
+            pub microlenses: MicrolensesSpec,
+            /// Views along each side of the light field; as many as the opening holds in a square when absent.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub views: Option<u32>,
+            /// From one view to the next on the sensor (pixels); 1 when absent.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub view_step: Option<f64>,
+        }
+        light {
+            /// The height of all rows of the sensor (mm), instead of `sensor.pixel_pitch`.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub sensor_height: Option<Millimetres>,
+        }
+        /// The grid of pixels of the sensor behind the lenslets.
+        sensor
+    }
 }
 
 fn one() -> f64 {
@@ -99,10 +84,10 @@ pub struct MicrolensesSpec {
     /// Square when absent.
     #[serde(default)]
     pub grid: Grid,
-    /// How far the rows are turned about the axis from +x towards +y of the lens (degrees).
+    /// Turn of the rows about the axis from +x towards +y of the lens (degrees).
     #[serde(default)]
     pub rotation: Degrees,
-    /// Where the centre of a lenslet is (mm from the axis).
+    /// Centre of a lenslet (mm from the axis).
     #[serde(default)]
     pub offset: [Millimetres; 2],
     /// Width and height of the array (mm); a little more than the sensor's when absent.
@@ -114,7 +99,7 @@ pub struct MicrolensesSpec {
     /// The width of an opening from flat to flat, as a share of the pitch.
     #[serde(default = "one")]
     pub fill: f64,
-    /// What is between openings: opaque when absent.
+    /// Gaps between openings: opaque when absent.
     #[serde(default)]
     pub gaps: Gaps,
     /// The focal length of thin lenslets (mm).
@@ -131,7 +116,7 @@ pub struct MicrolensesSpec {
     /// From the front vertex to the rear one of thick lenslets (mm).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thickness: Option<Millimetres>,
-    /// What thick lenslets are made of.
+    /// Glass of thick lenslets.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub glass: Option<GlassSpec>,
     /// A filter on each lenslet: the share of light that passes (0..=1) by wavelength.
@@ -140,13 +125,13 @@ pub struct MicrolensesSpec {
     /// Thin lenslets of several types: what differs of each. Distances follow from the first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub types: Vec<LensletSpec>,
-    /// Which type stands where, as of a `microlens_array`.
+    /// Types by place, as of a `microlens_array`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pattern: Vec<Vec<u32>>,
     /// From the array's last vertex to the sensor (mm); so that the sensor is in focus when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensor_distance: Option<Millimetres>,
-    /// How far in front of the array the main lens' picture is that the lenslets see (mm), negative for
+    /// Distance from the array to the main lens' picture in front of it that the lenslets see (mm), negative for
     /// one behind it; 0, in the array itself, when absent.
     #[serde(default)]
     pub picture_distance: Millimetres,
@@ -203,8 +188,8 @@ impl LightFieldSpec {
         // A thin lens with what stands around it, or a lens from its file; its stop set.
         let train = match (&self.focal_length, &self.lens) {
             (Some(Millimetres(focal_length)), None) => {
-                let opening = (self.aperture.as_ref(), self.f_number);
-                thin_lens(*focal_length, opening, &self.elements, resolve)?
+                let aperture = self.aperture.as_ref();
+                thin_lens(*focal_length, aperture, self.f_number, &self.elements, resolve)?
             }
             (None, Some(lens)) if self.aperture.is_none() && self.elements.is_empty() => {
                 lens.read(resolve)?

@@ -46,15 +46,15 @@ pub struct OpencvFit {
     pub coefficients: Vec<f64>,
     /// The distance for which it was fitted (m), the one in focus; `null` for infinity.
     pub distance: Option<f64>,
-    /// How far the lens' chief rays are seen from where they belong.
+    /// Distances of the lens' chief rays from where they belong.
     pub residuals: Residuals,
-    /// Where it stays within the tolerance.
+    /// Region in which it stays within the tolerance.
     pub holds: FitRegion,
-    /// What else a user should know, in sentences.
+    /// Notes for the user, in sentences.
     pub notes: Vec<String>,
 }
 
-/// What is left of a fit (pixels).
+/// Residuals of a fit (pixels).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Residuals {
     /// Places of the picture.
@@ -80,7 +80,7 @@ pub struct ResidualRing {
     pub largest: f64,
 }
 
-/// Where a fit holds.
+/// Region in which a fit holds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FitRegion {
     /// The residual that is allowed (pixels).
@@ -91,11 +91,11 @@ pub struct FitRegion {
     pub radius: f64,
     /// The angle from the axis there (degrees).
     pub field: f64,
-    /// From how near on they stay so (m); `null` when they are not so at the distance of the fit.
+    /// Nearest distance at which they stay so (m); `null` when they are not so at the distance of the fit.
     pub nearest: Option<f64>,
-    /// Up to how far (m); `null` for infinity, or as above.
+    /// Farthest such distance (m); `null` for infinity, or as above.
     pub farthest: Option<f64>,
-    /// How far chief rays pass from the entrance pupil's middle, at most (mm).
+    /// Greatest distance of chief rays from the entrance pupil's middle (mm).
     pub pupil_wander: f64,
 }
 
@@ -147,7 +147,7 @@ impl OpencvFit {
             ));
         }
         let residuals = residuals(&sights, distance, &model.0, &distortion);
-        let holds = holds(&sights, distance, (&model.0, &distortion), tolerance);
+        let holds = holds(&sights, distance, &model.0, &distortion, tolerance);
         Ok(Self {
             camera: as_spec(camera, &model),
             k: model.0.matrix(PixelOrigin::Center),
@@ -247,7 +247,7 @@ fn residuals(
     distortion: &Distortion,
 ) -> Residuals {
     // How far off each place is, and its radius and field.
-    let told: Vec<([f64; 2], f64)> = sights
+    let places: Vec<([f64; 2], f64)> = sights
         .iter()
         .map(|sight| {
             let off = residual(sight, distance, intrinsics, distortion);
@@ -258,12 +258,12 @@ fn residuals(
         (offs.iter().map(|off| off * off).sum::<f64>() / offs.len().max(1) as f64).sqrt()
     };
     let largest = |offs: &[f64]| offs.iter().copied().fold(0.0, f64::max);
-    let reach = told.iter().map(|([radius, _], _)| *radius).fold(0.0, f64::max);
+    let reach = places.iter().map(|([radius, _], _)| *radius).fold(0.0, f64::max);
     // Rings of even width about the middle of the picture.
     let ring = |i: u32| {
         let edge = |i: u32| reach * f64::from(i) / f64::from(RINGS);
         let inside = |radius: f64| radius <= edge(i + 1) && (i == 0 || radius > edge(i));
-        let of_ring: Vec<_> = told.iter().filter(|([radius, _], _)| inside(*radius)).collect();
+        let of_ring: Vec<_> = places.iter().filter(|([radius, _], _)| inside(*radius)).collect();
         let offs: Vec<f64> = of_ring.iter().map(|(_, off)| *off).collect();
         let field = of_ring.iter().map(|([_, field], _)| *field).fold(0.0, f64::max);
         (!offs.is_empty()).then(|| ResidualRing {
@@ -273,7 +273,7 @@ fn residuals(
             largest: largest(&offs),
         })
     };
-    let offs: Vec<f64> = told.iter().map(|(_, off)| *off).collect();
+    let offs: Vec<f64> = places.iter().map(|(_, off)| *off).collect();
     Residuals {
         places: offs.len(),
         rms: rms(&offs),
@@ -286,7 +286,8 @@ fn residuals(
 fn holds(
     sights: &[PixelSight],
     distance: f64,
-    (intrinsics, distortion): (&Intrinsics, &Distortion),
+    intrinsics: &Intrinsics,
+    distortion: &Distortion,
     tolerance: f64,
 ) -> FitRegion {
     let mut places: Vec<([f64; 2], bool)> = sights
@@ -313,7 +314,7 @@ fn holds(
     }
 }
 
-/// From where to where (m) around `distance` something holds; `None` for infinity.
+/// Nearest and farthest distance (m) on both sides of `distance` between which something holds; `None` for infinity.
 fn range(distance: f64, holds: &dyn Fn(f64) -> bool) -> (Option<f64>, Option<f64>) {
     // Displacements go with one over the distance.
     let own = 1.0 / distance;

@@ -175,10 +175,10 @@ fn distances_follow_from_f_numbers_and_mismatches_are_told() {
     let b = focused.sensor_z() - focused.train().last_vertex();
     assert!((b - expected).abs() < 1e-12, "{b} {expected}");
     assert!((focused.object_distance() - 0.5).abs() < 1e-12);
-    let told = |camera: &Camera| camera.lens().unwrap().implausible().join("; ");
-    assert!(!told(&matched).contains("lenslets"), "{}", told(&matched));
-    assert!(told(&light_field(r#""f_number": 6"#, "").unwrap()).contains("overlap"));
-    assert!(told(&light_field(r#""f_number": 3"#, "").unwrap()).contains("dark"));
+    let implausible = |camera: &Camera| camera.lens().unwrap().implausible().join("; ");
+    assert!(!implausible(&matched).contains("lenslets"), "{}", implausible(&matched));
+    assert!(implausible(&light_field(r#""f_number": 6"#, "").unwrap()).contains("overlap"));
+    assert!(implausible(&light_field(r#""f_number": 3"#, "").unwrap()).contains("dark"));
     let opaque = light_field(r#""transmission": 0"#, "").unwrap_err().to_string();
     assert!(opaque.contains("no light gets through any lenslet"), "{opaque}");
 }

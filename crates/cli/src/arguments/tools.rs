@@ -247,7 +247,7 @@ pub(crate) struct CalibrateArguments {
     /// A side of a square, such as "25 mm"; what fills half of the picture when absent
     #[arg(long, value_name = "LENGTH", value_parser = parse::length)]
     pub(crate) square: Option<f64>,
-    /// How far the chessboard is, such as "1.2 m"; where the lens is focused when absent
+    /// Distance of the chessboard, such as "1.2 m"; where the lens is focused when absent
     #[arg(long, value_name = "DISTANCE", value_parser = parse::length)]
     pub(crate) distance: Option<f64>,
     /// Read out a region alone: left column, top row, width and height (pixels)

@@ -13,7 +13,7 @@ use etendue_tracer::LayerSpec;
 use crate::arguments::BenchArguments;
 use crate::fault::Fault;
 use crate::progress::Phases;
-use crate::{render, stop};
+use crate::{job, stop};
 
 /// Time limit of all renders (s), and in a quick run.
 const SECONDS: [f64; 2] = [600.0, 50.0];
@@ -25,7 +25,8 @@ const BOUNCES: [u32; 3] = [8, 4, 2];
 pub(super) fn race(
     arguments: &BenchArguments,
     target: f64,
-    (scene, phases): (&Scene, Phases),
+    scene: &Scene,
+    phases: Phases,
     axes: &[Vec<Change>],
 ) -> Result<Target, Fault> {
     if scene.picture != Some(LayerSpec::Radiance) {
@@ -47,7 +48,7 @@ pub(super) fn race(
     // The picture that all are compared with has everything.
     let in_full = [("tolerance".to_owned(), "null".to_owned())];
     let effort = Effort { target, seconds };
-    measure((axes, &in_full), effort, &mut program, &|share| progress(share))
+    measure(axes, &in_full, effort, &mut program, &|share| progress(share))
 }
 
 /// Settings that remove a scene's layers of sampling, which there are of samples that stop by
@@ -75,7 +76,7 @@ fn whole_run(
     folder: &std::path::Path,
 ) -> Result<WholeRun, etendue::Error> {
     let mut options =
-        Options { memory_limit: arguments.memory_limit, ..render::options(&arguments.scene) };
+        Options { memory_limit: arguments.memory_limit, ..job::options(&arguments.scene) };
     let mut settings = rendered_with(&run.contender.settings, run.samples);
     let wanted = settings.len();
     // What is no key of a scene is an output.

@@ -1,5 +1,7 @@
 //! Every refusal: exit code 2, one message that names the file and the place, and no output.
 
+use etendue_accel::AccelName;
+
 use crate::run::{Bench, text};
 
 /// Renders `scene.json` with `more` arguments, which must be refused in words that hold each of
@@ -119,9 +121,7 @@ fn scenes_beyond_what_accelerators_tell_apart_are_refused_by_all() {
             {{"shape": "box", "transform": {{"translate": [{}, 0, 0]}}}}]}}"#,
         "5e29"
     );
-    let accelerators: &[&str] =
-        if cfg!(feature = "embree") { &["embree", "bvh", "exact"] } else { &["bvh", "exact"] };
-    for accel in accelerators {
+    for accel in AccelName::built().map(AccelName::name) {
         let says = ["and accelerators hold 1e-12 to 1e12 m", "scale its objects"];
         for scale in ["1e38", "1e25", "1.1e12", "0.9e-12", "1e-30"] {
             refused(&scaled(scale), &["--accel", accel], &says);
@@ -312,10 +312,7 @@ fn instruction_sets_that_there_are_not_are_refused_by_name() {
 fn a_memory_limit_that_the_build_would_pass_stops_it() {
     let bench =
         Bench::with_scene(r#"{"etendue": 1, "objects": [{"shape": "blob", "triangles": 200000}]}"#);
-    for accel in ["embree", "bvh", "exact"] {
-        if accel == "embree" && !cfg!(feature = "embree") {
-            continue;
-        }
+    for accel in AccelName::built().map(AccelName::name) {
         refused(&bench, &["--memory-limit", "1M", "--accel", accel], &["--memory-limit"]);
     }
 }

@@ -2,6 +2,7 @@
 //! tests with `ETENDUE_GENERATE=1`, which writes the files in place of comparing them.
 
 mod keys;
+mod presets;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -36,6 +37,15 @@ fn hold(name: &str, wanted: &str) {
     assert!(found == wanted, "{name}:{line} is not what the program writes; run `make generated`");
 }
 
+/// The page `name` with `lines` between the marks of its `part`.
+fn with_part(name: &str, part: &str, lines: &str) -> String {
+    let page = fs::read_to_string(root().join(name)).expect("the page");
+    let [begin, end] = ["begin", "end"].map(|side| format!("<!-- {part} {side} -->\n"));
+    let (before, rest) = page.split_once(&begin).expect("a mark where the part begins");
+    let (_, after) = rest.split_once(&end).expect("a mark where the part ends");
+    format!("{before}{begin}{lines}{end}{after}")
+}
+
 fn schema(of: &str) -> Value {
     serde_json::from_str(&output(&["schema", of])).expect("JSON")
 }
@@ -51,6 +61,13 @@ fn schemas_are_those_of_the_program() {
 fn the_page_of_keys_is_that_of_the_schemas() {
     let [scene, lens, rays] = ["scene", "lens", "rays"].map(schema);
     hold("docs/reference/keys.md", &keys::page(&scene, &lens, &rays));
+}
+
+#[test]
+fn the_table_of_presets_is_that_of_the_program() {
+    let cards: Vec<Value> = serde_json::from_str(&output(&["sensor", "--json"])).expect("JSON");
+    let page = "docs/reference/sensors.md";
+    hold(page, &with_part(page, "presets", &presets::table(&cards)));
 }
 
 /// The commands that `etendue --help` lists.

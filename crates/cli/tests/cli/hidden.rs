@@ -1,15 +1,13 @@
 //! Models of which there is nothing to see: meshes collapsed to a point, and nodes scaled to 0.
 
+use etendue_accel::AccelName;
 use serde_json::json;
 
 use crate::run::{Bench, text};
 
 /// Renders `file` with default settings and every accelerator; none ends the process.
 fn renders(bench: &Bench, file: &str) {
-    for accel in ["embree", "bvh", "exact"] {
-        if accel == "embree" && !cfg!(feature = "embree") {
-            continue;
-        }
+    for accel in AccelName::built().map(AccelName::name) {
         let size = "camera.sensor.resolution=[8,4]";
         let output = bench.run(&["render", file, "-o", accel, "--accel", accel, "--set", size]);
         let code = output.status.code();

@@ -1,5 +1,7 @@
 //! Pictures with a closed-form answer.
 
+use etendue_accel::AccelName;
+
 use crate::run::Bench;
 
 /// A camera at `from` that looks at the origin, over a box of side 1.
@@ -57,15 +59,10 @@ fn any_size_that_is_accepted_gives_the_same_ids() {
     for radius in ["6e-13", "1e-6", "1e6", "4e11"] {
         // The framed camera is placed by rounded numbers of another scale, so that a ray or two may
         // pass on the other side of an edge; nothing is lost by the dozen.
-        let found = ids(radius, best_accelerator());
+        let found = ids(radius, AccelName::best().name());
         let other = expected.iter().zip(&found).filter(|(a, b)| a != b).count();
         assert!(other <= 4, "radius {radius}: {other} of {} differ", expected.len());
     }
-}
-
-/// The accelerator that a render takes when none is named.
-fn best_accelerator() -> &'static str {
-    if cfg!(feature = "embree") { "embree" } else { "bvh" }
 }
 
 /// The wall z = −1 m before a camera at `at`, moved with it.
@@ -144,9 +141,8 @@ const MANY: &str = r#"{"etendue": 1,
 #[test]
 fn a_picture_is_the_same_to_the_bit_for_any_thread_count() {
     let bench = Bench::with_scene(MANY);
-    let accelerators: &[&str] =
-        if cfg!(feature = "embree") { &["embree", "bvh"] } else { &["bvh", "exact"] };
-    for accel in accelerators {
+    // The two best.
+    for accel in AccelName::built().map(AccelName::name).take(2) {
         let mut hashes = Vec::new();
         for threads in ["1", "2", "7"] {
             bench.render(&["--threads", threads, "--accel", accel, "--report", "report.json"]);
@@ -166,9 +162,8 @@ fn a_picture_is_the_same_to_the_bit_for_any_thread_count() {
 fn all_accelerators_see_the_same_scene() {
     let bench = Bench::with_scene(MANY);
     let mut seen = Vec::new();
-    let accelerators: &[&str] =
-        if cfg!(feature = "embree") { &["exact", "bvh", "embree"] } else { &["exact", "bvh"] };
-    for accel in accelerators {
+    // The reference first.
+    for accel in AccelName::built().rev().map(AccelName::name) {
         bench.render(&["--accel", accel, "--outputs", "npy"]);
         let (objects, triangles) = (bench.array("id_object"), bench.array("id_primitive"));
         let ids: Vec<f64> = objects.into_iter().zip(triangles).flat_map(|(a, b)| [a, b]).collect();

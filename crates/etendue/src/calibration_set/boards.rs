@@ -41,7 +41,7 @@ pub(super) struct Board {
     camera_position: DVec3,
 }
 
-/// Where a board is, and where its inner corners are seen.
+/// Place of a board, and places where its inner corners are seen.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct BoardPose {
     /// From the board's frame (x along rows, y down columns, z away from the viewer, the first inner corner at 0) to the
@@ -90,12 +90,12 @@ impl Board {
             camera_position,
         };
         for number in 0..count {
-            board.poses.push(board.pose(camera, number, (distance, free)));
+            board.poses.push(board.pose(camera, number, distance, free));
         }
         Ok(board)
     }
 
-    fn pose(&self, camera: &Camera, number: u32, (distance, free): (f64, [f64; 2])) -> BoardPose {
+    fn pose(&self, camera: &Camera, number: u32, distance: f64, free: [f64; 2]) -> BoardPose {
         let place = PLACES[number as usize % PLACES.len()];
         // Tilts go around, about axes that differ from pose to pose by the golden angle.
         let axis = f64::from(number) * 2.399_963;

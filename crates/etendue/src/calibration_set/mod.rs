@@ -18,7 +18,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::progress::Phase;
-use crate::{Channel, Error, Layer, Picture, Progress, Session, Values, Written, places};
+use crate::{Channel, Error, Layer, Picture, Progress, Session, Values, WrittenFiles, places};
 use boards::{Board, BoardPose};
 use surroundings::WhiteSurroundings;
 
@@ -113,7 +113,7 @@ pub fn calibrate(
     options: &CalibrationOptions,
     folder: &Path,
     progress: &Progress,
-) -> Result<Written, Error> {
+) -> Result<WrittenFiles, Error> {
     let start = Instant::now();
     check(options)?;
     let surroundings = WhiteSurroundings::of(session, progress)?;
@@ -122,7 +122,7 @@ pub fn calibrate(
     let sensor = white.sensor().clone();
     let first = Exposure { exposure: 0.01, frame: 0 };
     let shot = Exposure { frame: 0, ..sensor.shots().next().unwrap_or(first) };
-    let factor = surroundings.factor(&white, (shot, options.level))?;
+    let factor = surroundings.factor(&white, shot, options.level)?;
     let board = match options.boards {
         0 => None,
         count => {
@@ -152,22 +152,22 @@ pub fn calibrate(
             false => Err(Error::from(ExposeError::Stopped)),
         };
         goes_on(0.0)?;
-        let mut sets = set.of_light((to, folder), &white, &goes_on)?;
+        let mut sets = set.of_light(to, folder, &white, &goes_on)?;
         for (number, pose) in board.iter().flat_map(|board| &board.poses).enumerate() {
             goes_on(3.0 + number as f64)?;
             let objects = board.iter().flat_map(|board| board.objects(pose)).collect();
             let light = surroundings.take(objects, progress)?.scaled(factor);
             let kind = format!("board_{number:03}");
-            let mut frames = set.frames((to, folder), (&kind, "a chessboard"), &light)?;
+            let mut frames = set.frames(to, folder, &kind, "a chessboard", &light)?;
             frames.pose = Some(pose.clone());
             sets.push(frames);
         }
-        set.tell((to, folder), (sets, board.clone()), resolution)
+        set.describe(to, folder, sets, board.clone(), resolution)
     })?;
     let CalibrationSet { files, mut notes, .. } = set;
     notes.dedup();
     notes.iter().for_each(|note| progress.note(note));
-    Ok(Written { files, notes, time: start.elapsed() })
+    Ok(WrittenFiles { files, notes, time: start.elapsed() })
 }
 
 fn check(options: &CalibrationOptions) -> Result<(), Error> {
@@ -237,7 +237,8 @@ impl CalibrationSet<'_> {
     /// Darks, flats and white images of white light.
     fn of_light(
         &mut self,
-        to: (&Transaction, &Path),
+        to: &Transaction,
+        folder: &Path,
         white: &SensorLight,
         goes_on: &dyn Fn(f64) -> Result<(), Error>,
     ) -> Result<Vec<FrameSet>, Error> {
@@ -252,16 +253,18 @@ impl CalibrationSet<'_> {
         let mut sets = Vec::new();
         for ((kind, what, light), done) in kinds.into_iter().zip([0.0, 1.0, 2.0]) {
             goes_on(done)?;
-            sets.push(self.frames(to, (kind, what), light)?);
+            sets.push(self.frames(to, folder, kind, what, light)?);
         }
         Ok(sets)
     }
 
     /// Writes `calibration.json`.
-    fn tell(
+    fn describe(
         &mut self,
-        (to, folder): (&Transaction, &Path),
-        (sets, board): (Vec<FrameSet>, Option<Board>),
+        to: &Transaction,
+        folder: &Path,
+        sets: Vec<FrameSet>,
+        board: Option<Board>,
         resolution: [usize; 2],
     ) -> Result<(), Error> {
         let (sensor, options) = (self.sensor, self.options);
@@ -322,8 +325,10 @@ impl CalibrationSet<'_> {
     /// Writes the frames of one kind, and their mean.
     fn frames(
         &mut self,
-        to: (&Transaction, &Path),
-        (kind, what): (&str, &'static str),
+        to: &Transaction,
+        folder: &Path,
+        kind: &str,
+        what: &'static str,
         light: &SensorLight,
     ) -> Result<FrameSet, Error> {
         let mut files = Vec::new();
@@ -336,7 +341,13 @@ impl CalibrationSet<'_> {
             sums.resize(image.values.len(), 0.0);
             sums.iter_mut().zip(&image.values).for_each(|(sum, &y)| *sum += f64::from(y));
             size = [image.width, image.height, image.depth];
-            files.extend(self.write(to, &format!("{kind}_{frame:03}"), image, light.white())?);
+            files.extend(self.write(
+                to,
+                folder,
+                &format!("{kind}_{frame:03}"),
+                image,
+                light.white(),
+            )?);
         }
         let count = f64::from(self.options.frames);
         #[expect(clippy::cast_possible_truncation, reason = "a mean of numbers of 16 bits")]
@@ -348,8 +359,8 @@ impl CalibrationSet<'_> {
         let picture =
             Picture::new(width, height, vec![layer], Vec::new()).map_err(ExposeError::from)?;
         let mean = format!("{kind}_mean.npy");
-        let path = to.1.join(&mean);
-        npy::write(to.0, &path, &picture, "Raw")?;
+        let path = folder.join(&mean);
+        npy::write(to, &path, &picture, "Raw")?;
         self.files.push(path);
         Ok(FrameSet { kind: kind.to_owned(), what, files, mean, pose: None })
     }
@@ -372,7 +383,8 @@ impl CalibrationSet<'_> {
     /// Writes one frame in all formats that are wanted; their names.
     fn write(
         &mut self,
-        (to, folder): (&Transaction, &Path),
+        to: &Transaction,
+        folder: &Path,
         stem: &str,
         image: RawImage,
         white: &[f64],
@@ -380,7 +392,7 @@ impl CalibrationSet<'_> {
         let mut names = Vec::new();
         let outputs = self.options.outputs;
         if outputs.dng && self.sensor.spec().kind == SensorKind::Raw {
-            names.extend(self.dng((to, folder), stem, &image, white)?);
+            names.extend(self.dng(to, folder, stem, &image, white)?);
         }
         if let Some(packing) = self.options.packed {
             let bytes = packing.pack(&image).map_err(in_words)?;
@@ -413,7 +425,8 @@ impl CalibrationSet<'_> {
 
     fn dng(
         &mut self,
-        (to, folder): (&Transaction, &Path),
+        to: &Transaction,
+        folder: &Path,
         stem: &str,
         image: &RawImage,
         white: &[f64],

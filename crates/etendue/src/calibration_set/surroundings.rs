@@ -90,7 +90,8 @@ impl WhiteSurroundings {
     pub(super) fn factor(
         &self,
         white: &SensorLight,
-        (shot, level): (Exposure, f64),
+        shot: Exposure,
+        level: f64,
     ) -> Result<f64, Error> {
         let (sensor, brightest) = (white.sensor(), white.brightest(shot.exposure));
         let dark = sensor.dark_current() * shot.exposure;
@@ -99,7 +100,7 @@ impl WhiteSurroundings {
             true => Ok(wanted / brightest),
             false => Err(self.refused(&format!(
                 "camera.sensor: no light brings it to {level} of saturation at {} s: the dark signal alone is {dark:.0} e⁻ \
-                 of {:.0}; set the sensor's `exposure` lower",
+                 of {:.0}\nhint: set the sensor's `exposure` lower",
                 shot.exposure,
                 sensor.saturation()
             ))),

@@ -40,7 +40,7 @@ pub struct Calibration {
     pub npy: f64,
     /// A pixel of a layer's picture.
     pub png: f64,
-    /// What all three take together, against one after the other.
+    /// Time of all three together, against one after the other.
     pub together: f64,
     /// A pixel of a raw sensor's files, without noise.
     pub raw: f64,

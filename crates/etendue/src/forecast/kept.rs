@@ -17,7 +17,7 @@ const FILE: &str = "etendue/calibration.json";
 /// The most bytes that such a file has: a few hundred machines that share a home.
 const MOST_BYTES: u64 = 1 << 20;
 
-/// What is kept: rates by the machine that they were measured on.
+/// Rates that are kept, by the machine that they were measured on.
 #[derive(Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct KeptRates {
@@ -89,7 +89,7 @@ fn place() -> Option<PathBuf> {
     Some(cache.join(FILE))
 }
 
-/// What rates depend on: the processor, the threads, and this program with the accelerator that it has.
+/// Words for all that rates depend on: the processor, the threads, and this program with the accelerator that it has.
 #[expect(clippy::disallowed_methods, reason = "a table of the kernel's, no user's file")]
 fn machine() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
@@ -130,8 +130,8 @@ mod tests {
             keep(&path, RATES).unwrap();
             assert_eq!(read(&path).machines.len(), 1);
         }
-        let beside = std::fs::read_dir(path.parent().unwrap()).unwrap().count();
-        assert_eq!(beside, 1, "written beside and renamed, nothing is left");
+        let entries = std::fs::read_dir(path.parent().unwrap()).unwrap().count();
+        assert_eq!(entries, 1, "written beside and renamed, nothing is left");
     }
 
     #[test]

@@ -44,7 +44,7 @@ pub struct TimeForecast {
     pub build: f64,
     /// Tracing rays and filling layers.
     pub trace: f64,
-    /// What the sensor makes of the light, with its files.
+    /// The sensor's images of the light, with their files.
     pub sensor: f64,
     /// The views of a light field, and its white image.
     pub views: f64,

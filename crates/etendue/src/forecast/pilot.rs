@@ -55,7 +55,7 @@ impl Pilot<'_> {
         // A lens' pupil is measured once for a picture, and here once for all.
         let start = Instant::now();
         let plan = Plan::new(self.scene, Outputs::ALL);
-        let whole = &camera.opened(&plan.bands).map_err(|e| RenderError::Camera(e.why))?;
+        let whole = &camera.opened(&plan.bands).map_err(|e| RenderError::camera(e.why))?;
         let opening = start.elapsed().as_secs_f64();
         let film = plan.memory.film as f64 / pixels(&self.scene.camera) * pixels(whole);
         let camera = match film > MOST_FILM {
@@ -92,7 +92,7 @@ impl Pilot<'_> {
     pub(super) fn white(&self) -> Result<f64, Error> {
         let start = Instant::now();
         let camera = &self.scene.camera;
-        let camera = &camera.opened(&Bands::Rgb).map_err(|e| RenderError::Camera(e.why))?;
+        let camera = &camera.opened(&Bands::Rgb).map_err(|e| RenderError::camera(e.why))?;
         let opening = start.elapsed().as_secs_f64();
         let [width, height] = camera.resolution();
         let step = height.div_ceil((WHITE_PIXELS / width.max(1)).max(1));
@@ -113,10 +113,10 @@ impl Pilot<'_> {
         let mut plan = Plan::new(&scene, Outputs::ALL);
         plan.passes = std::iter::once(0..samples).collect();
         let prepared = Prepared { accel: self.accel, images: self.images, others: &[] };
-        let course = RenderState { shard: Some(share), ..RenderState::default() };
+        let state = RenderState { shard: Some(share), ..RenderState::default() };
         let mut times = [0.0; TIMES];
         for time in &mut times {
-            let film = trace(&scene, &plan, prepared, &[], &course, &|_: f64| self.goes_on())?;
+            let film = trace(&scene, &plan, prepared, &[], &state, &|_: f64| self.goes_on())?;
             *time = film.trace_time().as_secs_f64();
             if !self.goes_on() {
                 return Err(RenderError::Stopped.into());

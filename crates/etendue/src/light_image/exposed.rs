@@ -24,7 +24,7 @@ impl LightImage {
         let factor = self.factor(unit, options)?;
         let mut notes: Vec<String> = self.notes.clone();
         refuse_what_a_camera_knows(sensor)?;
-        let sensor = for_light(sensor, (unit, self.pixel_pitch), &path)?;
+        let sensor = for_light(sensor, unit, self.pixel_pitch, &path)?;
         notes.extend(self.judge_size(&sensor)?);
         let [columns, rows] = self.picture.size;
         let bytes = SensorLight::bytes_of(&sensor, &self.picture);
@@ -55,8 +55,7 @@ impl LightImage {
 
     fn resolved_unit(&self, options: &ExposeOptions) -> Result<LightUnit, Error> {
         if self.quantity == Quantity::Reflectance {
-            let why =
-                "holds what is reflected and no light: multiply it by the light that falls on it";
+            let why = "holds what is reflected and no light\nhint: multiply it by the light that falls on it";
             return Err(refused(&self.path, why.to_owned()));
         }
         match (options.unit, &self.unit) {
@@ -64,13 +63,13 @@ impl LightImage {
             (None, Some(text)) => LightUnit::parse(text).map_err(|_| {
                 let text = text.escape_debug();
                 let why = format!(
-                    "gives its values in \"{text}\", which is not read: give --unit, {KNOWN_UNITS}"
+                    "gives its values in \"{text}\", which is not read\nhint: give --unit, {KNOWN_UNITS}"
                 );
                 refused(&self.path, why)
             }),
             (None, None) => {
                 let why = format!(
-                    "does not say in which unit its values are: give --unit, {KNOWN_UNITS}"
+                    "does not say in which unit its values are\nhint: give --unit, {KNOWN_UNITS}"
                 );
                 Err(refused(&self.path, why))
             }
@@ -85,7 +84,7 @@ impl LightImage {
                 (true, Some(solid_angle)) => Ok(unit.irradiance(solid_angle)),
                 (true, None) => Err(refused(
                     &self.path,
-                    "its values are radiance, of which a lens lets a part onto the sensor: give its --f-number N \
+                    "its values are radiance, of which a lens lets a part onto the sensor\nhint: give its --f-number N \
                      (E = π L / (1 + 4 N² (1 + m)²)), or irradiance on the sensor with its --unit W/m2/nm"
                         .to_owned(),
                 )),
@@ -94,7 +93,7 @@ impl LightImage {
         };
         if !is_radiance {
             let why = format!(
-                "an f-number makes irradiance of radiance, and the values are in {unit}: leave it out"
+                "an f-number makes irradiance of radiance, and the values are in {unit}\nhint: leave it out"
             );
             return Err(refused(&self.path, why));
         }
@@ -120,7 +119,7 @@ impl LightImage {
         }
         if sensor.spec().resolution.is_some() {
             let why = format!(
-                "has {columns} x {rows} pixels, and the sensor's `resolution` is {wide} x {high}: leave that out, or \
+                "has {columns} x {rows} pixels, and the sensor's `resolution` is {wide} x {high}\nhint: leave that out, or \
                  --set it"
             );
             return Err(refused(&self.path, why));
@@ -143,7 +142,8 @@ fn frame_seed(seed: u64, frame: u32) -> u64 {
 /// nothing of its own.
 fn for_light(
     file: &SensorFile,
-    (unit, pitch): (LightUnit, Option<f64>),
+    unit: LightUnit,
+    pitch: Option<f64>,
     path: &Path,
 ) -> Result<Sensor, Error> {
     let wanted = match unit {
@@ -160,7 +160,7 @@ fn for_light(
                 path,
                 format!(
                     "its values are in {unit}, for a sensor of {wanted} radiometry, and this one's `radiometry` is \
-                     {own}: leave that out, or give another --unit"
+                     {own}\nhint: leave that out, or give another --unit"
                 ),
             ))
         }
@@ -193,5 +193,5 @@ fn refuse_what_a_camera_knows(sensor: &SensorFile) -> Result<(), Error> {
     } else {
         return Ok(());
     };
-    Err(sensor.fault(&SensorError::Misplaced { key, why }).into())
+    Err(sensor.fault(&SensorError::misplaced(key, why)).into())
 }

@@ -29,7 +29,7 @@ impl Session {
         vertices: &[[f64; 3]],
         triangles: &[[u32; 3]],
     ) -> Result<(), Error> {
-        self.insert_mesh_with(name, (vertices, triangles), MeshAttributes::default())
+        self.insert_mesh_with(name, vertices, triangles, MeshAttributes::default())
     }
 
     /// As [`Self::insert_mesh`], with what is known at the vertices.
@@ -40,7 +40,8 @@ impl Session {
     pub fn insert_mesh_with(
         &mut self,
         name: &str,
-        (vertices, triangles): (&[[f64; 3]], &[[u32; 3]]),
+        vertices: &[[f64; 3]],
+        triangles: &[[u32; 3]],
         attributes: MeshAttributes<'_>,
     ) -> Result<(), Error> {
         let mesh = Mesh::from_arrays(name, vertices, triangles)

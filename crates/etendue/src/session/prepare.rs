@@ -13,7 +13,7 @@ use etendue_scene::file::SceneFile;
 use etendue_scene::memory::Budget;
 use etendue_scene::{LoadOptions, Scene, Strictness};
 
-use super::{Decoded, LoadedScene, Ready, Session};
+use super::{DecodedImages, LoadedScene, PreparedScene, Session};
 use crate::neighbours::{self, Neighbour};
 use crate::progress::Phase;
 use crate::words::in_words;
@@ -21,10 +21,10 @@ use crate::{Error, Progress};
 
 impl Session {
     /// The scene, the structure over it and its images, once they are [prepared](Self::prepare).
-    pub(crate) fn prepared(&self) -> Result<Ready, Error> {
+    pub(crate) fn prepared(&self) -> Result<PreparedScene, Error> {
         let LoadedScene { scene, accel, .. } = self.loaded()?;
         let accel = accel.clone().ok_or_else(not_built)?;
-        Ok((Arc::clone(scene), accel, Arc::clone(&self.images)))
+        Ok(PreparedScene { scene: Arc::clone(scene), accel, images: Arc::clone(&self.images) })
     }
 
     /// Kinds of file to be written of the pictures.
@@ -72,7 +72,7 @@ impl Session {
         let plan = Plan::new(&scene, self.options.outputs);
         let scene = Arc::new(scene);
         let (accel, coarse) = (None, None);
-        let decoded = Decoded::Nothing;
+        let decoded = DecodedImages::Nothing;
         self.loaded = Some(LoadedScene { scene, plan, notes, accel, neighbours, decoded, coarse });
         self.seconds.load += start.elapsed().as_secs_f64();
         Ok(())
@@ -118,7 +118,7 @@ impl Session {
         // Two steps may lead to one frame.
         let mut loaded: BTreeMap<usize, Arc<Scene>> = BTreeMap::new();
         let mut neighbours = Vec::new();
-        for (step, frame) in neighbours::around(frames, *number, &steps) {
+        for (step, frame) in neighbours::in_steps(frames, *number, &steps) {
             let scene = match loaded.get(&frame.number) {
                 Some(scene) => Arc::clone(scene),
                 None => Arc::new(self.load_file(&self.file.at(frame)?, progress)?),
@@ -188,7 +188,7 @@ impl Session {
 
     /// Decodes the images that the plan wants, unless they are.
     pub(super) fn decode(&mut self, progress: &Progress) -> Result<(), Error> {
-        self.decode_as(Decoded::Whole, progress)
+        self.decode_as(DecodedImages::Whole, progress)
     }
 
     /// Decodes the images for the rays of the picture alone: in fewer texels where the scene's tolerance allows. Of
@@ -197,18 +197,21 @@ impl Session {
         let is_single = self.file.spec.frames.is_none();
         let has_tolerance = self.loaded()?.scene.tolerance.is_some();
         let may_be_coarse = is_single && has_tolerance;
-        self.decode_as(if may_be_coarse { Decoded::ForPicture } else { Decoded::Whole }, progress)
+        self.decode_as(
+            if may_be_coarse { DecodedImages::ForPicture } else { DecodedImages::Whole },
+            progress,
+        )
     }
 
-    fn decode_as(&mut self, wanted: Decoded, progress: &Progress) -> Result<(), Error> {
+    fn decode_as(&mut self, wanted: DecodedImages, progress: &Progress) -> Result<(), Error> {
         let LoadedScene { scene, plan, decoded, .. } = self.loaded()?;
         if *decoded == wanted {
             return Ok(());
         }
         let start = Instant::now();
         let coarse = match wanted {
-            Decoded::ForPicture => tolerance::coarse_images(scene, plan),
-            Decoded::Nothing | Decoded::Whole => Vec::new(),
+            DecodedImages::ForPicture => tolerance::coarse_images(scene, plan),
+            DecodedImages::Nothing | DecodedImages::Whole => Vec::new(),
         };
         let images = self.images.renewed(scene, plan, self.options.memory_limit, &coarse)?;
         if let (Strictness::Strict, Some(fault)) = (self.options.strictness, images.faults.first())
@@ -286,7 +289,7 @@ fn not_built() -> Error {
 /// Small lists, and buffers of files that are written (bytes).
 const BESIDE: u64 = 16 << 20;
 
-/// The part of a forecast by which it may be too low (`benches/memory.py`).
+/// The part of a forecast by which it may be too low (`benches/forecasts.py memory`).
 const SLACK: u64 = 4;
 
 /// The stack of a thread of Embree's, and its small lists (bytes).

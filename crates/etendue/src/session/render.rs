@@ -21,6 +21,12 @@ use super::{LoadedScene, Session};
 use crate::words::{NOT_FOLLOWED, changed, fingerprints, header, not_finite};
 use crate::{Error, Progress, Rendering, Shares};
 
+/// Start of a render, and the time of what was prepared before it (s): a part of its time, too.
+struct Clock {
+    start: Instant,
+    before: f64,
+}
+
 impl Session {
     /// Renders the scene as it is now. When it is stopped while it renders and every pixel has samples, the
     /// picture of these is returned: see [`Rendering::partial`].
@@ -55,7 +61,7 @@ impl Session {
         }
         film.notes().iter().for_each(|note| progress.note(note));
         let files = Transaction::at_once().keeping(&scene.inputs);
-        Ok(film.write((&files, path), &self.identity(scene, plan)?, origin)?)
+        Ok(film.write(&files, path, &self.identity(scene, plan)?, origin)?)
     }
 
     /// Puts the shares of a render together: the rendering that one machine would have made, to the bit when
@@ -84,9 +90,9 @@ impl Session {
         self.checkpoint = checkpoint;
     }
 
-    /// Start of a render, and the time of what was prepared before it: a part of its time, too.
-    fn clock(&self) -> (Instant, f64) {
-        (Instant::now(), self.seconds.load + self.seconds.build + self.seconds.decode)
+    fn clock(&self) -> Clock {
+        let before = self.seconds.load + self.seconds.build + self.seconds.decode;
+        Clock { start: Instant::now(), before }
     }
 
     /// Traces the scene, or a share of it, or puts shares of its samples together.
@@ -105,8 +111,8 @@ impl Session {
             (None, Some(_)) if shares.is_empty() => self.kept_identity(scene, plan)?,
             _ => self.identity(scene, plan)?,
         };
-        let course = RenderState { shard, shares, checkpoint: self.checkpoint.clone(), identity };
-        if let Some(film) = self.trace_slots(&course, progress)? {
+        let state = RenderState { shard, shares, checkpoint: self.checkpoint.clone(), identity };
+        if let Some(film) = self.trace_slots(&state, progress)? {
             return Ok(film);
         }
         let LoadedScene { scene, plan, neighbours, .. } = self.loaded()?;
@@ -115,7 +121,7 @@ impl Session {
         let others: Vec<FollowedFrame<'_>> =
             neighbours.iter().filter_map(|other| other.followed(scene)).collect();
         let prepared = Prepared { accel, images: &self.images, others: &others };
-        let film = etendue_render::trace(scene, plan, prepared, &header, &course, progress)?;
+        let film = etendue_render::trace(scene, plan, prepared, &header, &state, progress)?;
         self.seconds.render = start.elapsed().as_secs_f64();
         Ok(film)
     }
@@ -123,7 +129,7 @@ impl Session {
     /// Identity that films must agree in to be of one picture.
     fn identity(&self, scene: &Scene, plan: &Plan) -> Result<Identity, Error> {
         let prints = fingerprints(scene, &self.loaded()?.neighbours)?;
-        self.identity_by(scene, plan, (plan.samples.to_string(), prints))
+        self.identity_by(scene, plan, plan.samples.to_string(), prints)
     }
 
     /// Identity that a film must agree in for a render to go on from it: where more samples follow
@@ -139,14 +145,15 @@ impl Session {
             Some(size) => format!("any of a set of {size}"),
         };
         let print = ("scene_hash".to_owned(), scene.hash_of_any_samples()?.to_string());
-        self.identity_by(scene, plan, (samples, vec![print]))
+        self.identity_by(scene, plan, samples, vec![print])
     }
 
     fn identity_by(
         &self,
         scene: &Scene,
         plan: &Plan,
-        (samples, prints): (String, Vec<(String, String)>),
+        samples: String,
+        prints: Vec<(String, String)>,
     ) -> Result<Identity, Error> {
         let [width, height] = scene.camera.resolution();
         let layers: Vec<_> = plan.layers.iter().map(|layer| layer.row().name).collect();
@@ -169,7 +176,7 @@ impl Session {
     fn conclude(
         &mut self,
         film: Film,
-        (start, before): (Instant, f64),
+        clock: Clock,
         progress: &Progress,
     ) -> Result<Rendering, Error> {
         let loaded = self.loaded()?;
@@ -179,7 +186,7 @@ impl Session {
         let header = header(&scene, &fingerprints);
         let rendered = etendue_render::finish(&scene, plan, film, header, Some(accel))?;
         let mut seconds = self.seconds;
-        seconds.total = start.elapsed().as_secs_f64() + before;
+        seconds.total = clock.start.elapsed().as_secs_f64() + clock.before;
         let mut more = rendered.notes.clone();
         more.extend(not_finite(&rendered));
         more.extend(changed(&scene));
@@ -202,7 +209,7 @@ impl Session {
             .filter(|_| asks || scene.camera.light_field().is_some())
             .map(|accel| (accel, Arc::clone(&self.images)));
         let mut rendering =
-            Rendering::new(scene, (picture, band_film), traced, (report, fingerprints))?;
+            Rendering::new(scene, picture, band_film, traced, report, fingerprints)?;
         rendering.light = rendering.light.map(|light| self.at_common_exposure(light));
         match &self.denoiser {
             Some(denoiser) => {

@@ -11,7 +11,7 @@ use etendue_scene::Scene;
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 
-use super::{Decoded, LoadedScene, Session};
+use super::{DecodedImages, LoadedScene, Session};
 use crate::words::{fingerprints, header};
 use crate::{Error, Progress};
 
@@ -25,7 +25,7 @@ fn with_layers(scene: &Scene, wanted: impl Fn(&LayerSpec) -> bool) -> Scene {
 
 impl Session {
     /// Refuses what is not divided into slots.
-    fn allows_slots(&self, scene: &Scene, course: &RenderState<'_>) -> Result<(), Error> {
+    fn allows_slots(&self, scene: &Scene, state: &RenderState<'_>) -> Result<(), Error> {
         let why = if scene.picture != Some(LayerSpec::Radiance) {
             "adds up light, and the picture shows none\nhint: give the scene a `tracer` of light, such as \
              {\"type\": \"path\"}"
@@ -33,9 +33,9 @@ impl Session {
             "does not go with a light-field camera, whose views are rendered from one camera\nhint: leave one of them out"
         } else if scene.layers.iter().any(|layer| layer.is_of_sampling()) {
             "has samples of its own in each slot, of which `sample_count` and `variance` do not tell\nhint: leave them out"
-        } else if course.checkpoint.is_some() {
+        } else if state.checkpoint.is_some() {
             "is not kept on the way\nhint: leave `--checkpoint` out, or render rows with `--shard`"
-        } else if course.shard.is_some_and(Shard::is_of_samples) || !course.shares.is_empty() {
+        } else if state.shard.is_some_and(Shard::is_of_samples) || !state.shares.is_empty() {
             "is not divided by samples\nhint: use `--shard-by rows`"
         } else {
             return Ok(());
@@ -47,7 +47,7 @@ impl Session {
     /// without light are those of the scene by itself.
     pub(super) fn trace_slots(
         &mut self,
-        course: &RenderState<'_>,
+        state: &RenderState<'_>,
         progress: &Progress,
     ) -> Result<Option<Film>, Error> {
         if self.file().spec.serial.is_empty() {
@@ -56,8 +56,8 @@ impl Session {
         let start = Instant::now();
         let LoadedScene { scene, plan, neighbours, .. } = self.loaded()?;
         let (scene, outputs) = (Arc::clone(scene), self.options.outputs);
-        self.allows_slots(&scene, course)?;
-        let (bands, shard) = (plan.bands.clone(), course.shard);
+        self.allows_slots(&scene, state)?;
+        let (bands, shard) = (plan.bands.clone(), state.shard);
         let plan = plan.clone();
         // What is no light, of the scene itself.
         let head = header(&scene, &fingerprints(&scene, neighbours)?);
@@ -77,7 +77,7 @@ impl Session {
         let mut film = SerialFilm::new(&scene, &plan, shard, data)?;
         // Slot by slot, each as a scene by itself.
         let (whole, images) = (self.loaded.take(), Arc::clone(&self.images));
-        let added = self.add_slots(&mut film, &bands, (&head, &of_part), progress);
+        let added = self.add_slots(&mut film, &bands, &head, &of_part, progress);
         (self.loaded, self.images) = (whole, images);
         added?;
         self.seconds.render = start.elapsed().as_secs_f64();
@@ -88,7 +88,8 @@ impl Session {
         &mut self,
         film: &mut SerialFilm,
         bands: &Bands,
-        (head, course): (&[(String, String)], &RenderState<'_>),
+        head: &[(String, String)],
+        state: &RenderState<'_>,
         progress: &Progress,
     ) -> Result<(), Error> {
         for slot in self.file().slots(&self.opener)? {
@@ -101,14 +102,14 @@ impl Session {
                 notes: Vec::new(),
                 accel: None,
                 neighbours: Vec::new(),
-                decoded: Decoded::Nothing,
+                decoded: DecodedImages::Nothing,
                 coarse: None,
             });
             self.build(progress)?;
             self.decode(progress)?;
             let LoadedScene { scene, plan, .. } = self.loaded()?;
             let prepared = Prepared { accel: self.built()?, images: &self.images, others: &[] };
-            let traced = etendue_render::trace(scene, plan, prepared, head, course, progress)?;
+            let traced = etendue_render::trace(scene, plan, prepared, head, state, progress)?;
             if !traced.is_complete() {
                 return Err(RenderError::Stopped.into());
             }

@@ -55,7 +55,7 @@ fn render_frames(
         session.show(frame)?;
         session.check_place(&out.join(pattern.folder(frame.number)), &[], &none)?;
         let rendering = session.render(&none)?;
-        pattern.write(&rendering, out, frame.number, (outputs, &none))?;
+        pattern.write(&rendering, out, frame.number, outputs, &none)?;
         dataset.add(frame, rendering.scene(), &pattern, outputs)?;
     }
     let files = dataset.write(&Transaction::at_once(), out)?;

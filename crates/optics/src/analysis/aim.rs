@@ -122,8 +122,8 @@ impl Outline {
 
 /// Finds the part of the sphere that a beam lights.
 pub(crate) fn outline(beam: &Beam<'_>, sphere: &ReferenceSphere) -> Result<Outline, AnalysisError> {
-    let no_sphere = AnalysisError::NoSphere { z: sphere.centre[2] };
-    let (middle, rest) = sphere.meet(&beam.chief_end).ok_or(no_sphere.clone())?;
+    let no_sphere = || AnalysisError::no_sphere(sphere.centre[2]);
+    let (middle, rest) = sphere.meet(&beam.chief_end).ok_or_else(no_sphere)?;
     let path = beam.chief_end.length + rest;
     let [low, high] = beam.bounds()?;
     let size = (high - low) / f64::from(SAMPLES);
@@ -221,7 +221,7 @@ pub(crate) fn field(
 ) -> Result<PupilField, AnalysisError> {
     let PupilGrid { cells, step, middle } = sampling;
     if !(LEAST_CELLS..=MOST_CELLS).contains(&cells) {
-        return Err(AnalysisError::Cells(cells));
+        return Err(AnalysisError::out_of_range(cells));
     }
     let wavelength = beam.at.wavelength();
     let mut pupil = PupilField::dark(wavelength, cells, step, middle, sphere.index);

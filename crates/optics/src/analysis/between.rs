@@ -22,7 +22,7 @@ const USUAL: usize = 128;
 pub const FARTHEST_WAVES: f64 = 60.0;
 
 /// Wavelengths times the f-number of the image that a grid has to hold beside where rays land.
-const BESIDE: f64 = 42.0;
+const IMAGE_MARGIN: f64 = 42.0;
 
 /// Greatest difference of a wavefront from the polynomial that stands for it (waves): a picture's
 /// irradiance changes by a few thousandths of its peak per hundredth of a wave.
@@ -100,7 +100,7 @@ impl FieldsBetween {
             clippy::cast_sign_loss,
             reason = "a small count"
         )]
-        let needed = ((2.0 * (far + BESIDE)).ceil() as usize).next_multiple_of(4);
+        let needed = ((2.0 * (far + IMAGE_MARGIN)).ceil() as usize).next_multiple_of(4);
         if needed > MOST_CELLS {
             return Err(AnalysisError::TooRough { needed, waves: far });
         }

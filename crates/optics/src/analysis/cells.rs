@@ -18,7 +18,8 @@ use rustfft::num_complex::Complex64;
 
 use super::between::{FARTHEST_WAVES, airy_unit, landing_reach};
 use super::pupil::PupilField;
-use super::spread::{amplitudes, norm, quick_length, sinc};
+use super::quick_length;
+use super::spread::{amplitudes, norm, sinc};
 
 /// Margin beyond the rays' landings within which light is added up as waves (wavelengths times the
 /// f-number).

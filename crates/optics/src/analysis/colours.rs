@@ -6,9 +6,8 @@ use rayon::prelude::*;
 use super::aim::{self, PupilGrid};
 use super::object::{Beam, ObjectPoint};
 use super::pupil::RIM;
-use super::spread::quick_length;
 use super::wavefront::{COMFORTABLE, Cells, ReferenceSphere, USUAL_CELLS, Wavefront, chief_point};
-use super::{AnalysisError, LEAST_CELLS, MOST_CELLS, smooth};
+use super::{AnalysisError, LEAST_CELLS, MOST_CELLS, quick_length, smooth};
 use crate::train::{MonochromaticTrain, OpticalTrain};
 
 /// Cells a side of the grid that says how many are needed.
@@ -73,7 +72,7 @@ pub fn wavefronts(
         #[expect(clippy::cast_possible_truncation, reason = "at most 1024")]
         Cells::Needed => (2 * quick_length((0.5 * needed).ceil() as usize)).min(MOST_CELLS),
         Cells::Given(count) if !(LEAST_CELLS..=MOST_CELLS).contains(&count) => {
-            return Err(AnalysisError::Cells(count));
+            return Err(AnalysisError::out_of_range(count));
         }
         Cells::Given(count) => count,
     };

@@ -48,21 +48,21 @@ impl Conjugate {
         let all = train.matrix(&indices, 0, train.elements().len());
         let (before, behind) = (indices[0], indices[indices.len() - 1]);
         let paraxial = train.paraxial(train.wavelength())?;
-        let none = |key, why: &str| AnalysisError::Object { key, why: why.to_owned() };
         let distance = match self {
             Self::Infinity => None,
             Self::Distance(distance) if distance > 0.0 && distance.is_finite() => Some(distance),
             Self::Distance(distance) => {
                 let why = format!("{distance} mm is no distance in front of the lens");
-                return Err(none("object-distance", &why));
+                return Err(AnalysisError::object("object-distance", &why));
             }
             Self::Magnification(m) if !(m.is_finite() && m != 0.0) => {
-                return Err(none("magnification", "it must be a number other than 0"));
+                let why = "it must be a number other than 0";
+                return Err(AnalysisError::object("magnification", why));
             }
             Self::Magnification(_) if paraxial.efl.is_none() => {
-                let why = "the lens is afocal: it has one magnification at all distances; give \
-                           --object-distance";
-                return Err(none("magnification", why));
+                let why = "the lens is afocal: it has one magnification at all distances\n\
+                           hint: give --object-distance";
+                return Err(AnalysisError::object("magnification", why));
             }
             Self::Magnification(m) => {
                 // With the object d in front, the lower right number of the matrix is 1/m.
@@ -73,7 +73,7 @@ impl Conjugate {
                          has a negative magnification",
                         -distance
                     );
-                    return Err(none("magnification", &why));
+                    return Err(AnalysisError::object("magnification", &why));
                 }
                 Some(distance)
             }
@@ -90,11 +90,11 @@ impl Conjugate {
                 if !image.is_finite() || image.abs() > 1e9 {
                     let least = -paraxial.ffl.unwrap_or(0.0) * 1e-3;
                     let distance = distance * 1e-3;
-                    return Err(FocusError::AtFocalPoint { distance, least }.into());
+                    return Err(FocusError::at_focal_point(distance, least).into());
                 }
                 if image <= 0.0 {
                     let distance = distance * 1e-3;
-                    return Err(FocusError::Virtual { distance, image: z }.into());
+                    return Err(FocusError::virtual_image(distance, z).into());
                 }
                 z
             }
@@ -133,10 +133,10 @@ pub fn with_numerical_aperture(
     planes: &Planes,
     numerical_aperture: f64,
 ) -> Result<OpticalTrain, AnalysisError> {
-    let key = "numerical-aperture";
-    let none = |why: &str| AnalysisError::Object { key, why: why.to_owned() };
+    let none = |why: &str| AnalysisError::object("numerical-aperture", why);
     let Some(z) = planes.object_z else {
-        return Err(none("an object at infinity has none; give --object-distance or --f-number"));
+        let why = "an object at infinity has none\nhint: give --object-distance or --f-number";
+        return Err(none(why));
     };
     if !(numerical_aperture > 0.0 && numerical_aperture < 1.0) {
         return Err(none("it must lie between 0 and 1"));

@@ -19,9 +19,9 @@ pub struct FanRay {
     pub x: f64,
     /// In y (mm).
     pub y: f64,
-    /// How far its wave is ahead of the chief ray's on the reference sphere (waves).
+    /// Lead of its wave over the chief ray's on the reference sphere (waves).
     pub waves: f64,
-    /// How much farther along the fan it crosses the stop than a paraxial ray of the same place of the
+    /// Excess of its place on the stop, along the fan, over that of a paraxial ray of the same place of the
     /// entrance pupil (percent of the stop's paraxial radius); `null` where that is none.
     pub pupil_aberration: Option<f64>,
 }
@@ -33,7 +33,7 @@ pub struct Fans {
     pub field: String,
     /// The wavelength (nm).
     pub wavelength: f64,
-    /// Where the chief ray is begun (mm): a point of the plane in which rays from infinity start in step,
+    /// Start of the chief ray (mm): a point of the plane in which rays from infinity start in step,
     /// or the object point.
     pub origin: [f64; 3],
     /// The chief ray's direction there.
@@ -41,7 +41,7 @@ pub struct Fans {
     /// Half the paraxial entrance pupil, by which `pupil` is counted: mm on that plane, or a direction
     /// cosine at a near object.
     pub half_pupil: f64,
-    /// Where the chief ray crosses the plane of the paraxial entrance pupil, from its middle in x and in y
+    /// Crossing of the chief ray with the plane of the paraxial entrance pupil, from its middle in x and in y
     /// (mm): it would be 0 without aberrations of the pupil. `null` where the pupil is at infinity.
     pub pupil_shift: Option<[f64; 2]>,
     /// Along y in the pupil: those rays that pass.
@@ -73,8 +73,8 @@ pub fn fans(
     let own = chief_point(&beam, image_z);
     let centre = centre.map_or(own, |centre| centre.extend(image_z));
     let sphere = ReferenceSphere::about(train, at, centre)?;
-    let none = AnalysisError::NoSphere { z: image_z };
-    let (_, rest) = sphere.meet(&beam.chief_end).ok_or(none)?;
+    let no_sphere = || AnalysisError::no_sphere(image_z);
+    let (_, rest) = sphere.meet(&beam.chief_end).ok_or_else(no_sphere)?;
     let path = beam.chief_end.length + rest;
     let length = at.wavelength() * 1e-6;
     let pupil = train.paraxial(at.wavelength())?.entrance_pupil;
@@ -134,10 +134,10 @@ fn stop_radius(
 /// A point of a distortion grid (mm).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct GridPoint {
-    /// Where a lens without distortion puts it: focal length times the tangents of the angles, or
+    /// Its place by a lens without distortion: focal length times the tangents of the angles, or
     /// magnification times the height.
     pub ideal: [f64; 2],
-    /// Where the chief ray lands.
+    /// Landing point of the chief ray.
     pub real: [f64; 2],
     /// Distance of the two over that of `ideal` from the axis (percent); 0 on the axis.
     pub percent: f64,
@@ -151,7 +151,8 @@ pub fn distortion_grid(
     train: &OpticalTrain,
     at: &MonochromaticTrain,
     corner: &ObjectPoint,
-    (image_z, scale): (f64, f64),
+    image_z: f64,
+    scale: f64,
     points: u32,
 ) -> Vec<GridPoint> {
     let share = |k: u32| 2.0 * f64::from(k) / f64::from(points.max(2) - 1) - 1.0;

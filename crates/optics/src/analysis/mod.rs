@@ -8,7 +8,7 @@
 //! | `smooth` | the same of smooth wavefronts, by a polynomial through few rays |
 //! | [`wavefront`] | optical path differences against a reference sphere, and their statistics |
 //! | [`colours`] | one point at several wavelengths |
-//! | [`zernike`] | Zernike polynomials, Fringe and Noll, and their fit to a wavefront |
+//! | [`zernike`] | fits of Zernike polynomials to a wavefront |
 //! | [`least_squares`] | a small linear fit |
 //! | [`spread`] | point spread functions by FFT and by Huygens' sum, encircled energy, lines |
 //! | [`between`] | fields at a few depths and wavelengths, and those between them |
@@ -38,6 +38,8 @@ pub mod transfer;
 pub mod wavefront;
 pub mod zernike;
 
+use etendue_report::Refusal;
+
 use crate::glass::GlassError;
 use crate::train::FocusError;
 
@@ -48,7 +50,7 @@ pub use pupil::PupilField;
 pub use spread::PointSpread;
 pub use transfer::Transfer;
 pub use wavefront::{ReferenceSphere, Wavefront};
-pub use zernike::{ZernikeFit, ZernikeOrder};
+pub use zernike::ZernikeFit;
 
 /// Error of a lens that cannot be analysed in waves.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -71,50 +73,19 @@ pub enum AnalysisError {
     },
     /// No light.
     #[error(
-        "no light of the object point at {field} passes the lens: the field is beyond the image \
-         circle; give a smaller one"
+        "no light of the object point at {field} passes the lens: the field is beyond the image circle\n\
+         hint: give a smaller one"
     )]
     Dark {
         /// The object point, in words.
         field: String,
     },
-    /// The sums of a gradient are not made.
-    #[error(
-        "the index of a medium changes from place to place, which third-order sums leave out; rays follow it"
-    )]
-    Graded,
-    /// Nothing ends the beam.
-    #[error("nothing limits the beam: give the stop a radius, or a surface a semi_diameter")]
-    Unlimited,
-    /// The exit pupil lies in the image, or the image at infinity.
-    #[error(
-        "the reference sphere has no radius: the exit pupil lies in the plane of the image \
-         (z = {z} mm); move the sensor"
-    )]
-    NoSphere {
-        /// The image's z (mm).
-        z: f64,
-    },
-    /// No such object.
-    #[error("{key}: {why}")]
-    Object {
-        /// The option or key that asks for it.
-        key: &'static str,
-        /// Reason, as a sentence.
-        why: String,
-    },
-    /// An array of lenslets.
-    #[error(
-        "elements[{0}] is a microlens array: behind it there is no one wavefront; analyse the lens \
-         without it"
-    )]
-    Lenslets(usize),
     /// A grid too coarse for the wavefront.
     #[error(
         "{cells} x {cells} cells over the pupil are too few: the wavefront changes by {steepest:.2} \
          waves from one cell to the next, and half a wave is the most; it needs {needed} cells a side{}",
         if *needed > MOST_CELLS {
-            format!(", and {MOST_CELLS} are the most: refocus, stop down or take a smaller field")
+            format!(", and {MOST_CELLS} are the most\nhint: {CALMER}")
         } else {
             String::new()
         }
@@ -130,7 +101,7 @@ pub enum AnalysisError {
     /// More cells than there may be.
     #[error(
         "the wavefront needs {needed} x {needed} cells over the pupil, and {MOST_CELLS} a side are \
-         the most: it is {waves:.0} waves from its sphere; refocus, stop down or take a smaller field"
+         the most: it is {waves:.0} waves from its sphere\nhint: {CALMER}"
     )]
     TooRough {
         /// Cells a side that would do.
@@ -138,12 +109,6 @@ pub enum AnalysisError {
         /// Peak to valley (waves).
         waves: f64,
     },
-    /// Numbers of cells out of range.
-    #[error("{0} cells over the pupil: take from {LEAST_CELLS} to {MOST_CELLS}")]
-    Cells(usize),
-    /// Weights that make no mean.
-    #[error("the weights {0}: give one number from 0 on for each wavelength, not all of them 0")]
-    Weights(String),
     /// Too many terms for the pupil.
     #[error("{terms} Zernike terms cannot be told apart on the {rays} lit cells of the pupil")]
     Singular {
@@ -152,9 +117,40 @@ pub enum AnalysisError {
         /// Lit cells.
         rays: usize,
     },
+    /// Any other: what the lens, its object, its weights or its cells do not allow.
+    #[error(transparent)]
+    Refused(#[from] Refusal),
 }
 
+/// Remedy of a wavefront that bends too much.
+const CALMER: &str = "refocus, stop down or take a smaller field";
+
 impl AnalysisError {
+    /// A lens without an end to its light.
+    fn unlimited() -> Self {
+        let remedy = "give the stop a radius, or a surface a semi_diameter";
+        Refusal::new("nothing limits the beam").hint(remedy).into()
+    }
+
+    /// An image in a plane at `z` (mm), which the exit pupil lies in.
+    fn no_sphere(z: f64) -> Self {
+        let why = format!(
+            "the reference sphere has no radius: the exit pupil lies in the plane of the image (z = {z} mm)"
+        );
+        Refusal::new(why).hint("move the sensor").into()
+    }
+
+    /// A number of cells a side that is out of range.
+    fn out_of_range(cells: usize) -> Self {
+        let remedy = format!("take from {LEAST_CELLS} to {MOST_CELLS}");
+        Refusal::new(format!("{cells} cells over the pupil")).hint(remedy).into()
+    }
+
+    /// No such object, by the option or key that asks for it.
+    fn object(key: &str, why: &str) -> Self {
+        Refusal::new(why).at(key).into()
+    }
+
     /// True if the error is one of this field alone, so that others can do without it: no light
     /// arrives, or too rough.
     fn is_of_the_field(&self) -> bool {
@@ -167,3 +163,17 @@ pub const LEAST_CELLS: usize = 16;
 
 /// The greatest number of cells over the pupil.
 pub const MOST_CELLS: usize = 1024;
+
+/// The least length from `least` on that a transform is quick for: of no prime factors but 2, 3 and 5.
+#[must_use]
+pub fn quick_length(least: usize) -> usize {
+    let is_quick = |mut length: usize| {
+        for factor in [2, 3, 5] {
+            while length.is_multiple_of(factor) {
+                length /= factor;
+            }
+        }
+        length == 1
+    };
+    (least.max(1)..).find(|&length| is_quick(length)).unwrap_or(least)
+}

@@ -5,6 +5,7 @@
 //! and M at that point. In both an even grid of rays carries even power: of a far point that lights
 //! the entrance evenly, and of a near one in a flat object that radiates by Lambert's law.
 
+use etendue_report::Refusal;
 use glam::{DVec2, DVec3};
 
 use super::AnalysisError;
@@ -141,7 +142,10 @@ impl<'a> Beam<'a> {
         object: ObjectPoint,
     ) -> Result<Self, AnalysisError> {
         if let Some(array) = train.first_array() {
-            return Err(AnalysisError::Lenslets(array));
+            let why = format!(
+                "elements[{array}] is a microlens array: behind it there is no one wavefront"
+            );
+            return Err(Refusal::new(why).hint("analyse the lens without it").into());
         }
         let pupil = train.paraxial(at.wavelength())?.entrance_pupil;
         let z = pupil.z.unwrap_or(0.0);
@@ -262,7 +266,7 @@ impl<'a> Beam<'a> {
         }
         match found {
             None => Err(AnalysisError::Dark { field: self.object.name() }),
-            Some((_, false)) if !self.launch.is_near => Err(AnalysisError::Unlimited),
+            Some((_, false)) if !self.launch.is_near => Err(AnalysisError::unlimited()),
             // A closer look at a small rectangle has smaller cells to spare.
             Some((lit, _)) => Ok(self.lit(lit, CELLS).unwrap_or(lit)),
         }

@@ -9,6 +9,7 @@
 //!
 //! Heights and slopes are u = dy/dz. The ideal thin lens adds nothing.
 
+use etendue_report::Refusal;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -63,7 +64,7 @@ pub struct SeidelTable {
     pub surfaces: Vec<SeidelSums>,
     /// All together.
     pub total: SeidelSums,
-    /// Where the stop would have to be for a sum to be nothing.
+    /// Places of the stop at which a sum would be nothing.
     pub stop_shifts: Vec<StopShift>,
 }
 
@@ -75,7 +76,7 @@ pub struct SeidelTable {
 pub struct StopShift {
     /// Without `coma` or without `lateral_colour`.
     pub without: &'static str,
-    /// How much of the marginal ray the chief ray is moved by.
+    /// Multiple of the marginal ray by which the chief ray is moved.
     pub eccentricity: f64,
     /// z of the entrance pupil then (mm); `null` at infinity.
     pub entrance_pupil_z: Option<f64>,
@@ -105,10 +106,11 @@ pub fn seidel(
     colours: [f64; 2],
 ) -> Result<SeidelTable, AnalysisError> {
     if train.is_graded() {
-        return Err(AnalysisError::Graded);
+        let why = "the index of a medium changes from place to place, which third-order sums leave out; rays follow it";
+        return Err(Refusal::new(why).into());
     }
     let (marginal, chief) = rays(train, object)?;
-    let mut table = sums(train, object, colours, (marginal, chief))?.0;
+    let mut table = sums(train, object, colours, marginal, chief)?.0;
     let of = |without, across: f64, along: f64| -> Result<Option<StopShift>, AnalysisError> {
         let eccentricity = -across / along;
         if !eccentricity.is_finite() || across == 0.0 {
@@ -119,7 +121,7 @@ pub fn seidel(
             slope: chief.slope + eccentricity * marginal.slope,
         };
         let pupil = -chief.height / chief.slope;
-        let (table, stop_z) = sums(train, object, colours, (marginal, chief))?;
+        let (table, stop_z) = sums(train, object, colours, marginal, chief)?;
         let entrance_pupil_z = Some(pupil).filter(|z| z.is_finite());
         let total = table.total;
         Ok(Some(StopShift { without, eccentricity, entrance_pupil_z, stop_z, total }))
@@ -139,7 +141,8 @@ fn sums(
     train: &OpticalTrain,
     object: &ObjectPoint,
     colours: [f64; 2],
-    (mut marginal, mut chief): (ParaxialRay, ParaxialRay),
+    mut marginal: ParaxialRay,
+    mut chief: ParaxialRay,
 ) -> Result<(SeidelTable, Option<f64>), AnalysisError> {
     let indices = train.indices(train.wavelength())?;
     let [short, long] = [train.indices(colours[0])?, train.indices(colours[1])?];
@@ -223,7 +226,7 @@ fn rays(
 ) -> Result<(ParaxialRay, ParaxialRay), AnalysisError> {
     let pupil = train.paraxial(train.wavelength())?.entrance_pupil;
     let (Some(z), Some(diameter)) = (pupil.z, pupil.diameter) else {
-        return Err(AnalysisError::Unlimited);
+        return Err(AnalysisError::unlimited());
     };
     let radius = 0.5 * diameter;
     Ok(match *object {

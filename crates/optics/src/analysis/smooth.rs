@@ -212,7 +212,7 @@ pub(crate) fn field(
 fn lit(pupil: &mut PupilField, beam: &Beam<'_>, places: &[DVec2], turns: &[DMat2]) {
     let cells = pupil.cells;
     let passed = beam.throughputs(places);
-    let around = |i: usize| {
+    let lit_neighbours = |i: usize| {
         let (row, column) = (i / cells, i % cells);
         let near = |k: usize| k.saturating_sub(1)..=(k + 1).min(cells - 1);
         let rows = near(row).map(|row| {
@@ -221,7 +221,7 @@ fn lit(pupil: &mut PupilField, beam: &Beam<'_>, places: &[DVec2], turns: &[DMat2
         (rows.sum::<usize>(), near(row).count() * near(column).count())
     };
     for i in (0..cells * cells).filter(|&i| places[i].is_finite()) {
-        let ([clear, amplitude], lean) = match around(i) {
+        let ([clear, amplitude], lean) = match lit_neighbours(i) {
             (0, _) => continue,
             (lit, of) if lit < of => aim::cell(beam, places[i], turns[i] * pupil.step),
             _ => ([passed[i], passed[i].sqrt()], DVec2::ZERO),

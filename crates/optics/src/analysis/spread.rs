@@ -14,6 +14,7 @@
 //! as the wavefront changes by less than half a wave from cell to cell. The sum over cells sees the
 //! pupil through one cell, so what it gives is divided by that cell's own transform.
 
+use etendue_report::Refusal;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use rustfft::FftPlanner;
@@ -46,24 +47,12 @@ pub(super) fn shares(weights: &[f64], wavelengths: usize) -> Result<Vec<f64>, An
     let are_weights = weights.iter().all(|weight| *weight >= 0.0 && weight.is_finite());
     if weights.len() != wavelengths || !are_weights || sum <= 0.0 {
         let words: Vec<String> = weights.iter().map(f64::to_string).collect();
-        let what = format!("{} for {wavelengths} wavelengths make no mean", words.join(", "));
-        return Err(AnalysisError::Weights(what));
+        let words = words.join(", ");
+        let why = format!("the weights {words} for {wavelengths} wavelengths make no mean");
+        let remedy = "give one number from 0 on for each wavelength, not all of them 0";
+        return Err(Refusal::new(why).hint(remedy).into());
     }
     Ok(weights.iter().map(|weight| weight / sum).collect())
-}
-
-/// The least length from `least` on that a transform is quick for: of no prime factors but 2, 3 and 5.
-#[must_use]
-pub fn quick_length(least: usize) -> usize {
-    let is_quick = |mut length: usize| {
-        for factor in [2, 3, 5] {
-            while length.is_multiple_of(factor) {
-                length /= factor;
-            }
-        }
-        length == 1
-    };
-    (least.max(1)..).find(|&length| is_quick(length)).unwrap_or(least)
 }
 
 /// sin πx / πx.

@@ -17,7 +17,7 @@ pub struct Transfer {
     size: usize,
     /// From one frequency to the next (cycles/mm).
     pub step: f64,
-    /// From where on it is 0 in x and in y (cycles/mm): what the widest pupil over the shortest
+    /// Limits from which on it is 0 in x and in y (cycles/mm): what the widest pupil over the shortest
     /// wavelength passes.
     pub limit: f64,
     values: Vec<Complex64>,
@@ -216,8 +216,8 @@ pub fn modulation_at(fields: &WeightedFields, frequency: f64) -> [f64; 2] {
             }
             let scale = weight / field.total_power();
             // Along the line, and on both sides of it.
-            let at = |along: i64, beside: i64| {
-                let shift = [along * x + beside * y, along * y + beside * x];
+            let at = |along: i64, across: i64| {
+                let shift = [along * x + across * y, along * y + across * x];
                 autocorrelation(amplitudes, field.cells, shift)
             };
             let line: Vec<Complex64> = (-1..=NODES as i64).map(|k| at(nodes[0].0 + k, 0)).collect();

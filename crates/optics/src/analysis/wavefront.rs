@@ -12,8 +12,7 @@ use super::aim::{self, PupilGrid};
 use super::least_squares::LeastSquares;
 use super::object::{Beam, ObjectPoint};
 use super::pupil::PupilField;
-use super::spread::quick_length;
-use super::{AnalysisError, MOST_CELLS};
+use super::{AnalysisError, MOST_CELLS, quick_length};
 use crate::train::optical_path::PathEnd;
 use crate::train::{MonochromaticTrain, OpticalTrain};
 
@@ -64,7 +63,7 @@ impl ReferenceSphere {
             None => FLAT,
         };
         if radius.abs() < LEAST_RADIUS {
-            return Err(AnalysisError::NoSphere { z: centre.z });
+            return Err(AnalysisError::no_sphere(centre.z));
         }
         Ok(Self { centre: centre.into(), radius, index: at.index_before_sensor() })
     }
@@ -88,11 +87,11 @@ impl ReferenceSphere {
     }
 }
 
-/// Which point the sphere is about.
+/// Centre of a reference sphere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Reference {
-    /// Where the chief ray meets the image plane.
+    /// The point at which the chief ray meets the image plane.
     #[default]
     ChiefRay,
     /// The point near it, also along the axis, at which the root mean square of the waves is least.

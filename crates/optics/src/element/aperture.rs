@@ -55,7 +55,7 @@ pub struct PolygonSpec {
     pub radius: Millimetres,
     /// The number of corners, 3 or more.
     pub blades: u32,
-    /// How far the corners are turned about the axis from +x towards +y (degrees).
+    /// Turn of the corners about the axis from +x towards +y (degrees).
     #[serde(default)]
     pub rotation: Degrees,
 }

@@ -37,7 +37,7 @@ pub struct BiconicSpec {
     /// The conic constant along x.
     #[serde(skip_serializing_if = "is_zero")]
     pub conic_x: f64,
-    /// What follows the surface, on the sensor's side; air when absent.
+    /// Medium behind the surface, on the sensor's side; air when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub glass: Option<GlassSpec>,
     /// Half the clear diameter (mm): rays farther from the axis are stopped. Unlimited when absent.
@@ -254,7 +254,7 @@ impl Profile for Biconic {
     }
 }
 
-/// From where to where a part of a ray runs along x and along y.
+/// Ends of a part of a ray along x and along y.
 fn places_along(ray: Ray, part: [f64; 2]) -> [[f64; 2]; 2] {
     std::array::from_fn(|axis| {
         let ends = part.map(|t| ray.position[axis] + t * ray.direction[axis]);
@@ -533,7 +533,7 @@ mod asphere_tests {
     use super::*;
     use crate::element::newton::{cross, cross_block};
     use crate::element::rays::{LANES, PENDING};
-    use crate::element::refract::{Refracted, Refraction};
+    use crate::element::refract::{RefractedRay, Refraction};
     use crate::element::surface::polynomial;
 
     fn ray(position: [f64; 3], direction: [f64; 3]) -> Ray {
@@ -546,7 +546,7 @@ mod asphere_tests {
         Refraction::new(surface, 1.0, 1.5)
     }
 
-    fn at_asphere(asphere: &Refraction, ray: Ray, clip2: f64) -> Refracted {
+    fn at_asphere(asphere: &Refraction, ray: Ray, clip2: f64) -> RefractedRay {
         cross(&asphere.surface, asphere.media, ray, clip2)
     }
 
@@ -619,8 +619,7 @@ mod asphere_tests {
             rays.push([x, 1.0, -20.0].into(), [0.02, -0.01 * x, 1.0].into());
         }
         let before = rays.blocks[0].clone();
-        let with = (s.media, &s.slopes);
-        cross_block(&s.surface, with, &mut rays.blocks[0], (0, 0.0), 1e9, |_, _, _| ());
+        cross_block(&s.boundary(), &mut rays.blocks[0], 0, 0.0, 1e9, |_, _, _| ());
         for lane in 0..LANES {
             let single = at_asphere(&s, before.ray(lane), 1e9);
             let batch = rays.blocks[0].ray(lane);

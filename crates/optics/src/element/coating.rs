@@ -173,7 +173,7 @@ impl Stack {
 mod tests {
     use super::*;
 
-    /// Reference values of another program: `scripts/coatings-by-tmm.py`.
+    /// Reference values of another program: `scripts/lens_opinions.py`.
     #[test]
     fn stacks_reflect_and_pass_what_tmm_says() {
         let text = include_str!("../../tests/data/coatings.json");

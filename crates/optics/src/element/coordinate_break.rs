@@ -24,7 +24,7 @@ pub struct CoordinateBreakSpec {
     /// A turn about z (degrees, right-handed).
     #[serde(skip_serializing_if = "super::is_default")]
     pub rotation: Degrees,
-    /// Whether the axis is turned about z, then y, then x, and moved across itself then (Zemax' order flag 1); otherwise it
+    /// True if the axis is turned about z, then y, then x, and moved across itself then (Zemax' order flag 1); otherwise it
     /// is moved first, and turned about x, then y, then z.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub tilt_first: bool,

@@ -14,10 +14,10 @@
 
 use super::biconic::Biconic;
 use super::newton::{
-    Profile, cross_by_newton, cross_by_search, interval, keeps_off, reach_around, root_between,
+    Profile, cross_by_newton, cross_by_search, interval, keeps_off, root_between, search_radius,
 };
 use super::rays::Ray;
-use super::refract::{IndexPair, Refracted, TOUCH};
+use super::refract::{IndexPair, RefractedRay, TOUCH};
 use super::surface::Surface;
 
 /// Rings about the axis whose slopes are bounded one by one.
@@ -37,6 +37,14 @@ pub(crate) struct Slopes {
     least: Vec<f64>,
     /// Rings in a square millimetre.
     density: f64,
+}
+
+/// A surface between two media, met from one side, and the bounds of its slopes.
+#[derive(Debug)]
+pub(super) struct ProfileBoundary<'a, P> {
+    pub(super) surface: &'a P,
+    pub(super) media: IndexPair,
+    pub(super) slopes: &'a Slopes,
 }
 
 impl Slopes {
@@ -67,7 +75,7 @@ impl Slopes {
         Self::by_rings(biconic, |squares| biconic.steepest(squares[1]))
     }
 
-    /// By what no slope is above between two squared distances from the axis (mm²).
+    /// Bounds of a surface by its greatest `slope` between two squared distances from the axis (mm²).
     fn by_rings(surface: &impl Profile, slope: impl Fn([f64; 2]) -> f64) -> Self {
         let [end, own] = surface.extent();
         let clear = surface.clear_radius();
@@ -112,23 +120,22 @@ impl Slopes {
 /// A ray in the surface's frame, at the first place within the clear aperture where it crosses from front to
 /// back; where there is none, as Newton's method and its search have it.
 pub(super) fn cross_first<P: Profile>(
-    surface: &P,
-    (media, slopes): (IndexPair, &Slopes),
+    boundary: &ProfileBoundary<'_, P>,
     ray: Ray,
     clip2: f64,
-) -> Refracted {
-    let newton = cross_by_newton(surface, media, ray, clip2);
-    cross_first_after(surface, (media, slopes), ray, clip2, newton)
+) -> RefractedRay {
+    let newton = cross_by_newton(boundary.surface, boundary.media, ray, clip2);
+    cross_first_after(boundary, ray, clip2, newton)
 }
 
 /// Crosses the surface where Newton's method has found `newton`.
 pub(super) fn cross_first_after<P: Profile>(
-    surface: &P,
-    (media, slopes): (IndexPair, &Slopes),
+    boundary: &ProfileBoundary<'_, P>,
     ray: Ray,
     clip2: f64,
-    newton: Refracted,
-) -> Refracted {
+    newton: RefractedRay,
+) -> RefractedRay {
+    let &ProfileBoundary { surface, media, slopes } = boundary;
     if newton.hit && slopes.forbid_another(ray, newton.ray) {
         return newton;
     }
@@ -162,7 +169,7 @@ pub(super) fn cross_first_after<P: Profile>(
     let root = moved.advanced(first.root);
     let [x, y, _] = root.position;
     let (ray, through) = surface.refract(media, root, surface.sag_and_slope(root).1);
-    Refracted { ray, t: 0.0, hit: true, clear: x * x + y * y <= clip2, through }
+    RefractedRay { ray, t: 0.0, hit: true, clear: x * x + y * y <= clip2, through }
 }
 
 /// Distance of a ray's place behind a surface (mm), along the axis.
@@ -178,7 +185,7 @@ fn part_near<P: Profile>(surface: &P, ray: Ray, start: f64) -> Option<[f64; 2]> 
     let reach = if clear.is_finite() {
         clear.min(surface.extent()[0])
     } else {
-        reach_around(surface, ray, clear)
+        search_radius(surface, ray, clear)
     };
     let across = interval(u * u + v * v, x * u + y * v, x * x + y * y - reach * reach)?;
     let depths = surface.sag_range(reach).map(|sag| (sag - z) / w);
@@ -188,7 +195,7 @@ fn part_near<P: Profile>(surface: &P, ray: Ray, start: f64) -> Option<[f64; 2]> 
     (from < to && to - from < f64::INFINITY).then_some([from, to])
 }
 
-/// Where a ray crosses a surface from front to back.
+/// Crossing of a ray with a surface from front to back.
 struct SurfaceCrossing {
     /// A part of the ray in which it crosses nowhere else.
     part: [f64; 2],

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// √3.
 const ROOT3: f64 = 1.732_050_807_568_877_2;
 
-/// How lenslets are packed.
+/// Packing of lenslets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(rename = "LensletGrid")]

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::lattice::Grid;
 use super::microlens_array::{Gaps, Lenslet, LensletShape, MicrolensArray};
 use super::rays::{Block, Ray};
-use super::refract::{Refracted, Refraction, each_lane};
+use super::refract::{RefractedRay, Refraction, each_lane};
 use super::step::Clip;
 use super::surface::Surface;
 
@@ -121,7 +121,7 @@ impl Lenslets {
                     element,
                     z,
                     #[inline(always)]
-                    |ray| self.at_face(form, ray, clip, (one, at_end)),
+                    |ray| self.at_face(form, ray, clip, one, at_end),
                 ),
                 ([one], Gaps::Clear) if is_sphere(one) => each_lane(
                     block,
@@ -130,10 +130,10 @@ impl Lenslets {
                     #[inline(always)]
                     |ray| {
                         let gap = |_, _| flat.at_plane(ray, f64::INFINITY);
-                        self.at_face(form, ray, clip, (one, gap))
+                        self.at_face(form, ray, clip, one, gap)
                     },
                 ),
-                _ => each_lane(block, element, z, |ray| Refracted {
+                _ => each_lane(block, element, z, |ray| RefractedRay {
                     hit: false,
                     ..flat.at_plane(ray, f64::INFINITY)
                 }),
@@ -168,7 +168,7 @@ impl Lenslets {
         ray: Ray,
         clip: Clip,
         power: impl Fn([f64; 2]) -> f64,
-    ) -> Refracted {
+    ) -> RefractedRay {
         let (there, t) = to_plane(ray);
         let [x, y, _] = there.position;
         let place = self.place(form, [x, y], clip);
@@ -179,7 +179,7 @@ impl Lenslets {
         let scale = if power == 0.0 { 1.0 } else { 1.0 / length };
         let direction = [u * scale, v * scale, w * scale];
         let hit = goes_there(t) & (length < f64::INFINITY);
-        Refracted { ray: Ray { direction, ..there }, t, hit, clear: place.clear, through: true }
+        RefractedRay { ray: Ray { direction, ..there }, t, hit, clear: place.clear, through: true }
     }
 
     /// A ray at the face of the cell in which it crosses the plane; no hit where the face may be met in
@@ -190,8 +190,9 @@ impl Lenslets {
         form: (Grid, LensletShape),
         ray: Ray,
         clip: Clip,
-        (face, gap): (&Refraction, impl Fn(Ray, f64) -> Refracted),
-    ) -> Refracted {
+        face: &Refraction,
+        gap: impl Fn(Ray, f64) -> RefractedRay,
+    ) -> RefractedRay {
         let (there, t) = to_plane(ray);
         let [x, y, _] = there.position;
         let place = self.place(form, [x, y], clip);
@@ -203,13 +204,13 @@ impl Lenslets {
             crossing.ray.position[0],
             crossing.ray.position[1],
         );
-        let crossing = Refracted { hit: crossing.hit & same, ..moved(crossing, centre) };
+        let crossing = RefractedRay { hit: crossing.hit & same, ..moved(crossing, centre) };
         let on_face = place.open & place.clear;
-        Refracted { clear: place.clear, ..if on_face { crossing } else { gap(there, t) } }
+        RefractedRay { clear: place.clear, ..if on_face { crossing } else { gap(there, t) } }
     }
 
     /// A ray in the array's frame, exactly by the rule, and the type of lenslet that it meets.
-    pub(crate) fn exactly(&self, ray: Ray, clip: Clip) -> (Refracted, Option<usize>) {
+    pub(crate) fn exactly(&self, ray: Ray, clip: Clip) -> (RefractedRay, Option<usize>) {
         let form = (self.array.lattice.grid, self.array.shape);
         let (there, _) = to_plane(ray);
         let [x, y, _] = there.position;
@@ -221,7 +222,7 @@ impl Lenslets {
                 (self.at_thin(form, ray, clip, |index| powers[self.array.type_at(index)]), acting)
             }
             LensletOptics::Faces { flat, .. } if !(place.open && place.clear) => {
-                (Refracted { clear: place.clear, ..flat.at_plane(ray, f64::INFINITY) }, acting)
+                (RefractedRay { clear: place.clear, ..flat.at_plane(ray, f64::INFINITY) }, acting)
             }
             LensletOptics::Faces { faces, .. } => {
                 let centre = [x - place.away[0], y - place.away[1]];
@@ -237,26 +238,26 @@ impl Lenslets {
         ray: Ray,
         mut index: [f64; 2],
         mut centre: [f64; 2],
-    ) -> Refracted {
+    ) -> RefractedRay {
         let array = &*self.array;
         let mut last = None;
         for _ in 0..MOST_CELLS {
             let face = &faces[array.type_at(index)];
             let local = moved(ray, [-centre[0], -centre[1]]);
-            let met = moved(face.exactly(local, f64::INFINITY), centre);
-            if !met.hit {
-                return Refracted { clear: true, ..met };
+            let crossing = moved(face.exactly(local, f64::INFINITY), centre);
+            if !crossing.hit {
+                return RefractedRay { clear: true, ..crossing };
             }
-            let [x, y, _] = met.ray.position;
+            let [x, y, _] = crossing.ray.position;
             let found = array.lattice.cell(x, y).index;
             if found == index {
-                return Refracted { clear: true, ..met };
+                return RefractedRay { clear: true, ..crossing };
             }
-            (last, index, centre) = (Some(met), found, array.lattice.centre(found));
+            (last, index, centre) = (Some(crossing), found, array.lattice.centre(found));
         }
         // It runs into a wall between two faces.
-        let blocked = Refracted { ray, t: 0.0, hit: true, clear: false, through: true };
-        last.map_or(blocked, |met| Refracted { clear: false, ..met })
+        let blocked = RefractedRay { ray, t: 0.0, hit: true, clear: false, through: true };
+        last.map_or(blocked, |crossing| RefractedRay { clear: false, ..crossing })
     }
 }
 
@@ -271,8 +272,8 @@ fn is_sphere(face: &Refraction) -> bool {
 
 /// A ray that ends in the array's plane.
 #[inline(always)]
-fn at_end(there: Ray, t: f64) -> Refracted {
-    Refracted { ray: there, t, hit: goes_there(t), clear: false, through: true }
+fn at_end(there: Ray, t: f64) -> RefractedRay {
+    RefractedRay { ray: there, t, hit: goes_there(t), clear: false, through: true }
 }
 
 #[inline(always)]
@@ -297,7 +298,7 @@ impl Across for Ray {
     }
 }
 
-impl Across for Refracted {
+impl Across for RefractedRay {
     #[inline(always)]
     fn across(self, by: [f64; 2]) -> Self {
         Self { ray: self.ray.across(by), ..self }

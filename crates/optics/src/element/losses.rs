@@ -29,11 +29,11 @@ use etendue_spectrum::Curve;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LossesSpec {
-    /// What the surfaces between glass and air reflect: `uncoated`, or a coating. Cemented surfaces
+    /// Reflection of the surfaces between glass and air: `uncoated`, or a coating. Cemented surfaces
     /// are always uncoated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reflection: Option<Reflection>,
-    /// Whether glasses absorb, where the catalogue knows how much.
+    /// True if glasses absorb, where the catalogue knows how much.
     #[serde(skip_serializing_if = "is_false")]
     pub absorption: bool,
 }
@@ -43,7 +43,7 @@ fn is_false(value: &bool) -> bool {
     !value
 }
 
-/// How surfaces between glass and air reflect.
+/// Reflection of surfaces between glass and air.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Reflection {

@@ -28,13 +28,13 @@ pub struct MicrolensArraySpec {
     pub size: [Millimetres; 2],
     /// From a lenslet's centre to its next neighbour's (mm).
     pub pitch: Millimetres,
-    /// How lenslets are packed: square when absent.
+    /// Packing of the lenslets: square when absent.
     #[serde(default)]
     pub grid: Grid,
-    /// How far the rows are turned about the axis from +x towards +y (degrees).
+    /// Turn of the rows about the axis from +x towards +y (degrees).
     #[serde(default)]
     pub rotation: Degrees,
-    /// Where the centre of lenslet (0, 0) is (mm); in the middle of the array when absent.
+    /// Centre of lenslet (0, 0) (mm); in the middle of the array when absent.
     #[serde(default)]
     pub offset: [Millimetres; 2],
     /// The shape of a lenslet's opening: that of a cell when absent.
@@ -43,7 +43,7 @@ pub struct MicrolensArraySpec {
     /// The width of a lenslet's opening from flat to flat, or its diameter, as a share of the pitch.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub fill: f64,
-    /// What is between openings: opaque when absent.
+    /// Gaps between openings: opaque when absent.
     #[serde(default)]
     pub gaps: Gaps,
     /// The focal length of thin lenslets (mm), negative for diverging ones.
@@ -56,7 +56,7 @@ pub struct MicrolensArraySpec {
     /// The conic constant of a face: 0 a sphere.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub conic: f64,
-    /// What follows a face, on the sensor's side; air when absent.
+    /// Medium behind a face, on the sensor's side; air when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub glass: Option<GlassSpec>,
     /// A filter on each lenslet: the share of light that passes (0..=1) by wavelength.
@@ -65,13 +65,13 @@ pub struct MicrolensArraySpec {
     /// Lenslets of several types: what differs of each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub types: Vec<LensletSpec>,
-    /// Which type stands where: rows of numbers of `types`, repeated over the grid from lenslet (0, 0)
+    /// Types by place: rows of numbers of `types`, repeated over the grid from lenslet (0, 0)
     /// on. When absent the type of lenslet (i, j) is i − j modulo their number, which no neighbour has.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pattern: Vec<Vec<u32>>,
 }
 
-/// What is a lenslet type's own; the array's when absent.
+/// Values of a type of lenslets; the array's when absent.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LensletSpec {
@@ -98,7 +98,7 @@ pub enum LensletShape {
     Round,
 }
 
-/// What is between the openings of lenslets.
+/// Gaps between the openings of lenslets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Gaps {
@@ -306,7 +306,7 @@ impl MicrolensArraySpec {
     fn check_pattern(&self) -> Result<(), String> {
         let columns = self.pattern.first().map_or(0, Vec::len);
         if !self.pattern.is_empty() && (columns == 0 || self.types.is_empty()) {
-            return Err("pattern has rows of numbers of types; give both".to_owned());
+            return Err("pattern has rows of numbers of types\nhint: give both".to_owned());
         }
         for (j, row) in self.pattern.iter().enumerate() {
             if row.len() != columns {

@@ -54,7 +54,7 @@ pub struct MirrorSpec {
     /// Coefficients of the even asphere by their power of r, `{"4": 1e-6}` (mm to 1 − power).
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub aspheric: BTreeMap<String, f64>,
-    /// Whether the axis is folded by the mirror's tilt, as that of a fold mirror: what is behind stands on the axis
+    /// True if the axis is folded by the mirror's tilt, as that of a fold mirror: what is behind stands on the axis
     /// as the tilted vertex reflects it. Otherwise the tilt is one of the mirror alone.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub fold: bool,
@@ -90,7 +90,7 @@ pub struct MirrorMount {
 }
 
 impl MirrorMount {
-    /// From what a file has.
+    /// Builds it from what a file has.
     ///
     /// # Errors
     ///

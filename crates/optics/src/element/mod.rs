@@ -6,6 +6,7 @@
 //!
 //! What a lens takes from outside its own text.
 
+mod abcd;
 pub(crate) mod aperture;
 mod biconic;
 mod coating;
@@ -41,6 +42,7 @@ use serde_json::{Map, Value};
 use crate::glass::AgfCatalogue;
 use etendue_geometry::units::{Degrees, Millimetres};
 
+pub use abcd::Abcd;
 pub use aperture::{
     ApertureSpec, CircularSpec, MaskSpec, Opening, Picture, PolygonSpec, grey_picture,
 };
@@ -71,15 +73,15 @@ pub use thin_lens::{ThinLens, ThinLensSpec};
 /// An element of a lens file: a part, and how it is mounted.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ElementSpec {
-    /// What it is.
+    /// Its kind.
     #[serde(flatten)]
     pub part: PartSpec,
-    /// How it is mounted.
+    /// Its mount.
     #[serde(flatten)]
     pub mount: Mount,
 }
 
-/// How an element is mounted.
+/// Mount of an element.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mount {
@@ -87,7 +89,7 @@ pub struct Mount {
     /// to the sensor.
     #[serde(skip_serializing_if = "is_default")]
     pub thickness: Millimetres,
-    /// Whether this is the aperture stop, which chief rays pass in the middle.
+    /// True if this is the aperture stop, which chief rays pass in the middle.
     #[serde(skip_serializing_if = "is_default")]
     pub stop: bool,
     /// Turns about the x axis and then about the element's own y axis (degrees), right-handed,
@@ -97,7 +99,7 @@ pub struct Mount {
     /// Moved across the axis by x and y (mm). The elements behind are not moved.
     #[serde(skip_serializing_if = "is_default")]
     pub decentre: [Millimetres; 2],
-    /// How the index of the glass behind a surface changes from place to place; it is the same everywhere when absent.
+    /// Change of the index of the glass behind a surface from place to place; it is the same everywhere when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gradient: Option<GradientSpec>,
 }

@@ -6,10 +6,10 @@
 //! that Newton does not find, is looked for again by bisection of the part of the ray that runs near the
 //! surface, from its start on.
 
-use super::crossings::Slopes;
+use super::crossings::ProfileBoundary;
 use super::rays::{Block, LANES, PENDING, Ray, at_lane};
 use super::real::Real;
-use super::refract::{IndexPair, Refracted, TOUCH, each_numbered_lane};
+use super::refract::{IndexPair, RefractedRay, TOUCH, each_numbered_lane};
 
 /// The step (mm) at which the method has arrived.
 const SETTLED: f64 = 1e-10;
@@ -80,17 +80,18 @@ pub(super) trait Profile {
 }
 
 /// Takes a block through a surface at `z` (mm), as [`super::refract::each_lane`] does for conics. Rays that the
-/// method does not bring to it, and those that may cross elsewhere first by `slopes`, are left to `decide`, one by
+/// method does not bring to it, and those that may cross elsewhere first by their slopes, are left to `decide`, one by
 /// one with what the method has found.
 #[inline(always)]
 pub(super) fn cross_block<P: Profile>(
-    surface: &P,
-    (media, slopes): (IndexPair, &Slopes),
+    boundary: &ProfileBoundary<'_, P>,
     block: &mut Block,
-    (element, z): (usize, f64),
+    element: usize,
+    z: f64,
     clip2: f64,
-    decide: impl Fn(&mut Block, usize, Refracted),
+    decide: impl Fn(&mut Block, usize, RefractedRay),
 ) {
+    let &ProfileBoundary { surface, media, slopes } = boundary;
     let newton = Newton::<LANES, P>::run(
         surface,
         #[inline(always)]
@@ -113,7 +114,7 @@ pub(super) fn cross_block<P: Profile>(
         #[inline(always)]
         |lane, _| {
             let found = newton.refracted(surface, media, clip2, lane);
-            Refracted { hit: found.hit & is_first[lane], ..found }
+            RefractedRay { hit: found.hit & is_first[lane], ..found }
         },
     );
     if pending {
@@ -127,9 +128,14 @@ pub(super) fn cross_block<P: Profile>(
 
 /// A ray in the surface's frame: Newton first, then the search, wherever it crosses first.
 #[cfg(test)]
-pub(super) fn cross<P: Profile>(surface: &P, media: IndexPair, ray: Ray, clip2: f64) -> Refracted {
-    let met = cross_by_newton(surface, media, ray, clip2);
-    if met.hit { met } else { cross_by_search(surface, media, ray, clip2) }
+pub(super) fn cross<P: Profile>(
+    surface: &P,
+    media: IndexPair,
+    ray: Ray,
+    clip2: f64,
+) -> RefractedRay {
+    let found = cross_by_newton(surface, media, ray, clip2);
+    if found.hit { found } else { cross_by_search(surface, media, ray, clip2) }
 }
 
 /// A ray in the surface's frame by Newton's method alone.
@@ -139,7 +145,7 @@ pub(super) fn cross_by_newton<P: Profile>(
     media: IndexPair,
     ray: Ray,
     clip2: f64,
-) -> Refracted {
+) -> RefractedRay {
     Newton::<1, P>::run(surface, |_| (ray, true)).refracted(surface, media, clip2, 0)
 }
 
@@ -165,13 +171,13 @@ pub(super) fn cross_by_search<P: Profile>(
     media: IndexPair,
     ray: Ray,
     clip2: f64,
-) -> Refracted {
+) -> RefractedRay {
     let Some(root) = search(surface, ray, clip2) else {
-        return Refracted { ray, t: 0.0, hit: false, clear: false, through: false };
+        return RefractedRay { ray, t: 0.0, hit: false, clear: false, through: false };
     };
     let [x, y, _] = root.position;
     let (out, through) = surface.refract(media, root, surface.sag_and_slope(root).1);
-    Refracted { ray: out, t: 0.0, hit: true, clear: x * x + y * y <= clip2, through }
+    RefractedRay { ray: out, t: 0.0, hit: true, clear: x * x + y * y <= clip2, through }
 }
 
 /// Newton's method on `N` rays side by side.
@@ -253,7 +259,7 @@ impl<const N: usize, P: Profile> Newton<N, P> {
 
     /// Refracts a ray at its root; no hit where [`search`] has to look again.
     #[inline(always)]
-    fn refracted(&self, surface: &P, media: IndexPair, clip2: f64, lane: usize) -> Refracted {
+    fn refracted(&self, surface: &P, media: IndexPair, clip2: f64, lane: usize) -> RefractedRay {
         let root = self.ray(lane);
         let [x, y, _] = root.position;
         let slope = surface.slope_at(root, self.slope[lane]);
@@ -263,7 +269,7 @@ impl<const N: usize, P: Profile> Newton<N, P> {
             & surface.exists([x, y])
             & (surface.along(root, slope) * root.direction[2] > 0.0);
         let (ray, through) = surface.refract(media, root, slope);
-        Refracted { ray, t, hit, clear: x * x + y * y <= clip2, through }
+        RefractedRay { ray, t, hit, clear: x * x + y * y <= clip2, through }
     }
 
     #[inline(always)]
@@ -308,13 +314,13 @@ pub(super) fn squares_along(ray: Ray, [from, to]: [f64; 2]) -> [f64; 2] {
     [least, ends[0].max(ends[1])]
 }
 
-/// From where to where the ray is both near the surface's depths and no farther from the axis than the
+/// Ends of the part of the ray that is both near the surface's depths and no farther from the axis than the
 /// surface reaches.
 fn near_surface<P: Profile>(surface: &P, ray: Ray, clip2: f64) -> Option<[f64; 2]> {
     let Ray { position: [x, y, z], direction: [u, v, w] } = ray;
     let foot = ray.advanced(-(x * u + y * v + z * w));
     let clear = if clip2.is_finite() { 2.0 * clip2.sqrt() } else { f64::INFINITY };
-    let reach = reach_around(surface, foot, clear);
+    let reach = search_radius(surface, foot, clear);
     let across = interval(u * u + v * v, x * u + y * v, x * x + y * y - reach * reach)?;
     let [low, high] = surface.sag_range(reach);
     let slack = 0.1 * (high - low) + 1e-6;
@@ -328,7 +334,7 @@ fn near_surface<P: Profile>(surface: &P, ray: Ray, clip2: f64) -> Option<[f64; 2
 
 /// Distance from the axis up to which a ray's crossing is looked for, at most `limit` (mm); `foot`
 /// is where the ray is next to the vertex.
-pub(super) fn reach_around<P: Profile>(surface: &P, foot: Ray, limit: f64) -> f64 {
+pub(super) fn search_radius<P: Profile>(surface: &P, foot: Ray, limit: f64) -> f64 {
     let height = foot.position[0].hypot(foot.position[1]);
     let [end, own] = surface.extent();
     end.min(limit).min(4.0 * height + own)

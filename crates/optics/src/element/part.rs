@@ -79,7 +79,7 @@ pub enum Symbol {
         /// 1 when they point outwards, −1 inwards.
         converging: f64,
     },
-    /// By what is beside the opening.
+    /// By the walls of its opening.
     Opening,
     /// By two lines.
     Sheet,

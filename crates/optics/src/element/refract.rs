@@ -19,7 +19,7 @@
 //! direction is made a unit vector again. Equal indices leave every direction as it is, to the last
 //! bit.
 
-use super::crossings::Slopes;
+use super::crossings::{ProfileBoundary, Slopes};
 use super::rays::{Block, LANES, PENDING, Ray, RayStatus};
 use super::real::Real;
 use super::surface::Surface;
@@ -32,7 +32,7 @@ pub(crate) const TOUCH: f64 = 1e-9;
 pub(crate) struct Refraction {
     pub(crate) surface: Surface,
     pub(crate) media: IndexPair,
-    /// What tells which rays cross an asphere but once.
+    /// Bounds of slopes, by which rays are known to cross an asphere but once.
     pub(super) slopes: Slopes,
 }
 
@@ -47,7 +47,7 @@ pub(crate) struct IndexPair {
 
 /// Outcome of a ray at a surface.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Refracted<T = f64> {
+pub(crate) struct RefractedRay<T = f64> {
     /// Ray that goes on from the point where it meets the surface.
     pub(crate) ray: Ray<T>,
     /// Distance travelled (mm).
@@ -136,16 +136,22 @@ impl Refraction {
         Self { media: IndexPair::MIRROR, ..Self::new(surface, 1.0, 1.0) }
     }
 
+    /// The boundary that it is to rays that may cross its surface more than once.
+    #[inline(always)]
+    pub(super) fn boundary(&self) -> ProfileBoundary<'_, Surface> {
+        ProfileBoundary { surface: &self.surface, media: self.media, slopes: &self.slopes }
+    }
+
     /// A ray in the surface's frame at a plane.
     #[inline(always)]
-    pub(crate) fn at_plane<T: Real>(&self, ray: Ray<T>, clip2: f64) -> Refracted<T> {
+    pub(crate) fn at_plane<T: Real>(&self, ray: Ray<T>, clip2: f64) -> RefractedRay<T> {
         let w = ray.direction[2];
         let t = -ray.position[2] / w;
         let mut there = ray.advanced(t);
         let (zero, one) = (T::constant(0.0), T::constant(1.0));
         there.position[2] = zero;
         let (out, through) = self.media.refract(there, [zero, zero, one], one, w * w, w);
-        Refracted { ray: out, t, hit: is_ahead(t), clear: is_within(there, clip2), through }
+        RefractedRay { ray: out, t, hit: is_ahead(t), clear: is_within(there, clip2), through }
     }
 
     /// A ray in the surface's frame at a conic; with `SPHERE` the conic constant is taken to be 0.
@@ -155,7 +161,7 @@ impl Refraction {
         ray: Ray<T>,
         clip2: f64,
         which: Root,
-    ) -> Refracted<T> {
+    ) -> RefractedRay<T> {
         let crossing = meet_conic::<SPHERE, T>(&self.surface, ray, which);
         let [x, y, z] = crossing.ray.position;
         let (c, k) = (self.surface.curvature, self.surface.conic);
@@ -169,11 +175,11 @@ impl Refraction {
         let out = out.unit();
         // A ray that misses has a NaN for a root, which is not greater than anything.
         let hit = is_ahead(crossing.t) & (m[2].value() >= 0.0);
-        Refracted { ray: out, t: crossing.t, hit, clear: r2.value() <= clip2, through }
+        RefractedRay { ray: out, t: crossing.t, hit, clear: r2.value() <= clip2, through }
     }
 
     /// A ray in the frame of any surface but an asphere, exactly by the rule.
-    pub(crate) fn exactly<T: Real>(&self, ray: Ray<T>, clip2: f64) -> Refracted<T> {
+    pub(crate) fn exactly<T: Real>(&self, ray: Ray<T>, clip2: f64) -> RefractedRay<T> {
         if self.surface.is_plane() {
             self.at_plane(ray, clip2)
         } else if self.surface.conic == 0.0 {
@@ -184,7 +190,7 @@ impl Refraction {
     }
 
     #[inline(always)]
-    fn at_nearest<const SPHERE: bool, T: Real>(&self, ray: Ray<T>, clip2: f64) -> Refracted<T> {
+    fn at_nearest<const SPHERE: bool, T: Real>(&self, ray: Ray<T>, clip2: f64) -> RefractedRay<T> {
         let near = self.at_near_root::<SPHERE, T>(ray, clip2);
         if near.hit {
             return near;
@@ -201,10 +207,10 @@ impl Refraction {
         &self,
         ray: Ray<T>,
         clip2: f64,
-    ) -> Refracted<T> {
+    ) -> RefractedRay<T> {
         let crossing = self.at_conic::<SPHERE, T>(ray, clip2, Root::Near);
         let clear = rival_is_elsewhere::<SPHERE, T>(&self.surface, ray);
-        Refracted { hit: crossing.hit & clear, ..crossing }
+        RefractedRay { hit: crossing.hit & clear, ..crossing }
     }
 }
 
@@ -296,7 +302,7 @@ pub(crate) fn each_lane(
     block: &mut Block,
     element: usize,
     z: f64,
-    cross: impl Fn(Ray) -> Refracted,
+    cross: impl Fn(Ray) -> RefractedRay,
 ) -> bool {
     each_numbered_lane(
         block,
@@ -313,7 +319,7 @@ pub(crate) fn each_numbered_lane(
     block: &mut Block,
     element: usize,
     z: f64,
-    cross: impl Fn(usize, Ray) -> Refracted,
+    cross: impl Fn(usize, Ray) -> RefractedRay,
 ) -> bool {
     let vignetted = RayStatus::Vignetted { element }.code();
     let mut pending = 0;

@@ -20,7 +20,7 @@ pub struct BoxSpec {
     /// Turned about the axis from +x towards +y (degrees).
     #[serde(default, skip_serializing_if = "super::is_default")]
     pub rotation: Degrees,
-    /// Whether it is in the way: opaque inside, and open all around.
+    /// True if it is in the way: opaque inside, and open all around.
     #[serde(default, skip_serializing_if = "super::is_default")]
     pub obscures: bool,
 }
@@ -32,7 +32,7 @@ pub struct OutlineSpec {
     /// `[x, y]` of the corners in their order (mm), 3 to 1024; the last is joined to the first. Where the outline
     /// crosses itself, places are inside that a line from afar reaches by an odd number of crossings.
     pub corners: Vec<[Millimetres; 2]>,
-    /// Whether it is in the way: opaque inside, and open all around.
+    /// True if it is in the way: opaque inside, and open all around.
     #[serde(default, skip_serializing_if = "super::is_default")]
     pub obscures: bool,
 }
@@ -79,8 +79,8 @@ pub struct Shape {
     kind: ShapeKind,
     /// Cosine and sine of how far it is turned.
     turn: [f64; 2],
-    /// Of what is in the way: the radius of the opening around it (mm), infinite when unlimited.
-    around: Option<f64>,
+    /// Radius of the opening outside of what is in the way (mm), infinite when unlimited.
+    outer: Option<f64>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -124,11 +124,7 @@ impl BoxSpec {
         if !self.rotation.0.is_finite() {
             return Err("rotation must be finite".to_owned());
         }
-        Ok(Shape {
-            kind,
-            turn: turn(self.rotation),
-            around: self.obscures.then_some(f64::INFINITY),
-        })
+        Ok(Shape { kind, turn: turn(self.rotation), outer: self.obscures.then_some(f64::INFINITY) })
     }
 }
 
@@ -146,7 +142,7 @@ impl OutlineSpec {
         }
         let kind = ShapeKind::Outline(corners);
         length("the distance of the farthest of corners", kind.radius())?;
-        Ok(Shape { kind, turn: [1.0, 0.0], around: self.obscures.then_some(f64::INFINITY) })
+        Ok(Shape { kind, turn: [1.0, 0.0], outer: self.obscures.then_some(f64::INFINITY) })
     }
 }
 
@@ -167,7 +163,7 @@ impl AnnularSpec {
     pub(super) fn build(&self) -> Result<Shape, String> {
         let [inner, outer] = ring(self.inner_radius.0, self.radius)?;
         let kind = ShapeKind::Ring { inner, outer, arms: Vec::new(), half_width: 0.0 };
-        Ok(Shape { kind, turn: [1.0, 0.0], around: None })
+        Ok(Shape { kind, turn: [1.0, 0.0], outer: None })
     }
 }
 
@@ -187,7 +183,7 @@ impl SpiderSpec {
         Ok(Shape {
             kind: ShapeKind::Ring { inner, outer, arms, half_width },
             turn: turn(self.rotation),
-            around: None,
+            outer: None,
         })
     }
 }
@@ -239,24 +235,24 @@ impl Shape {
     pub fn is_open(&self, x: f64, y: f64) -> bool {
         let [c, s] = self.turn;
         let (along, across) = (c * x + s * y, c * y - s * x);
-        match self.around {
+        match self.outer {
             None => self.kind.holds(along, across),
-            Some(around) => !self.kind.holds(along, across) && x * x + y * y <= around * around,
+            Some(outer) => !self.kind.holds(along, across) && x * x + y * y <= outer * outer,
         }
     }
 
     /// The radius of the circle around what is open (mm).
     #[must_use]
     pub fn radius(&self) -> f64 {
-        self.around.unwrap_or_else(|| self.kind.radius())
+        self.outer.unwrap_or_else(|| self.kind.radius())
     }
 
     /// Returns the shape scaled so that `radius` (mm) is that of the circle around it. A ring whose
     /// opening is not limited keeps its disk, and so does what is in the way.
     #[must_use]
     pub fn with_radius(&self, radius: f64) -> Self {
-        if self.around.is_some() {
-            return Self { around: Some(radius), ..self.clone() };
+        if self.outer.is_some() {
+            return Self { outer: Some(radius), ..self.clone() };
         }
         let scale = radius / self.radius();
         let kind = match &self.kind {
@@ -275,7 +271,7 @@ impl Shape {
                 }
             }
         };
-        Self { kind, turn: self.turn, around: None }
+        Self { kind, turn: self.turn, outer: None }
     }
 
     /// True if a turn about the axis changes nothing.
@@ -287,22 +283,22 @@ impl Shape {
     /// True if something blocks the middle of the opening.
     #[must_use]
     pub fn is_obscured(&self) -> bool {
-        self.around.is_some() || matches!(&self.kind, ShapeKind::Ring { inner, .. } if *inner > 0.0)
+        self.outer.is_some() || matches!(&self.kind, ShapeKind::Ring { inner, .. } if *inner > 0.0)
     }
 
     /// The radius up to which light passes around what is in the way (mm), infinite when unlimited; `None` where nothing
     /// is in the way.
     #[must_use]
-    pub fn radius_around(&self) -> Option<f64> {
+    pub fn outer_radius(&self) -> Option<f64> {
         match self.kind {
             ShapeKind::Ring { outer, .. } => Some(outer),
-            ShapeKind::Rectangle(_) | ShapeKind::Ellipse(_) | ShapeKind::Outline(_) => self.around,
+            ShapeKind::Rectangle(_) | ShapeKind::Ellipse(_) | ShapeKind::Outline(_) => self.outer,
         }
     }
 
     /// Words on it.
     pub(super) fn words(&self) -> String {
-        let prefix = if self.around.is_some() { "around a " } else { "" };
+        let prefix = if self.outer.is_some() { "around a " } else { "" };
         match &self.kind {
             ShapeKind::Rectangle([a, b]) => {
                 format!("{prefix}rectangle of {} x {} mm", 2.0 * a, 2.0 * b)

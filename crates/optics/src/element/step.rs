@@ -12,15 +12,15 @@ use super::Frame;
 use super::aperture::{Opening, in_circle, in_polygon};
 use super::biconic::Biconic;
 use super::coordinate_break::CoordinateBreak;
-use super::crossings::{Slopes, cross_first, cross_first_after};
+use super::crossings::{ProfileBoundary, Slopes, cross_first, cross_first_after};
 use super::freeform::FreeformSurface;
-use super::gradient::step::Graded;
+use super::gradient::step::GradientPair;
 use super::lenslets::Lenslets;
 use super::losses::{Filter, Loss};
 use super::mirror::{Fold, Shadow};
 use super::newton::{Profile, cross_block};
 use super::rays::{Block, LANES, PENDING, Ray, RayStatus};
-use super::refract::{IndexPair, Refracted, Refraction, each_lane};
+use super::refract::{IndexPair, RefractedRay, Refraction, each_lane};
 use super::thin_lens::at_thin_lens;
 
 /// Clipping of rays by clear apertures.
@@ -46,7 +46,7 @@ pub(crate) struct ElementStep {
     /// Direction of the light behind a mirror.
     pub(crate) fold: Option<Fold>,
     /// Gradients before or behind it.
-    pub(crate) graded: Option<Arc<Graded>>,
+    pub(crate) graded: Option<Arc<GradientPair>>,
 }
 
 /// Action of an element on a ray.
@@ -201,13 +201,13 @@ impl ElementStep {
             }
             Action::Asphere(refraction) => {
                 let clip2 = limit(refraction.surface.semi_diameter, clip);
-                let Refraction { surface, media, slopes } = refraction;
-                self.cross_block(surface, (*media, slopes), block, z, clip2);
+                self.cross_block(&refraction.boundary(), block, z, clip2);
                 false
             }
             Action::Biconic { surface, media, slopes } => {
                 let clip2 = limit(surface.semi_diameter, clip);
-                self.cross_block(surface, (*media, slopes), block, z, clip2);
+                let boundary = ProfileBoundary { surface, media: *media, slopes };
+                self.cross_block(&boundary, block, z, clip2);
                 false
             }
             Action::ThinLens { power, semi_diameter } => {
@@ -235,7 +235,9 @@ impl ElementStep {
             }
             Action::Freeform { surface, media, efficiency } => {
                 let clip2 = limit(surface.shape.semi_diameter, clip);
-                self.cross_block(surface, (*media, &Slopes::default()), block, z, clip2);
+                let boundary =
+                    ProfileBoundary { surface, media: *media, slopes: &Slopes::default() };
+                self.cross_block(&boundary, block, z, clip2);
                 block.throughput.iter_mut().for_each(|share| *share *= efficiency);
                 false
             }
@@ -258,22 +260,14 @@ impl ElementStep {
     #[inline(always)]
     fn cross_block<P: Profile>(
         &self,
-        surface: &P,
-        (media, slopes): (IndexPair, &Slopes),
+        boundary: &ProfileBoundary<'_, P>,
         block: &mut Block,
         z: f64,
         clip2: f64,
     ) {
-        cross_block(
-            surface,
-            (media, slopes),
-            block,
-            (self.element, z),
-            clip2,
-            |block, lane, newton| {
-                self.cross_lane(surface, (media, slopes), (block, lane), (z, clip2), newton);
-            },
-        );
+        cross_block(boundary, block, self.element, z, clip2, |block, lane, newton| {
+            self.cross_lane(boundary, block, lane, z, clip2, newton);
+        });
     }
 
     /// Decides a ray of a block that Newton's method has not brought to its first crossing.
@@ -281,16 +275,17 @@ impl ElementStep {
     #[inline(never)]
     fn cross_lane<P: Profile>(
         &self,
-        surface: &P,
-        (media, slopes): (IndexPair, &Slopes),
-        (block, lane): (&mut Block, usize),
-        (z, clip2): (f64, f64),
-        newton: Refracted,
+        boundary: &ProfileBoundary<'_, P>,
+        block: &mut Block,
+        lane: usize,
+        z: f64,
+        clip2: f64,
+        newton: RefractedRay,
     ) {
         let ray = block.ray(lane);
         let mut local = ray;
         local.position[2] -= z;
-        let crossing = cross_first_after(surface, (media, slopes), local, clip2, newton);
+        let crossing = cross_first_after(boundary, local, clip2, newton);
         let traversal = self.settle(ray, self.crossed(crossing).raised(z));
         self.set_lane(block, lane, traversal);
     }
@@ -344,10 +339,11 @@ impl ElementStep {
             let Ray { position, direction } = block.ray(lane);
             let t = (z - position[2]) / direction[2];
             let passes = open(position[0] + t * direction[0], position[1] + t * direction[1]);
-            let met = t.abs() < f64::INFINITY;
-            let ended = if met { vignetted } else { missed };
+            let reaches = t.abs() < f64::INFINITY;
+            let ended = if reaches { vignetted } else { missed };
             let outcome = block.outcome[lane];
-            block.outcome[lane] = if (outcome == 0) & !(passes & met) { ended } else { outcome };
+            block.outcome[lane] =
+                if (outcome == 0) & !(passes & reaches) { ended } else { outcome };
         }
     }
 
@@ -446,12 +442,12 @@ impl ElementStep {
             }
             Action::Asphere(refraction) => {
                 let clip2 = limit(refraction.surface.semi_diameter, clip);
-                let Refraction { surface, media, slopes } = refraction;
-                self.crossed(cross_first(surface, (*media, slopes), ray, clip2))
+                self.crossed(cross_first(&refraction.boundary(), ray, clip2))
             }
             Action::Biconic { surface, media, slopes } => {
                 let clip2 = limit(surface.semi_diameter, clip);
-                self.crossed(cross_first(surface, (*media, slopes), ray, clip2))
+                let boundary = ProfileBoundary { surface, media: *media, slopes };
+                self.crossed(cross_first(&boundary, ray, clip2))
             }
             Action::ThinLens { power, semi_diameter } => {
                 self.crossed(at_thin_lens(*power, ray, limit(*semi_diameter, clip)))
@@ -471,7 +467,9 @@ impl ElementStep {
             }
             Action::Freeform { surface, media, efficiency } => {
                 let clip2 = limit(surface.shape.semi_diameter, clip);
-                let crossing = cross_first(surface, (*media, &Slopes::default()), ray, clip2);
+                let boundary =
+                    ProfileBoundary { surface, media: *media, slopes: &Slopes::default() };
+                let crossing = cross_first(&boundary, ray, clip2);
                 Traversal { transmission: *efficiency, ..self.crossed(crossing) }
             }
             Action::Turn(turn) => turn.renewed_one(ray),
@@ -488,12 +486,12 @@ impl ElementStep {
         }
     }
 
-    fn crossed(&self, crossing: Refracted) -> Traversal {
+    fn crossed(&self, crossing: RefractedRay) -> Traversal {
         let element = self.element;
         let status = match crossing {
-            Refracted { hit: false, .. } => RayStatus::Missed { element },
-            Refracted { clear: false, .. } => RayStatus::Vignetted { element },
-            Refracted { through: false, .. } => RayStatus::TotalInternalReflection { element },
+            RefractedRay { hit: false, .. } => RayStatus::Missed { element },
+            RefractedRay { clear: false, .. } => RayStatus::Vignetted { element },
+            RefractedRay { through: false, .. } => RayStatus::TotalInternalReflection { element },
             _ => RayStatus::Exited,
         };
         let point = crossing.hit.then_some(crossing.ray.position);

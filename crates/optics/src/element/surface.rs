@@ -33,7 +33,7 @@ pub struct SurfaceSpec {
     /// 1/radius (1/mm), instead of the radius; 0 is flat.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub curvature: Option<f64>,
-    /// What follows the surface, on the sensor's side; air when absent.
+    /// Medium behind the surface, on the sensor's side; air when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub glass: Option<GlassSpec>,
     /// Half the clear diameter (mm): rays farther from the axis are stopped. Unlimited when absent.

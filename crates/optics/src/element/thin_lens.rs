@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::rays::Ray;
 use super::real::Real;
-use super::refract::{Refracted, is_ahead, is_within};
+use super::refract::{RefractedRay, is_ahead, is_within};
 use super::surface::{LARGEST_CURVATURE, SMALLEST_RADIUS, checked_semi_diameter};
 
 /// A thin lens as a lens file writes it.
@@ -55,7 +55,7 @@ impl ThinLensSpec {
 
 /// Light from the object meets `power`, light traced from the sensor `−power`.
 #[inline(always)]
-pub(crate) fn at_thin_lens<T: Real>(power: f64, ray: Ray<T>, clip2: f64) -> Refracted<T> {
+pub(crate) fn at_thin_lens<T: Real>(power: f64, ray: Ray<T>, clip2: f64) -> RefractedRay<T> {
     let w = ray.direction[2];
     let t = -ray.position[2] / w;
     let mut there = ray.advanced(t);
@@ -68,7 +68,7 @@ pub(crate) fn at_thin_lens<T: Real>(power: f64, ray: Ray<T>, clip2: f64) -> Refr
     let scale = if power == 0.0 { one } else { one / length };
     there.direction = [u * scale, v * scale, w * scale];
     let hit = is_ahead(t) & (length.value() < f64::INFINITY);
-    Refracted { ray: there, t, hit, clear: is_within(there, clip2), through: true }
+    RefractedRay { ray: there, t, hit, clear: is_within(there, clip2), through: true }
 }
 
 #[cfg(test)]

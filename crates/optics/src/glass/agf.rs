@@ -11,27 +11,13 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use etendue_report::Refusal;
+
 use super::dispersion::Dispersion;
 use super::{Glass, extinction_of};
 
 /// The longest catalogue that is read (bytes); the longest of a maker has a fifth of a megabyte.
 const LONGEST: u64 = 64 << 20;
-
-/// Error of a file that cannot be read as a glass catalogue.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum AgfError {
-    /// It cannot be read at all.
-    #[error("{0}")]
-    File(String),
-    /// One of its lines makes no sense.
-    #[error("line {line}: {why}")]
-    Line {
-        /// Line number, from 1.
-        line: usize,
-        /// Description of the error.
-        why: String,
-    },
-}
 
 /// The glasses of one AGF file.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -47,9 +33,9 @@ impl AgfCatalogue {
     /// # Errors
     ///
     /// When it is no regular file, is longer than 64 MiB, or is no catalogue.
-    pub fn open(path: &Path) -> Result<Self, AgfError> {
+    pub fn open(path: &Path) -> Result<Self, Refusal> {
         let bytes = etendue_files::read(path, LONGEST)
-            .map_err(|error| AgfError::File(format!("cannot be read: {error}")))?;
+            .map_err(|error| Refusal::new(format!("cannot be read: {error}")))?;
         let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
         Self::read(&stem.unwrap_or_default(), &bytes)
     }
@@ -59,14 +45,14 @@ impl AgfCatalogue {
     /// # Errors
     ///
     /// When it has no glass, or a line of one makes no sense; the error names the line.
-    pub fn read(name: &str, bytes: &[u8]) -> Result<Self, AgfError> {
+    pub fn read(name: &str, bytes: &[u8]) -> Result<Self, Refusal> {
         let text = decode(bytes);
         let mut catalogue = Self { name: name.to_owned(), glasses: BTreeMap::new() };
         let mut entry: Option<AgfEntry<'_>> = None;
         for (number, line) in (1..).zip(text.lines()) {
             let mut words = line.split_whitespace();
             let command = words.next().unwrap_or_default();
-            let fault = |why: &str| AgfError::Line { line: number, why: why.to_owned() };
+            let fault = |why: &str| Refusal::new(why).at(format_args!("line {number}"));
             // An entry begins with NM and ends before the next one; other lines are about it.
             match (command, &mut entry) {
                 ("NM", previous) => {
@@ -94,7 +80,7 @@ impl AgfCatalogue {
         }
         if catalogue.glasses.is_empty() {
             let why = "has no glass (a line that begins with NM): not an AGF catalogue";
-            return Err(AgfError::File(why.to_owned()));
+            return Err(why.into());
         }
         Ok(catalogue)
     }
@@ -110,8 +96,8 @@ impl AgfCatalogue {
         self.glasses.keys().map(String::as_str)
     }
 
-    fn add(&mut self, entry: &AgfEntry<'_>) -> Result<(), AgfError> {
-        let fault = |why: String| AgfError::Line { line: entry.line, why };
+    fn add(&mut self, entry: &AgfEntry<'_>) -> Result<(), Refusal> {
+        let fault = |why: String| Refusal::new(why).at(format_args!("line {}", entry.line));
         let dispersion = formula(entry.formula, &entry.coefficients).ok_or_else(|| {
             fault(format!("{} has too few coefficients for formula {}", entry.name, entry.formula))
         })?;

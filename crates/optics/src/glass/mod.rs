@@ -9,12 +9,13 @@ mod dispersion;
 use std::borrow::Cow;
 use std::fmt;
 
+use etendue_report::Refusal;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-pub use agf::{AgfCatalogue, AgfError};
+pub use agf::AgfCatalogue;
 pub use catalogue::{Entry, Makers, catalogue};
 pub use dispersion::{Dispersion, FRAUNHOFER_C, FRAUNHOFER_D, FRAUNHOFER_F};
 
@@ -55,6 +56,12 @@ pub enum GlassError {
         /// The entry's first column.
         name: String,
     },
+}
+
+impl From<GlassError> for Refusal {
+    fn from(error: GlassError) -> Self {
+        Self::of(&error)
+    }
 }
 
 /// A glass as a lens file writes it.

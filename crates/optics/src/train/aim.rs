@@ -122,7 +122,8 @@ pub(crate) fn slopes_to(
     train: &OpticalTrain,
     at: &MonochromaticTrain,
     film: DVec3,
-    (element, place): (usize, DVec2),
+    element: usize,
+    place: DVec2,
     start: Option<DVec2>,
 ) -> Option<DVec2> {
     let miss = |film: DVec3, place: DVec2| {
@@ -145,7 +146,8 @@ pub(crate) fn slopes_to(
 pub(crate) fn slopes_near(
     at: &MonochromaticTrain,
     film: DVec3,
-    (element, place): (usize, DVec2),
+    element: usize,
+    place: DVec2,
     start: DVec2,
 ) -> Option<DVec2> {
     let miss = |slopes: DVec2| {

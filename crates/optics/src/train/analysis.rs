@@ -22,7 +22,7 @@ use crate::train::aim::towards_lens;
 use crate::train::pupil::SlopeWindow;
 use crate::train::{FieldSpec, MonochromaticTrain, OpticalTrain, Side};
 
-/// How the image of one wavelength stands to that of the design wavelength.
+/// Shift of the image of one wavelength from that of the design wavelength.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ColourShift {
     /// The wavelength (nm).
@@ -313,7 +313,7 @@ pub fn half_field(
 /// Cells across the square around the entrance pupil.
 const SPOT_GRID: u32 = 32;
 
-/// Where the rays of one field point meet the reference plane.
+/// Intersections of the rays of one field point with the reference plane.
 ///
 /// Rays start on a grid of 32 × 32 cell centres in the square around the paraxial entrance pupil,
 /// of which those inside the circle count, all in the direction (0, sin field, cos field). Vignetting factors move

@@ -15,7 +15,8 @@ impl LensFile {
         &self,
         index: usize,
         broken: &CoordinateBreakSpec,
-        (z, sense): (f64, f64),
+        z: f64,
+        sense: f64,
         before: &[Element],
     ) -> Result<CoordinateBreak, String> {
         let mount = &self.elements[index].mount;

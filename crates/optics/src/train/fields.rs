@@ -19,26 +19,26 @@ const MOST_WAVELENGTHS: usize = 24;
 pub struct FieldSpec {
     /// The angle off the axis, in the plane of y and z (degrees).
     pub angle: Degrees,
-    /// What it weighs among the fields; kept for other programs, since nothing here takes a mean of fields.
+    /// Its weight among the fields; kept for other programs, since nothing here takes a mean of fields.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub weight: f64,
-    /// What vignetting leaves of its pupil, as a designer states it; all of it when absent.
+    /// Vignetting of its pupil, as a designer states it; none when absent.
     #[serde(default, skip_serializing_if = "is_default")]
     pub vignetting: VignettingSpec,
 }
 
-/// What vignetting leaves of a pupil: its unit circle is made smaller, moved, and then turned about its middle
+/// Vignetting of a pupil: its unit circle is made smaller, moved, and then turned about its middle
 /// (`OpticStudio`'s vignetting factors VDX, VDY, VCX, VCY and VAN).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct VignettingSpec {
-    /// How far it is moved by x and y (radii of the pupil).
+    /// Displacement by x and y (radii of the pupil).
     #[serde(skip_serializing_if = "is_default")]
     pub decentre: [f64; 2],
-    /// By which share it is made smaller along x and y, below 1.
+    /// Share by which it is made smaller along x and y, below 1.
     #[serde(skip_serializing_if = "is_default")]
     pub compression: [f64; 2],
-    /// How far it is turned from +x towards +y (degrees).
+    /// Turn from +x towards +y (degrees).
     #[serde(skip_serializing_if = "is_default")]
     pub rotation: Degrees,
 }

@@ -24,10 +24,10 @@ use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LensFile {
-    /// What the lens is called.
+    /// Name of the lens.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub name: String,
-    /// Where the numbers come from.
+    /// Source of the numbers.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub source: String,
     /// The parts from the object side to the sensor.
@@ -42,10 +42,10 @@ pub struct LensFile {
     /// The wavelengths that it is looked at (nm), the main one first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub wavelengths: Vec<Nanometres>,
-    /// What each of those weighs; alike when absent.
+    /// Weight of each of those; alike when absent.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub weights: Vec<f64>,
-    /// How the sensor stands: tilted for Scheimpflug's rule, decentred for shift.
+    /// Mount of the sensor: tilted for Scheimpflug's rule, decentred for shift.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensor: Option<SensorMount>,
     /// Catalogues of glasses in Zemax' AGF format, by their paths from the lens file's folder; the last
@@ -54,7 +54,7 @@ pub struct LensFile {
     pub glass_catalogs: Vec<String>,
 }
 
-/// How a sensor stands in its lens.
+/// Mount of a sensor in its lens.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SensorMount {
@@ -121,9 +121,9 @@ impl LensFile {
         let (mut z, mut sense) = (0.0, 1.0);
         for (index, spec) in self.elements.iter().enumerate() {
             let error = |why| LensError::Element { index, why };
-            let mut element = place(spec, (z, sense), resolve).map_err(error)?;
+            let mut element = place(spec, z, sense, resolve).map_err(error)?;
             if let PartSpec::CoordinateBreak(broken) = &spec.part {
-                let turn = self.axis_behind(index, broken, (z, sense), &elements).map_err(error)?;
+                let turn = self.axis_behind(index, broken, z, sense, &elements).map_err(error)?;
                 element = Element { part: Part::CoordinateBreak(turn), frame: Frame::on_axis(z) };
             }
             if element.part.mirror().is_some() {
@@ -213,11 +213,7 @@ fn check_gap(thickness: f64, sense: f64) -> Result<(), String> {
 }
 
 /// An element where `sense` is −1 if light runs against the axis there.
-fn place(
-    spec: &ElementSpec,
-    (z, sense): (f64, f64),
-    resolve: Resolve<'_>,
-) -> Result<Element, String> {
+fn place(spec: &ElementSpec, z: f64, sense: f64, resolve: Resolve<'_>) -> Result<Element, String> {
     let part = spec.part.build(resolve)?;
     let part = if sense < 0.0 { part.flipped() } else { part };
     let tilt = spec.mount.tilt.map(|angle| along(sense, angle.0));
@@ -256,7 +252,7 @@ pub(super) const WHOLE_TURN: f64 = 360.0;
 const FARTHEST: f64 = 1e15;
 
 /// The most sentences on wavelengths out of range.
-const MOST_TOLD: usize = 20;
+const MOST_NOTED: usize = 20;
 
 /// Rays as their file writes them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -264,7 +260,7 @@ const MOST_TOLD: usize = 20;
 pub struct RaysFile {
     /// The side of the lens that the rays come from.
     pub from: Side,
-    /// Whether semi-diameters, apertures and opaque filters stop rays.
+    /// True if semi-diameters, apertures and opaque filters stop rays.
     pub clip: bool,
     /// The rays.
     pub rays: Vec<GivenRay>,
@@ -274,15 +270,15 @@ pub struct RaysFile {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GivenRay {
-    /// Where it starts, in lens coordinates (mm).
+    /// Its start, in lens coordinates (mm).
     pub origin: [f64; 3],
-    /// Where it goes, of any length but 0.
+    /// Its direction, of any length but 0.
     pub direction: [f64; 3],
     /// Its wavelength in air (nm).
     pub wavelength: f64,
 }
 
-/// What became of the rays, in their order.
+/// Outcomes of rays, in their order.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TracedRays {
     /// One for each ray.
@@ -292,14 +288,14 @@ pub struct TracedRays {
     pub out_of_range: Vec<String>,
 }
 
-/// What became of one ray.
+/// Outcome of one ray.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TracedRay {
-    /// How it ended.
+    /// Its status.
     pub status: StatusName,
     /// The element at which it ended, from 0 on the object side; `null` when it exited.
     pub element: Option<usize>,
-    /// Where it met each element that it reached (mm), in the order in which it met them.
+    /// Its intersections with the elements that it reached (mm), in their order along it.
     pub points: Vec<[f64; 3]>,
     /// Its unit direction behind the last element; `null` unless it exited.
     pub direction: Option<[f64; 3]>,
@@ -351,7 +347,7 @@ impl OpticalTrain {
             let at = match known {
                 Some(at) => at,
                 None => {
-                    if wavelengths.len() < MOST_TOLD && !wavelengths.contains(&ray.wavelength) {
+                    if wavelengths.len() < MOST_NOTED && !wavelengths.contains(&ray.wavelength) {
                         wavelengths.push(ray.wavelength);
                     }
                     self.at(ray.wavelength)

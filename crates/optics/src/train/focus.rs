@@ -1,5 +1,7 @@
 //! Placement of the sensor: focusing.
 
+use etendue_report::Refusal;
+
 use super::{Element, OpticalTrain, Part, SensorMount};
 use crate::element::Frame;
 use crate::glass::GlassError;
@@ -23,64 +25,64 @@ pub enum Focus {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FocusError {
-    /// A distance that is none.
-    #[error("the {what} is {value}; it must be a positive number")]
-    NotPositive {
-        /// Name of the quantity.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-    },
     /// An afocal lens and an object at infinity.
-    #[error("the lens is afocal: it images infinity to infinity; give sensor_distance")]
+    #[error("the lens is afocal: it images infinity to infinity\nhint: give sensor_distance")]
     Afocal,
-    /// The object plane lies behind the lens' front.
-    #[error(
-        "focus_distance {distance} m lies inside the lens: its entrance pupil is {depth} mm behind \
-         the front"
-    )]
-    Inside {
-        /// The distance asked for (m).
-        distance: f64,
-        /// Depth of the entrance pupil behind the first vertex (mm).
-        depth: f64,
-    },
-    /// At the front focal point, or so near it that the image is farther than any camera.
-    #[error(
-        "an object at {distance} m is at the front focal point: its image is at infinity; the \
-         focus distance must exceed {least} m"
-    )]
-    AtFocalPoint {
-        /// The distance asked for (m).
-        distance: f64,
-        /// The distance of the front focal point (m).
-        least: f64,
-    },
-    /// Inside the focal length, or the lens diverges.
-    #[error(
-        "an object at {} has no real image behind the lens: it would be at z = {image} mm",
-        if distance.is_finite() { format!("{distance} m") } else { "infinity".to_owned() }
-    )]
-    Virtual {
-        /// The distance asked for (m); infinite for infinity.
-        distance: f64,
-        /// Position of the virtual image (mm).
-        image: f64,
-    },
-    /// The axis breaks behind the image.
-    #[error(
-        "the image is at z = {image} mm, in front of elements[{element}], a coordinate_break behind which the sensor \
-         would stand: break the axis nearer to the lens, or put the sensor where it is to be by the last thickness"
-    )]
-    Broken {
-        /// The last element.
-        element: usize,
-        /// Position of the image (mm).
-        image: f64,
-    },
-    /// A glass without index.
+    /// A distance that is none, an object without a real image behind the lens, a broken axis, or a glass without index.
     #[error(transparent)]
-    Glass(#[from] GlassError),
+    Refused(#[from] Refusal),
+}
+
+impl FocusError {
+    /// A quantity that is not above zero.
+    fn not_positive(what: &str, value: f64) -> Self {
+        Refusal::new(format!("the {what} is {value}; it must be a positive number")).into()
+    }
+
+    /// An object at `distance` (m) at the front focal point, at `least` (m), or so near it that the image is farther
+    /// than any camera.
+    pub(crate) fn at_focal_point(distance: f64, least: f64) -> Self {
+        let why = format!(
+            "an object at {distance} m is at the front focal point: its image is at infinity; the focus distance must \
+             exceed {least} m"
+        );
+        Refusal::new(why).into()
+    }
+
+    /// A virtual image at z = `image` (mm) of an object at `distance` (m; infinite for infinity): it is inside the focal
+    /// length, or the lens diverges.
+    pub(crate) fn virtual_image(distance: f64, image: f64) -> Self {
+        let place = match distance.is_finite() {
+            true => format!("{distance} m"),
+            false => "infinity".to_owned(),
+        };
+        let why = format!(
+            "an object at {place} has no real image behind the lens: it would be at z = {image} mm"
+        );
+        Refusal::new(why).into()
+    }
+
+    /// An image at z = `image` (mm) in front of `element`, the last one, which breaks the axis.
+    fn broken_axis(element: usize, image: f64) -> Self {
+        let why = format!(
+            "the image is at z = {image} mm, in front of elements[{element}], a coordinate_break behind which the \
+             sensor would stand"
+        );
+        let remedy = "break the axis nearer to the lens, or put the sensor where it is to be by the last thickness";
+        Refusal::new(why).hint(remedy).into()
+    }
+}
+
+impl From<FocusError> for Refusal {
+    fn from(error: FocusError) -> Self {
+        Self::of(&error)
+    }
+}
+
+impl From<GlassError> for FocusError {
+    fn from(error: GlassError) -> Self {
+        Self::Refused(error.into())
+    }
 }
 
 /// Images farther behind the lens than this many focal lengths are said to be at infinity.
@@ -100,14 +102,10 @@ impl OpticalTrain {
             Focus::Sensor(distance) if distance > 0.0 && distance.is_finite() => {
                 Ok(last + distance)
             }
-            Focus::Sensor(value) => {
-                Err(FocusError::NotPositive { what: "sensor_distance (mm)", value })
-            }
+            Focus::Sensor(value) => Err(FocusError::not_positive("sensor_distance (mm)", value)),
             Focus::Distance(distance) if distance == f64::INFINITY => self.image_of_infinity(),
             Focus::Distance(distance) if distance > 0.0 => self.image_of(distance),
-            Focus::Distance(value) => {
-                Err(FocusError::NotPositive { what: "focus_distance (m)", value })
-            }
+            Focus::Distance(value) => Err(FocusError::not_positive("focus_distance (m)", value)),
         }
     }
 
@@ -127,10 +125,8 @@ impl OpticalTrain {
         let lens = self.elements.iter().rposition(|element| !is_break(element));
         let is_real = lens.is_some_and(|i| image > self.elements[i].frame.vertex.z);
         match (self.elements.len(), is_real) {
-            (count, true) if lens != Some(count - 1) => {
-                FocusError::Broken { element: count - 1, image }
-            }
-            _ => FocusError::Virtual { distance, image },
+            (count, true) if lens != Some(count - 1) => FocusError::broken_axis(count - 1, image),
+            _ => FocusError::virtual_image(distance, image),
         }
     }
 
@@ -144,14 +140,17 @@ impl OpticalTrain {
         let pupil = paraxial.entrance_pupil.z.unwrap_or(0.0);
         let object = distance * 1e3 - pupil;
         if object <= 0.0 {
-            return Err(FocusError::Inside { distance, depth: pupil });
+            let why = format!(
+                "focus_distance {distance} m lies inside the lens: its entrance pupil is {pupil} mm behind the front"
+            );
+            return Err(Refusal::new(why).into());
         }
         let (height, slope) = (all.a * object + all.b * before, all.c * object + all.d * before);
         let image = -behind * height / slope;
         let reach = paraxial.efl.map_or(f64::INFINITY, |efl| FARTHEST * efl.abs());
         if !image.is_finite() || image.abs() > reach {
             let least = (pupil - paraxial.ffl.unwrap_or(0.0)) * 1e-3;
-            return Err(FocusError::AtFocalPoint { distance, least });
+            return Err(FocusError::at_focal_point(distance, least));
         }
         if image <= 0.0 {
             return Err(self.no_image(distance, self.last_vertex() + image));

@@ -13,11 +13,10 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::paraxial::Abcd;
 use super::{FocusError, OpticalTrain, Part};
-use crate::element::{Lenslet, LensletShape, MicrolensArray, Opening, Surface};
+use crate::element::{Abcd, Lenslet, LensletShape, MicrolensArray, Opening, Surface};
 
-/// From how many lenslets' distances to the sensor on what they image counts as infinitely far: then
+/// Multiple of the lenslets' distance to the sensor from which on what they image counts as infinitely far: then
 /// they stand in the picture of the lens before them.
 const UNFOCUSED: f64 = 50.0;
 
@@ -250,7 +249,7 @@ impl OpticalTrain {
         let offset = array.front_z - array.picture_z(self.end);
         let shift = image + offset - array.front_z;
         if array.front_z + shift <= array.main.last_vertex() {
-            return Err(FocusError::Virtual { distance, image: image + offset });
+            return Err(FocusError::virtual_image(distance, image + offset));
         }
         let mut train = self.clone();
         for element in &mut train.elements[array.front..] {

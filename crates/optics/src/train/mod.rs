@@ -53,8 +53,8 @@ pub use folds::Isometry;
 pub use lenslets::BehindLenslets;
 pub use opening::WidestOpening;
 pub use paraxial::{Paraxial, Pupil};
-pub use pupil::{ExitPupil, ExitPupilError, PupilSample};
-pub use report::{Inquiry, LensReport, NOTES, ReportError, remove_notes};
+pub use pupil::{ExitPupil, PupilSample};
+pub use report::{Inquiry, LensReport, NOTES, remove_notes};
 pub use trace::{MonochromaticTrain, RayPath, Registers, Side};
 pub use zemax::{LensFormat, ZemaxError, ZemaxLens};
 
@@ -70,7 +70,7 @@ pub enum LensError {
     Empty,
     /// More elements than [`MOST_ELEMENTS`].
     #[error(
-        "the lens has {0} elements, and {MOST_ELEMENTS} are the most; leave out what bends no light"
+        "the lens has {0} elements, and {MOST_ELEMENTS} are the most\nhint: leave out what bends no light"
     )]
     TooMany(usize),
     /// A part that cannot be made.
@@ -136,7 +136,7 @@ pub struct OpticalTrain {
     pub(crate) elements: Vec<Element>,
     /// One more than elements: `media[i]` is before element `i`.
     pub(crate) media: Vec<Glass>,
-    /// How the index of each of them changes from place to place.
+    /// Change of the index of each of them from place to place.
     pub(crate) gradients: Vec<Option<GradedGap>>,
     pub(crate) stop: usize,
     pub(crate) wavelength: f64,

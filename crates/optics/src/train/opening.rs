@@ -61,7 +61,7 @@ impl OpticalTrain {
         for element in &mut open.elements {
             if let Part::Aperture(opening) = &element.part
                 && let Opening::Shaped(shape) = &**opening
-                && let Some(radius) = shape.radius_around()
+                && let Some(radius) = shape.outer_radius()
             {
                 element.part = Part::Aperture(Opening::Circle { radius }.into());
             }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::OpticalTrain;
 use super::folds::Obstruction;
-use crate::element::gradient::step::{Graded, GradedMedium};
+use crate::element::gradient::step::{GradedMedium, GradientPair};
 use crate::element::{
     Action, Block, Clip, ElementStep, Fold, Frame, LensRays, Loss, Ray, RayStatus,
 };
@@ -19,14 +19,14 @@ use crate::glass::GlassError;
 /// More elements than these make a train long: the largest zoom lenses have some fifty surfaces.
 const LONG: f64 = 64.0;
 
-/// How long a ray takes from the element before to this one, in elements: a step in a graded medium looks at the index
+/// Time of a ray from the element before to this one, in elements: a step in a graded medium looks at the index
 /// thrice and at the surface, which counts as two.
 fn cost(step: &ElementStep) -> f64 {
     let graded = step.graded.as_ref().and_then(|graded| graded.media[0].as_ref());
     1.0 + graded.map_or(0.0, |medium| 2.0 * medium.steps())
 }
 
-/// Where rays come from.
+/// Side from which rays come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Side {
@@ -43,7 +43,7 @@ pub struct MonochromaticTrain {
     indices: Indices,
     forward: Vec<ElementStep>,
     backward: Vec<ElementStep>,
-    /// How long a ray takes, in elements.
+    /// Time of a ray, in elements.
     cost_of_a_ray: f64,
     /// True if rays take long to be traced through the train.
     is_costly: bool,
@@ -169,7 +169,7 @@ impl OpticalTrain {
             if media.iter().any(Option::is_some) {
                 let part = self.elements[element].part.clone();
                 let loss = step.loss.take();
-                step.graded = Some(Arc::new(Graded { media, indices: of, part, loss }));
+                step.graded = Some(Arc::new(GradientPair { media, indices: of, part, loss }));
             }
         }
     }

@@ -290,7 +290,7 @@ fn mask(folder: &tempfile::TempDir, pixels: u32, grey: impl Fn(u32, u32) -> u8) 
     image.save(folder.path().join("mask.png")).unwrap();
 }
 
-fn build_beside(folder: &tempfile::TempDir, json: &str) -> OpticalTrain {
+fn build_in(folder: &tempfile::TempDir, json: &str) -> OpticalTrain {
     let file = LensFile::from_json(json).unwrap();
     file.build(&|name: &str| Ok(folder.path().join(name))).unwrap()
 }
@@ -320,7 +320,7 @@ fn masks_are_sampled_by_what_they_pass_without_bias() {
     for (name, pixels, grey) in MASKS {
         let folder = tempfile::tempdir().unwrap();
         mask(&folder, pixels, grey);
-        let train = build_beside(
+        let train = build_in(
             &folder,
             &format!(
                 r#"{{"elements": [{{"type": "thin_lens", "focal_length": {f}}}, {{"type": "aperture",
@@ -378,7 +378,7 @@ fn masks_inside_of_a_lens_and_in_front_of_one_are_sampled_without_bias() {
         ] {
             let folder = tempfile::tempdir().unwrap();
             mask(&folder, *pixels, grey);
-            let train = build_beside(&folder, json);
+            let train = build_in(&folder, json);
             let z = train.sensor_z(Focus::Infinity).unwrap();
             let at = train.at(train.wavelength()).unwrap();
             let pupil = ExitPupil::new(&train, &[587.56], z, half).unwrap();

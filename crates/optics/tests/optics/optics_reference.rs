@@ -36,8 +36,8 @@ impl System {
 
 /// The systems, or `None` with a line on why there are none.
 fn systems() -> Option<Vec<System>> {
-    let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let assets = std::env::var_os("ETENDUE_ASSETS").map_or(beside, PathBuf::from);
+    let shared = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    let assets = std::env::var_os("ETENDUE_ASSETS").map_or(shared, PathBuf::from);
     let folder = assets.join("reference/optics");
     let Ok(entries) = std::fs::read_dir(&folder) else {
         println!("skipped: no reference data (set ETENDUE_ASSETS to the folder that holds it)");

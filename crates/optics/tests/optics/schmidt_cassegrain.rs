@@ -71,7 +71,7 @@ fn a_schmidt_cassegrain_has_its_focal_length_and_its_plate_leaves_the_fifth_orde
 }
 
 /// OpticStudio's sample as ROBAST publishes it (`scenes/lenses/spider-schmidt-cassegrain.json`): focal length and spots of
-/// optiland (`scripts/lens_rays_opinion.py`), and the picture's shift by which ROBAST's tutorial centres a field of 0.1°.
+/// optiland (`scripts/lens_opinions.py`), and the picture's shift by which ROBAST's tutorial centres a field of 0.1°.
 #[test]
 fn a_published_schmidt_cassegrain_has_the_focal_length_and_spots_of_a_second_package() {
     let train = preset("spider-schmidt-cassegrain");

@@ -1,4 +1,4 @@
-//! Rays that optiland 0.6.3 traced through its own lenses (`scripts/lens_rays_opinion.py`), through the same files here.
+//! Rays that optiland 0.6.3 traced through its own lenses (`scripts/lens_opinions.py`), through the same files here.
 
 use std::path::PathBuf;
 

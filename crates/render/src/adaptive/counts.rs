@@ -19,7 +19,7 @@ const UNIT: f64 = 1000.0;
 /// The largest variance of a pixel that is counted, as a share of what is allowed.
 const LARGEST: f64 = 1e5;
 
-/// How many samples the pixels of a picture got.
+/// Numbers of samples of the pixels of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SampleCounts {
     /// The fewest.

@@ -34,9 +34,10 @@ use rayon::prelude::*;
 
 pub use counts::SampleCounts;
 pub(crate) use guide::ChiefHit;
-pub(crate) use rule::{Rule, variance_of_mean};
+pub(crate) use rule::Rule;
 
-use crate::film::{FilmLayer, NoMemory, filled};
+use crate::film::FilmLayer;
+use crate::memory::{NoMemory, filled};
 use crate::samples::Averaging;
 use crate::shard::Shard;
 use crate::tile::TILE;

@@ -1,9 +1,10 @@
 //! Rule of when the error of a block's samples is small enough.
 
-use super::sampled::Sampled;
+use super::sampled::PixelSets;
 use crate::Plan;
 use crate::expose::NoiseOfPixels;
 use crate::stopping::Stopping;
+use crate::sum::variance_of_mean;
 use etendue_scene::Scene;
 
 /// Rule of when samples are enough.
@@ -12,11 +13,11 @@ pub(crate) struct Rule {
     pub(crate) least: u32,
     /// Standard errors of a block's variance that are added to it.
     pub(super) sigmas: f64,
-    allowed: Allowed,
+    reference: ErrorReference,
 }
 
 /// Reference of the error of samples.
-enum Allowed {
+enum ErrorReference {
     /// The noise of the sensor, of which the variance of the samples' mean may be this share.
     SensorNoise(Box<NoiseOfPixels>, f64),
     /// The light itself, of which the standard deviation may be this share.
@@ -35,28 +36,28 @@ pub(super) struct PixelNoise {
 impl Rule {
     /// The rule of a plan; `None` where the number of samples is given.
     pub(crate) fn of(scene: &Scene, plan: &Plan) -> Option<Self> {
-        let allowed = match plan.stopping {
+        let reference = match plan.stopping {
             Stopping::Count | Stopping::Time(_) => return None,
-            Stopping::RelativeError(share) => Allowed::RelativeError(share),
+            Stopping::RelativeError(share) => ErrorReference::RelativeError(share),
             Stopping::SensorNoise(share) => {
                 let noise = NoiseOfPixels::of(scene, &plan.bands)?;
-                Allowed::SensorNoise(Box::new(noise), share)
+                ErrorReference::SensorNoise(Box::new(noise), share)
             }
         };
         let (least, sigmas) = (scene.render.samples.least(), scene.accuracy.sample_sigmas);
-        Some(Self { least, sigmas, allowed })
+        Some(Self { least, sigmas, reference })
     }
 
     /// A relative error, with so many standard errors.
     #[cfg(test)]
     pub(super) fn of_relative_error(share: f64, sigmas: f64) -> Self {
-        Self { least: 4, sigmas, allowed: Allowed::RelativeError(share) }
+        Self { least: 4, sigmas, reference: ErrorReference::RelativeError(share) }
     }
 
     /// Noise that the two sets of a pixel's samples tell, `a_set` being the number in each.
     pub(super) fn noise(
         &self,
-        Sampled { pixel, sets: [a, b] }: &Sampled<'_>,
+        PixelSets { pixel, sets: [a, b] }: &PixelSets<'_>,
         a_set: u32,
     ) -> PixelNoise {
         let a_set = f64::from(a_set.max(1));
@@ -68,24 +69,18 @@ impl Rule {
             light += 0.5 * (a + b);
         }
         let bands = a.len().max(1) as f64;
-        let variance = match &self.allowed {
-            Allowed::SensorNoise(noise, share) => noise.share(*pixel, of_set) / share,
-            Allowed::RelativeError(_) => variance / bands,
+        let variance = match &self.reference {
+            ErrorReference::SensorNoise(noise, share) => noise.share(*pixel, of_set) / share,
+            ErrorReference::RelativeError(_) => variance / bands,
         };
         PixelNoise { variance, light: light / bands }
     }
 
     /// The variance that is allowed where the light is `light` in the mean, in the unit of [`PixelNoise::variance`].
     pub(super) fn allowed(&self, light: f64) -> f64 {
-        match &self.allowed {
-            Allowed::SensorNoise(..) => 1.0,
-            Allowed::RelativeError(share) => (share * light).powi(2),
+        match &self.reference {
+            ErrorReference::SensorNoise(..) => 1.0,
+            ErrorReference::RelativeError(share) => (share * light).powi(2),
         }
     }
-}
-
-/// The variance of the mean of two independent sets of one size, by the difference of their means: a quarter
-/// of its square.
-pub(crate) fn variance_of_mean(difference: f64) -> f64 {
-    0.25 * difference * difference
 }

@@ -4,18 +4,17 @@ use etendue_scene::file::SETS;
 use etendue_tracer::LayerSpec;
 use rayon::prelude::*;
 
-use super::variance_of_mean;
 use crate::adding::put;
 use crate::film::{FilmLayer, PlaneRows, strips, take};
 use crate::samples::{Averaging, split};
-use crate::sum::Sum;
+use crate::sum::{Sum, variance_of_mean};
 use crate::tile::TILE;
 
 /// The sets that the samples of a pixel are of.
 const SETS_OF_PIXEL: usize = SETS as usize;
 
 /// A pixel: its place, and the sums of its two sets, of each band.
-pub(super) struct Sampled<'a> {
+pub(super) struct PixelSets<'a> {
     pub(super) pixel: [u32; 2],
     pub(super) sets: [&'a [Sum]; SETS_OF_PIXEL],
 }
@@ -27,7 +26,7 @@ impl Averaging<'_> {
     }
 
     /// The samples of a pixel: of the layer whose first value is `first`.
-    pub(super) fn sampled(&self, pixel: [u32; 2], first: usize) -> Sampled<'_> {
+    pub(super) fn sampled(&self, pixel: [u32; 2], first: usize) -> PixelSets<'_> {
         let [width, _] = self.what.camera().resolution();
         let (values, [_, bands]) = (self.values(), self.what.shape());
         let at = (pixel[1] as usize * width as usize + pixel[0] as usize) * SETS_OF_PIXEL;
@@ -35,7 +34,7 @@ impl Averaging<'_> {
             let start = (at + k) * values + first;
             &self.sums[start..start + bands]
         };
-        Sampled { pixel, sets: std::array::from_fn(set) }
+        PixelSets { pixel, sets: std::array::from_fn(set) }
     }
 
     /// Writes to the layers the means of the samples that each pixel has, in rows from the top; rows without any are

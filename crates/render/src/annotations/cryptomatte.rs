@@ -22,7 +22,7 @@ use serde_json::Map;
 
 use super::AnnotationError;
 use crate::RenderError;
-use crate::film::filled;
+use crate::memory::filled;
 use crate::output::{Channel, Layer, Look, Picture, Values, exr};
 
 /// The name of the file.
@@ -113,7 +113,8 @@ impl Matte {
 pub fn write(
     scene: &Scene,
     accel: &dyn Accel,
-    (files, path): (&Transaction, &Path),
+    files: &Transaction,
+    path: &Path,
     progress: &(dyn Fn(f64) -> bool + Sync),
 ) -> Result<(), AnnotationError> {
     let [width, height] = scene.camera.resolution();
@@ -121,7 +122,7 @@ pub fn write(
     // Things have one place for all colours here.
     let camera = scene.camera.without_dispersion();
     let camera = match camera.has_pupil() {
-        true => camera.opened(&Bands::Rgb).map_err(|error| RenderError::Camera(error.why))?,
+        true => camera.opened(&Bands::Rgb).map_err(|error| RenderError::camera(error.why))?,
         false => camera,
     };
     let samples = scene.render.samples.typical().clamp(FEWEST, MOST);

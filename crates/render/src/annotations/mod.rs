@@ -80,7 +80,7 @@ impl From<NoMemory> for AnnotationError {
     }
 }
 
-/// What is known of the copies of objects in one picture: `instances.json`.
+/// Annotation of the copies of objects in one picture: `instances.json`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Annotated {
     /// The program.
@@ -120,15 +120,15 @@ pub struct Instance {
     pub name: String,
     /// The pixels whose chief rays hit it first.
     pub visible: Mask,
-    /// What it would cover if nothing were before it; only of BOP's sets.
+    /// Pixels that it would cover if nothing were before it; only of BOP's sets.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub silhouette: Option<Silhouette>,
-    /// Where it stands; only of BOP's sets, and of what can be rigid.
+    /// Its place and rotation; only of BOP's sets, and of what can be rigid.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub pose: Option<Pose>,
 }
 
-/// What a copy would cover if nothing were before it.
+/// Pixels that a copy would cover if nothing were before it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Silhouette {
     /// Its pixels in the picture.
@@ -139,17 +139,17 @@ pub struct Silhouette {
     pub all_pixels: u32,
     /// The box around them: the least column and row, and the greatest less these (pixels).
     #[serde(rename = "box")]
-    pub around: [i64; 4],
+    pub bounds: [i64; 4],
 }
 
-/// Where a model stands and how it is turned.
+/// Place and rotation of a model.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Pose {
     /// World from model, by rows: a proper rotation.
     pub rotation: [[f64; 3]; 3],
     /// The model's origin in the world (m).
     pub translation: [f64; 3],
-    /// Which model: the same word for the same shape, whatever its place.
+    /// Name of the model: the same word for the same shape, whatever its place.
     pub model: String,
 }
 

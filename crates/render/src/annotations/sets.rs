@@ -53,7 +53,8 @@ pub struct Shot<'a> {
 pub fn write(
     shots: &[Shot<'_>],
     models: &Models,
-    (files, folder): (&Transaction, &Path),
+    files: &Transaction,
+    folder: &Path,
     outputs: Outputs,
 ) -> Result<Vec<PathBuf>, AnnotationError> {
     let mut written = Vec::new();
@@ -248,14 +249,14 @@ fn in_camera(
 fn facts_of(instance: &Instance, whole: &Silhouette) -> Value {
     let visible = instance.visible.area();
     let [x, y, w, h] = instance.visible.bounds().map(i64::from);
-    let (around, seen) = match visible {
+    let (whole_box, seen) = match visible {
         0 => ([-1; 4], [-1; 4]),
-        _ => (whole.around, [x, y, w - 1, h - 1]),
+        _ => (whole.bounds, [x, y, w - 1, h - 1]),
     };
     json!({
         "px_count_all": whole.all_pixels, "px_count_valid": whole.pixels, "px_count_visib": visible,
         "visib_fract": f64::from(visible) / f64::from(whole.all_pixels.max(1)),
-        "bbox_obj": around, "bbox_visib": seen,
+        "bbox_obj": whole_box, "bbox_visib": seen,
     })
 }
 

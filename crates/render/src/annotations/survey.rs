@@ -185,7 +185,7 @@ fn silhouette(
         false => [least[0], least[1], most[0] - least[0], most[1] - least[1]],
     };
     let all_pixels = u32::try_from(pixels.len()).unwrap_or(u32::MAX);
-    Ok(Silhouette { mask: runs.mask([height, width]), pixels: inside, all_pixels, around: bounds })
+    Ok(Silhouette { mask: runs.mask([height, width]), pixels: inside, all_pixels, bounds })
 }
 
 /// These placements with their meshes, and nothing else.

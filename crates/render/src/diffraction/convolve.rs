@@ -9,11 +9,11 @@ use rustfft::num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
 use std::sync::Arc;
 
-use super::IlluminationGrid;
+use super::illumination::IlluminationGrid;
 use super::layers::DepthLayers;
 use super::spreads::Spreads;
 use etendue_optics::analysis::CellSpread;
-use etendue_optics::analysis::spread::quick_length;
+use etendue_optics::analysis::quick_length;
 
 /// Share of a spread that has to be known, as otherwise nothing is.
 const KNOWN: f64 = 1e-6;
@@ -30,12 +30,22 @@ pub(crate) struct CellPicture {
     pub(crate) depths: Vec<f32>,
 }
 
-/// What is spread of one layer: its light, where it is, and where it could be seen.
+/// Planes of one layer that are spread: its light, where it is, and where it could be seen.
 struct LayerPlanes {
     light: Vec<Vec<f64>>,
     /// Of the rearmost, which nothing shines through, it is not asked.
     covers: Option<Vec<f64>>,
     known: Vec<f64>,
+}
+
+/// Light of one band on the cells of a picture, with what spreads it.
+#[derive(Clone, Copy)]
+struct BandLight<'a> {
+    picture: &'a CellPicture,
+    layers: &'a DepthLayers,
+    spreads: &'a Spreads,
+    band: usize,
+    arrives: &'a IlluminationGrid,
 }
 
 /// Others' spreads reach at most so many times as far as those of a layer's own nodes.
@@ -44,10 +54,12 @@ const FARTHER: usize = 3;
 /// The light of a band on pixels, for each layer of light, spread and multiplied by what arrives.
 pub(crate) fn composed(
     picture: &CellPicture,
-    (layers, spreads): (&DepthLayers, &Spreads),
+    layers: &DepthLayers,
+    spreads: &Spreads,
     band: usize,
     arrives: &IlluminationGrid,
 ) -> Vec<Vec<f32>> {
+    let band_light = BandLight { picture, layers, spreads, band, arrives };
     let pixels = picture.size.map(|side| side / picture.cells);
     let count = pixels[0] * pixels[1];
     let mut out = vec![vec![0.0_f64; count]; picture.light.len()];
@@ -60,8 +72,7 @@ pub(crate) fn composed(
     }
     let first = shines.iter().position(|shines| *shines).unwrap_or(shines.len());
     for layer in first..layers.nearness.len() {
-        let LayerPlanes { light, covers, known } =
-            spread_layer(picture, (layers, spreads), (layer, band), (arrives, layer > first));
+        let LayerPlanes { light, covers, known } = spread_layer(band_light, layer, layer > first);
         for i in 0..count {
             if known[i] <= KNOWN {
                 continue;
@@ -79,23 +90,19 @@ pub(crate) fn composed(
 }
 
 /// A layer's light, cover where it is wanted, and knowledge, spread over the pixels.
-fn spread_layer(
-    picture: &CellPicture,
-    (layers, spreads): (&DepthLayers, &Spreads),
-    (layer, band): (usize, usize),
-    (arrives, covers): (&IlluminationGrid, bool),
-) -> LayerPlanes {
+fn spread_layer(band_light: BandLight<'_>, layer: usize, covers: bool) -> LayerPlanes {
+    let BandLight { picture, layers, spreads, band, .. } = band_light;
     let pixels = picture.size.map(|side| side / picture.cells);
     let count = pixels[0] * pixels[1];
     let nodes = spreads.side * spreads.side;
     let windows: Vec<CellWindow> =
         (0..nodes).map(|node| CellWindow::of(node, spreads, picture.size)).collect();
     // The layer's cells, and how far their light gets.
-    let around = |margin: usize| {
+    let grown = |margin: usize| {
         let [low, high] = layers.boxes[layer];
         [low.map(|at| at.saturating_sub(margin)), high.map(|at| at + margin)]
     };
-    let meets = |node: usize, margin: usize| windows[node].within(around(margin)).is_some();
+    let meets = |node: usize, margin: usize| windows[node].within(grown(margin)).is_some();
     let farthest = |spreads: &[Option<CellSpread>]| {
         spreads.iter().flatten().map(|spread| spread.half).max().unwrap_or(0)
     };
@@ -115,14 +122,14 @@ fn spread_layer(
             let Some((spread, mirrored)) = spreads.of_node(&of_layer, node) else {
                 return Vec::new();
             };
-            let Some(window) = windows[node].within(around(reach + spread.half)) else {
+            let Some(window) = windows[node].within(grown(reach + spread.half)) else {
                 return Vec::new();
             };
-            let filled = window.filled(picture, layers, (layer, band), (arrives, covers));
+            let filled = window.filled(band_light, layer, covers);
             if filled.iter().all(|plane| plane.iter().all(|value| *value == 0.0)) {
                 return Vec::new();
             }
-            window.spread(filled, (spread, mirrored), picture)
+            window.spread(filled, spread, mirrored, picture)
         })
         .collect();
     let planes = picture.light.len() + usize::from(covers) + 1;
@@ -198,13 +205,8 @@ impl CellWindow {
     }
 
     /// Light of each layer of light, cover where it is wanted, and what is known, by cell.
-    fn filled(
-        &self,
-        picture: &CellPicture,
-        layers: &DepthLayers,
-        (layer, band): (usize, usize),
-        (arrives, covers): (&IlluminationGrid, bool),
-    ) -> Vec<Vec<f64>> {
+    fn filled(&self, band_light: BandLight<'_>, layer: usize, covers: bool) -> Vec<Vec<f64>> {
+        let BandLight { picture, layers, band, arrives, .. } = band_light;
         let [width, height] = self.size();
         let kinds = picture.light.len();
         let known = kinds + usize::from(covers);
@@ -242,7 +244,8 @@ impl CellWindow {
     fn spread(
         &self,
         planes: Vec<Vec<f64>>,
-        (spread, mirrored): (&CellSpread, [bool; 2]),
+        spread: &CellSpread,
+        mirrored: [bool; 2],
         picture: &CellPicture,
     ) -> Vec<ConvolutionBlock> {
         let [width, height] = self.size();

@@ -11,6 +11,7 @@
 //! So what the pupil's parts see differently, around edges of things and in mirrors, is lost.
 
 mod convolve;
+mod illumination;
 mod layers;
 mod spreads;
 mod words;
@@ -30,6 +31,7 @@ use crate::watch::{SoFar, Watch};
 use crate::{Plan, Shard};
 
 use self::convolve::{CellPicture, composed};
+use self::illumination::illumination;
 use self::layers::DepthLayers;
 use self::spreads::Spreads;
 
@@ -81,9 +83,9 @@ pub(crate) fn bytes(scene: &Scene, plan: &Plan) -> u64 {
 }
 
 /// Refuses what light that is spread over the picture cannot be.
-fn check(scene: &Scene, plan: &Plan, course: &RenderState<'_>) -> Result<(), RenderError> {
+fn check(scene: &Scene, plan: &Plan, state: &RenderState<'_>) -> Result<(), RenderError> {
     let camera = &scene.camera;
-    let refused = |why: &str| Err(RenderError::Diffraction(why.to_owned()));
+    let refused = |why: &str| Err(RenderError::diffraction(why));
     if camera.is_timed() || camera.light_of_rows_differs() || scene.slots > 0 {
         return refused(
             "something moves, or rows see different moments; leave out `motion` and `shutter`, or \
@@ -101,8 +103,8 @@ fn check(scene: &Scene, plan: &Plan, course: &RenderState<'_>) -> Result<(), Ren
              enough; give `render.samples` a number",
         );
     }
-    let is_whole = course.shard.is_none_or(|shard| shard == Shard::ALL);
-    if !is_whole || course.checkpoint.is_some() || !course.shares.is_empty() {
+    let is_whole = state.shard.is_none_or(|shard| shard == Shard::ALL);
+    if !is_whole || state.checkpoint.is_some() || !state.shares.is_empty() {
         return refused(
             "light of the whole picture is spread at once: leave out --shard and --checkpoint, or \
              `diffraction`",
@@ -142,15 +144,15 @@ pub(crate) fn spread_light(
     scene: &Scene,
     plan: &Plan,
     prepared: Prepared<'_>,
-    course: &RenderState<'_>,
+    state: &RenderState<'_>,
     opened: &Camera,
     watch: &dyn Watch,
 ) -> Result<Option<SpreadLight>, RenderError> {
     if !is_wanted(scene, plan) {
         return Ok(None);
     }
-    check(scene, plan, course)?;
-    let fault = |why: String| RenderError::Diffraction(why);
+    check(scene, plan, state)?;
+    let fault = |why: String| RenderError::diffraction(why);
     let Some(lens) = opened.lens() else { return Err(fault("the camera has no lens".to_owned())) };
     let waves = WaveLens::new(lens, &plan.bands).map_err(|error| fault(error.why))?;
     let all = || waves.wavelengths().iter().flatten().copied();
@@ -161,7 +163,7 @@ pub(crate) fn spread_light(
     let (picture, lit, mut film) = cell_picture(scene, plan, prepared, cells, watch)?;
     let [columns, rows] = scene.camera.resolution();
     let illumination =
-        illumination(opened, plan, [columns, rows], waves.is_mirrored([columns, rows]));
+        illumination(opened, &plan.bands, [columns, rows], waves.is_mirrored([columns, rows]));
     let mean = all().sum::<f64>() / all().count().max(1) as f64;
     let layers = DepthLayers::of(&picture.depths, picture.size[0], lens, mean);
     let spreads = Spreads::new(&waves, &layers, [columns, rows], f64::from(cells), pitch)
@@ -173,7 +175,7 @@ pub(crate) fn spread_light(
         if !part.goes_on(band as f64 / bands.max(1) as f64) {
             return Err(RenderError::Stopped);
         }
-        let own = composed(&picture, (&layers, &spreads), band, arrives);
+        let own = composed(&picture, &layers, &spreads, band, arrives);
         planes.iter_mut().zip(own).for_each(|(planes, plane)| planes.push(plane));
     }
     let notes = std::mem::take(&mut film.notes);
@@ -219,58 +221,6 @@ fn cell_picture(
     }
     let size = fine.camera.resolution().map(|side| side as usize);
     Ok((CellPicture { size, cells: cells as usize, light, depths }, lit, film))
-}
-
-/// Illumination: the light that arrives, on a grid over the picture that is interpolated in.
-#[derive(Debug, Clone)]
-pub(crate) struct IlluminationGrid {
-    values: Vec<f64>,
-    size: [f64; 2],
-}
-
-/// Places a side of the grid of what arrives.
-const PLACES: u32 = 25;
-
-impl IlluminationGrid {
-    /// What arrives at a place of the picture (pixels from the corner).
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the grid")]
-    pub(crate) fn at(&self, [column, row]: [f64; 2]) -> f64 {
-        let last = f64::from(PLACES - 1);
-        let part = |at: f64, size: f64| {
-            let at = (at / size * last).clamp(0.0, last);
-            let low = at.floor().min(last - 1.0);
-            (low as usize, at - low)
-        };
-        let (x, right) = part(column, self.size[0]);
-        let (y, down) = part(row, self.size[1]);
-        let value = |x: usize, y: usize| self.values[y * PLACES as usize + x];
-        let line = |y: usize| value(x, y) * (1.0 - right) + value(x + 1, y) * right;
-        line(y) * (1.0 - down) + line(y + 1) * down
-    }
-}
-
-/// Computes the illumination of each band; where halves of the picture are alike, of one quarter.
-fn illumination(
-    opened: &Camera,
-    plan: &Plan,
-    resolution: [u32; 2],
-    is_mirrored: bool,
-) -> Vec<IlluminationGrid> {
-    let size = resolution.map(f64::from);
-    let share = |k: u32| f64::from(k) / f64::from(PLACES - 1);
-    let traced = if is_mirrored { PLACES.div_ceil(2) } else { PLACES };
-    let places: Vec<[f64; 2]> = (0..traced * traced)
-        .map(|k| [share(k % traced) * size[0], share(k / traced) * size[1]])
-        .collect();
-    let own = |k: u32| if k < traced { k } else { PLACES - 1 - k };
-    let mut by_band = Vec::new();
-    for (number, group) in opened.band_groups(&plan.bands).into_iter().enumerate() {
-        let quarter = opened.illumination(&places, number);
-        let value = |k: u32| quarter[(own(k / PLACES) * traced + own(k % PLACES)) as usize];
-        let values: Vec<f64> = (0..PLACES * PLACES).map(value).collect();
-        by_band.extend(group.bands.map(|_| IlluminationGrid { values: values.clone(), size }));
-    }
-    by_band
 }
 
 /// Puts light that was spread onto its layers of the film, and what it took to the rest.

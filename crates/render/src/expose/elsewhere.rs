@@ -5,8 +5,8 @@ use etendue_spectrum::{Bands, Grid};
 use rayon::prelude::*;
 
 use super::{BandFilm, ExposeError, SensorLight};
-use crate::film::filled;
 use crate::forecast::bytes_exposed;
+use crate::memory::filled;
 
 /// A picture of light from anywhere.
 #[derive(Debug, Clone, PartialEq)]
@@ -107,7 +107,7 @@ fn divided(film: BandFilm, sensor: &Sensor) -> Result<BandFilm, ExposeError> {
     let [from, to] = grid.range();
     if let Some(band) = own.bands().position(|band| band.to <= from || band.from >= to) {
         let channel = Bands::Spectral(own.clone()).names()[band].clone();
-        return Err(SensorError::Blind { key: "bands", channel, bands: [from, to] }.into());
+        return Err(SensorError::blind("bands", &channel, [from, to]).into());
     }
     let mut edges: Vec<f64> = grid.edges().to_vec();
     for &edge in own.edges() {

@@ -44,7 +44,7 @@ pub(super) struct ExposureWriter<'a> {
     pub(super) moments: Vec<(f64, MomentFiles)>,
     pub(super) invalid: InvalidValues,
     /// The exposure time (s) of the last shot whose losses are told.
-    pub(super) told: Option<f64>,
+    pub(super) remarked_exposure: Option<f64>,
     pub(super) exposed: Exposed,
 }
 
@@ -69,8 +69,8 @@ impl ExposureWriter<'_> {
         // Every shot sees the same film, so once is enough.
         self.invalid = image.invalid;
         // Frames of one exposure time differ by their noise alone.
-        if self.told != Some(shot.exposure) {
-            self.told = Some(shot.exposure);
+        if self.remarked_exposure != Some(shot.exposure) {
+            self.remarked_exposure = Some(shot.exposure);
             let remarks = remarks::on(self.sensor, self.film(), &image, shot);
             self.exposed.notes.extend(remarks);
         }

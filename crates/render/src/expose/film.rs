@@ -8,8 +8,9 @@ use rayon::prelude::*;
 
 use super::files::plain;
 use super::{LightUnit, photodiodes};
-use crate::film::{FilmLayer, NoMemory, filled};
-use crate::output::{Channel, Layer, Look, Picture, Values};
+use crate::film::FilmLayer;
+use crate::memory::{NoMemory, filled};
+use crate::output::{Channel, Layer, Look, Picture, SPECTRUM, Values};
 
 /// Light in spectral bands, as a sensor is given it.
 #[derive(Debug, Clone, PartialEq)]
@@ -218,9 +219,6 @@ pub(crate) fn three_planes(layer: &Layer) -> Option<[&[f32]; 3]> {
         _ => None,
     }
 }
-
-/// Name of the layer of a hyperspectral cube.
-pub const SPECTRUM: &str = "Spectrum";
 
 /// True if the picture has a hyperspectral cube.
 pub(crate) fn has_spectrum(scene: &Scene) -> bool {

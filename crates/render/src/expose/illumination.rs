@@ -8,9 +8,7 @@ use etendue_scene::Scene;
 use etendue_sensor::{Factor, Illumination, Times};
 use etendue_spectrum::{Bands, Curve, Outside, rgb};
 use etendue_tracer::transport::Follow;
-use etendue_tracer::{
-    Color, Emission, EnvironmentImage, LightKind, Material, Paint, Scattering, Spectral,
-};
+use etendue_tracer::{Color, Emission, EnvironmentImage, LightKind, Material, Paint, Spectral};
 
 /// Lights, filters, colours, bodies and metals of a scene.
 pub(super) fn illumination(scene: &Scene) -> Illumination {
@@ -166,18 +164,8 @@ fn factors(material: &Material, most: u8) -> Vec<Factor> {
         };
         factors.extend(curve.map(|curve| Factor { curve, times: Times::AnyPower }));
     }
-    match &material.scattering {
-        Scattering::Metal { named: Some(metal), .. } => {
-            factors.push(Factor { curve: metal.face_on(), times: Times::UpTo(2) });
-        }
-        Scattering::Metal { named: None, .. }
-        | Scattering::Black
-        | Scattering::Matte
-        | Scattering::Unlit
-        | Scattering::Mirror
-        | Scattering::Dielectric(_)
-        | Scattering::Gltf(_) => {}
-    }
+    let metal = material.scattering.measured_metal();
+    factors.extend(metal.map(|m| Factor { curve: m.face_on(), times: Times::UpTo(2) }));
     let own = material.base_color.curves().iter();
     let layers = material.scattering.gltf();
     let layers = layers.into_iter().flat_map(|s| s.sheen_curve.iter().chain(&s.specular_curve));
@@ -215,7 +203,7 @@ impl Colours {
         self.some = true;
         let surface = material.scattering.gltf();
         self.passing |= surface.is_some_and(|surface| surface.transmission > 0.0)
-            || matches!(material.scattering, Scattering::Dielectric(_));
+            || material.scattering.is_body();
         self.mirroring |= surface.is_some() || material.scattering.shows_others();
     }
 
@@ -273,6 +261,6 @@ fn reflects_colour(material: &Material) -> bool {
         return false;
     }
     // So is that of a measured metal.
-    let named = matches!(material.scattering, Scattering::Metal { named: Some(_), .. });
-    layers || (!named && is_coloured(&material.base_color))
+    let is_measured = material.scattering.measured_metal().is_some();
+    layers || (!is_measured && is_coloured(&material.base_color))
 }

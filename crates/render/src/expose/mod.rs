@@ -41,16 +41,16 @@ use etendue_sensor::{
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 
+pub use crate::output::SPECTRUM;
 pub(crate) use bands::{bands, explain_bands};
 pub use elsewhere::{PictureLight, PixelLight};
 pub use film::BandFilm;
-pub use film::SPECTRUM;
 pub(crate) use film::{has_spectrum, spectrum, three_planes};
 pub(crate) use noise::NoiseOfPixels;
 pub use photometry::Photometry;
 pub use unit::{KNOWN_UNITS, LightUnit, pupil_solid_angle};
 
-use crate::film::NoMemory;
+use crate::memory::NoMemory;
 use crate::output::{OutputError, Outputs, Picture, PictureError, sidecar};
 use files::{ExposureWriter, Sidecar};
 use film::colors;
@@ -383,7 +383,7 @@ pub fn write(
         digits,
         moments: Vec::new(),
         invalid: InvalidValues::default(),
-        told: None,
+        remarked_exposure: None,
         exposed: Exposed { files: Vec::new(), notes: light.notes.clone() },
     };
     let mut sidecar = Sidecar::new(sensor, light.seeds);

@@ -6,7 +6,7 @@ use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 
 use super::film::light_factor;
-use crate::adaptive::variance_of_mean;
+use crate::sum::variance_of_mean;
 
 /// Parts of the way between the light of two sets of samples in which it is looked at how much of it is clipped.
 const PARTS: u32 = 32;

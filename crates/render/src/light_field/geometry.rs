@@ -9,10 +9,10 @@ use super::centres::{Centres, Places};
 use super::patches::{PatchFacts, Patches};
 use super::response::ViewResponse;
 
-/// What a decoder needs, and what it may be scored against.
+/// Facts that a decoder needs, and those that it may be scored against.
 #[derive(Debug, Serialize)]
 pub(super) struct LightFieldGeometry {
-    /// What pixel coordinates count from.
+    /// Origin of pixel coordinates.
     pixel_origin: PixelOrigin,
     /// `rect` or `hex`.
     grid: &'static str,
@@ -20,7 +20,7 @@ pub(super) struct LightFieldGeometry {
     pitch_px: f64,
     /// From row to row.
     row_pitch_px: f64,
-    /// How rows are turned from right towards down.
+    /// Angle by which rows are turned from right towards down.
     rotation_rad: f64,
     /// The middle of the image of lenslet (0, 0), the one in the first row and column.
     offset_px: Option<[f64; 2]>,
@@ -44,7 +44,7 @@ pub(super) struct LightFieldGeometry {
     centres_px: Option<Vec<Vec<[f64; 2]>>>,
     /// The same of red, green and blue light behind glass that tells wavelengths apart; `null` elsewhere.
     centres_by_color_px: Option<[Vec<Vec<[f64; 2]>>; 3]>,
-    /// How far these are from `centres_px` at most.
+    /// Greatest distance of these from `centres_px`.
     color_centres_apart_px: f64,
     /// True if red, green and blue views are sampled each at its own centres.
     views_by_color: bool,
@@ -59,14 +59,14 @@ pub(super) struct LightFieldGeometry {
     gains: Option<Vec<Vec<[f64; 6]>>>,
     /// The plane of `refocused.*` (m), where it is written; `null` for infinity, too.
     refocused_m: Option<f64>,
-    /// How a camera without views has its refocused picture from patches of the raw one.
+    /// Facts by which a camera without views has its refocused picture from patches of the raw one.
     patches: Option<PatchFacts>,
     /// Why it has none.
     no_patches: Option<String>,
     about: [&'static str; 6],
 }
 
-/// How disparity follows from depth.
+/// Disparity as a function of depth.
 #[derive(Debug, Serialize)]
 struct Disparity {
     formula: &'static str,

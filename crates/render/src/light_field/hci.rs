@@ -29,7 +29,8 @@ pub(super) fn view_name(k: u32) -> String {
 
 /// Fills the folder.
 pub(super) fn write(
-    (transaction, folder): (&Transaction, &Path),
+    transaction: &Transaction,
+    folder: &Path,
     scene: &Scene,
     grid: &ViewGrid,
     views: &Views,

@@ -11,8 +11,8 @@ use etendue_spectrum::Bands;
 
 use super::choice::ChosenViews;
 use super::patches::{PatchPlane, Patches};
-use super::views::{Views, picture};
-use super::{LightFieldError, by_layer, planes, white};
+use super::views::{Views, picture, planes};
+use super::{LightFieldError, by_layer, white};
 use crate::RenderError;
 use crate::output::{Development, Picture};
 
@@ -45,7 +45,7 @@ impl LightFieldViews {
         if picture.layer("").is_none() {
             return Ok(None);
         }
-        let fault = |error: CameraError| RenderError::Camera(error.to_string());
+        let fault = |error: CameraError| RenderError::camera(error.to_string());
         let chosen = ChosenViews::of(&scene.camera, &scene.accuracy).map_err(fault)?;
         let Some(ChosenViews { grid, response, no_views, light_field, .. }) = chosen else {
             return Ok(None);
@@ -119,7 +119,7 @@ impl LightFieldViews {
     /// When there are none.
     pub fn view(&self, [across, down]: [u32; 2]) -> Result<Picture, LightFieldError> {
         let LightFieldSource::Views { views, .. } = &self.source else {
-            return Err(RenderError::Camera("the camera has no views".to_owned()).into());
+            return Err(RenderError::camera("the camera has no views").into());
         };
         let last = views.views.saturating_sub(1);
         let view = views.single(across.min(last), down.min(last))?;
@@ -138,10 +138,10 @@ impl LightFieldViews {
             }
             LightFieldSource::Patches { camera, raw, white } => {
                 let lenslets = camera.lens().zip(camera.light_field());
-                let (lens, light_field) = lenslets
-                    .ok_or_else(|| RenderError::Camera("there are no lenslets".to_owned()))?;
+                let (lens, light_field) =
+                    lenslets.ok_or_else(|| RenderError::camera("there are no lenslets"))?;
                 let patches = Patches::new(lens, light_field, Some(depth));
-                patches.map_err(RenderError::Camera)?.rendered(raw, white)?
+                patches.map_err(RenderError::camera)?.rendered(raw, white)?
             }
         };
         Ok(picture.developed(self.development))
@@ -155,7 +155,7 @@ impl LightFieldSource {
             return Ok(None);
         };
         let opened = scene.camera.opened(&Bands::Rgb);
-        let opened = opened.map_err(|error| RenderError::Camera(error.to_string()))?;
+        let opened = opened.map_err(|error| RenderError::camera(error.to_string()))?;
         let white = Arc::new(white::picture(&opened, &scene.render)?);
         let size = [raw.width(), raw.height()];
         let raw = picture(size, "the raw picture", |pixel, color| planes[color][pixel])?;

@@ -38,7 +38,6 @@ use etendue_scene::Scene;
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 
-use crate::expose::SPECTRUM;
 use crate::output::{
     Channel, Layer, Look, OutputError, Outputs, Picture, PictureError, Values, exr, npy, pfm, png,
     sidecar,
@@ -136,7 +135,7 @@ pub fn write(
 ) -> Result<LightFieldSet, LightFieldError> {
     let scene = rendering.scene;
     let mut set = SetWriter { files, folder, outputs, written: LightFieldSet::default() };
-    let fault = |error: CameraError| RenderError::Camera(error.to_string());
+    let fault = |error: CameraError| RenderError::camera(error.to_string());
     let Some(chosen) = ChosenViews::of(&scene.camera, &scene.accuracy).map_err(fault)? else {
         return Ok(set.written);
     };
@@ -415,14 +414,9 @@ impl SetWriter<'_> {
         depth: &[f64],
     ) -> Result<(), LightFieldError> {
         self.below("hci", |set, folder| {
-            set.written.files.extend(hci::write(
-                (set.files, folder),
-                scene,
-                grid,
-                views,
-                shown,
-                depth,
-            )?);
+            set.written
+                .files
+                .extend(hci::write(set.files, folder, scene, grid, views, shown, depth)?);
             Ok(())
         })
     }
@@ -456,16 +450,3 @@ fn plane(
         Layer { name: NAME.to_owned(), look: Look::Distance, channels, meaning: meaning.into() };
     Picture::new(width as usize, height as usize, vec![layer], Vec::new())
 }
-
-/// The planes of a picture's own colours, and of its spectrum.
-fn planes<'a>(picture: &'a Picture, layer: &str) -> Option<Vec<&'a [f32]>> {
-    let layer = picture.layer(layer)?;
-    let plane = |channel: &'a Channel| match &channel.values {
-        Values::F32(values) => Some(values.as_slice()),
-        Values::F64(_) | Values::U16(_) | Values::U32(_) => None,
-    };
-    layer.channels.iter().map(plane).collect()
-}
-
-/// The name of the layer that holds a picture's bands.
-const BANDS: &str = SPECTRUM;

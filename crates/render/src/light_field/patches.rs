@@ -16,8 +16,7 @@ use etendue_spectrum::Bands;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::planes;
-use super::views::{picture, sampled};
+use super::views::{picture, planes, sampled};
 use crate::output::{Picture, PictureError};
 
 /// From the light of neighbours to what is sampled (pixels): cubic sampling looks that far for all but a
@@ -46,7 +45,7 @@ struct PatchLenslet {
     is_sharp: bool,
 }
 
-/// What another renderer needs.
+/// Facts that another renderer needs.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct PatchFacts {
     formula: &'static str,
@@ -58,9 +57,9 @@ pub(super) struct PatchFacts {
     magnification: f64,
     /// The same of red, green and blue light behind glass that disperses; `null` elsewhere.
     magnification_by_color: Option<[f64; 3]>,
-    /// How wide the patch is that a lenslet has to itself: its pitch times the magnification.
+    /// Width of the patch that a lenslet has to itself: its pitch times the magnification.
     patch_px: f64,
-    /// How far from the middle of its image a lenslet's pixels are used.
+    /// Distance from the middle of its image within which a lenslet's pixels are used.
     reach_px: f64,
     /// Over how many pixels of the refocused picture the sharpest lenslets spread a point of the plane.
     blur_px: f64,
@@ -227,13 +226,13 @@ impl Patches {
         while 2 * left < width && 2 * top < height {
             let (columns, rows) = (left..width - left, top..height - top);
             let first = unseen(left..left + 1, rows.clone());
-            let beside = first + unseen(columns.end - 1..columns.end, rows.clone());
+            let sides = first + unseen(columns.end - 1..columns.end, rows.clone());
             let above = unseen(columns.clone(), top..top + 1);
             let above = above + unseen(columns.clone(), rows.end - 1..rows.end);
-            if beside + above == 0 {
+            if sides + above == 0 {
                 break;
             }
-            match beside * columns.len() >= above * rows.len() {
+            match sides * columns.len() >= above * rows.len() {
                 true => left += 1,
                 false => top += 1,
             }
@@ -272,7 +271,7 @@ impl Patches {
 
     /// The picture of a raw picture and a white one.
     pub(super) fn rendered(&self, raw: &Picture, white: &Picture) -> Result<Picture, PictureError> {
-        let empty = || PictureError::Empty { what: "the raw picture".to_owned() };
+        let empty = || PictureError::empty("the raw picture");
         let size = [raw.width(), raw.height()];
         let planes = [raw, white].map(|picture| planes(picture, ""));
         let [Some(raw), Some(white)] = planes else { return Err(empty()) };

@@ -312,7 +312,7 @@ struct RequestedRays {
     first_set: usize,
 }
 
-/// What a pixel of a camera sees, by rays of its own.
+/// View of a pixel of a camera, by rays of its own.
 fn seen(
     camera: &Camera,
     asked: &RequestedRays,

@@ -9,8 +9,7 @@ use rayon::prelude::*;
 
 use super::centres::Centres;
 use super::response::{ViewResponse, weights};
-use super::{BANDS, planes};
-use crate::output::{Channel, Layer, Look, Picture, PictureError, Values};
+use crate::output::{Channel, Layer, Look, Picture, PictureError, SPECTRUM, Values};
 
 /// The values of all views.
 #[derive(Debug, Clone)]
@@ -60,9 +59,9 @@ impl Views {
             let views: Vec<Vec<f32>> = (0..n * n).into_par_iter().map(view).collect();
             ViewArray { values: views.concat(), channels: planes.len() }
         };
-        let empty = || PictureError::Empty { what: "the raw picture".to_owned() };
+        let empty = || PictureError::empty("the raw picture");
         let colors = decode(&planes(picture, "").ok_or_else(empty)?, in_colors);
-        let spectrum = planes(picture, BANDS).map(|planes| decode(&planes, in_bands));
+        let spectrum = planes(picture, SPECTRUM).map(|planes| decode(&planes, in_bands));
         Ok(Self { views: n, size: [cols, rows], colors, spectrum })
     }
 
@@ -84,7 +83,7 @@ impl Views {
             ViewArray { values, channels: planes.len() }
         };
         let colors = split(&planes(picture, "").unwrap_or_default());
-        let spectrum = planes(picture, BANDS).map(|planes| split(&planes));
+        let spectrum = planes(picture, SPECTRUM).map(|planes| split(&planes));
         Self { views: n, size: [cols, rows], colors, spectrum }
     }
 
@@ -202,6 +201,16 @@ fn sampled_rows(plane: &[f32], [width, height]: [usize; 2], [x, y]: [f64; 2], od
     #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
     let sum = sum as f32;
     sum
+}
+
+/// The planes of a picture's own colours, and of its spectrum.
+pub(super) fn planes<'a>(picture: &'a Picture, layer: &str) -> Option<Vec<&'a [f32]>> {
+    let layer = picture.layer(layer)?;
+    let plane = |channel: &'a Channel| match &channel.values {
+        Values::F32(values) => Some(values.as_slice()),
+        Values::F64(_) | Values::U16(_) | Values::U32(_) => None,
+    };
+    layer.channels.iter().map(plane).collect()
 }
 
 #[cfg(test)]

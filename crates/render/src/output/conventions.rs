@@ -10,8 +10,8 @@ use std::path::Path;
 
 use super::look::{Bits, ColourType, LayerImage, fill, indices};
 use super::{Layer, OutputError, Picture, png};
-use crate::film::NoMemory;
 use crate::losses::Losses;
+use crate::memory::NoMemory;
 use etendue_files::Transaction;
 
 /// Numbers a metre in TUM's depth images.
@@ -30,8 +30,10 @@ const UNKNOWN: f32 = 1e10;
 pub(super) fn write_scaled(
     files: &Transaction,
     path: &Path,
-    (picture, layer): (&Picture, &Layer),
-    (factor, unit): (f64, &str),
+    picture: &Picture,
+    layer: &Layer,
+    factor: f64,
+    unit: &str,
 ) -> Result<(), OutputError> {
     png::write_shown(files, path, picture, layer, &scaled(layer, factor, unit)?)
 }
@@ -40,7 +42,8 @@ pub(super) fn write_scaled(
 pub(super) fn write_flow(
     files: &Transaction,
     path: &Path,
-    (picture, layer): (&Picture, &Layer),
+    picture: &Picture,
+    layer: &Layer,
 ) -> Result<(), OutputError> {
     png::write_shown(files, path, picture, layer, &flow(layer)?)
 }
@@ -49,7 +52,8 @@ pub(super) fn write_flow(
 pub(super) fn write_indexed(
     files: &Transaction,
     path: &Path,
-    (picture, layer): (&Picture, &Layer),
+    picture: &Picture,
+    layer: &Layer,
 ) -> Result<bool, OutputError> {
     let Some(shown) = indices(layer)? else { return Ok(false) };
     png::write_shown(files, path, picture, layer, &shown).map(|()| true)
@@ -106,7 +110,8 @@ fn flow(layer: &Layer) -> Result<LayerImage, NoMemory> {
 pub(super) fn write_flo(
     files: &Transaction,
     path: &Path,
-    (picture, layer): (&Picture, &Layer),
+    picture: &Picture,
+    layer: &Layer,
 ) -> Result<(), OutputError> {
     let [x, y] = [0, 1].map(|k| &layer.channels[k].values);
     let side = |side: usize| {

@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 
 use super::look::{ColourType, LayerImage, srgb, unit};
 use super::{Layer, Picture, Values, png::Bits};
-use crate::film::NoMemory;
+use crate::memory::NoMemory;
 
 /// Settings of how a PNG shows the picture's light.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -1,101 +1,52 @@
 //! Errors between a render and its files.
 
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fmt, io};
 
 use etendue_files::WriteError;
+use etendue_report::Refusal;
 
-use crate::film::NoMemory;
+use crate::memory::NoMemory;
 
 /// Error of layers that do not make a picture.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PictureError {
-    /// A side of no pixels, or more pixels than memory has addresses.
-    #[error(
-        "a picture of {width} x {height} pixels cannot be\nhint: give both sides at least one pixel"
-    )]
-    Size {
-        /// Pixels a row.
-        width: usize,
-        /// Rows.
-        height: usize,
-    },
     /// The system has less memory than it takes.
     #[error(transparent)]
     Memory(#[from] NoMemory),
-    /// No layer, or a layer of no channels.
-    #[error("{what} is empty\nhint: ask for at least one")]
-    Empty {
-        /// The picture or the layer.
-        what: String,
-    },
-    /// A channel of the wrong length.
-    #[error("channel \"{channel}\" has {found} values where the picture has {expected} pixels")]
-    Length {
-        /// The channel's full name.
-        channel: String,
-        /// Its values.
-        found: usize,
-        /// The picture's pixels.
-        expected: usize,
-    },
-    /// A layer whose channels are of different types.
-    #[error("layer \"{layer}\" mixes {first} with {other}\nhint: split it into a layer a type")]
-    Mixed {
-        /// The layer's name.
-        layer: String,
-        /// The type of the first channel.
-        first: &'static str,
-        /// The type that differs.
-        other: &'static str,
-    },
-    /// A name that some file format or file system cannot take.
-    #[error(
-        "\"{name}\" cannot name a {what}\nhint: use 1 to 64 of the characters A-Z a-z 0-9 _ - \
-         (inside, a layer may have dots and an entry spaces)"
-    )]
-    Name {
-        /// Layer, channel, header entry …
-        what: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// A name given twice.
-    #[error("the name \"{name}\" is used twice; rename one of the two")]
-    Twice {
-        /// The name as it would stand in the file.
-        name: String,
-    },
-    /// A header string with a zero byte, which would cut it short.
-    #[error("the text of \"{name}\" holds a zero byte\nhint: remove it")]
-    ZeroByte {
-        /// The entry's name.
-        name: String,
-    },
-    /// Channels that the layer's look cannot show.
-    #[error("layer \"{layer}\" looks like {look}, which needs {needs}")]
-    Look {
-        /// The layer's name.
-        layer: String,
-        /// The look.
-        look: String,
-        /// The channels that the look needs.
-        needs: &'static str,
-    },
-    /// A value that is not a number, which no file may hold.
-    #[error(
-        "channel \"{channel}\" is NaN at column {x}, row {y} (counted from 0 at the top left): \
-         a fault of the renderer, please report it together with the scene"
-    )]
-    NotANumber {
-        /// The channel's full name.
-        channel: String,
-        /// Column, from the left.
-        x: usize,
-        /// Row, from the top.
-        y: usize,
-    },
+    /// Anything else: no layer, a size, a name or a value that no file may hold.
+    #[error(transparent)]
+    Refused(#[from] Refusal),
+}
+
+impl PictureError {
+    /// Error of a picture without layers, or a layer without channels.
+    pub(crate) fn empty(what: &str) -> Self {
+        Refusal::new(format!("{what} is empty")).hint("ask for at least one").into()
+    }
+
+    /// Error of a side of no pixels, or of more pixels than memory has addresses.
+    pub(super) fn size([width, height]: [usize; 2]) -> Self {
+        let why = format!("a picture of {width} x {height} pixels cannot be");
+        Refusal::new(why).hint("give both sides at least one pixel").into()
+    }
+
+    /// Error of a name that some file format or file system cannot take, of `what`: a layer, channel, header entry …
+    pub(super) fn name(what: &str, name: &str) -> Self {
+        let remedy = "use 1 to 64 of the characters A-Z a-z 0-9 _ - (inside, a layer may have dots and an entry \
+                      spaces)";
+        Refusal::new(format!("\"{name}\" cannot name a {what}")).hint(remedy).into()
+    }
+
+    /// Error of a value that is not a number, at a column and row from the top left.
+    pub(super) fn not_a_number(channel: &str, [x, y]: [usize; 2]) -> Self {
+        let why = format!(
+            "channel \"{channel}\" is NaN at column {x}, row {y} (counted from 0 at the top left): \
+             a fault of the renderer, please report it together with the scene"
+        );
+        Refusal::new(why).into()
+    }
 }
 
 /// Error of a file that was not written. What stood under its name before still does.
@@ -108,37 +59,9 @@ pub enum OutputError {
     /// The system has less memory than a file takes while it is made.
     #[error(transparent)]
     Memory(#[from] NoMemory),
-    /// The format cannot hold the picture.
-    #[error("{} cannot hold this picture: {message}", path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// Reason, which says what the format cannot hold.
-        message: String,
-    },
-    /// A finite number that would become infinite, and so a miss, in 32 bits.
-    #[error(
-        "channel \"{channel}\" is {value:e} at column {x}, row {y}, more than 32-bit floats reach; \
-         scale the scene down or write this layer as NPY"
-    )]
-    Overflow {
-        /// The channel's full name.
-        channel: String,
-        /// The value.
-        value: f64,
-        /// Column, from the left.
-        x: usize,
-        /// Row, from the top.
-        y: usize,
-    },
-    /// A layer that the picture does not have.
-    #[error("the picture has no layer \"{name}\"; it has {known}")]
-    UnknownLayer {
-        /// The name asked for.
-        name: String,
-        /// The names there are.
-        known: String,
-    },
+    /// Anything else: the format cannot hold the picture, or the picture has no such layer.
+    #[error(transparent)]
+    Refused(#[from] Refusal),
     /// The caller's progress function asked to stop.
     #[error("writing {} was stopped", path.display())]
     Stopped {
@@ -154,7 +77,18 @@ impl OutputError {
     }
 
     /// Error of what `path`'s format cannot hold.
-    pub(crate) fn format(path: &Path, message: impl ToString) -> Self {
-        Self::Format { path: path.to_owned(), message: message.to_string() }
+    pub(crate) fn format(path: &Path, message: impl fmt::Display) -> Self {
+        let why = format!("{} cannot hold this picture: {message}", path.display());
+        Refusal::new(why).into()
+    }
+
+    /// Error of a finite number that would become infinite, and so a miss, in 32 bits, at a column and row from the
+    /// top left.
+    pub(super) fn overflow(channel: &str, value: f64, [x, y]: [usize; 2]) -> Self {
+        let why = format!(
+            "channel \"{channel}\" is {value:e} at column {x}, row {y}, more than 32-bit floats reach; \
+             scale the scene down or write this layer as NPY"
+        );
+        Refusal::new(why).into()
     }
 }

@@ -35,8 +35,7 @@ use rayon::prelude::*;
 
 use super::picture::put;
 use super::sidecar::Entries;
-use super::{OutputError, Picture, Values};
-use crate::expose::SPECTRUM;
+use super::{OutputError, Picture, SPECTRUM, Values};
 use etendue_files::{SOFTWARE, Transaction};
 
 /// Packing of the pixels. Both keep every bit.
@@ -192,7 +191,7 @@ impl<'a> ScanLineBlocks<'a> {
         for (out, (row, (name, values, kind))) in bytes.chunks_exact_mut(row_bytes).zip(lines) {
             let pixels = row * self.width..(row + 1) * self.width;
             if let Err((x, value)) = put_samples(values, *kind, pixels, out) {
-                return Err(OutputError::Overflow { channel: name.clone(), value, x, y: row });
+                return Err(OutputError::overflow(name, value, [x, row]));
             }
         }
         Ok(bytes)
@@ -466,8 +465,8 @@ mod tests {
             [0.1, 0.0, f32::INFINITY]
         );
         let error = of(vec![1.0, 2.0, 1e39]).unwrap_err();
-        assert!(matches!(error, OutputError::Overflow { x: 2, y: 0, .. }), "{error}");
-        assert!(error.to_string().contains("Depth.Z"), "{error}");
+        let start = "channel \"Depth.Z\" is 1e39 at column 2, row 0, ";
+        assert!(error.to_string().starts_with(start), "{error}");
     }
 
     #[test]

@@ -24,12 +24,13 @@ pub const IMU: &str = "imu.csv";
 ///
 /// When the file cannot be written.
 pub fn write(
-    (to, path): (&Transaction, &Path),
+    files: &Transaction,
+    path: &Path,
     scene: &Scene,
     imu: &ImuSpec,
 ) -> Result<Option<String>, OutputError> {
     let (text, note) = table(scene, imu);
-    to.write(path, |file| file.write_all(text.as_bytes()))?;
+    files.write(path, |file| file.write_all(text.as_bytes()))?;
     Ok(note)
 }
 

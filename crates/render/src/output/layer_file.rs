@@ -2,11 +2,9 @@
 
 use std::path::Path;
 
-use super::DENOISED;
 use super::conventions::{self, KITTI_DEPTH, TUM_DEPTH};
 use super::png::Bits;
-use super::{Look, OutputError, Outputs, Picture, envi, npy, png};
-use crate::expose::SPECTRUM;
+use super::{DENOISED, Look, OutputError, Outputs, Picture, SPECTRUM, envi, npy, png};
 use etendue_files::Transaction;
 use etendue_tracer::LayerSpec;
 
@@ -169,7 +167,6 @@ impl LayerFile {
         name: &str,
     ) -> Result<bool, OutputError> {
         let layer = picture.require(name)?;
-        let of = (picture, layer);
         match self {
             Self::Preview => {
                 let bits = match layer.look {
@@ -186,16 +183,18 @@ impl LayerFile {
             }
             Self::Mask => return png::write_mask(files, path, picture, name),
             Self::Array => npy::write(files, path, picture, name)?,
-            Self::TumDepth => conventions::write_scaled(files, path, of, (TUM_DEPTH, "metres"))?,
+            Self::TumDepth => {
+                conventions::write_scaled(files, path, picture, layer, TUM_DEPTH, "metres")?;
+            }
             Self::KittiDepth => {
-                conventions::write_scaled(files, path, of, (KITTI_DEPTH, "metres"))?;
+                conventions::write_scaled(files, path, picture, layer, KITTI_DEPTH, "metres")?;
             }
             Self::KittiDisparity => {
-                conventions::write_scaled(files, path, of, (KITTI_DEPTH, "pixels"))?;
+                conventions::write_scaled(files, path, picture, layer, KITTI_DEPTH, "pixels")?;
             }
-            Self::KittiFlow => conventions::write_flow(files, path, of)?,
-            Self::Flo => conventions::write_flo(files, path, of)?,
-            Self::Indexed => return conventions::write_indexed(files, path, of),
+            Self::KittiFlow => conventions::write_flow(files, path, picture, layer)?,
+            Self::Flo => conventions::write_flo(files, path, picture, layer)?,
+            Self::Indexed => return conventions::write_indexed(files, path, picture, layer),
             Self::EnviHeader => envi::write_header(files, path, picture, name)?,
             Self::EnviNumbers => envi::write_numbers(files, path, picture, name)?,
         }

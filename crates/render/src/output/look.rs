@@ -4,7 +4,7 @@ pub use etendue_tracer::layer::Look;
 use rayon::prelude::*;
 
 use super::{Layer, Values};
-use crate::film::{NoMemory, filled};
+use crate::memory::{NoMemory, filled};
 
 /// Reason why `layer` cannot be shown as it looks, if there is one.
 pub(super) fn lacks(layer: &Layer) -> Option<&'static str> {

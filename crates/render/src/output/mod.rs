@@ -63,5 +63,8 @@ pub use outputs::Outputs;
 pub use picture::{Channel, Layer, Picture, Values};
 pub use screen::{DistanceScale, Screen};
 
+/// Name of the layer of a hyperspectral cube.
+pub const SPECTRUM: &str = "Spectrum";
+
 /// The name of the layer.
 pub const DENOISED: &str = "Denoised";

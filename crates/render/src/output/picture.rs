@@ -8,11 +8,11 @@ use rayon::prelude::*;
 use serde_json::Value;
 
 use etendue_image::cube::emission_channel;
+use etendue_report::Refusal;
 use etendue_tracer::LayerSpec;
 
 use super::look::lacks;
-use super::{Development, Look, OutputError, PictureError};
-use crate::expose::SPECTRUM;
+use super::{Development, Look, OutputError, PictureError, SPECTRUM};
 
 /// Numbers of one channel, a pixel each: row-major, row 0 at the top.
 #[derive(Debug, Clone)]
@@ -248,9 +248,9 @@ impl Picture {
         header: Vec<(String, String)>,
     ) -> Result<Self, PictureError> {
         let pixels = width.checked_mul(height).filter(|&pixels| pixels > 0);
-        let pixels = pixels.ok_or(PictureError::Size { width, height })?;
+        let pixels = pixels.ok_or_else(|| PictureError::size([width, height]))?;
         if layers.is_empty() {
-            return Err(PictureError::Empty { what: "the list of layers".into() });
+            return Err(PictureError::empty("the list of layers"));
         }
         for layer in &layers {
             check_shape(layer, pixels)?;
@@ -259,7 +259,7 @@ impl Picture {
         for (layer, channel) in channels(&layers) {
             if let Some(i) = channel.values.first_nan() {
                 let channel = layer.full_name(channel);
-                return Err(PictureError::NotANumber { channel, x: i % width, y: i / width });
+                return Err(PictureError::not_a_number(&channel, [i % width, i / width]));
             }
         }
         let (names, png) = Default::default();
@@ -331,7 +331,8 @@ impl Picture {
     pub(super) fn require(&self, name: &str) -> Result<&Layer, OutputError> {
         self.layer(name).ok_or_else(|| {
             let names: Vec<_> = self.layers.iter().map(|l| format!("{:?}", l.name)).collect();
-            OutputError::UnknownLayer { name: name.to_owned(), known: names.join(", ") }
+            let known = names.join(", ");
+            Refusal::new(format!("the picture has no layer \"{name}\"; it has {known}")).into()
         })
     }
 
@@ -372,22 +373,27 @@ fn channels(layers: &[Layer]) -> impl Iterator<Item = (&Layer, &Channel)> {
 
 fn check_shape(layer: &Layer, pixels: usize) -> Result<(), PictureError> {
     let Some(first) = layer.channels.first() else {
-        return Err(PictureError::Empty { what: format!("layer \"{}\"", layer.name) });
+        return Err(PictureError::empty(&format!("layer \"{}\"", layer.name)));
     };
     for channel in &layer.channels {
         let (first, other) = (first.values.type_name(), channel.values.type_name());
         if first != other {
-            return Err(PictureError::Mixed { layer: layer.title(), first, other });
+            let why = format!("layer \"{}\" mixes {first} with {other}", layer.title());
+            return Err(Refusal::new(why).hint("split it into a layer a type").into());
         }
         let found = channel.values.len();
         if found != pixels {
             let channel = layer.full_name(channel);
-            return Err(PictureError::Length { channel, found, expected: pixels });
+            let why = format!(
+                "channel \"{channel}\" has {found} values where the picture has {pixels} pixels"
+            );
+            return Err(Refusal::new(why).into());
         }
     }
     if let Some(needs) = lacks(layer) {
-        let look = format!("{:?}", layer.look);
-        return Err(PictureError::Look { layer: layer.title(), look, needs });
+        let (layer, look) = (layer.title(), layer.look);
+        let why = format!("layer \"{layer}\" looks like {look:?}, which needs {needs}");
+        return Err(Refusal::new(why).into());
     }
     Ok(())
 }
@@ -422,7 +428,7 @@ fn check_names(layers: &[Layer], header: &[(String, String)]) -> Result<(), Pict
 fn check_name(what: &'static str, part: &str, name: &str) -> Result<(), PictureError> {
     let fit = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if part.is_empty() || name.len() > 64 || !part.chars().all(fit) {
-        return Err(PictureError::Name { what, name: name.to_owned() });
+        return Err(PictureError::name(what, name));
     }
     Ok(())
 }
@@ -431,14 +437,16 @@ fn check_name(what: &'static str, part: &str, name: &str) -> Result<(), PictureE
 fn check_entry(what: &'static str, key: &str, text: &str) -> Result<(), PictureError> {
     key.split(' ').try_for_each(|part| check_name(what, part, key))?;
     if text.contains('\0') {
-        return Err(PictureError::ZeroByte { name: key.to_owned() });
+        let why = format!("the text of \"{key}\" holds a zero byte");
+        return Err(Refusal::new(why).hint("remove it").into());
     }
     Ok(())
 }
 
 fn claim(taken: &mut BTreeSet<String>, name: String) -> Result<(), PictureError> {
     if taken.contains(&name) {
-        return Err(PictureError::Twice { name });
+        let why = format!("the name \"{name}\" is used twice; rename one of the two");
+        return Err(Refusal::new(why).into());
     }
     taken.insert(name);
     Ok(())
@@ -465,7 +473,8 @@ mod tests {
         values[290 * width + 17] = f32::NAN;
         values[295 * width + 3] = f32::NAN;
         let error = Picture::new(width, height, vec![depth(values)], Vec::new()).unwrap_err();
-        assert_eq!(error, PictureError::NotANumber { channel: "Depth.Z".into(), x: 17, y: 290 });
+        let start = "channel \"Depth.Z\" is NaN at column 17, row 290 ";
+        assert!(error.to_string().starts_with(start), "{error}");
     }
 
     #[test]
@@ -478,8 +487,8 @@ mod tests {
     fn a_wrong_length_is_named() {
         let error = Picture::new(2, 2, vec![depth(vec![1.0; 3])], Vec::new()).unwrap_err();
         assert_eq!(
-            error,
-            PictureError::Length { channel: "Depth.Z".into(), found: 3, expected: 4 }
+            error.to_string(),
+            "channel \"Depth.Z\" has 3 values where the picture has 4 pixels"
         );
     }
 
@@ -487,7 +496,7 @@ mod tests {
     fn sizes_without_pixels_or_beyond_memory_are_refused() {
         for (width, height) in [(0, 4), (4, 0), (usize::MAX, 2)] {
             let error = Picture::new(width, height, vec![depth(Vec::new())], Vec::new());
-            assert_eq!(error.unwrap_err(), PictureError::Size { width, height });
+            assert_eq!(error.unwrap_err(), PictureError::size([width, height]));
         }
     }
 
@@ -496,7 +505,7 @@ mod tests {
         let mut mixed = depth(vec![1.0]);
         mixed.channels.push(Channel { name: "object".into(), values: Values::U32(vec![1]) });
         let error = Picture::new(1, 1, vec![mixed], Vec::new()).unwrap_err();
-        assert!(matches!(error, PictureError::Mixed { first: "f4", other: "u4", .. }), "{error}");
+        assert!(error.to_string().contains("mixes f4 with u4"), "{error}");
     }
 
     #[test]
@@ -505,7 +514,7 @@ mod tests {
             let error =
                 Picture::new(1, 1, vec![layer(name, "Z", Values::F32(vec![1.0]))], Vec::new())
                     .unwrap_err();
-            assert!(matches!(error, PictureError::Name { .. }), "{name}: {error}");
+            assert!(error.to_string().contains("cannot name a layer"), "{name}: {error}");
         }
         for (key, fits) in [("taken along", true), (" a", false), ("a  b", false), ("a:b", false)] {
             let mut depth = depth(vec![1.0]);
@@ -520,10 +529,10 @@ mod tests {
     fn names_that_would_meet_in_a_file_are_refused() {
         let twice = vec![depth(vec![1.0]), depth(vec![1.0])];
         let error = Picture::new(1, 1, twice, Vec::new()).unwrap_err();
-        assert_eq!(error, PictureError::Twice { name: "Depth.Z".into() });
+        assert!(error.to_string().contains("\"Depth.Z\" is used twice"), "{error}");
 
         let header = vec![("Depth".to_owned(), "1".to_owned())];
         let error = Picture::new(1, 1, vec![depth(vec![1.0])], header).unwrap_err();
-        assert_eq!(error, PictureError::Twice { name: "Depth".into() });
+        assert!(error.to_string().contains("\"Depth\" is used twice"), "{error}");
     }
 }

@@ -16,7 +16,7 @@ use super::DENOISED;
 pub use super::look::Bits;
 use super::look::{ColourType, LayerImage, mask, palette, show};
 use super::{Layer, Look, OutputError, Picture};
-use crate::film::check_room;
+use crate::memory::check_room;
 use etendue_files::{PartFile, SOFTWARE, Transaction};
 
 /// Writes the layer called `name` (empty for the picture itself, or for what it is without its noise where
@@ -108,7 +108,7 @@ fn encode(part: &mut PartFile<'_>, info: Info<'_>, bytes: &[u8]) -> Result<(), E
     writer.finish()
 }
 
-/// What stands in the file beside the pixels.
+/// Texts of the file, beside its pixels.
 fn texts(picture: &Picture, layer: &Layer, shown: &LayerImage) -> Vec<ITXtChunk> {
     let comment = match layer.look {
         Look::Counts { .. } => "data",
@@ -240,7 +240,8 @@ mod tests {
             "Id",
             Bits::Eight,
         );
-        assert!(matches!(error, Err(OutputError::UnknownLayer { .. })));
+        let error = error.unwrap_err().to_string();
+        assert!(error.starts_with("the picture has no layer \"Id\"; it has "), "{error}");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

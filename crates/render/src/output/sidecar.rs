@@ -25,7 +25,7 @@ impl Serialize for Entries<'_> {
     }
 }
 
-/// What a picture holds, without its values.
+/// Description of a picture, without its values.
 #[derive(Debug, Serialize)]
 struct Description<'a> {
     software: &'static str,

@@ -93,7 +93,7 @@ pub struct Plan {
     pub bands: Bands,
     /// Forecast of the memory, by counts and headers alone: within 1.5 of the peak of the example scenes.
     pub memory: MemoryForecast,
-    /// What is taken of the scene's tolerance.
+    /// Part of the scene's tolerance that is taken.
     pub taken: Option<Approximations>,
     /// The decisions, with their reasons.
     pub decisions: Vec<Decision>,
@@ -201,7 +201,7 @@ impl Plan {
         let is_open = scene.tolerance.is_some() && taken.is_none() && is_lit;
         let band_paths = match is_open {
             true => BandPaths::Apart("what is taken of the tolerance is not known yet".to_owned()),
-            false => BandPaths::of((scene, lit_by), &chosen.bands, stopping, is_lit),
+            false => BandPaths::of(scene, lit_by, &chosen.bands, stopping, is_lit),
         };
         let apart = |camera: &Camera| camera.band_groups(&chosen.bands).len() as u64;
         let sampled = |yes, apart| if yes { u64::from(spec.typical()) * apart } else { 0 };

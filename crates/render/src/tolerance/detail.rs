@@ -246,8 +246,8 @@ fn pixel_extent(scene: &Scene, distance: f64) -> Option<f64> {
     let at = |i: u32, side: f64| f64::from(i) / f64::from(PLACES - 1) * (side - 1.0).max(0.0);
     let places = (0..PLACES * PLACES).map(|i| [at(i % PLACES, width), at(i / PLACES, height)]);
     // Each with its neighbours on the right and below.
-    let around = places.flat_map(|[x, y]| [[x, y], [x + 1.0, y], [x, y + 1.0]]);
-    let (columns, rows): (Vec<f64>, Vec<f64>) = around.map(|[x, y]| (x, y)).unzip();
+    let corners = places.flat_map(|[x, y]| [[x, y], [x + 1.0, y], [x, y + 1.0]]);
+    let (columns, rows): (Vec<f64>, Vec<f64>) = corners.map(|[x, y]| (x, y)).unzip();
     let mut rays = RayBatch::default();
     scene.camera.rays_through(&columns, &rows, &mut rays);
     let point = |i: usize| rays.origin(i) + distance * rays.direction(i);

@@ -12,6 +12,7 @@
 //! `thin` and `thick` are the approximations of C. Kolb, D. Mitchell and P. Hanrahan, "A realistic camera model
 //! for computer graphics", 1995.
 
+use std::fmt;
 use std::path::PathBuf;
 
 use etendue_accel::Accel;
@@ -25,6 +26,7 @@ use etendue_geometry::Bounds;
 use etendue_geometry::units::{Micrometres, Millimetres};
 use etendue_optics::element::{ApertureSpec, ElementSpec, MaskSpec, Opening, PartSpec, Picture};
 use etendue_scene::Scene;
+use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
 
 use super::{Field, FullView, TakenCamera, Tolerance};
@@ -38,11 +40,61 @@ pub struct NoModels(
     pub &'static str,
 );
 
+/// Kind of a model of a lens, or the lens itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LensModelKind {
+    /// Its entrance pupil as a point.
+    Pinhole,
+    /// A pinhole with OpenCV's distortion.
+    Opencv,
+    /// OpenCV's camera with the lens' falloff of light.
+    Falloff,
+    /// A thin lens.
+    Thin,
+    /// A thin lens with its stop apart.
+    Thick,
+    /// All of the lens, at its design wavelength.
+    Undispersed,
+    /// All of the lens, with its bands in groups.
+    Grouped,
+    /// All of the lens.
+    Full,
+}
+
+impl LensModelKind {
+    /// Its name in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pinhole => "pinhole",
+            Self::Opencv => "opencv",
+            Self::Falloff => "falloff",
+            Self::Thin => "thin",
+            Self::Thick => "thick",
+            Self::Undispersed => "undispersed",
+            Self::Grouped => "grouped",
+            Self::Full => "full",
+        }
+    }
+}
+
+impl fmt::Display for LensModelKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl Serialize for LensModelKind {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
 /// A model of a lens.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LensModel {
-    /// `pinhole`, `opencv`, `falloff`, `thin`, `thick` or `undispersed`.
-    pub name: &'static str,
+    /// Its kind.
+    pub kind: LensModelKind,
     /// With the pose, resolution, shutter and motion of the camera.
     pub camera: Camera,
     /// The keys of a scene that take it.
@@ -62,18 +114,18 @@ pub struct LensModels {
 
 impl LensModels {
     /// Adds the camera that `full` is with the projection of `spec`, or why there is none.
-    fn add(&mut self, name: &'static str, full: &Camera, spec: Result<CameraSpec, String>) {
-        let model = spec.and_then(|spec| model(name, full, &spec));
+    fn add(&mut self, kind: LensModelKind, full: &Camera, spec: Result<CameraSpec, String>) {
+        let model = spec.and_then(|spec| model(kind, full, &spec));
         match model {
             Ok(model) => self.models.push(model),
-            Err(why) => self.notes.push(format!("no `{name}` model of this lens: {why}")),
+            Err(why) => self.notes.push(format!("no `{kind}` model of this lens: {why}")),
         }
     }
 }
 
 /// The model that `full` is with the projection of `spec`.
 pub(super) fn model(
-    name: &'static str,
+    kind: LensModelKind,
     full: &Camera,
     spec: &CameraSpec,
 ) -> Result<LensModel, String> {
@@ -81,7 +133,7 @@ pub(super) fn model(
     let camera = spec.build(|| Bounds::EMPTY, &|name: &str| Ok(PathBuf::from(name)));
     let camera = full.seen_through(&camera.map_err(|error| error.to_string())?);
     let scene = serde_json::to_value(spec).map_err(|error| error.to_string())?;
-    Ok(LensModel { name, camera, scene: json!({ "camera": scene }), lacks_mask: false })
+    Ok(LensModel { kind, camera, scene: json!({ "camera": scene }), lacks_mask: false })
 }
 
 /// The models of a camera's lens that keep what is known near its axis: pinhole, thin and thick lens.
@@ -93,14 +145,14 @@ pub fn near_axis(full: &Camera) -> Result<LensModels, NoModels> {
     let lens = full.lens().ok_or(NoModels("the camera has none"))?;
     let gauss = Gauss::of(full, lens)?;
     let mut found = LensModels::default();
-    found.add("pinhole", full, Ok(CameraSpec::Pinhole(gauss.pinhole())));
+    found.add(LensModelKind::Pinhole, full, Ok(CameraSpec::Pinhole(gauss.pinhole())));
     let lens = |spec: Result<ThinLensCameraSpec, &str>| {
         spec.map(CameraSpec::ThinLens).map_err(str::to_owned)
     };
-    found.add("thin", full, lens(gauss.thin()));
-    found.add("thick", full, lens(gauss.thick()));
+    found.add(LensModelKind::Thin, full, lens(gauss.thin()));
+    found.add(LensModelKind::Thick, full, lens(gauss.thick()));
     let lacks_mask = gauss.mask.is_none() && masks(full).next().is_some();
-    let blurred = found.models.iter_mut().filter(|model| model.name != "pinhole");
+    let blurred = found.models.iter_mut().filter(|model| model.kind != LensModelKind::Pinhole);
     blurred.for_each(|model| model.lacks_mask = lacks_mask);
     Ok(found)
 }
@@ -112,14 +164,15 @@ pub fn near_axis(full: &Camera) -> Result<LensModels, NoModels> {
 /// When there is none, in words.
 pub fn opencv(full: &Camera, tolerance: f64) -> Result<(LensModel, CameraSpec), String> {
     let fit = OpencvFit::new(full, tolerance).map_err(|error| error.to_string())?;
-    Ok((model("opencv", full, &fit.camera)?, fit.camera))
+    Ok((model(LensModelKind::Opencv, full, &fit.camera)?, fit.camera))
 }
 
 /// All of the lens, as at its design wavelength.
 #[must_use]
 pub fn undispersed(full: &Camera) -> LensModel {
     let scene = json!({ "plan": { "dispersion": false } });
-    LensModel { name: "undispersed", camera: full.without_dispersion(), scene, lacks_mask: false }
+    let (kind, camera) = (LensModelKind::Undispersed, full.without_dispersion());
+    LensModel { kind, camera, scene, lacks_mask: false }
 }
 
 /// The masks in a camera's lens, by the numbers of their elements.
@@ -307,10 +360,7 @@ impl Gauss {
 /// All bands are looked at: those at the sides of a group are farthest from where they run together.
 const ALL_BANDS: Field = Field { bands: usize::MAX, rays: 64, ..Field::QUICK };
 
-/// The name of the model whose bands are in groups.
-const GROUPED: &str = "grouped";
-
-/// How many numbers of groups are tried.
+/// Numbers of groups that are tried.
 const TRIES: usize = 6;
 
 /// Bands of a lens run together in groups, where the scene is traced for each band. Where bands share the paths of the
@@ -325,14 +375,14 @@ pub(super) fn fewest_groups(
     tolerance: Tolerance,
 ) -> Result<Option<TakenCamera>, RenderError> {
     let most = plan.bands.count() / 2;
-    let paths = || BandPaths::of((scene, &scene.camera), &plan.bands, plan.stopping, true);
+    let paths = || BandPaths::of(scene, &scene.camera, &plan.bands, plan.stopping, true);
     let can_pay = || most >= 2 && matches!(paths(), BandPaths::Apart(_));
     let Some(two) = scene.camera.with_bands_grouped(2).filter(|_| can_pay()) else {
         return Ok(None);
     };
     let view = FullView::new(scene, accel, &plan.bands, ALL_BANDS)?;
     // Displacements within a group go as its width.
-    let found = view.finding(GROUPED, &two, tolerance)?;
+    let found = view.finding(LensModelKind::Grouped, &two, tolerance)?;
     if found.is_within {
         return Ok(Some(TakenCamera { camera: two, finding: found }));
     }
@@ -344,7 +394,7 @@ pub(super) fn fewest_groups(
     };
     for count in (first..=most).take(TRIES) {
         let Some(camera) = scene.camera.with_bands_grouped(count) else { break };
-        let finding = view.finding(GROUPED, &camera, tolerance)?;
+        let finding = view.finding(LensModelKind::Grouped, &camera, tolerance)?;
         if finding.is_within {
             return Ok(Some(TakenCamera { camera, finding }));
         }

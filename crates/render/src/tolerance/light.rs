@@ -8,7 +8,8 @@ use etendue_scene::Scene;
 use etendue_scene::file::{SamplesSpec, TracerSpec};
 use etendue_tracer::LayerSpec;
 
-use super::{Approximations, TakenBounces, lens_models};
+use super::lens_models::{self, LensModelKind};
+use super::{Approximations, TakenBounces};
 use crate::output::Outputs;
 use crate::{Images, Plan, RenderError, Watch, render};
 
@@ -49,10 +50,11 @@ pub(super) fn fewest(
     }
     let camera = match lens_models::near_axis(&scene.camera) {
         // What a lens does beside is nothing to bounces.
-        Ok(found) if found.models.first().is_some_and(|model| model.name == "pinhole") => {
-            found.models[0].camera.clone()
-        }
-        _ => scene.camera.clone(),
+        Ok(found) => match found.models.into_iter().next() {
+            Some(model) if model.kind == LensModelKind::Pinhole => model.camera,
+            _ => scene.camera.clone(),
+        },
+        Err(_) => scene.camera.clone(),
     };
     let [width, height] = camera.resolution();
     let camera = camera.coarser(width.max(height).div_ceil(SIDE).max(BLOCK));

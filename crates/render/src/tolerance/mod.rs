@@ -10,6 +10,7 @@ mod detail;
 pub mod lens_models;
 mod light;
 mod pixel_views;
+mod place;
 mod small_things;
 mod verify;
 
@@ -21,16 +22,17 @@ use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 use serde::Serialize;
 
-use self::lens_models::{LensModel, LensModels, NoModels};
+use self::lens_models::{LensModel, LensModelKind, LensModels, NoModels};
 use self::pixel_views::{LightRay, PlaceView, chief_rays, places, seen};
 use crate::{Images, Plan, RenderError, Watch};
 
 pub use self::coarse_images::coarse_images;
 pub(crate) use self::detail::hidden_offset;
 pub use self::detail::{TakenDetail, coarser, with_meshes};
+pub use self::place::Place;
 pub use self::verify::{Verified, verify};
 
-/// What a model may be off by.
+/// Errors that a model may have.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Tolerance {
     /// Of places, blur and shifts of colour (pixels).
@@ -62,26 +64,14 @@ impl Field {
     pub const BETWEEN: Self = Self { size: [16, 12], rays: 256, bands: 5, across: 64 };
 }
 
-/// A place of the picture.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Place {
-    /// Its column (pixels from the outer corner of the top left pixel).
-    pub column: f64,
-    /// Its row.
-    pub row: f64,
-    /// Depths (m) that are seen around it, the nearest first.
-    #[serde(serialize_with = "finite_or_null")]
-    pub depths: Vec<f64>,
-}
-
-/// What a model misses, and what it costs.
+/// Errors of a model, and its cost.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelError {
-    /// `pinhole`, `opencv`, `falloff`, `thin`, `thick`, `undispersed`, `grouped` or `full`.
-    pub model: &'static str,
-    /// How far chief rays are from the train's (pixels).
+    /// Kind of the model.
+    pub model: LensModelKind,
+    /// Distance of chief rays from the train's (pixels).
     pub chief_ray: Worst,
-    /// How far the middle of a pixel's light is (pixels).
+    /// Distance of the middle of a pixel's light from the train's (pixels).
     pub centroid: Worst,
     /// The difference of the blur, the root mean square radius of a pixel's light in a band (pixels).
     pub blur: Worst,
@@ -93,7 +83,7 @@ pub struct ModelError {
     pub is_within: bool,
     /// The time of a sample of a pixel (s); `null` without a picture to time.
     pub seconds_a_sample: Option<f64>,
-    /// How many times as fast as the full train that is.
+    /// Speed as a multiple of the full train's.
     pub speed: Option<f64>,
 }
 
@@ -147,7 +137,7 @@ impl FullView {
     ///
     /// # Errors
     ///
-    /// [`RenderError::Camera`] when no light gets through the lens.
+    /// When no light gets through the lens.
     pub fn new(
         scene: &Scene,
         accel: &dyn Accel,
@@ -202,7 +192,8 @@ impl FullView {
     fn models_of(&self, sought: Sought, tolerance: Tolerance) -> Result<LensModels, NoModels> {
         let full = &self.camera;
         let LensModels { models: mut near, mut notes } = lens_models::near_axis(full)?;
-        let after = near.iter().take_while(|model| model.name == "pinhole").count();
+        let is_pinhole = |model: &&LensModel| model.kind == LensModelKind::Pinhole;
+        let after = near.iter().take_while(is_pinhole).count();
         let mut models: Vec<LensModel> = near.drain(..after).collect();
         if sought == Sought::WithPupil {
             models.clear();
@@ -258,10 +249,10 @@ impl FullView {
     ///
     /// # Errors
     ///
-    /// [`RenderError::Camera`] when no light gets through.
+    /// When no light gets through.
     pub fn finding(
         &self,
-        model: &'static str,
+        model: LensModelKind,
         camera: &Camera,
         tolerance: Tolerance,
     ) -> Result<ModelError, RenderError> {
@@ -274,10 +265,15 @@ impl FullView {
     /// The lens against itself.
     #[must_use]
     pub fn itself(&self, tolerance: Tolerance) -> ModelError {
-        self.compared("full", &self.seen, tolerance)
+        self.compared(LensModelKind::Full, &self.seen, tolerance)
     }
 
-    fn compared(&self, model: &'static str, own: &[PlaceView], tolerance: Tolerance) -> ModelError {
+    fn compared(
+        &self,
+        model: LensModelKind,
+        own: &[PlaceView],
+        tolerance: Tolerance,
+    ) -> ModelError {
         let [mut chief_ray, mut centroid, mut blur, mut colour, mut light] = [Worst::default(); 5];
         let scale = self.scale;
         for ((own, full), place) in own.iter().zip(&self.seen).zip(&self.places) {
@@ -333,11 +329,11 @@ enum Sought {
 fn with_falloff(full: &Camera, spec: CameraSpec, falloff: FalloffSpec) -> Option<LensModel> {
     let CameraSpec::Pinhole(mut spec) = spec else { return None };
     spec.falloff = Some(falloff);
-    lens_models::model("falloff", full, &CameraSpec::Pinhole(spec)).ok()
+    lens_models::model(LensModelKind::Falloff, full, &CameraSpec::Pinhole(spec)).ok()
 }
 
 fn open(camera: &Camera, bands: &Bands) -> Result<Camera, RenderError> {
-    camera.opened(bands).map_err(|error| RenderError::Camera(error.why))
+    camera.opened(bands).map_err(|error| RenderError::camera(error.why))
 }
 
 /// Of so many bands a few numbers: the first, the last, and even ones in between.
@@ -377,7 +373,7 @@ impl Approximations {
 pub struct TakenCamera {
     /// The camera.
     pub camera: Camera,
-    /// What it misses.
+    /// Its errors.
     pub finding: ModelError,
 }
 
@@ -460,11 +456,11 @@ fn simplest(
         }
     };
     // The root mean square of a blur says nothing of the pattern in it.
-    for LensModel { name, camera, .. } in models.into_iter().filter(|model| !model.lacks_mask) {
+    for LensModel { kind, camera, .. } in models.into_iter().filter(|model| !model.lacks_mask) {
         if view.chief_displacement(&camera) > tolerance.pixels {
             continue;
         }
-        let Ok(finding) = view.finding(name, &camera, tolerance) else { continue };
+        let Ok(finding) = view.finding(kind, &camera, tolerance) else { continue };
         if finding.is_within {
             return Ok(Some(TakenCamera { camera, finding }));
         }
@@ -481,8 +477,4 @@ impl From<ToleranceSpec> for Tolerance {
     fn from(spec: ToleranceSpec) -> Self {
         Self { pixels: spec.displacement.0, light: Some(spec.light.0) }
     }
-}
-
-fn finite_or_null<S: serde::Serializer>(values: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_seq(values.iter().map(|x| x.is_finite().then_some(*x)))
 }

@@ -45,7 +45,7 @@ pub(super) struct BandRays {
 }
 
 impl LightRay {
-    /// Where it runs at a depth whose inverse (1/m) is given, in tangents.
+    /// Returns its place at a depth whose inverse (1/m) is given, in tangents.
     pub(super) fn at(&self, nearness: f64) -> DVec2 {
         self.slope + self.offset * nearness
     }

@@ -35,7 +35,7 @@ struct ScreenBox {
 
 /// Places of the picture in even columns and rows.
 pub(super) struct PictureGrid {
-    /// How many columns and rows of them.
+    /// Numbers of columns and rows.
     pub(super) count: [usize; 2],
     /// From one to the next (pixels).
     pub(super) step: [f64; 2],
@@ -137,8 +137,8 @@ impl PictureGrid {
         }
     }
 
-    /// What is to be aimed at of a placement in a box; `None` where even rays meet it, where it is not seen, or where its
-    /// depths lie within those that are known.
+    /// Returns the box to be aimed at of a placement in a box; `None` where even rays meet it, where it is not seen, or
+    /// where its depths lie within those that are known.
     fn target(&self, eye: &Eye<'_>, places: &[Place], bounds: &Bounds) -> Option<ScreenBox> {
         if bounds.is_empty() {
             return None;

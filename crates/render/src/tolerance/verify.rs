@@ -17,7 +17,7 @@ const SIDE: u32 = 64;
 /// Samples of their pixels.
 const SAMPLES: u32 = 256;
 
-/// What was found.
+/// Errors that were found.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Verified {
     /// The greatest displacement (pixels), and that which is allowed.

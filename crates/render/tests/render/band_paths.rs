@@ -211,25 +211,25 @@ fn threads_passes_and_shares_make_one_picture() {
             true => shard.by(etendue_render::ShardBy::Samples),
             false => shard,
         });
-        let course = RenderState { shard, ..RenderState::default() };
-        let film = trace(&scene, &plan, prepared, &[], &course, &|_: f64| true).unwrap();
+        let state = RenderState { shard, ..RenderState::default() };
+        let film = trace(&scene, &plan, prepared, &[], &state, &|_: f64| true).unwrap();
         let path = folder.path().join(format!("{number}{by_samples}"));
-        film.write((&Transaction::at_once(), &path), &Vec::new(), &Value::Null).unwrap();
+        film.write(&Transaction::at_once(), &path, &Vec::new(), &Value::Null).unwrap();
         FilmFile::read(&path).unwrap()
     };
     let rows = [2, 3, 1].map(|number| share(number, false));
     let film = Film::merged(&scene, &plan, &rows, &Vec::new()).unwrap();
     let of_rows = finish(&scene, &plan, film, Vec::new(), Some(&*accel)).unwrap();
     let samples = [3, 1, 2].map(|number| share(number, true));
-    let course = RenderState { shares: &samples, ..RenderState::default() };
-    let film = trace(&scene, &plan, prepared, &[], &course, &|_: f64| true).unwrap();
+    let state = RenderState { shares: &samples, ..RenderState::default() };
+    let film = trace(&scene, &plan, prepared, &[], &state, &|_: f64| true).unwrap();
     let of_samples = finish(&scene, &plan, film, Vec::new(), Some(&*accel)).unwrap();
     // Stopped half-way, and gone on with.
     let checkpoint = Checkpoint { path: folder.path().join("kept"), every: Duration::ZERO };
-    let course = RenderState { checkpoint: Some(checkpoint.clone()), ..RenderState::default() };
-    let stopped = trace(&scene, &plan, prepared, &[], &course, &|share: f64| share < 0.5).unwrap();
+    let state = RenderState { checkpoint: Some(checkpoint.clone()), ..RenderState::default() };
+    let stopped = trace(&scene, &plan, prepared, &[], &state, &|share: f64| share < 0.5).unwrap();
     assert!(!stopped.is_complete() && checkpoint.path.exists());
-    let film = trace(&scene, &plan, prepared, &[], &course, &|_: f64| true).unwrap();
+    let film = trace(&scene, &plan, prepared, &[], &state, &|_: f64| true).unwrap();
     let gone_on = finish(&scene, &plan, film, Vec::new(), Some(&*accel)).unwrap();
     let bits = |done: &Rendered| -> Vec<u64> {
         let layers = ["", "Direct", "Indirect"].map(|name| channels(&done.picture, name).concat());

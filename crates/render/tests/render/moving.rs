@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use etendue_accel::AccelName;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitPrecision, Motion, Steady};
 use etendue_render::Plan;
@@ -72,7 +73,7 @@ const NOISE: f64 = 4.0 * 0.2 * 0.5 / 64.0;
 
 #[test]
 fn the_edge_of_a_lamp_that_moves_is_the_ramp_of_its_speed() {
-    for accel in ["embree", "bvh", "exact"] {
+    for accel in AccelName::built().map(AccelName::name) {
         for pixels in [3.0, 17.5] {
             let lamp = json!([{ "shape": "rectangle", "width": 20, "height": 20, "material": "lamp",
                                 "transform": { "translate": [10, 0, 0] } }]);
@@ -98,7 +99,7 @@ fn the_shadow_of_a_body_that_moves_is_the_ramp_of_its_speed() {
     // Its shadow, 6 m farther to the right, begins in the middle of the picture.
     let roof = json!({ "shape": "rectangle", "width": 20, "height": 20, "material": "floor",
                        "transform": { "translate": [4, 0, 6] } });
-    for accel in ["embree", "bvh", "exact"] {
+    for accel in AccelName::built().map(AccelName::name) {
         let open = mean(&profile(&scene(accel, sun.clone(), json!([floor]))));
         assert!(open > 0.01);
         let pixels = 11.0;
@@ -186,7 +187,7 @@ fn rows_of_a_rolling_shutter_see_objects_at_their_times() {
     let turning = json!({ "type": "velocity", "angular_velocity": [0, 0, degrees_a_second], "about": [0, 0, 0] });
     let both = json!({ "type": "velocity", "velocity": [-speed, 0, 0],
                        "angular_velocity": [0, 0, degrees_a_second], "about": [0, 0, 0] });
-    for accel in ["embree", "bvh", "exact"] {
+    for accel in AccelName::built().map(AccelName::name) {
         for readout in ["down", "up"] {
             let shutter = json!({ "type": "rolling", "line_time": line_time, "readout": readout });
             for (motion, moves, turns) in

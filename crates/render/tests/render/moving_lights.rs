@@ -4,6 +4,7 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use etendue_accel::AccelName;
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Motion, Steps};
 use etendue_scene::Scene;
@@ -47,7 +48,7 @@ fn lit(scene: &Scene) -> [f64; 2] {
 
 /// All accelerators in both precisions of light.
 fn all_ways() -> impl Iterator<Item = Value> {
-    ["embree", "bvh", "exact"].into_iter().flat_map(|accel| {
+    AccelName::built().map(AccelName::name).flat_map(|accel| {
         ["single", "double"].map(|precision| {
             json!({ "render": { "samples": 256, "accel": accel, "time": 7 }, "precision": precision })
         })

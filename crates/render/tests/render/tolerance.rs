@@ -8,6 +8,7 @@ use etendue_geometry::Geometry;
 use etendue_geometry::HitPrecision;
 use etendue_render::expose::SPECTRUM;
 use etendue_render::output::Outputs;
+use etendue_render::tolerance::lens_models::LensModelKind;
 use etendue_render::tolerance::{
     Approximations, TakenBounces, choose, coarser, lens_models, with_meshes,
 };
@@ -99,7 +100,7 @@ fn a_lens_stopped_down_is_taken_as_opencv_has_it_with_its_falloff() {
     let scene = lens_scene(16.0, &allowed("0.5 px", "2 %"));
     let taken = taken(&scene);
     let camera = taken.camera.as_ref().expect("a simpler camera");
-    assert_eq!(camera.finding.model, "falloff", "{:?}", camera.finding);
+    assert_eq!(camera.finding.model, LensModelKind::Falloff, "{:?}", camera.finding);
     assert!(camera.finding.displacement() <= 0.5 && camera.finding.light.value <= 0.02);
     // Shutter, place and pixels are the scene's.
     assert_eq!(camera.camera.pose(), scene.camera.pose());
@@ -129,7 +130,7 @@ fn a_lens_stopped_down_is_taken_as_opencv_has_it_with_its_falloff() {
 fn a_lens_wide_open_is_taken_as_it_is_but_for_its_colours() {
     // Blur of half a pixel: of all models, the lens without its dispersion alone has it.
     let own = taken(&lens_scene(2.8, &allowed("0.1 px", "3 %")));
-    assert_eq!(own.camera.map(|camera| camera.finding.model), Some("undispersed"));
+    assert_eq!(own.camera.map(|camera| camera.finding.model), Some(LensModelKind::Undispersed));
 }
 
 #[test]
@@ -387,7 +388,7 @@ fn parted_colours(pixels: &str) -> Scene {
     load_json(tempfile::tempdir().unwrap().path(), scene)
 }
 
-/// Where the middle of the light of each band lies (pixels).
+/// Middles of the light of the bands (pixels).
 fn middles(scene: &Scene, taken: Option<Approximations>) -> Vec<[f64; 2]> {
     let plan = Plan::taking(scene, Outputs::ALL, taken);
     let (accel, images) = prepare(scene, &plan);
@@ -409,7 +410,7 @@ fn bands_run_together_in_as_few_groups_as_the_tolerance_allows() {
     let scene = parted_colours("0.3 px");
     let taken = taken(&scene);
     let camera = taken.camera.clone().expect("bands in groups");
-    assert_eq!(camera.finding.model, "grouped", "{:?}", camera.finding);
+    assert_eq!(camera.finding.model, LensModelKind::Grouped, "{:?}", camera.finding);
     assert!(camera.finding.displacement() <= 0.3, "{:?}", camera.finding);
     let plan = Plan::taking(&scene, Outputs::ALL, Some(taken.clone()));
     let groups = camera.camera.band_groups(&plan.bands).len();

@@ -193,16 +193,16 @@ pub struct StepSizes {
 
 impl StepSizes {
     /// The forecast; `None` for a scene without triangles.
-    pub(super) fn of(geometry: &Geometry, around: Bounds) -> Option<Self> {
-        if around.is_empty() {
+    pub(super) fn of(geometry: &Geometry, bounds: Bounds) -> Option<Self> {
+        if bounds.is_empty() {
             return None;
         }
-        let farthest = largest(around.min).max(largest(around.max));
+        let farthest = largest(bounds.min).max(largest(bounds.max));
         Some(Self {
             farthest_coordinate: farthest,
             input_step: input_step(geometry),
             f32_step_in_world: step(farthest, f32::EPSILON.into()),
-            f32_step_from_centre: step(largest(around.max - around.centre()), f32::EPSILON.into()),
+            f32_step_from_centre: step(largest(bounds.max - bounds.centre()), f32::EPSILON.into()),
             f64_step: step(farthest, f64::EPSILON),
         })
     }

@@ -14,7 +14,7 @@ const EMBREE_PER_TRIANGLE: u64 = 92;
 
 /// Bytes per placement of a mesh that is placed twice or more, all in all: where it stands in the file, in the
 /// scene and while it is framed, and Embree's instance of it or ours. 890 to 1290 were held for 0.04 to 1 million
-/// copies of one object; `benches/memory.py`, with `--accel bvh`, too.
+/// copies of one object; `benches/forecasts.py memory`, with `--accel bvh`, too.
 const PER_COPY: u64 = 1000;
 
 /// Bytes of a placement that moves while the shutter is open, beside what copies have: its motion, with what the structure keeps of
@@ -51,11 +51,11 @@ pub struct MemoryForecast {
     pub film: u64,
     /// Sums of samples that are kept from pass to pass.
     pub sums: u64,
-    /// What the sensor's exposures take, with the light in its bands.
+    /// Bytes of the sensor's exposures, with the light in its bands.
     pub sensor: u64,
-    /// What is made of the planes on the way to files and for a look at the picture so far.
+    /// Bytes of what is made of the planes on the way to files and for a look at the picture so far.
     pub files: u64,
-    /// What the views of a light field take: they are made when all of the former is done.
+    /// Bytes of the views of a light field, which are made when all of the former is done.
     pub views: u64,
     /// All but the mapped part. Sums are gone when the sensor's images and files are made.
     pub total: u64,

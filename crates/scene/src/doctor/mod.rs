@@ -19,7 +19,7 @@ use crate::{
 pub use checks::StepSizes;
 pub use memory::MemoryForecast;
 
-/// What `etendue check` tells of a scene or model. Serialises to what `--json` prints.
+/// Findings of `etendue check` on a scene or model. Serialises to what `--json` prints.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
     /// The file.
@@ -44,11 +44,11 @@ pub struct Diagnosis {
     pub nodes: Vec<IdName>,
     /// Triangles that are no good.
     pub defects: Defects,
-    /// How exactly places can be told.
+    /// Precision of places.
     pub precision: Option<StepSizes>,
     /// The camera that a render would use, as `camera.json` tells it.
     pub camera: CameraFile,
-    /// Where that camera came from, in words.
+    /// Origin of that camera, in words.
     pub camera_origin: String,
     /// Cameras that the models bring along; `--camera` takes their name or number.
     pub cameras: Vec<CameraReport>,
@@ -56,7 +56,7 @@ pub struct Diagnosis {
     pub lights: u64,
     /// Frames of the scene; null when it is one picture.
     pub frames: Option<usize>,
-    /// What a render will need.
+    /// Forecast of a render's memory.
     pub memory: MemoryForecast,
     /// glTF extensions that are not, or not wholly, supported, and what to do.
     pub extensions: Vec<Finding>,
@@ -81,7 +81,7 @@ pub struct BoxExtent {
 pub struct Units {
     /// True if the longest side is between a millimetre and a kilometre.
     pub plausible: bool,
-    /// What is assumed, and what to do when it is wrong.
+    /// The assumption, and what to do when it is wrong.
     pub remark: String,
 }
 
@@ -130,13 +130,13 @@ pub struct CameraReport {
 /// Something to know about.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Finding {
-    /// What kind of thing.
+    /// Kind of thing.
     pub kind: NoteKind,
-    /// What it is about.
+    /// Its subject.
     pub subject: String,
-    /// What happens, and what to do.
+    /// Sentence on what happens, and what to do.
     pub message: String,
-    /// How often.
+    /// Number of times.
     pub count: u64,
 }
 

@@ -5,7 +5,7 @@
 //! toolkit", 2015, section 6): every such number has a name, and a scene may set it.
 
 use etendue_camera::SharingLimits;
-use etendue_report::{Decision, DecisionKind};
+use etendue_report::{Decision, DecisionKind, DecisionValue};
 use etendue_sensor::bands::TOLERANCE;
 use etendue_tracer::Rules;
 use schemars::JsonSchema;
@@ -160,7 +160,7 @@ impl AccuracySpec {
     pub fn decisions(&self) -> Vec<Decision> {
         let row = |AccuracySetting { name, path, unit, what, default, value, .. }| {
             let reason = format!("{what} ({unit}); {default} by itself");
-            Decision::new(DecisionKind::Accuracy, format!("{name} {value}"), reason)
+            Decision::new(DecisionKind::Accuracy, DecisionValue::Number { name, value }, reason)
                 .by_key(path)
                 .forced(true)
         };

@@ -15,6 +15,17 @@ pub struct Place {
     pub column: usize,
 }
 
+/// Place where a value was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Origin {
+    /// In the file's text.
+    Text(Place),
+    /// On the command line, or in one of the frames: where, and as it was written there.
+    Setting(String),
+    /// Nowhere: it is missing, or the file is a model.
+    Nowhere,
+}
+
 /// Fault of a text that is no JSON document for us.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct JsonFault {

@@ -79,7 +79,7 @@ pub enum CameraPath {
         /// Frames a second; 24 when absent.
         #[serde(default)]
         rate: Option<f64>,
-        /// Which of a file's animations, by name or by number from 0; the first when absent.
+        /// Name of one of a file's animations, or its number from 0; the first when absent.
         #[serde(default)]
         name: Option<String>,
         /// The objects that move, by number from 0; all of glTF files when absent.
@@ -94,7 +94,7 @@ pub enum CameraPath {
     Rig {
         /// The cameras.
         cameras: Vec<RigCameraSpec>,
-        /// Where the rig stands at each moment: any other frames. What these make the camera's pose is the rig's.
+        /// Pose of the rig at each moment: any other frames. What these make the camera's pose is the rig's.
         path: Box<FramesSpec>,
     },
     /// Poses of a file: `.npy` of n × 4 × 4 or n × 3 × 4 matrices; TUM's `timestamp tx ty tz qx qy qz qw`;
@@ -104,10 +104,10 @@ pub enum CameraPath {
     Trajectory {
         /// The file, relative to the scene file.
         file: String,
-        /// What it is; told by its name when absent, and of `.txt` by its first line.
+        /// Format of the file; known by its name when absent, and of `.txt` by its first line.
         #[serde(default)]
         format: Option<TrajectoryFormat>,
-        /// Which way the poses map, of NPY, TUM and KITTI files; camera to world when absent.
+        /// Direction in which the poses map, of NPY, TUM and KITTI files; camera to world when absent.
         #[serde(default)]
         maps: Option<Maps>,
         /// The camera's axes, of NPY, TUM and KITTI files; OpenCV's when absent.
@@ -120,7 +120,7 @@ pub enum CameraPath {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RigCameraSpec {
-    /// What it is called in `index.json`.
+    /// Name in `index.json`.
     pub name: Option<String>,
     /// Its place in the rig: to the right, up and back (m). It looks the rig's way.
     pub at: Option<[f64; 3]>,
@@ -166,13 +166,13 @@ pub struct SlotSpec {
     /// When it starts (s from its row's opening); when the slot before it ends, if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub start: Option<Seconds>,
-    /// How long it lasts (s); when absent, an equal share of what slots with durations leave of the exposure.
+    /// Duration (s); when absent, an equal share of what slots with durations leave of the exposure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub duration: Option<Seconds>,
-    /// What each pixel takes of the slot's light, 0 to 1; all of it when absent.
+    /// Share of the slot's light that each pixel takes, 0 to 1; all of it when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pixels: Option<PixelsSpec>,
-    /// What is set for it: paths of `camera`, `lights`, `objects` or `materials` and their values, as
+    /// Settings of it: paths of `camera`, `lights`, `objects` or `materials` and their values, as
     /// `{"camera.pose": …}`. The sensor and the shutter are those of the exposure.
     pub set: BTreeMap<String, Value>,
     /// Frames that are spread over it, each for an equal share: a list of settings, `poses` or a `trajectory`, as `frames`
@@ -181,7 +181,7 @@ pub struct SlotSpec {
     pub along: Option<FramesSpec>,
 }
 
-/// What each pixel takes of a slot's light.
+/// Share of a slot's light that each pixel takes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum PixelsSpec {

@@ -12,7 +12,7 @@ const FASTEST: f64 = 1e6;
 /// The most readings of a picture, and the highest number of one.
 const MOST: f64 = 1e8;
 
-/// What an inertial unit on the camera reads while it moves: `imu.csv` beside the picture.
+/// Readings of an inertial unit on the camera while it moves: `imu.csv` beside the picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImuSpec {
@@ -28,7 +28,7 @@ pub struct ImuSpec {
     /// Its axes: those of the camera in this convention.
     #[serde(default = "opencv")]
     pub convention: Convention,
-    /// Where it sits (m, from the camera's origin along its axes).
+    /// Its place (m, from the camera's origin along its axes).
     #[serde(default)]
     pub at: [f64; 3],
     /// The acceleration of what falls (m/s², in the world).

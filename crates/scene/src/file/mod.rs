@@ -29,7 +29,7 @@ use serde_json::{Value, json};
 
 pub use accuracy::{AccuracySetting, AccuracySpec, AccuracyUse};
 pub use camera::SensorFile;
-pub use document::Place;
+pub use document::{Origin, Place};
 pub use frames::{
     CameraPath, FramesSpec, PixelsSpec, RigCameraSpec, SlotSpec, TrajectoryFormat, texts_of,
 };
@@ -38,7 +38,6 @@ pub use lens::{ReadLens, is_lens, lens_schema, rays_schema, read_lens, read_lens
 pub use object::{
     AnimationSpec, InstancesSpec, ObjectMotionSpec, ObjectSpec, Scale, Source, TransformSpec, Up,
 };
-pub use overrides::OverrideError;
 pub use path::{PathStep, ScenePath};
 pub use samples::{
     LEAST_SAMPLES, RelativeErrorSpec, SETS, SamplesSpec, SensorNoiseSpec, TimeSpec, Until,
@@ -210,7 +209,8 @@ impl SceneFile {
         let mut file = Self { written, kind, value, spec: SceneSpec::default(), sensor: None };
         (file.spec, file.sensor) = file.check()?;
         let spec = &file.spec;
-        let fault = samples::fault(&spec.render, &spec.sampling_layers(), &file.value)
+        let (samples, sampler) = (spec.render.samples, spec.render.sampler);
+        let fault = samples::fault(samples, sampler, &spec.sampling_layers(), &file.value)
             .or_else(|| spec.layer_fault())
             .or_else(|| {
                 let (key, why) = spec.plan.contradiction(spec.render.accel)?;
@@ -361,7 +361,7 @@ impl WrittenPlaces {
         for (key, text) in all {
             let setting = format!("{key}={text}");
             let applied = overrides::apply(value, key, text)
-                .map_err(|why| Refusal::new(why.to_string()).at(format_args!("--set {setting}")))?;
+                .map_err(|why| why.at(format_args!("--set {setting}")))?;
             let is_camera = applied == ScenePath::of("camera");
             self.settings.insert(applied, setting);
             if is_camera {
@@ -414,17 +414,6 @@ fn layers_of(photodiodes: Photodiodes) -> &'static [LayerSpec] {
             LayerSpec::BottomRightPupil,
         ],
     }
-}
-
-/// Place where a value was written.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Origin {
-    /// In the file's text.
-    Text(Place),
-    /// On the command line, or in one of the frames: where, and as it was written there.
-    Setting(String),
-    /// Nowhere: it is missing, or the file is a model.
-    Nowhere,
 }
 
 fn is_model(path: &Path) -> bool {

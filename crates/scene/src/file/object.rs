@@ -39,7 +39,7 @@ pub struct ObjectSpec {
     pub motion: Option<ObjectMotionSpec>,
 }
 
-/// How an object moves, as the scene file writes it.
+/// Motion of an object, as the scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum ObjectMotionSpec {
@@ -63,7 +63,7 @@ pub enum ObjectMotionSpec {
         transforms: Vec<TransformSpec>,
         /// When the object is there (s, in the scene's clock), increasing.
         times: Vec<Seconds>,
-        /// How its place runs between two transforms.
+        /// Interpolation of its place between two transforms.
         #[serde(default)]
         translation: Interpolation,
     },
@@ -128,15 +128,15 @@ impl ObjectMotionSpec {
 pub struct AnimationSpec {
     /// When; before its first key and after its last an animation stands still.
     pub time: Seconds,
-    /// Which of the file's animations, by name or by number from 0; the first when absent.
+    /// Name of one of the file's animations, or its number from 0; the first when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Whether it goes on from there while the shutter is open: nodes move, and skins and morph targets change shapes.
+    /// True if it goes on from there while the shutter is open: nodes move, and skins and morph targets change shapes.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub plays: bool,
 }
 
-/// Which axis of a file's coordinates points up.
+/// Axis of a file's coordinates that points up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Up {
@@ -183,7 +183,7 @@ pub enum Source {
 /// The keys that every object may have.
 #[derive(Serialize, Deserialize, JsonSchema)]
 struct Common {
-    /// What the outputs call this object.
+    /// Name of the object in outputs.
     #[serde(default)]
     name: Option<String>,
     /// The name of one of `materials`; replaces those of the model.
@@ -192,21 +192,21 @@ struct Common {
     /// For materials of the model by name, the one of the scene's `materials` that replaces each.
     #[serde(default)]
     materials: BTreeMap<String, String>,
-    /// Which axis of the file's coordinates points up, before `transform`; the scene's `up` for OBJ and
+    /// Axis of the file's coordinates that points up, before `transform`; the scene's `up` for OBJ and
     /// PLY files when absent, and +Y for all else.
     #[serde(default)]
     up: Option<Up>,
     /// The moment of a glTF file's animation that is shown; at rest when absent.
     #[serde(default)]
     animation: Option<AnimationSpec>,
-    /// Where it stands.
+    /// Its placement.
     #[serde(default)]
     transform: TransformSpec,
-    /// Where copies of it stand, all moved by `transform`: a list of transforms, or an NPY file of
+    /// Placements of copies of it, all moved by `transform`: a list of transforms, or an NPY file of
     /// n × 4 × 4 or n × 3 × 4 matrices by rows.
     #[serde(default)]
     instances: Option<InstancesSpec>,
-    /// How it moves while the shutter is open; it stands still when absent.
+    /// Its motion while the shutter is open; it stands still when absent.
     #[serde(default)]
     motion: Option<ObjectMotionSpec>,
 }
@@ -301,7 +301,7 @@ impl JsonSchema for ObjectSpec {
     }
 }
 
-/// Where an object stands: scaled, then rotated, then translated; or one matrix.
+/// Placement of an object: scaled, then rotated, then translated; or one matrix.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TransformSpec {
@@ -456,8 +456,8 @@ mod tests {
         assert_eq!(build(rows).unwrap().point(DVec3::X), DVec3::new(1.0, 2.0, 1.0));
         assert!(build("{}").unwrap().is_identity());
         // A third of a turn about the diagonal swaps the axes around; sin and cos round once each.
-        let around = build(r#"{"rotate": [1, 1, 1, 120]}"#).unwrap().point(DVec3::X);
-        assert!((around - DVec3::Y).length() < 1e-15, "{around}");
+        let turned = build(r#"{"rotate": [1, 1, 1, 120]}"#).unwrap().point(DVec3::X);
+        assert!((turned - DVec3::Y).length() < 1e-15, "{turned}");
     }
 
     #[test]

@@ -1,62 +1,10 @@
 //! `--set camera.fov=30`: single values of a scene file, changed from the command line.
 
+use etendue_report::Refusal;
 use serde_json::Value;
 
 use super::document::JsonDocument;
-use super::path::{MOST_STEPS, ScenePath};
-
-/// Error of a setting that cannot be applied.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum OverrideError {
-    /// The path cannot be read.
-    #[error(
-        "`{path}` is no path\nhint: write keys with dots between and indices in brackets, such as \
-             objects[0].transform.scale"
-    )]
-    Path {
-        /// The path as given.
-        path: String,
-    },
-    /// More steps than a scene has levels.
-    #[error("the path has {steps} steps; the format needs no more than {MOST_STEPS}")]
-    TooDeep {
-        /// Its steps.
-        steps: usize,
-    },
-    /// An index past the end.
-    #[error("{array} has {len} entries, so there is no {array}[{index}]")]
-    Index {
-        /// The array's path.
-        array: String,
-        /// Its length.
-        len: usize,
-        /// The index asked for.
-        index: String,
-    },
-    /// A number that 64 bits do not hold.
-    #[error("{text} is beyond the numbers that a computer holds (1.8e308)")]
-    TooLarge {
-        /// The number as given.
-        text: String,
-    },
-    /// JSON that no scene file may hold.
-    #[error("{reason}")]
-    Refused {
-        /// Description of the error.
-        reason: String,
-    },
-    /// A value on the way that has nothing inside.
-    #[error("{parent} is {found}, which has no `{step}`")]
-    Leaf {
-        /// The value's path.
-        parent: String,
-        /// Kind of the value found there.
-        found: &'static str,
-        /// The step asked for.
-        step: String,
-    },
-}
+use super::path::ScenePath;
 
 /// Sets `path` of `root` to `text`: JSON when it is JSON, else a string. Objects on the way that
 /// are missing are made. Returns the path as messages write it.
@@ -64,20 +12,21 @@ pub enum OverrideError {
 /// # Errors
 ///
 /// When the path cannot be read or leads nowhere.
-pub(crate) fn apply(root: &mut Value, path: &str, text: &str) -> Result<ScenePath, OverrideError> {
+pub(crate) fn apply(root: &mut Value, path: &str, text: &str) -> Result<ScenePath, Refusal> {
     path.parse::<ScenePath>()?.set(root, read(text)?)
 }
 
 /// JSON, as strictly as files are read, where the text is JSON at all, else a string.
-fn read(text: &str) -> Result<Value, OverrideError> {
+fn read(text: &str) -> Result<Value, Refusal> {
     let is_number = text.trim_start().starts_with(|c: char| c.is_ascii_digit() || c == '-');
     match serde_json::from_str::<serde::de::IgnoredAny>(text) {
         Ok(_) => match JsonDocument::parse(text.to_owned()) {
             Ok((_, value)) => Ok(value),
-            Err(fault) => Err(OverrideError::Refused { reason: fault.reason }),
+            Err(fault) => Err(fault.reason.into()),
         },
         Err(_) if is_number && text.trim().parse().is_ok_and(f64::is_infinite) => {
-            Err(OverrideError::TooLarge { text: text.trim().to_owned() })
+            let number = text.trim();
+            Err(format!("{number} is beyond the numbers that a computer holds (1.8e308)").into())
         }
         Err(_) => Ok(Value::String(text.to_owned())),
     }

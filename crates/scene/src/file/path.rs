@@ -1,9 +1,9 @@
 use std::fmt;
 use std::str::FromStr;
 
+use etendue_report::Refusal;
 use serde_json::{Map, Value};
 
-use super::OverrideError;
 use crate::words::kind_of;
 
 /// The place of a value in a scene's values: the keys and indices that lead to it from the top.
@@ -30,7 +30,7 @@ pub enum PathStep {
 }
 
 /// The most steps of a path that is set: half as many as the levels of a JSON text.
-pub(super) const MOST_STEPS: usize = 64;
+const MOST_STEPS: usize = 64;
 
 impl ScenePath {
     /// The place that `path` names; what cannot be read as a path is one key.
@@ -122,10 +122,12 @@ impl ScenePath {
     ///
     /// When there are too many steps, or one leads into something that is neither an object nor an array with such an
     /// entry.
-    pub fn set(&self, root: &mut Value, new: Value) -> Result<Self, OverrideError> {
+    pub fn set(&self, root: &mut Value, new: Value) -> Result<Self, Refusal> {
         let steps = self.0.len();
         if steps > MOST_STEPS {
-            return Err(OverrideError::TooDeep { steps });
+            let why =
+                format!("the path has {steps} steps; the format needs no more than {MOST_STEPS}");
+            return Err(why.into());
         }
         let mut here = root;
         let mut walked = Self::default();
@@ -141,14 +143,18 @@ impl ScenePath {
                 (Value::Array(elements), step) => {
                     let (array, len) = (walked.as_parent(), elements.len());
                     let Some(index) = step.as_index().filter(|&index| index < len) else {
-                        return Err(OverrideError::Index { array, len, index: step.text() });
+                        let index = step.text();
+                        let why =
+                            format!("{array} has {len} entries, so there is no {array}[{index}]");
+                        return Err(why.into());
                     };
                     walked = walked.index(index);
                     &mut elements[index]
                 }
                 (leaf, step) => {
                     let (parent, found) = (walked.as_parent(), kind_of(leaf));
-                    return Err(OverrideError::Leaf { parent, found, step: step.text() });
+                    let step = step.text();
+                    return Err(format!("{parent} is {found}, which has no `{step}`").into());
                 }
             };
         }
@@ -201,11 +207,14 @@ impl fmt::Display for ScenePath {
 }
 
 impl FromStr for ScenePath {
-    type Err = OverrideError;
+    type Err = Refusal;
 
-    fn from_str(text: &str) -> Result<Self, OverrideError> {
-        let steps = steps(text).ok_or_else(|| OverrideError::Path { path: text.to_owned() })?;
-        Ok(Self(steps))
+    fn from_str(text: &str) -> Result<Self, Refusal> {
+        steps(text).map(Self).ok_or_else(|| {
+            Refusal::new(format!("`{text}` is no path")).hint(
+                "write keys with dots between and indices in brackets, such as objects[0].transform.scale",
+            )
+        })
     }
 }
 

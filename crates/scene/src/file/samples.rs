@@ -6,15 +6,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::RenderSpec;
-
 /// The sets that the samples of a pixel are of where they go on until an error is reached.
 pub const SETS: u32 = 2;
 
 /// The fewest samples that an error is told by; `max` is a multiple of it.
 pub const LEAST_SAMPLES: u32 = 4;
 
-/// How many samples a pixel gets.
+/// Number of samples of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum SamplesSpec {
@@ -32,7 +30,7 @@ pub enum SamplesSpec {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SensorNoiseSpec {
-    /// What they are to reach.
+    /// Goal of the samples.
     pub until: Until,
     /// The variance of the samples' mean, as a share of the sensor's own at that signal (above 0, at
     /// most 1).
@@ -49,7 +47,7 @@ pub struct SensorNoiseSpec {
     pub max: u32,
 }
 
-/// What samples are to reach.
+/// Goal of samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Until {
     /// The noise of the camera's sensor.
@@ -78,7 +76,7 @@ pub struct RelativeErrorSpec {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TimeSpec {
-    /// How long samples are taken (s, above 0). Loading, building and writing are not counted.
+    /// Time for which samples are taken (s, above 0). Loading, building and writing are not counted.
     pub time: Seconds,
     /// Samples that no pixel gets more of.
     #[serde(default = "sixty_thousand")]
@@ -148,15 +146,16 @@ impl SamplesSpec {
     }
 }
 
-/// Fault of `render.samples` in the scene `value`, with its path.
+/// Fault of `samples`, which `render.samples` of the scene `value` is, with its path.
 pub(super) fn fault(
-    render: &RenderSpec,
+    samples: SamplesSpec,
+    sampler: Sampler,
     layers: &[&str],
     value: &Value,
 ) -> Option<(String, String)> {
     let at = |key: &str, why: &str| Some((format!("render.samples{key}"), why.to_owned()));
     // Rules that never stop, or at once.
-    let [min, max] = match render.samples {
+    let [min, max] = match samples {
         SamplesSpec::Count(_) | SamplesSpec::Time(_) if !layers.is_empty() => {
             let why = format!(
                 "the layer `{}` is of samples that go on until an error is reached\nhint: give \
@@ -195,7 +194,7 @@ pub(super) fn fault(
         );
         return at(key, &why);
     }
-    if matches!(render.sampler, Sampler::Stratified | Sampler::Hammersley | Sampler::BlueNoise) {
+    if matches!(sampler, Sampler::Stratified | Sampler::Hammersley | Sampler::BlueNoise) {
         let why = "has to be told the number of samples beforehand, and `render.samples` is none\
                    \nhint: take `sobol` or `independent`";
         return Some(("render.sampler".to_owned(), why.to_owned()));

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{ImuSpec, SamplesSpec};
 
-/// What the picture shows.
+/// Content of the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum TracerSpec {
@@ -108,7 +108,7 @@ impl TracerSpec {
     }
 }
 
-/// How the scene is rendered. The command line's options of the same names go before these.
+/// Settings of the render. The command line's options of the same names go before these.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RenderSpec {
@@ -116,7 +116,7 @@ pub struct RenderSpec {
     /// ray alone.
     #[serde(default = "one")]
     pub samples: SamplesSpec,
-    /// Where in its pixel a sample lies.
+    /// Rule for the places of samples in their pixels.
     #[serde(default)]
     pub sampler: Sampler,
     /// Another seed gives other samples.
@@ -126,7 +126,7 @@ pub struct RenderSpec {
     /// sensor's noise. Each of a scene's `frames` has its own number; here it stands for a single picture.
     #[serde(default, skip_serializing_if = "is_first")]
     pub frame: u32,
-    /// Whether all frames have the random numbers of frame 0, so that noise stands still while things move.
+    /// True if all frames have the random numbers of frame 0, so that noise stands still while things move.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub frozen_noise: bool,
     /// When the frame is taken (s, in the scene's clock): the moment at which its shutter opens. When absent, its
@@ -139,65 +139,65 @@ pub struct RenderSpec {
     /// An inertial unit on the camera, whose readings are written beside the picture.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub imu: Option<ImuSpec>,
-    /// What finds the hits; the best that was built in when absent.
+    /// Accelerator that finds the hits; the best that was built in when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accel: Option<AccelName>,
-    /// How bright `picture.png` is: stops, each of which doubles the light, or `"auto"`. EXR and NPY
+    /// Brightness of `picture.png`: stops, each of which doubles the light, or `"auto"`. EXR and NPY
     /// keep the radiance as it is.
     #[serde(default)]
     pub exposure: Exposure,
-    /// What brings light above full scale into the range of `picture.png`.
+    /// Curve that brings light above full scale into the range of `picture.png`.
     #[serde(default)]
     pub tone_map: ToneMap,
-    /// Whether the background of `picture.png` is transparent; adds the layers `Alpha` and, with a
+    /// True if the background of `picture.png` is transparent; adds the layers `Alpha` and, with a
     /// tracer of light, `Backdrop`.
     #[serde(default)]
     pub alpha: bool,
 }
 
-/// What the plan is told instead of deciding it.
+/// Decisions that the plan is given instead of making them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlanSpec {
-    /// How precisely paths of light hit surfaces. Data layers are always in f64.
+    /// Precision of paths' hits on surfaces. Data layers are always in f64.
     #[serde(default)]
     pub light_precision: LightPrecision,
-    /// How much time the build of the structure may take; by the number of rays when absent.
+    /// Time that the build of the structure may take; by the number of rays when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub build_quality: Option<BuildQuality>,
-    /// Whether surfaces that no ray of the data layers can meet are built into the structure all the same (true). They
+    /// True if surfaces that no ray of the data layers can meet are built into the structure all the same. They
     /// are left out when absent, where nothing but data layers is traced; the files are the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unseen: Option<bool>,
-    /// Whether hits that data layers and light in f64 are made of are solved again in f64 (true), or taken
-    /// as Embree finds them in f32.
+    /// True if hits that data layers and light in f64 are made of are solved again in f64, false if they are
+    /// taken as Embree finds them in f32.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub refine: Option<bool>,
-    /// Whether images of materials are read where a layer shows colour (true), or materials have their
+    /// True if images of materials are read where a layer shows colour, false if materials have their
     /// factors alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub textures: Option<bool>,
-    /// Whether rays of each band run by the lens' indices at its own wavelengths (true), or those of all bands
+    /// True if rays of each band run by the lens' indices at its own wavelengths, false if those of all bands run
     /// together, as at the design wavelength, so that the lens shows no colour errors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dispersion: Option<bool>,
-    /// Whether the bands of a picture share the paths of the scene behind a lens that sends each its own way, where
-    /// they can, or the scene is traced for each band. When absent they share paths of several surfaces, and
+    /// True if the bands of a picture share the paths of the scene behind a lens that sends each its own way, where
+    /// they can, false if the scene is traced for each band. When absent they share paths of several surfaces, and
     /// direct light in more than eight bands.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shared_paths: Option<bool>,
-    /// Whether images are averaged over what a sample covers; where the camera tells that when absent.
+    /// True if images are averaged over what a sample covers; where the camera tells that when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub texture_filter: Option<bool>,
 }
 
-/// How much time the build of the structure may take.
+/// Time that the build of the structure may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BuildQuality {
     /// The least.
     Low,
-    /// What pays for most pictures.
+    /// The choice that pays for most pictures.
     Medium,
     /// The most, for the quickest rays.
     High,
@@ -229,7 +229,7 @@ impl PlanSpec {
     }
 }
 
-/// How precisely paths of light hit surfaces.
+/// Precision of paths' hits on surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LightPrecision {
@@ -271,7 +271,7 @@ pub enum Auto {
     Auto,
 }
 
-/// What brings light above full scale into range.
+/// Curve that brings light above full scale into range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ToneMap {

@@ -34,39 +34,39 @@ pub struct SceneSpec {
     #[serde(default)]
     #[schemars(with = "Option<CameraSource>")]
     pub camera: Option<CameraSpec>,
-    /// What the picture shows. When absent there is one only if there are no `layers` either, and
+    /// Content of the picture. When absent there is a picture only if there are no `layers` either, and
     /// it shows `facing`.
     #[serde(default)]
     pub tracer: Option<TracerSpec>,
     /// The layers to write beside the picture.
     #[serde(default)]
     pub layers: Vec<LayerSpec>,
-    /// Which axis points up in OBJ and PLY files, which do not say; an object's own `up` goes before.
+    /// Axis that points up in OBJ and PLY files, which do not say; an object's own `up` goes before.
     #[serde(default)]
     pub up: Up,
     /// Surfaces of glTF models that are not `doubleSided` are not there from behind.
     #[serde(default)]
     pub cull_backfaces: bool,
-    /// What is in the scene; may be empty.
+    /// Objects of the scene; may be empty.
     #[serde(default)]
     pub objects: Vec<ObjectSpec>,
     /// Materials by name, for `objects` to use.
     #[serde(default)]
     pub materials: BTreeMap<String, MaterialSpec>,
-    /// Where light comes from, beside emissive surfaces and the models' own lights. When there is
+    /// Lights of the scene, beside emissive surfaces and the models' own lights. When there is
     /// none at all, a studio lights the scene; an empty list leaves it dark.
     #[serde(default)]
     pub lights: Option<Vec<LightSpec>>,
-    /// How it is rendered.
+    /// Settings of the render.
     #[serde(default)]
     pub render: RenderSpec,
-    /// What the plan is told instead of deciding it.
+    /// Decisions that the plan is given instead of making them.
     #[serde(default)]
     pub plan: PlanSpec,
     /// Numbers that trade accuracy for speed.
     #[serde(default, skip_serializing_if = "AccuracySpec::is_default")]
     pub accuracy: AccuracySpec,
-    /// What the picture may be off by, of which the plan takes what is cheapest. Nothing is approximated when
+    /// Errors that the picture may have, of which the plan takes what is cheapest. Nothing is approximated when
     /// absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<ToleranceSpec>,
@@ -137,8 +137,10 @@ impl SceneSpec {
 
     /// The layers that tell of samples which go on until an error is reached, by name.
     pub(super) fn sampling_layers(&self) -> Vec<&'static str> {
-        let told = [(LayerSpec::SampleCount, "sample_count"), (LayerSpec::Variance, "variance")];
-        told.iter()
+        let statistics =
+            [(LayerSpec::SampleCount, "sample_count"), (LayerSpec::Variance, "variance")];
+        statistics
+            .iter()
             .filter(|(layer, _)| self.layers.contains(layer))
             .map(|(_, name)| *name)
             .collect()

@@ -8,12 +8,12 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::PlanSpec;
 
-/// What a picture may be off by: what is cheapest within it is taken of the camera's lens, of the detail of meshes, and
-/// of the surfaces that light is followed to. Without it nothing is approximated.
+/// Errors that a picture may have: what is cheapest within them is taken of the camera's lens, of the detail of meshes,
+/// and of the surfaces that light is followed to. Without it nothing is approximated.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ToleranceSpec {
-    /// How far places, blur and colours of the picture may be displaced (pixels).
+    /// Greatest displacement of places, blur and colours of the picture (pixels).
     pub displacement: DisplacementSpec,
     /// By which share the light may differ: of lenses, of the light on the axis; of bounces, of the light of 99 % of
     /// all blocks of 8 × 8 pixels.

@@ -2,6 +2,7 @@
 
 mod colmap;
 mod path;
+mod station;
 mod trajectory;
 mod transforms;
 
@@ -17,6 +18,7 @@ use crate::error::not_found;
 use crate::file::{CameraPath, FramesSpec, SceneFile, ScenePath};
 use crate::import::Note;
 use crate::{Scene, SceneError};
+use station::{PoseAxes, Station};
 use trajectory::TrajectorySource;
 use transforms::ScenePicture;
 
@@ -88,30 +90,6 @@ impl Start {
             center: scene.geometry.loose_bounds().centre(),
             cameras: scene.cameras.iter().map(|camera| camera.spec.clone()).collect(),
         }
-    }
-}
-
-/// A pose of a trajectory, with what else its file says.
-#[derive(Debug, Clone, PartialEq)]
-struct Station {
-    pose: PoseSpec,
-    time: Option<f64>,
-    /// More settings, such as intrinsics.
-    settings: Vec<(String, Value)>,
-}
-
-impl Station {
-    fn new(pose: PoseSpec) -> Self {
-        Self { pose, time: None, settings: Vec::new() }
-    }
-
-    /// Of a matrix by rows of four numbers; the last of its four rows may be missing.
-    fn of_rows(numbers: &[f64], (maps, convention): (Maps, Convention)) -> Self {
-        let mut matrix = [[0.0, 0.0, 0.0, 1.0]; 4];
-        for (row, numbers) in matrix.iter_mut().zip(numbers.chunks_exact(4)) {
-            row.copy_from_slice(numbers);
-        }
-        Self::new(PoseSpec::Matrix { matrix, maps, convention })
     }
 }
 
@@ -246,7 +224,7 @@ impl SceneFile {
                     folder: &folder,
                     file,
                     format: *format,
-                    axes: (maps, convention),
+                    axes: PoseAxes { maps, convention },
                     picture: self.picture(),
                 };
                 let (stations, found) = trajectory
@@ -267,7 +245,7 @@ impl SceneFile {
         for (number, station) in stations.into_iter().enumerate() {
             // Told here, by its number, and not when it is that frame's turn.
             station.pose.build().map_err(|error| {
-                let why = format!("pose {number}: {}: {}", error.at, error.why);
+                let why = format!("pose {number}: {}", error.under("pose"));
                 fault(match path {
                     CameraPath::Trajectory { file, .. } => ("file", format!("\"{file}\": {why}")),
                     _ => ("poses", why),

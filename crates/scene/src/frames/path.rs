@@ -8,7 +8,8 @@ use std::f64::consts::TAU;
 
 use serde_json::{Value, json};
 
-use super::{Frame, MOST_FRAMES, RigCamera, Start, Station, too_many};
+use super::station::Station;
+use super::{Frame, MOST_FRAMES, RigCamera, Start, too_many};
 use crate::file::{
     AnimationSpec, CameraPath, ObjectSpec, RigCameraSpec, SceneFile, ScenePath, Source,
 };
@@ -277,8 +278,7 @@ fn place(camera: &RigCameraSpec) -> Result<Pose, (&'static str, String)> {
             position.is_finite().then_some(Pose { position, ..Pose::IDENTITY }).ok_or_else(fault)
         }
         (None, Some(spec)) => {
-            let pose =
-                spec.build().map_err(|error| ("pose", format!("{}: {}", error.at, error.why)))?;
+            let pose = spec.build().map_err(|error| ("pose", error.under("pose").to_string()))?;
             Ok(match spec {
                 PoseSpec::Matrix { convention: Convention::Opencv, .. }
                 | PoseSpec::Quaternion { convention: Convention::Opencv, .. } => {
@@ -307,5 +307,5 @@ fn pose_at(file: &SceneFile, moment: &Frame, start: &Pose) -> Result<Pose, Strin
         }
     };
     let spec: PoseSpec = serde_json::from_value(value).map_err(|error| error.to_string())?;
-    spec.build().map_err(|error| format!("{}: {}", error.at, error.why))
+    spec.build().map_err(|error| error.under("pose").to_string())
 }

@@ -6,13 +6,13 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Station;
 use super::colmap::{self, numbers};
+use super::station::{PoseAxes, Station};
 use super::transforms::{self, ScenePicture};
 use crate::error::not_found;
 use crate::file::TrajectoryFormat;
 use crate::import::{Note, NoteKind};
-use etendue_camera::{Convention, Maps, PoseSpec};
+use etendue_camera::PoseSpec;
 use etendue_files::InputFolder;
 
 /// The longest trajectory that is read (bytes).
@@ -28,7 +28,7 @@ pub(super) struct TrajectorySource<'a> {
     /// Format of the file; told by its name when absent.
     pub(super) format: Option<TrajectoryFormat>,
     /// Axes of the poses in formats that do not say it themselves.
-    pub(super) axes: (Maps, Convention),
+    pub(super) axes: PoseAxes,
     /// The scene's own pixels.
     pub(super) picture: ScenePicture,
 }
@@ -121,7 +121,7 @@ fn told_by_name(path: &Path) -> Result<TrajectoryFormat, String> {
     }
 }
 
-fn read_npy(bytes: &[u8], axes: (Maps, Convention)) -> Result<Vec<Station>, String> {
+fn read_npy(bytes: &[u8], axes: PoseAxes) -> Result<Vec<Station>, String> {
     let array = etendue_image::npy::read(bytes, |shape| match shape {
         [_, 3 | 4, 4] => Ok(()),
         other => Err(format!("has the shape {other:?} instead of n × 4 × 4 or n × 3 × 4")),
@@ -145,7 +145,7 @@ pub(super) fn are_kittis(text: &str) -> bool {
     lines(text).next().is_some_and(|(_, words)| words.len() == KITTI_WORDS)
 }
 
-pub(super) fn read_tum(text: &str, axes: (Maps, Convention)) -> Result<Vec<Station>, String> {
+pub(super) fn read_tum(text: &str, axes: PoseAxes) -> Result<Vec<Station>, String> {
     let mut stations = Vec::new();
     for (number, words) in lines(text) {
         if words.len() != 8 {
@@ -166,15 +166,15 @@ pub(super) fn read_tum(text: &str, axes: (Maps, Convention)) -> Result<Vec<Stati
         let pose = PoseSpec::Quaternion {
             quaternion: [a, b, c, d],
             translation: [x, y, z],
-            maps: axes.0,
-            convention: axes.1,
+            maps: axes.maps,
+            convention: axes.convention,
         };
         stations.push(Station { time: Some(time), ..Station::new(pose) });
     }
     Ok(stations)
 }
 
-pub(super) fn read_kitti(text: &str, axes: (Maps, Convention)) -> Result<Vec<Station>, String> {
+pub(super) fn read_kitti(text: &str, axes: PoseAxes) -> Result<Vec<Station>, String> {
     let station = |(number, words): (usize, Vec<&str>)| {
         if words.len() != KITTI_WORDS {
             let count = words.len();

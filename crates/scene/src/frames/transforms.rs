@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 use serde_json::{Map, Value, json};
 
-use super::Station;
+use super::station::Station;
 use crate::import::NoteKind;
 use etendue_camera::{Convention, Maps, PoseSpec};
 

@@ -31,7 +31,7 @@ pub(super) struct MeshCandidate {
 
 /// A mesh that passed.
 #[derive(Debug)]
-pub(super) struct Admitted {
+pub(super) struct AdmittedMesh {
     pub mesh: Mesh,
     /// Triangles dropped because a corner is not finite.
     pub dropped: u64,
@@ -48,7 +48,7 @@ pub(super) fn admit(
     candidate: MeshCandidate,
     file: &Path,
     options: &Options,
-) -> Result<Admitted, Refusal> {
+) -> Result<AdmittedMesh, Refusal> {
     let mut gate =
         Gate { file, place: &candidate.place, strictness: options.strictness, notes: Vec::new() };
     let survey = gate.survey(&candidate.positions, &candidate.triangles)?;
@@ -87,7 +87,7 @@ pub(super) fn admit(
         degenerate,
         steps: None,
     };
-    Ok(Admitted { mesh, dropped: survey.broken, notes: gate.notes })
+    Ok(AdmittedMesh { mesh, dropped: survey.broken, notes: gate.notes })
 }
 
 /// Result of one look at all triangles.

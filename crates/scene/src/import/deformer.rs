@@ -4,7 +4,8 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use etendue_geometry::glam::{DMat3, DVec3};
-use etendue_geometry::{Between, Link, Steps, StepsError, Track, Transform, Vertices};
+use etendue_geometry::{Between, Link, Steps, Track, Transform, Vertices};
+use etendue_report::Refusal;
 use rayon::prelude::*;
 
 use super::single;
@@ -125,7 +126,7 @@ pub(crate) enum NoSteps<E> {
     /// There is no room for them.
     Room(E),
     /// A shape is not finite.
-    Broken(StepsError),
+    Broken(Refusal),
 }
 
 impl Deformer {

@@ -47,13 +47,13 @@ fn excerpt(text: &str) -> String {
 /// Something that the file has or asks for and the picture will not show.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Note {
-    /// What kind of thing.
+    /// Kind of thing.
     pub kind: NoteKind,
-    /// What it is about: an extension, a file, a mesh, a material.
+    /// Its subject: an extension, a file, a mesh, a material.
     pub subject: String,
-    /// What happens, and what to do about it.
+    /// Sentence on what happens, and what to do about it.
     pub message: String,
-    /// How often.
+    /// Number of times.
     pub count: u64,
 }
 

@@ -160,11 +160,11 @@ impl<'a> Clipper<'a> {
     /// turns left at least, or any.
     fn find(&self, from: usize) -> usize {
         let ring = &self.0;
-        let around = || std::iter::successors(Some(from), |&i| Some(ring.next[i])).take(ring.left);
-        around()
+        let corners = || std::iter::successors(Some(from), |&i| Some(ring.next[i])).take(ring.left);
+        corners()
             .find(|&i| self.is_ear(i))
-            .or_else(|| around().find(|&i| ring.turn(i) == 0.0))
-            .or_else(|| around().find(|&i| ring.turn(i) > 0.0))
+            .or_else(|| corners().find(|&i| ring.turn(i) == 0.0))
+            .or_else(|| corners().find(|&i| ring.turn(i) > 0.0))
             .unwrap_or(from)
     }
 
@@ -364,14 +364,14 @@ mod tests {
     #[test]
     fn large_broken_polygons_take_a_bounded_effort() {
         let plane = |[x, y]: [f64; 2]| DVec3::new(x, y, 0.0);
-        let around = |n: u32, step: u32| {
+        let angles = |n: u32, step: u32| {
             (0..n).map(move |i| f64::from(i * step % n) / f64::from(n) * std::f64::consts::TAU)
         };
         // Few places visited many times, a star that crosses itself everywhere, all on a line, and
         // back and forth on a line with a tip.
         let places = [[0.0, 0.0], [1.0, 0.0], [0.4, 0.4], [0.0, 1.0], [0.3, 0.3]];
         let repeated: Vec<DVec3> = (0..20_000).map(|i| plane(places[i % 5])).collect();
-        let star: Vec<DVec3> = around(19_999, 9_998).map(|a| plane([a.cos(), a.sin()])).collect();
+        let star: Vec<DVec3> = angles(19_999, 9_998).map(|a| plane([a.cos(), a.sin()])).collect();
         let mut zigzag: Vec<DVec3> = (0..20_000).map(|i| plane([f64::from(i % 7), 0.0])).collect();
         zigzag.push(plane([3.0, 1.0]));
         zigzag.push(plane([2.0, 0.1]));

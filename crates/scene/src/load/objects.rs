@@ -17,9 +17,9 @@ use crate::words::suggest;
 use crate::{Cache, SceneError, cache};
 use etendue_files::{FoundFile, InputFolder};
 use etendue_geometry::{Bounds, Geometry, Mesh, Placement};
-use etendue_tracer::{Light, LightKind, Material, Scattering};
+use etendue_tracer::{Light, LightKind, Material};
 
-/// Where triangles come from, once for all objects that share them.
+/// Origin of triangles, once for all objects that share them.
 pub(super) struct TriangleOrigin {
     pub(super) kind: OriginKind,
     /// The first object that uses it, for messages.
@@ -307,8 +307,7 @@ pub(crate) fn of(geometry: &Geometry, materials: &[Material], lights: &[Light]) 
                 *area = some_area(geometry.mesh_of(placement), placement);
             }
         }
-        let is_glass = matches!(material.scattering, Scattering::Dielectric(_));
-        if is_glass && !bends.contains(&material.name.as_str()) {
+        if material.scattering.is_body() && !bends.contains(&material.name.as_str()) {
             bends.push(&material.name);
         }
     }

@@ -263,7 +263,7 @@ struct Cut {
     j: u32,
 }
 
-/// Where all vertices are: of the rings, in the middle of cut edges, and on the seam.
+/// Places of all vertices: of the rings, in the middle of cut edges, and on the seam.
 struct GlobeVertices<'a> {
     globe: &'a Globe,
     cuts: &'a [Cut],

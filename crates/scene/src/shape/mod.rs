@@ -46,7 +46,7 @@ pub enum ShapeSpec {
         /// Its radius (m).
         #[serde(default = "one_metre")]
         radius: Metres,
-        /// How many triangles, counted as for a blob.
+        /// Number of triangles, counted as for a blob.
         #[serde(default = "sphere_triangles")]
         triangles: u64,
     },
@@ -64,11 +64,11 @@ pub enum ShapeSpec {
         /// The mean radius (m).
         #[serde(default = "one_metre")]
         radius: Metres,
-        /// How many triangles: exactly as many from 128 on, an odd number rounded up; the next
+        /// Number of triangles: exactly as many from 128 on, an odd number rounded up; the next
         /// 8 n² below.
         #[serde(default = "sphere_triangles")]
         triangles: u64,
-        /// Which blob.
+        /// Number of the blob.
         #[serde(default)]
         seed: u64,
         /// The largest displacement as a fraction of the radius (0..=0.9).

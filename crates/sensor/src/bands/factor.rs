@@ -2,7 +2,8 @@
 
 use etendue_spectrum::Curve;
 
-use super::DIM;
+/// The part of white that bodies and metals leave of it, below which their light need not be better.
+pub(super) const DIM: f64 = 0.003;
 
 /// Steps between the lengths of way that are tried.
 const STEP: f64 = 1.4;

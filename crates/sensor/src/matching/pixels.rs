@@ -24,7 +24,7 @@ const MOST_ROWS: usize = 512;
 /// The share of pixels that may be clipped, at either end.
 const MOST_CLIPPED: f64 = 0.02;
 
-/// What counts: pixels that are expected to be dark enough, and are no defects.
+/// Pixels that count: those that are expected to be dark enough, and are no defects.
 pub(super) struct DarkPixels {
     pub(super) line: Vec<f64>,
     /// DN, of what is expected.
@@ -80,8 +80,8 @@ impl Pixels<'_> {
         (0..sums.len()).max_by(|a, b| mean(a).total_cmp(&mean(b))).unwrap_or(0)
     }
 
-    /// What counts by a fit. Deviations are in units of their median, which defects do not bend, or of what is expected
-    /// where that is more.
+    /// Returns the pixels that count by a fit. Deviations are in units of their median, which defects do not bend, or of
+    /// what is expected where that is more.
     pub(super) fn kept(&self, fit: &Fit, white: f64) -> DarkPixels {
         let most = NEARLY_SATURATED * (white - fit.line[0]) + fit.line[0];
         let all = DarkPixels {
@@ -130,9 +130,9 @@ impl Pixels<'_> {
             sums
         };
         let sums = self.sum_of_rows(count, of_row);
-        let (line, covariance) = sums.solved().ok_or(MatchError::OneLevel)?;
+        let (line, covariance) = sums.solved().ok_or_else(MatchError::one_level)?;
         if line[1..].iter().any(|slope| *slope <= 0.0) {
-            return Err(MatchError::OneLevel);
+            return Err(MatchError::one_level());
         }
         (fit.line, fit.line_covariance) = (line, covariance);
         Ok(())
@@ -157,7 +157,7 @@ impl Pixels<'_> {
             sums
         };
         let sums = self.sum_of_rows(2, of_row);
-        let (found, covariance) = sums.solved().ok_or(MatchError::OneLevel)?;
+        let (found, covariance) = sums.solved().ok_or_else(MatchError::one_level)?;
         // Below these the weights of the next round would be none.
         fit.gain = found[0].max(1e-3 * fit.gain);
         fit.floor = found[1].max(1.0 / 24.0);
@@ -191,7 +191,7 @@ impl Pixels<'_> {
         // A parabola lies a quarter of its bend off its chord.
         let (bend, error) = (bent[2].abs() / most, covariance[2][2].sqrt() / most);
         match bend > 4.0 * MOST_BENT && bend > CERTAIN * error {
-            true => Err(MatchError::NotLinear(25.0 * bend)),
+            true => Err(MatchError::not_linear(25.0 * bend)),
             false => Ok(()),
         }
     }
@@ -236,22 +236,12 @@ pub(super) fn not_clipped(numbers: &[u16], white: f64) -> Result<(), MatchError>
     let bright = share(&|y| f64::from(**y) >= white);
     if bright > MOST_CLIPPED {
         let remedy = "photograph it with a shorter exposure or less light";
-        return Err(MatchError::Clipped {
-            share: 100.0 * bright,
-            level: white,
-            end: "upper end",
-            remedy,
-        });
+        return Err(MatchError::clipped(bright, white, "upper end", remedy));
     }
     let dark = share(&|y| **y == 0);
     if dark > MOST_CLIPPED {
         let remedy = "leave the black level in the raw numbers";
-        return Err(MatchError::Clipped {
-            share: 100.0 * dark,
-            level: 0.0,
-            end: "lower end",
-            remedy,
-        });
+        return Err(MatchError::clipped(dark, 0.0, "lower end", remedy));
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! How much light rough reflection returns in all: the table that keeps the layer beneath from
+//! Albedo of rough reflection, the light that it returns in all: the table that keeps the layer beneath from
 //! returning it a second time.
 //!
 //! A GGX sheet with Schlick's reflectance f₀ (face on) and f₉₀ (grazing) has the directional albedo

@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 
 use etendue_geometry::glam::DVec3;
 
-use super::losses::Lacking;
+use super::losses::Compensation;
 use super::{Weights, fresnel, ggx};
 use crate::sampling::cosine_direction;
 
@@ -22,12 +22,12 @@ pub(super) struct RoughBoundary {
     alpha: f64,
     /// Index behind the surface over the index in front.
     eta: f64,
-    lacking: Option<Lacking>,
+    lacking: Option<Compensation>,
 }
 
 impl RoughBoundary {
     pub(super) fn new(alpha: f64, eta: f64, wo: DVec3) -> Self {
-        Self { alpha, eta, lacking: Lacking::new(alpha, eta, wo.z) }
+        Self { alpha, eta, lacking: Compensation::new(alpha, eta, wo.z) }
     }
 
     /// Value times cosine, and the density of [`Self::sample`]; `wo` is above the surface.

@@ -1,4 +1,4 @@
-//! How much facets return that are rougher along the surface than across it: [`super::albedo`]'s table with two more
+//! Albedo of facets that are rougher along the surface than across it: [`super::albedo`]'s table with two more
 //! axes, worked out once a surface asks for it.
 
 use std::f64::consts::FRAC_PI_2;

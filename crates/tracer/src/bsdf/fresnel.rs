@@ -1,4 +1,4 @@
-//! How much a smooth boundary reflects.
+//! Reflectance of a smooth boundary.
 
 /// Reflectance of unpolarised light at a boundary between dielectrics (Fresnel 1823; Born and Wolf,
 /// *Principles of Optics*, section 1.5.2), for the cosine of incidence (0..=1) and the relative index

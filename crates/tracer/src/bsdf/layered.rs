@@ -69,7 +69,7 @@ impl LayeredSample {
     }
 
     /// A direction with its value times cosine and its density; `None` where the model never gives it.
-    fn of_density(wi: DVec3, (value, pdf): (Weights, f64)) -> Option<Self> {
+    fn of_density(wi: DVec3, value: Weights, pdf: f64) -> Option<Self> {
         (pdf > 0.0).then(|| Self { wi, weights: value.times(1.0 / pdf), pdf, is_specular: false })
     }
 }
@@ -309,7 +309,8 @@ impl Layered {
                 below.wi
             }
         };
-        LayeredSample::of_density(wi, self.evaluate(wo, wi, viewed))
+        let (value, pdf) = self.evaluate(wo, wi, viewed);
+        LayeredSample::of_density(wi, value, pdf)
     }
 
     fn sample_uncoated(
@@ -344,7 +345,8 @@ impl Layered {
             return None;
         }
         // Weighed by all ways in which this direction could have been found.
-        LayeredSample::of_density(wi, self.evaluate_uncoated(wo, wi, viewed))
+        let (value, pdf) = self.evaluate_uncoated(wo, wi, viewed);
+        LayeredSample::of_density(wi, value, pdf)
     }
 
     fn reflected(&self, wo: DVec3, square: [f64; 2]) -> DVec3 {

@@ -1,4 +1,4 @@
-//! What single scattering by rough boundaries of glass loses, and how it comes out in the end.
+//! Losses of single scattering by rough boundaries of glass, and the lobes by which they come out in the end.
 //!
 //! Facets that reflect and refract once return `E(μ)` of the light, together on both sides; the rest went on to
 //! other facets. It is given back by two matte lobes, one on each side (after Kulla and Conty, "Revisiting
@@ -160,9 +160,9 @@ fn passes(eta: f64) -> f64 {
     Slab::of(index).passes * (1.0 - share) + Slab::of(index + 1).passes * share
 }
 
-/// Light that a rough boundary lacks, seen from one direction.
+/// Compensation of the light that a rough boundary lacks, seen from one direction.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Lacking {
+pub(super) struct Compensation {
     own: BoundarySide,
     other: BoundarySide,
     eta: f64,
@@ -172,7 +172,7 @@ pub(super) struct Lacking {
     pub(super) reflected: f64,
 }
 
-impl Lacking {
+impl Compensation {
     /// Of a boundary of roughness `alpha` and relative index `eta`, from the cosine `mu`; `None` where nothing is
     /// lacking.
     pub(super) fn new(alpha: f64, eta: f64, mu: f64) -> Option<Self> {

@@ -1,4 +1,4 @@
-//! How a surface scatters light: each model as a function to evaluate, to sample, and the density of
+//! Models of the scattering of light by surfaces: each as a function to evaluate, to sample, and the density of
 //! the sampling.
 //!
 //! Every model's value is a sum of a few colours, white, the surface's own, that of its highlights and
@@ -166,13 +166,14 @@ impl Bsdf {
         wo: DVec3,
         colors: [impl Into<Tint>; 2],
     ) -> Self {
-        Self::turned(model, (geometric, Frame::around(shading)), wo, colors.map(Into::into))
+        Self::turned(model, geometric, Frame::around(shading), wo, colors.map(Into::into))
     }
 
     /// As [`Self::new`], with a frame around the shading normal whose x axis goes along the surface's grain.
     pub(crate) fn turned(
         model: Model,
-        (geometric, frame): (DVec3, Frame),
+        geometric: DVec3,
+        frame: Frame,
         wo: DVec3,
         [base, highlight]: [Tint; 2],
     ) -> Self {

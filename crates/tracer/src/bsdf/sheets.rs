@@ -34,7 +34,7 @@ pub(crate) struct Sheets<const N: usize = LANES> {
     /// Rows of the table and the shares of the next.
     rows: [u32; N],
     shares: [f64; N],
-    /// What facets of reflectance 1, and the dielectric, return of light from the viewer; their means over
+    /// Shares that facets of reflectance 1, and the dielectric, return of light from the viewer; their means over
     /// directions; the mean of what facets of reflectance 1 lack.
     facets: [f64; N],
     dielectric: [f64; N],
@@ -45,6 +45,17 @@ pub(crate) struct Sheets<const N: usize = LANES> {
     sheet: [f64; N],
     base: [f64; N],
     values: SheetValues<N>,
+}
+
+/// Directions to lights, one for each of so many hits.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LightSamples<'a, F, const N: usize = LANES> {
+    /// Unit.
+    pub(crate) toward: &'a [[F; N]; 3],
+    /// The density with which each was chosen (1/sr); infinite where its light does not shine to there.
+    pub(crate) pdf: &'a [F; N],
+    /// 1 of a light that is of a single direction, else 0.
+    pub(crate) is_delta: &'a [F; N],
 }
 
 /// Values times cosine, as [`Weights`], and densities.
@@ -92,7 +103,7 @@ impl<const N: usize> Default for Sheets<N> {
 }
 
 impl<const N: usize> Sheets<N> {
-    /// What was found last of a lane's value.
+    /// The weights that were found last of a lane's value.
     #[inline(always)]
     pub(crate) fn weights(&self, lane: usize) -> Weights {
         let SheetValues { white, base, highlight, dip, deep, .. } = &self.values;
@@ -111,16 +122,16 @@ impl<const N: usize> Sheets<N> {
         view(self, &TABLE, shading, direction);
     }
 
-    /// What the surfaces turn to the viewer of light from `toward`, by the power heuristic against
-    /// [`Self::scatter`] and over the density `pdf` (1/sr), unless that light is of a single direction: to `share`,
-    /// which is 0 where there is none, times the weights.
+    /// Puts the share of light from directions to lights that the surfaces turn to the viewer into `share`, by the power
+    /// heuristic against [`Self::scatter`], unless that light is of a single direction, and over the density: 0 where
+    /// there is none, and to be multiplied by the weights.
     pub(crate) fn reflect(
         &mut self,
         [normal, shading]: [&[[f64; N]; 3]; 2],
-        (toward, pdf, is_delta): (&[[f64; N]; 3], &[f64; N], &[f64; N]),
+        samples: LightSamples<'_, f64, N>,
         share: &mut [f64; N],
     ) {
-        reflect(self, &TABLE, [normal, shading], (toward, pdf, is_delta), share);
+        reflect(self, &TABLE, [normal, shading], samples, share);
     }
 
     /// Directions that light comes from, chosen in proportion to what it contributes by choices and squares, to
@@ -128,10 +139,12 @@ impl<const N: usize> Sheets<N> {
     pub(crate) fn scatter(
         &mut self,
         [normal, shading]: [&[[f64; N]; 3]; 2],
-        (choices, squares): (&[f64; N], &[[f64; 2]; N]),
-        (along, pdf): (&mut [[f64; N]; 3], &mut [f64; N]),
+        choices: &[f64; N],
+        squares: &[[f64; 2]; N],
+        along: &mut [[f64; N]; 3],
+        pdf: &mut [f64; N],
     ) {
-        scatter(self, &TABLE, [normal, shading], (choices, squares), (along, pdf));
+        scatter(self, &TABLE, [normal, shading], choices, squares, along, pdf);
     }
 }
 
@@ -279,7 +292,7 @@ fn reflect<const N: usize>(
     sheets: &mut Sheets<N>,
     table: &AlbedoTable,
     [normal, shading]: [&[[f64; N]; 3]; 2],
-    (toward, pdf, is_delta): (&[[f64; N]; 3], &[f64; N], &[f64; N]),
+    LightSamples { toward, pdf, is_delta }: LightSamples<'_, f64, N>,
     share: &mut [f64; N],
 ) {
     let mut wi = [[0.0; N]; 3];
@@ -310,8 +323,10 @@ fn scatter<const N: usize>(
     sheets: &mut Sheets<N>,
     table: &AlbedoTable,
     [normal, shading]: [&[[f64; N]; 3]; 2],
-    (choices, squares): (&[f64; N], &[[f64; 2]; N]),
-    (along, pdf): (&mut [[f64; N]; 3], &mut [f64; N]),
+    choices: &[f64; N],
+    squares: &[[f64; 2]; N],
+    along: &mut [[f64; N]; 3],
+    pdf: &mut [f64; N],
 ) {
     let mut wi = [[0.0; N]; 3];
     for i in 0..N {
@@ -470,7 +485,8 @@ mod tests {
         };
         sheets.view(&shading, &direction);
         let mut found = ZERO;
-        sheets.reflect([&normal, &shading], (&toward, &pdf, &is_delta), &mut found);
+        let samples = LightSamples { toward: &toward, pdf: &pdf, is_delta: &is_delta };
+        sheets.reflect([&normal, &shading], samples, &mut found);
         let mut lit = 0;
         for (k, surface) in surfaces.iter().enumerate() {
             let wi = DVec3::new(toward[0][k], toward[1][k], toward[2][k]);
@@ -490,7 +506,7 @@ mod tests {
         }
         assert!((40..LANES).contains(&lit), "{lit}");
         let (mut along, mut density) = ([ZERO; 3], ZERO);
-        sheets.scatter([&normal, &shading], (&choices, &squares), (&mut along, &mut density));
+        sheets.scatter([&normal, &shading], &choices, &squares, &mut along, &mut density);
         let mut sent = 0;
         for (k, surface) in surfaces.iter().enumerate() {
             let Some(sample) = surface.sample(choices[k], squares[k]) else {

@@ -7,7 +7,7 @@ use etendue_geometry::block::LANES;
 
 /// The smooth surfaces of so many hits.
 #[derive(Debug)]
-pub(crate) struct Smooth<const N: usize = LANES> {
+pub(crate) struct SmoothSurfaces<const N: usize = LANES> {
     /// Index behind a boundary over the index in front; 0 of mirrors.
     pub(crate) eta: [f64; N],
     /// 1 for metal, which is white at grazing incidence.
@@ -19,15 +19,15 @@ pub(crate) struct Smooth<const N: usize = LANES> {
     dip: [f64; N],
 }
 
-impl<const N: usize> Default for Smooth<N> {
+impl<const N: usize> Default for SmoothSurfaces<N> {
     fn default() -> Self {
         let zero = [0.0; N];
         Self { eta: zero, is_metal: zero, refracts: zero, white: zero, base: zero, dip: zero }
     }
 }
 
-impl<const N: usize> Smooth<N> {
-    /// What of a lane's light goes the way that was chosen last.
+impl<const N: usize> SmoothSurfaces<N> {
+    /// The weights of a lane's light that goes the way which was chosen last.
     #[inline(always)]
     pub(crate) fn weights(&self, lane: usize) -> Weights {
         let (white, base, dip) = (self.white[lane], self.base[lane], self.dip[lane]);
@@ -39,19 +39,23 @@ impl<const N: usize> Smooth<N> {
     pub(crate) fn scatter(
         &mut self,
         [normal, shading]: [&[[f64; N]; 3]; 2],
-        (direction, choices): (&[[f64; N]; 3], &[f64; N]),
-        (along, value): (&mut [[f64; N]; 3], &mut [f64; N]),
+        direction: &[[f64; N]; 3],
+        choices: &[f64; N],
+        along: &mut [[f64; N]; 3],
+        value: &mut [f64; N],
     ) {
-        scatter(self, [normal, shading], (direction, choices), (along, value));
+        scatter(self, [normal, shading], direction, choices, along, value);
     }
 }
 
 #[multiversion::multiversion(targets = "simd")]
 fn scatter<const N: usize>(
-    smooth: &mut Smooth<N>,
+    smooth: &mut SmoothSurfaces<N>,
     [normal, shading]: [&[[f64; N]; 3]; 2],
-    (direction, choices): (&[[f64; N]; 3], &[f64; N]),
-    (along, value): (&mut [[f64; N]; 3], &mut [f64; N]),
+    direction: &[[f64; N]; 3],
+    choices: &[f64; N],
+    along: &mut [[f64; N]; 3],
+    value: &mut [f64; N],
 ) {
     for i in 0..N {
         let (mut cosine, is_boundary) = (0.0, smooth.eta[i] > 0.0);

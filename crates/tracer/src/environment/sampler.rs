@@ -11,7 +11,7 @@ use crate::angles;
 use crate::sampling::{GridCell, GridDistribution, linear_place};
 use etendue_geometry::Float;
 
-/// What cells get of their neighbours, along each axis 1/8 of both. Columns go around, rows end.
+/// Cells blurred by their neighbours, along each axis by 1/8 of both. Columns go around, rows end.
 fn blurred(bright: &[f64], [columns, rows]: [usize; 2]) -> Vec<f64> {
     let along = |row: usize, x: usize| {
         let row = &bright[row * columns..(row + 1) * columns];
@@ -24,7 +24,7 @@ fn blurred(bright: &[f64], [columns, rows]: [usize; 2]) -> Vec<f64> {
     (0..columns * rows).map(|k| down(k % columns, k / columns)).collect()
 }
 
-/// How bright a map is, in cells: texels, or the means of some.
+/// Brightness of a map in cells: texels, or the means of some.
 #[derive(Debug, Clone)]
 struct LuminanceGrid {
     /// Columns and rows.
@@ -45,7 +45,7 @@ impl LuminanceGrid {
         [above + x, above + next, below + x, below + next].map(|cell| cell as u32)
     }
 
-    /// Where a row of patches begins and ends, in rows of cells.
+    /// Beginning and end of a row of patches, in rows of cells.
     #[inline]
     fn ends(&self, row: usize) -> [f64; 2] {
         let within = |v: f64| v.clamp(0.0, self.size[1] as f64);
@@ -136,7 +136,7 @@ impl MapSampler {
 
     /// A direction, its [`place`](super::place), and its density (1/sr) for each of `squares`, and the radiance of `map` there.
     #[cfg(test)]
-    pub(crate) fn sample(&self, map: &EnvironmentMap, squares: &[[f64; 2]], out: &mut OnMap) {
+    pub(crate) fn sample(&self, map: &EnvironmentMap, squares: &[[f64; 2]], out: &mut MapLookups) {
         out.directions.clear();
         self.cells(squares.iter().copied(), &mut out.cells);
         out.resize(squares.len());
@@ -147,7 +147,7 @@ impl MapSampler {
 
     /// The [`place`](super::place)s of the unit directions in `asked`, their densities (1/sr), and the radiance of `map` there.
     #[cfg(test)]
-    pub(crate) fn look_up(&self, map: &EnvironmentMap, asked: &mut OnMap) {
+    pub(crate) fn look_up(&self, map: &EnvironmentMap, asked: &mut MapLookups) {
         asked.resize(asked.directions.len());
         if !map.texels.is_empty() {
             looked_up(self, map, asked);
@@ -159,7 +159,7 @@ impl MapSampler {
         self.cells.bright.is_empty()
     }
 
-    /// How bright cells of the table are.
+    /// Brightness of cells of the table.
     #[inline(always)]
     fn bright_at<F: Float, const N: usize>(&self, numbers: &[[u32; N]; 4]) -> [[F; N]; 4] {
         let mut bright = [[F::ZERO; N]; 4];
@@ -202,7 +202,7 @@ impl MapSampler {
         MapLookup { directions, places, densities, colors }
     }
 
-    /// What the map has in unit directions.
+    /// Lookups of the map in unit directions.
     #[inline(always)]
     pub(crate) fn in_directions<F: Float, const N: usize>(
         &self,
@@ -308,7 +308,7 @@ impl MapSampler {
     }
 }
 
-/// What a map has in directions side by side, a row a number.
+/// Lookups of a map in directions side by side, a row a number.
 pub(crate) struct MapLookup<F, const N: usize> {
     /// Unit.
     pub(crate) directions: [[F; N]; 3],
@@ -321,7 +321,7 @@ pub(crate) struct MapLookup<F, const N: usize> {
 /// Directions, and what a map has there; kept for the next.
 #[cfg(test)]
 #[derive(Debug, Default)]
-pub(crate) struct OnMap {
+pub(crate) struct MapLookups {
     cells: Vec<GridCell>,
     /// Unit.
     pub(crate) directions: Vec<DVec3>,
@@ -332,7 +332,7 @@ pub(crate) struct OnMap {
 }
 
 #[cfg(test)]
-impl OnMap {
+impl MapLookups {
     /// Makes room for so many, which have nothing yet.
     fn resize(&mut self, count: usize) {
         self.directions.resize(count, DVec3::Y);
@@ -346,7 +346,7 @@ impl OnMap {
 }
 
 #[cfg(test)]
-impl OnMap {
+impl MapLookups {
     /// Takes what a map has in the directions from one on.
     #[inline(always)]
     fn put(&mut self, start: usize, lit: &MapLookup<f64, LANES>) {
@@ -362,7 +362,7 @@ impl OnMap {
 
 #[cfg(test)]
 #[multiversion::multiversion(targets = "simd")]
-fn chosen(sampler: &MapSampler, map: &EnvironmentMap, out: &mut OnMap) {
+fn chosen(sampler: &MapSampler, map: &EnvironmentMap, out: &mut MapLookups) {
     for start in (0..out.directions.len()).step_by(LANES) {
         let count = LANES.min(out.directions.len() - start);
         let mut patches = [GridCell::default(); LANES];
@@ -373,7 +373,7 @@ fn chosen(sampler: &MapSampler, map: &EnvironmentMap, out: &mut OnMap) {
 
 #[cfg(test)]
 #[multiversion::multiversion(targets = "simd")]
-fn looked_up(sampler: &MapSampler, map: &EnvironmentMap, asked: &mut OnMap) {
+fn looked_up(sampler: &MapSampler, map: &EnvironmentMap, asked: &mut MapLookups) {
     for start in (0..asked.directions.len()).step_by(LANES) {
         let mut directions = [[0.0; LANES]; 3];
         for (i, d) in asked.directions[start..].iter().take(LANES).enumerate() {

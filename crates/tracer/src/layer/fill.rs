@@ -7,7 +7,7 @@ use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{HitBatch, MISS, Placement};
 
 use super::{Columns, LayerContext, NormalKind, Space};
-use crate::{Color, Paint, SceneView, Traced};
+use crate::{Color, Paint, SceneView, TracedBatch};
 
 impl LayerContext<'_> {
     /// Refills the first columns with `value` of each ray.
@@ -60,7 +60,7 @@ impl LayerContext<'_> {
 
     /// Angles of incidence on the triangles (radians, 0 to π/2), `+inf` for a miss.
     pub(super) fn incidences(&self, out: &mut Columns) {
-        let Traced { rays, hits } = self.traced;
+        let TracedBatch { rays, hits } = self.traced;
         self.each(out, |i| {
             let (normal, direction) = (hits.normal(i), rays.direction(i));
             // The arc cosine would lose half of the digits near 0.
@@ -190,7 +190,7 @@ impl SceneView<'_> {
     /// ray came from.
     fn shading_cosines(
         &self,
-        traced: Traced<'_>,
+        traced: TracedBatch<'_>,
         run: Range<usize>,
         placement: &Placement,
         out: &mut [f64],
@@ -200,7 +200,7 @@ impl SceneView<'_> {
         for i in run {
             let (geometric, direction) = (traced.hits.normal(i), traced.rays.direction(i));
             let side = if geometric.dot(direction) > 0.0 { 1.0 } else { -1.0 };
-            let point = self.spot(traced.hits, i);
+            let point = self.point(traced.hits, i);
             let normal = point.and_then(|point| point.turned_normal(turn.as_ref(), geometric));
             out[i] = (normal.unwrap_or(geometric).dot(direction) * side).max(0.0);
         }
@@ -209,7 +209,7 @@ impl SceneView<'_> {
 
 /// Cosines between rays and the triangles' normals.
 #[multiversion::multiversion(targets = "simd")]
-fn cosines(traced: Traced<'_>, run: Range<usize>, out: &mut [f64]) {
+fn cosines(traced: TracedBatch<'_>, run: Range<usize>, out: &mut [f64]) {
     let [dx, dy, dz] = traced.rays.directions().map(|array| &array[run.clone()]);
     let [nx, ny, nz] = traced.hits.normal.each_ref().map(|array| &array[run.clone()]);
     for (i, out) in out[run].iter_mut().enumerate() {
@@ -218,7 +218,7 @@ fn cosines(traced: Traced<'_>, run: Range<usize>, out: &mut [f64]) {
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn depths(traced: Traced<'_>, from: DVec3, forward: DVec3, out: &mut [f64]) {
+fn depths(traced: TracedBatch<'_>, from: DVec3, forward: DVec3, out: &mut [f64]) {
     let [ox, oy, oz] = traced.rays.origins().map(|array| &array[..out.len()]);
     let [dx, dy, dz] = traced.rays.directions().map(|array| &array[..out.len()]);
     let t = &traced.hits.t[..out.len()];
@@ -233,7 +233,7 @@ fn depths(traced: Traced<'_>, from: DVec3, forward: DVec3, out: &mut [f64]) {
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn normals(traced: Traced<'_>, axes: [DVec3; 3], out: &mut Columns) {
+fn normals(traced: TracedBatch<'_>, axes: [DVec3; 3], out: &mut Columns) {
     let [a, b, c, _] = out;
     let len = a.len();
     let (b, c) = (&mut b[..len], &mut c[..len]);

@@ -13,9 +13,9 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
-pub use self::pair::{Along, FrameStep, OtherFrame, RowMoment, Sight, WrittenStep};
+pub use self::pair::{FrameStep, OtherFrame, RowMoment, Sight, StepAxis, WrittenStep};
 pub use self::table::LayerSpec;
-use crate::{LightingContext, Needs, SceneView, Traced};
+use crate::{LightingContext, Needs, SceneView, TracedBatch};
 
 /// The frame of a vector-valued layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
@@ -30,7 +30,7 @@ pub enum Space {
     Opencv,
 }
 
-/// Which of a surface's two normals.
+/// One of a surface's two normals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NormalKind {
@@ -153,7 +153,7 @@ pub struct LayerContext<'a> {
     /// The scene.
     pub scene: SceneView<'a>,
     /// The batch.
-    pub traced: Traced<'a>,
+    pub traced: TracedBatch<'a>,
     /// The scene's light, where it is traced.
     pub light: Option<LightingContext<'a>>,
     /// Columns and rows of the rays on the sensor (pixels from the corner of the top left one); empty where

@@ -16,12 +16,12 @@ use super::{Columns, LayerContext};
 #[serde(try_from = "WrittenStep", into = "WrittenStep")]
 pub struct FrameStep {
     count: i32,
-    along: Along,
+    along: StepAxis,
 }
 
 /// Axis along which the frames of a step are counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Along {
+pub enum StepAxis {
     /// Time: the same camera of a rig, where there is one.
     Frames,
     /// The cameras of a rig at one moment; frames where there is no rig.
@@ -64,7 +64,7 @@ impl FrameStep {
 
     /// Axis along which they are counted.
     #[must_use]
-    pub fn along(self) -> Along {
+    pub fn along(self) -> StepAxis {
         self.along
     }
 
@@ -72,15 +72,15 @@ impl FrameStep {
     #[must_use]
     pub fn across(self) -> Self {
         match self.along {
-            Along::Exposure => self,
-            Along::Frames | Along::Cameras => Self { along: Along::Cameras, ..self },
+            StepAxis::Exposure => self,
+            StepAxis::Frames | StepAxis::Cameras => Self { along: StepAxis::Cameras, ..self },
         }
     }
 
     /// The moment of the frame's own exposure, where it is one.
     #[must_use]
     pub fn moment(self) -> Option<RowMoment> {
-        (self.along == Along::Exposure).then_some(match self.count {
+        (self.along == StepAxis::Exposure).then_some(match self.count {
             ..0 => RowMoment::Open,
             _ => RowMoment::Close,
         })
@@ -95,18 +95,20 @@ impl FrameStep {
     /// Entry of headers that says which frame it is.
     pub(super) fn meaning(self) -> (&'static str, &'static str) {
         let which = match (self.along, self.count) {
-            (Along::Exposure, ..0) => "this one, when the shutter of the row opens",
-            (Along::Exposure, _) => "this one, when the shutter of the row closes",
-            (Along::Frames, 1) => "the next one",
-            (Along::Frames, -1) => "the one before",
-            (Along::Frames, 1..) => "as many on as the layer's name says",
-            (Along::Frames, _) => "as many back as the layer's name says",
-            (Along::Cameras, 1) => "that of the rig's next camera; without a rig the next one",
-            (Along::Cameras, -1) => "that of the rig's camera before; without a rig the one before",
-            (Along::Cameras, 1..) => {
+            (StepAxis::Exposure, ..0) => "this one, when the shutter of the row opens",
+            (StepAxis::Exposure, _) => "this one, when the shutter of the row closes",
+            (StepAxis::Frames, 1) => "the next one",
+            (StepAxis::Frames, -1) => "the one before",
+            (StepAxis::Frames, 1..) => "as many on as the layer's name says",
+            (StepAxis::Frames, _) => "as many back as the layer's name says",
+            (StepAxis::Cameras, 1) => "that of the rig's next camera; without a rig the next one",
+            (StepAxis::Cameras, -1) => {
+                "that of the rig's camera before; without a rig the one before"
+            }
+            (StepAxis::Cameras, 1..) => {
                 "that of the rig's camera as many on as the layer's name says; without a rig as many frames on"
             }
-            (Along::Cameras, _) => {
+            (StepAxis::Cameras, _) => {
                 "that of the rig's camera as many back as the layer's name says; without a rig as many frames \
                  back"
             }
@@ -118,10 +120,10 @@ impl FrameStep {
     /// and `FlowClose`.
     pub(super) fn name(self, name: &'static str) -> Cow<'static, str> {
         let along = match self.along {
-            Along::Frames => "",
-            Along::Cameras => "Camera",
-            Along::Exposure if self.count < 0 => return format!("{name}Open").into(),
-            Along::Exposure => return format!("{name}Close").into(),
+            StepAxis::Frames => "",
+            StepAxis::Cameras => "Camera",
+            StepAxis::Exposure if self.count < 0 => return format!("{name}Open").into(),
+            StepAxis::Exposure => return format!("{name}Close").into(),
         };
         match self.count {
             1 if along.is_empty() => name.into(),
@@ -135,17 +137,17 @@ impl FrameStep {
 
 impl Default for FrameStep {
     fn default() -> Self {
-        Self { count: 1, along: Along::Frames }
+        Self { count: 1, along: StepAxis::Frames }
     }
 }
 
 impl From<FrameStep> for WrittenStep {
     fn from(step: FrameStep) -> Self {
         match step.along {
-            Along::Frames => Self::Frames(step.count),
-            Along::Cameras => Self::Cameras { cameras: step.count },
-            Along::Exposure if step.count < 0 => Self::Moment(RowMoment::Open),
-            Along::Exposure => Self::Moment(RowMoment::Close),
+            StepAxis::Frames => Self::Frames(step.count),
+            StepAxis::Cameras => Self::Cameras { cameras: step.count },
+            StepAxis::Exposure if step.count < 0 => Self::Moment(RowMoment::Open),
+            StepAxis::Exposure => Self::Moment(RowMoment::Close),
         }
     }
 }
@@ -155,10 +157,10 @@ impl TryFrom<WrittenStep> for FrameStep {
 
     fn try_from(written: WrittenStep) -> Result<Self, Self::Error> {
         let (count, along) = match written {
-            WrittenStep::Frames(count) => (count, Along::Frames),
-            WrittenStep::Cameras { cameras } => (cameras, Along::Cameras),
-            WrittenStep::Moment(RowMoment::Open) => (-1, Along::Exposure),
-            WrittenStep::Moment(RowMoment::Close) => (1, Along::Exposure),
+            WrittenStep::Frames(count) => (count, StepAxis::Frames),
+            WrittenStep::Cameras { cameras } => (cameras, StepAxis::Cameras),
+            WrittenStep::Moment(RowMoment::Open) => (-1, StepAxis::Exposure),
+            WrittenStep::Moment(RowMoment::Close) => (1, StepAxis::Exposure),
         };
         match count {
             0 => Err("`to` is 0: a frame does not move against itself; 1 is the next frame"),

@@ -49,7 +49,7 @@ layers! {
         Normal {
             /// The frame.
             space: Space,
-            /// Which normal.
+            /// The normal that it shows.
             kind: NormalKind
         } = "normal": Layer {
             name: name_of_normals(space, kind),
@@ -239,7 +239,7 @@ layers! {
 
         /// `Flow.X Y`: from where a pixel's point is seen to where another frame sees it (pixels).
         Flow {
-            /// Which frame.
+            /// The other frame.
             to: FrameStep
         } = "flow": Layer {
             name: to.name("Flow"),
@@ -261,7 +261,7 @@ layers! {
 
         /// `Disparity.X`: how far left of its place here another frame sees a pixel's point (pixels).
         Disparity {
-            /// Which frame.
+            /// The other frame.
             to: FrameStep
         } = "disparity": Layer {
             name: to.name("Disparity"),
@@ -283,7 +283,7 @@ layers! {
         /// `Occlusion.hidden.X` and `Occlusion.outside.X`: 1 where another frame does not see a pixel's
         /// point, because something is before it, or because its picture ends.
         Occlusion {
-            /// Which frame.
+            /// The other frame.
             to: FrameStep
         } = "occlusion": Layer {
             name: to.name("Occlusion"),

@@ -78,7 +78,8 @@ impl Choices {
     #[inline(always)]
     pub(crate) fn push_some<F: Float>(
         &mut self,
-        (points, origin): (&[[F; LANES]; 3], DVec3),
+        points: &[[F; LANES]; 3],
+        origin: DVec3,
         normals: &[[F; LANES]; 3],
         u: &[F; LANES],
         compress: impl Fn(&[f32; LANES], &mut [f32]) -> usize,
@@ -229,7 +230,7 @@ pub(super) fn descend_together(tree: &LightTree, choices: &mut Choices) {
         branches.clear();
         let mut counts = [0_usize; WIDTH];
         for numbers in order.chunks(LANES) {
-            let taken = take_branches(node, &choices.asking(numbers));
+            let taken = take_branches(node, &choices.branch_queries(numbers));
             for (i, &number) in numbers.iter().enumerate() {
                 let (number, code) = (number as usize, taken.codes[i]);
                 let chance = choices.chance[number] * taken.share[i];
@@ -296,7 +297,7 @@ pub(super) fn descend(nodes: &[Node], walkers: &mut [Walker]) {
 
 /// Points at one node that ask for a branch each.
 #[derive(Debug, Default)]
-struct Asking {
+struct BranchQueries {
     points: [[f32; LANES]; 3],
     normals: [[f32; LANES]; 3],
     u: [f64; LANES],
@@ -305,33 +306,33 @@ struct Asking {
 impl Choices {
     /// Those of some numbers that ask for a branch.
     #[inline(always)]
-    fn asking(&self, numbers: &[u32]) -> Asking {
-        let mut asking = Asking::default();
+    fn branch_queries(&self, numbers: &[u32]) -> BranchQueries {
+        let mut queries = BranchQueries::default();
         let [first, last] = [numbers[0], numbers[numbers.len() - 1]].map(|k| k as usize);
         if last - first < numbers.len() {
             // They stand side by side, as all do at first.
             let run = first..first + LANES;
             for axis in 0..3 {
-                asking.points[axis].copy_from_slice(&self.local[axis][run.clone()]);
-                asking.normals[axis].copy_from_slice(&self.normal[axis][run.clone()]);
+                queries.points[axis].copy_from_slice(&self.local[axis][run.clone()]);
+                queries.normals[axis].copy_from_slice(&self.normal[axis][run.clone()]);
             }
-            asking.u.copy_from_slice(&self.u[run]);
-            return asking;
+            queries.u.copy_from_slice(&self.u[run]);
+            return queries;
         }
         for (i, &number) in numbers.iter().enumerate() {
             let Viewer { point, normal } = self.viewer(number as usize);
             for axis in 0..3 {
-                (asking.points[axis][i], asking.normals[axis][i]) = (point[axis], normal[axis]);
+                (queries.points[axis][i], queries.normals[axis][i]) = (point[axis], normal[axis]);
             }
-            asking.u[i] = self.u[number as usize];
+            queries.u[i] = self.u[number as usize];
         }
-        asking
+        queries
     }
 }
 
 /// The branches that points at one node took.
 #[derive(Debug)]
-struct Taken {
+struct BranchPicks {
     /// The branch; and [`WIDTH`] more where a light of it is chosen by intensity.
     codes: [u32; LANES],
     /// Rests of the numbers that chose them.
@@ -342,14 +343,14 @@ struct Taken {
 
 /// Takes a branch for each of some points, as [`View::pick`] does for one, to the bit.
 #[inline(always)]
-fn take_branches(node: &Node, asking: &Asking) -> Taken {
+fn take_branches(node: &Node, queries: &BranchQueries) -> BranchPicks {
     let (mut sent, mut codes) = ([[0.0_f32; LANES]; WIDTH], [[0.0_f32; LANES]; WIDTH]);
     let mut code = 0.0;
     for k in 0..WIDTH {
         // What is not there sends nothing.
         if node.clusters.intensity[k] > 0.0 {
             let clusters = node.clusters.spread::<LANES>(k);
-            let (own, squared) = clusters.sent(&asking.points, Some(&asking.normals));
+            let (own, squared) = clusters.sent(&queries.points, Some(&queries.normals));
             let (goes_on, ends, limit) = (code, code + WIDTH as f32, node.limits[k]);
             for i in 0..LANES {
                 codes[k][i] = select_unpredictable(squared[i] > limit, ends, goes_on);
@@ -366,7 +367,7 @@ fn take_branches(node: &Node, asking: &Asking) -> Taken {
     }
     let (mut place, mut below) = ([0.0; LANES], [0.0; LANES]);
     for i in 0..LANES {
-        place[i] = asking.u[i] * total[i];
+        place[i] = queries.u[i] * total[i];
     }
     let [mut before, mut chosen, mut code] = [[0.0; LANES]; 3];
     for k in 0..WIDTH {
@@ -393,7 +394,7 @@ fn take_branches(node: &Node, asking: &Asking) -> Taken {
         let number = code[i] as u32;
         numbers[i] = number;
     }
-    Taken { codes: numbers, rest, share }
+    BranchPicks { codes: numbers, rest, share }
 }
 
 /// Tests whether any point is so far away that one light of a tree is as good as another.

@@ -106,8 +106,8 @@ pub(crate) struct LightTree {
     places: Vec<u32>,
 }
 
-/// Branch that lights have become in the tree, and their cluster.
-struct Grown {
+/// Branch that lights became in the tree, and their cluster.
+struct BranchCluster {
     cluster: Cluster,
     /// They are all points.
     is_points: bool,
@@ -123,7 +123,7 @@ impl LightTree {
         if let Some(all) = all {
             tree.extent = Extent::of(&all);
             tree.nodes.push(Node::default());
-            let Grown { cluster, branch, .. } = tree.grow(&mut lights, 0);
+            let BranchCluster { cluster, branch, .. } = tree.grow(&mut lights, 0);
             let extent = tree.extent;
             tree.nodes[ALL].set(0, &extent, &cluster, branch);
         }
@@ -131,7 +131,7 @@ impl LightTree {
     }
 
     /// Adds what is below a branch.
-    fn grow(&mut self, lights: &mut [(u32, Cluster)], depth: u32) -> Grown {
+    fn grow(&mut self, lights: &mut [(u32, Cluster)], depth: u32) -> BranchCluster {
         let begin = self.order.len();
         if let [(number, cluster)] = lights {
             let sum = self.below[begin] + cluster.intensity;
@@ -140,7 +140,7 @@ impl LightTree {
             self.below.push(sum);
             let is_points = cluster.is_point();
             let branch = Branch { node: MISS, alike: true, lights: [begin, begin + 1].map(place) };
-            return Grown { cluster: *cluster, is_points, branch };
+            return BranchCluster { cluster: *cluster, is_points, branch };
         }
         let (at, sizes) = (self.nodes.len(), parts(lights, depth >= DEEP));
         self.nodes.push(Node::default());
@@ -162,7 +162,7 @@ impl LightTree {
         let end = self.order.len();
         let alike = alike && self.below[end] > self.below[begin];
         let branch = Branch { node: place(at), alike, lights: [begin, end].map(place) };
-        Grown { cluster: all, is_points, branch }
+        BranchCluster { cluster: all, is_points, branch }
     }
 
     /// Node at which a point begins to ask: the one that parts all lights, unless it need not ([`ALL`]).

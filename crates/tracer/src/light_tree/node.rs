@@ -1,4 +1,4 @@
-//! What points have of the lights of a node, in single precision: of eight branches side by side, or many of one.
+//! Importance of the lights of a node to points, in single precision: of eight branches side by side, or many of one.
 
 use std::f64::consts::PI;
 

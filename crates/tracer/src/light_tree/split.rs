@@ -1,4 +1,4 @@
-//! Where the lights of a node are parted.
+//! The split of the lights of a node.
 
 use super::cluster::Cluster;
 

@@ -44,7 +44,7 @@ fn at(place: DVec3, axis: DVec3, cone: f64, intensity: f64) -> Cluster {
     Cluster { bounds, axis, cone, reach: FRAC_PI_2, intensity }
 }
 
-/// Lamps that shine to one side, and points, in a room of two metres.
+/// Lights that shine to one side, and points, in a room of two metres.
 fn lights(count: u32, mut random: impl FnMut() -> f64) -> Vec<(u32, Cluster)> {
     let mut vector = move || DVec3::from([random(), random(), random()].map(|x| 2.0 * x - 1.0));
     (0..count)
@@ -125,7 +125,7 @@ fn choices_are_the_same_alone_and_among_others() {
     }
 }
 
-/// Wherever a lamp's front is seen and some of it is above the point's horizon, it may be picked; nothing far
+/// Wherever a light's front is seen and some of it is above the point's horizon, it may be picked; nothing far
 /// below that is.
 #[test]
 fn nothing_that_shines_is_left_out() {
@@ -188,10 +188,10 @@ fn near_lights_are_picked_more_often() {
     assert!(by_tree[1] < by_power / 10.0, "{by_tree:?} {by_power}");
 }
 
-/// Lamps all over a ceiling, asked from the floor: one light's share over its chance differs from the sum by a twentieth
+/// Lights all over a ceiling, asked from the floor: one light's share over its chance differs from the sum by a twentieth
 /// of it in the median. By the largest cosines alone it would be by a twelfth.
 #[test]
-fn lamps_on_a_ceiling_are_picked_by_what_they_bring() {
+fn lights_on_a_ceiling_are_picked_by_what_they_bring() {
     let place = |k: u32| DVec3::new(f64::from(k % 40) / 39.0, 1.0, f64::from(k / 40) / 24.0);
     let all: Vec<_> = (0..1000).map(|k| (k, at(place(k), DVec3::NEG_Y, 0.0, 1.0))).collect();
     let tree = LightTree::new(all.clone(), 1000);

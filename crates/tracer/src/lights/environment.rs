@@ -1,4 +1,4 @@
-//! The light of an environment: what comes from a direction, and how often it is asked.
+//! The light of an environment that comes from a direction.
 
 use etendue_geometry::glam::DVec3;
 
@@ -15,7 +15,7 @@ impl Lights {
             None => radiance.copy_from_slice(self.bands_of(sky.index, radiance.len())),
             Some((map, _)) => {
                 let at = place(sky.world_from_map.transpose() * direction);
-                self.spread_sky(spectral, (at, &map.radiance_at(at)), radiance);
+                self.spread_sky(spectral, at, &map.radiance_at(at), radiance);
             }
         }
     }
@@ -24,7 +24,8 @@ impl Lights {
     pub(crate) fn spread_sky(
         &self,
         spectral: &Spectral,
-        (at, color): ([f64; 2], &Color),
+        at: [f64; 2],
+        color: &Color,
         radiance: &mut [f64],
     ) {
         let Some(sky) = &self.sky else { return };

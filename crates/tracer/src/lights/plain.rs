@@ -24,7 +24,7 @@ pub(crate) struct LightBounds {
     pub(crate) brightest: f64,
     /// Some of those are triangles: they are not alike all over, they move, or they are too many to be kept ready.
     pub(crate) has_other_triangles: bool,
-    /// What some of these shine is looked up in a texture.
+    /// The light of some of these is looked up in a texture.
     pub(crate) are_textured: bool,
     /// All are far away.
     pub(crate) are_far: bool,
@@ -52,7 +52,7 @@ pub(crate) enum PlainLight<'a> {
 }
 
 impl Lights {
-    /// What [`Self::pick`] picks by, where that is a short list: the sum of the chances of all lights before
+    /// The short list by which [`Self::pick`] picks, where there is one: the sum of the chances of all lights before
     /// each, and 1 at the end.
     pub(crate) fn few(&self) -> Option<&[f64]> {
         self.sampler.few()
@@ -67,7 +67,7 @@ impl Lights {
     /// the number goes to the choice.
     #[inline(always)]
     pub(crate) fn pick_far(&self, u: f64) -> Choice {
-        self.sampler.pick_other((u, 1.0))
+        self.sampler.pick_other(u, 1.0)
     }
 
     /// Bounds of all of them.
@@ -75,7 +75,7 @@ impl Lights {
         &self.bounds
     }
 
-    /// How many lights there are.
+    /// Number of lights.
     pub(crate) fn count(&self) -> usize {
         self.lights.len() + self.triangles.len()
     }
@@ -135,24 +135,25 @@ impl Lights {
             }
             if let Some(at) = light.kind.place() {
                 bounds.are_far = false;
-                let at = light.stand(0.0).point(at);
+                let at = light.pose(0.0).point(at);
                 bounds.farthest = bounds.farthest.max(at.abs().max_element());
             }
         }
         for (placement, first) in (0_u32..).zip(&self.first) {
             if let Some(first) = first {
-                self.bound_surface(scene, span, (placement, *first as usize), &mut bounds);
+                self.bound_surface(scene, span, placement, *first as usize, &mut bounds);
             }
         }
         bounds
     }
 
-    /// Takes the bounds of a placement that shines, whose triangles are lights from `first` on.
+    /// Takes the bounds of a placement that shines, by its number, whose triangles are lights from `first` on.
     fn bound_surface(
         &self,
         scene: &SceneView<'_>,
         span: [f64; 2],
-        (number, first): (u32, usize),
+        number: u32,
+        first: usize,
         bounds: &mut LightBounds,
     ) {
         let placement = &scene.geometry.placements[number as usize];
@@ -186,13 +187,13 @@ impl Lights {
     }
 }
 
-/// Where a light is (m), if it is a point that shines alike to all sides and stands still.
+/// The place of a light (m), if it is a point that shines alike to all sides and stands still.
 #[inline(always)]
 pub(super) fn standing_point(light: &Light) -> Option<DVec3> {
     let LightKind::Point(at) = light.kind else { return None };
     let stands = || !light.moves_within([f64::NEG_INFINITY, f64::INFINITY]);
     match light.motion {
         None => Some(at),
-        Some(_) => stands().then(|| light.stand(0.0).point(at)),
+        Some(_) => stands().then(|| light.pose(0.0).point(at)),
     }
 }

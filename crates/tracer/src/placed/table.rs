@@ -22,7 +22,7 @@ pub(crate) struct SurfaceTable {
     pub(crate) are_smooth: bool,
     /// Some are not alike all over.
     pub(crate) are_varied: bool,
-    /// How much of some paths see counts behind mirrors and smooth boundaries, too.
+    /// The cones of paths count behind mirrors and smooth boundaries, too.
     pub(crate) carry_cones: bool,
     /// The colours of materials that are alike all over, `[material][band]`; 0 of others. Of measured metals what they
     /// reflect face on. Empty where bands are red, green and blue.
@@ -84,7 +84,7 @@ impl SurfaceKind {
     }
 }
 
-/// What a sheet of facets has, or a smooth surface, as [`crate::bsdf::sheets::Sheets`] takes it.
+/// Properties of a sheet of facets, or of a smooth surface, as [`crate::bsdf::sheets::Sheets`] takes them.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Facets {
     /// The square of the roughness, and the share of metal.
@@ -115,7 +115,7 @@ impl SurfaceTable {
         !self.facets.is_empty() || self.are_varied
     }
 
-    /// How many bands there are.
+    /// Number of bands.
     pub(crate) fn count(&self) -> usize {
         self.count
     }
@@ -137,17 +137,19 @@ impl SurfaceTable {
     /// Those of a scene.
     pub(super) fn of(
         placed: &[Option<PlacedSurface>],
-        (geometry, materials): (&Geometry, &[Material]),
-        (spectral, traits): (&Spectral, &Traits),
+        geometry: &Geometry,
+        materials: &[Material],
+        spectral: &Spectral,
+        traits: &Traits,
     ) -> Self {
         // Many copies are of few materials.
         let mut all = Vec::with_capacity(placed.len() + 1);
         for (placed, placement) in placed.iter().zip(&geometry.placements) {
             let material = materials.get(placement.material as usize);
-            let placement = (placement, geometry.mesh_of(placement));
+            let mesh = geometry.mesh_of(placement);
             all.push(match (placed, material) {
                 (Some(placed), Some(material)) => {
-                    SurfaceRow::of(placed, material, placement, (spectral, traits))
+                    SurfaceRow::of(placed, material, placement, mesh, spectral, traits)
                 }
                 _ => SurfaceRow::default(),
             });
@@ -193,8 +195,10 @@ impl SurfaceRow {
     fn of(
         placed: &PlacedSurface,
         material: &Material,
-        (placement, mesh): (&Placement, &Mesh),
-        (spectral, traits): (&Spectral, &Traits),
+        placement: &Placement,
+        mesh: &Mesh,
+        spectral: &Spectral,
+        traits: &Traits,
     ) -> Self {
         let parts_media = traits.has_media || traits.has_dispersion;
         let kind = match SurfaceKind::of(&material.scattering) {
@@ -252,7 +256,7 @@ fn measured(material: &Material) -> Option<ConductorId> {
     }
 }
 
-/// What a material that is alike all over reflects in a band: of a measured metal face on.
+/// Reflectance in a band of a material that is alike all over: of a measured metal face on.
 fn face_on(material: &Material, spectral: &Spectral, band: usize) -> f64 {
     match measured(material) {
         Some(metal) => spectral.metal(metal, band)[0],

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use super::light_motion::LightMotionSpec;
 use super::{
-    Bound, ColorSpec, CubeSpec, Emitted, Fault, PaintSpec, Supply, emitted, in_bounds, luminous,
-    one, radiant_paint, share_of, unit_scale, white,
+    Bound, ColorSpec, CubeSpec, Fault, LightSpectrum, PaintSpec, Supply, emitted, in_bounds,
+    luminous, one, radiant_paint, share_of, unit_scale, white,
 };
 use crate::clear_sky::SUN_DIAMETER;
 use crate::goniometric::{Goniometric, Photometry};
@@ -25,7 +25,7 @@ use crate::{
 pub enum LightSpec {
     /// A point that shines alike in all directions.
     Point {
-        /// Where it is (m).
+        /// Its position (m).
         at: [f64; 3],
         /// Radiant intensity, linear RGB: at 1 m it gives this irradiance.
         intensity: ColorSpec,
@@ -39,16 +39,16 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
-        /// How its strength changes with time; not at all when absent.
+        /// Change of its strength with time; none when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         modulation: Option<ModulationSpec>,
-        /// How it moves while the shutter is open; it stands still when absent.
+        /// Its motion while the shutter is open; it stands still when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         motion: Option<LightMotionSpec>,
     },
     /// A point that shines into a cone.
     Spot {
-        /// Where it is (m).
+        /// Its position (m).
         at: [f64; 3],
         /// A point that it is aimed at (m).
         look_at: [f64; 3],
@@ -72,16 +72,16 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
-        /// How its strength changes with time; not at all when absent.
+        /// Change of its strength with time; none when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         modulation: Option<ModulationSpec>,
-        /// How it moves while the shutter is open; it stands still when absent.
+        /// Its motion while the shutter is open; it stands still when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         motion: Option<LightMotionSpec>,
     },
     /// Parallel light, as from the sun.
     Directional {
-        /// Where the light goes.
+        /// Direction in which the light goes.
         direction: [f64; 3],
         /// Irradiance on a surface that faces it, linear RGB.
         irradiance: ColorSpec,
@@ -100,17 +100,17 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
-        /// How its strength changes with time; not at all when absent.
+        /// Change of its strength with time; none when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         modulation: Option<ModulationSpec>,
     },
     /// A point that shines by a measured distribution.
     Goniometric {
-        /// Where it is (m).
+        /// Its position (m).
         at: [f64; 3],
         /// An IES file (LM-63, type C), relative to the scene file.
         file: String,
-        /// Where the luminaire's downward direction points: the plane of the horizontal angle 0 is turned from
+        /// Direction that the luminaire's downward direction points in: the plane of the horizontal angle 0 is turned from
         /// +X the shortest way.
         #[serde(default = "downwards")]
         direction: [f64; 3],
@@ -130,20 +130,20 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
-        /// How its strength changes with time; not at all when absent.
+        /// Change of its strength with time; none when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         modulation: Option<ModulationSpec>,
-        /// How it moves while the shutter is open; it stands still when absent.
+        /// Its motion while the shutter is open; it stands still when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         motion: Option<LightMotionSpec>,
     },
     /// A point that throws an image, as for structured light.
     Projector {
-        /// Where it is (m).
+        /// Its position (m).
         at: [f64; 3],
         /// A point that it is aimed at (m).
         look_at: [f64; 3],
-        /// What is up in the image.
+        /// Direction that is up in the image.
         #[serde(default = "upwards")]
         up: [f64; 3],
         /// Angle across the image (degrees).
@@ -153,7 +153,7 @@ pub enum LightSpec {
         /// Width over height; that of the image when absent, of a plain colour 1.
         #[serde(default)]
         aspect: Option<f64>,
-        /// What is thrown: an image, or a colour. It is seen as from the projector.
+        /// The image that is thrown, or a colour. It is seen as from the projector.
         #[serde(default)]
         image: PaintSpec,
         /// Radiant intensity along the axis where the image is white, linear RGB: on a screen that faces it at
@@ -165,10 +165,10 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
-        /// How its strength changes with time; not at all when absent.
+        /// Change of its strength with time; none when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         modulation: Option<ModulationSpec>,
-        /// How it moves while the shutter is open; it stands still when absent.
+        /// Its motion while the shutter is open; it stands still when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         motion: Option<LightMotionSpec>,
     },
@@ -184,7 +184,7 @@ pub enum LightSpec {
         /// Turns the image about its top (degrees, counter-clockwise from above).
         #[serde(default)]
         rotate: f64,
-        /// Where the image's top is: the image is tilted the shortest way from +Y.
+        /// Direction of the image's top: the image is tilted the shortest way from +Y.
         #[serde(default = "upwards")]
         up: [f64; 3],
         /// The camera sees it where nothing is in the way; if not, it lights, and is seen in mirrors and
@@ -197,13 +197,13 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
-        /// How its strength changes with time; not at all when absent.
+        /// Change of its strength with time; none when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         modulation: Option<ModulationSpec>,
     },
     /// A clear sky with its sun, and the ground below the horizon. It is the scene's environment.
     Sky {
-        /// How hazy the air is: 1 (none but air) to 10.
+        /// Turbidity, the haze of the air: 1 (none but air) to 10.
         #[serde(default = "default_turbidity")]
         #[schemars(range(min = 1.0, max = 10.0))]
         turbidity: f64,
@@ -218,7 +218,7 @@ pub enum LightSpec {
         #[serde(default = "one")]
         #[schemars(range(min = 0.0))]
         scale: f64,
-        /// Where the zenith is: the sky is tilted the shortest way from +Y.
+        /// Direction of the zenith: the sky is tilted the shortest way from +Y.
         #[serde(default = "upwards")]
         up: [f64; 3],
         /// The camera sees it where nothing is in the way.
@@ -227,7 +227,7 @@ pub enum LightSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
-        /// How its strength changes with time; not at all when absent.
+        /// Change of its strength with time; none when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         modulation: Option<ModulationSpec>,
     },
@@ -255,7 +255,7 @@ pub struct SkyCubeSpec {
     pub bands: Option<Grid>,
 }
 
-/// Where the sun of a sky stands.
+/// Position of the sun of a sky.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SunSpec {
@@ -296,7 +296,7 @@ impl LightSpec {
             Self::Sky { turbidity, sun, ground_albedo, scale, up, visible, .. } => {
                 let sky = ClearSky::new(*turbidity, sun.elevation, *ground_albedo, sun.shines);
                 let sky = sky.ok_or_else(|| Fault::new("", "is no sky that the model knows"))?;
-                return shining(sky, sun.azimuth, *scale, (*up, *visible));
+                return shining(sky, sun.azimuth, *scale, *up, *visible);
             }
             Self::Point { intensity, illuminant, .. }
             | Self::Spot { intensity, illuminant, .. }
@@ -307,7 +307,7 @@ impl LightSpec {
             }
             Self::Environment { radiance, illuminant, .. } => ("radiance", radiance, illuminant),
         };
-        let Emitted { color, curve } = emitted((key, color), *illuminant, supply)?;
+        let LightSpectrum { color, curve } = emitted(key, color, *illuminant, supply)?;
         let kind = match self {
             Self::Sky { .. } => return Ok(Vec::new()),
             Self::Point { at, .. } => LightKind::Point(DVec3::from(*at)),
@@ -331,7 +331,7 @@ impl LightSpec {
             },
             Self::Goniometric { at, file, direction, rotate, .. } => {
                 let below = unit("direction", DVec3::from(*direction))?;
-                let measured = goniometric(DVec3::from(*at), below, *rotate, (file, supply))?;
+                let measured = goniometric(DVec3::from(*at), below, *rotate, file, supply)?;
                 LightKind::Goniometric(Box::new(measured))
             }
             Self::Projector { at, look_at, up, fov, aspect, image, .. } => {
@@ -341,13 +341,13 @@ impl LightSpec {
                                spectrum is that of its `intensity`";
                     return Err(Fault::new("image", why));
                 }
-                let (image, spectrum) = radiant_paint(("image", image), None, supply)?;
+                let (image, spectrum) = radiant_paint("image", image, None, supply)?;
                 if spectrum.is_some() || !image.curves().is_empty() {
                     let why = "has a curve; a projector's spectrum is that of its `intensity`";
                     return Err(Fault::new("image", why));
                 }
-                let shape = (*fov, *aspect, image);
-                LightKind::Projector(Box::new(projector(ends, DVec3::from(*up), shape)?))
+                let up = DVec3::from(*up);
+                LightKind::Projector(Box::new(projector(ends, up, *fov, *aspect, image)?))
             }
             Self::Environment { image, rotate, up, visible, radiance, .. } => {
                 let stray = match (radiance, &curve) {
@@ -360,11 +360,11 @@ impl LightSpec {
                 LightKind::Environment { image, turn, visible: *visible }
             }
         };
-        let color = self.brought_to_flux(color, (&kind, curve.as_deref()))?;
+        let color = self.brought_to_flux(color, &kind, curve.as_deref())?;
         Ok(vec![Light { illuminant: curve, ..Light::steady(kind, color) }])
     }
 
-    /// How its strength changes with time, if it does.
+    /// Change of its strength with time, if it changes.
     #[must_use]
     pub fn modulation(&self) -> Option<&ModulationSpec> {
         match self {
@@ -378,7 +378,7 @@ impl LightSpec {
         }
     }
 
-    /// How it moves, and where it is written to be (m), if it does.
+    /// Its motion, and the position that is written (m), if it moves.
     #[must_use]
     pub fn motion(&self) -> Option<(&LightMotionSpec, DVec3)> {
         match self {
@@ -394,7 +394,8 @@ impl LightSpec {
     fn brought_to_flux(
         &self,
         color: Color,
-        (kind, curve): (&LightKind, Option<&Curve>),
+        kind: &LightKind,
+        curve: Option<&Curve>,
     ) -> Result<Color, Fault> {
         // Of a flux the intensity is spread over directions; an illuminance is that of the irradiance itself.
         let (key, wanted, spread) = match (self.lumens(), self) {
@@ -465,7 +466,7 @@ fn unit(key: &str, v: DVec3) -> Result<DVec3, Fault> {
     v.try_normalize().ok_or_else(|| Fault::new(key, "gives no direction"))
 }
 
-/// What brings an environment's directions into the world: its top from +Y to `up` the shortest way, after a
+/// The turn that brings an environment's directions into the world: its top from +Y to `up` the shortest way, after a
 /// turn by `rotate` (degrees, counter-clockwise from above).
 fn tilted(up: [f64; 3], rotate: f64) -> Result<DMat3, Fault> {
     let tilt = DQuat::from_rotation_arc(DVec3::Y, unit("up", DVec3::from(up))?);
@@ -477,7 +478,8 @@ fn shining(
     sky: ClearSky,
     azimuth: f64,
     scale: f64,
-    (up, visible): ([f64; 3], bool),
+    up: [f64; 3],
+    visible: bool,
 ) -> Result<Vec<Light>, Fault> {
     in_bounds("scale", &[scale; 3], Bound::None)?;
     if !azimuth.is_finite() {
@@ -507,7 +509,9 @@ fn shining(
 fn projector(
     [at, look_at]: [DVec3; 2],
     up: DVec3,
-    (fov, aspect, image): (f64, Option<f64>, Paint),
+    fov: f64,
+    aspect: Option<f64>,
+    image: Paint,
 ) -> Result<Projector, Fault> {
     let back = unit("look_at", at - look_at)?;
     let right = up.cross(back).try_normalize().ok_or_else(|| {
@@ -531,7 +535,8 @@ fn goniometric(
     at: DVec3,
     below: DVec3,
     rotate: f64,
-    (file, supply): (&str, &mut dyn Supply),
+    file: &str,
+    supply: &mut dyn Supply,
 ) -> Result<Goniometric, Fault> {
     let tilt = DMat3::from_quat(DQuat::from_rotation_arc(DVec3::NEG_Y, below));
     let turn = tilt * DMat3::from_rotation_y(rotate.to_radians());

@@ -1,4 +1,4 @@
-//! How lights move, as the scene file writes it.
+//! Motion of lights, as the scene file writes it.
 
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::units::Seconds;
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Fault;
 
-/// How a light moves, as the scene file writes it.
+/// Motion of a light, as the scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum LightMotionSpec {
@@ -31,7 +31,7 @@ pub enum LightMotionSpec {
         offsets: Vec<[f64; 3]>,
         /// When the light is there (s, in the scene's clock), increasing; before and after it stands still.
         times: Vec<Seconds>,
-        /// How its place runs between two of them.
+        /// Interpolation of its place between two of them.
         #[serde(default)]
         translation: Interpolation,
     },
@@ -70,7 +70,7 @@ impl LightMotionSpec {
         }
     }
 
-    /// Whether its times are those of the scene's clock.
+    /// True if its times are those of the scene's clock.
     #[must_use]
     pub fn has_times(&self) -> bool {
         matches!(self, Self::Offsets { .. })

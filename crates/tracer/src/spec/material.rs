@@ -59,7 +59,7 @@ pub enum MaterialSpec {
         #[serde(default)]
         #[schemars(range(min = 0.0, max = 1.0))]
         roughness: f64,
-        /// What the body takes from light on its way through; nothing when absent.
+        /// Absorption of light on its way through the body; none when absent.
         #[serde(default)]
         absorption: Option<AbsorptionSpec>,
     },
@@ -102,11 +102,11 @@ pub enum MaterialSpec {
         /// Colour of the reflection of what is no metal, face on: linear RGB, each 0..=1, or a curve.
         #[serde(default = "super::white")]
         specular_color: ColorSpec,
-        /// How much rougher highlights are along the surface's grain than across it, 0 to 1.
+        /// Anisotropy: by how much rougher highlights are along the surface's grain than across it, 0 to 1.
         #[serde(default)]
         #[schemars(range(min = 0.0, max = 1.0))]
         anisotropy: f64,
-        /// Where the grain goes: degrees from growing u of the texture coordinates, counter-clockwise as the
+        /// Direction of the grain: degrees from growing u of the texture coordinates, counter-clockwise as the
         /// image is seen.
         #[serde(default)]
         anisotropy_rotation: f64,
@@ -133,7 +133,7 @@ pub enum MaterialSpec {
         /// The group that the layer request `light_groups` shows it with.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         group: Option<LightGroup>,
-        /// How its strength changes with time; not at all when absent.
+        /// Change of its strength with time; none when absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         modulation: Option<ModulationSpec>,
     },
@@ -210,7 +210,7 @@ pub struct AbbeSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AbsorptionSpec {
-    /// What is left of light after `distance`: linear RGB, each 0..=1, or a curve.
+    /// Share of light that is left after `distance`: linear RGB, each 0..=1, or a curve.
     pub color: ColorSpec,
     /// m (> 0).
     pub distance: f64,
@@ -263,7 +263,7 @@ impl MaterialSpec {
             Self::Gltf { .. } => self.gltf(name, supply)?,
             Self::Emissive { radiance, illuminant, luminance, two_sided, group, modulation } => {
                 let (mut radiance, illuminant) =
-                    radiant_paint(("radiance", radiance), *illuminant, supply)?;
+                    radiant_paint("radiance", radiance, *illuminant, supply)?;
                 if let Some(wanted) = *luminance {
                     let (Paint::Plain(color) | Paint::Image { factor: color, .. }) = &mut radiance
                     else {
@@ -291,7 +291,7 @@ impl MaterialSpec {
                 Material { emission: Some(emission), ..plain }
             }
             Self::Checker { colors, squares } => {
-                let paint = checker("colors", (colors, *squares), supply)?;
+                let paint = checker("colors", colors, *squares, supply)?;
                 Material::new(name, paint, Scattering::Matte)
             }
         })
@@ -353,7 +353,7 @@ impl MaterialSpec {
         Ok(Material { alpha, ..plain })
     }
 
-    /// How its strength changes with time, if it shines and does.
+    /// Change of its strength with time, if it shines and changes.
     #[must_use]
     pub fn modulation(&self) -> Option<&ModulationSpec> {
         match self {
@@ -382,7 +382,7 @@ impl MaterialSpec {
     }
 }
 
-/// What a surface looks like that shines by `radiance` and of which nothing is reflected.
+/// The look of a surface that shines by `radiance` and of which nothing is reflected.
 fn look_of(radiance: Paint) -> Paint {
     match radiance {
         Paint::Checker { colors, squares, .. } => Paint::Checker { colors, curves: None, squares },

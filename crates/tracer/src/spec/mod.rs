@@ -70,10 +70,10 @@ pub struct CubeSpec {
     /// The wavelengths of the bands (nm) of an NPY file; the others say their own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bands: Option<Grid>,
-    /// What happens outside of 0..=1, along both axes.
+    /// Treatment of coordinates outside of 0..=1, along both axes.
     #[serde(default)]
     pub wrap: Wrap,
-    /// How texels are read.
+    /// Filter by which texels are read.
     #[serde(default)]
     pub filter: Filter,
     /// Copies of the cube along one unit of the texture coordinates, along u and v.
@@ -107,13 +107,13 @@ pub struct ImageSpec {
     /// Multiplies the image: linear RGB, or a curve.
     #[serde(default = "white")]
     pub factor: ColorSpec,
-    /// What the file's numbers are: colours by the sRGB curve, or plain.
+    /// Encoding of the file's numbers: colours by the sRGB curve, or plain.
     #[serde(default)]
     pub encoding: crate::texture::Encoding,
-    /// What happens outside of 0..=1, along both axes.
+    /// Treatment of coordinates outside of 0..=1, along both axes.
     #[serde(default)]
     pub wrap: Wrap,
-    /// How texels are read.
+    /// Filter by which texels are read.
     #[serde(default)]
     pub filter: Filter,
     /// Copies of the image along one unit of the texture coordinates, along u and v.
@@ -121,7 +121,7 @@ pub struct ImageSpec {
     pub repeat: [f64; 2],
 }
 
-/// What is wrong with a value.
+/// Fault of a value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
     /// The key below the material or light.
@@ -137,7 +137,7 @@ impl Fault {
     }
 }
 
-/// What specifications name that stands elsewhere: files, and glasses of a catalogue.
+/// Source of what specifications name and stands elsewhere: files, and glasses of a catalogue.
 pub trait Supply {
     /// An image as a paint, white times what it is multiplied by.
     ///
@@ -178,7 +178,7 @@ pub trait Supply {
     fn index(&mut self, spec: &IorSpec) -> Result<Ior, String>;
 }
 
-/// What a colour may be.
+/// Bound of a colour.
 #[derive(Clone, Copy, PartialEq)]
 enum Bound {
     /// A reflectance.
@@ -210,7 +210,7 @@ fn reflectance(key: &str, spec: &ColorSpec, supply: &mut dyn Supply) -> Result<R
     }
 }
 
-/// What a surface reflects or lets pass: 0 to 1.
+/// Share of light that a surface reflects or lets pass: 0 to 1.
 fn share(curve: Curve) -> Result<Curve, String> {
     curve.within(0.0, 1.0).map_err(|error| match error {
         CurveError::OutOfBounds { wavelength: Some(nm), value, .. } if value > 1.0 => format!(
@@ -226,7 +226,7 @@ fn share(curve: Curve) -> Result<Curve, String> {
     })
 }
 
-/// What a reflectance looks like: linear RGB in 0..=1, of its colour under daylight.
+/// Look of a reflectance: linear RGB in 0..=1, of its colour under daylight.
 fn look(curve: &Curve) -> Color {
     let color = match Bands::Rgb.from_curve(curve, Outside::Held) {
         Ok(color) => std::array::from_fn(|k| color[k]),
@@ -236,22 +236,23 @@ fn look(curve: &Curve) -> Color {
     color.map(|part: f64| part.clamp(0.0, 1.0))
 }
 
-/// What a light sends: a colour and the curve that it multiplies, where it has one. The colour is then grey, by what
+/// Spectrum of a light: a colour and the curve that it multiplies, where it has one. The colour is then grey, by what
 /// the curve is to the eye, and the curve that much less: lights are chosen by their colours.
-struct Emitted {
+struct LightSpectrum {
     color: Color,
     curve: Option<Arc<Curve>>,
 }
 
 fn emitted(
-    (key, spec): (&str, &ColorSpec),
+    key: &str,
+    spec: &ColorSpec,
     illuminant: Option<Illuminant>,
     supply: &mut dyn Supply,
-) -> Result<Emitted, Fault> {
+) -> Result<LightSpectrum, Fault> {
     match spec {
         ColorSpec::Rgb(color) => {
             in_bounds(key, color, Bound::None)?;
-            Ok(Emitted { color: *color, curve: checked(illuminant)? })
+            Ok(LightSpectrum { color: *color, curve: checked(illuminant)? })
         }
         ColorSpec::Curve(spec) => {
             if illuminant.is_some() {
@@ -264,16 +265,16 @@ fn emitted(
 }
 
 /// A curve of a light.
-fn emission(key: &str, curve: &Curve) -> Result<Emitted, Fault> {
+fn emission(key: &str, curve: &Curve) -> Result<LightSpectrum, Fault> {
     let high = brightest(key, curve)?;
     let color = Bands::Rgb.from_curve(curve, Outside::Zero).unwrap_or_default();
     let seen = color.iter().sum::<f64>() / 3.0;
     let grey = if seen > 0.0 { seen } else { high };
     if grey <= 0.0 {
-        return Ok(Emitted { color: [0.0; 3], curve: None });
+        return Ok(LightSpectrum { color: [0.0; 3], curve: None });
     }
     let unit = curve.scaled(1.0 / grey).map_err(|e| Fault::new(key, e.to_string()))?;
-    Ok(Emitted { color: [grey; 3], curve: Some(Arc::new(unit)) })
+    Ok(LightSpectrum { color: [grey; 3], curve: Some(Arc::new(unit)) })
 }
 
 /// The greatest value of a curve of a light.
@@ -317,7 +318,7 @@ fn luminous(color: &Color, curve: Option<&Curve>) -> f64 {
         }
 }
 
-/// What a light that has so much of a photometric quantity is multiplied by to have as much as is `wanted`.
+/// Factor that a light with so much of a photometric quantity is multiplied by to have as much as is `wanted`.
 fn share_of(key: &str, wanted: f64, own: f64) -> Result<f64, Fault> {
     if !(wanted >= 0.0 && wanted.is_finite()) {
         return Err(Fault::new(key, format!("{wanted} is no amount of light")));

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use etendue_spectrum::{Bands, Curve, Illuminant, Outside, rgb};
 
 use super::{
-    Bound, CheckerSpec, ColorSpec, CubeSpec, Emitted, Fault, ImageSpec, PaintSpec, Reflectance,
-    Supply, brightest, checked, curve, emitted, in_bounds, reflectance,
+    Bound, CheckerSpec, ColorSpec, CubeSpec, Fault, ImageSpec, LightSpectrum, PaintSpec,
+    Reflectance, Supply, brightest, checked, curve, emitted, in_bounds, reflectance,
 };
 use crate::{Color, CubeKind, Paint, SceneCube, SceneCurve};
 
@@ -25,22 +25,23 @@ pub(super) fn paint(key: &str, spec: &PaintSpec, supply: &mut dyn Supply) -> Res
                 None => Paint::Plain(look),
             })
         }
-        PaintSpec::Cube(cube) => cube_paint((key, cube), CubeKind::Reflectance, supply),
+        PaintSpec::Cube(cube) => cube_paint(key, cube, CubeKind::Reflectance, supply),
         PaintSpec::Checker(CheckerSpec { checker, squares }) => {
             let below = |fault: Fault| Fault::new(format!("{key}.{}", fault.key), fault.why);
-            self::checker("checker", (checker, *squares), supply).map_err(below)
+            self::checker("checker", checker, *squares, supply).map_err(below)
         }
         PaintSpec::Image(image) => {
             let Reflectance { look, curve } =
                 reflectance(&format!("{key}.factor"), &image.factor, supply)?;
-            image_paint(key, image, (look, curve), supply)
+            image_paint(key, image, look, curve, supply)
         }
     }
 }
 
 /// A cube over a surface.
 fn cube_paint(
-    (key, spec): (&str, &CubeSpec),
+    key: &str,
+    spec: &CubeSpec,
     kind: CubeKind,
     supply: &mut dyn Supply,
 ) -> Result<Paint, Fault> {
@@ -54,7 +55,8 @@ fn cube_paint(
 fn image_paint(
     key: &str,
     image: &ImageSpec,
-    (own, own_curve): (Color, Option<SceneCurve>),
+    own: Color,
+    own_curve: Option<SceneCurve>,
     supply: &mut dyn Supply,
 ) -> Result<Paint, Fault> {
     let below = |fault: Fault| Fault::new(format!("{key}.{}", fault.key), fault.why);
@@ -68,7 +70,8 @@ fn image_paint(
 /// Squares of two colours.
 pub(super) fn checker(
     key: &str,
-    (colors, squares): (&[ColorSpec; 2], f64),
+    colors: &[ColorSpec; 2],
+    squares: f64,
     supply: &mut dyn Supply,
 ) -> Result<Paint, Fault> {
     let [a, b] = [reflectance(key, &colors[0], supply)?, reflectance(key, &colors[1], supply)?];
@@ -90,21 +93,22 @@ pub(super) fn checker(
     Ok(Paint::Checker { colors: looks, curves, squares })
 }
 
-/// What a surface gives off: a paint, and the curve that multiplies it.
+/// The light of a surface: a paint, and the curve that multiplies it.
 pub(super) fn radiant_paint(
-    (key, spec): (&str, &PaintSpec),
+    key: &str,
+    spec: &PaintSpec,
     illuminant: Option<Illuminant>,
     supply: &mut dyn Supply,
 ) -> Result<(Paint, Option<Arc<Curve>>), Fault> {
     Ok(match spec {
         PaintSpec::Color(color) => {
-            let Emitted { color, curve } =
-                emitted((key, &ColorSpec::Rgb(*color)), illuminant, supply)?;
+            let LightSpectrum { color, curve } =
+                emitted(key, &ColorSpec::Rgb(*color), illuminant, supply)?;
             (Paint::Plain(color), curve)
         }
         PaintSpec::Curve(spec) => {
             let spec = ColorSpec::Curve(spec.clone());
-            let Emitted { color, curve } = emitted((key, &spec), illuminant, supply)?;
+            let LightSpectrum { color, curve } = emitted(key, &spec, illuminant, supply)?;
             (Paint::Plain(color), curve)
         }
         PaintSpec::Cube(cube) => {
@@ -113,19 +117,20 @@ pub(super) fn radiant_paint(
                     format!("is given beside a cube of `{key}`, which has spectra of its own");
                 return Err(Fault::new("illuminant", format!("{why}: leave one of them out")));
             }
-            (cube_paint((key, cube), CubeKind::Light, supply)?, None)
+            (cube_paint(key, cube, CubeKind::Light, supply)?, None)
         }
         PaintSpec::Checker(CheckerSpec { checker, squares }) => {
             if squares.is_nan() || *squares <= 0.0 {
                 let why = format!("{squares} is not above zero");
                 return Err(Fault::new(format!("{key}.squares"), why));
             }
-            radiant_checker(key, (checker, *squares), illuminant, supply)?
+            radiant_checker(key, checker, *squares, illuminant, supply)?
         }
         PaintSpec::Image(image) => {
             let factor = format!("{key}.factor");
-            let Emitted { color, curve } = emitted((&factor, &image.factor), illuminant, supply)?;
-            (image_paint(key, image, (color, None), supply)?, curve)
+            let LightSpectrum { color, curve } =
+                emitted(&factor, &image.factor, illuminant, supply)?;
+            (image_paint(key, image, color, None, supply)?, curve)
         }
     })
 }
@@ -133,7 +138,8 @@ pub(super) fn radiant_paint(
 /// Squares of two lights, and the curve that multiplies both, where neither is one.
 fn radiant_checker(
     key: &str,
-    (specs, squares): (&[ColorSpec; 2], f64),
+    specs: &[ColorSpec; 2],
+    squares: f64,
     illuminant: Option<Illuminant>,
     supply: &mut dyn Supply,
 ) -> Result<(Paint, Option<Arc<Curve>>), Fault> {

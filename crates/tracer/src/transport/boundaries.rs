@@ -5,9 +5,9 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Detail, HitBatch, HitPrecision, RayBatch};
 
 use super::Tracing;
-use super::media::{Coincident, Crossing, Media};
+use super::media::{CoincidentBoundary, Media, MediumInterface};
+use crate::Ior;
 use crate::surface::SurfaceInteraction;
-use crate::{Ior, Scattering};
 
 impl<const RGB: bool> Tracing<'_, RGB> {
     /// The media on both sides of a boundary that a path in `media` met, which is told of them; `None` where it parts
@@ -15,15 +15,15 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     pub(super) fn cross(
         &self,
         media: Media,
-        hit: (u32, Coincident),
+        placement: u32,
+        coincident: CoincidentBoundary,
         interaction: &mut SurfaceInteraction<'_>,
-    ) -> Option<Crossing> {
-        let Scattering::Dielectric(_) = interaction.material.scattering else { return None };
-        if !self.ctx.traits.has_media {
+    ) -> Option<MediumInterface> {
+        if !interaction.material.scattering.is_body() || !self.ctx.traits.has_media {
             return None;
         }
         let placed = self.ctx.placed;
-        let crossing = Crossing::of(media, hit, interaction.front, placed);
+        let crossing = MediumInterface::of(media, placement, coincident, interaction.front, placed);
         let [outside, inside] = [crossing.outside, crossing.inside].map(|m| m.medium(placed));
         interaction.media = if interaction.front { [outside, inside] } else { [inside, outside] };
         Some(crossing)
@@ -34,29 +34,29 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         &self,
         placement: u32,
         interaction: &SurfaceInteraction<'_>,
-    ) -> Option<Vanished> {
+    ) -> Option<NullBoundary> {
         let body = self.ctx.placed.get(placement)?.body?;
         let [here, behind] = interaction.media;
         if !body.may_vanish {
             return None;
         }
         if here == behind {
-            return Some(Vanished { is_tinted: false });
+            return Some(NullBoundary { is_tinted: false });
         }
         let scene = &self.ctx.scene;
         let index = |medium| scene.index(medium);
         let air = Ior::Constant(1.0);
         let [here, behind] = [here, behind].map(|medium| index(medium).unwrap_or(&air));
-        (here == behind).then_some(Vanished { is_tinted: true })
+        (here == behind).then_some(NullBoundary { is_tinted: true })
     }
 
-    /// The other boundary at a point of one that a ray along `direction` interaction.
+    /// The other boundary at a point of one that a ray along `direction` hit.
     pub(super) fn coincident_at(
         &self,
         point: DVec3,
         direction: DVec3,
         own: [u32; 2],
-    ) -> Coincident {
+    ) -> CoincidentBoundary {
         /// Shares of a triangle beyond its edges, as the point is known to no more.
         const BEYOND: f64 = 1e-6;
         let geometry = self.ctx.scene.geometry;
@@ -77,10 +77,14 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             };
             if [(a, b), (b, c), (c, a)].into_iter().all(|(from, to)| share(from, to) >= -BEYOND) {
                 let turned = normal * placed.world_from_mesh.handedness();
-                return Coincident { placement, triangle, front: turned.dot(direction) <= 0.0 };
+                return CoincidentBoundary {
+                    placement,
+                    triangle,
+                    front: turned.dot(direction) <= 0.0,
+                };
             }
         }
-        Coincident::NONE
+        CoincidentBoundary::NONE
     }
 
     /// Takes from light what a medium absorbs over a way (m); nothing over one without end.
@@ -116,7 +120,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let place = (rays.origin(i), rays.time(i));
             media.push(match (last, media.last()) {
                 (Some(same), Some(&media)) if same == place => media,
-                _ if holds(i) => self.media_at(place),
+                _ if holds(i) => self.media_at(place.0, place.1),
                 _ => Media::NONE,
             });
             last = Some(place);
@@ -125,16 +129,17 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     }
 
     /// The media at a place (m) at a time (s from the frame's time).
-    fn media_at(&self, place: (DVec3, f64)) -> Media {
+    fn media_at(&self, origin: DVec3, time: f64) -> Media {
         /// A line that no model is likely to have a face or an edge along.
         const LINE: DVec3 = DVec3::new(0.529_1, 0.694_7, 0.487_3);
-        let [one, other] = [1.0, -1.0].map(|sign| self.backs_along(place, LINE.normalize() * sign));
+        let [one, other] =
+            [1.0, -1.0].map(|sign| self.backs_along(origin, time, LINE.normalize() * sign));
         let both = one.iter().filter(|body| other.contains(body));
         both.fold(Media::NONE, |media, &body| media.with(body))
     }
 
     /// The bodies of which a ray meets the back more often than the front.
-    fn backs_along(&self, (origin, time): (DVec3, f64), direction: DVec3) -> Vec<u32> {
+    fn backs_along(&self, origin: DVec3, time: f64, direction: DVec3) -> Vec<u32> {
         /// By how much of its distance the next surface lies behind one.
         const BEHIND: f64 = 1e-13;
         /// The most surfaces on the way.
@@ -172,7 +177,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
 
 /// A boundary that is not there.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Vanished {
+pub(super) struct NullBoundary {
     /// It parts two bodies of one index, and tints what passes; else it lies in a body of higher rank.
     pub(super) is_tinted: bool,
 }

@@ -36,8 +36,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         &self,
         boundary: &Boundary<'_>,
         throughput: &[f64],
-        ([pick, place], choice): ([f64; 2], f64),
-        mut each: impl FnMut((&BsdfSample, Option<f64>), &mut [f64]),
+        [pick, place]: [f64; 2],
+        choice: f64,
+        mut each: impl FnMut(&BsdfSample, Option<f64>, &mut [f64]),
     ) {
         let passages = self.passages(boundary, throughput, place);
         let live = passages.len() as f64;
@@ -48,7 +49,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             for passage in &passages {
                 sent[passage.band] = throughput[passage.band] * passage.reflectance / mean;
             }
-            return each((&mirrored, None), &mut sent);
+            return each(&mirrored, None, &mut sent);
         }
         let parts = passages.len().min(MOST_PARTS);
         for part in 0..parts {
@@ -60,7 +61,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let tint = self.in_band(&boundary.bsdf, refracted.weights, passage.band);
             sent.fill(0.0);
             sent[passage.band] = throughput[passage.band] * passed * tint;
-            each((&refracted, Some(passage.wavelength)), &mut sent);
+            each(&refracted, Some(passage.wavelength), &mut sent);
         }
     }
 
@@ -84,7 +85,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     /// end by chance. What it carries is told of that.
     pub(super) fn goes_on(
         &self,
-        (bounces, chance): (u32, f64),
+        bounces: u32,
+        chance: f64,
         before: &[f64],
         part: &mut [f64],
     ) -> bool {

@@ -12,17 +12,21 @@ use crate::sampling::power_heuristic;
 
 /// Hit of a ray.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct RayHit {
+pub(crate) struct RayHit {
+    /// Start of the ray (m).
+    pub(crate) origin: DVec3,
+    /// Direction of the ray (unit).
+    pub(crate) direction: DVec3,
     /// Placement and triangle.
-    pub(super) id: PlacedTriangle,
+    pub(crate) id: PlacedTriangle,
     /// Of the second and the third corner.
-    pub(super) weights: [f64; 2],
+    pub(crate) weights: [f64; 2],
     /// From where the ray starts (m).
-    pub(super) t: f64,
+    pub(crate) t: f64,
     /// Of the triangle (unit), on its front.
-    pub(super) normal: DVec3,
+    pub(crate) normal: DVec3,
     /// Time (s from the frame's time).
-    pub(super) time: f64,
+    pub(crate) time: f64,
 }
 
 /// Way in which a path came to its direction.
@@ -53,8 +57,6 @@ impl Way {
 /// A surface that a path met by itself.
 pub(super) struct Encounter {
     pub(super) hit: RayHit,
-    /// The ray's start (m) and its unit direction.
-    pub(super) ray: (DVec3, DVec3),
     /// Point where the path left the last surface that scattered it, as lights were chosen for it.
     pub(super) receiver: Receiver,
 }
@@ -62,7 +64,7 @@ pub(super) struct Encounter {
 impl Encounter {
     /// Tests whether it is the front of the triangle that was met.
     pub(super) fn is_front(&self) -> bool {
-        self.hit.normal.dot(self.ray.1) <= 0.0
+        self.hit.normal.dot(self.hit.direction) <= 0.0
     }
 }
 
@@ -76,7 +78,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         radiance: &mut [f64],
     ) -> Option<f64> {
         let LightingContext { lights, scene, spectral, .. } = self.ctx;
-        let Encounter { hit, ray: (origin, direction), receiver } = encounter;
+        let Encounter { hit, receiver } = encounter;
         let is_front = encounter.is_front();
         let weight = |pdf: f64| way.weight_against(if pdf.is_finite() { pdf } else { 0.0 });
         if let Some(index) = lights.index_of(hit.id)
@@ -89,8 +91,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             if way.is_specular {
                 return Some(1.0);
             }
-            let cosine = direction.dot(area_light.shape.normal).abs();
-            let distance = hit.t + (*origin - receiver.point).length();
+            let cosine = hit.direction.dot(area_light.shape.normal).abs();
+            let distance = hit.t + (hit.origin - receiver.point).length();
             let density = distance * distance / (cosine * area_light.shape.area);
             return Some(weight(lights.chance(receiver, index) * density));
         }
@@ -109,7 +111,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         if !lights.emitted(scene, spectral, &point, is_front, radiance) {
             return None;
         }
-        let pdf = lights.pdf_of_surface(scene, hit.id[0], &point, receiver, *direction);
+        let pdf = lights.pdf_of_surface(scene, hit.id[0], &point, receiver, hit.direction);
         Some(weight(pdf))
     }
 }

@@ -51,7 +51,7 @@ impl Media {
 
 /// The boundary of another body in the very place of a hit, of a lens cemented to another or a liquid in its glass.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Coincident {
+pub(super) struct CoincidentBoundary {
     /// [`MISS`] where there is none.
     pub(super) placement: u32,
     pub(super) triangle: u32,
@@ -59,7 +59,7 @@ pub(super) struct Coincident {
     pub(super) front: bool,
 }
 
-impl Coincident {
+impl CoincidentBoundary {
     pub(super) const NONE: Self = Self { placement: MISS, triangle: MISS, front: false };
 
     /// The placement's triangle.
@@ -70,24 +70,24 @@ impl Coincident {
 
 /// The media on both sides of a surface.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Crossing {
+pub(super) struct MediumInterface {
     /// Before the front of its triangles.
     pub(super) outside: Media,
     /// Behind it.
     pub(super) inside: Media,
 }
 
-impl Crossing {
+impl MediumInterface {
     /// Those that a path which was in `media` finds at a boundary. That it met the front of a body says that it was not
     /// in it, and the back that it was, whatever it crossed before.
     pub(super) fn of(
         media: Media,
-        hit: (u32, Coincident),
+        placement: u32,
+        second: CoincidentBoundary,
         front: bool,
         placed: &PlacedSurfaces,
     ) -> Self {
         let open = Media { sheet: MISS, ..media };
-        let (placement, second) = hit;
         if second.placement != MISS {
             // Both at once, as the ray meets them.
             let sides = [(placement, front), (second.placement, second.front)];

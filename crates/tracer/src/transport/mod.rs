@@ -28,6 +28,7 @@ use etendue_accel::Accel;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Geometry, HitPrecision, RayBatch};
 
+pub(crate) use self::encounter::RayHit;
 pub use self::rules::{Follow, Rules};
 pub(crate) use self::trace::SIZES;
 use self::trace::Workspace;
@@ -38,7 +39,7 @@ use crate::placed::{PlacedSurface, PlacedSurfaces};
 use crate::reference::SceneView;
 use crate::spawn::{self, Anchor};
 use crate::spectral::Spectral;
-use crate::{ConductorId, Glass, Ior, Material, Scattering, Tint};
+use crate::{ConductorId, Ior, Material, Tint};
 
 /// The scene as light sees it.
 #[derive(Debug, Clone, Copy)]
@@ -110,16 +111,15 @@ impl Traits {
             traits.has_alpha |= material.has_alpha();
             traits.has_panes |= material.is_pane();
             traits.has_media |= material.absorption().is_some();
-            traits.has_dispersion |= matches!(
-                &material.scattering,
-                Scattering::Dielectric(Glass { ior: Ior::Dispersive(_), .. })
-            );
+            let glass = material.scattering.glass();
+            traits.has_dispersion |=
+                glass.is_some_and(|glass| matches!(glass.ior, Ior::Dispersive(_)));
             match surfaces.get(i).and_then(|surface| surface.body) {
                 Some(body) => {
                     has_bodies = true;
                     traits.has_nested |= body.may_vanish;
                 }
-                None => has_sheets |= matches!(material.scattering, Scattering::Dielectric(_)),
+                None => has_sheets |= material.scattering.is_body(),
             }
         }
         traits.has_media |= traits.has_nested || (has_sheets && has_bodies);

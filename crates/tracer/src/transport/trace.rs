@@ -5,12 +5,12 @@
 //! Both precisions have the same random numbers by use: pictures are the same up to the roundings of single precision.
 
 mod ask;
+mod block_lights;
 mod choose;
 mod compaction;
 mod depart;
 mod facets;
 mod kernel;
-mod lamps;
 mod lane;
 mod light;
 mod parting;
@@ -23,17 +23,18 @@ mod varied;
 use std::ops::RangeInclusive;
 
 use etendue_geometry::block::{Floats as Row, LANES};
+use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitPrecision, RayBlocks};
 
-use self::choose::ChosenLamps;
+use self::block_lights::BlockLights;
+use self::choose::ChosenLights;
 use self::facets::BlockFacets;
-use self::kernel::{Leaving, Numbers, leave_blocks};
-use self::lamps::Lights;
+use self::kernel::{StepOutput, StepRules, leave_blocks};
 use self::lane::{Batch, Lane, Query, RayEnds};
 use self::light::EmitterQuery;
-use self::passing::Passing;
+use self::passing::Passages;
 use self::single::SingleHits;
-use self::surfaces::{Surfaces, Varied};
+use self::surfaces::{Surfaces, TextureLookups};
 use super::media::Media;
 use super::{DRAWS, Draw};
 use super::{LightingContext, RaySamples, Tracing};
@@ -48,14 +49,36 @@ const EDGE_WEIGHT: f64 = 1.0 / 256.0;
 /// Single precision holds squares of lengths, and densities over areas, of scenes between these sizes (m).
 pub(crate) const SIZES: [f64; 2] = [1e-6, 1e9];
 
-/// The least area of a lamp over the square of the scene's size that it holds.
+/// The least area of a light over the square of the scene's size that it holds.
 const LEAST_AREA: f64 = 1e-12;
 
 /// Largest bands of lights whose light single precision holds, however near or far they are (W/sr, W/m² or
 /// W/(m² sr)).
 const BRIGHTNESS: RangeInclusive<f64> = 1e-12..=1e18;
 
-/// What sixteen and more paths carry, a column a number; behind the last there is room for a block.
+/// A step of all paths of a batch of camera rays.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TraceStep<'a> {
+    /// The rays of the camera, as which the paths began.
+    pub(super) camera: &'a RaySamples<'a>,
+    /// Counted from 0, at whose beginning the paths are the camera's rays.
+    pub(super) number: u32,
+}
+
+impl TraceStep<'_> {
+    /// Tests whether its rays run close together.
+    fn is_coherent(self) -> bool {
+        self.number == 0 && self.camera.rays.coherent
+    }
+
+    /// The direction of the path of a lane: the camera's own where it comes straight from there, else `of_block`.
+    #[inline(always)]
+    fn direction(self, lane: usize, of_block: impl FnOnce() -> DVec3) -> DVec3 {
+        if self.number == 0 { self.camera.rays.direction(lane) } else { of_block() }
+    }
+}
+
+/// The numbers that sixteen and more paths carry, a column each; behind the last there is room for a block.
 #[derive(Debug, Default)]
 pub(super) struct Columns<F> {
     pub(super) len: usize,
@@ -64,12 +87,12 @@ pub(super) struct Columns<F> {
     pub(super) pdf: Vec<F>,
     /// By band.
     pub(super) throughput: Vec<Vec<F>>,
-    /// The normal of the surface that each left, where there are many lamps; unused of the camera's.
+    /// The normal of the surface that each left, where there are many lights; unused of the camera's.
     pub(super) normal: [Vec<F>; 3],
     /// The chance with which the sky was chosen there; unused of the camera's, and without a sky.
     pub(super) sky_chance: Vec<F>,
-    /// What each stands for where it starts, if that is more than a point: a width (m), and by how much that grows per
-    /// length. Unused of the camera's, and where no surface is smooth or all are alike all over.
+    /// The cone that each stands for where it starts, if that is more than a point: its width (m), and by how much that
+    /// grows per length. Unused of the camera's, and where no surface is smooth or all are alike all over.
     pub(super) cone: [Vec<F>; 2],
     /// [`SPECULAR`], [`LAST`] and [`SCATTERED`]; empty where no surface is smooth.
     pub(super) flags: Vec<u32>,
@@ -97,8 +120,8 @@ pub(super) struct RayColumns<F> {
     pub(super) reach: Vec<F>,
     /// The block's lane that each leaves, counted from the first block.
     pub(super) left: Vec<u32>,
-    /// The lamp that each is sent to.
-    pub(super) lamp: Vec<u32>,
+    /// The light that each is sent to.
+    pub(super) light: Vec<u32>,
     /// The triangles that each leaves and ends on; empty where nothing asks for them.
     ends: Vec<RayEnds>,
     pub(super) carried: Columns<F>,
@@ -115,7 +138,7 @@ pub(super) struct Workspace<F> {
     last: RayColumns<F>,
     shadow_rays: RayBlocks<F>,
     numbers: [[Vec<F>; 2]; DRAWS as usize],
-    chosen: ChosenLamps<F>,
+    chosen: ChosenLights<F>,
     /// Hits on what shines, and rays that met nothing.
     seen: Vec<u32>,
     missed: Vec<u32>,
@@ -123,18 +146,18 @@ pub(super) struct Workspace<F> {
     colors: Vec<Row<F>>,
     shares: Vec<Row<F>>,
     singles: SingleHits,
-    varied: Varied,
-    passing: Passing<F>,
+    varied: TextureLookups,
+    passages: Passages<F>,
     query: EmitterQuery,
     /// Light of one hit by band.
     light: Vec<f64>,
     batch: Batch,
-    /// When rays are (s from the frame's time), where that counts.
+    /// Times of rays (s from the frame's time), where these count.
     times: Vec<f64>,
 }
 
 impl<F: Lane> Columns<F> {
-    /// How many bands there are.
+    /// Number of bands.
     #[inline(always)]
     pub(super) fn count<const RGB: bool>(&self) -> usize {
         if RGB { 3 } else { self.throughput.len() }
@@ -150,8 +173,8 @@ impl<F: Lane> Columns<F> {
         self.wavelengths.get(i).copied().flatten()
     }
 
-    /// Makes room for at least so many of so many bands; whether surfaces may be smooth.
-    fn reserve(&mut self, (len, count): (usize, usize), are_smooth: bool) {
+    /// Makes room for at least `len` of `count` bands; `are_smooth` says that surfaces may be smooth.
+    fn reserve(&mut self, len: usize, count: usize, are_smooth: bool) {
         self.throughput.resize(count, Vec::new());
         let len = len.next_multiple_of(LANES) + LANES;
         if are_smooth {
@@ -175,34 +198,35 @@ fn grow<T: Copy + Default>(column: &mut Vec<T>, len: usize) {
 }
 
 impl<F: Lane> RayColumns<F> {
-    fn restart(&mut self, most: (usize, usize), are_smooth: bool) {
+    /// Empties it, with room as by [`Self::reserve`].
+    fn restart(&mut self, most: usize, count: usize, are_smooth: bool) {
         self.len = 0;
         self.carried.media.clear();
         self.carried.wavelengths.clear();
-        self.reserve(most, are_smooth);
+        self.reserve(most, count, are_smooth);
     }
 
-    /// Makes room for so many of so many bands in all; whether surfaces may be smooth.
-    fn reserve(&mut self, most: (usize, usize), are_smooth: bool) {
-        self.carried.reserve(most, are_smooth);
+    /// Makes room for `most` in all, of `count` bands; `are_smooth` says that surfaces may be smooth.
+    fn reserve(&mut self, most: usize, count: usize, are_smooth: bool) {
+        self.carried.reserve(most, count, are_smooth);
         let len = self.carried.ray.len();
         for axis in self.start.iter_mut().chain(&mut self.along) {
             grow(axis, len);
         }
         grow(&mut self.reach, len);
         grow(&mut self.left, len);
-        grow(&mut self.lamp, len);
+        grow(&mut self.light, len);
     }
 
-    /// Appends a ray to an emitter along a unit direction, as far as that (m), which starts as one of others does; its
+    /// Appends a ray to a light along a unit direction, as far as `reach` (m), which starts as ray `of` of others does; its
     /// number, by which its light is put.
-    fn push(&mut self, (other, of): (&Self, usize), along: ([F; 3], F), lamp: u32) -> usize {
+    fn push(&mut self, other: &Self, of: usize, along: [F; 3], reach: F, light: u32) -> usize {
         let to = self.len;
-        for axis in 0..3 {
+        for (axis, along) in along.into_iter().enumerate() {
             self.start[axis][to] = other.start[axis][of];
-            self.along[axis][to] = along.0[axis];
+            self.along[axis][to] = along;
         }
-        (self.reach[to], self.lamp[to], self.left[to]) = (along.1, lamp, other.left[of]);
+        (self.reach[to], self.light[to], self.left[to]) = (reach, light, other.left[of]);
         self.carried.ray[to] = other.carried.ray[of];
         self.len += 1;
         to
@@ -256,7 +280,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             all: placed.table(),
             placed,
             geometry: scene.geometry,
-            varied: Varied::NONE,
+            varied: TextureLookups::NONE,
             roundings: F::of(roundings),
             edge_weight: F::of(edge_weight),
         }
@@ -271,62 +295,67 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
     ) {
         let accel = self.ctx.accel;
         let surfaces = self.surfaces::<F>();
-        let lights = &Lights::new(self.ctx.lights, F::origin(accel), self.count());
+        let lights = &BlockLights::new(self.ctx.lights, F::origin(accel), self.count());
         F::convert(accel, camera.rays, &mut workspace.rays);
         let are_smooth = surfaces.all.are_smooth;
         start(camera, self.count(), are_smooth, &mut workspace.carried);
         workspace.carried.media = self.media_at_origins(camera.rays);
         workspace.next.ends.clear();
-        let mut coherent = camera.rays.coherent;
         let mut is_scattered = true;
         for number in 0..=self.rules.bounces {
+            let step = TraceStep { camera, number };
             let len = workspace.rays.len();
             if len == 0 {
                 break;
             }
             self.times_of::<F>(workspace.carried.ray[..len].iter().copied(), &mut workspace.times);
-            let query = Query { times: &workspace.times, ends: &workspace.next.ends, coherent };
+            let query = Query {
+                times: &workspace.times,
+                ends: &workspace.next.ends,
+                coherent: step.is_coherent(),
+            };
             F::closest(self.ctx, &mut workspace.rays, query, &mut workspace.batch);
             self.tally.rays += len as u64;
-            self.pass((camera, number), workspace, out);
+            self.pass(step, workspace, out);
             is_scattered &= number < self.rules.bounces;
-            self.leave((camera, number), (surfaces, lights), is_scattered, workspace);
-            self.carry_cones((camera, number), surfaces.all, workspace);
-            self.meet((camera, number), workspace, out);
-            self.add_sky((camera, number), lights, workspace, out);
-            self.add_disks((camera, number), workspace, out);
+            self.leave(step, surfaces, lights, is_scattered, workspace);
+            self.carry_cones(step, surfaces.all, workspace);
+            self.meet(step, workspace, out);
+            self.add_sky(step, lights, workspace, out);
+            self.add_disks(step, workspace, out);
             if let Some(emitters) = self.asked_emitters() {
                 self.ask_emitters(emitters, lights, workspace);
             }
             let Workspace { rays, singles, carried, shadows, next, .. } = &mut *workspace;
             for leaving in [shadows, next] {
-                self.carry_media((rays, singles), carried, leaving);
+                self.carry_media(rays, singles, carried, leaving);
             }
-            self.light(workspace, lights, (number, coherent), out);
+            self.light(step, lights, workspace, out);
             // Last directions that do not ask what shines are followed as the others are.
             is_scattered &= !self.is_end_unless_specular(number) || are_smooth;
             self.find_ends_of_paths(workspace);
             workspace.next.pack(&mut workspace.rays);
             std::mem::swap(&mut workspace.carried, &mut workspace.next.carried);
             workspace.carried.len = workspace.next.len;
-            coherent = false;
         }
     }
 
     /// Notes the rays that leave the hits of a step, where these scatter light.
     fn leave<F: Lane>(
         &self,
-        (camera, number): (&RaySamples<'_>, u32),
-        (surfaces, lights): (Surfaces<'_, F>, &Lights<'_, F>),
+        step: TraceStep<'_>,
+        surfaces: Surfaces<'_, F>,
+        lights: &BlockLights<'_, F>,
         is_scattered: bool,
         workspace: &mut Workspace<F>,
     ) {
+        let number = step.number;
         let (len, all) = (workspace.rays.len(), surfaces.all);
         // Last directions may become rays to the sky.
         let count = self.count();
-        workspace.shadows.restart((2 * len, count), all.are_smooth);
-        workspace.next.restart((len, count), all.are_smooth);
-        workspace.last.restart((len, count), all.are_smooth);
+        workspace.shadows.restart(2 * len, count, all.are_smooth);
+        workspace.next.restart(len, count, all.are_smooth);
+        workspace.last.restart(len, count, all.are_smooth);
         workspace.seen.clear();
         workspace.missed.clear();
         let is_last = self.is_end_unless_specular(number);
@@ -335,12 +364,12 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         let roulette = !is_last && self.rules.roulette.is_some_and(|after| number + 1 >= after);
         if is_scattered {
             let needs = [goes_on || all.are_smooth, roulette, all.are_rich()];
-            self.draw(camera, number, needs, workspace);
-            self.look_up_varied((camera, number), surfaces, workspace);
+            self.draw(step, needs, workspace);
+            self.look_up_varied(step, surfaces, workspace);
             // Behind the paths of glass that parts wavelengths.
-            workspace.next.reserve((workspace.next.len + len, count), all.are_smooth);
+            workspace.next.reserve(workspace.next.len + len, count, all.are_smooth);
             if lights.are_many() && !self.ctx.lights.is_dark() {
-                self.choose_lamps((surfaces, lights), workspace);
+                self.choose_lights(surfaces, lights, workspace);
             }
         }
         let surfaces = Surfaces { varied: &workspace.varied, ..surfaces };
@@ -348,19 +377,20 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         let chosen = (asks_lights && lights.are_many()).then_some(&workspace.chosen);
         let emitters = self.asked_emitters().map(|emitters| emitters.sphere::<F>(lights.origin));
         let (asks_emitters, drawn) = (emitters.is_some(), &workspace.numbers);
-        let numbers = Numbers {
+        let (has_environment, has_disks) =
+            (self.ctx.lights.has_environment(), self.ctx.lights.has_disks());
+        let rules = StepRules {
             is_scattered,
             goes_on,
             roulette,
             is_last,
             asks_lights,
             asks_emitters,
+            sphere: emitters.filter(|_| is_last && !has_environment),
             drawn,
             chosen,
         };
-        let (has_environment, has_disks) =
-            (self.ctx.lights.has_environment(), self.ctx.lights.has_disks());
-        let leaving = Leaving {
+        let output = StepOutput {
             shadows: &mut workspace.shadows,
             next: &mut workspace.next,
             last: &mut workspace.last,
@@ -371,7 +401,6 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             colors: &mut workspace.colors,
             shares: &mut workspace.shares,
         };
-        let sphere = emitters.filter(|_| is_last && !has_environment);
         let is_rich = all.are_rich() || self.ctx.lights.has_others();
         let leave = match (all.are_tilted, is_rich) {
             (false, false) => leave_blocks::<F, false, false, RGB>,
@@ -379,11 +408,11 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
             (true, false) => leave_blocks::<F, true, false, RGB>,
             (true, true) => leave_blocks::<F, true, true, RGB>,
         };
-        let paths = (workspace.rays.blocks(), &workspace.carried);
-        leave((self, surfaces, lights), paths, (numbers, sphere), leaving);
+        let (blocks, carried) = (workspace.rays.blocks(), &workspace.carried);
+        leave(self, surfaces, lights, blocks, carried, rules, output);
     }
 
-    /// When a ray of the camera is (s from the frame's time).
+    /// The time of a ray of the camera (s from the frame's time).
     #[inline(always)]
     fn time_of(&self, ray: u32) -> f64 {
         self.times.get(ray as usize).copied().unwrap_or(0.0)
@@ -406,8 +435,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
     /// Draws what a step needs for all lanes.
     fn draw<F: Lane>(
         &self,
-        camera: &RaySamples<'_>,
-        number: u32,
+        TraceStep { camera, number }: TraceStep<'_>,
         [goes_on, roulette, has_choice]: [bool; 3],
         workspace: &mut Workspace<F>,
     ) {
@@ -436,7 +464,7 @@ fn start<F: Lane>(
     carried: &mut Columns<F>,
 ) {
     let len = camera.rays.len();
-    carried.reserve((len, count), are_smooth);
+    carried.reserve(len, count, are_smooth);
     carried.flags.fill(SPECULAR);
     carried.len = len;
     carried.wavelengths.clear();

@@ -1,6 +1,6 @@
 //! Keys that the whole window heeds, and files that are dropped on it.
 //!
-//! What is asked of a place of the picture, and of the lens.
+//! Questions about a place of the picture, and about the lens.
 //!
 //! An image that is looked at instead of a scene.
 
@@ -12,7 +12,7 @@ use eframe::egui::{self, Context, Key, KeyboardShortcut, Modifiers};
 use super::App;
 use crate::document::Edit;
 use crate::panels::light_field::LightFieldPanel;
-use crate::state::{Asking, PictureCanvas, PixelQuery};
+use crate::state::{PathPrompt, PictureCanvas, PixelQuery};
 use crate::worker::ScreenPicture;
 use etendue::Still;
 use serde_json::Value;
@@ -51,7 +51,7 @@ impl App {
             self.ask_what_to_open();
         }
         if pressed(&RENDER) && self.document.is_some() {
-            self.asking = Some((Asking::Render, "out".to_owned()));
+            self.asking = Some((PathPrompt::Render, "out".to_owned()));
         }
         if pressed(&THEME) {
             let theme =
@@ -98,7 +98,8 @@ impl App {
     pub(crate) fn focus(&mut self, ctx: &Context, place: [f64; 2]) {
         let Some(inspector) = &self.inspector else { return };
         if inspector.scene().camera.lens().is_none() {
-            let why = "this camera has no lens to focus: choose a type that has, such as thin_lens";
+            let why =
+                "this camera has no lens to focus\nhint: choose a type that has, such as thin_lens";
             self.error = Some(why.to_owned());
             return;
         }

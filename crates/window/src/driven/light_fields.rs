@@ -1,7 +1,7 @@
 //! The panel of light fields.
 
 use super::*;
-use crate::panels::light_field::Shows;
+use crate::panels::light_field::LightFieldPart;
 
 fn camera(folder: &Path) -> Driver {
     camera_with(folder, json!({"pitch": "90 um"}))
@@ -34,7 +34,9 @@ fn views_are_moved_through_by_the_pupil() {
     window.step(Vec::new());
     let pupil = marked(&window.ctx, "pupil").unwrap();
     window.drag(pupil.min + Vec2::splat(3.0), pupil.size() - Vec2::splat(6.0));
-    let Shows::View([u, v]) = window.app.light_field.shows else { panic!("no view is shown") };
+    let LightFieldPart::View([u, v]) = window.app.light_field.shows else {
+        panic!("no view is shown")
+    };
     assert!(u == v && u > 2, "the drag ended in the pupil's other corner: {u}, {v}");
     assert_ne!(window.pixels(), corner, "seen from elsewhere");
     window.click("light field=raw");
@@ -46,14 +48,18 @@ fn all_views_are_focused_anew_by_the_slider() {
     let folder = tempfile::tempdir().unwrap();
     let mut window = camera(folder.path());
     window.click("light field=refocus");
-    let Shows::Focused(at) = window.app.light_field.shows else { panic!("no focus is shown") };
+    let LightFieldPart::Focused(at) = window.app.light_field.shows else {
+        panic!("no focus is shown")
+    };
     assert!((at - 2.0).abs() < 1e-6, "where the camera is focused: {at}");
     let sharp = window.pixels();
     window.step(Vec::new());
     let slider = marked(&window.ctx, "refocus").unwrap();
     let knob = slider.left_center() + Vec2::new(0.3 * slider.width(), 0.0);
     window.drag(knob, Vec2::new(-0.2 * slider.width(), 0.0));
-    let Shows::Focused(near) = window.app.light_field.shows else { panic!("no focus is shown") };
+    let LightFieldPart::Focused(near) = window.app.light_field.shows else {
+        panic!("no focus is shown")
+    };
     assert!(near < 1.5, "{near}");
     assert_ne!(window.pixels(), sharp);
     assert_eq!(window.app.error, None);
@@ -68,7 +74,9 @@ fn a_focused_camera_is_focused_anew_and_shows_no_views() {
     let raw = window.pixels();
     window.click("light field=refocus");
     assert_eq!(marked(&window.ctx, "light field=view"), None);
-    let Shows::Focused(at) = window.app.light_field.shows else { panic!("no focus is shown") };
+    let LightFieldPart::Focused(at) = window.app.light_field.shows else {
+        panic!("no focus is shown")
+    };
     assert!((at - 2.0).abs() < 1e-6, "where the camera is focused: {at}");
     let sharp = window.pixels();
     assert_ne!(sharp, raw);
@@ -78,7 +86,9 @@ fn a_focused_camera_is_focused_anew_and_shows_no_views() {
         slider.left_center() + Vec2::new(0.3 * slider.width(), 0.0),
         Vec2::new(-0.3 * slider.width(), 0.0),
     );
-    let Shows::Focused(near) = window.app.light_field.shows else { panic!("no focus is shown") };
+    let LightFieldPart::Focused(near) = window.app.light_field.shows else {
+        panic!("no focus is shown")
+    };
     // Nearer pictures are nearer to the lenslets, until patches leave gaps.
     assert!(near < 2.0 && near > 1.0, "{near}");
     assert_ne!(window.pixels(), sharp);
@@ -97,7 +107,7 @@ fn views_of_every_kind_are_shown() {
         let mut window = camera_with(folder.path(), microlenses.clone());
         let raw = window.pixels();
         window.click("light field=view");
-        assert!(matches!(window.app.light_field.shows, Shows::View(_)), "{microlenses}");
+        assert!(matches!(window.app.light_field.shows, LightFieldPart::View(_)), "{microlenses}");
         assert_ne!(window.pixels(), raw, "{microlenses}");
         assert_eq!(window.app.error, None, "{microlenses}");
     }

@@ -25,11 +25,11 @@ pub(super) fn show(
             }
         }
         Value::String(word) if !words.is_empty() && words.contains(&&**word) => {
-            choice(ui, schema, (pointer, word), &words, edits);
+            choice(ui, schema, pointer, word, &words, edits);
         }
         Value::String(text) => match quantity(text) {
             Some((number, unit)) => {
-                if let Some(number) = drag(ui, (pointer, number), schema, &format!(" {unit}")) {
+                if let Some(number) = drag(ui, pointer, number, schema, &format!(" {unit}")) {
                     edits.push(Edit::set(pointer, format!("{number} {unit}")));
                 }
             }
@@ -38,7 +38,7 @@ pub(super) fn show(
         Value::Number(number) => {
             let is_whole = number.is_u64() || number.is_i64();
             let unit = schema["x-unit"].as_str().map(|unit| format!(" {unit}")).unwrap_or_default();
-            let new = drag(ui, (pointer, number.as_f64().unwrap_or(0.0)), schema, &unit);
+            let new = drag(ui, pointer, number.as_f64().unwrap_or(0.0), schema, &unit);
             if let Some(new) = new {
                 edits.push(Edit::set(pointer, as_number(new, is_whole && is_integer(schema))));
             }
@@ -68,7 +68,7 @@ fn as_number(number: f64, is_whole: bool) -> Value {
 }
 
 /// A number to be dragged or typed; the new one when it was changed.
-fn drag(ui: &mut Ui, (pointer, now): (&str, f64), schema: &Value, unit: &str) -> Option<f64> {
+fn drag(ui: &mut Ui, pointer: &str, now: f64, schema: &Value, unit: &str) -> Option<f64> {
     let mut number = now;
     let bound = |key: &str, none: f64| schema[key].as_f64().unwrap_or(none);
     let range = bound("minimum", f64::NEG_INFINITY)..=bound("maximum", f64::INFINITY);
@@ -103,7 +103,8 @@ pub(super) fn words(schema: &Value) -> Vec<&str> {
 fn choice(
     ui: &mut Ui,
     schema: &Value,
-    (pointer, now): (&str, &str),
+    pointer: &str,
+    now: &str,
     words: &[&str],
     edits: &mut Vec<Edit>,
 ) {

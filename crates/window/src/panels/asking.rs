@@ -7,14 +7,14 @@ use eframe::egui::{self, Context, Key};
 use super::bar::button;
 use crate::app::App;
 use crate::form::mark;
-use crate::state::{Asking, Kinds, Listing};
+use crate::state::{Kinds, Listing, PathPrompt};
 
 pub(crate) fn show(app: &mut App, ctx: &Context) {
     let Some((asking, mut path)) = app.asking.take() else { return };
     let (title, action, kinds) = match asking {
-        Asking::Open => ("Open a scene, a model, a lens or an image", "Open", Kinds::Open),
-        Asking::SaveAs => ("Save the scene as", "Save", Kinds::Save),
-        Asking::Render => ("Render into the folder", "Render", Kinds::Folders),
+        PathPrompt::Open => ("Open a scene, a model, a lens or an image", "Open", Kinds::Open),
+        PathPrompt::SaveAs => ("Save the scene as", "Save", Kinds::Save),
+        PathPrompt::Render => ("Render into the folder", "Render", Kinds::Folders),
     };
     let mut is_done = false;
     let mut is_cancelled = ctx.input(|input| input.key_pressed(Key::Escape));
@@ -37,9 +37,9 @@ pub(crate) fn show(app: &mut App, ctx: &Context) {
     if is_done && !path.trim().is_empty() {
         let path = PathBuf::from(path.trim());
         match asking {
-            Asking::Open => app.open(&path),
-            Asking::SaveAs => app.save_as(&path),
-            Asking::Render => app.render(&path),
+            PathPrompt::Open => app.open(&path),
+            PathPrompt::SaveAs => app.save_as(&path),
+            PathPrompt::Render => app.render(&path),
         }
     } else if !is_cancelled && !is_done {
         app.asking = Some((asking, path));

@@ -7,7 +7,7 @@ use eframe::egui::{self, Context, Ui};
 use crate::app::App;
 use crate::document::View;
 use crate::form::mark;
-use crate::state::{Asking, Tool};
+use crate::state::{PathPrompt, Tool};
 
 pub(crate) fn show_bar(app: &mut App, ctx: &Context) {
     egui::TopBottomPanel::top("bar").show(ctx, |ui| {
@@ -43,11 +43,11 @@ fn files(app: &mut App, ui: &mut Ui) {
         if button(ui, "save as", "Save as", "Write the scene to another file") {
             let path = app.document.as_ref().map(crate::document::Document::own_file);
             let path = path.map(|path| path.display().to_string()).unwrap_or_default();
-            app.asking = Some((Asking::SaveAs, path));
+            app.asking = Some((PathPrompt::SaveAs, path));
         }
         let about = "Render the whole scene as the command line does, and write PNG, EXR and all other files";
         if button(ui, "render", "Render", about) {
-            app.asking = Some((Asking::Render, "out".to_owned()));
+            app.asking = Some((PathPrompt::Render, "out".to_owned()));
         }
     });
 }

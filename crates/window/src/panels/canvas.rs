@@ -3,7 +3,7 @@
 use eframe::egui::{self, Color32, Key, PointerButton, Pos2, Rect, Response, Sense, Ui, Vec2};
 use etendue::{DistanceScale, Viewpoint};
 
-use super::light_field::Shows;
+use super::light_field::LightFieldPart;
 use super::start;
 use crate::app::App;
 use crate::document::Edit;
@@ -47,7 +47,7 @@ pub(crate) fn show(app: &mut App, ui: &mut Ui) {
 
 /// Columns and rows of the picture at its own size.
 fn resolution(app: &App) -> [f32; 2] {
-    let is_raw = app.light_field.shows == Shows::Raw;
+    let is_raw = app.light_field.shows == LightFieldPart::Raw;
     let known = app
         .inspector
         .as_ref()
@@ -138,7 +138,7 @@ fn point(app: &mut App, response: &Response, place: Rect, size: [f32; 2]) {
     let ctx = &response.ctx;
     // A view of a light field has pixels of its own.
     if response.clicked()
-        && app.light_field.shows == Shows::Raw
+        && app.light_field.shows == LightFieldPart::Raw
         && let Some(at) = response.interact_pointer_pos().filter(|at| place.contains(*at))
     {
         let pixel = [

@@ -8,7 +8,7 @@ use crate::form::{mark, short};
 
 /// Part of a light field that is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) enum Shows {
+pub(crate) enum LightFieldPart {
     /// The picture on the sensor.
     #[default]
     Raw,
@@ -21,14 +21,14 @@ pub(crate) enum Shows {
 /// The light field of the picture that is shown.
 #[derive(Debug, Default)]
 pub(crate) struct LightFieldPanel {
-    pub(crate) shows: Shows,
+    pub(crate) shows: LightFieldPart,
     views: Option<LightFieldViews>,
-    offered: Option<Offered>,
+    offered: Option<ViewChoices>,
 }
 
 /// Choices that the views of the last whole picture offer: it stays while the next one is rendered.
 #[derive(Debug, Clone, Copy)]
-struct Offered {
+struct ViewChoices {
     /// Views along a side of the pupil; 0 of focused cameras.
     count: u32,
     /// The distance in focus, and the nearest and the farthest to focus at (m).
@@ -47,7 +47,7 @@ impl LightFieldPanel {
         // Lenslets are told apart at the picture's own size alone.
         if let (None, Some(preview)) = (&self.views, preview.filter(|of| of.factor() == 1)) {
             self.views = preview.light_field()?;
-            self.offered = self.views.as_ref().map(|views| Offered {
+            self.offered = self.views.as_ref().map(|views| ViewChoices {
                 count: views.count(),
                 focus: views.focus(),
                 distances: views.distances(),
@@ -61,9 +61,9 @@ impl LightFieldPanel {
         self.find(preview)?;
         let Some(views) = &self.views else { return Ok(None) };
         let picture: Picture = match self.shows {
-            Shows::Raw => return Ok(None),
-            Shows::View(at) => views.view(at)?,
-            Shows::Focused(depth) => {
+            LightFieldPart::Raw => return Ok(None),
+            LightFieldPart::View(at) => views.view(at)?,
+            LightFieldPart::Focused(depth) => {
                 let [nearest, farthest] = views.distances();
                 views.refocused(depth.clamp(nearest, farthest))?
             }
@@ -77,26 +77,34 @@ impl LightFieldPanel {
         self.find(picture)?;
         let before = self.shows;
         let mut shows = before;
-        let Some(Offered { count, focus, distances }) = self.offered else { return Ok(false) };
+        let Some(ViewChoices { count, focus, distances }) = self.offered else { return Ok(false) };
         let focus = if focus.is_finite() && focus > 0.0 { focus } else { 1.0 };
         ui.horizontal(|ui| {
-            let mut choice = |title: &str, is_on: bool, kind: Shows| {
+            let mut choice = |title: &str, is_on: bool, kind: LightFieldPart| {
                 let one = ui.selectable_label(is_on, title);
                 mark(ui.ctx(), &format!("light field={title}"), one.rect);
                 if one.clicked() && !is_on {
                     shows = kind;
                 }
             };
-            choice("raw", before == Shows::Raw, Shows::Raw);
+            choice("raw", before == LightFieldPart::Raw, LightFieldPart::Raw);
             if count > 0 {
-                choice("view", matches!(before, Shows::View(_)), Shows::View([0, 0]));
+                choice(
+                    "view",
+                    matches!(before, LightFieldPart::View(_)),
+                    LightFieldPart::View([0, 0]),
+                );
             }
-            choice("refocus", matches!(before, Shows::Focused(_)), Shows::Focused(focus));
+            choice(
+                "refocus",
+                matches!(before, LightFieldPart::Focused(_)),
+                LightFieldPart::Focused(focus),
+            );
         });
         match &mut shows {
-            Shows::Raw => {}
-            Shows::View(at) => pupil(ui, count, at),
-            Shows::Focused(depth) => {
+            LightFieldPart::Raw => {}
+            LightFieldPart::View(at) => pupil(ui, count, at),
+            LightFieldPart::Focused(depth) => {
                 let slider = egui::Slider::new(depth, distances[0]..=distances[1])
                     .logarithmic(true)
                     .suffix(" m");

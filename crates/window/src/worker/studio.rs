@@ -5,11 +5,11 @@ use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
 use etendue::{
-    Error, Options, Outputs, Preview, Progress, Roughness, Screen, Session, Viewed, places,
+    Error, Options, Outputs, Preview, Progress, Roughness, Screen, Session, ViewedFile, places,
 };
 use serde_json::Value;
 
-use super::{Kind, News, ScreenPicture, Shared, Task, Teller, WATCH, Wish};
+use super::{Kind, News, NewsSender, ScreenPicture, Task, WATCH, Wish, WorkerState};
 use crate::document::View;
 
 /// Time that a first picture may take, so that it is on the screen within a tenth of a second, twenty in each: the
@@ -27,15 +27,15 @@ type Stamp = Option<(u64, SystemTime)>;
 
 pub(super) struct PreviewRenderer {
     options: Options,
-    teller: Teller,
-    shared: Arc<Shared>,
-    open: Option<Open>,
+    sender: NewsSender,
+    shared: Arc<WorkerState>,
+    open: Option<OpenFile>,
     /// The image that is looked at instead, as it was.
     image: Option<(PathBuf, Stamp)>,
 }
 
 /// File that is open.
-struct Open {
+struct OpenFile {
     path: PathBuf,
     session: Session,
     /// Values of the file.
@@ -59,8 +59,8 @@ enum WorkerJob {
 }
 
 impl PreviewRenderer {
-    pub(super) fn new(options: Options, teller: Teller, shared: Arc<Shared>) -> Self {
-        Self { options, teller, shared, open: None, image: None }
+    pub(super) fn new(options: Options, sender: NewsSender, shared: Arc<WorkerState>) -> Self {
+        Self { options, sender, shared, open: None, image: None }
     }
 
     pub(super) fn work(&mut self) {
@@ -89,7 +89,7 @@ impl PreviewRenderer {
                 return WorkerJob::Wish(wish);
             }
             if !is_idle {
-                self.teller.tell(News::Idle);
+                self.sender.send(News::Idle);
                 is_idle = true;
             }
             let waited = self.shared.bell.wait_timeout(desk, WATCH);
@@ -103,14 +103,14 @@ impl PreviewRenderer {
 
     /// A progress that tells the window; stopped by the user alone, or also for something newer.
     fn progress(&self, may_be_replaced: bool) -> Progress {
-        let teller = self.teller.clone();
+        let sender = self.sender.clone();
         let last = std::sync::Mutex::new(None::<Instant>);
         let progress = Progress::new(move |phase, share| {
             if let Ok(mut last) = last.try_lock()
                 && last.is_none_or(|at| at.elapsed() > TELL)
             {
                 *last = Some(Instant::now());
-                teller.tell(News::Busy(phase.name(), share));
+                sender.send(News::Busy(phase.name(), share));
             }
             true
         });
@@ -131,7 +131,7 @@ impl PreviewRenderer {
             Task::Render(folder, scene, frame) => self.render(folder, &scene, frame),
         };
         if let Err(error) = done {
-            self.teller.fault(&error);
+            self.sender.fault(&error);
         }
     }
 
@@ -141,15 +141,15 @@ impl PreviewRenderer {
             Ok(scene) => scene,
             Err(image) => {
                 (self.open, self.image) = (None, Some((path.clone(), stamp(&path))));
-                self.teller.tell(News::Looked(path, image));
+                self.sender.send(News::Looked(path, image));
                 return Ok(());
             }
         };
         let base = Arc::new(session.values().clone());
         let scene = Arc::clone(&base);
-        self.teller.tell(News::Opened(path.clone(), kind, Arc::clone(&base)));
+        self.sender.send(News::Opened(path.clone(), kind, Arc::clone(&base)));
         self.image = None;
-        self.open = Some(Open { path, session, base, scene, wish: None, files, cost: None });
+        self.open = Some(OpenFile { path, session, base, scene, wish: None, files, cost: None });
         Ok(())
     }
 
@@ -160,10 +160,10 @@ impl PreviewRenderer {
         let session = Session::from_json_with(".", scene, self.options.clone())?;
         let base = Arc::new(session.values().clone());
         let (path, scene) = (PathBuf::from(name), Arc::clone(&base));
-        self.teller.tell(News::Opened(path.clone(), Kind::First, Arc::clone(&base)));
+        self.sender.send(News::Opened(path.clone(), Kind::First, Arc::clone(&base)));
         self.image = None;
         let files = Vec::new();
-        self.open = Some(Open { path, session, base, scene, wish: None, files, cost: None });
+        self.open = Some(OpenFile { path, session, base, scene, wish: None, files, cost: None });
         Ok(())
     }
 
@@ -180,7 +180,7 @@ impl PreviewRenderer {
         if let Some(open) = &mut self.open {
             open.files.iter_mut().for_each(|(path, was)| *was = stamp(path));
         }
-        self.teller.tell(News::Saved(path, Arc::clone(scene)));
+        self.sender.send(News::Saved(path, Arc::clone(scene)));
         Ok(())
     }
 
@@ -198,7 +198,7 @@ impl PreviewRenderer {
         open.session.check_place(&folder, &[], &progress)?;
         let rendering = open.session.render(&progress)?;
         let written = rendering.write_with(&folder, Outputs::ALL, &progress)?;
-        self.teller.tell(News::Written(folder, written.files.len()));
+        self.sender.send(News::Written(folder, written.files.len()));
         Ok(())
     }
 
@@ -218,13 +218,13 @@ impl PreviewRenderer {
         match open.take_up(&self.options) {
             Ok(()) => {
                 let (base, scene) = (Arc::clone(&open.base), Arc::clone(&open.scene));
-                self.teller.tell(News::TakenUp(base, Arc::clone(&scene)));
+                self.sender.send(News::TakenUp(base, Arc::clone(&scene)));
                 if let Some(wish) = open.wish.clone() {
                     self.follow(Wish { scene, ..wish });
                 }
             }
             // Often it is being written, and complete in a moment.
-            Err(error) => self.teller.fault(&error),
+            Err(error) => self.sender.fault(&error),
         }
     }
 
@@ -233,7 +233,7 @@ impl PreviewRenderer {
         match self.follow_to_the_end(wish) {
             Ok(()) => {}
             Err(error) if error.is_stopped() => {}
-            Err(error) => self.teller.tell(News::Refused(number, error.message())),
+            Err(error) => self.sender.send(News::Refused(number, error.message())),
         }
     }
 
@@ -250,7 +250,7 @@ impl PreviewRenderer {
         open.scene = Arc::clone(&wish.scene);
         open.wish = Some(wish.clone());
         let scene = Arc::clone(&wish.scene);
-        self.teller.tell(News::Accepted(wish.number, scene, inspector, frames));
+        self.sender.send(News::Accepted(wish.number, scene, inspector, frames));
         let mut factor = self.first_factor(&wish.view, pixels);
         let mut progress = patient;
         // A single sample of the fine picture is of use where many are to follow.
@@ -292,7 +292,7 @@ impl PreviewRenderer {
 
     /// Shows the picture after each pass of samples.
     fn looks(&self, wish: &Wish) -> impl Fn(&etendue::SoFar<'_>) + Send + Sync + 'static {
-        let (teller, number) = (self.teller.clone(), wish.number);
+        let (sender, number) = (self.sender.clone(), wish.number);
         let is_picture = wish.view == View::Picture;
         move |so_far| {
             if !is_picture {
@@ -300,7 +300,7 @@ impl PreviewRenderer {
             }
             let screen = so_far.picture().ok().and_then(|p| Screen::of_layer(&p, "").ok());
             if let Some(screen) = screen {
-                teller.tell(News::Shown(Box::new(ScreenPicture {
+                sender.send(News::Shown(Box::new(ScreenPicture {
                     number,
                     screen,
                     factor: 1,
@@ -334,7 +334,7 @@ impl PreviewRenderer {
         let number = wish.number;
         let shown =
             ScreenPicture { number, screen, factor, layer, layers, preview, samples, is_final };
-        self.teller.tell(News::Shown(Box::new(shown)));
+        self.sender.send(News::Shown(Box::new(shown)));
         Ok(())
     }
 }
@@ -342,7 +342,8 @@ impl PreviewRenderer {
 /// Screen of a view of a preview.
 pub(crate) fn screen_of(preview: &Preview, view: &View, layer: &str) -> Result<Screen, Error> {
     let none = || {
-        let why = "the camera's sensor is ideal: give it a `type` or a `model` to see its numbers";
+        let why =
+            "the camera's sensor is ideal\nhint: give it a `type` or a `model` to see its numbers";
         Error::Refused(why.to_owned())
     };
     match view {
@@ -358,7 +359,7 @@ pub(crate) fn screen_of(preview: &Preview, view: &View, layer: &str) -> Result<S
     }
 }
 
-impl Open {
+impl OpenFile {
     /// Reads the file again, and sets anew what was edited and not saved.
     fn take_up(&mut self, options: &Options) -> Result<(), Error> {
         let (_, mut file) = open_scene(&self.path, options)?.map_err(|_| {
@@ -380,11 +381,11 @@ fn open_scene(
     path: &Path,
     options: &Options,
 ) -> Result<Result<(Kind, Session), Arc<etendue::Still>>, Error> {
-    Ok(match Viewed::open(path, options.clone())? {
-        Viewed::Scene(session) => Ok((Kind::Scene, *session)),
-        Viewed::Model(session) => Ok((Kind::Model, *session)),
-        Viewed::Lens(session) => Ok((Kind::Lens, *session)),
-        Viewed::Image(still) => Err(Arc::from(still)),
+    Ok(match ViewedFile::open(path, options.clone())? {
+        ViewedFile::Scene(session) => Ok((Kind::Scene, *session)),
+        ViewedFile::Model(session) => Ok((Kind::Model, *session)),
+        ViewedFile::Lens(session) => Ok((Kind::Lens, *session)),
+        ViewedFile::Image(still) => Err(Arc::from(still)),
     })
 }
 

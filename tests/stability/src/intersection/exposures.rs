@@ -1,8 +1,9 @@
-//! What moves while a whole exposure is summed: codes that shut it out, whole turns, copies of copies, lamps.
+//! Motion while a whole exposure is summed: codes that shut it out, whole turns, copies of copies, lamps.
 
 use std::f64::consts::PI;
 
 use anyhow::Result;
+use etendue_accel::AccelName;
 use etendue_geometry::glam::{DMat3, DVec3};
 use serde_json::{Value, json};
 
@@ -96,7 +97,7 @@ fn whole_turns(scale: Scale) -> Result<Outcome> {
     let samples = scale.pick(64, 1024);
     let (half_length, half_width) = (1.0, 0.2_f64);
     let mut worst = 0.0_f64;
-    for accel in ["embree", "bvh", "exact"] {
+    for accel in AccelName::built().map(AccelName::name) {
         for degrees in [360.0, 720.0, 3600.0] {
             let scene = json!({
                 "etendue": 1, "tracer": { "type": "path" }, "lights": [],
@@ -160,7 +161,7 @@ fn copies(scale: Scale) -> Result<Outcome> {
         let list: Vec<Value> = places.iter().map(|place| json!({ "translate": place })).collect();
         let whole = json!([with("instances", json!(list))]);
         let each: Vec<Value> = list.iter().map(|place| with("transform", place.clone())).collect();
-        for accel in ["embree", "bvh", "exact"] {
+        for accel in AccelName::built().map(AccelName::name) {
             let depth = |objects: &Value| {
                 let scene = json!({
                     "etendue": 1, "layers": ["depth"], "render": { "accel": accel }, "objects": objects,
@@ -215,7 +216,7 @@ fn lamps(scale: Scale) -> Result<Outcome> {
             lambert([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(corner))
         };
         let due = ALBEDO / PI * (0..MOMENTS).map(due).sum::<f64>() / f64::from(MOMENTS);
-        for accel in ["embree", "bvh", "exact"] {
+        for accel in AccelName::built().map(AccelName::name) {
             let lamp = json!({ "shape": "rectangle", "width": side, "height": side, "material": "lamp",
                 "transform": { "translate": from.to_array() },
                 "motion": { "type": "velocity", "velocity": [0, 0, 1], "angular_velocity": [0, degrees, 0] } });

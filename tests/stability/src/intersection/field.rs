@@ -170,7 +170,7 @@ impl Difference {
         self.hits() == 0 && self.distance == 0.0 && self.normal == 0.0
     }
 
-    /// How the answers of `ours` differ from those of `truth`.
+    /// Differences of the answers of `ours` from those of `truth`.
     pub(super) fn between(truth: &dyn Accel, ours: &dyn Accel, rays: &Rays) -> Self {
         let batches = rays.batches.par_iter();
         let each = batches.map(|rays| {

@@ -95,7 +95,7 @@ impl Aimed {
         self.0.iter().map(|(rays, _)| rays.len()).sum()
     }
 
-    /// How many of the rays have their closest hit behind what they aim at, by more than `slack` of its
+    /// Number of the rays that have their closest hit behind what they aim at, by more than `slack` of its
     /// distance.
     fn past(&self, accel: &dyn Accel, slack: f64) -> usize {
         let batch = |(rays, distances): &(RayBatch, Vec<f64>)| {
@@ -107,7 +107,7 @@ impl Aimed {
         self.0.par_iter().map(batch).sum()
     }
 
-    /// How many of the rays are told that nothing is in the way.
+    /// Number of the rays that are found to have nothing in their way.
     fn free(&self, accel: &dyn Accel) -> usize {
         let batch = |(rays, _): &(RayBatch, Vec<f64>)| {
             let mut blocked = Vec::new();

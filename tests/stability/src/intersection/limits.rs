@@ -1,4 +1,4 @@
-//! Where single precision cannot follow, and what the instruction sets make of it.
+//! The limits of single precision, and what the instruction sets make of it.
 
 use std::sync::Arc;
 

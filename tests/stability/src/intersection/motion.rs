@@ -1,6 +1,7 @@
 //! Bodies that move while the rows of a rolling shutter are read.
 
 use anyhow::Result;
+use etendue_accel::AccelName;
 use serde_json::{Value, json};
 
 use crate::rendered::Pixels;
@@ -50,7 +51,7 @@ fn motion(scale: Scale) -> Result<Outcome> {
             let shutter = json!({ "type": "rolling", "line_time": line_time, "exposure": 0 });
             let moving = json!({ "type": "velocity", "velocity": [speed, 0, 0],
                                  "angular_velocity": [0, 0, rate], "about": [0, 0, 0] });
-            for accel in ["embree", "bvh", "exact"] {
+            for accel in AccelName::built().map(AccelName::name) {
                 let start = json!({ "translate": [0.4, 0, 0] });
                 let text = scene(accel, rows, &shutter, &start, &moving);
                 let seen = Pixels::read(&text.to_string())?;

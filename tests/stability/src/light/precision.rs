@@ -31,10 +31,10 @@ pub(super) const CORNER: Case = Case {
     run: corner,
 };
 
-/// How far away the scenes are (m), and the words for it.
+/// Distances of the scenes from the origin (m), and the words for them.
 const AWAY: [(f64, &str); 4] = [(0.0, "origin"), (1e3, "10³ m"), (1e6, "10⁶ m"), (1e9, "10⁹ m")];
 
-/// Whether the plan, when it is free to choose, takes f32.
+/// True if the plan, when it is free to choose, takes f32.
 fn takes_single(scene: &mut Scene) -> Result<bool> {
     scene.plan.light_precision = LightPrecision::Auto;
     let outputs = Outputs::from_list("exr").map_err(anyhow::Error::msg)?;

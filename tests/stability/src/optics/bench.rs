@@ -14,7 +14,7 @@ pub(super) fn lens(json: &str) -> Result<OpticalTrain> {
     Ok(file.build(&|name: &str| Err(format!("{name}: no files")))?)
 }
 
-/// What becomes of a ray from the object side. A batch of one has to end as the single ray does, and
+/// Fate of a ray from the object side. A batch of one has to end as the single ray does, and
 /// all numbers have to be finite.
 pub(super) fn status(
     train: &OpticalTrain,
@@ -41,7 +41,7 @@ pub(super) fn status(
     Ok(path.status)
 }
 
-/// What becomes of a ray parallel to the axis at the height `y` (mm).
+/// Fate of a ray parallel to the axis at the height `y` (mm).
 pub(super) fn parallel(train: &OpticalTrain, clip: Clip, y: f64) -> Result<RayStatus> {
     status(train, clip, DVec3::new(0.0, y, -5.0), DVec3::Z)
 }

@@ -64,7 +64,7 @@ fn sphere(curvature: f64, p: DVec2) -> f64 {
 const PLACES: u32 = 8_000;
 const RANGE: f64 = 80.0;
 
-/// Where a ray first crosses from front to back, to a step, and how often it crosses at all.
+/// First crossing of a ray from front to back, to a step, and the number of all of them.
 fn scanned(surface: &Surface, from: DVec3, along: DVec3) -> (Option<f64>, u32) {
     let step = RANGE / f64::from(PLACES);
     let behind = |i: u32| {

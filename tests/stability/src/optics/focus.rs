@@ -126,21 +126,26 @@ fn zoom(scale: Scale) -> Result<Outcome> {
     Ok(outcome)
 }
 
+/// True if a focus is refused with these words.
+fn says(focus: &Result<f64, FocusError>, words: &str) -> bool {
+    focus.as_ref().is_err_and(|error| error.to_string().contains(words))
+}
+
 fn focus(_: Scale) -> Result<Outcome> {
     let mut outcome = Outcome::default();
     let train = lens(r#"{"type": "thin_lens", "focal_length": 50, "semi_diameter": 10}"#)?;
     let z = |distance| train.sensor_z(Focus::Distance(distance));
     let at = z(0.05);
-    let least = matches!(at, Err(FocusError::AtFocalPoint { least: 0.05, .. }));
-    outcome.must(least, || format!("at f: {at:?}"));
     let message = at.err().map(|error| error.to_string()).unwrap_or_default();
+    outcome.must(message.contains("is at the front focal point"), || message.clone());
     outcome.must(message.contains("must exceed 0.05 m"), || message.clone());
     outcome.measured(format!("at f: “{message}”"));
     let within = z(0.03);
-    outcome.must(matches!(within, Err(FocusError::Virtual { .. })), || format!("{within:?}"));
+    let is_virtual = says(&within, "has no real image behind the lens");
+    outcome.must(is_virtual, || format!("{within:?}"));
     for distance in [0.0, -1.0, f64::NAN] {
         let none = z(distance);
-        let refused = matches!(none, Err(FocusError::NotPositive { .. }));
+        let refused = says(&none, "it must be a positive number");
         outcome.must(refused, || format!("at {distance} m: {none:?}"));
     }
     let mut worst = 0.0_f64;
@@ -156,8 +161,8 @@ fn focus(_: Scale) -> Result<Outcome> {
     }
     let diverging = lens(r#"{"type": "thin_lens", "focal_length": -50}"#)?;
     let virtual_image = diverging.sensor_z(Focus::Infinity);
-    let told = matches!(virtual_image, Err(FocusError::Virtual { image: -50.0, .. }));
-    outcome.must(told, || format!("diverging: {virtual_image:?}"));
+    let place = says(&virtual_image, "it would be at z = -50 mm");
+    outcome.must(place, || format!("diverging: {virtual_image:?}"));
     Ok(outcome)
 }
 

@@ -6,9 +6,7 @@ use std::path::Path;
 use anyhow::Result;
 use etendue_geometry::glam::{DVec2, DVec3};
 use etendue_optics::element::{Clip, LensRays, RayStatus};
-use etendue_optics::train::{
-    ExitPupil, ExitPupilError, Focus, LensFile, OpticalTrain, PupilSample, Side,
-};
+use etendue_optics::train::{ExitPupil, Focus, LensFile, OpticalTrain, PupilSample, Side};
 
 use super::bench::{YELLOW, lens, parallel, status};
 use crate::{Case, Outcome, Scale, rendered};
@@ -60,9 +58,8 @@ fn closed(_: Scale) -> Result<Outcome> {
     outcome.must(none, || format!("{paraxial:?}"));
     let z = closed.sensor_z(Focus::Infinity)?;
     let pupil = ExitPupil::new(&closed, &[YELLOW], z, [5.0, 5.0]).map(drop);
-    let named = matches!(pupil, Err(ExitPupilError::Dark { element: 1, .. }));
-    outcome.must(named, || format!("{pupil:?}"));
     let message = pupil.err().map(|error| error.to_string()).unwrap_or_default();
+    outcome.must(message.contains("past elements[1]"), || message.clone());
     outcome.measured(format!("“{message}”"));
     let axis = parallel(&closed, Clip::On, 0.0)?;
     outcome.must(axis == RayStatus::Exited, || format!("the axis: {axis:?}"));
@@ -200,7 +197,7 @@ fn one_pixel(scale: Scale) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// What is said of a scene whose camera has a black mask.
+/// Message of a scene whose camera has a black mask.
 fn dark_scene(folder: &Path) -> Result<String> {
     write_mask(folder, 0)?;
     std::fs::write(folder.join("lens.json"), MASKED)?;

@@ -1,4 +1,4 @@
-//! What holds for any lens and any ray.
+//! Laws that hold for any lens and any ray.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;

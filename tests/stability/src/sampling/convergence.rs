@@ -1,4 +1,4 @@
-//! How fast errors fall, against integrands of known value.
+//! Rates at which errors fall, against integrands of known value.
 
 use anyhow::Result;
 use etendue_camera::Sampler;

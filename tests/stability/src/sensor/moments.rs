@@ -16,7 +16,7 @@ pub(super) const MOMENTS: Case = Case {
     run: moments,
 };
 
-/// What one pixel is under.
+/// Law of one pixel: what it is under.
 #[derive(Debug, Clone, Copy)]
 struct Law {
     electrons: f64,
@@ -58,7 +58,7 @@ fn moments(scale: Scale) -> Result<Outcome> {
 }
 
 impl Law {
-    /// How far the sensor's mean and variance are off, as shares of what is allowed.
+    /// Errors of the sensor's mean and variance, as shares of what is allowed.
     fn off(&self, bits: i32) -> Result<[f64; 2]> {
         let keys = json!({
             "system_gain": self.gain, "read_noise": self.read_noise, "black_level": self.black,

@@ -1,4 +1,4 @@
-//! What a sensor makes of the light of a scene: the white of its raw files.
+//! A sensor's numbers of the light of a scene: the white of its raw files.
 
 use anyhow::Result;
 use etendue_sensor::bands::TOLERANCE;

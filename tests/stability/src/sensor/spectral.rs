@@ -84,7 +84,7 @@ fn worst(
     Ok((worst, count))
 }
 
-/// What is promised, and what the sums' own steps may add to it.
+/// Error that is promised, and what the sums' own steps may add to it.
 const LIMIT: f64 = 1.1e-3;
 
 pub(super) fn coloured_light(_: Scale) -> Result<Outcome> {

@@ -27,7 +27,7 @@ pub(super) struct PacketTriangles<'a, 'b, L: Lanes, S> {
     group: u32,
     boxes: BoxTest<L>,
     test: TriangleTest<L::Sixteen>,
-    /// From where on limits are certainly kept.
+    /// Distances from which on limits are certainly kept.
     surely_near: Wide<L>,
     /// Distance up to which each ray looks in this frame; −∞ for rays of no concern.
     far: Wide<L>,

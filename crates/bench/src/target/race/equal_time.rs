@@ -3,7 +3,7 @@
 use super::Race;
 use super::forecast::{Forecast, apart};
 use crate::BenchError;
-use crate::target::{AS_IT_IS, EqualTime, Outcome, Run, Strip, Verified};
+use crate::target::{AS_IT_IS, EqualTime, Outcome, Run, Strip, Verification};
 
 /// The most settings that are shown: the scene as it is, the soonest, and those next to it.
 const MOST: usize = 4;
@@ -19,7 +19,7 @@ impl<E: From<BenchError>> Race<'_, E> {
     /// the soonest took; the converged picture stands first among the pictures. What there is no time for is left out.
     pub(super) fn equal_time(
         &mut self,
-        found: &Verified,
+        found: &Verification,
     ) -> Result<(Vec<EqualTime>, Option<Strip>), E> {
         let mut order: Vec<usize> = (0..self.entries.len()).collect();
         order.sort_by(|&a, &b| {
@@ -76,7 +76,7 @@ fn within(points: &[super::TrialRender], seconds: f64) -> Option<Forecast> {
     Some(Forecast { samples: samples as u32, seconds })
 }
 
-/// What is shown of pictures of one `shape`, the converged one first: where the second differs from it most. `None`
+/// Part that is shown of pictures of one `shape`, the converged one first: where the second differs from it most. `None`
 /// where there are no two, or they are none.
 fn strip(pictures: &[Vec<f64>], shape @ [width, height, depth]: [usize; 3]) -> Option<Strip> {
     let [converged, second, ..] = pictures else { return None };

@@ -18,8 +18,10 @@ use super::seidel::{SeidelTable, seidel};
 use super::spread::{PointSpread, WeightedFields, shares, strehl_of};
 use super::transfer::{Transfer, geometric_modulation, geometric_modulations, modulation_at};
 use super::wavefront::{Cells, ReferenceSphere, USUAL_CELLS, Wavefront};
-use super::zernike::{FRINGE_TERMS, ZernikeFit, ZernikeOrder};
+use super::zernike::ZernikeFit;
+use crate::sentence;
 use crate::train::{Focus, MonochromaticTrain, OpticalTrain};
+use crate::zernike::{FRINGE_TERMS, ZernikeOrder};
 
 pub use figures::page;
 
@@ -63,12 +65,12 @@ pub struct WaveInquiry {
     /// Frequencies (cycles/mm); shares of the limit on the axis when empty.
     pub frequencies: Vec<f64>,
     /// Origin of the fields, wavelengths, weights and the object's position.
-    pub taken: Taken,
+    pub taken: PremiseSources,
 }
 
-/// Where a report's premises come from: `option`, `file` or `default`.
+/// Sources of a report's premises: `option`, `file` or `default`.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, JsonSchema)]
-pub struct Taken {
+pub struct PremiseSources {
     /// Of the fields.
     pub fields: &'static str,
     /// Of the wavelengths.
@@ -79,12 +81,12 @@ pub struct Taken {
     pub object: &'static str,
 }
 
-/// What a lens does in waves.
+/// Analysis of a lens in waves.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct WaveReport {
-    /// Where the premises come from.
-    pub taken: Taken,
-    /// What lengths on the image are in: `mm`; `mrad` of an afocal lens.
+    /// Sources of the premises.
+    pub taken: PremiseSources,
+    /// Unit of lengths on the image: `mm`; `mrad` of an afocal lens.
     pub image_unit: &'static str,
     /// Object and image.
     pub planes: Planes,
@@ -92,7 +94,7 @@ pub struct WaveReport {
     pub refocused: f64,
     /// Wavelengths (nm), the main one first.
     pub wavelengths: Vec<f64>,
-    /// What each counts for; 1 in all.
+    /// Weight of each; 1 in all.
     pub weights: Vec<f64>,
     /// Fields that light reaches.
     pub fields: Vec<FieldWaves>,
@@ -102,7 +104,7 @@ pub struct WaveReport {
     pub foci: Vec<FieldFoci>,
     /// Distortion over a square with the widest field in its corners.
     pub distortion_grid: Vec<GridPoint>,
-    /// What is missing, and why.
+    /// Notes on what is missing, and why.
     pub notes: Vec<String>,
 }
 
@@ -131,7 +133,7 @@ pub struct FieldWaves {
     pub noll: ZernikeFit,
     /// Strehl's ratio of all wavelengths together.
     pub strehl: f64,
-    /// Where the brightest point is, from the sphere's centre (mm in x and y).
+    /// Brightest point, from the sphere's centre (mm in x and y).
     pub brightest: [f64; 2],
     /// 1 over the width of the cone of light in y and in x (direction cosines): f-numbers.
     pub working_f_number: [f64; 2],
@@ -228,7 +230,8 @@ impl WaveReport {
                     return Err(error);
                 }
                 Err(error) => {
-                    notes.push(format!("no waves of {}: {error}", planes.point(field).name()));
+                    let name = planes.point(field).name();
+                    notes.push(format!("no waves of {name}: {}", sentence(&error)));
                 }
             }
         }
@@ -244,7 +247,7 @@ impl WaveReport {
         let seidel = match seidel(train, &planes.point(widest), ends) {
             Ok(table) => Some(table),
             Err(error) => {
-                notes.push(format!("no Seidel sums: {error}"));
+                notes.push(format!("no Seidel sums: {}", sentence(&error)));
                 None
             }
         };
@@ -410,7 +413,7 @@ impl AnalysisSetup<'_> {
         let is_wide = matches!(corner, ObjectPoint::Infinity { .. }) && widest.abs() >= 85.0;
         let scale = self.planes.magnification.or(efl).filter(|_| !is_wide && widest != 0.0);
         Ok(scale.map_or_else(Vec::new, |scale| {
-            distortion_grid(self.train, at, &corner, (self.planes.image_z, scale), GRID)
+            distortion_grid(self.train, at, &corner, self.planes.image_z, scale, GRID)
         }))
     }
 }

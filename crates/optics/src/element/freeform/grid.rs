@@ -23,7 +23,7 @@ pub struct HeightMapSpec {
     /// The picture's height (mm); by square pixels when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height: Option<Millimetres>,
-    /// How much higher white is than black (mm).
+    /// Height of white above black (mm).
     pub depth: Millimetres,
 }
 

@@ -60,7 +60,7 @@ pub struct FreeformSpec {
     /// 1/radius (1/mm), instead of the radius; 0 is flat.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub curvature: Option<f64>,
-    /// What follows the surface, on the sensor's side; air when absent.
+    /// Medium behind the surface, on the sensor's side; air when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub glass: Option<GlassSpec>,
     /// Half the clear diameter (mm): rays farther from the axis are stopped. Unlimited when absent.
@@ -76,16 +76,16 @@ pub struct FreeformSpec {
     /// centre lies at greater z; 0 for a cylinder, that goes straight.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotation_radius: Option<Millimetres>,
-    /// What is added to the base.
+    /// Terms that are added to the base.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sag: Vec<SagSpec>,
-    /// Whether it is a Fresnel surface: a plane that bends light by the slopes of the sag.
+    /// True if it is a Fresnel surface: a plane that bends light by the slopes of the sag.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub fresnel: bool,
     /// A phase that it adds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub phase: Option<PhaseSpec>,
-    /// Whether it is a mirror; `thickness` behind one runs against the light before it.
+    /// True if it is a mirror; `thickness` behind one runs against the light before it.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub mirror: bool,
     /// Of a mirror: the radius of a hole in its middle (mm).

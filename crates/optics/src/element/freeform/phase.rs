@@ -22,7 +22,7 @@ use crate::element::real::Real;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PhaseSpec {
-    /// What it is of.
+    /// Its pattern.
     pub pattern: PatternSpec,
     /// The order of diffraction; 1 when absent. Not that of a mask with a `design_wavelength`.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -3,7 +3,7 @@
 //!
 //! # Sources
 //!
-//! Zernike's as in [`crate::analysis::zernike`]. Q polynomials: G. W. Forbes, "Shape specification for axially symmetric
+//! Zernike's as in [`crate::zernike`]. Q polynomials: G. W. Forbes, "Shape specification for axially symmetric
 //! optical surfaces", *Opt. Express* 15, 5218 (2007), Eqs. (2.2) and (3.6), and "Robust, efficient computational methods
 //! for axially symmetric optical aspheres", *Opt. Express* 18, 19700 (2010), Eqs. (A.13) to (A.16).
 
@@ -14,9 +14,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::grid::{HeightGrid, HeightMapSpec};
-use crate::analysis::zernike::ZernikeOrder;
 use crate::element::Resolve;
 use crate::element::real::{Real, power};
+use crate::zernike::{FRINGE_TERMS, ZernikeOrder};
 
 /// The most of any list of coefficients.
 const MOST_TERMS: usize = 400;
@@ -24,7 +24,7 @@ const MOST_TERMS: usize = 400;
 /// The highest power or degree.
 const HIGHEST: u32 = 40;
 
-/// What is added to the sag of a base (mm), as a lens file writes it.
+/// Term that is added to the sag of a base (mm), as a lens file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum SagSpec {
@@ -186,7 +186,7 @@ fn zernike(
     coefficients: &BTreeMap<String, f64>,
 ) -> Result<Vec<(i32, Vec<f64>)>, String> {
     let most = match order {
-        ZernikeOrder::Fringe => crate::analysis::zernike::FRINGE_TERMS,
+        ZernikeOrder::Fringe => FRINGE_TERMS,
         ZernikeOrder::Noll => 231,
     };
     let table = order.terms(most);

@@ -21,7 +21,7 @@ use etendue_geometry::units::Millimetres;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::train::paraxial::Abcd;
+use crate::element::Abcd;
 
 /// Phase of a ray's swing per step of the numerical integration (radians). The rule's own error is
 /// the fourth power of it over 120 of the phase: 10⁻¹⁰ of it.

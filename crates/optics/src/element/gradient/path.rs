@@ -109,11 +109,11 @@ impl Gradient {
                 return Arrival::Lost;
             }
             if above * there <= 0.0 {
-                let end = self.between(base, (here, above), (h, there), &of);
+                let end = self.between(base, here, [above, there], h, &of);
                 let beyond = end.place.truncate().length_squared() > side2;
                 return if beyond { Arrival::Side(end.place) } else { Arrival::On(end) };
             }
-            if let Some(place) = self.leaves(base, here, (next, h), side2) {
+            if let Some(place) = self.leaves(base, here, next, h, side2) {
                 return Arrival::Side(place);
             }
             (here, above) = (next, there);
@@ -128,7 +128,8 @@ impl Gradient {
         &self,
         base: f64,
         here: OpticalRay,
-        (next, h): (OpticalRay, f64),
+        next: OpticalRay,
+        h: f64,
         side2: f64,
     ) -> Option<DVec3> {
         let beyond = |ray: &OpticalRay| ray.place.truncate().length_squared() > side2;
@@ -152,13 +153,14 @@ impl Gradient {
         beyond(&farthest).then_some(farthest.place)
     }
 
-    /// The ray where it is on the surface, between a place `above` it (mm) and one a step of `h` farther on: by the regula
-    /// falsi with halved ordinates (M. Dowell and P. Jarratt, *BIT* 11, 168 (1971)).
+    /// The ray where it is on the surface, between its place and one a step of `h` farther on, at these heights (mm): by
+    /// the regula falsi with halved ordinates (M. Dowell and P. Jarratt, *BIT* 11, 168 (1971)).
     fn between(
         &self,
         base: f64,
-        (here, above): (OpticalRay, f64),
-        (h, there): (f64, f64),
+        here: OpticalRay,
+        [above, there]: [f64; 2],
+        h: f64,
         of: &impl Fn(&OpticalRay) -> f64,
     ) -> OpticalRay {
         let (mut low, mut high) = ((0.0, above), (h, there));

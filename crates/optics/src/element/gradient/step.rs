@@ -37,7 +37,7 @@ impl GradedMedium {
 
 /// The media on both sides of an element, as light meets it, at least one of them a gradient.
 #[derive(Debug, Clone)]
-pub(crate) struct Graded {
+pub(crate) struct GradientPair {
     /// The gradients before and behind.
     pub(crate) media: [Option<GradedMedium>; 2],
     /// The indices of the glasses before and behind.
@@ -100,7 +100,7 @@ impl ElementStep {
     /// Takes a block of rays through an element at a gradient, one by one.
     #[cold]
     #[inline(never)]
-    pub(crate) fn run_graded(&self, graded: &Graded, block: &mut Block, clip: Clip) {
+    pub(crate) fn run_graded(&self, graded: &GradientPair, block: &mut Block, clip: Clip) {
         for lane in 0..LANES {
             if block.outcome[lane] == 0 {
                 let traversal = self.graded_one(graded, block.ray(lane), clip);
@@ -125,7 +125,13 @@ impl ElementStep {
     }
 
     /// The way of a ray through the gradient before the element.
-    fn arrival(&self, graded: &Graded, medium: &GradedMedium, ray: Ray, clip: Clip) -> Arrival {
+    fn arrival(
+        &self,
+        graded: &GradientPair,
+        medium: &GradedMedium,
+        ray: Ray,
+        clip: Clip,
+    ) -> Arrival {
         medium.follow(ray, |place| self.height(&graded.part, place), clip)
     }
 
@@ -162,7 +168,7 @@ impl ElementStep {
     }
 
     /// One ray through the gradient before the element and the element itself.
-    pub(crate) fn graded_one(&self, graded: &Graded, ray: Ray, clip: Clip) -> Traversal {
+    pub(crate) fn graded_one(&self, graded: &GradientPair, ray: Ray, clip: Clip) -> Traversal {
         let element = self.element;
         let [before, behind] = &graded.media;
         let (start, length) = match before {

@@ -39,11 +39,11 @@ pub fn layout(
     // Mirrors are drawn as they are built.
     let spaces = train.built();
     let fans: Vec<Fan> =
-        fields.iter().map(|&field| fan(train, &at, report, field, (end, &spaces))).collect();
+        fields.iter().map(|&field| fan(train, &at, report, field, end, &spaces)).collect();
     let heights = heights(train, &fans);
     let train = &as_built(train, &spaces);
     let behind = spaces.last().copied().unwrap_or(Isometry::ONE);
-    let view = DrawingView::around(train, &heights, &fans, report, (end, &behind));
+    let view = DrawingView::holding(train, &heights, &fans, report, end, &behind);
     // Glass first, then rays, then the elements' lines over both.
     let mut canvas = Canvas::new(WIDTH, view.height, &title(report));
     glasses(&mut canvas, &view, &bodies(train, &at, &heights));
@@ -107,7 +107,8 @@ pub(super) fn fan(
     at: &MonochromaticTrain,
     report: &LensReport,
     field: f64,
-    (end, spaces): (f64, &[Isometry]),
+    end: f64,
+    spaces: &[Isometry],
 ) -> Fan {
     let none = Fan { rays: Vec::new() };
     let Some(chief) = train.chief_ray(at, field) else { return none };
@@ -117,7 +118,7 @@ pub(super) fn fan(
     let across = DVec3::new(0.0, chief.direction.z, -chief.direction.y);
     let lit = |offset: f64| {
         let position = chief.position + across * offset;
-        trace(train, at, (position, chief.direction), (end, spaces))
+        trace(train, at, position, chief.direction, end, spaces)
     };
     // Where the beam ends on both sides of its chief ray, to a percent of the pupil.
     let edge = |side: f64| {
@@ -139,7 +140,7 @@ pub(super) fn fan_of(
     report: &LensReport,
     field: f64,
 ) -> Vec<Vec<[f64; 2]>> {
-    fan(train, at, report, field, (report.sensor_z.unwrap_or_default(), &[])).rays
+    fan(train, at, report, field, report.sensor_z.unwrap_or_default(), &[]).rays
 }
 
 /// Moves the beginnings of parallel rays to a plane square to them, that of the one that begins first.
@@ -156,8 +157,10 @@ fn start_together(rays: &mut [Vec<[f64; 2]>], direction: [f64; 2]) {
 fn trace(
     train: &OpticalTrain,
     at: &MonochromaticTrain,
-    (position, direction): (DVec3, DVec3),
-    (end, spaces): (f64, &[Isometry]),
+    position: DVec3,
+    direction: DVec3,
+    end: f64,
+    spaces: &[Isometry],
 ) -> Option<Vec<[f64; 2]>> {
     let path = at.path(Side::Object, Clip::On, position, direction);
     let (RayStatus::Exited, Some(out)) = (path.status, path.direction) else { return None };
@@ -226,12 +229,13 @@ struct DrawingView {
 }
 
 impl DrawingView {
-    fn around(
+    fn holding(
         train: &OpticalTrain,
         heights: &[f64],
         fans: &[Fan],
         report: &LensReport,
-        (end, behind): (f64, &Isometry),
+        end: f64,
+        behind: &Isometry,
     ) -> Self {
         let sensor = behind.place(DVec3::new(0.0, 0.0, end));
         let (mut left, mut right) = (sensor.z.min(0.0), sensor.z);

@@ -285,7 +285,7 @@ impl Section {
         let end = end_of(train, report);
         let fields = drawn_fields(report);
         let fans: Vec<_> =
-            fields.iter().map(|&field| fan(train, &at, report, field, (end, &[]))).collect();
+            fields.iter().map(|&field| fan(train, &at, report, field, end, &[])).collect();
         let heights = heights(train, &fans);
         let glasses: Vec<Polyline> =
             bodies(train, &at, &heights).into_iter().map(|body| body.outline).collect();

@@ -88,7 +88,7 @@ fn spread([inner, reach]: [f64; 2], [a, b]: [f64; 2], radius: f64) -> ([f64; 2],
 
 type Row = [f64; LANES];
 
-/// What the nodes around the places of a block have there.
+/// Values of the nodes about the places of a block.
 struct NodeRows {
     /// The direction that is the nodes' +x.
     axis: [Row; 2],
@@ -108,7 +108,7 @@ impl NodeRows {
 
     /// Adds a node's share to a lane, at an angle between two of its table.
     #[inline(always)]
-    fn add(&mut self, lane: usize, (node, weight): (&PupilOutline, f64), angle: (usize, f64)) {
+    fn add(&mut self, lane: usize, node: &PupilOutline, weight: f64, angle: (usize, f64)) {
         let (centre, half) = (node.centre.to_array(), node.half.to_array());
         for axis in 0..2 {
             self.centre[axis][lane] += centre[axis] * weight;
@@ -130,7 +130,7 @@ impl ExitPupil {
         }
         rays.resize(bundle.squares.len());
         match &self.disk {
-            Some(disk) => disk.fill(&self.sensor, (bundle, self.index2), &mut rays.blocks),
+            Some(disk) => disk.fill(&self.sensor, bundle, self.index2, &mut rays.blocks),
             None => return self.fill_bounds(bundle, &mut rays.blocks),
         }
         true
@@ -156,11 +156,11 @@ impl ExitPupil {
                 let angle = angle_below(turn);
                 (rows.axis[0][lane], rows.axis[1][lane]) = axis.into();
                 for (node, weight) in nodes.into_iter().filter(|(_, weight)| *weight != 0.0) {
-                    rows.add(lane, (&self.nodes[node], weight), angle);
+                    rows.add(lane, &self.nodes[node], weight, angle);
                 }
             }
             let scale = bundle.scale * self.index2;
-            aim(&rows, (&self.sensor, scale), (&film, &square), block);
+            aim(&rows, &self.sensor, scale, &film, &square, block);
             are_lit &= block.throughput[..count].iter().all(|weight| *weight > 0.0);
             block.outcome[..count].fill(RayStatus::Exited.code());
         }
@@ -172,8 +172,10 @@ impl ExitPupil {
 #[multiversion::multiversion(targets = "simd")]
 fn aim(
     rows: &NodeRows,
-    (sensor, scale): (&Frame, f64),
-    (film, squares): (&[Row; 2], &[[f64; 2]; LANES]),
+    sensor: &Frame,
+    scale: f64,
+    film: &[Row; 2],
+    squares: &[[f64; 2]; LANES],
     block: &mut Block,
 ) {
     let Frame { vertex, rotation } = *sensor;

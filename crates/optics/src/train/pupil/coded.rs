@@ -33,7 +33,7 @@ const SAFETY: f64 = 1.5;
 
 /// A mask as the points of a sensor see it.
 #[derive(Debug, Clone)]
-pub(super) struct Coded {
+pub(super) struct MaskView {
     cells: MaskCells,
     region: MaskRegion,
     /// One for each wavelength (nm), or one for all.
@@ -42,7 +42,7 @@ pub(super) struct Coded {
 
 /// A direction drawn from a mask.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Aimed {
+pub(super) struct MaskSample {
     /// Slopes x/−z, y/−z.
     pub(super) slopes: DVec2,
     /// Their density per area of slopes.
@@ -70,7 +70,7 @@ impl Anywhere {
     }
 }
 
-impl Coded {
+impl MaskView {
     /// Looks at the first mask of a lens from a sensor, by rays of `wavelengths` (nm); `None` when it has
     /// none that dims anything, or when no direction towards it is found.
     pub(super) fn new(
@@ -119,8 +119,8 @@ impl Coded {
     fn map(&self, wavelength: f64) -> &MaskMap {
         let after = self.maps.partition_point(|(nm, _)| *nm < wavelength);
         let nearer = |i: &usize| (self.maps[*i].0 - wavelength).abs();
-        let around = after.saturating_sub(1)..=after.min(self.maps.len() - 1);
-        let nearest = around.min_by(|a, b| nearer(a).total_cmp(&nearer(b))).unwrap_or(0);
+        let neighbours = after.saturating_sub(1)..=after.min(self.maps.len() - 1);
+        let nearest = neighbours.min_by(|a, b| nearer(a).total_cmp(&nearer(b))).unwrap_or(0);
         &self.maps[nearest].1
     }
 
@@ -134,12 +134,12 @@ impl Coded {
         film: DVec2,
         [u, v]: [f64; 2],
         anywhere: &Anywhere,
-    ) -> Result<Option<Aimed>, Unknown> {
+    ) -> Result<Option<MaskSample>, UnknownMask> {
         let mut room = NO_TERMS;
-        let local = self.map(wavelength).at(film, &mut room).ok_or(Unknown)?;
+        let local = self.map(wavelength).at(film, &mut room).ok_or(UnknownMask)?;
         let both = |slopes: DVec2, own: f64| {
             let density = (1.0 - ANYWHERE) * own + ANYWHERE * anywhere.density(slopes);
-            (density > 0.0).then_some(Aimed { slopes, density })
+            (density > 0.0).then_some(MaskSample { slopes, density })
         };
         if u < ANYWHERE {
             let slopes = anywhere.draw([u / ANYWHERE, v]);
@@ -159,4 +159,4 @@ impl Coded {
 }
 
 /// Nothing is known of the mask from a point of the sensor.
-pub(super) struct Unknown;
+pub(super) struct UnknownMask;

@@ -115,7 +115,8 @@ impl Disk {
     pub(super) fn fill(
         &self,
         sensor: &Frame,
-        (bundle, index2): (&PupilSamples<'_>, f64),
+        bundle: &PupilSamples<'_>,
+        index2: f64,
         blocks: &mut [Block],
     ) {
         let bundle = PupilSamples { scale: bundle.scale * index2, ..*bundle };

@@ -14,12 +14,13 @@
 //! margin grows until there are none. Points of a region that lie in another cell, as beside circles, are
 //! lost.
 
+use etendue_report::Refusal;
 use glam::{DVec2, DVec3};
 
 use super::clear::{without_filters, without_masks};
 use super::outline_table::{NORMALS, OutlineTable, centre_of, normal, outline};
 use super::region::{Region, area_of};
-use super::{ExitPupil, ExitPupilError};
+use super::{ExitPupil, dark_array};
 use crate::element::{Clip, Gaps, Grid, LensRays, LensletShape, RayStatus, clipped};
 use crate::train::aim::towards_lens;
 use crate::train::lenslets::Sight;
@@ -28,7 +29,7 @@ use crate::train::{BehindLenslets, MonochromaticTrain, OpticalTrain, Side};
 /// Added to the outline on all sides, as a share of its width, to begin with.
 const MARGIN: f64 = 0.002;
 
-/// By how much the margin grows, and how often at most.
+/// Factor by which the margin grows, and the most rounds of it.
 const GROWTH: f64 = 1.6;
 const ROUNDS: u32 = 10;
 
@@ -48,7 +49,7 @@ pub struct LensletPupil {
     gaps: Vec<Vec<DVec2>>,
     /// The area of an opening (mm²), and the radius of the circle around it (mm).
     area: f64,
-    around: f64,
+    opening_radius: f64,
     /// Change of the slopes towards the pupil over the array (1/mm).
     drift: f64,
     margin: f64,
@@ -61,7 +62,7 @@ impl LensletPupil {
         view: BehindLenslets,
         wavelengths: &[f64],
         pupil: &ExitPupil,
-    ) -> Result<Self, ExitPupilError> {
+    ) -> Result<Self, Refusal> {
         let array = &view.array;
         let turned = |corners: Vec<[f64; 2]>| -> Vec<DVec2> {
             corners.into_iter().map(|p| DVec2::from(array.lattice.turned(p))).collect()
@@ -69,7 +70,7 @@ impl LensletPupil {
         // The openings of this array and of the others, from a lenslet's centre, and what is
         // between them.
         let opening = turned(array.opening_corners());
-        let around = opening.iter().map(|p| p.length()).fold(0.0, f64::max);
+        let opening_radius = opening.iter().map(|p| p.length()).fold(0.0, f64::max);
         let others = view
             .openings(0, pupil.sensor.vertex.z)
             .map(|(_, other)| turned(other.opening_corners()))
@@ -91,8 +92,17 @@ impl LensletPupil {
         let table = OutlineTable::new(&main, &view, wavelengths, pupil, drift)?;
         let lenses = wavelengths.iter().map(|&nm| train.at(nm)).collect::<Result<Vec<_>, _>>()?;
         let area = area_of(&opening);
-        let mut own =
-            Self { view, table, opening, others, gaps, area, around, drift, margin: MARGIN };
+        let mut own = Self {
+            view,
+            table,
+            opening,
+            others,
+            gaps,
+            area,
+            opening_radius,
+            drift,
+            margin: MARGIN,
+        };
         own.widen_until_tight(&lenses, pupil)?;
         Ok(own)
     }
@@ -199,7 +209,7 @@ impl LensletPupil {
         let widest = self.widest(&extent) * (1.0 + 2.0 * self.margin);
         let kappa = (sight.slope[0] - self.drift * sight.height[0]).abs();
         let sigma = (sight.slope[1] - self.drift * sight.height[1] - self.drift).abs();
-        Some((at, (widest + kappa * self.around) / sigma + 1e-9))
+        Some((at, (widest + kappa * self.opening_radius) / sigma + 1e-9))
     }
 
     #[expect(clippy::unused_self, reason = "belongs to the table's normals")]
@@ -244,7 +254,7 @@ impl LensletPupil {
         let array = &self.view.array;
         let centre = self.view.centre(cell);
         let outside = (centre - self.view.decentre).abs() - DVec2::from(array.half_size);
-        if outside.max_element() > self.around {
+        if outside.max_element() > self.opening_radius {
             return None;
         }
         // The main lens' opening as the sensor sees it through the lenslet: scaled by kappa, and
@@ -253,7 +263,7 @@ impl LensletPupil {
         let away = centre - film.truncate();
         let kappa = sight.slope[0] - self.drift * sight.height[0];
         let shift = away * (sight.slope[1] - self.drift * sight.height[1]);
-        let reach = kappa.abs() * self.around;
+        let reach = kappa.abs() * self.opening_radius;
         // Whether the opening, or another array's, cuts the lenslet's own.
         let mut cut = false;
         for k in 0..NORMALS {
@@ -309,13 +319,13 @@ impl LensletPupil {
         let clip = seen.map(|p| p.to_array());
         // The pieces of gaps that lie in it or are cut by it.
         let array = &self.view.array;
-        let around = array.lattice.pitch;
+        let pitch = array.lattice.pitch;
         let local = (centre - self.view.decentre).to_array();
-        for cell in array.lattice.cells_near(local, widest + around) {
+        for cell in array.lattice.cells_near(local, widest + pitch) {
             let at = self.view.centre(cell);
             for piece in &self.gaps {
                 let corners: Vec<DVec2> = piece.iter().map(|p| at + *p).collect();
-                if corners[0].distance(centre) > widest + around {
+                if corners[0].distance(centre) > widest + pitch {
                     continue;
                 }
                 if corners.iter().all(inside) {
@@ -344,7 +354,7 @@ impl LensletPupil {
         &mut self,
         lenses: &[MonochromaticTrain],
         pupil: &ExitPupil,
-    ) -> Result<(), ExitPupilError> {
+    ) -> Result<(), Refusal> {
         for round in 0..ROUNDS {
             let (mut passed, mut strays) = (0, 0);
             for lens in lenses {
@@ -353,7 +363,7 @@ impl LensletPupil {
                 strays += found[1];
             }
             if round == 0 && passed == 0 {
-                return Err(ExitPupilError::Array { element: self.view.rear });
+                return Err(dark_array(self.view.rear));
             }
             // One in a thousand of what passes is less than what other approximations leave.
             if strays * 2000 <= passed {
@@ -375,7 +385,7 @@ impl LensletPupil {
             let film = pupil.film_point(place);
             let sight = self.view.sight(0, film.z);
             let Some((middle, reach)) = self.middle(film, &sight) else { continue };
-            let radius = 1.2 * (reach + self.around) * u[2].sqrt();
+            let radius = 1.2 * (reach + self.opening_radius) * u[2].sqrt();
             let at = middle + DVec2::from_angle(u[1] * std::f64::consts::TAU) * radius;
             rays.push(film, towards_lens(self.view.aim(film, at).0));
             aims.push((film, at));

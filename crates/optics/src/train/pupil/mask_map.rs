@@ -27,7 +27,7 @@ const POINTS: usize = 16;
 
 /// Margin around the points that any node sees, as a share of the square, and the number of times
 /// that the square is drawn in to them: polynomials of a high degree are for places that are seen.
-const AROUND: f64 = 0.12;
+const SEEN_MARGIN: f64 = 0.12;
 const DRAWN_IN: u32 = 2;
 
 /// The highest degree of the polynomials, and the number of their terms.
@@ -137,7 +137,7 @@ struct DirectionSolution {
 }
 
 impl DirectionSolution {
-    /// How far from the middle points are seen, in −1..1; along x and y, or from the middle of a round map.
+    /// Farthest distance from the middle of points that are seen, in −1..1; along x and y, or from the middle of a round map.
     fn reach(&self) -> DVec2 {
         let seen = self.points.iter().filter(|(.., weight)| *weight > HIDDEN);
         seen.fold(DVec2::ZERO, |most, (place, ..)| {
@@ -190,8 +190,8 @@ impl MaskMap {
         let mut solved = solve(&map);
         for _ in 0..DRAWN_IN {
             let seen = solved.iter().flatten().map(DirectionSolution::reach).reduce(DVec2::max);
-            let Some(mut reach) = seen.map(|reach| reach + AROUND) else { break };
-            if reach.min_element() <= AROUND {
+            let Some(mut reach) = seen.map(|reach| reach + SEEN_MARGIN) else { break };
+            if reach.min_element() <= SEEN_MARGIN {
                 break;
             }
             if round {
@@ -244,10 +244,10 @@ impl MaskMap {
         // In the mask's frame, for the node as it stands.
         let target = |place: DVec2| self.centre + place * self.half - self.offset;
         let solve = |place: DVec2, guess: Option<DVec2>| {
-            let aim = (scene.element, target(place));
+            let (element, place) = (scene.element, target(place));
             match guess {
-                Some(guess) => slopes_near(scene.lens, film, aim, guess),
-                None => slopes_to(scene.clear, scene.lens, film, aim, None),
+                Some(guess) => slopes_near(scene.lens, film, element, place, guess),
+                None => slopes_to(scene.clear, scene.lens, film, element, place, None),
             }
         };
         let middle = solve(DVec2::ZERO, None)?;

@@ -81,7 +81,7 @@ struct Interval {
 
 /// A point of the mask.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Drawn {
+pub(super) struct MaskPoint {
     pub(super) at: DVec2,
     /// Per mm².
     pub(super) density: f64,
@@ -142,7 +142,7 @@ impl MaskRegion {
         [first, first + 1, first + FILM + 1, first + FILM + 2]
     }
 
-    /// What is visible between nodes, joined by straight lines; `None` unless all four have ends. Where they
+    /// Visible part between nodes, joined by straight lines; `None` unless all four have ends. Where they
     /// have none, all of the mask is aimed at.
     fn joined(&self, view: &FilmCell) -> Option<Chords> {
         let mut joined = Chords { heights: [0.0; 2], ends: [[0.0; 2]; LINES + 1], margin: 0.0 };
@@ -222,7 +222,12 @@ impl MaskRegion {
 
     /// A point of the mask for a place in the unit square, as a point of the sensor (mm) sees it; `None` for
     /// places that are given up, whose density counts as drawn.
-    pub(super) fn draw(&self, cells: &MaskCells, film: DVec2, [u, v]: [f64; 2]) -> Option<Drawn> {
+    pub(super) fn draw(
+        &self,
+        cells: &MaskCells,
+        film: DVec2,
+        [u, v]: [f64; 2],
+    ) -> Option<MaskPoint> {
         let (part, view) = self.view(film)?;
         let interval = self.intervals[part].as_ref()?;
         let mut left = v * interval.mass;
@@ -241,7 +246,7 @@ impl MaskRegion {
         };
         let (x, across) = cells.draw_column(row, columns, u)?;
         let along = cells.row_density(chosen.columns(), row) / interval.mass;
-        Some(Drawn { at: DVec2::new(x, y), density: along * across })
+        Some(MaskPoint { at: DVec2::new(x, y), density: along * across })
     }
 
     /// The density (per mm²) with which [`Self::draw`] draws a point (mm).
@@ -389,7 +394,7 @@ struct MaskRays<'a> {
 }
 
 impl MaskRays<'_> {
-    /// Which points of the mask (mm) are visible.
+    /// True for each point of the mask (mm) that is visible.
     fn passes(&self, places: &[DVec2]) -> Vec<bool> {
         let mut passed = vec![false; places.len()];
         for (scene, map) in self.scenes {

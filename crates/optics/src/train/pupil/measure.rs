@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::place::{NodePlace, angle_below, between};
 use super::search::SlopeWindow;
-use super::wavelengths::{Divided, Stray};
+use super::wavelengths::{LensSplit, Stray};
 use super::{
     ANGLES, ExitPupil, NodeLayout, PLANAR_INTERVALS, PupilOutline, RADIAL_INTERVALS, turn_of,
 };
@@ -190,7 +190,7 @@ impl ExitPupil {
         &self,
         lenses: &[MonochromaticTrain],
         initial: f64,
-        measure: fn(&mut [f64; 2 * ANGLES], &MonochromaticTrain, DVec3, &Searched),
+        measure: fn(&mut [f64; 2 * ANGLES], &MonochromaticTrain, DVec3, &SearchRegion),
     ) -> Vec<[f64; 2 * ANGLES]> {
         let [columns, rows] = self.intervals();
         let columns = 2 * columns + 1;
@@ -199,9 +199,9 @@ impl ExitPupil {
             let mut radii = [initial; 2 * ANGLES];
             if let Some(frame) = self.frame(film) {
                 let at = self.film_point(film);
-                let searched = Searched { frame, is_round: self.is_radial() };
+                let region = SearchRegion { frame, is_round: self.is_radial() };
                 for lens in lenses {
-                    measure(&mut radii, lens, at, &searched);
+                    measure(&mut radii, lens, at, &region);
                 }
             }
             radii
@@ -222,11 +222,11 @@ impl ExitPupil {
 
     /// Looks for rays that pass just outside of the bound, and widens it around them until there
     /// are none.
-    pub(super) fn widen_until_tight(&mut self, lenses: &Divided) {
+    pub(super) fn widen_until_tight(&mut self, lenses: &LensSplit) {
         for round in 0..4 {
             let found = self.found_in_round(lenses, round, Self::strays);
             for stray in &found {
-                self.widen_around(stray);
+                self.widen_at(stray);
             }
             if found.is_empty() {
                 return;
@@ -235,7 +235,7 @@ impl ExitPupil {
     }
 
     /// Looks for rays that pass just inside of the obscured middle, and lets them through until there are none.
-    pub(super) fn narrow_until_tight(&mut self, lenses: &Divided) {
+    pub(super) fn narrow_until_tight(&mut self, lenses: &LensSplit) {
         for round in 4..8 {
             let found = self.found_in_round(lenses, round, Self::inner_strays);
             for stray in &found {
@@ -308,7 +308,7 @@ impl ExitPupil {
     }
 
     /// Raises the table's entries around a ray to the ray's radius.
-    fn widen_around(&mut self, stray: &Stray) {
+    fn widen_at(&mut self, stray: &Stray) {
         let low = turn_index(stray.turn);
         for (node, _) in stray.nodes.into_iter().filter(|&(_, weight)| weight > 0.0) {
             let reach = &mut self.nodes[node].reach;
@@ -338,7 +338,7 @@ fn turn_index(turn: f64) -> usize {
 pub(super) const ROBERTS: [f64; 4] =
     [0.856_674_883_854_503, 0.733_891_856_627_126, 0.628_706_721_037_806, 0.538_597_270_645_735];
 
-/// How far from the axis there is light, up to `limit` (mm), and a little more.
+/// Farthest distance from the axis at which there is light, up to `limit` (mm), and a little more.
 pub fn lit_radius(train: &OpticalTrain, lenses: &[MonochromaticTrain], z: f64, limit: f64) -> f64 {
     let lit = |r: f64| {
         let film = DVec3::new(r, 0.0, z);
@@ -396,9 +396,9 @@ fn widen(
     radii: &mut [f64; 2 * ANGLES],
     lens: &MonochromaticTrain,
     film: DVec3,
-    searched: &Searched,
+    region: &SearchRegion,
 ) {
-    for (radius, found) in radii.iter_mut().zip(limits(RimSide::Outer, lens, film, searched)) {
+    for (radius, found) in radii.iter_mut().zip(limits(RimSide::Outer, lens, film, region)) {
         *radius = found.map_or(*radius, |found| radius.max(found));
     }
 }
@@ -408,16 +408,16 @@ fn narrow(
     radii: &mut [f64; 2 * ANGLES],
     lens: &MonochromaticTrain,
     film: DVec3,
-    searched: &Searched,
+    region: &SearchRegion,
 ) {
-    for (radius, found) in radii.iter_mut().zip(limits(RimSide::Inner, lens, film, searched)) {
+    for (radius, found) in radii.iter_mut().zip(limits(RimSide::Inner, lens, film, region)) {
         // Where nothing passes at an angle, nothing is known.
         *radius = radius.min(found.unwrap_or(0.0));
     }
 }
 
 /// Directions among which passing rays are looked for.
-struct Searched {
+struct SearchRegion {
     /// The middle and the half axes of slopes.
     frame: [DVec2; 2],
     is_round: bool,
@@ -438,7 +438,7 @@ fn limits(
     limit: RimSide,
     lens: &MonochromaticTrain,
     film: DVec3,
-    &Searched { frame: [centre, half], is_round }: &Searched,
+    &SearchRegion { frame: [centre, half], is_round }: &SearchRegion,
 ) -> [Option<f64>; 2 * ANGLES] {
     // Costly trains are measured more coarsely: to 0.003 of the radius, which [`MARGIN`] covers.
     let (scanned, halvings) = if lens.is_costly() { (16, 5) } else { (32, 12) };

@@ -46,17 +46,17 @@ mod region;
 mod search;
 mod wavelengths;
 
+use etendue_report::Refusal;
 use glam::{DVec2, DVec3};
 
 use self::bound::PupilBound;
 use self::clear::without_masks;
-use self::coded::Coded;
+use self::coded::MaskView;
 use self::place::turn_of;
-use self::wavelengths::Divided;
+use self::wavelengths::LensSplit;
 use super::aim::towards_lens;
 use super::{MonochromaticTrain, OpticalTrain, Side};
 use crate::element::{Clip, Frame, LensRays, RayStatus, StatusCounts};
-use crate::glass::GlassError;
 
 pub use bound::PupilSamples;
 pub use clear::{without_dimming, without_filters};
@@ -73,44 +73,6 @@ const RADIAL_INTERVALS: usize = 40;
 
 /// Intervals between nodes over each side of the sensor for other lenses.
 const PLANAR_INTERVALS: usize = 8;
-
-/// Error of a lens without an exit pupil to sample.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ExitPupilError {
-    /// Not one ray leaves the lens.
-    #[error(
-        "no light passes the lens: nothing gets from the sensor past elements[{element}] ({})",
-        losses.join(", ")
-    )]
-    Dark {
-        /// The element on which the rays end that got farthest.
-        element: usize,
-        /// Losses of the rays from the sensor's centre, as percentages by cause and element.
-        losses: Vec<String>,
-    },
-    /// No element has a rim.
-    #[error(
-        "the lens passes light in all directions: give its stop a radius, or a surface a \
-         semi_diameter"
-    )]
-    Unbounded,
-    /// Not one ray gets through an array of lenslets.
-    #[error(
-        "no light gets through the microlens array elements[{element}] to the sensor: it stands outside \
-         of the light of the lens before it, or its lenslets are closed"
-    )]
-    Array {
-        /// The array.
-        element: usize,
-    },
-    /// A sensor without size, or before the lens.
-    #[error("the sensor must lie behind the last element and have a finite size")]
-    Sensor,
-    /// A glass without index.
-    #[error(transparent)]
-    Glass(#[from] GlassError),
-}
 
 /// One sample of the exit pupil.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -132,7 +94,7 @@ pub struct ExitPupil {
     disk: Option<Disk>,
     nodes: Vec<PupilOutline>,
     /// The first mask, which is sampled by what it passes.
-    coded: Option<Coded>,
+    coded: Option<MaskView>,
     /// The lenslets through which light comes; there are no nodes then.
     lenslets: Option<Box<LensletPupil>>,
     index2: f64,
@@ -194,16 +156,16 @@ impl ExitPupil {
         wavelengths: &[f64],
         sensor_z: f64,
         half_size: [f64; 2],
-    ) -> Result<Self, ExitPupilError> {
+    ) -> Result<Self, Refusal> {
         let half_size = DVec2::from(half_size);
         if !half_size.is_finite() || half_size.min_element() < 0.0 || !sensor_z.is_finite() {
-            return Err(ExitPupilError::Sensor);
+            return Err(no_sensor());
         }
         if train.elements.iter().all(|e| !e.clear_radius().is_finite()) {
-            return Err(ExitPupilError::Unbounded);
+            return Err(unbounded());
         }
         if wavelengths.is_empty() {
-            return Err(ExitPupilError::Sensor);
+            return Err(no_sensor());
         }
         let symmetric = train.is_rotationally_symmetric();
         let mut pupil = Self {
@@ -235,7 +197,7 @@ impl ExitPupil {
         let masked = train;
         let train = &without_masks(masked);
         let lenses = wavelengths.iter().map(|&nm| train.at(nm)).collect::<Result<Vec<_>, _>>()?;
-        let Some(first) = lenses.first() else { return Err(ExitPupilError::Sensor) };
+        let Some(first) = lenses.first() else { return Err(no_sensor()) };
         pupil.index2 = first.index_before_sensor().powi(2);
         // A round opening as the only rim is known in closed form.
         pupil.disk = Disk::of(train, &pupil.sensor, half_size);
@@ -243,7 +205,7 @@ impl ExitPupil {
             return Ok(pupil);
         }
         // All others are measured by rays at nodes over the sensor.
-        let lenses = Divided::of(train, lenses);
+        let lenses = LensSplit::of(train, lenses);
         pupil.measure(train, &lenses.measured);
         if pupil.nodes.iter().all(PupilOutline::is_dark) {
             return Err(blocked(train, &train.at(wavelengths[0])?, pupil.sensor.vertex));
@@ -263,7 +225,7 @@ impl ExitPupil {
     #[must_use]
     pub fn aimed_at_mask(mut self, train: &OpticalTrain, wavelengths: &[f64]) -> Self {
         if self.lenslets.is_none() && train.first_array().is_none() {
-            self.coded = Coded::new(train, wavelengths, &self.sensor, self.half_size);
+            self.coded = MaskView::new(train, wavelengths, &self.sensor, self.half_size);
         }
         self
     }
@@ -280,7 +242,7 @@ impl ExitPupil {
         wavelengths: &[f64],
         sensor_z: f64,
         half_size: [f64; 2],
-    ) -> Result<Self, ExitPupilError> {
+    ) -> Result<Self, Refusal> {
         Self::new(&train.rear_part(first), wavelengths, sensor_z, half_size)
     }
 
@@ -421,8 +383,31 @@ impl ExitPupil {
     }
 }
 
-/// The error that names what blocks the light.
-pub fn blocked(train: &OpticalTrain, lens: &MonochromaticTrain, film: DVec3) -> ExitPupilError {
+/// Refusal of a sensor without size, or before the lens.
+fn no_sensor() -> Refusal {
+    Refusal::new("the sensor must lie behind the last element and have a finite size")
+}
+
+/// Refusal of a lens of which no element has a rim.
+#[must_use]
+pub fn unbounded() -> Refusal {
+    Refusal::new("the lens passes light in all directions")
+        .hint("give its stop a radius, or a surface a semi_diameter")
+}
+
+/// Refusal of a microlens array, `element`, whose lenslets no ray gets through.
+#[must_use]
+pub fn dark_array(element: usize) -> Refusal {
+    Refusal::new(format!(
+        "no light gets through the microlens array elements[{element}] to the sensor: it stands outside of the light of \
+         the lens before it, or its lenslets are closed"
+    ))
+}
+
+/// Refusal of a lens that not one ray leaves: it names the element on which the rays end that got farthest, and the
+/// losses of those from `film`, a point of the sensor (mm), by cause and element.
+#[must_use]
+pub fn blocked(train: &OpticalTrain, lens: &MonochromaticTrain, film: DVec3) -> Refusal {
     let mut counts = StatusCounts::new(train.elements.len());
     match SlopeWindow::probe(train, film) {
         Some(mut rays) => {
@@ -437,7 +422,10 @@ pub fn blocked(train: &OpticalTrain, lens: &MonochromaticTrain, film: DVec3) -> 
     }
     // Where the last rays end: nothing gets past it.
     let element = counts.farthest_from_sensor().unwrap_or(train.stop);
-    ExitPupilError::Dark { element, losses: counts.losses() }
+    let losses = counts.losses().join(", ");
+    Refusal::new(format!(
+        "no light passes the lens: nothing gets from the sensor past elements[{element}] ({losses})"
+    ))
 }
 
 #[cfg(test)]
@@ -482,7 +470,7 @@ mod tests {
             *reach *= 0.95;
         }
         let before = pupil.strays(&lens, 0..CHECKS).len();
-        pupil.widen_until_tight(&Divided::of(&train, vec![lens.clone()]));
+        pupil.widen_until_tight(&LensSplit::of(&train, vec![lens.clone()]));
         let after = pupil.strays(&lens, 20 * CHECKS..21 * CHECKS).len();
         assert!(before > 1000 && after * 100 < before, "{before} and then {after}");
     }
@@ -492,12 +480,12 @@ mod tests {
         let closed = preset("double-gauss").with_stop_radius(0.0).unwrap();
         let z = closed.sensor_z(Focus::Infinity).unwrap();
         let error = ExitPupil::new(&closed, &[587.56], z, [18.0, 12.0]).unwrap_err();
-        assert!(matches!(error, ExitPupilError::Dark { element: 5, .. }), "{error}");
-        assert!(error.to_string().contains("vignetted at element 5"), "{error}");
+        assert!(error.why().contains("past elements[5]"), "{error}");
+        assert!(error.why().contains("vignetted at element 5"), "{error}");
         let open =
             LensFile::from_json(r#"{"elements": [{"type": "thin_lens", "focal_length": 9}]}"#);
         let open = open.unwrap().build(&|_: &str| Err(String::new())).unwrap();
         let error = ExitPupil::new(&open, &[587.56], 9.0, [1.0, 1.0]).unwrap_err();
-        assert_eq!(error, ExitPupilError::Unbounded);
+        assert_eq!(error, unbounded());
     }
 }

@@ -1,9 +1,10 @@
 //! The exit pupil of the lens before an array of lenslets, over the array's plane: the extent of its outline
 //! in 16 directions, at nodes.
 
+use etendue_report::Refusal;
 use glam::DVec2;
 
-use super::{ExitPupil, ExitPupilError};
+use super::ExitPupil;
 use crate::element::{Clip, LensRays, RayStatus};
 use crate::train::aim::towards_lens;
 use crate::train::{BehindLenslets, MonochromaticTrain, OpticalTrain, Side};
@@ -82,7 +83,7 @@ impl OutlineTable {
         wavelengths: &[f64],
         pupil: &ExitPupil,
         drift: f64,
-    ) -> Result<Self, ExitPupilError> {
+    ) -> Result<Self, Refusal> {
         let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
         let mut half = DVec2::ZERO;
         for corner in corners {
@@ -108,7 +109,7 @@ impl OutlineTable {
 
     /// The outline from a point of the array (mm); `None` in the dark.
     pub(super) fn at(&self, at: DVec2) -> Option<[f64; NORMALS]> {
-        match self.around(at) {
+        match self.corners(at) {
             Some(corners) => {
                 Some(std::array::from_fn(|k| corners.iter().map(|(e, weight)| e[k] * weight).sum()))
             }
@@ -118,14 +119,14 @@ impl OutlineTable {
 
     /// The middle of that outline.
     pub(super) fn centre_at(&self, at: DVec2) -> Option<DVec2> {
-        match self.around(at) {
+        match self.corners(at) {
             Some(corners) => Some(corners.iter().map(|(e, weight)| centre_of(e) * *weight).sum()),
             None => extent_of(&self.main.outline(at)).map(|extent| centre_of(&extent)),
         }
     }
 
     /// The nodes around a point of the array (mm) and their weights, where there is light at all of them.
-    fn around(&self, at: DVec2) -> Option<[(&[f64; NORMALS], f64); 4]> {
+    fn corners(&self, at: DVec2) -> Option<[(&[f64; NORMALS], f64); 4]> {
         let last = f64::from(NODES - 1);
         let place = (0.5 * (at / self.half + 1.0) * last).clamp(DVec2::ZERO, DVec2::splat(last));
         let low = place.floor().min(DVec2::splat(last - 1.0));

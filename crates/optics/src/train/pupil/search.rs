@@ -28,7 +28,7 @@ pub struct SlopeWindow {
 }
 
 impl SlopeWindow {
-    fn around(centre: DVec2, half: DVec2) -> Self {
+    fn centred(centre: DVec2, half: DVec2) -> Self {
         Self { min: centre - half, max: centre + half }
     }
 
@@ -57,7 +57,7 @@ impl SlopeWindow {
         at: &MonochromaticTrain,
         film: DVec3,
     ) -> Option<Self> {
-        let found = Self::around(centre, half).grown(at, film)?;
+        let found = Self::centred(centre, half).grown(at, film)?;
         Some(found.tightened(at, film))
     }
 
@@ -74,9 +74,9 @@ impl SlopeWindow {
         {
             let half = DVec2::splat(diameter / (film.z - z).abs());
             if half.x > 0.0 && half.is_finite() {
-                guesses.push(Self::around(-film.truncate() / (film.z - z), half));
+                guesses.push(Self::centred(-film.truncate() / (film.z - z), half));
                 if let Some(chief) = train.chief_direction(at, film) {
-                    guesses.push(Self::around(-chief.truncate() / chief.z, half));
+                    guesses.push(Self::centred(-chief.truncate() / chief.z, half));
                 }
             }
         }
@@ -90,7 +90,7 @@ impl SlopeWindow {
         let depth = (film.z - rim.frame.vertex.z).abs().max(1e-3);
         let reach = 1.5 * rim.clear_radius() / depth;
         let centre = (rim.frame.vertex.truncate() - film.truncate()) / depth;
-        (reach > 0.0).then(|| Self::around(centre, DVec2::splat(reach)))
+        (reach > 0.0).then(|| Self::centred(centre, DVec2::splat(reach)))
     }
 
     /// The passing part of the window, looked for in wider windows as long as it touches the edge.
@@ -102,7 +102,7 @@ impl SlopeWindow {
             if !touches {
                 break;
             }
-            outer = Self::around(found.centre(), 2.0 * found.half());
+            outer = Self::centred(found.centre(), 2.0 * found.half());
             found = outer.passing(at, film, grid(at))?;
         }
         Some(found)

@@ -24,12 +24,12 @@ pub(super) struct Stray {
 }
 
 /// The lenses at which outlines are measured, and all others, each in the order in which they were given.
-pub(super) struct Divided {
+pub(super) struct LensSplit {
     pub(super) measured: Vec<MonochromaticTrain>,
     pub(super) checked: Vec<MonochromaticTrain>,
 }
 
-impl Divided {
+impl LensSplit {
     /// Of the lens `train` at some wavelengths: both ends, and those that lie evenly between them in 1/λ². All are
     /// measured where orders of diffraction part them by more than glass does.
     pub(super) fn of(train: &OpticalTrain, lenses: Vec<MonochromaticTrain>) -> Self {
@@ -64,7 +64,7 @@ impl ExitPupil {
     /// measured, and one round together for all that are checked.
     pub(super) fn found_in_round(
         &self,
-        Divided { measured, checked }: &Divided,
+        LensSplit { measured, checked }: &LensSplit,
         round: u32,
         find: impl Fn(&Self, &MonochromaticTrain, std::ops::Range<u32>) -> Vec<Stray>,
     ) -> Vec<Stray> {
@@ -97,7 +97,7 @@ mod tests {
             let train = preset(name);
             let z = train.sensor_z(Focus::Infinity).unwrap();
             let lenses: Vec<_> = wavelengths.iter().map(|&nm| train.at(nm).unwrap()).collect();
-            let divided = Divided::of(&train, lenses.clone());
+            let divided = LensSplit::of(&train, lenses.clone());
             let measured: Vec<f64> =
                 divided.measured.iter().map(MonochromaticTrain::wavelength).collect();
             assert_eq!((measured.len(), divided.checked.len()), (5, 25), "{measured:?}");

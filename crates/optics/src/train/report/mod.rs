@@ -4,6 +4,7 @@
 
 mod table;
 
+use etendue_report::Refusal;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
@@ -13,7 +14,7 @@ use super::analysis::{
     image_circle, spot,
 };
 use super::{FieldSpec, Focus, MonochromaticTrain, OpticalTrain, Paraxial, VignettingSpec};
-use crate::glass::{FRAUNHOFER_C, FRAUNHOFER_D, FRAUNHOFER_F, GlassError};
+use crate::glass::{FRAUNHOFER_C, FRAUNHOFER_D, FRAUNHOFER_F};
 
 /// Field angles of a lens whose image circle has no end (degrees).
 const FIELDS: [f64; 5] = [0.0, 5.0, 10.0, 15.0, 20.0];
@@ -38,30 +39,12 @@ pub struct Inquiry {
     pub focus: Focus,
 }
 
-/// Error of a lens that gives no report.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ReportError {
-    /// A wavelength that is none.
-    #[error("the wavelength {0} nm is none; it must be positive")]
-    Wavelength(f64),
-    /// A field angle out of range.
-    #[error("the field angle {0} degrees must lie between -180 and 180")]
-    Field(f64),
-    /// A focus that was asked for and cannot be had.
-    #[error(transparent)]
-    Focus(#[from] super::FocusError),
-    /// A glass without index.
-    #[error(transparent)]
-    Glass(#[from] GlassError),
-}
-
-/// What is known about a lens.
+/// Report of what is known about a lens.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct LensReport {
-    /// What the lens is called; empty when its file does not say.
+    /// Name of the lens; empty when its file does not say.
     pub name: String,
-    /// Where its numbers come from; empty when its file does not say.
+    /// Source of its numbers; empty when its file does not say.
     pub source: String,
     /// The units of all that follows.
     pub units: ReportUnits,
@@ -96,7 +79,7 @@ pub struct LensReport {
     pub colour: Vec<ColourRow>,
     /// Glasses and filters that are not stated for one of the wavelengths, in sentences.
     pub out_of_range: Vec<String>,
-    /// What else is odd about the lens, in sentences.
+    /// Notes on what else is odd about the lens, in sentences.
     pub notes: Vec<String>,
 }
 
@@ -121,22 +104,22 @@ const UNITS: ReportUnits = ReportUnits {
 /// An element in a report.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ElementRow {
-    /// What it is, as in a lens file.
+    /// Its kind, as in a lens file.
     #[serde(rename = "type")]
     pub kind: &'static str,
     /// z of its vertex (mm).
     pub z: f64,
     /// Its radius of curvature (mm), for a thin lens its focal length; `null` when flat.
     pub radius: Option<f64>,
-    /// How it differs from a centred sphere or a round hole, in words; empty when it does not.
+    /// Its differences from a centred sphere or a round hole, in words; empty when there are none.
     pub shape: String,
     /// To the next element's vertex, behind the last one to the sensor when there is an image (mm).
     pub thickness: Option<f64>,
-    /// What is behind it.
+    /// Name of the medium behind it.
     pub medium: String,
     /// The index of that at the report's wavelength.
     pub index: f64,
-    /// How far from its axis it lets light pass (mm); `null` when unlimited.
+    /// Distance from its axis up to which it lets light pass (mm); `null` when unlimited.
     pub semi_diameter: Option<f64>,
 }
 
@@ -173,7 +156,7 @@ impl LensReport {
     ///
     /// When a wavelength or field is none, a focus asked for cannot be had, or a glass has no index
     /// at a wavelength asked for. A lens without image is no error: `notes` say what is missing.
-    pub fn new(train: &OpticalTrain, inquiry: &Inquiry) -> Result<Self, ReportError> {
+    pub fn new(train: &OpticalTrain, inquiry: &Inquiry) -> Result<Self, Refusal> {
         let at = train.at(train.wavelength())?;
         let paraxial = train.paraxial(train.wavelength())?;
         let wavelengths = inquiry.wavelengths(train)?;
@@ -188,7 +171,8 @@ impl LensReport {
         let sensor_z = match (train.sensor_z(inquiry.focus), inquiry.focus) {
             (Ok(z), _) => Some(z),
             (Err(error), Focus::AsWritten) => {
-                notes.push(format!("no spots, distortion or illumination: {error}"));
+                let why = crate::sentence(&error);
+                notes.push(format!("no spots, distortion or illumination: {why}"));
                 None
             }
             (Err(error), _) => return Err(error.into()),
@@ -219,7 +203,7 @@ impl LensReport {
             notes,
         };
         if let Some(z) = sensor_z {
-            report.look_at_fields(train, &at, (&inquiry.stated, z));
+            report.look_at_fields(train, &at, &inquiry.stated, z);
         }
         report.note_missing_spots();
         Ok(report)
@@ -229,7 +213,8 @@ impl LensReport {
         &mut self,
         train: &OpticalTrain,
         at: &MonochromaticTrain,
-        (stated, z): (&[FieldSpec], f64),
+        stated: &[FieldSpec],
+        z: f64,
     ) {
         for &field in &self.fields {
             let whole = spot(train, at, &FieldSpec::at(field), z);
@@ -270,7 +255,7 @@ impl LensReport {
 }
 
 impl Inquiry {
-    fn wavelengths(&self, train: &OpticalTrain) -> Result<Vec<f64>, ReportError> {
+    fn wavelengths(&self, train: &OpticalTrain) -> Result<Vec<f64>, Refusal> {
         let design = train.wavelength();
         let Some(wavelengths) = &self.wavelengths else {
             let has_index = |nm: f64| train.media().iter().all(|glass| glass.index(nm).is_ok());
@@ -283,12 +268,14 @@ impl Inquiry {
             return Ok(lines);
         };
         match wavelengths.iter().find(|nm| !(**nm > 0.0 && nm.is_finite())) {
-            Some(&wrong) => Err(ReportError::Wavelength(wrong)),
+            Some(&wrong) => {
+                Err(format!("the wavelength {wrong} nm is none; it must be positive").into())
+            }
             None => Ok(wavelengths.clone()),
         }
     }
 
-    fn fields(&self, half_field: Option<f64>) -> Result<Vec<f64>, ReportError> {
+    fn fields(&self, half_field: Option<f64>) -> Result<Vec<f64>, Refusal> {
         let Some(fields) = &self.fields else {
             return Ok(match half_field {
                 Some(half) => SHARES.map(|share| rounded(share * half)).to_vec(),
@@ -296,7 +283,10 @@ impl Inquiry {
             });
         };
         match fields.iter().find(|field| field.is_nan() || field.abs() >= WIDEST) {
-            Some(&wrong) => Err(ReportError::Field(wrong)),
+            Some(&wrong) => {
+                let why = format!("the field angle {wrong} degrees must lie between -180 and 180");
+                Err(why.into())
+            }
             None => Ok(fields.clone()),
         }
     }
@@ -323,7 +313,7 @@ fn colour(
     wavelengths: &[f64],
     fields: &[f64],
     sensor_z: Option<f64>,
-) -> Result<Vec<ColourRow>, ReportError> {
+) -> Result<Vec<ColourRow>, Refusal> {
     let (seen, z) = match sensor_z {
         Some(z) => (fields, z),
         None => (&[][..], 0.0),

@@ -30,7 +30,7 @@ pub(super) struct Axes {
     rotation: DMat3,
 }
 
-/// Where a surface stands, as a lens file says it.
+/// Place of a surface, as a lens file says it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SheetPlace {
     pub(super) z: f64,

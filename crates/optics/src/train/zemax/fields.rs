@@ -17,13 +17,13 @@ pub(super) struct Fields {
     /// 0 for angles, 1 for heights of the object, 2 and 3 for those of the paraxial and the real image.
     pub(super) kind: usize,
     pub(super) count: Option<usize>,
-    /// How many wavelengths are in use, which stands in the same line.
+    /// Number of wavelengths in use, which stands in the same line.
     pub(super) wavelengths: Option<usize>,
     pub(super) x: Vec<f64>,
     pub(super) y: Vec<f64>,
-    /// What each of them weighs.
+    /// Weight of each of them.
     pub(super) weights: Vec<f64>,
-    /// What vignetting leaves of their pupils: VDX, VDY, VCX, VCY, VAN.
+    /// Vignetting of their pupils: VDX, VDY, VCX, VCY, VAN.
     pub(super) vignetting: [Vec<f64>; 5],
 }
 
@@ -123,7 +123,7 @@ fn angle_of_object(
 fn angle_of_image(train: &OpticalTrain, height: f64, real: bool) -> Result<f64, String> {
     const NEAR: f64 = 1e-6;
     let dark = || format!("no chief ray arrives at an image height of {height} mm");
-    let sensor = train.sensor_z(Focus::AsWritten).map_err(|error| error.to_string())?;
+    let sensor = train.sensor_z(Focus::AsWritten).map_err(|error| crate::sentence(&error))?;
     let lens = train.at(train.wavelength()).map_err(|error| error.to_string())?;
     let lands = |slope: f64| chief_height(train, &lens, slope.atan().to_degrees(), sensor);
     let scale = lands(NEAR).filter(|scale| *scale != 0.0).ok_or_else(dark)? / NEAR;

@@ -23,7 +23,7 @@ const INDEX_MISSED: f64 = 1e-4;
 const NOT_TAKEN: [&str; 4] = ["transform", "zernike", "aspheric_coefficients", "lookuptable"];
 
 /// Keys of a file that are read, or that say what it is for.
-const TOLD: [&str; 6] = ["name", "description", "type", "surfaces", "surfaceArray", "units"];
+const KNOWN: [&str; 6] = ["name", "description", "type", "surfaces", "surfaceArray", "units"];
 
 impl ZemaxSheet {
     /// Reads the text of a lens of ISET.
@@ -37,7 +37,7 @@ impl ZemaxSheet {
             return Err(ZemaxError::new(0, why));
         }
         if value.get("microlens").is_some_and(|lenslets| !lenslets.is_null()) {
-            let why = "microlens: lenslets are not imported; take the key out, and put them in front of the sensor of the \
+            let why = "microlens: lenslets are not imported\nhint: take the key out, and put them in front of the sensor of the \
                        scene (\"type\": \"light_field\")";
             return Err(ZemaxError::new(0, why));
         }
@@ -57,7 +57,7 @@ impl ZemaxSheet {
             narrow(&mut interfaces, &value);
         }
         for other in value.as_object().into_iter().flatten().map(|(key, _)| key) {
-            if !TOLD.contains(&other.as_str()) {
+            if !KNOWN.contains(&other.as_str()) {
                 sheet.leave_out(other, 0);
             }
         }
@@ -79,7 +79,7 @@ fn of_table(line: usize, surface: &Value) -> Result<Interface, String> {
             && surface[key] == serde_json::json!([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]]);
         if surface.get(key).is_some_and(|value| !value.is_null()) && !is_plain {
             return Err(format!(
-                "{key}: has no counterpart here; take it out, or write the surface into a lens file"
+                "{key}: has no counterpart here\nhint: take it out, or write the surface into a lens file"
             ));
         }
     }
@@ -87,7 +87,7 @@ fn of_table(line: usize, surface: &Value) -> Result<Interface, String> {
     let [semi_x, semi_y] = pair(surface, "semi_aperture")?.unwrap_or([0.0; 2]);
     if semi_x != semi_y {
         return Err(
-            "semi_aperture: rims that are no circles have no counterpart here; give one number"
+            "semi_aperture: rims that are no circles have no counterpart here\nhint: give one number"
                 .to_owned(),
         );
     }

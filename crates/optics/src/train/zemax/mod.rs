@@ -189,7 +189,7 @@ impl ZemaxLens {
         file.weights = weights;
         // What only the built train tells: the stop, field angles, and whether the focal length is
         // as stated.
-        let train = open_stop(&mut file, (sheet, glasses), object_z, &mut notes)?;
+        let train = open_stop(&mut file, sheet, glasses, object_z, &mut notes)?;
         let (fields, left_out) = sheet.fields.angles(sheet.unit, &train, object_z);
         notes.extend(left_out);
         file.fields = fields;

@@ -22,9 +22,9 @@ use super::optiland_system::{put_aperture, put_fields, put_wavelengths};
 use super::oslo::add_placed;
 use super::row::{Parameter, SheetGlass, SheetOpening, SheetRow, SurfaceShape};
 use super::sheet::ZemaxSheet;
-use crate::analysis::ZernikeOrder;
 use crate::element::{FreeformSpec, PatternSpec, PhaseSpec, SagSpec};
 use crate::glass::{GlassSpec, Makers};
+use crate::zernike::ZernikeOrder;
 use etendue_geometry::units::Millimetres;
 
 /// The most surfaces.

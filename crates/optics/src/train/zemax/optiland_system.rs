@@ -1,4 +1,4 @@
-//! What a lens of optiland says of its whole: wavelengths, aperture and fields. Its text is JSON as Python writes it, with
+//! Values of a whole lens of optiland: wavelengths, aperture and fields. Its text is JSON as Python writes it, with
 //! words for infinite numbers and for none.
 
 use serde_json::Value;

@@ -6,11 +6,11 @@ use etendue_geometry::units::{Degrees, Millimetres};
 
 use super::row::{Parameter, SheetOpening, SheetRow, SurfaceShape};
 use super::{Importer, ZemaxError};
-use crate::analysis::ZernikeOrder;
 use crate::element::{
     AnnularSpec, ApertureSpec, BiconicSpec, BoxSpec, CircularSpec, FreeformSpec, MirrorSpec,
     PartSpec, PatternSpec, PhaseSpec, SagSpec, SpiderSpec, SurfaceSpec, ThinLensSpec,
 };
+use crate::zernike::ZernikeOrder;
 
 impl Importer<'_> {
     /// Converts a row to a part; `None` for a plane between air and air that does nothing.

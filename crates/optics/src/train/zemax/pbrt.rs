@@ -92,8 +92,7 @@ impl ZemaxSheet {
     /// Adds the rows of a table, between an object at infinity and the film.
     pub(super) fn add_interfaces(&mut self, interfaces: &[Interface]) -> Result<(), ZemaxError> {
         let Some(last) = interfaces.last() else {
-            let why =
-                "the table has no surface; it needs rows of radius, thickness, index and aperture";
+            let why = "the table has no surface\nhint: give it rows of radius, thickness, index and aperture";
             return Err(ZemaxError::new(self.last_line, why));
         };
         if last.thickness != 0.0 {
@@ -110,13 +109,13 @@ impl ZemaxSheet {
             let mut row = interface.row()?;
             if interface.is_stop {
                 if in_glass || interface.glass.is_some() {
-                    let why = "the stop (radius 0) bends no light, and a glass touches it: give it an index of 0 or 1 and \
-                               air in front, or write a plane as a radius of 1e9";
+                    let why = "the stop (radius 0) bends no light, and a glass touches it\nhint: give it an index of 0 or 1 \
+                               and air in front, or write a plane as a radius of 1e9";
                     return Err(ZemaxError::new(interface.line, why));
                 }
                 if has_stop {
-                    let why = "a second stop (radius 0): a lens has one; write another diaphragm as a radius of 1e9 with \
-                               its diameter";
+                    let why = "a second stop (radius 0): a lens has one\nhint: write another diaphragm as a radius of \
+                               1e9 with its diameter";
                     return Err(ZemaxError::new(interface.line, why));
                 }
                 (has_stop, row.stop) = (true, true);

@@ -249,11 +249,11 @@ impl SheetRow {
     /// Radius from the axis within which light passes, in the file's unit.
     pub(super) fn semi_diameter(&self) -> Option<f64> {
         // One that stands beside the axis is a sheet of its own, and rims of rectangles are corners.
-        let is_beside = self.aperture_decentre != [0.0; 2];
+        let is_decentred = self.aperture_decentre != [0.0; 2];
         match self.clear {
-            Some(_) if is_beside => None,
+            Some(_) if is_decentred => None,
             Some(clear) => Some(clear),
-            None if is_beside || self.has_corners() => None,
+            None if is_decentred || self.has_corners() => None,
             None => self.semi_diameter,
         }
     }

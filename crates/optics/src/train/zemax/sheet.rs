@@ -18,7 +18,7 @@ const MOST_SURFACES: usize = crate::train::MOST_ELEMENTS;
 const MOST_WAVELENGTHS: usize = 24;
 
 /// The most surfaces of which a note of one kind is made.
-const MOST_TOLD: usize = 5;
+const MOST_NOTED: usize = 5;
 
 /// A whole file.
 #[derive(Debug, Default)]
@@ -46,7 +46,7 @@ pub(super) struct ZemaxSheet {
     pub(super) wavelength_weights: Vec<f64>,
     /// Sentences on what the file says, for its user.
     pub(super) notes: Vec<String>,
-    pub(super) ignored: BTreeMap<String, Ignored>,
+    pub(super) ignored: BTreeMap<String, IgnoredCommand>,
 }
 
 /// Width of the beam.
@@ -60,7 +60,7 @@ pub(super) enum Aperture {
 }
 
 #[derive(Debug)]
-pub(super) struct Ignored {
+pub(super) struct IgnoredCommand {
     first: usize,
     times: usize,
 }
@@ -248,8 +248,10 @@ impl ZemaxSheet {
 
     /// Counts a command that is left out.
     pub(super) fn leave_out(&mut self, command: &str, line: usize) {
-        let ignored =
-            self.ignored.entry(command.to_owned()).or_insert(Ignored { first: line, times: 0 });
+        let ignored = self
+            .ignored
+            .entry(command.to_owned())
+            .or_insert(IgnoredCommand { first: line, times: 0 });
         ignored.times += 1;
     }
 
@@ -339,7 +341,7 @@ impl ZemaxSheet {
                 "line {line}: {which} of this type of surface is left out; it is read as if it were 0"
             ))
         };
-        self.rows.iter().filter_map(unread).take(MOST_TOLD).collect()
+        self.rows.iter().filter_map(unread).take(MOST_NOTED).collect()
     }
 
     pub(super) fn what_is_left_out(&self) -> Vec<String> {
@@ -361,7 +363,7 @@ impl ZemaxSheet {
                 self.wavelengths.len()
             ));
         }
-        let mut left_out: Vec<(&String, &Ignored)> = self.ignored.iter().collect();
+        let mut left_out: Vec<(&String, &IgnoredCommand)> = self.ignored.iter().collect();
         left_out.sort_by_key(|(_, ignored)| ignored.first);
         let words: Vec<String> = left_out
             .iter()

@@ -23,7 +23,8 @@ fn with_entrance_pupil(
 /// Sets the stop by the system's aperture, and gives the lens.
 pub(super) fn open_stop(
     file: &mut LensFile,
-    (sheet, glasses): (&ZemaxSheet, &[AgfCatalogue]),
+    sheet: &ZemaxSheet,
+    glasses: &[AgfCatalogue],
     object_z: Option<f64>,
     notes: &mut Vec<String>,
 ) -> Result<OpticalTrain, ZemaxError> {

@@ -2,12 +2,12 @@
 
 use std::fmt::Write;
 
-use crate::analysis::ZernikeOrder;
 use crate::element::{
     ApertureSpec, BoxSpec, ElementSpec, FreeformSpec, PartSpec, PatternSpec, PhaseSpec, SagSpec,
 };
 use crate::glass::{FRAUNHOFER_D, GlassSpec};
 use crate::train::{FieldSpec, LensFile};
+use crate::zernike::ZernikeOrder;
 use etendue_geometry::units::Millimetres;
 
 /// The lines of one surface.

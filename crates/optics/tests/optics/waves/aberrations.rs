@@ -150,7 +150,7 @@ fn foci_of_an_ideal_lens_lie_in_the_image_and_no_ray_from_behind_has_any() {
     }
     let corner = ObjectPoint::field(10.0);
     let efl = ideal.paraxial(550.0).unwrap().efl.unwrap();
-    let grid = distortion_grid(&ideal, &at, &corner, (image, efl), 5);
+    let grid = distortion_grid(&ideal, &at, &corner, image, efl, 5);
     assert_eq!(grid.len(), 25);
     for point in &grid {
         assert!(point.percent < 1e-7, "{point:?}");

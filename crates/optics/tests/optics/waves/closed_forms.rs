@@ -9,10 +9,11 @@ use etendue_optics::analysis::spread::{WeightedFields, strehl};
 use etendue_optics::analysis::transfer::{
     geometric_modulation, geometric_modulations, modulation_at,
 };
-use etendue_optics::analysis::zernike::{ZernikeFit, ZernikeOrder};
+use etendue_optics::analysis::zernike::ZernikeFit;
 use etendue_optics::analysis::{
-    AnalysisError, CellGrid, CellSpread, PointSpread, PupilField, ReferenceSphere, Transfer,
+    CellGrid, CellSpread, PointSpread, PupilField, ReferenceSphere, Transfer,
 };
+use etendue_optics::zernike::ZernikeOrder;
 use glam::DVec2;
 
 /// Wavelength (mm and nm) and numerical aperture.
@@ -248,7 +249,8 @@ fn wavelengths_add_by_their_weights_and_weights_of_nothing_are_refused() {
     }
     for weights in [&[0.0][..], &[-1.0], &[f64::NAN], &[1.0, 1.0]] {
         let refused = WeightedFields::new(vec![green.clone()], weights);
-        assert!(matches!(refused, Err(AnalysisError::Weights(_))), "{weights:?}");
+        let refused = refused.unwrap_err().to_string();
+        assert!(refused.contains("not all of them 0"), "{weights:?}: {refused}");
     }
 }
 
@@ -275,8 +277,9 @@ fn wide_cells_have_the_mean_of_airys_pattern() {
     for (row, column) in [(0, 0), (0, 1), (1, 1), (2, 0), (0, 3), (3, 2)] {
         let [x, y] = [column, row].map(|k| k as f64 * cell);
         let own = mean(x, y);
-        let around = mean(x + cell, y) + mean(x - cell, y) + mean(x, y + cell) + mean(x, y - cell);
-        let expected = (own - (around - 4.0 * own) / 24.0).max(0.0);
+        let neighbours =
+            mean(x + cell, y) + mean(x - cell, y) + mean(x, y + cell) + mean(x, y - cell);
+        let expected = (own - (neighbours - 4.0 * own) / 24.0).max(0.0);
         let share = spread.shares[(spread.half + row) * side + spread.half + column];
         // The rim on cells of the pupil, and what the ring beyond 40 λN takes for good.
         assert!((share - expected).abs() < 1e-3 * peak, "{row} {column}: {share} {expected}");

@@ -197,7 +197,7 @@ fn light_within_a_body_is_absorbed_on_its_way_to_the_wall() {
     }
 }
 
-/// What stands between a wall of radiance 1 and its viewer, and between a point and a floor: sheets that are partly there,
+/// Surfaces between a wall of radiance 1 and its viewer, and between a point and a floor: sheets that are partly there,
 /// which each take their share of what is left, and bodies of the index of air, which tint at both boundaries.
 #[test]
 fn surfaces_that_light_passes_take_their_shares_one_by_one() {

@@ -9,8 +9,9 @@ use etendue_geometry::{self as geometry, Between, Joint};
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
+use super::GltfReader;
 use super::document::GltfNode;
-use super::{GltfReader, damaged};
+use super::fault::damaged;
 use crate::file::{ScenePath, read_value};
 use crate::import::error::{Note, NoteKind};
 use crate::import::{Import, Play, Refusal};
@@ -23,7 +24,7 @@ struct Animation {
     samplers: Vec<KeySampler>,
 }
 
-/// Which property of which node a sampler moves.
+/// Property of a node that a sampler moves.
 #[derive(Debug, Deserialize)]
 struct KeyChannel {
     sampler: usize,
@@ -74,7 +75,7 @@ struct KeySampler {
 }
 
 /// Effect of a channel on a node.
-pub(super) struct Moved {
+pub(super) struct NodeChange {
     node: usize,
     property: KeyProperty,
     values: Vec<f64>,
@@ -102,7 +103,7 @@ pub(super) fn moved(
     reader: &GltfReader<'_>,
     play: &Play,
     import: &mut Import,
-) -> Result<Vec<Moved>, Refusal> {
+) -> Result<Vec<NodeChange>, Refusal> {
     let (number, animation) = chosen(reader, play)?;
     let mut moved = Vec::new();
     for (k, channel) in animation.channels.iter().enumerate() {
@@ -123,14 +124,18 @@ pub(super) fn moved(
         };
         let place = format!("animations[{number}].samplers[{}]", channel.sampler);
         let track = PropertyTrack::read(reader, sampler, property, &place)?;
-        moved.push(Moved { node, property, values: track.at(play.time), track });
+        moved.push(NodeChange { node, property, values: track.at(play.time), track });
     }
     Ok(moved)
 }
 
 /// Puts what moved in place of what the nodes have at rest.
-pub(super) fn apply(file: &Path, moved: &[Moved], nodes: &mut [GltfNode]) -> Result<(), Refusal> {
-    for Moved { node: index, property, values, .. } in moved {
+pub(super) fn apply(
+    file: &Path,
+    moved: &[NodeChange],
+    nodes: &mut [GltfNode],
+) -> Result<(), Refusal> {
+    for NodeChange { node: index, property, values, .. } in moved {
         let node = &mut nodes[*index];
         if node.matrix.is_some() && *property != KeyProperty::Weights {
             let reason = "it has a matrix and is animated, which moves translation, rotation and scale; \
@@ -159,12 +164,12 @@ pub(super) struct Playing {
 /// Collects what goes on from the moment `time` (s), of nodes that stand as they do then.
 pub(super) fn playing(
     file: &Path,
-    moved: Vec<Moved>,
+    moved: Vec<NodeChange>,
     time: f64,
     nodes: &[GltfNode],
 ) -> Result<Playing, Refusal> {
     let mut playing = Playing::default();
-    for Moved { node: index, property, track, .. } in
+    for NodeChange { node: index, property, track, .. } in
         moved.into_iter().filter(|it| it.track.changes())
     {
         if property == KeyProperty::Weights {

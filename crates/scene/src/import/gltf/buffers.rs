@@ -11,9 +11,10 @@ use base64::{DecodeError, Engine as _};
 use bytemuck::AnyBitPattern;
 use gltf::json;
 
+use super::GltfReader;
 use super::document::GltfDocument;
+use super::fault::{damaged, first_version};
 use super::meshopt::MeshoptView;
-use super::{GltfReader, damaged};
 use crate::import::files::Files;
 use crate::import::text::without_mark;
 use crate::import::{Refusal, refuse_other_kind};
@@ -324,7 +325,7 @@ pub(super) fn open<'a>(path: &Path, map: &'a Arc<MappedFile>) -> Result<Containe
         ));
     };
     if version == 1 {
-        return Err(broken(super::first_version()));
+        return Err(broken(first_version()));
     }
     if version != 2 {
         return Err(broken(format!("version {version} instead of 2\nhint: export it as glTF 2.0")));

@@ -264,7 +264,8 @@ impl Skin {
         reader: &GltfReader<'_>,
         index: usize,
         user: usize,
-        (pose, chains): (&NodePoses, &Chains<'_>),
+        pose: &NodePoses,
+        chains: &Chains<'_>,
     ) -> Result<Self, Refusal> {
         let document = reader.document;
         let Some(skin) = document.skins.get(index) else {

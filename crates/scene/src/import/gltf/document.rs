@@ -7,6 +7,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
+use super::fault::{damaged, first_version};
 use crate::file::{JsonDocument as JsonText, JsonFault, Place, read_value};
 use crate::import::Refusal;
 use crate::import::error::wrong_text;
@@ -142,9 +143,9 @@ fn require_version_2(path: &Path, document: &Map<String, Value>) -> Result<(), R
     let is_first = ["nodes", "meshes", "accessors"].into_iter().any(is_named);
     let why = match written("minVersion").or(written("version")) {
         Some(Value::String(version)) if version == "2.0" => return Ok(()),
-        Some(Value::String(version)) if version.starts_with("1.") => super::first_version(),
-        Some(Value::Number(version)) if version.as_f64() == Some(1.0) => super::first_version(),
-        None if is_first => super::first_version(),
+        Some(Value::String(version)) if version.starts_with("1.") => first_version(),
+        Some(Value::Number(version)) if version.as_f64() == Some(1.0) => first_version(),
+        None if is_first => first_version(),
         Some(Value::String(other)) => {
             format!("glTF {other} is not supported\nhint: export it as glTF 2.0")
         }
@@ -153,12 +154,12 @@ fn require_version_2(path: &Path, document: &Map<String, Value>) -> Result<(), R
         }
         None => "missing; this is not a glTF 2.0 file, or it is damaged".to_owned(),
     };
-    Err(super::damaged(path, "asset.version", why))
+    Err(damaged(path, "asset.version", why))
 }
 
 /// `value` as a `T`, or where in the document it is not one.
 fn typed<T: DeserializeOwned>(path: &Path, value: &Value) -> Result<T, Refusal> {
-    read_value(value).map_err(|(place, why)| super::damaged(path, place, why))
+    read_value(value).map_err(|(place, why)| damaged(path, place, why))
 }
 
 /// The error of a text that is no JSON object.
@@ -247,7 +248,7 @@ fn refuse_arrays(value: &Value, at: &str) -> Result<(), String> {
 }
 
 fn not_an_object(path: &Path, place: String) -> Refusal {
-    super::damaged(path, place, "expected an object, found an array\nhint: export the file again")
+    damaged(path, place, "expected an object, found an array\nhint: export the file again")
 }
 
 /// At most 80 characters of a line around `column`.

@@ -30,7 +30,7 @@ pub(super) const NAME: &str = "KHR_draco_mesh_compression";
 const PER_FACE: u64 = 256;
 const PER_POINT: u64 = 128;
 
-/// What a primitive says of its compressed form.
+/// Compressed form of a primitive.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct DracoPrimitive {

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::animation::Playing;
 use super::document::GltfDocument;
+use super::fault::{absent, damaged};
 use super::pose::NodePoses;
-use super::{absent, damaged};
 use crate::import::error::Note;
 use crate::import::{CameraProjection, ImportedCamera, ImportedLight, Refusal};
 use etendue_geometry::Transform;

@@ -16,7 +16,8 @@ use etendue_geometry::{Link, Placement, Transform, Vertices};
 /// Places the primitives of each mesh at each of its nodes, and at each instance of those.
 pub(super) fn place(
     reader: &GltfReader<'_>,
-    (scene, chains): (&SceneNodes, &Chains<'_>),
+    scene: &SceneNodes,
+    chains: &Chains<'_>,
     shapes: &ShapeSet,
     import: &mut Import,
 ) -> Result<(), Refusal> {

@@ -12,8 +12,8 @@ use etendue_tracer::{Light, LightKind};
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::damaged;
 use super::document::{GltfDocument, GltfNode};
+use super::fault::damaged;
 use crate::file::{ScenePath, read_value};
 use crate::import::Refusal;
 use crate::import::error::{self, Note, NoteKind};

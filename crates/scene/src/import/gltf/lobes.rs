@@ -74,7 +74,7 @@ pub(super) fn add(
 
 const GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
 
-/// What the extension says of a material.
+/// The extension's part of a material.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Glossiness {

@@ -97,8 +97,7 @@ fn read(
         };
         read.emission = emission(images, judge, material, import)?;
         // Who looks out of a body of glass sees the backs of its surfaces.
-        let is_body = matches!(read.scattering, Scattering::Dielectric(_));
-        read.one_sided = !material.double_sided && !is_body;
+        read.one_sided = !material.double_sided && !read.scattering.is_body();
         read.normal_map = match &material.normal_texture {
             Some(normal) => {
                 let moved = normal.extensions.as_ref().and_then(|e| e.others.get(TRANSFORM));

@@ -25,7 +25,7 @@ pub(super) struct MeshoptView<'a> {
     written: &'a Value,
 }
 
-/// Where the stream of a compressed view is, and what it holds.
+/// Place and content of the stream of a compressed view.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Stream {

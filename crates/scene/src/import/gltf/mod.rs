@@ -16,6 +16,7 @@ mod deform;
 mod document;
 mod draco;
 mod extensions;
+mod fault;
 mod hierarchy;
 mod images;
 mod instances;
@@ -40,6 +41,7 @@ use buffers::Buffers;
 use chains::Chains;
 use document::GltfDocument;
 use draco::DracoMesh;
+use fault::{absent, damaged};
 
 /// State that the parts of the reader share.
 pub(super) struct GltfReader<'a> {
@@ -66,22 +68,6 @@ impl GltfReader<'_> {
     fn absent(&self, from: impl Display, what: &str, index: usize, count: usize) -> Refusal {
         absent(self.file, from, what, index, count)
     }
-}
-
-/// Advice on a file of glTF's first version.
-fn first_version() -> String {
-    "this is glTF 1.0, which is not supported\nhint: convert it: npx gltf-pipeline -i OLD.gltf -o NEW.glb, or \
-     export it as glTF 2.0"
-        .to_owned()
-}
-
-fn absent(file: &Path, from: impl Display, what: &str, index: usize, count: usize) -> Refusal {
-    let reason = format!("there is no {what} {index}; the file has {count}\nhint: export it again");
-    damaged(file, from, reason)
-}
-
-fn damaged(file: &Path, place: impl Display, why: impl Into<Refusal>) -> Refusal {
-    error::damaged(file, place, why)
 }
 
 /// Reads the glTF or GLB file at `path`.
@@ -134,10 +120,10 @@ pub(super) fn import(
         playing: &playing,
     };
     let chains = Chains::new(&reader);
-    let shapes = primitive::load(&reader, (&scene, &chains), &mut import)?;
+    let shapes = primitive::load(&reader, &scene, &chains, &mut import)?;
     material::load(&reader, &mut import)?;
     chains.note(&scene.pose, &mut import);
-    instances::place(&reader, (&scene, &chains), &shapes, &mut import)?;
+    instances::place(&reader, &scene, &chains, &shapes, &mut import)?;
     import.cameras = scene.cameras;
     if wanted.light {
         let moves = |(node, light)| ImportedLight { links: chains.of(node), ..light };

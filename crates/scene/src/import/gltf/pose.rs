@@ -6,7 +6,7 @@ use etendue_geometry::Transform;
 use etendue_geometry::glam::{DMat3, DQuat, DVec3};
 
 use super::document::{GltfDocument, GltfNode};
-use super::{absent, damaged};
+use super::fault::{absent, damaged};
 use crate::import::Refusal;
 
 /// The nodes of a document with each of them somewhere.

@@ -15,13 +15,13 @@ use super::chains::Chains;
 use super::deform::{PrimitiveCorners, Skin};
 use super::hierarchy::{NodeShape, SceneNodes};
 use super::part::PrimitiveReader;
-use crate::import::admit::{Admitted, MeshCandidate, admit, cost};
+use crate::import::admit::{AdmittedMesh, MeshCandidate, admit, cost};
 use crate::import::deformer::Deformer;
 use crate::import::error::{self, Note, NoteKind};
 use crate::import::{Import, Refusal};
 
 /// A primitive that became a mesh.
-pub(super) struct Loaded {
+pub(super) struct LoadedPrimitive {
     /// Index into the import's meshes.
     pub mesh: u32,
     /// Index into the import's materials.
@@ -35,7 +35,7 @@ pub(super) struct ShapeSet {
     /// In order.
     shapes: Vec<NodeShape>,
     /// For each the primitives that have triangles.
-    primitives: Vec<Vec<Loaded>>,
+    primitives: Vec<Vec<LoadedPrimitive>>,
 }
 
 impl ShapeSet {
@@ -51,27 +51,27 @@ impl ShapeSet {
     }
 
     /// The primitives of `shape` that have triangles.
-    pub(super) fn primitives(&self, shape: &NodeShape) -> &[Loaded] {
+    pub(super) fn primitives(&self, shape: &NodeShape) -> &[LoadedPrimitive] {
         self.shapes.binary_search(shape).map_or(&[], |found| &self.primitives[found])
     }
 }
 
 /// A primitive on its way in.
-struct Read {
+struct ReadPrimitive {
     skinned: bool,
-    admitted: Admitted,
+    admitted: AdmittedMesh,
     deformer: Option<Deformer>,
     copied: u64,
     mapped: u64,
     notes: Vec<Note>,
 }
 
-impl Read {
+impl ReadPrimitive {
     /// A mesh of nothing, of which there are `notes`.
     fn empty(name: String, notes: Vec<Note>) -> Self {
         let positions = Positions::F32(Vertices::from_arrays(&[]));
         let mesh = Mesh::new(name, positions, Vec::new().into());
-        let admitted = Admitted { mesh, dropped: 0, notes: Vec::new() };
+        let admitted = AdmittedMesh { mesh, dropped: 0, notes: Vec::new() };
         Self { skinned: false, admitted, deformer: None, copied: 0, mapped: 0, notes }
     }
 }
@@ -79,7 +79,8 @@ impl Read {
 /// Loads the meshes that `scene` shows. Materials are numbered as in the document.
 pub(super) fn load(
     reader: &GltfReader<'_>,
-    (scene, chains): (&SceneNodes, &Chains<'_>),
+    scene: &SceneNodes,
+    chains: &Chains<'_>,
     import: &mut Import,
 ) -> Result<ShapeSet, Refusal> {
     let meshes = &reader.document.root.meshes;
@@ -92,7 +93,7 @@ pub(super) fn load(
         *shown = true;
     }
     note_unused(&shown, &mut import.notes);
-    let skins = skins(reader, (scene, chains))?;
+    let skins = skins(reader, scene, chains)?;
     let mut shapes = ShapeSet::of(scene);
     let wanted: Vec<(usize, usize, &Primitive)> = (shapes.shapes.iter().enumerate())
         .flat_map(|(s, shape)| {
@@ -100,7 +101,7 @@ pub(super) fn load(
             primitives.map(move |(number, primitive)| (s, number, primitive))
         })
         .collect();
-    let read: Vec<Option<Read>> = wanted
+    let read: Vec<Option<ReadPrimitive>> = wanted
         .par_iter()
         .map(|&(s, number, primitive)| {
             let shape = &shapes.shapes[s];
@@ -117,7 +118,7 @@ pub(super) fn load(
         let material = super::material::number(reader, primitive, place)?;
         let skinned = read.skinned;
         let mesh = take(read, import, reader)?;
-        shapes.primitives[s].push(Loaded { mesh, material, skinned });
+        shapes.primitives[s].push(LoadedPrimitive { mesh, material, skinned });
     }
     Ok(shapes)
 }
@@ -125,21 +126,22 @@ pub(super) fn load(
 /// The skins that nodes of `scene` wear.
 fn skins(
     reader: &GltfReader<'_>,
-    (scene, chains): (&SceneNodes, &Chains<'_>),
+    scene: &SceneNodes,
+    chains: &Chains<'_>,
 ) -> Result<BTreeMap<usize, Skin>, Refusal> {
     let mut skins = BTreeMap::new();
     for placed in &scene.meshes {
         if let Some(index) = placed.shape.skin
             && let Entry::Vacant(entry) = skins.entry(index)
         {
-            entry.insert(Skin::read(reader, index, placed.node, (&scene.pose, chains))?);
+            entry.insert(Skin::read(reader, index, placed.node, &scene.pose, chains)?);
         }
     }
     Ok(skins)
 }
 
 /// Adds a mesh to `import`; its index.
-fn take(read: Read, import: &mut Import, reader: &GltfReader<'_>) -> Result<u32, Refusal> {
+fn take(read: ReadPrimitive, import: &mut Import, reader: &GltfReader<'_>) -> Result<u32, Refusal> {
     let index = u32::try_from(import.meshes.len())
         .map_err(|_| reader.damaged("meshes", "there are more than 32 bits can count"))?;
     import.stats.bytes_copied += read.copied;
@@ -183,7 +185,7 @@ fn read(
     skin: Option<&Skin>,
     number: usize,
     primitive: &Primitive,
-) -> Result<Option<Read>, Refusal> {
+) -> Result<Option<ReadPrimitive>, Refusal> {
     let name = reader.document.root.meshes[shape.mesh].name.clone().unwrap_or_default();
     let place = place(reader, shape.mesh, number);
     // Each primitive has the mesh's name for itself, and another one in messages.
@@ -200,7 +202,7 @@ fn read(
     let mut part = PrimitiveReader::new(reader, primitive, draco, place);
     let Some(positions) = part.attribute::<3>(&Semantic::Positions, 0.0)? else {
         part.note(NoteKind::Irregular, "a primitive without positions is left out");
-        return Ok(Some(Read::empty(name, part.notes)));
+        return Ok(Some(ReadPrimitive::empty(name, part.notes)));
     };
     let triangles = part.triangles(mode, positions.len())?;
     let wanted = reader.wanted;
@@ -242,7 +244,7 @@ fn read(
         tangents,
     };
     let admitted = admit(candidate, reader.file, reader.options)?;
-    Ok(Some(Read { skinned, admitted, deformer, copied, mapped, notes: part.notes }))
+    Ok(Some(ReadPrimitive { skinned, admitted, deformer, copied, mapped, notes: part.notes }))
 }
 
 /// `triangles` with their backs in front.

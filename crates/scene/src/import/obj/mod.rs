@@ -27,7 +27,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::admit::{self, Admitted};
+use super::admit::{self, AdmittedMesh};
 use super::error::{self, Note, NoteKind};
 use super::files::Files;
 use super::text::{TextFault, pieces, with_newlines, without_mark};
@@ -130,7 +130,7 @@ fn refuse_foreign(chunks: &[Chunk], pieces: &[(usize, &[u8])]) -> Result<(), Tex
 
 /// Adds a mesh where the file has it.
 fn place(
-    admitted: Admitted,
+    admitted: AdmittedMesh,
     segment: &Segment,
     [material, node]: [u32; 2],
     import: &mut Import,

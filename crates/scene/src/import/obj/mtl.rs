@@ -28,7 +28,7 @@ use crate::import::{Import, Refusal, Strictness, Wanted};
 const MOST_LIBRARIES: usize = 1000;
 
 /// A material and the file that defines it.
-struct Defined {
+struct MaterialDefinition {
     material: tobj::Material,
     file: PathBuf,
 }
@@ -42,11 +42,11 @@ pub(super) fn load(
     strictness: Strictness,
     import: &mut Import,
 ) -> Result<Vec<u32>, Refusal> {
-    let mut defined: HashMap<String, Defined> = HashMap::new();
+    let mut defined: HashMap<String, MaterialDefinition> = HashMap::new();
     for file in find(libraries, files, &mut import.notes)? {
         for material in read(&file, files, &mut import.notes)? {
             let name = material.name.clone();
-            defined.insert(name, Defined { material, file: file.clone() });
+            defined.insert(name, MaterialDefinition { material, file: file.clone() });
         }
     }
     let mut known: HashMap<Option<&str>, u32> = HashMap::new();
@@ -179,7 +179,7 @@ fn undefined(name: Option<&str>, notes: &mut Vec<Note>) -> Material {
 }
 
 fn resolve(
-    defined: &Defined,
+    defined: &MaterialDefinition,
     maps: &mut MtlMaps<'_>,
     wanted: Wanted,
     import: &mut Import,
@@ -264,7 +264,7 @@ fn nearest(material: &tobj::Material, plain: Material) -> Material {
     let tr = material.unknown_param.get("Tr").and_then(|tr| tr.parse::<f64>().ok());
     let dissolve = material.dissolve.or(tr.map(|tr| 1.0 - tr));
     let dissolve = dissolve.filter(|d| d.is_finite()).unwrap_or(1.0);
-    if dissolve < 1.0 && !matches!(read.scattering, Scattering::Dielectric(_)) {
+    if dissolve < 1.0 && !read.scattering.is_body() {
         read.alpha = Alpha::Blend { factor: dissolve.max(0.0) };
     }
     let shines = |[red, green, blue]: [f64; 3]| Emission {

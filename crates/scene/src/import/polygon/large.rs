@@ -170,7 +170,7 @@ struct BoxTree {
 }
 
 struct BoxNode {
-    around: Area,
+    bounds: Area,
     parent: usize,
     content: BoxContent,
     /// Corners below that are not forgotten.
@@ -194,17 +194,17 @@ impl BoxTree {
     /// Adds the node of a part of `order`, and those below; its number.
     fn grow(&mut self, part: Range<usize>, parent: usize) -> usize {
         let places = &self.places;
-        let around = Area::around(self.order[part.clone()].iter().map(|&corner| places[corner]));
+        let bounds = Area::of(self.order[part.clone()].iter().map(|&corner| places[corner]));
         let number = self.nodes.len();
         let content = BoxContent::Leaf(part.clone());
-        self.nodes.push(BoxNode { around, parent, content, count: part.len() });
+        self.nodes.push(BoxNode { bounds, parent, content, count: part.len() });
         if part.len() <= LEAF {
             for &corner in &self.order[part] {
                 self.leaf[corner] = number;
             }
             return number;
         }
-        let wide = around.max.x - around.min.x >= around.max.y - around.min.y;
+        let wide = bounds.max.x - bounds.min.x >= bounds.max.y - bounds.min.y;
         let key = |corner: usize| if wide { places[corner].x } else { places[corner].y };
         let middle = part.len() / 2;
         self.order[part.clone()].select_nth_unstable_by(middle, |&a, &b| key(a).total_cmp(&key(b)));
@@ -232,7 +232,7 @@ impl BoxTree {
         most: u64,
         blocks: impl Fn(usize) -> Option<bool>,
     ) -> Option<usize> {
-        let around = Area::around(triangle.into_iter());
+        let bounds = Area::of(triangle.into_iter());
         // As deep as the tree, of which halves are halves.
         let mut open = vec![0];
         while let Some(number) = open.pop() {
@@ -241,7 +241,7 @@ impl BoxTree {
             }
             *effort += 1;
             let node = &self.nodes[number];
-            if node.count == 0 || !node.around.meets(around) || node.around.is_beside(triangle) {
+            if node.count == 0 || !node.bounds.meets(bounds) || node.bounds.is_beside(triangle) {
                 continue;
             }
             match &node.content {
@@ -249,7 +249,7 @@ impl BoxTree {
                 BoxContent::Leaf(part) => {
                     for &corner in &self.order[part.clone()] {
                         *effort += 1;
-                        if !around.contains(self.places[corner]) {
+                        if !bounds.contains(self.places[corner]) {
                             continue;
                         }
                         if let Some(blocks) = blocks(corner) {
@@ -274,7 +274,7 @@ struct Area {
 }
 
 impl Area {
-    fn around(places: impl Iterator<Item = Coord<f64>>) -> Self {
+    fn of(places: impl Iterator<Item = Coord<f64>>) -> Self {
         let [low, high] = [f64::INFINITY, f64::NEG_INFINITY];
         let mut area = Self { min: Coord { x: low, y: low }, max: Coord { x: high, y: high } };
         for Coord { x, y } in places {

@@ -7,9 +7,9 @@ use std::hint::select_unpredictable;
 use etendue_geometry::block::{Floats as Row, LANES};
 
 use super::RayColumns;
+use super::block_lights::{OtherPlaces, Places};
 use super::compaction::{Compaction, Instructions};
 use super::kernel::{Hits, Mask, mask};
-use super::lamps::{OtherPlaces, Places};
 use super::lane::Lane;
 
 /// The rays to lights.
@@ -17,7 +17,8 @@ pub(super) struct LightRays<F> {
     start: [Row<F>; 3],
     along: [Row<F>; 3],
     length: Row<F>,
-    /// From the hit itself to its light (unit), and the density of that (1/sr).
+    /// From the hit itself to its light (unit), and the density of that (1/sr): infinite where the light does not shine
+    /// to there.
     pub(super) toward: [Row<F>; 3],
     pub(super) pdf: Row<F>,
     /// The share of the light's radiance that comes from there, per colour.
@@ -27,8 +28,10 @@ pub(super) struct LightRays<F> {
 /// The rays to lights, each with the share of the light's radiance that a matte surface turns to the viewer.
 #[inline(always)]
 pub(super) fn ask<F: Lane, const TILTED: bool, const RICH: bool>(
-    (places, others): (&Places<F>, Option<&OtherPlaces<F>>),
-    (offset, roundings): ([F; 3], F),
+    places: &Places<F>,
+    others: Option<&OtherPlaces<F>>,
+    offset: [F; 3],
+    roundings: F,
     hits: &Hits<F>,
 ) -> LightRays<F> {
     let (mut squared, mut facing, mut above, mut blur) =
@@ -114,8 +117,11 @@ pub(super) fn ask<F: Lane, const TILTED: bool, const RICH: bool>(
 pub(super) fn send<F: Lane, const RICH: bool>(
     asked: &LightRays<F>,
     places: &Places<F>,
-    (asks, [ray, lanes], shares): (&Mask, [&[u32; LANES]; 2], &[Row<F>]),
-    (instructions, shadows): (Instructions, &mut RayColumns<F>),
+    asks: &Mask,
+    [ray, lanes]: [&[u32; LANES]; 2],
+    shares: &[Row<F>],
+    instructions: Instructions,
+    shadows: &mut RayColumns<F>,
 ) {
     let mut goes = [0; LANES];
     for i in 0..LANES {
@@ -131,7 +137,7 @@ pub(super) fn send<F: Lane, const RICH: bool>(
         going.put(share, column, at);
     }
     going.put(&asked.length, &mut shadows.reach, at);
-    going.put(&places.lamp, &mut shadows.lamp, at);
+    going.put(&places.light, &mut shadows.light, at);
     going.put(ray, &mut shadows.carried.ray, at);
     if RICH || F::HAS_ENDS {
         going.put(lanes, &mut shadows.left, at);

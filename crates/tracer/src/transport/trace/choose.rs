@@ -6,26 +6,26 @@ use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
 
 use super::Workspace;
-use super::kernel::{ask_for_lamps, round, single};
-use super::lamps::{Lights, OTHER, SKY, flag};
+use super::block_lights::{BlockLights, OTHER, SKY, flag};
+use super::kernel::{ReceiverColumns, gather_receivers, round, single};
 use super::lane::Lane;
 use super::sky::place_on_sky;
 use super::surfaces::Surfaces;
-use crate::light_sampler::Receiver;
-use crate::light_tree::{Choice, Choices};
+use crate::light_sampler::{LightQuery, Receiver};
+use crate::light_tree::Choices;
 use crate::sampling::GridCell;
 use crate::target::TargetKind;
 use crate::transport::{Draw, Tracing};
 
 /// Lights that are chosen by where paths are: for points side by side, and by lane.
 #[derive(Debug, Default)]
-pub(in crate::transport) struct ChosenLamps<F> {
+pub(in crate::transport) struct ChosenLights<F> {
     pub(super) choices: Choices,
     /// The lane of each choice.
-    pub(super) asking: Vec<u32>,
-    /// Where each is that chooses, from the blocks' origin (m); empty where no light is [`OTHER`].
+    pub(super) lanes: Vec<u32>,
+    /// The place of each point that chooses, from the blocks' origin (m); empty where no light is [`OTHER`].
     pub(super) points: [Vec<F>; 3],
-    pub(super) lamp: Vec<u32>,
+    pub(super) light: Vec<u32>,
     /// 0 where none was chosen.
     pub(super) chance: Vec<F>,
     /// Of [`OTHER`] lights: where they are from the blocks' origin (m), or unit directions to them, their density, and
@@ -34,7 +34,7 @@ pub(in crate::transport) struct ChosenLamps<F> {
     pub(super) density: Vec<F>,
     pub(super) radiance: Vec<Vec<F>>,
     /// That of one light, by band.
-    pub(super) light: Vec<f64>,
+    pub(super) bands: Vec<f64>,
     pub(super) is_far: Vec<F>,
     pub(super) is_delta: Vec<F>,
     /// Of those that are triangles their normals, what their numbers add to the rounding of the place (m), whether they are
@@ -72,22 +72,23 @@ pub(super) struct LightSide<F> {
     pub(super) two_sided: bool,
 }
 
-impl<F: Lane> ChosenLamps<F> {
+impl<F: Lane> ChosenLights<F> {
     /// Empties it for so many lanes and bands, of which some may choose other lights, triangles and the sky among
     /// them.
     pub(super) fn restart(
         &mut self,
-        (room, count): (usize, usize),
+        room: usize,
+        count: usize,
         [has_others, has_triangles, has_sky]: [bool; 3],
     ) {
-        let Self { lamp, chance, density, place, radiance, is_far, is_delta, .. } = self;
-        self.light.resize(count, 0.0);
+        let Self { light, chance, density, place, radiance, is_far, is_delta, .. } = self;
+        self.bands.resize(count, 0.0);
         radiance.resize(count, Vec::new());
-        lamp.clear();
-        lamp.resize(room, 0);
+        light.clear();
+        light.resize(room, 0);
         chance.clear();
         chance.resize(room, F::ZERO);
-        self.asking.resize(room, 0);
+        self.lanes.resize(room, 0);
         if has_others {
             let rows = place.iter_mut().chain(radiance).chain(&mut self.points);
             rows.chain([density, is_far, is_delta]).for_each(|row| row.resize(room, F::ZERO));
@@ -104,7 +105,7 @@ impl<F: Lane> ChosenLamps<F> {
     /// Notes what a lane chose, which brings so much of each band.
     #[inline(always)]
     pub(super) fn put(&mut self, lane: usize, own: &OtherPlace<F>, radiance: &[f64]) {
-        self.lamp[lane] = OTHER | own.light;
+        self.light[lane] = OTHER | own.light;
         for axis in 0..3 {
             self.place[axis][lane] = own.place[axis];
         }
@@ -133,9 +134,10 @@ fn below_one<F: Lane>(x: f64) -> F {
 
 impl<const RGB: bool> Tracing<'_, RGB> {
     /// Chooses one of many lights for each path that is scattered, and a place on those that need more than one.
-    pub(super) fn choose_lamps<F: Lane>(
+    pub(super) fn choose_lights<F: Lane>(
         &self,
-        (surfaces, lights): (Surfaces<'_, F>, &Lights<'_, F>),
+        surfaces: Surfaces<'_, F>,
+        lights: &BlockLights<'_, F>,
         workspace: &mut Workspace<F>,
     ) {
         let Workspace { rays, carried, numbers, chosen, varied, singles, .. } = workspace;
@@ -145,24 +147,28 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let has_others = self.ctx.lights.has_others();
         let has_triangles = self.ctx.lights.bounds().has_other_triangles;
         let has_sky = lights.sky.is_some();
-        chosen.restart((room, self.count()), [has_others, has_triangles, has_sky]);
+        chosen.restart(room, self.count(), [has_others, has_triangles, has_sky]);
         if lights.are_far {
             self.choose_far(lights, workspace);
             return;
         }
         self.ctx.lights.restart(&mut chosen.choices, room);
-        let ask = match (surfaces.all.are_tilted, surfaces.all.are_rich()) {
-            (false, false) => ask_for_lamps::<F, false, false>,
-            (false, true) => ask_for_lamps::<F, false, true>,
-            (true, false) => ask_for_lamps::<F, true, false>,
-            (true, true) => ask_for_lamps::<F, true, true>,
+        let gather = match (surfaces.all.are_tilted, surfaces.all.are_rich()) {
+            (false, false) => gather_receivers::<F, false, false>,
+            (false, true) => gather_receivers::<F, false, true>,
+            (true, false) => gather_receivers::<F, true, false>,
+            (true, true) => gather_receivers::<F, true, true>,
         };
-        let asked = (&mut chosen.choices, &mut *chosen.asking, &mut chosen.points);
-        ask((surfaces, lights.origin, singles), (rays.blocks(), carried), first, asked);
+        let receivers = ReceiverColumns {
+            choices: &mut chosen.choices,
+            lanes: &mut chosen.lanes,
+            points: &mut chosen.points,
+        };
+        gather(surfaces, lights.origin, singles, rays.blocks(), carried, first, receivers);
         self.ctx.lights.pick(&mut chosen.choices);
         for number in 0..chosen.choices.len() {
-            let (lane, choice) = (chosen.asking[number] as usize, chosen.choices.get(number));
-            // What is left of the number that chose the lamp chooses the place: both stay even.
+            let (lane, choice) = (chosen.lanes[number] as usize, chosen.choices.get(number));
+            // What is left of the number that chose the light chooses the place: both stay even.
             first[lane] = below_one(choice.u);
             if has_sky {
                 let chance = self.ctx.lights.chance_of_sky(&chosen.choices, number);
@@ -172,19 +178,20 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 let [x, y, z] = &chosen.points;
                 let point = DVec3::new(x[number].into(), y[number].into(), z[number].into());
                 let (point, normal) = (lights.origin + point, chosen.choices.normal(number));
-                let (lane, square) = (chosen.asking[number], [choice.u, second[lane].into()]);
+                let (lane, square) = (chosen.lanes[number], [choice.u, second[lane].into()]);
                 let receiver = Receiver { point, normal };
                 let time = self.time_of(carried.ray[lane as usize]);
-                self.place_on_other(lights, chosen, (lane, receiver, time), (choice, square));
+                let query = LightQuery { receiver, time, choice, square };
+                self.place_on_other(lights, chosen, lane, &query);
                 continue;
             }
-            (chosen.lamp[lane], chosen.chance[lane]) = (choice.light, round(choice.chance));
+            (chosen.light[lane], chosen.chance[lane]) = (choice.light, round(choice.chance));
         }
         self.choose_sky(lights, chosen);
     }
 
     /// The same where all lights are far away: as likely from everywhere, and in the same direction.
-    fn choose_far<F: Lane>(&self, lights: &Lights<'_, F>, workspace: &mut Workspace<F>) {
+    fn choose_far<F: Lane>(&self, lights: &BlockLights<'_, F>, workspace: &mut Workspace<F>) {
         let Workspace { rays, carried, numbers, chosen, .. } = workspace;
         let [first, second] = &mut numbers[Draw::Light as usize];
         let receiver = Receiver { point: DVec3::ZERO, normal: DVec3::ZERO };
@@ -197,7 +204,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             first[number] = below_one(choice.u);
             let square = [choice.u, second[number].into()];
             let time = self.time_of(carried.ray[number]);
-            self.place_on_other(lights, chosen, (lane, receiver, time), (choice, square));
+            let query = LightQuery { receiver, time, choice, square };
+            self.place_on_other(lights, chosen, lane, &query);
         }
         if lights.sky.is_some() {
             let chance = self.ctx.lights.chance_of_sky(&chosen.choices, 0);
@@ -210,28 +218,28 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     /// directions to a sky are chosen later.
     fn place_on_other<F: Lane>(
         &self,
-        lights: &Lights<'_, F>,
-        chosen: &mut ChosenLamps<F>,
-        (lane, receiver, time): (u32, Receiver, f64),
-        (choice, square): (Choice, [f64; 2]),
+        lights: &BlockLights<'_, F>,
+        chosen: &mut ChosenLights<F>,
+        lane: u32,
+        query: &LightQuery,
     ) {
+        let choice = query.choice;
         if choice.chance <= 0.0 {
             return;
         }
         if let Some(sky) = lights.sky.filter(|sky| sky.index == choice.light as usize) {
             let chance = round(choice.chance);
             if sky.map.is_some() {
-                chosen.squares.push(square);
+                chosen.squares.push(query.square);
                 chosen.of_sky.push((lane, chance));
             } else {
-                (chosen.lamp[lane as usize], chosen.chance[lane as usize]) = (SKY, chance);
+                (chosen.light[lane as usize], chosen.chance[lane as usize]) = (SKY, chance);
             }
             return;
         }
-        let one = ((choice.light as usize, choice.chance), square);
         let (scene, spectral) = (&self.ctx.scene, self.ctx.spectral);
-        let mut radiance = std::mem::take(&mut chosen.light);
-        let found = self.ctx.lights.place(scene, spectral, (&receiver, time), one, &mut radiance);
+        let mut radiance = std::mem::take(&mut chosen.bands);
+        let found = self.ctx.lights.place(scene, spectral, query, &mut radiance);
         if let Some(target) = found {
             let is_far = matches!(target.kind, TargetKind::Far | TargetKind::Parallel);
             let is_delta = matches!(target.kind, TargetKind::Point | TargetKind::Parallel);
@@ -249,11 +257,11 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let own = OtherPlace { light, place, is_far, is_delta, density, side };
             chosen.put(lane as usize, &own, &radiance);
         }
-        chosen.light = radiance;
+        chosen.bands = radiance;
     }
 
     /// Chooses directions to the sky's image for the lanes that chose it.
-    fn choose_sky<F: Lane>(&self, lights: &Lights<'_, F>, chosen: &mut ChosenLamps<F>) {
+    fn choose_sky<F: Lane>(&self, lights: &BlockLights<'_, F>, chosen: &mut ChosenLights<F>) {
         let Some(sky) = &lights.sky else { return };
         let Some((_, sampler)) = sky.map else { return };
         sampler.cells(chosen.squares.iter().copied(), &mut chosen.cells);

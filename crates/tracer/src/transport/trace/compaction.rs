@@ -13,7 +13,7 @@ pub(super) struct Compaction {
     by_register: Option<(pulp::x86::V4, u16)>,
 }
 
-/// What has an instruction of AVX-512 that does so.
+/// The instructions of AVX-512 that do so, where the machine has them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Instructions {
     #[cfg(target_arch = "x86_64")]

@@ -8,9 +8,10 @@ use etendue_geometry::block::{Floats as Row, LANES};
 
 use super::compaction::{Compaction, Instructions};
 use super::facets::BsdfSamples;
-use super::kernel::{Hits, Mask, Numbers, Sphere, mask};
+use super::kernel::{Hits, Mask, StepRules, mask};
 use super::lane::Lane;
 use super::{LAST, RayColumns, SCATTERED, SPECULAR};
+use crate::emitters::EmitterSphere;
 
 /// Leaves out paths that carry nothing and, by roulette, some of those that carry little of their largest band.
 #[inline(always)]
@@ -44,7 +45,7 @@ pub(super) fn end_some<F: Lane>(
     }
 }
 
-/// What the paths of a block carry that leave its hits.
+/// The paths of a block that leave its hits, with what they carry.
 pub(super) struct BlockPaths<'a, F> {
     /// By band.
     pub(super) throughput: &'a [Row<F>],
@@ -52,42 +53,44 @@ pub(super) struct BlockPaths<'a, F> {
     /// With which they arrived.
     pub(super) flags: [u32; LANES],
     pub(super) lanes: [u32; LANES],
-    /// Those whose directions only their surfaces can give.
-    pub(super) specular: Mask,
     pub(super) sky_chance: Option<Row<F>>,
 }
 
 /// Notes the paths that leave a block's hits.
 #[inline(always)]
 pub(super) fn depart<F: Lane, const RICH: bool>(
-    (left, shading): (&BsdfSamples<F>, Option<&[Row<F>; 3]>),
+    left: &BsdfSamples<F>,
+    shading: Option<&[Row<F>; 3]>,
     departing: &BlockPaths<'_, F>,
-    numbers: &Numbers<'_, F>,
-    (instructions, (next, last)): (Instructions, (&mut RayColumns<F>, &mut RayColumns<F>)),
+    rules: &StepRules<'_, F>,
+    instructions: Instructions,
+    next: &mut RayColumns<F>,
+    last: &mut RayColumns<F>,
 ) {
-    let ends_apart = numbers.is_last && numbers.asks_emitters;
+    let ends_apart = rules.is_last && rules.asks_emitters;
     let (mut rough, mut specular) = (left.goes, left.goes);
     if RICH && ends_apart {
         for i in 0..LANES {
-            rough[i] &= !departing.specular[i];
-            specular[i] &= departing.specular[i];
+            rough[i] &= !left.specular[i];
+            specular[i] &= left.specular[i];
         }
     }
     let to = if ends_apart { last } else { &mut *next };
     if RICH && !to.carried.flags.is_empty() {
-        let of_rough = if numbers.is_last { LAST } else { 0 };
-        put_flags(departing, Compaction::new(&rough, instructions), of_rough, to);
+        let of_rough = if rules.is_last { LAST } else { 0 };
+        put_flags(left, departing, Compaction::new(&rough, instructions), of_rough, to);
     }
-    put((left, shading), departing, Compaction::new(&rough, instructions), to);
-    if RICH && ends_apart && departing.specular != [0; LANES] {
-        put_flags(departing, Compaction::new(&specular, instructions), 0, next);
-        put((left, shading), departing, Compaction::new(&specular, instructions), next);
+    put(left, shading, departing, Compaction::new(&rough, instructions), to);
+    if RICH && ends_apart && left.specular != [0; LANES] {
+        put_flags(left, departing, Compaction::new(&specular, instructions), 0, next);
+        put(left, shading, departing, Compaction::new(&specular, instructions), next);
     }
 }
 
 /// Notes which paths are specular, and so much of the others.
 #[inline(always)]
 fn put_flags<F: Lane>(
+    left: &BsdfSamples<F>,
     departing: &BlockPaths<'_, F>,
     going: Compaction,
     of_rough: u32,
@@ -95,7 +98,7 @@ fn put_flags<F: Lane>(
 ) {
     let mut flags = [0; LANES];
     for i in 0..LANES {
-        let own = if departing.specular[i] != 0 { SPECULAR } else { of_rough | SCATTERED };
+        let own = if left.specular[i] != 0 { SPECULAR } else { of_rough | SCATTERED };
         flags[i] = own | (departing.flags[i] & SCATTERED);
     }
     going.put(&flags, &mut to.carried.flags, to.len);
@@ -104,7 +107,8 @@ fn put_flags<F: Lane>(
 /// Notes paths, and how they came to their directions.
 #[inline(always)]
 fn put<F: Lane>(
-    (left, shading): (&BsdfSamples<F>, Option<&[Row<F>; 3]>),
+    left: &BsdfSamples<F>,
+    shading: Option<&[Row<F>; 3]>,
     departing: &BlockPaths<'_, F>,
     going: Compaction,
     to: &mut RayColumns<F>,
@@ -132,8 +136,8 @@ fn put<F: Lane>(
     to.len += going.count;
 }
 
-/// Where rays of matte surfaces start (m), their unit directions about the shading normals with density cos θ / π (1/sr),
-/// that density, and whether there is one.
+/// Samples of matte surfaces: starts of rays (m), unit directions about the shading normals with density cos θ / π
+/// (1/sr), and that density.
 #[inline(always)]
 pub(super) fn scatter<F: Lane, const TILTED: bool>(
     hits: &Hits<F>,
@@ -152,7 +156,7 @@ pub(super) fn scatter<F: Lane, const TILTED: bool>(
             start[axis][i] = hits.point[axis][i] + lifted;
         }
     }
-    BsdfSamples { start, along, pdf, goes }
+    BsdfSamples { start, along, pdf, goes, specular: [0; LANES] }
 }
 
 /// Unit directions about normals with density cos θ / π (1/sr), and that density.
@@ -198,14 +202,14 @@ fn disk_point<F: Lane>([u, v]: [F; 2]) -> [F; 2] {
     [select_unpredictable(flat, near, far), select_unpredictable(flat, far, near)]
 }
 
-/// Leaves out rays that meet nothing of a sphere for sure, but for those of some lanes.
+/// Leaves out rays that meet nothing of a sphere for sure, but for specular ones.
 #[inline(always)]
 pub(super) fn keep_those_that_may_meet<F: Lane>(
-    ((centre, radius), roundings): (&Sphere<F>, F),
-    (start, along): (&[Row<F>; 3], &[Row<F>; 3]),
-    others: &Mask,
-    goes: &mut Mask,
+    &EmitterSphere { centre, radius }: &EmitterSphere<F>,
+    roundings: F,
+    left: &mut BsdfSamples<F>,
 ) {
+    let BsdfSamples { start, along, goes, specular, .. } = left;
     let (mut foot, mut squared) = ([F::ZERO; LANES], [F::ZERO; LANES]);
     for axis in 0..3 {
         for i in 0..LANES {
@@ -214,13 +218,13 @@ pub(super) fn keep_those_that_may_meet<F: Lane>(
             squared[i] += way * way;
         }
     }
-    let within = *radius * *radius;
+    let within = radius * radius;
     for i in 0..LANES {
         let is_ahead = (foot[i] >= F::ZERO) | (squared[i] <= within);
         // Roundings of what is subtracted.
         let slack = roundings * squared[i];
         let is_near = squared[i] - foot[i] * foot[i] <= within + slack;
-        goes[i] &= mask((*radius >= F::ZERO) & is_ahead & is_near) | others[i];
+        goes[i] &= mask((radius >= F::ZERO) & is_ahead & is_near) | specular[i];
     }
 }
 

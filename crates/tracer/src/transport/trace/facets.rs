@@ -7,22 +7,23 @@ use etendue_geometry::block::{Floats as Row, LANES};
 
 use super::kernel::{Hits, Mask, mask, round};
 use super::lane::Lane;
-use super::surfaces::{Found, Surfaces};
+use super::surfaces::{BlockLookup, Surfaces};
 use crate::bsdf::Weights;
 use crate::bsdf::metal::{mean_reflectance, multiple};
-use crate::bsdf::sheets::Sheets;
-use crate::bsdf::smooth::Smooth;
+use crate::bsdf::sheets::{LightSamples, Sheets};
+use crate::bsdf::smooth::SmoothSurfaces;
 
-type Wide = [f64; LANES];
+/// A row in double precision.
+type WideRow = [f64; LANES];
 
 /// The facets of a block's hits, kept for the next block.
 #[derive(Debug, Default)]
 pub(super) struct BlockFacets<F> {
     sheets: Box<Sheets<LANES>>,
-    smooth: Box<Smooth<LANES>>,
-    normal: [Wide; 3],
-    shading: [Wide; 3],
-    direction: [Wide; 3],
+    smooth: Box<SmoothSurfaces<LANES>>,
+    normal: [WideRow; 3],
+    shading: [WideRow; 3],
+    direction: [WideRow; 3],
     bands: Vec<FacetBand>,
     /// Of what was scattered by chance what goes on, by band.
     scattered: Vec<Row<F>>,
@@ -31,11 +32,22 @@ pub(super) struct BlockFacets<F> {
 /// A band of a block's facets.
 #[derive(Debug, Clone, Copy, Default)]
 struct FacetBand {
-    base: Wide,
-    highlight: Wide,
-    dip: Wide,
+    base: WideRow,
+    highlight: WideRow,
+    dip: WideRow,
     /// Of what met several facets of a sheet.
-    deep: Wide,
+    deep: WideRow,
+}
+
+/// The hits of a block, as facets are seen there.
+pub(super) struct FacetHits<'a, F> {
+    pub(super) block: &'a RayBlock<F>,
+    pub(super) found: &'a BlockLookup<F>,
+    pub(super) hits: &'a Hits<F>,
+    /// Normals that light is scattered about.
+    pub(super) shading: &'a [Row<F>; 3],
+    /// By band.
+    pub(super) colors: &'a [Row<F>],
 }
 
 /// The rays that leave a block's hits by chance, and what they carry.
@@ -44,31 +56,31 @@ pub(super) struct BsdfSamples<F> {
     pub(super) along: [Row<F>; 3],
     pub(super) pdf: Row<F>,
     pub(super) goes: Mask,
+    /// Those whose directions only their surfaces can give.
+    pub(super) specular: Mask,
 }
 
 impl<F: Lane> BlockFacets<F> {
-    /// Takes the facets of a block's hits as they are seen, with normals that light is scattered about and colours by
-    /// band.
+    /// Takes the facets of a block's hits as they are seen.
     #[inline(always)]
     pub(super) fn see<const RGB: bool>(
         &mut self,
         surfaces: Surfaces<'_, F>,
-        (block, first, found): (&RayBlock<F>, usize, &Found<F>),
-        (hits, shading, colors): (&Hits<F>, &[Row<F>; 3], &[Row<F>]),
+        seen: FacetHits<'_, F>,
     ) {
-        see::<F, RGB>(self, surfaces, (block, first, found), (hits, shading, colors));
+        see::<F, RGB>(self, surfaces, seen);
     }
 
-    /// What sheets turn to the viewer of light that comes from unit directions which were chosen with a density (1/sr):
-    /// to `value`, in the lanes of sheets. How much of it in each band [`Self::sheets_in_band`] says.
+    /// Puts the share of light from directions to lights that sheets turn to the viewer into `value`, in the lanes of
+    /// sheets. How much of it in each band [`Self::sheets_in_band`] says.
     #[inline(always)]
     pub(super) fn reflect(
         &mut self,
         lanes: &Mask,
-        (toward, pdf, is_delta): (&[Row<F>; 3], &Row<F>, &Row<F>),
+        samples: LightSamples<'_, F>,
         value: &mut Row<F>,
     ) {
-        reflect(self, lanes, (toward, pdf, is_delta), value);
+        reflect(self, lanes, samples, value);
     }
 
     /// Puts the directions in which sheets and smooth surfaces send the paths in place of what is there. How much of the
@@ -76,16 +88,17 @@ impl<F: Lane> BlockFacets<F> {
     #[inline(always)]
     pub(super) fn scatter(
         &mut self,
-        found: &Found<F>,
+        found: &BlockLookup<F>,
         hits: &Hits<F>,
-        (choice, square): (&Row<F>, &[Row<F>; 2]),
+        choice: &Row<F>,
+        square: &[Row<F>; 2],
         scattered: &mut BsdfSamples<F>,
     ) {
         if found.sheets != [0; LANES] {
-            scatter_sheets(self, &found.sheets, (choice, square), scattered);
+            scatter_sheets(self, &found.sheets, choice, square, scattered);
         }
         if found.smooth != [0; LANES] {
-            scatter_smooth(self, (&found.smooth, hits), choice, scattered);
+            scatter_smooth(self, &found.smooth, hits, choice, scattered);
         }
         let mut shares = std::mem::take(&mut self.scattered);
         shares.resize(self.bands.len(), [F::ZERO; LANES]);
@@ -102,7 +115,7 @@ impl<F: Lane> BlockFacets<F> {
 
     /// Puts a band of what [`Self::scatter`] passes on in place of what is there.
     #[inline(always)]
-    pub(super) fn in_band(&self, found: &Found<F>, band: usize, share: &mut Row<F>) {
+    pub(super) fn in_band(&self, found: &BlockLookup<F>, band: usize, share: &mut Row<F>) {
         for i in 0..LANES {
             let is_own = found.sheets[i] | found.smooth[i] != 0;
             share[i] = if is_own { self.scattered[band][i] } else { share[i] };
@@ -129,7 +142,7 @@ impl<F: Lane> BlockFacets<F> {
 }
 
 impl FacetBand {
-    /// What a lane has of light.
+    /// A lane's share of light.
     #[inline(always)]
     fn of(&self, value: Weights, lane: usize) -> f64 {
         let sum = value.white
@@ -142,7 +155,7 @@ impl FacetBand {
 }
 
 #[inline(always)]
-fn widen<F: Lane>(rows: &[Row<F>; 3], to: &mut [Wide; 3]) {
+fn widen<F: Lane>(rows: &[Row<F>; 3], to: &mut [WideRow; 3]) {
     for axis in 0..3 {
         for i in 0..LANES {
             to[axis][i] = rows[axis][i].into();
@@ -154,9 +167,10 @@ fn widen<F: Lane>(rows: &[Row<F>; 3], to: &mut [Wide; 3]) {
 fn see<F: Lane, const RGB: bool>(
     facets: &mut BlockFacets<F>,
     surfaces: Surfaces<'_, F>,
-    (block, first, found): (&RayBlock<F>, usize, &Found<F>),
-    (hits, shading, colors): (&Hits<F>, &[Row<F>; 3], &[Row<F>]),
+    seen: FacetHits<'_, F>,
 ) {
+    let FacetHits { block, found, hits, shading, colors } = seen;
+    let first = found.first;
     widen(&hits.normal, &mut facets.normal);
     widen(shading, &mut facets.shading);
     widen(&block.direction, &mut facets.direction);
@@ -227,17 +241,17 @@ fn see<F: Lane, const RGB: bool>(
 fn reflect<F: Lane>(
     facets: &mut BlockFacets<F>,
     lanes: &Mask,
-    (toward, pdf, is_delta): (&[Row<F>; 3], &Row<F>, &Row<F>),
+    samples: LightSamples<'_, F>,
     value: &mut Row<F>,
 ) {
-    let mut wide = [[0.0; LANES]; 3];
-    widen(toward, &mut wide);
-    let (mut of_pdf, mut of_delta, mut found) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    let mut toward = [[0.0; LANES]; 3];
+    widen(samples.toward, &mut toward);
+    let (mut pdf, mut is_delta, mut found) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
     for i in 0..LANES {
-        (of_pdf[i], of_delta[i]) = (pdf[i].into(), is_delta[i].into());
+        (pdf[i], is_delta[i]) = (samples.pdf[i].into(), samples.is_delta[i].into());
     }
-    let asked = (&wide, &of_pdf, &of_delta);
-    facets.sheets.reflect([&facets.normal, &facets.shading], asked, &mut found);
+    let wide = LightSamples { toward: &toward, pdf: &pdf, is_delta: &is_delta };
+    facets.sheets.reflect([&facets.normal, &facets.shading], wide, &mut found);
     for i in 0..LANES {
         value[i] = if lanes[i] != 0 { round(found[i]) } else { value[i] };
     }
@@ -247,7 +261,8 @@ fn reflect<F: Lane>(
 fn scatter_sheets<F: Lane>(
     facets: &mut BlockFacets<F>,
     lanes: &Mask,
-    (choice, square): (&Row<F>, &[Row<F>; 2]),
+    choice: &Row<F>,
+    square: &[Row<F>; 2],
     scattered: &mut BsdfSamples<F>,
 ) {
     let (mut choices, mut squares) = ([0.0; LANES], [[0.0; 2]; LANES]);
@@ -257,7 +272,7 @@ fn scatter_sheets<F: Lane>(
     }
     let (mut along, mut pdf) = ([[0.0; LANES]; 3], [0.0; LANES]);
     let normals = [&facets.normal, &facets.shading];
-    facets.sheets.scatter(normals, (&choices, &squares), (&mut along, &mut pdf));
+    facets.sheets.scatter(normals, &choices, &squares, &mut along, &mut pdf);
     for axis in 0..3 {
         for i in 0..LANES {
             let own = round(along[axis][i]);
@@ -277,7 +292,8 @@ fn scatter_sheets<F: Lane>(
 #[multiversion::multiversion(targets = "simd")]
 fn scatter_smooth<F: Lane>(
     facets: &mut BlockFacets<F>,
-    (lanes, hits): (&Mask, &Hits<F>),
+    lanes: &Mask,
+    hits: &Hits<F>,
     choice: &Row<F>,
     scattered: &mut BsdfSamples<F>,
 ) {
@@ -287,8 +303,7 @@ fn scatter_smooth<F: Lane>(
     }
     let (mut along, mut goes) = ([[0.0; LANES]; 3], [0.0; LANES]);
     let normals = [&facets.normal, &facets.shading];
-    let seen = (&facets.direction, &choices);
-    facets.smooth.scatter(normals, seen, (&mut along, &mut goes));
+    facets.smooth.scatter(normals, &facets.direction, &choices, &mut along, &mut goes);
     let smooth = &facets.smooth;
     for axis in 0..3 {
         for i in 0..LANES {

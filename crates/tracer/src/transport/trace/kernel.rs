@@ -1,4 +1,4 @@
-//! One step of all paths: what is looked up for sixteen hits first, then arithmetic on their rows, then
+//! One step of all paths: the surfaces of sixteen hits are looked up first, then comes arithmetic on their rows, then
 //! the rays that leave them side by side.
 #![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
@@ -8,21 +8,23 @@ use etendue_geometry::RayBlock;
 use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::glam::DVec3;
 
-use super::ask::{ask, send};
-use super::choose::ChosenLamps;
+use super::ask::{LightRays, ask, send};
+use super::block_lights::{BlockLights, OtherPlaces, place, place_on_chosen};
+use super::choose::ChosenLights;
 use super::compaction::{Compaction, Instructions};
 use super::depart::{BlockPaths, depart, end_some, keep_those_that_may_meet, scatter};
-use super::facets::BlockFacets;
-use super::lamps::{Lights, OtherPlaces, place, place_on_chosen};
+use super::facets::{BlockFacets, FacetHits};
 use super::lane::Lane;
 use super::single::SingleHits;
-use super::surfaces::{Found, Surfaces, bend};
+use super::surfaces::{BlockLookup, Surfaces, bend};
 use super::{Columns, LAST, RayColumns};
+use crate::bsdf::sheets::LightSamples;
+use crate::emitters::EmitterSphere;
 use crate::light_tree::Choices;
 use crate::transport::Tracing;
 use crate::transport::{DRAWS, Draw};
 
-/// How far rays that leave hits of f32 beside an edge start back, over the bound of [`crate::spawn`], which
+/// Distance by which rays that leave hits of f32 beside an edge start back, over the bound of [`crate::spawn`], which
 /// counts more roundings for safety than these two: of the hit, and of the origin of the ray that leaves it.
 const BACK: f64 = 0.25;
 
@@ -30,24 +32,26 @@ const BACK: f64 = 0.25;
 /// one.
 pub(super) type Mask = [u32; LANES];
 
-/// What a step does, and its random numbers by use, a number a lane.
-pub(super) struct Numbers<'a, F> {
+/// The rules of a step, and its random numbers by use, a number a lane.
+pub(super) struct StepRules<'a, F> {
     pub(super) is_scattered: bool,
     pub(super) goes_on: bool,
     pub(super) roulette: bool,
-    /// Paths go on no farther than to the light that they meet, but for those of smooth surfaces; and whether what
-    /// shines is asked for that light first.
+    /// Paths go on no farther than to the light that they meet, but for those of smooth surfaces.
     pub(super) is_last: bool,
+    /// Emitters are asked for that light first.
     pub(super) asks_emitters: bool,
     /// Anything shines.
     pub(super) asks_lights: bool,
+    /// The sphere that directions have to meet, but for those of smooth surfaces; `None` where all are followed.
+    pub(super) sphere: Option<EmitterSphere<F>>,
     pub(super) drawn: &'a [[Vec<F>; 2]; DRAWS as usize],
-    /// What lanes chose where each chooses by itself; what is left of the number that chose is drawn.
-    pub(super) chosen: Option<&'a ChosenLamps<F>>,
+    /// The lights of lanes where each chooses by itself; what is left of the number that chose is drawn.
+    pub(super) chosen: Option<&'a ChosenLights<F>>,
 }
 
-/// Where rays go that leave hits.
-pub(super) struct Leaving<'a, F> {
+/// The rays that leave hits, the hits on what shines, and memory of a step.
+pub(super) struct StepOutput<'a, F> {
     pub(super) shadows: &'a mut RayColumns<F>,
     pub(super) next: &'a mut RayColumns<F>,
     /// Last directions that ask what shines first.
@@ -61,9 +65,6 @@ pub(super) struct Leaving<'a, F> {
     pub(super) colors: &'a mut Vec<Row<F>>,
     pub(super) shares: &'a mut Vec<Row<F>>,
 }
-
-/// A sphere around all that shines, relative to the blocks' origin: its centre and its radius (m).
-pub(super) type Sphere<F> = ([F; 3], F);
 
 /// The hits of a block.
 pub(super) struct Hits<F> {
@@ -87,25 +88,38 @@ impl<F: Lane> Hits<F> {
     }
 }
 
-/// The points of some blocks, where surfaces scatter light, that choose among many lamps by a number a lane; their lanes
-/// go to `asking` and, unless that is empty, their places from the origin to `points`, which have room for all.
+/// Room for the points that choose a light each, by a column a number.
+pub(super) struct ReceiverColumns<'a, F> {
+    pub(super) choices: &'a mut Choices,
+    /// Their lanes, counted from the first block.
+    pub(super) lanes: &'a mut [u32],
+    /// Their places from the blocks' origin (m), unless it is empty.
+    pub(super) points: &'a mut [Vec<F>; 3],
+}
+
+/// Gathers the points of some blocks, where surfaces scatter light, that choose among many lights by a number a lane;
+/// `receivers` has room for all.
 #[multiversion::multiversion(targets = "simd")]
-pub(super) fn ask_for_lamps<F: Lane, const TILTED: bool, const RICH: bool>(
-    (surfaces, origin, singles): (Surfaces<'_, F>, DVec3, &SingleHits),
-    (blocks, carried): (&[RayBlock<F>], &Columns<F>),
+pub(super) fn gather_receivers<F: Lane, const TILTED: bool, const RICH: bool>(
+    surfaces: Surfaces<'_, F>,
+    origin: DVec3,
+    singles: &SingleHits,
+    blocks: &[RayBlock<F>],
+    carried: &Columns<F>,
     numbers: &[F],
-    (choices, asking, points): (&mut Choices, &mut [u32], &mut [Vec<F>; 3]),
+    receivers: ReceiverColumns<'_, F>,
 ) {
+    let ReceiverColumns { choices, lanes, points } = receivers;
     let instructions = Instructions::of_machine();
     for (number, block) in blocks.iter().enumerate() {
         let first = number * LANES;
         let count = carried.len.saturating_sub(first);
-        let mut found = Found::NOTHING;
-        found.look_up::<TILTED, RICH, true>(surfaces, (block, first, count), (|_| (), |_| ()));
+        let mut found = BlockLookup::nothing(first);
+        found.look_up::<TILTED, RICH, true>(surfaces, block, count, |_| (), |_| ());
         if RICH {
-            leave_out(&mut found, carried, first);
+            leave_out(&mut found, carried);
             if TILTED && !singles.is_empty() {
-                singles.mark(first, &mut found);
+                singles.mark(&mut found);
             }
         }
         let own: Row<F> = numbers[first..first + LANES].try_into().unwrap_or([F::ZERO; LANES]);
@@ -114,14 +128,15 @@ pub(super) fn ask_for_lamps<F: Lane, const TILTED: bool, const RICH: bool>(
             singles.put_normals(first, &mut hits.bent);
         }
         let (wanted, at) = (Compaction::new(&found.asks(), instructions), choices.len());
-        wanted.put(&lanes_from(first), asking, at);
+        wanted.put(&lanes_from(first), lanes, at);
         for axis in 0..3 {
             if !points[axis].is_empty() {
                 wanted.put(&hits.point[axis], &mut points[axis], at);
             }
         }
         choices.push_some(
-            (&hits.point, origin),
+            &hits.point,
+            origin,
             hits.shading::<TILTED>(),
             &own,
             |row, to| {
@@ -137,168 +152,165 @@ pub(super) fn ask_for_lamps<F: Lane, const TILTED: bool, const RICH: bool>(
 /// in which some surface is not matte or not alike all over, or some light needs more than its place.
 #[multiversion::multiversion(targets = "simd")]
 pub(super) fn leave_blocks<F: Lane, const TILTED: bool, const RICH: bool, const RGB: bool>(
-    (tracing, surfaces, lights): (&Tracing<'_, RGB>, Surfaces<'_, F>, &Lights<'_, F>),
-    (blocks, carried): (&[RayBlock<F>], &Columns<F>),
-    (numbers, sphere): (Numbers<'_, F>, Option<Sphere<F>>),
-    mut leaving: Leaving<'_, F>,
+    tracing: &Tracing<'_, RGB>,
+    surfaces: Surfaces<'_, F>,
+    lights: &BlockLights<'_, F>,
+    blocks: &[RayBlock<F>],
+    carried: &Columns<F>,
+    rules: StepRules<'_, F>,
+    mut output: StepOutput<'_, F>,
 ) {
     // Blocks' coordinates are those of the world less their origin, whose roundings count as well.
     let offset = single::<F>(lights.origin).map(|axis| F::of(2.0) * axis.abs());
     let instructions = Instructions::of_machine();
-    for rows in [&mut *leaving.colors, &mut *leaving.shares] {
+    for rows in [&mut *output.colors, &mut *output.shares] {
         rows.resize(if RGB { 0 } else { carried.throughput.len() }, [F::ZERO; LANES]);
     }
     for (number, block) in blocks.iter().enumerate() {
         let first = number * LANES;
         let count = carried.len.saturating_sub(first);
         let lanes = lanes_from(first);
-        let (seen, missed) = (&mut *leaving.seen, &mut leaving.missed);
+        let (seen, missed) = (&mut *output.seen, &mut output.missed);
         let meets = |lane: usize| seen.push(lanes[lane]);
         let misses = |lane: usize| {
             if let Some(missed) = missed {
                 missed.push(lanes[lane]);
             }
         };
-        let mut found = Found::NOTHING;
-        found.look_up::<TILTED, RICH, RGB>(surfaces, (block, first, count), (meets, misses));
+        let mut found = BlockLookup::nothing(first);
+        found.look_up::<TILTED, RICH, RGB>(surfaces, block, count, meets, misses);
         if RICH {
-            leave_out(&mut found, carried, first);
-            if TILTED && !leaving.singles.is_empty() {
-                leaving.singles.mark(first, &mut found);
+            leave_out(&mut found, carried);
+            if TILTED && !output.singles.is_empty() {
+                output.singles.mark(&mut found);
             }
         }
-        if !numbers.is_scattered || found.scatters == [0; LANES] {
+        if !rules.is_scattered || found.scatters == [0; LANES] {
             continue;
         }
         let mut hits = measure(surfaces, block, &found, offset);
         let has_singles = RICH && TILTED && found.single != [0; LANES];
         if has_singles {
-            leaving.singles.put_normals(first, &mut hits.bent);
+            output.singles.put_normals(first, &mut hits.bent);
         }
         let run = first..first + LANES;
         let row =
             |column: &[F]| -> Row<F> { column[run.clone()].try_into().unwrap_or([F::ZERO; LANES]) };
         let square = |draw: Draw| {
-            let [first, second] = &numbers.drawn[draw as usize];
+            let [first, second] = &rules.drawn[draw as usize];
             [row(first), row(second)]
         };
-        let colors = found.colors::<RGB>(surfaces, leaving.colors);
+        let colors = found.colors::<RGB>(surfaces, output.colors);
         let has_facets = RICH && found.has_facets();
         if has_facets {
-            let seen = (&hits, hits.shading::<TILTED>(), colors);
-            leaving.facets.see::<RGB>(surfaces, (block, first, &found), seen);
+            let (found, hits, shading) = (&found, &hits, hits.shading::<TILTED>());
+            output.facets.see::<RGB>(surfaces, FacetHits { block, found, hits, shading, colors });
         }
         let ray: [u32; LANES] = carried.ray[run.clone()].try_into().unwrap_or([0; LANES]);
         let light = square(Draw::Light);
-        let mut places = match numbers.chosen {
+        let mut places = match rules.chosen {
             None => place(lights, &hits.point, light),
-            Some(chosen) => place_on_chosen((lights, chosen), &hits.point, (&light, first)),
+            Some(chosen) => place_on_chosen(lights, chosen, &hits.point, &light, first),
         };
-        let others = RICH.then(|| {
-            OtherPlaces::of::<TILTED>(numbers.chosen, &hits, (&light, first), &mut places)
-        });
+        let others = RICH
+            .then(|| OtherPlaces::of::<TILTED>(rules.chosen, &hits, &light, first, &mut places));
         let mut asked =
-            ask::<F, TILTED, RICH>((&places, others.as_ref()), (offset, surfaces.roundings), &hits);
+            ask::<F, TILTED, RICH>(&places, others.as_ref(), offset, surfaces.roundings, &hits);
         let has_sheets = RICH && found.sheets != [0; LANES];
         if has_sheets {
-            let toward = (&asked.toward, &asked.pdf, &places.is_delta);
-            leaving.facets.reflect(&found.sheets, toward, &mut asked.value);
+            let LightRays { toward, pdf, value, .. } = &mut asked;
+            let samples = LightSamples { toward, pdf, is_delta: &places.is_delta };
+            output.facets.reflect(&found.sheets, samples, value);
         }
         if has_singles {
-            let toward = (&asked.toward, &asked.pdf, &places.is_delta);
-            leaving.singles.reflect(tracing, (&found, first), toward, &mut asked.value);
+            let LightRays { toward, pdf, value, .. } = &mut asked;
+            let samples = LightSamples { toward, pdf, is_delta: &places.is_delta };
+            output.singles.reflect(tracing, &found, samples, value);
         }
-        let asks = match (numbers.asks_lights, RICH) {
+        let asks = match (rules.asks_lights, RICH) {
             (false, _) => [0; LANES],
             (true, true) => found.asks(),
             (true, false) => found.scatters,
         };
         // Rows are worked out in locals: closures for them, and rows that change in place, go through memory.
         let (mut three, bands) = ([[F::ZERO; LANES]; 3], carried.count::<RGB>());
-        let shares: &mut [Row<F>] = if RGB { &mut three } else { leaving.shares };
+        let shares: &mut [Row<F>] = if RGB { &mut three } else { output.shares };
         for band in 0..bands {
             let (mut share, arrived) = (colors[band], row(&carried.throughput[band]));
             if has_sheets {
-                leaving.facets.sheets_in_band(&found.sheets, band, &mut share);
+                output.facets.sheets_in_band(&found.sheets, band, &mut share);
             }
             if has_singles {
-                leaving.singles.in_band((&found, first), (band, bands), &mut share);
+                output.singles.in_band(&found, band, bands, &mut share);
             }
             for i in 0..LANES {
                 share[i] *= arrived[i] * asked.value[i];
             }
-            if let (Some(others), Some(chosen)) = (&others, numbers.chosen) {
-                let radiance = others.radiance((chosen, first), &places.lamp, band);
+            if let (Some(others), Some(chosen)) = (&others, rules.chosen) {
+                let radiance = others.radiance(chosen, first, &places.light, band);
                 for i in 0..LANES {
                     share[i] *= radiance[i];
                 }
             }
             shares[band] = share;
         }
-        let toward = (&asks, [&ray, &lanes], &*shares);
-        send::<F, RICH>(&asked, &places, toward, (instructions, leaving.shadows));
-        if !numbers.goes_on && !has_singles && (!RICH || found.smooth == [0; LANES]) {
+        let shadows = &mut *output.shadows;
+        send::<F, RICH>(&asked, &places, &asks, [&ray, &lanes], shares, instructions, shadows);
+        if !rules.goes_on && !has_singles && (!RICH || found.smooth == [0; LANES]) {
             continue;
         }
-        let mut specular = found.smooth;
         let mut left = scatter::<F, TILTED>(&hits, square(Draw::Direction));
+        left.specular = found.smooth;
         for i in 0..LANES {
             left.goes[i] &= found.scatters[i];
         }
         if has_facets {
-            let choice = square(Draw::Choice);
-            leaving.facets.scatter(
-                &found,
-                &hits,
-                (&choice[1], &square(Draw::Direction)),
-                &mut left,
-            );
+            let (choice, directions) = (square(Draw::Choice), square(Draw::Direction));
+            output.facets.scatter(&found, &hits, &choice[1], &directions, &mut left);
         }
         if has_singles {
-            let drawn = (&hits, &square(Draw::Choice)[1], &square(Draw::Direction));
-            let scattered = (&mut left, &mut specular);
-            leaving.singles.scatter(tracing, (&found, first), drawn, scattered);
+            let (choice, directions) = (square(Draw::Choice), square(Draw::Direction));
+            output.singles.scatter(tracing, &found, &hits, &choice[1], &directions, &mut left);
         }
-        if RICH && !numbers.goes_on {
+        if RICH && !rules.goes_on {
             for i in 0..LANES {
-                left.goes[i] &= specular[i];
+                left.goes[i] &= left.specular[i];
             }
         }
-        if let Some(sphere) = &sphere {
-            let rays = (&left.start, &left.along);
-            keep_those_that_may_meet((sphere, surfaces.roundings), rays, &specular, &mut left.goes);
+        if let Some(sphere) = &rules.sphere {
+            keep_those_that_may_meet(sphere, surfaces.roundings, &mut left);
         }
         let mut three = [[F::ZERO; LANES]; 3];
-        let throughput: &mut [Row<F>] = if RGB { &mut three } else { leaving.shares };
+        let throughput: &mut [Row<F>] = if RGB { &mut three } else { output.shares };
         for band in 0..bands {
             let (mut passed, arrived) = (colors[band], row(&carried.throughput[band]));
             if has_facets {
-                leaving.facets.in_band(&found, band, &mut passed);
+                output.facets.in_band(&found, band, &mut passed);
             }
             if has_singles {
-                leaving.singles.in_band((&found, first), (band, bands), &mut passed);
+                output.singles.in_band(&found, band, bands, &mut passed);
             }
             for i in 0..LANES {
                 passed[i] *= arrived[i];
             }
             throughput[band] = passed;
         }
-        end_some(throughput, &mut left.goes, numbers.roulette.then(|| square(Draw::Chance)));
-        let sky_chance = numbers.chosen.filter(|chosen| RICH && !chosen.sky_chance.is_empty());
+        end_some(throughput, &mut left.goes, rules.roulette.then(|| square(Draw::Chance)));
+        let sky_chance = rules.chosen.filter(|chosen| RICH && !chosen.sky_chance.is_empty());
         let sky_chance = sky_chance.map(|chosen| row(&chosen.sky_chance));
         let flags = carried.flags.get(run.clone()).and_then(|flags| flags.try_into().ok());
         let flags = flags.unwrap_or([0; LANES]);
-        let departing = BlockPaths { throughput, ray, flags, lanes, specular, sky_chance };
-        let shading = numbers.chosen.is_some().then(|| hits.shading::<TILTED>());
-        let to = (&mut *leaving.next, &mut *leaving.last);
-        depart::<F, RICH>((&left, shading), &departing, &numbers, (instructions, to));
+        let departing = BlockPaths { throughput, ray, flags, lanes, sky_chance };
+        let shading = rules.chosen.is_some().then(|| hits.shading::<TILTED>());
+        let (next, last) = (&mut *output.next, &mut *output.last);
+        depart::<F, RICH>(&left, shading, &departing, &rules, instructions, next, last);
     }
 }
 
 /// Leaves out the surfaces that paths met which only look for light.
 #[inline(always)]
-fn leave_out<F: Lane>(found: &mut Found<F>, carried: &Columns<F>, first: usize) {
-    let Some(flags) = carried.flags.get(first..first + LANES) else { return };
+fn leave_out<F: Lane>(found: &mut BlockLookup<F>, carried: &Columns<F>) {
+    let Some(flags) = carried.flags.get(found.first..found.first + LANES) else { return };
     for i in 0..LANES {
         let goes_on = if flags[i] & LAST == 0 { u32::MAX } else { 0 };
         found.scatters[i] &= goes_on;
@@ -328,7 +340,7 @@ fn lanes_from(first: usize) -> [u32; LANES] {
 fn measure<F: Lane>(
     Surfaces { roundings, edge_weight, .. }: Surfaces<'_, F>,
     block: &RayBlock<F>,
-    found: &Found<F>,
+    found: &BlockLookup<F>,
     offset: [F; 3],
 ) -> Hits<F> {
     let magnitudes = &found.magnitudes;

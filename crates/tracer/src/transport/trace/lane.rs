@@ -21,7 +21,7 @@ pub(in crate::transport) struct Batch {
     blocked: Vec<bool>,
 }
 
-/// What is known of rays that are traced together.
+/// Properties of rays that are traced together.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::transport) struct Query<'a> {
     /// Times (s from the frame's time); all at 0 where there are none.

@@ -1,18 +1,18 @@
-//! Light that paths meet, and that rays to lights bring.
+//! Light of emitters that paths meet, and that rays to lights bring.
 
 use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Detail, HitBatch, RayBatch};
 
+use super::block_lights::{BlockLights, OTHER};
 use super::kernel::{round, single};
-use super::lamps::{Lights, OTHER};
 use super::lane::{Lane, Query, wide};
 use super::sky::ask_sky;
-use super::{Columns, RayColumns, SPECULAR, Workspace};
+use super::{Columns, RayColumns, SPECULAR, TraceStep, Workspace};
 use crate::emitters::Emitters;
 use crate::footprint::{Cone, Footprint};
+use crate::transport::Tracing;
 use crate::transport::encounter::{Encounter, RayHit, Way};
-use crate::transport::{RaySamples, Tracing};
 
 /// Last directions, as what shines is asked about them, and what they meet of it.
 #[derive(Debug, Default)]
@@ -26,35 +26,35 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     /// Adds the light of emitters that paths met, but for those that may not be there.
     pub(super) fn meet<F: Lane>(
         &mut self,
-        (camera, number): (&RaySamples<'_>, u32),
+        step: TraceStep<'_>,
         workspace: &mut Workspace<F>,
         out: &mut [f64],
     ) {
         let seen = std::mem::take(&mut workspace.seen);
-        seen.iter().for_each(|&i| self.meet_lane((camera, number), workspace, i as usize, out));
+        seen.iter().for_each(|&i| self.meet_lane(step, workspace, i as usize, out));
         workspace.seen = seen;
     }
 
     /// Adds the light of the emitter that the path of a lane met.
     pub(super) fn meet_lane<F: Lane>(
         &mut self,
-        (camera, number): (&RaySamples<'_>, u32),
+        step: TraceStep<'_>,
         workspace: &mut Workspace<F>,
         i: usize,
         out: &mut [f64],
     ) {
-        let (hit, ray) = self.hit_of(&workspace.rays, i, workspace.carried.ray[i]);
-        let from = workspace.passing.from.get(i).copied().unwrap_or(ray.0);
+        let hit = self.hit_of(&workspace.rays, i, workspace.carried.ray[i]);
+        let from = workspace.passages.from.get(i).copied().unwrap_or(hit.origin);
         let flags = workspace.carried.flags.get(i);
-        let is_specular = number == 0 || flags.is_some_and(|flags| flags & SPECULAR != 0);
+        let is_specular = step.number == 0 || flags.is_some_and(|flags| flags & SPECULAR != 0);
         let way = if is_specular { Way::CAMERA } else { way_of(&workspace.carried, i) };
         // Few lights are chosen with the same chance for all points.
-        let encounter =
-            Encounter { hit, ray, receiver: way_of(&workspace.carried, i).receiver(from) };
+        let receiver = way_of(&workspace.carried, i).receiver(from);
+        let encounter = Encounter { hit, receiver };
         let mut light = std::mem::take(&mut workspace.light);
         let footprint = || {
-            let Cone { width, .. } = self.cone((camera, number), workspace, i)?;
-            let direction = if number == 0 { camera.rays.direction(i) } else { ray.1 };
+            let Cone { width, .. } = self.cone(step, workspace, i)?;
+            let direction = step.direction(i, || hit.direction);
             Some(Footprint { direction, width })
         };
         light.resize(self.count(), 0.0);
@@ -63,7 +63,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 *light *= wide(band[i]) * weight;
             }
             let group = || self.ctx.lights.group_of_placement(&self.ctx.scene, hit.id[0]);
-            let row = self.parts.row(workspace.carried.ray[i], number, group);
+            let row = self.parts.row(workspace.carried.ray[i], step.number, group);
             self.add(&light, row, out);
         }
         workspace.light = light;
@@ -72,9 +72,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     /// Adds what lights bring along rays that nothing blocks.
     pub(super) fn light<F: Lane>(
         &mut self,
+        step: TraceStep<'_>,
+        lights: &BlockLights<'_, F>,
         workspace: &mut Workspace<F>,
-        lights: &Lights<'_, F>,
-        (number, coherent): (u32, bool),
         out: &mut [f64],
     ) {
         if workspace.shadows.len == 0 {
@@ -85,10 +85,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let Workspace { shadows, shadow_rays, times, batch, .. } = workspace;
         shadows.pack(shadow_rays);
         if self.may_pass_to_lights(shadows) {
-            return self.light_through(workspace, lights, (number, coherent), out);
+            return self.light_through(step, lights, workspace, out);
         }
         self.times_of::<F>(shadows.carried.ray[..shadows.len].iter().copied(), times);
-        let query = Query { times, ends: &shadows.ends, coherent };
+        let query = Query { times, ends: &shadows.ends, coherent: step.is_coherent() };
         F::occlude(self.ctx, shadow_rays, query, batch);
         let (count, mut three) = (self.count(), [0.0; 3]);
         let mut more = if RGB { Vec::new() } else { vec![0.0; count] };
@@ -100,15 +100,15 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                     continue;
                 }
                 let i = first + lane;
-                let radiance = &lights.radiance(shadows.lamp[i], count)[..count];
+                let radiance = &lights.radiance(shadows.light[i], count)[..count];
                 for band in 0..count {
                     light[band] = wide(shares[band][i]) * radiance[band];
                 }
                 if let Some(media) = shadows.carried.media.get(i) {
                     self.dim_along(media, wide(shadows.reach[i]), light);
                 }
-                let group = || lights.group_of(&self.ctx.scene, shadows.lamp[i]);
-                let row = self.parts.row(shadows.carried.ray[i], number + 1, group);
+                let group = || lights.group_of(&self.ctx.scene, shadows.light[i]);
+                let row = self.parts.row(shadows.carried.ray[i], step.number + 1, group);
                 self.add(light, row, out);
             }
         }
@@ -119,12 +119,12 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     pub(super) fn ask_emitters<F: Lane>(
         &self,
         emitters: &Emitters,
-        lights: &Lights<'_, F>,
+        lights: &BlockLights<'_, F>,
         workspace: &mut Workspace<F>,
     ) {
         let Workspace { last, shadows, query, .. } = workspace;
         if last.len > 0 && !emitters.is_empty() {
-            last.len = self.ask_surfaces(emitters, (query, last), shadows);
+            last.len = self.ask_surfaces(emitters, query, last, shadows);
         }
         if let Some(sky) = &lights.sky {
             ask_sky::<F, RGB>(sky, self.ctx.spectral, last, shadows);
@@ -132,11 +132,12 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         last.len = 0;
     }
 
-    /// The same of surfaces that shine; how many directions meet none, which are put first.
+    /// The same of surfaces that shine; the number of directions that meet none, which are put first.
     fn ask_surfaces<F: Lane>(
         &self,
         emitters: &Emitters,
-        (query, last): (&mut EmitterQuery, &mut RayColumns<F>),
+        query: &mut EmitterQuery,
+        last: &mut RayColumns<F>,
         shadows: &mut RayColumns<F>,
     ) -> usize {
         let EmitterQuery { rays, hits, light } = query;
@@ -160,6 +161,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             };
             let (from, along) = (rays.origin(i), rays.direction(i));
             let hit = RayHit {
+                origin: from,
+                direction: along,
                 id: [hits.placement[i], hits.triangle[i]],
                 weights: [hits.u[i], hits.v[i]],
                 t: hits.t[i],
@@ -167,7 +170,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 time: 0.0,
             };
             let way = way_of(&last.carried, i);
-            let encounter = Encounter { hit, ray: (from, along), receiver: way.receiver(from) };
+            let encounter = Encounter { hit, receiver: way.receiver(from) };
             let Some(weight) = self.light_of_hit(&encounter, way, || None, light) else { continue };
             let Some(number) = self.ctx.lights.index_of(hit.id) else { continue };
             let end = self.ctx.anchor(from + along * hit.t, hit.normal, from, placed);
@@ -177,8 +180,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let along = if distance > 0.0 { offset / distance } else { DVec3::Z };
             let is_plain = self.ctx.lights.plain_light(number).is_some();
             let number = u32::try_from(number).unwrap_or_default();
-            let lamp = if is_plain { number } else { OTHER | number };
-            let to = shadows.push((&*last, i), (single(along), round(distance)), lamp);
+            let light_number = if is_plain { number } else { OTHER | number };
+            let to = shadows.push(last, i, single(along), round(distance), light_number);
             for (k, band) in light.iter().enumerate() {
                 let share = if is_plain { weight } else { weight * band };
                 let carried = wide(last.carried.throughput[k][i]);
@@ -189,7 +192,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     }
 }
 
-/// How a path of some columns came to its direction, if not specular.
+/// The way in which a path of some columns came to its direction, if not specular.
 fn way_of<F: Lane>(carried: &Columns<F>, i: usize) -> Way {
     Way {
         pdf: wide(carried.pdf[i]),

@@ -6,26 +6,25 @@ use etendue_geometry::block::LANES;
 use super::kernel::{round, single};
 use super::lane::{Lane, wide};
 use super::single::{SingleHit, SingleHits};
-use super::{SCATTERED, SPECULAR, Workspace};
+use super::{SCATTERED, SPECULAR, TraceStep, Workspace};
 use crate::Scattering;
-use crate::transport::Draw;
 use crate::transport::dispersion::Boundary;
-use crate::transport::{RaySamples, Tracing};
+use crate::transport::{Draw, Tracing};
 
 impl<const RGB: bool> Tracing<'_, RGB> {
-    /// How the surface that a lane hit scatters light, which is worked out by itself.
+    /// Looks up the scattering of light by the surface that a lane hit, which is worked out by itself.
     pub(super) fn look_up_single<F: Lane>(
         &self,
-        (camera, number): (&RaySamples<'_>, u32),
+        step: TraceStep<'_>,
         workspace: &mut Workspace<F>,
-        (lane, singles): (usize, &mut SingleHits),
+        lane: usize,
+        singles: &mut SingleHits,
     ) -> Option<()> {
-        let block_hit = self.hit_of(&workspace.rays, lane, workspace.carried.ray[lane]);
-        let placement = block_hit.0.id[0];
-        let mut interaction =
-            self.interaction_of((camera, number), (workspace, lane), &block_hit)?;
-        let boundary = (placement, self.coincident_of(&block_hit));
-        let crossing = self.cross(workspace.carried.media_of(lane), boundary, &mut interaction);
+        let hit = self.hit_of(&workspace.rays, lane, workspace.carried.ray[lane]);
+        let placement = hit.id[0];
+        let mut interaction = self.interaction_of(step, workspace, lane, &hit)?;
+        let (media, coincident) = (workspace.carried.media_of(lane), self.coincident_of(&hit));
+        let crossing = self.cross(media, placement, coincident, &mut interaction);
         let (scene, spectral) = (&self.ctx.scene, self.ctx.spectral);
         let mut wavelength = workspace.carried.wavelength_of(lane);
         let mut is_parted = false;
@@ -37,7 +36,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             if is_parted {
                 let bsdf = interaction.bsdf(scene, spectral, spectral.wavelength(0));
                 let boundary = Boundary { lane, interaction: &interaction, bsdf };
-                self.part(number, workspace, &boundary);
+                self.part(step.number, workspace, &boundary);
             } else {
                 wavelength = self.keep_one_of(workspace, lane);
             }
@@ -78,12 +77,12 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let before: Vec<f64> = bands.collect();
         let origin = F::origin(self.ctx.accel);
         let next = &mut workspace.next;
-        self.part_bands(boundary, &before, (light, choice), |(way, wavelength), part| {
-            if !self.goes_on((number + 1, chance), &before, part) {
+        self.part_bands(boundary, &before, light, choice, |way, wavelength, part| {
+            if !self.goes_on(number + 1, chance, &before, part) {
                 return;
             }
             let to = next.len;
-            next.reserve((to + LANES, part.len()), true);
+            next.reserve(to + LANES, part.len(), true);
             let start = single(boundary.interaction.anchor.leave(way.direction) - origin);
             let along = single(way.direction);
             for axis in 0..3 {

@@ -6,19 +6,20 @@ use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::glam::DVec3;
 
 use super::facets::BsdfSamples;
-use super::kernel::{Hits, Mask, round, single};
+use super::kernel::{Hits, round, single};
 use super::lane::{Lane, wide};
-use super::surfaces::Found;
+use super::surfaces::BlockLookup;
+use crate::bsdf::sheets::LightSamples;
 use crate::bsdf::{Bsdf, Weights};
 use crate::sampling::power_heuristic;
 use crate::transport::Tracing;
-use crate::transport::media::Crossing;
+use crate::transport::media::MediumInterface;
 
 /// Hits that are worked out one by one, in the order of their lanes.
 #[derive(Debug, Default)]
 pub(super) struct SingleHits {
     hits: Vec<SingleHit>,
-    /// What goes to the viewer of the light that was asked, or of what was scattered by chance, `[hit][band]`.
+    /// Shares that go to the viewer of the light that was asked, or on of what was scattered by chance, `[hit][band]`.
     shares: Vec<f64>,
 }
 
@@ -31,7 +32,7 @@ pub(super) struct SingleHit {
     /// Light may pass the surface.
     pub(super) passes: bool,
     /// The media on its sides, where they count.
-    pub(super) crossing: Option<Crossing>,
+    pub(super) crossing: Option<MediumInterface>,
     /// It has sent all paths that leave it, as glass that parts wavelengths does.
     pub(super) is_parted: bool,
 }
@@ -51,7 +52,7 @@ impl SingleHits {
     }
 
     /// The media on the sides of a lane's boundary.
-    pub(super) fn crossing(&self, lane: usize) -> Option<Crossing> {
+    pub(super) fn crossing(&self, lane: usize) -> Option<MediumInterface> {
         let place = self.hits.binary_search_by_key(&lane, |own| own.lane as usize);
         self.hits[place.ok()?].crossing
     }
@@ -66,8 +67,8 @@ impl SingleHits {
 
     /// Says of a block's lanes what hits have that is known before they are measured.
     #[inline(never)]
-    pub(super) fn mark<F: Lane>(&self, first: usize, found: &mut Found<F>) {
-        for (number, lane) in self.of_block(first) {
+    pub(super) fn mark<F: Lane>(&self, found: &mut BlockLookup<F>) {
+        for (number, lane) in self.of_block(found.first) {
             let SingleHit { bsdf, passes, is_parted, .. } = &self.hits[number];
             if *is_parted {
                 (found.scatters[lane], found.single[lane]) = (0, 0);
@@ -92,17 +93,17 @@ impl SingleHits {
         }
     }
 
-    /// What hits turn to the viewer of light from unit directions that were chosen with a density (1/sr), in their lanes
-    /// of `value`. How much of it in each band [`Self::in_band`] says.
+    /// Puts the share of light from directions to lights that hits turn to the viewer into `value`, in their lanes. How
+    /// much of it in each band [`Self::in_band`] says.
     #[inline(never)]
     pub(super) fn reflect<F: Lane, const RGB: bool>(
         &mut self,
         tracing: &Tracing<'_, RGB>,
-        (found, first): (&Found<F>, usize),
-        (toward, pdf, is_delta): (&[Row<F>; 3], &Row<F>, &Row<F>),
+        found: &BlockLookup<F>,
+        LightSamples { toward, pdf, is_delta }: LightSamples<'_, F>,
         value: &mut Row<F>,
     ) {
-        let own: Vec<(usize, usize)> = self.of_block(first).collect();
+        let own: Vec<(usize, usize)> = self.of_block(found.first).collect();
         for (number, lane) in own {
             if found.single[lane] == 0 {
                 continue;
@@ -117,7 +118,7 @@ impl SingleHits {
             let balance =
                 if wide(is_delta[lane]) > 0.0 { 1.0 } else { power_heuristic(pdf, density) };
             value[lane] = if weights.is_zero() { F::ZERO } else { round(balance / pdf) };
-            self.put_shares(tracing, number, (&bsdf, weights));
+            self.put_shares(tracing, number, &bsdf, weights);
         }
     }
 
@@ -127,11 +128,13 @@ impl SingleHits {
     pub(super) fn scatter<F: Lane, const RGB: bool>(
         &mut self,
         tracing: &Tracing<'_, RGB>,
-        (found, first): (&Found<F>, usize),
-        (hits, choice, square): (&Hits<F>, &Row<F>, &[Row<F>; 2]),
-        (left, specular): (&mut BsdfSamples<F>, &mut Mask),
+        found: &BlockLookup<F>,
+        hits: &Hits<F>,
+        choice: &Row<F>,
+        square: &[Row<F>; 2],
+        left: &mut BsdfSamples<F>,
     ) {
-        let own: Vec<(usize, usize)> = self.of_block(first).collect();
+        let own: Vec<(usize, usize)> = self.of_block(found.first).collect();
         for (number, lane) in own {
             if found.single[lane] == 0 {
                 continue;
@@ -151,8 +154,8 @@ impl SingleHits {
             // What is denser than single precision holds is as good as specular against any light.
             left.pdf[lane] = round(sample.pdf.min(wide(F::MAX)));
             left.goes[lane] = u32::MAX;
-            specular[lane] = if sample.is_specular { u32::MAX } else { 0 };
-            self.put_shares(tracing, number, (&bsdf, sample.weights));
+            left.specular[lane] = if sample.is_specular { u32::MAX } else { 0 };
+            self.put_shares(tracing, number, &bsdf, sample.weights);
         }
     }
 
@@ -160,7 +163,8 @@ impl SingleHits {
         &mut self,
         tracing: &Tracing<'_, RGB>,
         number: usize,
-        (bsdf, weights): (&Bsdf, Weights),
+        bsdf: &Bsdf,
+        weights: Weights,
     ) {
         let count = tracing.count();
         let end = (number + 1) * count;
@@ -176,11 +180,12 @@ impl SingleHits {
     #[inline(never)]
     pub(super) fn in_band<F: Lane>(
         &self,
-        (found, first): (&Found<F>, usize),
-        (band, count): (usize, usize),
+        found: &BlockLookup<F>,
+        band: usize,
+        count: usize,
         share: &mut Row<F>,
     ) {
-        for (number, lane) in self.of_block(first) {
+        for (number, lane) in self.of_block(found.first) {
             if found.single[lane] != 0 {
                 share[lane] = round(self.shares.get(number * count + band).copied().unwrap_or(0.0));
             }

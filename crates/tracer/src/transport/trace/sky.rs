@@ -7,20 +7,20 @@ use etendue_geometry::RayBlocks;
 use etendue_geometry::block::{Floats as Row, LANES, vector};
 use etendue_geometry::glam::{DMat3, DVec3};
 
-use super::choose::{ChosenLamps, OtherPlace};
+use super::block_lights::{BlockLights, OTHER};
+use super::choose::{ChosenLights, OtherPlace};
 use super::kernel::{round, single};
-use super::lamps::{Lights, OTHER};
 use super::lane::{Lane, wide};
-use super::{Columns, RayColumns, SCATTERED, SPECULAR, Workspace};
+use super::{Columns, RayColumns, SCATTERED, SPECULAR, TraceStep, Workspace};
 use crate::Spectral;
 use crate::environment::{EnvironmentMap, MapLookup, MapSampler, place};
 use crate::sampling::GridCell;
-use crate::transport::{RaySamples, Tracing};
+use crate::transport::Tracing;
 
 /// The sky of a scene.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SkyView<'a> {
-    /// Which of the lights it is.
+    /// Its number among all lights.
     pub(super) index: usize,
     pub(super) map: Option<(&'a EnvironmentMap, &'a MapSampler)>,
     world_from_map: DMat3,
@@ -31,7 +31,7 @@ pub(super) struct SkyView<'a> {
     of_spectra: Option<&'a crate::lights::Lights>,
 }
 
-/// What paths that met the sky brought there, side by side.
+/// Paths that met the sky, side by side.
 struct SkyHits<F> {
     direction: [Row<F>; 3],
     /// Density (1/sr) of the direction, and the chance with which the sky was asked where it began; 1 and 0 where no
@@ -55,7 +55,8 @@ impl<F: Lane> SkyHits<F> {
     fn put(
         &mut self,
         i: usize,
-        (carried, own): (&Columns<F>, usize),
+        carried: &Columns<F>,
+        own: usize,
         direction: [F; 3],
         was_asked: bool,
     ) {
@@ -90,11 +91,12 @@ impl<'a> SkyView<'a> {
     fn light<const RGB: bool>(
         &self,
         spectral: &Spectral,
-        (color, at): ([f64; 3], impl FnOnce() -> [f64; 2]),
+        color: [f64; 3],
+        at: impl FnOnce() -> [f64; 2],
         light: &mut [f64],
     ) {
         if !RGB && let Some(lights) = self.of_spectra {
-            return lights.spread_sky(spectral, (at(), &color.map(wide)), light);
+            return lights.spread_sky(spectral, at(), &color.map(wide), light);
         }
         // How many there are of red, green and blue is known when the program is compiled.
         let bands = if RGB { 3 } else { light.len() };
@@ -184,11 +186,11 @@ fn number_of(sky: &SkyView<'_>) -> u32 {
 pub(super) fn place_on_sky<F: Lane, const RGB: bool>(
     sky: &SkyView<'_>,
     spectral: &Spectral,
-    chosen: &mut ChosenLamps<F>,
+    chosen: &mut ChosenLights<F>,
 ) {
     let Some((map, sampler)) = sky.map else { return };
     let (cells, mut radiance) =
-        (std::mem::take(&mut chosen.cells), std::mem::take(&mut chosen.light));
+        (std::mem::take(&mut chosen.cells), std::mem::take(&mut chosen.bands));
     for (number, run) in cells.chunks(LANES).enumerate() {
         let mut patches = [GridCell::default(); LANES];
         patches[..run.len()].copy_from_slice(run);
@@ -203,12 +205,12 @@ pub(super) fn place_on_sky<F: Lane, const RGB: bool>(
                 let (light, place) = (number_of(sky), axis(&directions));
                 let own = OtherPlace { light, place, is_far, is_delta, density, side: None };
                 let at = || [lit.places[0][i], lit.places[1][i]].map(wide);
-                sky.light::<RGB>(spectral, (axis(&lit.colors).map(wide), at), &mut radiance);
+                sky.light::<RGB>(spectral, axis(&lit.colors).map(wide), at, &mut radiance);
                 chosen.put(lane as usize, &own, &radiance);
             }
         }
     }
-    (chosen.cells, chosen.light) = (cells, radiance);
+    (chosen.cells, chosen.bands) = (cells, radiance);
 }
 
 impl<const RGB: bool> Tracing<'_, RGB> {
@@ -216,30 +218,30 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     /// paths: surfaces that scatter light ask for theirs.
     pub(super) fn add_disks<F: Lane>(
         &mut self,
-        (camera, number): (&RaySamples<'_>, u32),
+        step: TraceStep<'_>,
         workspace: &mut Workspace<F>,
         out: &mut [f64],
     ) {
         let Workspace { missed, rays, carried, light, .. } = workspace;
-        if !self.ctx.lights.has_disks() || (number > 0 && carried.flags.is_empty()) {
+        if !self.ctx.lights.has_disks() || (step.number > 0 && carried.flags.is_empty()) {
             return;
         }
         let count = self.count();
         for &own in &*missed {
             let own = own as usize;
-            if number > 0 && carried.flags[own] & SCATTERED != 0 {
+            if step.number > 0 && carried.flags[own] & SCATTERED != 0 {
                 continue;
             }
-            let direction = direction_of((camera, number), rays, own).normalize();
+            let direction = direction_of(step, rays, own).normalize();
             let time = self.time_of(carried.ray[own]);
-            for (index, radiance) in self.ctx.lights.disks_in(direction, time, number == 0) {
+            for (index, radiance) in self.ctx.lights.disks_in(direction, time, step.number == 0) {
                 let throughput = carried.throughput.iter().map(|band| radiance * wide(band[own]));
                 let bands = self.ctx.lights.bands_of(index, count);
                 light.clear();
                 light.extend(throughput.zip(bands).map(|(passed, band)| passed * band));
                 let number_of_light = u32::try_from(index).unwrap_or_default();
                 let group = || self.ctx.lights.group_of_any(&self.ctx.scene, number_of_light);
-                let row = self.parts.row(carried.ray[own], number, group);
+                let row = self.parts.row(carried.ray[own], step.number, group);
                 self.add(light, row, out);
             }
         }
@@ -248,12 +250,12 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     /// Adds the light of the sky that paths met.
     pub(super) fn add_sky<F: Lane>(
         &mut self,
-        (camera, number): (&RaySamples<'_>, u32),
-        lights: &Lights<'_, F>,
+        step: TraceStep<'_>,
+        lights: &BlockLights<'_, F>,
         workspace: &Workspace<F>,
         out: &mut [f64],
     ) {
-        let Some(sky) = lights.sky.filter(|sky| sky.visible || number > 0) else { return };
+        let Some(sky) = lights.sky.filter(|sky| sky.visible || step.number > 0) else { return };
         let (flags, throughput) = (&workspace.carried.flags, &workspace.carried.throughput);
         let (mut lit, mut light) =
             (SkyLight { color: [[F::ZERO; LANES]; 3], weight: [F::ZERO; LANES] }, Vec::new());
@@ -262,21 +264,21 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let mut arrived = SkyHits::NOTHING;
             for (i, &own) in missed.iter().enumerate() {
                 let own = own as usize;
-                let direction = direction_of((camera, number), &workspace.rays, own);
+                let direction = direction_of(step, &workspace.rays, own);
                 let is_specular = flags.get(own).is_some_and(|flags| flags & SPECULAR != 0);
-                let was_asked = number > 0 && !is_specular;
-                arrived.put(i, (&workspace.carried, own), single(direction), was_asked);
+                let was_asked = step.number > 0 && !is_specular;
+                arrived.put(i, &workspace.carried, own, single(direction), was_asked);
             }
             light_of(&sky, &arrived, &mut lit);
             for (i, &own) in missed.iter().enumerate() {
                 let own = own as usize;
                 let at = || sky.place_of(&arrived.direction, i);
-                sky.light::<RGB>(self.ctx.spectral, (lit.color(i).map(wide), at), &mut light);
+                sky.light::<RGB>(self.ctx.spectral, lit.color(i).map(wide), at, &mut light);
                 for (k, band) in light.iter_mut().enumerate() {
                     *band *= wide(throughput[k][own] * lit.weight[i]);
                 }
                 let group = || self.ctx.lights.group_of_sky();
-                let row = self.parts.row(workspace.carried.ray[own], number, group);
+                let row = self.parts.row(workspace.carried.ray[own], step.number, group);
                 self.add(&light, row, out);
             }
         }
@@ -286,15 +288,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
 /// The direction of a path that met nothing. The camera's rays are not all traced: those that cannot hit anything are other
 /// ones in blocks.
 #[inline(always)]
-fn direction_of<F: Lane>(
-    (camera, number): (&RaySamples<'_>, u32),
-    rays: &RayBlocks<F>,
-    own: usize,
-) -> DVec3 {
-    match number {
-        0 => camera.rays.direction(own),
-        _ => vector(&rays.blocks()[own / LANES].direction, own % LANES),
-    }
+fn direction_of<F: Lane>(step: TraceStep<'_>, rays: &RayBlocks<F>, own: usize) -> DVec3 {
+    step.direction(own, || vector(&rays.blocks()[own / LANES].direction, own % LANES))
 }
 
 /// Makes last directions that meet nothing else that shines rays to the sky: they bring its light unless something is in between.
@@ -313,7 +308,7 @@ pub(super) fn ask_sky<F: Lane, const RGB: bool>(
         let count = LANES.min(last.len - first);
         for i in 0..count {
             let direction = [0, 1, 2].map(|axis| last.along[axis][first + i]);
-            arrived.put(i, (&last.carried, first + i), direction, true);
+            arrived.put(i, &last.carried, first + i, direction, true);
         }
         light_of(sky, &arrived, &mut lit);
         for i in 0..count {
@@ -323,13 +318,13 @@ pub(super) fn ask_sky<F: Lane, const RGB: bool>(
                 shadows.along[axis][to] = last.along[axis][from];
             }
             let at = || sky.place_of(&arrived.direction, i);
-            sky.light::<RGB>(spectral, (lit.color(i).map(wide), at), light);
+            sky.light::<RGB>(spectral, lit.color(i).map(wide), at, light);
             for band in 0..bands {
                 let carried = wide(last.carried.throughput[band][from] * lit.weight[i]);
                 shadows.carried.throughput[band][to] = round(carried * light[band]);
             }
             shadows.reach[to] = F::INFINITY;
-            shadows.lamp[to] = number_of(sky) | OTHER;
+            shadows.light[to] = number_of(sky) | OTHER;
             shadows.carried.ray[to] = last.carried.ray[from];
             shadows.left[to] = last.left[from];
             shadows.len += 1;

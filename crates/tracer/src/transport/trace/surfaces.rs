@@ -1,4 +1,4 @@
-//! What is looked up for the hits of a block, and the normals that light is scattered about.
+//! The surfaces that the lanes of a block hit, looked up, and the normals that light is scattered about.
 #![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
 use std::hint::select_unpredictable;
@@ -17,7 +17,7 @@ pub(in crate::transport) struct Surfaces<'a, F> {
     pub(super) all: &'a SurfaceTable,
     pub(super) placed: &'a PlacedSurfaces,
     pub(super) geometry: &'a Geometry,
-    pub(super) varied: &'a Varied,
+    pub(super) varied: &'a TextureLookups,
     /// Bound on the error of a hit, and of what leaves it, relative to the numbers that it is worked out of.
     pub(super) roundings: F,
     /// Hits are beside an edge of their triangle where their least barycentric weight is below this
@@ -25,23 +25,23 @@ pub(in crate::transport) struct Surfaces<'a, F> {
     pub(super) edge_weight: F,
 }
 
-/// What surfaces that are not alike all over have, by lane; empty where all are.
+/// Values by lane of surfaces that are not alike all over; empty where all are.
 #[derive(Debug, Default)]
-pub(in crate::transport) struct Varied {
+pub(in crate::transport) struct TextureLookups {
     pub(super) lookups: Vec<TextureLookup>,
-    /// Where bands are not red, green and blue: colours, `[lane][band]`, and those of highlights with the dips of
-    /// measured metals.
+    /// Colours, `[lane][band]`, and those of highlights with the dips of measured metals, where bands are not red, green
+    /// and blue.
     pub(super) colors: Vec<f32>,
     pub(super) facet_bands: Vec<[f64; 2]>,
 }
 
-impl Varied {
-    /// What all have that are alike all over.
+impl TextureLookups {
+    /// Those of surfaces that are all alike all over.
     pub(super) const NONE: &'static Self =
         &Self { lookups: Vec::new(), colors: Vec::new(), facet_bands: Vec::new() };
 }
 
-/// What a surface that is not alike all over has where it was hit.
+/// Values of a surface that is not alike all over, where it was hit.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct TextureLookup {
     /// Red, green and blue, and the largest band of any.
@@ -49,14 +49,14 @@ pub(super) struct TextureLookup {
     pub(super) base_peak: f64,
     /// About which light is scattered, of any length and side, where normals are mapped.
     pub(super) normal: [f64; 3],
-    /// Where these are not alike all over.
+    /// Its facets, where these are not alike all over.
     pub(super) facets: Facets,
     /// It is worked out by itself.
     pub(super) is_single: bool,
 }
 
 impl<F: Lane> Surfaces<'_, F> {
-    /// What a placement's own numbers add to the rounding of a hit (m), which single precision need not hold.
+    /// Magnitudes of a placement's own numbers, which add to the rounding of a hit (m) and which single precision need not hold.
     #[inline(always)]
     fn magnitudes(&self, placement: u32, surface: &SurfaceRow) -> [F; 3] {
         if F::HAS_ENDS {
@@ -92,9 +92,11 @@ impl<F: Lane> Surfaces<'_, F> {
     }
 }
 
-/// What is looked up for the hits of a block.
+/// The surfaces that the lanes of a block hit, looked up.
 #[derive(Debug)]
-pub(super) struct Found<F> {
+pub(super) struct BlockLookup<F> {
+    /// The block's first lane, counted from the first block.
+    pub(super) first: usize,
     /// Red, green and blue; or what has each lane's bands: its material, or with the bit [`VARIED`] itself, counted from
     /// the first block.
     color: [Row<F>; 3],
@@ -116,20 +118,24 @@ pub(super) struct Found<F> {
 /// The bit of lanes whose colours are looked up.
 const VARIED: u32 = 1 << 31;
 
-impl<F: Lane> Found<F> {
-    /// Nothing yet.
-    pub(super) const NOTHING: Self = Self {
-        color: [[F::ZERO; LANES]; 3],
-        source: [0; LANES],
-        magnitudes: [[F::ZERO; LANES]; 3],
-        scatters: [0; LANES],
-        sheets: [0; LANES],
-        smooth: [0; LANES],
-        single: [0; LANES],
-        delta: [0; LANES],
-        passed: [0; LANES],
-        tilted: None,
-    };
+impl<F: Lane> BlockLookup<F> {
+    /// Nothing yet, of the block whose first lane that is.
+    #[inline(always)]
+    pub(super) fn nothing(first: usize) -> Self {
+        Self {
+            first,
+            color: [[F::ZERO; LANES]; 3],
+            source: [0; LANES],
+            magnitudes: [[F::ZERO; LANES]; 3],
+            scatters: [0; LANES],
+            sheets: [0; LANES],
+            smooth: [0; LANES],
+            single: [0; LANES],
+            delta: [0; LANES],
+            passed: [0; LANES],
+            tilted: None,
+        }
+    }
 
     /// All lanes' colours by band, of which `rows` has room for those that are not red, green and blue.
     #[inline(always)]
@@ -171,15 +177,18 @@ impl<F: Lane> Found<F> {
         (self.sheets != [0; LANES]) | (self.smooth != [0; LANES])
     }
 
-    /// What the lanes of a block hit from the first on, of which so many are rays; each that hit what shines goes to `meets`, each that
-    /// hit nothing to `misses`.
+    /// Looks up what the lanes of a block hit, of which the first `count` are rays; each that hit what shines goes to
+    /// `meets`, each that hit nothing to `misses`.
     #[inline(always)]
     pub(super) fn look_up<const TILTED: bool, const RICH: bool, const RGB: bool>(
         &mut self,
         surfaces: Surfaces<'_, F>,
-        (block, first, count): (&RayBlock<F>, usize, usize),
-        (mut meets, mut misses): (impl FnMut(usize), impl FnMut(usize)),
+        block: &RayBlock<F>,
+        count: usize,
+        mut meets: impl FnMut(usize),
+        mut misses: impl FnMut(usize),
     ) {
+        let first = self.first;
         let all = &*surfaces.all.all;
         let Some(last) = all.len().checked_sub(1) else { return };
         for lane in 0..LANES {

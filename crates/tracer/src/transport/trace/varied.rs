@@ -1,4 +1,4 @@
-//! What surfaces that are not alike all over have where paths hit them, and how much of them each path sees.
+//! Values of surfaces that are not alike all over, where paths hit them, and the footprints of paths on them.
 
 use etendue_geometry::block::{LANES, vector};
 
@@ -6,19 +6,19 @@ use etendue_geometry::glam::DVec3;
 
 use super::kernel::{round, single};
 use super::lane::{Lane, wide};
-use super::surfaces::{Surfaces, TextureLookup, Varied};
-use super::{LAST, SPECULAR, Workspace};
+use super::surfaces::{Surfaces, TextureLookup, TextureLookups};
+use super::{LAST, SPECULAR, TraceStep, Workspace};
 use crate::Scattering;
 use crate::footprint::{Cone, Footprint};
 use crate::placed::{Facets, LEAST_ALPHA, SurfaceKind, SurfaceTable};
 use crate::reference::SurfacePoint;
-use crate::transport::{RaySamples, Tracing};
+use crate::transport::Tracing;
 
 impl<const RGB: bool> Tracing<'_, RGB> {
     /// Looks up the colours, facets and normals of hits on surfaces that are not alike all over.
     pub(super) fn look_up_varied<F: Lane>(
         &self,
-        (camera, number): (&RaySamples<'_>, u32),
+        step: TraceStep<'_>,
         surfaces: Surfaces<'_, F>,
         workspace: &mut Workspace<F>,
     ) {
@@ -46,12 +46,11 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let mut is_single = own.kind == SurfaceKind::Other;
             varied.lookups[lane].is_single = false;
             if !is_single {
-                let found = (lane, &mut varied);
-                self.look_up_lane((camera, number), surfaces, workspace, found);
+                self.look_up_lane(step, surfaces, workspace, lane, &mut varied);
                 is_single = varied.lookups[lane].is_single;
             }
             if is_single {
-                self.look_up_single((camera, number), workspace, (lane, &mut singles));
+                self.look_up_single(step, workspace, lane, &mut singles);
             }
         }
         workspace.varied = varied;
@@ -61,10 +60,11 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     /// The same of one lane; what its surface has that is alike all over is left.
     fn look_up_lane<F: Lane>(
         &self,
-        (camera, number): (&RaySamples<'_>, u32),
+        step: TraceStep<'_>,
         surfaces: Surfaces<'_, F>,
         workspace: &Workspace<F>,
-        (lane, varied): (usize, &mut Varied),
+        lane: usize,
+        varied: &mut TextureLookups,
     ) -> Option<()> {
         let (block, i) = (&workspace.rays.blocks()[lane / LANES], lane % LANES);
         let (scene, spectral) = (&self.ctx.scene, self.ctx.spectral);
@@ -74,16 +74,13 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             (self.ctx.placed.get(number_of)?, &surfaces.all.all[number_of as usize]);
         let corner = SurfacePoint::corner(scene.geometry, placement, block.triangle[i] as usize);
         let [u, v] = [block.u[i], block.v[i]].map(|weight| wide(weight).clamp(0.0, 1.0));
-        let cone = self.cone((camera, number), workspace, lane);
-        let direction = || match number {
-            0 => camera.rays.direction(lane),
-            _ => vector(&block.direction, i),
-        };
+        let cone = self.cone(step, workspace, lane);
+        let direction = || step.direction(lane, || vector(&block.direction, i));
         let footprint = cone.map(|Cone { width, .. }| Footprint { direction: direction(), width });
         let time = self.time_of(workspace.carried.ray[lane]);
         let point = SurfacePoint { weights: [1.0 - u - v, u, v], time, footprint, ..corner };
         let material = scene.material(&point)?;
-        let is_measured = matches!(&material.scattering, Scattering::Metal { named: Some(_), .. });
+        let is_measured = material.scattering.measured_metal().is_some();
         let looked_up = || scene.base_tint(spectral, material, &point).0.clamped();
         let tint = placed.color.unwrap_or_else(looked_up);
         let bands = lane * self.count()..(lane + 1) * self.count();
@@ -121,10 +118,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         Some(())
     }
 
-    /// What the path of a lane stands for where it hit, which is a point where it was scattered by chance.
+    /// The cone that the path of a lane stands for where it hit; a point where it was scattered by chance.
     pub(super) fn cone<F: Lane>(
         &self,
-        (camera, number): (&RaySamples<'_>, u32),
+        step: TraceStep<'_>,
         workspace: &Workspace<F>,
         lane: usize,
     ) -> Option<Cone> {
@@ -134,15 +131,16 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let start: DVec3 = F::origin(self.ctx.accel) + vector(&block.origin, i);
             start + vector(&block.direction, i) * t
         };
-        if number > 0 {
+        if step.number > 0 {
             let is_specular = workspace.carried.flags.get(lane)? & SPECULAR != 0;
             let [width, spread] = workspace.carried.cone.each_ref().map(|row| wide(row[lane]));
-            let from = workspace.passing.from.get(lane);
+            let from = workspace.passages.from.get(lane);
             let t = from.map_or(t, |from| (hit() - *from).length());
             return (is_specular && width >= 0.0).then(|| Cone { width, spread }.after(t));
         }
         // A block's ray may start nearer.
-        let (start, direction) = (camera.rays.origin(lane), camera.rays.direction(lane));
+        let rays = step.camera.rays;
+        let (start, direction) = (rays.origin(lane), rays.direction(lane));
         let cone = self.ctx.scene.view.cone(direction)?;
         Some(cone.after((hit() - start).dot(direction)))
     }
@@ -150,7 +148,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     /// Gives paths that leave mirrors and smooth boundaries the cones that met these.
     pub(super) fn carry_cones<F: Lane>(
         &self,
-        (camera, number): (&RaySamples<'_>, u32),
+        step: TraceStep<'_>,
         surfaces: &SurfaceTable,
         workspace: &mut Workspace<F>,
     ) {
@@ -161,7 +159,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         for i in 0..workspace.next.len {
             let is_specular = workspace.next.carried.flags[i] & SPECULAR != 0;
             let left = workspace.next.left[i] as usize;
-            let cone = self.cone((camera, number), workspace, left).filter(|_| is_specular);
+            let cone = self.cone(step, workspace, left).filter(|_| is_specular);
             // Less than nothing where it is a point.
             let own: [F; 2] = cone.map_or([-1.0; 2], |cone| [cone.width, cone.spread]).map(round);
             for (row, own) in workspace.next.carried.cone.iter_mut().zip(own) {

@@ -1,13 +1,16 @@
-"""A second opinion: optiland 0.6.3 (from PyPI) traces rays through lenses of all shapes that both programs have.
+"""Second opinions of other programs, which tests of lenses hold ours to: optiland 0.6.3 and tmm 0.2.0 (S. Byrnes), from PyPI.
 
-    python3 -m venv out/optiland && out/optiland/bin/pip install optiland==0.6.3
-    out/optiland/bin/python scripts/lens_rays_opinion.py crates/optics/tests/optics/optiland
+    python3 -m venv out/optiland && out/optiland/bin/pip install optiland==0.6.3 tmm==0.2.0
+    out/optiland/bin/python scripts/lens_opinions.py rays crates/optics/tests/optics/optiland
+    out/optiland/bin/python scripts/lens_opinions.py coatings crates/optics/tests/data/coatings.json
 
-writes `../schmidt-cassegrain-spots.json`, focal length and spots of a published telescope, and a file a lens: the lens as optiland saves it, and rays by where they start (mm, z from the first vertex), their
+`rays` writes `../schmidt-cassegrain-spots.json`, focal length and spots of a published telescope, and a file a lens of all shapes
+that both programs have: the lens as optiland saves it, and rays by where they start (mm, z from the first vertex), their
 direction, and where they end on the image, in the coordinates of the whole lens. `crates/optics/tests/optics/second_opinion.rs` reads
-the lenses and holds the rays to 1e-10 mm."""
+the lenses and holds the rays to 1e-10 mm. `coatings` writes transmittance and reflectance of coatings."""
 
 import json
+import math
 import sys
 import warnings
 from pathlib import Path
@@ -153,23 +156,61 @@ def rays_of(name):
     return x, y, np.full_like(x, -10.0), l, m, np.sqrt(1 - l**2 - m**2)
 
 
-def main():
-    folder = Path(sys.argv[1])
+def rays(folder):
+    """Writes the lenses and their rays."""
+    folder = Path(folder)
     (folder / "../schmidt-cassegrain-spots.json").write_text(json.dumps(spots_of_telescope(), indent=1) + "\n")
     for name, optic in LENSES.items():
         x, y, z, l, m, n = rays_of(name)
         start = list(zip(x.tolist(), y.tolist(), z.tolist(), l.tolist(), m.tolist(), n.tolist()))
-        rays = RealRays(x, y, z, l, m, n, np.ones_like(x), 0.55 * np.ones_like(x))
-        optic.surfaces.trace(rays)
-        if not np.isfinite(rays.x).all():
+        traced = RealRays(x, y, z, l, m, n, np.ones_like(x), 0.55 * np.ones_like(x))
+        optic.surfaces.trace(traced)
+        if not np.isfinite(traced.x).all():
             raise SystemExit(f"{name}: optiland lost rays")
         saved = {"optic": optic.to_dict(), "rays": [
             {"origin": s[:3], "direction": s[3:], "end": end}
-            for s, *end in zip(start, rays.x.tolist(), rays.y.tolist(), rays.z.tolist())
+            for s, *end in zip(start, traced.x.tolist(), traced.y.tolist(), traced.z.tolist())
         ]}
         as_list = lambda value: value.tolist() if hasattr(value, "tolist") else value.item()
         (folder / f"{name}.json").write_text(json.dumps(saved, default=as_list) + "\n")
         print(name, len(start))
 
 
-main()
+# Index and extinction before, of each layer with its thickness (nm), and behind.
+STACKS = [
+    ([1.0, 0.0], [], [1.5168, 0.0]),
+    ([1.0, 0.0], [[1.38, 0.0, 99.64]], [1.5168, 0.0]),
+    ([1.0, 0.0], [[1.38, 0.0, 99.64], [2.1, 0.0, 130.9], [1.62, 0.0, 84.9]], [1.5168, 0.0]),
+    ([1.5168, 0.0], [[2.35, 0.0, 58.5], [1.46, 0.0, 94.2], [2.35, 0.0, 58.5], [1.46, 0.0, 94.2]], [1.0, 0.0]),
+    ([1.0, 0.0], [[1.46, 0.0, 94.0]], [0.958, 6.69]),
+    ([1.0, 0.0], [[2.35, 0.0, 58.5], [1.46, 0.0, 94.2], [2.35, 0.0, 58.5], [1.46, 0.0, 94.2]], [0.05, 3.6]),
+    ([1.0, 0.0], [[1.7, 0.02, 350.0], [2.0, 0.1, 40.0]], [1.5168, 0.0]),
+]
+
+
+def coatings(path):
+    """Writes what stacks reflect and let through, by angle and wavelength."""
+    from tmm import coh_tmm
+
+    rows = []
+    for before, layers, behind in STACKS:
+        for wavelength in [430.0, 550.0, 700.0]:
+            for angle in [0.0, 15.0, 40.0, 75.0]:
+                n = [complex(*before), *[complex(a, b) for a, b, _ in layers], complex(*behind)]
+                d = [math.inf, *[d for _, _, d in layers], math.inf]
+                theta = math.radians(angle)
+                if behind[1] == 0.0 and abs(before[0] * math.sin(theta) / behind[0]) >= 1.0:
+                    continue
+                both = [coh_tmm(kind, n, d, theta, wavelength) for kind in "sp"]
+                rows.append({
+                    "before": before[0], "layers": layers, "behind": behind,
+                    "wavelength": wavelength, "angle": angle,
+                    "reflectance": sum(float(one["R"]) for one in both) / 2.0,
+                    "transmittance": sum(float(one["T"]) for one in both) / 2.0,
+                })
+    Path(path).write_text("[\n" + ",\n".join(json.dumps(row) for row in rows) + "\n]\n")
+
+
+if __name__ == "__main__":
+    task, path = sys.argv[1:]
+    {"rays": rays, "coatings": coatings}[task](path)

@@ -7,7 +7,7 @@ use std::hint::select_unpredictable;
 use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::glam::DVec3;
 
-use super::choose::ChosenLamps;
+use super::choose::ChosenLights;
 use super::depart::cosine_directions;
 use super::kernel::{Hits, round, single};
 use super::lane::{Lane, wide};
@@ -19,7 +19,7 @@ use crate::sampling::sphere_direction;
 
 /// A triangle that shines, or a point, relative to the blocks' origin (m).
 #[derive(Debug, Clone, Copy, Default)]
-struct Lamp<F> {
+struct BlockLight<F> {
     corner: [F; 3],
     edges: [[F; 3]; 2],
     normal: [F; 3],
@@ -31,7 +31,7 @@ struct Lamp<F> {
     is_point: F,
 }
 
-impl<F: Lane> Lamp<F> {
+impl<F: Lane> BlockLight<F> {
     fn point(at: DVec3, origin: DVec3) -> Self {
         Self { corner: single(at - origin), area: F::ONE, is_point: F::ONE, ..Self::default() }
     }
@@ -52,23 +52,23 @@ impl<F: Lane> Lamp<F> {
 
 /// The lights of a scene.
 #[derive(Debug)]
-pub(in crate::transport) struct Lights<'a, F> {
+pub(in crate::transport) struct BlockLights<'a, F> {
     all: &'a lights::Lights,
     /// All of them, and the sum of the chances of all before each with 1 at the end, where they are few points and
     /// triangles that are alike from everywhere; else each point chooses among all ([`lights::Lights::pick`]).
-    few: Vec<Lamp<F>>,
+    few: Vec<BlockLight<F>>,
     few_bands: Vec<f64>,
     below: Vec<F>,
     pub(super) sky: Option<SkyView<'a>>,
     /// All are far away.
     pub(super) are_far: bool,
-    /// What blocks' coordinates are relative to (m).
+    /// The point that blocks' coordinates are relative to (m).
     pub(super) origin: DVec3,
     /// Of lights whose rays carry their radiance.
     ones: Vec<f64>,
 }
 
-impl<'a, F: Lane> Lights<'a, F> {
+impl<'a, F: Lane> BlockLights<'a, F> {
     pub(super) fn new(all: &'a lights::Lights, origin: DVec3, count: usize) -> Self {
         let (few, few_bands) = (Vec::new(), Vec::new());
         let sky = SkyView::of(all, count);
@@ -76,7 +76,7 @@ impl<'a, F: Lane> Lights<'a, F> {
         let (below, ones) = (Vec::new(), vec![1.0; count]);
         let mut own = Self { all, few, few_bands, below, sky, are_far, origin, ones };
         if let Some(below) = all.few().filter(|_| !all.has_others()) {
-            own.few = (0..all.count()).map(|number| own.lamp(number)).collect();
+            own.few = (0..all.count()).map(|number| own.light(number)).collect();
             let bands = (0..all.count()).flat_map(|number| own.bands_of(number));
             own.few_bands = bands.copied().collect();
             own.below = below.iter().map(|&sum| round(sum)).collect();
@@ -90,36 +90,36 @@ impl<'a, F: Lane> Lights<'a, F> {
     }
 
     #[inline(always)]
-    fn lamp(&self, number: usize) -> Lamp<F> {
+    fn light(&self, number: usize) -> BlockLight<F> {
         if number >= SKY as usize {
-            return Lamp { area: F::ONE, ..Lamp::default() };
+            return BlockLight { area: F::ONE, ..BlockLight::default() };
         }
         match self.all.plain_light(number) {
-            Some(lights::PlainLight::Point(at)) => Lamp::point(at, self.origin),
-            Some(lights::PlainLight::Triangle(own)) => Lamp::triangle(own, self.origin),
-            None => Lamp::default(),
+            Some(lights::PlainLight::Point(at)) => BlockLight::point(at, self.origin),
+            Some(lights::PlainLight::Triangle(own)) => BlockLight::triangle(own, self.origin),
+            None => BlockLight::default(),
         }
     }
 
     /// Radiance of a triangle or the sky, intensity of a point; 1 of other lights, whose rays carry it.
     #[inline(always)]
-    pub(super) fn radiance(&self, lamp: u32, count: usize) -> &[f64] {
-        if lamp >= SKY {
-            let sky = self.sky.as_ref().filter(|_| lamp == SKY);
+    pub(super) fn radiance(&self, light: u32, count: usize) -> &[f64] {
+        if light >= SKY {
+            let sky = self.sky.as_ref().filter(|_| light == SKY);
             return sky.map_or(&*self.ones, |sky| sky.bands);
         }
-        let first = lamp as usize * count;
+        let first = light as usize * count;
         let kept = self.few_bands.get(first..first + count);
-        kept.unwrap_or_else(|| self.bands_of(lamp as usize))
+        kept.unwrap_or_else(|| self.bands_of(light as usize))
     }
 
     /// The group of a light, or of the sky.
     #[inline(always)]
-    pub(super) fn group_of(&self, scene: &SceneView<'_>, lamp: u32) -> u32 {
-        if lamp == SKY {
+    pub(super) fn group_of(&self, scene: &SceneView<'_>, light: u32) -> u32 {
+        if light == SKY {
             self.all.group_of_sky()
         } else {
-            self.all.group_of_any(scene, lamp & !OTHER)
+            self.all.group_of_any(scene, light & !OTHER)
         }
     }
 
@@ -136,8 +136,8 @@ pub(super) const OTHER: u32 = 1 << 31;
 pub(super) const SKY: u32 = 1 << 30;
 
 /// The light that a ray is sent to, by its number among all but [`SKY`].
-pub(super) fn number_of_light(lamp: u32) -> usize {
-    (lamp & !OTHER) as usize
+pub(super) fn number_of_light(light: u32) -> usize {
+    (light & !OTHER) as usize
 }
 
 /// Places on lights, one for each of sixteen points. Flags are 1 where they hold, else 0.
@@ -145,17 +145,17 @@ pub(super) struct Places<F> {
     /// From the point (m).
     pub(super) way: [Row<F>; 3],
     pub(super) normal: [Row<F>; 3],
-    /// What its own numbers add to the rounding of the place (m).
+    /// Magnitudes of its own numbers, which add to the rounding of the place (m).
     pub(super) magnitudes: [Row<F>; 3],
     /// Of the place (1/m²), of the direction (1/sr).
     pub(super) density: Row<F>,
     pub(super) two_sided: Row<F>,
     /// No direction comes upon it by chance.
     pub(super) is_delta: Row<F>,
-    pub(super) lamp: [u32; LANES],
+    pub(super) light: [u32; LANES],
 }
 
-/// What places on lights have beyond those on triangles and on points that shine alike to all sides.
+/// Properties of places on lights beyond those on triangles and on points that shine alike to all sides.
 #[derive(Debug)]
 pub(super) struct OtherPlaces<F> {
     /// It is a direction.
@@ -174,36 +174,38 @@ impl<F: Lane> Places<F> {
             density: [F::ZERO; LANES],
             two_sided: [F::ZERO; LANES],
             is_delta: [F::ZERO; LANES],
-            lamp: [0; LANES],
+            light: [0; LANES],
         }
     }
 }
 
-/// Places on the lamps that sixteen points chose, by what was left of the numbers that chose them and others.
+/// Places on the lights that sixteen points chose, by what was left of the numbers that chose them and others.
 #[inline(always)]
 pub(super) fn place_on_chosen<F: Lane>(
-    (lights, chosen): (&Lights<'_, F>, &ChosenLamps<F>),
+    lights: &BlockLights<'_, F>,
+    chosen: &ChosenLights<F>,
     points: &[Row<F>; 3],
-    (square, first): (&[Row<F>; 2], usize),
+    square: &[Row<F>; 2],
+    first: usize,
 ) -> Places<F> {
     let run = first..first + LANES;
-    let lamps: &[u32; LANES] = chosen.lamp[run.clone()].try_into().unwrap_or(&[0; LANES]);
+    let light: &[u32; LANES] = chosen.light[run.clone()].try_into().unwrap_or(&[0; LANES]);
     let chance: Row<F> = chosen.chance[run.clone()].try_into().unwrap_or([F::ZERO; LANES]);
-    let mut places = Places { lamp: *lamps, ..Places::nowhere() };
+    let mut places = Places { light: *light, ..Places::nowhere() };
     // What there is in memory of each.
     let (mut corner, mut edges, mut area) =
         ([[F::ZERO; LANES]; 3], [[[F::ZERO; LANES]; 3]; 2], [F::ZERO; LANES]);
     for i in 0..LANES {
-        let lamp = lights.lamp(lamps[i] as usize);
+        let own = lights.light(light[i] as usize);
         for axis in 0..3 {
-            corner[axis][i] = lamp.corner[axis];
-            edges[0][axis][i] = lamp.edges[0][axis];
-            edges[1][axis][i] = lamp.edges[1][axis];
-            places.normal[axis][i] = lamp.normal[axis];
-            places.magnitudes[axis][i] = lamp.magnitudes[axis];
+            corner[axis][i] = own.corner[axis];
+            edges[0][axis][i] = own.edges[0][axis];
+            edges[1][axis][i] = own.edges[1][axis];
+            places.normal[axis][i] = own.normal[axis];
+            places.magnitudes[axis][i] = own.magnitudes[axis];
         }
-        (area[i], places.two_sided[i]) = (lamp.area, lamp.two_sided);
-        places.is_delta[i] = lamp.is_point;
+        (area[i], places.two_sided[i]) = (own.area, own.two_sided);
+        places.is_delta[i] = own.is_point;
     }
     let [second, third] = corner_weights(square);
     for axis in 0..3 {
@@ -222,9 +224,10 @@ impl<F: Lane> OtherPlaces<F> {
     /// Puts the places and directions of lanes that chose other lights in place of what is there.
     #[inline(always)]
     pub(super) fn of<const TILTED: bool>(
-        chosen: Option<&ChosenLamps<F>>,
+        chosen: Option<&ChosenLights<F>>,
         hits: &Hits<F>,
-        (square, first): (&[Row<F>; 2], usize),
+        square: &[Row<F>; 2],
+        first: usize,
         places: &mut Places<F>,
     ) -> Self {
         let mut has_side = [F::ZERO; LANES];
@@ -235,8 +238,8 @@ impl<F: Lane> OtherPlaces<F> {
         let Some(chosen) = chosen else { return others };
         let (mut is_other, mut is_sky) = (false, false);
         for i in 0..LANES {
-            is_other |= places.lamp[i] >= OTHER;
-            is_sky |= places.lamp[i] == SKY;
+            is_other |= places.light[i] >= OTHER;
+            is_sky |= places.light[i] == SKY;
         }
         let run = first..first + LANES;
         others.has_others = is_other;
@@ -272,7 +275,7 @@ impl<F: Lane> OtherPlaces<F> {
             }
         }
         for i in 0..LANES {
-            let is_own = places.lamp[i] == SKY;
+            let is_own = places.light[i] == SKY;
             for axis in 0..3 {
                 let way = &mut places.way[axis][i];
                 *way = if is_own { directions[axis][i] } else { *way };
@@ -287,15 +290,16 @@ impl<F: Lane> OtherPlaces<F> {
     #[inline(always)]
     pub(super) fn radiance(
         &self,
-        (chosen, first): (&ChosenLamps<F>, usize),
-        lamps: &[u32; LANES],
+        chosen: &ChosenLights<F>,
+        first: usize,
+        light: &[u32; LANES],
         band: usize,
     ) -> Row<F> {
         let mut radiance = [F::ONE; LANES];
         if self.has_others {
             let own = &chosen.radiance[band][first..first + LANES];
             for i in 0..LANES {
-                radiance[i] = if lamps[i] >= OTHER { own[i] } else { F::ONE };
+                radiance[i] = if light[i] >= OTHER { own[i] } else { F::ONE };
             }
         }
         radiance
@@ -305,7 +309,7 @@ impl<F: Lane> OtherPlaces<F> {
     #[inline(always)]
     fn take_others(
         &mut self,
-        chosen: &ChosenLamps<F>,
+        chosen: &ChosenLights<F>,
         points: &[Row<F>; 3],
         run: std::ops::Range<usize>,
         places: &mut Places<F>,
@@ -317,7 +321,7 @@ impl<F: Lane> OtherPlaces<F> {
         for axis in 0..3 {
             let place = row(&chosen.place[axis]);
             for i in 0..LANES {
-                let is_own = places.lamp[i] >= OTHER;
+                let is_own = places.light[i] >= OTHER;
                 let way = if is_far[i] > F::ZERO { place[i] } else { place[i] - points[axis][i] };
                 places.way[axis][i] = if is_own { way } else { places.way[axis][i] };
                 places.normal[axis][i] = if is_own { F::ZERO } else { places.normal[axis][i] };
@@ -326,7 +330,7 @@ impl<F: Lane> OtherPlaces<F> {
             }
         }
         for i in 0..LANES {
-            let is_own = places.lamp[i] >= OTHER;
+            let is_own = places.light[i] >= OTHER;
             places.density[i] = if is_own { density[i] } else { places.density[i] };
             places.is_delta[i] = if is_own { is_delta[i] } else { places.is_delta[i] };
             self.is_far[i] = if is_own { is_far[i] } else { F::ZERO };
@@ -341,25 +345,25 @@ impl<F: Lane> OtherPlaces<F> {
     #[inline(always)]
     fn take_sides(
         &mut self,
-        chosen: &ChosenLamps<F>,
+        chosen: &ChosenLights<F>,
         run: std::ops::Range<usize>,
         places: &mut Places<F>,
     ) {
         let row =
             |column: &[F]| -> Row<F> { column[run.clone()].try_into().unwrap_or([F::ZERO; LANES]) };
         let (has_side, two_sided) = (row(&chosen.has_side), row(&chosen.two_sided));
-        let takes = |lamp: u32, has_side: F| (lamp >= OTHER) & (has_side > F::ZERO);
+        let takes = |light: u32, has_side: F| (light >= OTHER) & (has_side > F::ZERO);
         for axis in 0..3 {
             let (normal, magnitudes) = (row(&chosen.normal[axis]), row(&chosen.magnitudes[axis]));
             let (normals, more) = (&mut places.normal[axis], &mut places.magnitudes[axis]);
             for i in 0..LANES {
-                let is_own = takes(places.lamp[i], has_side[i]);
+                let is_own = takes(places.light[i], has_side[i]);
                 normals[i] = if is_own { normal[i] } else { normals[i] };
                 more[i] = if is_own { magnitudes[i] } else { more[i] };
             }
         }
         for i in 0..LANES {
-            let is_own = takes(places.lamp[i], has_side[i]);
+            let is_own = takes(places.light[i], has_side[i]);
             places.two_sided[i] = if is_own { two_sided[i] } else { places.two_sided[i] };
             self.has_side[i] = if is_own { F::ONE } else { self.has_side[i] };
         }
@@ -383,10 +387,10 @@ fn corner_weights<F: Lane>([u, v]: &[Row<F>; 2]) -> [Row<F>; 2] {
     [second, third]
 }
 
-/// Chooses one of few lamps for each of sixteen points, and a place on it.
+/// Chooses one of few lights for each of sixteen points, and a place on it.
 #[inline(always)]
 pub(super) fn place<F: Lane>(
-    lights: &Lights<'_, F>,
+    lights: &BlockLights<'_, F>,
     points: &[Row<F>; 3],
     [mut u, v]: [Row<F>; 2],
 ) -> Places<F> {
@@ -395,13 +399,13 @@ pub(super) fn place<F: Lane>(
     let mut chance = [F::ONE; LANES];
     if lights.few.len() > 1 {
         let (mut start, mut end) = ([F::ZERO; LANES], [F::ONE; LANES]);
-        for (number, of_lamp) in (0_u32..).zip(below.windows(2)) {
-            let (from, to) = (of_lamp[0], of_lamp[1]);
+        for (number, ends) in (0_u32..).zip(below.windows(2)) {
+            let (from, to) = (ends[0], ends[1]);
             for i in 0..LANES {
                 let is_in = (from <= u[i]) & (from < to);
                 start[i] = select_unpredictable(is_in, from, start[i]);
                 end[i] = select_unpredictable(is_in, to, end[i]);
-                places.lamp[i] = select_unpredictable(is_in, number, places.lamp[i]);
+                places.light[i] = select_unpredictable(is_in, number, places.light[i]);
             }
         }
         for i in 0..LANES {
@@ -412,25 +416,25 @@ pub(super) fn place<F: Lane>(
         }
     }
     let [second, third] = corner_weights(&[u, v]);
-    for (number, lamp) in (0_u32..).zip(&lights.few) {
+    for (number, light) in (0_u32..).zip(&lights.few) {
         for axis in 0..3 {
-            let (corner, normal) = (lamp.corner[axis], lamp.normal[axis]);
-            let (along, across) = (lamp.edges[0][axis], lamp.edges[1][axis]);
-            let magnitude = lamp.magnitudes[axis];
+            let (corner, normal) = (light.corner[axis], light.normal[axis]);
+            let (along, across) = (light.edges[0][axis], light.edges[1][axis]);
+            let magnitude = light.magnitudes[axis];
             let (way, normals) = (&mut places.way[axis], &mut places.normal[axis]);
             let magnitudes = &mut places.magnitudes[axis];
             for i in 0..LANES {
-                let is_own = places.lamp[i] == number;
+                let is_own = places.light[i] == number;
                 let there = (corner - points[axis][i]) + (along * second[i] + across * third[i]);
                 way[i] = select_unpredictable(is_own, there, way[i]);
                 normals[i] = select_unpredictable(is_own, normal, normals[i]);
                 magnitudes[i] = select_unpredictable(is_own, magnitude, magnitudes[i]);
             }
         }
-        let (inverse, two_sided) = (F::ONE / lamp.area, lamp.two_sided);
-        let is_point = lamp.is_point;
+        let (inverse, two_sided) = (F::ONE / light.area, light.two_sided);
+        let is_point = light.is_point;
         for i in 0..LANES {
-            let is_own = places.lamp[i] == number;
+            let is_own = places.light[i] == number;
             let density = &mut places.density[i];
             *density = select_unpredictable(is_own, chance[i] * inverse, *density);
             places.two_sided[i] = select_unpredictable(is_own, two_sided, places.two_sided[i]);
