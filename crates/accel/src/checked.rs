@@ -13,7 +13,9 @@ use etendue_geometry::{
 
 use crate::embree::{CommittedScene, ExactFilter, FoundHits, NearestSearch, version};
 use crate::few::FewTriangles;
-use crate::nearest::{Nearest, Query, settle, settle_blocks};
+use crate::nearest::{
+    Nearest, Query, find_lost_weights, find_lost_weights_of_blocks, settle, settle_blocks,
+};
 use crate::parts::check_scale;
 use crate::recheck::EndTriangles;
 use crate::single::{F32Frame, Rays32, round};
@@ -394,6 +396,9 @@ impl Accel for Embree {
         SCRATCH.with_borrow_mut(|scratch| {
             if rays.precision == HitPrecision::Single {
                 self.closest_as_found(rays, hits, scratch);
+                if hits.detail == Detail::Surface {
+                    find_lost_weights(self.scene.geometry(), rays, hits);
+                }
                 return settle(&self.coplanar, self.scene.geometry(), rays, hits);
             }
             let geometry = self.scene.geometry();
@@ -510,6 +515,7 @@ impl BlockAccel for Embree {
             None => {
                 self.scene.closest_of_blocks(blocks, coherent);
                 self.turn_normals(blocks);
+                find_lost_weights_of_blocks(self.scene.geometry(), self.frame.origin, blocks);
             }
         }
         settle_blocks(&self.coplanar, self.scene.geometry(), self.frame.origin, blocks);

@@ -248,6 +248,61 @@ fn later(
     (!stays).then_some(latest)
 }
 
+/// Weights of the second and third corner at the place where a ray (m) hit a triangle; `None` along its plane.
+#[cfg(feature = "embree")]
+fn weights(
+    geometry: &Geometry,
+    [placement, number]: PlacedTriangle,
+    origin: DVec3,
+    direction: DVec3,
+) -> Option<[f64; 2]> {
+    let triangle = Triangle::of(geometry, placement, number);
+    let place = &geometry.placements[placement as usize].world_from_mesh;
+    let [a, b, c] = PlacementView::new(place).seen_from(origin, triangle.corners);
+    // Möller and Trumbore 1997, of edges without a scale.
+    let longest = (b - a).abs().max((c - a).abs()).max_element();
+    let [along, across, from] = [b - a, c - a, -a].map(|v| v / longest);
+    let side = direction.cross(across);
+    let volume = along.dot(side);
+    let weights = [from.dot(side) / volume, direction.dot(from.cross(along)) / volume];
+    weights.iter().all(|w| w.is_finite()).then(|| weights.map(|w| w.clamp(0.0, 1.0)))
+}
+
+/// Finds the weights of hits that have none: Embree leaves both at 0 where twice a triangle's area, as large as the ray sees
+/// it, is below 10⁻¹⁸ (m², in the mesh's frame, times the length that the ray's direction has there).
+#[cfg(feature = "embree")]
+pub(crate) fn find_lost_weights(geometry: &Geometry, rays: &RayBatch, hits: &mut HitBatch) {
+    for i in 0..rays.len() {
+        if hits.u[i] == 0.0 && hits.v[i] == 0.0 && hits.placement[i] != MISS {
+            let id = [hits.placement[i], hits.triangle[i]];
+            if let Some([u, v]) = weights(geometry, id, rays.origin(i), rays.direction(i)) {
+                (hits.u[i], hits.v[i]) = (u, v);
+            }
+        }
+    }
+}
+
+/// As [`find_lost_weights`], of blocks of rays, which start from `origin` (m).
+#[cfg(feature = "embree")]
+pub(crate) fn find_lost_weights_of_blocks(
+    geometry: &Geometry,
+    origin: DVec3,
+    blocks: &mut [RayBlock],
+) {
+    for block in blocks {
+        for lane in 0..LANES {
+            if block.u[lane] == 0.0 && block.v[lane] == 0.0 && block.placement[lane] != MISS {
+                let id = [block.placement[lane], block.triangle[lane]];
+                let start = origin + vector(&block.origin, lane);
+                let found = weights(geometry, id, start, vector(&block.direction, lane));
+                if let Some(found) = found {
+                    [block.u[lane], block.v[lane]] = found.map(round);
+                }
+            }
+        }
+    }
+}
+
 /// Settles by [`crate::Accel`]'s rule what each ray hit whose triangle has others in its plane.
 pub(crate) fn settle(
     coplanar: &Coplanar,

@@ -5,11 +5,11 @@ use std::sync::Arc;
 #[cfg(feature = "embree")]
 use etendue_accel::{Accel, Embree};
 use etendue_accel::{BuildOptions, Exact};
-use etendue_geometry::block::LANES;
-use etendue_geometry::glam::DVec3;
 #[cfg(feature = "embree")]
-use etendue_geometry::{HitPrecision, RayBlock};
-use etendue_geometry::{MISS, Mesh, RayBatch, RayBlocks, Transform};
+use etendue_geometry::RayBlock;
+use etendue_geometry::block::LANES;
+use etendue_geometry::glam::{DQuat, DVec3};
+use etendue_geometry::{HitPrecision, MISS, Mesh, RayBatch, RayBlocks, Transform};
 
 use super::meshes::{Random, at, mesh, placed, soup};
 use super::{closest, each, is_at_edge};
@@ -157,4 +157,73 @@ fn instances_are_met_in_blocks_as_in_batches() {
         assert!(count >= 38, "{count} of {} placements are hit", is_hit.len());
         assert!(is_hit.last() == Some(&true), "the mirror image that is used once is hit");
     }
+}
+
+/// A mesh `size` times as large, whose triangles share no corners.
+fn scaled(body: &Mesh, size: f64) -> Mesh {
+    let corners = (0..body.triangles.len()).flat_map(|triangle| body.corners(triangle));
+    let positions: Vec<[f32; 3]> =
+        corners.map(|corner| (corner * size).to_array().map(|axis| axis as f32)).collect();
+    let triangles = (0..positions.len() as u32 / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]);
+    mesh("scaled", &positions, triangles.collect())
+}
+
+/// The weights of hits of single precision do not depend on the unit of length, in scenes of 10⁻¹⁰ m and of meshes that
+/// placements enlarge as much: Embree itself has none of triangles below 10⁻¹⁸ m².
+#[test]
+fn triangles_of_every_size_have_their_weights() {
+    let mut compared = 0;
+    for size in [1.0, 1e-3, 1e-6, 1e-8, 1e-10] {
+        let enlarge = |x: f64| {
+            let at = DVec3::new(x, 0.0, 0.0);
+            placed(0, Transform::from_trs(DVec3::splat(1.0 / size), DQuat::IDENTITY, at))
+        };
+        let small = || vec![scaled(&super::blob(8), size)];
+        let as_it_is = at(small(), vec![placed(0, Transform::IDENTITY)]);
+        // What is placed more than once is an instance.
+        let enlarged = at(small(), vec![enlarge(0.0), enlarge(5.0)]);
+        for (geometry, world) in [(as_it_is, size), (enlarged, 1.0)] {
+            let mut random = Random(53);
+            let mut batch = RayBatch::default();
+            for _ in 0..1500 {
+                let (from, to) = (2.0 * random.direction(), 0.6 * random.cube());
+                batch.push(world * from, (to - from).normalize());
+            }
+            let options = BuildOptions::default();
+            let truth = closest(&Exact::build(Arc::clone(&geometry), &options).unwrap(), &batch);
+            batch.precision = HitPrecision::Single;
+            for (name, accel) in each(&geometry) {
+                let mut found = vec![closest(&*accel, &batch)];
+                if let Some(blocks) = accel.blocks() {
+                    let mut rays = RayBlocks::default();
+                    blocks.convert(&batch, &mut rays);
+                    blocks.closest_of_blocks(rays.blocks_mut(), &[], false);
+                    let mut hits = truth.clone();
+                    for i in 0..batch.len() {
+                        let (block, lane) = (&rays.blocks()[i / LANES], i % LANES);
+                        (hits.placement[i], hits.triangle[i]) =
+                            (block.placement[lane], block.triangle[lane]);
+                        (hits.u[i], hits.v[i]) =
+                            (f64::from(block.u[lane]), f64::from(block.v[lane]));
+                    }
+                    found.push(hits);
+                }
+                for hits in found {
+                    for i in (0..batch.len()).filter(|&i| truth.is_hit(i)) {
+                        let same = [hits.placement[i], hits.triangle[i]]
+                            == [truth.placement[i], truth.triangle[i]];
+                        let cosine = truth.normal(i).dot(batch.direction(i)).abs();
+                        if same && cosine > 0.1 {
+                            compared += 1;
+                            // A place is off by some millionths of the size, an edge is a tenth of it long.
+                            let off =
+                                (hits.u[i] - truth.u[i]).abs() + (hits.v[i] - truth.v[i]).abs();
+                            assert!(off < 1e-3, "{name}, {size} m, {world} m: {off}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+    assert!(compared > 10_000, "{compared}");
 }
