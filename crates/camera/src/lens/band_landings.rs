@@ -6,8 +6,8 @@ use etendue_optics::train::{MonochromaticTrain, Side};
 use glam::DVec3;
 
 use super::lens_camera::LensCamera;
-use super::nodes::MOST_NODES;
-use super::opened::{BANDS_AT_ONCE, BandInterpolation, DrawnWavelengths, place_of};
+use super::nodes::{MOST_NODES, NodeWeights};
+use super::opened::{BandInterpolation, place_of};
 use crate::{CameraRays, FilmSamples, Pose};
 
 /// Landing points of the light of each band that comes along rays which all bands share, `[ray][band]`.
@@ -145,7 +145,7 @@ impl LensCamera {
         let size = resolution.map(f64::from);
         let is_seen = |[x, y]: [f64; 2]| x >= 0.0 && y >= 0.0 && x < size[0] && y < size[1];
         let (count, nodes) = (out.sample.len(), paths.nodes.len());
-        let bands = paths.bands();
+        let bands = paths.bands.len();
         pixel.resize(count * bands, BandLandings::NOWHERE);
         weight.resize(count * bands, 0.0);
         let lands_of = pixel.chunks_exact_mut(bands).zip(weight.chunks_exact_mut(bands));
@@ -159,19 +159,31 @@ impl LensCamera {
                 makes += u32::from(share[node] > 0.0 && is_seen(at[node]));
             }
             let scale = weights[ray] * nodes as f64 / f64::from(makes.max(1));
-            let drawn = paths.drawn_by(samples.spectrum[out.sample[ray] as usize]);
-            if passes {
-                let next = paths.next.at(at[0], points[ray]);
-                let ends = NodeEnds { at, share, next, scale };
-                place_bands(paths, drawn, &ends, resolution, pixels, weights_of_bands);
-                continue;
-            }
-            for (band, &number) in drawn.numbers.iter().enumerate() {
-                let from = [points[ray], directions[ray]];
-                let (place, passed) = self.trace_back(paths.lead, band, number, from);
+            let more = paths.next.at(at[0], points[ray]);
+            let u = samples.spectrum[out.sample[ray] as usize];
+            for (band, wavelengths) in paths.bands.iter().enumerate() {
+                let number = place_of(u, wavelengths.len());
+                let NodeWeights { weights, next, filters } = &wavelengths[number];
+                let (place, passed) = if passes {
+                    let (mut place, mut passed) = ([more[0] * next, more[1] * next], 0.0);
+                    for node in 0..NODES {
+                        place[0] += weights[node] * at[node][0];
+                        place[1] += weights[node] * at[node][1];
+                        passed += weights[node] * share[node];
+                    }
+                    (place, if paths.has_losses { passed * filters } else { *filters })
+                } else {
+                    let from = [points[ray], directions[ray]];
+                    self.trace_back(paths.lead, band, number, from)
+                };
                 if passed > 0.0 && is_seen(place) {
-                    pixels[band] = pixel_at(place, resolution[0]);
-                    weights_of_bands[band] = scale * passed;
+                    #[expect(
+                        clippy::cast_possible_truncation,
+                        clippy::cast_sign_loss,
+                        reason = "a pixel of a picture"
+                    )]
+                    let at = place[1] as u32 * resolution[0] + place[0] as u32;
+                    (pixels[band], weights_of_bands[band]) = (at, scale * passed);
                 }
             }
         }
@@ -198,74 +210,6 @@ impl LensCamera {
         (place, if end.status == RayStatus::Exited { end.throughput } else { 0.0 })
     }
 }
-
-/// Ends of a ray at the nodes, all of which it passes the lens at.
-struct NodeEnds<const NODES: usize> {
-    /// Places (pixels), and the shares that pass.
-    at: [[f64; 2]; NODES],
-    share: [f64; NODES],
-    /// That of the next term where its weight is 1 (pixels).
-    next: [f64; 2],
-    /// Weight of what passes.
-    scale: f64,
-}
-
-/// Index of the pixel in which a place of the picture lies.
-#[inline(always)]
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a pixel of a picture; other places are not looked at"
-)]
-fn pixel_at([column, row]: [f64; 2], width: u32) -> u32 {
-    (row as u32).wrapping_mul(width).wrapping_add(column as u32)
-}
-
-/// Interpolates the landing points of all bands of a ray between those at the nodes.
-#[multiversion::multiversion(targets = "simd")]
-fn place_bands<const NODES: usize>(
-    paths: &BandInterpolation,
-    drawn: &DrawnWavelengths,
-    ends: &NodeEnds<NODES>,
-    resolution: [u32; 2],
-    pixels: &mut [u32],
-    weights: &mut [f64],
-) {
-    let size = resolution.map(f64::from);
-    let run = |row: &[f64], first: usize| -> [f64; BANDS_AT_ONCE] {
-        row[first..first + BANDS_AT_ONCE].try_into().unwrap_or([0.0; BANDS_AT_ONCE])
-    };
-    let chunks = pixels.chunks_mut(BANDS_AT_ONCE).zip(weights.chunks_mut(BANDS_AT_ONCE));
-    for (first, (pixels, weights)) in (0..).step_by(BANDS_AT_ONCE).zip(chunks) {
-        let (next, filters) = (run(&drawn.next, first), run(&drawn.filters, first));
-        let (mut columns, mut rows) = ([0.0; BANDS_AT_ONCE], [0.0; BANDS_AT_ONCE]);
-        let mut passed = [0.0; BANDS_AT_ONCE];
-        for k in 0..BANDS_AT_ONCE {
-            columns[k] = ends.next[0] * next[k];
-            rows[k] = ends.next[1] * next[k];
-        }
-        for (node, weights) in drawn.weights.iter().enumerate().take(NODES) {
-            let (weights, [column, row]) = (run(weights, first), ends.at[node]);
-            for k in 0..BANDS_AT_ONCE {
-                columns[k] += weights[k] * column;
-                rows[k] += weights[k] * row;
-                passed[k] += weights[k] * ends.share[node];
-            }
-        }
-        let (mut at, mut own) = ([0; BANDS_AT_ONCE], [0.0; BANDS_AT_ONCE]);
-        for k in 0..BANDS_AT_ONCE {
-            let passed = if paths.has_losses { passed[k] * filters[k] } else { filters[k] };
-            let is_in = (columns[k] >= 0.0) & (columns[k] < size[0]);
-            let is_seen = is_in & (rows[k] >= 0.0) & (rows[k] < size[1]) & (passed > 0.0);
-            let pixel = pixel_at([columns[k], rows[k]], resolution[0]);
-            at[k] = if is_seen { pixel } else { BandLandings::NOWHERE };
-            own[k] = if is_seen { ends.scale * passed } else { 0.0 };
-        }
-        pixels.copy_from_slice(&at[..pixels.len()]);
-        weights.copy_from_slice(&own[..weights.len()]);
-    }
-}
-
 impl BandLandings {
     fn clear(&mut self) {
         let Self { pixel, weight, points, directions, weights, leading, before, places, shares } =
@@ -358,7 +302,9 @@ mod tests {
         let (mut landed, mut elsewhere) = (0, 0);
         for (ray, &sample) in rays.sample.iter().enumerate() {
             let u = samples.spectrum[sample as usize];
-            for (band, &number) in paths.drawn_by(u).numbers.iter().enumerate() {
+            for band in 0..bands {
+                let wavelengths = &paths.bands[band];
+                let number = place_of(u, wavelengths.len());
                 let from = [landings.points[ray], landings.directions[ray]];
                 let ([x, y], passed) = lens.trace_back(paths.lead, band, number, from);
                 let is_seen = passed > 0.0 && x.min(y) >= 0.0 && x.max(y) < 256.0;

@@ -41,7 +41,7 @@ use glam::{DVec2, DVec3};
 
 use super::lens_camera::LensCamera;
 use super::nodes::{MOST_NODES, NextTerm, NodeWeights, Variable};
-use super::opened::{BandInterpolation, DrawnWavelengths, filtered};
+use super::opened::{BandInterpolation, filtered};
 use super::traced_at::TracedAt;
 
 /// Wavelengths at which interpolation is checked, at most.
@@ -195,9 +195,8 @@ impl LensCamera {
                 });
                 places.collect()
             };
-            let bands: Vec<_> = spreads.iter().enumerate().map(of_band).collect();
-            let drawn = DrawnWavelengths::of(&bands, nodes.len());
-            return Ok(BandInterpolation { nodes, drawn, next, has_losses, lead, reach, error });
+            let bands = spreads.iter().enumerate().map(of_band).collect();
+            return Ok(BandInterpolation { nodes, bands, next, has_losses, lead, reach, error });
         }
         Err(format!(
             "places between {MOST_NODES} wavelengths are {:.2} pixels off, {} being the most, and \

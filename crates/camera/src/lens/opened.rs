@@ -30,8 +30,8 @@ pub(super) struct OpenedGroup {
 pub(super) struct BandInterpolation {
     /// The lens at its leading wavelengths, with filters clear.
     pub(super) nodes: Vec<MonochromaticTrain>,
-    /// In ascending order of the numbers that draw them.
-    pub(super) drawn: Vec<DrawnWavelengths>,
+    /// By band and by wavelength that it is drawn from.
+    pub(super) bands: Vec<Vec<NodeWeights>>,
     pub(super) next: NextTerm,
     /// True if glass takes light.
     pub(super) has_losses: bool,
@@ -40,62 +40,6 @@ pub(super) struct BandInterpolation {
     /// Greatest distance by which places of a ray part: rows of pixels and their size (mm).
     pub(super) reach: f64,
     pub(super) error: f64,
-}
-
-/// A wavelength of each band, as all numbers of one part of 0..1 draw them. Rows are padded to [`BANDS_AT_ONCE`].
-#[derive(Debug)]
-pub(super) struct DrawnWavelengths {
-    /// End of the part.
-    end: f64,
-    /// Index of the wavelength among those of its band, by band.
-    pub(super) numbers: Vec<usize>,
-    /// Weights of the nodes, `[node][band]`.
-    pub(super) weights: Vec<Vec<f64>>,
-    /// Weights of the [`NextTerm`], by band.
-    pub(super) next: Vec<f64>,
-    /// Transmission of the filters, by band.
-    pub(super) filters: Vec<f64>,
-}
-
-/// Bands that are worked on side by side.
-pub(super) const BANDS_AT_ONCE: usize = 8;
-
-impl DrawnWavelengths {
-    /// Those of bands whose wavelengths are drawn alike often each, between so many nodes.
-    pub(super) fn of(bands: &[Vec<NodeWeights>], nodes: usize) -> Vec<Self> {
-        let ends_of = |count: usize| (1..=count).map(move |k| k as f64 / count as f64);
-        let mut ends: Vec<f64> = bands.iter().flat_map(|band| ends_of(band.len())).collect();
-        ends.sort_by(f64::total_cmp);
-        ends.dedup();
-        let starts = std::iter::once(0.0).chain(ends.iter().copied());
-        let part = |(start, &end): (f64, &f64)| {
-            let number = |band: &Vec<NodeWeights>| place_of(0.5 * (start + end), band.len());
-            let numbers: Vec<usize> = bands.iter().map(number).collect();
-            let row = |value: &dyn Fn(&NodeWeights) -> f64| {
-                let values = bands.iter().zip(&numbers).map(|(band, &number)| value(&band[number]));
-                let mut row: Vec<f64> = values.collect();
-                row.resize(bands.len().next_multiple_of(BANDS_AT_ONCE), 0.0);
-                row
-            };
-            let weights = (0..nodes).map(|node| row(&|at| at.weights[node])).collect();
-            let (next, filters) = (row(&|at| at.next), row(&|at| at.filters));
-            Self { end, numbers, weights, next, filters }
-        };
-        starts.zip(&ends).map(part).collect()
-    }
-}
-
-impl BandInterpolation {
-    /// The wavelengths that a number in 0..1 draws.
-    pub(super) fn drawn_by(&self, u: f64) -> &DrawnWavelengths {
-        let number = self.drawn.partition_point(|part| part.end <= u);
-        &self.drawn[number.min(self.drawn.len() - 1)]
-    }
-
-    /// The number of bands.
-    pub(super) fn bands(&self) -> usize {
-        self.drawn[0].numbers.len()
-    }
 }
 
 impl OpenedGroup {
