@@ -178,9 +178,9 @@ fn triangles_of_every_size_have_their_weights() {
             let at = DVec3::new(x, 0.0, 0.0);
             placed(0, Transform::from_trs(DVec3::splat(1.0 / size), DQuat::IDENTITY, at))
         };
-        let small = || vec![scaled(&super::blob(8), size)];
+        let small = || vec![scaled(&super::blob(16), size)];
         let as_it_is = at(small(), vec![placed(0, Transform::IDENTITY)]);
-        // What is placed more than once is an instance.
+        // A mesh of many triangles that is placed more than once has instances.
         let enlarged = at(small(), vec![enlarge(0.0), enlarge(5.0)]);
         for (geometry, world) in [(as_it_is, size), (enlarged, 1.0)] {
             let mut random = Random(53);
