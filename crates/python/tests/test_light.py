@@ -93,7 +93,7 @@ def test_arrays_are_counted_by_area_time_and_energy():
 
 def test_what_makes_no_sense_raises_with_the_remedy(tmp_path):
     grey = etendue.Light(np.ones((2, 2)))
-    with pytest.raises(ValueError, match="does not say in which unit .*give unit, 1"):
+    with pytest.raises(ValueError, match="does not say in which unit .*\nhint: give unit, 1"):
         grey.expose("imx183")
     with pytest.raises(ValueError, match="f_number N"):
         grey.expose("imx183", unit="W/m2/sr/nm")
