@@ -56,8 +56,8 @@ impl Aimed {
             let corners = body.corners(k / 3 % body.triangles.len());
             let [from, to] = [corners[k % 3], corners[(k + 1) % 3]];
             // Some meet a corner of a cube exactly.
-            let beside = if k % 8 == 0 { DVec3::ZERO } else { random.cube() * 0.2 };
-            let origin = place.point(from * ahead + beside);
+            let offset = if k % 8 == 0 { DVec3::ZERO } else { random.cube() * 0.2 };
+            let origin = place.point(from * ahead + offset);
             let along = match target {
                 Target::Edges => 0.5 * 10_f64.powf(-3.0 * random.unit()),
                 Target::BesideCorners | Target::Corners => 0.0,

@@ -25,8 +25,8 @@ fn what_is_not_finite_is_counted_and_left_out() {
             "materials": {"lamp": {"type": "emissive", "radiance": [1, 1, 1]},
                 "m": {"type": "gltf", "color": [1, 1, 1], "opacity": 0.5}}"#,
         ));
-        let lamp = scene.materials.iter_mut().find(|m| m.name == "lamp").unwrap();
-        lamp.emission.as_mut().unwrap().radiance = Paint::Plain([f64::NAN, 1.0, f64::INFINITY]);
+        let emitter = scene.materials.iter_mut().find(|m| m.name == "lamp").unwrap();
+        emitter.emission.as_mut().unwrap().radiance = Paint::Plain([f64::NAN, 1.0, f64::INFINITY]);
         scene.render.accel = Some(AccelName::Bvh);
         let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
         let (accel, images) = prepare(&scene, &plan);
