@@ -6,7 +6,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::sobol::{self, SobolKey};
+use crate::sobol::{self, Half, SobolKey};
 
 /// The point sets that samples come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
@@ -81,8 +81,8 @@ impl PixelSamples {
         let random = |salt: u64| unit(mix(key ^ mix(u64::from(index) << 8 | salt)));
         match self.sampler {
             Sampler::Sobol | Sampler::BlueNoise => {
-                let (key, first) = self.sobol_key(index, pair, &mut Sequence::default());
-                sobol::point(key, first)
+                let (key, half) = self.sobol_key(index, pair, &mut Sequence::default());
+                sobol::point(key, half)
             }
             Sampler::Independent => [random(0), random(1)],
             Sampler::Stratified => {
@@ -105,14 +105,14 @@ impl PixelSamples {
         }
     }
 
-    /// Key of a pair's point, and its first dimension.
+    /// Key of a pair's point, and its half of the set.
     #[inline]
-    fn sobol_key(&self, index: u32, pair: u32, sequence: &mut Sequence) -> (SobolKey, usize) {
+    fn sobol_key(&self, index: u32, pair: u32, sequence: &mut Sequence) -> (SobolKey, Half) {
         if self.sampler == Sampler::BlueNoise {
-            return (self.blue_noise_key(index, pair, sequence), 0);
+            return (self.blue_noise_key(index, pair, sequence), Half::First);
         }
-        let (first, shift) = set_of_pair(pair);
-        (self.key_of_set(index, shift), first)
+        let (half, shift) = set_of_pair(pair);
+        (self.key_of_set(index, shift), half)
     }
 
     /// Key of a sample's point in a set. Sets have 2¹⁶ points, and start over, scrambled anew.
@@ -156,13 +156,13 @@ pub fn squares_of_pair(
     out: &mut Vec<[f64; 2]>,
 ) {
     out.clear();
-    let SobolKeys { keys, dimensions, is_sobol } = SobolKeys::of(samples.clone(), pair);
+    let SobolKeys { keys, half, is_sobol } = SobolKeys::of(samples.clone(), pair);
     if !is_sobol {
         out.extend(samples.map(|(pixel, index)| pixel.square(index, pair)));
         return;
     }
     out.resize(keys.len(), [0.0; 2]);
-    sobol::points(&keys, dimensions, out);
+    sobol::points(&keys, half, out);
 }
 
 /// Samples of which numbers are drawn again and again: what is the same for all pairs of dimensions is worked out once.
@@ -188,16 +188,16 @@ impl SampleKeys {
 
     /// [`PixelSamples::square`] of one pair of dimensions for each of all samples: `out` is refilled.
     pub fn squares_of_all(&self, pair: u32, out: &mut Vec<[f64; 2]>) {
-        let (first, shift) = set_of_pair(pair);
+        let (half, shift) = set_of_pair(pair);
         if !self.samples.is_empty() {
             squares_of_pair(self.samples.iter().copied(), pair, out);
         } else if shift == 0 {
             out.resize(self.keys.len(), [0.0; 2]);
-            sobol::points(&self.keys, first, out);
+            sobol::points(&self.keys, half, out);
         } else {
             let keys: Vec<SobolKey> = self.keys.iter().map(|key| key.shifted(shift)).collect();
             out.resize(keys.len(), [0.0; 2]);
-            sobol::points(&keys, first, out);
+            sobol::points(&keys, half, out);
         }
     }
 
@@ -209,11 +209,11 @@ impl SampleKeys {
             squares_of_pair(samples, pair, out);
             return;
         }
-        let (first, shift) = set_of_pair(pair);
+        let (half, shift) = set_of_pair(pair);
         let key = |&number: &u32| self.keys[number as usize].shifted(shift);
         let keys: Vec<SobolKey> = picked.iter().map(key).collect();
         out.resize(keys.len(), [0.0; 2]);
-        sobol::points(&keys, first, out);
+        sobol::points(&keys, half, out);
     }
 
     /// Numbers of a pair of dimensions in single precision, below 1, in two columns.
@@ -228,27 +228,23 @@ impl SampleKeys {
             }
             return;
         }
-        let (first, shift) = set_of_pair(pair);
-        sobol::floats(&self.keys, shift, picked, first, [x, y]);
+        let (half, shift) = set_of_pair(pair);
+        sobol::floats(&self.keys, shift, picked, half, [x, y]);
     }
 }
 
-/// The first dimension of a pair in its set, and what is added to the scramblings of the first set. The places in the
-/// pixel and in the pupil (the pairs 0 and 1) say together what a sample sees, and are the first dimensions of one set.
-/// Each other pair is a set for itself: later dimensions of one set are not nearly as even in pairs (of 64 points, the
-/// fifth and sixth leave half of 8 × 8 cells empty).
-fn set_of_pair(pair: u32) -> (usize, u32) {
-    match pair {
-        0 | 1 => (2 * pair as usize, 0),
-        _ => (0, pair.wrapping_mul(0x9e37_79b9)),
-    }
+/// The half of a set that a pair of dimensions is, and what is added to the scramblings of the first set. The pairs 2k and
+/// 2k + 1 are one: the places in the pixel and in the pupil (the pairs 0 and 1) say together what a sample sees.
+fn set_of_pair(pair: u32) -> (Half, u32) {
+    let half = if pair & 1 == 0 { Half::First } else { Half::Second };
+    (half, (pair >> 1).wrapping_mul(0x9e37_79b9))
 }
 
 /// The points of Sobol's sequence that a pair of dimensions is of some samples.
 struct SobolKeys {
     keys: Vec<SobolKey>,
-    /// The first of the pair.
-    dimensions: usize,
+    /// Half of their sets.
+    half: Half,
     /// True if all of them are of samplers that have such points.
     is_sobol: bool,
 }
@@ -256,13 +252,13 @@ struct SobolKeys {
 impl SobolKeys {
     fn of(samples: impl Iterator<Item = (PixelSamples, u32)>, pair: u32) -> Self {
         let keys = Vec::with_capacity(samples.size_hint().0);
-        let mut all = Self { keys, dimensions: 0, is_sobol: true };
+        let mut all = Self { keys, half: Half::First, is_sobol: true };
         let mut sequence = Sequence::default();
         for (pixel, index) in samples {
             all.is_sobol &= pixel.sampler.is_sobol();
-            let (key, first) = pixel.sobol_key(index, pair, &mut sequence);
+            let (key, half) = pixel.sobol_key(index, pair, &mut sequence);
             all.keys.push(key);
-            all.dimensions = first;
+            all.half = half;
         }
         all
     }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use etendue_camera::{CameraRays, LensCamera};
+use etendue_camera::{BandLandings, CameraRays, LensCamera};
 use etendue_tracer::layer::RaySource;
 
 use crate::film::{PlaneRows, Strip};
@@ -36,6 +36,14 @@ pub(crate) struct RowSums<'a> {
     /// Greatest number of rows from where light starts to where it lands.
     pub(crate) rows: u32,
     pub(crate) sums: &'a mut [Sum],
+}
+
+/// Sums that the light of a batch is added to.
+enum Destination<'a, 'b> {
+    /// Those of the pixels that samples start from, in [`Memory::sums`].
+    Starts,
+    /// Those of the pixels on which it lands.
+    Landings(&'a mut RowSums<'b>),
 }
 
 /// Selection of the samples that are added.
@@ -87,8 +95,12 @@ impl Adding<'_> {
             }
             // Samples for these, and back to where their sums are kept.
             match self.work {
-                Work::Pass(pass) => self.tile(tile, &pixels, pass, memory)?,
-                Work::Wanted(_) => self.tile_of_wanted(tile, &pixels, &range, memory)?,
+                Work::Pass(pass) => {
+                    self.tile(tile, &pixels, pass, &mut Destination::Starts, memory)?;
+                }
+                Work::Wanted(_) => {
+                    self.tile_of_wanted(tile, &pixels, &range, &mut Destination::Starts, memory)?;
+                }
             }
             for (at, sums) in places.zip(memory.sums.chunks(count)) {
                 match (&mut kept, self.work) {
@@ -108,6 +120,7 @@ impl Adding<'_> {
         tile: Tile,
         pixels: &[(u32, u32)],
         pass: &Range<u32>,
+        to: &mut Destination<'_, '_>,
         memory: &mut Memory,
     ) -> Result<(), Stopped> {
         let at_once = (pass.end - pass.start).clamp(1, self.what.batch());
@@ -116,51 +129,68 @@ impl Adding<'_> {
         for (pixels, slot) in pixels.chunks(pixels_at_once).zip((0_u32..).step_by(pixels_at_once)) {
             for first in pass.clone().step_by(at_once as usize) {
                 let range = first..pass.end.min(first + at_once);
+                let range = || range.clone();
                 let of_pixel =
-                    |(&pixel, slot)| SampleRun { pixel, set: 0, range: range.clone(), slot };
+                    |(&pixel, slot)| SampleRun { pixel, set: 0, range: range(), slot, share: 1.0 };
                 runs.clear();
                 runs.extend(pixels.iter().zip(slot..).map(of_pixel));
-                self.add_runs(tile, &runs, memory)?;
+                self.add_runs(tile, &runs, to, memory)?;
             }
         }
         Ok(())
     }
 
-    /// Adds to each of `pixels` the samples `range` of both its sets together, which are even numbers.
+    /// Adds to each of `pixels` the samples `range` of both its sets together, which are even numbers. Where light lands
+    /// each counts as its share of them.
     fn tile_of_wanted(
         &self,
         tile: Tile,
         pixels: &[(u32, u32)],
         range: &dyn Fn(u32, u32) -> Range<u32>,
+        to: &mut Destination<'_, '_>,
         memory: &mut Memory,
     ) -> Result<(), Stopped> {
         let (batch, sets) = (self.what.batch(), self.sampling.sets);
         let (mut runs, mut room) = (Vec::new(), batch);
         for (&pixel, slot) in pixels.iter().zip((0..).step_by(sets as usize)) {
             let Range { start, end } = range(pixel.0, pixel.1);
+            let share = match to {
+                Destination::Starts => 1.0,
+                Destination::Landings(_) => 1.0 / f64::from(end - start),
+            };
             for set in 0..sets {
                 let (mut first, end) = (start / sets, end / sets);
                 while first < end {
                     let last = end.min(first + room);
-                    runs.push(SampleRun { pixel, set, range: first..last, slot: slot + set });
+                    let slot = slot + set;
+                    runs.push(SampleRun { pixel, set, range: first..last, slot, share });
                     (room, first) = (room - (last - first), last);
                     if room == 0 {
-                        self.add_runs(tile, &runs, memory)?;
+                        self.add_runs(tile, &runs, to, memory)?;
                         runs.clear();
                         room = batch;
                     }
                 }
             }
         }
-        if runs.is_empty() { Ok(()) } else { self.add_runs(tile, &runs, memory) }
+        if runs.is_empty() { Ok(()) } else { self.add_runs(tile, &runs, to, memory) }
     }
 
     /// Adds the samples of a batch.
-    fn add_runs(&self, tile: Tile, runs: &[SampleRun], memory: &mut Memory) -> Result<(), Stopped> {
+    fn add_runs(
+        &self,
+        tile: Tile,
+        runs: &[SampleRun],
+        to: &mut Destination<'_, '_>,
+        memory: &mut Memory,
+    ) -> Result<(), Stopped> {
         self.place(tile, runs, memory);
         memory.slots.clear();
         for run in runs {
             memory.slots.extend(run.range.clone().map(|_| run.slot));
+        }
+        if self.what.shared_rows().is_some() {
+            return self.add_shared_runs(tile, runs, to, memory);
         }
         for (number, group) in self.what.groups().iter().enumerate() {
             memory.film.group = number;
@@ -171,41 +201,67 @@ impl Adding<'_> {
         self.watcher.did(memory.slots.len() as u64)
     }
 
+    /// Adds the samples of a batch whose bands share their paths.
+    fn add_shared_runs(
+        &self,
+        tile: Tile,
+        runs: &[SampleRun],
+        to: &mut Destination<'_, '_>,
+        memory: &mut Memory,
+    ) -> Result<(), Stopped> {
+        memory.shares.clear();
+        for run in runs {
+            memory.shares.extend(run.range.clone().map(|_| run.share));
+        }
+        let (shape, [width, _]) = (self.what.shape(), self.what.camera().resolution());
+        let Memory { film, rays, landings, .. } = memory;
+        self.what.camera().sample_band_rays(film, rays, landings);
+        self.what.trace(&(0..shape[1]), memory);
+        let counts = |run: &&SampleRun| match to {
+            Destination::Starts => true,
+            // Others count those that start beside the share.
+            Destination::Landings(_) => self.owns(tile.top + run.pixel.1),
+        };
+        let counted: usize = runs.iter().filter(counts).map(|run| run.range.len()).sum();
+        match to {
+            Destination::Starts => memory.add_where_it_starts(shape),
+            Destination::Landings(window) => {
+                memory.add_where_it_lands(window, shape, width as usize);
+            }
+        }
+        self.watcher.did(counted as u64)
+    }
+
+    /// True if a row is of the share.
+    fn owns(&self, row: u32) -> bool {
+        self.sampling.shard.owns((row / TILE) as usize)
+    }
+
     /// Adds the light of a strip's samples where it lands.
     pub(crate) fn fill_window(
         &self,
-        (strip, pass): ([u32; 2], &Range<u32>),
+        strip: [u32; 2],
         window: &mut RowSums<'_>,
         memory: &mut Memory,
     ) -> Result<(), Stopped> {
         let [width, height] = self.what.camera().resolution();
-        let [_, bands] = self.what.shape();
-        let shard = self.sampling.shard;
-        let owns = |row: u32| shard.owns((row / TILE) as usize);
         // Rows from which light lands on rows of the share.
         let rows = window.rows;
         let lands = |row: u32| {
             let last = (row + rows).min(height - 1);
-            (row.saturating_sub(rows) / TILE..=last / TILE).any(|strip| owns(strip * TILE))
+            (row.saturating_sub(rows) / TILE..=last / TILE).any(|strip| self.owns(strip * TILE))
         };
+        let to = &mut Destination::Landings(window);
         for tile in Tile::across(width, strip) {
             let pixels: Vec<(u32, u32)> =
                 tile.pixels().filter(|&(_, y)| lands(tile.top + y)).collect();
-            let at_once = (pass.end - pass.start).clamp(1, self.what.batch());
-            for pixels in pixels.chunks((self.what.batch() / at_once) as usize) {
-                for first in pass.clone().step_by(at_once as usize) {
-                    let range = first..pass.end.min(first + at_once);
-                    let a_pixel = range.end - range.start;
-                    let of_pixel =
-                        |&pixel| SampleRun { pixel, set: 0, range: range.clone(), slot: 0 };
-                    let runs: Vec<SampleRun> = pixels.iter().map(of_pixel).collect();
-                    self.place(tile, &runs, memory);
-                    let Memory { film, rays, landings, .. } = memory;
-                    self.what.camera().sample_band_rays(film, rays, landings);
-                    self.what.trace(&(0..bands), memory);
-                    memory.add_where_it_lands(window, self.what.shape(), width as usize);
-                    let own = pixels.iter().filter(|&&(_, y)| owns(tile.top + y)).count();
-                    self.watcher.did(own as u64 * u64::from(a_pixel))?;
+            match self.work {
+                Work::Pass(pass) => self.tile(tile, &pixels, pass, to, memory)?,
+                Work::Wanted(wanted) => {
+                    let range = |x: u32, y: u32| {
+                        wanted((tile.top + y) as usize * width as usize + (tile.left + x) as usize)
+                    };
+                    self.tile_of_wanted(tile, &pixels, &range, to, memory)?;
                 }
             }
         }
@@ -305,6 +361,23 @@ impl Memory {
         in_order(sample, order, &mut add);
     }
 
+    /// Adds the values of the batch's rays whose bands share paths, sample by sample, to the sums of the pixels that they
+    /// start from.
+    fn add_where_it_starts(&mut self, [layers, bands]: [usize; 2]) {
+        let Self { rays, values, sums, slots, landings, order, .. } = self;
+        let count = layers * bands;
+        let mut add = |ray: usize| {
+            let at = slots[rays.sample[ray] as usize] as usize * count;
+            for k in 0..count {
+                let landing = ray * bands + k % bands;
+                if landings.pixel[landing] != BandLandings::NOWHERE {
+                    sums[at + k].add(values[ray * count + k] * landings.weight[landing]);
+                }
+            }
+        };
+        in_order(&rays.sample, order, &mut add);
+    }
+
     /// Adds the values of the batch's rays, sample by sample, to the sums of the pixels on which each band of
     /// them lands.
     fn add_where_it_lands(
@@ -313,16 +386,17 @@ impl Memory {
         [layers, bands]: [usize; 2],
         width: usize,
     ) {
-        let Self { rays, values, landings, film, order, .. } = self;
+        let Self { rays, values, landings, film, shares, order, .. } = self;
         let count = layers * bands;
         let RowSums { first, rows, sums } = window;
         let mut add = |ray: usize| {
+            let sample = rays.sample[ray] as usize;
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
                 reason = "a row of a picture"
             )]
-            let start = film.rows[rays.sample[ray] as usize] as u32;
+            let start = film.rows[sample] as u32;
             let nearest = start.saturating_sub(*rows) as usize * width;
             let farthest = (start + *rows + 1) as usize * width;
             let first = *first as usize * width;
@@ -332,7 +406,7 @@ impl Memory {
                 if pixel < nearest || pixel >= farthest {
                     continue;
                 }
-                let weight = landings.weight[ray * bands + band];
+                let weight = landings.weight[ray * bands + band] * shares[sample];
                 for layer in 0..layers {
                     let value = values[ray * count + layer * bands + band];
                     sums[(pixel - first) * count + layer * bands + band].add(value * weight);

@@ -4,6 +4,7 @@
 use etendue_camera::{Camera, SharedPaths};
 use etendue_report::{Decision, DecisionKind, Size};
 use etendue_scene::Scene;
+use etendue_scene::file::SETS;
 use etendue_spectrum::Bands;
 use etendue_tracer::transport::Follow;
 
@@ -12,6 +13,10 @@ use crate::stopping::Stopping;
 
 /// So many bands of direct light are traced each by itself.
 const FEW_BANDS: usize = 8;
+
+/// So many bands, or groups of them, are traced each by itself where shared paths are taken twice: once to find out how
+/// many samples each pixel wants, once to let their light land.
+const FEW_GROUPS: usize = 4;
 
 /// The most memory that the sums of bands may take which share paths: they are kept for the whole film.
 const MOST_BYTES_OF_SUMS: u64 = 2 << 30;
@@ -49,9 +54,11 @@ impl BandPaths {
             let why = "direct light has less noise than how much of it lands on a pixel would, and bands are few";
             return Self::Apart(why.to_owned());
         }
-        if stopping.is_adaptive() {
+        let sets = if stopping.is_adaptive() { u64::from(SETS) } else { 1 };
+        let is_twice = stopping.is_adaptive() && lens.band_groups(bands).len() <= FEW_GROUPS;
+        if scene.plan.shared_paths.is_none() && is_twice {
             let why =
-                "pixels differ in their samples, and light lands beside the pixel it starts from";
+                "samples until an error is reached take shared paths twice, and bands are few";
             return Self::Apart(why.to_owned());
         }
         if scene.camera.light_of_rows_differs() {
@@ -65,7 +72,7 @@ impl BandPaths {
         let [width, height] = scene.camera.resolution().map(u64::from);
         let lit = scene.layers.iter().filter(|layer| layer.is_light()).count();
         let values = (width * height).saturating_mul((lit * bands.count()) as u64);
-        if values.saturating_mul(BYTES_OF_SUM) > MOST_BYTES_OF_SUMS {
+        if values.saturating_mul(sets * BYTES_OF_SUM) > MOST_BYTES_OF_SUMS {
             return Self::Apart(format!(
                 "sums of them would take more than {}",
                 Size(MOST_BYTES_OF_SUMS)

@@ -9,7 +9,6 @@ use crate::error::RenderError;
 use crate::film::FilmLayer;
 use crate::memory::NoMemory;
 use crate::samples::Averaging;
-use crate::sampling::Sampling;
 use crate::tile::RayCounts;
 use crate::tiles::{Job, OtherLayers, SamplesTaken};
 use crate::watch::{SoFar, Watcher};
@@ -76,6 +75,7 @@ impl Job<'_> {
         traffic: &Mutex<RayCounts>,
     ) -> Result<SamplesTaken, RenderError> {
         let mut passed: Option<SamplesTaken> = None;
+        let lands = parts.iter().any(|part| part.what.shared_rows().is_some());
         while adaptive.goes_on() {
             let wanted = |pixel| adaptive.wanted(pixel);
             let mut add = |part: &mut Averaging<'_>| part.add_wanted(&wanted, watcher, traffic);
@@ -84,15 +84,21 @@ impl Job<'_> {
             }
             adaptive.judge(parts);
             adaptive.show(parts, others.of_sampling);
-            watcher.expect(adaptive.to_come() * parts.len() as u64);
+            let to_land = if lands { adaptive.taken() + adaptive.to_come() } else { 0 };
+            watcher.expect(adaptive.to_come() * parts.len() as u64 + to_land);
             let counts = adaptive.counts();
             let least = counts.map_or(self.sampling.samples, |counts| counts.least);
             if adaptive.goes_on() {
                 self.look(least, parts, watcher);
             }
-            passed =
-                Some(SamplesTaken { samples: least, is_complete: !adaptive.goes_on(), counts });
+            // Light that has not landed is no picture.
+            passed = (!lands || !adaptive.goes_on()).then_some(SamplesTaken {
+                samples: least,
+                is_complete: !adaptive.goes_on(),
+                counts,
+            });
         }
+        parts.iter_mut().try_for_each(|part| part.land(adaptive.have(), watcher, traffic))?;
         // A share without rows wants nothing.
         let all = SamplesTaken { samples: self.sampling.samples, is_complete: true, counts: None };
         Ok(passed.unwrap_or(all))
@@ -109,8 +115,8 @@ impl Job<'_> {
             Some((k, layer * part.what.shape()[1]))
         };
         let judged = parts.iter().enumerate().find_map(place).unwrap_or((0, 0));
-        let Sampling { samples, shard, .. } = self.sampling;
-        Adaptive::new(rule, samples, self.camera.resolution(), shard, judged, &self.chief_hits()?)
+        let (strips, hits) = (self.sampled_strips(), self.chief_hits()?);
+        Adaptive::new(rule, self.sampling.samples, self.camera.resolution(), strips, judged, &hits)
     }
 
     /// The samples after the next pass; `None` when there is no time for one.

@@ -15,6 +15,7 @@ use crate::film::{FilmLayer, strips, take};
 use crate::memory::{NoMemory, filled};
 pub(crate) use crate::sampling::passes;
 use crate::sampling::{Memory, SampledQuantity, Sampling};
+use crate::shard::SampledStrips;
 pub(crate) use crate::sum::BYTES_OF_SUM;
 use crate::sum::Sum;
 use crate::tile::{RayCounts, TILE};
@@ -55,7 +56,7 @@ impl<'a> Averaging<'a> {
         traffic: &Mutex<RayCounts>,
     ) -> Result<(), Stopped> {
         match self.what.shared_rows() {
-            Some(rows) => self.add_shared(rows, pass, watcher, traffic),
+            Some(rows) => self.add_shared(rows, Work::Pass(pass), watcher, traffic),
             None => self.add_to(Work::Pass(pass), watcher, traffic),
         }
     }
@@ -70,6 +71,24 @@ impl<'a> Averaging<'a> {
         self.add_to(Work::Wanted(wanted), watcher, traffic)
     }
 
+    /// Takes again the samples that each pixel has, in rows from the top, once it is known how many they are: where
+    /// bands share paths, light lands on pixels beside its own, and counts by the samples of the pixel that it started
+    /// from.
+    pub(crate) fn land(
+        &mut self,
+        have: &[u32],
+        watcher: &Watcher<'_>,
+        traffic: &Mutex<RayCounts>,
+    ) -> Result<(), Stopped> {
+        let Some(rows) = self.what.shared_rows() else { return Ok(()) };
+        // The sums of both sets have told what they were to tell.
+        self.sums.truncate(self.sums.len() / self.sampling.sets as usize);
+        self.sums.fill(Sum::default());
+        self.add_shared(rows, Work::Wanted(&|pixel| 0..have[pixel]), watcher, traffic)?;
+        self.show(1);
+        Ok(())
+    }
+
     fn add_to(
         &mut self,
         work: Work<'_>,
@@ -77,13 +96,15 @@ impl<'a> Averaging<'a> {
         traffic: &Mutex<RayCounts>,
     ) -> Result<(), Stopped> {
         let sets = self.sampling.sets as usize;
+        let resolution = self.what.camera().resolution();
         let Self { what, sampling, layers, sums, spare } = self;
         let spare = &*spare;
-        let resolution = what.camera().resolution();
+        let rows = what.shared_rows().unwrap_or(0);
+        let taken = SampledStrips { shard: sampling.shard, rows, height: resolution[1] };
         let kept = split(sums, *what, sets, resolution);
         let strips = strips(layers, resolution, TILE);
         strips.par_iter().zip(&kept).enumerate().try_for_each(|(k, (strip, kept))| {
-            let Some(mut strip) = take(strip).filter(|_| sampling.shard.owns(k)) else {
+            let Some(mut strip) = take(strip).filter(|_| taken.contains(k)) else {
                 return Ok(());
             };
             let adding = Adding { what: *what, sampling: *sampling, work, watcher };
@@ -91,7 +112,11 @@ impl<'a> Averaging<'a> {
             let mut memory = spare().pop().unwrap_or_default();
             let done = adding.fill(&mut strip, take(kept), &mut memory);
             let statuses = std::mem::take(&mut memory.rays.statuses);
-            RayCounts::add(traffic, std::mem::take(&mut memory.traffic), &statuses);
+            let own = std::mem::take(&mut memory.traffic);
+            // Rays from beside a share's rows are counted by the share that has those.
+            if sampling.shard.owns(k) {
+                RayCounts::add(traffic, own, &statuses);
+            }
             spare().push(memory);
             done
         })
@@ -105,7 +130,7 @@ impl<'a> Averaging<'a> {
     fn add_shared(
         &mut self,
         rows: u32,
-        pass: &Range<u32>,
+        work: Work<'_>,
         watcher: &Watcher<'_>,
         traffic: &Mutex<RayCounts>,
     ) -> Result<(), Stopped> {
@@ -114,7 +139,7 @@ impl<'a> Averaging<'a> {
         let [width, height] = what.camera().resolution();
         let [count, bands] = what.shape();
         let a_row = width as usize * count * bands;
-        let adding = Adding { what: *what, sampling, work: Work::Pass(pass), watcher };
+        let adding = Adding { what: *what, sampling, work, watcher };
         let sets = 1 + (2 * rows).div_ceil(TILE);
         for set in 0..sets {
             // The rows on which each strip of the set lands.
@@ -133,7 +158,7 @@ impl<'a> Averaging<'a> {
                 let Some((strip, mut window)) = take(strip) else { return Ok(()) };
                 let spare = || spare.lock().unwrap_or_else(PoisonError::into_inner);
                 let mut memory = spare().pop().unwrap_or_default();
-                let done = adding.fill_window((strip, pass), &mut window, &mut memory);
+                let done = adding.fill_window(strip, &mut window, &mut memory);
                 let statuses = std::mem::take(&mut memory.rays.statuses);
                 let own = std::mem::take(&mut memory.traffic);
                 // Rays from beside a share's rows are counted by the share that has those.

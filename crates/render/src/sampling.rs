@@ -30,9 +30,9 @@ const LONGEST_KEPT_PASS: u32 = 16;
 /// A pass is no longer than this share of all: what a stopped render loses; or than [`SIDE_BY_SIDE`].
 const SHARE_OF_PASS: u32 = 8;
 
-/// Pairs of random numbers that the camera uses before light does: place in the pixel, place in the
-/// pupil, and of the third one number for the wavelength.
-pub(crate) const CAMERA_PAIRS: u32 = 3;
+/// Pairs of random numbers that are the camera's: place in the pixel, place in the pupil, the wavelength and where bands
+/// share paths the leading one, and one that nothing draws, so that light's pairs begin with a set of its own.
+pub(crate) const CAMERA_PAIRS: u32 = 4;
 
 /// The pair of random numbers whose first is a sample's time: the last that there is, which light never gets to.
 pub(crate) const TIME_PAIR: u32 = u32::MAX;
@@ -98,6 +98,8 @@ pub(crate) struct SampleRun {
     pub(crate) range: Range<u32>,
     /// The sum that they are added to.
     pub(crate) slot: u32,
+    /// Factor on the light of each, where it lands.
+    pub(crate) share: f64,
 }
 
 impl Sampling {
@@ -159,6 +161,8 @@ pub(crate) struct Memory {
     pub(crate) sums: Vec<Sum>,
     /// The sum that each sample of the batch is added to: its number among those of a pixel's set.
     pub(crate) slots: Vec<u32>,
+    /// Factor on the light of each sample of the batch, where bands share paths.
+    pub(crate) shares: Vec<f64>,
     pub(crate) order: Vec<u32>,
 }
 

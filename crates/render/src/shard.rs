@@ -116,6 +116,26 @@ impl Shard {
     }
 }
 
+/// Strips whose samples a share takes: its own, and those from which light lands on them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SampledStrips {
+    pub(crate) shard: Shard,
+    /// Greatest number of rows from where light starts to where it lands.
+    pub(crate) rows: u32,
+    /// Rows of the picture.
+    pub(crate) height: u32,
+}
+
+impl SampledStrips {
+    /// True if a strip is one of them.
+    pub(crate) fn contains(self, strip: usize) -> bool {
+        let (rows, a_strip) = (self.rows as usize, TILE as usize);
+        let first = (strip * a_strip).saturating_sub(rows);
+        let last = ((strip + 1) * a_strip - 1 + rows).min(self.height.max(1) as usize - 1);
+        (first / a_strip..=last / a_strip).any(|strip| self.shard.owns(strip))
+    }
+}
+
 impl fmt::Display for Shard {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}/{}", self.index + 1, self.count)
@@ -138,6 +158,20 @@ impl FromStr for Shard {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Light of a share's third strip comes from those beside it, where it lands as many rows away; a picture's end is no
+    /// strip of another share.
+    #[test]
+    fn a_share_takes_the_strips_from_which_light_lands_on_its_own() {
+        let shard = Shard { index: 2, count: 5, by: ShardBy::Rows };
+        let height = 5 * TILE - 3;
+        let taken = |rows| {
+            let strips = SampledStrips { shard, rows, height };
+            (0..5).filter(|strip| strips.contains(*strip)).collect::<Vec<_>>()
+        };
+        assert_eq!((taken(0), taken(1)), (vec![2], vec![1, 2, 3]));
+        assert_eq!((taken(TILE), taken(TILE + 1)), (vec![1, 2, 3], vec![0, 1, 2, 3, 4]));
+    }
 
     #[test]
     fn shares_are_counted_from_one_and_written_so() {

@@ -22,6 +22,7 @@ use crate::output::{Picture, PictureError};
 use crate::radiance::LightPass;
 use crate::samples::Averaging;
 use crate::sampling::{Memory, SampledQuantity, Sampling};
+use crate::shard::SampledStrips;
 use crate::sum::Sum;
 use crate::tile::{RayCounts, TILE, Tile};
 use crate::watch::{Stopped, Watcher};
@@ -246,12 +247,20 @@ impl Job<'_> {
         Ok(())
     }
 
+    /// Strips whose samples of light the share takes.
+    pub(crate) fn sampled_strips(&self) -> SampledStrips {
+        let rows = self.light.as_ref().and_then(|pass| pass.rows).unwrap_or(0);
+        let [_, height] = self.camera.resolution();
+        SampledStrips { shard: self.sampling.shard, rows, height }
+    }
+
     /// Hits of the chief ray of each pixel, in rows from the top: by which pixels are alike.
     pub(crate) fn chief_hits(&self) -> Result<Vec<ChiefHit>, NoMemory> {
         let [width, height] = self.camera.resolution();
         let mut all = filled(ChiefHit::default(), width as usize * height as usize)?;
         let strips = all.par_chunks_mut((width * TILE) as usize).enumerate();
-        strips.filter(|(k, _)| self.sampling.shard.owns(*k)).for_each(|(k, strip_hits)| {
+        let taken = self.sampled_strips();
+        strips.filter(|(k, _)| taken.contains(*k)).for_each(|(k, strip_hits)| {
             let mut batch = RayBuffers::new(Detail::Surface);
             #[expect(clippy::cast_possible_truncation, reason = "a row of a picture")]
             let top = k as u32 * TILE;

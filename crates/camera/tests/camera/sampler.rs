@@ -8,9 +8,6 @@ const COUNT: u32 = 64;
 /// Pairs of dimensions that the camera and the first surfaces of a path use.
 const PAIRS: u32 = 12;
 
-/// Pair of the place in the pupil: the third and fourth dimensions of the set of the place in the pixel.
-const PUPIL: u32 = 1;
-
 /// One pair of dimensions of some samples by each way in which it is asked for: of all of them, of picked ones, and of
 /// picked ones in single precision.
 fn asked(samples: &[(PixelSamples, u32)], pair: u32) -> [Vec<[f64; 2]>; 3] {
@@ -44,19 +41,16 @@ fn samples(sampler: Sampler, [column, row]: [u32; 2], first: u32) -> Vec<(PixelS
     (first..first + COUNT).map(|index| (pixel, index)).collect()
 }
 
-/// Of 64 samples from a multiple of 64 on each box of 2⁻ᵃ by 2ᵃ⁻⁶ has one, for all a, the 8 by 8 among them. Of the
-/// places in the pupil only strips are promised, of which each has one: a set's later dimensions are no such net
-/// together. `blue_noise` has a sequence for each pair, the pupil's as well.
+/// Of 64 samples from a multiple of 64 on each box of 2⁻ᵃ by 2ᵃ⁻⁶ has one, for all a, the 8 by 8 among them.
 #[test]
 fn each_elementary_interval_has_one_of_64_samples() {
     for sampler in [Sampler::Sobol, Sampler::BlueNoise] {
         for (pixel, first) in [([0, 0], 0), ([5, 3], 64), ([638, 479], 192), ([17, 2], 1 << 16)] {
             let samples = samples(sampler, pixel, first);
             for pair in 0..PAIRS {
-                let is_net = pair != PUPIL || sampler == Sampler::BlueNoise;
                 for (way, points) in asked(&samples, pair).iter().enumerate() {
                     assert_eq!(points.len(), samples.len());
-                    for a in (0..=6_u32).filter(|a| is_net || a % 6 == 0) {
+                    for a in 0..=6_u32 {
                         let boxes = boxes(points, [1 << a, 1 << (6 - a)]);
                         assert!(
                             boxes.iter().all(|&points| points == 1),

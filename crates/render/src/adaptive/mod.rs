@@ -39,7 +39,7 @@ pub(crate) use rule::Rule;
 use crate::film::FilmLayer;
 use crate::memory::{NoMemory, filled};
 use crate::samples::Averaging;
-use crate::shard::Shard;
+use crate::shard::SampledStrips;
 use crate::tile::TILE;
 use guide::{Guide, guides};
 use strip::{Demand, Evidence, StripOfPixels};
@@ -49,7 +49,8 @@ pub(crate) struct Adaptive<'a> {
     rule: &'a Rule,
     /// Samples after which a pixel is given up.
     most: u32,
-    shard: Shard,
+    /// Strips whose samples are judged.
+    strips: SampledStrips,
     resolution: [u32; 2],
     /// Samples that each pixel has, in rows from the top, and is to have.
     have: Vec<u32>,
@@ -67,7 +68,7 @@ impl<'a> Adaptive<'a> {
         rule: &'a Rule,
         most: u32,
         resolution: [u32; 2],
-        shard: Shard,
+        strips: SampledStrips,
         judged: (usize, usize),
         hits: &[ChiefHit],
     ) -> Result<Self, NoMemory> {
@@ -76,12 +77,12 @@ impl<'a> Adaptive<'a> {
         let (a_strip, next) = (width * TILE as usize, rule.least.min(most));
         // Other strips are another share's.
         let rows = demands.chunks_mut(a_strip.max(1)).enumerate();
-        rows.filter(|(k, _)| shard.owns(*k))
+        rows.filter(|(k, _)| strips.contains(*k))
             .for_each(|(_, rows)| rows.fill(Demand { next, needs: next }));
         Ok(Self {
             rule,
             most,
-            shard,
+            strips,
             resolution,
             have: filled(0, width * height)?,
             demands,
@@ -105,13 +106,13 @@ impl<'a> Adaptive<'a> {
     /// Judges what there is after the samples that were wanted, and says which are wanted next.
     pub(crate) fn judge(&mut self, parts: &[Averaging<'_>]) {
         let (part, first) = (&parts[self.judged.0], self.judged.1);
-        let (rule, most, shard, width) = (self.rule, self.most, self.shard, self.resolution[0]);
+        let (rule, most, taken, width) = (self.rule, self.most, self.strips, self.resolution[0]);
         let a_strip = (width * TILE) as usize;
         let strips = self.have.par_chunks_mut(a_strip).zip(self.demands.par_chunks_mut(a_strip));
         let strips = strips.zip(self.evidence.par_chunks_mut(a_strip));
         let strips = strips.zip(self.guides.par_chunks(a_strip)).enumerate();
         strips.for_each(|(k, (((have, demands), evidence), guides))| {
-            if !shard.owns(k) {
+            if !taken.contains(k) {
                 return;
             }
             #[expect(clippy::cast_possible_truncation, reason = "a row of a picture")]
@@ -141,6 +142,16 @@ impl<'a> Adaptive<'a> {
         }
     }
 
+    /// Samples that each pixel has, in rows from the top.
+    pub(crate) fn have(&self) -> &[u32] {
+        &self.have
+    }
+
+    /// Samples of all pixels.
+    pub(crate) fn taken(&self) -> u64 {
+        self.have.iter().copied().map(u64::from).sum()
+    }
+
     /// The rays that are still to come, by what pixels lack, for each part that is averaged.
     pub(crate) fn to_come(&self) -> u64 {
         let lacks = |(demand, have): (&Demand, &u32)| {
@@ -166,6 +177,6 @@ impl<'a> Adaptive<'a> {
             strip.counts(self.rule, (top, self.most), &self.demands[rows])
         };
         let strips = 0..self.have.len().div_ceil(a_strip.max(1));
-        strips.filter(|k| self.shard.owns(*k)).filter_map(of_strip).reduce(SampleCounts::and)
+        strips.filter(|k| self.strips.shard.owns(*k)).filter_map(of_strip).reduce(SampleCounts::and)
     }
 }

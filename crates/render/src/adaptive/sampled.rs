@@ -37,29 +37,34 @@ impl Averaging<'_> {
         PixelSets { pixel, sets: std::array::from_fn(set) }
     }
 
-    /// Writes to the layers the means of the samples that each pixel has, in rows from the top; rows without any are
-    /// another share's.
+    /// Writes to the layers the means of the samples that each pixel has, in rows from the top: of the share's rows.
     pub(crate) fn show_counted(&mut self, have: &[u32]) {
         let values = self.values();
-        let Self { what, layers, sums, .. } = self;
+        let Self { what, layers, sums, sampling, .. } = self;
+        let shard = sampling.shard;
         let resolution @ [width, _] = what.camera().resolution();
         let [_, bands] = what.shape();
         let kept = split(sums, *what, SETS_OF_PIXEL, resolution);
-        strips(layers, resolution, TILE).par_iter().zip(&kept).for_each(|(strip, kept)| {
-            let (Some(mut strip), Some(sums)) = (take(strip), take(kept)) else { return };
-            let have = &have[(strip.top * width) as usize..];
-            let pixels = sums.chunks(values * SETS_OF_PIXEL).zip(have).enumerate();
-            for (index, (sets, &have)) in pixels.filter(|(_, (_, have))| **have > 0) {
-                let (a, b) = sets.split_at(values);
-                let both = |(a, b): (&Sum, &Sum)| {
-                    let mut both = *a;
-                    both.add_sum(*b);
-                    both
-                };
-                let whole: Vec<Sum> = a.iter().zip(b).map(both).collect();
-                put(&mut strip, index, &whole, bands, have);
-            }
-        });
+        strips(layers, resolution, TILE).par_iter().zip(&kept).enumerate().for_each(
+            |(k, (strip, kept))| {
+                let (Some(mut strip), Some(sums)) = (take(strip), take(kept)) else { return };
+                if !shard.owns(k) {
+                    return;
+                }
+                let have = &have[(strip.top * width) as usize..];
+                let pixels = sums.chunks(values * SETS_OF_PIXEL).zip(have).enumerate();
+                for (index, (sets, &have)) in pixels {
+                    let (a, b) = sets.split_at(values);
+                    let both = |(a, b): (&Sum, &Sum)| {
+                        let mut both = *a;
+                        both.add_sum(*b);
+                        both
+                    };
+                    let whole: Vec<Sum> = a.iter().zip(b).map(both).collect();
+                    put(&mut strip, index, &whole, bands, have);
+                }
+            },
+        );
     }
 
     /// Writes what sampling found of itself to `findings`, for the layer whose first value is `first`.

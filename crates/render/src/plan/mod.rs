@@ -205,7 +205,12 @@ impl Plan {
         };
         let apart = |camera: &Camera| camera.band_groups(&chosen.bands).len() as u64;
         let sampled = |yes, apart| if yes { u64::from(spec.typical()) * apart } else { 0 };
-        let apart_in_light = if band_paths.are_shared() { 1 } else { apart(lit_by) };
+        let apart_in_light = match (band_paths.are_shared(), stopping.is_adaptive()) {
+            (false, _) => apart(lit_by),
+            (true, false) => 1,
+            // Once to find out how many samples each pixel wants, and once to land.
+            (true, true) => 2,
+        };
         let lit = sampled(passes.light, apart_in_light);
         let rays = pixels
             * (u64::from(passes.centre)

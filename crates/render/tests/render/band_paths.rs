@@ -244,6 +244,70 @@ fn threads_passes_and_shares_make_one_picture() {
     }
 }
 
+/// Samples until an error is reached, as a scene has them.
+fn until_an_error() -> Value {
+    json!({ "relative_error": 0.02, "min": 16, "max": 512 })
+}
+
+/// Pixels at the lamp's edges get many samples, those beside them few, and light crosses from the ones to the others: it
+/// counts by the samples of the pixel that it starts from, or the even field beside an edge would be as many times
+/// too bright. The bounds are those of [`edges_lie_where_each_band_has_them`].
+#[test]
+fn samples_until_an_error_count_by_the_pixel_that_they_start_from() {
+    let of = |samples: Value, shares| {
+        let more = json!({ "render": { "samples": samples } });
+        light(&scene(singlet(), true, 1, &more), &Bands::Rgb, shares)
+    };
+    let [shared, apart] = [of(until_an_error(), true), of(json!(256), false)];
+    let parted = rms(&profile(&apart[0]), &profile(&apart[2]));
+    for (band, (shared, apart)) in shared.iter().zip(&apart).enumerate() {
+        let off = rms(&profile(shared), &profile(apart));
+        let mean_off = mean(shared) / mean(apart) - 1.0;
+        println!("band {band}: {off:.2e} of {parted:.2e}, mean {mean_off:.2e}");
+        assert!(off < 0.3 * parted, "band {band}: {off} of {parted}");
+        assert!(mean_off.abs() < 3e-3, "band {band}: {mean_off}");
+    }
+}
+
+/// The same to the bit on one thread and on three, and in shares of the rows, which judge the strips from which light
+/// lands on theirs; a render that is stopped before light has landed is none.
+#[test]
+fn samples_until_an_error_make_one_picture() {
+    let more = json!({ "render": { "samples": until_an_error() } });
+    let scene = scene(singlet(), true, 1, &more);
+    let plan = Plan::new(&scene, Outputs::ALL);
+    assert!(plan.band_paths.are_shared() && plan.stopping.is_adaptive());
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| rendered(&scene, &plan))
+    };
+    let [one, three] = [on(1), on(3)];
+    let counts = one.sample_counts.unwrap();
+    assert!(counts.least < 64 && counts.most > 256, "{counts:?}");
+    let (accel, images) = prepare(&scene, &plan);
+    let prepared = Prepared { accel: &*accel, images: &images, others: &[] };
+    let folder = tempfile::tempdir().unwrap();
+    let rows = [2, 3, 1].map(|number| {
+        let state = RenderState { shard: Shard::new(number, 3), ..RenderState::default() };
+        let film = trace(&scene, &plan, prepared, &[], &state, &|_: f64| true).unwrap();
+        let path = folder.path().join(number.to_string());
+        film.write(&Transaction::at_once(), &path, &Vec::new(), &Value::Null).unwrap();
+        FilmFile::read(&path).unwrap()
+    });
+    let film = Film::merged(&scene, &plan, &rows, &Vec::new()).unwrap();
+    let of_rows = finish(&scene, &plan, film, Vec::new(), Some(&*accel)).unwrap();
+    let bits = |done: &Rendered| -> Vec<u64> {
+        channels(&done.picture, "").concat().into_iter().map(f64::to_bits).collect()
+    };
+    for other in [&three, &of_rows] {
+        assert_eq!(bits(&one), bits(other));
+        assert_eq!(one.sample_counts, other.sample_counts);
+        assert_eq!(one.rays, other.rays);
+    }
+    let state = RenderState::default();
+    assert!(trace(&scene, &plan, prepared, &[], &state, &|share: f64| share < 0.7).is_err());
+}
+
 /// The plan says how bands travel: bands share paths unless something parts them, and then it says what.
 #[test]
 fn the_plan_says_how_bands_travel() {
@@ -264,11 +328,11 @@ fn the_plan_says_how_bands_travel() {
     };
     own(double_gauss(), json!({ "plan": { "shared_paths": false } }), "the scene has");
     own(double_gauss(), json!({ "plan": {} }), "direct light has less noise");
-    own(
-        double_gauss(),
-        json!({ "render": { "samples": { "relative_error": 0.05 } } }),
-        "pixels differ in their samples",
-    );
+    let until = json!({ "relative_error": 0.05 });
+    let few = json!({ "plan": {}, "tracer": { "type": "path" }, "render": { "samples": until } });
+    own(double_gauss(), few, "take shared paths twice, and bands are few");
+    let asked = json!({ "render": { "samples": until } });
+    assert_eq!(choice(how(double_gauss(), &asked)), "shared");
     // Nothing to decide: no lens, or one that takes all bands along the same way.
     assert_eq!(how(json!({ "type": "pinhole", "fov": 40 }), &json!({})), None);
     assert_eq!(how(double_gauss(), &json!({ "plan": { "dispersion": false } })), None);

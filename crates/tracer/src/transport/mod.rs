@@ -212,6 +212,19 @@ pub(super) enum Draw {
 /// Number of uses.
 pub(super) const DRAWS: u32 = 4;
 
+impl Draw {
+    /// Pair of random numbers of this use at a step. Two pairs from an even one on are even together: a direction, and
+    /// the light that is asked where it leads.
+    pub(super) fn pair(self, step: u32) -> u32 {
+        match self {
+            Self::Light => step * DRAWS,
+            Self::Direction => (step + 1) * DRAWS + 1,
+            Self::Choice => step * DRAWS + 2,
+            Self::Chance => step * DRAWS + 3,
+        }
+    }
+}
+
 /// Statistics of a batch.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct RayStats {

@@ -449,7 +449,7 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         ] {
             if needs {
                 let drawn = &mut workspace.numbers[draw as usize];
-                F::draw(camera, rays, number * DRAWS + draw as u32, drawn);
+                F::draw(camera, rays, draw.pair(number), drawn);
                 drawn.iter_mut().for_each(|half| half.resize(padded, F::of(0.5)));
             }
         }

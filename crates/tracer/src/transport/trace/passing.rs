@@ -15,8 +15,8 @@ use super::{Columns, RayColumns, TraceStep, Workspace};
 use crate::footprint::{Cone, Footprint};
 use crate::reference::SurfacePoint;
 use crate::surface::SurfaceInteraction;
+use crate::transport::Draw;
 use crate::transport::media::{CoincidentBoundary, Media};
-use crate::transport::{DRAWS, Draw};
 use crate::transport::{LightingContext, RayHit, Tracing};
 
 /// The most surfaces that a path passes within a step, and a ray to a light.
@@ -106,8 +106,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             workspace.passages.from.extend((0..len).map(|i| origin + start(i)));
         }
         if traits.has_alpha {
-            let (rays, pair) =
-                (&workspace.carried.ray[..len], step.number * DRAWS + Draw::Chance as u32);
+            let (rays, pair) = (&workspace.carried.ray[..len], Draw::Chance.pair(step.number));
             step.camera.samples.squares_of_pair(rays, pair, &mut workspace.passages.chances);
         }
         for _ in 0..MOST_PASSED {
