@@ -5,7 +5,7 @@ use std::sync::Arc;
 use etendue_geometry::RayBatch;
 use etendue_spectrum::Bands;
 
-use crate::lens::{self, SharingLimits, focused::View};
+use crate::lens::{self, LensAccuracy, focused::View};
 use crate::{
     BandGroup, BandLandings, CameraError, CameraRays, CameraTime, Distortion, DistortionSpec,
     FilmSamples, Intrinsics, LensCamera, LightField, Orthographic, Pinhole, PixelBlock, Pose,
@@ -219,10 +219,10 @@ impl Camera {
         Some(Self { projection: Projection::Lens(Arc::new(lens)), ..self.clone() })
     }
 
-    /// Returns the camera with bands that share rays of its lens within `limits`.
+    /// Returns the camera with its lens measured by other numbers.
     #[must_use]
-    pub fn sharing_within(&self, limits: SharingLimits) -> Self {
-        self.with_lens(|lens| lens.sharing_within(limits))
+    pub fn with_lens_accuracy(&self, accuracy: LensAccuracy) -> Self {
+        self.with_lens(|lens| lens.with_accuracy(accuracy))
     }
 
     /// Returns the camera, in its place and with its pixels, shutter and motion, whose rays run as those of `other`.

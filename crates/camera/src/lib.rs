@@ -40,8 +40,8 @@ pub use falloff::FalloffSpec;
 pub use framing::{Subject, SupportFunction, Viewpoint};
 pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin, SensorSpec};
 pub use lens::{
-    BandGroup, BandLandings, ChromaticRealLensCameraSpec, LensCamera, LensCameraSpec,
-    RealLensCameraSpec, SharedPaths, SharingLimits, ThinLensCameraSpec, WaveLens,
+    BandGroup, BandLandings, ChromaticRealLensCameraSpec, LensAccuracy, LensCamera, LensCameraSpec,
+    RealLensCameraSpec, SharedPaths, SharingLimits, ThinLensCameraSpec, WaveAccuracy, WaveLens,
 };
 pub use light_field::{LightField, LightFieldSpec, ViewGrid};
 pub use motion::{CameraMotionSpec, Kinematics, MotionAxes, Trajectory};

@@ -11,14 +11,15 @@ use etendue_tracer::transport::Follow;
 use crate::samples::BYTES_OF_SUM;
 use crate::stopping::Stopping;
 
-/// So many bands of direct light are traced each by itself.
+/// So many bands of direct light are traced each by itself. Not a setting: `plan.shared_paths` decides.
 const FEW_BANDS: usize = 8;
 
 /// So many bands, or groups of them, are traced each by itself where shared paths are taken twice: once to find out how
 /// many samples each pixel wants, once to let their light land.
 const FEW_GROUPS: usize = 4;
 
-/// The most memory that the sums of bands may take which share paths: they are kept for the whole film.
+/// The most memory that the sums of bands may take which share paths: they are kept for the whole film. Not a setting:
+/// it changes time alone.
 const MOST_BYTES_OF_SUMS: u64 = 2 << 30;
 
 /// Paths of a picture's bands of light through the camera's lens.

@@ -183,7 +183,8 @@ fn images(scene: &Scene, plan: &Plan) -> u64 {
             textures.saturating_add(cube.bytes_in(&plan.bands)).saturating_add(looks)
         }
         Some(EnvironmentImage::ClearSky(_)) if plan.layers.contains(&LayerSpec::Radiance) => {
-            textures.saturating_add(ClearSky::map_bytes(plan.bands != Bands::Rgb))
+            let rows = scene.accuracy.sky_rows;
+            textures.saturating_add(ClearSky::map_bytes(plan.bands != Bands::Rgb, rows))
         }
         _ => textures,
     }

@@ -14,10 +14,8 @@ use etendue_tracer::Material;
 use etendue_tracer::material::Alpha;
 use etendue_tracer::spawn::{magnitudes, roundings};
 
-/// The share of a placement's probed area up to which thin places are contacts.
-const CONTACT: f64 = 1e-3;
-
-/// Triangles up to which each is probed in four places.
+/// Triangles up to which each is probed in four places. Not a setting: how many are probed at all is one
+/// (`path_probes`).
 const FEW: usize = 4096;
 
 /// Cells of the grid of probes along an axis.
@@ -281,7 +279,7 @@ fn thinnest(probes: &[NormalProbe], offsets: &Offsets, scene: &Scene) -> Option<
     for own in probes.chunk_by(|a, b| a.placement == b.placement) {
         let area: f64 = own.iter().map(|probe| probe.area).sum();
         let thin = own.iter().filter(|probe| probe.found.is_some()).map(|probe| probe.area);
-        if thin.sum::<f64>() <= CONTACT * area {
+        if thin.sum::<f64>() <= scene.accuracy.path_contact * area {
             continue;
         }
         for probe in own {

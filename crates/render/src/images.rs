@@ -26,8 +26,8 @@ pub struct Images {
     pub environment: Option<Arc<EnvironmentMap>>,
     /// Origin of each texture, and its fault.
     origins: Vec<Option<ImageOrigin>>,
-    /// Origin of the environment, its file as it was, and whether it has spectra.
-    sky: Option<(EnvironmentImage, Option<Stamp>, bool)>,
+    /// Origin of the environment, its file as it was, whether it has spectra, and the rows of a clear sky's map.
+    sky: Option<(EnvironmentImage, Option<Stamp>, bool, u32)>,
     /// Descriptions of the images that could not be decoded.
     pub faults: Vec<String>,
 }
@@ -69,7 +69,8 @@ impl Images {
             .map(|(i, (texture, encodings))| {
                 let encodings = (*encodings)?;
                 let coarse = coarse.get(i).copied().flatten();
-                let origin = ImageOrigin { coarse, ..ImageOrigin::of(texture, encodings) };
+                let lookups = scene.accuracy.texture_lookups;
+                let origin = ImageOrigin { coarse, ..ImageOrigin::of(texture, encodings, lookups) };
                 Some(match self.known(i, &origin) {
                     Some(known) => Ok(known),
                     None => decoded(texture, origin, limits),
@@ -133,13 +134,14 @@ impl Images {
             | EnvironmentImage::Cube(_)
             | EnvironmentImage::Constant => None,
         };
-        self.sky = Some((image.clone(), stamp, spectral));
+        let rows = scene.accuracy.sky_rows;
+        self.sky = Some((image.clone(), stamp, spectral, rows));
         // The map as it was, or made anew.
         let known = before.environment.as_ref().filter(|_| before.sky == self.sky);
         let map = match (known, image) {
             (Some(known), _) => Arc::clone(known),
             (None, EnvironmentImage::Studio) => Arc::new(EnvironmentMap::studio()),
-            (None, EnvironmentImage::ClearSky(sky)) => Arc::new(sky.map(spectral)),
+            (None, EnvironmentImage::ClearSky(sky)) => Arc::new(sky.map(spectral, rows)),
             (None, EnvironmentImage::Cube(cube)) => Arc::new(EnvironmentMap::of_cube(cube)),
             (None, EnvironmentImage::File(path)) => Arc::new(EnvironmentMap::read(path, limits)?),
             (None, EnvironmentImage::Constant) => return Ok(()),
@@ -226,19 +228,22 @@ struct ImageOrigin {
     filter: Filter,
     /// Encodings in which it is filtered by footprint.
     encodings: Encodings,
+    /// Lookups along a footprint, at most.
+    lookups: u32,
     /// Coarseness that it may have.
     coarse: Option<Coarseness>,
     fault: Option<String>,
 }
 
 impl ImageOrigin {
-    fn of(texture: &Texture, encodings: Encodings) -> Self {
+    fn of(texture: &Texture, encodings: Encodings, lookups: u32) -> Self {
         Self {
             source: texture.source.clone(),
             stamp: texture.file().and_then(|path| Stamp::of(path)),
             wrap: texture.wrap,
             filter: texture.filter,
             encodings,
+            lookups,
             coarse: None,
             fault: None,
         }
@@ -254,7 +259,7 @@ impl ImageOrigin {
         source
             && self.stamp == other.stamp
             && (self.wrap, self.filter) == (other.wrap, other.filter)
-            && self.encodings == other.encodings
+            && (self.encodings, self.lookups) == (other.encodings, other.lookups)
             && self.coarse == other.coarse
     }
 }
@@ -271,7 +276,8 @@ fn decoded(
     limits: Limits,
 ) -> Result<(Arc<Image>, ImageOrigin), ImageError> {
     let decode = || -> Result<Image, ImageError> {
-        let mut image = texture.decode(limits.coarse(origin.coarse))?;
+        let image = texture.decode(limits.coarse(origin.coarse))?;
+        let mut image = image.with_lookups(origin.lookups);
         for encoding in origin.encodings.into_iter().flatten() {
             image.filter_by_footprint(encoding, &texture.name)?;
         }

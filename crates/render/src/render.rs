@@ -163,7 +163,7 @@ fn light_of(
     let roulette = rules.roulette.map(|_| scene.accuracy.roulette_after);
     let fewer = plan.taken.as_ref().and_then(|taken| taken.bounces);
     let bounces = fewer.map_or(rules.bounces, |fewer| fewer.bounces.min(rules.bounces));
-    let rules = Rules { roulette, bounces, ..rules };
+    let rules = Rules { roulette, bounces, parts: scene.accuracy.dispersion_paths, ..rules };
     let map = images.environment.clone();
     let found = lighting::settle(scene, map, rules, seen, &|share| watch.goes_on(share))?;
     notes.extend(found.note);

@@ -313,7 +313,7 @@ impl SceneFile {
             lights: parts.lights,
             studio_if_dark: parts.studio_if_dark,
             tracer: self.spec.tracer,
-            camera: camera.sharing_within(self.spec.accuracy.sharing()),
+            camera: camera.with_lens_accuracy(self.spec.accuracy.of_lens()),
             sensor,
             camera_origin,
             cameras: parts.cameras,

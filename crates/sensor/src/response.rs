@@ -21,7 +21,8 @@ use crate::spec::{Channels, FilterSet, Filters, Radiometry, SensorKind, SensorSp
 use crate::{CfaSpec, SensorError};
 
 /// The width of bands (nm) when nobody asks for any, curves have to be integrated and nothing is known
-/// of the light. A test shows what it costs.
+/// of the light. A test shows what it costs. Not a setting: `bands` of the sensor says otherwise, and of known light
+/// `band_error`.
 pub(crate) const BAND_WIDTH: f64 = 10.0;
 
 /// One kind of photosite.

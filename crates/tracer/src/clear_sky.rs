@@ -29,9 +29,6 @@ const OBSERVER: f64 = 106.857;
 /// Linear sRGB of light of the same power at every wavelength (IEC 61966-2-1).
 const EQUAL_ENERGY: Color = [1.2048, 0.9484, 0.9087];
 
-/// Columns and rows of the tabulated sky.
-const SIZE: [usize; 2] = [1024, 512];
-
 /// A clear sky whose sun stands over −Z, with +Y up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClearSky {
@@ -44,6 +41,9 @@ pub struct ClearSky {
 }
 
 impl ClearSky {
+    /// Rows of the [`Self::map`] where nothing else is said.
+    pub const ROWS: u32 = 512;
+
     /// A sky over air of a turbidity (1, air without haze, to 10), whose sun stands at `elevation` (degrees, 0..=90)
     /// over ground that reflects `ground_albedo` (0..=1); without a sun of its own where it is not `sunlit`, as
     /// when a cloud hides it. `None` outside of these.
@@ -145,27 +145,27 @@ impl ClearSky {
         spectral_sky::last_wavelength()
     }
 
-    /// All directions as an image: the dome, and below the horizon the ground as that dome and the sun light it; where
-    /// it is to be `spectral`, at the authors' wavelengths besides.
+    /// All directions as an image of so many `rows` and twice as many columns: the dome, and below the horizon the
+    /// ground as that dome and the sun light it; where it is to be `spectral`, at the authors' wavelengths besides.
     #[must_use]
-    pub fn map(&self, spectral: bool) -> EnvironmentMap {
-        let colors = self.texels(|toward| self.dome(toward), self.sun());
-        let map = EnvironmentMap::new(SIZE, colors);
-        match spectral {
-            true => map.with_spectra(
-                self.texels(|toward| self.dome_at_wavelengths(toward), self.sun_at_wavelengths()),
-            ),
-            false => map,
+    pub fn map(&self, spectral: bool, rows: u32) -> EnvironmentMap {
+        let size = map_size(rows);
+        let colors = self.texels(size, |toward| self.dome(toward), self.sun());
+        let map = EnvironmentMap::new(size, colors);
+        if !spectral {
+            return map;
         }
+        let dome = |toward| self.dome_at_wavelengths(toward);
+        map.with_spectra(self.texels(size, dome, self.sun_at_wavelengths()))
     }
 
     /// The texels of the map of a dome and of the irradiance of its sun, row by row from the top.
     fn texels<const N: usize>(
         &self,
+        [width, height]: [usize; 2],
         dome: impl Fn(DVec3) -> [f64; N],
         sun: [f64; N],
     ) -> Vec<[f32; N]> {
-        let [width, height] = SIZE;
         let mut texels = vec![[0.0_f32; N]; width * height];
         let mut falling = sun.map(|part| part * self.elevation.sin());
         for (y, row) in texels.chunks_mut(width).take(height / 2).enumerate() {
@@ -189,10 +189,17 @@ impl ClearSky {
 
     /// Bytes of the [`Self::map`], with the table that directions are chosen by.
     #[must_use]
-    pub fn map_bytes(spectral: bool) -> u64 {
+    pub fn map_bytes(spectral: bool, rows: u32) -> u64 {
         let spectra = if spectral { size_of::<[f32; spectral_sky::COUNT]>() } else { 0 };
-        (SIZE[0] * SIZE[1]) as u64 * (EnvironmentMap::LOOK_BYTES + spectra as u64)
+        let [width, height] = map_size(rows);
+        (width * height) as u64 * (EnvironmentMap::LOOK_BYTES + spectra as u64)
     }
+}
+
+/// Columns and rows of a map of so many rows, which are even: the horizon lies between two.
+fn map_size(rows: u32) -> [usize; 2] {
+    let rows = rows.max(2).next_multiple_of(2) as usize;
+    [2 * rows, rows]
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "radiance is kept as f32")]
@@ -289,7 +296,7 @@ mod tests {
     #[test]
     fn the_map_has_the_dome_and_the_ground() {
         let sky = sky(3.0, 40.0, 0.3);
-        let map = sky.map(true);
+        let map = sky.map(true, ClearSky::ROWS);
         for toward in
             [DVec3::new(0.3, 0.8, -0.5), DVec3::new(-0.7, 0.2, 0.3), DVec3::new(0.1, 0.9, 0.2)]
         {
@@ -309,6 +316,16 @@ mod tests {
         // The sun alone.
         let least = 0.3 * sky.sun()[1] * 40.0_f64.to_radians().sin() / PI;
         assert!(ground[1] > least && ground[1] < 1.5 * least, "{ground:?} {least}");
+    }
+
+    #[test]
+    fn a_map_has_the_rows_that_are_asked_for() {
+        let sky = sky(3.0, 40.0, 0.3);
+        assert_eq!(sky.map(false, ClearSky::ROWS).size(), [1024, 512]);
+        // An even number of them.
+        assert_eq!(sky.map(true, 31).size(), [64, 32]);
+        let bytes = |rows| ClearSky::map_bytes(true, rows);
+        assert_eq!(bytes(64), 4 * bytes(32));
     }
 
     #[test]

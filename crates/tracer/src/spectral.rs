@@ -7,7 +7,8 @@ use etendue_spectrum::{Bands, Curve, Metal, NoOverlap, Outside};
 use crate::bsdf::metal;
 use crate::{Color, ConductorId, Cube, Material, SceneCube, Tint, TintSpectrum};
 
-/// Shares of a band's light between which a wavelength is interpolated.
+/// Shares of a band's light between which a wavelength is interpolated. Not a setting: wavelengths are drawn, and over
+/// a 32nd of a band's light glass bends them in proportion.
 const SHARES: usize = 32;
 
 /// The bands of a render, and the way from linear RGB to them.

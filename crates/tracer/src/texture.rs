@@ -86,6 +86,8 @@ pub struct Image {
     filter: Filter,
     /// For each encoding that is filtered by footprint.
     pyramids: [Option<Pyramid>; 2],
+    /// Lookups along a footprint, at most: beyond so many times as long as wide it is made wider.
+    lookups: f64,
     stands_in: bool,
     /// Texels that were not finite or below zero, and count as black.
     pub dropped: u64,
@@ -169,8 +171,9 @@ impl Texture {
         let mut raster = read_image(&self.name, bytes, limits)?;
         let dropped = raster.drop_unsound();
         let raster = raster.packed();
-        let (wrap, filter) = (self.wrap, self.filter);
-        Ok(Image { raster, wrap, filter, pyramids: [None, None], stands_in: false, dropped })
+        let (wrap, filter, lookups) = (self.wrap, self.filter, f64::from(Image::LOOKUPS));
+        let pyramids = [None, None];
+        Ok(Image { raster, wrap, filter, pyramids, lookups, stands_in: false, dropped })
     }
 }
 
@@ -194,6 +197,9 @@ pub(crate) fn read_image(name: &str, bytes: &[u8], limits: Limits) -> Result<Ras
 }
 
 impl Image {
+    /// Lookups along a footprint, at most, where nothing else is said.
+    pub const LOOKUPS: u32 = 8;
+
     /// The magenta and black checker that stands in for an image that cannot be had.
     #[must_use]
     pub fn missing() -> Self {
@@ -204,6 +210,7 @@ impl Image {
             wrap: [Wrap::Repeat; 2],
             filter: Filter::Nearest,
             pyramids: [None, None],
+            lookups: f64::from(Self::LOOKUPS),
             stands_in: true,
             dropped: 0,
         }
@@ -214,6 +221,12 @@ impl Image {
     #[must_use]
     pub fn stands_in(&self) -> bool {
         self.stands_in
+    }
+
+    /// Returns the image with another number of lookups along a footprint, at most.
+    #[must_use]
+    pub fn with_lookups(self, most: u32) -> Self {
+        Self { lookups: f64::from(most.max(1)), ..self }
     }
 
     /// Makes ready for [`Self::sample_over`] in an encoding.
@@ -298,11 +311,11 @@ impl Image {
         if !(long > 1.0 && uv.iter().all(|c| c.is_finite())) {
             return self.sample(uv, encoding);
         }
-        let wide = short.max(long / MOST_LOOKUPS).max(1.0);
+        let wide = short.max(long / self.lookups).max(1.0);
         let level = wide.log2().min(pyramid.len() as f64);
-        let count = (long / wide).ceil().clamp(1.0, MOST_LOOKUPS);
+        let count = (long / wide).ceil().clamp(1.0, self.lookups);
         let mut sum = [0.0; 4];
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 8")]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few")]
         for i in 0..count as u32 {
             let at = (f64::from(i) + 0.5) / count - 0.5;
             let value =
@@ -338,13 +351,33 @@ impl Image {
     }
 }
 
-/// Lookups along a footprint: beyond eight times as long as wide it is made wider.
-const MOST_LOOKUPS: f64 = 8.0;
-
 /// Linear colour and alpha of a texel. Floats are linear light whatever a colour's encoding is.
 fn decoded(raster: &Raster, index: usize, encoding: Encoding) -> [f64; 4] {
     match encoding {
         Encoding::Srgb => raster.linear(index),
         Encoding::Linear => raster.texel(index),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One white row among sixteen, seen over all of it by an ellipse as high as a row: by sixteen lookups it is white,
+    /// and by one, which is as high as wide, a sixteenth of that.
+    #[test]
+    fn few_lookups_blur_across_a_footprint() {
+        let texels: Vec<u8> = (0..256).map(|i| if i / 16 == 8 { 255 } else { 0 }).collect();
+        let raster = Raster::new([16, 16], 1, Samples::U8(texels));
+        let (wrap, filter) = ([Wrap::Repeat; 2], Filter::Bilinear);
+        let mut image = Image { raster, wrap, filter, ..Image::missing() };
+        image.filter_by_footprint(Encoding::Linear, "rows").unwrap();
+        let seen = |lookups: u32| {
+            let image = image.clone().with_lookups(lookups);
+            image.sample_over([0.5, 8.5 / 16.0], [[1.0, 0.0], [0.0, 1.0 / 16.0]], Encoding::Linear)
+        };
+        // Means have 16 bits.
+        assert!((seen(16)[0] - 1.0).abs() < 1e-4, "{:?}", seen(16));
+        assert!((seen(1)[0] - 1.0 / 16.0).abs() < 1e-4, "{:?}", seen(1));
     }
 }

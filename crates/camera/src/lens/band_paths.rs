@@ -44,7 +44,8 @@ use super::nodes::{MOST_NODES, NextTerm, NodeWeights, Variable};
 use super::opened::{BandInterpolation, filtered};
 use super::traced_at::TracedAt;
 
-/// Wavelengths at which interpolation is checked, at most.
+/// Wavelengths at which interpolation is checked, at most. Not a setting, as the places and directions: how near places
+/// are to lie is one (`band_place_error`).
 const CHECKS: usize = 16;
 
 /// Places on each side of the film, and in the pupil, from which rays are taken to measure it.
@@ -55,7 +56,7 @@ const DIRECTIONS: u32 = 64;
 const FEWEST: usize = 32;
 
 /// The farthest that the places of one ray may part (rows of pixels): the sums of so many more are
-/// kept from other threads.
+/// kept from other threads. Not a setting: where they part farther, each band is traced by itself, as accurately.
 const FARTHEST: f64 = 32.0;
 
 /// Factor on the measured parting of places, which may be greater in between.
@@ -158,7 +159,7 @@ impl LensCamera {
             ));
         }
         // As few nodes as will do.
-        let limits = self.sharing;
+        let limits = self.accuracy.sharing;
         let has_losses = !train.losses().is_none()
             || train.elements().iter().any(|element| element.part.is_coated_or_blazed());
         let mut least = (f64::INFINITY, f64::INFINITY);

@@ -16,7 +16,8 @@ use etendue_optics::element::{Clip, Frame, Ray, RayStatus};
 use etendue_optics::train::pupil::{SlopeWindow, lit_radius};
 use etendue_optics::train::{BehindLenslets, MonochromaticTrain, OpticalTrain, Side};
 
-/// Nodes over the half diagonal, for lenses with rotational symmetry.
+/// Nodes over the half diagonal, for lenses with rotational symmetry. No setting, as those of other lenses: from nodes
+/// farther apart Newton's method comes to the same rays, and nodes are solved when a camera is read.
 const RADIAL_NODES: u32 = 257;
 
 /// Nodes over each side of the sensor for other lenses.
@@ -266,15 +267,13 @@ impl LensletChiefs {
     }
 }
 
-/// Directions from the sensor's centre in which its edge is looked for.
+/// Directions from the sensor's centre in which its edge is looked for. Not a setting: what straight lines between them
+/// cut off of a border is known to no more than where it is in each.
 const DIRECTIONS: usize = 32;
 
 /// Reach of the search for the edge beyond the sensor's border, in its distances: a line from an
 /// edge on the sensor to one far outside of it cuts nothing off.
 const BEYOND: f64 = 2.0;
-
-/// Precision of the search for the edge of the light, as a share of its distance.
-const CLOSE: f64 = 5e-3;
 
 /// Distance from the sensor's centre within which light arrives (mm).
 #[derive(Debug, Clone, PartialEq)]
@@ -297,16 +296,18 @@ pub(crate) struct LightReach {
 }
 
 impl ImageCircle {
-    /// Measures it on a sensor of half width and height `half` (mm) that stands at `frame`.
+    /// Measures it on a sensor of half width and height `half` (mm) that stands at `frame`, to within an `error`, a
+    /// share of the distance of its edge.
     pub(crate) fn measure(
         train: &OpticalTrain,
         lens: &MonochromaticTrain,
         frame: Frame,
         half: DVec2,
+        error: f64,
     ) -> Self {
         if train.is_rotationally_symmetric() {
             let lenses = std::slice::from_ref(lens);
-            return Self::Circle(lit_radius(train, lenses, frame.vertex.z, half.length()));
+            return Self::Circle(lit_radius(train, lenses, frame.vertex.z, half.length(), error));
         }
         let lit =
             |film: DVec2| SlopeWindow::find(train, lens, frame.point(film.extend(0.0))).is_some();
@@ -320,7 +321,7 @@ impl ImageCircle {
                 return LightReach { distance: border, ends: false };
             }
             let (mut low, mut high) = (0.0, border);
-            while high - low > CLOSE * high {
+            while high - low > error * high {
                 let middle = 0.5 * (low + high);
                 if lit(axis * middle) { low = middle } else { high = middle }
             }

@@ -16,9 +16,9 @@ use etendue_report::Refusal;
 use etendue_spectrum::{Bands, Curve, Outside, Spread};
 use glam::{DVec2, DVec3};
 
+use super::accuracy::LensAccuracy;
 use super::chief::{ChiefTable, ImageCircle, LensletChiefs};
 use super::focused::{FocusedLens, View};
-use super::nodes::SharingLimits;
 use super::opened::{OpenedGroup, OpenedLens, through_filters, uniform_filters};
 use super::traced_at::{BandGroup, TracedAt, grouped};
 
@@ -39,15 +39,15 @@ pub struct LensCamera {
     /// The lenslets that the sensor looks through.
     lenslets: Option<LensletChiefs>,
     /// Region of the sensor where light arrives.
-    lit: ImageCircle,
+    pub(super) lit: ImageCircle,
     /// Projected solid angle of the unvignetted pupil seen from the axis (sr).
     pub(super) solid_angle: f64,
     pub(super) opened: Option<Arc<OpenedLens>>,
     pub(super) traced_at: TracedAt,
     /// Spreading of light on the sensor.
     pub(super) spread: SpreadBy,
-    /// Limits of the distance between shared rays of bands and rays of their own.
-    pub(super) sharing: SharingLimits,
+    /// Numbers by which it is measured.
+    pub(super) accuracy: LensAccuracy,
 }
 
 /// Means by which light of a point is spread on the sensor.
@@ -68,7 +68,7 @@ impl PartialEq for LensCamera {
         self.focused == other.focused
             && self.traced_at == other.traced_at
             && self.spread == other.spread
-            && self.sharing == other.sharing
+            && self.accuracy == other.accuracy
     }
 }
 
@@ -109,7 +109,8 @@ impl LensCamera {
                 _ => blocked(train, &clear, frame.vertex),
             }));
         }
-        let lit = ImageCircle::measure(train, &clear, frame, half);
+        let accuracy = LensAccuracy::DEFAULT;
+        let lit = ImageCircle::measure(train, &clear, frame, half, accuracy.pupil.image_circle);
         let solid_angle = unvignetted(focused.train(), &design, &focused);
         let straight = unbent.at(unbent.wavelength()).unwrap_or_else(|_| design.clone());
         let chief = ChiefTable::new(&unbent, &frame, half, &straight);
@@ -124,7 +125,7 @@ impl LensCamera {
             opened,
             traced_at,
             spread,
-            sharing: SharingLimits::DEFAULT,
+            accuracy,
         })
     }
 
@@ -201,12 +202,6 @@ impl LensCamera {
     /// The same with rays that run at other wavelengths.
     pub(super) fn running_at(&self, traced_at: TracedAt) -> Self {
         Self { traced_at, opened: None, ..self.clone() }
-    }
-
-    /// Returns the camera with bands that share rays within other limits.
-    pub(crate) fn sharing_within(&self, sharing: SharingLimits) -> Self {
-        let opened = self.opened.clone().filter(|_| sharing == self.sharing);
-        Self { sharing, opened, ..self.clone() }
     }
 
     /// Returns the camera with its light spread another way.
@@ -301,7 +296,8 @@ impl LensCamera {
         }
         let half_size = self.focused.film().half_size().to_array();
         let clear = without_filters(train);
-        let pupil = ExitPupil::new(&clear, &measured, self.focused.sensor_z(), half_size)
+        let (accuracy, z) = (self.accuracy.pupil, self.focused.sensor_z());
+        let pupil = ExitPupil::within(accuracy, &clear, &measured, z, half_size)
             .map_err(|error| fault(error.to_string()))?;
         let all: Vec<f64> =
             groups.iter().flat_map(|g| &g.lenses).map(MonochromaticTrain::wavelength).collect();

@@ -10,6 +10,7 @@
 //! | [`focused`] | a lens and its sensor: where pixels lie, and the paraxial camera of both |
 //! | [`chief`] | the chief rays of a whole sensor; which lenslet a place on the sensor belongs to; the part of the sensor that light reaches |
 //! | [`lens_camera`] | chief rays for data, and what is measured for pictures |
+//! | `accuracy` | numbers of it that trade accuracy for time |
 //! | `keys` | what cameras with a lens have in common in a scene file |
 //! | `opened` | the same measured for the bands of a picture |
 //! | `nodes` | wavelengths that rays of all bands are traced at |
@@ -21,6 +22,7 @@
 //! | `band_paths` | one ray of the scene for all bands: why, and by how many wavelengths |
 //! | `band_landings` | such rays, and where each band's light of them lands |
 
+mod accuracy;
 mod band_landings;
 mod band_paths;
 pub mod chief;
@@ -37,6 +39,7 @@ pub mod spec;
 mod traced_at;
 pub mod waves;
 
+pub use accuracy::{LensAccuracy, WaveAccuracy};
 pub use band_landings::BandLandings;
 pub use band_paths::SharedPaths;
 pub use chief::LensletChiefs;

@@ -13,17 +13,11 @@ use super::lens_camera::{LensCamera, SpreadBy};
 use super::opened::uniform_filters;
 use crate::{Camera, CameraError, CameraRays, FilmSamples};
 
-/// Wavelengths that fields are traced at, of a lens that disperses.
-const NODES: usize = 3;
-
 /// Bands narrower than this are one wavelength (nm).
 const NARROW: f64 = 1.0;
 
 /// Nearer than this to 0, an object is at infinity (1/m).
 const FAR: f64 = 1e-5;
-
-/// Places a side of the pupil by which the light that arrives is measured.
-const PUPIL: u32 = 64;
 
 impl LensCamera {
     /// True if the light of pictures is to be spread as waves are.
@@ -86,7 +80,8 @@ impl LensCamera {
     #[must_use]
     pub fn waves_to_trace(&self) -> (bool, usize) {
         let train = self.focused.train();
-        (is_ideal(train), if self.parts_wavelengths() { NODES } else { 1 })
+        let traced = self.accuracy.waves.wavelengths as usize;
+        (is_ideal(train), if self.parts_wavelengths() { traced } else { 1 })
     }
 
     /// True if what arrives in a picture of so many columns and rows is the same on both sides of its middle, but for
@@ -149,7 +144,9 @@ impl<'a> WaveLens<'a> {
         let disperses = camera.parts_wavelengths();
         let nodes = match disperses && high - low > NARROW {
             true => {
-                (0..NODES).map(|k| low + (high - low) * k as f64 / (NODES - 1) as f64).collect()
+                let count = camera.accuracy.waves.wavelengths;
+                let step = |k: u32| (high - low) * f64::from(k) / f64::from(count - 1);
+                (0..count).map(|k| low + step(k)).collect()
             }
             false if disperses => vec![0.5 * (low + high)],
             false => vec![train.wavelength()],
@@ -205,6 +202,7 @@ impl<'a> WaveLens<'a> {
             nearness: &nearness,
             object: &object,
             image,
+            error: self.camera.accuracy.waves.error,
         })
     }
 
@@ -230,21 +228,21 @@ impl<'a> WaveLens<'a> {
 impl Camera {
     /// Relative illumination at places of the picture (pixels from the corner) for a radiance of 1 all over,
     /// by rays of a camera that was [opened](Self::opened), in one of its groups of bands: the mean weight of rays
-    /// over the pupil.
+    /// over the pupil, of which there are `across` a side.
     #[must_use]
-    pub fn illumination(&self, places: &[[f64; 2]], group: usize) -> Vec<f64> {
+    pub fn illumination(&self, places: &[[f64; 2]], group: usize, across: u32) -> Vec<f64> {
         let mut rays = CameraRays::default();
         let mut samples = FilmSamples { group, ..FilmSamples::default() };
         let mean = |&place: &[f64; 2]| {
             samples.clear();
-            let share = |k: u32| (f64::from(k) + 0.5) / f64::from(PUPIL);
-            for k in 0..PUPIL * PUPIL {
+            let share = |k: u32| (f64::from(k) + 0.5) / f64::from(across);
+            for k in 0..across * across {
                 // Every wavelength of the band with all parts of the pupil.
                 let spectrum = (f64::from(k) * 0.618_033_988_749_895).fract();
-                samples.push(place, [share(k % PUPIL), share(k / PUPIL)], spectrum);
+                samples.push(place, [share(k % across), share(k / across)], spectrum);
             }
             self.sample_rays(&samples, &mut rays);
-            rays.weight.iter().sum::<f64>() / f64::from(PUPIL * PUPIL)
+            rays.weight.iter().sum::<f64>() / f64::from(across * across)
         };
         places.iter().map(mean).collect()
     }

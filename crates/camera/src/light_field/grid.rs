@@ -22,7 +22,9 @@ const MOST_VIEWS: u32 = 255;
 const LEAST_IMAGE: f64 = 5.0;
 
 /// Over how many pixels parallel light in front of a lenslet may be spread on the sensor: a view is taken
-/// through one pixel's share of the opening, and twice that is told apart from it at 40 dB.
+/// through one pixel's share of the opening, and twice that is told apart from it at 40 dB. Not a setting, nor is the
+/// narrowest image: which views there are is decided while the camera is read, and which are good enough by
+/// `view_psnr`.
 const MOST_BLUR: f64 = 1.0;
 
 /// Rows and columns of lenslets, as the picture has them: row 0 at the top, column 0 on the left.

@@ -24,7 +24,7 @@ use crate::{
 };
 use etendue_geometry::Bounds;
 use etendue_geometry::units::Micrometres;
-use models::{COUNT, PixelSight, sights};
+use models::{PixelSight, places_a_side, sights};
 
 /// Rings of the picture for which the residuals are told.
 const RINGS: u32 = 8;
@@ -139,10 +139,11 @@ impl OpencvFit {
         let (_, model, distortion) = best.ok_or_else(|| why.unwrap_or_else(none))?;
         // What it misses, and how far it holds.
         let mut notes = Vec::new();
-        let dark = COUNT - sights.len();
+        let places = places_a_side(camera).pow(2) as usize;
+        let dark = places - sights.len();
         if dark > 0 {
             notes.push(format!(
-                "{dark} of {COUNT} places of the picture see nothing through the lens; the fit goes on \
+                "{dark} of {places} places of the picture see nothing through the lens; the fit goes on \
                  there as its polynomial does"
             ));
         }

@@ -7,7 +7,7 @@
 use glam::DVec3;
 
 use crate::distortion::{BrownConrady, DistortionSpec, Fisheye};
-use crate::{Camera, Intrinsics};
+use crate::{Camera, Intrinsics, LensAccuracy, LensCamera};
 use etendue_geometry::RayBatch;
 
 /// Directions further than this off the axis (as the cosine) are nothing that tangents can tell.
@@ -95,7 +95,7 @@ fn fisheye_rows(at: &[f64; 8], direction: DVec3, pixel: [f64; 2]) -> [ResidualRo
     ]
 }
 
-/// Steps after which no better parameters are looked for.
+/// Steps after which no better parameters are looked for. Not a setting: from the paraxial camera a few are enough.
 const MOST_STEPS: usize = 50;
 
 /// Steps that change the sum of squares by less than this share have arrived.
@@ -179,10 +179,9 @@ fn step<const N: usize>(rows: &[ResidualRow<N>]) -> Option<[f64; N]> {
 }
 
 /// Places on each side of the picture, its edges among them.
-const PLACES: u32 = 33;
-
-/// Places in all.
-pub(super) const COUNT: usize = (PLACES * PLACES) as usize;
+pub(super) fn places_a_side(camera: &Camera) -> u32 {
+    camera.lens().map_or(LensAccuracy::DEFAULT, LensCamera::accuracy).fit_places
+}
 
 /// A chief ray. Axes are OpenCV's: x right, y down, z forward.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -212,10 +211,11 @@ impl PixelSight {
 /// The chief rays of places all over the picture; places that see nothing have none.
 pub(super) fn sights(camera: &Camera) -> Vec<PixelSight> {
     let [width, height] = camera.resolution().map(f64::from);
-    let share = |i: u32| f64::from(i) / f64::from(PLACES - 1);
+    let across = places_a_side(camera);
+    let share = |i: u32| f64::from(i) / f64::from(across - 1);
     let (mut columns, mut rows) = (Vec::new(), Vec::new());
-    for row in 0..PLACES {
-        for column in 0..PLACES {
+    for row in 0..across {
+        for column in 0..across {
             columns.push(share(column) * width);
             rows.push(share(row) * height);
         }

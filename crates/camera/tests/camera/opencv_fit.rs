@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use etendue_camera::{Camera, CameraSpec, OpencvFit};
+use etendue_camera::{Camera, CameraSpec, LensAccuracy, OpencvFit};
 use etendue_geometry::{Bounds, RayBatch};
 use glam::DVec3;
 
@@ -60,6 +60,12 @@ fn an_ideal_lens_is_a_pinhole() {
     assert!(fit.residuals.largest < 1e-8, "{:?}", fit.residuals);
     assert_eq!((fit.model, fit.holds.share), ("brown_conrady", 1.0));
     assert!(fit.holds.pupil_wander < 1e-9 && fit.holds.farthest.is_none(), "{:?}", fit.holds);
+    // To as many places as the camera says.
+    assert_eq!(fit.residuals.places, 33 * 33);
+    let accuracy = LensAccuracy { fit_places: 9, ..LensAccuracy::DEFAULT };
+    let few = OpencvFit::new(&thin.with_lens_accuracy(accuracy), 0.5).unwrap();
+    assert_eq!(few.residuals.places, 81);
+    assert!(few.residuals.largest < 1e-8, "{:?}", few.residuals);
 }
 
 /// The camera's own rays, by the inverse of the distortion, against the lens' chief rays: what the fit says

@@ -24,9 +24,9 @@ pub const FARTHEST_WAVES: f64 = 60.0;
 /// Wavelengths times the f-number of the image that a grid has to hold beside where rays land.
 const IMAGE_MARGIN: f64 = 42.0;
 
-/// Greatest difference of a wavefront from the polynomial that stands for it (waves): a picture's
-/// irradiance changes by a few thousandths of its peak per hundredth of a wave.
-const SMOOTH: f64 = 2e-3;
+/// Greatest difference of a wavefront from the polynomial that stands for it (waves) where nothing else is said: a
+/// picture's irradiance changes by a few thousandths of its peak per hundredth of a wave.
+pub const WAVEFRONT_ERROR: f64 = 2e-3;
 
 /// Fields at all of some wavelengths and nearnesses.
 #[derive(Debug, Clone)]
@@ -54,6 +54,8 @@ pub struct FieldSource<'a> {
     pub object: &'a (dyn Fn(f64) -> ObjectPoint + Sync),
     /// The point of the image (mm) that the fields are about.
     pub image: DVec3,
+    /// Greatest difference of a wavefront from the polynomial that stands for it (waves).
+    pub error: f64,
 }
 
 impl FieldsBetween {
@@ -67,7 +69,7 @@ impl FieldsBetween {
     /// When there is no light, no chief ray or no sphere, or the wavefront is too rough for the most
     /// cells.
     pub fn new(source: &FieldSource<'_>) -> Result<Self, AnalysisError> {
-        let FieldSource { train, lenses, nearness, object, image } = *source;
+        let FieldSource { train, lenses, nearness, object, image, error } = *source;
         let all: Vec<_> =
             lenses.iter().flat_map(|lens| nearness.iter().map(move |&near| (lens, near))).collect();
         let part = |(lens, near)| {
@@ -86,7 +88,7 @@ impl FieldsBetween {
             let step = half / (0.5 * cells as f64 - super::pupil::RIM);
             let sampling = PupilGrid { cells, step, middle };
             let field = |(beam, sphere, outline): &(Beam<'_>, ReferenceSphere, aim::Outline)| {
-                smooth::field(beam, sphere, outline, sampling, SMOOTH)
+                smooth::field(beam, sphere, outline, sampling, error)
                     .map_or_else(|| aim::field(beam, sphere, outline, sampling), Ok)
             };
             parts.par_iter().map(field).collect()

@@ -11,11 +11,13 @@ use super::rays::{Block, LANES, PENDING, Ray, at_lane};
 use super::real::Real;
 use super::refract::{IndexPair, RefractedRay, TOUCH, each_numbered_lane};
 
-/// The step (mm) at which the method has arrived.
+/// The step (mm) at which the method has arrived. Not a setting: digits double with each step, so that a coarser end
+/// would save one at most.
 const SETTLED: f64 = 1e-10;
 const MOST_STEPS: usize = 20;
 
-/// Number of pieces of a ray that are searched for a change of sign.
+/// Number of pieces of a ray that are searched for a change of sign. Not a setting: only rays are searched that the
+/// method does not bring to the surface, and fewer pieces lose crossings.
 const PIECES: u32 = 256;
 
 /// A surface in its own frame (mm), as the search for its crossing with a ray asks for it.

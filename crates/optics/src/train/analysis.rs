@@ -121,7 +121,8 @@ pub fn chief_height(
     height.is_finite().then_some(height)
 }
 
-/// Cells a side over the rectangle of passing directions.
+/// Cells a side over the rectangle of passing directions. Not a setting of a scene: a camera's solid angle is measured
+/// while its description is read, before anything of the scene is known, and to 10⁻⁴.
 const PUPIL_GRID: f64 = 500.0;
 
 /// Least number of cells a side, for the longest trains.
@@ -146,7 +147,7 @@ fn grid(at: &MonochromaticTrain, places: usize) -> u32 {
     rays.sqrt().clamp(LEAST_GRID, PUPIL_GRID) as u32
 }
 
-/// Rings around the axis of a round lens.
+/// Rings around the axis of a round lens. Not a setting, as [`PUPIL_GRID`].
 const RINGS: u32 = 1024;
 
 /// Steps in which the edge between two of them is sought.
@@ -310,7 +311,7 @@ pub fn half_field(
     [window.centre(), corners[0], corners[1]].into_iter().find_map(outside)
 }
 
-/// Cells across the square around the entrance pupil.
+/// Cells across the square around the entrance pupil. Not a setting of a scene: no picture is made of spots.
 const SPOT_GRID: u32 = 32;
 
 /// Intersections of the rays of one field point with the reference plane.

@@ -7,7 +7,8 @@ use super::pupil::without_dimming;
 use super::{Focus, LensError, MonochromaticTrain, OpticalTrain, Part, Side};
 use crate::element::{Clip, Opening, Ray, RayStatus};
 
-/// Directions across the axis in which a lens without rotational symmetry is looked at.
+/// Directions across the axis in which a lens without rotational symmetry is looked at. Not a setting, as [`RAYS`]: a
+/// lens is closed down while its camera is read, before anything of a scene is known.
 const AZIMUTHS: u32 = 16;
 
 /// Rays among which a beam's edge is looked for before it is bisected.

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use etendue_optics::element::{Clip, LensRays};
 use etendue_optics::train::analysis::projected_solid_angle;
-use etendue_optics::train::pupil::PupilSamples;
+use etendue_optics::train::pupil::{PupilAccuracy, PupilSamples, lit_radius};
 use etendue_optics::train::{ExitPupil, Focus, LensFile, OpticalTrain, Side};
 use glam::{DVec2, DVec3};
 
@@ -48,6 +48,40 @@ fn of_the_rays_sampled_in_the_double_gauss_95_percent_leave_without_bias() {
             println!("f/{f_number} at {r} mm: {left:.4} leave, irradiance off by {error:.1e}");
         }
     }
+}
+
+/// Area of an outline in slopes.
+fn area(outline: &[DVec2]) -> f64 {
+    let next = |i: usize| outline[(i + 1) % outline.len()];
+    0.5 * (0..outline.len()).map(|i| outline[i].perp_dot(next(i))).sum::<f64>().abs()
+}
+
+#[test]
+fn a_pupil_is_measured_by_the_numbers_that_are_given() {
+    const USUAL: PupilAccuracy = PupilAccuracy::DEFAULT;
+    let train = preset("double-gauss");
+    let z = train.sensor_z(Focus::Infinity).unwrap();
+    let measured = |accuracy: PupilAccuracy| {
+        ExitPupil::within(accuracy, &train, &[587.56], z, [18.0, 12.0]).unwrap()
+    };
+    let usual = measured(USUAL);
+    let film = DVec2::new(3.0, 0.0);
+    // All radii are longer by 1.05 / 1.004.
+    let wide = measured(PupilAccuracy { margin: 0.05, ..USUAL });
+    let ratio = area(&wide.outline(film)) / area(&usual.outline(film));
+    assert!((1.05..1.12).contains(&ratio), "{ratio}");
+    // Between four nodes the bound is farther from the pupil, and holds it all the same.
+    let coarse = measured(PupilAccuracy { radial_intervals: 4, ..USUAL });
+    let film = DVec2::from_angle(0.7) * 14.2;
+    let [few, most] = [&coarse, &usual].map(|pupil| sample(&train, pupil, film, 50_000));
+    assert!(few.0 < most.0, "{few:?}, {most:?}");
+    // A tenth of 50 000 samples fails: sqrt(0.1/50 000) = 1.4e-3 if random.
+    assert!((few.1 / most.1 - 1.0).abs() < 5e-3, "{few:?}, {most:?}");
+    // The image circle is as much wider as it may be off.
+    let lens = [train.at(587.56).unwrap()];
+    let radius = |error: f64| lit_radius(&train, &lens, z, 100.0, error);
+    let ratio = radius(0.05) / radius(5e-3);
+    assert!((1.04..1.07).contains(&ratio), "{ratio}");
 }
 
 #[test]

@@ -13,6 +13,12 @@ pub(crate) struct Rule {
     pub(crate) least: u32,
     /// Standard errors of a block's variance that are added to it.
     pub(super) sigmas: f64,
+    /// Share of a block's mean variance that each of its pixels is reckoned to have in any case: what none of those
+    /// around it happened to tell.
+    pub(super) floor: f64,
+    /// The most samples that a pixel gets in a round, as a share of what it has: the variance of Sobol points falls
+    /// faster than their number grows, and what a round takes too many is lost.
+    pub(super) growth: f64,
     reference: ErrorReference,
 }
 
@@ -44,14 +50,20 @@ impl Rule {
                 ErrorReference::SensorNoise(Box::new(noise), share)
             }
         };
-        let (least, sigmas) = (scene.render.samples.least(), scene.accuracy.sample_sigmas);
-        Some(Self { least, sigmas, reference })
+        Some(Self {
+            least: scene.render.samples.least(),
+            sigmas: scene.accuracy.sample_sigmas,
+            floor: scene.accuracy.sample_floor,
+            growth: scene.accuracy.sample_growth,
+            reference,
+        })
     }
 
     /// A relative error, with so many standard errors.
     #[cfg(test)]
     pub(super) fn of_relative_error(share: f64, sigmas: f64) -> Self {
-        Self { least: 4, sigmas, reference: ErrorReference::RelativeError(share) }
+        let reference = ErrorReference::RelativeError(share);
+        Self { least: 4, sigmas, floor: 0.1, growth: 0.5, reference }
     }
 
     /// Noise that the two sets of a pixel's samples tell, `a_set` being the number in each.

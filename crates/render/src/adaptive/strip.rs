@@ -17,14 +17,6 @@ const LEAST: f32 = 1e-6;
 /// The colours of the chessboard.
 const HALVES: usize = 2;
 
-/// The share of a block's mean variance that each of its pixels is reckoned to have in any case: what none of those
-/// around it happened to tell.
-const OF_BLOCK: f64 = 0.1;
-
-/// The most samples that a pixel gets in a round, as a share of what it has: the variance of Sobol points falls faster
-/// than their number grows, and what a round takes too many is lost.
-const GROWTH: f64 = 0.5;
-
 /// The fewest that it gets when it gets any, as a share of what it has.
 const STEP: u32 = 8;
 
@@ -167,15 +159,16 @@ impl StripOfPixels<'_> {
             let is_new = |row: usize| columns.clone().any(|x| has_changed[row * across + x]);
             if (0..down).any(is_new) {
                 for half in 0..HALVES {
-                    self.ask_half(rule, most, &self.half(place, half, &variances), demands);
+                    let half = self.half(rule.floor, place, half, &variances);
+                    self.ask_half(rule, most, &half, demands);
                 }
             }
         }
     }
 
     /// Estimates of the pixels of one colour in a block, by those of the other: `variances` is that
-    /// of one sample of each.
-    fn half(&self, place: [usize; 2], half: usize, variances: &[f64]) -> HalfOfBlock {
+    /// of one sample of each, of which each has a share of the mean, `floor`, in any case.
+    fn half(&self, floor: f64, place: [usize; 2], half: usize, variances: &[f64]) -> HalfOfBlock {
         let pixels: Vec<usize> =
             self.pixels(place).filter(|&index| self.half_of(index) == half).collect();
         let window = PixelWindow::around(place, [self.width, self.height()]);
@@ -200,7 +193,7 @@ impl StripOfPixels<'_> {
         }
         let mean = of_one.iter().sum::<f64>() / of_one.len().max(1) as f64;
         for own in &mut of_one {
-            *own = (1.0 - OF_BLOCK) * *own + OF_BLOCK * mean;
+            *own = (1.0 - floor) * *own + floor * mean;
         }
         // And on the whole, where pixels get samples by the root of their variance.
         let mut bears = vec![0.0; window.len()];
@@ -255,7 +248,7 @@ impl StripOfPixels<'_> {
                         clippy::cast_sign_loss,
                         reason = "saturated"
                     )]
-                    let many = have.saturating_add((GROWTH * f64::from(have)) as u32).max(few);
+                    let many = have.saturating_add((rule.growth * f64::from(have)) as u32).max(few);
                     needs.clamp(few, many).next_multiple_of(2).min(most.max(have))
                 }
                 false => have,
@@ -406,6 +399,15 @@ mod tests {
             );
             // Half as many again as it has, at most.
             assert_eq!(demand.next, 6);
+        }
+        // Rounds that grow faster, and pixels that are all reckoned to have the mean.
+        let mut rule = rule;
+        (rule.growth, rule.floor) = (2.0, 1.0);
+        strip.ask(&rule, 1 << 20, &[true; 64], &mut demands);
+        for demand in demands {
+            // 19 over the 0.25 that are allowed, rounded up.
+            assert!(demand.needs.abs_diff(76) <= 2, "{demand:?}");
+            assert_eq!(demand.next, 12);
         }
     }
 }

@@ -31,9 +31,6 @@ pub const CRYPTOMATTE: &str = "cryptomatte.exr";
 /// Pairs of number and share a pixel: more than six things in one pixel are rare, and the least are left out.
 const RANKS: usize = 6;
 
-/// Samples a pixel where the picture has fewer: an edge has 64 steps then.
-const FEWEST: u32 = 64;
-
 /// Samples a pixel where the picture has more: 1/1024 is below what an 8-bit matte tells.
 const MOST: u32 = 1024;
 
@@ -125,7 +122,8 @@ pub fn write(
         true => camera.opened(&Bands::Rgb).map_err(|error| RenderError::camera(error.why))?,
         false => camera,
     };
-    let samples = scene.render.samples.typical().clamp(FEWEST, MOST);
+    let fewest = scene.accuracy.matte_samples.min(MOST);
+    let samples = scene.render.samples.typical().clamp(fewest, MOST);
     let tracing = MatteTracing { scene, accel, camera: &camera, mattes: &mattes, samples };
     let pixels = width as usize * height as usize;
     let mut planes: Vec<Vec<f32>> = Vec::new();

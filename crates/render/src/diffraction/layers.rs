@@ -5,14 +5,11 @@
 
 use etendue_camera::LensCamera;
 
-/// Waves of defocus from one layer to the next, near focus.
-pub(super) const STEP: f64 = 0.35;
-
-/// From so many waves on, layers are a tenth of the defocus deep.
+/// From so many waves of defocus on, layers are so much deeper as it is larger: a tenth of it at steps of 0.35 waves.
 const LINEAR: f64 = 3.5;
 
-/// The most layers in front of focus, and behind it.
-const MOST: u8 = 60;
+/// The most layers in front of focus, and behind it, times the waves from one to the next: 60 at steps of 0.35 waves.
+const MOST: f64 = 21.0;
 
 /// Cells by their layers.
 #[derive(Debug, Clone)]
@@ -29,8 +26,14 @@ pub(crate) struct DepthLayers {
 
 impl DepthLayers {
     /// Sorts cells, rows of so many `columns`, by their depths (m, infinite where there is nothing), for a
-    /// lens at a wavelength (nm).
-    pub(crate) fn of(depths: &[f32], columns: usize, lens: &LensCamera, wavelength: f64) -> Self {
+    /// lens at a wavelength (nm), into layers a `step` of waves of defocus deep near focus.
+    pub(crate) fn of(
+        depths: &[f32],
+        columns: usize,
+        lens: &LensCamera,
+        wavelength: f64,
+        step: f64,
+    ) -> Self {
         let waves = lens.waves_of_defocus(wavelength);
         let focus = lens.focused().object_distance();
         let focus = if focus.is_finite() && focus != 0.0 { 1.0 / focus } else { 0.0 };
@@ -38,8 +41,8 @@ impl DepthLayers {
             true => 1.0 / f64::from(depth),
             false => 0.0,
         };
-        let number = |depth: f32| number_of(waves * (near(depth) - focus));
-        let mut sums = vec![(0.0, 0_u64); 2 * usize::from(MOST) + 1];
+        let number = |depth: f32| number_of(waves * (near(depth) - focus), step);
+        let mut sums = vec![(0.0, 0_u64); 2 * most_of(step) + 1];
         for &depth in depths {
             let (sum, count) = &mut sums[number(depth)];
             *sum += near(depth);
@@ -72,15 +75,21 @@ impl DepthLayers {
     }
 }
 
-/// The layer of so many waves of defocus, counted from the rearmost that there may be.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 120")]
-fn number_of(waves: f64) -> usize {
+/// The most layers on one side of focus: numbers of all of them are to fit into a byte.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 127")]
+fn most_of(step: f64) -> usize {
+    (MOST / step).round().clamp(1.0, 127.0) as usize
+}
+
+/// The layer of so many waves of defocus, counted from the rearmost that there may be, at so many waves a `step`.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 254")]
+fn number_of(waves: f64, step: f64) -> usize {
     let far = waves.abs();
     let steps = match far < LINEAR {
-        true => far / STEP,
-        false => LINEAR / STEP + (far / LINEAR).ln() * LINEAR / STEP,
+        true => far / step,
+        false => LINEAR / step + (far / LINEAR).ln() * LINEAR / step,
     };
-    let most = f64::from(MOST);
+    let most = most_of(step) as f64;
     (most + steps.min(most).copysign(waves)).round() as usize
 }
 
@@ -88,9 +97,13 @@ fn number_of(waves: f64) -> usize {
 mod tests {
     use super::*;
 
+    const STEP: f64 = 0.35;
+
     #[test]
     fn layers_are_a_third_of_a_wave_or_a_tenth_of_the_defocus_deep() {
-        assert_eq!([number_of(-1000.0), number_of(1000.0)], [0, 2 * usize::from(MOST)]);
+        let number_of = |waves| number_of(waves, STEP);
+        assert_eq!(most_of(STEP), 60);
+        assert_eq!([number_of(-1000.0), number_of(1000.0)], [0, 120]);
         let mut last = number_of(-100.0);
         let mut edges = Vec::new();
         for k in -100_000..=100_000 {
@@ -107,6 +120,17 @@ mod tests {
             let (deep, far) = (pair[1] - pair[0], pair[0].abs().min(pair[1].abs()));
             assert!(deep <= STEP.max(0.107 * far) + 2e-3, "{pair:?}");
         }
-        assert_eq!(number_of(0.0), usize::from(MOST));
+        assert_eq!(number_of(0.0), 60);
+    }
+
+    #[test]
+    fn half_the_step_makes_twice_the_layers_over_the_same_defocus() {
+        for waves in [-100.0, -3.0, 0.5, 2.0, 30.0, 400.0] {
+            let from_focus = |step| number_of(waves, step) as f64 - most_of(step) as f64;
+            // Both are rounded.
+            assert!((from_focus(0.175) - 2.0 * from_focus(0.35)).abs() <= 1.5, "{waves}");
+        }
+        assert_eq!(2 * most_of(0.17) + 1, 249);
+        assert_eq!(most_of(3.5), 6);
     }
 }

@@ -1,8 +1,8 @@
 //! Diffraction in the picture: the scene along chief rays, on cells of pixels, whose light is then spread
 //! by the lens' point spread functions in waves. Nothing is spread by rays, so nothing is spread twice.
 //!
-//! 1. Cells a third of the finest detail that the lens can draw, but at least a third of a pixel, are
-//!    rendered along chief rays, with their depths.
+//! 1. Cells a third of the finest detail that the lens can draw, but at least a third of a pixel (where `accuracy`
+//!    says nothing else), are rendered along chief rays, with their depths.
 //! 2. Light is multiplied by what of it arrives, which the lens' rays say as they do without diffraction.
 //! 3. Cells are sorted by depth into layers, over each of which the spread hardly changes.
 //! 4. From the rearmost to the foremost, each layer's light and its coverage are spread, and it is laid over
@@ -18,7 +18,7 @@ mod words;
 
 use etendue_camera::{Camera, WaveLens};
 use etendue_scene::Scene;
-use etendue_scene::file::SamplesSpec;
+use etendue_scene::file::{AccuracySpec, SamplesSpec};
 use etendue_tracer::LayerSpec;
 
 use crate::error::RenderError;
@@ -36,12 +36,6 @@ use self::layers::DepthLayers;
 use self::spreads::Spreads;
 
 pub(crate) use self::words::decision;
-
-/// The most cells that a pixel has a side.
-const MOST_CELLS: u32 = 3;
-
-/// Cells across the finest detail that a lens can draw.
-const CELLS_OF_DETAIL: f64 = 3.0;
 
 /// Tracing takes this share of the work, as a rule.
 const TRACING: f64 = 0.8;
@@ -65,7 +59,8 @@ pub(crate) fn bytes(scene: &Scene, plan: &Plan) -> u64 {
     let bands = plan.bands.count();
     let shortest = (0..bands).map(|band| plan.bands.wavelength(band)).fold(f64::INFINITY, f64::min);
     let pitch = 1e-3 * lens.focused().pixel_pitch();
-    let cells = cells_a_pixel(pitch, lens.airy_unit(shortest));
+    let accuracy = &scene.accuracy;
+    let cells = cells_a_pixel(pitch, lens.airy_unit(shortest), accuracy);
     let lit = plan.layers.iter().filter(|layer| layer.is_light()).count();
     let each = size_of::<f32>() * (lit * bands + 1) + 1;
     let resolution = scene.camera.resolution();
@@ -75,11 +70,11 @@ pub(crate) fn bytes(scene: &Scene, plan: &Plan) -> u64 {
     // Beside light, what a layer covers and what is known.
     let is_flat = words::depths(scene).is_some_and(|[near, far]| {
         lens.waves_of_defocus(f64::midpoint(shortest, longest)) * (1.0 / near - 1.0 / far)
-            <= layers::STEP
+            <= accuracy.defocus_step
     });
     let planes = if is_flat { lit + 1 } else { lit + 2 };
     columns * rows * each as u64
-        + spreads::bytes(lens, resolution, (cells, unit), (planes, is_flat))
+        + spreads::bytes(lens, accuracy, resolution, (cells, unit), (planes, is_flat))
 }
 
 /// Refuses what light that is spread over the picture cannot be.
@@ -129,10 +124,10 @@ impl Watch for PartialProgress<'_> {
 }
 
 /// Number of cells of a pixel a side.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 3")]
-fn cells_a_pixel(pitch: f64, finest: f64) -> u32 {
-    let cells = (CELLS_OF_DETAIL * pitch / finest - 1e-9).ceil();
-    cells.clamp(1.0, f64::from(MOST_CELLS)) as u32
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few")]
+fn cells_a_pixel(pitch: f64, finest: f64, accuracy: &AccuracySpec) -> u32 {
+    let cells = (accuracy.spread_detail_cells * pitch / finest - 1e-9).ceil();
+    cells.clamp(1.0, f64::from(accuracy.spread_pixel_cells)) as u32
 }
 
 /// Traces the light of `scene` and spreads it, where that is [wanted](is_wanted). `opened` is the camera, opened for the plan's bands.
@@ -158,15 +153,18 @@ pub(crate) fn spread_light(
     let all = || waves.wavelengths().iter().flatten().copied();
     let shortest = all().fold(f64::INFINITY, f64::min);
     let pitch = 1e-3 * lens.focused().pixel_pitch();
-    let cells = cells_a_pixel(pitch, lens.airy_unit(shortest));
+    let accuracy = &scene.accuracy;
+    let cells = cells_a_pixel(pitch, lens.airy_unit(shortest), accuracy);
     // Light along chief rays, and depths.
     let (picture, lit, mut film) = cell_picture(scene, plan, prepared, cells, watch)?;
     let [columns, rows] = scene.camera.resolution();
-    let illumination =
-        illumination(opened, &plan.bands, [columns, rows], waves.is_mirrored([columns, rows]));
+    let is_mirrored = waves.is_mirrored([columns, rows]);
+    let illumination = illumination(opened, &plan.bands, [columns, rows], is_mirrored, accuracy);
     let mean = all().sum::<f64>() / all().count().max(1) as f64;
-    let layers = DepthLayers::of(&picture.depths, picture.size[0], lens, mean);
-    let spreads = Spreads::new(&waves, &layers, [columns, rows], f64::from(cells), pitch)
+    let (across, step) = (picture.size[0], accuracy.defocus_step);
+    let layers = DepthLayers::of(&picture.depths, across, lens, mean, step);
+    let sides = (f64::from(cells), pitch);
+    let spreads = Spreads::new(&waves, &layers, [columns, rows], sides, accuracy)
         .map_err(|error| fault(error.to_string()))?;
     let bands = plan.bands.count();
     let mut planes: Vec<Vec<Vec<f32>>> = vec![Vec::new(); lit.len()];

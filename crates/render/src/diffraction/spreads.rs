@@ -3,26 +3,21 @@
 
 use etendue_camera::{LensCamera, WaveLens};
 use etendue_optics::analysis::{AnalysisError, CellGrid, CellSpread, FieldsBetween};
+use etendue_scene::file::AccuracySpec;
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
 use super::layers::DepthLayers;
 
-/// Nodes a side behind a lens whose aberrations change over the picture, and behind an ideal one.
-const NODES: usize = 5;
+/// Nodes a side behind an ideal lens, over whose picture nothing changes but what is cut off.
 const IDEAL_NODES: usize = 3;
 
-/// Wavelengths of a band that are added up, at most.
-const WAVELENGTHS: usize = 3;
-
-/// Waves of defocus that one depth may stand for.
+/// Waves of defocus that one depth may stand for. Not a setting: so few change a spread by less than what counts as
+/// alike.
 const ONE_DEPTH: f64 = 0.02;
 
 /// Factor by which a dark node looks towards the middle each time.
 const INWARDS: f64 = 0.88;
-
-/// Spreads that differ by less than this share of the light are one: their modulation differs by less.
-const ALIKE: f64 = 5e-3;
 
 /// Cells a side of the tiles of a picture of one spread.
 const TILE: usize = 512;
@@ -47,7 +42,12 @@ pub(crate) struct Spreads {
     grid: CellGrid,
 }
 
-/// Depths at which fields are traced, at most.
+/// Nodes a side, of an ideal lens or not.
+fn nodes(is_ideal: bool, accuracy: &AccuracySpec) -> usize {
+    if is_ideal { IDEAL_NODES } else { accuracy.spread_nodes as usize }
+}
+
+/// Depths at which fields are traced, at most: polynomials through three have all between, as defocus is linear.
 const DEPTHS: usize = 3;
 
 /// Bytes of the fields of all nodes, and of what is made of them on the way to so many `planes` of pixels: for each
@@ -55,6 +55,7 @@ const DEPTHS: usize = 3;
 /// `unit`, of a lens that draws sharply, and of things that lie within one depth or not.
 pub(crate) fn bytes(
     lens: &LensCamera,
+    accuracy: &AccuracySpec,
     resolution: [u32; 2],
     (cells, unit): (u32, f64),
     (planes, is_flat): (usize, bool),
@@ -62,11 +63,11 @@ pub(crate) fn bytes(
     /// The spread, a plane, its transform and the scratch of that.
     const TRANSFORMS: usize = 4;
     let (is_ideal, wavelengths) = lens.waves_to_trace();
-    let side = if is_ideal { IDEAL_NODES } else { NODES };
+    let side = nodes(is_ideal, accuracy);
+    let summed = accuracy.spread_wavelengths as usize;
     let traced = if lens.is_mirrored(resolution) { side.div_ceil(2) } else { side };
     let depths = if is_flat { 1 } else { DEPTHS };
-    let fields =
-        (traced * traced * wavelengths * depths + 2 * WAVELENGTHS) * FieldsBetween::FIELD_BYTES;
+    let fields = (traced * traced * wavelengths * depths + 2 * summed) * FieldsBetween::FIELD_BYTES;
     let size = resolution.map(|pixels| pixels as usize * cells as usize);
     let half = CellSpread::half_of_sharp(unit, size[0].max(size[1]));
     let window = |size: usize| size.min(2 * size / (side - 1)) + 2 * half;
@@ -79,7 +80,7 @@ pub(crate) fn bytes(
 }
 
 impl Spreads {
-    /// Traces the fields of all nodes.
+    /// Traces the fields of all nodes of a picture of pixels of a `pitch` (mm), in so many `cells` a side.
     ///
     /// # Errors
     ///
@@ -88,10 +89,10 @@ impl Spreads {
         lens: &WaveLens<'_>,
         layers: &DepthLayers,
         resolution: [u32; 2],
-        cells: f64,
-        pitch: f64,
+        (cells, pitch): (f64, f64),
+        accuracy: &AccuracySpec,
     ) -> Result<Self, AnalysisError> {
-        let side = if lens.is_ideal() { IDEAL_NODES } else { NODES };
+        let side = nodes(lens.is_ideal(), accuracy);
         let [low, high] = layers.span();
         let nearness = match (high - low) * layers.waves > ONE_DEPTH {
             true => vec![low, 0.5 * (low + high), high],
@@ -132,12 +133,14 @@ impl Spreads {
             reason = "a picture's size"
         )]
         let grid = CellGrid { pitch: pitch / cells, turn: lens.turn(), most: most as usize };
+        let most = accuracy.spread_wavelengths as usize;
+        let few = |all: &Vec<f64>| few(all, most);
         let mut spreads = Self {
             side,
             is_uniform: false,
             fields: vec![None; traced.len()],
             own,
-            bands: lens.wavelengths().iter().map(|all| few(all)).collect(),
+            bands: lens.wavelengths().iter().map(few).collect(),
             nearness: layers.nearness.iter().map(|near| 1e-3 * near).collect(),
             grid,
         };
@@ -145,7 +148,7 @@ impl Spreads {
         first.sort_unstable();
         first.dedup();
         trace(&mut spreads, &first)?;
-        if spreads.are_alike() {
+        if spreads.are_alike(accuracy.spread_difference) {
             return Ok(spreads.joined());
         }
         let rest: Vec<usize> = (0..traced.len()).filter(|k| !first.contains(k)).collect();
@@ -159,9 +162,9 @@ impl Spreads {
         [self.side / 2 * (self.side + 1), 0, last, last * self.side, last * (self.side + 1)]
     }
 
-    /// True if the spreads in the corners are hardly others than that in the middle: in the first,
-    /// the middle and the last band, of the rearmost and the foremost layer.
-    fn are_alike(&self) -> bool {
+    /// True if the spreads in the corners differ from that in the middle by no more than a share of the light: in the
+    /// first, the middle and the last band, of the rearmost and the foremost layer. Their modulation differs by less.
+    fn are_alike(&self, most: f64) -> bool {
         let [middle, corners @ ..] = self.ends();
         let bands = self.bands.len();
         let mut ends = vec![0, bands / 2, bands.saturating_sub(1)];
@@ -178,7 +181,7 @@ impl Spreads {
                 let Some((own, _)) = self.of_node(&spreads, middle) else { return false };
                 corners.iter().all(|&corner| {
                     let other = self.of_node(&spreads, corner);
-                    other.is_some_and(|(other, _)| own.difference(other) <= ALIKE)
+                    other.is_some_and(|(other, _)| own.difference(other) <= most)
                 })
             })
         })
@@ -240,9 +243,9 @@ fn sources(side: usize, is_mirrored: bool) -> (Vec<usize>, Vec<(usize, [bool; 2]
     (nodes, (0..side * side).map(source).collect())
 }
 
-/// Wavelengths that stand for as many, each for a run of them.
-fn few(all: &[f64]) -> Vec<f64> {
-    let count = all.len().clamp(1, WAVELENGTHS);
+/// So many wavelengths at most that stand for all, each for a run of them.
+fn few(all: &[f64], most: usize) -> Vec<f64> {
+    let count = all.len().clamp(1, most);
     let run = |k: usize| &all[k * all.len() / count..(k + 1) * all.len() / count];
     let mean = |run: &[f64]| run.iter().sum::<f64>() / run.len().max(1) as f64;
     (0..count).map(|k| mean(run(k))).collect()

@@ -8,7 +8,8 @@ use etendue_tracer::LayerSpec;
 use super::film::light_factor;
 use crate::sum::variance_of_mean;
 
-/// Parts of the way between the light of two sets of samples in which it is looked at how much of it is clipped.
+/// Parts of the way between the light of two sets of samples in which it is looked at how much of it is clipped. Not a
+/// setting: it is looked at only where one set is clipped and the other is not.
 const PARTS: u32 = 32;
 
 /// The share by which slopes may differ that are taken for one.

@@ -55,7 +55,7 @@ impl ChosenViews {
         } else {
             vec![0, 1, 2]
         };
-        let rays = ViewRays::of_raw(&opened, light_field, (&unit, &centres), &colors);
+        let rays = ViewRays::of_raw(&opened, light_field, (&unit, &centres), &colors, accuracy);
         let mut views = light_field.views;
         loop {
             let narrowed = light_field.narrowed(views, rays.pupil_share(views));
@@ -63,7 +63,7 @@ impl ChosenViews {
             else {
                 return Ok(None);
             };
-            let ideal = ViewRays::of_reference(&reference, views, &unit);
+            let ideal = ViewRays::of_reference(&reference, views, &unit, accuracy);
             let response = ViewResponse::new(&rays, &ideal);
             // The middle ones stay in their places when two rows and columns fewer are taken.
             let sides = (0..=views.saturating_sub(1) / 2).map(|less| views - 2 * less);

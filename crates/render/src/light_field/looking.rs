@@ -156,7 +156,8 @@ impl LightFieldSource {
         };
         let opened = scene.camera.opened(&Bands::Rgb);
         let opened = opened.map_err(|error| RenderError::camera(error.to_string()))?;
-        let white = Arc::new(white::picture(&opened, &scene.render)?);
+        let samples = scene.accuracy.white_samples;
+        let white = Arc::new(white::picture(&opened, &scene.render, samples)?);
         let size = [raw.width(), raw.height()];
         let raw = picture(size, "the raw picture", |pixel, color| planes[color][pixel])?;
         Ok(Some(Self::Patches { camera: Box::new(scene.camera.clone()), raw: raw.into(), white }))

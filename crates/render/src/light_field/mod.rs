@@ -161,7 +161,7 @@ pub fn write(
     geometry.refocus(patches.as_ref(), light_field);
     sidecar::write_json(files, &set.place("geometry.json"), &geometry)?;
     let white = match raw {
-        Some(_) => Some(white::picture(&camera, &scene.render)?),
+        Some(_) => Some(white::picture(&camera, &scene.render, scene.accuracy.white_samples)?),
         None => None,
     };
     if let Some(white) = &white {

@@ -10,21 +10,12 @@ use std::f64::consts::TAU;
 use etendue_camera::{
     Camera, CameraRays, FilmSamples, LightField, Pose, Sampler, ViewGrid, squares_of_pair,
 };
+use etendue_scene::file::AccuracySpec;
 use etendue_spectrum::Bands;
 use rayon::prelude::*;
 
 use super::centres::Centres;
 use super::gain::{Gain, GainNode};
-
-/// Lenslets a side at which rays are traced.
-const NODES: u32 = 5;
-
-/// Rays a pixel in each of two sets: its light is right to a thousandth where nothing cuts it.
-const RAYS: u32 = 256;
-
-/// Rays of a pixel through cubic convolution, in each of two sets, some of which count less than nothing: the light of
-/// one is right to a percent, and the squares of errors in the mean over 25 lenslets to 47 dB. Colours share them.
-const CUBIC_RAYS: u32 = 1024;
 
 /// Sets of rays. Their errors have nothing to do with each other, so that the product of what both say of an
 /// error has its square in the mean, and not that of their own.
@@ -100,17 +91,23 @@ pub(super) struct ViewResponse {
 impl ViewRays {
     /// Traces the rays of a camera that is opened for red, green and blue: waves in these `colors`, light in
     /// green.
+    ///
+    /// Rays of a pixel through cubic convolution count less than nothing, some of them: of 1024 in each of two sets the
+    /// light of one is right to a percent, and the squares of errors in the mean over 25 lenslets to 47 dB. Colours
+    /// share them.
     pub(super) fn of_raw(
         camera: &Camera,
         light_field: &LightField,
         (unit, centres): (&ViewGrid, &Centres),
         colors: &[usize],
+        accuracy: &AccuracySpec,
     ) -> Self {
         let green = camera.band_groups(&Bands::Rgb).len() / 2;
         let [cols, _] = unit.view_resolution();
         #[expect(clippy::cast_possible_truncation, reason = "three colours at most")]
-        let count = CUBIC_RAYS / colors.len() as u32;
-        Self::traced(light_field.views, unit, |number, [across, down], [row, col]| {
+        let count = (accuracy.view_cubic_rays / colors.len() as u32).max(1);
+        let nodes = accuracy.view_nodes;
+        Self::traced(light_field.views, (unit, nodes), |number, [across, down], [row, col]| {
             let [right, below] = light_field.offset(across, down);
             let place = |color| {
                 let centre = centres.sampled(color)[(row * cols + col) as usize];
@@ -126,7 +123,8 @@ impl ViewRays {
             };
             // The pixel at the place has the same light wherever that is even about it, and rays that
             // do not count less than nothing tell it with less noise.
-            let of = RequestedRays { group: green, count: RAYS, number, first_set: 0 };
+            let count = accuracy.view_rays;
+            let of = RequestedRays { group: green, count, number, first_set: 0 };
             let pixel = place(green).map_or_else(PixelView::default, |at| {
                 seen(camera, &of, PixelSource::Pixel(at.map(|x| x - 0.5)), unit)
             });
@@ -135,22 +133,28 @@ impl ViewRays {
     }
 
     /// Traces the rays of an ideal lens with so many `views` a side.
-    pub(super) fn of_reference(reference: &Camera, views: u32, unit: &ViewGrid) -> Self {
+    pub(super) fn of_reference(
+        reference: &Camera,
+        views: u32,
+        unit: &ViewGrid,
+        accuracy: &AccuracySpec,
+    ) -> Self {
         let [cols, rows] = unit.view_resolution();
-        Self::traced(views, unit, |number, [across, down], [row, col]| {
+        let count = accuracy.view_rays;
+        Self::traced(views, (unit, accuracy.view_nodes), |number, [across, down], [row, col]| {
             let corner = [across * cols + col, down * rows + row].map(f64::from);
-            let of = RequestedRays { group: 0, count: RAYS, number, first_set: 0 };
+            let of = RequestedRays { group: 0, count, number, first_set: 0 };
             seen(reference, &of, PixelSource::Pixel(corner), unit)
         })
     }
 
     fn traced(
         views: u32,
-        unit: &ViewGrid,
+        (unit, most): (&ViewGrid, u32),
         trace: impl Fn([u32; 2], [u32; 2], [u32; 2]) -> PixelView + Sync,
     ) -> Self {
         let [cols, rows] = unit.view_resolution();
-        let nodes = [rows, cols].map(spread);
+        let nodes = [rows, cols].map(|count| spread(count, most));
         let cells: Vec<[u32; 2]> =
             nodes[0].iter().flat_map(|&row| nodes[1].iter().map(move |&col| [row, col])).collect();
         let view = |k: u32| {
@@ -277,10 +281,10 @@ fn errors_of(
     })
 }
 
-/// At most [`NODES`] of so many, the first and the last among them.
-fn spread(count: u32) -> Vec<u32> {
+/// At most so many (two at least) of all, the first and the last among them.
+fn spread(count: u32, most: u32) -> Vec<u32> {
     let last = count.saturating_sub(1);
-    let steps = last.clamp(1, NODES - 1);
+    let steps = last.clamp(1, most - 1);
     let mut nodes: Vec<u32> = (0..=steps).map(|k| k * last / steps).collect();
     nodes.dedup();
     nodes

@@ -10,17 +10,19 @@ use rayon::prelude::*;
 use super::LightFieldError;
 use crate::output::{Channel, Layer, Look, Picture, Values};
 
-/// Samples a pixel: few where all of them get through alike, more at the rims of images.
-const SAMPLES: [u32; 2] = [16, 64];
-
 /// Greatest difference of the weights of a pixel, as a share of the largest, at which they are alike: cos⁴ takes half
 /// within a lenslet's light at f/1. Sixteen stratified samples of what changes so evenly have its mean to a percent.
+/// Not a setting: how many samples are taken is one (`white_samples`).
 const ALIKE: f64 = 0.6;
 
-/// Picture of radiance 1 everywhere, by a camera that is opened for red, green and blue.
-pub(super) fn picture(camera: &Camera, spec: &RenderSpec) -> Result<Picture, LightFieldError> {
+/// Picture of radiance 1 everywhere, by a camera that is opened for red, green and blue, of so many samples a pixel.
+pub(super) fn picture(
+    camera: &Camera,
+    spec: &RenderSpec,
+    samples: u32,
+) -> Result<Picture, LightFieldError> {
     let [width, height] = camera.resolution();
-    let rows = white_rows(camera, spec, &(0..height).collect::<Vec<u32>>());
+    let rows = white_rows(camera, (spec, samples), &(0..height).collect::<Vec<u32>>());
     let channel = |(k, name): (usize, &str)| {
         let values = rows.iter().flat_map(|row| row[k].iter().copied()).collect();
         Channel { name: name.to_owned(), values: Values::F32(values) }
@@ -48,9 +50,15 @@ fn place(film: &mut FilmSamples, spec: &RenderSpec, [column, row]: [u32; 2], sam
     }
 }
 
-/// These rows of the white image of a camera that is opened for red, green and blue, each in three bands.
+/// These rows of the white image of a camera that is opened for red, green and blue, each in three bands: of so many
+/// samples a pixel, and of a quarter of them where all of those get through alike.
 #[must_use]
-pub fn white_rows(camera: &Camera, spec: &RenderSpec, rows: &[u32]) -> Vec<[Vec<f32>; 3]> {
+pub fn white_rows(
+    camera: &Camera,
+    (spec, samples): (&RenderSpec, u32),
+    rows: &[u32],
+) -> Vec<[Vec<f32>; 3]> {
+    let numbers = [(samples / 4).max(1), samples];
     let groups = camera.band_groups(&Bands::Rgb);
     let [width, _] = camera.resolution();
     let row = |&row: &u32| -> [Vec<f32>; 3] {
@@ -60,7 +68,7 @@ pub fn white_rows(camera: &Camera, spec: &RenderSpec, rows: &[u32]) -> Vec<[Vec<
             for (number, group) in groups.iter().enumerate() {
                 let mut light = 0.0;
                 // More samples only where the first ones differ.
-                for samples in SAMPLES {
+                for samples in numbers {
                     film.clear();
                     film.group = number;
                     place(&mut film, spec, [column, row], samples);

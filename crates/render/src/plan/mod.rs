@@ -100,14 +100,16 @@ pub struct Plan {
 }
 
 /// Rays per triangle from which a better structure pays for its longer build: a rule of thumb, which
-/// `make bench` measures both sides of (build time a triangle, traversal time a ray).
+/// `make bench` measures both sides of (build time a triangle, traversal time a ray). Not a setting: it changes no
+/// picture, and `plan.build_quality` decides.
 const RAYS_PER_TRIANGLE: u64 = 50;
 
 /// Rays that a sample of light is counted as when the build quality is chosen: the camera's, one to a
 /// light, and one more bounce with its own.
 const RAYS_A_SAMPLE_OF_LIGHT: u64 = 4;
 
-/// The most memory that the sums of a film may take between passes. A larger film is gone over once.
+/// The most memory that the sums of a film may take between passes. A larger film is gone over once. Not a setting: the
+/// picture is the same.
 const MOST_BYTES_OF_SUMS: u64 = 2 << 30;
 
 /// The passes in which the film is filled.

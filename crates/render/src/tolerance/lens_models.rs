@@ -132,6 +132,10 @@ pub(super) fn model(
     // A mask in it names the file that was read.
     let camera = spec.build(|| Bounds::EMPTY, &|name: &str| Ok(PathBuf::from(name)));
     let camera = full.seen_through(&camera.map_err(|error| error.to_string())?);
+    let camera = match full.lens() {
+        Some(lens) => camera.with_lens_accuracy(lens.accuracy()),
+        None => camera,
+    };
     let scene = serde_json::to_value(spec).map_err(|error| error.to_string())?;
     Ok(LensModel { kind, camera, scene: json!({ "camera": scene }), lacks_mask: false })
 }
@@ -357,9 +361,6 @@ impl Gauss {
     }
 }
 
-/// All bands are looked at: those at the sides of a group are farthest from where they run together.
-const ALL_BANDS: Field = Field { bands: usize::MAX, rays: 64, ..Field::QUICK };
-
 /// Numbers of groups that are tried.
 const TRIES: usize = 6;
 
@@ -380,7 +381,10 @@ pub(super) fn fewest_groups(
     let Some(two) = scene.camera.with_bands_grouped(2).filter(|_| can_pay()) else {
         return Ok(None);
     };
-    let view = FullView::new(scene, accel, &plan.bands, ALL_BANDS)?;
+    // All bands are looked at, by fewer rays: those at the sides of a group are farthest from where they run together.
+    let rays = (scene.accuracy.tolerance_rays / 4).max(1);
+    let field = Field { bands: usize::MAX, rays, ..Field::QUICK };
+    let view = FullView::new(scene, accel, &plan.bands, field)?;
     // Displacements within a group go as its width.
     let found = view.finding(LensModelKind::Grouped, &two, tolerance)?;
     if found.is_within {

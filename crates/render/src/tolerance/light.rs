@@ -19,7 +19,8 @@ pub(super) const BLOCK: u32 = 8;
 /// The longer side of the small pictures, at most.
 const SIDE: u32 = 28;
 
-/// Samples of their pixels, at least and at most.
+/// Samples of their pixels, at least and at most. Not a setting: all of these pictures draw the same numbers, so that
+/// their differences have little noise, and what was taken is verified by `tolerance_samples`.
 const SAMPLES: [u64; 2] = [8, 32];
 
 /// A small picture has so many times fewer samples than the picture itself, so that looking takes a few hundredths of

@@ -447,7 +447,8 @@ fn simplest(
         notes.push("light is spread by the waves of this very lens".to_owned());
         return Ok(None);
     }
-    let view = FullView::new(scene, accel, &plan.bands, Field::QUICK)?;
+    let field = Field { rays: scene.accuracy.tolerance_rays, ..Field::QUICK };
+    let view = FullView::new(scene, accel, &plan.bands, field)?;
     let models = match view.models_in_reach(tolerance) {
         Ok(found) => found.models,
         Err(error) => {

@@ -14,9 +14,6 @@ use crate::{Images, Plan, RenderError, Watch};
 /// The longer side of the small pictures, at most.
 const SIDE: u32 = 64;
 
-/// Samples of their pixels.
-const SAMPLES: u32 = 256;
-
 /// Errors that were found.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Verified {
@@ -86,7 +83,8 @@ pub fn verify(
     let (mut displacement, mut places) = (0.0, 0);
     if let Some(TakenCamera { camera, finding }) = &taken.camera {
         let bands = Plan::new(scene, crate::output::Outputs::ALL).bands;
-        let view = FullView::new(scene, accel, &bands, Field::BETWEEN)?;
+        let field = Field { rays: scene.accuracy.tolerance_rays, ..Field::BETWEEN };
+        let view = FullView::new(scene, accel, &bands, field)?;
         displacement = view.finding(finding.model, camera, tolerance)?.displacement();
         places = view.places.len();
     }
@@ -102,12 +100,12 @@ pub fn verify(
         }),
         ..taken.clone()
     };
-    let prepared = (accel, images);
-    let all = values(scene, &full, prepared, (SAMPLES, None), watch)?;
-    let less = values(rendered.0, &full, (rendered.1, rendered.2), (SAMPLES, Some(own)), watch)?;
+    let (prepared, samples) = ((accel, images), scene.accuracy.tolerance_samples);
+    let all = values(scene, &full, prepared, (samples, None), watch)?;
+    let less = values(rendered.0, &full, (rendered.1, rendered.2), (samples, Some(own)), watch)?;
     let mut other = scene.clone();
     other.render.seed ^= 0x9e37_79b9_7f4a_7c15;
-    let again = values(&other, &full, prepared, (SAMPLES, None), watch)?;
+    let again = values(&other, &full, prepared, (samples, None), watch)?;
     Ok(Verified {
         displacement: [displacement, tolerance.pixels],
         places,

@@ -306,7 +306,7 @@ pub fn import(path: &Path, wanted: Wanted, options: &Options) -> Result<Import, 
 }
 
 /// Rounding to f32 may move a vertex by this fraction of the mesh's diagonal; farther, and the
-/// mesh keeps f64.
+/// mesh keeps f64. Not a setting: it is what f32 rounds the corners of a mesh by that stands at the origin.
 const MOST_ROUNDING: f64 = 1e-7;
 
 /// `positions` in f32, or in f64 where rounding would move one too far.

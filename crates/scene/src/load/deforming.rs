@@ -15,9 +15,6 @@ use crate::file::SceneFile;
 use crate::import::{Deformer, NoSteps};
 use crate::memory::{Budget, TooMuch};
 
-/// Tolerance of a point's distance from where the animation has it (pixels of the picture).
-const CHORD_PIXELS: f64 = 1e-3;
-
 /// Points nearer to the camera than this share of their mesh's size are taken for as far: nothing could be
 /// fine enough for what touches the camera.
 const NEAREST: f64 = 0.01;
@@ -44,7 +41,8 @@ impl SceneFile {
             let places: Vec<&Placement> =
                 geometry.placements.iter().filter(|placement| placement.mesh == number).collect();
             let mesh = &mut all.meshes[number as usize];
-            let eyes = Eyes::new(&places, mesh.bounds, camera);
+            let allowed = self.spec.accuracy.deformation_error;
+            let eyes = Eyes::new(&places, mesh.bounds, camera, allowed);
             let bytes = STEP_BYTES * mesh.triangles.len() as u64;
             let mut count = 0_u32;
             let mut take = |step: u64| {
@@ -86,6 +84,8 @@ impl SceneFile {
 
 /// From where a mesh is seen while the shutter is open.
 struct Eyes {
+    /// Tolerance of a point's distance from where the animation has it (pixels of the picture).
+    allowed: f64,
     /// Of a pixel: its side per distance, or its side (m).
     pixel: PixelExtent,
     /// The camera (m, world), where the mesh stands, and by how much that stretches it at most.
@@ -99,7 +99,7 @@ struct Eyes {
 }
 
 impl Eyes {
-    fn new(places: &[&Placement], bounds: Bounds, camera: &Camera) -> Self {
+    fn new(places: &[&Placement], bounds: Bounds, camera: &Camera, allowed: f64) -> Self {
         let [open, close] = camera.exposure_span();
         let [width, height] = camera.resolution().map(f64::from);
         // What sees all around has half a turn over its longer side at least.
@@ -123,7 +123,7 @@ impl Eyes {
         };
         let nearest = (places.len() > MOST_PLACES)
             .then(|| views.iter().map(to_ball).fold(f64::INFINITY, f64::min).max(least));
-        Self { pixel, views, stretch, least, nearest }
+        Self { allowed, pixel, views, stretch, least, nearest }
     }
 
     /// Tolerance of a point of the mesh from its place (m, in the mesh's frame).
@@ -133,7 +133,7 @@ impl Eyes {
                 PixelExtent::Width(width) => width,
                 PixelExtent::Angle(angle) => angle * distance.max(self.least),
             };
-            CHORD_PIXELS * pixel / stretch
+            self.allowed * pixel / stretch
         };
         if let Some(nearest) = self.nearest {
             return at(nearest, self.stretch);
@@ -150,7 +150,8 @@ impl Eyes {
             PixelExtent::Angle(angle) => (0.0, angle),
             PixelExtent::Width(width) => (1.0, width),
         };
-        let mut key = vec![span[0], span[1], kind, pixel, self.least, self.nearest.unwrap_or(-1.0)];
+        let nearest = self.nearest.unwrap_or(-1.0);
+        let mut key = vec![span[0], span[1], self.allowed, kind, pixel, self.least, nearest];
         for (eye, place, _) in &self.views {
             key.extend(eye.to_array());
             key.extend(place.linear.to_cols_array());

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use etendue_camera::LensAccuracy;
 use etendue_report::DecisionKind;
-use etendue_scene::LoadOptions;
 use etendue_scene::file::{AccuracySetting, AccuracySpec, SceneFile};
+use etendue_scene::{LoadOptions, Wanted};
 use serde_json::{Value, json};
 
 fn read(scene: Value) -> Result<AccuracySpec, String> {
@@ -68,4 +69,30 @@ fn what_the_scene_says_elsewhere_is_contradicted_by_name() {
         error.contains("accuracy.band_place_error") && error.contains("`plan.shared_paths`"),
         "{error}"
     );
+    let points =
+        json!({ "accuracy": { "texture_lookups": 16 }, "plan": { "texture_filter": false } });
+    let error = read(points).unwrap_err();
+    assert!(
+        error.contains("accuracy.texture_lookups") && error.contains("`plan.texture_filter`"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_lens_is_measured_as_the_scene_says() {
+    let scene = json!({
+        "accuracy": { "pupil_margin": 0.01, "pupil_checks": 2048, "wavefront_error": 0.01, "fit_places": 9,
+                      "band_place_error": 0.1 },
+        "camera": { "type": "thin_lens", "focal_length": 50, "f_number": 2, "focus_distance": 2,
+                    "sensor_height": 24, "pose": { "from": [0, 0, 2], "look_at": [0, 0, 0] },
+                    "sensor": { "resolution": [8, 8] } },
+        "objects": [{ "shape": "sphere" }],
+    });
+    let options = LoadOptions::default();
+    let file = SceneFile::from_json(&options.opener, Path::new("."), scene).unwrap();
+    let scene = file.load(Wanted::NOTHING, &options).unwrap();
+    let mut expected = LensAccuracy::DEFAULT;
+    (expected.pupil.margin, expected.pupil.checks) = (0.01, 2048);
+    (expected.waves.error, expected.fit_places, expected.sharing.places) = (0.01, 9, 0.1);
+    assert_eq!(scene.camera.lens().unwrap().accuracy(), expected);
 }

@@ -20,7 +20,8 @@ use super::ggx::Facets;
 use super::split_sum::{cosine, entry, lacking};
 use super::split_sum::{obliquity, place};
 
-/// Knots in α, dense where sheets are smooth.
+/// Knots in α, dense where sheets are smooth. No table of surfaces has settings: all scenes share them, and this one
+/// is kept in a file.
 pub(super) const ROUGHNESSES: usize = 48;
 
 /// Knots in [`obliquity`].

@@ -18,7 +18,8 @@ pub(super) const LANES: usize = 16;
 /// Branches of two nodes.
 const TWICE: usize = 2 * WIDTH;
 
-/// Squared distance over squared radius from which on a branch's lights are as good as in one place.
+/// Squared distance over squared radius from which on a branch's lights are as good as in one place. Not a setting, as
+/// none of a light tree's numbers: they change which light is asked how often, and so noise, but no mean.
 const FAR: f32 = 256.0;
 
 /// Sums of eight of these are finite, and so are their squares in double.

@@ -9,9 +9,6 @@ use super::Tracing;
 use crate::bsdf::{Bsdf, BsdfSample};
 use crate::surface::SurfaceInteraction;
 
-/// The most paths that one is parted into. Of more bands each path keeps one of a few neighbours.
-const MOST_PARTS: usize = 32;
-
 /// A boundary as one band meets it.
 #[derive(Debug, Clone, Copy)]
 struct TransmittedBand {
@@ -51,7 +48,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             }
             return each(&mirrored, None, &mut sent);
         }
-        let parts = passages.len().min(MOST_PARTS);
+        let parts = passages.len().min(self.rules.parts.max(1) as usize);
         for part in 0..parts {
             let stratum = (part as f64 + pick) * live / parts as f64;
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range")]

@@ -11,6 +11,9 @@ pub struct Rules {
     pub follow: Follow,
     /// Surfaces after which paths go on with a chance of the root of what they carry of their brightest band.
     pub roulette: Option<u32>,
+    /// The most paths that one is parted into by glass that disperses. Of more bands each path keeps one of a few
+    /// neighbours.
+    pub parts: u32,
 }
 
 /// Scattered directions that a tracer follows.
@@ -26,11 +29,14 @@ impl Rules {
     /// Surfaces after which dim paths of [`Rules::path`] end by chance.
     pub const ROULETTE_AFTER: u32 = 5;
 
+    /// Paths that one is parted into, at most, where nothing else is said.
+    pub const PARTS: u32 = 32;
+
     /// Direct light: what lights send to the first surface, with shadows, and what it shows of them
     /// as a mirror.
     #[must_use]
     pub fn direct() -> Self {
-        Self { bounces: 1, follow: Follow::Single, roulette: None }
+        Self { bounces: 1, follow: Follow::Single, roulette: None, parts: Self::PARTS }
     }
 
     /// Direct light seen through any number of mirrors and clear boundaries, at most `bounces`
@@ -38,7 +44,7 @@ impl Rules {
     /// and refracts, one of the two is followed, by Fresnel's share.
     #[must_use]
     pub fn whitted(bounces: u32) -> Self {
-        Self { bounces, follow: Follow::Single, roulette: None }
+        Self { bounces, follow: Follow::Single, roulette: None, parts: Self::PARTS }
     }
 
     /// Global illumination: all paths from the camera to light of at most `bounces` surfaces (Kajiya,
@@ -46,7 +52,8 @@ impl Rules {
     /// directions that meet them by themselves.
     #[must_use]
     pub fn path(bounces: u32) -> Self {
-        Self { bounces, follow: Follow::All, roulette: Some(Self::ROULETTE_AFTER) }
+        let roulette = Some(Self::ROULETTE_AFTER);
+        Self { bounces, follow: Follow::All, roulette, parts: Self::PARTS }
     }
 
     /// The radiance that arrives along each ray against its direction, in `camera.bands`: `out` is

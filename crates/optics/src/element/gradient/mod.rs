@@ -24,7 +24,8 @@ use serde::{Deserialize, Serialize};
 use crate::element::Abcd;
 
 /// Phase of a ray's swing per step of the numerical integration (radians). The rule's own error is
-/// the fourth power of it over 120 of the phase: 10⁻¹⁰ of it.
+/// the fourth power of it over 120 of the phase: 10⁻¹⁰ of it. Not a setting: steps are laid when a lens is read, before
+/// anything of a scene is known.
 const PHASE_STEP: f64 = 0.01;
 
 /// Steps that a gap is divided into at least.

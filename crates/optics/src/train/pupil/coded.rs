@@ -24,10 +24,6 @@ use crate::train::{MonochromaticTrain, OpticalTrain, Part};
 /// The share of samples that is drawn from the whole pupil.
 const ANYWHERE: f64 = 0.01;
 
-/// Tolerance of a ray's landing from where it is aimed, as a share of a pixel, when polynomials can
-/// do it.
-const GOAL: f64 = 0.004;
-
 /// Factor on the misses: they may be greater between the places where they are measured.
 const SAFETY: f64 = 1.5;
 
@@ -71,13 +67,15 @@ impl Anywhere {
 }
 
 impl MaskView {
-    /// Looks at the first mask of a lens from a sensor, by rays of `wavelengths` (nm); `None` when it has
-    /// none that dims anything, or when no direction towards it is found.
+    /// Looks at the first mask of a lens from a sensor, by rays of `wavelengths` (nm), which land where they are aimed
+    /// within `aim` of a pixel, when polynomials can do it; `None` when it has none that dims anything, or when no
+    /// direction towards it is found.
     pub(super) fn new(
         train: &OpticalTrain,
         wavelengths: &[f64],
         sensor: &Frame,
         half_size: DVec2,
+        aim: f64,
     ) -> Option<Self> {
         let (element, mask) = first_mask(train)?;
         let bounds = open_bounds(mask)?;
@@ -100,7 +98,7 @@ impl MaskView {
         let mut miss = DVec2::ZERO;
         let mut degree = 1;
         for lens in &lenses {
-            let (map, missed) = MaskMap::new(&scene(lens), bounds, reach, GOAL * pixel, degree)?;
+            let (map, missed) = MaskMap::new(&scene(lens), bounds, reach, aim * pixel, degree)?;
             degree = map.degree();
             miss = miss.max(missed);
             maps.push((lens.wavelength(), map));

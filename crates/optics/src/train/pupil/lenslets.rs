@@ -26,15 +26,9 @@ use crate::train::aim::towards_lens;
 use crate::train::lenslets::Sight;
 use crate::train::{BehindLenslets, MonochromaticTrain, OpticalTrain, Side};
 
-/// Added to the outline on all sides, as a share of its width, to begin with.
-const MARGIN: f64 = 0.002;
-
 /// Factor by which the margin grows, and the most rounds of it.
 const GROWTH: f64 = 1.6;
 const ROUNDS: u32 = 10;
-
-/// Random rays of a round of the check.
-const CHECKS: u32 = 1 << 14;
 
 /// The light that reaches a sensor through an array of lenslets.
 #[derive(Debug, Clone)]
@@ -101,7 +95,7 @@ impl LensletPupil {
             area,
             opening_radius,
             drift,
-            margin: MARGIN,
+            margin: pupil.accuracy.lenslet_margin,
         };
         own.widen_until_tight(&lenses, pupil)?;
         Ok(own)
@@ -358,7 +352,7 @@ impl LensletPupil {
         for round in 0..ROUNDS {
             let (mut passed, mut strays) = (0, 0);
             for lens in lenses {
-                let found = self.strays(lens, pupil, round * CHECKS);
+                let found = self.strays(lens, pupil, round);
                 passed += found[0];
                 strays += found[1];
             }
@@ -374,12 +368,13 @@ impl LensletPupil {
         Ok(())
     }
 
-    /// Counts of random rays around what is aimed at: those that pass, and those of them that are
-    /// not aimed at.
-    fn strays(&self, lens: &MonochromaticTrain, pupil: &ExitPupil, first: u32) -> [u32; 2] {
-        let mut rays = LensRays::with_capacity(CHECKS as usize);
-        let mut aims = Vec::with_capacity(CHECKS as usize);
-        for i in first..first + CHECKS {
+    /// Counts of random rays of a round around what is aimed at: those that pass, and those of them that
+    /// are not aimed at.
+    fn strays(&self, lens: &MonochromaticTrain, pupil: &ExitPupil, round: u32) -> [u32; 2] {
+        let checks = pupil.accuracy.lenslet_checks;
+        let mut rays = LensRays::with_capacity(checks as usize);
+        let mut aims = Vec::with_capacity(checks as usize);
+        for i in round * checks..(round + 1) * checks {
             let u = super::measure::ROBERTS.map(|alpha| (0.5 + alpha * f64::from(i)).fract());
             let place = (2.0 * DVec2::new(u[0], u[3]) - 1.0) * pupil.half_size;
             let film = pupil.film_point(place);

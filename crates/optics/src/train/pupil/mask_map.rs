@@ -18,7 +18,8 @@ use crate::element::{Clip, Frame, Ray, RayStatus};
 use crate::train::aim::{slopes_near, slopes_to, towards_lens};
 use crate::train::{MonochromaticTrain, OpticalTrain, Part, Side};
 
-/// Intervals between nodes over a radius of the sensor, and over each of its sides.
+/// Intervals between nodes over a radius of the sensor, and over each of its sides. Not a setting, nor are the points:
+/// how near rays are to land is one (`mask_aim_error`), and the degree follows it.
 const RADIAL: usize = 24;
 const PLANAR: usize = 12;
 

@@ -8,15 +8,10 @@ use rayon::prelude::*;
 use super::place::{NodePlace, angle_below, between};
 use super::search::SlopeWindow;
 use super::wavelengths::{LensSplit, Stray};
-use super::{
-    ANGLES, ExitPupil, NodeLayout, PLANAR_INTERVALS, PupilOutline, RADIAL_INTERVALS, turn_of,
-};
+use super::{ANGLES, ExitPupil, NodeLayout, PupilOutline, turn_of};
 use crate::element::{Clip, LensRays, RayStatus};
 use crate::train::aim::towards_lens;
 use crate::train::{MonochromaticTrain, OpticalTrain, Side};
-
-/// Added to every radius, as a share of it: what rays measured on a grid may be short of.
-const MARGIN: f64 = 0.004;
 
 /// Margin beside nodes in the dark, likewise a share of the radius: at the edge of the image circle
 /// the pupil closes as a square root, faster than straight lines.
@@ -34,11 +29,11 @@ impl ExitPupil {
     fn fine_film(&self, column: usize, row: usize) -> DVec2 {
         #[expect(clippy::cast_precision_loss, reason = "a few dozen nodes")]
         let share = |i: usize, intervals: usize| i as f64 / (2 * intervals) as f64;
+        let [columns, rows] = self.intervals();
         match self.layout {
-            NodeLayout::Radial => DVec2::new(self.radius * share(column, RADIAL_INTERVALS), 0.0),
+            NodeLayout::Radial => DVec2::new(self.radius * share(column, columns), 0.0),
             NodeLayout::Planar => {
-                let across =
-                    DVec2::new(share(column, PLANAR_INTERVALS), share(row, PLANAR_INTERVALS));
+                let across = DVec2::new(share(column, columns), share(row, rows));
                 (2.0 * across - 1.0) * self.half_size
             }
         }
@@ -47,14 +42,15 @@ impl ExitPupil {
     /// Intervals between nodes along both directions.
     fn intervals(&self) -> [usize; 2] {
         match self.layout {
-            NodeLayout::Radial => [RADIAL_INTERVALS, 0],
-            NodeLayout::Planar => [PLANAR_INTERVALS, PLANAR_INTERVALS],
+            NodeLayout::Radial => [self.accuracy.radial_intervals as usize, 0],
+            NodeLayout::Planar => [self.accuracy.planar_intervals as usize; 2],
         }
     }
 
     pub(super) fn measure(&mut self, train: &OpticalTrain, lenses: &[MonochromaticTrain]) {
         if self.layout == NodeLayout::Radial {
-            self.radius = lit_radius(train, lenses, self.sensor.vertex.z, self.radius);
+            let error = self.accuracy.image_circle;
+            self.radius = lit_radius(train, lenses, self.sensor.vertex.z, self.radius, error);
         }
         // The frame of slopes around the light at each node, from its neighbour's.
         let [columns, rows] = self.intervals();
@@ -148,7 +144,7 @@ impl ExitPupil {
                 );
                 let [weight, free] = BEND;
                 let bent = weight * (across.max(down) - free).max(0.0);
-                margins.push((MARGIN + bent).min(FADING_MARGIN));
+                margins.push((self.accuracy.margin + bent).min(FADING_MARGIN));
             }
         }
         margins
@@ -236,6 +232,7 @@ impl ExitPupil {
 
     /// Looks for rays that pass just inside of the obscured middle, and lets them through until there are none.
     pub(super) fn narrow_until_tight(&mut self, lenses: &LensSplit) {
+        let margin = self.accuracy.margin;
         for round in 4..8 {
             let found = self.found_in_round(lenses, round, Self::inner_strays);
             for stray in &found {
@@ -243,7 +240,7 @@ impl ExitPupil {
                 for (node, _) in stray.nodes.into_iter().filter(|&(_, weight)| weight > 0.0) {
                     let inner = &mut self.nodes[node].inner;
                     for entry in [low, low + 1] {
-                        inner[entry] = inner[entry].min(stray.radius * (1.0 - MARGIN));
+                        inner[entry] = inner[entry].min(stray.radius * (1.0 - margin));
                     }
                     let ends = inner[0].min(inner[ANGLES]);
                     (inner[0], inner[ANGLES]) = (ends, ends);
@@ -309,11 +306,11 @@ impl ExitPupil {
 
     /// Raises the table's entries around a ray to the ray's radius.
     fn widen_at(&mut self, stray: &Stray) {
-        let low = turn_index(stray.turn);
+        let (low, margin) = (turn_index(stray.turn), self.accuracy.margin);
         for (node, _) in stray.nodes.into_iter().filter(|&(_, weight)| weight > 0.0) {
             let reach = &mut self.nodes[node].reach;
             for entry in [low, low + 1] {
-                reach[entry] = reach[entry].max(stray.radius * (1.0 + MARGIN));
+                reach[entry] = reach[entry].max(stray.radius * (1.0 + margin));
             }
             let ends = reach[0].max(reach[ANGLES]);
             (reach[0], reach[ANGLES]) = (ends, ends);
@@ -338,8 +335,15 @@ fn turn_index(turn: f64) -> usize {
 pub(super) const ROBERTS: [f64; 4] =
     [0.856_674_883_854_503, 0.733_891_856_627_126, 0.628_706_721_037_806, 0.538_597_270_645_735];
 
-/// Farthest distance from the axis at which there is light, up to `limit` (mm), and a little more.
-pub fn lit_radius(train: &OpticalTrain, lenses: &[MonochromaticTrain], z: f64, limit: f64) -> f64 {
+/// Farthest distance from the axis at which there is light, up to `limit` (mm), and a little more: by `error`, a share
+/// of it, 0.4 of which is how nearly it is found.
+pub fn lit_radius(
+    train: &OpticalTrain,
+    lenses: &[MonochromaticTrain],
+    z: f64,
+    limit: f64,
+    error: f64,
+) -> f64 {
     let lit = |r: f64| {
         let film = DVec3::new(r, 0.0, z);
         lenses.iter().any(|lens| SlopeWindow::find(train, lens, film).is_some())
@@ -348,11 +352,11 @@ pub fn lit_radius(train: &OpticalTrain, lenses: &[MonochromaticTrain], z: f64, l
         return limit;
     }
     let (mut low, mut high) = (0.0, limit);
-    while high - low > 2e-3 * high {
+    while high - low > 0.4 * error * high {
         let middle = 0.5 * (low + high);
         if lit(middle) { low = middle } else { high = middle }
     }
-    (high * 1.005).min(limit)
+    (high * (1.0 + error)).min(limit)
 }
 
 /// The frame around what passes at any of the wavelengths, begun from the node before.
@@ -440,7 +444,7 @@ fn limits(
     film: DVec3,
     &SearchRegion { frame: [centre, half], is_round }: &SearchRegion,
 ) -> [Option<f64>; 2 * ANGLES] {
-    // Costly trains are measured more coarsely: to 0.003 of the radius, which [`MARGIN`] covers.
+    // Costly trains are measured more coarsely: to 0.003 of the radius, which the margin covers.
     let (scanned, halvings) = if lens.is_costly() { (16, 5) } else { (32, 12) };
     // The frame's corners are √2 from its centre.
     const OUTERMOST: f64 = 1.6;

@@ -31,6 +31,7 @@
 //! The bounds that this replaces: C. Kolb, D. Mitchell, P. Hanrahan, "A realistic camera model for
 //! computer graphics", 1995; M. Pharr, W. Jakob, G. Humphreys, *Physically Based Rendering*, 6.4.5.
 
+mod accuracy;
 mod bound;
 mod clear;
 mod coded;
@@ -42,6 +43,7 @@ mod mask_region;
 mod measure;
 mod outline_table;
 mod place;
+mod refusals;
 mod region;
 mod search;
 mod wavelengths;
@@ -53,26 +55,24 @@ use self::bound::PupilBound;
 use self::clear::without_masks;
 use self::coded::MaskView;
 use self::place::turn_of;
+use self::refusals::no_sensor;
 use self::wavelengths::LensSplit;
 use super::aim::towards_lens;
-use super::{MonochromaticTrain, OpticalTrain, Side};
-use crate::element::{Clip, Frame, LensRays, RayStatus, StatusCounts};
+use super::{MonochromaticTrain, OpticalTrain};
+use crate::element::{Frame, LensRays, RayStatus};
 
+pub use accuracy::PupilAccuracy;
 pub use bound::PupilSamples;
 pub use clear::{without_dimming, without_filters};
 pub use disk::Disk;
 pub use lenslets::LensletPupil;
 pub use measure::lit_radius;
+pub use refusals::{blocked, dark_array, unbounded};
 pub use search::SlopeWindow;
 
-/// Angles in the table of a node.
+/// Angles in the table of a node. Not a setting: tables have this size when they are compiled, and what angles miss
+/// between them is [`PupilAccuracy::margin`]'s.
 const ANGLES: usize = 128;
-
-/// Intervals between nodes over the sensor's half diagonal, for lenses with rotational symmetry.
-const RADIAL_INTERVALS: usize = 40;
-
-/// Intervals between nodes over each side of the sensor for other lenses.
-const PLANAR_INTERVALS: usize = 8;
 
 /// One sample of the exit pupil.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,6 +100,7 @@ pub struct ExitPupil {
     index2: f64,
     /// Distance from the sensor's centre to the outermost node of a radial layout (mm).
     radius: f64,
+    accuracy: PupilAccuracy,
 }
 
 /// Layout of the nodes on the sensor.
@@ -157,6 +158,21 @@ impl ExitPupil {
         sensor_z: f64,
         half_size: [f64; 2],
     ) -> Result<Self, Refusal> {
+        Self::within(PupilAccuracy::DEFAULT, train, wavelengths, sensor_z, half_size)
+    }
+
+    /// As [`Self::new`], by other numbers.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::new`].
+    pub fn within(
+        accuracy: PupilAccuracy,
+        train: &OpticalTrain,
+        wavelengths: &[f64],
+        sensor_z: f64,
+        half_size: [f64; 2],
+    ) -> Result<Self, Refusal> {
         let half_size = DVec2::from(half_size);
         if !half_size.is_finite() || half_size.min_element() < 0.0 || !sensor_z.is_finite() {
             return Err(no_sensor());
@@ -178,6 +194,7 @@ impl ExitPupil {
             lenslets: None,
             index2: 1.0,
             radius: half_size.length(),
+            accuracy,
         };
         // Behind lenslets each of them has a pupil of its own; other arrays are aimed at as they
         // are.
@@ -187,7 +204,8 @@ impl ExitPupil {
             return Ok(Self { lenslets: Some(Box::new(lenslets)), ..pupil });
         }
         if let Some(first) = train.first_array() {
-            return Self::of_rear(train, first, wavelengths, sensor_z, half_size.to_array());
+            let (rear, half_size) = (train.rear_part(first), half_size.to_array());
+            return Self::within(accuracy, &rear, wavelengths, sensor_z, half_size);
         }
         // Masks are left out of what is measured: what they pass is drawn from within it.
         if train.closed_mask().is_some() {
@@ -205,7 +223,7 @@ impl ExitPupil {
             return Ok(pupil);
         }
         // All others are measured by rays at nodes over the sensor.
-        let lenses = LensSplit::of(train, lenses);
+        let lenses = LensSplit::of(train, lenses, accuracy.wavelengths as usize);
         pupil.measure(train, &lenses.measured);
         if pupil.nodes.iter().all(PupilOutline::is_dark) {
             return Err(blocked(train, &train.at(wavelengths[0])?, pupil.sensor.vertex));
@@ -225,7 +243,8 @@ impl ExitPupil {
     #[must_use]
     pub fn aimed_at_mask(mut self, train: &OpticalTrain, wavelengths: &[f64]) -> Self {
         if self.lenslets.is_none() && train.first_array().is_none() {
-            self.coded = MaskView::new(train, wavelengths, &self.sensor, self.half_size);
+            let aim = self.accuracy.mask_aim;
+            self.coded = MaskView::new(train, wavelengths, &self.sensor, self.half_size, aim);
         }
         self
     }
@@ -322,7 +341,7 @@ impl ExitPupil {
     }
 
     /// Appends one ray for each point of the sensor (mm) and point of the unit square, ready to be
-    /// traced at `wavelength` (nm) from [`Side::Sensor`]; its throughput is its weight. Where no light
+    /// traced at `wavelength` (nm) from [`Side::Sensor`](super::Side); its throughput is its weight. Where no light
     /// arrives the ray has ended and weighs 0.
     pub fn push_rays(&self, film: &[DVec2], u: &[[f64; 2]], wavelength: f64, rays: &mut LensRays) {
         for (&film, &u) in film.iter().zip(u) {
@@ -383,56 +402,12 @@ impl ExitPupil {
     }
 }
 
-/// Refusal of a sensor without size, or before the lens.
-fn no_sensor() -> Refusal {
-    Refusal::new("the sensor must lie behind the last element and have a finite size")
-}
-
-/// Refusal of a lens of which no element has a rim.
-#[must_use]
-pub fn unbounded() -> Refusal {
-    Refusal::new("the lens passes light in all directions")
-        .hint("give its stop a radius, or a surface a semi_diameter")
-}
-
-/// Refusal of a microlens array, `element`, whose lenslets no ray gets through.
-#[must_use]
-pub fn dark_array(element: usize) -> Refusal {
-    Refusal::new(format!(
-        "no light gets through the microlens array elements[{element}] to the sensor: it stands outside of the light of \
-         the lens before it, or its lenslets are closed"
-    ))
-}
-
-/// Refusal of a lens that not one ray leaves: it names the element on which the rays end that got farthest, and the
-/// losses of those from `film`, a point of the sensor (mm), by cause and element.
-#[must_use]
-pub fn blocked(train: &OpticalTrain, lens: &MonochromaticTrain, film: DVec3) -> Refusal {
-    let mut counts = StatusCounts::new(train.elements.len());
-    match SlopeWindow::probe(train, film) {
-        Some(mut rays) => {
-            lens.trace(Side::Sensor, Clip::On, &mut rays);
-            counts.add_all(&rays);
-        }
-        // There is no direction to the nearest rim: it is closed.
-        None => {
-            let closed = train.elements.iter().rposition(|e| e.clear_radius() == 0.0);
-            counts.add(RayStatus::Vignetted { element: closed.unwrap_or(train.stop) });
-        }
-    }
-    // Where the last rays end: nothing gets past it.
-    let element = counts.farthest_from_sensor().unwrap_or(train.stop);
-    let losses = counts.losses().join(", ");
-    Refusal::new(format!(
-        "no light passes the lens: nothing gets from the sensor past elements[{element}] ({losses})"
-    ))
-}
-
 #[cfg(test)]
 mod tests {
-    use super::wavelengths::CHECKS;
     use super::*;
     use crate::train::{Focus, LensFile};
+
+    const CHECKS: u32 = PupilAccuracy::DEFAULT.checks;
 
     pub(super) fn preset(name: &str) -> OpticalTrain {
         let path = format!("{}/../../scenes/lenses/{name}.json", env!("CARGO_MANIFEST_DIR"));
@@ -470,7 +445,7 @@ mod tests {
             *reach *= 0.95;
         }
         let before = pupil.strays(&lens, 0..CHECKS).len();
-        pupil.widen_until_tight(&LensSplit::of(&train, vec![lens.clone()]));
+        pupil.widen_until_tight(&LensSplit::of(&train, vec![lens.clone()], 5));
         let after = pupil.strays(&lens, 20 * CHECKS..21 * CHECKS).len();
         assert!(before > 1000 && after * 100 < before, "{before} and then {after}");
     }

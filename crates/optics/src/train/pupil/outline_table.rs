@@ -12,10 +12,8 @@ use crate::train::{BehindLenslets, MonochromaticTrain, OpticalTrain, Side};
 /// Directions in which the outline's extent is kept.
 pub(super) const NORMALS: usize = 16;
 
-/// Nodes over each side of the array.
-const NODES: u32 = 17;
-
-/// Directions from the middle of an outline in which it is found.
+/// Directions from the middle of an outline in which it is found, more than are kept. Not a setting: what lies between
+/// them is the margin's (`lenslet_margin`).
 const ANGLES: u32 = 64;
 
 /// Steps inwards of the search for outlines, and its halvings.
@@ -73,6 +71,8 @@ pub(super) fn centre_of(extent: &[f64; NORMALS]) -> DVec2 {
 pub(super) struct OutlineTable {
     main: ExitPupil,
     half: DVec2,
+    /// Nodes over each side of the array.
+    across: u32,
     nodes: Vec<Option<[f64; NORMALS]>>,
 }
 
@@ -95,16 +95,18 @@ impl OutlineTable {
         }
         let half = half * 1.05 + DVec2::splat(4.0 * view.array.lattice.pitch);
         let lenses = wavelengths.iter().map(|&nm| main.at(nm)).collect::<Result<Vec<_>, _>>()?;
-        let main = ExitPupil::new(main, wavelengths, view.front_z, half.to_array())?;
-        let share = |i: u32| 2.0 * f64::from(i) / f64::from(NODES - 1) - 1.0;
-        let at = |i: u32| DVec2::new(share(i % NODES), share(i / NODES)) * half;
+        let (accuracy, side) = (pupil.accuracy, half.to_array());
+        let main = ExitPupil::within(accuracy, main, wavelengths, view.front_z, side)?;
+        let across = accuracy.lenslet_nodes;
+        let share = |i: u32| 2.0 * f64::from(i) / f64::from(across - 1) - 1.0;
+        let at = |i: u32| DVec2::new(share(i % across), share(i / across)) * half;
         let exact = main.disk().is_some();
         let node = |i: u32| match exact {
             true => extent_of(&main.outline(at(i))),
             false => extent_of(&tight_outline(&main, &lenses, at(i))),
         };
-        let nodes = (0..NODES * NODES).map(node).collect();
-        Ok(Self { main, half, nodes })
+        let nodes = (0..across * across).map(node).collect();
+        Ok(Self { main, half, across, nodes })
     }
 
     /// The outline from a point of the array (mm); `None` in the dark.
@@ -127,7 +129,7 @@ impl OutlineTable {
 
     /// The nodes around a point of the array (mm) and their weights, where there is light at all of them.
     fn corners(&self, at: DVec2) -> Option<[(&[f64; NORMALS], f64); 4]> {
-        let last = f64::from(NODES - 1);
+        let last = f64::from(self.across - 1);
         let place = (0.5 * (at / self.half + 1.0) * last).clamp(DVec2::ZERO, DVec2::splat(last));
         let low = place.floor().min(DVec2::splat(last - 1.0));
         let share = place - low;
@@ -136,8 +138,8 @@ impl OutlineTable {
             clippy::cast_sign_loss,
             reason = "between 0 and the number of nodes"
         )]
-        let first = low.y as usize * NODES as usize + low.x as usize;
-        let next = first + NODES as usize;
+        let first = low.y as usize * self.across as usize + low.x as usize;
+        let next = first + self.across as usize;
         let (x, y) = (share.x, share.y);
         let node = |i: usize, weight: f64| Some((self.nodes[i].as_ref()?, weight));
         Some([

@@ -3,7 +3,7 @@
 
 use glam::DVec2;
 
-use super::{ANGLES, ExitPupil, NodeLayout, PLANAR_INTERVALS};
+use super::{ANGLES, ExitPupil, NodeLayout};
 
 impl ExitPupil {
     pub(super) fn place(&self, film: DVec2) -> Option<NodePlace> {
@@ -26,15 +26,15 @@ impl ExitPupil {
     }
 
     fn planar_place(&self, film: DVec2) -> Option<NodePlace> {
+        let intervals = self.accuracy.planar_intervals;
+        let count = intervals as usize;
         let along = |x: f64, half: f64| {
-            #[expect(clippy::cast_precision_loss, reason = "8 intervals")]
-            let at =
-                if half > 0.0 { 0.5 * (x / half + 1.0) } else { 0.0 } * PLANAR_INTERVALS as f64;
-            split(at, PLANAR_INTERVALS)
+            let share = if half > 0.0 { 0.5 * (x / half + 1.0) } else { 0.0 };
+            split(share * f64::from(intervals), count)
         };
         let (column, right) = along(film.x, self.half_size.x)?;
         let (row, down) = along(film.y, self.half_size.y)?;
-        let node = |c: usize, r: usize| (row + r) * (PLANAR_INTERVALS + 1) + column + c;
+        let node = |c: usize, r: usize| (row + r) * (count + 1) + column + c;
         let nodes = [
             (node(0, 0), (1.0 - right) * (1.0 - down)),
             (node(1, 0), right * (1.0 - down)),

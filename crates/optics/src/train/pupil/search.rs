@@ -7,7 +7,8 @@ use crate::element::{Clip, LensRays, RayStatus};
 use crate::train::aim::towards_lens;
 use crate::train::{MonochromaticTrain, OpticalTrain, Side};
 
-/// Cells a side of a search grid.
+/// Cells a side of a search grid. Not a setting: what is smaller than a cell is found by finer grids, and light by none
+/// is lost for good.
 const GRID: u32 = 48;
 
 /// Cells a side of a search grid, for trains through which rays take long to be traced.

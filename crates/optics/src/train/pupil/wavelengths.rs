@@ -8,12 +8,6 @@ use super::ExitPupil;
 use crate::element::Part;
 use crate::train::{MonochromaticTrain, OpticalTrain};
 
-/// The most wavelengths at which a lens of glass is measured.
-const MEASURED: usize = 5;
-
-/// Random rays of a round of the closing check.
-pub(super) const CHECKS: u32 = 1 << 16;
-
 /// A ray that passes outside of the bound.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stray {
@@ -30,14 +24,14 @@ pub(super) struct LensSplit {
 }
 
 impl LensSplit {
-    /// Of the lens `train` at some wavelengths: both ends, and those that lie evenly between them in 1/λ². All are
-    /// measured where orders of diffraction part them by more than glass does.
-    pub(super) fn of(train: &OpticalTrain, lenses: Vec<MonochromaticTrain>) -> Self {
+    /// Of the lens `train` at some wavelengths: both ends, and those that lie evenly between them in 1/λ², at `most` so
+    /// many. All are measured where orders of diffraction part them by more than glass does.
+    pub(super) fn of(train: &OpticalTrain, lenses: Vec<MonochromaticTrain>, most: usize) -> Self {
         let diffracts = train
             .elements
             .iter()
             .any(|element| matches!(&element.part, Part::Freeform(it) if it.is_dispersive()));
-        if diffracts || lenses.len() <= MEASURED {
+        if diffracts || lenses.len() <= most {
             return Self { measured: lenses, checked: Vec::new() };
         }
         let places: Vec<f64> = lenses.iter().map(|lens| lens.wavelength().powi(-2)).collect();
@@ -45,8 +39,8 @@ impl LensSplit {
             .iter()
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &x| [a.min(x), b.max(x)]);
         let mut is_measured = vec![false; lenses.len()];
-        for k in 0..MEASURED {
-            let wanted = low + (high - low) * k as f64 / (MEASURED - 1) as f64;
+        for k in 0..most {
+            let wanted = low + (high - low) * k as f64 / (most - 1) as f64;
             let off = |i: &usize| (places[*i] - wanted).abs();
             let nearest = (0..places.len()).min_by(|a, b| off(a).total_cmp(&off(b)));
             nearest.into_iter().for_each(|i| is_measured[i] = true);
@@ -68,11 +62,12 @@ impl ExitPupil {
         round: u32,
         find: impl Fn(&Self, &MonochromaticTrain, std::ops::Range<u32>) -> Vec<Stray>,
     ) -> Vec<Stray> {
-        let (first, last) = (round * CHECKS, (round + 1) * CHECKS);
+        let checks = self.accuracy.checks;
+        let (first, last) = (round * checks, (round + 1) * checks);
         let mut found: Vec<Stray> =
             measured.iter().flat_map(|lens| find(self, lens, first..last)).collect();
         let count = u32::try_from(checked.len()).unwrap_or(u32::MAX);
-        let share = CHECKS / count.max(1);
+        let share = checks / count.max(1);
         for (lens, k) in checked.iter().zip(0..) {
             let from = first + k * share;
             found.extend(find(self, lens, from..from + share));
@@ -86,6 +81,9 @@ mod tests {
     use super::super::tests::preset;
     use super::*;
     use crate::train::Focus;
+    use crate::train::pupil::PupilAccuracy;
+
+    const CHECKS: u32 = PupilAccuracy::DEFAULT.checks;
 
     /// Thirty bands of 10 nm, of which five are measured: of a million rays at all thirty none passes outside of the
     /// bound, which the bound of the middle wavelength alone lets pass.
@@ -97,11 +95,14 @@ mod tests {
             let train = preset(name);
             let z = train.sensor_z(Focus::Infinity).unwrap();
             let lenses: Vec<_> = wavelengths.iter().map(|&nm| train.at(nm).unwrap()).collect();
-            let divided = LensSplit::of(&train, lenses.clone());
+            let divided = LensSplit::of(&train, lenses.clone(), 5);
             let measured: Vec<f64> =
                 divided.measured.iter().map(MonochromaticTrain::wavelength).collect();
             assert_eq!((measured.len(), divided.checked.len()), (5, 25), "{measured:?}");
             assert_eq!([measured[0], measured[4]], [405.0, 695.0]);
+            let ends = LensSplit::of(&train, lenses.clone(), 2).measured;
+            let ends: Vec<f64> = ends.iter().map(MonochromaticTrain::wavelength).collect();
+            assert_eq!(ends, [405.0, 695.0]);
             let all = ExitPupil::new(&train, &wavelengths, z, [18.0, 12.0]).unwrap();
             let one = ExitPupil::new(&train, &[545.0], z, [18.0, 12.0]).unwrap();
             let mut passed = 0;
