@@ -204,15 +204,16 @@ fn upper_bits<const N: usize>(
     out
 }
 
-/// An index among its four, of which `key` draws the neighbours: the first of four is that of the second, of the third or
-/// of the last, as the lower bits of all are put.
+/// An index among its four, of which `key` draws the neighbours, that differ in the last bit alone: the first of four is
+/// the second's, the third's or the last's.
 #[inline(always)]
 fn paired(index: u32, key: u32) -> u32 {
     let drawn = hash(key ^ (index >> 2).wrapping_mul(0x9e37_79b9)) >> 16;
     let way = (drawn * 3) >> 16;
     let (low, high) = (index & 1, (index >> 1) & 1);
-    let other = if way == 1 { high } else { high ^ low };
-    let turned = (low << 1) | other;
+    let third = (low << 1) | high;
+    let last = ((low ^ high) << 1) | low;
+    let turned = if way == 1 { third } else { last };
     (index & !3) | if way == 0 { index & 3 } else { turned }
 }
 

@@ -1,5 +1,6 @@
-//! Rays in blocks, which are packets of sixteen as they stand. Where packets may never come back the rays of a block are
-//! traced one by one.
+//! Rays in blocks, which are packets of sixteen as they stand. Processors with narrower registers get them in packets of
+//! their own width: Embree would trace sixteen there without looking at the mask, and what lanes without a ray hold ends the
+//! process. Where packets may never come back the rays of a block are traced one by one.
 
 use std::mem::offset_of;
 
@@ -50,22 +51,35 @@ impl CommittedScene {
                 self.closest_of_block(block, &mut arguments);
                 continue;
             }
-            let valid = PacketAligned(live_lanes::<LANES>(&block.t_max));
-            if !BLOCKS_ARE_PACKETS || valid.0 == [0; LANES] {
-                continue;
-            }
-            let packet: *mut sys::RTCRayHit16 = std::ptr::from_mut(block).cast();
-            // SAFETY: the scene is committed; `BLOCKS_ARE_PACKETS` has that the block is a packet, aligned as
-            // one; lanes without a ray are masked off; Embree keeps no pointer.
-            unsafe {
-                let scene = self.handle.0.as_ptr();
-                sys::rtcIntersect16(valid.0.as_ptr(), scene, packet, &mut arguments);
+            match self.device.width {
+                16 => self.closest_of_packet(block, &mut arguments),
+                8 => self.closest_by_8(block, &mut arguments),
+                4 => self.closest_by_4(block, &mut arguments),
+                _ => {
+                    self.closest_of_block(block, &mut arguments);
+                    continue;
+                }
             }
             if self.has_instances {
                 for (placement, &instance) in block.placement.iter_mut().zip(&block.instance) {
                     *placement = if instance == MISS { *placement } else { instance };
                 }
             }
+        }
+    }
+
+    /// The closest hits of a block whose hits were cleared, as the packet that it is.
+    fn closest_of_packet(&self, block: &mut RayBlock, arguments: &mut sys::RTCIntersectArguments) {
+        let valid = PacketAligned(live_lanes::<LANES>(&block.t_max));
+        if !BLOCKS_ARE_PACKETS || valid.0 == [0; LANES] {
+            return;
+        }
+        let packet: *mut sys::RTCRayHit16 = std::ptr::from_mut(block).cast();
+        // SAFETY: the scene is committed; `BLOCKS_ARE_PACKETS` has that the block is a packet, aligned as
+        // one; lanes without a ray are masked off; Embree keeps no pointer.
+        unsafe {
+            let scene = self.handle.0.as_ptr();
+            sys::rtcIntersect16(valid.0.as_ptr(), scene, packet, arguments);
         }
     }
 
@@ -101,22 +115,34 @@ impl CommittedScene {
         let mut spread = occluded_arguments(false);
         let in_packets = self.packets_come_back();
         for block in blocks {
-            if !in_packets {
-                self.occluded_of_block(block, &mut arguments);
-                continue;
-            }
-            let valid = PacketAligned(live_lanes::<LANES>(&block.t_max));
-            if !BLOCKS_ARE_PACKETS || valid.0 == [0; LANES] {
-                continue;
-            }
-            let apart = coherent && spread_out(&block.direction, |lane| valid.0[lane] != 0);
+            let live = live_lanes::<LANES>(&block.t_max);
+            let apart = coherent && spread_out(&block.direction, |lane| live[lane] != 0);
             let arguments = if apart { &mut spread } else { &mut arguments };
-            let packet: *mut sys::RTCRay16 = std::ptr::from_mut(block).cast();
-            // SAFETY: as above; rays are the first part of a packet of rays and hits.
-            unsafe {
-                let scene = self.handle.0.as_ptr();
-                sys::rtcOccluded16(valid.0.as_ptr(), scene, packet, arguments);
+            match if in_packets { self.device.width } else { 1 } {
+                16 => self.occluded_of_packet(block, live, arguments),
+                8 => self.occluded_by_8(block, arguments),
+                4 => self.occluded_by_4(block, arguments),
+                _ => self.occluded_of_block(block, arguments),
             }
+        }
+    }
+
+    /// Occlusion of a block, as the packet that it begins with, of which these lanes have rays.
+    fn occluded_of_packet(
+        &self,
+        block: &mut RayBlock,
+        live: [i32; LANES],
+        arguments: &mut sys::RTCOccludedArguments,
+    ) {
+        if !BLOCKS_ARE_PACKETS || live == [0; LANES] {
+            return;
+        }
+        let valid = PacketAligned(live);
+        let packet: *mut sys::RTCRay16 = std::ptr::from_mut(block).cast();
+        // SAFETY: as above; rays are the first part of a packet of rays and hits.
+        unsafe {
+            let scene = self.handle.0.as_ptr();
+            sys::rtcOccluded16(valid.0.as_ptr(), scene, packet, arguments);
         }
     }
 
@@ -131,6 +157,97 @@ impl CommittedScene {
         }
     }
 }
+
+/// Blocks in packets of a width below sixteen: the same code on C types of another size.
+macro_rules! narrow_packets {
+    ($closest:ident, $occluded:ident, $width:literal, $rayhit:ident, $ray:ident, $intersect:ident,
+     $occlude:ident) => {
+        impl CommittedScene {
+            /// The closest hits of a block whose hits were cleared.
+            fn $closest(&self, block: &mut RayBlock, arguments: &mut sys::RTCIntersectArguments) {
+                let mut query = PacketAligned(sys::$rayhit::default());
+                for start in (0..LANES).step_by($width) {
+                    let valid =
+                        PacketAligned(live_lanes::<$width>(&block.t_max[start..start + $width]));
+                    if valid.0 == [0; $width] {
+                        continue;
+                    }
+                    put_rays!(query.0.ray, block, start);
+                    query.0.hit.geomID = [MISS; $width];
+                    query.0.hit.primID = [MISS; $width];
+                    query.0.hit.instID[0] = [MISS; $width];
+                    // SAFETY: the scene is committed; packet and mask have the C types' layout and are aligned to 64
+                    // bytes by `PacketAligned`; lanes without a ray are masked off; Embree keeps no pointer.
+                    unsafe {
+                        let scene = self.handle.0.as_ptr();
+                        sys::$intersect(valid.0.as_ptr(), scene, &mut query.0, arguments);
+                    }
+                    let hit = &query.0.hit;
+                    put(&mut block.placement, start, &hit.geomID);
+                    put(&mut block.triangle, start, &hit.primID);
+                    put(&mut block.instance, start, &hit.instID[0]);
+                    put(&mut block.u, start, &hit.u);
+                    put(&mut block.v, start, &hit.v);
+                    for (axis, n) in block.normal.iter_mut().zip([hit.Ng_x, hit.Ng_y, hit.Ng_z]) {
+                        put(axis, start, &n);
+                    }
+                    put(&mut block.t_max, start, &query.0.ray.tfar);
+                }
+            }
+
+            /// Occlusion of a block.
+            fn $occluded(&self, block: &mut RayBlock, arguments: &mut sys::RTCOccludedArguments) {
+                let mut query = PacketAligned(sys::$ray::default());
+                for start in (0..LANES).step_by($width) {
+                    let valid =
+                        PacketAligned(live_lanes::<$width>(&block.t_max[start..start + $width]));
+                    if valid.0 == [0; $width] {
+                        continue;
+                    }
+                    put_rays!(query.0, block, start);
+                    // SAFETY: as above.
+                    unsafe {
+                        let scene = self.handle.0.as_ptr();
+                        sys::$occlude(valid.0.as_ptr(), scene, &mut query.0, arguments);
+                    }
+                    put(&mut block.t_max, start, &query.0.tfar);
+                }
+            }
+        }
+    };
+}
+
+/// Puts the rays of a block from a lane on into a packet.
+macro_rules! put_rays {
+    ($ray:expr, $block:expr, $start:expr) => {{
+        let (ray, start) = (&mut $ray, $start);
+        let RayBlock { origin, direction, t_min, t_max, mask, .. } = &*$block;
+        take(&mut ray.org_x, &origin[0], start);
+        take(&mut ray.org_y, &origin[1], start);
+        take(&mut ray.org_z, &origin[2], start);
+        take(&mut ray.dir_x, &direction[0], start);
+        take(&mut ray.dir_y, &direction[1], start);
+        take(&mut ray.dir_z, &direction[2], start);
+        take(&mut ray.tnear, t_min, start);
+        take(&mut ray.tfar, t_max, start);
+        take(&mut ray.mask, mask, start);
+    }};
+}
+
+/// Takes the lanes of a row from `start` on.
+#[inline(always)]
+fn take<T: Copy, const W: usize>(lanes: &mut [T; W], row: &[T; LANES], start: usize) {
+    lanes.copy_from_slice(&row[start..start + W]);
+}
+
+/// Puts lanes into a row from `start` on.
+#[inline(always)]
+fn put<T: Copy, const W: usize>(row: &mut [T; LANES], start: usize, lanes: &[T; W]) {
+    row[start..start + W].copy_from_slice(lanes);
+}
+
+narrow_packets!(closest_by_4, occluded_by_4, 4, RTCRayHit4, RTCRay4, rtcIntersect4, rtcOccluded4);
+narrow_packets!(closest_by_8, occluded_by_8, 8, RTCRayHit8, RTCRay8, rtcIntersect8, rtcOccluded8);
 
 fn ray_of(block: &RayBlock, lane: usize) -> sys::RTCRay {
     let [origin, direction] = [&block.origin, &block.direction];

@@ -159,6 +159,60 @@ fn instances_are_met_in_blocks_as_in_batches() {
     }
 }
 
+/// With each instruction set that the processor has blocks meet what batches meet, and whatever the lanes hold that have no
+/// ray, they meet nothing. Embree has no packets of sixteen where registers are narrower.
+#[cfg(feature = "embree")]
+#[test]
+fn every_instruction_set_meets_the_same_in_blocks() {
+    let geometry = at(vec![soup(3000, 0.2, 5)], vec![placed(0, Transform::IDENTITY)]);
+    let mut tried = 0;
+    for isa in ["sse2", "sse4.2", "avx", "avx2", "avx512"] {
+        let options = BuildOptions { isa: Some(isa.to_owned()), ..BuildOptions::default() };
+        let Ok(accel) = Embree::build(Arc::clone(&geometry), &options) else { continue };
+        tried += 1;
+        let blocks = accel.blocks().expect("Embree takes blocks of every scene");
+        for coherent in [false, true] {
+            let mut batch = super::rays(4000, DVec3::ZERO, 1.0, 41).with_coherence(coherent);
+            batch.precision = HitPrecision::Single;
+            let due = closest(&accel, &batch);
+            let mut due_blocked = Vec::new();
+            accel.occluded(&batch, &mut due_blocked);
+            let mut rays = RayBlocks::default();
+            blocks.convert(&batch, &mut rays);
+            // Some blocks have a few rays, some half of them, and some none.
+            let has_ray = |i: usize| match i / LANES % 4 {
+                0 => true,
+                1 => i % 5 == 0,
+                2 => i % LANES < 8,
+                _ => false,
+            };
+            for i in (0..batch.len()).filter(|&i| !has_ray(i)) {
+                let (block, lane) = (&mut rays.blocks_mut()[i / LANES], i % LANES);
+                let rows = block.origin.iter_mut().chain(&mut block.direction);
+                rows.for_each(|row| row[lane] = f32::NAN);
+                block.t_max[lane] = 0.0;
+            }
+            let mut shadows = rays.clone();
+            blocks.closest_of_blocks(rays.blocks_mut(), &[], coherent);
+            blocks.occluded_of_blocks(shadows.blocks_mut(), &[], coherent);
+            let mut differ = 0;
+            for (i, &due_blocked) in due_blocked.iter().enumerate() {
+                let (block, lane) = (&rays.blocks()[i / LANES], i % LANES);
+                let own = [block.placement[lane], block.triangle[lane]];
+                let is_blocked = shadows.blocks()[i / LANES].is_blocked(lane);
+                if !has_ray(i) {
+                    assert_eq!((own, is_blocked), ([MISS; 2], false), "{isa}: lane {i}");
+                } else if own != [due.placement[i], due.triangle[i]] || is_blocked != due_blocked {
+                    differ += 1;
+                }
+            }
+            // Packets round in another order than rays one by one.
+            assert!(differ <= 4, "{isa}, coherent {coherent}: {differ} differ");
+        }
+    }
+    assert!(tried >= 1, "no instruction set of Embree's is this processor's");
+}
+
 /// A mesh `size` times as large, whose triangles share no corners.
 fn scaled(body: &Mesh, size: f64) -> Mesh {
     let corners = (0..body.triangles.len()).flat_map(|triangle| body.corners(triangle));
