@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Runs the tests that touch Embree against Embree 4, in a Debian 13 root below target/. test-embree4.sh --library leaves
-# out those of the command, which calls the same library.
+# out those of the command, which calls the same library; --root makes the root alone.
 #
 # The root is made once (a minute) and kept, and so is what cargo builds for it. All mounts live in a
 # mount namespace of their own: they end with the process, however it ends, and nobody else sees them.
@@ -50,6 +50,7 @@ may_be_root || skip "making a Debian 13 root and entering it takes root, or sudo
 why=$(in_namespace true 2>&1) || skip "this system lets not even root mount ($why)."
 # A root of an earlier time may lack the C++ compiler.
 [ -e "$root/usr/bin/g++" ] || make_root || skip "debootstrap could not make the Debian 13 root; see above."
+[ "${1:-}" != --root ] || exit 0
 
 # What does not trace, or traces by `bvh` in the tests of the workspace, too, is not run twice.
 elsewhere=$(printf -- '--skip %s:: ' files gallery inputs lamps lens lens_pictures lens_reference light_fields memory models \

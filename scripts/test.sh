@@ -16,8 +16,30 @@ run_tests() {
     fi
 }
 
+# in_background NAME COMMAND...: what mostly waits for a network or for daemons goes on beside other steps.
+in_background() {
+    mkdir -p target/background
+    "${@:2}" >"target/background/$1.log" 2>&1 &
+    echo $! >"target/background/$1.pid"
+}
+
+# finish NAME: waits for it, and shows what it said.
+finish() {
+    local status=0
+    wait "$(cat "target/background/$1.pid")" || status=$?
+    cat "target/background/$1.log"
+    return "$status"
+}
+
+# Snapshots of messages ask cargo for it otherwise, once a test.
+export INSTA_WORKSPACE_ROOT=$PWD
+
+trap 'kill $(jobs -p) 2>/dev/null || true' EXIT
+
 step "format"
 cargo fmt --all --check
+
+in_background debian13 scripts/test-embree4.sh --root
 
 if cargo deny --version >/dev/null 2>&1; then
     step "licences, sources and advisories of dependencies"
@@ -57,21 +79,24 @@ fi
 EMBREE_DIR=/nonexistent run_tests "${without_embree[@]}"
 
 step "tests against Embree 4"
+finish debian13
 scripts/test-embree4.sh --library
-
-step "Python package"
-PROFILE=dev scripts/python.sh
 
 # The command that the tests of the workspace leave serves all that follows.
 step "building the tests"
 run_tests --workspace --features etendue-cli/window --no-run
 export ETENDUE=target/debug/etendue
 
-step "jobs on Slurm"
-scripts/test-slurm.sh
+in_background slurm scripts/test-slurm.sh
+
+step "Python package"
+PROFILE=dev scripts/python.sh
 
 step "light fields: the page, and another decoder's opinion"
 IMAGES=target/light-field-images scripts/light-fields.sh --samples 32 --quiet
+
+step "jobs on Slurm"
+finish slurm
 
 step "window"
 scripts/window.sh x11 wayland

@@ -18,13 +18,13 @@ mod bundle;
 mod fold;
 mod lanes;
 mod packet;
+mod queries;
 mod ray;
 mod single;
 mod traverse;
 mod wide;
 
 use std::fmt;
-use std::marker::PhantomData;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -32,21 +32,14 @@ use rayon::prelude::*;
 
 use self::fold::{InstanceLeafWriter, Triangles, fold};
 use self::lanes::{Lanes, Portable};
-use self::packet::BatchTraversal;
-use self::single::{AnyHit, Sink};
-use self::wide::{MOST_IN_LEAF, WideTree};
+use self::wide::{LeafNumbers, LeafUnits, MOST_IN_LEAF, WideTree};
 use crate::few::FewTriangles;
-use crate::nearest::{Nearest, PlacementView, Triangle, settle, settle_blocks};
+use crate::nearest::{PlacementView, Triangle};
 use crate::parts::{Baking, Blas, Layout, Members, PartInstance, outward};
 use crate::tree::{LeafSize, Ref, Tree};
-use crate::{
-    Accel, BlockAccel, BuildError, BuildOptions, BuildReport, BuildWatch, Quality, with_threads,
-};
-use etendue_geometry::glam::{DVec3, Vec3};
-use etendue_geometry::{
-    Bounds, Coplanar, Geometry, HitBatch, MISS, Mesh, RayBatch, RayBlock, RayBlocks,
-};
-use wide::{LeafNumbers, LeafUnits};
+use crate::{BuildError, BuildOptions, BuildWatch, with_threads};
+use etendue_geometry::glam::Vec3;
+use etendue_geometry::{Bounds, Coplanar, Geometry, MISS, Mesh};
 
 /// The pure-Rust bounding volume hierarchy.
 pub struct Bvh {
@@ -211,7 +204,7 @@ fn top_tree(
     let refs = (0..count).into_par_iter().map(|i| {
         let instance = &layout.instances[i as usize];
         let local = parts[instance.part as usize].bounds();
-        let bounds = instance.world_bounds(layout, geometry, local);
+        let bounds = layout.bounds_of(instance, geometry, local);
         let (lo, hi) = outward([bounds.min, bounds.max]);
         Ref { lo, first: i, hi, second: i }
     });
@@ -222,76 +215,6 @@ fn top_tree(
         backend: "bvh",
         limit: MOST_INSTANCES,
     })
-}
-
-impl Bvh {
-    fn run<L: Lanes, S: Sink>(&self, lanes: L, rays: &RayBatch, sink: impl FnMut(usize, S)) {
-        lanes.run(BatchTraversal { lanes, bvh: self, rays, sink, seen: PhantomData });
-    }
-
-    fn dispatch<S: Sink>(&self, rays: &RayBatch, sink: impl FnMut(usize, S)) {
-        match self.isa {
-            Isa::Portable => self.run(Portable, rays, sink),
-            #[cfg(target_arch = "x86_64")]
-            Isa::Avx2(token) => self.run(token, rays, sink),
-            #[cfg(target_arch = "x86_64")]
-            Isa::Avx512(token) => self.run(token, rays, sink),
-        }
-    }
-}
-
-impl BlockAccel for Bvh {
-    fn origin(&self) -> DVec3 {
-        self.few.as_ref().map_or(DVec3::ZERO, FewTriangles::origin)
-    }
-
-    fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks) {
-        if let Some(few) = &self.few {
-            few.convert(rays, blocks);
-        }
-    }
-
-    fn closest_of_blocks(&self, blocks: &mut [RayBlock], _times: &[f64], _coherent: bool) {
-        let Some(few) = &self.few else { return };
-        few.closest_of_blocks(blocks);
-        settle_blocks(&self.coplanar, &self.geometry, few.origin(), blocks);
-    }
-
-    fn occluded_of_blocks(&self, blocks: &mut [RayBlock], _times: &[f64], _coherent: bool) {
-        if let Some(few) = &self.few {
-            few.occluded_of_blocks(blocks);
-        }
-    }
-}
-
-impl Accel for Bvh {
-    fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
-        hits.reset(rays.len());
-        self.dispatch(rays, |i, nearest: Nearest| nearest.write(&self.geometry, hits, i));
-        settle(&self.coplanar, &self.geometry, rays, hits);
-    }
-
-    fn blocks(&self) -> Option<&dyn BlockAccel> {
-        self.few.is_some().then_some(self)
-    }
-
-    fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>) {
-        blocked.clear();
-        blocked.resize(rays.len(), false);
-        self.dispatch(rays, |i, found: AnyHit| blocked[i] = found.found);
-    }
-
-    fn report(&self) -> BuildReport {
-        let trees = self.parts.iter().map(|part| &part.tree).chain([&self.top]);
-        let instances = self.layout.instances.capacity() * size_of::<PartInstance>();
-        BuildReport {
-            backend: format!("bvh {}", self.isa.name()),
-            quality: Quality::Medium,
-            time: self.time,
-            bytes: (trees.map(WideTree::bytes).sum::<usize>() + instances) as u64,
-            copied_bytes: 0,
-        }
-    }
 }
 
 impl fmt::Debug for Bvh {

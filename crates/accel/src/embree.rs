@@ -27,10 +27,9 @@ use embree4_sys as sys;
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Geometry, Mesh, Placement, Transform};
 
-use self::device::Device;
-use self::shape::EmbreeGeometry;
-use crate::{BuildError, BuildOptions, Quality, single};
-use shape::{InstanceChoice, InstanceKind};
+use self::device::{Device, SceneHandle};
+use self::shape::{EmbreeGeometry, InstanceChoice, InstanceKind};
+use crate::{BuildError, BuildOptions, single};
 
 pub use self::device::{Version, version};
 pub(crate) use self::filter::{ExactFilter, NearestSearch};
@@ -43,32 +42,6 @@ unsafe extern "C" fn on_progress(user: *mut c_void, done: f64) -> bool {
     // long as the callback is registered.
     let progress = unsafe { *user.cast::<&ProgressFn>() };
     progress(done)
-}
-
-impl Quality {
-    fn to_embree(self) -> sys::RTCBuildQuality {
-        match self {
-            Self::Low => sys::RTC_BUILD_QUALITY_LOW,
-            Self::Medium => sys::RTC_BUILD_QUALITY_MEDIUM,
-            Self::High => sys::RTC_BUILD_QUALITY_HIGH,
-        }
-    }
-}
-
-/// One reference to an Embree scene.
-struct SceneHandle(NonNull<sys::RTCSceneTy>);
-
-// SAFETY: references are counted atomically by Embree, so any thread may release one; a handle that is
-// not a `SceneBuilder`'s alone is of a committed scene, which is read only, and queries are re-entrant.
-unsafe impl Send for SceneHandle {}
-// SAFETY: as above.
-unsafe impl Sync for SceneHandle {}
-
-impl Drop for SceneHandle {
-    fn drop(&mut self) {
-        // SAFETY: releases the reference that `rtcNewScene` gave.
-        unsafe { sys::rtcReleaseScene(self.0.as_ptr()) };
-    }
 }
 
 /// A scene that takes shapes and cannot be traced yet.

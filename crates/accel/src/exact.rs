@@ -213,7 +213,7 @@ impl Boxes {
         let bounds = |i: u32| {
             let instance = &layout.instances[i as usize];
             let local = parts[instance.part as usize].bounds();
-            instance.world_bounds(layout, geometry, local)
+            layout.bounds_of(instance, geometry, local)
         };
         let count = u32::try_from(layout.instances.len()).unwrap_or(u32::MAX);
         let refs = (0..count).into_par_iter().map(|i| {

@@ -12,14 +12,12 @@
 mod edges;
 mod faces;
 
-use std::ops::Range;
-
 use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Geometry, MISS, RayBatch, RayBlock, RayBlocks, is_degenerate};
 
 use self::edges::{FewTriangle, PluckerEdge};
-use self::faces::{BlockOcclusion, Face, NearestFace};
+use self::faces::{BlockOcclusion, Face, FaceList, FaceRun, NearestFace};
 use crate::single::{F32Frame, Rays32, round};
 
 /// Scenes of more triangles are traced by trees.
@@ -37,16 +35,6 @@ struct TriangleId {
 /// The most triangles of a run: those of a box.
 const RUN: usize = 12;
 
-/// Faces of triangles that follow each other in the list, and their box.
-#[derive(Debug)]
-struct FaceRun {
-    faces: Range<usize>,
-    /// Number of the first face.
-    first: u32,
-    /// From and to, in the frame, and a little beyond.
-    bounds: [[f32; 3]; 2],
-}
-
 /// A scene of few triangles.
 #[derive(Debug)]
 pub(crate) struct FewTriangles {
@@ -54,10 +42,7 @@ pub(crate) struct FewTriangles {
     edges: Vec<PluckerEdge>,
     triangles: Vec<FewTriangle>,
     named: Vec<TriangleId>,
-    faces: Vec<Face>,
-    runs: Vec<FaceRun>,
-    /// The largest distance of a corner from the frame's origin (m).
-    radius: f32,
+    list: FaceList,
 }
 
 impl FewTriangles {
@@ -71,9 +56,7 @@ impl FewTriangles {
             edges: Vec::new(),
             triangles: Vec::new(),
             named: Vec::new(),
-            faces: Vec::new(),
-            runs: Vec::new(),
-            radius: 0.0,
+            list: FaceList::default(),
         };
         let mut ends: Vec<[[f64; 3]; 2]> = Vec::new();
         let mut corners: Vec<[DVec3; 3]> = Vec::new();
@@ -118,7 +101,7 @@ impl FewTriangles {
             self.edges.push(PluckerEdge::between(from, to));
             ends.len() - 1
         });
-        self.radius = self.radius.max(round(from.length()));
+        self.list.radius = self.list.radius.max(round(from.length()));
         let length = from.distance(to);
         (at, if ends[at] == [a, b] { length } else { -length })
     }
@@ -130,14 +113,15 @@ impl FewTriangles {
             *end += own.len();
             Some(*end)
         });
+        let list = &mut self.list;
         let (mut number, mut held, mut bounds) = (0, RUN, Bounds::EMPTY);
         for end in ends {
-            while let Some(face) = Face::first_of(&corners[number..end], number, self.radius) {
+            while let Some(face) = Face::first_of(&corners[number..end], number, list.radius) {
                 let count = face.triangles.len();
                 if held + count > RUN {
                     (held, bounds) = (0, Bounds::EMPTY);
-                    let start = self.faces.len();
-                    self.runs.push(FaceRun {
+                    let start = list.faces.len();
+                    list.runs.push(FaceRun {
                         faces: start..start,
                         first: u32::try_from(start).unwrap_or(MISS),
                         bounds: [[0.0; 3]; 2],
@@ -149,11 +133,11 @@ impl FewTriangles {
                 let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
                 let beyond = DVec3::splat(largest * 4.0 * f64::from(f32::EPSILON));
                 let grown = [bounds.min - beyond, bounds.max + beyond];
-                if let Some(run) = self.runs.last_mut() {
+                if let Some(run) = list.runs.last_mut() {
                     run.faces.end += 1;
                     run.bounds = grown.map(|corner| corner.to_array().map(round));
                 }
-                self.faces.push(face);
+                list.faces.push(face);
                 (number, held) = (number + count, held + count);
             }
         }
@@ -174,13 +158,13 @@ impl FewTriangles {
         let mut nearest = NearestFace::NONE;
         for block in blocks {
             block.clear_hits();
-            faces::closest(self, block, &mut nearest);
+            faces::closest(&self.list, block, &mut nearest);
             for lane in 0..LANES {
                 if nearest.doubts[lane] != 0 {
-                    if let Some(hit) = edges::closest(self, block, lane) {
+                    if let Some(hit) = edges::closest(&self.edges, &self.triangles, block, lane) {
                         self.note(block, lane, hit.number, round(hit.t), hit.weights.map(round));
                     }
-                } else if let Some(face) = self.faces.get(nearest.face[lane] as usize) {
+                } else if let Some(face) = self.list.faces.get(nearest.face[lane] as usize) {
                     let [x, y] = &nearest.place;
                     let (number, weights) = face.at([x[lane], y[lane]]);
                     self.note(block, lane, number, nearest.t[lane], weights);
@@ -204,11 +188,11 @@ impl FewTriangles {
     pub(crate) fn occluded_of_blocks(&self, blocks: &mut [RayBlock]) {
         let mut occlusion = BlockOcclusion::default();
         for block in blocks {
-            faces::occluded(self, block, &mut occlusion);
+            faces::occluded(&self.list, block, &mut occlusion);
             for lane in 0..LANES {
                 let is_blocked = match occlusion.doubts[lane] {
                     0 => occlusion.blocked[lane] != 0,
-                    _ => edges::is_occluded(self, block, lane),
+                    _ => edges::is_occluded(&self.edges, &self.triangles, block, lane),
                 };
                 block.t_max[lane] = if is_blocked { f32::NEG_INFINITY } else { block.t_max[lane] };
             }
@@ -337,7 +321,7 @@ mod tests {
         let cases = [0.0, 1e4].map(|far| [(far, scene(far), 52), (far, quadrilaterals(far), 32)]);
         for (far, geometry, count) in cases.into_iter().flatten() {
             let few = FewTriangles::of(&geometry).unwrap();
-            assert_eq!(few.faces.len(), count);
+            assert_eq!(few.list.faces.len(), count);
             assert!(few.edges.len() < 3 * few.named.len(), "edges are shared");
             let exact = Exact::build(Arc::clone(&geometry), &BuildOptions::default()).unwrap();
             let mut rays = RayBatch::default();
@@ -436,7 +420,7 @@ mod tests {
         let faces = |last: [f32; 3], second: [u32; 3]| {
             let corners = [base[0], base[1], base[2], last];
             let own = mesh(&corners, vec![[0, 1, 2], second]);
-            FewTriangles::of(&Geometry::alone(own, Transform::IDENTITY)).unwrap().faces.len()
+            FewTriangles::of(&Geometry::alone(own, Transform::IDENTITY)).unwrap().list.faces.len()
         };
         assert_eq!(faces([0.9, 0.8, 0.0], [3, 2, 1]), 1);
         assert_eq!(faces([0.9, 0.8, 1e-5], [3, 2, 1]), 2, "bent");
@@ -446,7 +430,7 @@ mod tests {
         let mut geometry = Geometry::alone(half([0, 1, 2]), Transform::IDENTITY);
         geometry.meshes.push(half([3, 2, 1]));
         geometry.placements.push(Placement { mesh: 1, ..geometry.placements[0].clone() });
-        assert_eq!(FewTriangles::of(&geometry).unwrap().faces.len(), 2, "of two placements");
+        assert_eq!(FewTriangles::of(&geometry).unwrap().list.faces.len(), 2, "of two placements");
     }
 
     #[test]

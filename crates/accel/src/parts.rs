@@ -9,18 +9,17 @@
 //! Rays reach a frame in f64, as seen from the instance, and know how far rounding may have moved
 //! them against the triangles (see [`LocalRay::pad`]): boxes are widened by that, so nothing is
 //! culled that the exact test would hit.
-//!
-//! Frames in which coordinates are about 1, and boxes in single precision that lose nothing.
 
+mod frame;
 mod instance;
 mod part;
 
 use self::instance::{largest, norm};
-use self::part::MOST_TRIANGLES;
+use self::part::{MOST_TRIANGLES, index};
 use crate::{BuildError, BuildOptions};
-use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Bounds, Geometry, MISS, Placement, Transform};
+use etendue_geometry::{Bounds, Geometry, MISS, Placement};
 
+pub(crate) use self::frame::{PartFrame, outward};
 pub(crate) use self::instance::{LocalRay, LocalRays, PartInstance};
 pub(crate) use self::part::{Blas, Members, MeshTriangles};
 
@@ -143,6 +142,27 @@ impl Layout {
         }
     }
 
+    /// A box around the box `local` of an instance's part, in the frame of the tree over the instances.
+    pub(crate) fn bounds_of(
+        &self,
+        instance: &PartInstance,
+        geometry: &Geometry,
+        local: Bounds,
+    ) -> Bounds {
+        let part = &self.parts[instance.part as usize];
+        let frame = self.world_frame;
+        let mut bounds = Bounds::EMPTY;
+        for corner in local.corners() {
+            let corner = corner / part.frame.scale + part.frame.origin;
+            let point = match geometry.placements.get(instance.placement as usize) {
+                Some(placement) => placement.world_from_mesh.point_from(corner, frame.origin),
+                None => corner - frame.origin,
+            };
+            bounds.include(point * frame.scale);
+        }
+        bounds
+    }
+
     /// Adds parts for `placements`, as few as can be numbered.
     fn bake_together(&mut self, geometry: &Geometry, placements: Vec<u32>) {
         let mut together = Vec::new();
@@ -173,12 +193,6 @@ impl Layout {
     }
 }
 
-/// Placements, parts and triangles are counted in u32 by the contract.
-#[expect(clippy::cast_possible_truncation, reason = "counted in u32 by the contract")]
-fn index(i: usize) -> u32 {
-    i as u32
-}
-
 /// The magnitudes that a placement's corners are summed from in `frame`.
 fn baked_reach(geometry: &Geometry, placement: &Placement, frame: PartFrame) -> f64 {
     let transform = &placement.world_from_mesh;
@@ -192,71 +206,4 @@ fn is_coarse(geometry: &Geometry, placement: &Placement, frame: PartFrame) -> bo
     let triangles = geometry.mesh_of(placement).triangles.len() as f64;
     let size = geometry.loose_bounds_of(placement).diagonal() / triangles.sqrt();
     size * frame.scale > BAKED_RESOLUTION * f64::from(f32::EPSILON)
-}
-
-/// Origin and scale of a part: `p ↦ (p − origin) · scale`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PartFrame {
-    pub(crate) origin: DVec3,
-    /// A power of two.
-    pub(crate) scale: f64,
-}
-
-impl PartFrame {
-    /// A frame in which `bounds` lies within about −1..1. The origin stays where it is unless it is
-    /// far away, because f32 coordinates stay exact then.
-    pub(crate) fn of(bounds: Bounds) -> Self {
-        if bounds.is_empty() {
-            return Self { origin: DVec3::ZERO, scale: 1.0 };
-        }
-        let centre = bounds.min * 0.5 + bounds.max * 0.5;
-        let half = bounds.max * 0.5 - bounds.min * 0.5;
-        let far = centre.abs().max_element() > 4.0 * half.max_element();
-        let origin = if far { centre } else { DVec3::ZERO };
-        let reach = (bounds.max - origin).abs().max((bounds.min - origin).abs()).max_element();
-        let origin = if origin.is_finite() { origin } else { DVec3::ZERO };
-        Self { origin, scale: reciprocal_power(reach) }
-    }
-
-    /// A point of the mesh whose frame this is.
-    #[inline(always)]
-    fn local(&self, point: DVec3) -> DVec3 {
-        (point - self.origin) * self.scale
-    }
-
-    /// A point of a mesh that `transform` places in the world.
-    #[inline(always)]
-    fn baked(&self, transform: &Transform, point: DVec3) -> DVec3 {
-        transform.point_from(point, self.origin) * self.scale
-    }
-}
-
-/// The power of two that brings `size` to at most 1 (1 for a size of 0), within f64's range.
-#[expect(clippy::cast_possible_truncation, reason = "an exponent of f64 has 11 bits")]
-fn reciprocal_power(size: f64) -> f64 {
-    if size > 0.0 { 2f64.powi(-(size.log2().ceil().clamp(-1000.0, 1000.0) as i32)) } else { 1.0 }
-}
-
-/// The single-precision box around `points`, rounded outward.
-#[inline]
-pub(crate) fn outward<const N: usize>(points: [DVec3; N]) -> ([f32; 3], [f32; 3]) {
-    let mut bounds = Bounds::EMPTY;
-    for point in points {
-        bounds.include(point);
-    }
-    (bounds.min.to_array().map(round_down), bounds.max.to_array().map(round_up))
-}
-
-/// The largest f32 not above `x`.
-#[inline]
-#[expect(clippy::cast_possible_truncation, reason = "rounding is the point")]
-pub(crate) fn round_down(x: f64) -> f32 {
-    let near = x as f32;
-    if f64::from(near) > x { near.next_down() } else { near }
-}
-
-/// The smallest f32 not below `x`.
-#[inline]
-pub(crate) fn round_up(x: f64) -> f32 {
-    -round_down(-x)
 }

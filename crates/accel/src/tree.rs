@@ -8,66 +8,16 @@
 //! only, so the tree is the same for any number of threads.
 
 mod bins;
+mod node;
 
-use bytemuck::{Pod, Zeroable};
-use etendue_geometry::glam::Vec4;
+use bytemuck::Zeroable;
 use rayon::prelude::*;
 
-use self::bins::{BinGrid, Bins};
+use self::bins::{BinGrid, Bins, SplitSide, halve, partition, partition_wide};
+use self::node::{CHUNK, RefBounds, WIDE_NODE, half_area};
 use crate::{BuildError, BuildWatch};
-use bins::{RefBounds, SplitSide, half_area, halve, partition, partition_wide};
 
-/// The box of one thing, with two numbers by which its owner knows it.
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-#[repr(C, align(16))]
-pub(crate) struct Ref {
-    pub(crate) lo: [f32; 3],
-    pub(crate) first: u32,
-    pub(crate) hi: [f32; 3],
-    pub(crate) second: u32,
-}
-
-impl Ref {
-    /// The lower and upper corner; the fourth components are noise.
-    #[inline]
-    fn corners(&self) -> [Vec4; 2] {
-        let [lo, hi]: [[f32; 4]; 2] = bytemuck::cast(*self);
-        [Vec4::from_array(lo), Vec4::from_array(hi)]
-    }
-}
-
-/// A node with its box. Nodes stand in depth-first order: an inner node's left child follows it,
-/// its right child stands [`right`](Node::right) places after it.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct BinaryNode {
-    pub(crate) lo: [f32; 3],
-    pub(crate) hi: [f32; 3],
-    /// A leaf's first ref; how far an inner node's right child is.
-    link: u32,
-    /// A leaf's number of refs; 0 for an inner node.
-    count: u32,
-}
-
-impl BinaryNode {
-    /// The range of refs of a leaf; `None` for an inner node.
-    pub(crate) fn leaf(&self) -> Option<std::ops::Range<usize>> {
-        (self.count > 0).then(|| self.link as usize..(self.link + self.count) as usize)
-    }
-
-    /// Number of places from an inner node to its right child.
-    pub(crate) fn right(&self) -> usize {
-        self.link as usize
-    }
-
-    /// Half the surface of the box.
-    pub(crate) fn area(&self) -> f32 {
-        half_area(Vec4::from((glam3(self.hi) - glam3(self.lo), 0.0)))
-    }
-}
-
-fn glam3(v: [f32; 3]) -> etendue_geometry::glam::Vec3 {
-    v.into()
-}
+pub(crate) use self::node::{BinaryNode, Ref};
 
 /// Limits at which splitting ends.
 #[derive(Debug, Clone, Copy)]
@@ -90,10 +40,6 @@ pub(crate) struct Tree {
 pub(crate) const MAX_DEPTH: usize = SAH_DEPTH + 32;
 const SAH_DEPTH: usize = 40;
 
-/// From this many refs on, one node's refs are binned and moved in parallel.
-const WIDE_NODE: usize = 1 << 17;
-/// Refs that one thread bins or moves at a time.
-const CHUNK: usize = 1 << 14;
 /// Down to this many refs, the two sides of a split are built in parallel.
 const PARALLEL_NODE: usize = 1 << 12;
 

@@ -1,4 +1,4 @@
-//! A camera's time: its shutter and its motion, and rays that are carried to where the camera is at their time.
+//! A camera in time: what its shutter and its motion make of it, and rays that are carried to where it is at theirs.
 
 use std::sync::Arc;
 
@@ -13,28 +13,6 @@ const STEPS: usize = 60;
 
 /// Moments (s) so near that they are the same.
 const SAME_MOMENT: f64 = 1e-15;
-
-/// Shutter and motion of a camera.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CameraTime {
-    /// The shutter.
-    pub shutter: Shutter,
-    /// The camera's motion, where it moves while the shutter is open.
-    pub motion: Option<Trajectory>,
-    /// Trajectory of the camera, whether it moves while the shutter is open or not.
-    pub trajectory: Option<Trajectory>,
-    /// True if anything of the scene moves while the shutter is open.
-    pub things_move: bool,
-    /// True if some light changes with time.
-    pub lights_change: bool,
-}
-
-impl CameraTime {
-    /// The moment (s) of the frame's pose: that at which data layers see the middle of a picture of so many rows.
-    pub(crate) fn middle(&self, rows: u32) -> f64 {
-        self.shutter.truth(0.5 * f64::from(rows))
-    }
-}
 
 impl Camera {
     /// The shutter, where the scene gives one or the camera moves.

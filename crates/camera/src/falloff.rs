@@ -8,7 +8,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Camera, CameraError, Intrinsics, Projection};
+use crate::{CameraError, Intrinsics};
 
 /// The relative light of a pixel: `axis (1 + a1 r² + a2 r⁴ + a3 r⁶)`, r its distance from the principal point in focal
 /// lengths. Samples of pictures count by it; data layers do not.
@@ -40,19 +40,17 @@ impl FalloffSpec {
     }
 
     /// That of places of a pinhole's picture (column and row, pixels from the corner) with their light, by least
-    /// squares; `None` of other cameras, and of places that do not tell it.
+    /// squares; `None` of places that do not tell it.
     #[must_use]
-    pub fn fitted(camera: &Camera, lit: &[([f64; 2], f64)]) -> Option<Self> {
-        let Projection::Pinhole(pinhole) = camera.projection() else { return None };
-        let k = pinhole.intrinsics();
+    pub fn fitted(k: &Intrinsics, lit: &[([f64; 2], f64)]) -> Option<Self> {
         // In the largest square, so that all columns of the equations are of about 1.
-        let most = lit.iter().map(|(place, _)| square_of(&k, *place)).fold(0.0, f64::max);
+        let most = lit.iter().map(|(place, _)| square_of(k, *place)).fold(0.0, f64::max);
         if !(most > 0.0 && most.is_finite()) {
             return None;
         }
         let mut equations = [[0.0; 5]; 4];
         for (place, light) in lit {
-            let u = square_of(&k, *place) / most;
+            let u = square_of(k, *place) / most;
             let row = [1.0, u, u * u, u * u * u, *light];
             for (i, sums) in equations.iter_mut().enumerate() {
                 sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += row[i] * value);
@@ -113,7 +111,7 @@ fn solved(mut rows: [[f64; 5]; 4]) -> Option<[f64; 4]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{CameraSpec, PinholeSpec, SensorSpec};
+    use crate::{CameraSpec, PinholeSpec, Projection, SensorSpec};
     use etendue_geometry::Bounds;
 
     #[test]
@@ -123,12 +121,11 @@ mod tests {
             CameraSpec::Pinhole(spec).build(|| Bounds::EMPTY, &|name: &str| Err(name.into()));
         let camera = camera.unwrap();
         let Projection::Pinhole(pinhole) = camera.projection() else { panic!("no pinhole") };
+        let k = pinhole.intrinsics();
         let wanted = FalloffSpec { axis: 0.9, a1: -1.3, a2: 0.8, a3: -0.1 };
         let place = |i: u32| [f64::from(i % 8) * 60.0 / 7.0, f64::from(i / 8) * 40.0 / 7.0];
-        let lit: Vec<_> = (0..64)
-            .map(|i| (place(i), wanted.at(square_of(&pinhole.intrinsics(), place(i)))))
-            .collect();
-        let found = FalloffSpec::fitted(&camera, &lit).unwrap();
+        let lit: Vec<_> = (0..64).map(|i| (place(i), wanted.at(square_of(&k, place(i))))).collect();
+        let found = FalloffSpec::fitted(&k, &lit).unwrap();
         // Four numbers of 64 places in f64, whose equations are conditioned to some 10⁵.
         for (found, wanted) in [
             (found.axis, wanted.axis),
@@ -138,7 +135,7 @@ mod tests {
         ] {
             assert!((found - wanted).abs() < 1e-8, "{found} {wanted}");
         }
-        assert!(FalloffSpec::fitted(&camera, &lit[..1]).is_none());
+        assert!(FalloffSpec::fitted(&k, &lit[..1]).is_none());
         assert!(FalloffSpec { axis: 0.0, ..wanted }.check().is_err());
         assert!(FalloffSpec { a2: f64::NAN, ..wanted }.check().is_err());
     }

@@ -35,7 +35,6 @@ pub use camera::{Camera, PixelExtent, Projection};
 pub use camera_file::{CameraFile, ProjectionName};
 pub use camera_spec::CameraSpec;
 pub use distortion::{Distortion, DistortionSpec};
-pub use exposure::CameraTime;
 pub use falloff::FalloffSpec;
 pub use framing::{Subject, SupportFunction, Viewpoint};
 pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin, SensorSpec};
@@ -44,7 +43,7 @@ pub use lens::{
     RealLensCameraSpec, SharedPaths, SharingLimits, ThinLensCameraSpec, WaveAccuracy, WaveLens,
 };
 pub use light_field::{LightField, LightFieldSpec, ViewGrid};
-pub use motion::{CameraMotionSpec, Kinematics, MotionAxes, Trajectory};
+pub use motion::{CameraMotionSpec, CameraTime, Kinematics, MotionAxes, Trajectory};
 pub use opencv_fit::OpencvFit;
 pub use pinhole::{Orthographic, OrthographicSpec, Pinhole, PinholeSpec};
 pub use pose::{Convention, Maps, Pose, PoseSpec};

@@ -7,7 +7,7 @@ use glam::{DMat3, DQuat, DVec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{CameraError, Convention, Pose, PoseSpec};
+use crate::{CameraError, Convention, Pose, PoseSpec, Shutter};
 use etendue_geometry::hermite::{self, Interpolation, Points, Way};
 use etendue_geometry::units::Seconds;
 
@@ -123,6 +123,28 @@ impl Kinematics {
         let arm = self.pose.rotation * (convention.ours_from_theirs() * at);
         let acceleration = self.acceleration + turn.cross(turn.cross(arm));
         [turn, acceleration - gravity].map(|vector| self.along_camera(vector, convention))
+    }
+}
+
+/// Shutter and motion of a camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraTime {
+    /// The shutter.
+    pub shutter: Shutter,
+    /// The camera's motion, where it moves while the shutter is open.
+    pub motion: Option<Trajectory>,
+    /// Trajectory of the camera, whether it moves while the shutter is open or not.
+    pub trajectory: Option<Trajectory>,
+    /// True if anything of the scene moves while the shutter is open.
+    pub things_move: bool,
+    /// True if some light changes with time.
+    pub lights_change: bool,
+}
+
+impl CameraTime {
+    /// The moment (s) of the frame's pose: that at which data layers see the middle of a picture of so many rows.
+    pub(crate) fn middle(&self, rows: u32) -> f64 {
+        self.shutter.truth(0.5 * f64::from(rows))
     }
 }
 

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use etendue_camera::{
     CameraFile, Convention, PixelOrigin, ProjectionName, Readout, ShutterKind, TruthAt,
 };
-use etendue_files::{MANIFEST, MOST_OWN_BYTES, SOFTWARE, Transaction};
+use etendue_files::{MANIFEST, SOFTWARE, Transaction};
 use etendue_geometry::glam::{DMat3, DQuat};
 use etendue_render::annotations::{self, BOP_DEPTH, COCO, INSTANCES, Models, Shot, Source};
 use etendue_render::denoise::DENOISED;
@@ -20,10 +20,8 @@ use etendue_scene::{Frame, RigCamera, Scene};
 use etendue_tracer::LayerSpec;
 use serde_json::{Map, Value, json};
 
+use crate::records::INDEX;
 use crate::{Error, FramePattern, rendering};
-
-/// File that lists the frames.
-const INDEX: &str = "index.json";
 
 /// File that nerfstudio reads.
 const TRANSFORMS: &str = "transforms.json";
@@ -338,15 +336,6 @@ impl Dataset {
         let [a, b, c] = COLMAP;
         [(a, lines), (b, images), (c, points)]
     }
-}
-
-/// The numbers of the frames of the data set that was written to `folder`.
-pub(crate) fn numbers(folder: &Path) -> Vec<usize> {
-    let index = etendue_files::read(&folder.join(INDEX), MOST_OWN_BYTES).ok();
-    let index: Option<Value> = index.and_then(|bytes| serde_json::from_slice(&bytes).ok());
-    let frames = index.as_ref().and_then(|index| index["frames"].as_array());
-    let number = |frame: &Value| usize::try_from(frame["frame"].as_u64()?).ok();
-    frames.into_iter().flatten().filter_map(number).collect()
 }
 
 /// The files of each layer by their ending, as seen from the data set's folder.

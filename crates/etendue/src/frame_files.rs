@@ -4,15 +4,13 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-use etendue_files::{
-    Ledger, MANIFEST, MOST_OWN_BYTES, Transaction, WriteError, remove_empty_folders,
-};
-use etendue_render::denoise;
+use etendue_files::{MANIFEST, Transaction, WriteError, remove_empty_folders};
 use etendue_render::output::{Outputs, sidecar};
-use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
 
-use crate::{Error, Progress, Rendering, WrittenFiles, dataset, places};
+use crate::records::{
+    RECORD, Record, frame_numbers, is_rendered, numbered, read_record, record_of, remove_recorded,
+};
+use crate::{Error, Progress, Rendering, WrittenFiles, places};
 
 /// Names of the files of frames: `{frame}` stands for the frame's number in six digits, `{layer}` for the
 /// layer's name, and the ending follows.
@@ -21,15 +19,6 @@ pub struct FramePattern {
     text: String,
     /// The part before `{layer}`, when each frame has a folder to itself.
     folder: Option<String>,
-}
-
-/// Record by which a complete frame is known, where its files lie among those of others.
-#[derive(Debug, Default, Serialize, Deserialize)]
-struct Record {
-    /// Entries of its files' headers.
-    fingerprints: Vec<(String, String)>,
-    /// Its files and their sizes (bytes).
-    files: Vec<(String, u64)>,
 }
 
 impl Default for FramePattern {
@@ -193,7 +182,7 @@ impl FramePattern {
     /// that follow the scene's last without a gap.
     pub fn remove_from(&self, out: &Path, count: usize) -> BTreeSet<usize> {
         let following = (count..).take_while(|&number| self.is_begun(out, number));
-        let listed = dataset::numbers(out).into_iter().filter(|number| *number >= count);
+        let listed = frame_numbers(out).into_iter().filter(|number| *number >= count);
         let gone: BTreeSet<usize> =
             following.chain(listed).filter(|&number| self.is_begun(out, number)).collect();
         gone.iter().for_each(|&number| self.remove(out, number));
@@ -235,95 +224,6 @@ impl FramePattern {
         }
         Ok(moved)
     }
-}
-
-/// File that lists the files of a frame, where they lie among those of others.
-const RECORD: &str = "frames/{frame}.json";
-
-/// True if a place that lists files is a record, and no folder.
-pub(crate) fn is_record(place: &Path) -> bool {
-    place.extension().is_some_and(|ending| ending == "json")
-}
-
-/// Removes from `out` what a record lists, as far as it has the size that it had, and the record.
-pub(crate) fn remove_recorded(out: &Path, path: &Path) {
-    let is_plain =
-        |name: &str| Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
-    let files = read_record(path).unwrap_or_default().files;
-    for (name, size) in files.iter().filter(|(name, _)| is_plain(name)) {
-        let file = out.join(name);
-        // What cannot be removed is nobody's loss.
-        if fs::symlink_metadata(&file).is_ok_and(|data| data.is_file() && data.len() == *size) {
-            let _ = fs::remove_file(&file);
-            remove_empty_folders(out, &file);
-        }
-    }
-    let _ = fs::remove_file(path);
-}
-
-fn numbered(text: &str, number: usize) -> String {
-    text.replace("{frame}", &format!("{number:06}"))
-}
-
-fn record_of(out: &Path, number: usize) -> PathBuf {
-    out.join(numbered(RECORD, number))
-}
-
-fn read_record(path: &Path) -> Option<Record> {
-    serde_json::from_slice(&etendue_files::read(path, MOST_OWN_BYTES).ok()?).ok()
-}
-
-/// True if `folder` has a complete picture of the scene with these fingerprints, `files` among its
-/// files, and all as they were written.
-fn is_rendered(folder: &Path, fingerprints: &[(String, String)], files: &[String]) -> bool {
-    let Some((header, found)) = complete_picture(folder) else { return false };
-    // What its noise was taken out of is another picture.
-    let (denoised, _) = denoise::fingerprint();
-    let is_wanted = fingerprints.iter().any(|(key, _)| *key == denoised);
-    is_of(&header, fingerprints)
-        && (is_wanted || header.get(&denoised).is_none())
-        && files.iter().all(|file| found.contains_key(file))
-        && Ledger::open(folder, "render").is_whole()
-}
-
-/// True if a header has these fingerprints among its entries.
-fn is_of(header: &Value, fingerprints: &[(String, String)]) -> bool {
-    let is_same = |(key, print): &(String, String)| {
-        header.get(key).and_then(Value::as_str) == Some(print.as_str())
-    };
-    fingerprints.iter().all(is_same)
-}
-
-/// The header and the files of the picture in `folder`, as [`picture`]; `None` also when it was stopped before
-/// all samples were taken.
-pub(crate) fn complete_picture(folder: &Path) -> Option<(Value, Map<String, Value>)> {
-    picture(folder).filter(|(header, _)| header.get("partial").is_none())
-}
-
-/// The samples a pixel of the picture with these fingerprints in `folder`, where it was stopped before all of
-/// them were taken.
-pub(crate) fn stopped_samples(folder: &Path, fingerprints: &[(String, String)]) -> Option<u64> {
-    let (header, _) = picture(folder)?;
-    header.get("partial").filter(|_| is_of(&header, fingerprints))?;
-    header.get("samples")?.as_str()?.parse().ok()
-}
-
-/// The header and the files of the picture in `folder`; `None` when there is none, or when a file of it is
-/// missing.
-fn picture(folder: &Path) -> Option<(Value, Map<String, Value>)> {
-    let read = |name: &str| -> Option<Value> {
-        let bytes = etendue_files::read(&folder.join(name), MOST_OWN_BYTES).ok()?;
-        serde_json::from_slice(&bytes).ok()
-    };
-    let header = read("layers.json")?.get("header")?.clone();
-    let Value::Object(files) = read(MANIFEST)?.pointer("/files/render")?.clone() else {
-        return None;
-    };
-    let is_there = |(name, print): (&String, &Value)| {
-        let bytes = print.get("bytes").and_then(Value::as_u64);
-        folder.join(name).metadata().is_ok_and(|data| Some(data.len()) == bytes)
-    };
-    files.iter().all(is_there).then_some((header, files))
 }
 
 #[cfg(test)]

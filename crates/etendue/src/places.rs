@@ -7,7 +7,7 @@ use etendue_files::{
     Ledger, MANIFEST, Transaction, WriteError, prepare_folder, remove_empty_folders,
 };
 
-use crate::{Error, frame_files};
+use crate::{Error, records};
 
 /// Makes `folder` and checks that it can be written to.
 ///
@@ -88,8 +88,8 @@ pub(crate) fn clear(folder: &Path) {
 /// Removes what a ledger lists from before and not again, also in places below that list files of their own.
 fn clear_listed(ledger: &mut Ledger) -> Result<(), WriteError> {
     for place in ledger.stale_below() {
-        match frame_files::is_record(&place) {
-            true => frame_files::remove_recorded(ledger.folder(), &place),
+        match records::is_record(&place) {
+            true => records::remove_recorded(ledger.folder(), &place),
             false => clear(&place),
         }
         remove_empty_folders(ledger.folder(), &place);

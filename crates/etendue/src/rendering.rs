@@ -21,8 +21,8 @@ use etendue_scene::Scene;
 use etendue_scene::file::SceneSpec;
 use etendue_sensor::{Exposure, RawImage};
 
-use crate::frame_files::{complete_picture, stopped_samples};
 use crate::progress::Phase;
+use crate::records::{complete_picture, stopped_samples};
 use crate::{Error, Progress, places};
 
 /// The folder of a stopped picture, in that of a complete one.

@@ -1,6 +1,7 @@
 //! A scene that is opened once and rendered often.
 
 mod coarse;
+mod loaded;
 mod meshes;
 mod opening;
 mod prepare;
@@ -26,14 +27,15 @@ use serde_json::Value;
 
 pub use meshes::MeshAttributes;
 pub use opening::read_glasses;
+pub use render::Shares;
 
-use self::coarse::CoarseScene;
+use self::loaded::LoadedScene;
 use crate::changes;
-use crate::neighbours::{self, Neighbour};
+use crate::neighbours;
 use crate::rendering::{certain_files, file_names};
 use crate::structures::Structures;
 use crate::words::{fingerprints, in_words};
-use crate::{Dataset, Error, FramePattern, Options, Progress, Prospect, places, rendering};
+use crate::{Dataset, Error, FramePattern, Options, Progress, places, rendering};
 
 /// A scene that is opened once, changed by [`set`](Self::set) and rendered as often as one likes.
 ///
@@ -73,37 +75,24 @@ pub struct Session {
     metered: Option<f64>,
 }
 
+/// Prospect of a render: what is known of a scene before it is rendered.
+#[derive(Debug, Clone, Copy)]
+pub struct Prospect<'a> {
+    /// The loaded scene.
+    pub scene: &'a Scene,
+    /// Its plan.
+    pub plan: &'a Plan,
+    /// The files that are wanted.
+    pub outputs: Outputs,
+    /// Duration of loading (s).
+    pub load: f64,
+}
+
 /// A scene, the structure over it, and its images.
 pub(crate) struct PreparedScene {
     pub(crate) scene: Arc<Scene>,
     pub(crate) accel: Arc<dyn Accel>,
     pub(crate) images: Arc<Images>,
-}
-
-/// The scene as it is now: while its picture is rendered, the one in its place.
-struct LoadedScene {
-    scene: Arc<Scene>,
-    plan: Plan,
-    notes: Vec<String>,
-    /// The structure over it, once it is built.
-    accel: Option<Arc<dyn Accel>>,
-    /// Other frames that it is compared with.
-    neighbours: Vec<Neighbour>,
-    /// State of the images of this scene: whether they are decoded, and how much of them.
-    decoded: DecodedImages,
-    /// Coarser scene that is rendered in its place, once that was looked for.
-    coarse: Option<CoarseScene>,
-}
-
-/// State of a scene's images.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum DecodedImages {
-    /// Nothing yet.
-    Nothing,
-    /// All of those that are looked at.
-    Whole,
-    /// As much as the rays of the picture can tell apart, where the scene has a tolerance.
-    ForPicture,
 }
 
 impl fmt::Debug for Session {

@@ -8,7 +8,7 @@
 //! finish wins. The rename is atomic for everyone who looks at the folder; data may still be on its
 //! way to the disk when it happens, so a power cut within seconds can lose it.
 //!
-//! Files of one [`Transaction`] take their names when all of them are complete.
+//! Files of one [`Transaction`](crate::Transaction) take their names when all of them are complete.
 //!
 //! Part files are locked by the process that writes them. One that is not is left from a process that
 //! was killed, and the next one that writes into the folder removes it.
@@ -19,13 +19,13 @@
 use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fs::{self, File};
-use std::io::{self, Seek, SeekFrom, Write};
+use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::{Builder, NamedTempFile};
 
-use crate::{Transaction, WriteError};
+use crate::WriteError;
 
 /// The part files of this process, for a signal handler: what a signal ends is not dropped.
 static OPEN: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
@@ -98,17 +98,9 @@ fn target_of_part(name: &str) -> Option<&str> {
     is_random.then_some(target)
 }
 
-/// A file on its way. Dropped without [`Self::finish`], it leaves nothing behind.
-#[derive(Debug)]
-pub struct PartFile<'t> {
-    content: Content,
-    target: PathBuf,
-    transaction: &'t Transaction,
-}
-
 /// Place of a file's content until it is complete.
 #[derive(Debug)]
-enum Content {
+pub(crate) enum Content {
     /// Beside its place, to be renamed.
     Beside {
         file: NamedTempFile,
@@ -120,74 +112,30 @@ enum Content {
     Apart { file: File, to: Special },
 }
 
-impl<'t> PartFile<'t> {
-    /// A part file beside `target`, for [`Transaction::create`].
-    pub(crate) fn create(transaction: &'t Transaction, target: &Path) -> Result<Self, WriteError> {
-        let refuse = |source| WriteError::io(target, source);
-        if target.is_dir() || target.file_name().is_none() {
-            return Err(refuse(io::ErrorKind::IsADirectory.into()));
+impl Content {
+    /// None as yet, of what is to be written to `target`.
+    pub(crate) fn begin(target: &Path) -> io::Result<Self> {
+        if let Some(to) = Special::of(target) {
+            return Ok(Self::Apart { file: tempfile::tempfile()?, to });
         }
-        let target = target.to_owned();
-        if let Some(to) = Special::of(&target) {
-            let file = tempfile::tempfile().map_err(refuse)?;
-            return Ok(Self { content: Content::Apart { file, to }, target, transaction });
-        }
-        if let (Some(name), Some(folder)) = (target.file_name(), folder_of(&target)) {
+        if let (Some(name), Some(folder)) = (target.file_name(), folder_of(target)) {
             remove_leftovers(folder, |left| name == left);
         }
         // The set is locked until the new file is in it: a handler that reads it misses none.
         let mut open = open_set();
-        let file = open_beside(&target).map_err(refuse)?;
+        let file = open_beside(target)?;
         let path = absolute(file.path());
         open.insert(path.clone());
         drop(open);
-        Ok(Self {
-            content: Content::Beside { file, entry: PartRegistration(path) },
-            target,
-            transaction,
-        })
+        Ok(Self::Beside { file, entry: PartRegistration(path) })
     }
 
-    fn file(&mut self) -> &mut File {
-        match &mut self.content {
-            Content::Beside { file, .. } => file.as_file_mut(),
-            Content::Apart { file, .. } => file,
+    /// The file that it is written to.
+    pub(crate) fn file(&mut self) -> &mut File {
+        match self {
+            Self::Beside { file, .. } => file.as_file_mut(),
+            Self::Apart { file, .. } => file,
         }
-    }
-
-    /// Says that the file is complete: it takes its name, in place of what had it before, now or with the
-    /// others of its transaction.
-    ///
-    /// # Errors
-    ///
-    /// [`WriteError`] when it cannot be renamed, or an input has the name by now; the part file is removed
-    /// then.
-    pub fn finish(self) -> Result<(), WriteError> {
-        let Self { content, target, transaction } = self;
-        match content {
-            Content::Beside { file, entry } => transaction.take(file, target, entry),
-            Content::Apart { mut file, to } => {
-                to.fill(&target, &mut file).map_err(|source| WriteError::io(&target, source))?;
-                transaction.note_finished(target);
-                Ok(())
-            }
-        }
-    }
-}
-
-impl Write for PartFile<'_> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file().write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.file().flush()
-    }
-}
-
-impl Seek for PartFile<'_> {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.file().seek(to)
     }
 }
 
@@ -309,7 +257,10 @@ fn own_stream(_target: &fs::Metadata) -> Option<File> {
 
 #[cfg(test)]
 mod tests {
+    use std::io::SeekFrom;
+
     use super::*;
+    use crate::Transaction;
 
     fn names(folder: &Path) -> Vec<String> {
         let mut names: Vec<_> = fs::read_dir(folder)

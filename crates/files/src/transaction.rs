@@ -5,13 +5,14 @@
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
-use std::io;
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::{NamedTempFile, TempPath};
 
-use crate::part::{PartFile, PartRegistration};
+use crate::WriteError;
+use crate::part::{Content, PartRegistration};
 
 /// Files that are kept open while they wait: a process may not have many more.
 const MOST_OPEN: usize = 200;
@@ -142,7 +143,7 @@ impl Transaction {
     }
 
     /// Takes a complete part file of `target`.
-    pub(crate) fn take(
+    fn take(
         &self,
         file: NamedTempFile,
         target: PathBuf,
@@ -169,6 +170,61 @@ impl Transaction {
     }
 }
 
+/// A file on its way. Dropped without [`Self::finish`], it leaves nothing behind.
+#[derive(Debug)]
+pub struct PartFile<'t> {
+    content: Content,
+    target: PathBuf,
+    transaction: &'t Transaction,
+}
+
+impl<'t> PartFile<'t> {
+    /// A part file beside `target`, for [`Transaction::create`].
+    fn create(transaction: &'t Transaction, target: &Path) -> Result<Self, WriteError> {
+        let refuse = |source| WriteError::io(target, source);
+        if target.is_dir() || target.file_name().is_none() {
+            return Err(refuse(io::ErrorKind::IsADirectory.into()));
+        }
+        let content = Content::begin(target).map_err(refuse)?;
+        Ok(Self { content, target: target.to_owned(), transaction })
+    }
+
+    /// Says that the file is complete: it takes its name, in place of what had it before, now or with the
+    /// others of its transaction.
+    ///
+    /// # Errors
+    ///
+    /// [`WriteError`] when it cannot be renamed, or an input has the name by now; the part file is removed
+    /// then.
+    pub fn finish(self) -> Result<(), WriteError> {
+        let Self { content, target, transaction } = self;
+        match content {
+            Content::Beside { file, entry } => transaction.take(file, target, entry),
+            Content::Apart { mut file, to } => {
+                to.fill(&target, &mut file).map_err(|source| WriteError::io(&target, source))?;
+                transaction.note_finished(target);
+                Ok(())
+            }
+        }
+    }
+}
+
+impl Write for PartFile<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.content.file().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.content.file().flush()
+    }
+}
+
+impl Seek for PartFile<'_> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.content.file().seek(to)
+    }
+}
+
 /// Identity that two names of one file share, links followed: device and inode.
 #[cfg(unix)]
 type FileIdentity = (u64, u64);
@@ -188,66 +244,8 @@ fn identity(path: &Path) -> Option<FileIdentity> {
     fs::canonicalize(path).ok()
 }
 
-/// Error of a file that was not written. What stood under its name before still does.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum WriteError {
-    /// The system refused.
-    #[error("cannot write {}: {source}\nhint: {remedy}", path.display())]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        /// The system's answer.
-        source: io::Error,
-        /// Remedy.
-        remedy: &'static str,
-    },
-    /// The file is an input.
-    #[error(
-        "{} would be written over, and is read by this command{}; nothing was written\n\
-         hint: choose another folder or name",
-        path.display(),
-        also_called(path, input)
-    )]
-    IsInput {
-        /// The file that was to be written.
-        path: PathBuf,
-        /// The name under which it is read.
-        input: PathBuf,
-    },
-}
-
-/// The name that an input is read under, where it is another.
-fn also_called(path: &Path, input: &Path) -> String {
-    if path == input { String::new() } else { format!(" as {}", input.display()) }
-}
-
-impl WriteError {
-    /// The system's refusal of `path`, with what to do about it.
-    #[must_use]
-    pub fn io(path: &Path, source: io::Error) -> Self {
-        let remedy = match source.kind() {
-            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
-                "make the folder writable or choose another one"
-            }
-            io::ErrorKind::NotFound => "create the folder first or choose another one",
-            io::ErrorKind::AlreadyExists => "it is a file; choose another folder",
-            io::ErrorKind::NotADirectory => "a part of the path is a file; choose another folder",
-            io::ErrorKind::IsADirectory => "a folder has this name; choose another name",
-            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
-                "free some space or choose a folder on another disk"
-            }
-            io::ErrorKind::InvalidFilename => "choose a shorter or simpler name",
-            _ => "check the folder and its disk, or choose another one",
-        };
-        Self::Io { path: path.to_owned(), source, remedy }
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use std::io::Write;
-
     use super::*;
 
     fn put(files: &Transaction, path: &Path, text: &str) {

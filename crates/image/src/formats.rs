@@ -1,4 +1,4 @@
-//! Formats whose decoders are called here and not by the crate `image`.
+//! What decoders of the crate `image` have, and formats whose decoders are called here and not by it.
 //!
 //! OpenEXR files: colour, or luminance alone.
 //!
@@ -7,14 +7,14 @@
 
 use std::io::{BufRead, Cursor, Read};
 
+use bytemuck::Pod;
 use exr::meta::header::Header;
 use exr::meta::{BlockDescription, MetaData};
 use exr::prelude::*;
 use image::codecs::hdr::HdrDecoder;
+use image::{ColorType, ImageDecoder};
 
-use crate::{
-    DecodeError, ExrChannels, Limits, MOST_BYTES, Plane, Raster, Samples, bytes_of, read, room,
-};
+use crate::{DecodeError, ExrChannels, Limits, MOST_BYTES, Plane, Raster, Samples, room};
 
 // The prelude below has another.
 use std::result::Result;
@@ -275,4 +275,48 @@ pub(crate) fn is_cut_jpeg(bytes: &[u8]) -> bool {
         let Some(data) = data else { return true };
         rest = &behind[data..];
     }
+}
+
+/// Bytes of what `decoder` will read.
+pub(crate) fn bytes_of(decoder: &impl ImageDecoder) -> u64 {
+    let (width, height) = decoder.dimensions();
+    let texel = u64::from(decoder.color_type().bytes_per_pixel());
+    u64::from(width).saturating_mul(height.into()).saturating_mul(texel)
+}
+
+/// Reads what `decoder` has, once its size is judged.
+pub(crate) fn read(decoder: impl ImageDecoder, limits: Limits) -> Result<Raster, DecodeError> {
+    let (width, height) = decoder.dimensions();
+    let color = decoder.color_type();
+    let texels = limits.judge([width, height].map(u64::from), color.bytes_per_pixel().into())?;
+    let channels = usize::from(color.channel_count());
+    let count = texels * channels;
+    let samples = match color {
+        ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => {
+            Samples::U8(filled(decoder, count)?)
+        }
+        ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => {
+            Samples::U16(filled(decoder, count)?)
+        }
+        ColorType::Rgb32F | ColorType::Rgba32F => Samples::F32(filled(decoder, count)?),
+        other => {
+            return Err(DecodeError::Refused(format!(
+                "its texels are {other:?}, which is not read"
+            )));
+        }
+    };
+    Ok(Raster::new([width, height].map(|side| side as usize), channels, samples))
+}
+
+fn filled<T: Pod>(decoder: impl ImageDecoder, count: usize) -> Result<Vec<T>, DecodeError> {
+    let mut values = zeroed::<T>(count)?;
+    decoder.read_image(bytemuck::cast_slice_mut(&mut values))?;
+    Ok(values)
+}
+
+/// So many zeros, where there is memory for them.
+fn zeroed<T: Pod>(count: usize) -> Result<Vec<T>, DecodeError> {
+    let mut values = room(count)?;
+    values.resize(count, T::zeroed());
+    Ok(values)
 }

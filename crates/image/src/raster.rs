@@ -1,5 +1,6 @@
 //! Texels as a file has them.
 
+use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use exr::prelude::f16;
@@ -190,4 +191,24 @@ pub(crate) fn linear_of_bytes() -> &'static [f64; 256] {
 #[must_use]
 pub fn linear_from_srgb(c: f64) -> f64 {
     if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+}
+
+/// The values of one channel of an EXR file, by rows.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Plane {
+    /// Half or single precision.
+    F32(Vec<f32>),
+    /// Integers.
+    U32(Vec<u32>),
+}
+
+/// All channels of an EXR file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExrChannels {
+    /// Columns and rows.
+    pub size: [usize; 2],
+    /// The channels by their full names (`R`, `Depth.Z`), in the file's order: that of their names.
+    pub planes: Vec<(String, Plane)>,
+    /// Attributes of the header that are text.
+    pub texts: BTreeMap<String, String>,
 }

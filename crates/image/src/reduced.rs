@@ -7,32 +7,7 @@
 use std::io::Cursor;
 
 use crate::raster::linear_of_bytes;
-use crate::{DecodeError, Limits, Raster, Samples, room};
-
-/// Permitted coarseness of an image.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Coarseness {
-    /// The least width over which it is averaged whenever it is looked up, as a share of its shorter side.
-    pub footprint: f64,
-    /// True if integers are colours by the sRGB curve; else they are shares of full scale.
-    pub is_srgb: bool,
-}
-
-impl Coarseness {
-    /// Number of times that both sides may be halved, so that no texel is wider than what is averaged over.
-    #[must_use]
-    pub fn halvings(&self, size: [usize; 2]) -> u32 {
-        let [width, height] = size;
-        if width == 0 || height == 0 {
-            return 0;
-        }
-        let even = width.trailing_zeros().min(height.trailing_zeros());
-        let texels = self.footprint * width.min(height) as f64;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it saturates")]
-        let allowed = texels.log2().floor().max(0.0) as u32;
-        allowed.min(even)
-    }
-}
+use crate::{Coarseness, DecodeError, Limits, Raster, Samples, room};
 
 /// `raster` as coarse as it may be; as it is where that is as fine.
 pub(crate) fn reduced(raster: Raster, coarse: Coarseness) -> Result<Raster, DecodeError> {

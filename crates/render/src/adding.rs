@@ -6,7 +6,9 @@ use etendue_camera::{BandLandings, CameraRays, LensCamera};
 use etendue_tracer::layer::RaySource;
 
 use crate::film::{PlaneRows, Strip};
-use crate::sampling::{DIFFUSION_PAIR, Memory, SampleRun, SampledQuantity, Sampling, TIME_PAIR};
+use crate::sampling::{
+    DIFFUSION_PAIR, Memory, PUPIL_PAIR, SampleRun, SampledQuantity, Sampling, TIME_PAIR,
+};
 use crate::sum::{Sum, add_run};
 use crate::tile::{TILE, Tile};
 use crate::watch::{Stopped, Watcher};
@@ -141,7 +143,7 @@ impl Adding<'_> {
     }
 
     /// Adds to each of `pixels` the samples `range` of both its sets together, which are even numbers. Where light lands
-    /// each counts as its share of them.
+    /// each counts as its share of its set.
     fn tile_of_wanted(
         &self,
         tile: Tile,
@@ -156,7 +158,7 @@ impl Adding<'_> {
             let Range { start, end } = range(pixel.0, pixel.1);
             let share = match to {
                 Destination::Starts => 1.0,
-                Destination::Landings(_) => 1.0 / f64::from(end - start),
+                Destination::Landings(_) => f64::from(sets) / f64::from(end - start),
             };
             for set in 0..sets {
                 let (mut first, end) = (start / sets, end / sets);
@@ -226,7 +228,7 @@ impl Adding<'_> {
         match to {
             Destination::Starts => memory.add_where_it_starts(shape),
             Destination::Landings(window) => {
-                memory.add_where_it_lands(window, shape, width as usize);
+                memory.add_where_it_lands(window, shape, [width, self.sampling.sets]);
             }
         }
         self.watcher.did(counted as u64)
@@ -275,6 +277,7 @@ impl Adding<'_> {
         let pixel = |run: &SampleRun| [tile.left + run.pixel.0, tile.top + run.pixel.1];
         numbers
             .refill(|all| runs.iter().for_each(|run| self.sampling.extend(pixel(run), run, all)));
+        numbers.has_pupil = self.what.camera().has_pupil();
         let count = numbers.samples.len();
         // Their places on the sensor, in the pupil, and in the spectrum.
         let draw = |pair, out: &mut Vec<_>| numbers.draw(pair, out);
@@ -302,7 +305,7 @@ impl Adding<'_> {
         }
         let lens = self.what.camera().lens();
         match self.what.camera().has_pupil() {
-            true => draw(1, &mut film.pupil),
+            true => draw(PUPIL_PAIR, &mut film.pupil),
             false => film.pupil.resize(count, [0.5; 2]),
         }
         let is_shared = self.what.shared_rows().is_some();
@@ -384,10 +387,10 @@ impl Memory {
         &mut self,
         window: &mut RowSums<'_>,
         [layers, bands]: [usize; 2],
-        width: usize,
+        [width, sets]: [u32; 2],
     ) {
-        let Self { rays, values, landings, film, shares, order, .. } = self;
-        let count = layers * bands;
+        let Self { rays, values, landings, film, slots, shares, order, .. } = self;
+        let (count, width) = (layers * bands, width as usize);
         let RowSums { first, rows, sums } = window;
         let mut add = |ray: usize| {
             let sample = rays.sample[ray] as usize;
@@ -407,9 +410,10 @@ impl Memory {
                     continue;
                 }
                 let weight = landings.weight[ray * bands + band] * shares[sample];
+                let at = (pixel - first) * sets as usize + (slots[sample] % sets) as usize;
                 for layer in 0..layers {
                     let value = values[ray * count + layer * bands + band];
-                    sums[(pixel - first) * count + layer * bands + band].add(value * weight);
+                    sums[at * count + layer * bands + band].add(value * weight);
                 }
             }
         };

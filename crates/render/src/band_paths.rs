@@ -14,10 +14,6 @@ use crate::stopping::Stopping;
 /// So many bands of direct light are traced each by itself. Not a setting: `plan.shared_paths` decides.
 const FEW_BANDS: usize = 8;
 
-/// So many bands, or groups of them, are traced each by itself where shared paths are taken twice: once to find out how
-/// many samples each pixel wants, once to let their light land.
-const FEW_GROUPS: usize = 4;
-
 /// The most memory that the sums of bands may take which share paths: they are kept for the whole film. Not a setting:
 /// it changes time alone.
 const MOST_BYTES_OF_SUMS: u64 = 2 << 30;
@@ -56,10 +52,9 @@ impl BandPaths {
             return Self::Apart(why.to_owned());
         }
         let sets = if stopping.is_adaptive() { u64::from(SETS) } else { 1 };
-        let is_twice = stopping.is_adaptive() && lens.band_groups(bands).len() <= FEW_GROUPS;
-        if scene.plan.shared_paths.is_none() && is_twice {
+        if scene.plan.shared_paths.is_none() && stopping.is_adaptive() {
             let why =
-                "samples until an error is reached take shared paths twice, and bands are few";
+                "samples stop at an error, and how unevenly light lands is known too late for that";
             return Self::Apart(why.to_owned());
         }
         if scene.camera.light_of_rows_differs() {

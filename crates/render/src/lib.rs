@@ -50,6 +50,7 @@ mod sampling;
 pub mod serial;
 mod shard;
 mod sparkles;
+mod state;
 mod stopping;
 mod sum;
 mod tile;
@@ -68,10 +69,9 @@ pub use images::Images;
 pub use memory::NoMemory;
 pub use other_frame::FollowedFrame;
 pub use plan::{Plan, Unseen};
-pub use render::{
-    Film, Prepared, Progress, RenderState, Rendered, finish, render, sample_set, trace,
-};
+pub use render::{Progress, Rendered, finish, render, sample_set, trace};
 pub use report::{Report, Seconds};
 pub use shard::{Shard, ShardBy};
+pub use state::{Film, Prepared, RenderState};
 pub use stopping::Stopping;
 pub use watch::{SoFar, Watch};

@@ -14,8 +14,9 @@ use crate::error::RenderError;
 use crate::film::FilmLayer;
 use crate::film_file::{FilmFile, Identity, Writing, must_be_whole};
 use crate::output::OutputError;
-use crate::render::{Film, empty_film};
+use crate::render::empty_film;
 use crate::shard::Shard;
+use crate::state::Film;
 use crate::tile::RayCounts;
 use crate::tiles::SamplesTaken;
 

@@ -98,7 +98,12 @@ impl Job<'_> {
                 counts,
             });
         }
-        parts.iter_mut().try_for_each(|part| part.land(adaptive.have(), watcher, traffic))?;
+        if let (true, Some(passed)) = (lands, &mut passed) {
+            parts.iter_mut().try_for_each(|part| part.land(adaptive.have(), watcher, traffic))?;
+            adaptive.judge_landed(parts);
+            adaptive.show(parts, others.of_sampling);
+            passed.counts = adaptive.counts();
+        }
         // A share without rows wants nothing.
         let all = SamplesTaken { samples: self.sampling.samples, is_complete: true, counts: None };
         Ok(passed.unwrap_or(all))

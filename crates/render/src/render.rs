@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 use etendue_accel::Accel;
 use etendue_camera::{Camera, LensCamera, PixelExtent};
 use etendue_optics::element::StatusCounts;
-use etendue_report::Refusal;
 use etendue_scene::Scene;
 use etendue_scene::file::{LightRow, SETS};
 use etendue_sensor::Sensor;
@@ -18,23 +17,22 @@ use etendue_tracer::{
 };
 
 use crate::adaptive::{Rule, SampleCounts};
-use crate::checkpoint::{Checkpoint, Keeper};
+use crate::checkpoint::Keeper;
 use crate::error::RenderError;
 use crate::film::FilmLayer;
-use crate::film_file::{FilmFile, Identity, must_be_whole};
+use crate::film_file::FilmFile;
 use crate::images::Images;
 use crate::memory::NoMemory;
-use crate::other_frame::FollowedFrame;
 use crate::output::{Development, Layer, Picture, PictureError};
 use crate::radiance::LightPass;
 use crate::sampling::{Sampling, short_passes};
 use crate::shard::Shard;
-use crate::stopping::Stopping;
-use crate::sum::Sum;
 use crate::tile::RayCounts;
 use crate::tiles::{Job, JobResult, SamplesTaken};
 use crate::watch::{Watch, Watcher};
 use crate::{Plan, diffraction, expose, lighting, names};
+
+pub use crate::state::{Film, Prepared, RenderState};
 
 /// Told the share done (0..=1) now and then; answering `false` stops.
 pub type Progress = Arc<dyn Fn(f64) -> bool + Send + Sync>;
@@ -63,66 +61,6 @@ pub struct Rendered {
     pub trace_time: Duration,
     /// Notes on the picture for the user.
     pub notes: Vec<String>,
-}
-
-/// Data made ready for a frame.
-#[derive(Debug, Clone, Copy)]
-pub struct Prepared<'a> {
-    /// The structure over the scene's geometry.
-    pub accel: &'a dyn Accel,
-    /// The images that the plan wants.
-    pub images: &'a Images,
-    /// The frames that layers compare this one with; a layer whose frame is not here finds nothing there.
-    pub others: &'a [FollowedFrame<'a>],
-}
-
-/// Scope of a render: which part of it is wanted, and where it is kept on the way.
-#[derive(Debug, Clone, Default)]
-pub struct RenderState<'a> {
-    /// The share of the picture's rows, or of its samples; all of it when absent.
-    pub shard: Option<Shard>,
-    /// Shares of the samples, which are put together instead of being traced.
-    pub shares: &'a [FilmFile],
-    /// Checkpoint: where what there is so far is kept, and found again.
-    pub checkpoint: Option<Checkpoint>,
-    /// Identity of the render, which other shares, and what was kept, must have too.
-    pub identity: Identity,
-}
-
-impl RenderState<'_> {
-    /// Refuses what cannot be kept, or put together.
-    fn allows(&self, stopping: Stopping) -> Result<(), RenderError> {
-        if !self.shares.is_empty() {
-            must_be_whole(self.shares, &self.identity).map_err(Refusal::new)?;
-        }
-        let is_kept = self.checkpoint.is_some();
-        match stopping {
-            Stopping::Time(_) if is_kept || self.shard.is_some() => Err(RenderError::timed()),
-            _ if stopping.is_adaptive() && is_kept => Err(RenderError::adaptive_checkpoint()),
-            _ if stopping.is_adaptive() && self.shard.is_some_and(Shard::is_of_samples) => {
-                Err(RenderError::adaptive_shares())
-            }
-            _ => Ok(()),
-        }
-    }
-}
-
-/// A film with what was traced onto it.
-#[derive(Debug)]
-pub struct Film {
-    pub(crate) layers: Vec<FilmLayer>,
-    pub(crate) resolution: [u32; 2],
-    pub(crate) shard: Shard,
-    pub(crate) counts: RayCounts,
-    pub(crate) passed: SamplesTaken,
-    pub(crate) trace_time: Duration,
-    /// Of a share of the samples, the sums of what is averaged.
-    pub(crate) sums: Vec<Vec<Sum>>,
-    /// The layers that are not averaged.
-    pub(crate) centres: Vec<LayerSpec>,
-    pub(crate) notes: Vec<String>,
-    /// The camera as it was opened for it.
-    pub(crate) camera: Option<Camera>,
 }
 
 /// Renders `scene` as planned. Runs on the threads of the current rayon pool; the picture does not
@@ -215,7 +153,7 @@ pub fn trace(
     let shared = shared.and_then(LensCamera::opened_paths);
     // Light that is spread as waves are is traced by itself.
     let whole = Prepared { accel, images, others };
-    let spread = diffraction::spread_light(scene, plan, whole, state, &light_camera, watch)?;
+    let spread = diffraction::spread_light(scene, plan, whole, state, &light_camera, watch, trace)?;
     // Lights, the studio among them where all else leaves the scene dark.
     let surroundings = surroundings(scene, images, scene.render.samples.typical());
     let traced = if plan.alike { &Bands::Grey } else { &plan.bands };
@@ -302,42 +240,6 @@ pub(crate) fn empty_film(scene: &Scene, plan: &Plan) -> Result<Vec<FilmLayer>, N
         .collect()
 }
 
-impl Film {
-    /// One on which nothing was traced, without layers, of a share of a picture of so many columns and rows.
-    pub(crate) fn without_layers(resolution: [u32; 2], shard: Shard, samples: u32) -> Self {
-        Self {
-            layers: Vec::new(),
-            resolution,
-            shard,
-            counts: RayCounts::default(),
-            passed: SamplesTaken { samples, is_complete: true, counts: None },
-            trace_time: Duration::ZERO,
-            sums: Vec::new(),
-            centres: Vec::new(),
-            notes: Vec::new(),
-            camera: None,
-        }
-    }
-
-    /// True if the film has all samples that were wanted: a film of a render that was stopped has not.
-    #[must_use]
-    pub fn is_complete(&self) -> bool {
-        self.passed.is_complete
-    }
-
-    /// Notes on the film for the user.
-    #[must_use]
-    pub fn notes(&self) -> &[String] {
-        &self.notes
-    }
-
-    /// Wall time of its tracing alone.
-    #[must_use]
-    pub fn trace_time(&self) -> Duration {
-        self.trace_time
-    }
-}
-
 /// The picture on a film. With an accelerator it is judged, too, whether it is black.
 ///
 /// # Errors
@@ -421,7 +323,7 @@ fn finished(
         .collect();
     layers.extend(expose::spectrum(scene, &layers, band_film.as_ref())?);
     let picture = Picture::new(width, height, layers, header)?.with_names(names::tables(scene));
-    let development = Development::new(&scene.render, &picture);
+    let development = Development::new(&scene.render, picture.layer(""));
     Ok((picture.developed(development), band_film))
 }
 
@@ -459,7 +361,7 @@ fn so_far(
     };
     let header = marked(header.to_vec(), samples.to_string(), [samples, plan.samples]);
     let picture = Picture::new(width, height, layers, header)?;
-    let development = Development::new(&scene.render, &picture);
+    let development = Development::new(&scene.render, picture.layer(""));
     Ok(picture.developed(development))
 }
 

@@ -73,7 +73,7 @@ impl<'a> Averaging<'a> {
 
     /// Takes again the samples that each pixel has, in rows from the top, once it is known how many they are: where
     /// bands share paths, light lands on pixels beside its own, and counts by the samples of the pixel that it started
-    /// from.
+    /// from. Then each set has one value, the mean of what landed of it.
     pub(crate) fn land(
         &mut self,
         have: &[u32],
@@ -81,12 +81,9 @@ impl<'a> Averaging<'a> {
         traffic: &Mutex<RayCounts>,
     ) -> Result<(), Stopped> {
         let Some(rows) = self.what.shared_rows() else { return Ok(()) };
-        // The sums of both sets have told what they were to tell.
-        self.sums.truncate(self.sums.len() / self.sampling.sets as usize);
+        // The sums of where light starts have told what they were to tell.
         self.sums.fill(Sum::default());
-        self.add_shared(rows, Work::Wanted(&|pixel| 0..have[pixel]), watcher, traffic)?;
-        self.show(1);
-        Ok(())
+        self.add_shared(rows, Work::Wanted(&|pixel| 0..have[pixel]), watcher, traffic)
     }
 
     fn add_to(
@@ -138,7 +135,7 @@ impl<'a> Averaging<'a> {
         let (spare, sampling) = (&*spare, *sampling);
         let [width, height] = what.camera().resolution();
         let [count, bands] = what.shape();
-        let a_row = width as usize * count * bands;
+        let a_row = width as usize * count * bands * sampling.sets as usize;
         let adding = Adding { what: *what, sampling, work, watcher };
         let sets = 1 + (2 * rows).div_ceil(TILE);
         for set in 0..sets {

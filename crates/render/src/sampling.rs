@@ -34,6 +34,9 @@ const SHARE_OF_PASS: u32 = 8;
 /// share paths the leading one, and one that nothing draws, so that light's pairs begin with a set of its own.
 pub(crate) const CAMERA_PAIRS: u32 = 4;
 
+/// The pair of random numbers that is a sample's place in the pupil.
+pub(crate) const PUPIL_PAIR: u32 = 1;
+
 /// The pair of random numbers whose first is a sample's time: the last that there is, which light never gets to.
 pub(crate) const TIME_PAIR: u32 = u32::MAX;
 
@@ -175,6 +178,8 @@ pub(crate) struct SampleNumbers {
     pub(crate) of_ray: Vec<u32>,
     /// Each sample has a ray, in order.
     is_straight: bool,
+    /// Samples have places in a pupil.
+    pub(crate) has_pupil: bool,
     /// By sample.
     keys: SampleKeys,
 }
@@ -208,13 +213,21 @@ impl SampleNumbers {
     }
 }
 
+impl SampleNumbers {
+    /// Pair of the sampler that is light's pair of this number. Its first is even together with the place in the pixel
+    /// where no place in a pupil is.
+    fn pair_of_light(&self, pair: u32) -> u32 {
+        if pair == 0 && !self.has_pupil { PUPIL_PAIR } else { CAMERA_PAIRS + pair }
+    }
+}
+
 impl Samples for SampleNumbers {
     fn squares_of_pair(&self, rays: &[u32], pair: u32, out: &mut Vec<[f64; 2]>) {
-        self.keys.squares_of_pair(&self.samples_of(rays), CAMERA_PAIRS + pair, out);
+        self.keys.squares_of_pair(&self.samples_of(rays), self.pair_of_light(pair), out);
     }
 
     fn floats_of_pair(&self, rays: &[u32], pair: u32, out: &mut [Vec<f32>; 2]) {
-        self.keys.floats_of_pair(&self.samples_of(rays), CAMERA_PAIRS + pair, out);
+        self.keys.floats_of_pair(&self.samples_of(rays), self.pair_of_light(pair), out);
     }
 }
 

@@ -8,7 +8,8 @@ use crate::error::RenderError;
 use crate::film::FilmLayer;
 use crate::memory::filled;
 use crate::output::Values;
-use crate::render::{Film, empty_film};
+use crate::render::empty_film;
+use crate::state::Film;
 use crate::{Plan, Shard};
 
 /// A film onto which the light of slots is added.

@@ -11,8 +11,9 @@ use etendue_geometry::{Geometry, Mesh};
 use etendue_tracer::Material;
 use xxhash_rust::xxh3::Xxh3Default;
 
+use crate::SceneError;
+use crate::cameras::CameraOrigin;
 use crate::import::{Import, ImportedPlacement, Play, Stats, Strictness, Wanted};
-use crate::{CameraOrigin, SceneError};
 
 /// Models, cameras and fingerprints of files that loads of one scene share, and the models that are in
 /// no file. What a load does not use any more is dropped at its end, and a file that has changed

@@ -8,7 +8,7 @@ use etendue_camera::{Pose, Subject, Viewpoint};
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Bounds, Geometry, Placement, Transform};
 
-use crate::scene::{self, WorldVertices};
+use crate::world_vertices::{WorldVertices, tight};
 
 /// Columns and rows of a coarse picture.
 const CELLS: usize = 48;
@@ -30,7 +30,7 @@ const INSIDE: f64 = 0.1;
 /// Subject that a camera without a pose has to frame, and its viewpoint.
 pub(crate) fn subject<'a>(vertices: &'a WorldVertices<'a>) -> Subject<'a> {
     let geometry = vertices.geometry;
-    let subject = Subject { points: Some(vertices), ..Subject::from(scene::tight(*vertices)) };
+    let subject = Subject { points: Some(vertices), ..Subject::from(tight(*vertices)) };
     let bounds = subject.bounds;
     let is_box = !bounds.is_empty() && (bounds.max - bounds.min).is_finite();
     if !is_box || bounds.diagonal() == 0.0 || geometry.triangles() > MOST_TRIANGLES {

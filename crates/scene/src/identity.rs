@@ -12,8 +12,8 @@ use serde::Serialize;
 use serde_json::Value;
 use xxhash_rust::xxh3::{Xxh3Default, xxh3_128};
 
+use crate::SceneError;
 use crate::cache::Digests;
-use crate::{Scene, SceneError};
 
 /// The identity of a scene: XXH3-128 (Collet, *xxHash fast digest algorithm*, 2020) of
 ///
@@ -185,7 +185,7 @@ pub struct Copies {
 }
 
 impl Copies {
-    fn names(&self) -> Vec<IdName> {
+    pub(crate) fn names(&self) -> Vec<IdName> {
         let Self { first, count, ref name, object } = *self;
         let entry = |id, last, name| IdName { id, last, name, object: Some(object + 1) };
         match count {
@@ -196,45 +196,6 @@ impl Copies {
             _ => vec![entry(first + 1, Some(first + count), name.clone())],
         }
     }
-}
-
-impl Scene {
-    /// The objects by the numbers of `Id.object`.
-    #[must_use]
-    pub fn object_names(&self) -> Vec<IdName> {
-        named(&self.objects)
-    }
-
-    /// The copies by the numbers of `Id.instance`: every object has one at least. Of more than 10,000
-    /// copies of one thing, the first and the last number are given.
-    #[must_use]
-    pub fn instance_names(&self) -> Vec<IdName> {
-        self.copies.iter().flat_map(Copies::names).collect()
-    }
-
-    /// The nodes of models by the numbers of `Id.node`.
-    #[must_use]
-    pub fn node_names(&self) -> Vec<IdName> {
-        let entry = |(id, node): (u32, &SceneNode)| IdName {
-            id,
-            last: None,
-            name: node.name.clone(),
-            object: Some(node.object + 1),
-        };
-        (1..).zip(&self.nodes).map(entry).collect()
-    }
-
-    /// The materials by the numbers of `MaterialId.X`.
-    #[must_use]
-    pub fn material_names(&self) -> Vec<IdName> {
-        named(self.materials.iter().map(|material| &material.name))
-    }
-}
-
-fn named<'a>(names: impl IntoIterator<Item = &'a String>) -> Vec<IdName> {
-    let entry =
-        |(id, name): (u32, &String)| IdName { id, last: None, name: name.clone(), object: None };
-    (1..).zip(names).map(entry).collect()
 }
 
 /// Objects, nodes and copies while a scene is put together. Numbers are given in the order asked for;

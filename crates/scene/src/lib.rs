@@ -24,6 +24,7 @@
 #![cfg_attr(test, allow(clippy::disallowed_methods, reason = "tests set their stage by hand"))]
 
 mod cache;
+mod cameras;
 mod cubes;
 pub mod doctor;
 pub mod error;
@@ -42,8 +43,10 @@ pub mod serial;
 pub mod shape;
 mod sniff;
 mod words;
+mod world_vertices;
 
 pub use cache::Cache;
+pub use cameras::{CameraOrigin, SceneCamera};
 pub use cubes::{EnviFault, read_envi};
 pub use doctor::{Diagnosis, MemoryForecast};
 pub use error::SceneError;
@@ -52,5 +55,4 @@ pub use file::{FileKind, PathStep, SceneFile, ScenePath, SceneSpec, scene_schema
 pub use frames::{Frame, Frames, RigCamera, Start};
 pub use identity::{Copies, IdName, SceneHash, SceneNode};
 pub use import::{Import, Note, NoteKind, Strictness, Wanted};
-pub use load::camera::{CameraOrigin, SceneCamera};
 pub use scene::{LoadOptions, LoadProgress, LoadStats, Scene};

@@ -1,6 +1,6 @@
 //! From a scene file to a scene: each model once, in parallel, then put together.
 
-pub(crate) mod camera;
+mod camera;
 mod deforming;
 mod objects;
 mod shutter;

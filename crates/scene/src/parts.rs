@@ -11,11 +11,11 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use crate::cameras::SceneCamera;
 use crate::error::not_found;
 use crate::file::{InstancesSpec, ScenePath, TransformSpec};
 use crate::identity::Register;
 use crate::import::{self, Deformer, Import, ImportedPlacement, Note, NoteKind};
-use crate::load::camera::SceneCamera;
 use crate::memory::has_room;
 use crate::scene::LoadStats;
 use etendue_files::{InputFolder, MappedFile};

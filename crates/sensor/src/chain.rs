@@ -22,7 +22,8 @@
 
 use std::sync::Arc;
 
-use crate::effects::{Defect, Effects};
+use crate::chip::Effects;
+use crate::effects::Defect;
 use crate::moments::PixelLaw;
 use crate::normal::{ln, pair};
 use crate::philox::{DrawUse, PhiloxKey, Site, unit32, unit52};

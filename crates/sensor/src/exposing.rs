@@ -1,18 +1,71 @@
-//! A film in the course of an exposure: what light, neighbours, rows and columns bring to each block of pixels.
+//! Exposures of a sensor, and a film in the course of one: what light, neighbours, rows and columns bring to each block of pixels.
 
 use std::borrow::Cow;
 
 use rayon::prelude::*;
 
-use crate::Sensor;
 use crate::chain::{self, BLOCK, BlockPlace, BlockValues, Chain};
-use crate::effects::Effects;
-use crate::film::{Exposure, Film, InvalidValues};
+use crate::chip::Effects;
+use crate::film::{Exposure, Film, InvalidValues, Moments, RawImage};
 use crate::normal::pair;
 use crate::philox::{DrawUse, PhiloxKey, Site};
 use crate::responsivity::Responsivity;
 use crate::spec::{NoiseModel, Radiometry};
 use crate::whole_frame::WholeFrame;
+use crate::{Sensor, SensorError};
+
+impl Sensor {
+    /// Exposes a film. The result depends on the film, the shot, the seed and the serial number
+    /// alone: not on threads, nor on other frames.
+    ///
+    /// # Errors
+    ///
+    /// When the film is not of the sensor's size and bands.
+    pub fn expose(
+        &self,
+        film: Film<'_>,
+        shot: Exposure,
+        seed: u64,
+    ) -> Result<RawImage, SensorError> {
+        let (width, height, depth) = self.check(film)?;
+        let exposing = Exposing::new(self, film, shot, seed);
+        let mut values = vec![0; width * height * depth];
+        let rows = values.par_chunks_mut(width * depth).enumerate();
+        let invalid = rows
+            .map(|(row, out)| exposing.row(row, out))
+            .reduce(InvalidValues::default, InvalidValues::sum);
+        Ok(RawImage { width, height, depth, values, invalid })
+    }
+
+    /// The expected value and the variance of every pixel over frames of this very sensor, fixed
+    /// pattern included: of the law that [`Self::expose`] draws from, with the well, the rounding and
+    /// both ends of the converter in it. Row and column offsets count as each pixel's own.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::expose`].
+    pub fn moments(&self, film: Film<'_>, shot: Exposure) -> Result<Moments, SensorError> {
+        let (width, height, depth) = self.check(film)?;
+        let exposing = Exposing::new(self, film, shot, 0);
+        let mut mean = vec![0.0; width * height * depth];
+        let mut variance = vec![0.0; width * height * depth];
+        let rows = mean.par_chunks_mut(width * depth).zip(variance.par_chunks_mut(width * depth));
+        let invalid = rows
+            .enumerate()
+            .map(|(row, (mean, variance))| exposing.moments_of_row(row, mean, variance))
+            .reduce(InvalidValues::default, InvalidValues::sum);
+        Ok(Moments { width, height, depth, mean, variance, invalid })
+    }
+
+    fn check(&self, film: Film<'_>) -> Result<(usize, usize, usize), SensorError> {
+        let [width, height] = self.settings.resolution.map(|side| side as usize);
+        let bands = self.response.bands.count();
+        if film.values.len() != width * height * bands {
+            return Err(SensorError::film(film.values.len(), [width, height, bands]));
+        }
+        Ok((width, height, self.depth()))
+    }
+}
 
 /// A film in the course of an exposure.
 pub(crate) struct Exposing<'a> {

@@ -35,6 +35,7 @@ pub mod approximation;
 pub mod bands;
 pub mod cfa;
 mod chain;
+mod chip;
 pub mod demosaic;
 pub mod dng;
 pub mod effects;
@@ -47,6 +48,7 @@ mod inertial;
 mod least_squares;
 pub mod matching;
 mod moments;
+mod noise_floor;
 mod normal;
 pub mod packed;
 mod philox;
@@ -70,9 +72,10 @@ pub use effects::{
     AngularResponse, AutoExposure, Defect, DefectMap, ListedDefect, Photodiodes, SecondReadout,
 };
 pub use error::SensorError;
-pub use film::{Exposure, Film, InvalidValues, Moments, NoiseFloor, RawImage};
+pub use film::{Exposure, Film, InvalidValues, Moments, RawImage};
 pub use hdr::HdrImage;
 pub use inertial::{InertialError, InertialNoise, InertialNoiseSpec};
+pub use noise_floor::NoiseFloor;
 pub use packed::Packing;
 pub use philox::mixed_seed;
 pub use preset::{Model, Preset};

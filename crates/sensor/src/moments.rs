@@ -12,7 +12,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::effects::Nonlinearity;
+use crate::chip::Nonlinearity;
 use crate::normal::{clipped, normal_cdf, normal_density};
 use crate::poisson::probability;
 use crate::spec::NoiseModel;

@@ -29,7 +29,7 @@ impl Sensor {
         let settings = &self.settings;
         let mut first: SensorSpec = at_its_iso(self.spec())?.into_owned();
         first.system_gain = Some(settings.gain);
-        let mut other = Self::new(&second.spec_of(&first))?;
+        let mut other = Self::new(&first.second(second))?;
         let own = &mut other.settings;
         own.resolution = settings.resolution;
         own.noise = settings.noise;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use etendue_report::Refusal;
 use etendue_spectrum::Curve;
 
-use crate::effects::Effects;
+use crate::chip::Effects;
 use crate::error::Readable;
 use crate::spec::{Filters, HotPixels, NoiseModel, Radiometry, SensorKind, SensorSpec};
 use crate::{CfaSpec, Model, SensorError};

@@ -188,6 +188,32 @@ impl SensorSpec {
             Self { resolution: self.resolution, pixel_pitch: self.pixel_pitch, ..Self::default() };
         *self != grid
     }
+
+    /// The spec of a sensor that is the second reading alone.
+    pub(crate) fn second(&self, second: SecondReadout) -> Self {
+        let mut spec = Self {
+            second_readout: None,
+            hdr: None,
+            iso_settings: None,
+            iso: None,
+            analog_gain: None,
+            ..self.clone()
+        };
+        match second {
+            SecondReadout::DualGain { system_gain, read_noise, full_well, black_level } => {
+                spec.system_gain = Some(system_gain);
+                spec.read_noise = read_noise.or(self.read_noise);
+                spec.full_well = full_well.or(self.full_well);
+                spec.black_level = black_level.or(self.black_level);
+            }
+            SecondReadout::SplitPixel { system_gain, read_noise, full_well, .. } => {
+                spec.system_gain = system_gain.or(self.system_gain);
+                spec.read_noise = read_noise.or(self.read_noise);
+                spec.full_well = full_well.or(self.full_well);
+            }
+        }
+        spec
+    }
 }
 
 /// Quantities that a pixel measures.

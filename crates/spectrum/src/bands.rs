@@ -8,8 +8,8 @@
 use std::sync::{Arc, LazyLock};
 
 use crate::colour::{Matrix3, OBSERVER, inverse};
-use crate::curve::integral;
-use crate::{Curve, Grid, WeightedBands, rgb};
+use crate::curve::{integral, known_everywhere, mean};
+use crate::{Curve, Grid, Outside, WeightedBands, rgb};
 
 /// Visible light (nm), where RGB assets are known.
 pub const VISIBLE: [f64; 2] = [380.0, 780.0];
@@ -26,15 +26,6 @@ pub enum Bands {
     Spectral(Grid),
     /// Such means, weighted for a sensor and a light.
     Weighted(Arc<WeightedBands>),
-}
-
-/// Value of a curve where it is not known.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outside {
-    /// Nothing: an emission, a quantum efficiency.
-    Zero,
-    /// The value at its nearer end: a reflectance, a refractive index.
-    Held,
 }
 
 /// A curve says nothing about any band.
@@ -246,29 +237,6 @@ static GREY_FROM_RGB: LazyLock<[f64; 3]> = LazyLock::new(|| {
 fn normalised(weights: [f64; 3]) -> [f64; 3] {
     let sum: f64 = weights.iter().sum();
     weights.map(|weight| weight / sum)
-}
-
-/// The mean of a curve over an interval (nm) that may reach beyond its range.
-pub(crate) fn mean(curve: &Curve, from: f64, to: f64, outside: Outside) -> f64 {
-    let [low, high] = curve.range();
-    let inside = curve.integral(from, to);
-    let held = match outside {
-        Outside::Zero => 0.0,
-        Outside::Held => {
-            let before = (low.min(to) - from).max(0.0);
-            let after = (to - high.max(from)).max(0.0);
-            before * curve.held(low) + after * curve.held(high)
-        }
-    };
-    (inside + held) / (to - from)
-}
-
-/// The curve with its ends held over `from..to` (nm), or itself where it is to be 0.
-pub(crate) fn known_everywhere(curve: &Curve, from: f64, to: f64, outside: Outside) -> Curve {
-    if outside == Outside::Zero {
-        return curve.clone();
-    }
-    curve.held_over(from, to)
 }
 
 /// To a thousandth, for names.

@@ -32,6 +32,15 @@ enum CurveShape {
     Sampled(Vec<[f64; 2]>),
 }
 
+/// Value of a curve where it is not known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outside {
+    /// Nothing: an emission, a quantum efficiency.
+    Zero,
+    /// The value at its nearer end: a reflectance, a refractive index.
+    Held,
+}
+
 /// Error of numbers that make no curve.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -378,6 +387,29 @@ impl TryFrom<Vec<[f64; 2]>> for Curve {
     fn try_from(samples: Vec<[f64; 2]>) -> Result<Self, CurveError> {
         Self::sampled(samples)
     }
+}
+
+/// The mean of a curve over an interval (nm) that may reach beyond its range.
+pub(crate) fn mean(curve: &Curve, from: f64, to: f64, outside: Outside) -> f64 {
+    let [low, high] = curve.range();
+    let inside = curve.integral(from, to);
+    let held = match outside {
+        Outside::Zero => 0.0,
+        Outside::Held => {
+            let before = (low.min(to) - from).max(0.0);
+            let after = (to - high.max(from)).max(0.0);
+            before * curve.held(low) + after * curve.held(high)
+        }
+    };
+    (inside + held) / (to - from)
+}
+
+/// The curve with its ends held over `from..to` (nm), or itself where it is to be 0.
+pub(crate) fn known_everywhere(curve: &Curve, from: f64, to: f64, outside: Outside) -> Curve {
+    if outside == Outside::Zero {
+        return curve.clone();
+    }
+    curve.held_over(from, to)
 }
 
 #[cfg(test)]

@@ -24,7 +24,8 @@
 //! | [`metal`] | metals by name
 //! | [`rgb`] | from a colour to a spectrum and back |
 //! | [`bands`] | the numbers that a ray of a render carries |
-//! | [`weighted`] | bands for a given light and sensor; wavelengths that stand for a wide band |
+//! | [`weighted`] | bands for a given light and sensor |
+//! | [`spread`] | wavelengths that stand for a wide band |
 
 pub mod bands;
 mod cie;
@@ -38,18 +39,20 @@ pub mod input;
 mod lamps;
 pub mod metal;
 pub mod rgb;
+pub mod spread;
 pub mod summary;
 pub mod table;
 pub mod weighted;
 
-pub use bands::{Bands, NoOverlap, Outside, VISIBLE};
-pub use curve::{Curve, CurveError, integral};
+pub use bands::{Bands, NoOverlap, VISIBLE};
+pub use curve::{Curve, CurveError, Outside, integral};
 pub use grid::{Band, Grid, GridError};
 pub use illuminant::{Illuminant, IlluminantError};
 pub use input::{CurveFault, CurveSpec};
 pub use metal::Metal;
+pub use spread::Spread;
 pub use summary::Summary;
-pub use weighted::{Spread, WeightedBands};
+pub use weighted::WeightedBands;
 
 /// Planck's constant (J·s), exact in the SI.
 pub const PLANCK: f64 = 6.626_070_15e-34;

@@ -7,8 +7,8 @@ use etendue_image::BandAxis;
 use etendue_spectrum::{Bands, Curve, NoOverlap, Outside, rgb};
 
 use crate::Color;
-use crate::spec::BRIGHTEST;
 use crate::texture::{Filter, Wrap};
+use crate::tint::BRIGHTEST;
 
 /// Kind of the numbers of a [`Cube`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -11,9 +11,9 @@ use etendue_geometry::glam::DVec3;
 use etendue_image::Limits;
 
 use crate::angles;
-use crate::spec::BRIGHTEST;
 use crate::spectral_sky::{self, Spectrum};
 use crate::texture::{ImageError, read_file, read_image};
+use crate::tint::BRIGHTEST;
 use crate::{Color, Cube};
 use etendue_geometry::Float;
 

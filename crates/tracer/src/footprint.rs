@@ -11,8 +11,6 @@
 
 use etendue_geometry::glam::DVec3;
 
-use crate::reference::{SurfacePoint, View};
-
 /// Grazing rays see no more of a surface than this (a cosine).
 const LEAST_COSINE: f64 = 1e-4;
 
@@ -42,24 +40,6 @@ impl Cone {
     }
 }
 
-impl View {
-    /// The cone around the camera's ray along the unit `direction`; `None` when the camera does not
-    /// tell.
-    ///
-    /// Off the axis of a perspective camera a pixel's solid angle falls as cos³, so its side does as
-    /// cos^1.5.
-    #[must_use]
-    pub fn cone(&self, direction: DVec3) -> Option<Cone> {
-        Some(match self.pixel? {
-            Pixel::Width(width) => Cone { width, spread: 0.0 },
-            Pixel::Angle(angle) => {
-                let cosine = direction.dot(self.forward()).clamp(0.0, 1.0);
-                Cone { width: 0.0, spread: angle * cosine * cosine.sqrt() }
-            }
-        })
-    }
-}
-
 /// A cone where it meets a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Footprint {
@@ -69,21 +49,18 @@ pub struct Footprint {
     pub width: f64,
 }
 
-impl SurfacePoint<'_> {
-    /// The axes of the ellipse that the footprint covers, in texture coordinates of a set; `None`
-    /// where there is no footprint or no texture coordinates.
-    #[must_use]
-    pub fn extent(&self, set: usize) -> Option<[[f64; 2]; 2]> {
-        let Footprint { direction, width } = self.footprint?;
-        let uvs = self.mesh.uvs.get(set)?;
-        let linear = &self.linear();
-        let [p0, p1, p2] = self.mesh.corners_at(self.triangle, self.time);
-        let (e1, e2) = (*linear * (p1 - p0), *linear * (p2 - p0));
+impl Footprint {
+    /// The axes of the ellipse that it covers of a triangle, by the edges from its first corner to the others (m), in the
+    /// texture coordinates of its corners; `None` where it has no area.
+    pub(crate) fn extent(
+        &self,
+        [e1, e2]: [DVec3; 2],
+        [a, b, c]: [[f64; 2]; 3],
+    ) -> Option<[[f64; 2]; 2]> {
+        let Self { direction, width } = *self;
         let cross = e1.cross(e2);
         let squared = cross.length_squared();
         let normal = cross.try_normalize()?;
-        let [a, b, c] =
-            self.mesh.triangles[self.triangle].map(|k| uvs.get(k as usize).map(f64::from));
         let cosine = normal.dot(direction);
         let along = (direction - normal * cosine).try_normalize();
         let along = along.unwrap_or_else(|| normal.any_orthonormal_vector());

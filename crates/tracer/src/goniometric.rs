@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use etendue_geometry::glam::{DMat3, DVec3};
 
-use crate::spec::BRIGHTEST;
+use crate::tint::BRIGHTEST;
 
 /// The longest file (bytes).
 const LONGEST: u64 = 1 << 24;

@@ -11,6 +11,7 @@
 //! |---|---|
 //! | [`layer`] | the table of layers, and what fills each |
 //! | [`reference`](mod@reference) | what a ray meets first, without light |
+//! | [`view`], [`surface_point`] | the camera's frame and its cones; places on meshes |
 //! | [`spec`] | materials and lights as scene files write them, and which surfaces they are |
 //! | [`material`], [`texture`], [`cube`] | surfaces, ready to be looked up |
 //! | [`footprint`] | how much of a surface a sample stands for |
@@ -53,10 +54,12 @@ pub mod spec;
 pub mod spectral;
 mod spectral_sky;
 mod surface;
+pub mod surface_point;
 mod target;
 pub mod texture;
 pub mod tint;
 pub mod transport;
+pub mod view;
 
 pub use clear_sky::ClearSky;
 pub use cube::{Cube, CubeKind, SceneCube};
@@ -65,17 +68,19 @@ pub use environment::EnvironmentMap;
 pub use footprint::{Cone, Footprint, Pixel};
 pub use goniometric::Goniometric;
 pub use group::LightGroup;
-pub use layer::{Layer, LayerSpec, NormalKind, Space};
+pub use layer::{Layer, LayerSpec};
 pub use light::{EnvironmentImage, Light, LightKind};
 pub use lights::Lights;
-pub use material::{Color, Emission, Material, Paint, TextureScope};
-pub use modulation::{Clock, Modulation, ModulationSpec};
+pub use material::{Emission, Material, Paint, TextureScope};
+pub use modulation::{Clock, Modulation};
 pub use placed::PlacedSurfaces;
 pub use projector::Projector;
-pub use reference::{Needs, SceneView, SurfacePoint, TracedBatch, View};
+pub use reference::{Needs, NormalKind, SceneView, TracedBatch};
 pub use scattering::{Absorption, Glass, Ior, Scattering};
-pub use spec::{LightMotionSpec, LightSpec, MaterialSpec};
+pub use spec::{LightMotionSpec, LightSpec, MaterialSpec, ModulationSpec};
 pub use spectral::Spectral;
+pub use surface_point::SurfacePoint;
 pub use texture::{Image, ImageSource, Texture, TextureUse};
-pub use tint::{Conductor, ConductorId, SceneCurve, Tint, TintSpectrum};
+pub use tint::{Color, Conductor, ConductorId, SceneCurve, Tint, TintSpectrum};
 pub use transport::{LightingContext, RayStats, Rules, Samples, Scratch, Traits};
+pub use view::{Space, View};

@@ -15,29 +15,13 @@ use etendue_geometry::glam::DVec3;
 use crate::light_tree::{self, Choice, Choices, Cluster, LightTree};
 use crate::sampling::{DiscreteDistribution, ONE_BELOW};
 
+pub(crate) use crate::light_tree::Receiver;
+
 /// The least chance of a light near by, and of one far away, where there are both.
 const LEAST_SHARE: f64 = 0.25;
 
 /// So many lights are few.
 const FEW: usize = 8;
-
-/// A point that asks for light.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Receiver {
-    /// m.
-    pub(crate) point: DVec3,
-    /// The unit normal of the one side that it gets light from, by which that is weighed; zero where light comes
-    /// from both.
-    pub(crate) normal: DVec3,
-}
-
-impl Receiver {
-    /// True if it gets light from one side alone.
-    #[inline(always)]
-    pub(crate) fn is_one_sided(&self) -> bool {
-        self.normal != DVec3::ZERO
-    }
-}
 
 /// A point that asks a light which it chose.
 #[derive(Debug, Clone, Copy)]

@@ -10,18 +10,20 @@ use std::sync::Arc;
 use etendue_geometry::glam::DVec3;
 use etendue_spectrum::{NoOverlap, Outside};
 
-pub(crate) use self::plain::{LightBounds, PlainLight};
+pub(crate) use self::plain::PlainLight;
 use crate::area_light::{self, AreaLight, AreaLightMotion, triangle_power};
 use crate::environment::EnvironmentMap;
 use crate::group::Groups;
+pub(crate) use crate::light::LightBounds;
 use crate::light::{EnvironmentImage, Light, LightKind, irradiance, power, spot_falloff};
 use crate::light_sampler::{Candidate, LightQuery, LightSampler, Receiver};
 use crate::light_tree::Choices;
 use crate::material::Alpha;
-use crate::reference::{SceneView, SurfacePoint, squares_at};
+use crate::reference::{SceneView, SurfacePoint};
 use crate::sampling::{Frame, cone_direction, triangle_point};
 use crate::sky::{Sky, uniform_direction};
 use crate::spectral::Spectral;
+use crate::surface_point::squares_at;
 use crate::target::{Target, TargetKind};
 use crate::{LightGroup, Material, Modulation, Paint, SceneCurve};
 
@@ -196,12 +198,6 @@ impl Lights {
         self.sampler.pick(choices);
     }
 
-    /// The chance with which [`Self::pick`] picks the sky for a point that chose.
-    pub(crate) fn chance_of_sky(&self, choices: &Choices, number: usize) -> f64 {
-        let sky = self.sky.as_ref();
-        sky.map_or(0.0, |sky| self.sampler.chance_of_other(choices, number, sky.index))
-    }
-
     /// Light `index` and its bands, if it is a triangle that is kept ready and shines alike all over.
     #[inline(always)]
     pub(crate) fn plain_triangle(
@@ -269,12 +265,6 @@ impl Lights {
         self.sky.is_some() || !self.triangles.is_empty()
     }
 
-    /// True if light comes from where nothing is.
-    #[must_use]
-    pub fn has_environment(&self) -> bool {
-        self.sky.is_some()
-    }
-
     /// True if some light is a disk far away.
     pub(crate) fn has_disks(&self) -> bool {
         !self.disks.is_empty()
@@ -312,11 +302,6 @@ impl Lights {
     #[must_use]
     pub fn are_modulated(&self) -> bool {
         self.parts().iter().any(|(_, modulation)| modulation.is_some())
-    }
-
-    /// The group of the sky.
-    pub(crate) fn group_of_sky(&self) -> u32 {
-        self.groups.of_light(self.sky.as_ref().map_or(0, |sky| sky.index))
     }
 
     /// The group of a surface that shines.

@@ -7,10 +7,7 @@ use etendue_spectrum::Curve;
 
 use crate::scattering::{Absorption, Scattering};
 use crate::texture::Encoding;
-use crate::{LightGroup, Modulation, SceneCube, SceneCurve, TextureUse};
-
-/// Linear RGB with the sRGB primaries, 0..=1 for reflectances.
-pub type Color = [f64; 3];
+use crate::{Color, LightGroup, Modulation, SceneCube, SceneCurve, TextureUse};
 
 /// A material ready to be looked up at a hit.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,15 +3,17 @@
 
 mod table;
 
-use etendue_geometry::glam::{DMat3, DVec3};
+use etendue_geometry::glam::DMat3;
 use etendue_geometry::{Coplanar, Geometry, Placement};
 
-pub(crate) use self::table::{Facets, LEAST_ALPHA, SurfaceKind, SurfaceRow, SurfaceTable};
+use self::table::plain_tint;
+pub(crate) use self::table::{
+    Facets, LEAST_ALPHA, PlacedSurface, SurfaceKind, SurfaceRow, SurfaceTable,
+};
 use crate::bodies::{Body, bodies};
-use crate::scattering::Absorption;
 use crate::spawn::magnitudes;
 use crate::transport::Traits;
-use crate::{Material, Paint, Scattering, Spectral, Tint};
+use crate::{Material, Scattering, Spectral};
 
 /// Properties of the placements of a scene that light has to know, by their numbers.
 #[derive(Debug, Clone, Default)]
@@ -26,46 +28,6 @@ pub struct PlacedSurfaces {
     fits_single: bool,
     /// The diagonal of the box around all (m).
     size: f64,
-}
-
-/// A placement as light meets it.
-#[derive(Debug, Clone)]
-pub(crate) struct PlacedSurface {
-    /// Magnitudes of its own numbers, which add to the rounding of a hit (m).
-    pub(crate) magnitudes: DVec3,
-    /// The matrix that brings its mesh's normals into the world; `None` where none has to.
-    pub(crate) turn: Option<DMat3>,
-    /// It shines, or shows itself without light.
-    pub(crate) is_seen: bool,
-    /// It is partly not there.
-    pub(crate) has_alpha: bool,
-    /// No light passes it.
-    pub(crate) is_opaque: bool,
-    /// Its shading normal is not that of its triangles.
-    pub(crate) is_tilted: bool,
-    /// Absorption of light by the body behind its front.
-    pub(crate) absorption: Option<Absorption>,
-    /// The body that it encloses, of glass that is closed.
-    pub(crate) body: Option<Body>,
-    /// Its colour, where that is alike all over.
-    pub(crate) color: Option<Tint>,
-}
-
-impl PlacedSurface {
-    /// True if rays may pass it as if it were not there.
-    pub(crate) fn may_vanish(&self) -> bool {
-        self.has_alpha || self.body.is_some_and(|body| body.may_vanish)
-    }
-}
-
-/// The colour of a paint that is alike all over, 0..=1.
-fn plain_tint(paint: &Paint, spectral: &Spectral) -> Option<Tint> {
-    match paint {
-        Paint::Plain(color) => Some(Tint::from(*color).clamped()),
-        Paint::Curve { look, .. } if spectral.is_rgb() => Some(Tint::from(*look).clamped()),
-        Paint::Curve { curve, .. } => Some(Tint { color: [1.0; 3], spectrum: curve.spectrum() }),
-        Paint::Checker { .. } | Paint::Image { .. } | Paint::Cube { .. } => None,
-    }
 }
 
 impl PlacedSurfaces {

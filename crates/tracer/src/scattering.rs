@@ -2,7 +2,7 @@
 
 use etendue_spectrum::Curve;
 
-use crate::{Color, Conductor, SceneCurve, Spectral, TextureUse, Tint, TintSpectrum};
+use crate::{Color, Conductor, SceneCurve, TextureUse};
 
 /// Way in which a surface scatters light.
 #[derive(Debug, Clone, PartialEq)]
@@ -168,14 +168,6 @@ pub struct Absorption {
     pub distance: f64,
 }
 
-impl Absorption {
-    /// Share of light that is left after the distance.
-    pub(crate) fn tint(&self, spectral: &Spectral) -> Tint {
-        let (color, spectrum) = part(spectral, self.color, self.curve.as_ref());
-        Tint { color, spectrum }
-    }
-}
-
 /// A refractive index.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ior {
@@ -250,18 +242,6 @@ pub struct GltfSurface {
     pub anisotropy_rotation: f64,
     /// The grain in red and green (over 0..=1 what is −1..=1), strength in blue (linear).
     pub anisotropy_texture: Option<TextureUse>,
-}
-
-/// The factor of a part's image, and its spectrum: the look alone where light is traced as red, green and blue.
-pub(crate) fn part(
-    spectral: &Spectral,
-    look: Color,
-    curve: Option<&SceneCurve>,
-) -> (Color, TintSpectrum) {
-    match curve.filter(|_| !spectral.is_rgb()) {
-        Some(curve) => ([1.0; 3], curve.spectrum()),
-        None => (look, TintSpectrum::White),
-    }
 }
 
 impl Default for GltfSurface {

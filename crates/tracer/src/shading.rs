@@ -5,7 +5,8 @@ use etendue_geometry::glam::DVec3;
 use crate::bsdf::{Bsdf, Coat, Layered, Model, Sheen, fresnel};
 use crate::reference::{SceneView, SurfacePoint};
 use crate::sampling::Frame;
-use crate::scattering::{GltfSurface, part};
+use crate::scattering::GltfSurface;
+use crate::spectral::part;
 use crate::surface::SurfaceInteraction;
 use crate::{Conductor, Scattering, Spectral, TextureUse, Tint};
 

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use etendue_spectrum::{Bands, Curve, Metal, NoOverlap, Outside};
 
 use crate::bsdf::metal;
-use crate::{Color, ConductorId, Cube, Material, SceneCube, Tint, TintSpectrum};
+use crate::{
+    Absorption, Color, ConductorId, Cube, Material, SceneCube, SceneCurve, Tint, TintSpectrum,
+};
 
 /// Shares of a band's light between which a wavelength is interpolated. Not a setting: wavelengths are drawn, and over
 /// a 32nd of a band's light glass bends them in proportion.
@@ -212,6 +214,26 @@ impl Spectral {
     }
 }
 
+impl Absorption {
+    /// Share of light that is left after the distance.
+    pub(crate) fn tint(&self, spectral: &Spectral) -> Tint {
+        let (color, spectrum) = part(spectral, self.color, self.curve.as_ref());
+        Tint { color, spectrum }
+    }
+}
+
+/// The factor of a part's image, and its spectrum: the look alone where light is traced as red, green and blue.
+pub(crate) fn part(
+    spectral: &Spectral,
+    look: Color,
+    curve: Option<&SceneCurve>,
+) -> (Color, TintSpectrum) {
+    match curve.filter(|_| !spectral.is_rgb()) {
+        Some(curve) => ([1.0; 3], curve.spectrum()),
+        None => (look, TintSpectrum::White),
+    }
+}
+
 /// Multiplies light in bands by a colour, by the rows of red, green and blue.
 #[multiversion::multiversion(targets = "simd")]
 fn times_color([red, green, blue]: [&[f64]; 3], color: &Color, light: &mut [f64]) {
@@ -250,7 +272,7 @@ mod tests {
     use etendue_spectrum::Grid;
 
     use super::*;
-    use crate::{Paint, Scattering, SceneCurve};
+    use crate::{Paint, Scattering};
 
     #[test]
     fn light_is_multiplied_as_band_by_band_to_the_bit() {

@@ -1,10 +1,15 @@
-//! The colour of a surface where it was met: linear RGB, times a curve where it has one.
+//! Colours, and that of a surface where it was met: linear RGB, times a curve where it has one.
 
 use std::sync::Arc;
 
 use etendue_spectrum::{Curve, Metal};
 
-use crate::Color;
+/// Linear RGB with the sRGB primaries, 0..=1 for reflectances.
+pub type Color = [f64; 3];
+
+/// The brightest that a light or a surface may be, in whichever unit: pictures hold no number above
+/// 3·10³⁸, and the powers of all lights are added up.
+pub const BRIGHTEST: f64 = 1e30;
 
 /// A curve of a scene, and its number in the table of [`Spectral`](crate::Spectral).
 #[derive(Debug, Clone, PartialEq)]

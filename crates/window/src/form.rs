@@ -6,7 +6,12 @@ use eframe::egui::{self, Ui};
 use etendue::ScenePath;
 use serde_json::{Map, Value, json};
 
+use self::leaf::hint;
 use crate::document::Edit;
+
+pub(crate) use self::leaf::mark;
+#[cfg(test)]
+pub(crate) use self::leaf::marked;
 
 /// Keys that no panel shows: what the format allows for editors and remarks.
 const HIDDEN: [&str; 2] = ["$schema", "comment"];
@@ -332,25 +337,6 @@ fn pointer_below(pointer: &str, key: &str) -> String {
 
 fn required(schema: &Value) -> impl Iterator<Item = &str> {
     schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str)
-}
-
-/// A response that explains itself.
-fn hint(response: egui::Response, about: Option<&str>) -> egui::Response {
-    match about {
-        Some(about) => response.on_hover_text(about.replace('\n', " ")),
-        None => response,
-    }
-}
-
-/// Notes where a widget is, by a name: for those who drive the window.
-pub(crate) fn mark(ctx: &egui::Context, name: &str, place: egui::Rect) {
-    ctx.data_mut(|data| data.insert_temp(egui::Id::new(("mark", name)), place));
-}
-
-/// Rectangle of a widget.
-#[cfg(test)]
-pub(crate) fn marked(ctx: &egui::Context, name: &str) -> Option<egui::Rect> {
-    ctx.data(|data| data.get_temp(egui::Id::new(("mark", name))))
 }
 
 /// A number with four significant digits.

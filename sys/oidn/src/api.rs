@@ -1,10 +1,59 @@
-//! Where the library is, and the calls of `oidn.h` that are made: those of versions 1.4 and 2, which differ in names alone.
+//! Where the library is, and the calls of `oidn.h` that are made: those of versions 1.4 and 2, which differ in names
+//! alone. Also what may go wrong with it.
 
 use std::ffi::{OsStr, OsString, c_char, c_int, c_void};
 
 use libloading::{Error, Library};
 
-use crate::OidnError;
+/// Why a picture was not denoised.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OidnError {
+    /// There is no library.
+    #[error(
+        "Open Image Denoise is not found: install it (`pip install pyoidn` brings it as \
+         pyoidn/oidn/lib/libOpenImageDenoise.so.2, and https://www.openimagedenoise.org has releases), and \
+         name its library by the environment variable ETENDUE_OIDN where the dynamic loader does not find it"
+    )]
+    Missing,
+    /// What was named is no such library, or lacks something itself.
+    #[error(
+        "{library} cannot be used as Open Image Denoise ({why}); let ETENDUE_OIDN name the file \
+         libOpenImageDenoise.so.2 of version 1.4 or later, beside the libraries that came with it"
+    )]
+    Unusable {
+        /// The library.
+        library: String,
+        /// What the dynamic loader or the library says.
+        why: String,
+    },
+    /// The library failed at its work.
+    #[error("Open Image Denoise {version}: {why}")]
+    Failed {
+        /// Its version.
+        version: String,
+        /// What it says.
+        why: String,
+    },
+    /// An image has another number of values than its pixels take.
+    #[error("an image of {width} x {height} pixels has {found} values where three a pixel belong")]
+    Size {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// What there is.
+        found: usize,
+    },
+}
+
+impl OidnError {
+    /// Whether the caller can mend it: by another library, or by installing one.
+    #[must_use]
+    pub fn is_refused(&self) -> bool {
+        matches!(self, Self::Missing | Self::Unusable { .. })
+    }
+}
 
 /// A device or a filter of the library.
 type Handle = *mut c_void;

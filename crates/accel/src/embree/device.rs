@@ -1,4 +1,4 @@
-//! An Embree device: its threads, its memory, its errors, and what it says of itself.
+//! An Embree device: its threads, its memory, its errors, and what it says of itself; and references to its scenes.
 
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::fmt;
@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 
 use embree4_sys as sys;
 
-use crate::{BuildError, BuildOptions};
+use crate::{BuildError, BuildOptions, Quality};
 
 /// State that Embree's callbacks write to while a device lives.
 #[derive(Default)]
@@ -238,4 +238,30 @@ fn cpu_has_avx2() -> bool {
     return is_x86_feature_detected!("avx2");
     #[cfg(not(target_arch = "x86_64"))]
     return false;
+}
+
+impl Quality {
+    pub(super) fn to_embree(self) -> sys::RTCBuildQuality {
+        match self {
+            Self::Low => sys::RTC_BUILD_QUALITY_LOW,
+            Self::Medium => sys::RTC_BUILD_QUALITY_MEDIUM,
+            Self::High => sys::RTC_BUILD_QUALITY_HIGH,
+        }
+    }
+}
+
+/// One reference to an Embree scene.
+pub(super) struct SceneHandle(pub(super) NonNull<sys::RTCSceneTy>);
+
+// SAFETY: references are counted atomically by Embree, so any thread may release one; a handle that is
+// not a `SceneBuilder`'s alone is of a committed scene, which is read only, and queries are re-entrant.
+unsafe impl Send for SceneHandle {}
+// SAFETY: as above.
+unsafe impl Sync for SceneHandle {}
+
+impl Drop for SceneHandle {
+    fn drop(&mut self) {
+        // SAFETY: releases the reference that `rtcNewScene` gave.
+        unsafe { sys::rtcReleaseScene(self.0.as_ptr()) };
+    }
 }

@@ -8,8 +8,7 @@ use std::ptr::NonNull;
 use embree4_sys as sys;
 use rayon::prelude::*;
 
-use super::SceneHandle;
-use super::device::Device;
+use super::device::{Device, SceneHandle};
 use crate::{BuildError, BuildOptions};
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{

@@ -4,8 +4,6 @@ use etendue_geometry::RayBlock;
 use etendue_geometry::block::vector;
 use etendue_geometry::glam::DVec3;
 
-use super::FewTriangles;
-
 /// An edge, by its Plücker coordinates in the frame, the direction a unit vector.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PluckerEdge {
@@ -79,10 +77,15 @@ impl FewTriangle {
 }
 
 /// The closest hit of the ray of a lane; of those in one place the last.
-pub(super) fn closest(few: &FewTriangles, block: &RayBlock, lane: usize) -> Option<TriangleHit> {
+pub(super) fn closest(
+    edges: &[PluckerEdge],
+    triangles: &[FewTriangle],
+    block: &RayBlock,
+    lane: usize,
+) -> Option<TriangleHit> {
     let (mut line, mut nearest) = (LaneRay::of(block, lane), None);
-    for (number, triangle) in few.triangles.iter().enumerate() {
-        let Some((t, weights)) = triangle.hit(&few.edges, &line) else { continue };
+    for (number, triangle) in triangles.iter().enumerate() {
+        let Some((t, weights)) = triangle.hit(edges, &line) else { continue };
         nearest = Some(TriangleHit { number, t, weights });
         line.t_max = t;
     }
@@ -90,7 +93,12 @@ pub(super) fn closest(few: &FewTriangles, block: &RayBlock, lane: usize) -> Opti
 }
 
 /// Tests whether anything is between the ends of the ray of a lane.
-pub(super) fn is_occluded(few: &FewTriangles, block: &RayBlock, lane: usize) -> bool {
+pub(super) fn is_occluded(
+    edges: &[PluckerEdge],
+    triangles: &[FewTriangle],
+    block: &RayBlock,
+    lane: usize,
+) -> bool {
     let line = LaneRay::of(block, lane);
-    few.triangles.iter().any(|triangle| triangle.hit(&few.edges, &line).is_some())
+    triangles.iter().any(|triangle| triangle.hit(edges, &line).is_some())
 }

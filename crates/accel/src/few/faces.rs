@@ -12,7 +12,6 @@ use etendue_geometry::block::{Floats, LANES};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{MISS, RayBlock};
 
-use super::FewTriangles;
 use crate::single::round;
 
 /// Roundings of single precision in the distance of a place from a side, of the distances from the frame's origin of
@@ -133,6 +132,25 @@ fn quadrilateral(own: [DVec3; 3], other: [DVec3; 3], tolerance: f64) -> Option<[
     };
     // A corner that is hardly one has sides whose roundings tell nothing.
     (is_flat && (0..4).all(|i| turn(i) > 1e-3)).then_some(quad)
+}
+
+/// Faces of triangles that follow each other in the list, and their box.
+#[derive(Debug)]
+pub(super) struct FaceRun {
+    pub(super) faces: Range<usize>,
+    /// Number of the first face.
+    pub(super) first: u32,
+    /// From and to, in the frame, and a little beyond.
+    pub(super) bounds: [[f32; 3]; 2],
+}
+
+/// The faces of a scene, in runs.
+#[derive(Debug, Default)]
+pub(super) struct FaceList {
+    pub(super) faces: Vec<Face>,
+    pub(super) runs: Vec<FaceRun>,
+    /// The largest distance of a corner from the frame's origin (m).
+    pub(super) radius: f32,
 }
 
 /// The closest hits of a block's rays: distances (m), numbers of faces or [`MISS`], and places in them.
@@ -278,15 +296,15 @@ fn reaches([from, to]: [[f32; 3]; 2], block: &RayBlock, inverse: &[Floats; 3]) -
 
 /// The closest hits of a block.
 #[multiversion::multiversion(targets = "simd")]
-pub(super) fn closest(few: &FewTriangles, block: &RayBlock, nearest: &mut NearestFace) {
-    let lines = BlockRays::of(block, few.radius);
+pub(super) fn closest(list: &FaceList, block: &RayBlock, nearest: &mut NearestFace) {
+    let lines = BlockRays::of(block, list.radius);
     let mut doubts = [0; LANES];
     let (mut t, mut hit, mut place) = (lines.t_max, [MISS; LANES], [[0.0; LANES]; 2]);
-    for run in &few.runs {
+    for run in &list.runs {
         if !reaches(run.bounds, block, &lines.inverse) {
             continue;
         }
-        for (number, face) in (run.first..).zip(&few.faces[run.faces.clone()]) {
+        for (number, face) in (run.first..).zip(&list.faces[run.faces.clone()]) {
             let Some(own) = cross(face, block, &lines, &t) else { continue };
             own.doubt(&mut doubts);
             for i in 0..LANES {
@@ -303,14 +321,14 @@ pub(super) fn closest(few: &FewTriangles, block: &RayBlock, nearest: &mut Neares
 
 /// Finds the rays of a block that have anything between their ends.
 #[multiversion::multiversion(targets = "simd")]
-pub(super) fn occluded(few: &FewTriangles, block: &RayBlock, occlusion: &mut BlockOcclusion) {
-    let lines = BlockRays::of(block, few.radius);
+pub(super) fn occluded(list: &FaceList, block: &RayBlock, occlusion: &mut BlockOcclusion) {
+    let lines = BlockRays::of(block, list.radius);
     let (mut doubts, mut hit) = ([0; LANES], [0; LANES]);
-    for run in &few.runs {
+    for run in &list.runs {
         if !reaches(run.bounds, block, &lines.inverse) {
             continue;
         }
-        for face in &few.faces[run.faces.clone()] {
+        for face in &list.faces[run.faces.clone()] {
             let Some(own) = cross(face, block, &lines, &lines.t_max) else { continue };
             own.doubt(&mut doubts);
             for i in 0..LANES {

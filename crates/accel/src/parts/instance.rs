@@ -1,9 +1,9 @@
 //! A part at a place, and rays as they reach it: in f64, with what rounding may have done to them.
 
 use etendue_geometry::glam::{DMat3, DVec3};
-use etendue_geometry::{Bounds, Geometry, MISS, Placement};
+use etendue_geometry::{Bounds, MISS, Placement};
 
-use super::{Layout, PartFrame, reciprocal_power};
+use super::frame::{PartFrame, reciprocal_power};
 
 /// A part at a place.
 #[derive(Debug, Clone)]
@@ -158,27 +158,6 @@ impl PartInstance {
             rays.direction[2][i] = lx.z * x + ly.z * y + lz.z * z;
         }
         rays
-    }
-
-    /// A box around the box `lo..hi` of this instance's part, in `world` coordinates.
-    pub(crate) fn world_bounds(
-        &self,
-        layout: &Layout,
-        geometry: &Geometry,
-        local: Bounds,
-    ) -> Bounds {
-        let part = &layout.parts[self.part as usize];
-        let frame = layout.world_frame;
-        let mut bounds = Bounds::EMPTY;
-        for corner in local.corners() {
-            let corner = corner / part.frame.scale + part.frame.origin;
-            let point = match geometry.placements.get(self.placement as usize) {
-                Some(placement) => placement.world_from_mesh.point_from(corner, frame.origin),
-                None => corner - frame.origin,
-            };
-            bounds.include(point * frame.scale);
-        }
-        bounds
     }
 }
 

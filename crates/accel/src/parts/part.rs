@@ -4,7 +4,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{AreaTest, Geometry, MISS, Positions, Transform};
 use rayon::prelude::*;
 
-use super::{PartFrame, index, outward};
+use super::frame::{PartFrame, outward};
 use crate::BuildError;
 use crate::tree::Ref;
 
@@ -191,4 +191,10 @@ impl MeshTriangles<'_> {
             Slice::F64(positions) => positions[i as usize].into(),
         }
     }
+}
+
+/// Placements, parts and triangles are counted in u32 by the contract.
+#[expect(clippy::cast_possible_truncation, reason = "counted in u32 by the contract")]
+pub(super) fn index(i: usize) -> u32 {
+    i as u32
 }

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::{SceneArguments, parse};
+use super::parse;
+use super::scene::SceneArguments;
 use etendue::LightUnit;
 use etendue_optics::train::Focus;
 

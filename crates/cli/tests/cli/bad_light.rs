@@ -1,6 +1,6 @@
 //! Materials, textures and lights that make no sense: refused by name, or shown as such and told.
 
-use crate::run::{Bench, text};
+use crate::run::{Bench, under};
 
 /// A square over the whole picture with the texture `image` on it, by an OBJ model.
 fn textured(image: Option<&[u8]>) -> Bench {
@@ -33,30 +33,30 @@ fn png_header(side: u32) -> Vec<u8> {
 #[test]
 fn textures_that_cannot_be_had_are_magenta_and_told_or_refused_when_strict() {
     let cases: [(&str, Option<&[u8]>); 4] = [
-        ("does not exist", None),
-        ("wood.png", Some(b"\x89PNG\r\n\x1a\nnot much of an image")),
-        ("wood.png", Some(&png_header(8))),
-        ("wood.png", Some(&png_header(100_000))),
+        ("no file", None),
+        ("words", Some(b"\x89PNG\r\n\x1a\nnot much of an image")),
+        ("a header of 8 x 8 pixels", Some(&png_header(8))),
+        ("a header of 100000 x 100000 pixels", Some(&png_header(100_000))),
     ];
-    for (words, image) in cases {
+    let mut all = String::new();
+    for (image_is, image) in cases {
         let bench = textured(image);
         bench.render(&["--report", "report.json"]);
         let picture = bench.array("picture");
         let magenta = picture.chunks(3).filter(|p| **p == [1.0, 0.0, 1.0]).count();
         let black = picture.chunks(3).filter(|p| **p == [0.0; 3]).count();
-        assert_eq!((magenta, black), (32, 32), "{words}: two of four squares each");
-        let notes = bench.json("report.json")["notes"].to_string();
-        assert!(notes.contains(words) && notes.contains("magenta"), "{notes}");
-        let output = bench.run(&["render", "scene.json", "-o", "strict", "--strict"]);
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{message}");
-        assert!(message.contains("wood.png"), "{message}");
+        assert_eq!((magenta, black), (32, 32), "{image_is}: two of four squares each");
+        let notes = &bench.json("report.json")["notes"];
+        let strict = bench.refusal(&["render", "scene.json", "-o", "strict", "--strict"]);
+        all += &under(image_is, &format!("{notes:#}\n{strict}"));
     }
+    insta::assert_snapshot!(all);
 }
 
 /// A colour is a colour whatever its encoding; a roughness that cannot be had is left out.
 #[test]
 fn broken_images_of_linear_colours_are_magenta_too() {
+    let mut all = String::new();
     for (encoding, ending) in [("srgb", "png"), ("linear", "png"), ("linear", "webp")] {
         let image = format!("wood.{ending}");
         let scene = serde_json::json!({
@@ -72,9 +72,10 @@ fn broken_images_of_linear_colours_are_magenta_too() {
         let picture = bench.array("picture");
         let magenta = picture.chunks(3).filter(|p| **p == [1.0, 0.0, 1.0]).count();
         assert_eq!(magenta, 32, "{encoding}: two of four squares");
-        let notes = bench.json("report.json")["notes"].to_string();
-        assert!(notes.contains("where it is a colour, magenta squares"), "{notes}");
+        let notes = &bench.json("report.json")["notes"];
+        all += &under(&format!("{image}, {encoding}"), &format!("{notes:#}\n"));
     }
+    insta::assert_snapshot!(all);
 }
 
 #[test]
@@ -84,71 +85,55 @@ fn images_that_the_scene_itself_names_have_to_be_there() {
         "materials": {"m": {"type": "matte", "color": {"image": "wodo.png"}}}}"#;
     let bench = Bench::with_scene(scene);
     bench.write("wood.png", b"");
-    let output = bench.run(&["render", "scene.json", "-o", "out"]);
-    let message = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    for word in ["materials.m.color.image", "wodo.png", "mean \"wood.png\""] {
-        assert!(message.contains(word), "{word}: {message}");
-    }
+    insta::assert_snapshot!(bench.refusal(&["render", "scene.json", "-o", "out"]), @r#"
+    error: scene.json, line 3, column 56: materials.m.color.image: no such file: "wodo.png"
+    hint: did you mean "wood.png"?
+    "#);
 }
 
 #[test]
 fn values_that_no_material_or_light_can_have_are_refused_by_path() {
-    let material = |m: &str| {
-        format!(
+    let materials = [
+        r#"{"type": "matte", "color": [0.5, -0.1, 0]}"#,
+        r#"{"type": "matte", "color": [0.5, NaN, 0]}"#,
+        r#"{"type": "matte", "color": [0.5, 1e999, 0]}"#,
+        r#"{"type": "emissive", "radiance": [-1, 0, 0]}"#,
+        r#"{"type": "emissive", "radiance": [1e31, 0, 0]}"#,
+        r#"{"type": "emissive", "radiance": [1, 1, 1], "illuminant": "d66"}"#,
+        r#"{"type": "dielectric", "ior": 0.9}"#,
+        r#"{"type": "dielectric", "ior": {"nd": 0.5, "vd": 60}}"#,
+        r#"{"type": "gltf", "ior": 0.9}"#,
+        r#"{"type": "metal", "color": [1, 1, 1], "roughness": -1}"#,
+        r#"{"type": "gltf", "roughness": 1.1}"#,
+    ];
+    let lights = [
+        r#"{"type": "environment", "radiance": [1e308, 1, 1]}"#,
+        r#"{"type": "point", "at": [0, 0, 0], "intensity": [1, -1, 1]}"#,
+        r#"{"type": "environment", "radiance": [-1, 1, 1]}"#,
+        r#"{"type": "sky", "turbidity": 0.5}"#,
+        r#"{"type": "sky", "sun": {"elevation": -1}}"#,
+        r#"{"type": "sky", "ground_albedo": 1.5}"#,
+        r#"{"type": "sky", "scale": -1}"#,
+        r#"{"type": "sky", "up": [0, 0, 0]}"#,
+        r#"{"type": "environment", "image": "sky.exr"}"#,
+        r#"{"type": "environment", "image": "."}"#,
+        r#"{"type": "projector", "at": [0, 2, 0], "look_at": [0, 0, 0], "intensity": [1, 1, 1]}"#,
+        r#"{"type": "directional", "direction": [0, 0, 0], "irradiance": [1, 1, 1]}"#,
+    ];
+    let refused =
+        |scene: &str| Bench::with_scene(scene).refusal(&["render", "scene.json", "-o", "out"]);
+    let mut all = String::new();
+    for m in materials {
+        let scene = format!(
             r#"{{"etendue": 1, "tracer": {{"type": "path"}},
             "objects": [{{"shape": "box", "material": "m"}}], "materials": {{"m": {m}}}}}"#
-        )
-    };
-    let light = |l: &str| format!(r#"{{"etendue": 1, "lights": [{l}]}}"#);
-    let cases = [
-        (material(r#"{"type": "matte", "color": [0.5, -0.1, 0]}"#), "materials.m.color"),
-        (material(r#"{"type": "matte", "color": [0.5, NaN, 0]}"#), "broken JSON"),
-        (material(r#"{"type": "matte", "color": [0.5, 1e999, 0]}"#), "out of range"),
-        (material(r#"{"type": "emissive", "radiance": [-1, 0, 0]}"#), "materials.m.radiance"),
-        (material(r#"{"type": "emissive", "radiance": [1e31, 0, 0]}"#), "above 1e30"),
-        (light(r#"{"type": "environment", "radiance": [1e308, 1, 1]}"#), "above 1e30"),
-        (
-            material(r#"{"type": "emissive", "radiance": [1, 1, 1], "illuminant": "d66"}"#),
-            "materials.m.illuminant: \"d66\" is not known here\nhint: did you mean `d65`?",
-        ),
-        (material(r#"{"type": "dielectric", "ior": 0.9}"#), "materials.m.ior: 0.9 is below 1"),
-        (material(r#"{"type": "dielectric", "ior": {"nd": 0.5, "vd": 60}}"#), "materials.m.ior"),
-        (material(r#"{"type": "gltf", "ior": 0.9}"#), "materials.m.ior"),
-        (material(r#"{"type": "metal", "color": [1, 1, 1], "roughness": -1}"#), "roughness"),
-        (material(r#"{"type": "gltf", "roughness": 1.1}"#), "materials.m.roughness"),
-        (light(r#"{"type": "point", "at": [0, 0, 0], "intensity": [1, -1, 1]}"#), "lights[0]"),
-        (light(r#"{"type": "environment", "radiance": [-1, 1, 1]}"#), "lights[0].radiance"),
-        (
-            light(r#"{"type": "sky", "turbidity": 0.5}"#),
-            "lights[0].turbidity: 0.5 is below the least, 1",
-        ),
-        (
-            light(r#"{"type": "sky", "sun": {"elevation": -1}}"#),
-            "lights[0].sun.elevation: -1 is below the least, 0",
-        ),
-        (light(r#"{"type": "sky", "ground_albedo": 1.5}"#), "lights[0].ground_albedo"),
-        (light(r#"{"type": "sky", "scale": -1}"#), "lights[0].scale"),
-        (light(r#"{"type": "sky", "up": [0, 0, 0]}"#), "lights[0].up: gives no direction"),
-        (light(r#"{"type": "environment", "image": "sky.exr"}"#), "lights[0].image: no such file"),
-        (light(r#"{"type": "environment", "image": "."}"#), "lights[0].image: \".\" is a folder"),
-        (
-            light(
-                r#"{"type": "projector", "at": [0, 2, 0], "look_at": [0, 0, 0], "intensity": [1, 1, 1]}"#,
-            ),
-            "lights[0].up: has no length or lies along the view",
-        ),
-        (
-            light(r#"{"type": "directional", "direction": [0, 0, 0], "irradiance": [1, 1, 1]}"#),
-            "lights[0].direction",
-        ),
-    ];
-    for (scene, words) in cases {
-        let output = Bench::with_scene(&scene).run(&["render", "scene.json", "-o", "out"]);
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{scene}: {message}");
-        assert!(message.contains(words), "expected \"{words}\": {message}");
+        );
+        all += &under(m, &refused(&scene));
     }
+    for light in lights {
+        all += &under(light, &refused(&format!(r#"{{"etendue": 1, "lights": [{light}]}}"#)));
+    }
+    insta::assert_snapshot!(all);
 }
 
 /// A plane of this material under these lights, by global illumination; the picture's numbers.
@@ -225,10 +210,14 @@ fn an_environment_that_is_no_number_is_black_and_counted_or_refused_when_strict(
     let picture = plane(matte, lights, &mut bench);
     assert!(picture.iter().all(|p| p.is_finite() && *p > 0.3 && *p < 1.0), "{picture:?}");
     let bench = bench.expect("the bench of the render");
-    let notes = bench.json("report.json")["notes"].to_string();
-    assert!(notes.contains("32 pixels that are not finite, below zero or above 1e30"), "{notes}");
-    let output = bench.run(&["render", "scene.json", "-o", "strict", "--strict"]);
-    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+    let notes = &bench.json("report.json")["notes"];
+    insta::assert_snapshot!(format!("{notes:#}"), @r#"
+    [
+      "the environment has 32 pixels that are not finite, below zero or above 1e30; they are black"
+    ]
+    "#);
+    let strict = ["render", "scene.json", "-o", "strict", "--strict"];
+    insta::assert_snapshot!(bench.refusal(&strict), @"error: the environment has 32 pixels that are not finite, below zero or above 1e30; they are black");
 }
 
 /// The brightest lights that are taken leave every number finite.

@@ -2,7 +2,7 @@
 
 use etendue_accel::AccelName;
 
-use crate::run::{Bench, text};
+use crate::run::{Bench, text, under};
 
 const SCENE: &str = r#"{"etendue": 1,
     "camera": {"type": "pinhole", "sensor": {"resolution": [48, 32]}},
@@ -103,7 +103,7 @@ fn rays_scatter_from_what_the_camera_sees() {
     assert!(text(&output.stdout).contains(&format!("Rays: {rays} scattered")));
     let nothing = bench.run(&[&words[..], &["--set", "objects=[]"]].concat());
     assert_eq!(nothing.status.code(), Some(2));
-    assert!(text(&nothing.stderr).contains("sees nothing"), "{}", text(&nothing.stderr));
+    insta::assert_snapshot!(bench.said(&nothing), @"error: --scattered: the camera sees nothing that rays could scatter from");
 }
 
 #[test]
@@ -153,26 +153,30 @@ fn models_of_a_lens_are_compared_with_the_full_train() {
 #[test]
 fn counts_that_make_no_sense_are_refused() {
     let bench = Bench::with_scene(SCENE);
-    let cases = [
-        (["--rounds", "0"], "1 to 1000"),
-        (["--threads", "1,0"], "1 to 1024"),
-        (["--batches", "a"], "whole number"),
-        (["--rays", "-3"], "-3"),
-        (["--memory-limit", "1"], "--memory-limit"),
-        (["--sample-counts", "0"], "1 to 65536"),
-        (["--seconds", "nan"], "seconds"),
-        (["--only", "lenses"], "lenses"),
-    ];
-    for (options, word) in cases {
-        let output = bench.run(&[&["bench", "scene.json", "-o", "out"], &options[..]].concat());
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{options:?}: {message}");
-        assert!(message.contains(word), "{options:?}: {message}");
+    let refused = |options: [&str; 2]| {
+        let said = bench.refusal(&[&["bench", "scene.json", "-o", "out"], &options[..]].concat());
         assert!(!bench.path("out").exists(), "{options:?}");
-    }
-    let missing = bench.run(&["bench", "none.json", "-o", "out"]);
-    assert_eq!(missing.status.code(), Some(2));
-    assert!(text(&missing.stderr).contains("none.json"));
+        said
+    };
+    let cases = [
+        ["--rounds", "0"],
+        ["--threads", "1,0"],
+        ["--batches", "a"],
+        ["--rays", "-3"],
+        ["--sample-counts", "0"],
+        ["--seconds", "nan"],
+        ["--only", "lenses"],
+    ];
+    insta::assert_snapshot!(
+        cases.map(|options| under(&options.join(" "), &refused(options))).concat()
+    );
+    // How much it takes is the accelerator's own.
+    let limited = refused(["--memory-limit", "1"]);
+    assert!(limited.contains("--memory-limit"), "{limited}");
+    insta::assert_snapshot!(bench.refusal(&["bench", "none.json", "-o", "out"]), @r#"
+    error: none.json: no such file
+    hint: did you mean "scene.json"?
+    "#);
     assert_eq!(bench.run(&["bench", "scene.json"]).status.code(), Some(2), "-o is needed");
 }
 
@@ -272,35 +276,31 @@ fn numbers_of_accuracy_contend_for_a_target() {
     settings("accuracy.path_noise 0.1");
     settings("accuracy.path_noise 1");
     let refused = |sweep: &str| {
-        let words = ["bench", "scene.json", "-o", "no", "--target", "20%", "--sweep", sweep];
-        let output = bench.run(&words);
-        assert_eq!(output.status.code(), Some(2), "{sweep}");
-        text(&output.stderr)
+        bench.refusal(&["bench", "scene.json", "-o", "no", "--target", "20%", "--sweep", sweep])
     };
-    assert!(refused("render.seed").contains("hint: write --sweep render.seed=VALUE,VALUE"));
-    assert!(refused("accuracy.path_noise=-1").contains("--set accuracy.path_noise=-1"));
-    assert!(refused("accuracy.pathnoise=1").contains("`path_noise`"));
+    insta::assert_snapshot!(refused("render.seed"), @"
+    error: --sweep render.seed: no number of `accuracy`, which alone are swept without values
+    hint: write --sweep render.seed=VALUE,VALUE, or one of accuracy.band_error, accuracy.path_offset_of_edge, accuracy.path_offset_of_extent, accuracy.path_noise, accuracy.path_clearance, accuracy.path_absorption, accuracy.path_probes, accuracy.path_contact, accuracy.band_place_error, accuracy.band_share_error, accuracy.roulette_after, accuracy.dispersion_paths, accuracy.sample_sigmas, accuracy.sample_error, accuracy.sample_growth, accuracy.sample_floor, accuracy.view_psnr, accuracy.view_color_shift, accuracy.view_rays, accuracy.view_cubic_rays, accuracy.view_nodes, accuracy.white_samples, accuracy.pupil_margin, accuracy.pupil_radial_intervals, accuracy.pupil_planar_intervals, accuracy.pupil_wavelengths, accuracy.pupil_checks, accuracy.image_circle_error, accuracy.mask_aim_error, accuracy.lenslet_margin, accuracy.lenslet_nodes, accuracy.lenslet_checks, accuracy.wavefront_wavelengths, accuracy.wavefront_error, accuracy.spread_nodes, accuracy.spread_wavelengths, accuracy.spread_difference, accuracy.defocus_step, accuracy.spread_detail_cells, accuracy.spread_pixel_cells, accuracy.illumination_places, accuracy.illumination_rays, accuracy.fit_places, accuracy.tolerance_rays, accuracy.tolerance_samples, accuracy.deformation_error, accuracy.texture_lookups, accuracy.sky_rows, accuracy.matte_samples
+    ");
+    insta::assert_snapshot!(refused("accuracy.path_noise=-1"), @"error: --set accuracy.path_noise=-1: accuracy.path_noise: -1 is below the least, 0.000001");
+    insta::assert_snapshot!(refused("accuracy.pathnoise=1"), @"
+    error: --set accuracy.pathnoise=1: accuracy.pathnoise: unknown key
+    hint: did you mean `path_noise`? known: `band_error`, `band_place_error`, `band_share_error`, `defocus_step`, `deformation_error`, `dispersion_paths`, `fit_places`, `illumination_places`, `illumination_rays`, `image_circle_error`, `lenslet_checks`, `lenslet_margin`, `lenslet_nodes`, `mask_aim_error`, `matte_samples`, `path_absorption`, `path_clearance`, `path_contact`, `path_noise`, `path_offset_of_edge`, `path_offset_of_extent`, `path_probes`, `pupil_checks`, `pupil_margin`, `pupil_planar_intervals`, `pupil_radial_intervals`, `pupil_wavelengths`, `roulette_after`, `sample_error`, `sample_floor`, `sample_growth`, `sample_sigmas`, `sky_rows`, `spread_detail_cells`, `spread_difference`, `spread_nodes`, `spread_pixel_cells`, `spread_wavelengths`, `texture_lookups`, `tolerance_rays`, …
+    ");
 }
 
 #[test]
 fn a_target_that_is_none_is_refused() {
     let bench = Bench::with_scene(LIT);
-    for target in ["0", "150%", "-1%", "much"] {
-        let output =
-            bench.run(&["bench", "scene.json", "-o", "out", &format!("--target={target}")]);
-        assert_eq!(output.status.code(), Some(2), "{target}");
-        assert!(text(&output.stderr).contains("such as 1% or 0.01"), "{}", text(&output.stderr));
-    }
-    let flat = bench.run(&[
-        "bench",
-        "scene.json",
-        "-o",
-        "out",
-        "--target",
-        "1%",
-        "--set",
-        "tracer={\"type\": \"facing\"}",
-    ]);
-    assert_eq!(flat.status.code(), Some(2));
-    assert!(text(&flat.stderr).contains("--target") && text(&flat.stderr).contains("tracer"));
+    let messages = ["0", "150%", "-1%", "much"].map(|target| {
+        let option = format!("--target={target}");
+        under(&option, &bench.refusal(&["bench", "scene.json", "-o", "out", &option]))
+    });
+    insta::assert_snapshot!(messages.concat());
+    let facing = "tracer={\"type\": \"facing\"}";
+    let flat = ["bench", "scene.json", "-o", "out", "--target", "1%", "--set", facing];
+    insta::assert_snapshot!(bench.refusal(&flat), @"
+    error: --target: the scene has no picture of light, whose error samples could mend
+    hint: name a `tracer` such as path
+    ");
 }

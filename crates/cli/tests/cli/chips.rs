@@ -31,9 +31,7 @@ fn wall(sensor: &Value, more: &Value) -> Bench {
 }
 
 fn refused(bench: &Bench, more: &[&str]) -> String {
-    let output = bench.run(&[&["render", "scene.json", "-o", "out", "--quiet"], more].concat());
-    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
-    text(&output.stderr)
+    bench.refusal(&[&["render", "scene.json", "-o", "out", "--quiet"], more].concat())
 }
 
 /// Frames of different light have the exposure of the first, or each its own where that is asked for; a run that
@@ -50,8 +48,10 @@ fn all_frames_have_the_exposure_of_the_first() {
         sidecar["metered_exposure_s"].as_f64().unwrap()
     };
     let bench = wall(&metering(false), &json!({ "frames": frames }));
-    let why = refused(&bench, &["--frames", "1..3"]);
-    assert!(why.contains("auto_exposure") && why.contains("frame 0"), "{why}");
+    insta::assert_snapshot!(refused(&bench, &["--frames", "1..3"]), @"
+    error: camera.sensor.auto_exposure: all frames have the exposure that is metered on frame 0, which is neither rendered by this run nor in out
+    hint: render it first, give sensor.exposure, or set camera.sensor.auto_exposure.each_frame=true
+    ");
     bench.render(&["--frames", "0..1"]);
     bench.render(&["--frames", "1..3"]);
     let first = metered(&bench, 0);
@@ -79,8 +79,10 @@ fn an_exposure_is_metered_once_and_never_while_things_move() {
     let moving = json!({ "objects": [{
         "shape": "sphere", "material": "paint", "motion": { "type": "velocity", "velocity": [1, 0, 0] }
     }] });
-    let why = refused(&wall(&metering, &moving), &[]);
-    assert!(why.contains("camera.sensor.auto_exposure") && why.contains("shutter"), "{why}");
+    insta::assert_snapshot!(refused(&wall(&metering, &moving), &[]), @"
+    error: scene.json, line 1, column 73: camera.sensor.auto_exposure: how long the shutter is open is known when the light is, and what moves or changes has to know it before
+    hint: give the shutter its `exposure`, or the sensor the `exposure` that a render of the still scene reports
+    ");
     let shutter = json!({
         "type": "pinhole", "fov": 60, "pose": { "from": [0, 0, 2], "look_at": [0, 0, 0] },
         "shutter": { "exposure": 1e-3 },
@@ -92,10 +94,14 @@ fn an_exposure_is_metered_once_and_never_while_things_move() {
     // Nor is there one to judge samples by.
     let judged = json!({ "render": { "samples": { "until": "sensor-noise" } } });
     let second = json!({ "second_readout": { "type": "split_pixel", "ratio": 0.1 } });
-    for (sensor, key) in [(&metering, "auto_exposure"), (&second, "second_readout")] {
-        let why = refused(&wall(sensor, &judged), &[]);
-        assert!(why.contains(&format!("camera.sensor.{key}: `render.samples`")), "{why}");
-    }
+    insta::assert_snapshot!(refused(&wall(&metering, &judged), &[]), @"
+    error: scene.json, line 1, column 73: camera.sensor.auto_exposure: `render.samples` until the sensor's noise goes by one plain read-out at an exposure that is known beforehand
+    hint: give it a number of samples or a `relative_error`, or leave this out
+    ");
+    insta::assert_snapshot!(refused(&wall(&second, &judged), &[]), @"
+    error: scene.json, line 1, column 164: camera.sensor.second_readout: `render.samples` until the sensor's noise goes by one plain read-out at an exposure that is known beforehand
+    hint: give it a number of samples or a `relative_error`, or leave this out
+    ");
     let mut open = moving;
     open["camera"] = shutter;
     wall(&metering, &open).render(&[]);
@@ -164,16 +170,10 @@ fn maps_of_defects_are_read() {
     }
     let bench = with("map.png");
     png(&bench, [8, 5], &|_| 0);
-    let why = refused(&bench, &[]);
-    assert!(
-        why.contains("camera.sensor.defect_map") && why.contains("8 columns and 5 rows"),
-        "{why}"
-    );
+    insta::assert_snapshot!(refused(&bench, &[]), @"error: scene.json, line 1, column 106: camera.sensor.defect_map: has 8 columns and 5 rows, the sensor [8,6]: give a map of the sensor's own");
     png(&bench, [8, 6], &|at| u8::from(at == 17) * 9);
-    let why = refused(&bench, &[]);
-    assert!(why.contains("the number 9 at column 1, row 2"), "{why}");
-    let why = refused(&with("none.png"), &[]);
-    assert!(why.contains("camera.sensor.defect_map") && why.contains("none.png"), "{why}");
+    insta::assert_snapshot!(refused(&bench, &[]), @r#"error: scene.json, line 1, column 106: camera.sensor.defect_map: "map.png" has the number 9 at column 1, row 2: 0 is a good pixel, 1 a hot, 2 a dead and 3 a stuck one"#);
+    insta::assert_snapshot!(refused(&with("none.png"), &[]), @r#"error: scene.json, line 1, column 106: camera.sensor.defect_map: "none.png" no such file: "none.png""#);
 }
 
 /// Both numbers of a pixel have their files, and the merged picture has what neither could hold.
@@ -296,19 +296,15 @@ fn halves_of_a_defocused_point_are_apart_and_make_the_whole() {
 #[test]
 fn what_a_camera_has_not_is_refused() {
     let dual = json!({ "photodiodes": "dual" });
-    let why = refused(&wall(&dual, &json!({ "tracer": { "type": "direct" } })), &[]);
-    assert!(why.contains("camera.sensor.photodiodes") && why.contains("one lens"), "{why}");
-    let why = refused(
-        &lamp(&json!({ "photodiodes": "dual", "pixel_pitch": 5.0 })),
-        &["--set", "tracer={\"type\": \"flat\"}"],
-    );
-    assert!(
-        why.contains("camera.sensor.photodiodes") && why.contains("`tracer` of light"),
-        "{why}"
-    );
+    let pinhole = wall(&dual, &json!({ "tracer": { "type": "direct" } }));
+    insta::assert_snapshot!(refused(&pinhole, &[]), @"error: scene.json, line 1, column 121: camera.sensor.photodiodes: parts of the pupil want a camera with one lens: thin_lens, real_lens or lens");
+    let flat = lamp(&json!({ "photodiodes": "dual", "pixel_pitch": 5.0 }));
+    insta::assert_snapshot!(refused(&flat, &["--set", "tracer={\"type\": \"flat\"}"]), @r#"
+    error: scene.json, line 1, column 123: camera.sensor.photodiodes: base colours come through no pupil
+    hint: give the scene a `tracer` of light, such as {"type": "path"}
+    "#);
     let parts = json!({ "layers": ["left_pupil"], "tracer": { "type": "direct" } });
-    let why = refused(&wall(&json!({}), &parts), &[]);
-    assert!(why.contains("layers[0]") && why.contains("one lens"), "{why}");
+    insta::assert_snapshot!(refused(&wall(&json!({}), &parts), &[]), @"error: scene.json, line 1, column 236: layers[0]: parts of the pupil want a camera with one lens: thin_lens, real_lens or lens");
     // A picture from elsewhere says nothing of a pupil.
     let bench = wall(&dual, &json!({}));
     let header = "{'descr': '<f4', 'fortran_order': False, 'shape': (6, 8), }";
@@ -316,27 +312,19 @@ fn what_a_camera_has_not_is_refused() {
     bytes.extend(format!("{header:<117}\n").bytes());
     bytes.extend([0; 4 * 48]);
     bench.write("light.npy", &bytes);
-    let output = bench.run(&[
-        "expose",
-        "light.npy",
-        "--sensor",
-        "scene.json",
-        "--unit",
-        "W/m2/nm",
-        "-o",
-        "out",
-    ]);
-    let why = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{why}");
-    assert!(why.contains("photodiodes") && why.contains("from elsewhere"), "{why}");
+    let expose =
+        ["expose", "light.npy", "--sensor", "scene.json", "--unit", "W/m2/nm", "-o", "out"];
+    insta::assert_snapshot!(bench.refusal(&expose), @"error: scene.json, line 1, column 121: camera.sensor.photodiodes: is of no use here: a picture from elsewhere does not say through which part of the pupil its light came");
     let rolling = json!({
         "camera": {
             "type": "pinhole", "fov": 60, "shutter": { "type": "rolling", "exposure": 0.01, "line_time": 1e-5 },
             "sensor": { "type": "raw", "resolution": [8, 6], "carrier_diffusion": 0.5 },
         },
     });
-    let why = refused(&wall(&json!({}), &rolling), &[]);
-    assert!(why.contains("carrier_diffusion") && why.contains("shutter"), "{why}");
+    insta::assert_snapshot!(refused(&wall(&json!({}), &rolling), &[]), @"
+    error: scene.json, line 1, column 31: camera.sensor.carrier_diffusion: a shutter looks at rows of the light, and carriers come from beside them
+    hint: leave out `shutter`, or this
+    ");
 }
 
 /// Across a slanted edge the modulation is that of the pixel times that of the diffusion, exp(−2π²σ²f²), within 0.5 %.

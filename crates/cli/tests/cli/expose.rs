@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::run::{Bench, text};
+use crate::run::{Bench, notes_in, text, under};
 
 /// An array as numpy writes it.
 pub(crate) fn npy(shape: &[usize], values: &[f32]) -> Vec<u8> {
@@ -252,7 +252,10 @@ fn what_is_no_light_counts_as_none_and_is_told() {
     let notes = exposed(&bench, "grey.npy", "sensor.json", &["--unit", "W/m2/nm"]);
     let raw = read(&bench, "again/raw.npy");
     assert!(raw[..3] == [0.0; 3] && raw[3] > 100.0, "{raw:?}");
-    assert!(notes.contains("are no light and were taken for none"), "{notes}");
+    insta::assert_snapshot!(notes_in(&notes), @"
+    note: 25.0 % of the pixels are saturated at an exposure of 0.01 s (65535 DN): set the sensor's `exposure` to 1.5e-3 s, at which nine pixels of ten have less than half of that, or use a smaller pupil
+    note: 3 negative and 6 infinite or NaN values of the film are no light and were taken for none
+    ");
     let invalid = &bench.json("again/sensor.json")["invalid"];
     assert!(
         invalid["negative"].as_u64() > Some(0) && invalid["not_finite"].as_u64() > Some(0),
@@ -315,7 +318,7 @@ fn a_preset_takes_a_radiance_picture_whole() {
     // 64/256 · 2^(127 − 128) = 1/8 of full scale; the imx183 has 38 DN of black of 4095.
     let notes = exposed(&bench, "photo.hdr", "imx183", &["--unit", "1", "--set", "noise=none"]);
     assert_eq!(read(&bench, "again/raw.npy"), [(38.0_f64 + 4057.0 / 8.0).round()]);
-    assert!(notes.contains("1 x 1 pixels, of the 5496 x 3672 of an IMX183"), "{notes}");
+    insta::assert_snapshot!(notes_in(&notes), @"note: the picture has 1 x 1 pixels, of the 5496 x 3672 of an IMX183");
     for name in ["raw.png", "raw.dng", "raw.preview.png", "sensor.json", "etendue-manifest.json"] {
         assert!(bench.path("again").join(name).exists(), "{name}");
     }
@@ -420,22 +423,16 @@ fn faulty() -> Bench {
     bench
 }
 
-/// Refusal: the picture, the sensor, more arguments, and two parts of the message.
-type Refusal<'a> = (&'a str, &'a str, &'a [&'a str], [&'a str; 2]);
-
-/// Asserts that each is refused with exit code 2 and its words, and that nothing is left behind.
-fn assert_refused(refusals: &[Refusal<'_>]) {
+/// The messages that refuse each picture with a sensor and more arguments; nothing is left behind.
+fn refused(cases: &[(&str, &str, &[&str])]) -> String {
     let bench = faulty();
-    for &(image, sensor, more, words) in refusals {
+    let messages = cases.iter().map(|&(image, sensor, more)| {
         let arguments = [&["expose", image, "--sensor", sensor, "-o", "again"], more].concat();
-        let output = bench.run(&arguments);
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-        for word in words {
-            assert!(message.contains(word), "expected \"{word}\" in: {message}");
-        }
+        let message = bench.refusal(&arguments);
         assert!(!bench.path("again").exists(), "{arguments:?}: something was left behind");
-    }
+        under(&arguments.join(" "), &message)
+    });
+    messages.collect()
 }
 
 const IRRADIANCE: &[&str] = &["--unit", "W/m2/nm"];
@@ -443,112 +440,49 @@ const WITH_BANDS: &[&str] = &["--unit", "W/m2/nm", "--wavelengths", "500,600"];
 
 #[test]
 fn light_units_and_sensors_that_do_not_go_together_are_refused_with_the_remedy() {
-    assert_refused(&[
-        (
-            "grey.npy",
-            "sensor.json",
-            &[],
-            ["grey.npy: does not say in which unit", "--unit, 1 (1 is full scale)"],
-        ),
-        ("grey.npy", "sensor.json", &["--unit", "lux"], ["--unit", "\"lux\" is no unit of light"]),
-        (
-            "grey.npy",
-            "sensor.json",
-            &["--unit", "W/m2/sr/nm"],
-            ["are radiance", "give its --f-number N"],
-        ),
-        (
-            "grey.npy",
-            "sensor.json",
-            &["--unit", "1", "--f-number", "4"],
-            ["the values are in 1", "leave it out"],
-        ),
-        (
-            "grey.npy",
-            "sensor.json",
-            &["--unit", "1", "--f-number", "-4"],
-            ["--f-number", "above 0"],
-        ),
-        ("grey.npy", "sized.json", &["--unit", "1"], ["has 2 x 2 pixels", "`resolution` is 8 x 8"]),
-        (
-            "grey.npy",
-            "digital.json",
-            IRRADIANCE,
-            ["for a sensor of physical radiometry", "is digital"],
-        ),
-        ("grey.npy", "imx999", IRRADIANCE, ["imx999", "neither a file nor a preset"]),
-        ("cube.npy", "sensor.json", IRRADIANCE, ["has 2 values a pixel", "--wavelengths"]),
-        (
-            "cube.npy",
-            "sensor.json",
-            &["--unit", "1", "--wavelengths", "500"],
-            ["cube.npy", "one band"],
-        ),
-        (
-            "cube.npy",
-            "sensor.json",
-            &["--unit", "1", "--wavelengths", "1,2,3"],
-            ["cube.npy", "did you mean micrometres"],
-        ),
-        (
-            "cube.npy",
-            "sensor.json",
-            &["--unit", "1", "--wavelengths", "400,500,600"],
-            ["2 bands", "3 wavelengths"],
-        ),
-        (
-            "cube.npy",
-            "sensor.json",
-            &["--unit", "1", "--wavelengths", "600,500"],
-            ["out of order", "sort"],
-        ),
-        ("cube.npy", "bands.json", WITH_BANDS, ["cube.npy: its bands miss", "425nm"]),
-        ("line.npy", "sensor.json", IRRADIANCE, ["line.npy", "instead of rows × columns"]),
-        ("cut.npy", "sensor.json", IRRADIANCE, ["cut.npy", "ends before its last number"]),
-        ("words.exr", "sensor.json", IRRADIANCE, ["words.exr", "EXR, NPY, ENVI and Radiance"]),
-        ("nothing.exr", "sensor.json", IRRADIANCE, ["nothing.exr", "No such file"]),
+    let messages = refused(&[
+        ("grey.npy", "sensor.json", &[]),
+        ("grey.npy", "sensor.json", &["--unit", "lux"]),
+        ("grey.npy", "sensor.json", &["--unit", "W/m2/sr/nm"]),
+        ("grey.npy", "sensor.json", &["--unit", "1", "--f-number", "4"]),
+        ("grey.npy", "sensor.json", &["--unit", "1", "--f-number", "-4"]),
+        ("grey.npy", "sized.json", &["--unit", "1"]),
+        ("grey.npy", "digital.json", IRRADIANCE),
+        ("grey.npy", "imx999", IRRADIANCE),
+        ("cube.npy", "sensor.json", IRRADIANCE),
+        ("cube.npy", "sensor.json", &["--unit", "1", "--wavelengths", "500"]),
+        ("cube.npy", "sensor.json", &["--unit", "1", "--wavelengths", "1,2,3"]),
+        ("cube.npy", "sensor.json", &["--unit", "1", "--wavelengths", "400,500,600"]),
+        ("cube.npy", "sensor.json", &["--unit", "1", "--wavelengths", "600,500"]),
+        ("cube.npy", "bands.json", WITH_BANDS),
+        ("line.npy", "sensor.json", IRRADIANCE),
+        ("cut.npy", "sensor.json", IRRADIANCE),
+        ("words.exr", "sensor.json", IRRADIANCE),
+        ("nothing.exr", "sensor.json", IRRADIANCE),
     ]);
+    insta::assert_snapshot!(messages);
 }
 
 #[test]
 fn pictures_that_make_no_sense_are_refused_by_file_and_place() {
-    assert_refused(&[
-        ("good.hdr", "sensor.json", &[], ["good.hdr: does not say in which unit", "--unit"]),
-        (
-            "good.hdr",
-            "sensor.json",
-            WITH_BANDS,
-            ["wavelengths are given for NPY arrays", "says its own"],
-        ),
-        (
-            "short.img",
-            "sensor.json",
-            IRRADIANCE,
-            ["short.hdr: promises 4 samples x 2 lines x 2 bands", "has 60 bytes"],
-        ),
-        ("far.hdr", "sensor.json", IRRADIANCE, ["far.hdr: its bands miss", "1450..=1650 nm"]),
-        ("micro.hdr", "sensor.json", IRRADIANCE, ["micro.hdr", "did you mean micrometres"]),
-        (
-            "order.hdr",
-            "sensor.json",
-            IRRADIANCE,
-            ["order.hdr", "band 1 is at 600 nm and band 2 at 500 nm"],
-        ),
-        ("twice.hdr", "sensor.json", IRRADIANCE, ["twice.hdr", "two bands at 500 nm"]),
-        ("nowhere.hdr", "sensor.json", IRRADIANCE, ["nowhere.hdr", "`wavelength = {…}`"]),
-        ("share.hdr", "sensor.json", IRRADIANCE, ["share.hdr", "what is reflected and no light"]),
-        ("lux.hdr", "sensor.json", &[], ["gives its values in \"lux\"", "--unit"]),
-        ("alone.hdr", "sensor.json", IRRADIANCE, ["alone.hdr", "without its numbers"]),
-        ("orphan.img", "sensor.json", IRRADIANCE, ["orphan.img", "no ENVI header beside it"]),
-        ("empty", "sensor.json", IRRADIANCE, ["empty", "no picture of light"]),
-        ("mixed", "sensor.json", IRRADIANCE, ["several kinds", ".exr, .npy"]),
-        (
-            "grey.npy",
-            "sensor.json",
-            &["--unit", "1", "--outputs", "exr"],
-            ["--outputs", "png, npy or dng"],
-        ),
+    let messages = refused(&[
+        ("good.hdr", "sensor.json", &[]),
+        ("good.hdr", "sensor.json", WITH_BANDS),
+        ("short.img", "sensor.json", IRRADIANCE),
+        ("far.hdr", "sensor.json", IRRADIANCE),
+        ("micro.hdr", "sensor.json", IRRADIANCE),
+        ("order.hdr", "sensor.json", IRRADIANCE),
+        ("twice.hdr", "sensor.json", IRRADIANCE),
+        ("nowhere.hdr", "sensor.json", IRRADIANCE),
+        ("share.hdr", "sensor.json", IRRADIANCE),
+        ("lux.hdr", "sensor.json", &[]),
+        ("alone.hdr", "sensor.json", IRRADIANCE),
+        ("orphan.img", "sensor.json", IRRADIANCE),
+        ("empty", "sensor.json", IRRADIANCE),
+        ("mixed", "sensor.json", IRRADIANCE),
+        ("grey.npy", "sensor.json", &["--unit", "1", "--outputs", "exr"]),
     ]);
+    insta::assert_snapshot!(messages);
 }
 
 #[test]
@@ -558,18 +492,12 @@ fn a_picture_is_never_written_over() {
     fs::create_dir(bench.path("here")).unwrap();
     let bytes = npy(&[2, 2], &[0.5; 4]);
     bench.write("here/raw.npy", &bytes);
-    let output = bench.run(&[
-        "expose",
-        "here/raw.npy",
-        "--sensor",
-        "sensor.json",
-        "-o",
-        "here",
-        "--unit",
-        "1",
-    ]);
-    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
-    assert!(text(&output.stderr).contains("raw.npy"), "{}", text(&output.stderr));
+    let arguments =
+        ["expose", "here/raw.npy", "--sensor", "sensor.json", "-o", "here", "--unit", "1"];
+    insta::assert_snapshot!(bench.refusal(&arguments), @"
+    error: here/raw.npy would be written over, and is read by this command; nothing was written
+    hint: choose another folder or name
+    ");
     assert_eq!(fs::read(bench.path("here/raw.npy")).unwrap(), bytes);
     assert!(Path::new(&bench.path("here")).read_dir().unwrap().count() == 1);
 }

@@ -124,10 +124,10 @@ fn disparity_of_a_rig_is_within_the_rig_and_flow_along_time() {
     // None of the cameras has one that is two further on, at any moment.
     let far = scene(&wall_and_square(), &rig, &json!(["depth", {"type": "disparity", "to": 2}]));
     let bench = Bench::with_scene(&far.to_string());
-    let output = bench.run(&["render", "scene.json", "-o", "out"]);
-    assert_eq!(output.status.code(), Some(2));
-    let said = text(&output.stderr);
-    assert!(said.contains("the rig's cameras, which are 0..2"), "{said}");
+    insta::assert_snapshot!(bench.refusal(&["render", "scene.json", "-o", "out"]), @"
+    error: scene.json: layers: `to`: 2 leads out of the rig's cameras, which are 0..2, from each of them
+    hint: name a nearer one, or leave the layer out
+    ");
 }
 
 /// Numbers of copies run through all objects: what stands still is followed whatever became of others.
@@ -266,18 +266,15 @@ fn flow_lands_on_the_same_point_of_a_curved_surface_and_through_a_lens() {
 #[test]
 fn comparisons_without_another_frame_are_refused() {
     let mut alone = scene(&wall_and_square(), &json!([{}]), &json!(["flow"]));
-    let refused = |scene: &Value, what: &str| {
+    let refused = |scene: &Value| {
         let bench = Bench::with_scene(&scene.to_string());
-        let output = bench.run(&["render", "scene.json", "-o", "out", "-q"]);
-        let error = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{error}");
-        assert!(error.contains(what), "{error}");
+        bench.refusal(&["render", "scene.json", "-o", "out", "-q"])
     };
     alone["layers"] = json!([{"type": "flow", "to": 0}]);
-    refused(&alone, "`to` is 0");
+    insta::assert_snapshot!(refused(&alone), @"error: scene.json, line 1, column 212: layers[0]: `to` is 0: a frame does not move against itself; 1 is the next frame");
     alone["layers"] = json!(["flow"]);
     alone.as_object_mut().unwrap().remove("frames");
-    refused(&alone, "no `frames`");
+    insta::assert_snapshot!(refused(&alone), @"error: scene.json: layers: flow, disparity and occlusion compare frames, and the scene has no `frames`");
 }
 
 #[test]
@@ -306,8 +303,8 @@ fn a_frame_to_compare_with_that_is_not_there_is_told() {
     // None of the two frames has one that is two further.
     let far = json!(["depth", {"type": "flow", "to": 2}]);
     let bench = Bench::with_scene(&scene(&wall_and_square(), &grid, &far).to_string());
-    let output = bench.run(&["render", "scene.json", "-o", "out"]);
-    assert_eq!(output.status.code(), Some(2));
-    let said = text(&output.stderr);
-    assert!(said.contains("scene.json: layers: `to`: 2") && said.contains("0..2"), "{said}");
+    insta::assert_snapshot!(bench.refusal(&["render", "scene.json", "-o", "out"]), @"
+    error: scene.json: layers: `to`: 2 leads out of the scene's frames, which are 0..2, from each of them
+    hint: name a nearer one, or leave the layer out
+    ");
 }

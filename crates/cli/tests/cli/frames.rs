@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::run::{Bench, text};
+use crate::run::{Bench, text, under};
 
 /// A ball on a floor and the frames of it.
 pub(crate) fn scene(frames: &Value) -> String {
@@ -25,10 +25,9 @@ pub(crate) fn scene(frames: &Value) -> String {
 fn refused(frames: &Value, files: &[(&str, &[u8])], more: &[&str]) -> String {
     let bench = Bench::with_scene(&scene(frames));
     files.iter().for_each(|(name, bytes)| bench.write(name, bytes));
-    let output = bench.run(&[&["render", "scene.json", "-o", "out", "-q"], more].concat());
-    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+    let message = bench.refusal(&[&["render", "scene.json", "-o", "out", "-q"], more].concat());
     assert!(!bench.path("out/frames/000000/layers.exr").exists());
-    text(&output.stderr)
+    message
 }
 
 #[test]
@@ -114,22 +113,16 @@ fn the_index_lists_no_file_that_was_not_written() {
 /// Frames are told to be too many before any is made.
 #[test]
 fn too_many_frames_are_refused_at_once() {
-    for frames in [
-        json!({"type": "grid", "columns": 100_000, "rows": 100_000, "spacing": 0.1}),
-        json!({"type": "orbit", "count": 4_000_000_000_u32}),
-    ] {
-        let err = refused(&frames, &[], &[]);
-        assert!(err.contains("frames; 100000 are the most"), "{err}");
-    }
+    let grid = json!({"type": "grid", "columns": 100_000, "rows": 100_000, "spacing": 0.1});
+    insta::assert_snapshot!(refused(&grid, &[], &[]), @"error: scene.json, line 1, column 139: frames.columns: 10000000000 frames; 100000 are the most");
+    let orbit = json!({"type": "orbit", "count": 4_000_000_000_u32});
+    insta::assert_snapshot!(refused(&orbit, &[], &[]), @"error: scene.json, line 1, column 139: frames.count: 4000000000 frames; 100000 are the most");
 }
 
 #[test]
 fn a_value_that_is_wrong_in_one_frame_is_told_with_its_place() {
     let bench = Bench::with_scene(&scene(&json!([{}, {"camera.fov": 300}])));
-    let output = bench.run(&["render", "scene.json", "-o", "out", "-q"]);
-    let err = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{err}");
-    assert!(err.contains("frames[1]: camera.fov=300") && !err.contains("--set"), "{err}");
+    insta::assert_snapshot!(bench.refusal(&["render", "scene.json", "-o", "out", "-q"]), @"error: frames[1]: camera.fov=300: camera.fov: 300 is outside 0 to 180 degrees (both excluded)");
     assert!(!bench.path("out/frames/000001").exists(), "no empty folder is left");
 }
 
@@ -333,9 +326,12 @@ fn files_lie_where_a_pattern_says_and_a_kill_leaves_nothing_half() {
     let folders = Bench::with_scene(&scene(&grid));
     folders.render(&[]);
     assert_eq!(folders.array("frames/000002/position"), bench.array("position/000002"));
-    let output = bench.run(&["render", "scene.json", "-o", "out", "--pattern", "{frame}"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("{layer}"), "{}", text(&output.stderr));
+    let pattern = ["render", "scene.json", "-o", "out", "--pattern", "{frame}"];
+    insta::assert_snapshot!(bench.refusal(&pattern), @"
+    error: invalid value '{frame}' for '--pattern <NAMES>': wants {frame} and {layer} in it, as {layer}/{frame}
+
+    For more information, try '--help'.
+    ");
 }
 
 #[test]
@@ -413,82 +409,78 @@ fn models_bring_their_animations_and_cameras() {
     let cameras = bench.json("out/index.json");
     assert_eq!(cameras["frames"].as_array().map(Vec::len), Some(1));
     assert_eq!(cameras["frames"][0]["resolution"], json!([320, 240]));
-    let error = |frames: &Value, words: &str| {
-        bench.write("scene.json", scene(frames).to_string().as_bytes());
-        let output = bench.run(&["render", "scene.json", "-o", "out", "-q"]);
-        assert_eq!(output.status.code(), Some(2));
-        assert!(text(&output.stderr).contains(words), "{}", text(&output.stderr));
-    };
-    error(&json!({"type": "animation", "times": [0], "name": "walk"}), "MoleIdle");
-    error(&json!({"type": "animation"}), "either `times` or `end`");
-    error(&json!({"type": "animation", "end": 1, "rate": 0}), "frames.rate");
-    error(&json!({"type": "animation", "end": 1, "objects": [1]}), "objects[1]");
+    let wrong = [
+        json!({"type": "animation", "times": [0], "name": "walk"}),
+        json!({"type": "animation"}),
+        json!({"type": "animation", "end": 1, "rate": 0}),
+        json!({"type": "animation", "end": 1, "objects": [1]}),
+    ];
+    let messages = wrong.map(|frames| {
+        bench.write("scene.json", scene(&frames).to_string().as_bytes());
+        under(&frames.to_string(), &bench.refusal(&["render", "scene.json", "-o", "out", "-q"]))
+    });
+    insta::assert_snapshot!(messages.concat());
 }
 
 #[test]
 fn bad_frames_are_refused_by_number() {
-    let error = refused(&json!([{"camera.fov": 30}, {"camera.fow": 30}]), &[], &[]);
-    assert!(error.contains("frames[1]") && error.contains("fow"), "{error}");
-    let error = refused(&json!([]), &[], &[]);
-    assert!(error.contains("no frame"), "{error}");
-    let error = refused(&json!([{}]), &[], &["--frames", "1..2"]);
-    assert!(error.contains("0..1"), "{error}");
     let poses = |name: &str| json!({"type": "trajectory", "file": name});
-    let stretched = b"0 0 0 4 0 0 0 1\n1 0 0 4 0 0 0 0\n";
-    let error = refused(&poses("a.txt"), &[("a.txt", stretched)], &[]);
-    assert!(
-        error.contains("pose 1") && error.contains("a.txt") | error.contains("quaternion"),
-        "{error}"
-    );
-    let error = refused(&poses("a.txt"), &[("a.txt", b"0 0 nan 4 0 0 0 1\n")], &[]);
-    assert!(error.contains("line 1") && error.contains("nan"), "{error}");
-    let error = refused(&poses("a.txt"), &[("a.txt", b"0 0 0\n")], &[]);
-    assert!(error.contains("3 words") && error.contains("tx ty tz"), "{error}");
-    let falls = b"0.1 0 0 4 0 0 0 1\n0.2 0 0 4 0 0 0 1\n0.15 0 0 4 0 0 0 1\n";
-    let error = refused(&poses("a.txt"), &[("a.txt", falls)], &[]);
-    assert!(error.contains("time 0.15 in line 3, after 0.2"), "{error}");
-    let error = refused(&poses("no.npy"), &[], &[]);
-    assert!(error.contains("no such file"), "{error}");
-    let error = refused(&json!({"type": "orbit", "count": 0}), &[], &[]);
-    assert!(error.contains("frames.count"), "{error}");
-    let error = refused(&json!({"type": "orbit", "count": 3, "axis": [0, 0, 0]}), &[], &[]);
-    assert!(error.contains("frames.axis"), "{error}");
-    // Intrinsics of no lens, before anything is rendered: 16 × 12 pixels of them took 6 s.
+    // Poses that are no rotation: which, and by how much.
+    let bent = json!([[1, 0, 0, 0], [0, 1.01, 0, 0], [0, 0, 1, 4], [0, 0, 0, 1]]);
+    let good = json!({"from": [0, 0, 4], "look_at": [0, 0, 0]});
+    let bent = json!({"matrix": bent, "maps": "world_from_camera", "convention": "opengl"});
+    let cases = [
+        json!([{"camera.fov": 30}, {"camera.fow": 30}]),
+        json!([]),
+        poses("no.npy"),
+        json!({"type": "orbit", "count": 0}),
+        json!({"type": "orbit", "count": 3, "axis": [0, 0, 0]}),
+        json!({"type": "poses", "poses": [good, bent]}),
+        json!({"type": "poses", "poses": [], "times": [1]}),
+    ];
+    let mut all =
+        cases.map(|frames| under(&frames.to_string(), &refused(&frames, &[], &[]))).concat();
+    all += &under("--frames 1..2", &refused(&json!([{}]), &[], &["--frames", "1..2"]));
+    let files: [(&str, &[u8]); 4] = [
+        ("a quaternion of no length", b"0 0 0 4 0 0 0 1\n1 0 0 4 0 0 0 0\n"),
+        ("no number", b"0 0 nan 4 0 0 0 1\n"),
+        ("three words", b"0 0 0\n"),
+        ("times that fall", b"0.1 0 0 4 0 0 0 1\n0.2 0 0 4 0 0 0 1\n0.15 0 0 4 0 0 0 1\n"),
+    ];
+    for (what, bytes) in files {
+        all += &under(what, &refused(&poses("a.txt"), &[("a.txt", bytes)], &[]));
+    }
+    let npy = |shape: &str, values: &[u8]| {
+        let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}");
+        [&b"\x93NUMPY\x01\x00\x76\x00"[..], format!("{header:<117}\n").as_bytes(), values].concat()
+    };
+    for (shape, values) in
+        [("(1, 4, 5)", vec![0; 160]), ("(1, 3, 4)", f64::NAN.to_le_bytes().repeat(12))]
+    {
+        let bytes = npy(shape, &values);
+        all += &under(shape, &refused(&poses("a.npy"), &[("a.npy", &bytes)], &[]));
+    }
+    insta::assert_snapshot!(all);
+}
+
+/// Intrinsics of no lens, before anything is rendered: 16 × 12 pixels of them took 6 s.
+#[test]
+fn intrinsics_of_no_lens_are_refused_at_once() {
     let pose = |z: f64| json!([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, z], [0, 0, 0, 1]]);
     let odd = json!({"fl_x": 2e-5, "fl_y": 20, "k1": 0.01, "frames": [
         {"file_path": "a", "transform_matrix": pose(4.0)}, {"file_path": "b", "transform_matrix": pose(5.0)}]});
-    let mut free: Value = serde_json::from_str(&scene(&poses("odd.json"))).unwrap();
+    let trajectory = json!({"type": "trajectory", "file": "odd.json"});
+    let mut free: Value = serde_json::from_str(&scene(&trajectory)).unwrap();
     free["camera"].as_object_mut().unwrap().remove("fov");
     let bench = Bench::with_scene(&free.to_string());
     bench.write("odd.json", odd.to_string().as_bytes());
     let started = std::time::Instant::now();
-    let output = bench.run(&["render", "scene.json", "-o", "out", "-q"]);
-    let error = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{error}");
-    assert!(error.contains("frames[0]") && error.contains("check the focal lengths"), "{error}");
+    let message = bench.refusal(&["render", "scene.json", "-o", "out", "-q"]);
     assert!(started.elapsed().as_secs_f64() < 5.0, "{:?}", started.elapsed());
-    // Poses that are no rotation: which, and by how much.
-    let bent = json!([[1, 0, 0, 0], [0, 1.01, 0, 0], [0, 0, 1, 4], [0, 0, 0, 1]]);
-    let good = json!({"from": [0, 0, 4], "look_at": [0, 0, 0]});
-    let poses_of = json!({"type": "poses", "poses": [good, {"matrix": bent,
-        "maps": "world_from_camera", "convention": "opengl"}]});
-    let error = refused(&poses_of, &[], &[]);
-    assert!(error.contains("pose 1") && error.contains("rotation"), "{error}");
-    assert!(error.contains("2.01e-2"), "by how much: {error}");
-    let mut npy = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
-    let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1, 4, 5), }";
-    npy.extend(format!("{header:<117}\n").bytes());
-    npy.extend([0; 160]);
-    let error = refused(&poses("a.npy"), &[("a.npy", &npy)], &[]);
-    assert!(error.contains("[1, 4, 5]") && error.contains("n × 4 × 4"), "{error}");
-    let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1, 3, 4), }";
-    let mut npy = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
-    npy.extend(format!("{header:<117}\n").bytes());
-    npy.extend((0..12).flat_map(|_| f64::NAN.to_le_bytes()));
-    let error = refused(&poses("a.npy"), &[("a.npy", &npy)], &[]);
-    assert!(error.contains("a.npy") && error.contains("finite"), "{error}");
-    let error = refused(&json!({"type": "poses", "poses": [], "times": [1]}), &[], &[]);
-    assert!(error.contains("1 times for 0 poses"), "{error}");
+    insta::assert_snapshot!(message, @r#"
+    error: frames[0]: camera.distortion={"k1":0.01,"k2":0.0,"k3":0.0,"p1":0.0,"p2":0.0,"type":"brown_conrady"}: camera.distortion: the picture reaches 89.9999° from the axis, where no lens of this model sees
+    hint: check the focal lengths (fx, fy) and the resolution, which are in pixels, or leave out the distortion
+    "#);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Additions that people and editors write beside the format.
 
-use crate::run::{Bench, text};
+use crate::run::{Bench, text, under};
 
 #[test]
 fn comments_and_schema_addresses_are_allowed_anywhere() {
@@ -20,15 +20,15 @@ fn comments_and_schema_addresses_are_allowed_anywhere() {
     };
     assert_eq!(hash(plain), hash(remarked));
     // Only these words, and only as text.
-    for (wrong, said) in [
-        (remarked.replace("\"comment\": \"1 m\"", "\"coment\": \"1 m\""), "objects[0].coment"),
-        (remarked.replace("\"comment\": \"1 m\"", "\"comment\": 7"), "objects[0].comment"),
-    ] {
-        let bench = Bench::with_scene(&wrong);
-        let output = bench.run(&["check", "scene.json"]);
-        assert_eq!(output.status.code(), Some(2), "{said}");
-        assert!(text(&output.stderr).contains(said), "{}", text(&output.stderr));
-    }
+    let refused = |remark: &str| {
+        let wrong = remarked.replace("\"comment\": \"1 m\"", remark);
+        Bench::with_scene(&wrong).refusal(&["check", "scene.json"])
+    };
+    insta::assert_snapshot!(refused("\"coment\": \"1 m\""), @"
+    error: scene.json, line 4, column 22: objects[0].coment: unknown key
+    hint: known: `animation`, `instances`, `material`, `materials`, `motion`, `name`, `shape`, `size`, `transform`, `up`
+    ");
+    insta::assert_snapshot!(refused("\"comment\": 7"), @"error: scene.json, line 4, column 22: objects[0].comment: expected a string or an array, found 7");
 }
 
 #[test]
@@ -74,13 +74,11 @@ fn resolutions_may_be_words() {
     assert_eq!(bench.array("depth").len(), 12 * 7);
     bench.render(&["--set", "camera.sensor.resolution=9 x 5"]);
     assert_eq!(bench.json("out/camera.json")["resolution"], serde_json::json!([9, 5]));
-    for wrong in ["640*480", "640", "-3x4", "1x2x3", "4294967296x1"] {
+    let messages = ["640*480", "640", "-3x4", "1x2x3", "4294967296x1"].map(|wrong| {
         let setting = format!("camera.sensor.resolution=\"{wrong}\"");
-        let output = bench.run(&["check", "scene.json", "--set", &setting]);
-        assert_eq!(output.status.code(), Some(2), "{wrong}");
-        let said = text(&output.stderr);
-        assert!(said.contains("camera.sensor.resolution") && said.contains("640x480"), "{said}");
-    }
+        under(wrong, &bench.refusal(&["check", "scene.json", "--set", &setting]))
+    });
+    insta::assert_snapshot!(messages.concat());
 }
 
 #[test]

@@ -389,11 +389,8 @@ fn points_are_followed_to_the_ends_of_their_exposure() {
     written["serial"] = json!([{}, {}]);
     written["tracer"] = json!({ "type": "direct" });
     std::fs::write(bench.path("scene.json"), written.to_string()).unwrap();
-    let output = bench.run(&["render", "scene.json", "-o", "slots"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(
-        text(&output.stderr).contains("moments of one camera's exposure"),
-        "{}",
-        text(&output.stderr)
-    );
+    insta::assert_snapshot!(bench.refusal(&["render", "scene.json", "-o", "slots"]), @r#"
+    error: scene.json: layers: `to`: "open" and "close" are moments of one camera's exposure
+    hint: leave them out, or `serial`
+    "#);
 }

@@ -8,7 +8,7 @@ use std::process::Command;
 use serde_json::json;
 
 use crate::frames::scene;
-use crate::run::{Bench, text};
+use crate::run::{Bench, text, under};
 
 const BOX: &str = r#"{"etendue": 1, "layers": ["depth", "ids"],
     "camera": {"type": "pinhole", "sensor": {"resolution": [8, 8]}},
@@ -33,15 +33,12 @@ fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     found
 }
 
-/// Runs a command that has to be refused by the name of a file, and has to change nothing.
-fn refuses(bench: &Bench, arguments: &[&str], name: &str) {
+/// Runs a command that has to be refused, and has to change nothing; what it says, below it.
+fn refused(bench: &Bench, arguments: &[&str]) -> String {
     let before = contents(&bench.path(""));
-    let output = bench.run(arguments);
-    let err = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {err}");
-    assert!(err.contains(name) && err.contains("is read by this command"), "{arguments:?}: {err}");
-    assert!(err.contains("nothing was written"), "{err}");
+    let message = bench.refusal(arguments);
     assert!(contents(&bench.path("")) == before, "{arguments:?} changed something");
+    under(&arguments.join(" "), &message)
 }
 
 #[test]
@@ -58,16 +55,18 @@ fn no_command_writes_over_what_it_reads() {
     fs::copy(achromat, bench.path("lens.json")).expect("a lens");
     bench.write("rays.json", br#"{"from": "object", "rays": []}"#);
 
-    refuses(&bench, &["render", "camera.json", "-o", "."], "camera.json");
-    refuses(&bench, &["render", "layers.json", "-o", "."], "layers.json");
-    refuses(&bench, &["render", "model.obj", "-o", "."], "picture.png");
-    refuses(&bench, &["render", "scene.json", "-o", "o", "--report", "scene.json"], "scene.json");
-    refuses(&bench, &["render", "model.obj", "-o", "o", "--report", "m.mtl"], "m.mtl");
-    refuses(&bench, &["bench", "bench.json", "-o", ".", "--quick"], "bench.json");
-    refuses(&bench, &["sensor", "curves.json", "-o", "."], "curves.json");
-    refuses(&bench, &["lens", "lens.json", "--save", "lens.json"], "lens.json");
-    let rays = ["lens", "lens.json", "--rays", "rays.json", "--save", "rays.json"];
-    refuses(&bench, &rays, "rays.json");
+    let commands: [&[&str]; 9] = [
+        &["render", "camera.json", "-o", "."],
+        &["render", "layers.json", "-o", "."],
+        &["render", "model.obj", "-o", "."],
+        &["render", "scene.json", "-o", "o", "--report", "scene.json"],
+        &["render", "model.obj", "-o", "o", "--report", "m.mtl"],
+        &["bench", "bench.json", "-o", ".", "--quick"],
+        &["sensor", "curves.json", "-o", "."],
+        &["lens", "lens.json", "--save", "lens.json"],
+        &["lens", "lens.json", "--rays", "rays.json", "--save", "rays.json"],
+    ];
+    insta::assert_snapshot!(commands.map(|arguments| refused(&bench, arguments)).concat());
     assert!(!bench.path("o").exists());
 }
 
@@ -78,13 +77,14 @@ fn links_to_inputs_are_inputs() {
     fs::create_dir(bench.path("out")).expect("a folder");
     let link = bench.path("out/layers.json");
     std::os::unix::fs::symlink("../scene.json", &link).expect("a link");
-    refuses(&bench, &["render", "scene.json", "-o", "out"], "out/layers.json");
+    let render = ["render", "scene.json", "-o", "out"];
+    let mut all = refused(&bench, &render);
     fs::remove_file(&link).expect("a link");
     fs::hard_link(bench.path("scene.json"), bench.path("out/depth.npy")).expect("a link");
-    refuses(&bench, &["render", "scene.json", "-o", "out"], "out/depth.npy");
+    all += &refused(&bench, &render);
     fs::rename(bench.path("out/depth.npy"), bench.path("report")).expect("a file");
-    let report = ["render", "scene.json", "-o", "out", "--report", "report"];
-    refuses(&bench, &report, "report");
+    all += &refused(&bench, &["render", "scene.json", "-o", "out", "--report", "report"]);
+    insta::assert_snapshot!(all);
 }
 
 /// Two poses that look at the box, as nerfstudio has them.
@@ -115,14 +115,15 @@ fn trajectories_are_inputs() {
     }
     bench.write("scene.json", along("transforms.json").as_bytes());
     std::os::unix::fs::symlink(".", bench.path("linked")).unwrap();
-    refuses(&bench, &["render", "scene.json", "-o", "."], "transforms.json");
-    refuses(&bench, &["render", "scene.json", "-o", "linked"], "linked/transforms.json");
+    let mut all = refused(&bench, &["render", "scene.json", "-o", "."]);
+    all += &refused(&bench, &["render", "scene.json", "-o", "linked"]);
     let report = ["render", "scene.json", "-o", "o", "--report", "transforms.json"];
-    refuses(&bench, &report, "transforms.json");
+    all += &refused(&bench, &report);
     bench.write("scene.json", along("colmap/images.txt").as_bytes());
-    refuses(&bench, &["render", "scene.json", "-o", "."], "colmap/cameras.txt");
+    all += &refused(&bench, &["render", "scene.json", "-o", "."]);
     let report = ["render", "scene.json", "-o", "o", "--report", "linked/colmap/cameras.txt"];
-    refuses(&bench, &report, "cameras.txt");
+    all += &refused(&bench, &report);
+    insta::assert_snapshot!(all);
     assert!(!bench.path("o").exists());
 }
 
@@ -135,6 +136,7 @@ fn a_file_of_any_frame_is_refused_before_the_first_is_written() {
     // An image of the scene, and one that a frame alone names.
     let place = "o/frames/000001/picture.png";
     let (by_scene, by_frame) = (image(place), json!([{}, {}, {"materials.paint": image(place)}]));
+    let mut all = String::new();
     for (paint, frames) in [(by_scene, json!([{}, {}])), (image("plain.png"), by_frame)] {
         let bench = Bench::new();
         bench.write("plain.png", include_bytes!("../../../etendue/tests/data/paint.png"));
@@ -142,22 +144,27 @@ fn a_file_of_any_frame_is_refused_before_the_first_is_written() {
         fs::copy(bench.path("plain.png"), bench.path(place)).unwrap();
         (scene["materials"], scene["frames"]) = (json!({"paint": paint}), frames);
         bench.write("scene.json", scene.to_string().as_bytes());
-        refuses(&bench, &["render", "scene.json", "-o", "o"], place);
+        all += &refused(&bench, &["render", "scene.json", "-o", "o"]);
     }
+    insta::assert_snapshot!(all);
     let bench = Bench::with_scene(&crate::frames::scene(&json!([{}, {}])));
     let name = "out/frames/000001/depth.npy";
-    let output = bench.run(&["render", "scene.json", "-o", "out", "--report", name]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("a result has this name"), "{}", text(&output.stderr));
+    let report = ["render", "scene.json", "-o", "out", "--report", name];
+    insta::assert_snapshot!(bench.refusal(&report), @"
+    error: --report out/frames/000001/depth.npy: a result has this name
+    hint: choose another one
+    ");
     assert!(!bench.path("out").exists());
 }
 
 #[test]
 fn a_report_does_not_take_the_place_of_a_result() {
     let bench = Bench::with_scene(BOX);
-    let output = bench.run(&["render", "scene.json", "-o", "out", "--report", "out/camera.json"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("a result has this name"));
+    let report = ["render", "scene.json", "-o", "out", "--report", "out/camera.json"];
+    insta::assert_snapshot!(bench.refusal(&report), @"
+    error: --report out/camera.json: a result has this name
+    hint: choose another one
+    ");
     bench.render(&["--report", "out/report.json"]);
     bench.render(&["--report", "out/report.json"]);
     assert!(bench.path("out/report.json").exists());
@@ -262,10 +269,7 @@ fn strict_checks_decode_images() {
     bench.write("m.mtl", b"newmtl m\nmap_Kd broken.png\n");
     bench.write("broken.png", b"\x89PNG\r\n\x1a\n and no more");
     assert!(bench.run(&["check", "model.obj"]).status.success());
-    let output = bench.run(&["check", "model.obj", "--strict"]);
-    let err = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{err}");
-    assert!(err.contains("broken.png"), "{err}");
+    insta::assert_snapshot!(bench.refusal(&["check", "model.obj", "--strict"]), @"error: cannot decode broken.png: Format error decoding Png: ChunkType { type:  no , critical: false, private: true, reserved: true, safecopy: true } chunk appeared before IHDR chunk");
 }
 
 #[test]

@@ -52,6 +52,22 @@ impl Bench {
         assert!(output.status.success(), "{}", text(&output.stderr));
     }
 
+    /// What a command said beside its results, with `FOLDER` for the bench's own: for a snapshot of the whole of it.
+    pub(crate) fn said(&self, output: &Output) -> String {
+        let named = self.folder.path();
+        let real = named.canonicalize().expect("the bench's folder");
+        let said = text(&output.stderr).replace(&*real.to_string_lossy(), "FOLDER");
+        said.replace(&*named.to_string_lossy(), "FOLDER")
+    }
+
+    /// The whole message of a command that refuses what it is given.
+    pub(crate) fn refusal(&self, arguments: &[&str]) -> String {
+        let output = self.run(arguments);
+        let said = self.said(&output);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        said
+    }
+
     /// The numbers of `out/NAME.npy`, row by row, whatever their type.
     pub(crate) fn array(&self, name: &str) -> Vec<f64> {
         read_npy(&self.path("out").join(format!("{name}.npy")))
@@ -66,6 +82,17 @@ impl Bench {
 
 pub(crate) fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// A message below what provoked it, for one snapshot of many.
+pub(crate) fn under(heading: &str, message: &str) -> String {
+    format!("# {heading}\n{message}\n")
+}
+
+/// The notes in what a command said, without the times and the memory beside them.
+pub(crate) fn notes_in(said: &str) -> String {
+    let notes: Vec<&str> = said.lines().filter(|line| line.starts_with("note: ")).collect();
+    notes.join("\n")
 }
 
 /// The format of numpy's NEP 1, as far as the command writes it.

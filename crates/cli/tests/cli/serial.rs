@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::run::{Bench, read_npy, text};
+use crate::run::{Bench, read_npy, text, under};
 
 const SIZE: [usize; 2] = [12, 10];
 
@@ -214,58 +214,38 @@ fn what_is_no_slot_is_refused_by_its_place() {
     let mut facing = with(json!([{}]));
     facing["tracer"] = json!({ "type": "facing" });
     facing["layers"] = json!([]);
-    for (scene, place, words) in [
-        (with(json!([{ "duration": "13 ms" }])), "serial[0]", "exposure"),
-        (with(json!([{ "duration": "12 ms" }, {}])), "serial[1].duration", "leave"),
-        (with(json!([{ "start": -1 }])), "serial[0].start", "within"),
-        (
-            with(json!([{ "set": { "camera.sensor.resolution": [1, 1] } }])),
-            "serial[0].set",
-            "whole exposure",
-        ),
-        (with(json!([{ "set": { "camera": {} } }])), "serial[0].set", "whole exposure"),
-        (with(json!([{ "set": { "render.seed": 1 } }])), "serial[0].set", "whole exposure"),
-        (with(json!([{ "set": { "camera.f_stop": 1 } }])), "serial[0]", "f_stop"),
-        (
-            with(json!([{}, { "along": { "type": "orbit", "count": 4 } }])),
-            "serial[1].along",
-            "`poses`",
-        ),
-        (with(json!([{ "along": [] }])), "serial[0].along", "no frame"),
-        (
-            with(json!([{ "along": [{}, { "camera.sensor.exposure": 1 }] }])),
-            "serial[0].along[1]",
-            "whole exposure",
-        ),
-        (
-            with(json!([{ "along": { "type": "trajectory", "file": "none.txt" } }])),
-            "serial[0].along.file",
-            "none.txt",
-        ),
-        (with(json!([{ "pixels": [[1], [1, 0]] }])), "serial[0].pixels", "tile"),
-        (with(json!([{ "pixels": [[2]] }])), "serial[0].pixels", "0 to 1"),
-        (with(json!([{ "pixels": "none.png" }])), "serial[0].pixels", "none.png"),
-        (instant, "serial", "exposure"),
-        (reset, "serial", "global reset"),
-        (coded, "serial[1]", "closed"),
-        (facing, "serial", "tracer"),
+    let slots = [
+        json!([{ "duration": "13 ms" }]),
+        json!([{ "duration": "12 ms" }, {}]),
+        json!([{ "start": -1 }]),
+        json!([{ "set": { "camera.sensor.resolution": [1, 1] } }]),
+        json!([{ "set": { "camera": {} } }]),
+        json!([{ "set": { "render.seed": 1 } }]),
+        json!([{ "set": { "camera.f_stop": 1 } }]),
+        json!([{}, { "along": { "type": "orbit", "count": 4 } }]),
+        json!([{ "along": [] }]),
+        json!([{ "along": [{}, { "camera.sensor.exposure": 1 }] }]),
+        json!([{ "along": { "type": "trajectory", "file": "none.txt" } }]),
+        json!([{ "pixels": [[1], [1, 0]] }]),
+        json!([{ "pixels": [[2]] }]),
+        json!([{ "pixels": "none.png" }]),
+    ];
+    let render = ["render", "scene.json", "-o", "out"];
+    let refused = |scene: &Value| Bench::with_scene(&scene.to_string()).refusal(&render);
+    let mut all = slots.map(|slots| under(&slots.to_string(), &refused(&with(slots)))).concat();
+    for (what, scene) in [
+        ("no exposure", instant),
+        ("global reset", reset),
+        ("a coded shutter", coded),
+        ("no light", facing),
     ] {
-        let bench = Bench::with_scene(&scene.to_string());
-        let output = bench.run(&["render", "scene.json", "-o", "out"]);
-        let error = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{place}: {error}");
-        assert!(error.contains(place) && error.contains(words), "{place}: {error}");
+        all += &under(what, &refused(&scene));
     }
     let bench = Bench::with_scene(&with(json!([{}])).to_string());
-    for (arguments, word) in [
-        (&["--checkpoint", "1"][..], "--checkpoint"),
-        (&["--shard", "1/2", "--shard-by", "samples"], "--shard-by"),
-    ] {
-        let output = bench.run(&[&["render", "scene.json", "-o", "out"], arguments].concat());
-        let error = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{word}: {error}");
-        assert!(error.contains("serial") && error.contains(word), "{word}: {error}");
+    for more in [&["--checkpoint", "1"][..], &["--shard", "1/2", "--shard-by", "samples"]] {
+        all += &under(&more.join(" "), &bench.refusal(&[&render, more].concat()));
     }
+    insta::assert_snapshot!(all);
     // A mask of another size than the sensor.
     let bench = Bench::with_scene(&with(json!([{ "pixels": "small.png" }])).to_string());
     let mut bytes = Vec::new();
@@ -273,7 +253,5 @@ fn what_is_no_slot_is_refused_by_its_place() {
     encoder.set_color(png::ColorType::Grayscale);
     encoder.write_header().unwrap().write_image_data(&[255; 4]).unwrap();
     bench.write("small.png", &bytes);
-    let output = bench.run(&["render", "scene.json", "-o", "out"]);
-    let error = text(&output.stderr);
-    assert!(error.contains("serial[0].pixels") && error.contains("2 x 2"), "{error}");
+    insta::assert_snapshot!(bench.refusal(&render), @r#"error: scene.json, line 1, column 791: serial[0].pixels: "small.png" has 2 x 2 pixels, and the sensor 12 x 10; a mask has one for each"#);
 }

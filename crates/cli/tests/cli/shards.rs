@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use serde_json::json;
 
-use crate::run::{Bench, text};
+use crate::run::{Bench, text, under};
 
 /// Light through a lens that disperses onto a sensor with noise, and data beside it.
 fn scene() -> Bench {
@@ -80,10 +80,9 @@ fn share(bench: &Bench, number: u32, count: u32, more: &[&str]) -> String {
 
 /// Message of a merge that must be refused.
 fn refused(bench: &Bench, shares: &[&str]) -> String {
-    let output = bench.run(&[&["merge", "merged"], shares].concat());
-    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+    let message = bench.refusal(&[&["merge", "merged"], shares].concat());
     assert!(!bench.path("merged").exists(), "nothing is written");
-    text(&output.stderr)
+    message
 }
 
 #[test]
@@ -117,11 +116,16 @@ fn shares_of_the_samples_make_the_picture_of_one_machine() {
         [1, 2, 3].map(|number| format!("shares/samples-{number}-of-3.film"));
     let size = |path: &str| std::fs::metadata(bench.path(path)).expect("a share").len();
     assert!(size(&first) > size(&second), "data layers are in the first share alone");
-    let said = refused(&bench, &[&first, &third]);
-    assert!(said.contains("missing: 2/3"), "{said}");
+    insta::assert_snapshot!(refused(&bench, &[&first, &third]), @r#"
+    note: lights: nothing in the scene shines: it is lit by a grey studio; name `lights` in the scene for others, or `"lights": []` for none
+    error: 2 of 3 shares are here; missing: 2/3
+    hint: render them first
+    "#);
     let of_rows = share(&bench, 2, 3, &[]);
-    let said = refused(&bench, &[&first, &of_rows, &third]);
-    assert!(said.contains("a share of the rows") && said.contains("samples"), "{said}");
+    insta::assert_snapshot!(refused(&bench, &[&first, &of_rows, &third]), @r#"
+    note: lights: nothing in the scene shines: it is lit by a grey studio; name `lights` in the scene for others, or `"lights": []` for none
+    error: shares/shard-2-of-3.film: is a share of the rows, and shares/samples-1-of-3.film is one of the samples
+    "#);
     done(&bench, &["merge", "merged", "--report", "report.json", &third, &first, &second]);
     assert_same(&bench, "out", "merged");
     done(&bench, &["render", "scene.json", "-o", "out", "--report", "whole.json"]);
@@ -143,8 +147,10 @@ fn a_merge_asks_for_what_its_shares_were_asked_for() {
         std::fs::rename(bench.path(name), bench.path("moved").join(name)).expect("a file");
     }
     let shares = shares.each_ref().map(String::as_str);
-    let said = refused(&bench, &shares);
-    assert!(said.contains("scene.json") && said.contains("--scene"), "{said}");
+    insta::assert_snapshot!(refused(&bench, &shares), @"
+    error: FOLDER/scene.json: the shares are of this scene, which is not here
+    hint: say by --scene where it is
+    ");
     done(&bench, &["merge", "merged", "--scene", "moved/scene.json", shares[0], shares[1]]);
     assert_same(&bench, "out", "merged");
 }
@@ -154,17 +160,26 @@ fn shares_that_are_missing_doubled_or_foreign_are_refused_by_name() {
     let bench = scene();
     let few = ["--samples", "2"];
     let [first, second] = [1, 2].map(|number| share(&bench, number, 2, &few));
-    let said = refused(&bench, &[&first]);
-    assert!(said.contains("1 of 2 shares") && said.contains("missing: 2/2"), "{said}");
-    let said = refused(&bench, &[&first, &second, &first]);
-    assert!(said.contains(&first) && said.contains("give each once"), "{said}");
+    insta::assert_snapshot!(refused(&bench, &[&first]), @r#"
+    note: lights: nothing in the scene shines: it is lit by a grey studio; name `lights` in the scene for others, or `"lights": []` for none
+    error: 1 of 2 shares are here; missing: 2/2
+    hint: render them first
+    "#);
+    insta::assert_snapshot!(refused(&bench, &[&first, &second, &first]), @r#"
+    note: lights: nothing in the scene shines: it is lit by a grey studio; name `lights` in the scene for others, or `"lights": []` for none
+    error: shares/shard-1-of-2.film: is share 1/2, as shares/shard-1-of-2.film is
+    hint: give each once
+    "#);
     let third = share(&bench, 1, 3, &few);
-    let said = refused(&bench, &[&first, &third]);
-    assert!(said.contains(&third) && said.contains("share 1/3"), "{said}");
+    insta::assert_snapshot!(refused(&bench, &[&first, &third]), @r#"
+    note: lights: nothing in the scene shines: it is lit by a grey studio; name `lights` in the scene for others, or `"lights": []` for none
+    error: shares/shard-1-of-3.film: is share 1/3, and shares/shard-1-of-2.film is one of 2
+    "#);
     let foreign = Bench::new();
     std::fs::copy(bench.path(&second), foreign.path("second.film")).expect("a copy");
     for (setting, word) in [("render.seed=9", "seed"), ("camera.f_number=8", "scene hash")] {
         share(&bench, 2, 2, &["--samples", "2", "--set", setting]);
+        // It tells both hashes, or seeds.
         let said = refused(&bench, &[&first, &second]);
         assert!(said.contains(&second) && said.contains(word), "{said}");
     }
@@ -177,21 +192,21 @@ fn files_that_are_no_whole_shares_are_refused() {
     let bench = scene();
     let [first, second] = [1, 2].map(|number| share(&bench, number, 2, &["--samples", "2"]));
     let whole = std::fs::read(bench.path(&second)).expect("a share");
-    let refused_with = |bytes: &[u8]| {
-        bench.write(&second, bytes);
-        let said = refused(&bench, &[&first, &second]);
-        assert!(said.contains(&second), "{said}");
-        said
-    };
-    assert!(refused_with(b"").contains("no part of a render"));
-    assert!(refused_with(b"PNG and other bytes").contains("no part of a render"));
-    assert!(refused_with(&whole[..whole.len() - 1]).contains("not whole"));
-    assert!(refused_with(&whole[..15]).contains("not whole"));
     let mut turned = whole.clone();
     turned[whole.len() / 2] ^= 1;
-    assert!(refused_with(&turned).contains("not whole"));
-    let said = refused(&bench, &[&first, "nowhere.film"]);
-    assert!(said.contains("nowhere.film"), "{said}");
+    let files: [(&str, &[u8]); 5] = [
+        ("empty", b""),
+        ("of another kind", b"PNG and other bytes"),
+        ("without its last byte", &whole[..whole.len() - 1]),
+        ("its first 15 bytes", &whole[..15]),
+        ("with a bit turned", &turned),
+    ];
+    let messages = files.map(|(what, bytes)| {
+        bench.write(&second, bytes);
+        under(what, &refused(&bench, &[&first, &second]))
+    });
+    insta::assert_snapshot!(messages.concat());
+    insta::assert_snapshot!(refused(&bench, &[&first, "nowhere.film"]), @"error: nowhere.film: No such file or directory (os error 2)");
     bench.write(&second, &whole);
     done(&bench, &["merge", "merged", "--quiet", &first, &second]);
 }
@@ -199,20 +214,20 @@ fn files_that_are_no_whole_shares_are_refused() {
 #[test]
 fn shares_of_what_cannot_be_divided_are_refused() {
     let bench = scene();
-    let run = |more: &[&str]| {
-        let output = bench.run(&[&["render", "scene.json", "-o", "shares"], more].concat());
-        assert_eq!(output.status.code(), Some(2));
-        text(&output.stderr)
-    };
-    assert!(run(&["--shard", "0/4"]).contains("from 1/8 to 8/8"));
-    assert!(run(&["--shard", "5/4"]).contains("from 1/8 to 8/8"));
-    assert!(run(&["--shard", "1/2", "--report", "r.json"]).contains("etendue merge"));
-    assert!(run(&["--shard-by", "samples"]).contains("--shard"));
     let adaptive = "render.samples={\"relative_error\": 0.5}";
-    let adaptive = run(&["--shard", "1/2", "--shard-by", "samples", "--set", adaptive]);
-    assert!(adaptive.contains("divide the rows"), "{adaptive}");
-    let frames = run(&["--shard", "1/2", "--set", "frames=[{\"render.seed\": 1}]"]);
-    assert!(frames.contains("--frames"), "{frames}");
+    let commands: [&[&str]; 6] = [
+        &["--shard", "0/4"],
+        &["--shard", "5/4"],
+        &["--shard", "1/2", "--report", "r.json"],
+        &["--shard-by", "samples"],
+        &["--shard", "1/2", "--shard-by", "samples", "--set", adaptive],
+        &["--shard", "1/2", "--set", "frames=[{\"render.seed\": 1}]"],
+    ];
+    let messages = commands.map(|more| {
+        let arguments = [&["render", "scene.json", "-o", "shares"], more].concat();
+        under(&more.join(" "), &bench.refusal(&arguments))
+    });
+    insta::assert_snapshot!(messages.concat());
 }
 
 /// More shares than strips of rows: the others are empty.

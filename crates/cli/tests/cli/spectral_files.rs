@@ -88,9 +88,8 @@ fn bands_are_written_by_the_layout_of_spectral_images() {
 fn an_envi_cube_wants_a_sensor_of_bands() {
     let scene = r#"{"etendue": 1, "tracer": {"type": "facing"}, "objects": [{"shape": "sphere"}]}"#;
     let bench = Bench::with_scene(scene);
-    let output = bench.run(&["render", "scene.json", "-o", "out", "--outputs", "envi"]);
-    let message = text(&output.stderr);
-    assert!(message.contains("envi") && message.contains("multispectral"), "{message}");
+    let envi = ["render", "scene.json", "-o", "out", "--outputs", "envi"];
+    insta::assert_snapshot!(bench.refusal(&envi), @"error: outputs: `envi` is a file of light in bands, and the scene has no such layer; give `camera.sensor` the `type` `multispectral` and `bands`, or leave `envi` out");
 }
 
 #[test]

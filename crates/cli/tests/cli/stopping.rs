@@ -235,7 +235,7 @@ fn nothing_is_left_where_nothing_is_to_be_kept() {
     running.signal("INT");
     let (status, out, err) = running.end();
     assert_eq!((status.code(), out.as_str()), (Some(1), ""), "{err}");
-    assert!(err.contains("error: stopped; no unfinished file was left"), "{err}");
+    insta::assert_snapshot!(err, @"error: stopped; no unfinished file was left");
     assert!(!bench.path("out").exists(), "a new folder goes when nothing was written into it");
 }
 

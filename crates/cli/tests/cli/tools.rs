@@ -71,17 +71,15 @@ fn a_plan_says_what_is_off_and_why() {
 fn a_plan_lists_the_accuracy_that_a_scene_sets() {
     let bench =
         Bench::with_scene(r#"{"etendue": 1, "layers": ["depth"], "objects": [{"shape": "box"}]}"#);
-    let plan = |set: &str| bench.run(&["plan", "scene.json", "--json", "--set", set]);
+    let set = ["plan", "scene.json", "--json", "--set", "accuracy.view_psnr=40"];
     let decisions: Vec<serde_json::Value> =
-        serde_json::from_slice(&plan("accuracy.view_psnr=40").stdout).expect("JSON");
+        serde_json::from_slice(&bench.run(&set).stdout).expect("JSON");
     let rows: Vec<_> = decisions.iter().filter(|d| d["what"] == "accuracy").collect();
     assert_eq!(rows.len(), 1, "{decisions:?}");
     assert_eq!((&rows[0]["key"], &rows[0]["forced"]), (&"accuracy.view_psnr".into(), &true.into()));
     // What is out of range is refused by name.
-    let refused = plan("accuracy.view_psnr=400");
-    let why = text(&refused.stderr);
-    assert_eq!(refused.status.code(), Some(2), "{why}");
-    assert!(why.contains("accuracy.view_psnr") && why.contains("60"), "{why}");
+    let beyond = ["plan", "scene.json", "--json", "--set", "accuracy.view_psnr=400"];
+    insta::assert_snapshot!(bench.refusal(&beyond), @"error: --set accuracy.view_psnr=400: accuracy.view_psnr: 400 is above the most, 60");
 }
 
 #[test]

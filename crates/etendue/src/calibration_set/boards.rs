@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::CalibrationOptions;
+use super::options::CalibrationOptions;
 
 /// The share of the picture's width or height that the board fills, whichever is reached first.
 const FILLED: f64 = 0.5;

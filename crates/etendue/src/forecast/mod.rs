@@ -12,7 +12,6 @@ mod pilot;
 use std::time::{Duration, Instant};
 
 use etendue_accel::BuildOptions;
-use etendue_render::output::Outputs;
 use etendue_render::{Images, Plan, Stopping, build, build_without};
 use etendue_report::{Decision, DecisionKind, DecisionValue, Span, listed};
 use etendue_scene::Scene;
@@ -23,7 +22,7 @@ use serde::Serialize;
 
 pub use self::calibration::Calibration;
 use self::pilot::Pilot;
-use crate::Error;
+use crate::{Error, Prospect};
 
 /// The longest build (s), by the machine's rates, that is done for a forecast.
 const LONGEST_BUILD: f64 = 1.0;
@@ -54,19 +53,6 @@ pub struct TimeForecast {
     pub total: f64,
     /// True if parts of the picture were traced; else rays were only counted.
     pub is_piloted: bool,
-}
-
-/// Prospect of a render: what is known of a scene before it is rendered.
-#[derive(Debug, Clone, Copy)]
-pub struct Prospect<'a> {
-    /// The loaded scene.
-    pub scene: &'a Scene,
-    /// Its plan.
-    pub plan: &'a Plan,
-    /// The files that are wanted.
-    pub outputs: Outputs,
-    /// Duration of loading (s).
-    pub load: f64,
 }
 
 impl TimeForecast {

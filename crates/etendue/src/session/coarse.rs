@@ -5,23 +5,12 @@ use std::sync::Arc;
 
 use etendue_accel::Accel;
 use etendue_render::Plan;
-use etendue_render::tolerance::{TakenDetail, coarser, with_meshes};
+use etendue_render::tolerance::{coarser, with_meshes};
 use etendue_scene::Scene;
 
-use super::{LoadedScene, Session};
+use super::Session;
+use super::loaded::CoarseScene;
 use crate::Error;
-
-/// A scene with coarser meshes; while it is rendered, the scene with its own.
-pub(super) struct CoarseScene {
-    /// The other one of the two, its plan and the structure over it.
-    scene: Arc<Scene>,
-    plan: Plan,
-    accel: Option<Arc<dyn Accel>>,
-    /// Detail that was left out; nothing where the scene has to be rendered as it is.
-    detail: Option<TakenDetail>,
-    /// True if the coarser one is the session's now.
-    is_in_place: bool,
-}
 
 /// A scene with all its detail, and the structure over it once that is built.
 pub(super) type FullScene = (Arc<Scene>, Option<Arc<dyn Accel>>);
@@ -69,25 +58,5 @@ impl Session {
             Some(coarse) => (Arc::clone(&coarse.scene), coarse.accel.clone()),
             None => (Arc::clone(&loaded.scene), loaded.accel.clone()),
         })
-    }
-}
-
-impl LoadedScene {
-    /// Detail that is left out of its meshes.
-    pub(super) fn detail(&self) -> Option<TakenDetail> {
-        self.coarse.as_ref().filter(|coarse| coarse.is_in_place)?.detail
-    }
-
-    /// Exchanges the two scenes where the other one is wanted; whether it did.
-    fn exchange(&mut self, coarse_wanted: bool) -> bool {
-        let Some(coarse) = &mut self.coarse else { return false };
-        if coarse.detail.is_none() || coarse.is_in_place == coarse_wanted {
-            return false;
-        }
-        std::mem::swap(&mut self.scene, &mut coarse.scene);
-        std::mem::swap(&mut self.plan, &mut coarse.plan);
-        std::mem::swap(&mut self.accel, &mut coarse.accel);
-        coarse.is_in_place = coarse_wanted;
-        true
     }
 }

@@ -13,7 +13,8 @@ use etendue_scene::file::SceneFile;
 use etendue_scene::memory::Budget;
 use etendue_scene::{LoadOptions, Scene, Strictness};
 
-use super::{DecodedImages, LoadedScene, PreparedScene, Session};
+use super::loaded::{DecodedImages, LoadedScene};
+use super::{PreparedScene, Session};
 use crate::neighbours::{self, Neighbour};
 use crate::progress::Phase;
 use crate::words::in_words;

@@ -1,4 +1,4 @@
-//! Renders of a session: whole pictures, shares of them, and what is reported of them.
+//! Renders of a session: whole pictures, shares of them that are read from their files, and what is reported of them.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,9 +17,39 @@ use etendue_render::{
 use etendue_scene::Scene;
 use serde_json::Value;
 
-use super::{LoadedScene, Session};
+use super::Session;
+use super::loaded::LoadedScene;
 use crate::words::{NOT_FOLLOWED, changed, fingerprints, header, not_finite};
-use crate::{Error, Progress, Rendering, Shares};
+use crate::{Error, Progress, Rendering};
+
+/// Shares of a render, as [`Session::render_shard`] wrote them, for [`Session::merge`].
+#[derive(Debug)]
+pub struct Shares {
+    pub(crate) files: Vec<FilmFile>,
+}
+
+impl Shares {
+    /// Reads them.
+    ///
+    /// # Errors
+    ///
+    /// When a file cannot be read, is no share, or is not whole.
+    pub fn read<P: AsRef<Path>>(paths: impl IntoIterator<Item = P>) -> Result<Self, Error> {
+        let read = |path: P| FilmFile::read(path.as_ref()).map_err(RenderError::from);
+        Ok(Self { files: paths.into_iter().map(read).collect::<Result<_, _>>()? })
+    }
+
+    /// True if they are of the samples, and not of the rows.
+    pub(crate) fn are_of_samples(&self) -> bool {
+        self.files.iter().any(|file| file.header.shard.is_of_samples())
+    }
+
+    /// Origin that was given to the first share.
+    #[must_use]
+    pub fn origin(&self) -> Option<&Value> {
+        self.files.first().map(|file| &file.header.origin)
+    }
+}
 
 /// Start of a render, and the time of what was prepared before it (s): a part of its time, too.
 struct Clock {
@@ -42,7 +72,7 @@ impl Session {
     }
 
     /// Renders a share of the picture's rows, or of its samples, and writes it to `path`, for [`merge`](Self::merge). `origin` goes
-    /// with it, for whoever merges: [`Shares`](crate::Shares) reads it.
+    /// with it, for whoever merges: [`Shares`] reads it.
     ///
     /// # Errors
     ///

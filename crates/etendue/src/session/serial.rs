@@ -11,7 +11,8 @@ use etendue_scene::Scene;
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 
-use super::{DecodedImages, LoadedScene, Session};
+use super::Session;
+use super::loaded::{DecodedImages, LoadedScene};
 use crate::words::{fingerprints, header};
 use crate::{Error, Progress};
 

@@ -8,6 +8,7 @@
 //! | `smooth` | the same of smooth wavefronts, by a polynomial through few rays |
 //! | [`wavefront`] | optical path differences against a reference sphere, and their statistics |
 //! | [`colours`] | one point at several wavelengths |
+//! | `sampling` | how many cells a wavefront needs |
 //! | [`zernike`] | fits of Zernike polynomials to a wavefront |
 //! | [`least_squares`] | a small linear fit |
 //! | [`spread`] | point spread functions by FFT and by Huygens' sum, encircled energy, lines |
@@ -31,6 +32,7 @@ pub mod least_squares;
 pub mod object;
 pub mod pupil;
 pub mod report;
+mod sampling;
 pub mod seidel;
 mod smooth;
 pub mod spread;

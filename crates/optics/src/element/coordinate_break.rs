@@ -13,9 +13,8 @@ use glam::{DMat3, DVec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::rays::{Block, LANES, Ray, RayStatus, moved, turned};
+use super::rays::{Block, LANES, Ray, RayStatus, Traversal, moved, turned};
 use super::real::Real;
-use super::step::Traversal;
 
 /// A break as a lens file writes it, beside the element's `tilt` (about x and y) and `decentre`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]

@@ -14,10 +14,11 @@
 
 use super::biconic::Biconic;
 use super::newton::{
-    Profile, cross_by_newton, cross_by_search, interval, keeps_off, root_between, search_radius,
+    Newton, Profile, cross_by_newton, cross_by_search, interval, keeps_off, root_between,
+    search_radius,
 };
-use super::rays::Ray;
-use super::refract::{IndexPair, RefractedRay, TOUCH};
+use super::rays::{Block, LANES, PENDING, Ray};
+use super::refract::{IndexPair, RefractedRay, TOUCH, each_numbered_lane};
 use super::surface::Surface;
 
 /// Rings about the axis whose slopes are bounded one by one.
@@ -229,4 +230,51 @@ fn first_within<P: Profile>(
     let middle = 0.5 * (from + to);
     first_within(surface, ray, [from, middle], halvings - 1)
         .or_else(|| first_within(surface, ray, [middle, to], halvings - 1))
+}
+
+/// Takes a block through a surface at `z` (mm), as [`super::refract::each_lane`] does for conics. Rays that the
+/// method does not bring to it, and those that may cross elsewhere first by their slopes, are left to `decide`, one by
+/// one with what the method has found.
+#[inline(always)]
+pub(super) fn cross_block<P: Profile>(
+    boundary: &ProfileBoundary<'_, P>,
+    block: &mut Block,
+    element: usize,
+    z: f64,
+    clip2: f64,
+    decide: impl Fn(&mut Block, usize, RefractedRay),
+) {
+    let &ProfileBoundary { surface, media, slopes } = boundary;
+    let newton = Newton::<LANES, P>::run(
+        surface,
+        #[inline(always)]
+        |lane| {
+            let mut ray = block.ray(lane);
+            ray.position[2] -= z;
+            (ray, block.outcome[lane] == 0)
+        },
+    );
+    let mut is_first = [true; LANES];
+    if !slopes.are_convex() {
+        for (lane, is_first) in is_first.iter_mut().enumerate() {
+            *is_first = slopes.forbid_another(block.ray(lane), newton.ray(lane));
+        }
+    }
+    let pending = each_numbered_lane(
+        block,
+        element,
+        z,
+        #[inline(always)]
+        |lane, _| {
+            let found = newton.refracted(surface, media, clip2, lane);
+            RefractedRay { hit: found.hit & is_first[lane], ..found }
+        },
+    );
+    if pending {
+        for lane in 0..LANES {
+            if block.outcome[lane] == PENDING {
+                decide(block, lane, newton.refracted(surface, media, clip2, lane));
+            }
+        }
+    }
 }

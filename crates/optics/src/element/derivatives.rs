@@ -4,10 +4,10 @@
 //! The surface, and which of its crossings it is, are found as for every ray; the kernels are the same.
 
 use super::newton::cross_at;
-use super::rays::{Ray, RayStatus};
+use super::rays::{Clip, Ray, RayStatus};
 use super::real::Real;
-use super::refract::Refraction;
-use super::step::{Action, Clip, ElementStep};
+use super::refraction::Refraction;
+use super::step::{Action, ElementStep};
 use super::thin_lens::at_thin_lens;
 
 impl ElementStep {

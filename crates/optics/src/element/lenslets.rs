@@ -8,9 +8,9 @@ use std::sync::Arc;
 
 use super::lattice::Grid;
 use super::microlens_array::{Gaps, Lenslet, LensletShape, MicrolensArray};
-use super::rays::{Block, Ray};
-use super::refract::{RefractedRay, Refraction, each_lane};
-use super::step::Clip;
+use super::rays::{Block, Clip, Ray};
+use super::refract::{RefractedRay, each_lane};
+use super::refraction::Refraction;
 use super::surface::Surface;
 
 /// Cells that a ray is followed into on its way from the plane to a face.

@@ -25,9 +25,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Frame;
 use super::coating::{MirrorCoating, MirrorCoatingSpec};
-use super::rays::{Block, LANES, Ray, RayStatus};
+use super::rays::{Block, Clip, LANES, Ray, RayStatus, Traversal};
 use super::real::Real;
-use super::step::{Clip, Traversal};
 use super::surface::{Surface, SurfaceSpec};
 
 /// A mirror as a lens file writes it.

@@ -6,10 +6,9 @@
 //! that Newton does not find, is looked for again by bisection of the part of the ray that runs near the
 //! surface, from its start on.
 
-use super::crossings::ProfileBoundary;
-use super::rays::{Block, LANES, PENDING, Ray, at_lane};
+use super::rays::{Ray, at_lane};
 use super::real::Real;
-use super::refract::{IndexPair, RefractedRay, TOUCH, each_numbered_lane};
+use super::refract::{IndexPair, RefractedRay, TOUCH};
 
 /// The step (mm) at which the method has arrived. Not a setting: digits double with each step, so that a coarser end
 /// would save one at most.
@@ -81,53 +80,6 @@ pub(super) trait Profile {
     fn along_bounds(&self, ray: Ray, part: [f64; 2]) -> [f64; 2];
 }
 
-/// Takes a block through a surface at `z` (mm), as [`super::refract::each_lane`] does for conics. Rays that the
-/// method does not bring to it, and those that may cross elsewhere first by their slopes, are left to `decide`, one by
-/// one with what the method has found.
-#[inline(always)]
-pub(super) fn cross_block<P: Profile>(
-    boundary: &ProfileBoundary<'_, P>,
-    block: &mut Block,
-    element: usize,
-    z: f64,
-    clip2: f64,
-    decide: impl Fn(&mut Block, usize, RefractedRay),
-) {
-    let &ProfileBoundary { surface, media, slopes } = boundary;
-    let newton = Newton::<LANES, P>::run(
-        surface,
-        #[inline(always)]
-        |lane| {
-            let mut ray = block.ray(lane);
-            ray.position[2] -= z;
-            (ray, block.outcome[lane] == 0)
-        },
-    );
-    let mut is_first = [true; LANES];
-    if !slopes.are_convex() {
-        for (lane, is_first) in is_first.iter_mut().enumerate() {
-            *is_first = slopes.forbid_another(block.ray(lane), newton.ray(lane));
-        }
-    }
-    let pending = each_numbered_lane(
-        block,
-        element,
-        z,
-        #[inline(always)]
-        |lane, _| {
-            let found = newton.refracted(surface, media, clip2, lane);
-            RefractedRay { hit: found.hit & is_first[lane], ..found }
-        },
-    );
-    if pending {
-        for lane in 0..LANES {
-            if block.outcome[lane] == PENDING {
-                decide(block, lane, newton.refracted(surface, media, clip2, lane));
-            }
-        }
-    }
-}
-
 /// A ray in the surface's frame: Newton first, then the search, wherever it crosses first.
 #[cfg(test)]
 pub(super) fn cross<P: Profile>(
@@ -183,7 +135,7 @@ pub(super) fn cross_by_search<P: Profile>(
 }
 
 /// Newton's method on `N` rays side by side.
-struct Newton<const N: usize, P: Profile> {
+pub(super) struct Newton<const N: usize, P: Profile> {
     position: [[f64; N]; 3],
     direction: [[f64; N]; 3],
     /// Distance from the ray's start (mm).
@@ -200,7 +152,7 @@ struct Newton<const N: usize, P: Profile> {
 impl<const N: usize, P: Profile> Newton<N, P> {
     /// Runs the method on rays in the surface's frame; those that come with `false` are left out.
     #[inline(always)]
-    fn run(surface: &P, rays: impl Fn(usize) -> (Ray, bool)) -> Self {
+    pub(super) fn run(surface: &P, rays: impl Fn(usize) -> (Ray, bool)) -> Self {
         let mut newton = Self::begin(surface, rays);
         for _ in 0..MOST_STEPS {
             if newton.step(surface) {
@@ -261,7 +213,13 @@ impl<const N: usize, P: Profile> Newton<N, P> {
 
     /// Refracts a ray at its root; no hit where [`search`] has to look again.
     #[inline(always)]
-    fn refracted(&self, surface: &P, media: IndexPair, clip2: f64, lane: usize) -> RefractedRay {
+    pub(super) fn refracted(
+        &self,
+        surface: &P,
+        media: IndexPair,
+        clip2: f64,
+        lane: usize,
+    ) -> RefractedRay {
         let root = self.ray(lane);
         let [x, y, _] = root.position;
         let slope = surface.slope_at(root, self.slope[lane]);
@@ -275,7 +233,7 @@ impl<const N: usize, P: Profile> Newton<N, P> {
     }
 
     #[inline(always)]
-    fn ray(&self, lane: usize) -> Ray {
+    pub(super) fn ray(&self, lane: usize) -> Ray {
         Ray { position: at_lane(&self.position, lane), direction: at_lane(&self.direction, lane) }
     }
 }

@@ -431,6 +431,28 @@ impl LensRays {
     }
 }
 
+/// Clipping of rays by clear apertures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Clip {
+    /// Semi-diameters, apertures and opaque parts of filters end a ray.
+    #[default]
+    On,
+    /// Only missed surfaces and total reflection end a ray.
+    Off,
+}
+
+/// Outcome of a single ray at an element.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Traversal {
+    pub(crate) status: RayStatus,
+    /// The ray as it goes on; as it came unless [`RayStatus::Exited`].
+    pub(crate) ray: Ray,
+    /// Point where the ray met the element, in lens coordinates; `None` when it missed.
+    pub(crate) point: Option<[f64; 3]>,
+    /// The share of light that goes on.
+    pub(crate) transmission: f64,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -14,7 +14,7 @@ use std::path::Path;
 use etendue_report::Refusal;
 
 use super::dispersion::Dispersion;
-use super::{Glass, extinction_of};
+use super::medium::{Glass, extinction_of};
 
 /// The longest catalogue that is read (bytes); the longest of a maker has a fifth of a megabyte.
 const LONGEST: u64 = 64 << 20;
@@ -260,15 +260,6 @@ fn kind(name: &str) -> String {
         }
         _ => plain.to_owned(),
     }
-}
-
-/// The end of the sentence on an unknown glass.
-pub(super) fn offer(nearest: &[String]) -> String {
-    format!(
-        "the nearest names known are {}; a catalogue of your own is added with --glass-catalog FILE.agf, or by \
-         `glass_catalogs` of a lens file",
-        nearest.join(", ")
-    )
 }
 
 /// The glass of a code of six digits: nd − 1 in thousandths, then Abbe's number in tenths.

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-use super::agf::AgfCatalogue;
+use super::agf::{self, AgfCatalogue};
 use super::dispersion::Dispersion;
-use super::{Glass, GlassError, agf};
+use super::medium::{Glass, GlassError};
 
 /// Glasses of today, of yesterday and of other makers, and what is no glass.
 static TABLES: [&str; 3] =

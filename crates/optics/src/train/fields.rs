@@ -5,13 +5,12 @@ use glam::DVec2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{LensError, LensFile};
 use crate::element::is_default;
 use etendue_geometry::units::Degrees;
 
 /// The most field points and wavelengths; designs have a dozen, and each is looked at with many rays.
 pub(super) const MOST_FIELDS: usize = 100;
-const MOST_WAVELENGTHS: usize = 24;
+pub(super) const MOST_WAVELENGTHS: usize = 24;
 
 /// A field point of a lens file.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -59,7 +58,7 @@ impl FieldSpec {
         Self { angle: Degrees(angle), weight: 1.0, vignetting: VignettingSpec::default() }
     }
 
-    fn check(&self) -> Result<(), String> {
+    pub(super) fn check(&self) -> Result<(), String> {
         let angle = self.angle.0;
         if angle.is_nan() || angle.abs() >= 180.0 {
             return Err(format!("angle is {angle} degrees; it must lie between -180 and 180"));
@@ -94,62 +93,5 @@ impl VignettingSpec {
     #[must_use]
     pub fn area(&self) -> f64 {
         self.compression.iter().map(|share| 1.0 - share).product::<f64>().abs()
-    }
-}
-
-impl LensFile {
-    /// The angles of its fields (degrees).
-    #[must_use]
-    pub fn field_angles(&self) -> Vec<f64> {
-        self.fields.iter().map(|field| field.angle.0).collect()
-    }
-
-    /// Its wavelengths (nm), the main one first; none where it names none but that.
-    #[must_use]
-    pub fn wavelengths_nm(&self) -> Vec<f64> {
-        self.wavelengths.iter().map(|wavelength| wavelength.0).collect()
-    }
-
-    /// Refuses what its fields and wavelengths cannot be.
-    pub(super) fn check_fields(&self) -> Result<(), LensError> {
-        let error = |key: String, why: String| Err(LensError::Key { key, why });
-        let counts = [
-            ("fields", self.fields.len(), MOST_FIELDS),
-            ("wavelengths", self.wavelengths.len(), MOST_WAVELENGTHS),
-        ];
-        if let Some((key, count, most)) = counts.into_iter().find(|(_, count, most)| count > most) {
-            return error(key.to_owned(), format!("has {count}, and {most} are the most"));
-        }
-        for (i, field) in self.fields.iter().enumerate() {
-            field.check().or_else(|why| error(format!("fields[{i}]"), why))?;
-        }
-        for (i, nm) in self.wavelengths.iter().enumerate() {
-            if !(nm.0 > 0.0 && nm.0.is_finite()) {
-                let why = format!("{} nm is no wavelength; it must be positive", nm.0);
-                return error(format!("wavelengths[{i}]"), why);
-            }
-        }
-        if let (Some(main), Some(first)) = (self.wavelength, self.wavelengths.first())
-            && main != *first
-        {
-            let why = format!(
-                "{} nm is the first, and `wavelength` is {} nm: put that first, or leave it out",
-                first.0, main.0
-            );
-            return error("wavelengths".to_owned(), why);
-        }
-        if self.weights.is_empty() {
-            return Ok(());
-        }
-        let are_weights = self.weights.iter().all(|w| *w >= 0.0 && w.is_finite())
-            && self.weights.iter().any(|w| *w > 0.0);
-        if self.weights.len() != self.wavelengths.len() || !are_weights {
-            let why = format!(
-                "give one for each of the {} wavelengths, from 0 on and not all 0",
-                self.wavelengths.len()
-            );
-            return error("weights".to_owned(), why);
-        }
-        Ok(())
     }
 }

@@ -11,14 +11,14 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Element, FieldSpec, LensError, MOST_ELEMENTS, MonochromaticTrain, OpticalTrain, RayPath, Side,
-    remove_notes,
+    Element, FieldSpec, LensError, MOST_ELEMENTS, MonochromaticTrain, OpticalTrain, RayPath,
+    SensorMount, Side, remove_notes,
 };
 use crate::element::{
     Clip, ElementSpec, Frame, GradedGap, LossesSpec, Part, PartSpec, RayStatus, Resolve,
 };
 use crate::glass::{AgfCatalogue, FRAUNHOFER_D, Glass, GlassError};
-use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
+use etendue_geometry::units::{Degrees, Nanometres};
 
 /// A lens as its file writes it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
@@ -52,16 +52,6 @@ pub struct LensFile {
     /// is asked first, the built-in catalogue last.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub glass_catalogs: Vec<String>,
-}
-
-/// Mount of a sensor in its lens.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct SensorMount {
-    /// Turns about the x axis and then about the sensor's own y axis (degrees), right-handed.
-    pub tilt: [Degrees; 2],
-    /// Moved across the axis by x and y (mm).
-    pub decentre: [Millimetres; 2],
 }
 
 impl LensFile {

@@ -23,8 +23,10 @@ pub mod analysis;
 mod behind;
 pub mod differential;
 pub mod drawing;
+mod error;
 pub mod fields;
 pub mod file;
+mod file_fields;
 pub mod focus;
 pub mod folds;
 pub mod lenslets;
@@ -36,18 +38,20 @@ pub mod report;
 pub mod trace;
 pub mod zemax;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::element::shapes::SMALLEST_RADIUS;
 use crate::element::{Frame, GradedGap, LossesSpec, Symbol, ThinLens};
 use crate::glass::{Glass, GlassError};
-
-/// The most elements that a lens may have: the largest that were built have a hundred.
-pub const MOST_ELEMENTS: usize = 1000;
+use etendue_geometry::units::{Degrees, Millimetres};
 
 pub use crate::element::Part;
 pub use aim::ChiefRay;
 pub use differential::RayDifferential;
+pub use error::{LensError, MOST_ELEMENTS};
 pub use fields::{FieldSpec, VignettingSpec};
-pub use file::{GivenRay, LensFile, RayError, RaysFile, SensorMount, TracedRays};
+pub use file::{GivenRay, LensFile, RayError, RaysFile, TracedRays};
 pub use focus::{Focus, FocusError};
 pub use folds::Isometry;
 pub use lenslets::BehindLenslets;
@@ -58,66 +62,6 @@ pub use report::{Inquiry, LensReport, NOTES, remove_notes};
 pub use trace::{MonochromaticTrain, RayPath, Registers, Side};
 pub use zemax::{LensFormat, ZemaxError, ZemaxLens};
 
-/// Error of a lens file that cannot be built.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum LensError {
-    /// No JSON, or not that of a lens.
-    #[error("{0}")]
-    Json(String),
-    /// No element at all.
-    #[error("the lens has no elements")]
-    Empty,
-    /// More elements than [`MOST_ELEMENTS`].
-    #[error(
-        "the lens has {0} elements, and {MOST_ELEMENTS} are the most\nhint: leave out what bends no light"
-    )]
-    TooMany(usize),
-    /// A part that cannot be made.
-    #[error("elements[{index}]: {why}")]
-    Element {
-        /// Index of the element, from 0 on the object side.
-        index: usize,
-        /// Description of the error.
-        why: String,
-    },
-    /// A glass that is not known.
-    #[error("elements[{index}].glass: {source}")]
-    Glass {
-        /// The surface in front of it.
-        index: usize,
-        /// Cause of the error.
-        source: GlassError,
-    },
-    /// A key of the whole lens: a catalogue of glasses that cannot be read, a field or wavelength that is none.
-    #[error("{key}: {why}")]
-    Key {
-        /// Name of the key, with its place in a list from 0.
-        key: String,
-        /// Description of the error.
-        why: String,
-    },
-    /// Two elements marked as the stop.
-    #[error("elements[{second}].stop: elements[{first}] is the stop already")]
-    Stops {
-        /// The first.
-        first: usize,
-        /// The second.
-        second: usize,
-    },
-    /// A design wavelength that is none.
-    #[error("wavelength is {0} nm; it must be a positive length")]
-    Wavelength(f64),
-    /// A stop whose size cannot be set.
-    #[error("elements[{index}] is the stop and its opening cannot be set: {why}")]
-    Stop {
-        /// Index of the element.
-        index: usize,
-        /// Description of the error.
-        why: String,
-    },
-}
-
 /// A part at its place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Element {
@@ -125,6 +69,16 @@ pub struct Element {
     pub part: Part,
     /// Position and rotation in lens coordinates (mm).
     pub frame: Frame,
+}
+
+/// Mount of a sensor in its lens.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SensorMount {
+    /// Turns about the x axis and then about the sensor's own y axis (degrees), right-handed.
+    pub tilt: [Degrees; 2],
+    /// Moved across the axis by x and y (mm).
+    pub decentre: [Millimetres; 2],
 }
 
 /// A lens. Lengths are millimetres, z = 0 is the first element's vertex and +z runs from the object

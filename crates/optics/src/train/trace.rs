@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::OpticalTrain;
 use super::folds::Obstruction;
-use crate::element::gradient::step::{GradedMedium, GradientPair};
+use crate::element::gradient::medium::{GradedMedium, GradientPair};
 use crate::element::{
     Action, Block, Clip, ElementStep, Fold, Frame, LensRays, Loss, Ray, RayStatus,
 };

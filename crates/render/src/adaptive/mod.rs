@@ -28,8 +28,10 @@ mod rule;
 mod sampled;
 mod strip;
 
+use std::borrow::Cow;
 use std::ops::Range;
 
+use etendue_scene::file::SETS;
 use rayon::prelude::*;
 
 pub use counts::SampleCounts;
@@ -60,6 +62,8 @@ pub(crate) struct Adaptive<'a> {
     guides: Vec<Guide>,
     /// Index of the part of what is averaged that is judged, and of its first value of a pixel.
     judged: (usize, usize),
+    /// The sums of parts whose light lands beside where it starts are of where it landed.
+    has_landed: bool,
 }
 
 impl<'a> Adaptive<'a> {
@@ -89,6 +93,7 @@ impl<'a> Adaptive<'a> {
             evidence: filled(Evidence::default(), width * height)?,
             guides: hits.chunks(a_strip).flat_map(|hits| guides(hits, width)).collect(),
             judged,
+            has_landed: false,
         })
     }
 
@@ -136,9 +141,37 @@ impl<'a> Adaptive<'a> {
 
     /// Writes to the layers the means of what each pixel has, and to `findings` what sampling found of itself.
     pub(crate) fn show(&self, parts: &mut [Averaging<'_>], findings: &mut [&mut FilmLayer]) {
-        parts.iter_mut().for_each(|part| part.show_counted(&self.have));
+        for part in &mut *parts {
+            let in_sums = self.in_sums_of(part);
+            part.show_counted(&in_sums);
+        }
         if !findings.is_empty() {
-            parts[self.judged.0].tell(findings, &self.have, self.judged.1);
+            let part = &parts[self.judged.0];
+            part.tell(findings, &self.have, &self.in_sums_of(part), self.judged.1);
+        }
+    }
+
+    /// Number of values in the sums of each pixel.
+    fn in_sums_of(&self, part: &Averaging<'_>) -> Cow<'_, [u32]> {
+        match self.has_landed && part.what.shared_rows().is_some() {
+            true => Cow::Owned(vec![SETS; self.have.len()]),
+            false => Cow::Borrowed(&self.have),
+        }
+    }
+
+    /// Takes what pixels tell of themselves from the light that landed on them, which varies by how much of it did.
+    pub(crate) fn judge_landed(&mut self, parts: &[Averaging<'_>]) {
+        self.has_landed = true;
+        let (part, first) = (&parts[self.judged.0], self.judged.1);
+        if part.what.shared_rows().is_none() {
+            return;
+        }
+        let (rule, width, shard) = (self.rule, self.resolution[0], self.strips.shard);
+        for (index, evidence) in (0_u32..).zip(&mut self.evidence) {
+            let pixel = [index % width, index / width];
+            if shard.owns((pixel[1] / TILE) as usize) {
+                evidence.tell(rule.noise(&part.sampled(pixel, first), 1));
+            }
         }
     }
 

@@ -67,17 +67,25 @@ impl Averaging<'_> {
         );
     }
 
-    /// Writes what sampling found of itself to `findings`, for the layer whose first value is `first`.
-    pub(super) fn tell(&self, findings: &mut [&mut FilmLayer], have: &[u32], first: usize) {
+    /// Writes what sampling found of itself to `findings`, for the layer whose first value is `first`: of pixels that `have`
+    /// so many samples, and so many values in their sums.
+    pub(super) fn tell(
+        &self,
+        findings: &mut [&mut FilmLayer],
+        have: &[u32],
+        in_sums: &[u32],
+        first: usize,
+    ) {
         let resolution @ [width, _] = self.what.camera().resolution();
         strips(findings, resolution, TILE).par_iter().for_each(|strip| {
             let Some(mut strip) = take(strip) else { return };
             let (top, pixels) = (strip.top, strip.height * width);
             for index in 0..pixels {
                 let pixel = [index % width, top + index / width];
-                let samples = have[(top * width + index) as usize];
+                let place = (top * width + index) as usize;
+                let samples = have[place];
                 let [a, b] = self.sampled(pixel, first).sets;
-                let a_set = f64::from((samples / SETS).max(1));
+                let a_set = f64::from((in_sums[place] / SETS).max(1));
                 let variance =
                     |(a, b): (&Sum, &Sum)| variance_of_mean((a.total() - b.total()) / a_set);
                 for layer in &mut strip.layers {

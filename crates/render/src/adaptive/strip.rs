@@ -41,6 +41,11 @@ impl Evidence {
         let count = f64::from(samples);
         self.sum += count * count * (count * noise.variance);
         self.weight += count * count;
+        self.tell(noise);
+    }
+
+    /// Takes what all of its samples tell now.
+    pub(super) fn tell(&mut self, noise: PixelNoise) {
         (self.variance, self.light) = (noise.variance, noise.light);
     }
 

@@ -24,7 +24,7 @@ use etendue_tracer::LayerSpec;
 use crate::error::RenderError;
 use crate::film::FilmLayer;
 use crate::output::{Outputs, Values};
-use crate::render::{Film, Prepared, RenderState, trace};
+use crate::state::{Film, Prepared, RenderState, TraceFn};
 use crate::stopping::Stopping;
 use crate::tile::RayCounts;
 use crate::watch::{SoFar, Watch};
@@ -130,11 +130,12 @@ fn cells_a_pixel(pitch: f64, finest: f64, accuracy: &AccuracySpec) -> u32 {
     cells.clamp(1.0, f64::from(accuracy.spread_pixel_cells)) as u32
 }
 
-/// Traces the light of `scene` and spreads it, where that is [wanted](is_wanted). `opened` is the camera, opened for the plan's bands.
+/// Traces the light of `scene` by `trace` and spreads it, where that is [wanted](is_wanted). `opened` is the camera, opened
+/// for the plan's bands.
 ///
 /// # Errors
 ///
-/// As [`trace`]; when the scene asks for what goes with no diffraction, or the lens has no waves.
+/// As [`trace`](crate::trace); when the scene asks for what goes with no diffraction, or the lens has no waves.
 pub(crate) fn spread_light(
     scene: &Scene,
     plan: &Plan,
@@ -142,6 +143,7 @@ pub(crate) fn spread_light(
     state: &RenderState<'_>,
     opened: &Camera,
     watch: &dyn Watch,
+    trace: TraceFn,
 ) -> Result<Option<SpreadLight>, RenderError> {
     if !is_wanted(scene, plan) {
         return Ok(None);
@@ -156,7 +158,7 @@ pub(crate) fn spread_light(
     let accuracy = &scene.accuracy;
     let cells = cells_a_pixel(pitch, lens.airy_unit(shortest), accuracy);
     // Light along chief rays, and depths.
-    let (picture, lit, mut film) = cell_picture(scene, plan, prepared, cells, watch)?;
+    let (picture, lit, mut film) = cell_picture(scene, plan, prepared, cells, watch, trace)?;
     let [columns, rows] = scene.camera.resolution();
     let is_mirrored = waves.is_mirrored([columns, rows]);
     let illumination = illumination(opened, &plan.bands, [columns, rows], is_mirrored, accuracy);
@@ -188,6 +190,7 @@ fn cell_picture(
     prepared: Prepared<'_>,
     cells: u32,
     watch: &dyn Watch,
+    trace: TraceFn,
 ) -> Result<(CellPicture, Vec<LayerSpec>, Film), RenderError> {
     let mut fine = scene.clone();
     fine.camera = scene.camera.along_chief_rays(cells);

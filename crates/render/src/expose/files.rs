@@ -11,15 +11,11 @@ use etendue_sensor::{
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{ExposeError, Exposed, SensorLight, remarks};
+use super::film::plain;
+use super::light::{ExposeError, Exposed, SensorLight};
+use super::remarks;
 use crate::output::{Channel, Layer, Look, Outputs, Picture, PictureError, Values, npy, png};
 use etendue_files::{SOFTWARE, Transaction};
-
-/// A name fit for all formats: `452.5nm` becomes `452_5nm`.
-pub(super) fn plain(name: &str) -> String {
-    let fit = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
-    name.chars().map(fit).collect()
-}
 
 /// `raw_003.png` of `raw` and `png` when there are several shots.
 pub(super) fn name(digits: usize, stem: &str, number: u32, ending: &str) -> String {

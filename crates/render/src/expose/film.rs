@@ -1,13 +1,12 @@
 //! The light of a picture in the bands of a sensor.
 
 use etendue_scene::Scene;
-use etendue_sensor::{Radiometry, Sensor, SensorKind};
+use etendue_sensor::{Photodiodes, Radiometry, Sensor, SensorKind};
 use etendue_spectrum::{Bands, Grid};
 use etendue_tracer::LayerSpec;
 use rayon::prelude::*;
 
-use super::files::plain;
-use super::{LightUnit, photodiodes};
+use super::LightUnit;
 use crate::film::FilmLayer;
 use crate::memory::{NoMemory, filled};
 use crate::output::{Channel, Layer, Look, Picture, SPECTRUM, Values};
@@ -266,4 +265,26 @@ fn cube(grid: &Grid, planes: Vec<Vec<f32>>, unit: LightUnit) -> Layer {
     ];
     let meaning = meaning.map(|(key, text)| (key.to_owned(), text.to_owned())).into();
     Layer { name: SPECTRUM.to_owned(), look: Look::Cube, channels, meaning }
+}
+
+/// The photodiodes that a sensor divides its pixels into: the layer of the light of each, and the name of its files.
+pub(crate) fn photodiodes(sensor: &Sensor) -> &'static [(LayerSpec, &'static str)] {
+    match sensor.spec().photodiodes {
+        None => &[],
+        Some(Photodiodes::Dual) => {
+            &[(LayerSpec::LeftPupil, "raw_left"), (LayerSpec::RightPupil, "raw_right")]
+        }
+        Some(Photodiodes::Quad) => &[
+            (LayerSpec::TopLeftPupil, "raw_top_left"),
+            (LayerSpec::TopRightPupil, "raw_top_right"),
+            (LayerSpec::BottomLeftPupil, "raw_bottom_left"),
+            (LayerSpec::BottomRightPupil, "raw_bottom_right"),
+        ],
+    }
+}
+
+/// A name fit for all formats: `452.5nm` becomes `452_5nm`.
+pub(super) fn plain(name: &str) -> String {
+    let fit = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
+    name.chars().map(fit).collect()
 }

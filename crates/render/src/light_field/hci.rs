@@ -11,7 +11,7 @@ use etendue_camera::ViewGrid;
 use etendue_geometry::glam::DMat3;
 use etendue_scene::Scene;
 
-use super::LightFieldError;
+use super::set::LightFieldError;
 use super::views::Views;
 use crate::output::{Picture, pfm, png};
 use etendue_files::Transaction;

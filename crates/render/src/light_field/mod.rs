@@ -26,12 +26,12 @@ mod hci;
 mod looking;
 mod patches;
 mod response;
+mod set;
 mod views;
 mod white;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use etendue_accel::Accel;
 use etendue_camera::{Camera, CameraError, LensCamera, LightField, ViewGrid};
 use etendue_optics::element::Grid;
 use etendue_scene::Scene;
@@ -39,11 +39,10 @@ use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 
 use crate::output::{
-    Channel, Layer, Look, OutputError, Outputs, Picture, PictureError, Values, exr, npy, pfm, png,
-    sidecar,
+    Channel, Layer, Look, Outputs, Picture, PictureError, Values, exr, npy, pfm, png, sidecar,
 };
-use crate::{Images, Plan, RenderError, render};
-use etendue_files::{Transaction, WriteError, prepare_folder};
+use crate::{Plan, RenderError, render};
+use etendue_files::Transaction;
 
 use centres::Centres;
 use choice::ChosenViews;
@@ -51,53 +50,10 @@ use geometry::LightFieldGeometry;
 pub use looking::LightFieldViews;
 use patches::Patches;
 pub(crate) use patches::refocused_bytes;
+use set::SetWriter;
+pub use set::{LightFieldError, LightFieldSet, RenderedScene};
 use views::Views;
 pub use white::white_rows;
-
-/// Error of a light-field set that is not complete.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum LightFieldError {
-    /// The reference views could not be rendered, or it was stopped.
-    #[error(transparent)]
-    Render(#[from] RenderError),
-    /// A file could not be written.
-    #[error(transparent)]
-    Output(#[from] OutputError),
-}
-
-impl From<WriteError> for LightFieldError {
-    fn from(error: WriteError) -> Self {
-        Self::Output(error.into())
-    }
-}
-
-impl From<PictureError> for LightFieldError {
-    fn from(error: PictureError) -> Self {
-        Self::Render(error.into())
-    }
-}
-
-/// Files that were written.
-#[derive(Debug, Default)]
-pub struct LightFieldSet {
-    /// The files, in the order they were written.
-    pub files: Vec<PathBuf>,
-    /// Notes for the user.
-    pub notes: Vec<String>,
-}
-
-/// The scene, its structure and its images, as they were rendered.
-#[derive(Clone, Copy)]
-#[expect(missing_debug_implementations, reason = "holds an accelerator")]
-pub struct RenderedScene<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
-    /// Its structure.
-    pub accel: &'a dyn Accel,
-    /// Its images.
-    pub images: &'a Images,
-}
 
 /// The names of the files of the set, in the folder of the results and below it.
 #[must_use]
@@ -266,46 +222,7 @@ fn central_depth(
     Ok(values.map_or_else(Vec::new, |values| (0..values.len()).map(|i| values.at(i)).collect()))
 }
 
-/// Writer of the set, with its destination.
-struct SetWriter<'a> {
-    files: &'a Transaction,
-    folder: &'a Path,
-    outputs: Outputs,
-    written: LightFieldSet,
-}
-
 impl SetWriter<'_> {
-    fn place(&mut self, name: &str) -> PathBuf {
-        let path = self.folder.join(name);
-        self.written.files.push(path.clone());
-        path
-    }
-
-    /// A picture in all formats that are wanted.
-    fn picture(&mut self, stem: &str, picture: &Picture) -> Result<(), LightFieldError> {
-        if self.outputs.exr {
-            exr::write(
-                self.files,
-                &self.place(&format!("{stem}.exr")),
-                picture,
-                &exr::Options::default(),
-            )?;
-        }
-        if self.outputs.png {
-            png::write(
-                self.files,
-                &self.place(&format!("{stem}.png")),
-                picture,
-                "",
-                png::Bits::Eight,
-            )?;
-        }
-        if self.outputs.npy {
-            npy::write(self.files, &self.place(&format!("{stem}.npy")), picture, "")?;
-        }
-        Ok(())
-    }
-
     /// Views side by side, as one array, and one file each; `shown` says how.
     fn views(&mut self, stem: &str, views: &Views, shown: &Picture) -> Result<(), LightFieldError> {
         let side_by_side = views.side_by_side()?.developed(*shown.development());
@@ -419,18 +336,6 @@ impl SetWriter<'_> {
                 .extend(hci::write(set.files, folder, scene, grid, views, shown, depth)?);
             Ok(())
         })
-    }
-
-    /// Fills a folder in the folder.
-    fn below(
-        &mut self,
-        name: &str,
-        fill: impl FnOnce(&mut Self, &Path) -> Result<(), LightFieldError>,
-    ) -> Result<(), LightFieldError> {
-        let folder = self.folder.join(name);
-        prepare_folder(&folder)?;
-        fill(self, &folder)?;
-        Ok(())
     }
 }
 

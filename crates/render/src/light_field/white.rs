@@ -7,7 +7,7 @@ use etendue_scene::file::RenderSpec;
 use etendue_spectrum::Bands;
 use rayon::prelude::*;
 
-use super::LightFieldError;
+use super::set::LightFieldError;
 use crate::output::{Channel, Layer, Look, Picture, Values};
 
 /// Greatest difference of the weights of a pixel, as a share of the largest, at which they are alike: cos⁴ takes half

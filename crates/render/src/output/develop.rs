@@ -11,11 +11,10 @@
 //!   Neubelt, *Baking Lab*, 2016.
 
 use etendue_scene::file::{Exposure, RenderSpec, ToneMap};
-use etendue_tracer::LayerSpec;
 use serde_json::{Value, json};
 
-use super::look::{ColourType, LayerImage, srgb, unit};
-use super::{Layer, Picture, Values, png::Bits};
+use super::layer::{Layer, Values};
+use super::look::{Bits, ColourType, LayerImage, srgb, unit};
 use crate::memory::NoMemory;
 
 /// Settings of how a PNG shows the picture's light.
@@ -32,12 +31,12 @@ pub struct Development {
 }
 
 impl Development {
-    /// Development that `spec` asks for, of a picture with these layers, whose own goes without a name.
+    /// Development that `spec` asks for, of a picture whose light is in this layer.
     #[must_use]
-    pub fn new(spec: &RenderSpec, picture: &Picture) -> Self {
+    pub fn new(spec: &RenderSpec, own: Option<&Layer>) -> Self {
         let (stops, is_automatic) = match spec.exposure {
             Exposure::Stops(stops) => (stops, false),
-            Exposure::Auto(_) => (picture.layer("").and_then(fitting_stops).unwrap_or(0.0), true),
+            Exposure::Auto(_) => (own.and_then(fitting_stops).unwrap_or(0.0), true),
         };
         Self { stops, is_automatic, tone_map: spec.tone_map, alpha: spec.alpha }
     }
@@ -89,11 +88,11 @@ impl Development {
         }
     }
 
-    /// The picture's own layer, of one channel or three, as a PNG shows it.
+    /// The picture's own layer, of one channel or three, as a PNG shows it, by its alpha and backdrop.
     pub(super) fn show(
         &self,
-        picture: &Picture,
         layer: &Layer,
+        [alpha, backdrop]: [Option<&Layer>; 2],
         bits: Bits,
     ) -> Result<LayerImage, NoMemory> {
         let planes: Vec<_> = layer.channels.iter().map(|channel| &channel.values).collect();
@@ -103,7 +102,7 @@ impl Development {
         };
         let note = format!("sRGB; {}", self.in_words());
         // Without alpha: colour, or grey of one channel.
-        let alpha = picture.layer_of(LayerSpec::Alpha).and_then(|layer| layer.channels.first());
+        let alpha = alpha.and_then(|layer| layer.channels.first());
         let Some(alpha) = alpha.filter(|_| self.alpha) else {
             return match planes.len() {
                 3 => {
@@ -116,8 +115,7 @@ impl Development {
             };
         };
         // With it: light without the backdrop, over the share that the subject has.
-        let backdrop: Vec<&Values> = picture
-            .layer_of(LayerSpec::Backdrop)
+        let backdrop: Vec<&Values> = backdrop
             .map(|layer| layer.channels.iter().map(|channel| &channel.values).collect())
             .unwrap_or_default();
         let rgba = |i| {
@@ -220,7 +218,7 @@ fn aces(rgb: [f64; 3]) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Channel, Look};
+    use super::super::{Channel, Look, Picture};
     use super::*;
 
     fn by(tone_map: ToneMap, stops: f64) -> Development {
@@ -288,7 +286,7 @@ mod tests {
         // Log mean of 0.09 x 2^{-3, 3} is 0.09: one stop below 0.18. Black counts for nothing.
         let picture = picture(vec![0.09 / 8.0, 0.09 * 8.0, 0.0], Vec::new());
         let spec = RenderSpec { exposure: Exposure::AUTO, ..RenderSpec::default() };
-        let found = Development::new(&spec, &picture);
+        let found = Development::new(&spec, picture.layer(""));
         // f32 holds the values to 6e-8 of themselves.
         assert!((found.stops - 1.0).abs() < 1e-6 && found.is_automatic, "{found:?}");
     }
@@ -315,7 +313,8 @@ mod tests {
         let all =
             picture(vec![0.4, 0.6, 0.8], vec![layer("Alpha", ["A"], vec![0.0, 0.5, 1.0]), behind]);
         let develop = Development { alpha: true, ..Development::default() };
-        let shown = develop.show(&all, all.layer("").unwrap(), Bits::Eight).unwrap();
+        let all = all.developed(develop);
+        let shown = all.show(all.layer("").unwrap(), Bits::Eight).unwrap();
         assert_eq!(shown.channels, ColourType::Rgba);
         let edge = &shown.bytes[4..8];
         // 0.8 is 0.9063 in sRGB, 231 of 255.

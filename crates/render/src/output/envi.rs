@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use super::picture::LE_BAND;
+use super::layer::LE_BAND;
 use super::{Layer, OutputError, Picture};
 use etendue_files::{SOFTWARE, Transaction};
 

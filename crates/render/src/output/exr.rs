@@ -33,7 +33,7 @@ use ::exr::meta::header::Header;
 use ::exr::meta::{BlockDescription, MetaData, magic_number, sequence_end};
 use rayon::prelude::*;
 
-use super::picture::put;
+use super::layer::put;
 use super::sidecar::Entries;
 use super::{OutputError, Picture, SPECTRUM, Values};
 use etendue_files::{SOFTWARE, Transaction};

@@ -4,7 +4,7 @@ use std::fmt;
 
 use xxhash_rust::xxh3::Xxh3Default;
 
-use super::picture::LE_BAND;
+use super::layer::LE_BAND;
 use super::{Picture, Values};
 
 /// The XXH3 fingerprint (128 bits) of a picture. It depends on the size, on the channels' names

@@ -3,7 +3,7 @@
 pub use etendue_tracer::layer::Look;
 use rayon::prelude::*;
 
-use super::{Layer, Values};
+use super::layer::{Layer, Values};
 use crate::memory::{NoMemory, filled};
 
 /// Reason why `layer` cannot be shown as it looks, if there is one.

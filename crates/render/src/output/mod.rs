@@ -46,6 +46,7 @@ pub mod sidecar;
 mod develop;
 mod error;
 mod hash;
+mod layer;
 mod layer_file;
 mod look;
 mod outputs;
@@ -56,11 +57,12 @@ pub use develop::Development;
 pub(crate) use develop::luminance;
 pub use error::{OutputError, PictureError};
 pub use hash::ImageHash;
+pub use layer::{Channel, Layer, Values};
 pub(crate) use layer_file::has_mask;
 pub use layer_file::{LayerFile, layer_stem};
 pub use look::Look;
 pub use outputs::Outputs;
-pub use picture::{Channel, Layer, Picture, Values};
+pub use picture::Picture;
 pub use screen::{DistanceScale, Screen};
 
 /// Name of the layer of a hyperspectral cube.

@@ -11,7 +11,7 @@ use std::path::Path;
 
 use npyz::{DType, TypeStr, WriterBuilder};
 
-use super::picture::LE_BAND;
+use super::layer::LE_BAND;
 use super::{Layer, OutputError, Picture};
 use etendue_files::Transaction;
 

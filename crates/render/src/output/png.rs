@@ -38,7 +38,7 @@ pub fn write(
     let denoised = picture.layer(DENOISED).filter(|_| name.is_empty());
     let layer = denoised.unwrap_or(layer);
     let shown = match (layer.look, name) {
-        (Look::Color, "") => picture.development().show(picture, layer, bits)?,
+        (Look::Color, "") => picture.show(layer, bits)?,
         _ => show(layer, bits)?,
     };
     write_shown(files, path, picture, layer, &shown)

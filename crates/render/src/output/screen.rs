@@ -96,7 +96,7 @@ impl Screen {
         let size = [picture.width(), picture.height()];
         let shown = match (layer.look, name) {
             (Look::Distance, _) => return Ok(Self::of_distances(size, layer)),
-            (Look::Color, "") => picture.development().show(picture, layer, Bits::Eight),
+            (Look::Color, "") => picture.show(layer, Bits::Eight),
             _ => show(layer, Bits::Eight),
         }?;
         let rgba = rgba(&shown, size[0] * size[1]);

@@ -12,7 +12,6 @@
 //! `thin` and `thick` are the approximations of C. Kolb, D. Mitchell and P. Hanrahan, "A realistic camera model
 //! for computer graphics", 1995.
 
-use std::fmt;
 use std::path::PathBuf;
 
 use etendue_accel::Accel;
@@ -26,11 +25,14 @@ use etendue_geometry::Bounds;
 use etendue_geometry::units::{Micrometres, Millimetres};
 use etendue_optics::element::{ApertureSpec, ElementSpec, MaskSpec, Opening, PartSpec, Picture};
 use etendue_scene::Scene;
-use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
 
-use super::{Field, FullView, TakenCamera, Tolerance};
+use super::full_view::{Field, FullView};
+use super::taken::{TakenCamera, Tolerance};
 use crate::{BandPaths, Plan, RenderError};
+
+pub use super::full_view::scale;
+pub use super::taken::LensModelKind;
 
 /// Why a camera has no models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -39,56 +41,6 @@ pub struct NoModels(
     /// In words.
     pub &'static str,
 );
-
-/// Kind of a model of a lens, or the lens itself.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LensModelKind {
-    /// Its entrance pupil as a point.
-    Pinhole,
-    /// A pinhole with OpenCV's distortion.
-    Opencv,
-    /// OpenCV's camera with the lens' falloff of light.
-    Falloff,
-    /// A thin lens.
-    Thin,
-    /// A thin lens with its stop apart.
-    Thick,
-    /// All of the lens, at its design wavelength.
-    Undispersed,
-    /// All of the lens, with its bands in groups.
-    Grouped,
-    /// All of the lens.
-    Full,
-}
-
-impl LensModelKind {
-    /// Its name in reports.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Pinhole => "pinhole",
-            Self::Opencv => "opencv",
-            Self::Falloff => "falloff",
-            Self::Thin => "thin",
-            Self::Thick => "thick",
-            Self::Undispersed => "undispersed",
-            Self::Grouped => "grouped",
-            Self::Full => "full",
-        }
-    }
-}
-
-impl fmt::Display for LensModelKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl Serialize for LensModelKind {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.name())
-    }
-}
 
 /// A model of a lens.
 #[derive(Debug, Clone, PartialEq)]
@@ -198,16 +150,6 @@ fn mask_in_pupil(full: &Camera, magnification: Option<f64>) -> Option<MaskSpec> 
     let scale = 1.0 / magnification.filter(|m| is_stop && *m > 0.0)?;
     let [width, height] = picture.size.map(|side| Millimetres(scale * side));
     Some(MaskSpec { file: picture.file.to_str()?.to_owned(), width, height: Some(height) })
-}
-
-/// Pixels of a picture for a slope of 1 near the axis; `None` of a camera without a lens, or with a
-/// telecentric one.
-#[must_use]
-pub fn scale(camera: &Camera) -> Option<f64> {
-    match camera.lens()?.focused().view() {
-        View::Perspective(k) => Some(k.focal[0]),
-        View::Parallel { .. } => None,
-    }
 }
 
 /// Data of a lens near its axis.

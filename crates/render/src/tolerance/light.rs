@@ -8,8 +8,8 @@ use etendue_scene::Scene;
 use etendue_scene::file::{SamplesSpec, TracerSpec};
 use etendue_tracer::LayerSpec;
 
-use super::lens_models::{self, LensModelKind};
-use super::{Approximations, TakenBounces};
+use super::lens_models;
+use super::taken::{Approximations, LensModelKind, TakenBounces};
 use crate::output::Outputs;
 use crate::{Images, Plan, RenderError, Watch, render};
 

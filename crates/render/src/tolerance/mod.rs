@@ -7,159 +7,33 @@
 mod clusters;
 mod coarse_images;
 mod detail;
+mod full_view;
 pub mod lens_models;
 mod light;
 mod pixel_views;
-mod place;
 mod small_things;
+mod taken;
 mod verify;
 
 use etendue_accel::Accel;
-use etendue_camera::{Camera, CameraSpec, FalloffSpec};
+use etendue_camera::{Camera, CameraSpec, FalloffSpec, Projection};
 use etendue_scene::Scene;
-use etendue_scene::file::ToleranceSpec;
-use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
-use serde::Serialize;
 
 use self::lens_models::{LensModel, LensModelKind, LensModels, NoModels};
-use self::pixel_views::{LightRay, PlaceView, chief_rays, places, seen};
+use self::pixel_views::PlaceView;
 use crate::{Images, Plan, RenderError, Watch};
 
 pub use self::coarse_images::coarse_images;
 pub(crate) use self::detail::hidden_offset;
 pub use self::detail::{TakenDetail, coarser, with_meshes};
-pub use self::place::Place;
+pub use self::full_view::{Field, FullView};
+pub use self::taken::{
+    Approximations, ModelError, Place, TakenBounces, TakenCamera, Tolerance, Worst,
+};
 pub use self::verify::{Verified, verify};
 
-/// Errors that a model may have.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Tolerance {
-    /// Of places, blur and shifts of colour (pixels).
-    pub pixels: f64,
-    /// Of light, as a share of that on the axis; not judged when absent.
-    pub light: Option<f64>,
-}
-
-/// Fineness of the comparison of models.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Field {
-    /// Columns and rows of places, the picture's corners among them.
-    pub size: [u32; 2],
-    /// Rays of a place and a group of bands.
-    pub rays: u32,
-    /// Bands, at most, that are looked at: the first, the last, and some in between.
-    pub bands: usize,
-    /// Chief rays across the neighbourhood of a place, at most, by which its depths are found: one every two pixels
-    /// where that is enough.
-    pub across: u32,
-}
-
-impl Field {
-    /// For a user who compares models.
-    pub const FINE: Self = Self { size: [9, 7], rays: 1024, bands: usize::MAX, across: 256 };
-    /// For the choice that a render makes before it begins.
-    pub const QUICK: Self = Self { size: [9, 7], rays: 256, bands: 3, across: 64 };
-    /// For the verification of a choice: places in between, and more bands.
-    pub const BETWEEN: Self = Self { size: [16, 12], rays: 256, bands: 5, across: 64 };
-}
-
-/// Errors of a model, and its cost.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ModelError {
-    /// Kind of the model.
-    pub model: LensModelKind,
-    /// Distance of chief rays from the train's (pixels).
-    pub chief_ray: Worst,
-    /// Distance of the middle of a pixel's light from the train's (pixels).
-    pub centroid: Worst,
-    /// The difference of the blur, the root mean square radius of a pixel's light in a band (pixels).
-    pub blur: Worst,
-    /// The difference of where a band lies among all bands (pixels).
-    pub colour: Worst,
-    /// The difference of a pixel's light in a band, as a share of that on the axis.
-    pub light: Worst,
-    /// True if it stays within the tolerance.
-    pub is_within: bool,
-    /// The time of a sample of a pixel (s); `null` without a picture to time.
-    pub seconds_a_sample: Option<f64>,
-    /// Speed as a multiple of the full train's.
-    pub speed: Option<f64>,
-}
-
-impl ModelError {
-    /// The greatest displacement, of whatever kind (pixels).
-    #[must_use]
-    pub fn displacement(&self) -> f64 {
-        let all = [self.chief_ray, self.centroid, self.blur, self.colour];
-        all.into_iter().map(|worst| worst.value).fold(0.0, f64::max)
-    }
-}
-
-/// The greatest difference, and where it is.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Worst {
-    /// As the quantity says.
-    pub value: f64,
-    /// The column and row of its place (pixels from the corner).
-    pub at: [f64; 2],
-    /// Its depth (m); `null` for infinity, or where the depth plays no part.
-    pub depth: Option<f64>,
-}
-
-impl Worst {
-    fn raise(&mut self, value: f64, place: &Place, nearness: Option<f64>) {
-        if value > self.value {
-            let depth = nearness.map(|nearness| 1.0 / nearness).filter(|depth| depth.is_finite());
-            *self = Self { value, at: [place.column, place.row], depth };
-        }
-    }
-}
-
-/// View through all of a camera's lens, which its models are compared with.
-#[derive(Debug, Clone)]
-pub struct FullView {
-    camera: Camera,
-    bands: Bands,
-    chosen: Vec<usize>,
-    field: Field,
-    /// Pixels of a slope of 1.
-    scale: f64,
-    /// Places of the picture that are compared.
-    pub places: Vec<Place>,
-    seen: Vec<PlaceView>,
-    /// Notes on the view for the user, in sentences.
-    pub notes: Vec<String>,
-}
-
 impl FullView {
-    /// Of the camera of `scene` in `bands`, at the depths that it has behind `accel`.
-    ///
-    /// # Errors
-    ///
-    /// When no light gets through the lens.
-    pub fn new(
-        scene: &Scene,
-        accel: &dyn Accel,
-        bands: &Bands,
-        field: Field,
-    ) -> Result<Self, RenderError> {
-        let mut places = places(scene, accel, field.size, field.across);
-        let mut notes = Vec::new();
-        if places.iter().all(|place| place.depths.is_empty()) {
-            let in_focus = scene.camera.lens().map(|lens| lens.focused().object_distance());
-            notes.push("the camera sees no surface: compared at the distance in focus".to_owned());
-            let depth = in_focus.unwrap_or(f64::INFINITY).abs();
-            places.iter_mut().for_each(|place| place.depths.push(depth));
-        }
-        let chosen = some_of(bands.count(), field.bands);
-        let camera = open(&scene.camera, bands)?;
-        let seen = seen((&camera, bands), &chosen, &places, field.rays);
-        let scale = lens_models::scale(&scene.camera).unwrap_or(f64::NAN);
-        let bands = bands.clone();
-        Ok(Self { camera, bands, chosen, field, scale, places, seen, notes })
-    }
-
     /// The light of OpenCV's camera in the places of this one: a polynomial of the distance from the axis, by least
     /// squares.
     fn falloff(&self, camera: &Camera) -> Option<FalloffSpec> {
@@ -170,7 +44,8 @@ impl FullView {
         let places = self.places.iter().zip(&self.seen);
         let lit: Vec<([f64; 2], f64)> =
             places.map(|(place, seen)| ([place.column, place.row], light(seen))).collect();
-        FalloffSpec::fitted(camera, &lit)
+        let Projection::Pinhole(pinhole) = camera.projection() else { return None };
+        FalloffSpec::fitted(&pinhole.intrinsics(), &lit)
     }
 
     /// All models of the lens, the simplest first, and what is missing.
@@ -219,102 +94,6 @@ impl FullView {
         }
         Ok(LensModels { models, notes })
     }
-
-    /// The greatest blur of a pixel's light in a band, at any of the depths (pixels).
-    fn blur(&self) -> f64 {
-        let of_place = |(seen, place): (&PlaceView, &Place)| {
-            let depths = place.depths.iter();
-            let of_depth = |depth: &f64| {
-                seen.bands.iter().map(|band| band.blur(1.0 / depth)).fold(0.0, f64::max)
-            };
-            depths.map(of_depth).fold(0.0, f64::max)
-        };
-        self.scale * self.seen.iter().zip(&self.places).map(of_place).fold(0.0, f64::max)
-    }
-
-    /// Greatest distance of the chief rays of `camera` from the view's own (pixels): what is cheap
-    /// to find of a model, of which no more needs to be known when this is too far.
-    fn chief_displacement(&self, camera: &Camera) -> f64 {
-        let own = chief_rays(camera, &self.places);
-        let places = own.iter().zip(&self.seen).zip(&self.places);
-        let of_place = |((own, full), place): ((&Option<LightRay>, &PlaceView), &Place)| {
-            let (Some(own), Some(full)) = (own, &full.chief) else { return 0.0 };
-            let depths = place.depths.iter().map(|depth| 1.0 / depth);
-            depths.map(|near| (own.at(near) - full.at(near)).length()).fold(0.0, f64::max)
-        };
-        self.scale * places.map(of_place).fold(0.0, f64::max)
-    }
-
-    /// Compares `camera` with the view: what it misses.
-    ///
-    /// # Errors
-    ///
-    /// When no light gets through.
-    pub fn finding(
-        &self,
-        model: LensModelKind,
-        camera: &Camera,
-        tolerance: Tolerance,
-    ) -> Result<ModelError, RenderError> {
-        let rays = self.field.rays;
-        let camera = open(camera, &self.bands)?;
-        let own = seen((&camera, &self.bands), &self.chosen, &self.places, rays);
-        Ok(self.compared(model, &own, tolerance))
-    }
-
-    /// The lens against itself.
-    #[must_use]
-    pub fn itself(&self, tolerance: Tolerance) -> ModelError {
-        self.compared(LensModelKind::Full, &self.seen, tolerance)
-    }
-
-    fn compared(
-        &self,
-        model: LensModelKind,
-        own: &[PlaceView],
-        tolerance: Tolerance,
-    ) -> ModelError {
-        let [mut chief_ray, mut centroid, mut blur, mut colour, mut light] = [Worst::default(); 5];
-        let scale = self.scale;
-        for ((own, full), place) in own.iter().zip(&self.seen).zip(&self.places) {
-            // Light depends on the place alone.
-            for (a, b) in own.bands.iter().zip(&full.bands) {
-                light.raise((a.light - b.light).abs(), place, None);
-            }
-            // Chief rays, blur and colour also on the depth.
-            for &depth in &place.depths {
-                let nearness = 1.0 / depth;
-                let at = Some(nearness);
-                if let (Some(a), Some(b)) = (own.chief, full.chief) {
-                    chief_ray.raise(scale * (a.at(nearness) - b.at(nearness)).length(), place, at);
-                }
-                let (Some(a), Some(b)) = (own.centroid(nearness), full.centroid(nearness)) else {
-                    continue;
-                };
-                centroid.raise(scale * (a - b).length(), place, at);
-                for (c, d) in own.bands.iter().zip(&full.bands) {
-                    if let (Some(p), Some(q)) = (c.centroid(nearness), d.centroid(nearness)) {
-                        blur.raise(scale * (c.blur(nearness) - d.blur(nearness)).abs(), place, at);
-                        colour.raise(scale * ((p - a) - (q - b)).length(), place, at);
-                    }
-                }
-            }
-        }
-        let in_pixels = [chief_ray, centroid, blur, colour];
-        let is_within = in_pixels.iter().all(|worst| worst.value <= tolerance.pixels)
-            && tolerance.light.is_none_or(|most| light.value <= most);
-        ModelError {
-            model,
-            chief_ray,
-            centroid,
-            blur,
-            colour,
-            light,
-            is_within,
-            seconds_a_sample: None,
-            speed: None,
-        }
-    }
 }
 
 /// Choice of the models that are made.
@@ -330,60 +109,6 @@ fn with_falloff(full: &Camera, spec: CameraSpec, falloff: FalloffSpec) -> Option
     let CameraSpec::Pinhole(mut spec) = spec else { return None };
     spec.falloff = Some(falloff);
     lens_models::model(LensModelKind::Falloff, full, &CameraSpec::Pinhole(spec)).ok()
-}
-
-fn open(camera: &Camera, bands: &Bands) -> Result<Camera, RenderError> {
-    camera.opened(bands).map_err(|error| RenderError::camera(error.why))
-}
-
-/// Of so many bands a few numbers: the first, the last, and even ones in between.
-fn some_of(count: usize, most: usize) -> Vec<usize> {
-    if count <= most {
-        return (0..count).collect();
-    }
-    (0..most).map(|k| k * (count - 1) / (most - 1).max(1)).collect()
-}
-
-/// Part of a scene's tolerance that is used.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Approximations {
-    /// The tolerance.
-    pub tolerance: ToleranceSpec,
-    /// The camera that light is sampled by, in the place of the scene's.
-    pub camera: Option<TakenCamera>,
-    /// Number of surfaces to which light is followed, less than the scene's tracer does.
-    pub bounces: Option<TakenBounces>,
-    /// Detail that is left out of the scene's meshes.
-    pub detail: Option<TakenDetail>,
-    /// Number of the scene's images decoded in as few texels as the nearest view can tell apart.
-    pub images: usize,
-    /// Reasons why not more is used, in sentences.
-    pub notes: Vec<String>,
-}
-
-impl Approximations {
-    /// Nothing but the detail of meshes yet.
-    fn nothing(tolerance: ToleranceSpec, detail: Option<TakenDetail>) -> Self {
-        Self { tolerance, camera: None, bounces: None, detail, images: 0, notes: Vec::new() }
-    }
-}
-
-/// A simpler model of a lens that is taken.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TakenCamera {
-    /// The camera.
-    pub camera: Camera,
-    /// Its errors.
-    pub finding: ModelError,
-}
-
-/// Fewer surfaces to which light is followed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TakenBounces {
-    /// Number of surfaces to which light is followed.
-    pub bounces: u32,
-    /// The share of light that the others bring, in 99 % of blocks of 8 × 8 pixels.
-    pub share: f64,
 }
 
 /// Samples of light in three bands from which on looking for something cheaper can pay: finding out takes as long as
@@ -471,11 +196,4 @@ fn simplest(
         notes.push("no simpler model of the lens is within it".to_owned());
     }
     Ok(grouped)
-}
-
-/// The tolerance of a scene as models are judged by.
-impl From<ToleranceSpec> for Tolerance {
-    fn from(spec: ToleranceSpec) -> Self {
-        Self { pixels: spec.displacement.0, light: Some(spec.light.0) }
-    }
 }

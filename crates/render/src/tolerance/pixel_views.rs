@@ -6,8 +6,8 @@
 //!
 //! Beside it the depths of the scene where the camera looks.
 
-use super::Place;
 use super::small_things::PictureGrid;
+use super::taken::Place;
 use etendue_accel::Accel;
 use etendue_camera::{Camera, CameraRays, FilmSamples, Pose, Sampler};
 use etendue_geometry::glam::{DVec2, DVec3};

@@ -12,7 +12,7 @@ use etendue_geometry::glam::{DVec2, DVec3};
 use etendue_geometry::{Bounds, Detail, Geometry, HitBatch, RayBatch};
 use rayon::prelude::*;
 
-use super::Place;
+use super::taken::Place;
 
 /// Rays to each side of a box that are aimed at it.
 const AIMED: u32 = 8;

@@ -269,6 +269,41 @@ fn samples_until_an_error_count_by_the_pixel_that_they_start_from() {
     }
 }
 
+/// An even sky, which light that starts from a pixel does not show to vary at all: the layer `variance` is of
+/// the light that landed, and where that varies by more than was allowed, the render says so.
+#[test]
+fn the_variance_of_light_that_lands_is_told() {
+    let variances = |seed: u32| {
+        let samples = json!({ "relative_error": 0.02, "min": 8, "max": 4096 });
+        let more =
+            json!({ "render": { "samples": samples, "seed": seed }, "layers": ["variance"] });
+        let scene = scene(singlet(), false, 1, &more);
+        let plan = Plan::new(&scene, Outputs::ALL);
+        assert!(plan.band_paths.are_shared() && plan.stopping.is_adaptive());
+        let done = rendered(&scene, &plan);
+        let counts = done.sample_counts.unwrap();
+        assert!(!counts.notes().is_empty(), "{counts:?}");
+        [
+            channels(&done.picture, "").swap_remove(1),
+            channels(&done.picture, "Variance").swap_remove(1),
+        ]
+    };
+    let seeds = 8;
+    let (mut told, mut pictures) = (0.0, Vec::new());
+    for seed in 0..seeds {
+        let [light, variance] = variances(seed);
+        told += mean(&variance) / f64::from(seeds);
+        pictures.push(light);
+    }
+    let of_pixel = |pixel: usize| {
+        let all: Vec<f64> = pictures.iter().map(|picture| picture[pixel]).collect();
+        all.iter().map(|x| (x - mean(&all)).powi(2)).sum::<f64>() / f64::from(seeds - 1)
+    };
+    let found = mean(&(0..pictures[0].len()).map(of_pixel).collect::<Vec<_>>());
+    // Neighbours share what lands: of 7680 pixels of eight seeds some hundreds are independent.
+    assert!((0.8..1.25).contains(&(told / found)), "told {told:e}, found {found:e}");
+}
+
 /// The same to the bit on one thread and on three, and in shares of the rows, which judge the strips from which light
 /// lands on theirs; a render that is stopped before light has landed is none.
 #[test]
@@ -330,7 +365,7 @@ fn the_plan_says_how_bands_travel() {
     own(double_gauss(), json!({ "plan": {} }), "direct light has less noise");
     let until = json!({ "relative_error": 0.05 });
     let few = json!({ "plan": {}, "tracer": { "type": "path" }, "render": { "samples": until } });
-    own(double_gauss(), few, "take shared paths twice, and bands are few");
+    own(double_gauss(), few, "known too late");
     let asked = json!({ "render": { "samples": until } });
     assert_eq!(choice(how(double_gauss(), &asked)), "shared");
     // Nothing to decide: no lens, or one that takes all bands along the same way.

@@ -12,9 +12,8 @@ use etendue_geometry::{Coplanar, Geometry};
 use serde::Serialize;
 
 use crate::import::{NoteKind, Wanted};
-use crate::{
-    CameraOrigin, FileKind, IdName, LoadOptions, Note, Scene, SceneError, SceneFile, scene,
-};
+use crate::world_vertices::tight;
+use crate::{CameraOrigin, FileKind, IdName, LoadOptions, Note, Scene, SceneError, SceneFile};
 
 pub use checks::StepSizes;
 pub use memory::MemoryForecast;
@@ -170,7 +169,7 @@ impl Diagnosis {
     #[must_use]
     pub fn of(scene: &Scene, kind: FileKind) -> Self {
         let geometry = &*scene.geometry;
-        let bounds = scene::tight(geometry.into());
+        let bounds = tight(geometry.into());
         let coplanar = Coplanar::of(geometry).pairs(geometry);
         let is_extension = |note: &&Note| note.kind == NoteKind::Extension;
         let models: Vec<&Path> = scene.stats.files.iter().map(|(path, _)| path.as_path()).collect();

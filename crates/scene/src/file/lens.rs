@@ -17,7 +17,9 @@ use schemars::generate::SchemaSettings;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::{SCENE_KEYS, SceneFile, ScenePath, WrittenPlaces, check, read_document, spec, values};
+use super::camera::{SCENE_KEYS, read_bytes, read_document};
+use super::written::WrittenPlaces;
+use super::{SceneFile, ScenePath, check, spec, values};
 use crate::SceneError;
 use crate::load::CameraFiles;
 
@@ -227,7 +229,7 @@ fn format_of(path: &Path) -> Result<Option<LensFormat>, SceneError> {
     match LensFormat::named(path) {
         Some(format) => Ok(Some(format)),
         None if may_tell("json") || may_tell("txt") => {
-            Ok(LensFormat::of(path, &super::read_bytes(path).map_err(not_a_lens)?))
+            Ok(LensFormat::of(path, &read_bytes(path).map_err(not_a_lens)?))
         }
         None => Ok(None),
     }
@@ -239,7 +241,7 @@ fn import(
     configuration: Option<usize>,
     glasses: &[AgfCatalogue],
 ) -> Result<ReadLens, SceneError> {
-    let bytes = super::read_bytes(path).map_err(not_a_lens)?;
+    let bytes = read_bytes(path).map_err(not_a_lens)?;
     let zemax = |source: ZemaxError| {
         SceneError::Refused(Refusal::new(format!("{}, {source}", path.display())))
     };

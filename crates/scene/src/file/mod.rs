@@ -11,14 +11,14 @@ mod object;
 mod overrides;
 mod path;
 mod samples;
+mod sensor;
 mod settings;
 mod spec;
 mod tolerance;
 mod values;
+mod written;
 
-use std::collections::BTreeMap;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use etendue_files::Opener;
 use etendue_optics::train::remove_notes;
@@ -28,7 +28,6 @@ use etendue_tracer::LayerSpec;
 use serde_json::{Value, json};
 
 pub use accuracy::{AccuracySetting, AccuracySpec, AccuracyUse};
-pub use camera::SensorFile;
 pub use document::{Origin, Place};
 pub use frames::{
     CameraPath, FramesSpec, PixelsSpec, RigCameraSpec, SlotSpec, TrajectoryFormat, texts_of,
@@ -42,6 +41,7 @@ pub use path::{PathStep, ScenePath};
 pub use samples::{
     LEAST_SAMPLES, RelativeErrorSpec, SETS, SamplesSpec, SensorNoiseSpec, TimeSpec, Until,
 };
+pub use sensor::SensorFile;
 pub use settings::{
     Auto, BuildQuality, Exposure, LightPrecision, LightRow, PlanSpec, RenderSpec, ToneMap,
     TracerRow, TracerSpec,
@@ -53,23 +53,14 @@ pub(crate) use document::{JsonDocument, JsonFault};
 pub(crate) use values::read as read_value;
 
 use crate::SceneError;
-use crate::memory::{has_room, of_json};
-use crate::sniff::what_it_is;
-use camera::CameraDocument;
-use document::excerpt;
+use camera::read_document;
+use written::WrittenPlaces;
 
 /// The endings of models that may stand in for a scene file.
 const MODELS: [&str; 4] = ["gltf", "glb", "obj", "ply"];
 
-/// The keys of a scene that no lens file has.
-const SCENE_KEYS: [&str; 3] = ["etendue", "camera", "objects"];
-
 /// Name, in messages, of a scene that stands in no file.
 const IN_MEMORY: &str = "scene in memory";
-
-/// The longest text that is read as a scene (bytes): scenes name their meshes, they do not hold
-/// them.
-const LONGEST: u64 = 64 << 20;
 
 /// A scene file, read and checked for itself; nothing it names has been opened.
 #[derive(Debug, Clone)]
@@ -82,22 +73,6 @@ pub struct SceneFile {
     pub spec: SceneSpec,
     /// The camera's sensor, when the file says more of it than its grid of pixels.
     pub sensor: Option<Sensor>,
-}
-
-/// Places where the values of a file were written, to say where something is wrong.
-#[derive(Debug, Clone)]
-struct WrittenPlaces {
-    path: PathBuf,
-    /// The text; none for a model.
-    document: Option<JsonDocument>,
-    /// Opens the camera's file, where the scene names one.
-    opener: Opener,
-    /// That file, once it is read.
-    camera: Option<CameraDocument>,
-    /// Paths that the command line set, and how each was written there.
-    settings: BTreeMap<ScenePath, String>,
-    /// Of which frame they are; none for the command line's.
-    frame: Option<usize>,
 }
 
 /// Kind of file that stands for the scene.
@@ -201,7 +176,7 @@ impl SceneFile {
         }
         remove_notes(&mut value);
         written.read_curves(&mut value)?;
-        let sensor = camera::place_in_scene();
+        let sensor = sensor::place_in_scene();
         let resolution = sensor.key("resolution");
         spec::read_resolution(&mut value, &resolution)
             .map_err(|why| written.fault(resolution, why))?;
@@ -277,7 +252,7 @@ impl SceneFile {
             self.fault(problem.path, problem.reason + &hint)
         })?;
         let mut value = self.value.clone();
-        let sensor = camera::split(&mut value, &self.written)?;
+        let sensor = sensor::split(&mut value, &self.written)?;
         let spec = values::read(&value).map_err(|(path, why)| self.fault(path, why))?;
         Ok((spec, sensor))
     }
@@ -321,88 +296,6 @@ impl SceneFile {
     }
 }
 
-impl WrittenPlaces {
-    fn new(opener: &Opener, path: &Path, document: Option<JsonDocument>) -> Self {
-        Self {
-            path: path.to_owned(),
-            document,
-            opener: opener.clone(),
-            camera: None,
-            settings: BTreeMap::new(),
-            frame: None,
-        }
-    }
-
-    fn folder(&self) -> &Path {
-        match self.path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        }
-    }
-
-    /// Puts the camera in the place of the name of its file.
-    fn read_camera(&mut self, scene: &mut Value) -> Result<(), SceneError> {
-        let Some(place) = scene.get_mut("camera") else { return Ok(()) };
-        let Value::String(written) = &*place else { return Ok(()) };
-        let folder = self.folder();
-        let folder =
-            self.opener.folder(folder).map_err(|why| SceneError::unreadable(folder, &why))?;
-        let (file, camera) =
-            CameraDocument::read(&folder, written)?.map_err(|why| self.fault("camera", why))?;
-        *place = camera;
-        // What it says stands there, not where it is named.
-        self.settings.remove(&ScenePath::of("camera"));
-        self.camera = Some(file);
-        Ok(())
-    }
-
-    /// Applies settings of the command line to the file's values, the later the stronger.
-    fn set(&mut self, value: &mut Value, all: &[(String, String)]) -> Result<(), SceneError> {
-        for (key, text) in all {
-            let setting = format!("{key}={text}");
-            let applied = overrides::apply(value, key, text)
-                .map_err(|why| why.at(format_args!("--set {setting}")))?;
-            let is_camera = applied == ScenePath::of("camera");
-            self.settings.insert(applied, setting);
-            if is_camera {
-                self.camera = None;
-                self.read_camera(value)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// The error that the value at `path` is wrong because of `why`.
-    fn fault(&self, path: impl Into<ScenePath>, why: impl Into<Refusal>) -> SceneError {
-        let path = path.into();
-        let place = self.place(&path);
-        let file = self.camera.as_ref().zip(CameraDocument::own_path(&path));
-        // A setting is named as it was written, from the scene's top.
-        let file = file.filter(|_| !matches!(place, Origin::Setting(_)));
-        let (file, path) = match file {
-            Some((camera, own)) => (camera.path.clone(), own),
-            None => (self.path.clone(), path),
-        };
-        SceneError::Invalid { file, path, place, why: why.into() }
-    }
-
-    /// Place where the value at `path`, or the nearest that holds it, was written.
-    fn place(&self, path: &ScenePath) -> Origin {
-        // A setting replaces all that the text has below it.
-        if let Some(setting) = path.holders().find_map(|path| self.settings.get(&path)) {
-            return Origin::Setting(match self.frame {
-                Some(number) => format!("frames[{number}]: {setting}"),
-                None => format!("--set {setting}"),
-            });
-        }
-        let place = match self.camera.as_ref().zip(CameraDocument::own_path(path)) {
-            Some((camera, own)) => camera.document.near(&own),
-            None => self.document.as_ref().and_then(|document| document.near(path)),
-        };
-        place.map_or(Origin::Nowhere, Origin::Text)
-    }
-}
-
 /// The layers of the light that a sensor's photodiodes see.
 fn layers_of(photodiodes: Photodiodes) -> &'static [LayerSpec] {
     match photodiodes {
@@ -419,42 +312,4 @@ fn layers_of(photodiodes: Photodiodes) -> &'static [LayerSpec] {
 fn is_model(path: &Path) -> bool {
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     MODELS.iter().any(|model| ending.eq_ignore_ascii_case(model))
-}
-
-fn read_document(path: &Path) -> Result<(JsonDocument, Value), SceneError> {
-    let bytes = read_bytes(path)?;
-    let not_a_scene = |reason| SceneError::NotAScene { file: path.to_owned(), reason };
-    if let Some(what) = what_it_is(&bytes) {
-        return Err(not_a_scene(format!("is {what}, not JSON text")));
-    }
-    // Its text is kept beside its values.
-    if !has_room(of_json(&bytes) + bytes.len() as u64) {
-        return Err(not_a_scene("is more than the system has memory for".to_owned()));
-    }
-    let text = String::from_utf8(bytes).map_err(|error| {
-        not_a_scene(format!("is not UTF-8 text (byte {})", error.utf8_error().valid_up_to()))
-    })?;
-    let text = text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text);
-    // Text of another format, such as an STL model's: a name that is none of ours tells.
-    let is_named_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-    if !is_named_json && !text.trim_start().starts_with(['{', '[']) {
-        return Err(not_a_scene("is text that is no JSON".to_owned()));
-    }
-    JsonDocument::parse(text.clone()).map_err(|fault| {
-        let Place { line, column } = fault.place;
-        let why = Refusal::new(fault.reason).and(&format!("\n{}", excerpt(&text, fault.place)));
-        let place = format!("{}, line {line}, column {column}: broken JSON", path.display());
-        SceneError::Refused(why.at(place))
-    })
-}
-
-/// The bytes of a regular file of sensible size.
-fn read_bytes(path: &Path) -> Result<Vec<u8>, SceneError> {
-    etendue_files::read(path, LONGEST).map_err(|source| match source.kind() {
-        // What the opener itself says: it is there but no file for us.
-        io::ErrorKind::Other => {
-            SceneError::NotAScene { file: path.to_owned(), reason: source.to_string() }
-        }
-        _ => SceneError::unreadable(path, &source),
-    })
 }

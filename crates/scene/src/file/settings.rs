@@ -182,8 +182,8 @@ pub struct PlanSpec {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dispersion: Option<bool>,
     /// True if the bands of a picture share the paths of the scene behind a lens that sends each its own way, where
-    /// they can, false if the scene is traced for each band. When absent they share paths of several surfaces, direct
-    /// light in more than eight bands, and samples until an error is reached in more than four.
+    /// they can, false if the scene is traced for each band. When absent they share paths of several surfaces, and
+    /// direct light in more than eight bands, unless samples stop at an error.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shared_paths: Option<bool>,
     /// True if images are averaged over what a sample covers; where the camera tells that when absent.

@@ -10,7 +10,7 @@
 
 use std::collections::BTreeMap;
 
-use super::station::Station;
+use super::frame::Station;
 use super::transforms::{FileCamera, distortion};
 use etendue_camera::{Convention, Maps, PoseSpec};
 

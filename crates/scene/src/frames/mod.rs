@@ -1,97 +1,25 @@
 //! The frames of a scene: what is set for each of its pictures.
 
 mod colmap;
+mod frame;
 mod path;
-mod station;
 mod trajectory;
 mod transforms;
 
-use std::collections::BTreeMap;
-
-use etendue_camera::{CameraSpec, Convention, Maps, Pose, PoseSpec};
+use etendue_camera::{CameraSpec, Convention, Maps, PoseSpec};
 use etendue_files::Opener;
-use etendue_geometry::glam::DVec3;
 use etendue_report::Refusal;
-use serde_json::Value;
 
+use crate::SceneError;
 use crate::error::not_found;
 use crate::file::{CameraPath, FramesSpec, SceneFile, ScenePath};
 use crate::import::Note;
-use crate::{Scene, SceneError};
-use station::{PoseAxes, Station};
+use frame::{MOST_FRAMES, PoseAxes, Station, too_many};
 use trajectory::TrajectorySource;
 use transforms::ScenePicture;
 
-/// The most frames of a scene. All are made before the first is shown, of a few kilobytes each.
-const MOST_FRAMES: usize = 100_000;
-
-/// One picture of a scene.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Frame {
-    /// Its number, from 0.
-    pub number: usize,
-    /// Time of the frame (s), where the scene says.
-    pub time: Option<f64>,
-    /// Settings of the frame: paths of the scene and values.
-    pub settings: Vec<(String, Value)>,
-    /// Camera of a rig that takes the frame, where there is one.
-    pub rig: Option<RigCamera>,
-}
-
-impl Frame {
-    /// True if the frame sets some of the scene's keys `roots`, or what is inside of them.
-    #[must_use]
-    pub fn sets(&self, roots: &[&str]) -> bool {
-        let is_in =
-            |path: &String| ScenePath::of(path).root().is_some_and(|it| roots.contains(&it));
-        self.settings.iter().any(|(path, _)| is_in(path))
-    }
-}
-
-/// A camera of a rig, at a moment of the rig's path.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct RigCamera {
-    /// The number of the moment, from 0.
-    pub moment: usize,
-    /// The number of the camera, from 0.
-    pub camera: usize,
-    /// Number of cameras of the rig. The frame's number is `moment × count + camera`.
-    pub count: usize,
-    /// Name of the camera in the scene.
-    pub name: Option<String>,
-}
-
-/// The pictures of a scene, in order.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Frames {
-    /// One a picture.
-    pub frames: Vec<Frame>,
-    /// Notes on the file that the frames come from.
-    pub notes: Vec<Note>,
-}
-
-/// Starting values of the camera's paths.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Start {
-    /// The scene's own camera.
-    pub pose: Pose,
-    /// The middle of the scene's box (m).
-    pub center: DVec3,
-    /// The cameras of the models.
-    pub cameras: Vec<CameraSpec>,
-}
-
-impl Start {
-    /// Of a scene that is loaded.
-    #[must_use]
-    pub fn of(scene: &Scene) -> Self {
-        Self {
-            pose: *scene.camera.pose(),
-            center: scene.geometry.loose_bounds().centre(),
-            cameras: scene.cameras.iter().map(|camera| camera.spec.clone()).collect(),
-        }
-    }
-}
+pub(crate) use frame::listed;
+pub use frame::{Frame, Frames, RigCamera, Start};
 
 impl SceneFile {
     /// The frames of the scene, in order; `None` when it has no `frames` and is one picture. `start` is
@@ -271,19 +199,4 @@ impl SceneFile {
             .any(|key| self.value().pointer(&format!("/camera/sensor/{key}")).is_some());
         ScenePicture { resolution: sensor.resolution, is_given }
     }
-}
-
-/// A frame for each entry of a list.
-pub(crate) fn listed(list: &[BTreeMap<String, Value>]) -> Vec<Frame> {
-    let frame = |(number, settings): (usize, &BTreeMap<String, Value>)| Frame {
-        number,
-        time: None,
-        settings: settings.iter().map(|(k, v)| (k.clone(), v.clone())).collect(),
-        rig: None,
-    };
-    list.iter().enumerate().map(frame).collect()
-}
-
-fn too_many(count: usize) -> String {
-    format!("{count} frames; {MOST_FRAMES} are the most")
 }

@@ -8,8 +8,7 @@ use std::f64::consts::TAU;
 
 use serde_json::{Value, json};
 
-use super::station::Station;
-use super::{Frame, MOST_FRAMES, RigCamera, Start, too_many};
+use super::frame::{Frame, MOST_FRAMES, RigCamera, Start, Station, too_many};
 use crate::file::{
     AnimationSpec, CameraPath, ObjectSpec, RigCameraSpec, SceneFile, ScenePath, Source,
 };

@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use super::colmap::{self, numbers};
-use super::station::{PoseAxes, Station};
+use super::frame::{PoseAxes, Station};
 use super::transforms::{self, ScenePicture};
 use crate::error::not_found;
 use crate::file::TrajectoryFormat;

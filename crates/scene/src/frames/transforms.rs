@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 use serde_json::{Map, Value, json};
 
-use super::station::Station;
+use super::frame::Station;
 use crate::import::NoteKind;
 use etendue_camera::{Convention, Maps, PoseSpec};
 

@@ -8,7 +8,7 @@ use etendue_geometry::{Between, Link, Steps, Track, Transform, Vertices};
 use etendue_report::Refusal;
 use rayon::prelude::*;
 
-use super::single;
+use super::precision::single;
 
 /// Deformation of a mesh over time, in s from the moment that is shown.
 #[derive(Debug)]

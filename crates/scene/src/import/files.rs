@@ -11,6 +11,7 @@ use etendue_report::Size;
 
 use super::{Options, Refusal, error};
 use crate::memory::Budget;
+use crate::sniff::what_it_is;
 
 /// Bytes that a model may make appear, however small its files are.
 const MADE_OF_NOTHING: u64 = 512 << 20;
@@ -176,4 +177,16 @@ fn canonical(folder: &Path) -> Result<PathBuf, Refusal> {
 
 fn unreadable(path: &Path, source: &io::Error) -> Refusal {
     Refusal::new(format!("cannot be read: {source}")).at(path.display())
+}
+
+/// Refuses a file whose bytes are those of something else than `wanted`.
+pub(super) fn refuse_other_kind(file: &Path, bytes: &[u8], wanted: &str) -> Result<(), Refusal> {
+    match what_it_is(bytes) {
+        Some(what) => Err(error::damaged(
+            file,
+            "the file",
+            format!("it is {what}, not {wanted}\nhint: name the model itself"),
+        )),
+        None => Ok(()),
+    }
 }

@@ -1,21 +1,21 @@
 //! The camera of a scene: its files, its default view, and what is odd about its lens.
-//!
-//! The cameras that models bring along, and which one is used.
 
 use std::cell::{Cell, RefCell};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::cache::{self, KeptCamera};
+use crate::cache::{self, Cache, KeptCamera};
+use crate::cameras::{CameraOrigin, SceneCamera, pick};
 use crate::error::not_found;
 use crate::file::{SamplesSpec, SceneFile, ScenePath};
-use crate::import::{CameraProjection, ImportedCamera, Note, NoteKind, Strictness};
-use crate::scene::{LoadOptions, LoadProgress, WorldVertices};
-use crate::{Cache, SceneError, facing};
-use etendue_camera::{Camera, CameraError, CameraSpec, Pose};
+use crate::import::{Note, NoteKind, Strictness};
+use crate::scene::{LoadOptions, LoadProgress};
+use crate::world_vertices::WorldVertices;
+use crate::{SceneError, facing};
+use etendue_camera::{Camera, CameraError, CameraSpec};
 use etendue_files::InputFolder;
-use etendue_geometry::{Bounds, Geometry, Transform};
+use etendue_geometry::{Bounds, Geometry};
 use etendue_optics::element::LensResources;
 use etendue_optics::glass::AgfCatalogue;
 use etendue_report::Refusal;
@@ -290,79 +290,5 @@ impl LensResources for CameraFiles<'_> {
 
     fn glasses(&self) -> &[AgfCatalogue] {
         self.glasses
-    }
-}
-
-/// A camera of a model in the scene.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SceneCamera {
-    /// Its name in the model; may be empty.
-    pub name: String,
-    /// Index of the object whose model it came with.
-    pub object: u32,
-    /// The camera: the model's vertical field of view (or height) is kept, and unless the scene
-    /// says otherwise the picture has 1024 rows and as many columns as the model's aspect ratio
-    /// asks for.
-    pub spec: CameraSpec,
-}
-
-/// Origin of a scene's camera.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum CameraOrigin {
-    /// The scene file gives a camera and its pose.
-    Scene,
-    /// It was placed so that the whole scene is in the picture.
-    Framed,
-    /// A model's, by its name or number.
-    Model(String),
-}
-
-impl SceneCamera {
-    /// The camera of a model placed by `world_from_model`; `None` when its numbers make no camera.
-    pub(crate) fn new(
-        camera: &ImportedCamera,
-        object: u32,
-        world_from_model: &Transform,
-    ) -> Option<Self> {
-        let world = world_from_model.then_inner(&camera.model_from_camera);
-        let pose = Pose::from_node(world.linear, world.translation + world.translation_low)?;
-        let spec = match camera.projection {
-            CameraProjection::Perspective { yfov, aspect_ratio } => {
-                let aspect = aspect_ratio.unwrap_or(1.0);
-                let usable = yfov > 0.0 && yfov < std::f64::consts::PI && is_size(aspect);
-                usable.then(|| CameraSpec::perspective(pose, yfov, aspect))
-            }
-            CameraProjection::Orthographic { xmag, ymag } => {
-                let (xmag, ymag) = (xmag.abs(), ymag.abs());
-                // Nodes above may scale the view's extent along up.
-                let height = 2.0 * ymag * world.linear.y_axis.length();
-                let usable = is_size(xmag) && is_size(ymag) && is_size(height);
-                usable.then(|| CameraSpec::orthographic(pose, height, xmag / ymag))
-            }
-        }?;
-        Some(Self { name: camera.name.clone(), object, spec })
-    }
-}
-
-fn is_size(number: f64) -> bool {
-    number > 0.0 && number.is_finite()
-}
-
-/// The camera called `wanted`, or the one of that number; the error lists what there is.
-pub(crate) fn pick<'a>(
-    cameras: &'a [SceneCamera],
-    wanted: &str,
-) -> Result<(usize, &'a SceneCamera), String> {
-    let named = cameras.iter().position(|camera| camera.name == wanted && !wanted.is_empty());
-    let index = named.or_else(|| wanted.parse().ok());
-    match index.and_then(|index| Some((index, cameras.get(index)?))) {
-        Some(found) => Ok(found),
-        None if cameras.is_empty() => Err("no model of the scene has a camera".to_owned()),
-        None => {
-            let all = cameras.iter().enumerate();
-            let all: Vec<String> =
-                all.map(|(index, camera)| format!("{index} \"{}\"", camera.name)).collect();
-            Err(format!("no such camera; there are {}", all.join(", ")))
-        }
     }
 }

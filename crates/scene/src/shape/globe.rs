@@ -8,7 +8,6 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Mesh, Positions, Vertices};
 use rayon::prelude::*;
 
-use super::GoOn;
 use super::relief::{Relief, sin_cos_turns};
 use crate::import::{Wanted, count_degenerate};
 
@@ -20,6 +19,9 @@ const PADDING: usize = 4;
 
 /// From this many rings on there are enough edges to cut.
 const RINGS_TO_CUT: u32 = 4;
+
+/// Answers whether to go on, on any thread.
+pub type GoOn<'a> = &'a (dyn Fn() -> bool + Sync);
 
 /// The rings of a sphere and how many of its edges are cut.
 #[derive(Debug, Clone, Copy)]

@@ -17,6 +17,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::units::Metres;
 use etendue_geometry::{Mesh, Positions, Vertices};
 use globe::Globe;
+pub use globe::GoOn;
 use relief::Relief;
 
 /// The most triangles of a shape: 12 GiB of indices.
@@ -106,9 +107,6 @@ pub struct ShapeError {
     /// Description of the error, and of what is valid.
     pub reason: String,
 }
-
-/// Answers whether to go on, on any thread.
-pub type GoOn<'a> = &'a (dyn Fn() -> bool + Sync);
 
 impl ShapeSpec {
     /// The word behind `shape` in the file.

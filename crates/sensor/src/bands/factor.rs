@@ -32,6 +32,48 @@ pub enum Times {
     AnyPower,
 }
 
+/// Spectra and filters that the bands of a render have to tell apart.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Illumination {
+    /// Spectra of the lights, to any factor; none for equal energy.
+    pub spectra: Vec<Curve>,
+    /// Curves of filters in front of the sensor, each of which may be what light passes.
+    pub filters: Vec<Curve>,
+    /// Number of coloured factors that light meets on its way to the sensor: its own colour and
+    /// those of surfaces; more than three count as three.
+    pub colored: usize,
+    /// Other curves that light may be multiplied by on its way.
+    pub factors: Vec<Factor>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_are_all_there_is_room_for_and_the_simple_ones_first() {
+        assert_eq!([0, 1, 2, 3, 9].map(|n| of_colors(n).len()), [1, 4, 10, 20, 20]);
+        let powers = [vec![1.0, 2.0], vec![0.5]];
+        let all = Products::of(1, &powers, &[true; 2], 1000).unwrap();
+        // Four colours with nothing, three powers and one pair.
+        assert_eq!((all.all.len(), all.complete), (4 * 5, true));
+        let few = Products::of(1, &powers, &[true; 2], 7).unwrap();
+        assert_eq!((few.all.len(), few.complete), (7, false));
+        let once = Products::of(0, &[vec![1.0], vec![1.0]], &[false; 2], 1000).unwrap();
+        assert_eq!(once.all.len(), 3, "no pair where light is scattered once");
+        assert!(few.all[4..].iter().all(|p| p.colors.is_empty() && p.factors.len() == 1));
+        assert_eq!(Products::of(3, &powers, &[true; 2], 19), None);
+    }
+
+    #[test]
+    fn lengths_of_way_go_from_nearly_clear_to_dim() {
+        let powers = Times::AnyPower.powers(|p| [(-0.001 * p).exp(); 2]);
+        assert!((-0.001 * powers[0]).exp() >= 0.98 && powers.len() < MOST_LENGTHS);
+        assert!((-0.001 * powers[powers.len() - 1]).exp() < DIM);
+        assert_eq!(Times::UpTo(2).powers(|_| [1.0; 2]), [1.0, 2.0]);
+    }
+}
+
 impl Times {
     /// True if light may meet a second curve after it.
     pub(super) fn may_repeat(self) -> bool {
@@ -146,32 +188,4 @@ fn of_colors(colored: usize) -> Vec<Vec<usize>> {
         all.extend(last.iter().cloned());
     }
     all
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn products_are_all_there_is_room_for_and_the_simple_ones_first() {
-        assert_eq!([0, 1, 2, 3, 9].map(|n| of_colors(n).len()), [1, 4, 10, 20, 20]);
-        let powers = [vec![1.0, 2.0], vec![0.5]];
-        let all = Products::of(1, &powers, &[true; 2], 1000).unwrap();
-        // Four colours with nothing, three powers and one pair.
-        assert_eq!((all.all.len(), all.complete), (4 * 5, true));
-        let few = Products::of(1, &powers, &[true; 2], 7).unwrap();
-        assert_eq!((few.all.len(), few.complete), (7, false));
-        let once = Products::of(0, &[vec![1.0], vec![1.0]], &[false; 2], 1000).unwrap();
-        assert_eq!(once.all.len(), 3, "no pair where light is scattered once");
-        assert!(few.all[4..].iter().all(|p| p.colors.is_empty() && p.factors.len() == 1));
-        assert_eq!(Products::of(3, &powers, &[true; 2], 19), None);
-    }
-
-    #[test]
-    fn lengths_of_way_go_from_nearly_clear_to_dim() {
-        let powers = Times::AnyPower.powers(|p| [(-0.001 * p).exp(); 2]);
-        assert!((-0.001 * powers[0]).exp() >= 0.98 && powers.len() < MOST_LENGTHS);
-        assert!((-0.001 * powers[powers.len() - 1]).exp() < DIM);
-        assert_eq!(Times::UpTo(2).powers(|_| [1.0; 2]), [1.0, 2.0]);
-    }
 }

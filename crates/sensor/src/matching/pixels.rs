@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{Fit, MatchError, NEARLY_SATURATED};
+use super::error::MatchError;
 use crate::Sensor;
 use crate::least_squares::NormalEquations;
 
@@ -18,11 +18,38 @@ const OUTLIER: f64 = 8.0;
 /// The median of the absolute value of a normal variable, over its standard deviation.
 const MEDIAN_DEVIATION: f64 = 0.674_489_750_196_081_7;
 
+/// Of saturation: what is expected to be brighter is left out.
+pub(super) const NEARLY_SATURATED: f64 = 0.9;
+
 /// Rows of which the median deviation is taken, evenly spread.
 const MOST_ROWS: usize = 512;
 
 /// The share of pixels that may be clipped, at either end.
 const MOST_CLIPPED: f64 = 0.02;
+
+/// Parameters that are fitted.
+pub(super) struct Fit {
+    /// Of no light, and DN an electron of the simulation in each channel.
+    pub(super) line: Vec<f64>,
+    pub(super) line_covariance: Vec<Vec<f64>>,
+    pub(super) gain: f64,
+    pub(super) floor: f64,
+    pub(super) noise_covariance: [[f64; 2]; 2],
+    pub(super) sensor_prnu: f64,
+}
+
+impl Fit {
+    /// The expected number above black.
+    fn signal(&self, channel: usize, x: f64) -> f64 {
+        self.line[1 + channel] * x
+    }
+
+    /// Its variance (DN²).
+    fn variance(&self, signal: f64) -> f64 {
+        let signal = signal.max(0.0);
+        self.gain * signal + self.floor + (self.sensor_prnu * signal).powi(2)
+    }
+}
 
 /// Pixels that count: those that are expected to be dark enough, and are no defects.
 pub(super) struct DarkPixels {

@@ -18,7 +18,7 @@ use super::coat::{self, Coat};
 use super::ggx::Facets;
 use super::metal::{deep, mean_reflectance, multiple};
 use super::sheen::{self, Sheen};
-use super::{Weights, fresnel, ggx, mirrored};
+use super::{Weights, fresnel, ggx};
 use crate::sampling::cosine_direction;
 
 /// The numbers of the model at one hit.
@@ -358,4 +358,8 @@ impl Layered {
 /// A direction above the surface.
 fn above(wi: DVec3) -> Option<DVec3> {
     (wi.z > 0.0).then_some(wi)
+}
+
+pub(super) fn mirrored(w: DVec3) -> DVec3 {
+    DVec3::new(-w.x, -w.y, w.z)
 }

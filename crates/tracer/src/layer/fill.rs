@@ -6,8 +6,8 @@ use std::ops::Range;
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{HitBatch, MISS, Placement};
 
-use super::{Columns, LayerContext, NormalKind, Space};
-use crate::{Color, Paint, SceneView, TracedBatch};
+use super::{Columns, LayerContext};
+use crate::{Color, NormalKind, Paint, SceneView, Space, TracedBatch};
 
 impl LayerContext<'_> {
     /// Refills the first columns with `value` of each ray.

@@ -1,12 +1,9 @@
 //! Layers of two frames: where what a pixel shows is in another frame of the scene.
 
 use std::borrow::Cow;
-use std::fmt::Debug;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-use super::{Columns, LayerContext};
 
 /// The way from a frame to the other one: 1 for the next, −1 for the one before; or to the end or the beginning of its
 /// own exposure.
@@ -166,66 +163,5 @@ impl TryFrom<WrittenStep> for FrameStep {
             0 => Err("`to` is 0: a frame does not move against itself; 1 is the next frame"),
             count => Ok(Self { count, along }),
         }
-    }
-}
-
-/// Another frame of the scene, whose camera and objects may be elsewhere.
-pub trait OtherFrame: Debug + Sync {
-    /// The way to it.
-    fn step(&self) -> FrameStep;
-
-    /// Finds where the other camera sees each point that was hit (pixels from the corner of the top left one), objects
-    /// having moved: `places` is refilled, with `None` for misses and what has no place there.
-    fn follow(&self, seen: &LayerContext<'_>, places: &mut Vec<Option<[f64; 2]>>);
-
-    /// Finds how each of these points is seen there: `sights` is refilled.
-    fn look_for(&self, seen: &LayerContext<'_>, sights: &mut Vec<Sight>);
-}
-
-/// Visibility of a point of this frame in another one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sight {
-    /// There is no point.
-    Miss,
-    /// It is in the picture, and nothing is before it.
-    Visible,
-    /// Something is before it.
-    Hidden,
-    /// It is beyond the picture's edge, or behind the camera.
-    Outside,
-}
-
-impl LayerContext<'_> {
-    fn other(&self, to: FrameStep) -> Option<&dyn OtherFrame> {
-        self.others.iter().copied().find(|other| other.step() == to)
-    }
-
-    /// Places of points of this frame in the other, less their places here (pixels); `+inf` for none.
-    pub(super) fn flows(&self, to: FrameStep, out: &mut Columns) {
-        let mut places = Vec::new();
-        if let Some(other) = self.other(to) {
-            other.follow(self, &mut places);
-        }
-        let [columns, rows] = self.places;
-        self.each(out, |i| match places.get(i).copied().flatten() {
-            Some([column, row]) => [column - columns[i], row - rows[i]],
-            None => [f64::INFINITY; 2],
-        });
-    }
-
-    /// Distances that points move to the left on their way to the other frame (pixels); `+inf` for none.
-    pub(super) fn disparities(&self, to: FrameStep, out: &mut Columns) {
-        self.flows(to, out);
-        out[0].iter_mut().filter(|flow| flow.is_finite()).for_each(|flow| *flow = -*flow);
-    }
-
-    /// 1 where the other frame does not see the point: hidden, and outside.
-    pub(super) fn occlusions(&self, to: FrameStep, out: &mut Columns) {
-        let mut sights = Vec::new();
-        if let Some(other) = self.other(to) {
-            other.look_for(self, &mut sights);
-        }
-        let is = |i: usize, sight| f64::from(u8::from(sights.get(i) == Some(&sight)));
-        self.each(out, |i| [is(i, Sight::Hidden), is(i, Sight::Outside)]);
     }
 }

@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use super::{Layer, Look, NormalKind, RaySource, Space, ValueKind};
-use crate::Needs;
+use super::{Layer, Look, RaySource, ValueKind};
+use crate::{Needs, NormalKind, Space};
 
 /// A row to begin with: a measurement along the chief ray.
 pub(super) fn measured(name: &'static str, channels: &'static [&'static str], look: Look) -> Layer {

@@ -11,10 +11,8 @@ use super::rows::{
     BASE_COLOUR, CHIEF_RAY, LINEAR, SURFACE, colour, definition_of_normals, frame, light, measured,
     name_in, name_of_normals, part_of_pupil,
 };
-use super::{
-    Columns, FrameStep, Layer, LayerContext, Look, NormalKind, RaySource, Space, ValueKind,
-};
-use crate::{LightGroup, Needs};
+use super::{Columns, FrameStep, Layer, LayerContext, Look, RaySource, ValueKind};
+use crate::{LightGroup, Needs, NormalKind, Space};
 
 layers! {
     files name {

@@ -7,10 +7,10 @@ use std::ops::Range;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Float, MISS};
 
-use super::LightTree;
-use super::node::{self, Branch, Extent, LANES, Node, View, Viewer, WIDTH};
 #[cfg(test)]
-use crate::light_sampler::Receiver;
+use super::node::Receiver;
+use super::node::{self, Branch, Extent, LANES, Node, View, Viewer, WIDTH};
+use super::tree::LightTree;
 use crate::sampling::ONE_BELOW;
 
 /// Points that ask for a light each, a column a number with room for [`LANES`] behind the last, and what is chosen for
@@ -208,6 +208,24 @@ impl Walker {
         let is_end = node.is_end(lane, view.squared[lane]);
         self.at = if is_end { END } else { self.branch.node as usize };
         !is_end
+    }
+}
+
+impl LightTree {
+    /// Chooses one of a branch's lights by their intensity.
+    #[inline(always)]
+    pub(super) fn settle(&self, choices: &mut Choices, number: usize, branch: &Branch) {
+        let [begin, end] = branch.lights.map(|k| k as usize);
+        if end - begin == 1 {
+            choices.light[number] = self.order[begin];
+            return;
+        }
+        let place = self.below[begin] + choices.u[number] * (self.below[end] - self.below[begin]);
+        let k = begin + self.below[begin + 1..end].partition_point(|&sum| sum <= place);
+        let rest = (place - self.below[k]) / (self.below[k + 1] - self.below[k]);
+        choices.light[number] = self.order[k];
+        choices.u[number] = rest.clamp(0.0, ONE_BELOW);
+        choices.chance[number] *= self.share(k, [begin, end]);
     }
 }
 

@@ -1,4 +1,4 @@
-//! Importance of the lights of a node to points, in single precision: of eight branches side by side, or many of one.
+//! Points that ask for light, and importance of the lights of a node to them, in single precision: of eight branches side by side, or many of one.
 
 use std::f64::consts::PI;
 
@@ -6,7 +6,6 @@ use etendue_geometry::MISS;
 use etendue_geometry::glam::{DVec3, Vec3};
 
 use super::cluster::Cluster;
-use crate::light_sampler::Receiver;
 use crate::sampling::ONE_BELOW;
 
 /// Branches of a node.
@@ -35,6 +34,24 @@ const SHARE_OF_MOST: f32 = 0.125;
 
 /// Bound, with room, on what rounding may take from a cosine in single precision.
 const ROOM: f32 = 1e-5;
+
+/// A point that asks for light.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Receiver {
+    /// m.
+    pub(crate) point: DVec3,
+    /// The unit normal of the one side that it gets light from, by which that is weighed; zero where light comes
+    /// from both.
+    pub(crate) normal: DVec3,
+}
+
+impl Receiver {
+    /// True if it gets light from one side alone.
+    #[inline(always)]
+    pub(crate) fn is_one_sided(&self) -> bool {
+        self.normal != DVec3::ZERO
+    }
+}
 
 /// Clusters of lights, as they are asked side by side; what is not there has no intensity.
 #[derive(Debug, Clone)]

@@ -3,6 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use etendue_geometry::Bounds;
+use etendue_geometry::glam::DVec3;
 
 use super::*;
 

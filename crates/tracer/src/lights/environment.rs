@@ -1,13 +1,31 @@
-//! The light of an environment that comes from a direction.
+//! The environment among the lights, and its light that comes from a direction.
 
 use etendue_geometry::glam::DVec3;
 
 use super::Lights;
 use crate::environment::place;
+use crate::light_tree::Choices;
 use crate::sky::Spectra;
 use crate::{Color, Spectral};
 
 impl Lights {
+    /// True if light comes from where nothing is.
+    #[must_use]
+    pub fn has_environment(&self) -> bool {
+        self.sky.is_some()
+    }
+
+    /// The chance with which [`Self::pick`] picks the sky for a point that chose.
+    pub(crate) fn chance_of_sky(&self, choices: &Choices, number: usize) -> f64 {
+        let sky = self.sky.as_ref();
+        sky.map_or(0.0, |sky| self.sampler.chance_of_other(choices, number, sky.index))
+    }
+
+    /// The group of the sky.
+    pub(crate) fn group_of_sky(&self) -> u32 {
+        self.groups.of_light(self.sky.as_ref().map_or(0, |sky| sky.index))
+    }
+
     /// Radiance that the camera sees along the unit `direction` where nothing is.
     pub(crate) fn backdrop(&self, spectral: &Spectral, direction: DVec3, radiance: &mut [f64]) {
         let Some(sky) = self.sky.as_ref().filter(|sky| sky.visible) else { return };

@@ -6,42 +6,10 @@ use etendue_geometry::{MISS, PlacedTriangle};
 
 use super::Lights;
 use crate::area_light::{AreaLight, LightTriangle, brightest};
-use crate::light::{Light, LightKind};
+use crate::light::{Light, LightBounds, LightKind};
 use crate::light_tree::Choice;
 use crate::reference::{SceneView, SurfacePoint};
 use crate::sky::Sky;
-
-/// Bounds of all lights.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct LightBounds {
-    /// The least area of a triangle (m²); infinite without any.
-    pub(crate) least_area: f64,
-    /// The largest absolute coordinate of what has a place and is no triangle that stands still (m).
-    pub(crate) farthest: f64,
-    /// Some need more than their place.
-    pub(crate) has_others: bool,
-    /// The largest band of those (W/sr, W/m² or W/(m² sr)).
-    pub(crate) brightest: f64,
-    /// Some of those are triangles: they are not alike all over, they move, or they are too many to be kept ready.
-    pub(crate) has_other_triangles: bool,
-    /// The light of some of these is looked up in a texture.
-    pub(crate) are_textured: bool,
-    /// All are far away.
-    pub(crate) are_far: bool,
-}
-
-impl LightBounds {
-    /// Those of no light.
-    pub(super) const NOTHING: Self = Self {
-        least_area: f64::INFINITY,
-        farthest: 0.0,
-        has_others: false,
-        brightest: 0.0,
-        has_other_triangles: false,
-        are_textured: false,
-        are_far: false,
-    };
-}
 
 /// A light that needs no more than its place.
 #[derive(Debug, Clone, Copy)]

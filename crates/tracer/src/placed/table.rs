@@ -1,13 +1,54 @@
-//! A table of what is looked up for each hit, in single precision, by placement. What is not alike all over, as textures
+//! Placements as light meets them, and a table of what is looked up of them for each hit, in single precision. What is not alike all over, as textures
 //! have it, is looked up where it is hit.
 
-use etendue_geometry::glam::DMat3;
+use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Geometry, Mesh, Placement};
 
-use super::{PlacedSurface, plain_tint};
+use crate::bodies::Body;
+use crate::scattering::Absorption;
 use crate::shading::SheetSurface;
 use crate::transport::Traits;
-use crate::{Conductor, ConductorId, Material, Scattering, Spectral};
+use crate::{Conductor, ConductorId, Material, Paint, Scattering, Spectral, Tint};
+
+/// A placement as light meets it.
+#[derive(Debug, Clone)]
+pub(crate) struct PlacedSurface {
+    /// Magnitudes of its own numbers, which add to the rounding of a hit (m).
+    pub(crate) magnitudes: DVec3,
+    /// The matrix that brings its mesh's normals into the world; `None` where none has to.
+    pub(crate) turn: Option<DMat3>,
+    /// It shines, or shows itself without light.
+    pub(crate) is_seen: bool,
+    /// It is partly not there.
+    pub(crate) has_alpha: bool,
+    /// No light passes it.
+    pub(crate) is_opaque: bool,
+    /// Its shading normal is not that of its triangles.
+    pub(crate) is_tilted: bool,
+    /// Absorption of light by the body behind its front.
+    pub(crate) absorption: Option<Absorption>,
+    /// The body that it encloses, of glass that is closed.
+    pub(crate) body: Option<Body>,
+    /// Its colour, where that is alike all over.
+    pub(crate) color: Option<Tint>,
+}
+
+impl PlacedSurface {
+    /// True if rays may pass it as if it were not there.
+    pub(crate) fn may_vanish(&self) -> bool {
+        self.has_alpha || self.body.is_some_and(|body| body.may_vanish)
+    }
+}
+
+/// The colour of a paint that is alike all over, 0..=1.
+pub(super) fn plain_tint(paint: &Paint, spectral: &Spectral) -> Option<Tint> {
+    match paint {
+        Paint::Plain(color) => Some(Tint::from(*color).clamped()),
+        Paint::Curve { look, .. } if spectral.is_rgb() => Some(Tint::from(*look).clamped()),
+        Paint::Curve { curve, .. } => Some(Tint { color: [1.0; 3], spectrum: curve.spectrum() }),
+        Paint::Checker { .. } | Paint::Image { .. } | Paint::Cube { .. } => None,
+    }
+}
 
 /// The surfaces of a scene by their placements.
 #[derive(Debug, Clone, Default)]

@@ -6,7 +6,7 @@ use etendue_geometry::{Interpolation, Motion, MotionError, Steady, Transform};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Fault;
+use super::supply::Fault;
 
 /// Motion of a light, as the scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -6,17 +6,14 @@ use etendue_spectrum::{CurveSpec, Illuminant, Metal, table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Bound, ColorSpec, Fault, PaintSpec, Reflectance, Supply, checker, curve,
-    default_checker_squares, in_bounds, look, luminous, one, paint, radiant_paint, reflectance,
-    share_of,
-};
+use super::color::{Bound, Reflectance, curve, in_bounds, look, luminous, reflectance, share_of};
+use super::modulation::ModulationSpec;
+use super::paint::{PaintSpec, checker, default_checker_squares, paint, radiant_paint};
+use super::supply::{ColorSpec, Fault, IorSpec, Supply, one, white};
 use crate::bsdf::SECOND_COSINE;
 use crate::material::Alpha;
 use crate::scattering::{Absorption, Glass, GltfSurface};
-use crate::{
-    Conductor, Emission, LightGroup, Material, ModulationSpec, Paint, Scattering, SceneCurve,
-};
+use crate::{Conductor, Emission, LightGroup, Material, Paint, Scattering, SceneCurve};
 
 /// A material as the scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -100,7 +97,7 @@ pub enum MaterialSpec {
         #[schemars(range(min = 0.0, max = 1.0))]
         sheen_roughness: f64,
         /// Colour of the reflection of what is no metal, face on: linear RGB, each 0..=1, or a curve.
-        #[serde(default = "super::white")]
+        #[serde(default = "white")]
         specular_color: ColorSpec,
         /// Anisotropy: by how much rougher highlights are along the surface's grain than across it, 0 to 1.
         #[serde(default)]
@@ -176,34 +173,6 @@ pub struct MetalIndexSpec {
 pub struct MetalFileSpec {
     /// A `.yml` file of refractiveindex.info with n and k, relative to the scene file.
     pub file: String,
-}
-
-/// A refractive index as the scene file writes it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum IorSpec {
-    /// The same for all wavelengths, at least 1.
-    Constant(f64),
-    /// A glass of the catalogue.
-    Glass(String),
-    /// By the index and Abbe number of the helium d line.
-    Abbe(AbbeSpec),
-}
-
-impl Default for IorSpec {
-    fn default() -> Self {
-        Self::Constant(1.5)
-    }
-}
-
-/// Index and dispersion of a glass.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct AbbeSpec {
-    /// Index at 587.56 nm, at least 1.
-    pub nd: f64,
-    /// Abbe number (> 0).
-    pub vd: f64,
 }
 
 /// Absorption of a body, by Beer and Lambert.

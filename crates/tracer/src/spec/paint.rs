@@ -2,15 +2,49 @@
 
 use std::sync::Arc;
 
-use etendue_spectrum::{Bands, Curve, Illuminant, Outside, rgb};
+use etendue_spectrum::{Bands, Curve, CurveSpec, Illuminant, Outside, rgb};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use super::{
-    Bound, CheckerSpec, ColorSpec, CubeSpec, Fault, ImageSpec, LightSpectrum, PaintSpec,
-    Reflectance, Supply, brightest, checked, curve, emitted, in_bounds, reflectance,
+use super::color::{
+    Bound, LightSpectrum, Reflectance, brightest, checked, curve, emitted, in_bounds, reflectance,
 };
+use super::supply::{ColorSpec, CubeSpec, Fault, ImageSpec, Supply};
 use crate::{Color, CubeKind, Paint, SceneCube, SceneCurve};
 
-/// The colours of a surface.
+/// A colour, a curve over wavelengths, an image or squares of two colours.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum PaintSpec {
+    /// Linear RGB.
+    Color(Color),
+    /// An image over the surface's texture coordinates.
+    Image(ImageSpec),
+    /// A reflectance, or of a lamp its light, by wavelength over the surface's texture coordinates.
+    Cube(CubeSpec),
+    /// Squares over the surface's texture coordinates.
+    Checker(CheckerSpec),
+    /// A curve.
+    Curve(CurveSpec),
+}
+
+/// Squares of two colours over the surface's texture coordinates.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CheckerSpec {
+    /// The two colours.
+    pub checker: [ColorSpec; 2],
+    /// Squares along one unit of the texture coordinates (> 0).
+    #[serde(default = "default_checker_squares")]
+    pub squares: f64,
+}
+
+impl Default for PaintSpec {
+    fn default() -> Self {
+        Self::Color([1.0; 3])
+    }
+}
+
 pub(super) fn paint(key: &str, spec: &PaintSpec, supply: &mut dyn Supply) -> Result<Paint, Fault> {
     match spec {
         PaintSpec::Color(color) => {
@@ -175,4 +209,8 @@ fn radiant_checker(
     };
     let curves = Some(Box::new([of(first, colors[0]), of(second, colors[1])]));
     Ok((Paint::Checker { colors, curves, squares }, None))
+}
+
+pub(super) fn default_checker_squares() -> f64 {
+    8.0
 }

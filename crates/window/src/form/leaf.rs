@@ -1,9 +1,8 @@
-//! Widgets for single values: numbers with and without units, words, switches, vectors.
+//! Widgets for single values: numbers with and without units, words, switches, vectors; and notes where widgets are.
 
 use eframe::egui::{self, DragValue, Ui};
 use serde_json::{Value, json};
 
-use super::{hint, mark};
 use crate::document::Edit;
 
 /// The widget of a value that is there.
@@ -143,6 +142,25 @@ fn line(ui: &mut Ui, pointer: &str, text: &str, edits: &mut Vec<Edit>) {
     } else if response.has_focus() {
         ui.data_mut(|data| data.insert_temp(id, typed));
     }
+}
+
+/// A response that explains itself.
+pub(super) fn hint(response: egui::Response, about: Option<&str>) -> egui::Response {
+    match about {
+        Some(about) => response.on_hover_text(about.replace('\n', " ")),
+        None => response,
+    }
+}
+
+/// Notes where a widget is, by a name: for those who drive the window.
+pub(crate) fn mark(ctx: &egui::Context, name: &str, place: egui::Rect) {
+    ctx.data_mut(|data| data.insert_temp(egui::Id::new(("mark", name)), place));
+}
+
+/// Rectangle of a widget.
+#[cfg(test)]
+pub(crate) fn marked(ctx: &egui::Context, name: &str) -> Option<egui::Rect> {
+    ctx.data(|data| data.get_temp(egui::Id::new(("mark", name))))
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use etendue::{
 };
 use serde_json::Value;
 
-use super::{Kind, News, NewsSender, ScreenPicture, Task, WATCH, Wish, WorkerState};
+use super::desk::{Kind, News, NewsSender, ScreenPicture, Task, Wish, WorkerState};
 use crate::document::View;
 
 /// Time that a first picture may take, so that it is on the screen within a tenth of a second, twenty in each: the
@@ -21,6 +21,9 @@ const FIRST_PIXELS: f64 = 40_000.0;
 
 /// Progress is told this often.
 const TELL: Duration = Duration::from_millis(60);
+
+/// Interval at which files are looked at for changes when there is nothing else to do.
+const WATCH: Duration = Duration::from_secs(1);
 
 /// Stamp of a file when it was looked at last.
 type Stamp = Option<(u64, SystemTime)>;

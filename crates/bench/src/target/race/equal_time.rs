@@ -71,7 +71,7 @@ fn within(points: &[super::TrialRender], seconds: f64) -> Option<Forecast> {
     // Two short times may be alike by chance: a tenth of the longer one is its samples', at least.
     let least = LEAST_OF_SAMPLES * two.seconds / m;
     let slope = ((two.seconds - one.seconds) / (m - n)).max(least).max(f64::MIN_POSITIVE);
-    let samples = (m + (seconds - two.seconds) / slope).clamp(1.0, super::MOST_SAMPLES);
+    let samples = (m + (seconds - two.seconds) / slope).clamp(1.0, super::forecast::MOST_SAMPLES);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to a million")]
     Some(Forecast { samples: samples as u32, seconds })
 }

@@ -12,8 +12,9 @@
 //! gap of glass with cosines for ones where the index does not change along the axis (A. Gerrard and J. M. Burch,
 //! *Introduction to Matrix Methods in Optics*, 1975, III.5), and integrated by the rule of Runge and Kutta otherwise.
 
+pub(crate) mod medium;
 pub(crate) mod path;
-pub(crate) mod step;
+mod step;
 
 use std::sync::Arc;
 

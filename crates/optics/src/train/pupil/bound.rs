@@ -5,20 +5,10 @@ use etendue_geometry::disk;
 use glam::DVec2;
 
 use super::coded::Anywhere;
+use super::disk::PupilSamples;
 use super::place::{NodePlace, angle_below, between};
 use super::{ExitPupil, PupilOutline};
 use crate::element::{Block, Frame, LANES, LensRays, RayStatus};
-
-/// From samples of the film to weighted rays.
-#[derive(Debug, Clone, Copy)]
-pub struct PupilSamples<'a> {
-    /// Factor on all weights.
-    pub scale: f64,
-    /// Places on the sensor from its centre (mm), in the lens' axes, one array an axis.
-    pub film: [&'a [f64]; 2],
-    /// Places in the unit square.
-    pub squares: &'a [[f64; 2]],
-}
 
 /// The outline from one point of the sensor.
 pub(super) struct PupilBound<'a> {

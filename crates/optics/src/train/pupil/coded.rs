@@ -79,7 +79,7 @@ impl MaskView {
     ) -> Option<Self> {
         let (element, mask) = first_mask(train)?;
         let bounds = open_bounds(mask)?;
-        let mut clear = super::without_masks(train);
+        let mut clear = super::clear::without_masks(train);
         clear.elements[element].part =
             Part::Aperture(Opening::Circle { radius: f64::INFINITY }.into());
         let mut wavelengths = wavelengths.to_vec();

@@ -13,9 +13,19 @@ use std::f64::consts::PI;
 use etendue_geometry::disk;
 use glam::{DMat3, DVec2, DVec3};
 
-use super::PupilSamples;
 use crate::element::{Block, Frame, LANES, Opening, RayStatus};
 use crate::train::{OpticalTrain, Part};
+
+/// From samples of the film to weighted rays.
+#[derive(Debug, Clone, Copy)]
+pub struct PupilSamples<'a> {
+    /// Factor on all weights.
+    pub scale: f64,
+    /// Places on the sensor from its centre (mm), in the lens' axes, one array an axis.
+    pub film: [&'a [f64]; 2],
+    /// Places in the unit square.
+    pub squares: &'a [[f64; 2]],
+}
 
 /// A round opening square to the axis (mm).
 #[derive(Debug, Clone, Copy, PartialEq)]

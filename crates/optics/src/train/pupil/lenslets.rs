@@ -18,9 +18,9 @@ use etendue_report::Refusal;
 use glam::{DVec2, DVec3};
 
 use super::clear::{without_filters, without_masks};
-use super::outline_table::{NORMALS, OutlineTable, centre_of, normal, outline};
+use super::outline_table::{centre_of, normal, outline};
 use super::region::{Region, area_of};
-use super::{ExitPupil, dark_array};
+use super::{ExitPupil, LensletPupil, NORMALS, OutlineTable, dark_array};
 use crate::element::{Clip, Gaps, Grid, LensRays, LensletShape, RayStatus, clipped};
 use crate::train::aim::towards_lens;
 use crate::train::lenslets::Sight;
@@ -29,25 +29,6 @@ use crate::train::{BehindLenslets, MonochromaticTrain, OpticalTrain, Side};
 /// Factor by which the margin grows, and the most rounds of it.
 const GROWTH: f64 = 1.6;
 const ROUNDS: u32 = 10;
-
-/// The light that reaches a sensor through an array of lenslets.
-#[derive(Debug, Clone)]
-pub struct LensletPupil {
-    view: BehindLenslets,
-    table: OutlineTable,
-    /// The opening of a lenslet around its centre, in the array's axes (mm).
-    opening: Vec<DVec2>,
-    /// Openings of a lenslet of the other arrays, by kind and array.
-    others: Vec<Vec<DVec2>>,
-    /// Gaps between openings that let light by, in pieces around the centre of a cell.
-    gaps: Vec<Vec<DVec2>>,
-    /// The area of an opening (mm²), and the radius of the circle around it (mm).
-    area: f64,
-    opening_radius: f64,
-    /// Change of the slopes towards the pupil over the array (1/mm).
-    drift: f64,
-    margin: f64,
-}
 
 impl LensletPupil {
     /// Measures it for a sensor of half width and half height `half_size` (mm) at all of `lenses`.

@@ -5,10 +5,10 @@ use std::ops::Range;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::place::{NodePlace, angle_below, between};
+use super::place::{NodePlace, angle_below, between, turn_of};
 use super::search::SlopeWindow;
 use super::wavelengths::{LensSplit, Stray};
-use super::{ANGLES, ExitPupil, NodeLayout, PupilOutline, turn_of};
+use super::{ANGLES, ExitPupil, NodeLayout, PupilOutline};
 use crate::element::{Clip, LensRays, RayStatus};
 use crate::train::aim::towards_lens;
 use crate::train::{MonochromaticTrain, OpticalTrain, Side};

@@ -37,6 +37,7 @@ mod clear;
 mod coded;
 mod disk;
 mod lenslets;
+mod make;
 mod mask_cells;
 mod mask_map;
 mod mask_region;
@@ -45,27 +46,19 @@ mod outline_table;
 mod place;
 mod refusals;
 mod region;
+mod samples;
 mod search;
 mod wavelengths;
 
-use etendue_report::Refusal;
 use glam::{DVec2, DVec3};
 
-use self::bound::PupilBound;
-use self::clear::without_masks;
 use self::coded::MaskView;
-use self::place::turn_of;
-use self::refusals::no_sensor;
-use self::wavelengths::LensSplit;
-use super::aim::towards_lens;
-use super::{MonochromaticTrain, OpticalTrain};
-use crate::element::{Frame, LensRays, RayStatus};
+use super::BehindLenslets;
+use crate::element::Frame;
 
 pub use accuracy::PupilAccuracy;
-pub use bound::PupilSamples;
 pub use clear::{without_dimming, without_filters};
-pub use disk::Disk;
-pub use lenslets::LensletPupil;
+pub use disk::{Disk, PupilSamples};
 pub use measure::lit_radius;
 pub use refusals::{blocked, dark_array, unbounded};
 pub use search::SlopeWindow;
@@ -73,6 +66,9 @@ pub use search::SlopeWindow;
 /// Angles in the table of a node. Not a setting: tables have this size when they are compiled, and what angles miss
 /// between them is [`PupilAccuracy::margin`]'s.
 const ANGLES: usize = 128;
+
+/// Directions in which the outline's extent is kept.
+const NORMALS: usize = 16;
 
 /// One sample of the exit pupil.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -144,268 +140,40 @@ impl PupilOutline {
     }
 }
 
-impl ExitPupil {
-    /// Measures the exit pupil for a sensor of half width and half height `half_size` (mm) at
-    /// `sensor_z`, tilted and decentred as the lens file says, for light of all of `wavelengths` (nm): at a few of them,
-    /// and checked at the others.
-    ///
-    /// # Errors
-    ///
-    /// When no light passes, when nothing bounds the light, or when a glass has no index.
-    pub fn new(
-        train: &OpticalTrain,
-        wavelengths: &[f64],
-        sensor_z: f64,
-        half_size: [f64; 2],
-    ) -> Result<Self, Refusal> {
-        Self::within(PupilAccuracy::DEFAULT, train, wavelengths, sensor_z, half_size)
-    }
+/// The light that reaches a sensor through an array of lenslets.
+#[derive(Debug, Clone)]
+pub struct LensletPupil {
+    view: BehindLenslets,
+    table: OutlineTable,
+    /// The opening of a lenslet around its centre, in the array's axes (mm).
+    opening: Vec<DVec2>,
+    /// Openings of a lenslet of the other arrays, by kind and array.
+    others: Vec<Vec<DVec2>>,
+    /// Gaps between openings that let light by, in pieces around the centre of a cell.
+    gaps: Vec<Vec<DVec2>>,
+    /// The area of an opening (mm²), and the radius of the circle around it (mm).
+    area: f64,
+    opening_radius: f64,
+    /// Change of the slopes towards the pupil over the array (1/mm).
+    drift: f64,
+    margin: f64,
+}
 
-    /// As [`Self::new`], by other numbers.
-    ///
-    /// # Errors
-    ///
-    /// As [`Self::new`].
-    pub fn within(
-        accuracy: PupilAccuracy,
-        train: &OpticalTrain,
-        wavelengths: &[f64],
-        sensor_z: f64,
-        half_size: [f64; 2],
-    ) -> Result<Self, Refusal> {
-        let half_size = DVec2::from(half_size);
-        if !half_size.is_finite() || half_size.min_element() < 0.0 || !sensor_z.is_finite() {
-            return Err(no_sensor());
-        }
-        if train.elements.iter().all(|e| !e.clear_radius().is_finite()) {
-            return Err(unbounded());
-        }
-        if wavelengths.is_empty() {
-            return Err(no_sensor());
-        }
-        let symmetric = train.is_rotationally_symmetric();
-        let mut pupil = Self {
-            sensor: train.sensor_frame(sensor_z),
-            half_size,
-            layout: if symmetric { NodeLayout::Radial } else { NodeLayout::Planar },
-            disk: None,
-            nodes: Vec::new(),
-            coded: None,
-            lenslets: None,
-            index2: 1.0,
-            radius: half_size.length(),
-            accuracy,
-        };
-        // Behind lenslets each of them has a pupil of its own; other arrays are aimed at as they
-        // are.
-        if let Some(view) = train.behind_lenslets() {
-            pupil.index2 = train.at(wavelengths[0])?.index_before_sensor().powi(2);
-            let lenslets = LensletPupil::new(train, view, wavelengths, &pupil)?;
-            return Ok(Self { lenslets: Some(Box::new(lenslets)), ..pupil });
-        }
-        if let Some(first) = train.first_array() {
-            let (rear, half_size) = (train.rear_part(first), half_size.to_array());
-            return Self::within(accuracy, &rear, wavelengths, sensor_z, half_size);
-        }
-        // Masks are left out of what is measured: what they pass is drawn from within it.
-        if train.closed_mask().is_some() {
-            let lens = train.at(wavelengths[0])?;
-            return Err(blocked(train, &lens, pupil.sensor.vertex));
-        }
-        let masked = train;
-        let train = &without_masks(masked);
-        let lenses = wavelengths.iter().map(|&nm| train.at(nm)).collect::<Result<Vec<_>, _>>()?;
-        let Some(first) = lenses.first() else { return Err(no_sensor()) };
-        pupil.index2 = first.index_before_sensor().powi(2);
-        // A round opening as the only rim is known in closed form.
-        pupil.disk = Disk::of(train, &pupil.sensor, half_size);
-        if pupil.disk.is_some() {
-            return Ok(pupil);
-        }
-        // All others are measured by rays at nodes over the sensor.
-        let lenses = LensSplit::of(train, lenses, accuracy.wavelengths as usize);
-        pupil.measure(train, &lenses.measured);
-        if pupil.nodes.iter().all(PupilOutline::is_dark) {
-            return Err(blocked(train, &train.at(wavelengths[0])?, pupil.sensor.vertex));
-        }
-        pupil.widen_until_tight(&lenses);
-        if train.is_obscured() {
-            pupil.narrow_until_tight(&lenses);
-        }
-        for node in &mut pupil.nodes {
-            node.widest = node.reach.into_iter().fold(0.0, f64::max);
-        }
-        Ok(pupil.aimed_at_mask(masked, wavelengths))
-    }
-
-    /// Aims the pupil's samples at its first mask by rays of `wavelengths` (nm), which run apart
-    /// where the lens of `train` is dispersive: those that samples will be traced at.
-    #[must_use]
-    pub fn aimed_at_mask(mut self, train: &OpticalTrain, wavelengths: &[f64]) -> Self {
-        if self.lenslets.is_none() && train.first_array().is_none() {
-            let aim = self.accuracy.mask_aim;
-            self.coded = MaskView::new(train, wavelengths, &self.sensor, self.half_size, aim);
-        }
-        self
-    }
-
-    /// As [`Self::new`], with rays aimed at all of element `first` of the lens from behind, wherever they
-    /// may end: what serves where outlines do not follow from place to place, and checks what does.
-    ///
-    /// # Errors
-    ///
-    /// As [`Self::new`].
-    pub fn of_rear(
-        train: &OpticalTrain,
-        first: usize,
-        wavelengths: &[f64],
-        sensor_z: f64,
-        half_size: [f64; 2],
-    ) -> Result<Self, Refusal> {
-        Self::new(&train.rear_part(first), wavelengths, sensor_z, half_size)
-    }
-
-    /// The lenslets through which light comes, if it does.
-    #[must_use]
-    pub fn lenslets(&self) -> Option<&LensletPupil> {
-        self.lenslets.as_deref()
-    }
-
-    /// True if one radius of nodes serves the whole sensor; otherwise a coarser grid of nodes does,
-    /// and more rays are lost.
-    #[must_use]
-    pub fn is_radial(&self) -> bool {
-        self.layout == NodeLayout::Radial
-    }
-
-    /// The pupil in closed form, if it has one.
-    pub fn disk(&self) -> Option<&Disk> {
-        self.disk.as_ref()
-    }
-
-    /// A point of the sensor in lens coordinates (mm), from its place on the sensor: x and y from
-    /// the sensor's centre (mm), in the lens' axes. Images are upside down there.
-    #[must_use]
-    pub fn film_point(&self, film: DVec2) -> DVec3 {
-        self.sensor.point(film.extend(0.0))
-    }
-
-    /// The direction for the point `u` of the unit square, as seen from `film` on the sensor (mm), for a
-    /// ray of `wavelength` (nm): uniform in area over the bound, or towards what a mask passes, in proportion
-    /// to it. `None` where no light arrives.
-    ///
-    /// Neighbouring points of the square give neighbouring directions.
-    #[must_use]
-    pub fn sample(&self, film: DVec2, u: [f64; 2], wavelength: f64) -> Option<PupilSample> {
-        if let Some(lenslets) = &self.lenslets {
-            let (slopes, area) = lenslets.draw(self.film_point(film), u)?;
-            return Some(self.weigh(slopes, area));
-        }
-        let bound = self.bound(film)?;
-        if let Some(coded) = &self.coded
-            && let Ok(aimed) = coded.aim(wavelength, film, u, &bound.rectangle())
-        {
-            return aimed.map(|aimed| self.weigh(aimed.slopes, 1.0 / aimed.density));
-        }
-        let (slopes, area) = match self.disk {
-            Some(disk) => disk.draw(&self.sensor, self.film_point(film), u),
-            None => bound.draw(u)?,
-        };
-        Some(self.weigh(slopes, area))
-    }
-
-    /// The sample along slopes that stands for an area of slopes.
-    fn weigh(&self, slopes: DVec2, area: f64) -> PupilSample {
-        let direction = towards_lens(slopes);
-        let on_sensor = direction.dot(self.sensor.rotation.z_axis).abs();
-        let cosine = -direction.z;
-        let weight = self.index2 * area * cosine.powi(3) * on_sensor;
-        PupilSample { direction, weight }
-    }
-
-    /// The bound from a point of the sensor (mm); `None` where no light arrives.
-    fn bound(&self, film: DVec2) -> Option<PupilBound<'_>> {
-        let bound = if let Some(disk) = &self.disk {
-            let (centre, radius) = disk.seen_from(self.film_point(film));
-            PupilBound { nodes: &[], place: None, frame: [centre, DVec2::splat(radius)] }
-        } else {
-            let place = self.place(film)?;
-            let mut frame = [DVec2::ZERO; 2];
-            for (node, weight) in place.nodes {
-                frame[0] += self.nodes[node].centre * weight;
-                frame[1] += self.nodes[node].half * weight;
-            }
-            PupilBound { nodes: &self.nodes, place: Some(place), frame }
-        };
-        (bound.frame[1].min_element() > 0.0).then_some(bound)
-    }
-
-    /// Appends one ray for each point of the sensor (mm) and point of the unit square, ready to be
-    /// traced at `wavelength` (nm) from [`Side::Sensor`](super::Side); its throughput is its weight. Where no light
-    /// arrives the ray has ended and weighs 0.
-    pub fn push_rays(&self, film: &[DVec2], u: &[[f64; 2]], wavelength: f64, rays: &mut LensRays) {
-        for (&film, &u) in film.iter().zip(u) {
-            let at = self.film_point(film);
-            match self.sample(film, u, wavelength) {
-                Some(sample) => rays.push_weighted(at, sample.direction, sample.weight),
-                None => {
-                    rays.push_weighted(at, DVec3::NEG_Z, 0.0);
-                    rays.set_status(rays.len() - 1, RayStatus::Vignetted { element: 0 });
-                }
-            }
-        }
-    }
-
-    /// The direction of the chief ray from `film` (mm), which passes the stop's centre; `None` where
-    /// the stop's centre cannot be seen.
-    #[must_use]
-    pub fn chief_direction(
-        &self,
-        train: &OpticalTrain,
-        at: &MonochromaticTrain,
-        film: DVec2,
-    ) -> Option<DVec3> {
-        let start = self.place(film).and_then(|place| {
-            let mut slopes = DVec2::ZERO;
-            for (node, weight) in place.nodes {
-                slopes += self.nodes[node].chief? * weight;
-            }
-            Some(place.turned(slopes))
-        });
-        train.chief_direction_from(at, self.film_point(film), start)
-    }
-
-    /// The bound as a polygon of slopes around the passing directions from `film`, for drawing;
-    /// empty where no light arrives.
-    #[must_use]
-    pub fn outline(&self, film: DVec2) -> Vec<DVec2> {
-        if let Some(disk) = &self.disk {
-            let (centre, radius) = disk.seen_from(self.film_point(film));
-            let angle = |i| DVec2::from_angle(turn_of(i) * std::f64::consts::TAU);
-            return (0..ANGLES).map(|i| centre + angle(i) * radius).collect();
-        }
-        let Some(place) = self.place(film) else { return Vec::new() };
-        let mut corners = Vec::with_capacity(ANGLES);
-        for i in 0..ANGLES {
-            let angle = turn_of(i) * std::f64::consts::TAU;
-            let mut corner = [DVec2::ZERO, DVec2::ZERO];
-            let mut reach = 0.0;
-            for (node, weight) in place.nodes {
-                let outline = &self.nodes[node];
-                corner[0] += outline.centre * weight;
-                corner[1] += outline.half * weight;
-                reach += outline.reach[i] * weight;
-            }
-            corners.push(place.turned(corner[0] + DVec2::from_angle(angle) * corner[1] * reach));
-        }
-        corners
-    }
+/// The exit pupil of the lens before, over the plane of the array: extents of its outline in slopes.
+#[derive(Debug, Clone)]
+struct OutlineTable {
+    main: ExitPupil,
+    half: DVec2,
+    /// Nodes over each side of the array.
+    across: u32,
+    nodes: Vec<Option<[f64; NORMALS]>>,
 }
 
 #[cfg(test)]
 mod tests {
+    use super::wavelengths::LensSplit;
     use super::*;
-    use crate::train::{Focus, LensFile};
+    use crate::train::{Focus, LensFile, OpticalTrain};
 
     const CHECKS: u32 = PupilAccuracy::DEFAULT.checks;
 

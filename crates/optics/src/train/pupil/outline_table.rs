@@ -4,13 +4,10 @@
 use etendue_report::Refusal;
 use glam::DVec2;
 
-use super::ExitPupil;
+use super::{ExitPupil, NORMALS, OutlineTable};
 use crate::element::{Clip, LensRays, RayStatus};
 use crate::train::aim::towards_lens;
 use crate::train::{BehindLenslets, MonochromaticTrain, OpticalTrain, Side};
-
-/// Directions in which the outline's extent is kept.
-pub(super) const NORMALS: usize = 16;
 
 /// Directions from the middle of an outline in which it is found, more than are kept. Not a setting: what lies between
 /// them is the margin's (`lenslet_margin`).
@@ -64,16 +61,6 @@ pub(super) fn outline(extent: impl Fn(usize) -> f64) -> [DVec2; NORMALS] {
 /// The middle of an outline, by its extents.
 pub(super) fn centre_of(extent: &[f64; NORMALS]) -> DVec2 {
     0.5 * DVec2::new(extent[0] - extent[8], extent[4] - extent[12])
-}
-
-/// The exit pupil of the lens before, over the plane of the array: extents of its outline in slopes.
-#[derive(Debug, Clone)]
-pub(super) struct OutlineTable {
-    main: ExitPupil,
-    half: DVec2,
-    /// Nodes over each side of the array.
-    across: u32,
-    nodes: Vec<Option<[f64; NORMALS]>>,
 }
 
 impl OutlineTable {

@@ -3,8 +3,8 @@
 use etendue_report::Refusal;
 use glam::DVec3;
 
-use super::SlopeWindow;
-use crate::element::{Clip, LensRays, RayStatus, StatusCounts};
+use super::search::SlopeWindow;
+use crate::element::{Clip, RayStatus, StatusCounts};
 use crate::train::{MonochromaticTrain, OpticalTrain, Side};
 
 /// Refusal of a sensor without size, or before the lens.

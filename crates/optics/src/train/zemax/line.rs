@@ -2,7 +2,21 @@
 //!
 //! OpticStudio writes UTF-16 with a byte order mark, older versions one byte a character.
 
-use super::ZemaxError;
+/// Error of another program's lens file that cannot be converted.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}{why}", match line { 0 => String::new(), line => format!("line {line}: ") })]
+pub struct ZemaxError {
+    /// The line, from 1; 0 where the words name the place.
+    pub line: usize,
+    /// Description of the error, and of what would be valid.
+    pub why: String,
+}
+
+impl ZemaxError {
+    pub(super) fn new(line: usize, why: impl Into<String>) -> Self {
+        Self { line, why: why.into() }
+    }
+}
 
 /// One line, taken apart.
 pub(super) struct SheetLine<'a> {

@@ -16,7 +16,7 @@
 //! | `stop` | the stop's opening |
 //! | `pbrt`, `iset` | tables of pbrt's realistic camera, and ISET's JSON, which has the same |
 //! | `photons_to_photos` | tables of `PhotonsToPhotos`' Optical Bench |
-//! | `write` | a lens file to lines |
+//! | `write`, `write_surface` | a lens file to lines, and those of a surface |
 //! | here | rows to the elements of a lens file |
 //!
 //! What has no counterpart here and would change the light's way is an error that names its line;
@@ -46,6 +46,7 @@ mod row;
 mod sheet;
 mod stop;
 mod write;
+mod write_surface;
 
 use std::path::Path;
 
@@ -57,28 +58,13 @@ use crate::glass::{AgfCatalogue, GlassSpec, Makers};
 use axes::{Axes, Break};
 use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
 pub use format::LensFormat;
+pub use line::ZemaxError;
 use row::{SheetGlass, SheetRow, SurfaceShape};
 use sheet::ZemaxSheet;
 use stop::open_stop;
 
 /// A difference of focal lengths that is more than rounding (share).
 const SAME_FOCAL_LENGTH: f64 = 1e-3;
-
-/// Error of another program's lens file that cannot be converted.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{}{why}", match line { 0 => String::new(), line => format!("line {line}: ") })]
-pub struct ZemaxError {
-    /// The line, from 1; 0 where the words name the place.
-    pub line: usize,
-    /// Description of the error, and of what would be valid.
-    pub why: String,
-}
-
-impl ZemaxError {
-    fn new(line: usize, why: impl Into<String>) -> Self {
-        Self { line, why: why.into() }
-    }
-}
 
 /// A lens as another program's file has it.
 #[derive(Debug, Clone, PartialEq)]

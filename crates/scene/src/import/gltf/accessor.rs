@@ -9,8 +9,8 @@ use json::accessor::{ComponentType, Type};
 use json::validation::Checked;
 use rayon::prelude::*;
 
-use super::GltfReader;
-use super::buffers::{BufferView, Bytes, size};
+use super::buffers::Bytes;
+use super::reader::{BufferView, GltfReader, size};
 use crate::import::Refusal;
 
 /// Floats that Embree reads from the start of the last vertex on.

@@ -11,13 +11,12 @@ use base64::{DecodeError, Engine as _};
 use bytemuck::AnyBitPattern;
 use gltf::json;
 
-use super::GltfReader;
-use super::document::GltfDocument;
-use super::fault::{damaged, first_version};
+use super::document::{GltfDocument, first_version};
 use super::meshopt::MeshoptView;
-use crate::import::files::Files;
+use crate::import::Refusal;
+use crate::import::error::damaged;
+use crate::import::files::{Files, refuse_other_kind};
 use crate::import::text::without_mark;
-use crate::import::{Refusal, refuse_other_kind};
 use etendue_files::MappedFile;
 use etendue_geometry::Buffer;
 
@@ -65,13 +64,13 @@ impl Bytes {
 
 /// The buffers of a document; those that cannot be read say so once somebody needs them.
 pub(super) struct Buffers {
-    buffers: Vec<Result<Bytes, Unread>>,
+    pub(super) buffers: Vec<Result<Bytes, Unread>>,
     /// The bytes of compressed views, once somebody needs them.
-    decoded: Vec<OnceLock<Bytes>>,
+    pub(super) decoded: Vec<OnceLock<Bytes>>,
 }
 
 /// A buffer without bytes of its own: another extension's placeholder.
-struct Unread;
+pub(super) struct Unread;
 
 impl Buffers {
     /// Opens all buffers that buffer views use.
@@ -102,89 +101,6 @@ impl Buffers {
         decoded.resize_with(document.root.buffer_views.len(), OnceLock::new);
         Ok(Self { buffers, decoded })
     }
-}
-
-impl GltfReader<'_> {
-    /// The bytes of buffer `index`, which `from` names.
-    fn buffer(&self, index: usize, from: &str) -> Result<&Bytes, Refusal> {
-        match self.buffers.buffers.get(index) {
-            Some(Ok(bytes)) => Ok(bytes),
-            Some(Err(Unread)) => Err(self.damaged(
-                format!("buffers[{index}]"),
-                "it has neither a uri nor a binary chunk\nhint: export the file again",
-            )),
-            None => Err(self.absent(
-                format!("{from}.buffer"),
-                "buffer",
-                index,
-                self.buffers.buffers.len(),
-            )),
-        }
-    }
-
-    /// The buffer of view `index`, and where in it the view starts and how long it is (bytes);
-    /// `from` is who names the view.
-    pub(super) fn view(&self, index: usize, from: &str) -> Result<BufferView<'_>, Refusal> {
-        let place = || format!("bufferViews[{index}]");
-        let views = &self.document.root.buffer_views;
-        let Some(view) = views.get(index) else {
-            return Err(self.absent(from, "buffer view", index, views.len()));
-        };
-        let stride = view.byte_stride.map(|stride| stride.0).filter(|&stride| stride > 0);
-        if let Some(compressed) = MeshoptView::of(view) {
-            let bytes = self.decompressed(index, &compressed)?;
-            return Ok(BufferView { bytes, start: 0, len: bytes.as_slice().len(), stride });
-        }
-        let bytes = self.buffer(view.buffer.value(), &place())?;
-        let total = bytes.as_slice().len();
-        let range = size(view.byte_offset.unwrap_or_default())
-            .zip(size(view.byte_length))
-            .filter(|&(start, len)| start.checked_add(len).is_some_and(|end| end <= total));
-        let Some((start, len)) = range else {
-            return Err(self.damaged(
-                place(),
-                format!(
-                    "{} bytes from byte {} on lie outside its buffer of {total} bytes\nhint: export the \
-                     file again",
-                    view.byte_length.0,
-                    view.byte_offset.unwrap_or_default().0
-                ),
-            ));
-        };
-        Ok(BufferView { bytes, start, len, stride })
-    }
-
-    /// The bytes of the compressed view `index`, decoded once.
-    fn decompressed(&self, index: usize, compressed: &MeshoptView<'_>) -> Result<&Bytes, Refusal> {
-        let known = &self.buffers.decoded[index];
-        if let Some(bytes) = known.get() {
-            return Ok(bytes);
-        }
-        let place = format!("bufferViews[{index}].extensions.{}", compressed.name);
-        let stream = compressed.stream().map_err(|reason| self.damaged(&place, reason))?;
-        let buffer = self.buffer(stream.buffer, &place)?.as_slice();
-        let end = stream.start.checked_add(stream.len);
-        let Some(packed) = end.and_then(|end| buffer.get(stream.start..end)) else {
-            let reason = format!(
-                "{} bytes from byte {} on lie outside its buffer of {} bytes\nhint: export the file again",
-                stream.len,
-                stream.start,
-                buffer.len()
-            );
-            return Err(self.damaged(place, reason));
-        };
-        let bytes = stream.decode(packed).map_err(|reason| self.damaged(place, reason))?;
-        Ok(known.get_or_init(|| Bytes::Memory(bytes.into())))
-    }
-}
-
-/// Part of a buffer.
-#[derive(Clone, Copy)]
-pub(super) struct BufferView<'a> {
-    pub bytes: &'a Bytes,
-    pub start: usize,
-    pub len: usize,
-    pub stride: Option<usize>,
 }
 
 fn open_uri(
@@ -292,11 +208,6 @@ fn percent_decoded_bytes(uri: &str) -> Vec<u8> {
 fn hex_pair(pair: &[u8]) -> Option<u8> {
     let digit = |byte: u8| char::from(byte).to_digit(16);
     u8::try_from(digit(pair[0])? * 16 + digit(pair[1])?).ok()
-}
-
-/// A JSON size as this machine counts.
-pub(super) fn size(value: json::validation::USize64) -> Option<usize> {
-    usize::try_from(value.0).ok()
 }
 
 const MAGIC: &[u8] = b"glTF";

@@ -2,8 +2,8 @@
 
 use etendue_geometry::{Link, Transform};
 
-use super::GltfReader;
 use super::pose::{NodePoses, local};
+use super::reader::GltfReader;
 use crate::import::Import;
 use crate::import::error::{Note, NoteKind, push};
 

@@ -8,14 +8,15 @@ use gltf::json;
 use json::mesh::{MorphTarget, Semantic};
 use rayon::prelude::*;
 
-use super::GltfReader;
 use super::chains::Chains;
 use super::hierarchy::NodeShape;
 use super::part::PrimitiveReader;
 use super::pose::{NodePoses, exists};
+use super::reader::GltfReader;
 use crate::import::deformer::{Deformer, Influences, Joints, Morph, number};
 use crate::import::error::NoteKind;
-use crate::import::{Refusal, Strictness, precise_enough, single};
+use crate::import::precision::{precise_enough, single};
+use crate::import::{Refusal, Strictness};
 use etendue_geometry::glam::{DMat3, DVec3, DVec4};
 use etendue_geometry::{Link, Positions, Track, Transform, Vertices};
 

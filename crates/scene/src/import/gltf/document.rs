@@ -1,5 +1,6 @@
 //! The JSON of a glTF file.
 
+use std::fmt::Display;
 use std::path::Path;
 
 use gltf::json;
@@ -7,10 +8,9 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
-use super::fault::{damaged, first_version};
 use crate::file::{JsonDocument as JsonText, JsonFault, Place, read_value};
 use crate::import::Refusal;
-use crate::import::error::wrong_text;
+use crate::import::error::{damaged, wrong_text};
 use crate::words::kind_of;
 
 /// A glTF document: crate `gltf`'s types, but for what is read in f64 here.
@@ -256,4 +256,23 @@ fn excerpt(line: &[u8], column: usize) -> String {
     let from = column.saturating_sub(50);
     let part = line.get(from..).unwrap_or_default();
     String::from_utf8_lossy(&part[..part.len().min(80)]).trim_ascii().to_owned()
+}
+
+/// Advice on a file of glTF's first version.
+pub(super) fn first_version() -> String {
+    "this is glTF 1.0, which is not supported\nhint: convert it: npx gltf-pipeline -i OLD.gltf -o NEW.glb, or \
+     export it as glTF 2.0"
+        .to_owned()
+}
+
+/// The error that `from` names the `what` number `index`, of which there are only `count`.
+pub(super) fn absent(
+    file: &Path,
+    from: impl Display,
+    what: &str,
+    index: usize,
+    count: usize,
+) -> Refusal {
+    let reason = format!("there is no {what} {index}; the file has {count}\nhint: export it again");
+    damaged(file, from, reason)
 }

@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
-use super::animation::Playing;
-use super::document::GltfDocument;
-use super::fault::{absent, damaged};
+use super::document::{GltfDocument, absent};
 use super::pose::NodePoses;
-use crate::import::error::Note;
+use super::tracks::Playing;
+use crate::import::error::{Note, damaged};
 use crate::import::{CameraProjection, ImportedCamera, ImportedLight, Refusal};
 use etendue_geometry::Transform;
 

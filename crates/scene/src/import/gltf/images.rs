@@ -8,7 +8,8 @@ use json::texture::{MagFilter, WrappingMode};
 use json::validation::Checked;
 
 use super::buffers::{Bytes, data_uri, percent_decoded};
-use super::{GltfReader, extensions};
+use super::extensions;
+use super::reader::GltfReader;
 use crate::import::{Import, Refusal, Strictness, error};
 
 /// Index that crate `gltf` puts for an image that a texture does not name.

@@ -3,12 +3,12 @@
 
 use serde_json::Value;
 
-use super::GltfReader;
 use super::chains::Chains;
 use super::document::GltfNode;
 use super::hierarchy::SceneNodes;
 use super::pose::trs;
 use super::primitive::ShapeSet;
+use super::reader::GltfReader;
 use crate::import::{Import, ImportedPlacement, Refusal};
 use etendue_geometry::glam::{DQuat, DVec3};
 use etendue_geometry::{Link, Placement, Transform, Vertices};

@@ -3,7 +3,7 @@
 use gltf::json;
 use serde_json::Value;
 
-use super::GltfReader;
+use super::reader::GltfReader;
 use crate::import::error::{self, Note, NoteKind};
 use crate::import::{Import, Refusal, Strictness};
 

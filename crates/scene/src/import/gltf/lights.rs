@@ -13,10 +13,9 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::document::{GltfDocument, GltfNode};
-use super::fault::damaged;
 use crate::file::{ScenePath, read_value};
 use crate::import::Refusal;
-use crate::import::error::{self, Note, NoteKind};
+use crate::import::error::{self, Note, NoteKind, damaged};
 use crate::words::kind_of;
 
 const NAME: &str = "KHR_lights_punctual";

@@ -17,8 +17,9 @@ use serde_json::Value;
 
 use super::images::GltfImages;
 use super::judge::Judge;
+use super::lobes;
 use super::lobes::{Glossiness, MIRROR};
-use super::{GltfReader, lobes};
+use super::reader::GltfReader;
 use crate::import::{Import, Refusal};
 
 /// The number of the material of `primitive`, which messages call `place`.

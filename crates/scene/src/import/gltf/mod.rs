@@ -12,11 +12,11 @@ mod accessor;
 mod animation;
 mod buffers;
 mod chains;
+mod compressed;
 mod deform;
 mod document;
 mod draco;
 mod extensions;
-mod fault;
 mod hierarchy;
 mod images;
 mod instances;
@@ -28,47 +28,18 @@ mod meshopt;
 mod part;
 mod pose;
 mod primitive;
+mod reader;
+mod tracks;
 
-use std::fmt::Display;
 use std::path::Path;
-use std::sync::OnceLock;
 
 use super::files::Files;
 use super::{Import, ImportedLight, Options, Refusal, Wanted, error};
 use crate::memory::of_json;
-use animation::Playing;
 use buffers::Buffers;
 use chains::Chains;
-use document::GltfDocument;
-use draco::DracoMesh;
-use fault::{absent, damaged};
-
-/// State that the parts of the reader share.
-pub(super) struct GltfReader<'a> {
-    /// The model, for messages.
-    file: &'a Path,
-    files: &'a Files,
-    document: &'a GltfDocument,
-    buffers: &'a Buffers,
-    /// The meshes of views that Draco compressed, once somebody needs them.
-    meshes_of_views: Vec<OnceLock<DracoMesh>>,
-    wanted: Wanted,
-    options: &'a Options,
-    /// Nodes and weights that go on from the moment that is shown.
-    playing: &'a Playing,
-}
-
-impl GltfReader<'_> {
-    /// An error that names the file, `place` and `reason`.
-    fn damaged(&self, place: impl Display, reason: impl Into<Refusal>) -> Refusal {
-        damaged(self.file, place, reason)
-    }
-
-    /// The error that `from` names the `what` number `index`, of which there are only `count`.
-    fn absent(&self, from: impl Display, what: &str, index: usize, count: usize) -> Refusal {
-        absent(self.file, from, what, index, count)
-    }
-}
+use reader::GltfReader;
+use tracks::Playing;
 
 /// Reads the glTF or GLB file at `path`.
 pub(super) fn import(
@@ -102,9 +73,9 @@ pub(super) fn import(
             };
             animation::moved(&reader, play, &mut import)?
         };
-        animation::apply(path, &moved, &mut document.nodes)?;
+        tracks::apply(path, &moved, &mut document.nodes)?;
         if play.plays {
-            playing = animation::playing(path, moved, play.time, &document.nodes)?;
+            playing = tracks::playing(path, moved, play.time, &document.nodes)?;
         }
     }
     let scene = hierarchy::walk(path, &document, &playing, &mut import.notes)?;

@@ -6,9 +6,9 @@ use json::mesh::{Mode, Primitive, Semantic};
 use json::validation::Checked;
 use rayon::prelude::*;
 
-use super::GltfReader;
 use super::accessor::Accessor;
 use super::draco::{DracoMesh, DracoPrimitive};
+use super::reader::GltfReader;
 use crate::import::error::{Note, NoteKind};
 use crate::import::{Refusal, Strictness};
 

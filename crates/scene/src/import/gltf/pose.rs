@@ -5,9 +5,9 @@ use std::path::Path;
 use etendue_geometry::Transform;
 use etendue_geometry::glam::{DMat3, DQuat, DVec3};
 
-use super::document::{GltfDocument, GltfNode};
-use super::fault::{absent, damaged};
+use super::document::{GltfDocument, GltfNode, absent};
 use crate::import::Refusal;
+use crate::import::error::damaged;
 
 /// The nodes of a document with each of them somewhere.
 #[derive(Debug, Default)]

@@ -10,11 +10,11 @@ use json::mesh::{Mode, Primitive, Semantic};
 use json::validation::Checked;
 use rayon::prelude::*;
 
-use super::GltfReader;
 use super::chains::Chains;
 use super::deform::{PrimitiveCorners, Skin};
 use super::hierarchy::{NodeShape, SceneNodes};
 use super::part::PrimitiveReader;
+use super::reader::GltfReader;
 use crate::import::admit::{AdmittedMesh, MeshCandidate, admit, cost};
 use crate::import::deformer::Deformer;
 use crate::import::error::{self, Note, NoteKind};

@@ -8,7 +8,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use crate::import::single;
+use crate::import::precision::single;
 use crate::import::text::{TextFault, WordReader, number, whole};
 use etendue_tracer::spec::BRIGHTEST;
 

@@ -29,7 +29,7 @@ use rayon::prelude::*;
 
 use super::admit::{self, AdmittedMesh};
 use super::error::{self, Note, NoteKind};
-use super::files::Files;
+use super::files::{Files, refuse_other_kind};
 use super::text::{TextFault, pieces, with_newlines, without_mark};
 use super::{Import, ImportedPlacement, Options, Refusal, Wanted};
 use chunk::{Chunk, Segment, WantedColumns};
@@ -51,7 +51,7 @@ pub(super) fn import(
     options: &Options,
 ) -> Result<Import, Refusal> {
     let map = files.map_model(path)?;
-    super::refuse_other_kind(path, map.bytes(), "an OBJ model")?;
+    refuse_other_kind(path, map.bytes(), "an OBJ model")?;
     let text = with_newlines(without_mark(map.bytes()));
     let text: &[u8] = &text;
     let fault = |fault: TextFault| fault.locate(path, text);

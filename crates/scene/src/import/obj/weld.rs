@@ -11,8 +11,9 @@ use rayon::prelude::*;
 use super::chunk::{Chunk, KINDS, NONE, Polygon, Segment, V, VN, VT};
 use crate::import::admit::MeshCandidate;
 use crate::import::files::Files;
+use crate::import::precision::precise_enough;
 use crate::import::text::{TextFault, WordReader, whole};
-use crate::import::{Refusal, Strictness, polygon, precise_enough};
+use crate::import::{Refusal, Strictness, polygon};
 use etendue_geometry::Vertices;
 use etendue_geometry::glam::DVec3;
 

@@ -20,7 +20,7 @@ use etendue_geometry::{Positions, Transform};
 use etendue_tracer::Material;
 
 use super::admit::{self, MeshCandidate, cost};
-use super::files::Files;
+use super::files::{Files, refuse_other_kind};
 use super::text::TextFault;
 use super::{Import, ImportedPlacement, Options, Refusal, Wanted, error};
 use header::{Format, PlyHeader};
@@ -34,7 +34,7 @@ pub(super) fn import(
 ) -> Result<Import, Refusal> {
     let map = files.map_model(path)?;
     if !map.bytes().starts_with(b"ply") {
-        super::refuse_other_kind(path, map.bytes(), "a PLY model")?;
+        refuse_other_kind(path, map.bytes(), "a PLY model")?;
     }
     let fault = |fault: TextFault| fault.locate(path, map.bytes());
     let header = PlyHeader::parse(map.bytes()).map_err(fault)?;

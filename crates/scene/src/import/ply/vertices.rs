@@ -5,7 +5,8 @@
 use rayon::prelude::*;
 
 use super::header::{RowElement, Type};
-use crate::import::{Wanted, polygon, precise_enough, single};
+use crate::import::precision::{precise_enough, single};
+use crate::import::{Wanted, polygon};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Buffer, Positions, Vertices};
 

@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use robust::Coord;
 
-use super::Ring;
+use super::ring::Ring;
 
 /// Corners in a leaf of the tree.
 const LEAF: usize = 8;
