@@ -18,8 +18,8 @@ fn by_color(accuracy: &str) -> (serde_json::Value, [[f64; 5]; 3]) {
     let geometry = write_scene(
         folder.path(),
         &format!(
-            r#"{{"etendue": 1, "tracer": {{"type": "flat"}}, "render": {{"samples": 16}},
-            "accuracy": {{"view_psnr": 40 {accuracy}}}, "camera": {camera},
+            r#"{{"etendue": 1, "tracer": {{"type": "flat"}}, "render": {{"samples": 8}},
+            "accuracy": {{"view_psnr": 40, "white_samples": 256 {accuracy}}}, "camera": {camera},
             "materials": {{"a": {{"type": "matte",
                 "color": {{"image": "wave.png", "encoding": "linear", "repeat": [40, 1]}}}}}},
             "objects": [{{"shape": "rectangle", "width": {width}, "height": {width}, "material": "a",
