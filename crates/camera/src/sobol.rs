@@ -183,8 +183,8 @@ fn upper_bits<const N: usize>(
     let salts = match half {
         Half::First => SALTS[0],
         Half::Second => {
-            for i in 0..N {
-                index[i] = of_second_half(index[i]);
+            for index in &mut index {
+                *index = of_second_half(*index);
             }
             SALTS[1]
         }

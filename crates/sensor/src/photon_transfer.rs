@@ -120,10 +120,10 @@ impl PhotonTransfer {
                 0.1f64.min(most * 1e-3).powf(1.0 - part) * most.powf(part)
             }
         };
-        let points: Vec<CurvePoint> = (0..count)
-            .into_par_iter()
-            .map(|i| bench.point(i, electrons(i)))
-            .collect::<Result<_, _>>()?;
+        let points: Vec<_> =
+            (0..count).into_par_iter().map(|i| bench.point(i, electrons(i))).collect();
+        // The first in order fails, however threads run.
+        let points = points.into_iter().collect::<Result<Vec<CurvePoint>, _>>()?;
         Ok(bench.summed_up(wavelength, points))
     }
 }

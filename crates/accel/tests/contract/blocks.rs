@@ -182,7 +182,7 @@ fn every_instruction_set_meets_the_same_in_blocks() {
             // Some blocks have a few rays, some half of them, and some none.
             let has_ray = |i: usize| match i / LANES % 4 {
                 0 => true,
-                1 => i % 5 == 0,
+                1 => i.is_multiple_of(5),
                 2 => i % LANES < 8,
                 _ => false,
             };

@@ -78,7 +78,9 @@ impl FieldsBetween {
             let outline = aim::outline(&beam, &sphere)?;
             Ok((beam, sphere, outline))
         };
-        let parts = all.into_par_iter().map(part).collect::<Result<Vec<_>, AnalysisError>>()?;
+        let parts: Vec<_> = all.into_par_iter().map(part).collect();
+        // The first in order fails, however threads run.
+        let parts = parts.into_iter().collect::<Result<Vec<_>, AnalysisError>>()?;
         // One grid over all of them.
         let middle = parts.get(parts.len() / 2).map_or(DVec2::ZERO, |part| part.2.middle);
         let reach =
@@ -91,7 +93,8 @@ impl FieldsBetween {
                 smooth::field(beam, sphere, outline, sampling, error)
                     .map_or_else(|| aim::field(beam, sphere, outline, sampling), Ok)
             };
-            parts.par_iter().map(field).collect()
+            let fields: Vec<_> = parts.par_iter().map(field).collect();
+            fields.into_iter().collect()
         };
         let mut fields = traced(USUAL)?;
         // Where rays land, in wavelengths times the f-number.

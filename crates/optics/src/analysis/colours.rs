@@ -58,7 +58,9 @@ pub fn wavefronts(
         }
         Ok(((beam, sphere, outline), count))
     };
-    let parts = (0..beams.len()).into_par_iter().map(part).collect::<Result<Vec<_>, _>>()?;
+    let parts: Vec<_> = (0..beams.len()).into_par_iter().map(part).collect();
+    // The first in order fails, however threads run.
+    let parts = parts.into_iter().collect::<Result<Vec<_>, _>>()?;
     let (parts, counts): (Vec<_>, Vec<usize>) = parts.into_iter().unzip();
     let over = |(beam, _, outline): &(&Beam<'_>, ReferenceSphere, aim::Outline)| {
         outline.half / beam.at.wavelength()
@@ -83,5 +85,6 @@ pub fn wavefronts(
         let pupil = field((beam, &sphere, &outline), sampling)?;
         Wavefront::resolved(beam.object, sphere, pupil)
     };
-    parts.into_par_iter().map(wavefront).collect()
+    let wavefronts: Vec<_> = parts.into_par_iter().map(wavefront).collect();
+    wavefronts.into_iter().collect()
 }

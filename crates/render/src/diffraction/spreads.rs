@@ -121,8 +121,9 @@ impl Spreads {
         };
         let (traced, own) = sources(side, lens.is_mirrored(resolution));
         let trace = |spreads: &mut Self, nodes: &[usize]| -> Result<(), AnalysisError> {
-            let found =
-                nodes.par_iter().map(|&k| fields(traced[k])).collect::<Result<Vec<_>, _>>()?;
+            let found: Vec<_> = nodes.par_iter().map(|&k| fields(traced[k])).collect();
+            // The first in order fails, however threads run.
+            let found = found.into_iter().collect::<Result<Vec<_>, _>>()?;
             nodes.iter().zip(found).for_each(|(&k, found)| spreads.fields[k] = found);
             Ok(())
         };

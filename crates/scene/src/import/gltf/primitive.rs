@@ -101,14 +101,16 @@ pub(super) fn load(
             primitives.map(move |(number, primitive)| (s, number, primitive))
         })
         .collect();
-    let read: Vec<Option<ReadPrimitive>> = wanted
+    let read: Vec<_> = wanted
         .par_iter()
         .map(|&(s, number, primitive)| {
             let shape = &shapes.shapes[s];
             let skin = shape.skin.and_then(|skin| skins.get(&skin));
             read(reader, shape, skin, number, primitive)
         })
-        .collect::<Result<_, _>>()?;
+        .collect();
+    // The first that fails is told, however threads run.
+    let read = read.into_iter().collect::<Result<Vec<Option<ReadPrimitive>>, _>>()?;
     for ((s, number, primitive), read) in wanted.into_iter().zip(read) {
         let Some(read) = read else {
             note_no_triangles(&mut import.notes);

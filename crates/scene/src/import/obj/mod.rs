@@ -59,15 +59,16 @@ pub(super) fn import(
     let bytes = PARSED_PER_BYTE * text.len() as u64;
     files.take(bytes, || "the numbers of the text".to_owned())?;
     let pieces = pieces(text, PIECE);
-    let mut chunks: Vec<Chunk> = pieces
+    let chunks: Vec<Result<Chunk, TextFault>> = pieces
         .par_iter()
         .map(|&(start, piece)| {
             refuse_zero_bytes(piece)
                 .and_then(|()| Chunk::parse(piece, wish))
                 .map_err(|TextFault { at, reason }| TextFault { at: start + at, reason })
         })
-        .collect::<Result<_, _>>()
-        .map_err(fault)?;
+        .collect();
+    // The first of the file's faults is told, however threads run.
+    let mut chunks = chunks.into_iter().collect::<Result<Vec<_>, _>>().map_err(fault)?;
     refuse_foreign(&chunks, &pieces).map_err(fault)?;
     let missing = weld::settle(&mut chunks, options.strictness)
         .map_err(|chunk| weld::find_bad_index(&pieces, chunk, &chunks, options.strictness))

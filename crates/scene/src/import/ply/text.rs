@@ -31,7 +31,7 @@ pub(super) fn read_text(
         starts.push(before);
         before += count;
     }
-    let parts: Vec<TextPiece> = pieces
+    let parts: Vec<_> = pieces
         .par_iter()
         .zip(starts)
         .map(|(&(start, piece), row)| {
@@ -40,7 +40,9 @@ pub(super) fn read_text(
                 reason: fault.reason,
             })
         })
-        .collect::<Result<_, _>>()?;
+        .collect();
+    // The first of the file's faults is told, however threads run.
+    let parts = parts.into_iter().collect::<Result<Vec<TextPiece>, _>>()?;
     let needed = header.elements.iter().try_fold(0_usize, |sum, e| sum.checked_add(e.count));
     if needed.is_none_or(|needed| before < needed) {
         return Err(TextFault::new(
