@@ -416,9 +416,9 @@ fn numbers_that_no_surface_can_have_are_told_or_refused_when_strict() {
         assert!(odd.iter().flatten().all(|v| v.is_finite()), "{material}");
         let notes = &bench.json("report.json")["notes"];
         let notes = notes.as_array().expect("notes").iter().filter_map(Value::as_str);
-        let told: Vec<&str> = notes.filter(|note| note.contains("\"odd\"")).collect();
+        let of_surface: Vec<&str> = notes.filter(|note| note.contains("\"odd\"")).collect();
         let strict = bench.refusal(&["render", "scene.json", "-o", "strict", "--strict"]);
-        under(&material.to_string(), &format!("note: {}\n{strict}", told.join("\nnote: ")))
+        under(&material.to_string(), &format!("note: {}\n{strict}", of_surface.join("\nnote: ")))
     });
     insta::assert_snapshot!(messages.concat());
 }

@@ -274,7 +274,7 @@ fn samples_until_an_error_count_by_the_pixel_that_they_start_from() {
 #[test]
 fn the_variance_of_light_that_lands_is_told() {
     let variances = |seed: u32| {
-        let samples = json!({ "relative_error": 0.02, "min": 8, "max": 4096 });
+        let samples = json!({ "relative_error": 0.05, "min": 8, "max": 4096 });
         let more =
             json!({ "render": { "samples": samples, "seed": seed }, "layers": ["variance"] });
         let scene = scene(singlet(), false, 1, &more);
@@ -289,10 +289,10 @@ fn the_variance_of_light_that_lands_is_told() {
         ]
     };
     let seeds = 8;
-    let (mut told, mut pictures) = (0.0, Vec::new());
+    let (mut stated, mut pictures) = (0.0, Vec::new());
     for seed in 0..seeds {
         let [light, variance] = variances(seed);
-        told += mean(&variance) / f64::from(seeds);
+        stated += mean(&variance) / f64::from(seeds);
         pictures.push(light);
     }
     let of_pixel = |pixel: usize| {
@@ -301,7 +301,7 @@ fn the_variance_of_light_that_lands_is_told() {
     };
     let found = mean(&(0..pictures[0].len()).map(of_pixel).collect::<Vec<_>>());
     // Neighbours share what lands: of 7680 pixels of eight seeds some hundreds are independent.
-    assert!((0.8..1.25).contains(&(told / found)), "told {told:e}, found {found:e}");
+    assert!((0.8..1.25).contains(&(stated / found)), "stated {stated:e}, found {found:e}");
 }
 
 /// The same to the bit on one thread and on three, and in shares of the rows, which judge the strips from which light
