@@ -142,7 +142,7 @@ pub(crate) fn refuse_views(scene: &Scene) -> Result<(), Error> {
     match scene.layers.iter().any(|layer| layer.step().is_some()) && is_views {
         true => Err(Error::Refused(format!(
             "{}: layers: flow, disparity and occlusion want a camera that shows a point in one place; a \
-             light_field_reference shows it in every view",
+             light_field_reference shows it in every view\nhint: leave these layers out, or take another camera",
             scene.path.display()
         ))),
         false => Ok(()),

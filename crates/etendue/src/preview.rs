@@ -192,7 +192,8 @@ impl Session {
         let plan = Plan::new(&scene, self.outputs());
         let prepared = Prepared { accel: &*accel, images: &images, others: &[] };
         let (start, state) = (Instant::now(), etendue_render::RenderState::default());
-        let film = etendue_render::trace(&scene, &plan, prepared, &[], &state, progress)?;
+        let film = etendue_render::trace(&scene, &plan, prepared, &[], &state, progress)
+            .map_err(|error| self.placed(error))?;
         let rendered = etendue_render::finish(&scene, &plan, film, Vec::new(), Some(&*accel))?;
         let time = start.elapsed();
         let light = SensorLight::new(&scene, (&rendered.picture, rendered.band_film))?.ok();

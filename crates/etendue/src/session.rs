@@ -443,7 +443,7 @@ fn refuse_idle(outputs: Outputs, layers: &[LayerSpec], scene: &Value) -> Result<
                 _ => "add it to `layers`",
             };
             Err(Error::Refused(format!(
-                "outputs: `{output}` is a file of {wanted}, and the scene has no such layer; {remedy}, or \
+                "outputs: `{output}` is a file of {wanted}, and the scene has no such layer\nhint: {remedy}, or \
                  leave `{output}` out"
             )))
         }

@@ -33,7 +33,7 @@ pub fn guide(scene: &mut Scene) -> Result<(), RenderError> {
         |why: &str| Err(Refusal::new(format!("--denoise {why}")).at(scene.path.display()).into());
     if scene.picture != Some(LayerSpec::Radiance) {
         return refused(
-            "takes away the noise of light, and the picture shows none: give the scene a `tracer` of light, \
+            "takes away the noise of light, and the picture shows none\nhint: give the scene a `tracer` of light, \
              such as {\"type\": \"path\"}, or leave it out",
         );
     }

@@ -5,6 +5,7 @@ use std::fmt;
 use etendue_accel::BuildError;
 use etendue_oidn::OidnError;
 use etendue_report::Refusal;
+use etendue_scene::Scene;
 use etendue_tracer::texture::ImageError;
 
 use crate::film_file::FilmError;
@@ -55,22 +56,24 @@ impl RenderError {
         why.into().at("camera.diffraction").into()
     }
 
-    /// Error of a light's spectrum that is of no use to the sensor.
-    pub(crate) fn lights(fault: impl fmt::Display) -> Self {
+    /// Error of a spectrum of a light of `scene` that is of no use to the sensor.
+    pub(crate) fn lights(scene: &Scene, fault: impl fmt::Display) -> Self {
         let remedy = "give the light `equal_energy`, `a` or {\"black_body\": kelvin}, which reach further, or a \
                       curve or cube that does, or the sensor a quantum_efficiency or bands that see it";
-        Refusal::new(format!("a light's spectrum: {fault}")).hint(remedy).into()
+        let refusal = Refusal::new(format!("a light's spectrum: {fault}")).hint(remedy);
+        refusal.at(scene.path.display()).into()
     }
 
-    /// Error of rays of which not one left the lens: the element, counted from the object, nearest to the object at
+    /// Error of rays of which not one left the lens of `scene`: the element, counted from the object, nearest to the object at
     /// which rays ended, and the shares of the rays by where they ended.
-    pub(crate) fn dark(element: usize, losses: &[String]) -> Self {
+    pub(crate) fn dark(scene: &Scene, element: usize, losses: &[String]) -> Self {
         let why = format!(
             "the picture would be black: no ray gets from the sensor past element {element} of the \
              camera's lens, counted from 0 on the object side ({})",
             losses.join(", ")
         );
-        Refusal::new(why).into()
+        let refusal = Refusal::new(why).hint("let that element pass light, or leave it out");
+        refusal.at(scene.path.display()).into()
     }
 
     /// Error of samples that end by a time, differently on each machine: parts of a picture would not fit together.

@@ -77,7 +77,7 @@ pub(crate) fn settle(
     // The scene by its own lights alone.
     let (map, span) = (lighting.map.clone(), scene.camera.exposure_span());
     let lights = Lights::new(&lighting.lights, map, &surroundings, span, &spectral)
-        .map_err(RenderError::lights)?;
+        .map_err(|fault| RenderError::lights(scene, fault))?;
     let placed = PlacedSurfaces::of(&scene.geometry, &scene.materials, &spectral);
     let ctx = LightingContext {
         accel,

@@ -76,7 +76,8 @@ impl Film {
         // Samples by pixel, where the shares counted them.
         let of_pixels = shares.iter().filter_map(|share| share.header.sample_counts);
         let of_pixels = of_pixels.reduce(SampleCounts::and);
-        let samples = of_pixels.map_or(plan.samples, |counts| counts.least);
+        // Those that every pixel has, whoever counted them: slots of an exposure tell no more than that.
+        let samples = shares.iter().map(|share| share.header.samples).fold(plan.samples, u32::min);
         let passed = SamplesTaken { samples, is_complete: true, counts: of_pixels };
         Ok(Self {
             layers,

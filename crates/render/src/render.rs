@@ -107,7 +107,7 @@ fn light_of(
     notes.extend(found.note);
     let span = scene.camera.exposure_span();
     let lights = Lights::new(&found.lights, found.map, &seen.1, span, spectral)
-        .map_err(RenderError::lights)?;
+        .map_err(|fault| RenderError::lights(scene, fault))?;
     Ok(Some((rules, lights)))
 }
 
@@ -260,7 +260,7 @@ pub fn finish(
     if let (true, 0, Some(element)) =
         (statuses.total() > 0, statuses.exited, statuses.farthest_from_sensor())
     {
-        return Err(RenderError::dark(element, &statuses.losses()));
+        return Err(RenderError::dark(scene, element, &statuses.losses()));
     }
     notes.extend(sparkles.note_in_words());
     notes.extend(plan.not_as_asked.as_ref().map(|why| format!("samples: {why}")));

@@ -25,6 +25,7 @@
 
 mod cache;
 mod cameras;
+mod contradictions;
 mod cubes;
 pub mod doctor;
 pub mod error;
@@ -33,6 +34,7 @@ mod facing;
 pub mod file;
 mod frames;
 mod identity;
+mod idle;
 pub mod import;
 mod load;
 mod materials;

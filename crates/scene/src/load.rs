@@ -100,7 +100,10 @@ impl SceneFile {
         }
         let scene = self.finish((parts, ahead), &folder, options, (&budget, kept), since)?;
         kept.sweep();
-        Ok(Scene { slots: slot_count, ..scene })
+        let mut scene = Scene { slots: slot_count, ..scene };
+        self.check_contradictions(&scene)?;
+        scene.notes.extend(self.idle_accuracy(&scene));
+        Ok(scene)
     }
 
     /// The folder that the scene's paths start at.

@@ -86,7 +86,9 @@ impl SceneFile {
             }
             let is_sky = |l: &Light| matches!(l.kind, LightKind::Environment { .. });
             if built.iter().any(is_sky) && lights.iter().any(is_sky) {
-                return Err(self.fault(&at, "a second environment; a scene has one at most"));
+                let why =
+                    "a second environment; a scene has one at most\nhint: leave one of them out";
+                return Err(self.fault(&at, why));
             }
             lights.extend(built);
         }

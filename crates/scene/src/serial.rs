@@ -235,7 +235,8 @@ impl SceneFile {
         });
         let open: Vec<[f64; 2]> = open.collect();
         if open.is_empty() {
-            let why = "the shutter is closed all the time that it lasts, by `camera.shutter`";
+            let why = "the shutter is closed all the time that it lasts, by `camera.shutter`\nhint: let it last longer, \
+                       start at another time, or open the shutter";
             return Err(self.fault(&at, why));
         }
         let own = [

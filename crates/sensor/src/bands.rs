@@ -53,6 +53,24 @@ impl BandChoice {
 }
 
 impl Sensor {
+    /// True if its bands are chosen by the light, within a tolerance: false where they are given as they are to be
+    /// taken, and of a sensor in digital mode that tells no more than its colours or its channels apart.
+    #[must_use]
+    pub fn chooses_bands(&self) -> bool {
+        !self.has_untried_bands() && (self.spec().bands.is_none() || self.divides_bands())
+    }
+
+    /// True if the bands that are given are channels, which may be divided further.
+    fn divides_bands(&self) -> bool {
+        self.spec().kind == SensorKind::Multispectral && self.spec().bands.is_some()
+    }
+
+    /// True if its bands are taken without a look at the light: digital mode counts no electrons.
+    fn has_untried_bands(&self) -> bool {
+        let ideal = matches!(self.response.bands, Bands::Grey | Bands::Rgb);
+        self.settings.radiometry == Radiometry::Digital && (ideal || self.spec().bands.is_some())
+    }
+
     /// The fewest bands in which a render counts this sensor's electrons right within `tolerance` of themselves,
     /// or its own `bands`.
     ///
@@ -68,10 +86,8 @@ impl Sensor {
         tolerance: f64,
     ) -> Result<BandChoice, SensorError> {
         let spec = self.spec();
-        let counts = self.settings.radiometry == Radiometry::Physical;
         let ideal = matches!(self.response.bands, Bands::Grey | Bands::Rgb);
-        let multispectral = spec.kind == SensorKind::Multispectral && spec.bands.is_some();
-        if !counts && (ideal || spec.bands.is_some()) {
+        if self.has_untried_bands() {
             return Ok(BandChoice::untried(self.response.bands.clone()));
         }
         // The range in which the sensor sees the light, or the bands that are asked for.
@@ -95,7 +111,7 @@ impl Sensor {
         }
         // Otherwise bands are divided until they do.
         let fixed = table.cells_at(&edges);
-        let may_divide = given.is_none() || multispectral;
+        let may_divide = given.is_none() || self.divides_bands();
         let division = Division::of(&table);
         let cells = if may_divide { division.divided(&fixed, tolerance) } else { fixed };
         let (error, complete) = (Some(division.worst(&cells)), table.complete);

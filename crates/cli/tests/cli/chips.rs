@@ -297,14 +297,20 @@ fn halves_of_a_defocused_point_are_apart_and_make_the_whole() {
 fn what_a_camera_has_not_is_refused() {
     let dual = json!({ "photodiodes": "dual" });
     let pinhole = wall(&dual, &json!({ "tracer": { "type": "direct" } }));
-    insta::assert_snapshot!(refused(&pinhole, &[]), @"error: scene.json, line 1, column 121: camera.sensor.photodiodes: parts of the pupil want a camera with one lens: thin_lens, real_lens or lens");
+    insta::assert_snapshot!(refused(&pinhole, &[]), @"
+    error: scene.json, line 1, column 121: camera.sensor.photodiodes: parts of the pupil want a camera with one lens
+    hint: take a `thin_lens`, `real_lens` or `lens`, or leave this out
+    ");
     let flat = lamp(&json!({ "photodiodes": "dual", "pixel_pitch": 5.0 }));
     insta::assert_snapshot!(refused(&flat, &["--set", "tracer={\"type\": \"flat\"}"]), @r#"
     error: scene.json, line 1, column 123: camera.sensor.photodiodes: base colours come through no pupil
     hint: give the scene a `tracer` of light, such as {"type": "path"}
     "#);
     let parts = json!({ "layers": ["left_pupil"], "tracer": { "type": "direct" } });
-    insta::assert_snapshot!(refused(&wall(&json!({}), &parts), &[]), @"error: scene.json, line 1, column 236: layers[0]: parts of the pupil want a camera with one lens: thin_lens, real_lens or lens");
+    insta::assert_snapshot!(refused(&wall(&json!({}), &parts), &[]), @"
+    error: scene.json, line 1, column 236: layers[0]: parts of the pupil want a camera with one lens
+    hint: take a `thin_lens`, `real_lens` or `lens`, or leave this out
+    ");
     // A picture from elsewhere says nothing of a pupil.
     let bench = wall(&dual, &json!({}));
     let header = "{'descr': '<f4', 'fortran_order': False, 'shape': (6, 8), }";

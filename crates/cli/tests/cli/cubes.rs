@@ -268,7 +268,7 @@ fn what_is_no_cube_is_refused_with_its_place() {
     // A lamp that nothing of is rendered.
     let far = wall(&light("good.hdr"), &[900.0, 950.0, 1000.0]);
     insta::assert_snapshot!(refused(&far), @r#"
-    error: a light's spectrum: the curve covers 400..=800 nm, the spectral bands 900..=1000 nm: they do not overlap
+    error: scene.json: a light's spectrum: the curve covers 400..=800 nm, the spectral bands 900..=1000 nm: they do not overlap
     hint: give the light `equal_energy`, `a` or {"black_body": kelvin}, which reach further, or a curve or cube that does, or the sensor a quantum_efficiency or bands that see it
     "#);
     let mut thrown = wall(&of("good.hdr"), &BANDS);

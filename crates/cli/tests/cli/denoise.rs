@@ -187,7 +187,10 @@ fn what_has_no_noise_of_light_is_refused() {
     let camera = json!({ "type": "pinhole", "fov": 40, "sensor": sensor });
     let refused =
         |keys: &Value| room(keys).refusal(&["render", "scene.json", "-o", "out", "--denoise"]);
-    insta::assert_snapshot!(refused(&json!({ "tracer": { "type": "facing" } })), @r#"error: scene.json: --denoise takes away the noise of light, and the picture shows none: give the scene a `tracer` of light, such as {"type": "path"}, or leave it out"#);
+    insta::assert_snapshot!(refused(&json!({ "tracer": { "type": "facing" } })), @r#"
+    error: scene.json: --denoise takes away the noise of light, and the picture shows none
+    hint: give the scene a `tracer` of light, such as {"type": "path"}, or leave it out
+    "#);
     insta::assert_snapshot!(refused(&json!({ "camera": camera })), @"
     error: scene.json: --denoise knows red, green and blue alone, and camera.sensor is `multispectral`: its bands would keep their noise
     hint: leave it out

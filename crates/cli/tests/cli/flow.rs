@@ -274,7 +274,10 @@ fn comparisons_without_another_frame_are_refused() {
     insta::assert_snapshot!(refused(&alone), @"error: scene.json, line 1, column 212: layers[0]: `to` is 0: a frame does not move against itself; 1 is the next frame");
     alone["layers"] = json!(["flow"]);
     alone.as_object_mut().unwrap().remove("frames");
-    insta::assert_snapshot!(refused(&alone), @"error: scene.json: layers: flow, disparity and occlusion compare frames, and the scene has no `frames`");
+    insta::assert_snapshot!(refused(&alone), @"
+    error: scene.json: layers: flow, disparity and occlusion compare frames, and the scene has no `frames`
+    hint: give it some, or leave these layers out
+    ");
 }
 
 #[test]

@@ -142,7 +142,7 @@ fn light_beyond_the_visible_counts_where_the_sensor_sees_it() {
     // Daylight is known up to 830 nm: nothing of it is seen here, and what would do is named.
     let bench = shining(&json!("d65"), &json!({ "quantum_efficiency": [[900, 0.3], [1000, 0.3]] }));
     insta::assert_snapshot!(bench.refusal(&["render", "scene.json", "-o", "out"]), @r#"
-    error: a light's spectrum: the curve covers 300..=830 nm, the spectral bands 900..=1000 nm: they do not overlap
+    error: scene.json: a light's spectrum: the curve covers 300..=830 nm, the spectral bands 900..=1000 nm: they do not overlap
     hint: give the light `equal_energy`, `a` or {"black_body": kelvin}, which reach further, or a curve or cube that does, or the sensor a quantum_efficiency or bands that see it
     "#);
 }

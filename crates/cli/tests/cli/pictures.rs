@@ -67,7 +67,10 @@ fn exposures_that_make_no_sense_are_refused() {
     error: --set render.exposure=bright: render.exposure: "bright" is not known here
     hint: known: `auto`
     "#);
-    insta::assert_snapshot!(refused("render.exposure=1000"), @"error: --set render.exposure=1000: render.exposure: 1000 is above the most, 100");
+    insta::assert_snapshot!(refused("render.exposure=1000"), @"
+    error: --set render.exposure=1000: render.exposure: 1000 is above the most, 100
+    hint: give a number from -100 to 100
+    ");
     insta::assert_snapshot!(refused("render.tone_map=filmic"), @r#"
     error: --set render.tone_map=filmic: render.tone_map: "filmic" is not known here
     hint: known: `aces`, `agx`, `none`

@@ -132,6 +132,33 @@ fn rows_of_an_exposure_in_slots_are_put_together() {
     }
 }
 
+/// Where samples stop by themselves every pixel has other ones, and the header says how many all have: of rows that are
+/// put together, too.
+#[test]
+fn rows_of_slots_tell_the_samples_of_the_whole() {
+    let mut serial = scene();
+    serial["serial"] = slots();
+    serial["layers"] = json!([]);
+    serial["camera"]["sensor"]["resolution"] = json!([12, 40]);
+    serial["render"]["samples"] = json!({ "relative_error": 0.5, "min": 4, "max": 64 });
+    let bench = rendered(&serial, &["--report", "whole.json"]);
+    for share in ["1/2", "2/2"] {
+        run(&bench, &["render", "scene.json", "-o", "rows", "--shard", share]);
+    }
+    let shares = ["rows/shard-1-of-2.film", "rows/shard-2-of-2.film"];
+    run(&bench, &["merge", "merged", shares[0], shares[1], "--report", "merged.json"]);
+    let header = |folder: &str| bench.json(&format!("{folder}/layers.json"))["header"].clone();
+    let [whole, merged] = ["out", "merged"].map(header);
+    assert_eq!(whole, merged);
+    // Fewer than are allowed, which is what nobody who knew no better would say.
+    let samples = whole["samples"].as_str().and_then(|words| words.parse::<u32>().ok());
+    assert!(samples.is_some_and(|samples| samples < 64), "{whole}");
+    let [whole, merged] = ["whole.json", "merged.json"].map(|report| bench.json(report));
+    for key in ["samples", "samples_wanted", "image_hash"] {
+        assert_eq!(whole[key], merged[key], "{key}");
+    }
+}
+
 /// A white wall in 16 slots: the variance in electrons is the mean and the read noise once, not 16 times.
 #[test]
 fn noise_is_drawn_once() {

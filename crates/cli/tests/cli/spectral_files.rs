@@ -89,7 +89,10 @@ fn an_envi_cube_wants_a_sensor_of_bands() {
     let scene = r#"{"etendue": 1, "tracer": {"type": "facing"}, "objects": [{"shape": "sphere"}]}"#;
     let bench = Bench::with_scene(scene);
     let envi = ["render", "scene.json", "-o", "out", "--outputs", "envi"];
-    insta::assert_snapshot!(bench.refusal(&envi), @"error: outputs: `envi` is a file of light in bands, and the scene has no such layer; give `camera.sensor` the `type` `multispectral` and `bands`, or leave `envi` out");
+    insta::assert_snapshot!(bench.refusal(&envi), @"
+    error: outputs: `envi` is a file of light in bands, and the scene has no such layer
+    hint: give `camera.sensor` the `type` `multispectral` and `bands`, or leave `envi` out
+    ");
 }
 
 #[test]

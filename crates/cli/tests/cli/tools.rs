@@ -1,6 +1,6 @@
 //! check, plan, schema, version.
 
-use crate::run::{Bench, text};
+use crate::run::{Bench, notes_in, text};
 
 #[test]
 fn version_names_the_program_and_what_traces() {
@@ -79,7 +79,31 @@ fn a_plan_lists_the_accuracy_that_a_scene_sets() {
     assert_eq!((&rows[0]["key"], &rows[0]["forced"]), (&"accuracy.view_psnr".into(), &true.into()));
     // What is out of range is refused by name.
     let beyond = ["plan", "scene.json", "--json", "--set", "accuracy.view_psnr=400"];
-    insta::assert_snapshot!(bench.refusal(&beyond), @"error: --set accuracy.view_psnr=400: accuracy.view_psnr: 400 is above the most, 60");
+    insta::assert_snapshot!(bench.refusal(&beyond), @"
+    error: --set accuracy.view_psnr=400: accuracy.view_psnr: 400 is above the most, 60
+    hint: give a number from 0 to 60, or leave it out for 43
+    ");
+    let wrong = ["plan", "scene.json", "--json", "--set", "accuracy.roulette_after=1.5"];
+    insta::assert_snapshot!(bench.refusal(&wrong), @"
+    error: --set accuracy.roulette_after=1.5: accuracy.roulette_after: expected a whole number, found 1.5
+    hint: give a whole number from 1 to 1024, or leave it out for 5
+    ");
+}
+
+/// A number of what the scene has not is taken, and said to decide nothing: by each command as it says other notes.
+#[test]
+fn accuracy_that_decides_nothing_is_said() {
+    let bench = Bench::with_scene(
+        r#"{"etendue": 1, "layers": ["depth"], "objects": [{"shape": "box"}], "accuracy": {"view_psnr": 40}}"#,
+    );
+    let said = bench.run(&["plan", "scene.json"]);
+    assert!(said.status.success(), "{}", text(&said.stderr));
+    insta::assert_snapshot!(notes_in(&bench.said(&said)), @"note: `accuracy.view_psnr`: decides nothing here: the camera takes no light field; leave it out");
+    let row = "43 by itself; decides nothing here: the camera takes no light field [forced by accuracy.view_psnr]";
+    assert!(text(&said.stdout).contains(row), "{}", text(&said.stdout));
+    let checked = text(&bench.run(&["check", "scene.json"]).stdout);
+    let finding = "`accuracy.view_psnr`: decides nothing here: the camera takes no light field";
+    assert!(checked.contains(finding), "{checked}");
 }
 
 #[test]

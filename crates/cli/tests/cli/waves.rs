@@ -401,6 +401,21 @@ fn the_plan_says_whether_waves_would_show() {
         assert!(output.status.success(), "{}", text(&output.stderr));
         assert!(text(&output.stdout).contains(words), "{}", text(&output.stdout));
     }
+    // What it does not go with is refused before a render, and of a render with its place, too.
+    let bench = Bench::with_scene(&scene(8.0, true));
+    let until = ["scene.json", "--set", r#"render.samples={"relative_error": 0.1}"#];
+    let [checked, planned] =
+        ["check", "plan"].map(|command| bench.refusal(&[&[command], &until[..]].concat()));
+    insta::assert_snapshot!(checked, @"
+    error: scene.json, line 2, column 53: camera.diffraction: light that is spread as waves lands beside the pixel that it starts from, so that no pixel can tell when its samples are enough
+    hint: give `render.samples` a number, or leave out `diffraction`
+    ");
+    assert_eq!(checked, planned);
+    let share = ["render", "scene.json", "-o", "out", "--quiet", "--shard", "1/2"];
+    insta::assert_snapshot!(bench.refusal(&share), @"
+    error: scene.json, line 2, column 53: camera.diffraction: the light of the whole picture is spread at once
+    hint: leave out --shard and --checkpoint, or `diffraction`
+    ");
     let bench = Bench::with_scene(&scene(8.0, true).replace(
         r#""f_number": 8, "focus_distance": 2,"#,
         r#""sensor_distance": 51.3, "elements": [{"at": 50, "type": "aperture", "shape": "circular", "radius": 3, "stop": true}],"#,

@@ -109,7 +109,8 @@ impl Session {
         if self.file.spec.frames.is_none() {
             let path = self.file.path().display();
             return Err(Error::Refused(format!(
-                "{path}: layers: flow, disparity and occlusion compare frames, and the scene has no `frames`"
+                "{path}: layers: flow, disparity and occlusion compare frames, and the scene has no `frames`\nhint: give \
+                 it some, or leave these layers out"
             )));
         }
         // The scene by itself, when no frame is shown, has no neighbours.

@@ -151,9 +151,18 @@ impl Session {
         let others: Vec<FollowedFrame<'_>> =
             neighbours.iter().filter_map(|other| other.followed(scene)).collect();
         let prepared = Prepared { accel, images: &self.images, others: &others };
-        let film = etendue_render::trace(scene, plan, prepared, &header, &state, progress)?;
+        let film = etendue_render::trace(scene, plan, prepared, &header, &state, progress)
+            .map_err(|error| self.placed(error))?;
         self.seconds.render = start.elapsed().as_secs_f64();
         Ok(film)
+    }
+
+    /// The error of a render with its place in the scene's file, where it is about something there.
+    pub(crate) fn placed(&self, error: RenderError) -> Error {
+        match error {
+            RenderError::Refused(why) => self.file().placed(why).into(),
+            error => error.into(),
+        }
     }
 
     /// Identity that films must agree in to be of one picture.

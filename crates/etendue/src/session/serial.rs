@@ -72,7 +72,9 @@ impl Session {
                 let plan = Plan::in_bands(&seen, outputs, &bands);
                 let prepared =
                     Prepared { accel: self.built()?, images: &self.images, others: &others };
-                Some(etendue_render::trace(&seen, &plan, prepared, &head, &of_part, progress)?)
+                let traced =
+                    etendue_render::trace(&seen, &plan, prepared, &head, &of_part, progress);
+                Some(traced.map_err(|error| self.placed(error))?)
             }
         };
         let mut film = SerialFilm::new(&scene, &plan, shard, data)?;
@@ -110,7 +112,8 @@ impl Session {
             self.decode(progress)?;
             let LoadedScene { scene, plan, .. } = self.loaded()?;
             let prepared = Prepared { accel: self.built()?, images: &self.images, others: &[] };
-            let traced = etendue_render::trace(scene, plan, prepared, head, state, progress)?;
+            let traced = etendue_render::trace(scene, plan, prepared, head, state, progress)
+                .map_err(|error| self.placed(error))?;
             if !traced.is_complete() {
                 return Err(RenderError::Stopped.into());
             }

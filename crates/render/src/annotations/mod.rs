@@ -104,8 +104,8 @@ pub fn refusal(scene: &Scene, outputs: Outputs) -> Option<String> {
     let copies = scene.copies.iter().map(|copies| copies.count as usize).sum::<usize>();
     if copies > MOST_SILHOUETTES {
         return refuse(&format!(
-            "traces each of the {copies} copies by itself, of which there may be {MOST_SILHOUETTES}; join what is no \
-             object of its own in one mesh"
+            "traces each of the {copies} copies by itself, of which there may be {MOST_SILHOUETTES}\nhint: join what is \
+             no object of its own in one mesh"
         ));
     }
     None

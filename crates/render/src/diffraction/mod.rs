@@ -17,6 +17,7 @@ mod spreads;
 mod words;
 
 use etendue_camera::{Camera, WaveLens};
+use etendue_report::Refusal;
 use etendue_scene::Scene;
 use etendue_scene::file::{AccuracySpec, SamplesSpec};
 use etendue_tracer::LayerSpec;
@@ -25,7 +26,6 @@ use crate::error::RenderError;
 use crate::film::FilmLayer;
 use crate::output::{Outputs, Values};
 use crate::state::{Film, Prepared, RenderState, TraceFn};
-use crate::stopping::Stopping;
 use crate::tile::RayCounts;
 use crate::watch::{SoFar, Watch};
 use crate::{Plan, Shard};
@@ -78,32 +78,15 @@ pub(crate) fn bytes(scene: &Scene, plan: &Plan) -> u64 {
 }
 
 /// Refuses what light that is spread over the picture cannot be.
-fn check(scene: &Scene, plan: &Plan, state: &RenderState<'_>) -> Result<(), RenderError> {
-    let camera = &scene.camera;
-    let refused = |why: &str| Err(RenderError::diffraction(why));
-    if camera.is_timed() || camera.light_of_rows_differs() || scene.slots > 0 {
-        return refused(
-            "something moves, or rows see different moments; leave out `motion` and `shutter`, or \
-             `diffraction`",
-        );
-    }
-    if camera.shutter().is_some_and(|shutter| !shutter.is_fully_open()) || camera.lights_change() {
-        return refused(
-            "the shutter is closed for a part of the time; leave it out, or `diffraction`",
-        );
-    }
-    if plan.stopping.is_adaptive() || matches!(plan.stopping, Stopping::Time(_)) {
-        return refused(
-            "light lands beside the pixel that it starts from, so no pixel can be told when it has \
-             enough; give `render.samples` a number",
-        );
+fn check(scene: &Scene, state: &RenderState<'_>) -> Result<(), RenderError> {
+    if let Some(why) = scene.diffraction_fault() {
+        return Err(RenderError::diffraction(why));
     }
     let is_whole = state.shard.is_none_or(|shard| shard == Shard::ALL);
     if !is_whole || state.checkpoint.is_some() || !state.shares.is_empty() {
-        return refused(
-            "light of the whole picture is spread at once: leave out --shard and --checkpoint, or \
-             `diffraction`",
-        );
+        let why = Refusal::new("the light of the whole picture is spread at once");
+        let remedy = "leave out --shard and --checkpoint, or `diffraction`";
+        return Err(RenderError::diffraction(why.hint(remedy)));
     }
     Ok(())
 }
@@ -148,7 +131,7 @@ pub(crate) fn spread_light(
     if !is_wanted(scene, plan) {
         return Ok(None);
     }
-    check(scene, plan, state)?;
+    check(scene, state)?;
     let fault = |why: String| RenderError::diffraction(why);
     let Some(lens) = opened.lens() else { return Err(fault("the camera has no lens".to_owned())) };
     let waves = WaveLens::new(lens, &plan.bands).map_err(|error| fault(error.why))?;

@@ -118,7 +118,7 @@ impl Plan {
         decisions.extend(self.explain_unseen(scene, grounds.triangles));
         decisions.push(self.explain_quality(scene, grounds.triangles));
         decisions.extend(self.explain_precision(grounds));
-        decisions.extend(scene.accuracy.decisions());
+        decisions.extend(scene.accuracy_decisions());
         decisions.push(self.memory.decision());
         decisions
     }

@@ -11,8 +11,9 @@ use etendue_sensor::bands::TOLERANCE;
 use etendue_tracer::{ClearSky, Image, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
-use super::{LightPrecision, PlanSpec};
+use super::{LightPrecision, PlanSpec, ScenePath};
 
 /// Numbers of a lens where the scene says nothing.
 const LENS: LensAccuracy = LensAccuracy::DEFAULT;
@@ -40,7 +41,8 @@ pub struct AccuracySetting {
     pub value: f64,
 }
 
-/// The use of a number.
+/// The use of a number: by it a scene tells whether the number decides anything there
+/// ([`Scene::why_idle`](crate::Scene::why_idle)).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AccuracyUse {
     /// Bands of light for a sensor.
@@ -49,17 +51,33 @@ pub enum AccuracyUse {
     LightPrecision,
     /// Rays that bands of light share behind a lens that sends each its own way.
     SharedPaths,
-    /// The ends of paths and samples.
-    Samples,
+    /// Ends of paths by chance.
+    Roulette,
+    /// Parts of paths at glass that disperses.
+    DispersingGlass,
+    /// Samples that stop by themselves.
+    Stopping,
+    /// Samples that are to stop at a sensor's noise, where there is none.
+    StoppingWithoutNoise,
     /// Views of a light field.
     Views,
-    /// The exit pupil of a lens, and where its light arrives.
+    /// The exit pupil of a lens that is measured by rays.
     Pupils,
+    /// The same, of a lens that is not round.
+    UnevenPupils,
+    /// The part of the sensor where a lens' light arrives.
+    ImageCircles,
+    /// Coded apertures.
+    Masks,
+    /// Microlenses.
+    Lenslets,
     /// Light that is spread as waves.
     Waves,
     /// Fits of other cameras to a lens.
     Fits,
-    /// The search for what stays within a `tolerance`, and its verification.
+    /// The search for a simpler lens within a `tolerance`, and its verification.
+    LensTolerance,
+    /// The verification of what was taken of a `tolerance`.
     Tolerance,
     /// Meshes that change their shapes while the shutter is open.
     Shapes,
@@ -150,23 +168,23 @@ accuracy_settings! {
     SharedPaths band_share_error: f64 = LENS.sharing.shares, 1e-9 to 0.5, "share of the light",
         "Difference of what a lens with coatings or dark glass passes of a band that shares another's rays",
         "Less traces each shared ray at more wavelengths, and at last the scene once a band; more is off by as much";
-    Samples roulette_after: u32 = Rules::ROULETTE_AFTER, 1 to 1024, "surfaces",
+    Roulette roulette_after: u32 = Rules::ROULETTE_AFTER, 1 to 1024, "surfaces",
         "Surfaces of a path of the tracer `path` after which it may end by chance",
         "More follow dim paths farther, which takes time; fewer end paths sooner, which adds noise and no bias";
-    Samples dispersion_paths: u32 = Rules::PARTS, 1 to 4096, "paths",
+    DispersingGlass dispersion_paths: u32 = Rules::PARTS, 1 to 4096, "paths",
         "Paths that one is parted into by glass that disperses, at most, of one band each",
         "Fewer leave out bands at random, which adds noise of colours and no bias; more take as much longer there";
-    Samples sample_sigmas: f64 = 2.0, 0.0 to 10.0, "standard errors of a block's variance",
+    Stopping sample_sigmas: f64 = 2.0, 0.0 to 10.0, "standard errors of a block's variance",
         "Standard errors that are added to the variance of a block of pixels, where samples stop by themselves",
         "Less stops sooner, and half of the blocks above what is allowed at 0; more takes more samples";
-    Samples sample_error: f64 = 0.02, 1e-9 to 1.0, "relative error",
+    StoppingWithoutNoise sample_error: f64 = 0.02, 1e-9 to 1.0, "relative error",
         "Error at which samples stop that are to stop at a sensor's noise, where there is none",
         "Less takes more samples, by its square";
-    Samples sample_growth: f64 = 0.5, 0.125 to 16.0, "share of the samples that a pixel has",
+    Stopping sample_growth: f64 = 0.5, 0.125 to 16.0, "share of the samples that a pixel has",
         "Samples that a pixel gets at once, at most, where samples stop by themselves",
         "Less takes more rounds, in each of which the whole picture is looked at; more takes samples that turn out to \
          be too many";
-    Samples sample_floor: f64 = 0.1, 0.0 to 1.0, "share of a block's mean variance",
+    Stopping sample_floor: f64 = 0.1, 0.0 to 1.0, "share of a block's mean variance",
         "Variance that each pixel is reckoned to have in any case, where samples stop by themselves",
         "Less takes fewer samples, and stops too early where something small shows in few of them; more spreads them \
          evenly";
@@ -195,7 +213,7 @@ accuracy_settings! {
     Pupils pupil_radial_intervals: u32 = LENS.pupil.radial_intervals, 4 to 1024, "intervals",
         "Places over the sensor's half diagonal between which the pupil of a round lens is interpolated",
         "More aim fewer rays beside the pupil, and take longer before the render";
-    Pupils pupil_planar_intervals: u32 = LENS.pupil.planar_intervals, 2 to 128, "intervals",
+    UnevenPupils pupil_planar_intervals: u32 = LENS.pupil.planar_intervals, 2 to 128, "intervals",
         "Places over each side of the sensor between which the pupil of any other lens is interpolated",
         "More aim fewer rays beside the pupil, and take longer before the render, by their square";
     Pupils pupil_wavelengths: u32 = LENS.pupil.wavelengths, 2 to 256, "wavelengths",
@@ -204,19 +222,19 @@ accuracy_settings! {
     Pupils pupil_checks: u32 = LENS.pupil.checks, 1024 to 4_194_304, "rays",
         "Rays of a round that look for light outside of the measured pupil, which is widened around what they find",
         "More find what is smaller, and take longer before the render; fewer may lose light at the pupil's rim";
-    Pupils image_circle_error: f64 = LENS.pupil.image_circle, 1e-6 to 0.1, "share of its radius",
+    ImageCircles image_circle_error: f64 = LENS.pupil.image_circle, 1e-6 to 0.1, "share of its radius",
         "Precision of the edge of the image circle; that of a round lens is drawn as much wider",
         "Less searches longer before the render; more aims rays where no light arrives";
-    Pupils mask_aim_error: f64 = LENS.pupil.mask_aim, 1e-4 to 1.0, "share of the mask's pixel",
+    Masks mask_aim_error: f64 = LENS.pupil.mask_aim, 1e-4 to 1.0, "share of the mask's pixel",
         "Distance from where it is aimed on a coded aperture at which a ray may land, when polynomials can do it",
         "Less takes polynomials of a higher degree, which cost time on every ray; more stops more rays at the mask";
-    Pupils lenslet_margin: f64 = LENS.pupil.lenslet_margin, 2e-4 to 0.2, "share of its width",
+    Lenslets lenslet_margin: f64 = LENS.pupil.lenslet_margin, 2e-4 to 0.2, "share of its width",
         "Margin around the opening as lenslets see it, which grows until one ray in 2000 is missed at most",
         "Less stops fewer rays, and takes more rounds of the check before the render; more stops more";
-    Pupils lenslet_nodes: u32 = LENS.pupil.lenslet_nodes, 2 to 257, "places",
+    Lenslets lenslet_nodes: u32 = LENS.pupil.lenslet_nodes, 2 to 257, "places",
         "Places on each side of a microlens array between which the opening before it is interpolated",
         "More stop fewer rays, and take longer before the render, by their square";
-    Pupils lenslet_checks: u32 = LENS.pupil.lenslet_checks, 1024 to 4_194_304, "rays",
+    Lenslets lenslet_checks: u32 = LENS.pupil.lenslet_checks, 1024 to 4_194_304, "rays",
         "Rays of a round that look for light that no lenslet is aimed at through",
         "More find what is smaller, and take longer before the render; fewer may lose light at rims";
     Waves wavefront_wavelengths: u32 = LENS.waves.wavelengths, 2 to 16, "wavelengths",
@@ -255,7 +273,7 @@ accuracy_settings! {
     Fits fit_places: u32 = LENS.fit_places, 5 to 513, "places",
         "Places on each side of the picture that OpenCV's camera is fitted to",
         "More follow distortion in between, and take longer by their square";
-    Tolerance tolerance_rays: u32 = 256, 16 to 65_536, "rays",
+    LensTolerance tolerance_rays: u32 = 256, 16 to 65_536, "rays",
         "Rays of a place and band by which a simpler model is compared with the lens, under a `tolerance`; a quarter \
          of them for bands in groups",
         "More take longer before the render; fewer compare blur and light with more noise";
@@ -284,20 +302,20 @@ impl AccuracySpec {
     }
 
     /// The settings that are not as they are by themselves.
-    fn set(&self) -> impl Iterator<Item = AccuracySetting> {
+    pub(crate) fn set(&self) -> impl Iterator<Item = AccuracySetting> {
         self.settings().into_iter().filter(|setting| setting.value != setting.default)
     }
 
-    /// Those as rows of the plan.
+    /// The settings that a scene of these values writes, also as they are by themselves.
+    pub(crate) fn written(&self, scene: &Value) -> impl Iterator<Item = AccuracySetting> {
+        let all = self.settings().into_iter();
+        all.filter(move |setting| scene.pointer(&ScenePath::of(setting.path).pointer()).is_some())
+    }
+
+    /// Those that are not as they are by themselves, as rows of the plan.
     #[must_use]
     pub fn decisions(&self) -> Vec<Decision> {
-        let row = |AccuracySetting { name, path, unit, what, default, value, .. }| {
-            let reason = format!("{what} ({unit}); {default} by itself");
-            Decision::new(DecisionKind::Accuracy, DecisionValue::Number { name, value }, reason)
-                .by_key(path)
-                .forced(true)
-        };
-        self.set().map(row).collect()
+        self.set().map(AccuracySetting::decision).collect()
     }
 
     /// Numbers by which the camera's lens is measured.
@@ -324,41 +342,61 @@ impl AccuracySpec {
         }
     }
 
-    /// Contradiction with what the plan is told, or bands that the sensor is given (`has_bands`): the path, and why.
+    /// Contradiction of what the values `scene` say of these with what the plan is told, or bands that the sensor is
+    /// given (`has_bands`): the path, and why.
     pub(super) fn contradiction(
         &self,
+        scene: &Value,
         plan: &PlanSpec,
         has_bands: bool,
     ) -> Option<(&'static str, String)> {
-        let precision = match plan.light_precision {
-            LightPrecision::Auto => None,
-            LightPrecision::Double => Some("double"),
-            LightPrecision::Single => Some("single"),
-        };
-        self.set().find_map(|setting| match (setting.used_for, precision) {
-            (AccuracyUse::Bands, _) if has_bands => {
-                let why = "contradicts `bands` of the camera's sensor, which are taken as they are\nhint: leave one \
-                           of them out";
-                Some((setting.path, why.to_owned()))
-            }
-            (AccuracyUse::SharedPaths, _) if plan.shared_paths == Some(false) => {
-                let why = "contradicts `plan.shared_paths` false, with which no rays are shared\nhint: leave one of \
-                           them out";
-                Some((setting.path, why.to_owned()))
-            }
-            (AccuracyUse::Images, _) if plan.texture_filter == Some(false) => {
-                let why = "contradicts `plan.texture_filter` false, with which no image is averaged\nhint: leave one \
-                           of them out";
-                Some((setting.path, why.to_owned()))
-            }
-            (AccuracyUse::LightPrecision, Some(word)) => {
-                let why = format!(
-                    "contradicts `plan.light_precision` \"{word}\", which decides by itself\nhint: leave one of \
-                     them out"
-                );
-                Some((setting.path, why))
-            }
-            _ => None,
+        self.written(scene).find_map(|setting| {
+            let what = setting.used_for.contradicted(plan, has_bands)?;
+            Some((setting.path, format!("contradicts {what}\nhint: leave one of them out")))
         })
+    }
+}
+
+impl AccuracyUse {
+    /// Setting beside which such a number decides nothing, whatever the scene is.
+    fn contradicted(self, plan: &PlanSpec, has_bands: bool) -> Option<&'static str> {
+        match self {
+            Self::Bands if has_bands => {
+                Some("`bands` of the camera's sensor, which are taken as they are")
+            }
+            Self::SharedPaths if plan.shared_paths == Some(false) => {
+                Some("`plan.shared_paths` false, with which no rays are shared")
+            }
+            Self::SharedPaths if plan.dispersion == Some(false) => Some(
+                "`plan.dispersion` false, with which no band goes through the lens its own way",
+            ),
+            Self::Images if plan.textures == Some(false) => {
+                Some("`plan.textures` false, with which no image is read")
+            }
+            Self::Images if plan.texture_filter == Some(false) => {
+                Some("`plan.texture_filter` false, with which no image is averaged")
+            }
+            Self::LightPrecision => match plan.light_precision {
+                LightPrecision::Auto => None,
+                LightPrecision::Double => {
+                    Some("`plan.light_precision` \"double\", which decides by itself")
+                }
+                LightPrecision::Single => {
+                    Some("`plan.light_precision` \"single\", which decides by itself")
+                }
+            },
+            _ => None,
+        }
+    }
+}
+
+impl AccuracySetting {
+    /// Its row of the plan.
+    pub(crate) fn decision(self) -> Decision {
+        let Self { name, path, unit, what, default, value, .. } = self;
+        let reason = format!("{what} ({unit}); {default} by itself");
+        Decision::new(DecisionKind::Accuracy, DecisionValue::Number { name, value }, reason)
+            .by_key(path)
+            .forced(true)
     }
 }

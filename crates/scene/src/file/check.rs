@@ -112,7 +112,9 @@ impl<'a> Checker<'a> {
         if expected.iter().any(|kind| is_kind(kind, value)) {
             return Ok(());
         }
-        problem(path, wrong_kind(value, &expected))
+        let wrong = wrong_kind(value, &expected);
+        let hint = if wrong.contains("\nhint: ") { String::new() } else { number_hint(schema) };
+        problem(path, wrong + &hint)
     }
 
     fn range(schema: &Value, value: &Value, path: &ScenePath) -> Outcome {
@@ -125,10 +127,10 @@ impl<'a> Checker<'a> {
         let most = schema.get("maximum").and_then(Value::as_f64).or(most);
         match (least, most) {
             (Some(least), _) if number < least => {
-                problem(path, format!("{value} is below the least, {least}"))
+                problem(path, format!("{value} is below the least, {least}{}", number_hint(schema)))
             }
             (_, Some(most)) if number > most => {
-                problem(path, format!("{value} is above the most, {most}"))
+                problem(path, format!("{value} is above the most, {most}{}", number_hint(schema)))
             }
             _ => Ok(()),
         }
@@ -353,9 +355,36 @@ fn kinds_of(schema: &Value) -> Option<Vec<&str>> {
     }
 }
 
+/// The hint `give a number from 1 to 9, or leave it out for 5`, of a schema of numbers with limits or a value that stands
+/// where none is given; nothing of any other.
+fn number_hint(schema: &Value) -> String {
+    if let Some(unit) = schema.get("x-unit").and_then(Value::as_str) {
+        return format!("\nhint: give a number (in {unit}) or a string with its unit");
+    }
+    let noun = match kinds_of(schema).as_deref() {
+        Some(["integer"]) => "a whole number",
+        Some(["number"]) => "a number",
+        _ => return String::new(),
+    };
+    let (range, default) = (range(schema), schema.get("default").and_then(plain));
+    let default =
+        default.map_or_else(String::new, |default| format!(", or leave it out for {default}"));
+    match range.is_empty() && default.is_empty() {
+        true => String::new(),
+        false => format!("\nhint: give {noun}{range}{default}"),
+    }
+}
+
+/// A number without a point that says nothing; `None` of what is none.
+fn plain(number: &Value) -> Option<String> {
+    let value = number.as_f64()?;
+    let is_whole = value.fract() == 0.0 && value.abs() < 1e15;
+    Some(if is_whole { format!("{value:.0}") } else { number.to_string() })
+}
+
 /// ` from 1 to 9`, where the schema has limits.
 fn range(schema: &Value) -> String {
-    let limit = |key: &str| schema.get(key).filter(|limit| limit.is_number());
+    let limit = |key: &str| schema.get(key).and_then(plain);
     match (limit("minimum"), limit("maximum")) {
         (Some(least), Some(most)) => format!(" from {least} to {most}"),
         (Some(least), None) => format!(" from {least}"),

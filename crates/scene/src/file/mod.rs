@@ -192,8 +192,9 @@ impl SceneFile {
                 Some((format!("plan.{key}"), why))
             })
             .or_else(|| {
+                let has_bands = file.has_given_bands();
                 let (path, why) =
-                    spec.accuracy.contradiction(&spec.plan, file.has_given_bands())?;
+                    spec.accuracy.contradiction(&file.value, &spec.plan, has_bands)?;
                 Some((path.to_owned(), why))
             })
             .or_else(|| {
@@ -269,6 +270,20 @@ impl SceneFile {
     /// The error that the value at `path` is wrong because of `why`.
     pub(crate) fn fault(&self, path: impl Into<ScenePath>, why: impl Into<Refusal>) -> SceneError {
         self.written.fault(path, why)
+    }
+
+    /// The refusal with the file, and the line there, of what its place names, where that is a key of the scene; as it is
+    /// where it has another place, such as an option, or none.
+    #[must_use]
+    pub fn placed(&self, why: Refusal) -> SceneError {
+        let place = why.place().to_owned();
+        let (key, inside) = place.split_once(": ").unwrap_or((place.as_str(), ""));
+        let path = ScenePath::of(key);
+        let is_key = path.root().is_some_and(|key| spec::SCENE["properties"].get(key).is_some());
+        if !is_key || place.starts_with(&*self.path().to_string_lossy()) {
+            return why.into();
+        }
+        self.fault(path, why.without_place().at(inside))
     }
 
     /// The file.

@@ -189,7 +189,8 @@ impl SceneFile {
                 None => format!("layers[{number}]"),
             };
             let why = if !camera.has_pupil() || has_lenslets {
-                "parts of the pupil want a camera with one lens: thin_lens, real_lens or lens"
+                "parts of the pupil want a camera with one lens\nhint: take a `thin_lens`, `real_lens` or `lens`, or \
+                 leave this out"
             } else if camera.diffracts() {
                 "light that is spread as waves are came through all of the pupil\nhint: leave out `diffraction`"
             } else if camera.motion().is_some() {
@@ -226,7 +227,8 @@ impl SceneFile {
         if sensor.angular_response.is_some() && has_lenslets {
             return refused(
                 "angular_response",
-                "behind lenslets a pixel has no chief ray of its own",
+                "behind lenslets a pixel has no chief ray of its own\nhint: leave this out, or take a camera without \
+                 microlenses",
             );
         }
         if sensor.carrier_diffusion.is_some_and(|way| way.0 > 0.0) {

@@ -87,7 +87,8 @@ impl SceneFile {
                     })
                 }
                 Source::Shape(_) if spec.animation.is_some() => {
-                    let why = "a shape has no animation; models of glTF files have";
+                    let why =
+                        "a shape has no animation; models of glTF files have\nhint: leave this out";
                     return Err(self.fault(at.key("animation"), why));
                 }
                 Source::Shape(shape) => {
@@ -117,9 +118,10 @@ impl SceneFile {
             Source::File(path) if !names_no_up(path) => {
                 Ok(Some(Play { which: name.clone(), time: time.0, plays: *plays }))
             }
-            Source::File(_) | Source::Shape(_) => {
-                Err(self.fault(at.key("animation"), "only glTF files have animations"))
-            }
+            Source::File(_) | Source::Shape(_) => Err(self.fault(
+                at.key("animation"),
+                "only glTF files have animations\nhint: leave this out",
+            )),
         }
     }
 

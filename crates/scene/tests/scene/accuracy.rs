@@ -5,7 +5,7 @@ use std::path::Path;
 use etendue_camera::LensAccuracy;
 use etendue_report::DecisionKind;
 use etendue_scene::file::{AccuracySetting, AccuracySpec, SceneFile};
-use etendue_scene::{LoadOptions, Wanted};
+use etendue_scene::{LoadOptions, Note, NoteKind, Scene, Wanted};
 use serde_json::{Value, json};
 
 fn read(scene: Value) -> Result<AccuracySpec, String> {
@@ -95,4 +95,196 @@ fn a_lens_is_measured_as_the_scene_says() {
     (expected.pupil.margin, expected.pupil.checks) = (0.01, 2048);
     (expected.waves.error, expected.fit_places, expected.sharing.places) = (0.01, 9, 0.1);
     assert_eq!(scene.camera.lens().unwrap().accuracy(), expected);
+}
+
+/// All numbers as they are by themselves, for a scene to write.
+fn all_as_they_are() -> Value {
+    let written = |setting: &AccuracySetting| {
+        let value: Value = serde_json::from_str(&setting.default.to_string()).unwrap();
+        (setting.name.to_owned(), value)
+    };
+    Value::Object(AccuracySpec::default().settings().iter().map(written).collect())
+}
+
+/// What `more` makes of a scene of a ball that writes all numbers.
+fn loaded(more: Value) -> Result<Scene, String> {
+    let mut scene = json!({ "accuracy": all_as_they_are(), "objects": [{ "shape": "sphere" }] });
+    scene.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+    let options = LoadOptions::default();
+    let file = SceneFile::from_json(&options.opener, Path::new("."), scene);
+    let loaded = file.and_then(|file| file.load(Wanted::EVERYTHING, &options));
+    loaded.map_err(|error| error.to_string())
+}
+
+/// The numbers that are noted as deciding nothing.
+fn idle_in(scene: &Scene) -> Vec<String> {
+    let own = scene.notes.iter().filter(|note| note.message.starts_with("decides nothing here: "));
+    let name = |note: &Note| {
+        assert_eq!(note.kind, NoteKind::Unused);
+        let name = note.subject.strip_prefix("`accuracy.").and_then(|it| it.strip_suffix('`'));
+        name.expect("a key of `accuracy`").to_owned()
+    };
+    own.map(name).collect()
+}
+
+fn pose() -> Value {
+    json!({ "from": [0, 0, 2], "look_at": [0, 0, 0] })
+}
+
+/// A lens of glass behind an opening of six blades, which is not round: its pupil is measured all over the sensor.
+fn bladed_lens() -> Value {
+    json!({ "type": "lens", "focus_distance": 2, "sensor_height": 6, "pose": pose(), "sensor": { "resolution": [4, 4] },
+        "lens": { "elements": [
+            { "type": "surface", "radius": 30, "thickness": 2, "glass": "N-BK7", "semi_diameter": 4 },
+            { "type": "surface", "radius": -30, "thickness": 1, "semi_diameter": 4 },
+            { "type": "aperture", "shape": "polygon", "radius": 2, "blades": 6, "thickness": 1, "stop": true }] } })
+}
+
+#[test]
+fn refused_numbers_have_a_hint_with_their_range_and_what_they_are_by_themselves() {
+    for AccuracySetting { name, path, default, range: [_, most], .. } in
+        AccuracySpec::default().settings()
+    {
+        for wrong in [json!(2.0 * most + 1.5), json!("much"), json!(null), json!([1])] {
+            let error = read(json!({ "accuracy": { name: wrong } })).unwrap_err();
+            let (why, hint) = error.split_once("\nhint: give a ").expect("a hint");
+            assert!(why.contains(&format!("{path}: ")), "{error}");
+            assert!(
+                hint.contains("number from ") && hint.contains(&format!(" to {most}")),
+                "{error}"
+            );
+            assert!(hint.ends_with(&format!("or leave it out for {default}")), "{error}");
+        }
+    }
+}
+
+/// Beside what decides by itself a number is refused even as it is by itself: it is written, and decides nothing.
+#[test]
+fn a_number_is_contradicted_whatever_it_is() {
+    let bands = json!({ "from": 400, "to": 700, "count": 6 });
+    let sensor = json!({ "type": "raw", "resolution": [4, 4], "bands": bands });
+    let camera = json!({ "type": "pinhole", "sensor": sensor });
+    let cases = [
+        ("band_error", json!({ "camera": camera }), "`bands` of the camera's sensor"),
+        ("band_place_error", json!({ "plan": { "shared_paths": false } }), "`plan.shared_paths`"),
+        ("band_share_error", json!({ "plan": { "dispersion": false } }), "`plan.dispersion`"),
+        ("texture_lookups", json!({ "plan": { "textures": false } }), "`plan.textures`"),
+        (
+            "texture_lookups",
+            json!({ "plan": { "texture_filter": false } }),
+            "`plan.texture_filter`",
+        ),
+        ("path_probes", json!({ "plan": { "light_precision": "single" } }), "\"single\""),
+    ];
+    let all = all_as_they_are();
+    for (name, mut scene, what) in cases {
+        scene["accuracy"] = json!({ name: all[name] });
+        let error = read(scene.clone()).unwrap_err();
+        let begins = format!("accuracy.{name}: contradicts ");
+        assert!(error.contains(&begins) && error.contains(what), "{error}");
+        assert!(error.ends_with("\nhint: leave one of them out"), "{error}");
+        scene["accuracy"] = json!({});
+        assert!(read(scene).is_ok(), "{name}");
+    }
+}
+
+#[test]
+fn numbers_of_what_a_scene_lacks_are_noted() {
+    let scene = loaded(json!({ "layers": ["depth"] })).unwrap();
+    let idle = idle_in(&scene);
+    // Whether there are mattes, no scene says.
+    for AccuracySetting { name, .. } in AccuracySpec::default().settings() {
+        assert_eq!(idle.iter().any(|it| it == name), name != "matte_samples", "{name}");
+    }
+    // What nobody writes is not noted.
+    let silent = loaded(json!({ "layers": ["depth"], "accuracy": {} })).unwrap();
+    assert_eq!(idle_in(&silent), Vec::<String>::new());
+}
+
+#[test]
+fn numbers_of_what_a_scene_has_are_not_noted() {
+    let path = json!({ "type": "path" });
+    let clear_sky = json!([{ "type": "sky" }]);
+    let glass = json!({ "glass": { "type": "dielectric", "ior": "N-BK7" } });
+    let physical = json!({ "type": "pinhole", "sensor": { "type": "raw", "resolution": [4, 4], "radiometry": "physical",
+        "system_gain": 0.5, "exposure": 0.01 } });
+    let waves = json!({ "type": "thin_lens", "focal_length": 50, "f_number": 2, "focus_distance": 2, "sensor_height": 24,
+        "diffraction": true, "pose": pose(), "sensor": { "resolution": [4, 4] } });
+    let field = json!({ "type": "light_field", "focal_length": 20, "f_number": 4, "focus_distance": 0.5,
+        "microlenses": { "pitch": 0.1 }, "pose": pose(), "sensor": { "resolution": [240, 180], "pixel_pitch": 8 } });
+    let tolerance = json!({ "displacement": "0.5 px", "light": "2 %" });
+    let cases: [(Value, &[&str]); 7] = [
+        (
+            json!({ "tracer": path, "lights": clear_sky, "render": { "accel": "embree" } }),
+            &["roulette_after", "sky_rows", "path_noise", "path_contact"],
+        ),
+        (json!({ "tracer": path, "materials": glass }), &["dispersion_paths"]),
+        (json!({ "tracer": path, "camera": physical }), &["band_error"]),
+        (
+            json!({ "tracer": path, "render": { "samples": { "until": "sensor-noise" } } }),
+            &["sample_sigmas", "sample_growth", "sample_floor", "sample_error"],
+        ),
+        (
+            json!({ "tracer": path, "camera": waves }),
+            &["wavefront_error", "defocus_step", "spread_nodes", "fit_places"],
+        ),
+        (
+            json!({ "tracer": path, "camera": bladed_lens(), "tolerance": tolerance }),
+            &[
+                "pupil_margin",
+                "pupil_planar_intervals",
+                "image_circle_error",
+                "band_place_error",
+                "tolerance_rays",
+                "tolerance_samples",
+            ],
+        ),
+        (
+            json!({ "tracer": path, "camera": field }),
+            &["view_psnr", "white_samples", "lenslet_nodes", "lenslet_checks"],
+        ),
+    ];
+    for (more, names) in cases {
+        let idle = idle_in(&loaded(more.clone()).unwrap());
+        for name in names {
+            assert!(!idle.iter().any(|it| it == name), "{name} of {more}");
+        }
+        assert!(idle.iter().any(|name| name == "deformation_error"), "{more}");
+    }
+}
+
+/// The plan says it of those that it lists, too.
+#[test]
+fn a_row_of_the_plan_says_that_its_number_decides_nothing() {
+    let scene = |camera: Value| {
+        loaded(
+            json!({ "accuracy": { "pupil_margin": 0.01 }, "camera": camera, "layers": ["depth"] }),
+        )
+        .unwrap()
+    };
+    let reason = |scene: &Scene| scene.accuracy_decisions()[0].reason.clone();
+    let pinhole = scene(json!({ "type": "pinhole", "pose": pose() }));
+    let (idle, own) = (reason(&pinhole), reason(&scene(bladed_lens())));
+    assert!(
+        idle.ends_with("0.004 by itself; decides nothing here: the camera has no lens"),
+        "{idle}"
+    );
+    assert!(own.ends_with("0.004 by itself"), "{own}");
+}
+
+/// Rays of all bands that go through the lens together share nothing, unless its filters tell them apart.
+#[test]
+fn paths_are_not_shared_where_all_bands_are_one() {
+    let plan = json!({ "dispersion": false, "shared_paths": true });
+    let through =
+        |camera: &Value| loaded(json!({ "accuracy": {}, "camera": camera, "plan": plan }));
+    let mut lens = bladed_lens();
+    for camera in [&lens, &json!({ "type": "pinhole", "pose": pose() })] {
+        let error = through(camera).unwrap_err();
+        assert!(error.contains("plan.shared_paths: contradicts `dispersion` false"), "{error}");
+        assert!(error.ends_with("\nhint: leave one of them out"), "{error}");
+    }
+    let filter = json!({ "type": "filter", "transmission": [[400, 0.1], [700, 0.9]] });
+    lens["lens"]["elements"].as_array_mut().unwrap().push(filter);
+    assert!(through(&lens).is_ok(), "{:?}", through(&lens).err());
 }

@@ -136,6 +136,11 @@ fn a_morph_leaps_and_goes_by_cubics() {
     let settings = [("accuracy.deformation_error".to_owned(), "0.1".to_owned())];
     let model = morphed("CUBICSPLINE", &keys, json!([{"mesh": 0}]));
     let coarse = scene_with(&model, true, 0.5, None, &settings).unwrap();
+    assert!(
+        coarse.notes.iter().all(|note| !note.subject.contains("accuracy")),
+        "{:?}",
+        coarse.notes
+    );
     let coarse = self::steps(&coarse, 0).times().len();
     assert!((fine / 20..fine / 3).contains(&coarse), "{coarse} steps, {fine} before");
 }
