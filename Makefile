@@ -46,7 +46,7 @@ help:
 	@echo "make bench-gaps    what finding the thinnest gap of a million triangles takes; writes a part of docs/measurements/costs.md"
 	@echo "make bench-window  how soon and how often the window shows pictures; writes a part of docs/measurements/costs.md"
 	@echo "make bench-decisions  what decisions of the plan save, each against the fuller model, and what overriding it by hand would"
-	@echo "make generated     schemas, tables of keys and presets, the pages of the command line and of the Python package, as these write them"
+	@echo "make generated     schemas, tables of keys, presets and layers, the pages of the command line and of the Python package, as these write them"
 	@echo "make gallery       render the pictures of docs/guide/gallery.md, and write there what they took"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
 	@echo "make docs-window   screenshots of six states of the window, into docs/images/window"

@@ -17,7 +17,7 @@ use etendue_geometry::glam::Vec3;
 use etendue_geometry::{Bounds, Geometry, HitBatch, Mesh, Moment, RayBatch, Steps, Transform};
 use rayon::prelude::*;
 
-use crate::exact::{Slabs, descend};
+use crate::exact::{NodeBox, Slabs, WaitingNode, descend};
 use crate::nearest::{Nearest, PlacementView, Query, Triangle};
 use crate::parts::{LocalRay, outward};
 use crate::tree::{BinaryNode, LeafSize, MAX_DEPTH, Ref, Tree};
@@ -91,7 +91,7 @@ impl DeformingMesh {
         &self,
         query: &Query,
         moment: Moment,
-        stack: &mut Vec<(u32, f64)>,
+        stack: &mut Vec<WaitingNode>,
         see: &mut impl FnMut(&Triangle) -> Option<f64>,
     ) {
         let all = self.steps.bounds();
@@ -102,7 +102,7 @@ impl DeformingMesh {
         let slabs = Slabs::new(&ray, query.t_min);
         let mut t_max = query.t_max;
         let mesh = &self.geometry.meshes[0];
-        let node = |i: usize| (&self.nodes[i], self.bounds(i, moment));
+        let node = |i: usize| NodeBox { node: &self.nodes[i], bounds: self.bounds(i, moment) };
         let leaf = |range: Range<usize>, t_max: &mut f64| {
             self.triangles[range].iter().all(|&number| {
                 let corner = |corner: u32| self.steps.corner(moment, corner as usize);

@@ -133,7 +133,7 @@ impl Exact {
 
 /// Nodes still to visit with the distance at which the ray enters them, one list a level.
 #[derive(Default)]
-struct ExactStack([Vec<(u32, f64)>; 2]);
+struct ExactStack([Vec<WaitingNode>; 2]);
 
 impl ExactStack {
     fn new() -> Self {
@@ -262,11 +262,11 @@ impl Boxes {
         ray: &LocalRay,
         t_min: f64,
         t_max: &mut f64,
-        stack: &mut Vec<(u32, f64)>,
+        stack: &mut Vec<WaitingNode>,
         see: &mut impl FnMut([u32; 2], &mut f64) -> bool,
     ) {
         let slabs = Slabs::new(ray, t_min);
-        let node = |i: usize| (&self.nodes[i].node, self.nodes[i].bounds);
+        let node = |i: usize| NodeBox { node: &self.nodes[i].node, bounds: self.nodes[i].bounds };
         let leaf = |range: Range<usize>, t_max: &mut f64| {
             self.items[range].iter().all(|&item| see(item, t_max))
         };
@@ -276,24 +276,38 @@ impl Boxes {
     }
 }
 
+/// A node of a tree with its box.
+pub(crate) struct NodeBox<'t> {
+    pub(crate) node: &'t BinaryNode,
+    pub(crate) bounds: Bounds,
+}
+
+/// A node that is still to be looked at, and the distance at which the ray enters its box.
+#[derive(Clone, Copy)]
+pub(crate) struct WaitingNode {
+    number: u32,
+    near: f64,
+}
+
 /// Goes down a tree from its root, nearer children first: shows all leaves whose box the ray meets up to `t_max`, which
 /// `leaf` may lower, until `leaf` answers `false`.
 #[inline(always)]
 pub(crate) fn descend<'t>(
     slabs: &Slabs,
     t_max: &mut f64,
-    stack: &mut Vec<(u32, f64)>,
-    node: impl Fn(usize) -> (&'t BinaryNode, Bounds),
+    stack: &mut Vec<WaitingNode>,
+    node: impl Fn(usize) -> NodeBox<'t>,
     mut leaf: impl FnMut(Range<usize>, &mut f64) -> bool,
 ) {
     stack.clear();
-    stack.extend(slabs.enter(node(0).1, *t_max).map(|near| (0, near)));
-    while let Some((i, near)) = stack.pop() {
+    let near = slabs.enter(node(0).bounds, *t_max);
+    stack.extend(near.map(|near| WaitingNode { number: 0, near }));
+    while let Some(WaitingNode { number, near }) = stack.pop() {
         if near > *t_max {
             continue;
         }
-        let i = i as usize;
-        let (own, _) = node(i);
+        let i = number as usize;
+        let own = node(i).node;
         if let Some(range) = own.leaf() {
             if !leaf(range, t_max) {
                 return;
@@ -301,11 +315,11 @@ pub(crate) fn descend<'t>(
             continue;
         }
         let [a, b] = [i + 1, i + own.right()].map(|child| {
-            let near = slabs.enter(node(child).1, *t_max);
+            let near = slabs.enter(node(child).bounds, *t_max);
             #[expect(clippy::cast_possible_truncation, reason = "nodes are numbered in u32")]
-            near.map(|near| (child as u32, near))
+            near.map(|near| WaitingNode { number: child as u32, near })
         });
-        let a_first = matches!((a, b), (Some(a), Some(b)) if a.1 < b.1);
+        let a_first = matches!((a, b), (Some(a), Some(b)) if a.near < b.near);
         let (far, close) = if a_first { (b, a) } else { (a, b) };
         stack.extend(far);
         stack.extend(close);

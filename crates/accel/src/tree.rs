@@ -106,6 +106,12 @@ struct BuildTask<'a> {
     watch: &'a BuildWatch<'a>,
 }
 
+/// The nodes that a thread grows, and its bins.
+struct GrownNodes {
+    nodes: Vec<BinaryNode>,
+    bins: Bins,
+}
+
 impl BuildTask<'_> {
     /// The subtree over `refs`, which begin at `first` in the whole.
     fn grow(
@@ -117,11 +123,11 @@ impl BuildTask<'_> {
         extent: RefBounds,
     ) -> Result<BuiltSubtree, BuildError> {
         if refs.len() < PARALLEL_NODE {
-            let mut nodes = Vec::with_capacity(refs.len());
-            let mut bins = Bins::EMPTY;
-            self.grow_alone(refs, first, depth, extent, &mut (&mut nodes, &mut bins));
+            let nodes = Vec::with_capacity(refs.len());
+            let mut grown = GrownNodes { nodes, bins: Bins::EMPTY };
+            self.grow_alone(refs, first, depth, extent, &mut grown);
             self.watch.advance(refs.len() as u64)?;
-            return Ok(BuiltSubtree::Nodes(nodes));
+            return Ok(BuiltSubtree::Nodes(grown.nodes));
         }
         let mut bins = Bins::EMPTY;
         let sides = self.divide(refs, spare, depth, &extent, &mut bins);
@@ -143,9 +149,9 @@ impl BuildTask<'_> {
         first: usize,
         depth: usize,
         extent: RefBounds,
-        work: &mut (&mut Vec<BinaryNode>, &mut Bins),
+        grown: &mut GrownNodes,
     ) {
-        let (nodes, bins) = work;
+        let GrownNodes { nodes, bins } = grown;
         let sides = match self.divide(refs, &mut [], depth, &extent, bins) {
             None if refs.len() <= self.leaf.most => {
                 nodes.push(extent.node(index(first), index(refs.len())));
@@ -158,9 +164,9 @@ impl BuildTask<'_> {
         nodes.push(extent.node(0, 0));
         let [left, right] = sides;
         let (a, b) = refs.split_at_mut(left.len);
-        self.grow_alone(a, first, depth + 1, left.extent, work);
-        work.0[at].link = index(work.0.len() - at);
-        self.grow_alone(b, first + left.len, depth + 1, right.extent, work);
+        self.grow_alone(a, first, depth + 1, left.extent, grown);
+        grown.nodes[at].link = index(grown.nodes.len() - at);
+        self.grow_alone(b, first + left.len, depth + 1, right.extent, grown);
     }
 
     /// Splits by the surface-area heuristic and moves `refs` accordingly. `None` when a leaf is

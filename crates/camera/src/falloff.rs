@@ -31,6 +31,15 @@ impl Default for FalloffSpec {
     }
 }
 
+/// A place of a picture (column and row, pixels from the corner) with its light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LitPlace {
+    /// The place.
+    pub at: [f64; 2],
+    /// Its light.
+    pub light: f64,
+}
+
 impl FalloffSpec {
     /// The relative light at a square of the distance; 0 where the polynomial is below.
     #[must_use]
@@ -39,18 +48,17 @@ impl FalloffSpec {
         (axis * (1.0 + square * (a1 + square * (a2 + square * a3)))).max(0.0)
     }
 
-    /// That of places of a pinhole's picture (column and row, pixels from the corner) with their light, by least
-    /// squares; `None` of places that do not tell it.
+    /// That of places of a pinhole's picture, by least squares; `None` of places that do not tell it.
     #[must_use]
-    pub fn fitted(k: &Intrinsics, lit: &[([f64; 2], f64)]) -> Option<Self> {
+    pub fn fitted(k: &Intrinsics, lit: &[LitPlace]) -> Option<Self> {
         // In the largest square, so that all columns of the equations are of about 1.
-        let most = lit.iter().map(|(place, _)| square_of(k, *place)).fold(0.0, f64::max);
+        let most = lit.iter().map(|place| square_of(k, place.at)).fold(0.0, f64::max);
         if !(most > 0.0 && most.is_finite()) {
             return None;
         }
         let mut equations = [[0.0; 5]; 4];
-        for (place, light) in lit {
-            let u = square_of(k, *place) / most;
+        for LitPlace { at, light } in lit {
+            let u = square_of(k, *at) / most;
             let row = [1.0, u, u * u, u * u * u, *light];
             for (i, sums) in equations.iter_mut().enumerate() {
                 sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += row[i] * value);
@@ -124,7 +132,8 @@ mod tests {
         let k = pinhole.intrinsics();
         let wanted = FalloffSpec { axis: 0.9, a1: -1.3, a2: 0.8, a3: -0.1 };
         let place = |i: u32| [f64::from(i % 8) * 60.0 / 7.0, f64::from(i / 8) * 40.0 / 7.0];
-        let lit: Vec<_> = (0..64).map(|i| (place(i), wanted.at(square_of(&k, place(i))))).collect();
+        let lit = |at| LitPlace { at, light: wanted.at(square_of(&k, at)) };
+        let lit: Vec<LitPlace> = (0..64).map(|i| lit(place(i))).collect();
         let found = FalloffSpec::fitted(&k, &lit).unwrap();
         // Four numbers of 64 places in f64, whose equations are conditioned to some 10⁵.
         for (found, wanted) in [

@@ -35,7 +35,7 @@ pub use camera::{Camera, PixelExtent, Projection};
 pub use camera_file::{CameraFile, ProjectionName};
 pub use camera_spec::CameraSpec;
 pub use distortion::{Distortion, DistortionSpec};
-pub use falloff::FalloffSpec;
+pub use falloff::{FalloffSpec, LitPlace};
 pub use framing::{Subject, SupportFunction, Viewpoint};
 pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin, SensorSpec};
 pub use lens::{
@@ -47,7 +47,7 @@ pub use motion::{CameraMotionSpec, CameraTime, Kinematics, MotionAxes, Trajector
 pub use opencv_fit::OpencvFit;
 pub use pinhole::{Orthographic, OrthographicSpec, Pinhole, PinholeSpec};
 pub use pose::{Convention, Maps, Pose, PoseSpec};
-pub use sampler::{PixelSamples, SampleKeys, Sampler, squares_of_pair};
+pub use sampler::{PixelSample, PixelSamples, SampleKeys, Sampler, squares_of_pair};
 pub use samples::{CameraRays, FilmSamples, PixelBlock};
 pub use shutter::{Readout, Shutter, ShutterKind, ShutterSpec, TruthAt};
 

@@ -3,6 +3,8 @@
 //! A point depends on (seed, pixel, sample, dimension) alone, so any thread may work it out, in any
 //! order, and a resumed render goes on where it stopped.
 
+use std::ops::Range;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -71,7 +73,21 @@ impl Sampler {
     }
 }
 
+/// One of the samples of a pixel.
+#[derive(Debug, Clone, Copy)]
+pub struct PixelSample {
+    /// The samples of its pixel.
+    pub pixel: PixelSamples,
+    /// Its number among them.
+    pub index: u32,
+}
+
 impl PixelSamples {
+    /// The samples of these numbers.
+    pub fn samples(self, numbers: Range<u32>) -> impl Iterator<Item = PixelSample> + Clone {
+        numbers.map(move |index| PixelSample { pixel: self, index })
+    }
+
     /// Sample `index` in the square 0..1, for the `pair`-th pair of dimensions (0: place in the
     /// pixel, 1: place in the pupil). Numbers are multiples of 2⁻⁵³, with every sampler: what a choice
     /// among 2²⁴ leaves of one is still a number.
@@ -148,17 +164,16 @@ impl PixelSamples {
     }
 }
 
-/// [`PixelSamples::square`] of one pair of dimensions for each of `samples`, which are a pixel's
-/// samples and an index, in one go: `out` is refilled.
+/// [`PixelSamples::square`] of one pair of dimensions for each of `samples` in one go: `out` is refilled.
 pub fn squares_of_pair(
-    samples: impl Iterator<Item = (PixelSamples, u32)> + Clone,
+    samples: impl Iterator<Item = PixelSample> + Clone,
     pair: u32,
     out: &mut Vec<[f64; 2]>,
 ) {
     out.clear();
     let SobolKeys { keys, half, is_sobol } = SobolKeys::of(samples.clone(), pair);
     if !is_sobol {
-        out.extend(samples.map(|(pixel, index)| pixel.square(index, pair)));
+        out.extend(samples.map(|sample| sample.pixel.square(sample.index, pair)));
         return;
     }
     out.resize(keys.len(), [0.0; 2]);
@@ -171,16 +186,17 @@ pub struct SampleKeys {
     /// Those of the first pair, where all are of [`Sampler::Sobol`].
     keys: Vec<SobolKey>,
     /// The samples, where they are not.
-    samples: Vec<(PixelSamples, u32)>,
+    samples: Vec<PixelSample>,
 }
 
 impl SampleKeys {
-    /// Makes them those of `samples`, which are a pixel's samples and an index.
-    pub fn refill(&mut self, samples: impl Iterator<Item = (PixelSamples, u32)> + Clone) {
+    /// Makes them those of `samples`.
+    pub fn refill(&mut self, samples: impl Iterator<Item = PixelSample> + Clone) {
         self.keys.clear();
         self.samples.clear();
-        if samples.clone().all(|(pixel, _)| pixel.sampler == Sampler::Sobol) {
-            self.keys.extend(samples.map(|(pixel, index)| pixel.key_of_set(index, 0)));
+        if samples.clone().all(|sample| sample.pixel.sampler == Sampler::Sobol) {
+            let key = |PixelSample { pixel, index }: PixelSample| pixel.key_of_set(index, 0);
+            self.keys.extend(samples.map(key));
         } else {
             self.samples.extend(samples);
         }
@@ -250,11 +266,11 @@ struct SobolKeys {
 }
 
 impl SobolKeys {
-    fn of(samples: impl Iterator<Item = (PixelSamples, u32)>, pair: u32) -> Self {
+    fn of(samples: impl Iterator<Item = PixelSample>, pair: u32) -> Self {
         let keys = Vec::with_capacity(samples.size_hint().0);
         let mut all = Self { keys, half: Half::First, is_sobol: true };
         let mut sequence = Sequence::default();
-        for (pixel, index) in samples {
+        for PixelSample { pixel, index } in samples {
             all.is_sobol &= pixel.sampler.is_sobol();
             let (key, half) = pixel.sobol_key(index, pair, &mut sequence);
             all.keys.push(key);
@@ -401,7 +417,7 @@ mod tests {
     fn many_at_once_are_those_one_by_one() {
         for sampler in ALL {
             let pixel = |i: u32| sampler.pixel(5, i % 7, i / 7, 80_000);
-            let samples = (0..200).map(|i| (pixel(i), i * 381));
+            let samples = (0..200).map(|i| PixelSample { pixel: pixel(i), index: i * 381 });
             let [mut out, mut own] = [Vec::new(), Vec::new()];
             let mut floats = [Vec::new(), Vec::new()];
             let mut keys = SampleKeys::default();
@@ -409,7 +425,7 @@ mod tests {
             let picked: Vec<u32> = (0..200).rev().step_by(3).collect();
             for pair in [0, 1, 3, 200] {
                 squares_of_pair(samples.clone(), pair, &mut out);
-                let one_by_one = samples.clone().map(|(pixel, i)| pixel.square(i, pair));
+                let one_by_one = samples.clone().map(|of| of.pixel.square(of.index, pair));
                 assert_eq!(out, one_by_one.collect::<Vec<_>>(), "{sampler:?} pair {pair}");
                 keys.squares_of_all(pair, &mut own);
                 assert_eq!(out, own, "{sampler:?} pair {pair}");

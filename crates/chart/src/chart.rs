@@ -7,7 +7,7 @@ use crate::axis::{Axis, AxisScale, front};
 use crate::canvas::{
     COLOURS, Stroke, TextAnchor, Theme, dashed, document, line, path, rounded, straight, text,
 };
-use crate::names::{self, LINE, LabelArea, Obstacle};
+use crate::names::{self, LINE, LabelArea, Obstacle, PointName};
 
 /// The colour of what is no contestant: limits and models.
 pub const GREY: usize = 7;
@@ -204,10 +204,11 @@ impl Drawing<'_> {
         Some([self.x.at(x)?, self.y.at(y)?])
     }
 
-    /// The points of a series that can be seen.
-    fn places(&self, series: usize) -> Vec<([f64; 2], Mark)> {
+    /// The points of a series that can be seen, by their places in the drawing.
+    fn places(&self, series: usize) -> Vec<Point> {
         let points = self.chart.series[series].points.iter();
-        points.filter_map(|point| Some((self.place(point.at)?, point.mark))).collect()
+        let placed = |&Point { at, mark }: &Point| Some(Point { at: self.place(at)?, mark });
+        points.filter_map(placed).collect()
     }
 
     fn heading(&self, group: &mut Group) {
@@ -292,10 +293,10 @@ impl Drawing<'_> {
             let colour = series.colour % COLOURS;
             let places = self.places(i);
             if series.joined && places.len() > 1 {
-                let line: Vec<[f64; 2]> = places.iter().map(|(place, _)| *place).collect();
+                let line: Vec<[f64; 2]> = places.iter().map(|point| point.at).collect();
                 path(group, &line, &format!("s{colour}"), series.stroke);
             }
-            for (place, mark) in places {
+            for Point { at: place, mark } in places {
                 let (radius, class) = match mark {
                     Mark::Disk => (4.5, format!("f{colour}")),
                     Mark::Ring => (4.0, format!("ring s{colour}")),
@@ -319,8 +320,8 @@ impl Drawing<'_> {
         let mut named = Vec::new();
         for (i, series) in self.chart.series.iter().enumerate() {
             let places = self.places(i);
-            for (place, _) in &places {
-                obstacles.push(Obstacle { area: LabelArea::square_at(*place, 5.0), weight: 3.0 });
+            for point in &places {
+                obstacles.push(Obstacle { area: LabelArea::square_at(point.at, 5.0), weight: 3.0 });
             }
             if series.joined {
                 along(&places, &mut obstacles);
@@ -329,9 +330,10 @@ impl Drawing<'_> {
                 continue;
             }
             // Beside a disk where there is one.
-            let has_disk = places.iter().any(|(_, mark)| *mark == Mark::Disk);
-            let fit = places.iter().filter(|(_, mark)| !has_disk || *mark == Mark::Disk);
-            names.push((series.name.as_str(), fit.map(|(place, _)| *place).collect()));
+            let has_disk = places.iter().any(|point| point.mark == Mark::Disk);
+            let fit = places.iter().filter(|point| !has_disk || point.mark == Mark::Disk);
+            let points = fit.map(|point| point.at).collect();
+            names.push(PointName { name: &series.name, points });
             named.push(series);
         }
         if let (Some(_), Some(name)) = (self.y.zero(), &self.chart.axes[1].zero) {
@@ -341,7 +343,7 @@ impl Drawing<'_> {
             obstacles.push(Obstacle { area, weight: 20.0 });
         }
         let placed = names::place(&names, &obstacles, &self.frame);
-        for ((series, (name, _)), placed) in named.iter().zip(&names).zip(placed) {
+        for ((series, PointName { name, .. }), placed) in named.iter().zip(&names).zip(placed) {
             let Some(placed) = placed else { continue };
             let colour = series.colour % COLOURS;
             if let Some([from, to]) = placed.leader {
@@ -363,9 +365,9 @@ impl Drawing<'_> {
 }
 
 /// Keeps names away from the line through `places`.
-fn along(places: &[([f64; 2], Mark)], obstacles: &mut Vec<Obstacle>) {
+fn along(places: &[Point], obstacles: &mut Vec<Obstacle>) {
     for pair in places.windows(2) {
-        let [(from, _), (to, _)] = [pair[0], pair[1]];
+        let [from, to] = [pair[0].at, pair[1].at];
         let length = (to[0] - from[0]).hypot(to[1] - from[1]);
         let mut done = 0.0;
         while done < length {

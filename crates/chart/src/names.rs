@@ -43,6 +43,13 @@ pub(crate) struct Obstacle {
     pub(crate) weight: f64,
 }
 
+/// A name, and the points that it may stand beside.
+#[derive(Debug, Clone)]
+pub(crate) struct PointName<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) points: Vec<[f64; 2]>,
+}
+
 /// A name that has found its place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PlacedName {
@@ -67,15 +74,15 @@ const NEAR: f64 = 13.0;
 /// A name on another name is worse than anything else.
 const ON_A_NAME: f64 = 1e6;
 
-/// Places each of `names`, which may stand beside any of its points, inside `page`.
+/// Places each of `names` beside one of its points, inside `page`.
 pub(crate) fn place(
-    names: &[(&str, Vec<[f64; 2]>)],
+    names: &[PointName<'_>],
     obstacles: &[Obstacle],
     page: &LabelArea,
 ) -> Vec<Option<PlacedName>> {
     let mut taken: Vec<LabelArea> = Vec::new();
     let mut places = Vec::new();
-    for (name, points) in names {
+    for PointName { name, points } in names {
         let width = LETTER * name.chars().count() as f64 + 4.0;
         let candidates = points.iter().flat_map(|&point| {
             REACHES.iter().flat_map(move |&reach| places_near(point, reach, width))
@@ -126,8 +133,8 @@ mod tests {
         let page = LabelArea { left: 0.0, top: 0.0, right: 700.0, bottom: 400.0 };
         // Twelve points within a few pixels.
         let at = |i: u32| [350.0 + f64::from(i % 4), 200.0 + f64::from(i / 4)];
-        let names: Vec<(&str, Vec<[f64; 2]>)> =
-            (0..12).map(|i| ("embree robust + f64", vec![at(i)])).collect();
+        let name = |i| PointName { name: "embree robust + f64", points: vec![at(i)] };
+        let names: Vec<PointName<'_>> = (0..12).map(name).collect();
         let obstacles: Vec<Obstacle> = (0..12)
             .map(|i| Obstacle { area: LabelArea::square_at(at(i), 4.0), weight: 2.0 })
             .collect();

@@ -8,8 +8,9 @@ use std::path::PathBuf;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use etendue::{Shard, ShardBy};
+use etendue::{Setting, Shard, ShardBy};
 
+pub(crate) use parse::Sweep;
 pub(crate) use scene::SceneArguments;
 pub(crate) use tools::{
     BenchArguments, CalibrateArguments, EdgeArguments, ExposeArguments, LensArguments,
@@ -295,7 +296,7 @@ pub(crate) struct ViewArguments {
         value_parser = parse::setting,
         help = "Set any value of the scene, e.g. camera.fov=30 or objects[0].transform.scale=2"
     )]
-    pub(crate) settings: Vec<(String, String)>,
+    pub(crate) settings: Vec<Setting>,
     /// Let the scene name files outside its own folder
     #[arg(long)]
     pub(crate) allow_outside: bool,
@@ -359,7 +360,7 @@ pub(crate) struct SensorArguments {
         value_parser = parse::setting,
         help = "Set any value of the file, e.g. read_noise=3, or camera.sensor.read_noise=3 of a scene"
     )]
-    pub(crate) settings: Vec<(String, String)>,
+    pub(crate) settings: Vec<Setting>,
     /// Let a scene name a camera file outside its own folder
     #[arg(long, requires = "sensor")]
     pub(crate) allow_outside: bool,

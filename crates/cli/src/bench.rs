@@ -5,7 +5,7 @@ mod target;
 use std::io::Write;
 use std::path::PathBuf;
 
-use etendue::{Options, Session, places};
+use etendue::{Options, Session, Setting, places};
 use etendue_accel::{Accel, BuildOptions, Quality};
 use etendue_bench::accelerators::{self, Method};
 use etendue_bench::findings::Findings;
@@ -171,7 +171,7 @@ fn with_picture(
         &arguments.overrides(),
     )?;
     if file.spec.tracer.is_none() {
-        arguments.settings.push(("tracer".to_owned(), r#"{"type": "facing"}"#.to_owned()));
+        arguments.settings.push(Setting::new("tracer", r#"{"type": "facing"}"#));
         notes.push("the scene names no `tracer`; its pictures are of `facing`".to_owned());
     }
     Ok(arguments)

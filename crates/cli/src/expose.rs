@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use etendue::{ExposeOptions, ExposedImage, LightImage, Outputs, places, write_frames};
+use etendue::{ExposeOptions, ExposedFrame, LightImage, Outputs, places, write_frames};
 use etendue_files::{Opener, Reach};
 use etendue_scene::file::SensorFile;
 
@@ -12,6 +12,12 @@ use crate::fault::{Fault, print_text};
 use crate::progress::{Phases, say};
 use crate::stop;
 
+/// A picture to expose, with the number of its frame where there are several.
+struct FrameImage {
+    number: Option<u32>,
+    path: PathBuf,
+}
+
 pub(crate) fn run(arguments: &ExposeArguments) -> Result<(), Fault> {
     stop::listen(say);
     let outputs = sensor_outputs(&arguments.outputs)?;
@@ -19,13 +25,13 @@ pub(crate) fn run(arguments: &ExposeArguments) -> Result<(), Fault> {
     let opener = Opener::new(reach);
     let sensor = SensorFile::named(&opener, Path::new(&arguments.sensor), &arguments.settings)?;
     opener.record(Path::new(&arguments.sensor).exists().then(|| (&arguments.sensor).into()));
-    // Each with the number of its frame, where there are several.
-    let images: Vec<(Option<u32>, PathBuf)> = match arguments.image.is_dir() {
-        false => vec![(None, arguments.image.clone())],
+    let images: Vec<FrameImage> = match arguments.image.is_dir() {
+        false => vec![FrameImage { number: None, path: arguments.image.clone() }],
         true => {
             let found = LightImage::in_folder(&arguments.image)?;
             let many = found.len() > 1;
-            found.into_iter().map(|(number, path)| (many.then_some(number), path)).collect()
+            let image = |(number, path)| FrameImage { number: many.then_some(number), path };
+            found.into_iter().map(image).collect()
         }
     };
     keep_apart(&opener, &images, &sensor, &arguments.output)?;
@@ -34,19 +40,23 @@ pub(crate) fn run(arguments: &ExposeArguments) -> Result<(), Fault> {
         stop::made(&arguments.output);
     }
     let mut metered = None;
-    let open = |(frame, path): &(Option<u32>, PathBuf)| -> Result<_, etendue::Error> {
-        let image =
-            LightImage::open(path, arguments.wavelengths.as_deref(), arguments.memory_limit)?;
+    let open = |frame: &FrameImage| -> Result<_, etendue::Error> {
+        let number = frame.number;
+        let image = LightImage::open(
+            &frame.path,
+            arguments.wavelengths.as_deref(),
+            arguments.memory_limit,
+        )?;
         let options = ExposeOptions {
             unit: arguments.unit,
             f_number: arguments.f_number,
             magnification: arguments.magnification,
             seed: arguments.seed,
-            frame: frame.unwrap_or(0),
+            frame: number.unwrap_or(0),
             memory: arguments.memory_limit,
         };
-        let exposed = image.on(&sensor, &options)?.in_sequence(&mut metered);
-        Ok((*frame, exposed)) as Result<(Option<u32>, ExposedImage), _>
+        let image = image.on(&sensor, &options)?.in_sequence(&mut metered);
+        Ok(ExposedFrame { number, image })
     };
     let progress = Phases::new(arguments.quiet).progress(!arguments.quiet);
     let (mut done, of) = (0, images.len());
@@ -87,17 +97,17 @@ pub(crate) fn sensor_outputs(names: &str) -> Result<Outputs, Fault> {
 /// Refuses a folder in which a result would take the place of a picture or of the sensor's file.
 fn keep_apart(
     opener: &Opener,
-    images: &[(Option<u32>, PathBuf)],
+    images: &[FrameImage],
     sensor: &SensorFile,
     output: &Path,
 ) -> Result<(), Fault> {
     let mut inputs = opener.found();
-    inputs.extend(images.iter().map(|(_, path)| path.clone()));
+    inputs.extend(images.iter().map(|image| image.path.clone()));
     let names = etendue_render::expose::files_of(&sensor.sensor);
     let pattern = etendue::FramePattern::default();
-    let folders = images.iter().map(|(frame, _)| match frame {
+    let folders = images.iter().map(|image| match image.number {
         None => output.to_owned(),
-        Some(number) => output.join(pattern.folder(*number as usize)),
+        Some(number) => output.join(pattern.folder(number as usize)),
     });
     let results: Vec<PathBuf> =
         folders.flat_map(|folder| names.iter().map(move |name| folder.join(name))).collect();

@@ -10,7 +10,7 @@ use etendue::{
 };
 use etendue_chart::{Axis, Chart, Series, Theme};
 use etendue_files::{Reach, Transaction};
-use etendue_render::output::{npy, png, sidecar};
+use etendue_render::output::{HeaderEntry, npy, png, sidecar};
 use etendue_report::{Cell, Table};
 use etendue_sensor::matching::{Estimate, Matched};
 use serde::Serialize;
@@ -130,7 +130,7 @@ fn write(
     let picture = |values: Vec<f32>, look: Look| {
         let channels = vec![Channel { name: "Y".to_owned(), values: Values::F32(values) }];
         let meaning = [("definition", "residuals over their standard deviations"), ("unit", "1")];
-        let meaning = meaning.map(|(key, text)| (key.to_owned(), text.to_owned())).into();
+        let meaning = meaning.map(|(key, text)| HeaderEntry::new(key, text)).into();
         let layer = Layer { name: "Residuals".to_owned(), look, channels, meaning };
         Picture::new(width, height, vec![layer], Vec::new())
             .map_err(|error| Fault::failed(error.to_string()))

@@ -11,7 +11,9 @@ use etendue_optics::analysis::{
     Wavefront,
 };
 use etendue_optics::train::{Focus, LensReport};
-use etendue_render::output::{Channel, Layer, Look, Picture, Values, exr, npy, sidecar};
+use etendue_render::output::{
+    Channel, HeaderEntry, Layer, Look, Picture, Values, exr, npy, sidecar,
+};
 use etendue_scene::file::ReadLens;
 use serde::Serialize;
 
@@ -243,7 +245,7 @@ fn by_huygens(
         ));
     }
     let plane = |point: &PointField| {
-        let spread = PointSpread::by_huygens(&[(&point.pupil, &point.sphere, 1.0)], side, pitch);
+        let spread = PointSpread::by_huygens(&point.pupil, &point.sphere, side, pitch);
         let rows = spread.values.chunks(side).rev();
         rows.flatten().map(|value| (value * pitch * pitch) as f32).collect()
     };
@@ -299,7 +301,7 @@ fn files(
                     ("field", format!("{} degrees", meaning.fields[field])),
                     ("pitch", format!("{} um", meaning.pitch)),
                 ];
-                let about = about.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
+                let about = about.map(|(key, text)| HeaderEntry::new(key, text)).into();
                 layers.push(Layer {
                     name,
                     look: Look::Cube,

@@ -66,8 +66,15 @@ struct PictureSoFar {
     /// does, and so does that of a run that was killed.
     place: Option<(PathBuf, Temporary)>,
     start: Instant,
-    /// Time that it took to write it last, and when that was done.
-    shown: Mutex<Option<(Duration, Instant)>>,
+    /// The last time that it was written.
+    shown: Mutex<Option<LastLook>>,
+}
+
+/// Time that it took to write the picture so far, and when that was done.
+#[derive(Clone, Copy)]
+struct LastLook {
+    took: Duration,
+    when: Instant,
 }
 
 /// File of what there is of a render, to go on from.
@@ -95,12 +102,12 @@ impl PictureSoFar {
     }
 
     /// True if a picture of so many pixels is worth its writing now.
-    fn is_due(&self, last: Option<(Duration, Instant)>, share: f64) -> bool {
+    fn is_due(&self, last: Option<LastLook>, share: f64) -> bool {
         let left = self.start.elapsed().as_secs_f64() * (1.0 / share.max(1e-9) - 1.0);
         match last {
             // Not for renders that are done before anybody has opened it.
             None => left > 2.0,
-            Some((took, when)) => {
+            Some(LastLook { took, when }) => {
                 left > 2.0 && took.as_secs_f64() < SHARE_OF_LOOKS * when.elapsed().as_secs_f64()
             }
         }
@@ -119,6 +126,6 @@ impl PictureSoFar {
         if let Ok(picture) = so_far.picture() {
             let _ = png::write(&self.to, place, &picture, "", png::Bits::Eight);
         }
-        *shown = Some((start.elapsed(), Instant::now()));
+        *shown = Some(LastLook { took: start.elapsed(), when: Instant::now() });
     }
 }

@@ -26,17 +26,17 @@ pub(crate) fn run(arguments: &SpectrumArguments) -> Result<(), Fault> {
     let lit = match &arguments.under {
         Some(word) => {
             let lamp = lamp(word)?;
-            let lit = curves.iter().map(|(name, curve)| {
+            let lit = curves.iter().map(|NamedCurve { name, curve }| {
                 // The reflectance goes on beyond its ends as it is there.
                 let [from, to] = lamp.range();
                 let curve = times(&lamp, &curve.held_over(from, to));
-                (name.clone(), curve)
+                NamedCurve { name: name.clone(), curve }
             });
             lit.collect()
         }
         None => curves.clone(),
     };
-    let found: Vec<Row> = lit.iter().map(|(name, curve)| Row::new(name, curve)).collect();
+    let found: Vec<Row> = lit.iter().map(|own| Row::new(&own.name, &own.curve)).collect();
     if let Some(folder) = &arguments.output {
         let path = folder.join(DRAWING);
         let input = PathBuf::from(&arguments.spectrum);
@@ -55,12 +55,25 @@ pub(crate) fn run(arguments: &SpectrumArguments) -> Result<(), Fault> {
     print_text(&Table::of_rows(rows).to_string())
 }
 
+/// A curve with its name.
+#[derive(Debug, Clone)]
+struct NamedCurve {
+    name: String,
+    curve: Curve,
+}
+
+impl NamedCurve {
+    fn new(name: &str, curve: Curve) -> Self {
+        Self { name: name.to_owned(), curve }
+    }
+}
+
 /// The curves of a file by their names, or that of a lamp.
-fn curves(arguments: &SpectrumArguments) -> Result<Vec<(String, Curve)>, Fault> {
+fn curves(arguments: &SpectrumArguments) -> Result<Vec<NamedCurve>, Fault> {
     let name = &arguments.spectrum;
     let path = Path::new(name);
     if !path.exists() && path.extension().is_none() {
-        return Ok(vec![(name.clone(), lamp(name)?)]);
+        return Ok(vec![NamedCurve::new(name, lamp(name)?)]);
     }
     let refused = |why: String| Fault::refused(format!("{name}: {why}"));
     let bytes = etendue_files::read(path, LONGEST).map_err(|error| refused(error.to_string()))?;
@@ -68,7 +81,7 @@ fn curves(arguments: &SpectrumArguments) -> Result<Vec<(String, Curve)>, Fault> 
     let is_yml = path.extension().is_some_and(|ending| ending == "yml" || ending == "yaml");
     if is_yml {
         let [n, k] = table::refractive_index_info(&text).map_err(refused)?;
-        return Ok(vec![("n".to_owned(), n), ("k".to_owned(), k)]);
+        return Ok(vec![NamedCurve::new("n", n), NamedCurve::new("k", k)]);
     }
     let table = table::CurveTable::read(&text).map_err(refused)?;
     let curve = |column: Column| table.column(Some(&column)).map_err(refused);
@@ -78,13 +91,13 @@ fn curves(arguments: &SpectrumArguments) -> Result<Vec<(String, Curve)>, Fault> 
                 Ok(number) => Column::Number(number),
                 Err(_) => Column::Name(word.clone()),
             };
-            Ok(vec![(word.clone(), curve(column)?)])
+            Ok(vec![NamedCurve::new(word, curve(column)?)])
         }
         None => table
             .titles()
             .into_iter()
             .zip(1..)
-            .map(|(title, number)| Ok((title, curve(Column::Number(number))?)))
+            .map(|(name, number)| Ok(NamedCurve { name, curve: curve(Column::Number(number))? }))
             .collect(),
     }
 }
@@ -189,9 +202,9 @@ impl Row {
 }
 
 /// The curves as a chart.
-fn drawing(title: &str, curves: &[(String, Curve)]) -> String {
+fn drawing(title: &str, curves: &[NamedCurve]) -> String {
     let name = Path::new(title).file_name().unwrap_or_default().to_string_lossy();
-    let series = curves.iter().enumerate().map(|(number, (name, curve))| {
+    let series = curves.iter().enumerate().map(|(number, NamedCurve { name, curve })| {
         let points: Vec<[f64; 2]> = match curve.as_flat() {
             Some(value) => vec![[380.0, value], [780.0, value]],
             None => curve.samples().to_vec(),

@@ -74,7 +74,7 @@ impl ExposedImage {
         outputs: Outputs,
         progress: &Progress,
     ) -> Result<WrittenFiles, Error> {
-        let one = std::iter::once(Ok((None, self.clone())));
+        let one = std::iter::once(Ok(ExposedFrame { number: None, image: self.clone() }));
         write_frames(one, folder, outputs, progress, &mut |_, _| ())
     }
 
@@ -88,10 +88,19 @@ impl ExposedImage {
         let names = expose::files_of(self.light.sensor()).into_iter().chain([MANIFEST.to_owned()]);
         let results: Vec<PathBuf> = names.map(|name| folder.join(name)).collect();
         places::keep_apart(&self.inputs, &results)?;
-        let exposed = expose::write(&self.light, (to, folder), outputs, goes_on)?;
+        let exposed = expose::write(&self.light, to, folder, outputs, goes_on)?;
         let notes = self.notes.iter().cloned().chain(exposed.notes).collect();
         Ok(WrittenFiles { files: exposed.files, notes, time: Duration::ZERO })
     }
+}
+
+/// An exposed picture with the number of its frame, if it has one.
+#[derive(Debug, Clone)]
+pub struct ExposedFrame {
+    /// The number.
+    pub number: Option<u32>,
+    /// The picture.
+    pub image: ExposedImage,
 }
 
 /// Writes exposed pictures, each read when its turn comes, into `folder`: those with a number of a frame into
@@ -102,7 +111,7 @@ impl ExposedImage {
 ///
 /// Those of the pictures, and of [`ExposedImage::write`]; then nothing is written.
 pub fn write_frames(
-    images: impl Iterator<Item = Result<(Option<u32>, ExposedImage), Error>>,
+    images: impl Iterator<Item = Result<ExposedFrame, Error>>,
     folder: &Path,
     outputs: Outputs,
     progress: &Progress,
@@ -117,7 +126,7 @@ pub fn write_frames(
         let mut all = WrittenFiles::default();
         let mut begun = Instant::now();
         for (done, image) in images.enumerate() {
-            let (frame, image) = image?;
+            let ExposedFrame { number: frame, image } = image?;
             let own = match frame {
                 None => folder.to_owned(),
                 Some(number) => {

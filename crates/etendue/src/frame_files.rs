@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use etendue_files::{MANIFEST, Transaction, WriteError, remove_empty_folders};
-use etendue_render::output::{Outputs, sidecar};
+use etendue_render::output::{HeaderEntry, Outputs, sidecar};
 
 use crate::records::{
     RECORD, Record, frame_numbers, is_rendered, numbered, read_record, record_of, remove_recorded,
@@ -93,7 +93,7 @@ impl FramePattern {
         &self,
         out: &Path,
         number: usize,
-        fingerprints: &[(String, String)],
+        fingerprints: &[HeaderEntry],
         files: &[String],
     ) -> bool {
         match &self.folder {

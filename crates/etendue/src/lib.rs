@@ -59,14 +59,14 @@ pub use etendue_optics::analysis::fans::FanRay;
 pub use etendue_render::expose::{KNOWN_UNITS, LightUnit, PixelLight};
 pub use etendue_render::light_field::LightFieldViews;
 pub use etendue_render::output::{
-    Channel, DistanceScale, Layer, Look, Outputs, Picture, Screen, Values,
+    Channel, DistanceScale, HeaderEntry, Layer, Look, Outputs, Picture, Screen, Values,
 };
 pub use etendue_render::tolerance::Verified;
 pub use etendue_render::{Checkpoint, Plan, Report, Shard, ShardBy, SoFar};
 pub use etendue_report::{Decision, DecisionKind, DecisionValue, Refusal, Saving, Tabled};
 pub use etendue_scene::file::scene_schema;
-pub use etendue_scene::{Frame, RigCamera, Scene, ScenePath, Strictness};
-pub use exposed_image::{ExposedImage, write_frames};
+pub use etendue_scene::{Frame, RigCamera, Scene, ScenePath, Setting, Strictness};
+pub use exposed_image::{ExposedFrame, ExposedImage, write_frames};
 pub use forecast::{Calibration, TimeForecast};
 pub use frame_files::FramePattern;
 pub use inspector::{Inspector, Probe};

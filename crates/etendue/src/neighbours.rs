@@ -6,6 +6,7 @@ use std::sync::Arc;
 use etendue_accel::Accel;
 use etendue_camera::TruthAt;
 use etendue_render::FollowedFrame;
+use etendue_render::output::HeaderEntry;
 use etendue_scene::{Frame, Scene};
 use etendue_tracer::LayerSpec;
 use etendue_tracer::layer::{FrameStep, RowMoment, StepAxis};
@@ -116,7 +117,7 @@ impl Neighbour {
     }
 
     /// Entry in the header of files that tells which frame it was.
-    pub(crate) fn header(&self) -> Result<(String, String), Error> {
+    pub(crate) fn header(&self) -> Result<HeaderEntry, Error> {
         let way = if self.step.count() > 0 { "on" } else { "back" };
         let along = match self.step.along() {
             StepAxis::Frames => "",
@@ -124,7 +125,7 @@ impl Neighbour {
             StepAxis::Exposure => "exposure_",
         };
         let key = format!("scene_hash_{along}{}_{way}", self.step.count().unsigned_abs());
-        Ok((key, self.scene.hash()?.to_string()))
+        Ok(HeaderEntry { key, text: self.scene.hash()?.to_string() })
     }
 }
 

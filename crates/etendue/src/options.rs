@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use etendue_files::Reach;
 use etendue_render::output::Outputs;
-use etendue_scene::Strictness;
+use etendue_scene::{Setting, Strictness};
 
 /// Options of opening and building a scene.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// Settings of the scene's values, as pairs of a path and JSON: (`camera.fov`, `30`).
-    pub settings: Vec<(String, String)>,
+    /// Settings of the scene's values, the later the stronger.
+    pub settings: Vec<Setting>,
     /// Treatment of defects in the data.
     pub strictness: Strictness,
     /// Permission to read files outside of the scene's folder.

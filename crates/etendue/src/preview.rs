@@ -196,7 +196,7 @@ impl Session {
             .map_err(|error| self.placed(error))?;
         let rendered = etendue_render::finish(&scene, &plan, film, Vec::new(), Some(&*accel))?;
         let time = start.elapsed();
-        let light = SensorLight::new(&scene, (&rendered.picture, rendered.band_film))?.ok();
+        let light = SensorLight::new(&scene, &rendered.picture, rendered.band_film)?.ok();
         let (samples, scene) = ([rendered.samples, wanted], Arc::new(scene));
         let (picture, notes) = (rendered.picture, rendered.notes);
         let (factor, raw) = (rough.factor, OnceLock::new());
@@ -207,8 +207,8 @@ impl Session {
 /// Reading of a layer at pixel `i`: its name, and its values with their unit.
 pub(crate) fn layer_reading(layer: &Layer, i: usize) -> (String, String) {
     let values = layer.channels.iter().map(|channel| format!("{:.4}", channel.values.at(i)));
-    let unit = layer.meaning.iter().find(|(key, _)| key == "unit");
-    let unit = unit.map(|(_, unit)| format!(" {unit}")).filter(|unit| !unit.starts_with(" 1"));
+    let unit = layer.meaning.iter().find(|entry| entry.key == "unit");
+    let unit = unit.map(|unit| format!(" {}", unit.text)).filter(|unit| !unit.starts_with(" 1"));
     let values = values.collect::<Vec<_>>().join(", ");
     (layer.title(), format!("{values}{}", unit.unwrap_or_default()))
 }

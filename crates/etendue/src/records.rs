@@ -5,6 +5,7 @@ use std::path::{Component, Path, PathBuf};
 
 use etendue_files::{Ledger, MANIFEST, MOST_OWN_BYTES, remove_empty_folders};
 use etendue_render::denoise;
+use etendue_render::output::HeaderEntry;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -18,7 +19,7 @@ pub(crate) const RECORD: &str = "frames/{frame}.json";
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Record {
     /// Entries of its files' headers.
-    pub(crate) fingerprints: Vec<(String, String)>,
+    pub(crate) fingerprints: Vec<HeaderEntry>,
     /// Its files and their sizes (bytes).
     pub(crate) files: Vec<(String, u64)>,
 }
@@ -58,15 +59,11 @@ pub(crate) fn read_record(path: &Path) -> Option<Record> {
 
 /// True if `folder` has a complete picture of the scene with these fingerprints, `files` among its
 /// files, and all as they were written.
-pub(crate) fn is_rendered(
-    folder: &Path,
-    fingerprints: &[(String, String)],
-    files: &[String],
-) -> bool {
+pub(crate) fn is_rendered(folder: &Path, fingerprints: &[HeaderEntry], files: &[String]) -> bool {
     let Some((header, found)) = complete_picture(folder) else { return false };
     // What its noise was taken out of is another picture.
-    let (denoised, _) = denoise::fingerprint();
-    let is_wanted = fingerprints.iter().any(|(key, _)| *key == denoised);
+    let denoised = denoise::fingerprint().key;
+    let is_wanted = fingerprints.iter().any(|own| own.key == denoised);
     is_of(&header, fingerprints)
         && (is_wanted || header.get(&denoised).is_none())
         && files.iter().all(|file| found.contains_key(file))
@@ -74,9 +71,9 @@ pub(crate) fn is_rendered(
 }
 
 /// True if a header has these fingerprints among its entries.
-fn is_of(header: &Value, fingerprints: &[(String, String)]) -> bool {
-    let is_same = |(key, print): &(String, String)| {
-        header.get(key).and_then(Value::as_str) == Some(print.as_str())
+fn is_of(header: &Value, fingerprints: &[HeaderEntry]) -> bool {
+    let is_same = |HeaderEntry { key, text }: &HeaderEntry| {
+        header.get(key).and_then(Value::as_str) == Some(text.as_str())
     };
     fingerprints.iter().all(is_same)
 }
@@ -89,7 +86,7 @@ pub(crate) fn complete_picture(folder: &Path) -> Option<(Value, Map<String, Valu
 
 /// The samples a pixel of the picture with these fingerprints in `folder`, where it was stopped before all of
 /// them were taken.
-pub(crate) fn stopped_samples(folder: &Path, fingerprints: &[(String, String)]) -> Option<u64> {
+pub(crate) fn stopped_samples(folder: &Path, fingerprints: &[HeaderEntry]) -> Option<u64> {
     let (header, _) = picture(folder)?;
     header.get("partial").filter(|_| is_of(&header, fingerprints))?;
     header.get("samples")?.as_str()?.parse().ok()

@@ -14,9 +14,9 @@ use etendue_render::denoise::{self, DENOISED};
 use etendue_render::expose::{self, BandFilm, SensorLight};
 use etendue_render::light_field::{self, LightFieldSet};
 use etendue_render::output::imu::{self, IMU};
-use etendue_render::output::{Layer, LayerFile, Outputs, Picture, exr, sidecar};
+use etendue_render::output::{HeaderEntry, Layer, LayerFile, Outputs, Picture, exr, sidecar};
 use etendue_render::report::seconds;
-use etendue_render::{Images, Plan, RenderError, Report};
+use etendue_render::{Images, Plan, RenderError, RenderedScene, Report};
 use etendue_scene::Scene;
 use etendue_scene::file::SceneSpec;
 use etendue_sensor::{Exposure, RawImage};
@@ -39,9 +39,16 @@ pub struct Rendering {
     pub(crate) report: Report,
     /// The structure and the images of a scene that more is asked of when files are written: by light-field cameras,
     /// and by annotations.
-    traced: Option<(Arc<dyn Accel>, Arc<Images>)>,
+    traced: Option<TracedScene>,
     /// Entries of the header that tell what it shows.
-    fingerprints: Vec<(String, String)>,
+    fingerprints: Vec<HeaderEntry>,
+}
+
+/// The structure and the images that a scene was traced with.
+#[derive(Debug)]
+pub(crate) struct TracedScene {
+    pub(crate) accel: Arc<dyn Accel>,
+    pub(crate) images: Arc<Images>,
 }
 
 /// Part of the results that a picture is: whole by itself, or a frame.
@@ -69,11 +76,11 @@ impl Rendering {
         scene: Arc<Scene>,
         picture: Picture,
         band_film: Option<BandFilm>,
-        traced: Option<(Arc<dyn Accel>, Arc<Images>)>,
+        traced: Option<TracedScene>,
         report: Report,
-        fingerprints: Vec<(String, String)>,
+        fingerprints: Vec<HeaderEntry>,
     ) -> Result<Self, Error> {
-        let (light, idle_notes) = match SensorLight::new(&scene, (&picture, band_film))? {
+        let (light, idle_notes) = match SensorLight::new(&scene, &picture, band_film)? {
             Ok(light) => (Some(light), Vec::new()),
             Err(notes) => (None, notes),
         };
@@ -111,7 +118,7 @@ impl Rendering {
     /// Fingerprints that tell, in the headers of files, which scene is shown, and which other
     /// frames it is compared with.
     #[must_use]
-    pub fn fingerprints(&self) -> &[(String, String)] {
+    pub fn fingerprints(&self) -> &[HeaderEntry] {
         &self.fingerprints
     }
 
@@ -258,7 +265,7 @@ impl Rendering {
                 notes.extend(self.idle_notes.iter().cloned());
                 if let Some(light) = &self.light {
                     let goes_on = |share| progress.goes_on(Phase::Expose, share);
-                    let exposed = expose::write(light, (to, folder), outputs, &goes_on)?;
+                    let exposed = expose::write(light, to, folder, outputs, &goes_on)?;
                     files.extend(exposed.files);
                     notes.extend(exposed.notes);
                 }
@@ -296,10 +303,12 @@ impl Rendering {
         outputs: Outputs,
         progress: &Progress,
     ) -> Result<LightFieldSet, Error> {
-        let Some((accel, images)) = &self.traced else { return Ok(LightFieldSet::default()) };
-        let rendering = light_field::RenderedScene { scene: &self.scene, accel: &**accel, images };
+        let Some(TracedScene { accel, images }) = &self.traced else {
+            return Ok(LightFieldSet::default());
+        };
+        let rendering = RenderedScene { scene: &self.scene, accel: &**accel, images };
         let goes_on = |share| progress.goes_on(Phase::LightField, share);
-        Ok(light_field::write(rendering, &self.picture, (to, folder), outputs, &goes_on)?)
+        Ok(light_field::write(rendering, &self.picture, to, folder, outputs, &goes_on)?)
     }
 
     /// Writes what tells the scene's copies apart, and names by their shares of pixels.
@@ -319,7 +328,7 @@ impl Rendering {
             return Err(Error::Refused(why));
         }
         let accel = match &self.traced {
-            Some((accel, _)) => Arc::clone(accel),
+            Some(TracedScene { accel, .. }) => Arc::clone(accel),
             None => {
                 let plan = Plan::new(&self.scene, outputs);
                 etendue_render::build(&self.scene, &plan, &BuildOptions::default())?.into()

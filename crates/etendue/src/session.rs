@@ -21,7 +21,7 @@ use etendue_render::expose::SPECTRUM;
 use etendue_render::output::{LayerFile, Outputs};
 use etendue_render::{Checkpoint, Images, Plan, Seconds, denoise};
 use etendue_scene::file::{FramesSpec, SceneFile, texts_of};
-use etendue_scene::{Cache, Frame, Frames, Scene, SceneError, ScenePath, Start};
+use etendue_scene::{Cache, Frame, Frames, Scene, SceneError, ScenePath, Setting, Start};
 use etendue_tracer::LayerSpec;
 use serde_json::Value;
 
@@ -64,7 +64,7 @@ pub struct Session {
     structures: Structures,
     images: Arc<Images>,
     /// Settings since the session was opened.
-    settings: Vec<(String, String)>,
+    settings: Vec<Setting>,
     /// Seconds of what was done since the last render.
     seconds: Seconds,
     /// Checkpoint in which what there is of a render is kept.
@@ -122,11 +122,11 @@ impl Session {
         values: impl IntoIterator<Item = (&'p str, Value)>,
     ) -> Result<(), Error> {
         let values = values.into_iter();
-        let settings: Vec<(String, String)> =
-            values.map(|(path, value)| (path.to_owned(), value.to_string())).collect();
+        let settings: Vec<Setting> =
+            values.map(|(path, value)| Setting::new(path, value.to_string())).collect();
         self.file = self.file.with(&settings)?;
         // What was set before at the same path is of no effect any more.
-        self.settings.retain(|(path, _)| settings.iter().all(|(other, _)| other != path));
+        self.settings.retain(|own| settings.iter().all(|other| other.path != own.path));
         self.settings.extend(settings);
         self.leave_frame();
         Ok(())

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use etendue_image::{Cube, ExrChannels, Limits, MOST_BYTES, Plane, Raster, Samples, cube, envi};
 use etendue_render::expose::{BandFilm, SPECTRUM};
-use etendue_render::output::{Channel, Layer, Look, Picture, Screen, Values};
+use etendue_render::output::{Channel, HeaderEntry, Layer, Look, Picture, Screen, Values};
 use etendue_scene::file::{FileKind, is_lens};
 use etendue_spectrum::{Bands, Grid};
 use etendue_tracer::LayerSpec;
@@ -149,7 +149,7 @@ impl Still {
             vec![Channel { name: band_name(*nm), values: Values::F32(values) }]
         };
         let channels = cube.axis.wavelengths().iter().enumerate().flat_map(channel).collect();
-        let meaning = cube.unit.map(|unit| ("unit".to_owned(), unit)).into_iter().collect();
+        let meaning = cube.unit.map(|unit| HeaderEntry::new("unit", unit)).into_iter().collect();
         let bands = Layer { name: SPECTRUM.to_owned(), look: Look::Cube, channels, meaning };
         let finite = |value: &f32| if value.is_finite() { *value } else { 0.0 };
         let values = film.values.iter().map(finite).collect();
@@ -288,10 +288,10 @@ fn without_nan(plane: &mut Plane) -> usize {
 }
 
 /// The unit that this program's files state of a layer, as JSON.
-fn meaning(text: Option<&String>) -> Vec<(String, String)> {
+fn meaning(text: Option<&String>) -> Vec<HeaderEntry> {
     let value = text.and_then(|text| serde_json::from_str::<Value>(text).ok());
     let unit = value.as_ref().and_then(|value| value.get("unit")?.as_str());
-    unit.map(|unit| ("unit".to_owned(), unit.to_owned())).into_iter().collect()
+    unit.map(|unit| HeaderEntry::new("unit", unit)).into_iter().collect()
 }
 
 /// Look of a layer of this name, by the table of layers; other programs' layers are told by their channels.

@@ -2,6 +2,7 @@
 
 use etendue_render::Rendered;
 use etendue_render::expose::{self, LightUnit};
+use etendue_render::output::HeaderEntry;
 use etendue_scene::Scene;
 use etendue_scene::escape::one_line;
 use etendue_scene::import::Note;
@@ -15,13 +16,13 @@ pub(crate) const NOT_FOLLOWED: &str = "some meshes are others in the frame that 
                             points are not followed (+inf)";
 
 /// Entries in the header of every file.
-pub(crate) fn header(scene: &Scene, fingerprints: &[(String, String)]) -> Vec<(String, String)> {
+pub(crate) fn header(scene: &Scene, fingerprints: &[HeaderEntry]) -> Vec<HeaderEntry> {
     let more = [
         ("seed", scene.render.seed.to_string()),
         ("pixel_origin", "pixel centres lie at half-integers from the picture's corner".to_owned()),
         ("camera", serde_json::to_string(&scene.camera.opencv()).unwrap_or_default()),
     ]
-    .map(|(key, value)| (key.to_owned(), value));
+    .map(|(key, text)| HeaderEntry::new(key, text));
     fingerprints.iter().cloned().chain(more).chain(light(scene)).collect()
 }
 
@@ -38,14 +39,14 @@ pub(crate) const PUPIL: &str = "pupil_solid_angle";
 pub(crate) const PITCH: &str = "pixel_pitch";
 
 /// Header entries that another sensor needs to be exposed to the picture.
-fn light(scene: &Scene) -> Vec<(String, String)> {
+fn light(scene: &Scene) -> Vec<HeaderEntry> {
     let Some(sensor) = &scene.sensor else { return Vec::new() };
-    let mut entries = vec![(NOISE_SEED.to_owned(), expose::noise_seed(scene).to_string())];
+    let mut entries = vec![HeaderEntry::new(NOISE_SEED, expose::noise_seed(scene).to_string())];
     if sensor.radiometry() == Radiometry::Physical {
-        entries.push((LIGHT_UNIT.to_owned(), LightUnit::of(scene).to_string()));
-        entries.push((PITCH.to_owned(), sensor.pixel_pitch().to_string()));
+        entries.push(HeaderEntry::new(LIGHT_UNIT, LightUnit::of(scene).to_string()));
+        entries.push(HeaderEntry::new(PITCH, sensor.pixel_pitch().to_string()));
         let pupil = scene.camera.pupil_solid_angle();
-        entries.extend(pupil.map(|pupil| (PUPIL.to_owned(), pupil.to_string())));
+        entries.extend(pupil.map(|pupil| HeaderEntry::new(PUPIL, pupil.to_string())));
     }
     entries
 }
@@ -54,8 +55,8 @@ fn light(scene: &Scene) -> Vec<(String, String)> {
 pub(crate) fn fingerprints(
     scene: &Scene,
     neighbours: &[Neighbour],
-) -> Result<Vec<(String, String)>, Error> {
-    let own = Ok(("scene_hash".to_owned(), scene.hash()?.to_string()));
+) -> Result<Vec<HeaderEntry>, Error> {
+    let own = Ok(HeaderEntry::new("scene_hash", scene.hash()?.to_string()));
     std::iter::once(own).chain(neighbours.iter().map(Neighbour::header)).collect()
 }
 

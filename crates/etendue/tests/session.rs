@@ -19,7 +19,7 @@ mod unseen;
 use std::fs;
 use std::path::Path;
 
-use etendue::{Error, Options, Outputs, Phase, Progress, Rendering, Session, places};
+use etendue::{Error, Options, Outputs, Phase, Progress, Rendering, Session, Setting, places};
 use etendue_files::Ledger;
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -101,7 +101,7 @@ fn after_any_change_pictures_are_those_of_a_new_session() {
     let mut settings = Vec::new();
     for (path, value, _) in changes() {
         session.set(path, value.clone()).unwrap();
-        settings.push((path.to_owned(), value.to_string()));
+        settings.push(Setting::new(path, value.to_string()));
         let options = Options { settings: settings.clone(), ..Options::default() };
         let mut fresh = Session::open_with(folder.path().join("scene.json"), options).unwrap();
         assert_eq!(numbers(&render(&mut session)), numbers(&render(&mut fresh)), "{path} {value}");

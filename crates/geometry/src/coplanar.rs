@@ -270,10 +270,9 @@ impl Coplanar {
         })
     }
 
-    /// The pairs of placements of which triangles that face the same side lie over one another, the earlier placement
-    /// first, with how many of the earlier one's triangles do. (A box that stands on a floor faces the other side.)
+    /// The pairs of placements of which triangles that face the same side lie over one another. (A box that stands on a floor faces the other side.)
     #[must_use]
-    pub fn pairs(&self, geometry: &Geometry) -> Vec<([u32; 2], usize)> {
+    pub fn pairs(&self, geometry: &Geometry) -> Vec<CoplanarPair> {
         let mut pairs: BTreeMap<[u32; 2], usize> = BTreeMap::new();
         let normal = |id: PlacedTriangle| {
             let [a, b, c] = corners(geometry, id);
@@ -295,8 +294,18 @@ impl Coplanar {
                 pairs.insert([own, last], mesh.triangles.len());
             }
         }
-        pairs.into_iter().collect()
+        let pair = |(placements, triangles)| CoplanarPair { placements, triangles };
+        pairs.into_iter().map(pair).collect()
     }
+}
+
+/// Two placements of which triangles lie over one another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CoplanarPair {
+    /// Their numbers, the earlier first.
+    pub placements: [u32; 2],
+    /// Triangles of the earlier one that do.
+    pub triangles: usize,
 }
 
 /// The last placement of each mesh and place, by placement; empty where no two are in one place.

@@ -47,7 +47,7 @@ pub use batch::{Detail, HitBatch, HitPrecision, MISS, PlacedTriangle, RayBatch, 
 pub use block::{RayBlock, RayBlocks};
 pub use bounds::{Bounds, is_degenerate};
 pub use buffer::{Buffer, Vertices};
-pub use coplanar::Coplanar;
+pub use coplanar::{Coplanar, CoplanarPair};
 pub use float::Float;
 pub use hermite::Interpolation;
 pub use joint::{Between, Joint, Link, Track};

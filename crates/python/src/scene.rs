@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use etendue::{Error, MeshAttributes, Options, Outputs, Progress, Reach, Strictness};
+use etendue::{Error, MeshAttributes, Options, Outputs, Progress, Reach, Setting, Strictness};
 use etendue_files::Transaction;
 use etendue_render::output::{png, sidecar};
 use numpy::{IntoPyArray, PyReadonlyArray2};
@@ -75,6 +75,7 @@ impl Session {
         allow_outside: bool,
         memory_limit: Option<u64>,
     ) -> PyResult<Self> {
+        let settings = settings.into_iter().map(|(path, value)| Setting { path, value }).collect();
         let options = options(settings, strict, allow_outside, memory_limit);
         Ok(Self::of(etendue::Session::open_with(path, options).map_err(raised)?))
     }
@@ -192,7 +193,7 @@ impl Session {
 }
 
 fn options(
-    settings: Vec<(String, String)>,
+    settings: Vec<Setting>,
     strict: bool,
     allow_outside: bool,
     memory_limit: Option<u64>,
@@ -247,7 +248,8 @@ impl Rendering {
 
     /// Meaning of a layer, as `layers.json` has it.
     fn meaning(&self, name: &str) -> Vec<(String, String)> {
-        self.rendering.layer(name).map(|layer| layer.meaning.clone()).unwrap_or_default()
+        let meaning = self.rendering.layer(name).map(|layer| layer.meaning.clone());
+        meaning.into_iter().flatten().map(|entry| (entry.key, entry.text)).collect()
     }
 
     /// Exposure times (s) and frames.

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use etendue_files::Opener;
+use etendue_scene::Setting;
 use etendue_scene::file::SensorFile;
 use etendue_sensor::Exposure;
 use numpy::{IntoPyArray, PyReadonlyArray2};
@@ -27,6 +28,8 @@ pub struct Sensor {
 impl Sensor {
     #[new]
     fn new(name: &str, settings: Vec<(String, String)>) -> PyResult<Self> {
+        let settings: Vec<Setting> =
+            settings.into_iter().map(|(path, value)| Setting { path, value }).collect();
         let file = SensorFile::named(&Opener::default(), Path::new(name), &settings);
         Ok(Self { file: file.map_err(|error| raised(error.into()))? })
     }

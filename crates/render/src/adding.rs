@@ -77,7 +77,7 @@ impl Adding<'_> {
         let [layers, bands] = self.what.shape();
         let count = layers * bands * self.sampling.sets as usize;
         for tile in Tile::across(width, [strip.top, strip.height]) {
-            let range = |x: u32, y: u32| match self.work {
+            let range = |[x, y]: [u32; 2]| match self.work {
                 Work::Pass(pass) => pass.clone(),
                 Work::Wanted(wanted) => {
                     let above = strip.top as usize * width as usize;
@@ -85,9 +85,9 @@ impl Adding<'_> {
                 }
             };
             // Pixels that want more samples, with what they have so far.
-            let pixels: Vec<(u32, u32)> =
-                tile.pixels().filter(|&(x, y)| !range(x, y).is_empty()).collect();
-            let places = pixels.iter().map(|&(x, y)| tile.index(x, y, width));
+            let pixels: Vec<[u32; 2]> =
+                tile.pixels().filter(|&pixel| !range(pixel).is_empty()).collect();
+            let places = pixels.iter().map(|&[x, y]| tile.index(x, y, width));
             memory.sums.clear();
             match &kept {
                 Some(kept) => places.clone().for_each(|at| {
@@ -120,7 +120,7 @@ impl Adding<'_> {
     fn tile(
         &self,
         tile: Tile,
-        pixels: &[(u32, u32)],
+        pixels: &[[u32; 2]],
         pass: &Range<u32>,
         to: &mut Destination<'_, '_>,
         memory: &mut Memory,
@@ -147,15 +147,15 @@ impl Adding<'_> {
     fn tile_of_wanted(
         &self,
         tile: Tile,
-        pixels: &[(u32, u32)],
-        range: &dyn Fn(u32, u32) -> Range<u32>,
+        pixels: &[[u32; 2]],
+        range: &dyn Fn([u32; 2]) -> Range<u32>,
         to: &mut Destination<'_, '_>,
         memory: &mut Memory,
     ) -> Result<(), Stopped> {
         let (batch, sets) = (self.what.batch(), self.sampling.sets);
         let (mut runs, mut room) = (Vec::new(), batch);
         for (&pixel, slot) in pixels.iter().zip((0..).step_by(sets as usize)) {
-            let Range { start, end } = range(pixel.0, pixel.1);
+            let Range { start, end } = range(pixel);
             let share = match to {
                 Destination::Starts => 1.0,
                 Destination::Landings(_) => f64::from(sets) / f64::from(end - start),
@@ -222,7 +222,7 @@ impl Adding<'_> {
         let counts = |run: &&SampleRun| match to {
             Destination::Starts => true,
             // Others count those that start beside the share.
-            Destination::Landings(_) => self.owns(tile.top + run.pixel.1),
+            Destination::Landings(_) => self.owns(tile.top + run.pixel[1]),
         };
         let counted: usize = runs.iter().filter(counts).map(|run| run.range.len()).sum();
         match to {
@@ -255,12 +255,12 @@ impl Adding<'_> {
         };
         let to = &mut Destination::Landings(window);
         for tile in Tile::across(width, strip) {
-            let pixels: Vec<(u32, u32)> =
-                tile.pixels().filter(|&(_, y)| lands(tile.top + y)).collect();
+            let pixels: Vec<[u32; 2]> =
+                tile.pixels().filter(|&[_, y]| lands(tile.top + y)).collect();
             match self.work {
                 Work::Pass(pass) => self.tile(tile, &pixels, pass, to, memory)?,
                 Work::Wanted(wanted) => {
-                    let range = |x: u32, y: u32| {
+                    let range = |[x, y]: [u32; 2]| {
                         wanted((tile.top + y) as usize * width as usize + (tile.left + x) as usize)
                     };
                     self.tile_of_wanted(tile, &pixels, &range, to, memory)?;
@@ -274,7 +274,7 @@ impl Adding<'_> {
     fn place(&self, tile: Tile, runs: &[SampleRun], memory: &mut Memory) {
         let Memory { numbers, film, .. } = memory;
         // The numbers of all samples of these pixels.
-        let pixel = |run: &SampleRun| [tile.left + run.pixel.0, tile.top + run.pixel.1];
+        let pixel = |run: &SampleRun| [tile.left + run.pixel[0], tile.top + run.pixel[1]];
         numbers
             .refill(|all| runs.iter().for_each(|run| self.sampling.extend(pixel(run), run, all)));
         numbers.has_pupil = self.what.camera().has_pupil();

@@ -48,7 +48,8 @@ impl<'a> Keeper<'a> {
     pub(crate) fn new(
         checkpoint: &'a Checkpoint,
         identity: &'a Identity,
-        (shard, samples): (Shard, u32),
+        shard: Shard,
+        samples: u32,
         scene: &Scene,
     ) -> Self {
         let start = Instant::now();

@@ -11,7 +11,7 @@ use crate::RenderError;
 use crate::expose::{has_spectrum, three_planes};
 use crate::memory::{NoMemory, filled};
 pub use crate::output::DENOISED;
-use crate::output::{Channel, Layer, Look, Picture, Values};
+use crate::output::{Channel, HeaderEntry, Layer, Look, Picture, Values};
 
 /// Bytes a pixel of the picture and its guides on their way through the library, which takes more by
 /// itself, and of what comes back.
@@ -19,8 +19,8 @@ pub(crate) const BYTES: u64 = 48;
 
 /// Entry of files' headers that says that a picture was denoised.
 #[must_use]
-pub fn fingerprint() -> (String, String) {
-    ("denoised".to_owned(), format!("picture.png shows the layer {DENOISED}"))
+pub fn fingerprint() -> HeaderEntry {
+    HeaderEntry::new("denoised", format!("picture.png shows the layer {DENOISED}"))
 }
 
 /// Adds to the layers of `scene` what guides the library.
@@ -116,6 +116,6 @@ fn layer(light: &[f32], version: &str) -> Result<Layer, NoMemory> {
         name: DENOISED.to_owned(),
         look: Look::Color,
         channels: ["R", "G", "B"].into_iter().enumerate().map(channel).collect::<Result<_, _>>()?,
-        meaning: meaning.map(|(key, text)| (key.to_owned(), text.to_owned())).into(),
+        meaning: meaning.map(|(key, text)| HeaderEntry::new(key, text)).into(),
     })
 }

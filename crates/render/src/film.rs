@@ -7,7 +7,7 @@ use etendue_tracer::LayerSpec;
 use etendue_tracer::layer::{self, Look, RaySource, ValueKind};
 
 use crate::memory::{NoMemory, filled};
-use crate::output::{Channel, Layer, Values};
+use crate::output::{Channel, HeaderEntry, Layer, Values};
 
 /// Precision of data layers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -166,7 +166,7 @@ impl FilmLayer {
     pub(crate) fn into_layers(self, root: bool) -> Vec<Layer> {
         let files = self.row.names_in_files();
         let layer::Layer { name, look, meaning, apart, .. } = self.row;
-        let owned = |(k, v): &(&str, &str)| ((*k).to_owned(), (*v).to_owned());
+        let owned = |(key, text): &(&str, &str)| HeaderEntry::new(*key, *text);
         let meaning: Vec<_> = meaning.iter().map(owned).collect();
         if let Some(definitions) = apart {
             let layer = |((name, values), definition): ((String, Values), &&str)| {

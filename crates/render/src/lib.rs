@@ -72,6 +72,6 @@ pub use plan::{Plan, Unseen};
 pub use render::{Progress, Rendered, finish, render, sample_set, trace};
 pub use report::{Report, Seconds};
 pub use shard::{Shard, ShardBy};
-pub use state::{Film, Prepared, RenderState};
+pub use state::{Film, Prepared, RenderState, RenderedScene};
 pub use stopping::Stopping;
 pub use watch::{SoFar, Watch};

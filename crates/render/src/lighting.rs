@@ -66,7 +66,8 @@ pub(crate) fn settle(
     scene: &Scene,
     map: Option<Arc<EnvironmentMap>>,
     tracer: Rules,
-    (accel, surroundings): (&dyn Accel, SceneView<'_>),
+    accel: &dyn Accel,
+    surroundings: SceneView<'_>,
     progress: &(dyn Fn(f64) -> bool + Sync),
 ) -> Result<Lighting, RenderError> {
     let mut lighting = Lighting { lights: scene.lights.clone(), map, note: None };

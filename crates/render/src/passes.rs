@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use crate::adaptive::{Adaptive, Rule};
+use crate::adaptive::{Adaptive, JudgedValue, Rule};
 use crate::error::RenderError;
 use crate::film::FilmLayer;
 use crate::memory::NoMemory;
@@ -117,9 +117,9 @@ impl Job<'_> {
     ) -> Result<Adaptive<'a>, NoMemory> {
         let place = |(k, part): (usize, &Averaging<'_>)| {
             let layer = part.layers().position(|layer| Some(layer.spec) == self.judged)?;
-            Some((k, layer * part.what.shape()[1]))
+            Some(JudgedValue { part: k, first: layer * part.what.shape()[1] })
         };
-        let judged = parts.iter().enumerate().find_map(place).unwrap_or((0, 0));
+        let judged = parts.iter().enumerate().find_map(place).unwrap_or_default();
         let (strips, hits) = (self.sampled_strips(), self.chief_hits()?);
         Adaptive::new(rule, self.sampling.samples, self.camera.resolution(), strips, judged, &hits)
     }

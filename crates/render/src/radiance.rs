@@ -45,7 +45,7 @@ impl LightPass<'_> {
             let start = (ray * layers + picture) * bands;
             values[start..start + bands].iter().sum()
         };
-        let pixel = |ray: &usize| numbers.samples[numbers.of_ray[*ray] as usize].0;
+        let pixel = |ray: &usize| numbers.samples[numbers.of_ray[*ray] as usize].pixel;
         let rays: Vec<usize> = (0..numbers.of_ray.len()).collect();
         let mut of_pixel = Vec::new();
         for run in rays.chunk_by(|a, b| pixel(a) == pixel(b)) {

@@ -23,7 +23,7 @@ use crate::film::FilmLayer;
 use crate::film_file::FilmFile;
 use crate::images::Images;
 use crate::memory::NoMemory;
-use crate::output::{Development, Layer, Picture, PictureError};
+use crate::output::{Development, HeaderEntry, Layer, Picture, PictureError};
 use crate::radiance::LightPass;
 use crate::sampling::{Sampling, short_passes};
 use crate::shard::Shard;
@@ -32,7 +32,7 @@ use crate::tiles::{Job, JobResult, SamplesTaken};
 use crate::watch::{Watch, Watcher};
 use crate::{Plan, diffraction, expose, lighting, names};
 
-pub use crate::state::{Film, Prepared, RenderState};
+pub use crate::state::{Film, Prepared, RenderState, RenderedScene};
 
 /// Told the share done (0..=1) now and then; answering `false` stops.
 pub type Progress = Arc<dyn Fn(f64) -> bool + Send + Sync>;
@@ -78,7 +78,7 @@ pub fn render(
     plan: &Plan,
     accel: &dyn Accel,
     images: &Images,
-    header: Vec<(String, String)>,
+    header: Vec<HeaderEntry>,
     watch: &dyn Watch,
 ) -> Result<Rendered, RenderError> {
     let prepared = Prepared { accel, images, others: &[] };
@@ -88,9 +88,9 @@ pub fn render(
 
 /// The rules and lights of the picture, with `notes` of them; `None` without a picture of light.
 fn light_of(
-    (scene, plan): (&Scene, &Plan),
-    images: &Images,
-    seen: (&dyn Accel, SceneView<'_>),
+    RenderedScene { scene, accel, images }: RenderedScene<'_>,
+    plan: &Plan,
+    surroundings: SceneView<'_>,
     spectral: &Spectral,
     notes: &mut Vec<String>,
     watch: &dyn Watch,
@@ -103,10 +103,11 @@ fn light_of(
     let bounces = fewer.map_or(rules.bounces, |fewer| fewer.bounces.min(rules.bounces));
     let rules = Rules { roulette, bounces, parts: scene.accuracy.dispersion_paths, ..rules };
     let map = images.environment.clone();
-    let found = lighting::settle(scene, map, rules, seen, &|share| watch.goes_on(share))?;
+    let goes_on = |share: f64| watch.goes_on(share);
+    let found = lighting::settle(scene, map, rules, accel, surroundings, &goes_on)?;
     notes.extend(found.note);
     let span = scene.camera.exposure_span();
-    let lights = Lights::new(&found.lights, found.map, &seen.1, span, spectral)
+    let lights = Lights::new(&found.lights, found.map, &surroundings, span, spectral)
         .map_err(|fault| RenderError::lights(scene, fault))?;
     Ok(Some((rules, lights)))
 }
@@ -141,7 +142,7 @@ pub fn trace(
     scene: &Scene,
     plan: &Plan,
     Prepared { accel, images, others }: Prepared<'_>,
-    header: &[(String, String)],
+    header: &[HeaderEntry],
     state: &RenderState<'_>,
     watch: &dyn Watch,
 ) -> Result<Film, RenderError> {
@@ -159,10 +160,10 @@ pub fn trace(
     let traced = if plan.alike { &Bands::Grey } else { &plan.bands };
     let spectral = Spectral::of(traced, &scene.materials);
     let mut notes = Vec::new();
-    let seen = (accel, surroundings);
+    let rendered = RenderedScene { scene, accel, images };
     let lit = match spread {
         Some(_) => None,
-        None => light_of((scene, plan), images, seen, &spectral, &mut notes, watch)?,
+        None => light_of(rendered, plan, surroundings, &spectral, &mut notes, watch)?,
     };
     // What light passes ask of the scene.
     let emitters = lit.as_ref().and_then(|_| Emitters::of(&scene.geometry, &scene.materials));
@@ -218,7 +219,7 @@ pub fn trace(
         picture: &so_far,
         shares: state.shares,
         keeper: checkpoint
-            .map(|file| Keeper::new(file, &state.identity, (shard, plan.samples), scene)),
+            .map(|file| Keeper::new(file, &state.identity, shard, plan.samples, scene)),
     };
     // What was traced, and what a user should know of it.
     let watcher = Watcher::new(watch, job.rays(&layers));
@@ -249,7 +250,7 @@ pub fn finish(
     scene: &Scene,
     plan: &Plan,
     film: Film,
-    header: Vec<(String, String)>,
+    header: Vec<HeaderEntry>,
     accel: Option<&dyn Accel>,
 ) -> Result<Rendered, RenderError> {
     let Film { layers, counts, passed, trace_time, mut notes, camera, .. } = film;
@@ -295,7 +296,7 @@ fn finished(
     scene: &Scene,
     plan: &Plan,
     mut film: Vec<FilmLayer>,
-    header: Vec<(String, String)>,
+    header: Vec<HeaderEntry>,
 ) -> Result<(Picture, Option<expose::BandFilm>), PictureError> {
     let [width, height] = scene.camera.resolution().map(|side| side as usize);
     let mut band_film = None;
@@ -329,14 +330,14 @@ fn finished(
 
 /// `header` with the `words` for how many samples the pixels have; all have `samples`, of those asked for.
 fn marked(
-    mut header: Vec<(String, String)>,
+    mut header: Vec<HeaderEntry>,
     words: String,
     [samples, of]: [u32; 2],
-) -> Vec<(String, String)> {
-    header.push(("samples".to_owned(), words));
+) -> Vec<HeaderEntry> {
+    header.push(HeaderEntry::new("samples", words));
     if samples < of {
         let words = format!("stopped after {samples} of {of} samples a pixel");
-        header.push(("partial".to_owned(), words));
+        header.push(HeaderEntry::new("partial", words));
     }
     header
 }
@@ -345,7 +346,7 @@ fn marked(
 fn so_far(
     scene: &Scene,
     plan: &Plan,
-    header: &[(String, String)],
+    header: &[HeaderEntry],
     layers: &[&FilmLayer],
     samples: u32,
 ) -> Result<Picture, PictureError> {

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use etendue_camera::{
-    BandGroup, BandLandings, Camera, CameraRays, FilmSamples, PixelSamples, SampleKeys, Sampler,
+    BandGroup, BandLandings, Camera, CameraRays, FilmSamples, PixelSample, SampleKeys, Sampler,
 };
 use etendue_geometry::HitBatch;
 use etendue_tracer::layer::Columns;
@@ -96,7 +96,7 @@ const SECOND_SET: u64 = 0xD1B5_4A32_D192_ED03;
 #[derive(Debug, Clone)]
 pub(crate) struct SampleRun {
     /// The pixel from its tile's corner, and which of its sequences they are of.
-    pub(crate) pixel: (u32, u32),
+    pub(crate) pixel: [u32; 2],
     pub(crate) set: u32,
     pub(crate) range: Range<u32>,
     /// The sum that they are added to.
@@ -106,16 +106,11 @@ pub(crate) struct SampleRun {
 }
 
 impl Sampling {
-    /// Appends what each sample of a run at a pixel is sampled by, and its index there.
-    pub(crate) fn extend(
-        &self,
-        pixel: [u32; 2],
-        run: &SampleRun,
-        numbers: &mut Vec<(PixelSamples, u32)>,
-    ) {
+    /// Appends the samples of a run at a pixel.
+    pub(crate) fn extend(&self, pixel: [u32; 2], run: &SampleRun, numbers: &mut Vec<PixelSample>) {
         let seed = if run.set == 0 { self.seed } else { self.seed ^ SECOND_SET };
         let pixel = self.sampler.pixel(seed, pixel[0], pixel[1], self.samples);
-        numbers.extend(run.range.clone().map(|index| (pixel, index)));
+        numbers.extend(pixel.samples(run.range.clone()));
     }
 
     /// The samples that the share has.
@@ -172,8 +167,8 @@ pub(crate) struct Memory {
 /// The random numbers of a batch of rays.
 #[derive(Debug, Default)]
 pub(crate) struct SampleNumbers {
-    /// The pixel's numbers and the sample's index of each sample of the film.
-    pub(crate) samples: Vec<(PixelSamples, u32)>,
+    /// The samples of the film, each by its pixel's numbers.
+    pub(crate) samples: Vec<PixelSample>,
     /// The sample of each ray.
     pub(crate) of_ray: Vec<u32>,
     /// Each sample has a ray, in order.
@@ -186,7 +181,7 @@ pub(crate) struct SampleNumbers {
 
 impl SampleNumbers {
     /// Makes the samples those that `fill` appends to none.
-    pub(crate) fn refill(&mut self, fill: impl FnOnce(&mut Vec<(PixelSamples, u32)>)) {
+    pub(crate) fn refill(&mut self, fill: impl FnOnce(&mut Vec<PixelSample>)) {
         self.samples.clear();
         fill(&mut self.samples);
         self.keys.refill(self.samples.iter().copied());

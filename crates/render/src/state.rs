@@ -15,6 +15,7 @@ use crate::film::FilmLayer;
 use crate::film_file::{FilmFile, Identity, must_be_whole};
 use crate::images::Images;
 use crate::other_frame::FollowedFrame;
+use crate::output::HeaderEntry;
 use crate::shard::Shard;
 use crate::stopping::Stopping;
 use crate::sum::Sum;
@@ -31,6 +32,18 @@ pub struct Prepared<'a> {
     pub images: &'a Images,
     /// The frames that layers compare this one with; a layer whose frame is not here finds nothing there.
     pub others: &'a [FollowedFrame<'a>],
+}
+
+/// The scene, its structure and its images, as they were rendered.
+#[derive(Clone, Copy)]
+#[expect(missing_debug_implementations, reason = "holds an accelerator")]
+pub struct RenderedScene<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its structure.
+    pub accel: &'a dyn Accel,
+    /// Its images.
+    pub images: &'a Images,
 }
 
 /// Scope of a render: which part of it is wanted, and where it is kept on the way.
@@ -123,7 +136,7 @@ pub(crate) type TraceFn = fn(
     &Scene,
     &Plan,
     Prepared<'_>,
-    &[(String, String)],
+    &[HeaderEntry],
     &RenderState<'_>,
     &dyn Watch,
 ) -> Result<Film, RenderError>;

@@ -58,10 +58,10 @@ impl Tile {
 
     /// Pixels from the tile's corner along a Z-order curve, so that any 4, 8 or 16 of them in a row,
     /// as many as go into a packet, are a block.
-    pub(crate) fn pixels(self) -> impl Iterator<Item = (u32, u32)> {
+    pub(crate) fn pixels(self) -> impl Iterator<Item = [u32; 2]> {
         (0..TILE * TILE)
-            .map(|k| (even_bits(k), even_bits(k >> 1)))
-            .filter(move |&(x, y)| x < self.width && y < self.height)
+            .map(|k| [even_bits(k), even_bits(k >> 1)])
+            .filter(move |&[x, y]| x < self.width && y < self.height)
     }
 
     /// Index of a pixel of the tile in the rows of its strip.

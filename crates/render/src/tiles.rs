@@ -353,7 +353,7 @@ struct RayBuffers {
     /// The tile of the chief rays.
     tile: Option<Tile>,
     /// The pixel of each chief ray, from the tile's corner, and its place in the strip's rows.
-    pixels: Vec<(u32, u32)>,
+    pixels: Vec<[u32; 2]>,
     places: Vec<u32>,
     values: Columns,
     traced: u64,
@@ -385,11 +385,11 @@ impl RayBuffers {
         let [width, _] = camera.resolution();
         self.places.clear();
         let below = tile.top - top;
-        self.places.extend(self.pixels.iter().map(|&(x, y)| (below + y) * width + tile.left + x));
+        self.places.extend(self.pixels.iter().map(|&[x, y]| (below + y) * width + tile.left + x));
         self.columns.clear();
-        self.columns.extend(self.pixels.iter().map(|&(x, _)| f64::from(tile.left + x) + 0.5));
+        self.columns.extend(self.pixels.iter().map(|&[x, _]| f64::from(tile.left + x) + 0.5));
         self.rows.clear();
-        self.rows.extend(self.pixels.iter().map(|&(_, y)| f64::from(tile.top + y) + 0.5));
+        self.rows.extend(self.pixels.iter().map(|&[_, y]| f64::from(tile.top + y) + 0.5));
         camera.rays_through(&self.columns, &self.rows, &mut self.rays);
     }
 }

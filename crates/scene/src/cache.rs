@@ -58,7 +58,7 @@ struct KeptModel {
     manner: ImportManner,
     import: Arc<Import>,
     /// Its files as they were.
-    files: Vec<(PathBuf, Stamp)>,
+    files: Vec<StampedFile>,
     is_used: bool,
 }
 
@@ -71,17 +71,26 @@ pub(crate) struct KeptCamera {
     pub(crate) camera: Camera,
     pub(crate) origin: CameraOrigin,
     /// The files that it names, as they were.
-    pub(crate) files: Vec<(PathBuf, Stamp)>,
+    pub(crate) files: Vec<StampedFile>,
 }
 
-/// The stamps of files that are there.
-pub(crate) fn stamps<'p>(files: impl IntoIterator<Item = &'p PathBuf>) -> Vec<(PathBuf, Stamp)> {
-    files.into_iter().filter_map(|path| Some((path.clone(), Stamp::of(path)?))).collect()
+/// A file as it was.
+#[derive(Debug, Clone)]
+pub(crate) struct StampedFile {
+    pub(crate) path: PathBuf,
+    stamp: Stamp,
+}
+
+/// The files that are there, as they are.
+pub(crate) fn stamped<'p>(files: impl IntoIterator<Item = &'p PathBuf>) -> Vec<StampedFile> {
+    let stamped =
+        |path: &PathBuf| Some(StampedFile { path: path.clone(), stamp: Stamp::of(path)? });
+    files.into_iter().filter_map(stamped).collect()
 }
 
 /// Tests whether all files are as they were.
-pub(crate) fn are_current(files: &[(PathBuf, Stamp)]) -> bool {
-    files.iter().all(|(path, stamp)| Stamp::of(path) == Some(*stamp))
+pub(crate) fn are_current(files: &[StampedFile]) -> bool {
+    files.iter().all(|file| Stamp::of(&file.path) == Some(file.stamp))
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -145,7 +154,7 @@ impl Cache {
                 mesh.share_surface(old);
             }
         }
-        let files = stamps(import.stats.files.iter().map(|(path, _)| path));
+        let files = stamped(import.stats.files.iter().map(|(path, _)| path));
         kept.push(KeptModel {
             origin,
             manner,

@@ -53,7 +53,7 @@ pub use cubes::{EnviFault, read_envi};
 pub use doctor::{Diagnosis, MemoryForecast};
 pub use error::SceneError;
 pub use etendue_report::Refusal;
-pub use file::{FileKind, PathStep, SceneFile, ScenePath, SceneSpec, scene_schema};
+pub use file::{FileKind, PathStep, SceneFile, ScenePath, SceneSpec, Setting, scene_schema};
 pub use frames::{Frame, Frames, RigCamera, Start};
 pub use identity::{Copies, IdName, SceneHash, SceneNode};
 pub use import::{Import, Note, NoteKind, Strictness, Wanted};

@@ -32,6 +32,15 @@ use camera::CameraAhead;
 pub(crate) use camera::CameraFiles;
 use objects::{OriginKind, OwnParts, TriangleOrigin};
 
+/// What all steps of loading a scene share.
+#[derive(Clone, Copy)]
+struct LoadContext<'a> {
+    folder: &'a InputFolder,
+    options: &'a LoadOptions<'a>,
+    budget: &'a Arc<Budget>,
+    kept: &'a Cache,
+}
+
 impl SceneFile {
     /// Opens all that the scene names and puts it together. Of the models only what is `wanted` is
     /// read.
@@ -67,8 +76,8 @@ impl SceneFile {
         };
         let (origins, objects) = self.resolve_objects(&folder, &mut named)?;
         let instance_files = named.files;
-        let imports =
-            self.import_all(&origins, &objects, &folder, wanted, options, (&budget, kept))?;
+        let context = LoadContext { folder: &folder, options, budget: &budget, kept };
+        let imports = self.import_all(&origins, &objects, wanted, context)?;
         let mut parts =
             SceneParts::new(own.materials, own.textures, lights.clone().unwrap_or_default());
         let split_nodes = self.kind() == FileKind::Model;
@@ -98,7 +107,7 @@ impl SceneFile {
         if self.spec.picture() == Some(LayerSpec::Radiance) && lights.is_none() {
             parts.studio_if_dark = !parts.light_by_default();
         }
-        let scene = self.finish((parts, ahead), &folder, options, (&budget, kept), since)?;
+        let scene = self.finish(parts, ahead, context, since)?;
         kept.sweep();
         let mut scene = Scene { slots: slot_count, ..scene };
         self.check_contradictions(&scene)?;
@@ -144,10 +153,8 @@ impl SceneFile {
         &self,
         origins: &[TriangleOrigin],
         objects: &[Object],
-        folder: &InputFolder,
         wanted: Wanted,
-        options: &LoadOptions<'_>,
-        (budget, kept): (&Arc<Budget>, &Cache),
+        LoadContext { folder, options, budget, kept }: LoadContext<'_>,
     ) -> Result<Vec<Import>, SceneError> {
         let done = AtomicUsize::new(0);
         let settings = import::Options {
@@ -252,14 +259,13 @@ impl SceneFile {
 
     fn finish(
         &self,
-        (parts, ahead): (SceneParts, CameraAhead),
-        folder: &InputFolder,
-        options: &LoadOptions<'_>,
-        (budget, kept): (&Budget, &Cache),
+        parts: SceneParts,
+        ahead: CameraAhead,
+        context: LoadContext<'_>,
         since: SystemTime,
     ) -> Result<Scene, SceneError> {
-        let from = (folder, options);
-        let built = self.kept_camera(parts.geometry, &parts.cameras, from, kept, ahead)?;
+        let LoadContext { folder, options, budget, kept } = context;
+        let built = self.kept_camera(parts.geometry, &parts.cameras, context, ahead)?;
         let KeptCamera { geometry, camera, origin: camera_origin, files: camera_files, .. } = built;
         let geometry = self.deformed(geometry, &parts.deformers, &camera, budget)?;
         let span = camera.exposure_span();
@@ -276,7 +282,7 @@ impl SceneFile {
         let skies = parts.lights.iter().filter_map(Light::file);
         let others = parts.files.iter();
         let mut files: Vec<(String, PathBuf)> = opened
-            .chain(camera_files.into_iter().map(|(path, _)| path))
+            .chain(camera_files.into_iter().map(|file| file.path))
             .chain(images.chain(skies).chain(others).chain(options.also_read).cloned())
             .map(|path| (folder.relative(&path), path))
             .collect();

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use crate::SceneError;
 use crate::error::not_found;
 use crate::file::{
-    CameraPath, FramesSpec, PathStep, PixelsSpec, SceneFile, ScenePath, SlotSpec, texts_of,
+    CameraPath, FramesSpec, PathStep, PixelsSpec, SceneFile, ScenePath, Setting, SlotSpec, texts_of,
 };
 use crate::frames::listed;
 use etendue_camera::{Shutter, ShutterKind};
@@ -59,6 +59,18 @@ impl PixelShares {
     }
 }
 
+/// A slot, or one of the frames that it is divided among.
+struct SlotPart<'a> {
+    /// Number of the slot.
+    number: usize,
+    slot: &'a SlotSpec,
+    seed: u64,
+    /// From when to when (s from its row's opening).
+    span: [f64; 2],
+    /// Settings of the frame.
+    frame: &'a [(String, Value)],
+}
+
 impl SceneFile {
     /// The slots of the exposure, in order; none where it is in one piece.
     ///
@@ -86,8 +98,8 @@ impl SceneFile {
                 let from = start + each * k as f64;
                 let to = if k + 1 == frames.len() { end } else { from + each };
                 let seed = self.spec.render.seed.wrapping_add(all.len() as u64);
-                let own = (number, slot, seed);
-                all.push(self.slot(&folder, own, ([from, to], settings), &shutter)?);
+                let part = SlotPart { number, slot, seed, span: [from, to], frame: settings };
+                all.push(self.slot(&folder, part, &shutter)?);
             }
         }
         Ok(all)
@@ -107,7 +119,7 @@ impl SceneFile {
             FramesSpec::Path(path @ (CameraPath::Poses { .. } | CameraPath::Trajectory { .. })) => {
                 // What a user should know of the file is told of `frames`; here it is read for its poses alone.
                 let start = || Err(self.fault(&at, "starts from nothing"));
-                self.along(&at, path, (opener, &mut Vec::new()), start)?
+                self.along(&at, path, opener, &mut Vec::new(), start)?
             }
             FramesSpec::Path(_) => {
                 let why = "goes by the scene as it is loaded, which a slot does not know\nhint: give `poses`, a `trajectory`, \
@@ -221,10 +233,10 @@ impl SceneFile {
     fn slot(
         &self,
         folder: &InputFolder,
-        (number, slot, seed): (usize, &SlotSpec, u64),
-        ([start, end], frame): ([f64; 2], &[(String, Value)]),
+        part: SlotPart<'_>,
         shutter: &Shutter,
     ) -> Result<Slot, SceneError> {
+        let SlotPart { number, slot, seed, span: [start, end], frame } = part;
         let at = place_of(number);
         // When the shutter is open anyhow, from the opening of a row.
         let row = 0.5;
@@ -247,12 +259,12 @@ impl SceneFile {
             ("camera.shutter.code", Value::Null),
             ("camera.shutter.chip", Value::Null),
         ];
-        let own = own.into_iter().map(|(path, value)| (path.to_owned(), value.to_string()));
+        let own = own.into_iter().map(|(path, value)| Setting::new(path, value.to_string()));
         let frame = frame.iter().map(|(path, value)| (path, value));
         let set = slot.set.iter().chain(frame);
         let words: Vec<&str> = set.clone().flat_map(|(_, value)| texts_of(value)).collect();
-        let set = set.map(|(path, value)| (path.clone(), value.to_string()));
-        let settings: Vec<(String, String)> = own.chain(set).collect();
+        let set = set.map(|(path, value)| Setting::new(path, value.to_string()));
+        let settings: Vec<Setting> = own.chain(set).collect();
         let file = self.with(&settings).map_err(|error| {
             let why = match error {
                 SceneError::Invalid { path, why, .. } => why.at(path),

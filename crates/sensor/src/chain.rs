@@ -144,8 +144,10 @@ pub(crate) fn expose(
 pub(crate) fn moments(
     chain: &Chain,
     shared: f64,
-    (place, count): (BlockPlace, usize),
-    (mean, offset): (&mut BlockValues, &mut BlockValues),
+    place: BlockPlace,
+    count: usize,
+    mean: &mut BlockValues,
+    offset: &mut BlockValues,
     variance: &mut BlockValues,
 ) {
     match chain.has_pattern() && chain.noise != NoiseModel::None {

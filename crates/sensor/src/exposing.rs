@@ -126,7 +126,7 @@ impl<'a> Exposing<'a> {
                 frame.smear(smear);
             }
             if blooming > 0.0 {
-                frame.bloom(blooming, (self.chain.full_well, self.chain.dark));
+                frame.bloom(blooming, self.chain.full_well, self.chain.dark);
             }
             frame
         };
@@ -183,8 +183,7 @@ impl<'a> Exposing<'a> {
         let mut variance = [0.0; BLOCK];
         self.blocks(row, |place, start, channel, count, mean| {
             let mut offset = with_columns(of_row, &self.fixed_columns, start);
-            let means = (&mut *mean, &mut offset);
-            chain::moments(&self.chain, shared, (place, count), means, &mut variance);
+            chain::moments(&self.chain, shared, place, count, mean, &mut offset, &mut variance);
             let at = start * depth + channel;
             #[expect(clippy::cast_possible_truncation, reason = "DN need not more than f32")]
             for i in 0..count {

@@ -233,8 +233,12 @@ fn mean(image: &RawImage) -> f64 {
     image.values.iter().map(|&y| f64::from(y)).sum::<f64>() / image.values.len() as f64
 }
 
-/// Name, colour and stroke of a line.
-type LineStyle = (&'static str, usize, Stroke);
+/// Name and look of a line.
+struct LineStyle {
+    name: &'static str,
+    colour: usize,
+    stroke: Stroke,
+}
 
 impl PhotonTransfer {
     /// The figures and curves as text.
@@ -323,7 +327,7 @@ impl PhotonTransfer {
 
     fn line(
         &self,
-        (name, colour, stroke): LineStyle,
+        LineStyle { name, colour, stroke }: LineStyle,
         point: &dyn Fn(&CurvePoint) -> [f64; 2],
     ) -> Series {
         Series { colour, stroke, ..Series::curve(name, self.drawn().map(point)) }
@@ -401,10 +405,11 @@ impl PhotonTransfer {
     }
 }
 
-const EXACT: LineStyle = ("exact Poisson", 0, Stroke::Solid);
-const NORMAL: LineStyle = ("normal approximation", 2, Stroke::Dashed);
-const MODEL: LineStyle = ("linear model", GREY, Stroke::Dotted);
-const IDEAL: LineStyle = ("ideal sensor", 1, Stroke::Solid);
+const EXACT: LineStyle = LineStyle { name: "exact Poisson", colour: 0, stroke: Stroke::Solid };
+const NORMAL: LineStyle =
+    LineStyle { name: "normal approximation", colour: 2, stroke: Stroke::Dashed };
+const MODEL: LineStyle = LineStyle { name: "linear model", colour: GREY, stroke: Stroke::Dotted };
+const IDEAL: LineStyle = LineStyle { name: "ideal sensor", colour: 1, stroke: Stroke::Solid };
 
 /// A straight line that marks a figure, with places along it for its name.
 fn guide(name: &str, from: [f64; 2], to: [f64; 2]) -> Series {

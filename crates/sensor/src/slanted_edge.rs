@@ -189,6 +189,14 @@ impl Edge {
     }
 }
 
+/// Crossing of an edge with a line.
+struct Crossing {
+    /// Place of the line (pixels).
+    line: f64,
+    /// Place along it (pixels).
+    place: f64,
+}
+
 impl EdgeProfiles {
     fn measure(
         &self,
@@ -201,7 +209,7 @@ impl EdgeProfiles {
         for _ in 0..LOOKS {
             let centroids = self.centroids(edge, width as f64)?;
             let fit = straight(&centroids);
-            let square = |(y, x): &(f64, f64)| (x - fit.at(*y)).powi(2);
+            let square = |at: &Crossing| (at.place - fit.at(at.line)).powi(2);
             straightness =
                 (centroids.iter().map(square).sum::<f64>() / centroids.len() as f64).sqrt();
             edge = Some(fit);
@@ -225,8 +233,8 @@ impl EdgeProfiles {
         Ok(fit.with_spread(&spread))
     }
 
-    /// Crossings of the edge with each line: (line, place).
-    fn centroids(&self, about: Option<Edge>, width: f64) -> Result<Vec<(f64, f64)>, EdgeError> {
+    /// Crossings of the edge with each line.
+    fn centroids(&self, about: Option<Edge>, width: f64) -> Result<Vec<Crossing>, EdgeError> {
         let mut found = Vec::new();
         for (&line, values) in self.lines.iter().zip(&self.values) {
             let middle = about.map_or(0.5 * width, |edge| edge.at(line));
@@ -248,7 +256,7 @@ impl EdgeProfiles {
             }
             let place = moment / sum;
             if place.is_finite() && (0.0..width).contains(&place) {
-                found.push((line, place));
+                found.push(Crossing { line, place });
             }
         }
         // Most lines have to be crossed.
@@ -307,15 +315,15 @@ impl EdgeProfiles {
     }
 }
 
-/// The straight line through places (y, x), by least squares.
-fn straight(places: &[(f64, f64)]) -> Edge {
-    let count = places.len() as f64;
-    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| places.iter().map(of).sum::<f64>() / count;
-    let (y, x) = (mean(&|place| place.0), mean(&|place| place.1));
+/// The straight line through crossings, by least squares.
+fn straight(crossings: &[Crossing]) -> Edge {
+    let count = crossings.len() as f64;
+    let mean = |of: &dyn Fn(&Crossing) -> f64| crossings.iter().map(of).sum::<f64>() / count;
+    let (y, x) = (mean(&|at| at.line), mean(&|at| at.place));
     let (mut square, mut product) = (0.0, 0.0);
-    for place in places {
-        square += (place.0 - y).powi(2);
-        product += (place.0 - y) * (place.1 - x);
+    for at in crossings {
+        square += (at.line - y).powi(2);
+        product += (at.line - y) * (at.place - x);
     }
     let slope = if square > 0.0 { product / square } else { 0.0 };
     Edge { start: x - slope * y, slope }

@@ -31,7 +31,7 @@ impl WholeFrame {
     }
 
     /// Lets charge flow along columns out of pixels that hold no more than `well`, of which the dark signal takes `dark`.
-    pub(crate) fn bloom(&mut self, share: f64, (well, dark): (f64, f64)) {
+    pub(crate) fn bloom(&mut self, share: f64, well: f64, dark: f64) {
         let Self { width, values } = self;
         let flow = |carried: &mut [f64], row: &mut [f64]| {
             for (carried, value) in carried.iter_mut().zip(row) {
@@ -64,7 +64,7 @@ mod tests {
             let mut values = vec![0.0; width * rows];
             values[20 * width + 1] = wells * (well - dark) + well - dark;
             let mut frame = WholeFrame { width, values };
-            frame.bloom(share, (well, dark));
+            frame.bloom(share, well, dark);
             let column: Vec<f64> = frame.values.iter().skip(1).step_by(width).copied().collect();
             let gained: f64 =
                 column.iter().enumerate().filter(|(r, _)| *r != 20).map(|(_, v)| v).sum();

@@ -29,11 +29,20 @@ pub(crate) struct Body {
     pub(crate) bounds: Bounds,
 }
 
+/// A volume that a placement encloses.
+struct EnclosedVolume {
+    /// Its size (m³).
+    volume: f64,
+    /// Number of the placement.
+    placement: usize,
+    bounds: Bounds,
+}
+
 /// The bodies among the placements of a scene.
 pub(crate) fn bodies(geometry: &Geometry, materials: &[Material]) -> Vec<Option<Body>> {
     let mut enclosed: Vec<Option<Option<f64>>> = vec![None; geometry.meshes.len()];
     // Those that enclose something, the largest first.
-    let mut found: Vec<(f64, usize, Bounds)> = Vec::new();
+    let mut found: Vec<EnclosedVolume> = Vec::new();
     for (i, placement) in geometry.placements.iter().enumerate() {
         let material = materials.get(placement.material as usize);
         if !material.is_some_and(|material| material.scattering.is_body()) {
@@ -44,9 +53,10 @@ pub(crate) fn bodies(geometry: &Geometry, materials: &[Material]) -> Vec<Option<
         let Some(volume) = *volume else { continue };
         let linear: &DMat3 = &placement.world_from_mesh.linear;
         let bounds = geometry.loose_bounds_of(placement);
-        found.push((volume * linear.determinant().abs(), i, bounds));
+        let volume = volume * linear.determinant().abs();
+        found.push(EnclosedVolume { volume, placement: i, bounds });
     }
-    found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    found.sort_by(|a, b| b.volume.total_cmp(&a.volume).then(a.placement.cmp(&b.placement)));
     let nested = nested(&found);
     let mut bodies = vec![None; geometry.placements.len()];
     let is_air = |placement: usize| {
@@ -54,7 +64,8 @@ pub(crate) fn bodies(geometry: &Geometry, materials: &[Material]) -> Vec<Option<
         let glass = material.and_then(|material| material.scattering.glass());
         glass.is_some_and(|glass| glass.ior == Ior::Constant(1.0))
     };
-    for ((rank, &(_, placement, bounds)), is_nested) in (0..).zip(&found).zip(nested) {
+    for ((rank, own), is_nested) in (0..).zip(&found).zip(nested) {
+        let EnclosedVolume { placement, bounds, .. } = *own;
         let may_vanish = is_nested || is_air(placement);
         bodies[placement] = Some(Body { rank, may_vanish, bounds });
     }
@@ -62,7 +73,7 @@ pub(crate) fn bodies(geometry: &Geometry, materials: &[Material]) -> Vec<Option<
 }
 
 /// Tests, for each of them, whether its box meets that of another.
-fn nested(found: &[(f64, usize, Bounds)]) -> Vec<bool> {
+fn nested(found: &[EnclosedVolume]) -> Vec<bool> {
     if found.len() > MOST_COMPARED {
         return vec![true; found.len()];
     }
@@ -70,7 +81,7 @@ fn nested(found: &[(f64, usize, Bounds)]) -> Vec<bool> {
     let mut nested = vec![false; found.len()];
     for i in 0..found.len() {
         for k in i + 1..found.len() {
-            if meets(&found[i].2, &found[k].2) {
+            if meets(&found[i].bounds, &found[k].bounds) {
                 (nested[i], nested[k]) = (true, true);
             }
         }

@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 use etendue_geometry::Bounds;
 use etendue_geometry::glam::DVec3;
 
-use crate::light_tree::{self, Choice, Choices, Cluster, LightTree};
+use crate::light_tree::{self, Choice, Choices, Cluster, LightTree, NumberedCluster};
 use crate::sampling::{DiscreteDistribution, ONE_BELOW};
 
 pub(crate) use crate::light_tree::Receiver;
@@ -206,8 +206,10 @@ fn plant(candidates: &[Candidate], is_far: bool) -> Option<LightTree> {
         Candidate::Near { cluster, .. } if cluster.intensity > 0.0 => Some(*cluster),
         _ => None,
     };
-    let near: Vec<_> =
-        (0_u32..).zip(candidates).filter_map(|(k, c)| Some((k, cluster(c)?))).collect();
+    let near = (0_u32..).zip(candidates).filter_map(|(number, candidate)| {
+        Some(NumberedCluster { number, cluster: cluster(candidate)? })
+    });
+    let near: Vec<NumberedCluster> = near.collect();
     let least = if is_far { 1 } else { light_tree::LEAST };
     let is_worth_it = (least..=light_tree::MOST).contains(&near.len());
     is_worth_it.then(|| LightTree::new(near, candidates.len()))

@@ -122,8 +122,8 @@ impl Form {
             schema => schema,
         };
         let field = FormField { schema, ..field };
-        if let Some(variants) = variants(schema) {
-            return self.tagged(ui, field, &variants, edits);
+        if let Some(choice) = variants(schema) {
+            return self.tagged(ui, field, &choice, edits);
         }
         match field.value {
             Value::Object(members) => self.members(ui, field, members, edits),
@@ -140,7 +140,7 @@ impl Form {
         &self,
         ui: &mut Ui,
         field: FormField<'_>,
-        (tag, variants): &(&str, Vec<(&str, &Value)>),
+        KindChoice { tag, variants }: &KindChoice<'_>,
         edits: &mut Vec<Edit>,
     ) {
         let now = field.value.get(*tag).and_then(Value::as_str);
@@ -148,7 +148,7 @@ impl Form {
         let place = format!("{}/{tag}", field.pointer);
         let combo = egui::ComboBox::from_id_salt(id).selected_text(now.unwrap_or("none"));
         let shown = combo.show_ui(ui, |ui| {
-            for (name, variant) in variants {
+            for KindVariant { name, schema: variant } in variants {
                 let choice = ui.selectable_label(now == Some(*name), *name);
                 mark(ui.ctx(), &format!("{place}={name}"), choice.rect);
                 if hint(choice, variant["description"].as_str()).clicked() {
@@ -158,9 +158,9 @@ impl Form {
             }
         });
         mark(ui.ctx(), &place, shown.response.rect);
-        let chosen = variants.iter().find(|(name, _)| Some(*name) == now);
-        if let (Some((_, variant)), Value::Object(members)) = (chosen, field.value) {
-            self.members(ui, FormField { schema: variant, ..field }, members, edits);
+        let chosen = variants.iter().find(|variant| Some(variant.name) == now);
+        if let (Some(KindVariant { schema, .. }), Value::Object(members)) = (chosen, field.value) {
+            self.members(ui, FormField { schema, ..field }, members, edits);
         }
     }
 
@@ -187,10 +187,10 @@ impl Form {
             return default.clone();
         }
         let schema = self.resolved(schema);
-        if let Some((tag, variants)) = variants(schema) {
+        if let Some(KindChoice { tag, variants }) = variants(schema) {
             let first = variants.first();
-            return first.map_or(Value::Null, |(name, variant)| {
-                self.changed_to(&Value::Null, tag, name, variant)
+            return first.map_or(Value::Null, |KindVariant { name, schema }| {
+                self.changed_to(&Value::Null, tag, name, schema)
             });
         }
         if let Some(default) = schema.get("default").filter(|default| !default.is_null()) {
@@ -318,15 +318,31 @@ impl Form {
     }
 }
 
-/// The tag and the named variants of a choice among objects.
-fn variants(schema: &Value) -> Option<(&'static str, Vec<(&str, &Value)>)> {
+/// A choice among kinds of objects.
+struct KindChoice<'a> {
+    /// The key that says which it is.
+    tag: &'static str,
+    variants: Vec<KindVariant<'a>>,
+}
+
+/// One kind of them.
+struct KindVariant<'a> {
+    name: &'a str,
+    schema: &'a Value,
+}
+
+/// The choice among objects that a schema is.
+fn variants(schema: &Value) -> Option<KindChoice<'_>> {
     let choices = ["oneOf", "anyOf"].iter().find_map(|key| schema[*key].as_array())?;
     TAGS.into_iter().find_map(|tag| {
         let named: Option<Vec<_>> = choices
             .iter()
-            .map(|variant| Some((variant["properties"][tag]["const"].as_str()?, variant)))
+            .map(|schema| {
+                let name = schema["properties"][tag]["const"].as_str()?;
+                Some(KindVariant { name, schema })
+            })
             .collect();
-        Some((tag, named?))
+        Some(KindChoice { tag, variants: named? })
     })
 }
 

@@ -10,7 +10,7 @@ use etendue_optics::element::Picture;
 use etendue_optics::train::{Focus, Inquiry, LensFile, LensFormat, LensReport, ZemaxLens};
 use etendue_scene::file::{SensorFile, read_lens, trace_rays};
 use etendue_scene::import::{Options, import};
-use etendue_scene::{LoadOptions, SceneFile, Strictness, Wanted, doctor};
+use etendue_scene::{LoadOptions, SceneFile, Setting, Strictness, Wanted, doctor};
 use etendue_tracer::texture::{Filter, Wrap};
 use etendue_tracer::{EnvironmentMap, ImageSource, Texture};
 
@@ -147,8 +147,7 @@ fn set(bytes: &[u8], folder: &Path) {
     let path = write(folder, "s.json", scene);
     let text = String::from_utf8_lossy(bytes);
     let pairs = text.lines().filter_map(|line| line.split_once('='));
-    let settings: Vec<(String, String)> =
-        pairs.map(|(key, value)| (key.to_owned(), value.to_owned())).collect();
+    let settings: Vec<Setting> = pairs.map(|(path, value)| Setting::new(path, value)).collect();
     let _ = SceneFile::read(&path, &settings);
     let _ = doctor::check(&path, &settings, &LoadOptions::default());
 }

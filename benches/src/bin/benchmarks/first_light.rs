@@ -14,7 +14,7 @@ use etendue_geometry::{
 };
 use etendue_render::output::Outputs;
 use etendue_render::{Images, Plan, plan};
-use etendue_scene::{LoadOptions, Scene, SceneFile};
+use etendue_scene::{LoadOptions, Scene, SceneFile, Setting};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
@@ -86,8 +86,8 @@ struct Prepared {
 impl Prepared {
     fn load(overrides: &[(&str, &str)]) -> anyhow::Result<Self> {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/first-light.json");
-        let overrides: Vec<(String, String)> =
-            overrides.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
+        let overrides: Vec<Setting> =
+            overrides.iter().map(|&(path, value)| Setting::new(path, value)).collect();
         let file = SceneFile::read(&path, &overrides)?;
         let scene = file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default())?;
         let plan = Plan::new(&scene, Outputs { exr: true, ..Outputs::NONE });

@@ -7,7 +7,7 @@ use etendue_files::Opener;
 use etendue_render::output::{Outputs, Values};
 use etendue_render::{Images, Plan, Rendered, build, plan, render};
 use etendue_scene::file::SceneFile;
-use etendue_scene::{LoadOptions, Scene};
+use etendue_scene::{LoadOptions, Scene, Setting};
 use etendue_sensor::Sensor;
 use etendue_spectrum::Bands;
 use serde_json::{Value, json};
@@ -106,12 +106,12 @@ impl Study {
     /// The scene with the samples and exposure wanted.
     pub(crate) fn scene(&self, wanted: &Wanted, seed: u64) -> Scene {
         let mut settings = vec![
-            ("render.samples".to_owned(), wanted.samples.to_string()),
-            ("render.seed".to_owned(), seed.to_string()),
-            ("camera.sensor.exposure".to_owned(), wanted.exposure.to_string()),
+            Setting::new("render.samples", wanted.samples.to_string()),
+            Setting::new("render.seed", seed.to_string()),
+            Setting::new("camera.sensor.exposure", wanted.exposure.to_string()),
         ];
         if wanted.samples.is_object() {
-            settings.push(("layers".to_owned(), r#"["sample_count"]"#.to_owned()));
+            settings.push(Setting::new("layers", r#"["sample_count"]"#));
         }
         loaded(&self.file.with(&settings).expect("settings that the format knows"))
     }

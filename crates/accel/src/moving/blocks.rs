@@ -12,6 +12,13 @@ use crate::{Accel, BlockAccel};
 /// Distances that differ by no more than this share, where one of them is of single precision, are one.
 const ONE_PLACE: f64 = 8.0 * f32::EPSILON as f64;
 
+/// A lane of a block, by the block's number.
+#[derive(Clone, Copy)]
+struct BlockLane {
+    block: usize,
+    lane: usize,
+}
+
 impl MovingScene {
     /// The frame of blocks around all that stands and all that moves, whose coordinates are those of what stands; `None`
     /// where that is not asked in blocks, or too far away for single precision.
@@ -31,7 +38,7 @@ impl MovingScene {
         blocks: &mut [RayBlock],
         times: &[f64],
         ends: impl Fn(&RayBlock, usize) -> bool,
-        ask: impl FnOnce(&RayBatch, &[(usize, usize)], &mut [RayBlock]),
+        ask: impl FnOnce(&RayBatch, &[BlockLane], &mut [RayBlock]),
     ) {
         let origin = self.frame.map_or(DVec3::ZERO, |frame| frame.origin);
         let (mut rays, mut lanes, mut at) = (RayBatch::default(), Vec::new(), Vec::new());
@@ -49,7 +56,7 @@ impl MovingScene {
                 if meets(self.swept, origin + start, along, [limits[0], reach]) {
                     rays.push_between(origin + start, along, limits[0], reach);
                     at.push(times.get(number * LANES + lane).copied().unwrap_or(0.0));
-                    lanes.push((number, lane));
+                    lanes.push(BlockLane { block: number, lane });
                 }
             }
         }
@@ -84,7 +91,7 @@ impl BlockAccel for MovingScene {
         self.of_blocks(blocks, times, is_hit, |rays, lanes, blocks| {
             let mut hits = HitBatch::new(Detail::Surface);
             hits.reset(rays.len());
-            for (k, &(number, lane)) in lanes.iter().enumerate() {
+            for (k, &BlockLane { block: number, lane }) in lanes.iter().enumerate() {
                 let block = &blocks[number];
                 hits.placement[k] = block.placement[lane];
                 if hits.is_hit(k) {
@@ -122,7 +129,7 @@ impl BlockAccel for MovingScene {
                     hit.put(&mut hits, i, body.placement);
                 }
             }
-            for (k, &(number, lane)) in lanes.iter().enumerate() {
+            for (k, &BlockLane { block: number, lane }) in lanes.iter().enumerate() {
                 if self.moves.get(hits.placement[k] as usize) == Some(&true) {
                     write(&mut blocks[number], lane, &hits, k);
                 }
@@ -154,7 +161,7 @@ impl BlockAccel for MovingScene {
                         blocked[i] |= packed.rays.blocks()[k / LANES].is_blocked(k % LANES);
                     }
                 }
-                for (&(number, lane), _) in
+                for (&BlockLane { block: number, lane }, _) in
                     lanes.iter().zip(&blocked).filter(|(_, blocked)| **blocked)
                 {
                     blocks[number].t_max[lane] = f32::NEG_INFINITY;

@@ -58,7 +58,7 @@ fn accelerator(finding: &accelerators::AcceleratorMeasurement) -> Vec<(&'static 
 
 pub(super) fn samplers(found: &Samplers) -> Table {
     let row = |finding: &crate::samplers::SamplerMeasurement| {
-        let name = ("sampler", Cell::word(finding.sampler));
+        let name = ["sampler", finding.sampler];
         picture(name, finding.samples, finding.seconds, [finding.rmse, finding.relative_rmse])
     };
     Table::of_rows(found.findings.iter().map(row).collect())
@@ -66,7 +66,7 @@ pub(super) fn samplers(found: &Samplers) -> Table {
 
 pub(super) fn cameras(found: &Cameras) -> Table {
     let row = |finding: &crate::cameras::ModelMeasurement| {
-        let name = ("model", Cell::word(finding.model));
+        let name = ["model", finding.model];
         picture(name, finding.samples, finding.seconds, [finding.rmse, finding.relative_rmse])
     };
     Table::of_rows(found.findings.iter().map(row).collect())
@@ -122,14 +122,14 @@ pub(super) fn renders(found: &Target) -> Table {
 }
 
 fn picture(
-    name: (&'static str, Cell),
+    [title, name]: [&'static str; 2],
     samples: u32,
     seconds: TimeSpread,
     [rmse, relative]: [f64; 2],
 ) -> Vec<(&'static str, Cell)> {
     let shown = |value: f64| Cell::number(value, format!("{value:.4}"));
     vec![
-        name,
+        (title, Cell::word(name)),
         ("samples", Cell::count(samples.into())),
         ("trace_s", shown(seconds.median)),
         ("fastest_s", shown(seconds.fastest)),

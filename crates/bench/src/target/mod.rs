@@ -12,6 +12,7 @@
 
 mod race;
 
+use etendue_scene::Setting;
 use serde::Serialize;
 
 pub use self::race::measure;
@@ -21,8 +22,8 @@ pub use self::race::measure;
 pub struct Change {
     /// Its name.
     pub name: String,
-    /// Settings, as pairs of a path of the scene and JSON.
-    pub settings: Vec<(String, String)>,
+    /// Settings of the scene.
+    pub settings: Vec<Setting>,
 }
 
 /// Settings that contend: the scene under some changes, each of another axis.
@@ -33,7 +34,7 @@ pub struct Contender {
     /// Its name.
     pub name: String,
     /// All that is set.
-    pub settings: Vec<(String, String)>,
+    pub settings: Vec<Setting>,
 }
 
 impl Contender {
@@ -58,20 +59,20 @@ pub const RULES: [&str; 2] = ["relative_error", "sensor-noise"];
 /// `settings` of a scene rendered with so many samples. A rule has an error that falls as those of so many samples do: one
 /// over their root, and a variance of one over them.
 #[must_use]
-pub fn rendered_with(settings: &[(String, String)], samples: u32) -> Vec<(String, String)> {
+pub fn rendered_with(settings: &[Setting], samples: u32) -> Vec<Setting> {
     let most = samples.saturating_mul(64);
     let variance = 1.0 / f64::from(samples.max(2));
     let [relative, noise] = RULES;
     let mut all = settings.to_vec();
-    match all.iter_mut().find(|(path, _)| path == SAMPLES) {
-        Some((_, rule)) if rule == relative => {
+    match all.iter_mut().find(|setting| setting.path == SAMPLES) {
+        Some(Setting { value: rule, .. }) if rule == relative => {
             *rule = format!(r#"{{"{relative}": {:.6}, "max": {most}}}"#, variance.sqrt());
         }
-        Some((_, rule)) if rule == noise => {
+        Some(Setting { value: rule, .. }) if rule == noise => {
             *rule = format!(r#"{{"until": "{noise}", "fraction": {variance:.9}, "max": {most}}}"#);
         }
         Some(_) => {}
-        None => all.push((SAMPLES.to_owned(), samples.to_string())),
+        None => all.push(Setting::new(SAMPLES, samples.to_string())),
     }
     all
 }
@@ -180,8 +181,8 @@ pub struct ContenderForecast {
     pub seconds: Option<f64>,
     /// Number of times that it was rendered.
     pub renders: usize,
-    /// Settings, as pairs of a path of the scene and JSON.
-    pub settings: Vec<(String, String)>,
+    /// Settings of the scene.
+    pub settings: Vec<Setting>,
 }
 
 /// The soonest contender, rendered for itself.
@@ -243,7 +244,7 @@ impl Target {
         let settings = self.contenders.iter().find(|own| own.name == found.name);
         let settings = settings.map_or(&[][..], |own| &own.settings);
         // What is no key of a scene is an option.
-        let word = |(path, value): &(String, String)| match path.starts_with("--") {
+        let word = |Setting { path, value }: &Setting| match path.starts_with("--") {
             true => format!(" {path}"),
             false => format!(" --set '{path}={value}'"),
         };

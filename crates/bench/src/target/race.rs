@@ -6,6 +6,8 @@ mod forecast;
 
 use std::time::Instant;
 
+use etendue_scene::Setting;
+
 use super::{Change, Contender, Effort, Outcome, Render, Run, Target, WholeRun};
 use crate::pictures::{mean, mean_square};
 use crate::{BenchError, Progress};
@@ -49,7 +51,7 @@ struct ContenderRecord {
 /// itself is.
 pub fn measure<E: From<BenchError>>(
     axes: &[Vec<Change>],
-    in_full: &[(String, String)],
+    in_full: &[Setting],
     effort: Effort,
     program: &mut dyn FnMut(Run<'_>) -> Result<Outcome, E>,
     progress: Progress<'_>,

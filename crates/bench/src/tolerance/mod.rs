@@ -4,15 +4,15 @@
 //! Models are compared at places all over the picture, and at each of them at the depths that the scene
 //! itself has there.
 
-mod seconds;
 mod waves;
 mod words;
 
 use etendue_accel::Accel;
-use etendue_camera::Camera;
+use etendue_camera::{Camera, Sampler};
 use etendue_render::output::Outputs;
 use etendue_render::{Plan, RenderError};
 use etendue_scene::Scene;
+use etendue_scene::file::LightPrecision;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -21,8 +21,18 @@ use etendue_render::tolerance::{Field, FullView};
 pub use etendue_render::tolerance::{ModelError, Place, Tolerance, Worst};
 
 pub use self::waves::WaveFinding;
-use crate::pictures::Studio;
+use crate::pictures::{PointSet, Studio};
+use crate::timing::{Timings, order};
 use crate::{BenchError, Progress};
+
+/// Samples a pixel of the shorter and the longer picture: their difference has none of what is done once.
+const SAMPLES: [u32; 2] = [2, 8];
+
+/// Rounds in which every model takes its turn.
+const ROUNDS: usize = 3;
+
+/// Pixels that a model is timed on, at least.
+const PIXELS: u64 = 20_000;
 
 /// All models of a lens against the full train.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -96,7 +106,7 @@ pub fn compare(
     // What each costs, where there is a picture to time.
     match Studio::with_sensor(scene, accel) {
         Ok(mut studio) => {
-            let times = seconds::seconds_a_sample(&mut studio, &models, progress)?;
+            let times = seconds_a_sample(&mut studio, &models, progress)?;
             let full = times.last().copied().unwrap_or(f64::NAN);
             for (finding, time) in findings.iter_mut().zip(times) {
                 finding.seconds_a_sample = Some(time);
@@ -121,6 +131,45 @@ pub fn compare(
         waves,
         notes,
     })
+}
+
+/// The time of one sample of one pixel through each of `models` (s): of tracing the scene's picture on all
+/// threads, the median of the rounds.
+fn seconds_a_sample(
+    studio: &mut Studio<'_>,
+    models: &[Camera],
+    progress: Progress<'_>,
+) -> Result<Vec<f64>, BenchError> {
+    let mut series = vec![Timings::default(); models.len()];
+    let [few, many] = SAMPLES;
+    for round in 0..ROUNDS {
+        for who in order(round, models.len()) {
+            if !progress((round * models.len() + who) as f64 / (ROUNDS * models.len()) as f64) {
+                return Err(BenchError::Stopped);
+            }
+            let [width, height] = models[who].resolution().map(u64::from);
+            #[expect(clippy::cast_possible_truncation, reason = "a share of a side")]
+            let factor = (width * height / PIXELS).isqrt().max(1) as u32;
+            let camera = models[who].coarser(factor);
+            let [width, height] = camera.resolution().map(f64::from);
+            let mut take = |samples| {
+                let sampling = PointSet {
+                    samples,
+                    sampler: Sampler::Sobol,
+                    seed: round as u64,
+                    precision: LightPrecision::Auto,
+                };
+                studio.take(&camera, sampling).map(|taken| taken.seconds)
+            };
+            if round == 0 {
+                // Caches and threads wake.
+                take(few)?;
+            }
+            let (short, long) = (take(few)?, take(many)?);
+            series[who].0.push((long - short).max(0.0) / (width * height * f64::from(many - few)));
+        }
+    }
+    Ok(series.iter().map(Timings::median).collect())
 }
 
 /// The camera of a model, opened for the bands of the picture.

@@ -40,7 +40,7 @@ use etendue_spectrum::{Bands, Spread};
 use glam::{DVec2, DVec3};
 
 use super::lens_camera::LensCamera;
-use super::nodes::{MOST_NODES, NextTerm, NodeWeights, Variable};
+use super::nodes::{MOST_NODES, NextTerm, NodeWeights, RayOff, Variable};
 use super::opened::{BandInterpolation, filtered};
 use super::traced_at::TracedAt;
 
@@ -206,9 +206,9 @@ impl LensCamera {
         ))
     }
 
-    /// Rays that leave the lens at one wavelength (point and direction, mm), from all over the film and the
+    /// Rays that leave the lens at one wavelength, from all over the film and the
     /// pupil.
-    fn rays_to_measure(&self, lens: &MonochromaticTrain) -> Vec<(DVec3, DVec3)> {
+    fn rays_to_measure(&self, lens: &MonochromaticTrain) -> Vec<SceneRay> {
         let film = self.focused.film();
         let train = self.focused.train();
         let rim = train.elements().last().map_or(f64::INFINITY, |e| e.clear_radius());
@@ -237,13 +237,14 @@ impl LensCamera {
         }
         lens.trace(Side::Sensor, Clip::On, &mut rays);
         let left = (0..rays.len()).filter(|&i| rays.status(i) == RayStatus::Exited);
-        left.map(|i| (rays.position(i), rays.direction(i))).collect()
+        let ray = |i| SceneRay { point: rays.position(i), direction: rays.direction(i) };
+        left.map(ray).collect()
     }
 
     /// Landing points of rays of the scene at the wavelength of a lens.
-    fn landings(&self, lens: &MonochromaticTrain, rays: &[(DVec3, DVec3)], lead: f64) -> Landings {
+    fn landings(&self, lens: &MonochromaticTrain, rays: &[SceneRay], lead: f64) -> Landings {
         let mut back = LensRays::with_capacity(rays.len());
-        for &(point, direction) in rays {
+        for &SceneRay { point, direction } in rays {
             back.push(point + direction * lead, -direction);
         }
         lens.trace(Side::Object, Clip::On, &mut back);
@@ -277,9 +278,17 @@ fn parting(landed: &[Landings]) -> f64 {
     (0..first.places.len()).map(part).fold(0.0, f64::max) * first.pitch
 }
 
-/// Rays of the scene (point and direction, mm), and their landing points at the nodes.
+/// A ray of the scene.
+#[derive(Clone, Copy)]
+struct SceneRay {
+    /// A point on it (mm).
+    point: DVec3,
+    direction: DVec3,
+}
+
+/// Rays of the scene, and their landing points at the nodes.
 struct NodeLandings<'a> {
-    rays: &'a [(DVec3, DVec3)],
+    rays: &'a [SceneRay],
     landed: &'a [Landings],
 }
 
@@ -299,7 +308,8 @@ impl NodeLandings<'_> {
         let off = |ray: usize| {
             let (place, _) = found.places[ray]?;
             let (first, _) = self.landed[0].places[ray]?;
-            Some((first, self.rays[ray].0, place - self.between(weights, ray)?.0))
+            let off = place - self.between(weights, ray)?.0;
+            Some(RayOff { place: first, point: self.rays[ray].point, off })
         };
         NextTerm::fitted((0..self.rays.len()).filter_map(off))
     }
@@ -318,7 +328,7 @@ impl NodeLandings<'_> {
                 continue;
             };
             let first = self.landed[0].places[ray].map_or(DVec2::ZERO, |(place, _)| place);
-            let more = DVec2::from(next.at(first.into(), self.rays[ray].0)) * of_next;
+            let more = DVec2::from(next.at(first.into(), self.rays[ray].point)) * of_next;
             errors[0] = errors[0].max((sum.0 + more).distance(*place));
             errors[1] = errors[1].max((sum.1 - share).abs() / share);
         }

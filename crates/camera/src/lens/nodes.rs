@@ -124,12 +124,22 @@ pub(super) struct NextTerm {
 
 const TERMS: usize = 5;
 
+/// A ray that is off in between the nodes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RayOff {
+    /// Landing point (pixels).
+    pub(super) place: DVec2,
+    /// Point where it leaves the lens (mm).
+    pub(super) point: DVec3,
+    /// By how much it is off (pixels).
+    pub(super) off: DVec2,
+}
+
 impl NextTerm {
-    /// By least squares of rays that land on a place (pixels), leave the lens at a point (mm), and are off by so much
-    /// (pixels); zero where these do not tell it.
-    pub(super) fn fitted(rays: impl Iterator<Item = (DVec2, DVec3, DVec2)>) -> Self {
+    /// By least squares of `rays`; zero where these do not tell it.
+    pub(super) fn fitted(rays: impl Iterator<Item = RayOff>) -> Self {
         let mut fits = [LeastSquares::new(TERMS), LeastSquares::new(TERMS)];
-        for (place, point, off) in rays {
+        for RayOff { place, point, off } in rays {
             let row = terms(place.into(), point);
             fits[0].add(&row, off.x, 1.0);
             fits[1].add(&row, off.y, 1.0);

@@ -127,7 +127,7 @@ impl OpencvFit {
                     continue;
                 }
             };
-            let largest = worst(&sights, distance, &model.0, &built);
+            let largest = worst(&sights, distance, &model.intrinsics, &built);
             if best.as_ref().is_none_or(|(least, ..)| largest < *least) {
                 best = Some((largest, model, built));
             }
@@ -147,13 +147,13 @@ impl OpencvFit {
                  there as its polynomial does"
             ));
         }
-        let residuals = residuals(&sights, distance, &model.0, &distortion);
-        let holds = holds(&sights, distance, &model.0, &distortion, tolerance);
+        let residuals = residuals(&sights, distance, &model.intrinsics, &distortion);
+        let holds = holds(&sights, distance, &model.intrinsics, &distortion, tolerance);
         Ok(Self {
             camera: as_spec(camera, &model),
-            k: model.0.matrix(PixelOrigin::Center),
-            model: model.1.name(),
-            coefficients: model.1.coefficients(),
+            k: model.intrinsics.matrix(PixelOrigin::Center),
+            model: model.distortion.name(),
+            coefficients: model.distortion.coefficients(),
             distance: distance.is_finite().then_some(distance),
             residuals,
             holds,
@@ -186,7 +186,8 @@ fn distance_in_focus(camera: &Camera) -> f64 {
 }
 
 /// The camera of a model, standing where `camera` does.
-fn as_spec(camera: &Camera, (intrinsics, distortion): &OpencvModel) -> CameraSpec {
+fn as_spec(camera: &Camera, model: &OpencvModel) -> CameraSpec {
+    let OpencvModel { intrinsics, distortion } = model;
     let [fx, fy] = intrinsics.focal;
     let origin = PixelOrigin::Center;
     let [cx, cy] = intrinsics.centre.map(|c| c - origin.to_corner());

@@ -14,7 +14,10 @@ use etendue_geometry::RayBatch;
 const WIDEST: f64 = 0.02;
 
 /// A camera matrix and a distortion.
-pub(super) type OpencvModel = (Intrinsics, DistortionSpec);
+pub(super) struct OpencvModel {
+    pub(super) intrinsics: Intrinsics,
+    pub(super) distortion: DistortionSpec,
+}
 
 /// The standard model (k1, k2, p1, p2, k3) that comes nearest to `sights` at a `distance` (m), from the
 /// intrinsics `start` on.
@@ -37,7 +40,7 @@ pub(super) fn standard(
     let [fx, fy, cx, cy, k1, k2, p1, p2, k3] = found;
     let intrinsics = Intrinsics { focal: [fx, fy], centre: [cx, cy], skew: 0.0 };
     let model = BrownConrady { k1, k2, p1, p2, k3, ..BrownConrady::default() };
-    Some((intrinsics, DistortionSpec::BrownConrady(model)))
+    Some(OpencvModel { intrinsics, distortion: DistortionSpec::BrownConrady(model) })
 }
 
 /// Residuals of the column and the row of a point against `pixel`, and their derivatives by fx, fy,
@@ -74,7 +77,8 @@ pub(super) fn fisheye(
     let [fx, fy, cx, cy, k1, k2, k3, k4] =
         least_squares([fx, fy, cx, cy, 0.0, 0.0, 0.0, 0.0], rows)?;
     let intrinsics = Intrinsics { focal: [fx, fy], centre: [cx, cy], skew: 0.0 };
-    Some((intrinsics, DistortionSpec::Fisheye(Fisheye { k1, k2, k3, k4 })))
+    let distortion = DistortionSpec::Fisheye(Fisheye { k1, k2, k3, k4 });
+    Some(OpencvModel { intrinsics, distortion })
 }
 
 /// As [`standard_rows`], by fx, fy, cx, cy, k1, k2, k3, k4.
@@ -275,7 +279,8 @@ mod tests {
             let spec: CameraSpec = serde_json::from_str(&json).unwrap();
             let camera = spec.build(|| Bounds::EMPTY, &|name: &str| Err(name.to_owned())).unwrap();
             let Projection::Pinhole(pinhole) = camera.projection() else { panic!("a pinhole") };
-            let (k, found) = fit(&sights(&camera), f64::INFINITY, &start).unwrap();
+            let found = fit(&sights(&camera), f64::INFINITY, &start).unwrap();
+            let OpencvModel { intrinsics: k, distortion: found } = found;
             let own = pinhole.intrinsics();
             let off = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
             // The inverse leaves some 1e-14 of the slopes, the normal equations square their condition.

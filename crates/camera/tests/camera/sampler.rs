@@ -1,6 +1,6 @@
 //! Numbers of samplers as light asks for them: how evenly they fill the square.
 
-use etendue_camera::{PixelSamples, SampleKeys, Sampler};
+use etendue_camera::{PixelSample, SampleKeys, Sampler};
 
 /// Samples that are looked at together.
 const COUNT: u32 = 64;
@@ -10,7 +10,7 @@ const PAIRS: u32 = 12;
 
 /// One pair of dimensions of some samples by each way in which it is asked for: of all of them, of picked ones, and of
 /// picked ones in single precision.
-fn asked(samples: &[(PixelSamples, u32)], pair: u32) -> [Vec<[f64; 2]>; 3] {
+fn asked(samples: &[PixelSample], pair: u32) -> [Vec<[f64; 2]>; 3] {
     let mut keys = SampleKeys::default();
     keys.refill(samples.iter().copied());
     let picked: Vec<u32> = (0..COUNT).rev().collect();
@@ -36,9 +36,9 @@ fn boxes(points: &[[f64; 2]], [columns, rows]: [u32; 2]) -> Vec<u32> {
 }
 
 /// The last samples of a pixel, from the number `first` on.
-fn samples(sampler: Sampler, [column, row]: [u32; 2], first: u32) -> Vec<(PixelSamples, u32)> {
+fn samples(sampler: Sampler, [column, row]: [u32; 2], first: u32) -> Vec<PixelSample> {
     let pixel = sampler.pixel(7, column, row, first + COUNT);
-    (first..first + COUNT).map(|index| (pixel, index)).collect()
+    pixel.samples(first..first + COUNT).collect()
 }
 
 /// Of 64 samples from a multiple of 64 on each box of 2⁻ᵃ by 2ᵃ⁻⁶ has one, for all a, the 8 by 8 among them.

@@ -1,6 +1,7 @@
 //! Values of arguments from their words, or what would have been one.
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use etendue::Setting;
 use etendue_accel::AccelName;
 use etendue_bench::tolerance::Tolerance;
 use etendue_geometry::units::Dimension;
@@ -10,24 +11,29 @@ use etendue_tracer::LayerSpec;
 /// More threads than any machine has cores only make a machine unusable.
 const MOST_THREADS: usize = 1024;
 
-pub(super) fn setting(text: &str) -> Result<(String, String), String> {
+pub(super) fn setting(text: &str) -> Result<Setting, String> {
     match text.split_once('=') {
-        Some((path, value)) if !path.trim().is_empty() => {
-            Ok((path.trim().to_owned(), value.to_owned()))
-        }
+        Some((path, value)) if !path.trim().is_empty() => Ok(Setting::new(path.trim(), value)),
         _ => Err("expected PATH=VALUE, such as camera.fov=30".to_owned()),
     }
 }
 
 /// A key and the values that it takes in turn; none where the key stands alone.
-pub(super) fn sweep(text: &str) -> Result<(String, Vec<String>), String> {
-    let Ok((key, values)) = setting(text) else {
+#[derive(Debug, Clone)]
+pub(crate) struct Sweep {
+    pub(crate) key: String,
+    pub(crate) values: Vec<String>,
+}
+
+pub(super) fn sweep(text: &str) -> Result<Sweep, String> {
+    let Ok(Setting { path: key, value }) = setting(text) else {
         return match text.contains('=') {
             true => Err("expected KEY=VALUES, such as accuracy.path_noise=0.1,1".to_owned()),
-            false => Ok((text.trim().to_owned(), Vec::new())),
+            false => Ok(Sweep { key: text.trim().to_owned(), values: Vec::new() }),
         };
     };
-    Ok((key, values.split(',').map(|value| value.trim().to_owned()).collect()))
+    let values = value.split(',').map(|value| value.trim().to_owned()).collect();
+    Ok(Sweep { key, values })
 }
 
 /// A share from a number of hundredths, such as 1%.

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use etendue_bench::tolerance::Tolerance;
 use etendue_files::{Opener, Reach};
-use etendue_scene::LoadOptions;
 use etendue_scene::import::Strictness;
+use etendue_scene::{LoadOptions, Setting};
 use etendue_tracer::LayerSpec;
 
 use super::parse;
@@ -24,7 +24,7 @@ pub(crate) struct SceneArguments {
         value_parser = parse::setting,
         help = "Set any value of the scene, e.g. camera.fov=30 or objects[0].transform.scale=2"
     )]
-    pub(crate) settings: Vec<(String, String)>,
+    pub(crate) settings: Vec<Setting>,
     /// Look through one of the models' own cameras, by its name or number (from 0)
     #[arg(long, value_name = "NAME|INDEX")]
     pub(crate) camera: Option<String>,
@@ -90,10 +90,10 @@ impl SceneArguments {
     }
 
     /// The settings and options as overrides of the scene's values, the later the stronger.
-    pub(crate) fn overrides(&self) -> Vec<(String, String)> {
+    pub(crate) fn overrides(&self) -> Vec<Setting> {
         // Options that stand for keys come after `--set`, and so overrule it.
         let mut overrides = self.settings.clone();
-        let mut set = |key: &str, value: String| overrides.push((key.to_owned(), value));
+        let mut set = |path: &str, value: String| overrides.push(Setting::new(path, value));
         if let Some(layers) = &self.layers {
             let names: Vec<String> = layers.iter().map(|name| format!("\"{name}\"")).collect();
             set("layers", format!("[{}]", names.join(",")));

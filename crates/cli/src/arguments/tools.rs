@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 
 use super::parse;
 use super::scene::SceneArguments;
-use etendue::LightUnit;
+use etendue::{LightUnit, Setting};
 use etendue_optics::train::Focus;
 
 pub(super) const LENS_HELP: &str = "\
@@ -185,7 +185,7 @@ pub(crate) struct ExposeArguments {
         value_parser = parse::setting,
         help = "Set any value of the sensor's file, e.g. exposure=0.02, or camera.sensor.exposure=0.02 of a scene"
     )]
-    pub(crate) settings: Vec<(String, String)>,
+    pub(crate) settings: Vec<Setting>,
     /// Seed of the noise; when absent the `noise_seed` of the render that left the picture, or else 0
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
@@ -232,7 +232,7 @@ pub(crate) struct CalibrateArguments {
         value_parser = parse::setting,
         help = "Set any value of the scene, e.g. camera.sensor.exposure=0.02"
     )]
-    pub(crate) settings: Vec<(String, String)>,
+    pub(crate) settings: Vec<Setting>,
     /// Frames of each kind, 1 to 1000
     #[arg(long, value_name = "N", default_value_t = 16)]
     pub(crate) frames: u32,
@@ -310,7 +310,7 @@ pub(crate) struct MatchArguments {
         value_parser = parse::setting,
         help = "Set any value of the scene, e.g. camera.sensor.exposure=0.02"
     )]
-    pub(crate) settings: Vec<(String, String)>,
+    pub(crate) settings: Vec<Setting>,
     /// Draw residuals and write what was found into this folder, made when it is not there
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
@@ -469,7 +469,7 @@ pub(crate) struct BenchArguments {
     /// Values of a key that contend for --target, too, e.g. render.seed=1,2; of a number of `accuracy` the key alone
     /// takes a quarter, half, twice and four times its default. Several keys with several of these
     #[arg(long, value_name = "KEY=VALUES", value_parser = parse::sweep, requires = "target")]
-    pub(crate) sweep: Vec<(String, Vec<String>)>,
+    pub(crate) sweep: Vec<parse::Sweep>,
     /// Stop when a structure would need more than this, e.g. 800M or 4G (bytes, 1024-based)
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     pub(crate) memory_limit: Option<u64>,

@@ -1,6 +1,6 @@
 //! `etendue bench --target`: which settings reach a given error of what the sensor records soonest.
 
-use etendue::{Denoiser, Options, Outputs, Progress, Rendering, Session};
+use etendue::{Denoiser, Options, Outputs, Progress, Rendering, Session, Setting};
 use etendue_accel::AccelName;
 use etendue_bench::target::{
     Change, Effort, Outcome, RULES, Run, SAMPLES, Target, WholeRun, measure, rendered_with,
@@ -10,7 +10,7 @@ use etendue_scene::Scene;
 use etendue_scene::file::{AccuracySpec, SceneFile, TracerSpec};
 use etendue_tracer::LayerSpec;
 
-use crate::arguments::BenchArguments;
+use crate::arguments::{BenchArguments, Sweep};
 use crate::fault::Fault;
 use crate::progress::Phases;
 use crate::{job, stop};
@@ -46,14 +46,14 @@ pub(super) fn race(
     };
     let progress = phases.begin("target");
     // The picture that all are compared with has everything.
-    let in_full = [("tolerance".to_owned(), "null".to_owned())];
+    let in_full = [Setting::new("tolerance", "null")];
     let effort = Effort { target, seconds };
     measure(axes, &in_full, effort, &mut program, &|share| progress(share))
 }
 
 /// Settings that remove a scene's layers of sampling, which there are of samples that stop by
 /// themselves alone; nothing where it has none.
-fn without_sampling(scene: &Scene) -> Vec<(String, String)> {
+fn without_sampling(scene: &Scene) -> Vec<Setting> {
     let is_own = |layer: &&LayerSpec| Some(**layer) != scene.picture;
     let own: Vec<&LayerSpec> = scene.layers.iter().filter(is_own).collect();
     if !own.iter().any(|layer| layer.is_of_sampling()) {
@@ -65,13 +65,13 @@ fn without_sampling(scene: &Scene) -> Vec<(String, String)> {
     };
     let names: Vec<String> =
         kept.filter_map(|layer| Some(format!("\"{}\"", written(layer)?))).collect();
-    vec![("layers".to_owned(), format!("[{}]", names.join(",")))]
+    vec![Setting::new("layers", format!("[{}]", names.join(",")))]
 }
 
 /// The program from the scene's text to its files, with these `layers` where they are set.
 fn whole_run(
     arguments: &BenchArguments,
-    layers: &[(String, String)],
+    layers: &[Setting],
     run: Run<'_>,
     folder: &std::path::Path,
 ) -> Result<WholeRun, etendue::Error> {
@@ -80,11 +80,11 @@ fn whole_run(
     let mut settings = rendered_with(&run.contender.settings, run.samples);
     let wanted = settings.len();
     // What is no key of a scene is an output.
-    settings.retain(|(path, _)| path != DENOISE);
+    settings.retain(|setting| setting.path != DENOISE);
     options.outputs = Outputs { denoised: settings.len() < wanted, ..Outputs::ALL };
     options.settings.extend(layers.iter().cloned());
     options.settings.extend(settings);
-    options.settings.push(("render.seed".to_owned(), run.seed.to_string()));
+    options.settings.push(Setting::new("render.seed", run.seed.to_string()));
     let progress = Progress::new(|_, _| !stop::asked());
     let outputs = options.outputs;
     let rendering = Session::open_with(&arguments.scene.scene, options)?.render(&progress)?;
@@ -127,19 +127,16 @@ const SWEPT: [f64; 4] = [0.25, 0.5, 2.0, 4.0];
 /// # Errors
 ///
 /// When the scene does not take a value.
-pub(super) fn sweeps(
-    keys: &[(String, Vec<String>)],
-    file: &SceneFile,
-) -> Result<Vec<Vec<Change>>, Fault> {
-    let axis = |(key, values): &(String, Vec<String>)| -> Result<Vec<Change>, Fault> {
+pub(super) fn sweeps(keys: &[Sweep], file: &SceneFile) -> Result<Vec<Vec<Change>>, Fault> {
+    let axis = |Sweep { key, values }: &Sweep| -> Result<Vec<Change>, Fault> {
         let values = match values.is_empty() {
             true => by_itself(key)?,
             false => values.clone(),
         };
         let change = |value: String| {
-            let settings = vec![(key.clone(), value)];
+            let name = format!("{key} {value}");
+            let settings = vec![Setting::new(key, value)];
             file.with(&settings)?;
-            let name = format!("{key} {}", settings[0].1);
             Ok::<_, Fault>(Change { name, settings })
         };
         values.into_iter().map(change).collect()
@@ -173,7 +170,7 @@ fn by_itself(key: &str) -> Result<Vec<String>, Fault> {
 pub(super) fn axes(scene: &Scene) -> Vec<Vec<Change>> {
     let change = |name: &str, path: &str, value: &str| Change {
         name: name.to_owned(),
-        settings: vec![(path.to_owned(), value.to_owned())],
+        settings: vec![Setting::new(path, value)],
     };
     let is_embree = scene.render.accel.unwrap_or_else(AccelName::best) == AccelName::Embree;
     let mut axes = vec![

@@ -2,6 +2,7 @@
 //! tests with `ETENDUE_GENERATE=1`, which writes the files in place of comparing them.
 
 mod keys;
+mod layers;
 mod presets;
 
 use std::fs;
@@ -68,6 +69,12 @@ fn the_table_of_presets_is_that_of_the_program() {
     let cards: Vec<Value> = serde_json::from_str(&output(&["sensor", "--json"])).expect("JSON");
     let page = "docs/reference/sensors.md";
     hold(page, &with_part(page, "presets", &presets::table(&cards)));
+}
+
+#[test]
+fn the_table_of_layers_is_that_of_the_program() {
+    let page = "docs/reference/outputs.md";
+    hold(page, &with_part(page, "layers", &layers::table()));
 }
 
 /// The commands that `etendue --help` lists.

@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use etendue_files::{Ledger, MANIFEST, SOFTWARE, Transaction};
 use etendue_render::expose::{ExposeError, SensorLight};
-use etendue_render::output::{Look, npy, png, sidecar};
+use etendue_render::output::{HeaderEntry, Look, npy, png, sidecar};
 use etendue_sensor::dng::{DngDetails, DngError, GainMap};
 use etendue_sensor::{Exposure, InvalidValues, RawImage, Sensor, SensorError, SensorKind};
 use serde::Serialize;
@@ -312,7 +312,7 @@ impl CalibrationSet<'_> {
             ("unit", "DN".to_owned()),
             ("exposure", format!("{} s", self.shot.exposure)),
         ];
-        let meaning = meaning.map(|(key, text)| (key.to_owned(), text)).into();
+        let meaning = meaning.map(|(key, text)| HeaderEntry::new(key, text)).into();
         Layer { name: "Raw".to_owned(), look, channels: channels.collect(), meaning }
     }
 

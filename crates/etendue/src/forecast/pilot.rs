@@ -98,8 +98,8 @@ impl Pilot<'_> {
         let step = height.div_ceil((WHITE_PIXELS / width.max(1)).max(1));
         let rows: Vec<u32> = (step / 2..height).step_by(step.max(1) as usize).collect();
         let start = Instant::now();
-        let settings = (&self.scene.render, self.scene.accuracy.white_samples);
-        std::hint::black_box(white_rows(camera, settings, &rows));
+        let samples = self.scene.accuracy.white_samples;
+        std::hint::black_box(white_rows(camera, &self.scene.render, samples, &rows));
         let a_row = start.elapsed().as_secs_f64() / rows.len().max(1) as f64;
         Ok(opening + a_row * f64::from(height))
     }

@@ -5,6 +5,7 @@ use std::path::Path;
 use etendue_geometry::units::Micrometres;
 use etendue_image::Quantity;
 use etendue_render::expose::{self, KNOWN_UNITS, LightUnit, SensorLight, pupil_solid_angle};
+use etendue_render::output::HeaderEntry;
 use etendue_scene::file::{RenderSpec, SensorFile};
 use etendue_sensor::{Radiometry, Sensor, SensorError, SensorSpec};
 
@@ -41,9 +42,9 @@ impl LightImage {
             ("light_unit", unit.to_string()),
             ("noise_seed", seed.to_string()),
         ];
-        let header = header.map(|(key, text)| (key.to_owned(), text)).to_vec();
+        let header = header.map(|(key, text)| HeaderEntry::new(key, text)).to_vec();
         let seeds = [options.seed.unwrap_or(seed), seed];
-        let light = SensorLight::from_picture(&sensor, self.picture, factor, (seeds, header));
+        let light = SensorLight::from_picture(&sensor, self.picture, factor, seeds, header);
         let light = light.map_err(|error| match error {
             expose::ExposeError::Sensor(error) => {
                 refused(&path, format!("its bands miss what the sensor sees: {error}"))

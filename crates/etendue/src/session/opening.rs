@@ -7,7 +7,7 @@ use etendue_files::Opener;
 use etendue_optics::glass::AgfCatalogue;
 use etendue_render::Seconds;
 use etendue_scene::file::{FileKind, SceneFile};
-use etendue_scene::{Cache, SceneError};
+use etendue_scene::{Cache, SceneError, Setting};
 use serde_json::Value;
 
 use super::Session;
@@ -138,8 +138,8 @@ fn read(opener: &Opener, path: &Path, options: &Options) -> Result<SceneFile, Sc
         return Ok(file);
     }
     file.with(&[
-        ("tracer".to_owned(), r#"{"type": "facing"}"#.to_owned()),
-        ("layers".to_owned(), r#"["depth", "normal"]"#.to_owned()),
+        Setting::new("tracer", r#"{"type": "facing"}"#),
+        Setting::new("layers", r#"["depth", "normal"]"#),
     ])
 }
 

@@ -7,7 +7,7 @@ use std::time::Instant;
 use etendue_accel::{Accel, BuildOptions};
 use etendue_render::output::Outputs;
 use etendue_render::tolerance::{self, Verified};
-use etendue_render::{Plan, denoise, plan};
+use etendue_render::{Plan, RenderedScene, denoise, plan};
 use etendue_scene::escape::one_line;
 use etendue_scene::file::SceneFile;
 use etendue_scene::memory::Budget;
@@ -240,8 +240,8 @@ impl Session {
         }
         let start = Instant::now();
         let watch = |share: f64| progress.goes_on(Phase::Build, share);
-        let prepared = (self.built()?, &*self.images);
-        let taken = tolerance::choose(scene, plan, prepared, loaded.detail(), &watch)?;
+        let rendered = RenderedScene { scene, accel: self.built()?, images: &self.images };
+        let taken = tolerance::choose(rendered, plan, loaded.detail(), &watch)?;
         let plan = Plan::taking(scene, self.options.outputs, taken);
         if self.options.memory_limit.is_some() {
             fits(scene, &plan, self.options.memory_limit)?;
@@ -277,9 +277,10 @@ impl Session {
         let LoadedScene { scene, plan, .. } = self.loaded()?;
         let Some(taken) = &plan.taken else { return Ok(None) };
         let watch = |share: f64| progress.goes_on(Phase::Render, share);
-        let rendered = (&**scene, self.built()?, &*self.images);
+        let rendered = RenderedScene { scene, accel: self.built()?, images: &self.images };
         let whole = self.images.renewed(&full, plan, self.options.memory_limit, &[])?;
-        let found = tolerance::verify((&full, &*accel, &whole), rendered, taken, &watch)?;
+        let whole = RenderedScene { scene: &full, accel: &*accel, images: &whole };
+        let found = tolerance::verify(whole, rendered, taken, &watch)?;
         Ok(Some(found))
     }
 }

@@ -8,7 +8,7 @@ use etendue_accel::Accel;
 use etendue_files::{SOFTWARE, Transaction};
 use etendue_oidn::Denoiser;
 use etendue_render::expose::SensorLight;
-use etendue_render::output::{ImageHash, Layer};
+use etendue_render::output::{HeaderEntry, ImageHash, Layer};
 use etendue_render::report::memory;
 use etendue_render::{
     Checkpoint, Film, FilmFile, FollowedFrame, Identity, Plan, Prepared, RenderError, RenderState,
@@ -19,6 +19,7 @@ use serde_json::Value;
 
 use super::Session;
 use super::loaded::LoadedScene;
+use crate::rendering::TracedScene;
 use crate::words::{NOT_FOLLOWED, changed, fingerprints, header, not_finite};
 use crate::{Error, Progress, Rendering};
 
@@ -183,7 +184,7 @@ impl Session {
             Some(size) if size == plan.samples => return self.identity(scene, plan),
             Some(size) => format!("any of a set of {size}"),
         };
-        let print = ("scene_hash".to_owned(), scene.hash_of_any_samples()?.to_string());
+        let print = HeaderEntry::new("scene_hash", scene.hash_of_any_samples()?.to_string());
         self.identity_by(scene, plan, samples, vec![print])
     }
 
@@ -192,7 +193,7 @@ impl Session {
         scene: &Scene,
         plan: &Plan,
         samples: String,
-        prints: Vec<(String, String)>,
+        prints: Vec<HeaderEntry>,
     ) -> Result<Identity, Error> {
         let [width, height] = scene.camera.resolution();
         let layers: Vec<_> = plan.layers.iter().map(|layer| layer.row().name).collect();
@@ -207,7 +208,7 @@ impl Session {
             ("precision of light", format!("{:?}", plan.light_precision).to_lowercase()),
         ];
         let own = own.map(|(key, value)| (key.to_owned(), value));
-        let prints = prints.into_iter().map(|(key, value)| (key.replace('_', " "), value));
+        let prints = prints.into_iter().map(|print| (print.key.replace('_', " "), print.text));
         Ok(own.into_iter().chain(prints).collect())
     }
 
@@ -246,7 +247,7 @@ impl Session {
         let asks = outputs.annotates() || outputs.cryptomatte;
         let traced = structure
             .filter(|_| asks || scene.camera.light_field().is_some())
-            .map(|accel| (accel, Arc::clone(&self.images)));
+            .map(|accel| TracedScene { accel, images: Arc::clone(&self.images) });
         let mut rendering =
             Rendering::new(scene, picture, band_film, traced, report, fingerprints)?;
         rendering.light = rendering.light.map(|light| self.at_common_exposure(light));

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use etendue_render::output::HeaderEntry;
 use etendue_render::serial::SerialFilm;
 use etendue_render::{
     Film, FollowedFrame, Identity, Plan, Prepared, RenderError, RenderState, Shard,
@@ -91,7 +92,7 @@ impl Session {
         &mut self,
         film: &mut SerialFilm,
         bands: &Bands,
-        head: &[(String, String)],
+        head: &[HeaderEntry],
         state: &RenderState<'_>,
         progress: &Progress,
     ) -> Result<(), Error> {

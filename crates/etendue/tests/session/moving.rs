@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use etendue::{Options, Progress, Roughness, Session};
+use etendue::{Options, Progress, Roughness, Session, Setting};
 use serde_json::{Value, json};
 
 use super::{numbers, render};
@@ -91,7 +91,7 @@ fn after_any_change_of_what_moves_pictures_are_those_of_a_new_session() {
         ("objects[0].animation.plays", json!(true)),
     ] {
         session.set(at, value.clone()).unwrap();
-        settings.push((at.to_owned(), value.to_string()));
+        settings.push(Setting::new(at, value.to_string()));
         let options = Options { settings: settings.clone(), ..Options::default() };
         let mut fresh = Session::open_with(&path, options).unwrap();
         assert_eq!(numbers(&render(&mut session)), numbers(&render(&mut fresh)), "{at} {value}");

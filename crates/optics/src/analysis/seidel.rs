@@ -179,29 +179,30 @@ fn sums(
         let sums = match &element.part {
             Part::Surface(surface) => {
                 let dispersion = (short[i + 1] - long[i + 1]) / n1 - (short[i] - long[i]) / n;
-                let shape = (surface.paraxial_curvature(), quartic(surface));
+                let shape = VertexShape {
+                    curvature: surface.paraxial_curvature(),
+                    quartic: quartic(surface),
+                };
                 at_surface([n, n1], shape, dispersion, [marginal, chief], invariant)
             }
             Part::Biconic(surface) => {
                 let dispersion = (short[i + 1] - long[i + 1]) / n1 - (short[i] - long[i]) / n;
-                at_surface(
-                    [n, n1],
-                    (surface.curvature[1], 0.0),
-                    dispersion,
-                    [marginal, chief],
-                    invariant,
-                )
+                let shape = VertexShape { curvature: surface.curvature[1], quartic: 0.0 };
+                at_surface([n, n1], shape, dispersion, [marginal, chief], invariant)
             }
             // Reflection is refraction into the index −n; the sums are the same in the unfolded space.
             Part::Mirror(mirror) => {
-                let shape = (mirror.surface.paraxial_curvature(), quartic(&mirror.surface));
+                let shape = VertexShape {
+                    curvature: mirror.surface.paraxial_curvature(),
+                    quartic: quartic(&mirror.surface),
+                };
                 at_surface([n, -n], shape, 0.0, [marginal, chief], invariant)
             }
             // Its section along y near the axis, without what it adds farther out.
             Part::Freeform(surface) => {
                 let dispersion = (short[i + 1] - long[i + 1]) / n1 - (short[i] - long[i]) / n;
                 let behind = if surface.mirror.is_some() { -n } else { n1 };
-                let shape = (surface.paraxial_curvature(), 0.0);
+                let shape = VertexShape { curvature: surface.paraxial_curvature(), quartic: 0.0 };
                 at_surface([n, behind], shape, dispersion, [marginal, chief], invariant)
             }
             Part::ThinLens(_)
@@ -251,9 +252,17 @@ fn quartic(surface: &crate::element::Surface) -> f64 {
     own + surface.aspheric.get(1).unwrap_or(&0.0) - sphere.powi(3) / 8.0
 }
 
+/// Shape of a surface near its vertex.
+struct VertexShape {
+    /// Curvature (1/mm).
+    curvature: f64,
+    /// As [`quartic`] has it (1/mm³).
+    quartic: f64,
+}
+
 fn at_surface(
     [n, n1]: [f64; 2],
-    (c, quartic): (f64, f64),
+    VertexShape { curvature: c, quartic }: VertexShape,
     dispersion: f64,
     [marginal, chief]: [ParaxialRay; 2],
     invariant: f64,

@@ -198,46 +198,43 @@ impl PointSpread {
         Self { size, pitch, values, perfect: fields.perfect() }
     }
 
-    /// By Huygens' sum, on `size` points a side, `pitch` (mm) apart.
+    /// That of one wavelength by Huygens' sum, on `size` points a side, `pitch` (mm) apart.
     #[must_use]
     pub fn by_huygens(
-        fields: &[(&PupilField, &ReferenceSphere, f64)],
+        field: &PupilField,
+        sphere: &ReferenceSphere,
         size: usize,
         pitch: f64,
     ) -> Self {
         let mut values = vec![0.0; size * size];
-        let mut perfect = 0.0;
-        for &(field, sphere, weight) in fields {
-            let length = field.wavelength * 1e-6;
-            let cells: Vec<(DVec3, f64, f64)> = field
-                .lit()
-                .map(|i| {
-                    let p = field.place(i) / field.index;
-                    let direction = p.extend((1.0 - p.length_squared()).max(0.0).sqrt());
-                    (direction, averaged(field, i), field.mean_waves(i))
-                })
-                .collect();
-            let scale = weight * norm(field);
-            let sum: f64 = field.amplitude.iter().sum();
-            perfect += sum * sum * scale;
-            values.par_iter_mut().enumerate().for_each(|(i, value)| {
-                let at = |k: usize| (k as f64 - (size / 2) as f64) * pitch;
-                let place = DVec3::new(at(i % size), at(i / size), 0.0);
-                let mut field_there = Complex64::ZERO;
-                for &(direction, amplitude, waves) in &cells {
-                    // The way from the sphere less its radius, without losing digits.
-                    let square =
-                        2.0 * sphere.radius * direction.dot(place) + place.length_squared();
-                    let way = (sphere.radius * sphere.radius + square).max(0.0).sqrt();
-                    let rest = square / (way.copysign(sphere.radius) + sphere.radius);
-                    let phase = waves - field.index * rest / length;
-                    field_there += Complex64::from_polar(amplitude, std::f64::consts::TAU * phase);
-                }
-                let cycles = place.truncate() * (field.step / length);
-                let through = sinc(cycles.x) * sinc(cycles.y);
-                *value += scale * (field_there / through).norm_sqr();
-            });
-        }
+        let length = field.wavelength * 1e-6;
+        let cells: Vec<(DVec3, f64, f64)> = field
+            .lit()
+            .map(|i| {
+                let p = field.place(i) / field.index;
+                let direction = p.extend((1.0 - p.length_squared()).max(0.0).sqrt());
+                (direction, averaged(field, i), field.mean_waves(i))
+            })
+            .collect();
+        let scale = norm(field);
+        let sum: f64 = field.amplitude.iter().sum();
+        let perfect = sum * sum * scale;
+        values.par_iter_mut().enumerate().for_each(|(i, value)| {
+            let at = |k: usize| (k as f64 - (size / 2) as f64) * pitch;
+            let place = DVec3::new(at(i % size), at(i / size), 0.0);
+            let mut field_there = Complex64::ZERO;
+            for &(direction, amplitude, waves) in &cells {
+                // The way from the sphere less its radius, without losing digits.
+                let square = 2.0 * sphere.radius * direction.dot(place) + place.length_squared();
+                let way = (sphere.radius * sphere.radius + square).max(0.0).sqrt();
+                let rest = square / (way.copysign(sphere.radius) + sphere.radius);
+                let phase = waves - field.index * rest / length;
+                field_there += Complex64::from_polar(amplitude, std::f64::consts::TAU * phase);
+            }
+            let cycles = place.truncate() * (field.step / length);
+            let through = sinc(cycles.x) * sinc(cycles.y);
+            *value = scale * (field_there / through).norm_sqr();
+        });
         Self { size, pitch, values, perfect }
     }
 

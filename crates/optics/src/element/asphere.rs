@@ -58,8 +58,8 @@ impl Profile for Surface {
         }
         for lane in 0..N {
             let u = squares[lane];
-            let terms = (values[lane] * u, values[lane] + slopes[lane] * u);
-            (values[lane], slopes[lane]) = self.with_conic(u, terms);
+            let (value, slope) = (values[lane] * u, values[lane] + slopes[lane] * u);
+            (values[lane], slopes[lane]) = self.with_conic(u, value, slope);
         }
         (values, slopes)
     }

@@ -34,6 +34,13 @@ enum LensletOptics {
     Faces { faces: Vec<Refraction>, flat: Refraction },
 }
 
+/// The packing of lenslets, and their shape.
+#[derive(Debug, Clone, Copy)]
+struct LensletForm {
+    grid: Grid,
+    shape: LensletShape,
+}
+
 /// A point of the array's plane.
 struct PlanePoint {
     /// Index of the cell.
@@ -78,20 +85,21 @@ impl Lenslets {
         use Grid::{Hexagonal as Hex, Square as Quad};
         use LensletShape::{Hexagonal, Round, Square};
         // A kernel for each packing and shape, in which there is nothing to choose.
+        let form = |grid, shape| LensletForm { grid, shape };
         match (self.array.lattice.grid, self.array.shape) {
-            (Quad, Square) => self.lanes_of((Quad, Square), block, element, z, clip),
-            (Quad, Round) => self.lanes_of((Quad, Round), block, element, z, clip),
-            (Quad, Hexagonal) => self.lanes_of((Quad, Hexagonal), block, element, z, clip),
-            (Hex, Square) => self.lanes_of((Hex, Square), block, element, z, clip),
-            (Hex, Round) => self.lanes_of((Hex, Round), block, element, z, clip),
-            (Hex, Hexagonal) => self.lanes_of((Hex, Hexagonal), block, element, z, clip),
+            (Quad, Square) => self.lanes_of(form(Quad, Square), block, element, z, clip),
+            (Quad, Round) => self.lanes_of(form(Quad, Round), block, element, z, clip),
+            (Quad, Hexagonal) => self.lanes_of(form(Quad, Hexagonal), block, element, z, clip),
+            (Hex, Square) => self.lanes_of(form(Hex, Square), block, element, z, clip),
+            (Hex, Round) => self.lanes_of(form(Hex, Round), block, element, z, clip),
+            (Hex, Hexagonal) => self.lanes_of(form(Hex, Hexagonal), block, element, z, clip),
         }
     }
 
     #[inline(always)]
     fn lanes_of(
         &self,
-        form: (Grid, LensletShape),
+        form: LensletForm,
         block: &mut Block,
         element: usize,
         z: f64,
@@ -144,7 +152,7 @@ impl Lenslets {
     #[inline(always)]
     fn place(
         &self,
-        (grid, shape): (Grid, LensletShape),
+        LensletForm { grid, shape }: LensletForm,
         [x, y]: [f64; 2],
         clip: Clip,
     ) -> PlanePoint {
@@ -164,7 +172,7 @@ impl Lenslets {
     #[inline(always)]
     fn at_thin(
         &self,
-        form: (Grid, LensletShape),
+        form: LensletForm,
         ray: Ray,
         clip: Clip,
         power: impl Fn([f64; 2]) -> f64,
@@ -187,7 +195,7 @@ impl Lenslets {
     #[inline(always)]
     fn at_face(
         &self,
-        form: (Grid, LensletShape),
+        form: LensletForm,
         ray: Ray,
         clip: Clip,
         face: &Refraction,
@@ -200,7 +208,7 @@ impl Lenslets {
         let local = moved(ray, [-centre[0], -centre[1]]);
         let crossing = face.at_near_root::<true, f64>(local, f64::INFINITY);
         let same = self.array.lattice.is_well_inside(
-            form.0,
+            form.grid,
             crossing.ray.position[0],
             crossing.ray.position[1],
         );
@@ -211,7 +219,7 @@ impl Lenslets {
 
     /// A ray in the array's frame, exactly by the rule, and the type of lenslet that it meets.
     pub(crate) fn exactly(&self, ray: Ray, clip: Clip) -> (RefractedRay, Option<usize>) {
-        let form = (self.array.lattice.grid, self.array.shape);
+        let form = LensletForm { grid: self.array.lattice.grid, shape: self.array.shape };
         let (there, _) = to_plane(ray);
         let [x, y, _] = there.position;
         let place = self.place(form, [x, y], clip);

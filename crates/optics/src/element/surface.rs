@@ -251,12 +251,13 @@ impl Surface {
     /// goes on as if at its edge, which keeps an iteration going and is refused in the end.
     #[inline(always)]
     pub(crate) fn profile<T: Real>(&self, u: T) -> (T, T) {
-        self.with_conic(u, polynomial(&self.aspheric, u))
+        let (value, slope) = polynomial(&self.aspheric, u);
+        self.with_conic(u, value, slope)
     }
 
     /// [`Self::profile`] by what [`polynomial`] has at u.
     #[inline(always)]
-    pub(super) fn with_conic<T: Real>(&self, u: T, (value, slope): (T, T)) -> (T, T) {
+    pub(super) fn with_conic<T: Real>(&self, u: T, value: T, slope: T) -> (T, T) {
         let c = self.curvature;
         let root = self.conic_root(u);
         let sag = u.times(c) / root.plus(1.0) + value;

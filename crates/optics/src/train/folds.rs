@@ -87,12 +87,6 @@ impl Isometry {
     }
 }
 
-impl From<(DMat3, DVec3)> for Isometry {
-    fn from((turn, shift): (DMat3, DVec3)) -> Self {
-        Self { turn, shift }
-    }
-}
-
 /// A mirror in the way of a leg of light.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Obstruction {
@@ -234,7 +228,8 @@ pub(super) fn built(elements: &[Element]) -> Vec<Isometry> {
     spaces.push(here);
     for Element { part, frame } in elements {
         if let Some(mount) = part.mirror() {
-            here = here.after(&Fold::new(mount, frame, 1.0).map().into());
+            let (turn, shift) = Fold::new(mount, frame, 1.0).map();
+            here = here.after(&Isometry { turn, shift });
         }
         if let Part::CoordinateBreak(turn) = part {
             here = here.after(&Isometry::behind(turn, frame.vertex.z));

@@ -11,6 +11,20 @@ const TOO_MUCH: f64 = 2.0;
 /// Blocks to each side that are taken to be like one.
 const BESIDE: usize = 8;
 
+/// Variance of a pixel's mean, as a share of what is allowed, and its samples.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PixelVariance {
+    pub(super) variance: f64,
+    pub(super) samples: u32,
+}
+
+impl PixelVariance {
+    /// That of one sample.
+    fn of_one(&self) -> f64 {
+        self.variance * f64::from(self.samples)
+    }
+}
+
 /// Variance that the pixels of a block tell of themselves.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct OwnVariance {
@@ -23,18 +37,20 @@ pub(super) struct OwnVariance {
 }
 
 impl OwnVariance {
-    /// Of pixels with these variances of the mean of so many samples.
-    pub(super) fn of(pixels: &[(f64, u32)]) -> Self {
+    /// Of the pixels of a block.
+    pub(super) fn of(pixels: &[PixelVariance]) -> Self {
         let count = pixels.len().max(1) as f64;
-        let of_one = |&(variance, samples): &(f64, u32)| variance * f64::from(samples);
-        let mean = pixels.iter().map(of_one).sum::<f64>() / count;
-        let squares: f64 = pixels.iter().map(|pixel| (of_one(pixel) - mean).powi(2)).sum();
+        let mean = pixels.iter().map(PixelVariance::of_one).sum::<f64>() / count;
+        let squares: f64 = pixels.iter().map(|pixel| (pixel.of_one() - mean).powi(2)).sum();
         // A square of a normal number has twice the square of its mean as variance: so much there is in any case.
         let spread = (squares / (count - 1.0).max(1.0)).max(2.0 * mean * mean) / count;
-        let all = pixels.iter().map(|(variance, _)| variance).sum::<f64>() / count;
+        let all = pixels.iter().map(|pixel| pixel.variance).sum::<f64>() / count;
         let of_all = match mean > 0.0 {
             true => all / mean,
-            false => pixels.iter().map(|(_, n)| 1.0 / f64::from((*n).max(1))).sum::<f64>() / count,
+            false => {
+                let of_pixel = |pixel: &PixelVariance| 1.0 / f64::from(pixel.samples.max(1));
+                pixels.iter().map(of_pixel).sum::<f64>() / count
+            }
         };
         Self { mean, spread, of_all, pixels: pixels.len() }
     }
@@ -125,7 +141,8 @@ mod tests {
 
     /// With four samples a pixel.
     fn block(variances: &[f64]) -> OwnVariance {
-        OwnVariance::of(&variances.iter().map(|v| (*v, 4)).collect::<Vec<_>>())
+        let of_pixel = |&variance| PixelVariance { variance, samples: 4 };
+        OwnVariance::of(&variances.iter().map(of_pixel).collect::<Vec<_>>())
     }
 
     /// Blocks of known variances, told within a factor of 1.5 of how many are over the limit, in the mean of seeds:

@@ -46,6 +46,15 @@ use crate::tile::TILE;
 use guide::{Guide, guides};
 use strip::{Demand, Evidence, StripOfPixels};
 
+/// The value of a pixel by which its samples are judged.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct JudgedValue {
+    /// Index of its part of what is averaged.
+    pub(crate) part: usize,
+    /// Index of the first value of a pixel there.
+    pub(crate) first: usize,
+}
+
 /// Judges the samples of a picture.
 pub(crate) struct Adaptive<'a> {
     rule: &'a Rule,
@@ -60,8 +69,7 @@ pub(crate) struct Adaptive<'a> {
     /// Evidence of each pixel, and the features by which it is like others.
     evidence: Vec<Evidence>,
     guides: Vec<Guide>,
-    /// Index of the part of what is averaged that is judged, and of its first value of a pixel.
-    judged: (usize, usize),
+    judged: JudgedValue,
     /// The sums of parts whose light lands beside where it starts are of where it landed.
     has_landed: bool,
 }
@@ -73,7 +81,7 @@ impl<'a> Adaptive<'a> {
         most: u32,
         resolution: [u32; 2],
         strips: SampledStrips,
-        judged: (usize, usize),
+        judged: JudgedValue,
         hits: &[ChiefHit],
     ) -> Result<Self, NoMemory> {
         let [width, height] = resolution.map(|side| side as usize);
@@ -110,7 +118,7 @@ impl<'a> Adaptive<'a> {
 
     /// Judges what there is after the samples that were wanted, and says which are wanted next.
     pub(crate) fn judge(&mut self, parts: &[Averaging<'_>]) {
-        let (part, first) = (&parts[self.judged.0], self.judged.1);
+        let (part, first) = (&parts[self.judged.part], self.judged.first);
         let (rule, most, taken, width) = (self.rule, self.most, self.strips, self.resolution[0]);
         let a_strip = (width * TILE) as usize;
         let strips = self.have.par_chunks_mut(a_strip).zip(self.demands.par_chunks_mut(a_strip));
@@ -146,8 +154,8 @@ impl<'a> Adaptive<'a> {
             part.show_counted(&in_sums);
         }
         if !findings.is_empty() {
-            let part = &parts[self.judged.0];
-            part.tell(findings, &self.have, &self.in_sums_of(part), self.judged.1);
+            let part = &parts[self.judged.part];
+            part.tell(findings, &self.have, &self.in_sums_of(part), self.judged.first);
         }
     }
 
@@ -162,7 +170,7 @@ impl<'a> Adaptive<'a> {
     /// Takes what pixels tell of themselves from the light that landed on them, which varies by how much of it did.
     pub(crate) fn judge_landed(&mut self, parts: &[Averaging<'_>]) {
         self.has_landed = true;
-        let (part, first) = (&parts[self.judged.0], self.judged.1);
+        let (part, first) = (&parts[self.judged.part], self.judged.first);
         if part.what.shared_rows().is_none() {
             return;
         }
@@ -207,7 +215,7 @@ impl<'a> Adaptive<'a> {
             };
             #[expect(clippy::cast_possible_truncation, reason = "a row of a picture")]
             let top = k as u32 * TILE;
-            strip.counts(self.rule, (top, self.most), &self.demands[rows])
+            strip.counts(self.rule, top, self.most, &self.demands[rows])
         };
         let strips = 0..self.have.len().div_ceil(a_strip.max(1));
         strips.filter(|k| self.strips.shard.owns(*k)).filter_map(of_strip).reduce(SampleCounts::and)

@@ -1,7 +1,7 @@
 //! The pixels of a strip of rows: what they tell of each other, and how many samples they are to get.
 
 use super::counts::SampleCounts;
-use super::early::{self, OwnVariance};
+use super::early::{self, OwnVariance, PixelVariance};
 use super::guide::{Guide, likeness};
 use super::rule::{PixelNoise, Rule};
 
@@ -267,7 +267,8 @@ impl StripOfPixels<'_> {
     pub(super) fn counts(
         &self,
         rule: &Rule,
-        (top, most): (u32, u32),
+        top: u32,
+        most: u32,
         demands: &[Demand],
     ) -> Option<SampleCounts> {
         let [across, down] = self.blocks();
@@ -324,9 +325,9 @@ impl StripOfPixels<'_> {
             ..SampleCounts::of_pixel(self.have[index], share)
         };
         // Of what goes on nobody knows yet, and what was given up is told by itself.
-        let done: Vec<(f64, u32)> = (pixels.iter().zip(&shares))
+        let done: Vec<PixelVariance> = (pixels.iter().zip(&shares))
             .filter(|(index, _)| !gave_up(**index))
-            .map(|(&index, &share)| (share, self.have[index]))
+            .map(|(&index, &share)| PixelVariance { variance: share, samples: self.have[index] })
             .collect();
         CountedBlock {
             done: done.len(),

@@ -23,7 +23,7 @@ use serde_json::Map;
 use super::AnnotationError;
 use crate::RenderError;
 use crate::memory::filled;
-use crate::output::{Channel, Layer, Look, Picture, Values, exr};
+use crate::output::{Channel, HeaderEntry, Layer, Look, Picture, Values, exr};
 
 /// The name of the file.
 pub const CRYPTOMATTE: &str = "cryptomatte.exr";
@@ -83,7 +83,7 @@ impl Matte {
     }
 
     /// The entries of the EXR's header.
-    fn attributes(&self) -> [(String, String); 4] {
+    fn attributes(&self) -> [HeaderEntry; 4] {
         let key = format!("{:08x}", murmur3(self.layer.as_bytes()));
         let of = |entry: &str| format!("cryptomatte/{}/{entry}", &key[..7]);
         let named: BTreeMap<&String, u32> =
@@ -93,10 +93,10 @@ impl Matte {
             .map(|(name, id)| (name.clone(), format!("{id:08x}").into()))
             .collect();
         [
-            (of("name"), self.layer.to_owned()),
-            (of("hash"), "MurmurHash3_32".to_owned()),
-            (of("conversion"), "uint32_to_float32".to_owned()),
-            (of("manifest"), serde_json::Value::Object(manifest).to_string()),
+            HeaderEntry::new(of("name"), self.layer),
+            HeaderEntry::new(of("hash"), "MurmurHash3_32"),
+            HeaderEntry::new(of("conversion"), "uint32_to_float32"),
+            HeaderEntry::new(of("manifest"), serde_json::Value::Object(manifest).to_string()),
         ]
     }
 }
@@ -160,7 +160,7 @@ pub fn write(
                     name: format!("{}{number:02}", matte.layer),
                     look: Look::Cube,
                     channels: names.map(channel).collect(),
-                    meaning: meaning.map(|(key, text)| (key.to_owned(), text)).into(),
+                    meaning: meaning.map(|(key, text)| HeaderEntry::new(key, text)).into(),
                 }
             })
             .collect::<Vec<_>>()
@@ -211,7 +211,7 @@ impl MatteTracing<'_> {
         let mut numbers = Vec::with_capacity(pixels.len() * self.samples as usize);
         for &x in pixels {
             let pixel = render.sampler.pixel(render.frame_seed(), x, row, self.samples);
-            numbers.extend((0..self.samples).map(|index| (pixel, index)));
+            numbers.extend(pixel.samples(0..self.samples));
         }
         let draw = |pair, out: &mut Vec<_>| squares_of_pair(numbers.iter().copied(), pair, out);
         film.clear();

@@ -158,7 +158,7 @@ impl Bop<'_> {
                     let path = self.place(&format!("models/obj_{number:06}.ply"));
                     infos.insert(number, models.write(&pose.model, self.files, &path)?);
                 }
-                self.masks(shot, truth.len(), (instance, whole))?;
+                self.masks(shot, truth.len(), instance, whole)?;
                 let [rotation, translation] = in_camera(&camera, &pose.rotation, pose.translation);
                 truth.push(json!({
                     "obj_id": number, "cam_R_m2c": rotation, "cam_t_m2c": translation,
@@ -190,7 +190,8 @@ impl Bop<'_> {
         &mut self,
         shot: &Shot<'_>,
         number: usize,
-        (instance, whole): (&Instance, &Silhouette),
+        instance: &Instance,
+        whole: &Silhouette,
     ) -> Result<(), OutputError> {
         let size = [shot.annotated.width, shot.annotated.height];
         for (folder, mask) in [("mask", &whole.mask), ("mask_visib", &instance.visible)] {

@@ -74,7 +74,7 @@ pub(crate) fn bytes(scene: &Scene, plan: &Plan) -> u64 {
     });
     let planes = if is_flat { lit + 1 } else { lit + 2 };
     columns * rows * each as u64
-        + spreads::bytes(lens, accuracy, resolution, (cells, unit), (planes, is_flat))
+        + spreads::bytes(lens, accuracy, resolution, cells, unit, planes, is_flat)
 }
 
 /// Refuses what light that is spread over the picture cannot be.
@@ -148,8 +148,8 @@ pub(crate) fn spread_light(
     let mean = all().sum::<f64>() / all().count().max(1) as f64;
     let (across, step) = (picture.size[0], accuracy.defocus_step);
     let layers = DepthLayers::of(&picture.depths, across, lens, mean, step);
-    let sides = (f64::from(cells), pitch);
-    let spreads = Spreads::new(&waves, &layers, [columns, rows], sides, accuracy)
+    let size = [columns, rows];
+    let spreads = Spreads::new(&waves, &layers, size, f64::from(cells), pitch, accuracy)
         .map_err(|error| fault(error.to_string()))?;
     let bands = plan.bands.count();
     let mut planes: Vec<Vec<Vec<f32>>> = vec![Vec::new(); lit.len()];

@@ -57,8 +57,10 @@ pub(crate) fn bytes(
     lens: &LensCamera,
     accuracy: &AccuracySpec,
     resolution: [u32; 2],
-    (cells, unit): (u32, f64),
-    (planes, is_flat): (usize, bool),
+    cells: u32,
+    unit: f64,
+    planes: usize,
+    is_flat: bool,
 ) -> u64 {
     /// The spread, a plane, its transform and the scratch of that.
     const TRANSFORMS: usize = 4;
@@ -89,7 +91,8 @@ impl Spreads {
         lens: &WaveLens<'_>,
         layers: &DepthLayers,
         resolution: [u32; 2],
-        (cells, pitch): (f64, f64),
+        cells: f64,
+        pitch: f64,
         accuracy: &AccuracySpec,
     ) -> Result<Self, AnalysisError> {
         let side = nodes(lens.is_ideal(), accuracy);

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::{BandFilm, ExposeError, SensorLight};
 use crate::forecast::bytes_exposed;
 use crate::memory::filled;
+use crate::output::HeaderEntry;
 
 /// A picture of light from anywhere.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,7 +65,8 @@ impl SensorLight {
         sensor: &Sensor,
         picture: PictureLight,
         factor: f64,
-        (seeds, header): ([u64; 2], Vec<(String, String)>),
+        seeds: [u64; 2],
+        header: Vec<HeaderEntry>,
     ) -> Result<Self, ExposeError> {
         #[expect(clippy::cast_possible_truncation, reason = "a side of an image")]
         let sensor = sensor.clone().with_resolution(picture.size.map(|side| side as u32));

@@ -14,7 +14,9 @@ use serde::Serialize;
 use super::film::plain;
 use super::light::{ExposeError, Exposed, SensorLight};
 use super::remarks;
-use crate::output::{Channel, Layer, Look, Outputs, Picture, PictureError, Values, npy, png};
+use crate::output::{
+    Channel, HeaderEntry, Layer, Look, Outputs, Picture, PictureError, Values, npy, png,
+};
 use etendue_files::{SOFTWARE, Transaction};
 
 /// `raw_003.png` of `raw` and `png` when there are several shots.
@@ -169,7 +171,7 @@ impl ExposureWriter<'_> {
         names.into_iter().zip(planes).map(|(name, values)| Channel { name, values }).collect()
     }
 
-    fn meaning(&self, definition: &str, unit: &str, shot: Exposure) -> Vec<(String, String)> {
+    fn meaning(&self, definition: &str, unit: &str, shot: Exposure) -> Vec<HeaderEntry> {
         let sensor = self.sensor;
         [
             ("definition", definition.to_owned()),
@@ -179,7 +181,7 @@ impl ExposureWriter<'_> {
             ("exposure", format!("{} s", shot.exposure)),
             ("frame", shot.frame.to_string()),
         ]
-        .map(|(key, text)| (key.to_owned(), text))
+        .map(|(key, text)| HeaderEntry::new(key, text))
         .into()
     }
 
@@ -263,7 +265,7 @@ impl ExposureWriter<'_> {
                 ("unit", "e-/s".to_owned()),
                 ("exposures", format!("{} s", times.join(", "))),
             ];
-            let meaning = meaning.map(|(key, text)| (key.to_owned(), text)).into();
+            let meaning = meaning.map(|(key, text)| HeaderEntry::new(key, text)).into();
             let channels = self.named(planes);
             let layer = Layer { name: "Hdr".to_owned(), look: Look::Cube, channels, meaning };
             let header = self.light.header.clone();

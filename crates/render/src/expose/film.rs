@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::LightUnit;
 use crate::film::FilmLayer;
 use crate::memory::{NoMemory, filled};
-use crate::output::{Channel, Layer, Look, Picture, SPECTRUM, Values};
+use crate::output::{Channel, HeaderEntry, Layer, Look, Picture, SPECTRUM, Values};
 
 /// Light in spectral bands, as a sensor is given it.
 #[derive(Debug, Clone, PartialEq)]
@@ -263,7 +263,7 @@ fn cube(grid: &Grid, planes: Vec<Vec<f32>>, unit: LightUnit) -> Layer {
         ("unit", unit.as_str()),
         ("band edges nm", edges.as_str()),
     ];
-    let meaning = meaning.map(|(key, text)| (key.to_owned(), text.to_owned())).into();
+    let meaning = meaning.map(|(key, text)| HeaderEntry::new(key, text)).into();
     Layer { name: SPECTRUM.to_owned(), look: Look::Cube, channels, meaning }
 }
 

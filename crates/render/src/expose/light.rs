@@ -12,7 +12,7 @@ use etendue_tracer::LayerSpec;
 use super::film::{BandFilm, colors, photodiodes};
 use super::{angles, bands, illumination};
 use crate::memory::NoMemory;
-use crate::output::{OutputError, Picture, PictureError};
+use crate::output::{HeaderEntry, OutputError, Picture, PictureError};
 
 /// Error of an exposure.
 #[derive(Debug, thiserror::Error)]
@@ -62,7 +62,7 @@ pub struct SensorLight {
     pub(super) seeds: [u64; 2],
     /// Response of each channel to a white surface in the scene's light, the most being 1.
     pub(super) white: Vec<f64>,
-    pub(super) header: Vec<(String, String)>,
+    pub(super) header: Vec<HeaderEntry>,
     pub(super) notes: Vec<String>,
     /// The exposure that `auto_exposure` found (s).
     pub(super) metered: Option<f64>,
@@ -84,7 +84,8 @@ impl SensorLight {
     /// When there is no memory for it.
     pub fn new(
         scene: &Scene,
-        (picture, band_film): (&Picture, Option<BandFilm>),
+        picture: &Picture,
+        band_film: Option<BandFilm>,
     ) -> Result<Result<Self, Vec<String>>, ExposeError> {
         let Some(sensor) = &scene.sensor else { return Ok(Err(Vec::new())) };
         let mut notes = sensor.notes().to_vec();

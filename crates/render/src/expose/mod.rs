@@ -92,7 +92,8 @@ fn name(sensor: &Sensor) -> String {
 /// When a file cannot be written, or `progress` says stop.
 pub fn write(
     light: &SensorLight,
-    (files, folder): (&Transaction, &Path),
+    files: &Transaction,
+    folder: &Path,
     outputs: Outputs,
     progress: &dyn Fn(f64) -> bool,
 ) -> Result<Exposed, ExposeError> {

@@ -55,7 +55,7 @@ impl ChosenViews {
         } else {
             vec![0, 1, 2]
         };
-        let rays = ViewRays::of_raw(&opened, light_field, (&unit, &centres), &colors, accuracy);
+        let rays = ViewRays::of_raw(&opened, light_field, &unit, &centres, &colors, accuracy);
         let mut views = light_field.views;
         loop {
             let narrowed = light_field.narrowed(views, rays.pupil_share(views));

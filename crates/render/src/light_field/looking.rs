@@ -53,7 +53,7 @@ impl LightFieldViews {
         let source = match (scene.camera.lens(), response, no_views) {
             (Some(lens), Some(response), None) => {
                 let centres = by_layer(scene, lens, &light_field).map_err(fault)?;
-                let views = Views::decoded(picture, &centres, &light_field, (&grid, &response))?;
+                let views = Views::decoded(picture, &centres, &light_field, &grid, &response)?;
                 Some(LightFieldSource::Views { views, grid })
             }
             (Some(lens), _, Some(_)) => {

@@ -39,9 +39,10 @@ use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 
 use crate::output::{
-    Channel, Layer, Look, Outputs, Picture, PictureError, Values, exr, npy, pfm, png, sidecar,
+    Channel, HeaderEntry, Layer, Look, Outputs, Picture, PictureError, Values, exr, npy, pfm, png,
+    sidecar,
 };
-use crate::{Plan, RenderError, render};
+use crate::{Plan, RenderError, RenderedScene, render};
 use etendue_files::Transaction;
 
 use centres::Centres;
@@ -51,7 +52,7 @@ pub use looking::LightFieldViews;
 use patches::Patches;
 pub(crate) use patches::refocused_bytes;
 use set::SetWriter;
-pub use set::{LightFieldError, LightFieldSet, RenderedScene};
+pub use set::{LightFieldError, LightFieldSet};
 use views::Views;
 pub use white::white_rows;
 
@@ -85,7 +86,8 @@ fn view_name(across: u32, down: u32) -> String {
 pub fn write(
     rendering: RenderedScene<'_>,
     picture: &Picture,
-    (files, folder): (&Transaction, &Path),
+    files: &Transaction,
+    folder: &Path,
     outputs: Outputs,
     progress: &(dyn Fn(f64) -> bool + Sync),
 ) -> Result<LightFieldSet, LightFieldError> {
@@ -140,9 +142,9 @@ pub fn write(
         Some((lens, response)) => {
             // Gone before the reference is rendered, which takes as much again.
             let centres = by_layer(scene, lens, light_field).map_err(fault)?;
-            let views = Views::decoded(picture, &centres, light_field, (grid, response))?;
+            let views = Views::decoded(picture, &centres, light_field, grid, response)?;
             set.views("views", &views, picture)?;
-            set.refocused((light_field, grid), &views, picture)?;
+            set.refocused(light_field, grid, &views, picture)?;
             let truth = reference_picture(rendering, reference, outputs, &|share| {
                 progress(0.1 + 0.9 * share)
             })?;
@@ -153,7 +155,7 @@ pub fn write(
     let views = Views::split(truth, grid);
     set.views(if raw.is_some() { "reference" } else { "views" }, &views, truth)?;
     if raw.is_none() {
-        set.refocused((light_field, grid), &views, truth)?;
+        set.refocused(light_field, grid, &views, truth)?;
     }
     match (outputs.png, grid.packing()) {
         (true, Grid::Square) => set.hci(scene, grid, &views, truth, &depth)?,
@@ -270,7 +272,8 @@ impl SetWriter<'_> {
     /// The plane that is asked for, by all views together; nothing when none is.
     fn refocused(
         &mut self,
-        (light_field, grid): (&LightField, &ViewGrid),
+        light_field: &LightField,
+        grid: &ViewGrid,
         views: &Views,
         shown: &Picture,
     ) -> Result<(), LightFieldError> {
@@ -350,8 +353,7 @@ fn plane(
     values: &[f64],
 ) -> Result<Picture, PictureError> {
     let channels = vec![Channel { name: "Z".to_owned(), values: Values::F64(values.to_vec()) }];
-    let meaning = [("definition", what), ("unit", unit)].map(|(k, v)| (k.to_owned(), v.to_owned()));
-    let layer =
-        Layer { name: NAME.to_owned(), look: Look::Distance, channels, meaning: meaning.into() };
+    let meaning = vec![HeaderEntry::new("definition", what), HeaderEntry::new("unit", unit)];
+    let layer = Layer { name: NAME.to_owned(), look: Look::Distance, channels, meaning };
     Picture::new(width as usize, height as usize, vec![layer], Vec::new())
 }

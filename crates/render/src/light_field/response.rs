@@ -98,7 +98,8 @@ impl ViewRays {
     pub(super) fn of_raw(
         camera: &Camera,
         light_field: &LightField,
-        (unit, centres): (&ViewGrid, &Centres),
+        unit: &ViewGrid,
+        centres: &Centres,
         colors: &[usize],
         accuracy: &AccuracySpec,
     ) -> Self {
@@ -107,7 +108,7 @@ impl ViewRays {
         #[expect(clippy::cast_possible_truncation, reason = "three colours at most")]
         let count = (accuracy.view_cubic_rays / colors.len() as u32).max(1);
         let nodes = accuracy.view_nodes;
-        Self::traced(light_field.views, (unit, nodes), |number, [across, down], [row, col]| {
+        Self::traced(light_field.views, unit, nodes, |number, [across, down], [row, col]| {
             let [right, below] = light_field.offset(across, down);
             let place = |color| {
                 let centre = centres.sampled(color)[(row * cols + col) as usize];
@@ -141,7 +142,7 @@ impl ViewRays {
     ) -> Self {
         let [cols, rows] = unit.view_resolution();
         let count = accuracy.view_rays;
-        Self::traced(views, (unit, accuracy.view_nodes), |number, [across, down], [row, col]| {
+        Self::traced(views, unit, accuracy.view_nodes, |number, [across, down], [row, col]| {
             let corner = [across * cols + col, down * rows + row].map(f64::from);
             let of = RequestedRays { group: 0, count, number, first_set: 0 };
             seen(reference, &of, PixelSource::Pixel(corner), unit)
@@ -150,7 +151,8 @@ impl ViewRays {
 
     fn traced(
         views: u32,
-        (unit, most): (&ViewGrid, u32),
+        unit: &ViewGrid,
+        most: u32,
         trace: impl Fn([u32; 2], [u32; 2], [u32; 2]) -> PixelView + Sync,
     ) -> Self {
         let [cols, rows] = unit.view_resolution();
@@ -331,7 +333,7 @@ fn seen(
         let pixel =
             Sampler::Sobol.pixel(first_set as u64 + set, number[0], number[1], count_of_set);
         for (pair, out) in (0..).zip(&mut squares) {
-            squares_of_pair((0..count_of_set).map(|index| (pixel, index)), pair, out);
+            squares_of_pair(pixel.samples(0..count_of_set), pair, out);
         }
         let [places, pupil, spectrum] = &squares;
         for ((place, pupil), spectrum) in places.iter().zip(pupil).zip(spectrum) {

@@ -1,13 +1,11 @@
-//! The set of a light field: what it is made from, its files, and why it may not be complete.
+//! The set of a light field: its files, and why it may not be complete.
 
 use std::path::{Path, PathBuf};
 
-use etendue_accel::Accel;
 use etendue_files::{Transaction, WriteError, prepare_folder};
-use etendue_scene::Scene;
 
+use crate::RenderError;
 use crate::output::{OutputError, Outputs, Picture, PictureError, exr, npy, png};
-use crate::{Images, RenderError};
 
 /// Error of a light-field set that is not complete.
 #[derive(Debug, thiserror::Error)]
@@ -40,18 +38,6 @@ pub struct LightFieldSet {
     pub files: Vec<PathBuf>,
     /// Notes for the user.
     pub notes: Vec<String>,
-}
-
-/// The scene, its structure and its images, as they were rendered.
-#[derive(Clone, Copy)]
-#[expect(missing_debug_implementations, reason = "holds an accelerator")]
-pub struct RenderedScene<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
-    /// Its structure.
-    pub accel: &'a dyn Accel,
-    /// Its images.
-    pub images: &'a Images,
 }
 
 /// Writer of the set, with its destination.

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::centres::Centres;
 use super::response::{ViewResponse, weights};
-use crate::output::{Channel, Layer, Look, Picture, PictureError, SPECTRUM, Values};
+use crate::output::{Channel, HeaderEntry, Layer, Look, Picture, PictureError, SPECTRUM, Values};
 
 /// The values of all views.
 #[derive(Debug, Clone)]
@@ -38,7 +38,8 @@ impl Views {
         picture: &Picture,
         [in_colors, in_bands]: &[Centres; 2],
         light_field: &LightField,
-        (grid, response): (&ViewGrid, &ViewResponse),
+        grid: &ViewGrid,
+        response: &ViewResponse,
     ) -> Result<Self, PictureError> {
         let [cols, rows] = grid.view_resolution();
         let n = light_field.views;
@@ -165,7 +166,7 @@ pub(super) fn picture(
         Channel { name: name.to_owned(), values: Values::F32(values) }
     };
     let channels = ["R", "G", "B"].into_iter().enumerate().map(channel).collect();
-    let meaning = vec![("definition".to_owned(), definition.to_owned())];
+    let meaning = vec![HeaderEntry::new("definition", definition)];
     let layer = Layer { name: String::new(), look: Look::Color, channels, meaning };
     Picture::new(width, height, vec![layer], Vec::new())
 }

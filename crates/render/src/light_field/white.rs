@@ -8,7 +8,7 @@ use etendue_spectrum::Bands;
 use rayon::prelude::*;
 
 use super::set::LightFieldError;
-use crate::output::{Channel, Layer, Look, Picture, Values};
+use crate::output::{Channel, HeaderEntry, Layer, Look, Picture, Values};
 
 /// Greatest difference of the weights of a pixel, as a share of the largest, at which they are alike: cos⁴ takes half
 /// within a lenslet's light at f/1. Sixteen stratified samples of what changes so evenly have its mean to a percent.
@@ -22,16 +22,14 @@ pub(super) fn picture(
     samples: u32,
 ) -> Result<Picture, LightFieldError> {
     let [width, height] = camera.resolution();
-    let rows = white_rows(camera, (spec, samples), &(0..height).collect::<Vec<u32>>());
+    let rows = white_rows(camera, spec, samples, &(0..height).collect::<Vec<u32>>());
     let channel = |(k, name): (usize, &str)| {
         let values = rows.iter().flat_map(|row| row[k].iter().copied()).collect();
         Channel { name: name.to_owned(), values: Values::F32(values) }
     };
     let channels = ["R", "G", "B"].into_iter().enumerate().map(channel).collect();
-    let meaning = vec![(
-        "definition".to_owned(),
-        "the picture of a radiance of 1 from everywhere".to_owned(),
-    )];
+    let definition = "the picture of a radiance of 1 from everywhere";
+    let meaning = vec![HeaderEntry::new("definition", definition)];
     let layer = Layer { name: String::new(), look: Look::Color, channels, meaning };
     Ok(Picture::new(width as usize, height as usize, vec![layer], Vec::new())?)
 }
@@ -39,7 +37,7 @@ pub(super) fn picture(
 /// The samples of a pixel.
 fn place(film: &mut FilmSamples, spec: &RenderSpec, [column, row]: [u32; 2], samples: u32) {
     let pixel = spec.sampler.pixel(spec.frame_seed(), column, row, samples);
-    let numbers = (0..samples).map(|index| (pixel, index));
+    let numbers = pixel.samples(0..samples);
     let mut squares = [Vec::new(), Vec::new(), Vec::new()];
     for (pair, out) in (0..).zip(&mut squares) {
         squares_of_pair(numbers.clone(), pair, out);
@@ -55,7 +53,8 @@ fn place(film: &mut FilmSamples, spec: &RenderSpec, [column, row]: [u32; 2], sam
 #[must_use]
 pub fn white_rows(
     camera: &Camera,
-    (spec, samples): (&RenderSpec, u32),
+    spec: &RenderSpec,
+    samples: u32,
     rows: &[u32],
 ) -> Vec<[Vec<f32>; 3]> {
     let numbers = [(samples / 4).max(1), samples];

@@ -10,7 +10,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use super::layer::LE_BAND;
-use super::{Layer, OutputError, Picture};
+use super::{HeaderEntry, Layer, OutputError, Picture};
 use etendue_files::{SOFTWARE, Transaction};
 
 /// Writes the keys of the layer called `name` to `path`.
@@ -62,15 +62,15 @@ pub fn write_numbers(
 
 /// The edges of a layer's bands (nm), where it has as many bands.
 fn edges(layer: &Layer) -> Option<Vec<f64>> {
-    let (_, text) = layer.meaning.iter().find(|(key, _)| key == "band edges nm")?;
-    let edges: Vec<f64> = serde_json::from_str(text).ok()?;
+    let entry = layer.meaning.iter().find(|entry| entry.key == "band edges nm")?;
+    let edges: Vec<f64> = serde_json::from_str(&entry.text).ok()?;
     (edges.len() == layer.channels.len() + 1).then_some(edges)
 }
 
 fn header(picture: &Picture, layer: &Layer, edges: &[f64]) -> String {
     let entry = |key: &str| {
-        let found = layer.meaning.iter().find(|(known, _)| known == key);
-        found.map_or("", |(_, text)| text.as_str())
+        let found = layer.meaning.iter().find(|entry| entry.key == key);
+        found.map_or("", |entry| entry.text.as_str())
     };
     let middles: Vec<f64> = edges.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
     let widths: Vec<f64> = edges.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -105,7 +105,7 @@ fn header(picture: &Picture, layer: &Layer, edges: &[f64]) -> String {
     let _ = writeln!(text, "data units = {unit}");
     let _ = writeln!(text, "z plot titles = {{Wavelength (nm), Light ({unit})}}");
     // What else this program reads back; `camera` has braces of its own.
-    for (key, value) in picture.header() {
+    for HeaderEntry { key, text: value } in picture.header() {
         if !value.contains(['{', '}', '\n']) {
             let _ = writeln!(text, "etendue {key} = {value}");
         }
@@ -139,9 +139,9 @@ mod tests {
             name: "Spectrum".into(),
             look: Look::Cube,
             channels: channels.collect(),
-            meaning: meaning.map(|(key, text)| (key.to_owned(), text.to_owned())).into(),
+            meaning: meaning.map(|(key, text)| HeaderEntry::new(key, text)).into(),
         };
-        let header = vec![("noise_seed".to_owned(), "18446744073709551615".to_owned())];
+        let header = vec![HeaderEntry::new("noise_seed", "18446744073709551615")];
         let picture = Picture::new(3, 2, vec![layer], header).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let [keys, numbers] = ["a.hdr", "a.img"].map(|name| folder.path().join(name));

@@ -35,7 +35,7 @@ use rayon::prelude::*;
 
 use super::layer::put;
 use super::sidecar::Entries;
-use super::{OutputError, Picture, SPECTRUM, Values};
+use super::{HeaderEntry, OutputError, Picture, SPECTRUM, Values};
 use etendue_files::{SOFTWARE, Transaction};
 
 /// Packing of the pixels. Both keep every bit.
@@ -57,7 +57,7 @@ pub struct Options<'a> {
     /// Told the share done (0..=1) now and then; answering `false` stops, and leaves no file.
     pub progress: Option<&'a dyn Fn(f64) -> bool>,
     /// Texts of the header by their full names, as other programs look for them.
-    pub attributes: &'a [(String, String)],
+    pub attributes: &'a [HeaderEntry],
 }
 
 impl fmt::Debug for Options<'_> {
@@ -282,7 +282,7 @@ fn header(
     path: &Path,
     picture: &Picture,
     blocks: &ScanLineBlocks<'_>,
-    attributes: &[(String, String)],
+    attributes: &[HeaderEntry],
 ) -> Result<Header, OutputError> {
     // The format counts pixels in i32, and the crate panics beyond.
     if i32::try_from(blocks.width).is_err() || i32::try_from(blocks.height).is_err() {
@@ -309,16 +309,16 @@ fn header(
     }
     if let Some(spectrum) = picture.layer(SPECTRUM) {
         // The layout of Fichet et al. (2021): see `Layer::exr_name`.
-        let unit = spectrum.meaning.iter().find(|(key, _)| key == "unit");
-        let unit = unit.map_or("", |(_, unit)| unit);
+        let unit = spectrum.meaning.iter().find(|entry| entry.key == "unit");
+        let unit = unit.map_or("", |entry| entry.text.as_str());
         for (name, value) in [("spectralLayoutVersion", "1.0"), ("emissiveUnits", unit)] {
             own.other.insert(text(name), AttributeValue::Text(text(value)));
         }
     }
-    for (key, value) in picture.header() {
+    for HeaderEntry { key, text: value } in picture.header() {
         own.other.insert(attribute_name(key), AttributeValue::Text(text(value)));
     }
-    for (key, value) in attributes {
+    for HeaderEntry { key, text: value } in attributes {
         own.other.insert(text(key), AttributeValue::Text(text(value)));
     }
     Ok(header)
@@ -360,7 +360,7 @@ mod tests {
 
     fn layer(name: &str, channel: &str, look: Look, values: Values) -> Layer {
         let channels = vec![Channel { name: channel.into(), values }];
-        let meaning = vec![("unit".to_owned(), "m".to_owned())];
+        let meaning = vec![HeaderEntry::new("unit", "m")];
         Layer { name: name.into(), look, channels, meaning }
     }
 
@@ -374,7 +374,7 @@ mod tests {
             layer("Id", "object", Look::Ids, Values::U32(ids)),
             layer("Depth", "Z", Look::Distance, Values::F32(depth)),
         ];
-        Picture::new(37, 41, layers, vec![("seed".into(), "7".into())]).unwrap()
+        Picture::new(37, 41, layers, vec![HeaderEntry::new("seed", "7")]).unwrap()
     }
 
     fn bytes(picture: &Picture, compression: Compression) -> Vec<u8> {

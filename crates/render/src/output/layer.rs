@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use etendue_image::cube::emission_channel;
 use etendue_tracer::layer::Look;
+use serde::{Deserialize, Serialize};
 
 use super::SPECTRUM;
 
@@ -162,6 +163,36 @@ pub struct Channel {
     pub values: Values,
 }
 
+/// Entry of a file's header, or of what it says of a layer.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "[String; 2]", into = "[String; 2]")]
+pub struct HeaderEntry {
+    /// Its name.
+    pub key: String,
+    /// Its content.
+    pub text: String,
+}
+
+impl HeaderEntry {
+    /// A name and a text.
+    #[must_use]
+    pub fn new(key: impl Into<String>, text: impl Into<String>) -> Self {
+        Self { key: key.into(), text: text.into() }
+    }
+}
+
+impl From<[String; 2]> for HeaderEntry {
+    fn from([key, text]: [String; 2]) -> Self {
+        Self { key, text }
+    }
+}
+
+impl From<HeaderEntry> for [String; 2] {
+    fn from(HeaderEntry { key, text }: HeaderEntry) -> Self {
+        [key, text]
+    }
+}
+
 /// One named image of a render: `Depth`, `Normal`, … All its channels are of one type.
 #[derive(Debug)]
 pub struct Layer {
@@ -173,7 +204,7 @@ pub struct Layer {
     /// Its planes, in the order that an NPY gives them.
     pub channels: Vec<Channel>,
     /// Meaning of the numbers: `definition`, `unit`, `frame`, `miss` …
-    pub meaning: Vec<(String, String)>,
+    pub meaning: Vec<HeaderEntry>,
 }
 
 impl Layer {

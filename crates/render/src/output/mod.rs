@@ -20,15 +20,15 @@
 //!
 //! ```
 //! use etendue_files::Transaction;
-//! use etendue_render::output::{Channel, Layer, Look, Picture, Values, exr};
+//! use etendue_render::output::{Channel, HeaderEntry, Layer, Look, Picture, Values, exr};
 //!
 //! let depth = Layer {
 //!     name: "Depth".into(),
 //!     look: Look::Distance,
 //!     channels: vec![Channel { name: "Z".into(), values: Values::F32(vec![1.0, f32::INFINITY]) }],
-//!     meaning: vec![("unit".into(), "m".into()), ("miss".into(), "+inf".into())],
+//!     meaning: vec![HeaderEntry::new("unit", "m"), HeaderEntry::new("miss", "+inf")],
 //! };
-//! let picture = Picture::new(2, 1, vec![depth], vec![("seed".into(), "0".into())])?;
+//! let picture = Picture::new(2, 1, vec![depth], vec![HeaderEntry::new("seed", "0")])?;
 //! let folder = tempfile::tempdir()?;
 //! exr::write(&Transaction::at_once(), &folder.path().join("picture.exr"), &picture, &exr::Options::default())?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -57,7 +57,7 @@ pub use develop::Development;
 pub(crate) use develop::luminance;
 pub use error::{OutputError, PictureError};
 pub use hash::ImageHash;
-pub use layer::{Channel, Layer, Values};
+pub use layer::{Channel, HeaderEntry, Layer, Values};
 pub(crate) use layer_file::has_mask;
 pub use layer_file::{LayerFile, layer_stem};
 pub use look::Look;

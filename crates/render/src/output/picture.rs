@@ -7,7 +7,7 @@ use serde_json::Value;
 use etendue_report::Refusal;
 use etendue_tracer::LayerSpec;
 
-use super::layer::{Channel, Layer, Values};
+use super::layer::{Channel, HeaderEntry, Layer, Values};
 use super::look::{Bits, LayerImage, lacks};
 use super::{Development, OutputError, PictureError};
 use crate::memory::NoMemory;
@@ -19,7 +19,7 @@ pub struct Picture {
     width: usize,
     height: usize,
     layers: Vec<Layer>,
-    header: Vec<(String, String)>,
+    header: Vec<HeaderEntry>,
     names: Vec<(String, Value)>,
     png: Development,
 }
@@ -36,7 +36,7 @@ impl Picture {
         width: usize,
         height: usize,
         layers: Vec<Layer>,
-        header: Vec<(String, String)>,
+        header: Vec<HeaderEntry>,
     ) -> Result<Self, PictureError> {
         let pixels = width.checked_mul(height).filter(|&pixels| pixels > 0);
         let pixels = pixels.ok_or_else(|| PictureError::size([width, height]))?;
@@ -136,7 +136,7 @@ impl Picture {
 
     /// Header entries that hold for all layers: scene hash, seed …
     #[must_use]
-    pub fn header(&self) -> &[(String, String)] {
+    pub fn header(&self) -> &[HeaderEntry] {
         &self.header
     }
 
@@ -198,7 +198,7 @@ fn check_shape(layer: &Layer, pixels: usize) -> Result<(), PictureError> {
 
 /// Names must be fit for every format, and differ wherever they share a space: channels in an EXR,
 /// and its attributes, of which each layer and each header entry has one.
-fn check_names(layers: &[Layer], header: &[(String, String)]) -> Result<(), PictureError> {
+fn check_names(layers: &[Layer], header: &[HeaderEntry]) -> Result<(), PictureError> {
     let mut attributes = BTreeSet::new();
     let mut planes = BTreeSet::new();
     for layer in layers {
@@ -206,7 +206,7 @@ fn check_names(layers: &[Layer], header: &[(String, String)]) -> Result<(), Pict
             layer.name.split('.').try_for_each(|part| check_name("layer", part, &layer.name))?;
         }
         let mut entries = BTreeSet::new();
-        for (key, text) in &layer.meaning {
+        for HeaderEntry { key, text } in &layer.meaning {
             check_entry("entry of a layer's meaning", key, text)?;
             claim(&mut entries, key.clone())?;
         }
@@ -216,7 +216,7 @@ fn check_names(layers: &[Layer], header: &[(String, String)]) -> Result<(), Pict
         }
         claim(&mut attributes, layer.title())?;
     }
-    for (key, text) in header {
+    for HeaderEntry { key, text } in header {
         check_entry("header entry", key, text)?;
         claim(&mut attributes, key.clone())?;
     }
@@ -317,7 +317,7 @@ mod tests {
         }
         for (key, fits) in [("taken along", true), (" a", false), ("a  b", false), ("a:b", false)] {
             let mut depth = depth(vec![1.0]);
-            depth.meaning = vec![(key.into(), "text".into())];
+            depth.meaning = vec![HeaderEntry::new(key, "text")];
             assert_eq!(Picture::new(1, 1, vec![depth], Vec::new()).is_ok(), fits, "{key}");
         }
         let dotted = layer("View.3_4", "Z", Values::F32(vec![1.0]));
@@ -330,7 +330,7 @@ mod tests {
         let error = Picture::new(1, 1, twice, Vec::new()).unwrap_err();
         assert!(error.to_string().contains("\"Depth.Z\" is used twice"), "{error}");
 
-        let header = vec![("Depth".to_owned(), "1".to_owned())];
+        let header = vec![HeaderEntry::new("Depth", "1")];
         let error = Picture::new(1, 1, vec![depth(vec![1.0])], header).unwrap_err();
         assert!(error.to_string().contains("\"Depth\" is used twice"), "{error}");
     }

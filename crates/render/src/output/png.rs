@@ -15,7 +15,7 @@ use ::png::{BitDepth, ColorType, EncodingError, Info, SrgbRenderingIntent};
 use super::DENOISED;
 pub use super::look::Bits;
 use super::look::{ColourType, LayerImage, mask, palette, show};
-use super::{Layer, Look, OutputError, Picture};
+use super::{HeaderEntry, Layer, Look, OutputError, Picture};
 use crate::memory::check_room;
 use etendue_files::{PartFile, SOFTWARE, Transaction};
 
@@ -129,7 +129,8 @@ fn texts(picture: &Picture, layer: &Layer, shown: &LayerImage) -> Vec<ITXtChunk>
         ("Reading", shown.note.as_str()),
     ];
     let entries = layer.meaning.iter().chain(picture.header());
-    let entries = entries.map(|(key, text)| (Cow::from(format!("etendue:{key}")), text.as_str()));
+    let entries = entries
+        .map(|HeaderEntry { key, text }| (Cow::from(format!("etendue:{key}")), text.as_str()));
     let fixed = fixed.into_iter().map(|(key, text)| (Cow::from(key), text));
     let names = picture.names(&layer.name).filter(|_| shown.channels == ColourType::Indexed);
     let names = names.map(|names| ITXtChunk::new("Names", names.to_string()));
@@ -150,18 +151,18 @@ mod tests {
             name: "Depth".into(),
             look: Look::Distance,
             channels: vec![channel("Z", Values::F32(vec![1.0, 2.0, 4.0, f32::INFINITY]))],
-            meaning: vec![("unit".into(), "m".into())],
+            meaning: vec![HeaderEntry::new("unit", "m")],
         };
         let raw = Layer {
             name: "Raw".into(),
             look: Look::Counts { bits: 12 },
             channels: vec![channel("Y", Values::U16(vec![0, 1, 256, 4095]))],
-            meaning: vec![("unit".into(), "DN".into())],
+            meaning: vec![HeaderEntry::new("unit", "DN")],
         };
         let rgb = ["R", "G", "B"].map(|name| channel(name, Values::F32(vec![0.0, 0.18, 0.5, 1.0])));
         let light =
             Layer { name: String::new(), look: Look::Color, channels: rgb.into(), meaning: vec![] };
-        let header = vec![("scene".to_owned(), "größe.json".to_owned())];
+        let header = vec![HeaderEntry::new("scene", "größe.json")];
         Picture::new(2, 2, vec![depth, raw, light], header).unwrap()
     }
 

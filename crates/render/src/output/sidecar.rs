@@ -8,12 +8,12 @@ use serde::{Serialize, Serializer};
 use serde_json::Value;
 
 use super::DENOISED;
-use super::{OutputError, Picture};
+use super::{HeaderEntry, OutputError, Picture};
 use etendue_files::{SOFTWARE, Transaction};
 
 /// Names and texts as a JSON object, in their own order; a text that is an object in JSON is that object.
 #[derive(Debug)]
-pub(super) struct Entries<'a>(pub(super) &'a [(String, String)]);
+pub(super) struct Entries<'a>(pub(super) &'a [HeaderEntry]);
 
 impl Serialize for Entries<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -21,7 +21,7 @@ impl Serialize for Entries<'_> {
             Ok(object @ Value::Object(_)) => object,
             _ => Value::from(text.as_str()),
         };
-        serializer.collect_map(self.0.iter().map(|(key, text)| (key, value(text))))
+        serializer.collect_map(self.0.iter().map(|entry| (&entry.key, value(&entry.text))))
     }
 }
 
@@ -112,10 +112,10 @@ mod tests {
             name: "Depth".into(),
             look: Look::Distance,
             channels: vec![Channel { name: "Z".into(), values: Values::F32(vec![1.0, 2.0]) }],
-            meaning: vec![("unit".into(), "m".into()), ("miss".into(), "+inf".into())],
+            meaning: vec![HeaderEntry::new("unit", "m"), HeaderEntry::new("miss", "+inf")],
         };
         let header = [("seed", "3 \"quoted\""), ("camera", r#"{"K": [1.5]}"#)]
-            .map(|(key, text)| (key.to_owned(), text.to_owned()))
+            .map(|(key, text)| HeaderEntry::new(key, text))
             .to_vec();
         let picture = Picture::new(2, 1, vec![depth], header).unwrap();
         let folder = tempfile::tempdir().unwrap();

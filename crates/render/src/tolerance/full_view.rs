@@ -71,7 +71,7 @@ impl FullView {
         }
         let chosen = some_of(bands.count(), field.bands);
         let camera = open(&scene.camera, bands)?;
-        let seen = seen((&camera, bands), &chosen, &places, field.rays);
+        let seen = seen(&camera, bands, &chosen, &places, field.rays);
         let scale = scale(&scene.camera).unwrap_or(f64::NAN);
         let bands = bands.clone();
         Ok(Self { camera, bands, chosen, field, scale, places, seen, notes })
@@ -115,7 +115,7 @@ impl FullView {
     ) -> Result<ModelError, RenderError> {
         let rays = self.field.rays;
         let camera = open(camera, &self.bands)?;
-        let own = seen((&camera, &self.bands), &self.chosen, &self.places, rays);
+        let own = seen(&camera, &self.bands, &self.chosen, &self.places, rays);
         Ok(self.compared(model, &own, tolerance))
     }
 

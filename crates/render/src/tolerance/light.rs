@@ -2,16 +2,14 @@
 //! that the tolerance speaks of. All of them draw the same random numbers, so that what a path brings beyond a surface
 //! is the difference of two of them, without noise of its own.
 
-use etendue_accel::Accel;
 use etendue_camera::Camera;
-use etendue_scene::Scene;
 use etendue_scene::file::{SamplesSpec, TracerSpec};
 use etendue_tracer::LayerSpec;
 
 use super::lens_models;
 use super::taken::{Approximations, LensModelKind, TakenBounces};
 use crate::output::Outputs;
-use crate::{Images, Plan, RenderError, Watch, render};
+use crate::{Plan, RenderError, RenderedScene, Watch, render};
 
 /// Blocks of the picture whose light is compared (pixels a side).
 pub(super) const BLOCK: u32 = 8;
@@ -39,12 +37,13 @@ pub(super) const MOST_BLOCKS: f64 = 0.99;
 /// The fewest surfaces whose longer paths bring at most the share `light` in 99 % of blocks, of a picture with so many
 /// samples in all; `None` where the scene follows light no farther than that.
 pub(super) fn fewest(
-    scene: &Scene,
-    prepared: (&dyn Accel, &Images),
-    (light, samples): (f64, u64),
+    rendered: RenderedScene<'_>,
+    light: f64,
+    samples: u64,
     notes: &mut Vec<String>,
     watch: &dyn Watch,
 ) -> Result<Option<TakenBounces>, RenderError> {
+    let scene = rendered.scene;
     let Some(TracerSpec::Path { max_bounces }) = scene.tracer else { return Ok(None) };
     if max_bounces < 2 {
         return Ok(None);
@@ -66,7 +65,7 @@ pub(super) fn fewest(
     let small = |bounces: u32| {
         let mut scene = scene.clone();
         scene.tracer = Some(TracerSpec::Path { max_bounces: bounces });
-        values(&scene, &camera, prepared, (samples, None), watch)
+        values(RenderedScene { scene: &scene, ..rendered }, &camera, samples, None, watch)
     };
     let width = camera.resolution()[0] as usize;
     let all = pooled(&small(max_bounces)?, width);
@@ -93,12 +92,12 @@ pub(super) fn fewest(
     Ok(Some(TakenBounces { bounces: enough.0, share: enough.1 }))
 }
 
-/// The light of a picture of `scene` through `camera`, by pixels: red, green and blue added up.
+/// The light of a picture of a scene through `camera`, by pixels: red, green and blue added up.
 pub(super) fn values(
-    scene: &Scene,
+    RenderedScene { scene, accel, images }: RenderedScene<'_>,
     camera: &Camera,
-    (accel, images): (&dyn Accel, &Images),
-    (samples, taken): (u32, Option<Approximations>),
+    samples: u32,
+    taken: Option<Approximations>,
     watch: &dyn Watch,
 ) -> Result<Vec<f64>, RenderError> {
     let mut scene = scene.clone();

@@ -16,13 +16,13 @@ mod taken;
 mod verify;
 
 use etendue_accel::Accel;
-use etendue_camera::{Camera, CameraSpec, FalloffSpec, Projection};
+use etendue_camera::{Camera, CameraSpec, FalloffSpec, LitPlace, Projection};
 use etendue_scene::Scene;
 use etendue_tracer::LayerSpec;
 
 use self::lens_models::{LensModel, LensModelKind, LensModels, NoModels};
 use self::pixel_views::PlaceView;
-use crate::{Images, Plan, RenderError, Watch};
+use crate::{Plan, RenderError, RenderedScene, Watch};
 
 pub use self::coarse_images::coarse_images;
 pub(crate) use self::detail::hidden_offset;
@@ -42,8 +42,11 @@ impl FullView {
             bands.sum::<f64>() / seen.bands.len().max(1) as f64
         };
         let places = self.places.iter().zip(&self.seen);
-        let lit: Vec<([f64; 2], f64)> =
-            places.map(|(place, seen)| ([place.column, place.row], light(seen))).collect();
+        let lit = |(place, seen): (&Place, &PlaceView)| LitPlace {
+            at: [place.column, place.row],
+            light: light(seen),
+        };
+        let lit: Vec<LitPlace> = places.map(lit).collect();
         let Projection::Pinhole(pinhole) = camera.projection() else { return None };
         FalloffSpec::fitted(&pinhole.intrinsics(), &lit)
     }
@@ -115,20 +118,20 @@ fn with_falloff(full: &Camera, spec: CameraSpec, falloff: FalloffSpec) -> Option
 /// some 10⁵.
 const WORTH: u64 = 200_000;
 
-/// Chooses what of the tolerance of `scene` is used: beside what was left out of its meshes ([`coarser`]), which are
-/// those of `scene` now, the simplest camera model within what this leaves, and of the light that is left then the
+/// Chooses what of the tolerance of a scene is used: beside what was left out of its meshes ([`coarser`]), which are
+/// those of the scene now, the simplest camera model within what this leaves, and of the light that is left then the
 /// fewest surfaces. Says nothing of a scene without a tolerance.
 ///
 /// # Errors
 ///
 /// As a render: when no light gets through the lens, or `watch` asks to stop.
 pub fn choose(
-    scene: &Scene,
+    rendered: RenderedScene<'_>,
     plan: &Plan,
-    (accel, images): (&dyn Accel, &Images),
     detail: Option<TakenDetail>,
     watch: &dyn Watch,
 ) -> Result<Option<Approximations>, RenderError> {
+    let RenderedScene { scene, accel, images } = rendered;
     let Some(tolerance) = scene.tolerance else { return Ok(None) };
     let mut taken = Approximations::nothing(tolerance, detail);
     taken.images = images.coarser(scene);
@@ -150,8 +153,8 @@ pub fn choose(
     left.light = Some((tolerance.light.0 - light).max(0.0));
     taken.camera = simplest(scene, plan, accel, left, &mut taken.notes)?;
     let of_lens = taken.camera.as_ref().map_or(0.0, |camera| camera.finding.light.value);
-    let looked = ((tolerance.light.0 - light - of_lens).max(0.0), samples);
-    taken.bounces = light::fewest(scene, (accel, images), looked, &mut taken.notes, watch)?;
+    let light_left = (tolerance.light.0 - light - of_lens).max(0.0);
+    taken.bounces = light::fewest(rendered, light_left, samples, &mut taken.notes, watch)?;
     Ok(Some(taken))
 }
 

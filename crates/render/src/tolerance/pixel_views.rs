@@ -33,6 +33,12 @@ pub(super) struct LightRay {
     offset: DVec2,
 }
 
+/// A line with the weight of its light.
+struct WeightedRay {
+    ray: LightRay,
+    weight: f64,
+}
+
 /// The rays of a band that arrive.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct BandRays {
@@ -65,18 +71,18 @@ impl LightRay {
 
 impl BandRays {
     /// Of weighted lines, `count` rays having been sent.
-    fn of(lines: &[(LightRay, f64)], count: usize) -> Self {
-        let sum: f64 = lines.iter().map(|(_, weight)| weight).sum();
+    fn of(lines: &[WeightedRay], count: usize) -> Self {
+        let sum: f64 = lines.iter().map(|line| line.weight).sum();
         if sum <= 0.0 {
             return Self::default();
         }
         let mean = |of: &dyn Fn(&LightRay) -> DVec2| {
-            lines.iter().map(|(line, weight)| of(line) * *weight).sum::<DVec2>() / sum
+            lines.iter().map(|line| of(&line.ray) * line.weight).sum::<DVec2>() / sum
         };
         let middle =
             LightRay { slope: mean(&|line| line.slope), offset: mean(&|line| line.offset) };
-        let spread = lines.iter().fold([0.0; 3], |[a, b, c], (line, weight)| {
-            let (slope, offset) = (line.slope - middle.slope, line.offset - middle.offset);
+        let spread = lines.iter().fold([0.0; 3], |[a, b, c], WeightedRay { ray, weight }| {
+            let (slope, offset) = (ray.slope - middle.slope, ray.offset - middle.offset);
             [
                 a + weight * slope.length_squared() / sum,
                 b + weight * offset.length_squared() / sum,
@@ -123,7 +129,8 @@ pub(super) fn chief_rays(camera: &Camera, places: &[Place]) -> Vec<Option<LightR
 /// View of `camera`, opened for `bands`, from each of `places` in the bands that are `chosen`, by
 /// `rays` of each band or group of bands; by one where it has no pupil.
 pub(super) fn seen(
-    (camera, bands): (&Camera, &Bands),
+    camera: &Camera,
+    bands: &Bands,
     chosen: &[usize],
     places: &[Place],
     rays: u32,
@@ -150,11 +157,11 @@ pub(super) fn seen(
                 samples.push([place.column, place.row], points.square(k, 1), spectrum);
             }
             camera.sample_rays(&samples, &mut out);
-            let lines: Vec<(LightRay, f64)> = (0..out.rays.len())
+            let lines: Vec<WeightedRay> = (0..out.rays.len())
                 .filter_map(|k| {
-                    let line =
-                        LightRay::of(camera.pose(), out.rays.origin(k), out.rays.direction(k));
-                    Some((line?, out.weight[k]))
+                    let (origin, direction) = (out.rays.origin(k), out.rays.direction(k));
+                    let ray = LightRay::of(camera.pose(), origin, direction)?;
+                    Some(WeightedRay { ray, weight: out.weight[k] })
                 })
                 .collect();
             let band = BandRays::of(&lines, rays as usize);
@@ -190,8 +197,7 @@ pub(super) fn places(
         for column in 0..columns {
             let at = [share(column, columns) * width, share(row, rows) * height];
             let size = [width / f64::from(columns - 1), height / f64::from(rows - 1)];
-            let depths =
-                depths_in_cell(&scene.camera, accel, (at, size, most_across), sees_infinity);
+            let depths = depths_in_cell(&scene.camera, accel, at, size, most_across, sees_infinity);
             places.push(Place { column: at[0], row: at[1], depths });
         }
     }
@@ -202,7 +208,7 @@ pub(super) fn places(
         step,
         ray_step: across[0].max(across[1]),
     };
-    cells.look_for_small((&scene.geometry, accel), &scene.camera, &mut places);
+    cells.look_for_small(&scene.geometry, accel, &scene.camera, &mut places);
     places
 }
 
@@ -217,7 +223,9 @@ fn rays_across(side: f64, most: u32) -> u32 {
 fn depths_in_cell(
     camera: &Camera,
     accel: &dyn Accel,
-    (middle, size, most_across): ([f64; 2], [f64; 2], u32),
+    middle: [f64; 2],
+    size: [f64; 2],
+    most_across: u32,
     sees_infinity: bool,
 ) -> Vec<f64> {
     let picture = camera.resolution().map(f64::from);

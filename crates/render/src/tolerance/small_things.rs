@@ -99,7 +99,8 @@ impl PictureGrid {
     /// Adds to the depths of `places` those of small things of `geometry` that are nearer or farther.
     pub(super) fn look_for_small(
         &self,
-        (geometry, accel): (&Geometry, &dyn Accel),
+        geometry: &Geometry,
+        accel: &dyn Accel,
         camera: &Camera,
         places: &mut [Place],
     ) {

@@ -3,13 +3,11 @@
 
 use std::fmt;
 
-use etendue_accel::Accel;
-use etendue_scene::Scene;
 use serde::Serialize;
 
 use super::light::{BLOCK, differing, values};
 use super::{Approximations, Field, FullView, TakenCamera, Tolerance};
-use crate::{Images, Plan, RenderError, Watch};
+use crate::{Plan, RenderError, RenderedScene, Watch};
 
 /// The longer side of the small pictures, at most.
 const SIDE: u32 = 64;
@@ -60,19 +58,20 @@ impl fmt::Display for Verified {
     }
 }
 
-/// Renders a small part of a scene with everything and, as what is rendered in its place, with what was `taken`, and
-/// compares both. Each is given with the structure over it and its images; they are one where all meshes are the scene's own. What is
-/// left out of meshes displaces places by its bound, to which what the lens does is added.
+/// Renders a small part of the `whole` scene with everything and, as what is `rendered` in its place, with what was
+/// `taken`, and compares both. They are one where all meshes are the scene's own. What is left out of meshes displaces
+/// places by its bound, to which what the lens does is added.
 ///
 /// # Errors
 ///
 /// As a render.
 pub fn verify(
-    (scene, accel, images): (&Scene, &dyn Accel, &Images),
-    rendered: (&Scene, &dyn Accel, &Images),
+    whole: RenderedScene<'_>,
+    rendered: RenderedScene<'_>,
     taken: &Approximations,
     watch: &dyn Watch,
 ) -> Result<Verified, RenderError> {
+    let RenderedScene { scene, accel, .. } = whole;
     let tolerance = Tolerance::from(taken.tolerance);
     let is_nothing = taken.camera.is_none() && taken.bounces.is_none() && taken.detail.is_none();
     if is_nothing && taken.images == 0 {
@@ -100,12 +99,13 @@ pub fn verify(
         }),
         ..taken.clone()
     };
-    let (prepared, samples) = ((accel, images), scene.accuracy.tolerance_samples);
-    let all = values(scene, &full, prepared, (samples, None), watch)?;
-    let less = values(rendered.0, &full, (rendered.1, rendered.2), (samples, Some(own)), watch)?;
+    let samples = scene.accuracy.tolerance_samples;
+    let all = values(whole, &full, samples, None, watch)?;
+    let less = values(rendered, &full, samples, Some(own), watch)?;
     let mut other = scene.clone();
     other.render.seed ^= 0x9e37_79b9_7f4a_7c15;
-    let again = values(&other, &full, prepared, (samples, None), watch)?;
+    let other = RenderedScene { scene: &other, ..whole };
+    let again = values(other, &full, samples, None, watch)?;
     Ok(Verified {
         displacement: [displacement, tolerance.pixels],
         places,

@@ -299,7 +299,7 @@ fn a_time_gives_the_picture_of_some_number_of_samples() {
     let picture = |samples: &Value| rendered(&loaded(room(samples, &json!({ "/layers": [] }))));
     let timed = picture(&json!({ "time": "200 ms" }));
     assert!(timed.samples >= 4 && timed.samples_wanted == timed.samples, "{}", timed.samples);
-    assert!(timed.picture.header().iter().all(|(key, _)| key != "partial"));
+    assert!(timed.picture.header().iter().all(|entry| entry.key != "partial"));
     let counted = picture(&json!(timed.samples));
     assert_eq!(layer(&timed.picture, ""), layer(&counted.picture, ""));
     let few = picture(&json!({ "time": "1 min", "max": 6 }));

@@ -8,9 +8,9 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use etendue_files::Transaction;
-use etendue_render::Plan;
-use etendue_render::light_field::{self, RenderedScene};
+use etendue_render::light_field;
 use etendue_render::output::Outputs;
+use etendue_render::{Plan, RenderedScene};
 
 use crate::steps::{load_in, prepare, trace};
 
@@ -26,7 +26,8 @@ fn write_scene(folder: &Path, text: &str) -> serde_json::Value {
     let set = light_field::write(
         rendering,
         &rendered.picture,
-        (&Transaction::at_once(), folder),
+        &Transaction::at_once(),
+        folder,
         OUTPUTS,
         &|_: f64| true,
     )

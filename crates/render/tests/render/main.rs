@@ -8,6 +8,7 @@ mod coarse_images;
 mod curves;
 mod diffraction;
 mod dispersion;
+mod divided;
 mod known_radiance;
 mod layers;
 mod light_field;

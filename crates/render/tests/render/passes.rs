@@ -5,11 +5,11 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use etendue_accel::AccelName;
-use etendue_render::output::{Outputs, Picture, Values};
+use etendue_render::output::{Outputs, Picture};
 use etendue_render::{Plan, RenderError, Rendered, SoFar, Watch, render};
 use etendue_scene::Scene;
 
-use crate::steps::{load, prepare};
+use crate::steps::{bits, load, prepare};
 
 /// Blobs under a sky before a wall, larger than a tile and not a multiple of it.
 fn scene(tracer: &str, camera: &str, samples: u32, sampler: &str) -> Scene {
@@ -49,18 +49,6 @@ fn rendered(
     }
     let (accel, images) = prepare(scene, &plan);
     render(scene, &plan, &*accel, &images, Vec::new(), watch)
-}
-
-/// Every value's bits.
-fn bits(picture: &Picture) -> Vec<u64> {
-    let channels = picture.layers().iter().flat_map(|layer| &layer.channels);
-    let bits = channels.flat_map(|channel| match &channel.values {
-        Values::F32(values) => values.iter().map(|v| u64::from(v.to_bits())).collect::<Vec<_>>(),
-        Values::F64(values) => values.iter().map(|v| v.to_bits()).collect(),
-        Values::U16(values) => values.iter().map(|v| u64::from(*v)).collect(),
-        Values::U32(values) => values.iter().map(|v| u64::from(*v)).collect(),
-    });
-    bits.collect()
 }
 
 #[test]
@@ -124,8 +112,8 @@ fn a_stopped_picture_is_that_of_fewer_samples() {
         assert_eq!((stopped.samples, fewer.samples), (16, 16));
         assert_eq!(bits(&stopped.picture), bits(&fewer.picture), "{tracer}");
         let header = |picture: &Picture, wanted: &str| {
-            let entry = picture.header().iter().find(|(key, _)| key == wanted);
-            entry.map(|(_, text)| text.clone())
+            let entry = picture.header().iter().find(|entry| entry.key == wanted);
+            entry.map(|entry| entry.text.clone())
         };
         let partial = header(&stopped.picture, "partial");
         assert_eq!(partial.as_deref(), Some("stopped after 16 of 256 samples a pixel"));

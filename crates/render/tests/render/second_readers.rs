@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use etendue_files::{SOFTWARE, Transaction};
-use etendue_render::output::{Channel, ImageHash, Layer, Look, Picture, Values, exr, npy};
+use etendue_render::output::{
+    Channel, HeaderEntry, ImageHash, Layer, Look, Picture, Values, exr, npy,
+};
 use serde_json::{Map, Value, json};
 
 // Neither side a multiple of a block's 16 rows, nor of a vector's bands.
@@ -27,9 +29,9 @@ fn layer(name: &str, look: Look, planes: Vec<(&str, Values)>) -> Layer {
     let channels =
         planes.into_iter().map(|(name, values)| Channel { name: name.into(), values }).collect();
     let meaning = vec![
-        ("definition".into(), format!("what {name} means, \"quoted\", in m² and µm")),
-        ("unit".into(), "m".into()),
-        ("miss".into(), "+inf".into()),
+        HeaderEntry::new("definition", format!("what {name} means, \"quoted\", in m² and µm")),
+        HeaderEntry::new("unit", "m"),
+        HeaderEntry::new("miss", "+inf"),
     ];
     Layer { name: name.into(), look, channels, meaning }
 }
@@ -71,9 +73,9 @@ fn picture() -> Picture {
         ),
     ];
     let header = vec![
-        ("scene_hash".to_owned(), "0123456789abcdef0123456789abcdef".to_owned()),
-        ("seed".to_owned(), "0".to_owned()),
-        ("pixel_origin".to_owned(), "top left corner; centres at half integers".to_owned()),
+        HeaderEntry::new("scene_hash", "0123456789abcdef0123456789abcdef"),
+        HeaderEntry::new("seed", "0"),
+        HeaderEntry::new("pixel_origin", "top left corner; centres at half integers"),
     ];
     Picture::new(WIDTH, HEIGHT, layers, header).unwrap()
 }
@@ -94,14 +96,14 @@ fn attributes(picture: &Picture) -> Map<String, Value> {
         let meaning: Vec<_> = layer
             .meaning
             .iter()
-            .map(|(key, text)| format!("{}:{}", json!(key), json!(text)))
+            .map(|HeaderEntry { key, text }| format!("{}:{}", json!(key), json!(text)))
             .collect();
         attributes.insert(
             format!("etendue:{}", layer.title()),
             format!("{{{}}}", meaning.join(",")).into(),
         );
     }
-    for (key, text) in picture.header() {
+    for HeaderEntry { key, text } in picture.header() {
         attributes.insert(format!("etendue:{key}"), text.as_str().into());
     }
     attributes

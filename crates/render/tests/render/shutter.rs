@@ -175,23 +175,6 @@ fn data_layers_of_a_rolling_shutter_are_those_of_their_rows() {
     }
 }
 
-#[test]
-fn pictures_of_moving_cameras_do_not_depend_on_threads() {
-    let moving = || {
-        scene(
-            json!({ "shutter": { "type": "rolling", "line_time": 1e-4, "exposure": 0.01 }, "motion": aside(40.0) }),
-            json!({ "render": { "samples": 8 } }),
-        )
-    };
-    let on = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| {
-            layer(&picture(&moving()), "").iter().map(|x| x.to_bits()).collect::<Vec<_>>()
-        })
-    };
-    assert_eq!(on(1), on(3));
-}
-
 /// The layer `time` and `camera.json` say when each row is seen, and from where: with the pose of its row each pixel's
 /// point is projected back onto the pixel.
 #[test]

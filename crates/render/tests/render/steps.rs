@@ -5,7 +5,7 @@ use std::path::Path;
 use etendue_accel::{Accel, AccelName, BuildOptions};
 use etendue_files::Opener;
 use etendue_geometry::HitPrecision;
-use etendue_render::output::{Outputs, Picture};
+use etendue_render::output::{Outputs, Picture, Values};
 use etendue_render::{Images, Plan, Rendered, build, plan, render};
 use etendue_scene::file::SceneFile;
 use etendue_scene::{LoadOptions, Scene, SceneError};
@@ -95,6 +95,18 @@ pub(crate) fn channels(picture: &Picture, layer: &str) -> Vec<Vec<f64>> {
     let channels = &picture.layer(layer).unwrap().channels;
     let values = channels.iter().map(|channel| &channel.values);
     values.map(|values| (0..values.len()).map(|i| values.at(i)).collect()).collect()
+}
+
+/// The bits of every value of every layer.
+pub(crate) fn bits(picture: &Picture) -> Vec<u64> {
+    let channels = picture.layers().iter().flat_map(|layer| &layer.channels);
+    let bits = channels.flat_map(|channel| match &channel.values {
+        Values::F32(values) => values.iter().map(|v| u64::from(v.to_bits())).collect::<Vec<_>>(),
+        Values::F64(values) => values.iter().map(|v| v.to_bits()).collect(),
+        Values::U16(values) => values.iter().map(|v| u64::from(*v)).collect(),
+        Values::U32(values) => values.iter().map(|v| u64::from(*v)).collect(),
+    });
+    bits.collect()
 }
 
 /// Values of a layer's channels, one after the other.

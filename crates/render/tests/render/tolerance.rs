@@ -12,7 +12,7 @@ use etendue_render::tolerance::lens_models::LensModelKind;
 use etendue_render::tolerance::{
     Approximations, TakenBounces, choose, coarser, lens_models, with_meshes,
 };
-use etendue_render::{BandPaths, Plan};
+use etendue_render::{BandPaths, Plan, RenderedScene};
 #[cfg(feature = "embree")]
 use etendue_report::Decision;
 use etendue_report::DecisionKind;
@@ -69,7 +69,8 @@ fn allowed(pixels: &str, light: &str) -> Value {
 fn taken(scene: &Scene) -> Approximations {
     let plan = Plan::new(scene, Outputs::ALL);
     let (accel, images) = prepare(scene, &plan);
-    choose(scene, &plan, (&*accel, &images), None, &|_: f64| true).unwrap().unwrap()
+    let rendered = RenderedScene { scene, accel: &*accel, images: &images };
+    choose(rendered, &plan, None, &|_: f64| true).unwrap().unwrap()
 }
 
 /// The light of blocks of 8 × 8 pixels with what is `taken`.
@@ -179,7 +180,8 @@ fn nothing_is_taken_without_a_tolerance_or_where_looking_does_not_pay() {
     assert!(scene.tolerance.is_none());
     let plan = Plan::new(&scene, Outputs::ALL);
     let (accel, images) = prepare(&scene, &plan);
-    let found = choose(&scene, &plan, (&*accel, &images), None, &|_: f64| true).unwrap();
+    let rendered = RenderedScene { scene: &scene, accel: &*accel, images: &images };
+    let found = choose(rendered, &plan, None, &|_: f64| true).unwrap();
     assert!(found.is_none() && plan.taken.is_none());
     // Numbers are pixels and shares; a picture of few samples is rendered sooner than looked at.
     scene = room(0.5, &json!({ "displacement": 1, "light": 0.02 }));

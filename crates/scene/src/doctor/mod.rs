@@ -8,12 +8,14 @@ mod text;
 use std::path::{Path, PathBuf};
 
 use etendue_camera::CameraFile;
-use etendue_geometry::{Coplanar, Geometry};
+use etendue_geometry::{Coplanar, CoplanarPair, Geometry};
 use serde::Serialize;
 
 use crate::import::{NoteKind, Wanted};
 use crate::world_vertices::tight;
-use crate::{CameraOrigin, FileKind, IdName, LoadOptions, Note, Scene, SceneError, SceneFile};
+use crate::{
+    CameraOrigin, FileKind, IdName, LoadOptions, Note, Scene, SceneError, SceneFile, Setting,
+};
 
 pub use checks::StepSizes;
 pub use memory::MemoryForecast;
@@ -154,7 +156,7 @@ impl From<&Note> for Finding {
 /// When it cannot be loaded.
 pub fn check(
     path: &Path,
-    overrides: &[(String, String)],
+    overrides: &[Setting],
     options: &LoadOptions<'_>,
 ) -> Result<Diagnosis, SceneError> {
     let file = SceneFile::read_with(&options.opener, path, overrides)?;
@@ -218,7 +220,7 @@ impl Diagnosis {
 }
 
 /// Findings on what lies in one plane with something else.
-fn in_one_plane(scene: &Scene, pairs: &[([u32; 2], usize)]) -> Vec<Finding> {
+fn in_one_plane(scene: &Scene, pairs: &[CoplanarPair]) -> Vec<Finding> {
     /// The most pairs that are named.
     const NAMED: usize = 8;
     let name = |placement: u32| {
@@ -230,14 +232,14 @@ fn in_one_plane(scene: &Scene, pairs: &[([u32; 2], usize)]) -> Vec<Finding> {
             |name| format!("object {} \"{name}\"", placement.object + 1),
         )
     };
-    let finding = |&([earlier, later], count): &([u32; 2], usize)| {
+    let finding = |&CoplanarPair { placements: [earlier, later], triangles }: &CoplanarPair| {
         Finding {
         kind: NoteKind::Irregular,
         subject: format!("{} and {}", name(earlier), name(later)),
         message: "lie over one another in one plane; the later one is seen. Move one of them by a millimetre, or leave \
                   out what is hidden"
             .to_owned(),
-        count: count as u64,
+        count: triangles as u64,
     }
     };
     let mut findings: Vec<Finding> = pairs.iter().take(NAMED).map(finding).collect();

@@ -37,6 +37,7 @@ pub use lens::{ReadLens, is_lens, lens_schema, rays_schema, read_lens, read_lens
 pub use object::{
     AnimationSpec, InstancesSpec, ObjectMotionSpec, ObjectSpec, Scale, Source, TransformSpec, Up,
 };
+pub use overrides::Setting;
 pub use path::{PathStep, ScenePath};
 pub use samples::{
     LEAST_SAMPLES, RelativeErrorSpec, SETS, SamplesSpec, SensorNoiseSpec, TimeSpec, Until,
@@ -86,14 +87,14 @@ pub enum FileKind {
 
 impl SceneFile {
     /// Reads the scene at `path`, or makes a scene of the model there (`.gltf`, `.glb`, `.obj`,
-    /// `.ply`), and applies `overrides`: pairs such as (`camera.fov`, `30`), whose second part is
-    /// JSON or else a plain string. The camera's file, where the scene names one, is in the scene's folder.
+    /// `.ply`), and applies `overrides`, the later the stronger. The camera's file, where the scene names one, is in the
+    /// scene's folder.
     ///
     /// # Errors
     ///
     /// When the file is missing, not JSON, or says something that the format does not know; the
     /// message names the place.
-    pub fn read(path: &Path, overrides: &[(String, String)]) -> Result<Self, SceneError> {
+    pub fn read(path: &Path, overrides: &[Setting]) -> Result<Self, SceneError> {
         Self::read_with(&Opener::default(), path, overrides)
     }
 
@@ -105,7 +106,7 @@ impl SceneFile {
     pub fn read_with(
         opener: &Opener,
         path: &Path,
-        overrides: &[(String, String)],
+        overrides: &[Setting],
     ) -> Result<Self, SceneError> {
         let kind = if is_model(path) { FileKind::Model } else { FileKind::Scene };
         let (document, mut value) = match kind {
@@ -157,7 +158,7 @@ impl SceneFile {
     /// # Errors
     ///
     /// When the format does not know what they say; the message names the setting.
-    pub fn with(&self, overrides: &[(String, String)]) -> Result<Self, SceneError> {
+    pub fn with(&self, overrides: &[Setting]) -> Result<Self, SceneError> {
         Self::of(self.written.clone(), self.kind, self.value.clone(), overrides)
     }
 
@@ -165,13 +166,13 @@ impl SceneFile {
         mut written: WrittenPlaces,
         kind: FileKind,
         mut value: Value,
-        overrides: &[(String, String)],
+        overrides: &[Setting],
     ) -> Result<Self, SceneError> {
         written.read_camera(&mut value)?;
         written.set(&mut value, overrides)?;
         if let Value::Object(members) = &mut value {
             // A key of the scene that was set to null is as if it were not written.
-            let is_unset = |key: &str| overrides.iter().any(|(path, _)| path == key);
+            let is_unset = |key: &str| overrides.iter().any(|setting| setting.path == key);
             members.retain(|key, value| !(value.is_null() && is_unset(key)));
         }
         remove_notes(&mut value);

@@ -1,10 +1,35 @@
 //! `--set camera.fov=30`: single values of a scene file, changed from the command line.
 
 use etendue_report::Refusal;
+use serde::Serialize;
 use serde_json::Value;
 
 use super::document::JsonDocument;
 use super::path::ScenePath;
+
+/// A value of a scene that is set in place of the file's.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(into = "[String; 2]")]
+pub struct Setting {
+    /// Its path from the scene's top, such as `camera.fov`.
+    pub path: String,
+    /// JSON when it is JSON, such as `30`, and else a string.
+    pub value: String,
+}
+
+impl Setting {
+    /// A path and a value.
+    #[must_use]
+    pub fn new(path: impl Into<String>, value: impl Into<String>) -> Self {
+        Self { path: path.into(), value: value.into() }
+    }
+}
+
+impl From<Setting> for [String; 2] {
+    fn from(Setting { path, value }: Setting) -> Self {
+        [path, value]
+    }
+}
 
 /// Sets `path` of `root` to `text`: JSON when it is JSON, else a string. Objects on the way that
 /// are missing are made. Returns the path as messages write it.

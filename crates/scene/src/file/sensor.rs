@@ -5,6 +5,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::camera::read_document;
+use super::overrides::Setting;
 use super::path::ScenePath;
 use super::written::WrittenPlaces;
 use super::{check, spec, values};
@@ -128,11 +129,7 @@ impl SensorFile {
     ///
     /// When the file is missing or not JSON, has no sensor, or its sensor is refused; the message
     /// names the file, the place and the remedy.
-    pub fn read(
-        opener: &Opener,
-        path: &Path,
-        overrides: &[(String, String)],
-    ) -> Result<Self, SceneError> {
+    pub fn read(opener: &Opener, path: &Path, overrides: &[Setting]) -> Result<Self, SceneError> {
         let (document, value) = read_document(path)?;
         Self::of(WrittenPlaces::new(opener, path, Some(document)), value, overrides)
     }
@@ -142,11 +139,7 @@ impl SensorFile {
     /// # Errors
     ///
     /// As [`Self::read`], and when `name` is neither.
-    pub fn named(
-        opener: &Opener,
-        name: &Path,
-        overrides: &[(String, String)],
-    ) -> Result<Self, SceneError> {
+    pub fn named(opener: &Opener, name: &Path, overrides: &[Setting]) -> Result<Self, SceneError> {
         if name.exists() || name.extension().is_some_and(|ending| ending == "json") {
             return Self::read(opener, name, overrides);
         }
@@ -167,29 +160,25 @@ impl SensorFile {
     /// # Errors
     ///
     /// As [`Self::read`].
-    pub fn of_value(
-        name: &Path,
-        value: Value,
-        overrides: &[(String, String)],
-    ) -> Result<Self, SceneError> {
+    pub fn of_value(name: &Path, value: Value, overrides: &[Setting]) -> Result<Self, SceneError> {
         Self::of(WrittenPlaces::new(&Opener::default(), name, None), value, overrides)
     }
 
     fn of(
         mut written: WrittenPlaces,
         mut value: Value,
-        overrides: &[(String, String)],
+        overrides: &[Setting],
     ) -> Result<Self, SceneError> {
         written.read_camera(&mut value)?;
         let in_scene = value.get("etendue").is_some() || value.get("camera").is_some();
         // What is set does not make a scene of a sensor.
-        let of_scene =
-            overrides.iter().find(|(key, _)| key == "camera" || key.starts_with("camera."));
-        if let (false, Some((key, text))) = (in_scene, of_scene) {
-            let own = key.strip_prefix("camera.sensor.").unwrap_or("KEY");
+        let is_of_scene = |set: &&Setting| set.path == "camera" || set.path.starts_with("camera.");
+        let of_scene = overrides.iter().find(is_of_scene);
+        if let (false, Some(Setting { path, value })) = (in_scene, of_scene) {
+            let own = path.strip_prefix("camera.sensor.").unwrap_or("KEY");
             let refusal = Refusal::new("this is a sensor, not a scene that has one");
-            let refusal = refusal.hint(format!("write `{own}={text}`"));
-            return Err(refusal.at(format_args!("--set {key}={text}")).into());
+            let refusal = refusal.hint(format!("write `{own}={value}`"));
+            return Err(refusal.at(format_args!("--set {path}={value}")).into());
         }
         written.set(&mut value, overrides)?;
         remove_notes(&mut value);

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::camera::CameraDocument;
 use super::document::{JsonDocument, Origin};
-use super::overrides;
+use super::overrides::{self, Setting};
 use super::path::ScenePath;
 use crate::SceneError;
 
@@ -65,12 +65,8 @@ impl WrittenPlaces {
     }
 
     /// Applies settings of the command line to the file's values, the later the stronger.
-    pub(super) fn set(
-        &mut self,
-        value: &mut Value,
-        all: &[(String, String)],
-    ) -> Result<(), SceneError> {
-        for (key, text) in all {
+    pub(super) fn set(&mut self, value: &mut Value, all: &[Setting]) -> Result<(), SceneError> {
+        for Setting { path: key, value: text } in all {
             let setting = format!("{key}={text}");
             let applied = overrides::apply(value, key, text)
                 .map_err(|why| why.at(format_args!("--set {setting}")))?;

@@ -12,7 +12,7 @@ use etendue_report::Refusal;
 
 use crate::SceneError;
 use crate::error::not_found;
-use crate::file::{CameraPath, FramesSpec, SceneFile, ScenePath};
+use crate::file::{CameraPath, FramesSpec, SceneFile, ScenePath, Setting};
 use crate::import::Note;
 use frame::{MOST_FRAMES, PoseAxes, Station, too_many};
 use trajectory::TrajectorySource;
@@ -54,14 +54,14 @@ impl SceneFile {
                         ));
                     }
                     FramesSpec::Path(path) => {
-                        self.along(&"frames.path".into(), path, (opener, &mut notes), || Ok(start))?
+                        self.along(&"frames.path".into(), path, opener, &mut notes, || Ok(start))?
                     }
                 };
                 path::rig_frames(self, cameras, &moments, &pose)
                     .map_err(|(place, why)| self.fault(place, why))?
             }
             FramesSpec::Path(path) => {
-                self.along(&"frames".into(), path, (opener, &mut notes), start)?
+                self.along(&"frames".into(), path, opener, &mut notes, start)?
             }
         };
         if frames.len() > MOST_FRAMES {
@@ -95,12 +95,12 @@ impl SceneFile {
     ///
     /// When the format does not know what they say; the message names the frame.
     pub fn at(&self, frame: &Frame) -> Result<Self, SceneError> {
-        let number = Some(("render.frame".to_owned(), frame.number.to_string()));
-        let own = frame.settings.iter().map(|(path, value)| (path.clone(), value.to_string()));
+        let number = Some(Setting::new("render.frame", frame.number.to_string()));
+        let own = frame.settings.iter().map(|(path, value)| Setting::new(path, value.to_string()));
         // When a moving camera's frame is taken.
         let time = frame.time.filter(|_| self.has_clock());
-        let time = time.map(|time| ("render.time".to_owned(), time.to_string()));
-        let settings: Vec<(String, String)> =
+        let time = time.map(|time| Setting::new("render.time", time.to_string()));
+        let settings: Vec<Setting> =
             number.filter(|_| frame.number > 0).into_iter().chain(time).chain(own).collect();
         let in_frame = |error: SceneError| {
             let why = match error {
@@ -118,7 +118,8 @@ impl SceneFile {
         &self,
         place: &ScenePath,
         path: &CameraPath,
-        (opener, notes): (&Opener, &mut Vec<Note>),
+        opener: &Opener,
+        notes: &mut Vec<Note>,
         start: impl FnOnce() -> Result<Start, SceneError>,
     ) -> Result<Vec<Frame>, SceneError> {
         let fault = |(key, why): (&str, String)| self.fault(place.join(key), why);

@@ -183,7 +183,8 @@ impl Deformer {
     pub(crate) fn steps<E>(
         &self,
         triangles: &[[u32; 3]],
-        (span, key): ([f64; 2], Vec<u64>),
+        span: [f64; 2],
+        key: Vec<u64>,
         tolerance: Tolerance<'_>,
         take: &mut dyn FnMut(u64) -> Result<(), E>,
     ) -> Result<Arc<Steps>, NoSteps<E>> {

@@ -25,7 +25,8 @@ pub(super) fn too_much(file: &Path, place: impl Display, why: TooMuch) -> Refusa
 /// Line and column are counted from 1.
 pub(super) fn wrong_text(
     file: &Path,
-    (line, column): (usize, usize),
+    line: usize,
+    column: usize,
     why: String,
     text: &str,
 ) -> Refusal {

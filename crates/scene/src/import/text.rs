@@ -33,13 +33,21 @@ impl TextFault {
         let number = (0..at).filter(|&i| ends(i)).count() + 1;
         let column = self.at.saturating_sub(start) + 1;
         let shown = String::from_utf8_lossy(&line[..line.len().min(80)]);
-        wrong_text(file, (number, column), self.reason, shown.trim_end())
+        wrong_text(file, number, column, self.reason, shown.trim_end())
     }
 }
 
+/// A part of a text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct TextSlice<'a> {
+    /// Byte of the text where it starts.
+    pub start: usize,
+    pub text: &'a [u8],
+}
+
 /// Splits `text` into pieces of about `size` bytes that end with whole lines: behind a newline that
-/// no backslash continues. Pieces come with their starts.
-pub(super) fn pieces(text: &[u8], size: usize) -> Vec<(usize, &[u8])> {
+/// no backslash continues.
+pub(super) fn pieces(text: &[u8], size: usize) -> Vec<TextSlice<'_>> {
     let mut pieces = Vec::with_capacity(text.len() / size + 1);
     let mut start = 0;
     while start < text.len() {
@@ -47,7 +55,7 @@ pub(super) fn pieces(text: &[u8], size: usize) -> Vec<(usize, &[u8])> {
         while end < text.len() && !ends_line(&text[..end]) {
             end += 1;
         }
-        pieces.push((start, &text[start..end]));
+        pieces.push(TextSlice { start, text: &text[start..end] });
         start = end;
     }
     pieces
@@ -317,9 +325,10 @@ mod tests {
         words.end_line();
         assert_eq!(words.rest(), b"x");
         assert!(words.is_done());
-        assert_eq!(pieces(text, 7), [(0, &text[..19]), (19, &text[19..])]);
+        let piece = |start: usize, end: usize| TextSlice { start, text: &text[start..end] };
+        assert_eq!(pieces(text, 7), [piece(0, 19), piece(19, text.len())]);
         let joined: Vec<u8> =
-            pieces(text, 1).iter().flat_map(|(_, piece)| piece.iter().copied()).collect();
+            pieces(text, 1).iter().flat_map(|piece| piece.text.iter().copied()).collect();
         assert_eq!(joined, text);
     }
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::LoadContext;
 use crate::cache::{self, Cache, KeptCamera};
 use crate::cameras::{CameraOrigin, SceneCamera, pick};
 use crate::error::not_found;
@@ -67,8 +68,7 @@ impl SceneFile {
         &self,
         geometry: Geometry,
         cameras: &[SceneCamera],
-        (folder, options): (&InputFolder, &LoadOptions<'_>),
-        kept: &Cache,
+        LoadContext { folder, options, kept, .. }: LoadContext<'_>,
         ahead: CameraAhead,
     ) -> Result<KeptCamera, SceneError> {
         let words = self.camera_words(options);
@@ -93,7 +93,7 @@ impl SceneFile {
                 (camera, origin, files.found.into_inner())
             }
         };
-        let files = cache::stamps(&files);
+        let files = cache::stamped(&files);
         let built = KeptCamera { words, geometry, camera, origin, files };
         kept.keep_camera(built.clone());
         Ok(built)

@@ -50,8 +50,8 @@ impl SceneFile {
                 budget.take(step.saturating_add(bytes))
             };
             let tolerance = |point: DVec3| eyes.tolerance(point);
-            let wanted = (span, eyes.key(span));
-            let steps = deformer.steps(&mesh.triangles, wanted, &tolerance, &mut take);
+            let key = eyes.key(span);
+            let steps = deformer.steps(&mesh.triangles, span, key, &tolerance, &mut take);
             mesh.steps = Some(steps.map_err(|why| self.no_steps(&mesh.name, count, why))?);
         }
         for placement in &mut all.placements {

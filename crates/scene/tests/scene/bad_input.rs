@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use etendue_files::{Opener, Reach};
-use etendue_scene::{LoadOptions, SceneError, SceneFile, Wanted};
+use etendue_scene::{LoadOptions, SceneError, SceneFile, Setting, Wanted};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -17,8 +17,8 @@ fn folder(text: &str) -> (TempDir, PathBuf) {
 }
 
 fn load(path: &Path, settings: &[(&str, &str)]) -> Result<etendue_scene::Scene, SceneError> {
-    let settings: Vec<(String, String)> =
-        settings.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+    let settings: Vec<Setting> =
+        settings.iter().map(|&(path, value)| Setting::new(path, value)).collect();
     SceneFile::read(path, &settings)?.load(Wanted::NOTHING, &LoadOptions::default())
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use etendue_files::{Opener, Reach};
 use etendue_scene::file::SensorFile;
-use etendue_scene::{LoadOptions, SceneError, SceneFile, Wanted};
+use etendue_scene::{LoadOptions, SceneError, SceneFile, Setting, Wanted};
 use serde_json::json;
 
 const LENS: &str = r#"{"glass_catalogs": ["own.agf"], "elements": [
@@ -24,8 +24,8 @@ fn folder(named: &str, camera: &str) -> tempfile::TempDir {
     folder
 }
 
-fn settings(all: &[(&str, &str)]) -> Vec<(String, String)> {
-    all.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect()
+fn settings(all: &[(&str, &str)]) -> Vec<Setting> {
+    all.iter().map(|&(path, value)| Setting::new(path, value)).collect()
 }
 
 fn read(folder: &Path, all: &[(&str, &str)]) -> Result<SceneFile, SceneError> {

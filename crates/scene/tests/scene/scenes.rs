@@ -6,14 +6,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use etendue_geometry::glam::DVec3;
-use etendue_scene::{CameraOrigin, LoadOptions, Scene, SceneFile, Wanted, scene_schema};
+use etendue_scene::{CameraOrigin, LoadOptions, Scene, SceneFile, Setting, Wanted, scene_schema};
 use etendue_tracer::LayerSpec;
 
 use crate::test_data;
 
 fn load(path: &Path, settings: &[(&str, &str)]) -> Scene {
-    let settings: Vec<(String, String)> =
-        settings.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+    let settings: Vec<Setting> =
+        settings.iter().map(|&(path, value)| Setting::new(path, value)).collect();
     let file = SceneFile::read(path, &settings).unwrap_or_else(|error| panic!("{error}"));
     let scene = file.load(Wanted::EVERYTHING, &LoadOptions::default());
     scene.unwrap_or_else(|error| panic!("{error}"))
@@ -378,7 +378,7 @@ fn a_key_that_is_set_to_null_is_as_if_it_were_not_written() {
     let path = folder.path().join("scene.json");
     let scene = r#"{"etendue": 1, "layers": ["depth"], "render": {"samples": 4}, "objects": []}"#;
     std::fs::write(&path, scene).unwrap();
-    let null = |key: &str| (key.to_owned(), "null".to_owned());
+    let null = |key: &str| Setting::new(key, "null");
     let file = SceneFile::read(&path, &[null("layers"), null("render")]).unwrap();
     assert!(file.spec.layers.is_empty());
     let is_written = |key: &str| file.value().get(key).is_some();

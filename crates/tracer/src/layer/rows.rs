@@ -52,6 +52,23 @@ pub(super) fn part_of_pupil(name: &'static str) -> Layer {
     }
 }
 
+/// A row of the light that comes from a group of lights.
+pub(super) fn part_of_lights(name: Cow<'static, str>) -> Layer {
+    Layer {
+        name,
+        meaning: vec![
+            (
+                "definition",
+                "the part of the picture's light that comes from the lights whose `group` is the layer's name, \
+                 and for `other` from those without one; the picture is the sum of all groups, to rounding",
+            ),
+            LINEAR,
+            ("miss", "the environment's radiance, in its group"),
+        ],
+        ..light("")
+    }
+}
+
 pub(super) const SURFACE: Needs = Needs {
     surface: true,
     normals: false,

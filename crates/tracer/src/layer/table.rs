@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::layers::layers;
 use super::rows::{
     BASE_COLOUR, CHIEF_RAY, LINEAR, SURFACE, colour, definition_of_normals, frame, light, measured,
-    name_in, name_of_normals, part_of_pupil,
+    name_in, name_of_normals, part_of_lights, part_of_pupil,
 };
 use super::{Columns, FrameStep, Layer, LayerContext, Look, RaySource, ValueKind};
 use crate::{LightGroup, Needs, NormalKind, Space};
@@ -19,7 +19,11 @@ layers! {
         /// `Depth.Z`: distance along the camera's axis from the entrance pupil (m).
         Depth = "depth": Layer {
             meaning: vec![
-                ("definition", "distance along the camera's axis from the entrance pupil"),
+                (
+                    "definition",
+                    "distance along the camera's axis from the entrance pupil: computer vision's depth, \
+                     OpenCV's z",
+                ),
                 ("unit", "m"),
                 CHIEF_RAY,
                 ("miss", "+inf"),
@@ -66,7 +70,10 @@ layers! {
         Incidence = "incidence": Layer {
             needs: SURFACE,
             meaning: vec![
-                ("definition", "angle between the ray and the normal of the triangle"),
+                (
+                    "definition",
+                    "angle of incidence: between the ray and the normal of the triangle, 0 to pi/2",
+                ),
                 ("unit", "rad"),
                 CHIEF_RAY,
                 ("miss", "+inf"),
@@ -118,6 +125,7 @@ layers! {
                 ),
                 ("unit", "s"),
                 CHIEF_RAY,
+                ("miss", "as elsewhere"),
             ],
             ..measured("Time", &["S"], Look::Extent)
         }, |seen, out| seen.each(out, |i| [seen.traced.rays.time(i)]);
@@ -125,7 +133,11 @@ layers! {
         /// `Coverage.A`: 1 where the pixel's chief ray hits, else 0.
         Coverage = "coverage": Layer {
             kept: ValueKind::Shown,
-            meaning: vec![("definition", "1 where something was hit, else 0"), CHIEF_RAY],
+            meaning: vec![
+                ("definition", "1 where something was hit, else 0"),
+                CHIEF_RAY,
+                ("miss", "0"),
+            ],
             ..measured("Coverage", &["A"], Look::Share)
         }, |seen, out| {
             seen.each(out, |i| [f64::from(u8::from(seen.traced.hits.is_hit(i)))]);
@@ -148,8 +160,8 @@ layers! {
             meaning: vec![
                 (
                     "definition",
-                    "base colour under a headlight, mean over the pixel's samples: to look at, not \
-                     a measurement",
+                    "base colour under a headlight, (0.08 + 0.92 base colour) * (0.15 + 0.85 cos a), a between \
+                     ray and shading normal, mean over the pixel's samples: to look at, not a measurement",
                 ),
                 LINEAR,
                 ("miss", "0 0 0"),
@@ -162,7 +174,7 @@ layers! {
             taken: RaySource::ChiefRay,
             needs: BASE_COLOUR,
             meaning: vec![
-                ("definition", "base colour without light"),
+                ("definition", "base colour without light along the chief ray, not averaged"),
                 LINEAR,
                 CHIEF_RAY,
                 ("miss", "0 0 0"),
@@ -246,8 +258,8 @@ layers! {
                 (
                     "definition",
                     "where another frame sees the point that was hit, less where this one does; the \
-                     point stays on its object when that moves; given also where it is hidden there or \
-                     outside of the picture: see Occlusion",
+                     point stays on its object when that moves, turns or is bent; given also where it is \
+                     hidden there or outside of the picture: see Occlusion",
                 ),
                 ("unit", "px, x right and y down"),
                 to.meaning(),
@@ -289,7 +301,8 @@ layers! {
             kept: ValueKind::Shown,
             meaning: vec![to.meaning(), CHIEF_RAY, ("miss", "0")],
             apart: Some(&[
-                "1 where something is before the point in another frame, else 0",
+                "1 where something is before the point in another frame (nearer by more than 1e-9 of its \
+                 distance), else 0",
                 "1 where the point is beyond the edge of another frame or behind its camera, else 0",
             ]),
             ..measured("", &["hidden", "outside"], Look::Share)
@@ -299,11 +312,14 @@ layers! {
         Alpha = "alpha": Layer {
             kept: ValueKind::Shown,
             taken: RaySource::PictureShare,
-            meaning: vec![(
-                "definition",
-                "share of the pixel's samples that hit something; holes that a texture's alpha cuts \
-                 count as surface",
-            )],
+            meaning: vec![
+                (
+                    "definition",
+                    "share of the pixel's samples that hit something; holes that a texture's alpha cuts \
+                     count as surface",
+                ),
+                ("miss", "0"),
+            ],
             ..measured("Alpha", &["A"], Look::Share)
         }, |seen, out| seen.shares(out);
 
@@ -313,7 +329,8 @@ layers! {
                 (
                     "definition",
                     "the part of the picture's light that came straight from lights to the camera, or was \
-                     scattered, mirrored or refracted by one surface; the picture is this and Indirect",
+                     scattered, mirrored or refracted by one surface; this and Indirect add up to the picture, to \
+                     rounding",
                 ),
                 LINEAR,
                 ("miss", "the environment's radiance"),
@@ -354,14 +371,17 @@ layers! {
         BottomRightPupil = "bottom_right_pupil": part_of_pupil("BottomRightPupil"), |_seen, _out| {};
 
         /// A layer `Light.NAME` for each group of lights: see [`Self::LightGroup`], which takes its place.
-        LightGroups = "light_groups": light("Light"), |_seen, _out| {};
+        LightGroups = "light_groups": part_of_lights("Light".into()), |_seen, _out| {};
 
         /// `SampleCount.X`: samples that the pixel got.
         SampleCount = "sample_count": Layer {
             kept: ValueKind::Counted,
             taken: RaySource::Sampling,
             meaning: vec![
-                ("definition", "samples that the pixel's mean was taken over"),
+                (
+                    "definition",
+                    "samples that the pixel's mean was taken over, where they go on until an error is reached",
+                ),
                 ("unit", "1"),
             ],
             ..measured("SampleCount", &["X"], Look::Extent)
@@ -389,19 +409,7 @@ layers! {
         LightGroup {
             /// The group.
             group: LightGroup
-        }: Layer {
-            name: format!("Light.{group}").into(),
-            meaning: vec![
-                (
-                    "definition",
-                    "the part of the picture's light that comes from the lights whose `group` is the layer's \
-                     name, and for `other` from those without one; the picture is the sum of all groups",
-                ),
-                LINEAR,
-                ("miss", "the environment's radiance, in its group"),
-            ],
-            ..light("")
-        }, |_seen, _out| {};
+        }: part_of_lights(format!("Light.{group}").into()), |_seen, _out| {};
 
         /// `Backdrop.R G B`: the part of the picture's radiance that came past everything. No file
         /// names it; it comes with `render.alpha` and a tracer of light.
@@ -416,6 +424,7 @@ layers! {
                      wavelengths other than RGB",
                 ),
                 LINEAR,
+                ("miss", "the environment's radiance"),
             ],
             ..colour("Backdrop")
         }, |seen, out| seen.backdrops(out);

@@ -19,6 +19,13 @@ pub(crate) struct Cluster {
     pub(crate) intensity: f64,
 }
 
+/// A light by its number, as a cluster.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct NumberedCluster {
+    pub(crate) number: u32,
+    pub(crate) cluster: Cluster,
+}
+
 impl Cluster {
     /// Of no light.
     pub(super) const DARK: Self =

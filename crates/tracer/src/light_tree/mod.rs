@@ -32,12 +32,11 @@
 mod cluster;
 mod descent;
 mod node;
-mod split;
 #[cfg(test)]
 mod tests;
 mod tree;
 
-pub(crate) use self::cluster::Cluster;
+pub(crate) use self::cluster::{Cluster, NumberedCluster};
 pub(crate) use self::descent::{Choice, Choices};
 use self::descent::{descend, descend_together, is_any_far};
 use self::node::LANES;

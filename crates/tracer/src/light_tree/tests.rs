@@ -46,7 +46,7 @@ fn at(place: DVec3, axis: DVec3, cone: f64, intensity: f64) -> Cluster {
 }
 
 /// Lights that shine to one side, and points, in a room of two metres.
-fn lights(count: u32, mut random: impl FnMut() -> f64) -> Vec<(u32, Cluster)> {
+fn lights(count: u32, mut random: impl FnMut() -> f64) -> Vec<NumberedCluster> {
     let mut vector = move || DVec3::from([random(), random(), random()].map(|x| 2.0 * x - 1.0));
     (0..count)
         .map(|k| {
@@ -56,7 +56,7 @@ fn lights(count: u32, mut random: impl FnMut() -> f64) -> Vec<(u32, Cluster)> {
             if k % 2 == 1 {
                 light.bounds.max += 0.03 * vector().abs();
             }
-            (k, light)
+            NumberedCluster { number: k, cluster: light }
         })
         .collect()
 }
@@ -138,7 +138,7 @@ fn nothing_that_shines_is_left_out() {
         let from = DVec3::from([random(), random(), random()].map(|x| 3.0 * x - 1.5));
         let is_one_sided = k % 2 == 1;
         let from = receiver(from, is_one_sided);
-        for (number, light) in &all {
+        for NumberedCluster { number, cluster: light } in &all {
             let corners = light.bounds.corners();
             let shines = |corner: &DVec3| (from.point - *corner).dot(light.axis) > 0.0;
             let is_above = |corner: &DVec3| !is_one_sided || corner.y > from.point.y;
@@ -161,16 +161,19 @@ fn nothing_that_shines_is_left_out() {
 fn near_lights_are_picked_more_often() {
     let mut random = random();
     let mut place = || DVec3::from([random(), random(), random()].map(|x| 2.0 * x - 1.0));
-    let all: Vec<_> =
-        (0..100).map(|k| (k, at(place(), DVec3::Y, PI, 0.02 + 0.04 * f64::from(k % 3)))).collect();
+    let mut light = |number| {
+        let cluster = at(place(), DVec3::Y, PI, 0.02 + 0.04 * f64::from(number % 3));
+        NumberedCluster { number, cluster }
+    };
+    let all: Vec<_> = (0..100).map(&mut light).collect();
     let tree = LightTree::new(all.clone(), 100);
-    let power: f64 = all.iter().map(|(_, light)| light.intensity).sum();
+    let power: f64 = all.iter().map(|light| light.cluster.intensity).sum();
     let (mut by_tree, mut by_power) = ([0.0; 2], 0.0);
     for _ in 0..200 {
         // On the floor, which faces +Y.
         let from = DVec3::new(place().x, -1.0, place().z);
         let (mut sum, mut of_tree, mut of_power) = (0.0, [0.0; 2], 0.0);
-        for (number, light) in &all {
+        for NumberedCluster { number, cluster: light } in &all {
             let way = light.bounds.min - from;
             let brings = light.intensity * way.normalize().y / way.length_squared();
             sum += brings;
@@ -194,12 +197,14 @@ fn near_lights_are_picked_more_often() {
 #[test]
 fn lights_on_a_ceiling_are_picked_by_what_they_bring() {
     let place = |k: u32| DVec3::new(f64::from(k % 40) / 39.0, 1.0, f64::from(k / 40) / 24.0);
-    let all: Vec<_> = (0..1000).map(|k| (k, at(place(k), DVec3::NEG_Y, 0.0, 1.0))).collect();
+    let light =
+        |number| NumberedCluster { number, cluster: at(place(number), DVec3::NEG_Y, 0.0, 1.0) };
+    let all: Vec<_> = (0..1000).map(light).collect();
     let tree = LightTree::new(all.clone(), 1000);
     let deviation = |k: u32| {
         let from = DVec3::new(f64::from(k % 10) / 9.0, 0.0, f64::from(k / 10) / 9.0);
         let (mut sum, mut squares) = (0.0, 0.0);
-        for (number, light) in &all {
+        for NumberedCluster { number, cluster: light } in &all {
             let way = light.bounds.min - from;
             let brings = way.normalize().y.powi(2) / way.length_squared();
             sum += brings;
@@ -215,14 +220,18 @@ fn lights_on_a_ceiling_are_picked_by_what_they_bring() {
 #[test]
 fn lights_in_one_place_and_along_a_line_are_parted_too() {
     for step in [0.0, 1.0] {
-        let line = |k: u32| (k, at(DVec3::X * (step * f64::from(k)), DVec3::Y, 0.0, 1.0));
+        let line = |number: u32| {
+            let place = DVec3::X * (step * f64::from(number));
+            NumberedCluster { number, cluster: at(place, DVec3::Y, 0.0, 1.0) }
+        };
         let tree = LightTree::new((0..1000).map(line).collect(), 1000);
         let from = receiver(DVec3::new(3.0, 4.0, 0.0), false);
         let sum: f64 = (0..1000).map(|k| tree.chance(&from, k)).sum();
         assert!((sum - 1.0).abs() < 1e-12, "{sum}");
     }
     // All face away; along a line, the ball around a far node reaches to the other side.
-    let here = (0..1000).map(|k| (k, at(DVec3::X, DVec3::Y, 0.0, 1.0))).collect();
+    let cluster = at(DVec3::X, DVec3::Y, 0.0, 1.0);
+    let here = (0..1000).map(|number| NumberedCluster { number, cluster }).collect();
     let behind = receiver(DVec3::new(3.0, -4.0, 0.0), false);
     assert_eq!(pick(&LightTree::new(here, 1000), behind, 0.5).chance, 0.0);
 }

@@ -3,9 +3,8 @@
 use etendue_geometry::MISS;
 use etendue_geometry::glam::DVec3;
 
-use super::cluster::Cluster;
+use super::cluster::{Cluster, NumberedCluster};
 use super::node::{Branch, Extent, Node, Receiver, Viewer, WIDTH};
-use super::split::split;
 
 /// From this depth on nodes are parted into equal numbers of lights, whatever that costs: no branch is longer than
 /// this and the logarithm of that number.
@@ -18,6 +17,9 @@ pub(super) const FIRST: usize = 1;
 
 /// Half-angle (radians) of a cone within which lights shine the same way.
 const ALIKE: f64 = 0.3;
+
+/// Intervals of an axis that a split is looked for between.
+const BUCKETS: usize = 12;
 
 /// The branch with a light at a place of the tree's order that [`descend`](super::descent::descend) may come to from a node, and its chance.
 #[multiversion::multiversion(targets = "simd")]
@@ -60,10 +62,10 @@ struct BranchCluster {
 
 impl LightTree {
     /// Over `lights` by their numbers below `count`; those without intensity are left out.
-    pub(crate) fn new(mut lights: Vec<(u32, Cluster)>, count: usize) -> Self {
-        lights.retain(|(_, cluster)| cluster.intensity > 0.0);
+    pub(crate) fn new(mut lights: Vec<NumberedCluster>, count: usize) -> Self {
+        lights.retain(|light| light.cluster.intensity > 0.0);
         let mut tree = Self { below: vec![0.0], places: vec![MISS; count], ..Self::default() };
-        let all = lights.iter().map(|light| light.1).reduce(|a, b| a.union(&b));
+        let all = lights.iter().map(|light| light.cluster).reduce(|a, b| a.union(&b));
         if let Some(all) = all {
             tree.extent = Extent::of(&all);
             tree.nodes.push(Node::default());
@@ -75,9 +77,9 @@ impl LightTree {
     }
 
     /// Adds what is below a branch.
-    fn grow(&mut self, lights: &mut [(u32, Cluster)], depth: u32) -> BranchCluster {
+    fn grow(&mut self, lights: &mut [NumberedCluster], depth: u32) -> BranchCluster {
         let begin = self.order.len();
-        if let [(number, cluster)] = lights {
+        if let [NumberedCluster { number, cluster }] = lights {
             let sum = self.below[begin] + cluster.intensity;
             self.places[*number as usize] = place(begin);
             self.order.push(*number);
@@ -172,11 +174,11 @@ impl LightTree {
 
 /// Puts the lights of a node in the order of its branches, and says how many each has: again and again the branch
 /// that costs most is split, or the one of most lights where they are to be parted evenly.
-fn parts(lights: &mut [(u32, Cluster)], evenly: bool) -> Vec<usize> {
-    let cost = |lights: &[(u32, Cluster)]| match evenly {
+fn parts(lights: &mut [NumberedCluster], evenly: bool) -> Vec<usize> {
+    let cost = |lights: &[NumberedCluster]| match evenly {
         true => lights.len() as f64,
         false => {
-            let all = lights.iter().map(|light| light.1).reduce(|a, b| a.union(&b));
+            let all = lights.iter().map(|light| light.cluster).reduce(|a, b| a.union(&b));
             all.map_or(0.0, |all| all.cost())
         }
     };
@@ -188,12 +190,64 @@ fn parts(lights: &mut [(u32, Cluster)], evenly: bool) -> Vec<usize> {
         let several = parts.iter().copied().enumerate().filter(|(_, (size, _))| *size > 1);
         let Some((k, (size, _))) = several.max_by(by_cost) else { break };
         let start = parts[..k].iter().map(|part| part.0).sum();
-        let whole: &mut [(u32, Cluster)] = &mut lights[start..start + size];
+        let whole: &mut [NumberedCluster] = &mut lights[start..start + size];
         let middle = split(whole, evenly);
         let (first, second) = whole.split_at(middle);
         parts.splice(k..=k, [first, second].map(|part| (part.len(), cost(part))));
     }
     parts.into_iter().map(|part| part.0).collect()
+}
+
+/// Puts lights in an order in which those of the first part come first, at least one and not all; how many these
+/// are. `evenly`: as many as of the second.
+fn split(lights: &mut [NumberedCluster], evenly: bool) -> usize {
+    let half = lights.len() / 2;
+    let centre = |light: &NumberedCluster, axis: usize| light.cluster.bounds.centre()[axis];
+    let range = |axis: usize| {
+        let ends = |(low, high): (f64, f64), light| {
+            let c = centre(light, axis);
+            (low.min(c), high.max(c))
+        };
+        lights.iter().fold((f64::INFINITY, f64::NEG_INFINITY), ends)
+    };
+    let widest = (0..3).map(|axis| range(axis).1 - range(axis).0).fold(0.0, f64::max);
+    let mut best: Option<(f64, usize, usize)> = None;
+    for axis in 0..3 {
+        let (low, high) = range(axis);
+        if high <= low || evenly {
+            continue;
+        }
+        let place = |light: &NumberedCluster| bucket(centre(light, axis), low, high);
+        let mut buckets: [Option<Cluster>; BUCKETS] = [None; BUCKETS];
+        for light in &*lights {
+            let own = &mut buckets[place(light)];
+            *own = Some(own.map_or(light.cluster, |all| all.union(&light.cluster)));
+        }
+        let together = |part: &[Option<Cluster>]| {
+            part.iter().flatten().copied().reduce(|a, b| a.union(&b)).map(|c| c.cost())
+        };
+        for end in 1..BUCKETS {
+            let (Some(a), Some(b)) = (together(&buckets[..end]), together(&buckets[end..])) else {
+                continue;
+            };
+            let cost = (a + b) * widest / (high - low);
+            if best.is_none_or(|(least, ..)| cost < least) {
+                best = Some((cost, axis, end));
+            }
+        }
+    }
+    let Some((_, axis, end)) = best else { return half };
+    let (low, high) = range(axis);
+    lights.sort_by_key(|light| bucket(centre(light, axis), low, high) >= end);
+    let middle = lights.partition_point(|light| bucket(centre(light, axis), low, high) < end);
+    if middle == 0 || middle == lights.len() { half } else { middle }
+}
+
+/// The interval of a place between two ends.
+fn bucket(at: f64, low: f64, high: f64) -> usize {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in 0..=1")]
+    let bucket = ((at - low) / (high - low) * BUCKETS as f64) as usize;
+    bucket.min(BUCKETS - 1)
 }
 
 /// A place in a list of the tree, which has at most [`MOST`](super::MOST) lights.

@@ -127,6 +127,13 @@ struct PlotAxes {
     y: [f64; 2],
 }
 
+/// A curve of a plot.
+struct PlotCurve {
+    points: Vec<[f64; 2]>,
+    color: Color32,
+    is_dashed: bool,
+}
+
 impl PlotAxes {
     #[expect(clippy::cast_possible_truncation, reason = "points on the screen")]
     fn point(&self, [x, y]: [f64; 2]) -> Pos2 {
@@ -138,7 +145,7 @@ impl PlotAxes {
         )
     }
 
-    fn draw(&self, ui: &Ui, title: &str, curves: &[(Vec<[f64; 2]>, Color32, bool)]) {
+    fn draw(&self, ui: &Ui, title: &str, curves: &[PlotCurve]) {
         let weak = Stroke::new(0.6, ui.visuals().weak_text_color());
         let painter = ui.painter();
         painter.rect_stroke(self.place, 0.0, weak, egui::StrokeKind::Inside);
@@ -151,8 +158,8 @@ impl PlotAxes {
             }
         }
         let inside = painter.with_clip_rect(self.place);
-        for (curve, color, is_dashed) in curves {
-            let points: Vec<Pos2> = curve.iter().map(|&point| self.point(point)).collect();
+        for PlotCurve { points, color, is_dashed } in curves {
+            let points: Vec<Pos2> = points.iter().map(|&point| self.point(point)).collect();
             let stroke = Stroke::new(1.4, *color);
             match is_dashed {
                 true => inside.extend(Shape::dashed_line(&points, stroke, 5.0, 3.0)),
@@ -196,7 +203,12 @@ fn fans(ui: &Ui, waves: &LensWaves, place: Rect, are_rays: bool) {
         let color = COLORS[i % COLORS.len()][usize::from(!dark)];
         let unit = if are_rays { "\u{b5}m" } else { "waves" };
         let title = format!("{}\n\u{b1}{} {unit}", field.name, short(y));
-        axes.draw(ui, &title, &[(curve(field, 0), color, false), (curve(field, 1), color, true)]);
+        let curves = [false, true].map(|is_dashed| PlotCurve {
+            points: curve(field, usize::from(is_dashed)),
+            color,
+            is_dashed,
+        });
+        axes.draw(ui, &title, &curves);
     }
 }
 
@@ -208,7 +220,7 @@ fn modulation(ui: &Ui, waves: &LensWaves, place: Rect) {
         let color = COLORS[i % COLORS.len()][usize::from(!dark)];
         for axis in [0, 1] {
             let points = field.modulation.iter().map(|row| [row[0], row[1 + axis]]).collect();
-            curves.push((points, color, axis == 1));
+            curves.push(PlotCurve { points, color, is_dashed: axis == 1 });
         }
     }
     let limit = waves.limit;

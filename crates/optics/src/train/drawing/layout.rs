@@ -65,7 +65,8 @@ pub fn layout(
         canvas.path(&ends.map(|end| view.pixel([end.z, end.y])), "ink", 2.5);
     }
     let drawn = fields.iter().zip(&fans).enumerate().filter(|(_, (_, fan))| !fan.rays.is_empty());
-    let drawn: Vec<(usize, f64)> = drawn.map(|(i, (&field, _))| (i, field)).collect();
+    let drawn: Vec<DrawnField> =
+        drawn.map(|(colour, (&angle, _))| DrawnField { colour, angle }).collect();
     legend(&mut canvas, &view, &drawn);
     Ok(canvas.svg(Theme::Reader))
 }
@@ -432,15 +433,23 @@ fn draw(canvas: &mut Canvas, view: &DrawingView, element: &Element, height: f64,
     }
 }
 
-/// Fields of which rays were drawn, by the number of their colour, and a scale.
-fn legend(canvas: &mut Canvas, view: &DrawingView, fields: &[(usize, f64)]) {
+/// A field of which rays were drawn.
+struct DrawnField {
+    /// Number of its colour.
+    colour: usize,
+    /// Its angle (degrees).
+    angle: f64,
+}
+
+/// Fields of which rays were drawn, and a scale.
+fn legend(canvas: &mut Canvas, view: &DrawingView, fields: &[DrawnField]) {
     let y = view.height - 14.0;
     // Beams from the side may reach down here.
     canvas.cover([0.0, view.height - FOOT + 6.0], [WIDTH, FOOT]);
-    for (place, &(colour, field)) in (0_u32..).zip(fields) {
+    for (place, &DrawnField { colour, angle }) in (0_u32..).zip(fields) {
         let x = MARGIN + 90.0 * f64::from(place);
         canvas.path(&[[x, y - 4.0], [x + 24.0, y - 4.0]], &format!("s{}", colour % COLOURS), 2.0);
-        canvas.text([x + 30.0, y], TextAnchor::Start, "small", &format!("{}\u{b0}", short(field)));
+        canvas.text([x + 30.0, y], TextAnchor::Start, "small", &format!("{}\u{b0}", short(angle)));
     }
     let length = round_length(140.0 / view.scale);
     let right = WIDTH - MARGIN;

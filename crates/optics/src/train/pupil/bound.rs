@@ -6,7 +6,7 @@ use glam::DVec2;
 
 use super::coded::Anywhere;
 use super::disk::PupilSamples;
-use super::place::{NodePlace, angle_below, between};
+use super::place::{NodePlace, TableAngle, angle_below, between};
 use super::{ExitPupil, PupilOutline};
 use crate::element::{Block, Frame, LANES, LensRays, RayStatus};
 
@@ -98,7 +98,7 @@ impl NodeRows {
 
     /// Adds a node's share to a lane, at an angle between two of its table.
     #[inline(always)]
-    fn add(&mut self, lane: usize, node: &PupilOutline, weight: f64, angle: (usize, f64)) {
+    fn add(&mut self, lane: usize, node: &PupilOutline, weight: f64, angle: TableAngle) {
         let (centre, half) = (node.centre.to_array(), node.half.to_array());
         for axis in 0..2 {
             self.centre[axis][lane] += centre[axis] * weight;

@@ -16,7 +16,7 @@
 use glam::DVec2;
 
 use super::mask_cells::{MaskCells, first_mask, open_bounds, open_reach};
-use super::mask_map::{MaskMap, MaskScene, NO_TERMS};
+use super::mask_map::{MappedScene, MaskMap, MaskScene, NO_TERMS};
 use super::mask_region::MaskRegion;
 use crate::element::{Frame, Opening};
 use crate::train::{MonochromaticTrain, OpticalTrain, Part};
@@ -107,8 +107,8 @@ impl MaskView {
         // What is visible differs little from one wavelength to the next.
         let mut few = vec![0, lenses.len() / 2, lenses.len() - 1];
         few.dedup();
-        let few: Vec<(MaskScene<'_>, &MaskMap)> =
-            few.into_iter().map(|i| (scene(&lenses[i]), &maps[i].1)).collect();
+        let mapped = |i: usize| MappedScene { scene: scene(&lenses[i]), map: &maps[i].1 };
+        let few: Vec<MappedScene<'_>> = few.into_iter().map(mapped).collect();
         let region = MaskRegion::new(&few, &cells)?;
         Some(Self { cells, region, maps })
     }

@@ -68,9 +68,18 @@ pub(super) struct MaskCells {
     sums: Vec<f64>,
 }
 
+/// A place between two lines.
+#[derive(Debug, Clone, Copy)]
+struct LinePlace {
+    /// The interval of lines that holds it.
+    interval: usize,
+    /// The share of that which is before it.
+    share: f64,
+}
+
 /// Columns from one place to another.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ColumnSpan([(usize, f64); 2]);
+pub(super) struct ColumnSpan([LinePlace; 2]);
 
 /// Rows of some columns.
 #[derive(Debug, Clone, Copy)]
@@ -162,7 +171,7 @@ impl MaskCells {
 
     /// The row that holds a place (mm).
     pub(super) fn row_at(&self, y: f64) -> usize {
-        locate(&self.lines[1], y).0
+        locate(&self.lines[1], y).interval
     }
 
     /// The place of a line below a row (mm).
@@ -205,7 +214,7 @@ impl MaskCells {
     ) -> Option<(f64, f64)> {
         let [from, to] = columns.0.map(|end| self.up_to(row, end));
         let target = from + u * (to - from);
-        let (mut low, mut high) = (columns.0[0].0, columns.0[1].0 + 1);
+        let (mut low, mut high) = (columns.0[0].interval, columns.0[1].interval + 1);
         while high - low > 1 {
             let middle = usize::midpoint(low, high);
             if self.of_row(row, middle) <= target { low = middle } else { high = middle }
@@ -223,7 +232,7 @@ impl MaskCells {
     /// The share of the columns of a row that a millimetre has at `x` (mm).
     pub(super) fn column_density(&self, row: usize, columns: ColumnSpan, x: f64) -> f64 {
         let [from, to] = columns.0.map(|end| self.up_to(row, end));
-        let low = locate(&self.lines[0], x).0;
+        let low = locate(&self.lines[0], x).interval;
         let mass = self.of_row(row, low + 1) - self.of_row(row, low);
         if to > from {
             mass / (self.lines[0][low + 1] - self.lines[0][low]) / (to - from)
@@ -235,7 +244,8 @@ impl MaskCells {
     /// The sum of some columns of all rows below a line.
     fn sum(&self, ColumnSpan(ends): ColumnSpan, line: usize) -> f64 {
         let sums = &self.sums[line * self.lines[0].len()..];
-        let [from, to] = ends.map(|(i, share)| sums[i] + share * (sums[i + 1] - sums[i]));
+        let [from, to] =
+            ends.map(|LinePlace { interval: i, share }| sums[i] + share * (sums[i + 1] - sums[i]));
         to - from
     }
 
@@ -245,16 +255,17 @@ impl MaskCells {
         self.sums[at + self.lines[0].len()] - self.sums[at]
     }
 
-    fn up_to(&self, row: usize, (column, share): (usize, f64)) -> f64 {
+    fn up_to(&self, row: usize, LinePlace { interval: column, share }: LinePlace) -> f64 {
         let [low, high] = [self.of_row(row, column), self.of_row(row, column + 1)];
         low + share * (high - low)
     }
 }
 
-/// The interval of ascending lines that holds a place, and the share of it that is before.
-fn locate(lines: &[f64], at: f64) -> (usize, f64) {
+/// The place of a number between ascending lines.
+fn locate(lines: &[f64], at: f64) -> LinePlace {
     let i = lines.partition_point(|line| *line <= at).clamp(1, lines.len() - 1) - 1;
-    (i, ((at - lines[i]) / (lines[i + 1] - lines[i])).clamp(0.0, 1.0))
+    let share = ((at - lines[i]) / (lines[i + 1] - lines[i])).clamp(0.0, 1.0);
+    LinePlace { interval: i, share }
 }
 
 fn greatest_and_mean(values: impl Iterator<Item = f64>) -> [f32; 2] {

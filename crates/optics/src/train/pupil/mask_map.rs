@@ -76,6 +76,13 @@ pub(super) struct MaskScene<'a> {
     pub(super) half_size: DVec2,
 }
 
+/// A scene with its map.
+#[derive(Clone, Copy)]
+pub(super) struct MappedScene<'a> {
+    pub(super) scene: MaskScene<'a>,
+    pub(super) map: &'a MaskMap,
+}
+
 impl MaskScene<'_> {
     /// Point where a ray along slopes crosses the mask's plane, in the mask's frame (mm).
     pub(super) fn crossing(&self, film: DVec3, slopes: DVec2) -> Option<DVec2> {

@@ -16,7 +16,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::mask_cells::{MaskCells, RowSpan};
-use super::mask_map::{MaskMap, MaskScene, NO_TERMS};
+use super::mask_map::{MappedScene, NO_TERMS};
 use crate::element::{Clip, LensRays, RayStatus};
 use crate::train::Side;
 use crate::train::aim::towards_lens;
@@ -100,8 +100,8 @@ impl Chords {
 
 impl MaskRegion {
     /// Finds what is visible of a mask's cells by rays of any of the maps.
-    pub(super) fn new(scenes: &[(MaskScene<'_>, &MaskMap)], cells: &MaskCells) -> Option<Self> {
-        let (scene, _) = scenes.first()?;
+    pub(super) fn new(scenes: &[MappedScene<'_>], cells: &MaskCells) -> Option<Self> {
+        let MappedScene { scene, .. } = scenes.first()?;
         let mut region =
             Self { half_size: scene.half_size, nodes: Vec::new(), intervals: Vec::new() };
         let bounds = cells.bounds();
@@ -243,7 +243,7 @@ fn split(share: f64, count: usize) -> (usize, f64) {
 
 /// Rays from a point of the sensor towards points of the mask, at any of the wavelengths.
 struct MaskRays<'a> {
-    scenes: &'a [(MaskScene<'a>, &'a MaskMap)],
+    scenes: &'a [MappedScene<'a>],
     /// The point of the sensor (mm).
     film: DVec2,
     /// The corners of what is looked at (mm).
@@ -255,7 +255,7 @@ impl MaskRays<'_> {
     /// True for each point of the mask (mm) that is visible.
     fn passes(&self, places: &[DVec2]) -> Vec<bool> {
         let mut passed = vec![false; places.len()];
-        for (scene, map) in self.scenes {
+        for MappedScene { scene, map } in self.scenes {
             let mut room = NO_TERMS;
             let Some(local) = map.at(self.film, &mut room) else { continue };
             let start = scene.sensor.point(self.film.extend(0.0));
@@ -287,7 +287,7 @@ impl MaskRays<'_> {
     /// Visible part of the mask; all, where nobody knows.
     fn seen(&self) -> Visibility {
         let mut room = NO_TERMS;
-        if self.scenes.iter().all(|(_, map)| map.at(self.film, &mut room).is_none()) {
+        if self.scenes.iter().all(|of| of.map.at(self.film, &mut room).is_none()) {
             return Visibility::All;
         }
         let grid: Vec<DVec2> = (0..(GRID + 1) * (GRID + 1))

@@ -82,9 +82,18 @@ pub(super) fn turn_of(i: usize) -> f64 {
     i as f64 / ANGLES as f64
 }
 
-/// The angle of the table below a share of a full turn, 0..=1, and the share of the way to the next.
+/// A place between two angles of a table.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TableAngle {
+    /// The angle below.
+    low: usize,
+    /// The share of the way to the next.
+    share: f64,
+}
+
+/// The place in a table of a share of a full turn, 0..=1.
 #[inline(always)]
-pub(super) fn angle_below(turn: f64) -> (usize, f64) {
+pub(super) fn angle_below(turn: f64) -> TableAngle {
     #[expect(clippy::cast_precision_loss, reason = "128 angles")]
     let at = turn * ANGLES as f64;
     #[expect(
@@ -95,11 +104,11 @@ pub(super) fn angle_below(turn: f64) -> (usize, f64) {
     let low = (at as usize).min(ANGLES - 1);
     #[expect(clippy::cast_precision_loss, reason = "128 angles")]
     let share = at - low as f64;
-    (low, share)
+    TableAngle { low, share }
 }
 
 /// The table's value at an angle.
 #[inline(always)]
-pub(super) fn between(table: &[f64; ANGLES + 1], (low, share): (usize, f64)) -> f64 {
+pub(super) fn between(table: &[f64; ANGLES + 1], TableAngle { low, share }: TableAngle) -> f64 {
     table[low] + (table[low + 1] - table[low]) * share
 }

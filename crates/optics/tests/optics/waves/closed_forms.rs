@@ -209,7 +209,7 @@ fn huygens_and_fft_agree_where_the_sphere_is_large() {
     let one = field(128, 0.0, waves);
     let fft = PointSpread::by_fft(&WeightedFields::one(one.clone()), 1);
     let sphere = ReferenceSphere { centre: [0.0; 3], radius: 1e4, index: 1.0 };
-    let sum = PointSpread::by_huygens(&[(&one, &sphere, 1.0)], 24, fft.pitch);
+    let sum = PointSpread::by_huygens(&one, &sphere, 24, fft.pitch);
     assert!((sum.perfect - fft.perfect).abs() < 1e-9 * fft.perfect);
     for i in 0..sum.values.len() {
         let at = |k: usize| k + fft.size / 2 - sum.size / 2;

@@ -189,7 +189,7 @@ fn huygens_and_fft_agree_through_glass() {
     let at = train.at(train.wavelength()).unwrap();
     let wave = Wavefront::new(&train, &at, ObjectPoint::field(6.0), image, Cells::Needed).unwrap();
     let fft = PointSpread::by_fft(&WeightedFields::one(wave.pupil.clone()), 1);
-    let sum = PointSpread::by_huygens(&[(&wave.pupil, &wave.sphere, 1.0)], 32, fft.pitch);
+    let sum = PointSpread::by_huygens(&wave.pupil, &wave.sphere, 32, fft.pitch);
     let peak = fft.values.iter().copied().fold(0.0, f64::max);
     for i in 0..sum.values.len() {
         let at = |k: usize| k + fft.size / 2 - sum.size / 2;

@@ -9,6 +9,13 @@ use super::{
     Checker, Outcome, Problem, ScenePath, keys_of, nearest, problem, show, suggest, wrong_kind,
 };
 
+/// The key by which a branch says what it is, and its word there.
+#[derive(Clone, Copy)]
+struct KindTag<'a> {
+    key: &'a str,
+    word: &'a str,
+}
+
 impl<'a> Checker<'a> {
     /// Goes on in the branch that was meant: by tag, by the kind of value, or by the keys.
     pub(super) fn choose(&self, branches: &'a [Value], value: &Value, path: &ScenePath) -> Outcome {
@@ -51,13 +58,12 @@ impl<'a> Checker<'a> {
         let tag_of = |branch: &'a Value| {
             let properties = branch.get("properties").and_then(Value::as_object)?;
             properties.iter().find_map(|(key, schema)| {
-                schema.get("const").and_then(Value::as_str).map(|word| (key.as_str(), word))
+                schema.get("const").and_then(Value::as_str).map(|word| KindTag { key, word })
             })
         };
-        let tags: Vec<Option<(&str, &str)>> =
-            branches.iter().map(|branch| tag_of(branch)).collect();
+        let tags: Vec<Option<KindTag<'_>>> = branches.iter().map(|branch| tag_of(branch)).collect();
         for (branch, tag) in branches.iter().zip(&tags) {
-            if let Some((key, word)) = tag
+            if let Some(KindTag { key, word }) = tag
                 && members.get(*key).and_then(Value::as_str) == Some(word)
             {
                 return match branch.get("oneOf").and_then(Value::as_array) {
@@ -72,9 +78,9 @@ impl<'a> Checker<'a> {
                 };
             }
         }
-        let named = tags.iter().flatten().find(|(key, _)| members.contains_key(*key));
-        if let Some((key, _)) = named {
-            let words = tags.iter().flatten().filter(|(k, _)| k == key).map(|(_, word)| *word);
+        let named = tags.iter().flatten().find(|tag| members.contains_key(tag.key));
+        if let Some(KindTag { key, .. }) = named {
+            let words = tags.iter().flatten().filter(|tag| tag.key == *key).map(|tag| tag.word);
             let given = &members[*key];
             let known = suggest(given.as_str().unwrap_or_default(), words);
             return problem(&path.key(key), format!("unknown {key} {}{known}", show(given)));
@@ -87,7 +93,7 @@ impl<'a> Checker<'a> {
     fn choose_by_keys(
         &self,
         branches: &[&'a Value],
-        tags: &[Option<(&str, &str)>],
+        tags: &[Option<KindTag<'a>>],
         members: &Map<String, Value>,
         path: &ScenePath,
     ) -> Outcome {
@@ -104,7 +110,7 @@ impl<'a> Checker<'a> {
         };
         let untagged = branches.iter().zip(tags).filter(|(_, tag)| tag.is_none());
         let best = untagged.map(|(branch, _)| *branch).max_by_key(|branch| score(branch));
-        let keys: Vec<&str> = tags.iter().flatten().map(|(key, _)| *key).collect();
+        let keys: Vec<&str> = tags.iter().flatten().map(|tag| tag.key).collect();
         match (best, keys.first()) {
             (Some(best), _) if score(best).1.0 == 0 || keys.is_empty() => {
                 self.object(best, members, path)

@@ -180,7 +180,8 @@ impl<'a> Accessor<'a> {
     /// `count` elements that lie behind each other in `bytes`.
     pub(super) fn of_packed(
         bytes: &'a Bytes,
-        (component, components): (ComponentType, usize),
+        component: ComponentType,
+        components: usize,
         count: usize,
         normalized: bool,
     ) -> Self {

@@ -5,7 +5,7 @@ use etendue_report::Size;
 use gltf::json::mesh::Primitive;
 
 use super::accessor::Accessor;
-use super::draco::{Attribute, DracoMesh, DracoPrimitive, NAME};
+use super::draco::{Attribute, DracoData, DracoMesh, DracoPrimitive, NAME};
 use super::reader::{BufferView, GltfReader};
 use crate::import::Refusal;
 
@@ -20,7 +20,7 @@ impl GltfReader<'_> {
         &self,
         primitive: &Primitive,
         place: &str,
-    ) -> Result<Option<(DracoPrimitive, &DracoMesh)>, Refusal> {
+    ) -> Result<Option<DracoData<'_>>, Refusal> {
         let Some(compressed) = DracoPrimitive::of(primitive) else { return Ok(None) };
         // Some files keep a plain copy beside it, which has lost nothing.
         let accessors = &self.document.root.accessors;
@@ -34,7 +34,7 @@ impl GltfReader<'_> {
         let place = format!("{place}, {NAME}");
         let compressed = compressed.map_err(|why| self.damaged(&*place, why))?;
         let decoded = self.decoded(compressed.buffer_view, &place)?;
-        Ok(Some((compressed, decoded)))
+        Ok(Some(DracoData { primitive: compressed, mesh: decoded }))
     }
 
     /// The mesh of view `index`, decoded once.
@@ -84,6 +84,6 @@ impl DracoMesh {
                 "its stream has no attribute {id} that glTF could take\nhint: export the file again"
             )));
         };
-        Some(Ok(Accessor::of_packed(bytes, (*component, *components), self.points, normalized)))
+        Some(Ok(Accessor::of_packed(bytes, *component, *components, self.points, normalized)))
     }
 }

@@ -176,7 +176,7 @@ fn broken(path: &Path, json: &[u8], in_glb: bool, error: &serde_json::Error) -> 
     };
     let line = json.split(|&byte| byte == b'\n').nth(place.line - 1);
     let shown = excerpt(line.unwrap_or_default(), place.column);
-    wrong_text(path, (place.line, place.column), reason, &shown)
+    wrong_text(path, place.line, place.column, reason, &shown)
 }
 
 /// Fault of a text that is no JSON object: its place, and the reason.

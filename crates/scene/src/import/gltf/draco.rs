@@ -19,6 +19,13 @@ use crate::file::read_value;
 
 pub(super) const NAME: &str = "KHR_draco_mesh_compression";
 
+/// A compressed primitive, and its mesh as it was decoded.
+#[derive(Debug)]
+pub(super) struct DracoData<'a> {
+    pub(super) primitive: DracoPrimitive,
+    pub(super) mesh: &'a DracoMesh,
+}
+
 /// Compressed form of a primitive.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]

@@ -86,8 +86,8 @@ pub(super) fn check(
             Some(Support::Full | Support::As(_) | Support::Without(_)) => None,
             // A required look (a thin film, say) changes no geometry.
             Some(Support::Look) if !wanted.light => None,
-            Some(Support::Look) | None => Some((name.as_str(), UNKNOWN)),
-            Some(Support::Encoded(command)) => Some((name.as_str(), command)),
+            Some(Support::Look) | None => Some(MissingExtension { name, command: UNKNOWN }),
+            Some(Support::Encoded(command)) => Some(MissingExtension { name, command }),
         }
     });
     let missing: Vec<_> = missing.collect();
@@ -133,18 +133,24 @@ pub(super) fn encoded_texture(
         }
         let command = if name == "KHR_texture_basisu" { TO_PNG } else { FROM_AVIF };
         if wanted.textures {
-            return Err(refused(path, &[(name, command)]));
+            return Err(refused(path, &[MissingExtension { name, command }]));
         }
         return Ok(Some(Note::new(NoteKind::Extension, name, with_name(path, command))));
     }
     Ok(None)
 }
 
-/// That extensions are needed, each with the command that takes it out of a file.
-fn refused(path: &Path, missing: &[(&str, &str)]) -> Refusal {
-    let names: Vec<&str> = missing.iter().map(|(name, _)| *name).collect();
+/// An extension that is needed and not supported, with the command that takes it out of a file.
+struct MissingExtension<'a> {
+    name: &'a str,
+    command: &'a str,
+}
+
+/// That extensions are needed.
+fn refused(path: &Path, missing: &[MissingExtension<'_>]) -> Refusal {
+    let names: Vec<&str> = missing.iter().map(|extension| extension.name).collect();
     let why = Refusal::new(format!("needs {}, not supported", names.join(" and ")));
-    let remedies = missing.iter().map(|&(name, command)| match missing.len() {
+    let remedies = missing.iter().map(|MissingExtension { name, command }| match missing.len() {
         1 => with_name(path, command),
         _ => format!("{name}: {}", with_name(path, command)),
     });

@@ -7,7 +7,7 @@ use json::validation::Checked;
 use rayon::prelude::*;
 
 use super::accessor::Accessor;
-use super::draco::{DracoMesh, DracoPrimitive};
+use super::draco::DracoData;
 use super::reader::GltfReader;
 use crate::import::error::{Note, NoteKind};
 use crate::import::{Refusal, Strictness};
@@ -17,7 +17,7 @@ pub(super) struct PrimitiveReader<'a> {
     pub reader: &'a GltfReader<'a>,
     pub primitive: &'a Primitive,
     /// Vertices and triangles, when they are compressed.
-    draco: Option<(DracoPrimitive, &'a DracoMesh)>,
+    draco: Option<DracoData<'a>>,
     pub place: String,
     pub notes: Vec<Note>,
 }
@@ -27,7 +27,7 @@ impl<'a> PrimitiveReader<'a> {
     pub(super) fn new(
         reader: &'a GltfReader<'a>,
         primitive: &'a Primitive,
-        draco: Option<(DracoPrimitive, &'a DracoMesh)>,
+        draco: Option<DracoData<'a>>,
         place: String,
     ) -> Self {
         Self { reader, primitive, draco, place, notes: Vec::new() }
@@ -106,7 +106,7 @@ impl<'a> PrimitiveReader<'a> {
             Checked::Invalid => false,
         });
         let place = format!("{}, {wanted}", self.place);
-        if let Some((compressed, decoded)) = &self.draco {
+        if let Some(DracoData { primitive: compressed, mesh: decoded }) = &self.draco {
             let accessors = &self.reader.document.root.accessors;
             let own = found.and_then(|(_, index)| accessors.get(index.value()));
             let normalized = own.is_some_and(|accessor| accessor.normalized);
@@ -125,8 +125,8 @@ impl<'a> PrimitiveReader<'a> {
         mode: Mode,
         vertices: usize,
     ) -> Result<Buffer<[u32; 3]>, Refusal> {
-        if let Some((_, decoded)) = &self.draco {
-            return Ok(decoded.triangles.clone().into());
+        if let Some(DracoData { mesh, .. }) = &self.draco {
+            return Ok(mesh.triangles.clone().into());
         }
         let Some(index) = self.primitive.indices else {
             let count = u32::try_from(vertices).unwrap_or(u32::MAX);

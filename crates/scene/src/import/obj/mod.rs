@@ -30,7 +30,7 @@ use rayon::prelude::*;
 use super::admit::{self, AdmittedMesh};
 use super::error::{self, Note, NoteKind};
 use super::files::{Files, refuse_other_kind};
-use super::text::{TextFault, pieces, with_newlines, without_mark};
+use super::text::{TextFault, TextSlice, pieces, with_newlines, without_mark};
 use super::{Import, ImportedPlacement, Options, Refusal, Wanted};
 use chunk::{Chunk, Segment, WantedColumns};
 use etendue_geometry::glam::DVec3;
@@ -61,9 +61,9 @@ pub(super) fn import(
     let pieces = pieces(text, PIECE);
     let chunks: Vec<Result<Chunk, TextFault>> = pieces
         .par_iter()
-        .map(|&(start, piece)| {
-            refuse_zero_bytes(piece)
-                .and_then(|()| Chunk::parse(piece, wish))
+        .map(|&TextSlice { start, text }| {
+            refuse_zero_bytes(text)
+                .and_then(|()| Chunk::parse(text, wish))
                 .map_err(|TextFault { at, reason }| TextFault { at: start + at, reason })
         })
         .collect();
@@ -108,14 +108,13 @@ fn refuse_zero_bytes(text: &[u8]) -> Result<(), TextFault> {
 }
 
 /// Refuses text of another format: no line of it is one of OBJ, and some line is no comment.
-fn refuse_foreign(chunks: &[Chunk], pieces: &[(usize, &[u8])]) -> Result<(), TextFault> {
+fn refuse_foreign(chunks: &[Chunk], pieces: &[TextSlice<'_>]) -> Result<(), TextFault> {
     if chunks.iter().any(|chunk| chunk.is_obj) {
         return Ok(());
     }
-    let first = pieces
-        .iter()
-        .zip(chunks)
-        .find_map(|(piece, chunk)| chunk.foreign.as_ref().map(|(at, word)| (piece.0 + at, word)));
+    let first = pieces.iter().zip(chunks).find_map(|(piece, chunk)| {
+        chunk.foreign.as_ref().map(|(at, word)| (piece.start + at, word))
+    });
     let Some((at, word)) = first else { return Ok(()) };
     let what = match word.as_str() {
         // The letter says what it holds, numbers of its surface follow (MNI's BIC-obj, `bicobj.c`).

@@ -12,7 +12,7 @@ use super::chunk::{Chunk, KINDS, NONE, Polygon, Segment, V, VN, VT};
 use crate::import::admit::MeshCandidate;
 use crate::import::files::Files;
 use crate::import::precision::precise_enough;
-use crate::import::text::{TextFault, WordReader, whole};
+use crate::import::text::{TextFault, TextSlice, WordReader, whole};
 use crate::import::{Refusal, Strictness, polygon};
 use etendue_geometry::Vertices;
 use etendue_geometry::glam::DVec3;
@@ -304,14 +304,14 @@ pub(super) fn settle(chunks: &mut [Chunk], strictness: Strictness) -> Result<u64
 
 /// Fault of an index, in chunk number `chunk`, that names what does not exist.
 pub(super) fn find_bad_index(
-    pieces: &[(usize, &[u8])],
+    pieces: &[TextSlice<'_>],
     chunk: usize,
     chunks: &[Chunk],
     strictness: Strictness,
 ) -> TextFault {
     let kinds = if strictness == Strictness::Strict { KINDS } else { V + 1 };
     let (bases, total) = bases(chunks);
-    let (start, text) = pieces[chunk];
+    let TextSlice { start, text } = pieces[chunk];
     let mut defined = bases[chunk];
     let mut words = WordReader::new(text);
     while !words.is_done() {

@@ -24,7 +24,7 @@ pub(super) fn read_text(
 ) -> Result<(VertexData, Faces), TextFault> {
     let text = with_newlines(&map.bytes()[header.data..]);
     let pieces = pieces(&text, PIECE);
-    let lines: Vec<usize> = pieces.par_iter().map(|(_, piece)| count_rows(piece)).collect();
+    let lines: Vec<usize> = pieces.par_iter().map(|piece| count_rows(piece.text)).collect();
     let mut before = 0;
     let mut starts = Vec::with_capacity(lines.len());
     for count in lines {
@@ -34,9 +34,9 @@ pub(super) fn read_text(
     let parts: Vec<_> = pieces
         .par_iter()
         .zip(starts)
-        .map(|(&(start, piece), row)| {
-            TextPiece::parse(piece, header, row).map_err(|fault| TextFault {
-                at: header.data + start + fault.at,
+        .map(|(piece, row)| {
+            TextPiece::parse(piece.text, header, row).map_err(|fault| TextFault {
+                at: header.data + piece.start + fault.at,
                 reason: fault.reason,
             })
         })

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use etendue_geometry::Steps;
 use etendue_geometry::glam::{DQuat, DVec3};
-use etendue_scene::{LoadOptions, Scene, SceneError, SceneFile, Wanted};
+use etendue_scene::{LoadOptions, Scene, SceneError, SceneFile, Setting, Wanted};
 use serde_json::{Value, json};
 
 use super::build::{Builder, SQUARE};
@@ -26,7 +26,7 @@ fn scene_with(
     plays: bool,
     exposure: f64,
     limit: Option<u64>,
-    settings: &[(String, String)],
+    settings: &[Setting],
 ) -> Result<Scene, SceneError> {
     let folder = folder();
     write(&folder, "a.glb", model);
@@ -133,7 +133,7 @@ fn a_morph_leaps_and_goes_by_cubics() {
     let fine = steps.times().len();
     assert!((90..250).contains(&fine), "{fine} steps");
     // A tolerance a hundred times as large is met by about a tenth of the steps; parts of a way are divided evenly.
-    let settings = [("accuracy.deformation_error".to_owned(), "0.1".to_owned())];
+    let settings = [Setting::new("accuracy.deformation_error", "0.1")];
     let model = morphed("CUBICSPLINE", &keys, json!([{"mesh": 0}]));
     let coarse = scene_with(&model, true, 0.5, None, &settings).unwrap();
     assert!(

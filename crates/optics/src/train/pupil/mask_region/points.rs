@@ -10,7 +10,7 @@ use crate::element::{Clip, LensRays, RayStatus};
 use crate::train::Side;
 use crate::train::aim::towards_lens;
 use crate::train::pupil::mask_cells::MaskCells;
-use crate::train::pupil::mask_map::{MaskMap, MaskScene, NO_TERMS, roberts};
+use crate::train::pupil::mask_map::{MappedScene, NO_TERMS, roberts};
 
 /// A point of the mask.
 #[derive(Debug, Clone, Copy)]
@@ -125,11 +125,11 @@ impl MaskRegion {
     /// The nodes around those of many random rays that pass the lens and are not drawn.
     pub(super) fn missed(
         &self,
-        scenes: &[(MaskScene<'_>, &MaskMap)],
+        scenes: &[MappedScene<'_>],
         [low, high]: [DVec2; 2],
     ) -> BTreeSet<usize> {
         let mut nodes = BTreeSet::new();
-        for (scene, map) in scenes {
+        for MappedScene { scene, map } in scenes {
             let mut rays = LensRays::with_capacity(CHECKS as usize);
             let mut places = Vec::with_capacity(CHECKS as usize);
             for i in 0..CHECKS {
