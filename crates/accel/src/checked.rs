@@ -231,7 +231,7 @@ fn widen(found: &FoundHits, advance: &[f64], hits: &mut HitBatch) {
     let [x, y, z] = normal.each_mut().map(|axis| &mut axis[..n]);
     let [from_x, from_y, from_z] = found.normal.each_ref().map(|axis| &axis[..n]);
     for i in 0..n {
-        let own = [from_x[i], from_y[i], from_z[i]].map(f64::from);
+        let own = [f64::from(from_x[i]), f64::from(from_y[i]), f64::from(from_z[i])];
         let length = (own[0] * own[0] + own[1] * own[1] + own[2] * own[2]).sqrt();
         let scale = if placement[i] == MISS { 0.0 } else { 1.0 / length };
         let keep = |axis: f64| if placement[i] == MISS { 0.0 } else { axis * scale };

@@ -115,8 +115,17 @@ fn scrambled_floats(
             a[i] = (across[i] >> 8) as f32 / 16_777_216.0;
             b[i] = (up[i] >> 8) as f32 / 16_777_216.0;
         }
-        x.copy_from_slice(&a[..x.len()]);
-        y.copy_from_slice(&b[..y.len()]);
+        put(&a, x);
+        put(&b, y);
+    }
+}
+
+/// Puts the numbers of lanes into what there is room for, mostly all. (A copy between slices is a call.)
+#[inline(always)]
+fn put(lanes: &[f32; LANES], to: &mut [f32]) {
+    match to.first_chunk_mut() {
+        Some(to) => *to = *lanes,
+        None => to.copy_from_slice(&lanes[..to.len()]),
     }
 }
 
@@ -125,7 +134,7 @@ fn scrambled_floats(
 fn numbers_of(keys: &[SobolKey; LANES], half: Half) -> [[u32; LANES]; 2] {
     let (index, seeds) = apart(keys);
     let seed = seeds[0];
-    let numbers = match seeds.iter().fold(0, |others, other| others | (other ^ seed)) {
+    let numbers = match differences(&seeds) {
         0 => upper_bits(index, |_| seed, half),
         _ => upper_bits(index, |i| seeds[i], half),
     };
@@ -133,8 +142,17 @@ fn numbers_of(keys: &[SobolKey; LANES], half: Half) -> [[u32; LANES]; 2] {
     [across, up]
 }
 
-/// The samples and the scramblings of some keys. (What maps arrays is a function of its own, compiled without wide
-/// registers.)
+/// The bits in which some differ from the first. (What folds is a function of its own, compiled without wide registers.)
+#[inline(always)]
+fn differences(seeds: &[u32; LANES]) -> u32 {
+    let mut all = 0;
+    for seed in seeds {
+        all |= seed ^ seeds[0];
+    }
+    all
+}
+
+/// The samples and the scramblings of some keys.
 #[inline(always)]
 fn apart(keys: &[SobolKey; LANES]) -> ([u32; LANES], [u32; LANES]) {
     let (mut index, mut seeds) = ([0; LANES], [0; LANES]);
@@ -149,7 +167,7 @@ fn apart(keys: &[SobolKey; LANES]) -> ([u32; LANES], [u32; LANES]) {
 fn chunk(keys: &[SobolKey; LANES], half: Half) -> [[f64; 2]; LANES] {
     let (index, seeds) = apart(keys);
     let seed = seeds[0];
-    match seeds.iter().fold(0, |others, other| others | (other ^ seed)) {
+    match differences(&seeds) {
         0 => side_by_side(index, |_| seed, half),
         _ => side_by_side(index, |i| seeds[i], half),
     }

@@ -61,6 +61,24 @@ pub fn vector<F: Float>(axes: &[Floats<F>; 3], lane: usize) -> DVec3 {
     DVec3::new(x[lane].into(), y[lane].into(), z[lane].into())
 }
 
+/// As many numbers of a column as a block has lanes, from `start` on; those behind its end are the type's default. (A copy
+/// between slices is a call where the function has more instructions than the standard library.)
+#[must_use]
+#[inline(always)]
+pub fn lanes<T: Copy + Default>(column: &[T], start: usize) -> [T; LANES] {
+    let mut row = [T::default(); LANES];
+    if let Some(own) = column.get(start..start + LANES) {
+        for i in 0..LANES {
+            row[i] = own[i];
+        }
+    } else if let Some(rest) = column.get(start..) {
+        for (to, from) in row.iter_mut().zip(rest) {
+            *to = *from;
+        }
+    }
+    row
+}
+
 impl<F: Float> RayBlock<F> {
     /// A block of which no ray is traced.
     pub const EMPTY: Self = Self {

@@ -58,6 +58,7 @@ impl<T: AnyBitPattern> Buffer<T> {
 impl<T: AnyBitPattern> Deref for Buffer<T> {
     type Target = [T];
 
+    #[inline]
     fn deref(&self) -> &[T] {
         match &self.owner {
             Storage::Heap(values) => values,
@@ -131,8 +132,10 @@ impl<const N: usize> Vertices<N> {
     #[inline]
     pub fn get(&self, i: usize) -> [f32; N] {
         let (floats, start) = (&*self.floats, i * self.stride);
-        let mut own = [0.0; N];
-        own.copy_from_slice(&floats[start..start + N]);
+        let (mut own, floats) = ([0.0; N], &floats[start..start + N]);
+        for k in 0..N {
+            own[k] = floats[k];
+        }
         own
     }
 

@@ -364,7 +364,11 @@ fn shot_noise(
 /// Tests whether a condition holds somewhere, without a branch a pixel.
 #[inline(always)]
 fn any(values: &[f64; GROUP], condition: impl Fn(f64) -> bool) -> bool {
-    values.iter().fold(false, |any, &value| any | condition(value))
+    let mut any = false;
+    for &value in values {
+        any |= condition(value);
+    }
+    any
 }
 
 /// n ~ N(μ, μ), the approximation.

@@ -237,13 +237,19 @@ macro_rules! put_rays {
 /// Takes the lanes of a row from `start` on.
 #[inline(always)]
 fn take<T: Copy, const W: usize>(lanes: &mut [T; W], row: &[T; LANES], start: usize) {
-    lanes.copy_from_slice(&row[start..start + W]);
+    let row = &row[start..start + W];
+    for i in 0..W {
+        lanes[i] = row[i];
+    }
 }
 
 /// Puts lanes into a row from `start` on.
 #[inline(always)]
 fn put<T: Copy, const W: usize>(row: &mut [T; LANES], start: usize, lanes: &[T; W]) {
-    row[start..start + W].copy_from_slice(lanes);
+    let row = &mut row[start..start + W];
+    for i in 0..W {
+        row[i] = lanes[i];
+    }
 }
 
 narrow_packets!(closest_by_4, occluded_by_4, 4, RTCRayHit4, RTCRay4, rtcIntersect4, rtcOccluded4);

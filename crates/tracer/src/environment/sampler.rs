@@ -237,7 +237,8 @@ impl MapSampler {
         for (i, patch) in patches.iter().enumerate() {
             (across[i], down[i]) = (F::of(patch.rest[0]), F::of(patch.rest[1]));
             scale[i] = F::of(self.scale[patch.at[1] as usize]);
-            [start[i], end[i]] = self.cells.ends(patch.at[1] as usize).map(F::of);
+            let [from, to] = self.cells.ends(patch.at[1] as usize);
+            (start[i], end[i]) = (F::of(from), F::of(to));
             x[i] = F::of(f64::from(patch.at[0]));
         }
         let (mut places, mut density) = ([[F::ZERO; LANES]; 2], [F::ZERO; LANES]);

@@ -4,6 +4,7 @@
 use std::hint::select_unpredictable;
 use std::ops::Range;
 
+use etendue_geometry::block::lanes;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Float, MISS};
 
@@ -146,7 +147,7 @@ impl Choices {
     pub(super) fn points(&self, first: usize) -> ([[f32; LANES]; 3], usize) {
         let mut points = [[0.0; LANES]; 3];
         for axis in 0..3 {
-            points[axis].copy_from_slice(&self.local[axis][first..first + LANES]);
+            points[axis] = lanes(&self.local[axis], first);
         }
         (points, LANES.min(self.len - first))
     }
@@ -326,15 +327,14 @@ impl Choices {
     #[inline(always)]
     fn branch_queries(&self, numbers: &[u32]) -> BranchQueries {
         let mut queries = BranchQueries::default();
-        let [first, last] = [numbers[0], numbers[numbers.len() - 1]].map(|k| k as usize);
+        let (first, last) = (numbers[0] as usize, numbers[numbers.len() - 1] as usize);
         if last - first < numbers.len() {
             // They stand side by side, as all do at first.
-            let run = first..first + LANES;
             for axis in 0..3 {
-                queries.points[axis].copy_from_slice(&self.local[axis][run.clone()]);
-                queries.normals[axis].copy_from_slice(&self.normal[axis][run.clone()]);
+                queries.points[axis] = lanes(&self.local[axis], first);
+                queries.normals[axis] = lanes(&self.normal[axis], first);
             }
-            queries.u.copy_from_slice(&self.u[run]);
+            queries.u = lanes(&self.u, first);
             return queries;
         }
         for (i, &number) in numbers.iter().enumerate() {

@@ -281,8 +281,10 @@ fn spread([a, b]: [&[f32; 3]; 2]) -> [[f32; TWICE]; 3] {
 #[inline(always)]
 fn twice(a: &[f32; WIDTH], b: &[f32; WIDTH]) -> [f32; TWICE] {
     let mut both = [0.0; TWICE];
-    both[..WIDTH].copy_from_slice(a);
-    both[WIDTH..].copy_from_slice(b);
+    for k in 0..WIDTH {
+        both[k] = a[k];
+        both[WIDTH + k] = b[k];
+    }
     both
 }
 
@@ -428,11 +430,11 @@ impl View {
     /// The sums of what the branches up to each send.
     #[inline(always)]
     pub(super) fn sums(&self) -> [f64; WIDTH] {
-        let mut sum = 0.0;
-        self.importance.map(|own| {
-            sum += own;
-            sum
-        })
+        let mut sums = self.importance;
+        for k in 1..WIDTH {
+            sums[k] += sums[k - 1];
+        }
+        sums
     }
 
     /// A branch by `u` in 0..1, what is left of `u`, and its share; `None` where none sends anything.

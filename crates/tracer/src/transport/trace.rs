@@ -22,7 +22,7 @@ mod varied;
 
 use std::ops::RangeInclusive;
 
-use etendue_geometry::block::{Floats as Row, LANES};
+use etendue_geometry::block::{Floats as Row, LANES, lanes};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitPrecision, RayBlocks};
 
@@ -243,10 +243,9 @@ impl<F: Lane> RayColumns<F> {
     /// The rays as blocks, which are refilled.
     fn pack(&self, blocks: &mut RayBlocks<F>) {
         blocks.refill(self.len, |block, start, count| {
-            let run = start..start + LANES;
             for axis in 0..3 {
-                block.origin[axis].copy_from_slice(&self.start[axis][run.clone()]);
-                block.direction[axis].copy_from_slice(&self.along[axis][run.clone()]);
+                block.origin[axis] = lanes(&self.start[axis], start);
+                block.direction[axis] = lanes(&self.along[axis], start);
             }
             block.t_max[..count].copy_from_slice(&self.reach[start..start + count]);
         });

@@ -1,4 +1,9 @@
 //! Lanes of a mask put side by side.
+#![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
+#![expect(
+    clippy::manual_memcpy,
+    reason = "a copy between slices is a call, of functions with more instructions"
+)]
 
 use etendue_geometry::block::LANES;
 
@@ -64,7 +69,11 @@ impl Compaction {
         let to = &mut column[at..at + LANES];
         #[cfg(target_arch = "x86_64")]
         if let Some((simd, bits)) = self.by_register {
-            to.copy_from_slice(&T::compress(simd, bits, *row));
+            // A copy between slices would be a call.
+            let own = T::compress(simd, bits, *row);
+            for i in 0..LANES {
+                to[i] = own[i];
+            }
             return;
         }
         for (to, &lane) in to.iter_mut().zip(&self.lanes) {
@@ -102,13 +111,19 @@ impl Word for f64 {
     fn compress(simd: pulp::x86::V4, bits: u16, row: [Self; LANES]) -> [Self; LANES] {
         let [low, high]: [[Self; LANES / 2]; 2] = pulp::cast(row);
         let [of_low, of_high] = bits.to_le_bytes();
-        let halves = [(of_low, low), (of_high, high)].map(|(bits, half)| -> [Self; LANES / 2] {
-            pulp::cast(simd.avx512f._mm512_maskz_compress_pd(bits, pulp::cast(half)))
-        });
-        let mut whole = [0.0; LANES];
-        whole[..LANES / 2].copy_from_slice(&halves[0]);
+        let avx512f = simd.avx512f;
+        let low: [Self; LANES / 2] =
+            pulp::cast(avx512f._mm512_maskz_compress_pd(of_low, pulp::cast(low)));
+        let high: [Self; LANES / 2] =
+            pulp::cast(avx512f._mm512_maskz_compress_pd(of_high, pulp::cast(high)));
         let first = of_low.count_ones() as usize;
-        whole[first..first + LANES / 2].copy_from_slice(&halves[1]);
+        let (mut whole, behind) = ([0.0; LANES], first..first + LANES / 2);
+        for i in 0..LANES / 2 {
+            whole[i] = low[i];
+        }
+        for (to, from) in whole[behind].iter_mut().zip(high) {
+            *to = from;
+        }
         whole
     }
 }

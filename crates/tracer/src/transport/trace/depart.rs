@@ -137,13 +137,16 @@ fn put<F: Lane>(
 }
 
 /// Samples of matte surfaces: starts of rays (m), unit directions about the shading normals with density cos θ / π
-/// (1/sr), and that density.
+/// (1/sr), and that density; without numbers to choose them by the starts alone.
 #[inline(always)]
 pub(super) fn scatter<F: Lane, const TILTED: bool>(
     hits: &Hits<F>,
-    square: [Row<F>; 2],
+    square: Option<[Row<F>; 2]>,
 ) -> BsdfSamples<F> {
-    let (along, pdf) = cosine_directions(hits.shading::<TILTED>(), &square);
+    let (along, pdf) = match &square {
+        Some(square) => cosine_directions(hits.shading::<TILTED>(), square),
+        None => ([[F::ZERO; LANES]; 3], [F::ZERO; LANES]),
+    };
     let [gx, gy, gz] = &hits.normal;
     let (mut start, mut goes) = ([[F::ZERO; LANES]; 3], [0; LANES]);
     for i in 0..LANES {

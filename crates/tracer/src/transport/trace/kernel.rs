@@ -207,59 +207,64 @@ pub(super) fn leave_blocks<F: Lane, const TILTED: bool, const RICH: bool, const 
             output.facets.see::<RGB>(surfaces, FacetHits { block, found, hits, shading, colors });
         }
         let ray: [u32; LANES] = carried.ray[run.clone()].try_into().unwrap_or([0; LANES]);
-        let light = square(Draw::Light);
-        let mut places = match rules.chosen {
-            None => place(lights, &hits.point, light),
-            Some(chosen) => place_on_chosen(lights, chosen, &hits.point, &light, first),
-        };
-        let others = RICH
-            .then(|| OtherPlaces::of::<TILTED>(rules.chosen, &hits, &light, first, &mut places));
-        let mut asked =
-            ask::<F, TILTED, RICH>(&places, others.as_ref(), offset, surfaces.roundings, &hits);
         let has_sheets = RICH && found.sheets != [0; LANES];
-        if has_sheets {
-            let LightRays { toward, pdf, value, .. } = &mut asked;
-            let samples = LightSamples { toward, pdf, is_delta: &places.is_delta };
-            output.facets.reflect(&found.sheets, samples, value);
-        }
-        if has_singles {
-            let LightRays { toward, pdf, value, .. } = &mut asked;
-            let samples = LightSamples { toward, pdf, is_delta: &places.is_delta };
-            output.singles.reflect(tracing, &found, samples, value);
-        }
+        let bands = carried.count::<RGB>();
         let asks = match (rules.asks_lights, RICH) {
             (false, _) => [0; LANES],
             (true, true) => found.asks(),
             (true, false) => found.scatters,
         };
-        // Rows are worked out in locals: closures for them, and rows that change in place, go through memory.
-        let (mut three, bands) = ([[F::ZERO; LANES]; 3], carried.count::<RGB>());
-        let shares: &mut [Row<F>] = if RGB { &mut three } else { output.shares };
-        for band in 0..bands {
-            let (mut share, arrived) = (colors[band], row(&carried.throughput[band]));
+        if asks != [0; LANES] {
+            let light = square(Draw::Light);
+            let mut places = match rules.chosen {
+                None => place(lights, &hits.point, light),
+                Some(chosen) => place_on_chosen(lights, chosen, &hits.point, &light, first),
+            };
+            let others = RICH.then(|| {
+                OtherPlaces::of::<TILTED>(rules.chosen, &hits, &light, first, &mut places)
+            });
+            let mut asked =
+                ask::<F, TILTED, RICH>(&places, others.as_ref(), offset, surfaces.roundings, &hits);
             if has_sheets {
-                output.facets.sheets_in_band(&found.sheets, band, &mut share);
+                let LightRays { toward, pdf, value, .. } = &mut asked;
+                let samples = LightSamples { toward, pdf, is_delta: &places.is_delta };
+                output.facets.reflect(&found.sheets, samples, value);
             }
             if has_singles {
-                output.singles.in_band(&found, band, bands, &mut share);
+                let LightRays { toward, pdf, value, .. } = &mut asked;
+                let samples = LightSamples { toward, pdf, is_delta: &places.is_delta };
+                output.singles.reflect(tracing, &found, samples, value);
             }
-            for i in 0..LANES {
-                share[i] *= arrived[i] * asked.value[i];
-            }
-            if let (Some(others), Some(chosen)) = (&others, rules.chosen) {
-                let radiance = others.radiance(chosen, first, &places.light, band);
-                for i in 0..LANES {
-                    share[i] *= radiance[i];
+            // Rows are worked out in locals: closures for them, and rows that change in place, go through memory.
+            let mut three = [[F::ZERO; LANES]; 3];
+            let shares: &mut [Row<F>] = if RGB { &mut three } else { output.shares };
+            for band in 0..bands {
+                let (mut share, arrived) = (colors[band], row(&carried.throughput[band]));
+                if has_sheets {
+                    output.facets.sheets_in_band(&found.sheets, band, &mut share);
                 }
+                if has_singles {
+                    output.singles.in_band(&found, band, bands, &mut share);
+                }
+                for i in 0..LANES {
+                    share[i] *= arrived[i] * asked.value[i];
+                }
+                if let (Some(others), Some(chosen)) = (&others, rules.chosen) {
+                    let radiance = others.radiance(chosen, first, &places.light, band);
+                    for i in 0..LANES {
+                        share[i] *= radiance[i];
+                    }
+                }
+                shares[band] = share;
             }
-            shares[band] = share;
+            let shadows = &mut *output.shadows;
+            send::<F, RICH>(&asked, &places, &asks, [&ray, &lanes], shares, instructions, shadows);
         }
-        let shadows = &mut *output.shadows;
-        send::<F, RICH>(&asked, &places, &asks, [&ray, &lanes], shares, instructions, shadows);
         if !rules.goes_on && !has_singles && (!RICH || found.smooth == [0; LANES]) {
             continue;
         }
-        let mut left = scatter::<F, TILTED>(&hits, square(Draw::Direction));
+        let has_matte = !RICH || found.has_matte();
+        let mut left = scatter::<F, TILTED>(&hits, has_matte.then(|| square(Draw::Direction)));
         left.specular = found.smooth;
         for i in 0..LANES {
             left.goes[i] &= found.scatters[i];

@@ -221,3 +221,9 @@ impl Batch {
 pub(super) fn wide<F: Float>(x: F) -> f64 {
     x.into()
 }
+
+/// Three of them. (What maps arrays is a function without the instructions of those that call it.)
+#[inline(always)]
+pub(super) fn widen<F: Float>([x, y, z]: [F; 3]) -> [f64; 3] {
+    [x.into(), y.into(), z.into()]
+}

@@ -10,7 +10,7 @@ use etendue_geometry::glam::{DMat3, DVec3};
 use super::block_lights::{BlockLights, OTHER};
 use super::choose::{ChosenLights, OtherPlace};
 use super::kernel::{round, single};
-use super::lane::{Lane, wide};
+use super::lane::{Lane, wide, widen};
 use super::{Columns, RayColumns, SCATTERED, SPECULAR, TraceStep, Workspace};
 use crate::Spectral;
 use crate::environment::{EnvironmentMap, MapLookup, MapSampler, place};
@@ -204,8 +204,8 @@ pub(super) fn place_on_sky<F: Lane, const RGB: bool>(
                 let (is_far, is_delta) = (true, false);
                 let (light, place) = (number_of(sky), axis(&directions));
                 let own = OtherPlace { light, place, is_far, is_delta, density, side: None };
-                let at = || [lit.places[0][i], lit.places[1][i]].map(wide);
-                sky.light::<RGB>(spectral, axis(&lit.colors).map(wide), at, &mut radiance);
+                let at = || [wide(lit.places[0][i]), wide(lit.places[1][i])];
+                sky.light::<RGB>(spectral, widen(axis(&lit.colors)), at, &mut radiance);
                 chosen.put(lane as usize, &own, &radiance);
             }
         }
@@ -273,7 +273,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             for (i, &own) in missed.iter().enumerate() {
                 let own = own as usize;
                 let at = || sky.place_of(&arrived.direction, i);
-                sky.light::<RGB>(self.ctx.spectral, lit.color(i).map(wide), at, &mut light);
+                sky.light::<RGB>(self.ctx.spectral, widen(lit.color(i)), at, &mut light);
                 for (k, band) in light.iter_mut().enumerate() {
                     *band *= wide(throughput[k][own] * lit.weight[i]);
                 }
@@ -307,7 +307,8 @@ pub(super) fn ask_sky<F: Lane, const RGB: bool>(
         let mut arrived = SkyHits::NOTHING;
         let count = LANES.min(last.len - first);
         for i in 0..count {
-            let direction = [0, 1, 2].map(|axis| last.along[axis][first + i]);
+            let [x, y, z] = &last.along;
+            let direction = [x[first + i], y[first + i], z[first + i]];
             arrived.put(i, &last.carried, first + i, direction, true);
         }
         light_of(sky, &arrived, &mut lit);
@@ -318,7 +319,7 @@ pub(super) fn ask_sky<F: Lane, const RGB: bool>(
                 shadows.along[axis][to] = last.along[axis][from];
             }
             let at = || sky.place_of(&arrived.direction, i);
-            sky.light::<RGB>(spectral, lit.color(i).map(wide), at, light);
+            sky.light::<RGB>(spectral, widen(lit.color(i)), at, light);
             for band in 0..bands {
                 let carried = wide(last.carried.throughput[band][from] * lit.weight[i]);
                 shadows.carried.throughput[band][to] = round(carried * light[band]);

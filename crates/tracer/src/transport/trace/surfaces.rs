@@ -4,9 +4,10 @@
 use std::hint::select_unpredictable;
 
 use etendue_geometry::block::{Floats as Row, LANES};
+use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Geometry, RayBlock};
 
-use super::kernel::{Mask, mask};
+use super::kernel::{Mask, mask, single};
 use super::lane::Lane;
 use crate::placed::{Facets, PlacedSurfaces, SurfaceKind, SurfaceRow, SurfaceTable};
 use crate::surface::LEAST_ELEVATION;
@@ -61,9 +62,11 @@ impl<F: Lane> Surfaces<'_, F> {
     fn magnitudes(&self, placement: u32, surface: &SurfaceRow) -> [F; 3] {
         if F::HAS_ENDS {
             let placed = self.placed.get(placement);
-            return placed.map_or([F::ZERO; 3], |placed| placed.magnitudes.to_array().map(F::of));
+            let Some(placed) = placed else { return [F::ZERO; 3] };
+            return single(placed.magnitudes);
         }
-        surface.magnitudes.map(F::from)
+        let [x, y, z] = surface.magnitudes;
+        [F::from(x), F::from(y), F::from(z)]
     }
 
     /// The normal of a mesh's corners where a lane hit one of its triangles, in the world, of any length and side; zero
@@ -76,19 +79,18 @@ impl<F: Lane> Surfaces<'_, F> {
         let mesh = self.geometry.mesh_of(placement);
         let Some(normals) = &mesh.normals else { return [F::ZERO; 3] };
         let [a, b, c] = mesh.triangles[block.triangle[lane] as usize];
-        let [a, b, c] = [a, b, c].map(|corner| normals.get(corner as usize));
+        // No `map`: what it is given becomes a call for each number, since it has not this function's instructions.
+        let (a, b, c) = (normals.get(a as usize), normals.get(b as usize), normals.get(c as usize));
         let (u, v) = (block.u[lane], block.v[lane]);
-        let mut own = [F::ZERO; 3];
+        let (mut own, mut normal) = ([F::ZERO; 3], [F::ZERO; 3]);
         for k in 0..3 {
-            let [a, b, c] = [a[k], b[k], c[k]].map(F::from);
-            own[k] = (F::ONE - u - v) * a + u * b + v * c;
+            own[k] = (F::ONE - u - v) * F::from(a[k]) + u * F::from(b[k]) + v * F::from(c[k]);
         }
-        let [x, y, z] = turn;
-        let along = |row: &[f32; 3]| {
-            let [x, y, z] = row.map(F::from);
-            x * own[0] + y * own[1] + z * own[2]
-        };
-        [along(x), along(y), along(z)]
+        for k in 0..3 {
+            let [x, y, z] = turn[k];
+            normal[k] = F::from(x) * own[0] + F::from(y) * own[1] + F::from(z) * own[2];
+        }
+        normal
     }
 }
 
@@ -171,7 +173,17 @@ impl<F: Lane> BlockLookup<F> {
         asks
     }
 
-    /// Tests whether some lane hit anything but a matte surface.
+    /// Tests whether some lane hit a matte surface.
+    #[inline(always)]
+    pub(super) fn has_matte(&self) -> bool {
+        let mut matte = self.scatters;
+        for i in 0..LANES {
+            matte[i] &= !(self.sheets[i] | self.smooth[i] | self.single[i]);
+        }
+        matte != [0; LANES]
+    }
+
+    /// Tests whether some lane hit a sheet or a smooth surface.
     #[inline(always)]
     pub(super) fn has_facets(&self) -> bool {
         (self.sheets != [0; LANES]) | (self.smooth != [0; LANES])
@@ -231,7 +243,7 @@ impl<F: Lane> BlockLookup<F> {
             }
             if let Some(turn) = &surface.turn {
                 let normal = match varied.filter(|_| surface.is_mapped) {
-                    Some(varied) => varied.normal.map(F::of),
+                    Some(varied) => single(DVec3::from_array(varied.normal)),
                     None => surfaces.mesh_normal(block, lane, turn),
                 };
                 let tilted = self.tilted.get_or_insert([[F::ZERO; LANES]; 3]);
