@@ -88,12 +88,13 @@ run_tests --workspace --features etendue-cli/window --no-run
 export ETENDUE=target/debug/etendue
 
 in_background slurm scripts/test-slurm.sh
-
-step "Python package"
-PROFILE=dev scripts/python.sh
+PROFILE=dev in_background python scripts/python.sh
 
 step "light fields: the page, and another decoder's opinion"
 IMAGES=target/light-field-images scripts/light-fields.sh --samples 32 --quiet
+
+step "Python package"
+finish python
 
 step "jobs on Slurm"
 finish slurm

@@ -9,6 +9,7 @@ use crate::film::{PlaneRows, Strip};
 use crate::sampling::{
     DIFFUSION_PAIR, Memory, PUPIL_PAIR, SampleRun, SampledQuantity, Sampling, TIME_PAIR,
 };
+use crate::shard::SampledStrips;
 use crate::sum::{Sum, add_run};
 use crate::tile::{TILE, Tile};
 use crate::watch::{Stopped, Watcher};
@@ -30,6 +31,9 @@ pub(crate) fn put(strip: &mut Strip<'_>, index: usize, sums: &[Sum], bands: usiz
         }
     }
 }
+
+/// A pixel by column and row, which may be one beside the picture.
+type Pixel = [i32; 2];
 
 /// Sums of the pixels of some rows, on which light of a strip lands.
 pub(crate) struct RowSums<'a> {
@@ -77,17 +81,11 @@ impl Adding<'_> {
         let [layers, bands] = self.what.shape();
         let count = layers * bands * self.sampling.sets as usize;
         for tile in Tile::across(width, [strip.top, strip.height]) {
-            let range = |[x, y]: [u32; 2]| match self.work {
-                Work::Pass(pass) => pass.clone(),
-                Work::Wanted(wanted) => {
-                    let above = strip.top as usize * width as usize;
-                    wanted(above + tile.index(x, y, width))
-                }
-            };
             // Pixels that want more samples, with what they have so far.
-            let pixels: Vec<[u32; 2]> =
-                tile.pixels().filter(|&pixel| !range(pixel).is_empty()).collect();
-            let places = pixels.iter().map(|&[x, y]| tile.index(x, y, width));
+            let wants = |&at: &[u32; 2]| !self.range(tile.on_film(at)).is_empty();
+            let wanting: Vec<[u32; 2]> = tile.pixels().filter(wants).collect();
+            let pixels: Vec<Pixel> = wanting.iter().map(|&at| tile.on_film(at)).collect();
+            let places = wanting.iter().map(|&[x, y]| tile.index(x, y, width));
             memory.sums.clear();
             match &kept {
                 Some(kept) => places.clone().for_each(|at| {
@@ -96,14 +94,7 @@ impl Adding<'_> {
                 None => memory.sums.resize(pixels.len() * count, Sum::default()),
             }
             // Samples for these, and back to where their sums are kept.
-            match self.work {
-                Work::Pass(pass) => {
-                    self.tile(tile, &pixels, pass, &mut Destination::Starts, memory)?;
-                }
-                Work::Wanted(_) => {
-                    self.tile_of_wanted(tile, &pixels, &range, &mut Destination::Starts, memory)?;
-                }
-            }
+            self.add_pixels(&pixels, &mut Destination::Starts, memory)?;
             for (at, sums) in places.zip(memory.sums.chunks(count)) {
                 match (&mut kept, self.work) {
                     (Some(kept), _) => kept[at * count..(at + 1) * count].copy_from_slice(sums),
@@ -116,11 +107,38 @@ impl Adding<'_> {
         Ok(())
     }
 
-    /// Adds the same samples of each of `pixels`.
-    fn tile(
+    /// The samples that a pixel is to have of this work; one beside the picture those of the nearest pixel in it.
+    fn range(&self, pixel: Pixel) -> Range<u32> {
+        match self.work {
+            Work::Pass(pass) => pass.clone(),
+            Work::Wanted(wanted) => {
+                let size = self.what.camera().resolution();
+                let near = |axis: usize| {
+                    let last = size[axis].max(1) - 1;
+                    pixel[axis].max(0).cast_unsigned().min(last) as usize
+                };
+                wanted(near(1) * size[0] as usize + near(0))
+            }
+        }
+    }
+
+    /// Adds the samples of `pixels`.
+    fn add_pixels(
         &self,
-        tile: Tile,
-        pixels: &[[u32; 2]],
+        pixels: &[Pixel],
+        to: &mut Destination<'_, '_>,
+        memory: &mut Memory,
+    ) -> Result<(), Stopped> {
+        match self.work {
+            Work::Pass(pass) => self.add_pass(pixels, pass, to, memory),
+            Work::Wanted(_) => self.add_wanted(pixels, to, memory),
+        }
+    }
+
+    /// Adds the same samples of each of `pixels`.
+    fn add_pass(
+        &self,
+        pixels: &[Pixel],
         pass: &Range<u32>,
         to: &mut Destination<'_, '_>,
         memory: &mut Memory,
@@ -136,26 +154,24 @@ impl Adding<'_> {
                     |(&pixel, slot)| SampleRun { pixel, set: 0, range: range(), slot, share: 1.0 };
                 runs.clear();
                 runs.extend(pixels.iter().zip(slot..).map(of_pixel));
-                self.add_runs(tile, &runs, to, memory)?;
+                self.add_runs(&runs, to, memory)?;
             }
         }
         Ok(())
     }
 
-    /// Adds to each of `pixels` the samples `range` of both its sets together, which are even numbers. Where light lands
-    /// each counts as its share of its set.
-    fn tile_of_wanted(
+    /// Adds to each of `pixels` the samples that it is to have of both its sets together, which are even numbers. Where
+    /// light lands each counts as its share of its set.
+    fn add_wanted(
         &self,
-        tile: Tile,
-        pixels: &[[u32; 2]],
-        range: &dyn Fn([u32; 2]) -> Range<u32>,
+        pixels: &[Pixel],
         to: &mut Destination<'_, '_>,
         memory: &mut Memory,
     ) -> Result<(), Stopped> {
         let (batch, sets) = (self.what.batch(), self.sampling.sets);
         let (mut runs, mut room) = (Vec::new(), batch);
         for (&pixel, slot) in pixels.iter().zip((0..).step_by(sets as usize)) {
-            let Range { start, end } = range(pixel);
+            let Range { start, end } = self.range(pixel);
             let share = match to {
                 Destination::Starts => 1.0,
                 Destination::Landings(_) => f64::from(sets) / f64::from(end - start),
@@ -168,31 +184,30 @@ impl Adding<'_> {
                     runs.push(SampleRun { pixel, set, range: first..last, slot, share });
                     (room, first) = (room - (last - first), last);
                     if room == 0 {
-                        self.add_runs(tile, &runs, to, memory)?;
+                        self.add_runs(&runs, to, memory)?;
                         runs.clear();
                         room = batch;
                     }
                 }
             }
         }
-        if runs.is_empty() { Ok(()) } else { self.add_runs(tile, &runs, to, memory) }
+        if runs.is_empty() { Ok(()) } else { self.add_runs(&runs, to, memory) }
     }
 
     /// Adds the samples of a batch.
     fn add_runs(
         &self,
-        tile: Tile,
         runs: &[SampleRun],
         to: &mut Destination<'_, '_>,
         memory: &mut Memory,
     ) -> Result<(), Stopped> {
-        self.place(tile, runs, memory);
+        self.place(runs, memory);
         memory.slots.clear();
         for run in runs {
             memory.slots.extend(run.range.clone().map(|_| run.slot));
         }
         if self.what.shared_rows().is_some() {
-            return self.add_shared_runs(tile, runs, to, memory);
+            return self.add_shared_runs(runs, to, memory);
         }
         for (number, group) in self.what.groups().iter().enumerate() {
             memory.film.group = number;
@@ -206,7 +221,6 @@ impl Adding<'_> {
     /// Adds the samples of a batch whose bands share their paths.
     fn add_shared_runs(
         &self,
-        tile: Tile,
         runs: &[SampleRun],
         to: &mut Destination<'_, '_>,
         memory: &mut Memory,
@@ -218,11 +232,13 @@ impl Adding<'_> {
         let (shape, [width, _]) = (self.what.shape(), self.what.camera().resolution());
         let Memory { film, rays, landings, .. } = memory;
         self.what.camera().sample_band_rays(film, rays, landings);
-        self.what.trace(&(0..shape[1]), memory);
+        if !rays.sample.is_empty() {
+            self.what.trace(&(0..shape[1]), memory);
+        }
         let counts = |run: &&SampleRun| match to {
             Destination::Starts => true,
-            // Others count those that start beside the share.
-            Destination::Landings(_) => self.owns(tile.top + run.pixel[1]),
+            // Others count those that start beside the share, and nobody those that start beside the picture.
+            Destination::Landings(_) => self.owns(run.pixel),
         };
         let counted: usize = runs.iter().filter(counts).map(|run| run.range.len()).sum();
         match to {
@@ -234,12 +250,16 @@ impl Adding<'_> {
         self.watcher.did(counted as u64)
     }
 
-    /// True if a row is of the share.
-    fn owns(&self, row: u32) -> bool {
-        self.sampling.shard.owns((row / TILE) as usize)
+    /// True if a pixel is one of the picture and of the share.
+    fn owns(&self, [column, row]: Pixel) -> bool {
+        let [width, height] = self.what.camera().resolution();
+        let is_inside = |at: i32, side: u32| u32::try_from(at).is_ok_and(|at| at < side);
+        is_inside(column, width)
+            && is_inside(row, height)
+            && self.sampling.shard.owns((row.cast_unsigned() / TILE) as usize)
     }
 
-    /// Adds the light of a strip's samples where it lands.
+    /// Adds the light of a strip's samples, and of those beside it, where it lands.
     pub(crate) fn fill_window(
         &self,
         strip: [u32; 2],
@@ -248,35 +268,37 @@ impl Adding<'_> {
     ) -> Result<(), Stopped> {
         let [width, height] = self.what.camera().resolution();
         // Rows from which light lands on rows of the share.
-        let rows = window.rows;
-        let lands = |row: u32| {
-            let last = (row + rows).min(height - 1);
-            (row.saturating_sub(rows) / TILE..=last / TILE).any(|strip| self.owns(strip * TILE))
-        };
+        let taken = SampledStrips { shard: self.sampling.shard, rows: window.rows, height };
+        let lands = |pixel: &Pixel| taken.land_from(pixel[1]);
         let to = &mut Destination::Landings(window);
         for tile in Tile::across(width, strip) {
-            let pixels: Vec<[u32; 2]> =
-                tile.pixels().filter(|&[_, y]| lands(tile.top + y)).collect();
-            match self.work {
-                Work::Pass(pass) => self.tile(tile, &pixels, pass, to, memory)?,
-                Work::Wanted(wanted) => {
-                    let range = |[x, y]: [u32; 2]| {
-                        wanted((tile.top + y) as usize * width as usize + (tile.left + x) as usize)
-                    };
-                    self.tile_of_wanted(tile, &pixels, &range, to, memory)?;
-                }
-            }
+            let pixels = tile.pixels().map(|at| tile.on_film(at));
+            self.add_pixels(&pixels.filter(lands).collect::<Vec<_>>(), to, memory)?;
         }
-        Ok(())
+        let beside: Vec<Pixel> = self.beside(strip).filter(lands).collect();
+        self.add_pixels(&beside, to, memory)
+    }
+
+    /// Pixels beside the picture from which light may land on it: left and right of a strip, above the first one and
+    /// below the last.
+    fn beside(&self, [top, height]: [u32; 2]) -> impl Iterator<Item = Pixel> {
+        let size = self.what.camera().resolution();
+        let margin = self.what.margin().cast_signed();
+        let [width, all, top, end] = [size[0], size[1], top, top + height].map(u32::cast_signed);
+        let first = if top == 0 { -margin } else { top };
+        let end = if end == all { all + margin } else { end };
+        let is_beside =
+            move |&[column, row]: &Pixel| !(0..width).contains(&column) || !(0..all).contains(&row);
+        let rows = if margin > 0 { first..end } else { 0..0 };
+        rows.flat_map(move |row| (-margin..width + margin).map(move |column| [column, row]))
+            .filter(is_beside)
     }
 
     /// Refills the batch with the samples of `runs`. A camera without a lens looks at places alone.
-    fn place(&self, tile: Tile, runs: &[SampleRun], memory: &mut Memory) {
+    fn place(&self, runs: &[SampleRun], memory: &mut Memory) {
         let Memory { numbers, film, .. } = memory;
         // The numbers of all samples of these pixels.
-        let pixel = |run: &SampleRun| [tile.left + run.pixel[0], tile.top + run.pixel[1]];
-        numbers
-            .refill(|all| runs.iter().for_each(|run| self.sampling.extend(pixel(run), run, all)));
+        numbers.refill(|all| runs.iter().for_each(|run| self.sampling.extend(run, all)));
         numbers.has_pupil = self.what.camera().has_pupil();
         let count = numbers.samples.len();
         // Their places on the sensor, in the pupil, and in the spectrum.
@@ -286,7 +308,7 @@ impl Adding<'_> {
         draw(0, &mut places);
         let mut first = 0;
         for run in runs {
-            let (corner, end) = (pixel(run).map(f64::from), first + run.range.len());
+            let (corner, end) = (run.pixel.map(f64::from), first + run.range.len());
             film.columns.extend(places[first..end].iter().map(|place| corner[0] + place[0]));
             film.rows.extend(places[first..end].iter().map(|place| corner[1] + place[1]));
             first = end;
@@ -392,28 +414,38 @@ impl Memory {
         let Self { rays, values, landings, film, slots, shares, order, .. } = self;
         let (count, width) = (layers * bands, width as usize);
         let RowSums { first, rows, sums } = window;
+        let (first, rows_away) = (*first as usize * width, i64::from(*rows));
         let mut add = |ray: usize| {
             let sample = rays.sample[ray] as usize;
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "a row of a picture"
-            )]
-            let start = film.rows[sample] as u32;
-            let nearest = start.saturating_sub(*rows) as usize * width;
-            let farthest = (start + *rows + 1) as usize * width;
-            let first = *first as usize * width;
-            for band in 0..bands {
-                let pixel = landings.pixel[ray * bands + band] as usize;
+            // Those that start beside the picture land within its first rows, or its last.
+            let from = film.rows[sample];
+            #[expect(clippy::cast_possible_truncation, reason = "a row of a picture")]
+            let start = from as i64 - i64::from(from < 0.0);
+            let row = |row: i64| usize::try_from(row).unwrap_or(0) * width;
+            let (nearest, farthest) = (row(start - rows_away), row(start + rows_away + 1));
+            let (share, set) = (shares[sample], (slots[sample] % sets) as usize);
+            let pixels = &landings.pixel[ray * bands..(ray + 1) * bands];
+            let weights = &landings.weight[ray * bands..(ray + 1) * bands];
+            let values = &values[ray * count..(ray + 1) * count];
+            // Neighbouring bands mostly land on one pixel.
+            let mut end = 0;
+            for run in pixels.chunk_by(|a, b| a == b) {
+                let of_run = end..end + run.len();
+                end = of_run.end;
+                let pixel = run[0] as usize;
                 // Nowhere is beyond every row.
                 if pixel < nearest || pixel >= farthest {
                     continue;
                 }
-                let weight = landings.weight[ray * bands + band] * shares[sample];
-                let at = (pixel - first) * sets as usize + (slots[sample] % sets) as usize;
-                for layer in 0..layers {
-                    let value = values[ray * count + layer * bands + band];
-                    sums[at * count + layer * bands + band].add(value * weight);
+                let at = ((pixel - first) * sets as usize + set) * count;
+                for layer in (0..count).step_by(bands) {
+                    let sums = &mut sums[at + layer + of_run.start..at + layer + of_run.end];
+                    let values = &values[layer + of_run.start..layer + of_run.end];
+                    for ((sum, value), weight) in
+                        sums.iter_mut().zip(values).zip(&weights[of_run.clone()])
+                    {
+                        sum.add(value * (weight * share));
+                    }
                 }
             }
         };

@@ -9,6 +9,7 @@ use etendue_spectrum::Bands;
 use etendue_tracer::transport::Follow;
 
 use crate::samples::BYTES_OF_SUM;
+use crate::shard::{SampledStrips, Shard};
 use crate::stopping::Stopping;
 
 /// So many bands of direct light are traced each by itself. Not a setting: `plan.shared_paths` decides.
@@ -83,11 +84,23 @@ impl BandPaths {
         matches!(self, Self::Shared(_))
     }
 
+    /// Share of the samples of a picture of `height` rows that a share of its rows takes: its own, and those from which light
+    /// lands on them.
+    #[must_use]
+    pub fn share_of_samples(&self, shard: Shard, height: u32) -> f64 {
+        match self {
+            Self::Shared(SharedPaths { rows, margin, .. }) => {
+                SampledStrips { shard, rows: *rows, height }.share_of_rows(*margin)
+            }
+            Self::Alike | Self::Apart(_) => f64::from(shard.rows(height)) / f64::from(height),
+        }
+    }
+
     /// The row of the plan; none where there is nothing to decide.
     pub(crate) fn decision(&self, scene: &Scene) -> Option<Decision> {
         let (choice, because) = match self {
             Self::Alike => return None,
-            Self::Shared(SharedPaths { traced, error, rows }) => {
+            Self::Shared(SharedPaths { traced, error, rows, .. }) => {
                 let how = match traced {
                     1 => "filters alone tell the bands apart".to_owned(),
                     _ => format!(

@@ -152,6 +152,7 @@ fn dark_share(
             groups,
             count: Bands::Rgb.count(),
             rows: None,
+            margin: 0,
             layers: vec![LayerSpec::Radiance],
         }),
         passes: &pass,

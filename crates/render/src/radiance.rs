@@ -28,6 +28,8 @@ pub(crate) struct LightPass<'a> {
     pub(crate) groups: Vec<BandGroup>,
     /// Greatest number of rows from its own that each band's light lands, where the bands share rays all the same.
     pub(crate) rows: Option<u32>,
+    /// Pixels beside each side of the picture from which it lands there.
+    pub(crate) margin: u32,
     /// The picture, and the parts of its light that have layers of their own.
     pub(crate) layers: Vec<LayerSpec>,
 }
@@ -162,6 +164,10 @@ impl SampledQuantity for LightPass<'_> {
 
     fn shared_rows(&self) -> Option<u32> {
         self.rows
+    }
+
+    fn margin(&self) -> u32 {
+        self.margin
     }
 
     fn is_light(&self) -> bool {

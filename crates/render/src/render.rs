@@ -184,6 +184,7 @@ pub fn trace(
         groups: plan.groups_of_light(&light_camera),
         count: plan.values_of_light(),
         rows: shared.map(|shared| shared.rows),
+        margin: shared.map_or(0, |shared| shared.margin_pixels()),
         layers: plan.layers.iter().copied().filter(|layer| layer.is_light()).collect(),
     });
     // The passes, kept shorter where a checkpoint is written after each.

@@ -95,8 +95,8 @@ const SECOND_SET: u64 = 0xD1B5_4A32_D192_ED03;
 /// Samples of a pixel, side by side.
 #[derive(Debug, Clone)]
 pub(crate) struct SampleRun {
-    /// The pixel from its tile's corner, and which of its sequences they are of.
-    pub(crate) pixel: [u32; 2],
+    /// The pixel by column and row, also one beside the picture, and which of its sequences they are of.
+    pub(crate) pixel: [i32; 2],
     pub(crate) set: u32,
     pub(crate) range: Range<u32>,
     /// The sum that they are added to.
@@ -106,10 +106,11 @@ pub(crate) struct SampleRun {
 }
 
 impl Sampling {
-    /// Appends the samples of a run at a pixel.
-    pub(crate) fn extend(&self, pixel: [u32; 2], run: &SampleRun, numbers: &mut Vec<PixelSample>) {
+    /// Appends the samples of a run.
+    pub(crate) fn extend(&self, run: &SampleRun, numbers: &mut Vec<PixelSample>) {
         let seed = if run.set == 0 { self.seed } else { self.seed ^ SECOND_SET };
-        let pixel = self.sampler.pixel(seed, pixel[0], pixel[1], self.samples);
+        let [column, row] = run.pixel.map(i32::cast_unsigned);
+        let pixel = self.sampler.pixel(seed, column, row, self.samples);
         numbers.extend(pixel.samples(run.range.clone()));
     }
 
@@ -128,6 +129,10 @@ pub(crate) trait SampledQuantity: Sync {
     /// Greatest number of rows that light lands from the pixel that it starts from, where the groups share rays.
     fn shared_rows(&self) -> Option<u32> {
         None
+    }
+    /// Pixels beside each side of the picture from which light lands on it.
+    fn margin(&self) -> u32 {
+        0
     }
     /// True if it is light, of which a row gets as much as its shutter lets through.
     fn is_light(&self) -> bool;

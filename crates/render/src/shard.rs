@@ -134,6 +134,24 @@ impl SampledStrips {
         let last = ((strip + 1) * a_strip - 1 + rows).min(self.height.max(1) as usize - 1);
         (first / a_strip..=last / a_strip).any(|strip| self.shard.owns(strip))
     }
+
+    /// True if light of a row, which may be one beside the picture, lands on rows of the share.
+    pub(crate) fn land_from(self, row: i32) -> bool {
+        let (rows, last) = (i64::from(self.rows), i64::from(self.height.max(1)) - 1);
+        let strip = |row: i64| usize::try_from(row.clamp(0, last) / i64::from(TILE));
+        let ends = [i64::from(row) - rows, i64::from(row) + rows].map(strip);
+        let [Ok(first), Ok(end)] = ends else { return false };
+        (first..=end).any(|strip| self.shard.owns(strip))
+    }
+
+    /// Share of the rows whose samples are taken, those beside the picture included, of which there are as many as this
+    /// `margin` above and below.
+    pub(crate) fn share_of_rows(self, margin: f64) -> f64 {
+        let height = self.height.cast_signed();
+        let taken = (0..height).filter(|&row| self.land_from(row)).count() as f64;
+        let beside = [-1, height].into_iter().filter(|&row| self.land_from(row)).count() as f64;
+        (taken + margin * beside) / (f64::from(self.height) + 2.0 * margin)
+    }
 }
 
 impl fmt::Display for Shard {
@@ -171,6 +189,26 @@ mod tests {
         };
         assert_eq!((taken(0), taken(1)), (vec![2], vec![1, 2, 3]));
         assert_eq!((taken(TILE), taken(TILE + 1)), (vec![1, 2, 3], vec![0, 1, 2, 3, 4]));
+    }
+
+    /// Of 80 rows the share has 16 to 31. With three rows on each side it takes 22, of which none is beside the picture;
+    /// the first share takes 19 of its side, and those above, not those below.
+    #[test]
+    fn rows_from_which_light_lands_are_counted_beside_the_picture_too() {
+        let of = |index, row| {
+            let shard = Shard { index, count: 5, by: ShardBy::Rows };
+            SampledStrips { shard, rows: 3, height: 5 * TILE }.land_from(row)
+        };
+        assert_eq!(
+            (-10..100).filter(|&row| of(1, row)).collect::<Vec<_>>(),
+            (13..35).collect::<Vec<_>>()
+        );
+        assert!(of(0, -2) && !of(0, 81) && of(4, 81) && !of(4, -2));
+        let share = |index, margin| {
+            let shard = Shard { index, count: 5, by: ShardBy::Rows };
+            SampledStrips { shard, rows: 3, height: 5 * TILE }.share_of_rows(margin)
+        };
+        assert_eq!((share(1, 2.0), share(0, 2.0)), (22.0 / 84.0, 21.0 / 84.0));
     }
 
     #[test]

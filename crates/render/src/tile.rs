@@ -64,6 +64,11 @@ impl Tile {
             .filter(move |&[x, y]| x < self.width && y < self.height)
     }
 
+    /// Column and row of a pixel of the tile.
+    pub(crate) fn on_film(self, [x, y]: [u32; 2]) -> [i32; 2] {
+        [self.left + x, self.top + y].map(u32::cast_signed)
+    }
+
     /// Index of a pixel of the tile in the rows of its strip.
     pub(crate) fn index(self, x: u32, y: u32, width: u32) -> usize {
         y as usize * width as usize + (self.left + x) as usize

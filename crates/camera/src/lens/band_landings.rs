@@ -2,7 +2,7 @@
 //! has why).
 
 use etendue_optics::element::{Clip, LensRays, Ray, RayStatus};
-use etendue_optics::train::{MonochromaticTrain, Side};
+use etendue_optics::train::{MonochromaticTrain, RimTrace, Side};
 use glam::DVec3;
 
 use super::lens_camera::LensCamera;
@@ -22,9 +22,14 @@ pub struct BandLandings {
     directions: Vec<DVec3>,
     weights: Vec<f64>,
     leading: Vec<usize>,
+    /// True of rays whose places at all nodes are known without tracing them.
+    is_known: Vec<bool>,
     /// Before the lens is passed: the weights of a batch.
     before: Vec<f64>,
-    /// `[node][ray]`: the place (pixels), and the share that the lens passes, 0 where it ends.
+    /// And what becomes of it at the rims, and its displacements (mm), `[node][ray]`.
+    rims: RimTrace,
+    shifts: Vec<Vec<[f64; 2]>>,
+    /// `[ray][node]`: the place (pixels), and the share that the lens passes, 0 where it ends.
     places: Vec<[f64; 2]>,
     shares: Vec<f64>,
 }
@@ -33,8 +38,56 @@ impl BandLandings {
     /// No pixel.
     pub const NOWHERE: u32 = u32::MAX;
 }
+
+/// The film, and the margin beside it from which rays start (pixels).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StartArea {
+    pub(super) resolution: [u32; 2],
+    pub(super) margin: f64,
+}
+
+impl StartArea {
+    /// True if a place is on the film.
+    #[inline(always)]
+    fn is_seen(&self, [x, y]: [f64; 2]) -> bool {
+        let [width, height] = self.resolution.map(f64::from);
+        x >= 0.0 && y >= 0.0 && x < width && y < height
+    }
+
+    /// True if rays start from a place.
+    #[inline(always)]
+    fn contains(&self, [x, y]: [f64; 2]) -> bool {
+        let margin = self.margin;
+        let [width, height] = self.resolution.map(|side| f64::from(side) + margin);
+        x >= -margin && y >= -margin && x < width && y < height
+    }
+
+    /// Index of the pixel in which a place of the film lies.
+    #[inline(always)]
+    fn pixel_at(&self, place: [f64; 2]) -> u32 {
+        let [column, row] = column_and_row(place);
+        row * self.resolution[0] + column
+    }
+
+    /// Index of the only pixel in which places between two corners lie, if there is one.
+    #[inline(always)]
+    fn only_pixel(&self, [low, high]: [[f64; 2]; 2]) -> Option<u32> {
+        let is_one =
+            self.is_seen(low) && self.is_seen(high) && column_and_row(low) == column_and_row(high);
+        is_one.then(|| self.pixel_at(low))
+    }
+}
+
+/// Column and row of the pixel in which a place of the film lies.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a pixel of a picture")]
+fn column_and_row([x, y]: [f64; 2]) -> [u32; 2] {
+    [x as u32, y as u32]
+}
+
 impl LensCamera {
-    /// The rays of `samples` that all bands share, and where the light of each band lands.
+    /// The rays of `samples` that all bands share, and where the light of each band lands. Of samples beside the film, which
+    /// stand for light that lands on it all the same, those are left out from whose places none can, or does.
     ///
     /// # Panics
     ///
@@ -50,64 +103,53 @@ impl LensCamera {
         out.clear();
         let opened = self.opened.as_ref().expect("the camera is opened before it is sampled");
         let paths = opened.paths.as_ref().expect("bands share rays");
+        let area = StartArea { resolution, margin: self.margin(paths) };
         landings.clear();
         // Out of the camera, each at its leading wavelength.
         for (node, lens) in paths.nodes.iter().enumerate() {
             let is_of_node = |u: f64| place_of(u, paths.nodes.len()) == node;
-            let numbered = samples.leading.iter().zip(0..);
-            let numbers = numbered.filter(|&(&u, _)| is_of_node(u)).map(|(_, i)| i);
+            let starts = |&i: &usize| area.contains([samples.columns[i], samples.rows[i]]);
+            let of_node = (0..samples.len()).filter(|&i| is_of_node(samples.leading[i]));
+            #[expect(clippy::cast_possible_truncation, reason = "samples of a batch")]
+            let numbers = of_node.filter(starts).map(|i| i as u32);
             let first = self.aim_samples(&opened.pupil, lens, samples, numbers, out);
-            let before = &mut landings.before;
-            before.clear();
-            before.extend((0..out.in_lens.len()).map(|i| out.in_lens.throughput(i)));
-            lens.trace(Side::Sensor, Clip::On, &mut out.in_lens);
+            landings.pass(paths, node, &mut out.in_lens);
             out.statuses.add_all(&out.in_lens);
-            landings.keep(&out.in_lens, node);
+            let to_pixels = 1.0 / (self.focused.film().turn * self.focused.film().pitch);
+            landings.keep(node, to_pixels, samples, &out.sample[first..], &out.in_lens);
             self.leave(pose, first, out);
         }
         out.rays.coherent = true;
-        // Back into it at the others.
-        let count = out.sample.len();
-        landings.places.resize(paths.nodes.len() * count, [f64::NAN; 2]);
-        landings.shares.resize(paths.nodes.len() * count, 0.0);
+        // Back into it at the others, where it is not known where they land.
         for (node, lens) in paths.nodes.iter().enumerate() {
-            self.bring_back(node, lens, paths.lead, samples, out, landings);
+            self.bring_back([node, paths.nodes.len()], lens, paths.lead, out, landings);
         }
-        self.land(paths, resolution, samples, out, landings);
+        self.land(paths, &area, samples, out, landings);
+        landings.drop_lost(&area, samples, out);
     }
 
-    /// Takes the rays of other leading wavelengths back through the lens, to where they land.
+    /// Takes the rays of other leading wavelengths back through the lens at a node of so many, to where they land.
     fn bring_back(
         &self,
-        node: usize,
+        [node, nodes]: [usize; 2],
         lens: &MonochromaticTrain,
         lead: f64,
-        samples: &FilmSamples,
         out: &mut CameraRays,
         landings: &mut BandLandings,
     ) {
-        let BandLandings { points, directions, weights, leading, places, shares, .. } = landings;
-        let count = out.sample.len();
-        let (places, shares) =
-            (&mut places[node * count..][..count], &mut shares[node * count..][..count]);
+        let BandLandings { points, directions, leading, is_known, places, shares, .. } = landings;
+        let comes_back = |&ray: &usize| leading[ray] != node && !is_known[ray];
         let back = &mut out.in_lens;
         back.clear();
-        for ray in 0..count {
-            if leading[ray] == node {
-                let i = out.sample[ray] as usize;
-                places[ray] = [samples.columns[i], samples.rows[i]];
-                shares[ray] = out.weight[ray] / weights[ray];
-            } else {
-                back.push(points[ray] + directions[ray] * lead, -directions[ray]);
-            }
+        for ray in (0..points.len()).filter(comes_back) {
+            back.push(points[ray] + directions[ray] * lead, -directions[ray]);
         }
         lens.trace(Side::Object, Clip::On, back);
         let film = self.focused.film();
-        let others = (0..count).filter(|&ray| leading[ray] != node);
-        for (ray, i) in others.zip(0..) {
+        for (ray, i) in (0..points.len()).filter(comes_back).zip(0..) {
             if back.status(i) == RayStatus::Exited {
-                places[ray] = film.pixel(back.position(i), back.direction(i));
-                shares[ray] = back.throughput(i);
+                places[ray * nodes + node] = film.pixel(back.position(i), back.direction(i));
+                shares[ray * nodes + node] = back.throughput(i);
             }
         }
     }
@@ -116,7 +158,7 @@ impl LensCamera {
     fn land(
         &self,
         paths: &BandInterpolation,
-        resolution: [u32; 2],
+        area: &StartArea,
         samples: &FilmSamples,
         out: &CameraRays,
         landings: &mut BandLandings,
@@ -128,24 +170,23 @@ impl LensCamera {
             4 => Self::land_between::<4>,
             _ => Self::land_between::<MOST_NODES>,
         };
-        land(self, paths, resolution, samples, out, landings);
+        land(self, paths, area, samples, out, landings);
     }
 
     /// The same between so many nodes at most.
     fn land_between<const NODES: usize>(
         &self,
         paths: &BandInterpolation,
-        resolution: [u32; 2],
+        area: &StartArea,
         samples: &FilmSamples,
         out: &CameraRays,
         landings: &mut BandLandings,
     ) {
         let BandLandings { pixel, weight, points, directions, weights, places, shares, .. } =
             landings;
-        let size = resolution.map(f64::from);
-        let is_seen = |[x, y]: [f64; 2]| x >= 0.0 && y >= 0.0 && x < size[0] && y < size[1];
         let (count, nodes) = (out.sample.len(), paths.nodes.len());
-        let bands = paths.bands.len();
+        let (bands, is_clear) = (paths.bands.len(), paths.is_clear());
+        let next_term = paths.next.on_pixels(self.focused.film().pitch / paths.pitch);
         pixel.resize(count * bands, BandLandings::NOWHERE);
         weight.resize(count * bands, 0.0);
         let lands_of = pixel.chunks_exact_mut(bands).zip(weight.chunks_exact_mut(bands));
@@ -154,12 +195,22 @@ impl LensCamera {
             let (mut at, mut share) = ([[0.0; 2]; NODES], [0.0; NODES]);
             let (mut passes, mut makes) = (true, 0_u32);
             for node in 0..nodes.min(NODES) {
-                (at[node], share[node]) = (places[node * count + ray], shares[node * count + ray]);
+                let end = ray * nodes + node;
+                (at[node], share[node]) = (places[end], shares[end]);
                 passes &= share[node] > 0.0;
-                makes += u32::from(share[node] > 0.0 && is_seen(at[node]));
+                makes += u32::from(share[node] > 0.0 && area.contains(at[node]));
             }
             let scale = weights[ray] * nodes as f64 / f64::from(makes.max(1));
-            let more = paths.next.at(at[0], points[ray]);
+            let more = next_term.at(at[0], points[ray]);
+            // Most rays land on one pixel in all bands.
+            if passes
+                && is_clear
+                && let Some(only) = area.only_pixel(paths.bounds.corners(&at, more))
+            {
+                pixels.fill(only);
+                weights_of_bands.fill(scale);
+                continue;
+            }
             let u = samples.spectrum[out.sample[ray] as usize];
             for (band, wavelengths) in paths.bands.iter().enumerate() {
                 let number = place_of(u, wavelengths.len());
@@ -176,14 +227,9 @@ impl LensCamera {
                     let from = [points[ray], directions[ray]];
                     self.trace_back(paths.lead, band, number, from)
                 };
-                if passed > 0.0 && is_seen(place) {
-                    #[expect(
-                        clippy::cast_possible_truncation,
-                        clippy::cast_sign_loss,
-                        reason = "a pixel of a picture"
-                    )]
-                    let at = place[1] as u32 * resolution[0] + place[0] as u32;
-                    (pixels[band], weights_of_bands[band]) = (at, scale * passed);
+                if passed > 0.0 && area.is_seen(place) {
+                    pixels[band] = area.pixel_at(place);
+                    weights_of_bands[band] = scale * passed;
                 }
             }
         }
@@ -212,111 +258,107 @@ impl LensCamera {
 }
 impl BandLandings {
     fn clear(&mut self) {
-        let Self { pixel, weight, points, directions, weights, leading, before, places, shares } =
-            self;
-        pixel.clear();
-        weight.clear();
-        points.clear();
-        directions.clear();
-        weights.clear();
-        leading.clear();
-        before.clear();
-        places.clear();
-        shares.clear();
+        self.pixel.clear();
+        self.weight.clear();
+        self.points.clear();
+        self.directions.clear();
+        self.weights.clear();
+        self.leading.clear();
+        self.is_known.clear();
+        self.places.clear();
+        self.shares.clear();
     }
 
-    /// Appends the rays that left the lens at a node's wavelength.
-    fn keep(&mut self, rays: &LensRays, node: usize) {
+    /// Takes the rays of a node, just aimed, out of the lens.
+    fn pass(&mut self, paths: &BandInterpolation, node: usize, rays: &mut LensRays) {
+        self.before.clear();
+        self.before.extend((0..rays.len()).map(|i| rays.throughput(i)));
+        let nodes = paths.nodes.len();
+        self.shifts.resize_with(nodes, Vec::new);
+        self.shifts.iter_mut().for_each(Vec::clear);
+        let Some(displacements) = &paths.displacements else {
+            return paths.nodes[node].trace(Side::Sensor, Clip::On, rays);
+        };
+        displacements.trace(node, &paths.nodes[node], rays, &mut self.rims);
+        for (other, shifts) in self.shifts.iter_mut().enumerate().filter(|(k, _)| *k != node) {
+            displacements.between([node, other], self.rims.starts(), shifts);
+        }
+    }
+
+    /// Leaves out rays that start beside the film and of which nothing lands on it: nobody asks what they see.
+    fn drop_lost(&mut self, area: &StartArea, samples: &FilmSamples, out: &mut CameraRays) {
+        let is_seen = |&sample: &u32| {
+            let i = sample as usize;
+            area.is_seen([samples.columns[i], samples.rows[i]])
+        };
+        if out.sample.iter().all(is_seen) {
+            return;
+        }
+        let bands = self.pixel.len() / out.sample.len();
+        let lands = |pixels: &[u32]| pixels.iter().any(|&pixel| pixel != Self::NOWHERE);
+        let of_rays = out.sample.iter().zip(self.pixel.chunks_exact(bands));
+        let kept: Vec<bool> =
+            of_rays.map(|(sample, pixels)| is_seen(sample) || lands(pixels)).collect();
+        out.rays.retain(|ray| kept[ray]);
+        keep_rays(&mut out.weight, &kept, 1);
+        keep_rays(&mut out.sample, &kept, 1);
+        let Self { pixel, weight, points, directions, weights, leading, .. } = self;
+        keep_rays(pixel, &kept, bands);
+        keep_rays(weight, &kept, bands);
+        keep_rays(points, &kept, 1);
+        keep_rays(directions, &kept, 1);
+        keep_rays(weights, &kept, 1);
+        keep_rays(leading, &kept, 1);
+    }
+
+    /// Appends the rays that left the lens at a node's wavelength, which are of `samples` of these `numbers`, with where they
+    /// land at all nodes as far as that is known; a place on the film is `to_pixels` times its place in mm.
+    fn keep(
+        &mut self,
+        node: usize,
+        to_pixels: f64,
+        samples: &FilmSamples,
+        numbers: &[u32],
+        rays: &LensRays,
+    ) {
         let left = |&i: &usize| rays.status(i) == RayStatus::Exited && rays.throughput(i) > 0.0;
         for i in (0..rays.len()).filter(left) {
             self.points.push(rays.position(i));
             self.directions.push(rays.direction(i));
             self.weights.push(self.before[i]);
             self.leading.push(node);
-        }
-    }
-}
-#[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use etendue_geometry::Bounds;
-    use etendue_spectrum::{Bands, Grid};
-
-    use super::*;
-    use crate::{CameraSpec, SharingLimits};
-
-    /// The lens of a file, stopped down and focused, before 256 × 256 pixels of a sensor so high.
-    fn camera_with(file: &str, f_number: f64, [distance, height]: [&str; 2]) -> crate::Camera {
-        let spec: CameraSpec = serde_json::from_value(serde_json::json!({
-            "type": "lens", "lens": format!("lenses/{file}.json"), "f_number": f_number,
-            "focus_distance": distance, "sensor_height": height, "pose": {"from": [0, 1, 4.4], "look_at": [0, 1, 0]},
-            "sensor": {"resolution": [256, 256]}
-        }))
-        .unwrap();
-        let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
-        let bounds = || Bounds { min: DVec3::splat(-0.5), max: DVec3::splat(0.5) };
-        spec.build(bounds, &|name: &str| Ok(scenes.join(name))).unwrap()
-    }
-
-    /// Each band's light falls on the pixel of its own ray, but for rays that land nearer to an edge than places err:
-    /// behind lenses of one glass and of several, in three bands and in many. Two wavelengths place all bands behind
-    /// the double Gauss, as its secondary spectrum is foreseen.
-    #[test]
-    fn bands_land_where_their_own_rays_do() {
-        let edges: Vec<f64> = (0..32).map(|k| 400.0 + 10.0 * f64::from(k)).collect();
-        let many = Bands::Spectral(Grid::from_edges(edges).unwrap());
-        for (file, f_number, at) in [
-            ("double-gauss", 2.8, ["4.4 m", "28 mm"]),
-            ("cooke-triplet", 5.6, ["3 m", "20 mm"]),
-            ("achromat", 8.0, ["3 m", "4 mm"]),
-            ("singlet", 4.0, ["3 m", "4 mm"]),
-        ] {
-            for bands in [&Bands::Rgb, &many] {
-                let camera = camera_with(file, f_number, at).opened(bands).unwrap();
-                let (found, error) = landings_elsewhere(&camera, bands.count());
-                let nodes = camera.lens().unwrap().opened_paths().unwrap().traced;
-                assert!(file != "double-gauss" || nodes == 2, "{nodes}");
-                // Twice the error on either side, of columns and of rows.
-                let name = format!("{file}, {} bands, {nodes} nodes, {error}", bands.count());
-                assert!(error <= SharingLimits::DEFAULT.places, "{name}");
-                assert!(found < 4.0 * error, "{name}: {found}");
-            }
-        }
-    }
-
-    /// The share of landings that are not on the pixel of the band's own ray, and the error that was measured (pixels).
-    fn landings_elsewhere(camera: &crate::Camera, bands: usize) -> (f64, f64) {
-        let lens = camera.lens().unwrap();
-        let opened = lens.opened.as_ref().unwrap();
-        let paths = opened.paths.as_ref().unwrap();
-        let mut samples = FilmSamples::default();
-        for i in 0..60_000 / u32::try_from(bands).unwrap() {
-            let steps = [0.754_877_666, 0.569_840_290, 0.618_033_988, 0.414_213_562, 0.732_050_807];
-            let [x, y, u, v, w] = steps.map(|step: f64| (0.5 + step * f64::from(i)).fract());
-            samples.push([256.0 * x, 256.0 * y], [u, v], w);
-            samples.leading[i as usize] = (0.5 + 0.236_067_977 * f64::from(i)).fract();
-        }
-        let (mut rays, mut landings) = (CameraRays::default(), BandLandings::default());
-        camera.sample_band_rays(&samples, &mut rays, &mut landings);
-        let (mut landed, mut elsewhere) = (0, 0);
-        for (ray, &sample) in rays.sample.iter().enumerate() {
-            let u = samples.spectrum[sample as usize];
-            for band in 0..bands {
-                let wavelengths = &paths.bands[band];
-                let number = place_of(u, wavelengths.len());
-                let from = [landings.points[ray], landings.directions[ray]];
-                let ([x, y], passed) = lens.trace_back(paths.lead, band, number, from);
-                let is_seen = passed > 0.0 && x.min(y) >= 0.0 && x.max(y) < 256.0;
-                let own = match is_seen {
-                    true => y.floor() * 256.0 + x.floor(),
-                    false => f64::from(BandLandings::NOWHERE),
+            let sample = numbers[i] as usize;
+            let place = [samples.columns[sample], samples.rows[sample]];
+            let share = rays.throughput(i) / self.before[i];
+            let mut is_known = true;
+            for (other, shifts) in self.shifts.iter().enumerate() {
+                let (at, passed) = match shifts.get(i) {
+                    _ if other == node => (place, share),
+                    Some([x, y]) if self.rims.is_within(i) => {
+                        ([place[0] + x * to_pixels, place[1] - y * to_pixels], 1.0)
+                    }
+                    _ => {
+                        is_known = false;
+                        ([f64::NAN; 2], 0.0)
+                    }
                 };
-                landed += 1;
-                elsewhere += u32::from(own != f64::from(landings.pixel[bands * ray + band]));
+                self.places.push(at);
+                self.shares.push(passed);
             }
+            self.is_known.push(is_known);
         }
-        assert!(landed > 30_000, "{landed}");
-        (f64::from(elsewhere) / f64::from(landed), paths.error)
     }
 }
+
+/// Leaves the values of those rays alone that are kept, `each` of which has so many.
+fn keep_rays<T: Copy>(values: &mut Vec<T>, kept: &[bool], each: usize) {
+    let mut end = 0;
+    for (ray, _) in kept.iter().enumerate().filter(|(_, kept)| **kept) {
+        values.copy_within(ray * each..(ray + 1) * each, end);
+        end += each;
+    }
+    values.truncate(end);
+}
+
+#[cfg(test)]
+mod tests;

@@ -25,6 +25,11 @@
 //! traced by itself, whatever the weights are; where w is the same for all, as it nearly is, this is his balance
 //! heuristic. Rays that one wavelength loses at a rim come by another: the share of 1/m counts those that can.
 //!
+//! Light of a band that lands on the film may come along a ray that lands beside it at all leading wavelengths, as
+//! where the middle of the spectrum is displaced against both its ends. Rays start from a margin all about the film, too,
+//! that is as wide as the places of a ray part at the most, and m counts the wavelengths by which a ray lands on the film
+//! or on the margin: without it the outermost pixels would lack that light.
+//!
 //! # Interpolation
 //!
 //! Leading wavelengths are the nodes of a polynomial in the mean index of the lens' dispersive media, by which
@@ -40,7 +45,7 @@ use etendue_spectrum::{Bands, Spread};
 use glam::{DVec2, DVec3};
 
 use super::lens_camera::LensCamera;
-use super::nodes::{MOST_NODES, NextTerm, NodeWeights, RayOff, Variable};
+use super::nodes::{MOST_NODES, NextTerm, NodeWeights, RayOff, Variable, WeightBounds};
 use super::opened::{BandInterpolation, filtered};
 use super::traced_at::TracedAt;
 
@@ -71,6 +76,18 @@ pub struct SharedPaths {
     pub error: f64,
     /// Greatest number of rows of pixels between where a ray starts and where its light lands.
     pub rows: u32,
+    /// Width of the margin beside the film from which rays start, too (pixels).
+    pub margin: f64,
+}
+
+impl SharedPaths {
+    /// Pixels beside each side of the film from which rays start: the last ones in part.
+    #[must_use]
+    pub fn margin_pixels(&self) -> u32 {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few dozen")]
+        let pixels = self.margin.ceil() as u32;
+        pixels
+    }
 }
 
 impl LensCamera {
@@ -93,7 +110,13 @@ impl LensCamera {
     fn shared(&self, paths: &BandInterpolation) -> SharedPaths {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few dozen")]
         let rows = (paths.reach / self.focused.film().pitch).ceil() as u32 + 1;
-        SharedPaths { traced: paths.nodes.len(), error: paths.error, rows }
+        let error = paths.error * (paths.pitch / self.focused.film().pitch);
+        SharedPaths { traced: paths.nodes.len(), error, rows, margin: self.margin(paths) }
+    }
+
+    /// Width of the margin beside the film from which rays start (pixels).
+    pub(super) fn margin(&self, paths: &BandInterpolation) -> f64 {
+        paths.margin() / self.focused.film().pitch
     }
 
     /// Reason why rays of different bands differ by more than where they land, if they do.
@@ -145,10 +168,7 @@ impl LensCamera {
         if rays.len() < FEWEST {
             return Err("too few rays get through the lens to measure where they part".to_owned());
         }
-        let step = wavelengths.len().div_ceil(CHECKS);
-        let mut checks: Vec<f64> = wavelengths.iter().copied().step_by(step).collect();
-        checks.extend(wavelengths.last());
-        checks.dedup();
+        let checks = checks_among(&wavelengths);
         let land = |nm: &f64| Ok::<_, String>(self.landings(&at(*nm)?, &rays, lead));
         let checked = checks.iter().map(land).collect::<Result<Vec<_>, _>>()?;
         let reach = SAFETY * parting(&checked);
@@ -181,23 +201,26 @@ impl LensCamera {
                 nodes.error(&weights, of_next, &next, found)
             };
             let errors = checks.iter().zip(&checked).map(errors);
-            let [error, share] = errors.fold([0.0_f64; 2], |[a, b], [c, d]| [a.max(c), b.max(d)]);
+            let [error, share] = greatest(errors);
             least = (least.0.min(error), least.1.min(share));
             if error > limits.places || (has_losses && share > limits.shares) {
                 continue;
             }
             let nodes = chosen.iter().map(|&nm| at(nm)).collect::<Result<Vec<_>, _>>()?;
-            let of_band = |(band, spread): (usize, &Spread)| {
-                let filters = filtered(train, bands, band, spread);
-                let places = spread.wavelengths.iter().zip(filters).map(|(&nm, filters)| {
-                    let nm = if self.runs_apart() { nm } else { train.wavelength() };
-                    let (weights, next) = weights_at(nm);
-                    NodeWeights { weights, next, filters }
-                });
-                places.collect()
-            };
-            let bands = spreads.iter().enumerate().map(of_band).collect();
-            return Ok(BandInterpolation { nodes, bands, next, has_losses, lead, reach, error });
+            let bands = self.band_weights(bands, &spreads, &chosen);
+            let bounds = WeightBounds::of(bands.iter().flatten());
+            return Ok(BandInterpolation {
+                nodes,
+                bands,
+                bounds,
+                next,
+                has_losses,
+                lead,
+                reach,
+                error,
+                pitch: self.focused.film().pitch,
+                displacements: None,
+            });
         }
         Err(format!(
             "places between {MOST_NODES} wavelengths are {:.2} pixels off, {} being the most, and \
@@ -206,9 +229,30 @@ impl LensCamera {
         ))
     }
 
+    /// Weights of the nodes `chosen`, and what filters pass, by band and by wavelength that it is drawn from.
+    fn band_weights(
+        &self,
+        bands: &Bands,
+        spreads: &[Spread],
+        chosen: &[f64],
+    ) -> Vec<Vec<NodeWeights>> {
+        let train = self.focused.train();
+        let index = Variable::of(train);
+        let of_band = |(band, spread): (usize, &Spread)| {
+            let filters = filtered(train, bands, band, spread);
+            let places = spread.wavelengths.iter().zip(filters).map(|(&nm, filters)| {
+                let nm = if self.runs_apart() { nm } else { train.wavelength() };
+                let (weights, next) = (index.weights(chosen, nm), index.next_weight(chosen, nm));
+                NodeWeights { weights, next, filters }
+            });
+            places.collect()
+        };
+        spreads.iter().enumerate().map(of_band).collect()
+    }
+
     /// Rays that leave the lens at one wavelength, from all over the film and the
     /// pupil.
-    fn rays_to_measure(&self, lens: &MonochromaticTrain) -> Vec<SceneRay> {
+    pub(super) fn rays_to_measure(&self, lens: &MonochromaticTrain) -> Vec<SceneRay> {
         let film = self.focused.film();
         let train = self.focused.train();
         let rim = train.elements().last().map_or(f64::INFINITY, |e| e.clear_radius());
@@ -258,6 +302,15 @@ impl LensCamera {
     }
 }
 
+/// Some of ascending wavelengths, both ends among them.
+fn checks_among(wavelengths: &[f64]) -> Vec<f64> {
+    let step = wavelengths.len().div_ceil(CHECKS);
+    let mut checks: Vec<f64> = wavelengths.iter().copied().step_by(step).collect();
+    checks.extend(wavelengths.last());
+    checks.dedup();
+    checks
+}
+
 /// Landing points of rays (pixels), and the share of each that passed; `None` for those that ended.
 struct Landings {
     places: Vec<Option<(DVec2, f64)>>,
@@ -278,12 +331,18 @@ fn parting(landed: &[Landings]) -> f64 {
     (0..first.places.len()).map(part).fold(0.0, f64::max) * first.pitch
 }
 
+/// The greatest of some errors; infinite where one is not a number, as between nodes of the same mean index.
+fn greatest(errors: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
+    let worse = |a: f64, b: f64| if b.is_nan() { f64::INFINITY } else { a.max(b) };
+    errors.fold([0.0; 2], |[a, b], [c, d]| [worse(a, c), worse(b, d)])
+}
+
 /// A ray of the scene.
 #[derive(Clone, Copy)]
-struct SceneRay {
+pub(super) struct SceneRay {
     /// A point on it (mm).
-    point: DVec3,
-    direction: DVec3,
+    pub(super) point: DVec3,
+    pub(super) direction: DVec3,
 }
 
 /// Rays of the scene, and their landing points at the nodes.
@@ -322,16 +381,25 @@ impl NodeLandings<'_> {
         next: &NextTerm,
         found: &Landings,
     ) -> [f64; 2] {
-        let mut errors = [0.0_f64; 2];
-        for (ray, found) in found.places.iter().enumerate() {
-            let (Some(sum), Some((place, share))) = (self.between(weights, ray), found) else {
-                continue;
-            };
-            let first = self.landed[0].places[ray].map_or(DVec2::ZERO, |(place, _)| place);
+        let of_ray = |(ray, found): (usize, &Option<(DVec2, f64)>)| {
+            let ((sum, passed), (place, share)) = (self.between(weights, ray)?, (*found)?);
+            let (first, _) = self.landed[0].places[ray].unwrap_or((DVec2::ZERO, 0.0));
             let more = DVec2::from(next.at(first.into(), self.rays[ray].point)) * of_next;
-            errors[0] = errors[0].max((sum.0 + more).distance(*place));
-            errors[1] = errors[1].max((sum.1 - share).abs() / share);
-        }
-        errors
+            let off = (passed - share).abs();
+            Some([(sum + more).distance(place), if off == 0.0 { 0.0 } else { off / share }])
+        };
+        greatest(found.places.iter().enumerate().filter_map(of_ray))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_a_number_is_the_greatest_error() {
+        let all = [[0.1, 0.0], [f64::NAN, 0.2], [0.3, 0.1]];
+        assert_eq!(greatest(all.into_iter()), [f64::INFINITY, 0.2]);
+        assert_eq!(greatest(all[..1].iter().copied()), [0.1, 0.0]);
     }
 }

@@ -19,7 +19,7 @@ use glam::{DVec2, DVec3};
 use super::accuracy::LensAccuracy;
 use super::chief::{ChiefTable, ImageCircle, LensletChiefs};
 use super::focused::{FocusedLens, View};
-use super::opened::{OpenedGroup, OpenedLens, through_filters, uniform_filters};
+use super::opened::{BandInterpolation, OpenedGroup, OpenedLens, through_filters, uniform_filters};
 use super::traced_at::{BandGroup, TracedAt, grouped};
 
 use crate::{CameraError, Pose};
@@ -260,19 +260,25 @@ impl LensCamera {
         if self.opened.as_ref().is_some_and(|opened| opened.bands == *bands) {
             return Ok(self.clone());
         }
-        let mut opened = self.open(bands, self.focused.train())?;
-        opened.paths = self.band_paths(bands).ok();
+        let paths = self.band_paths(bands).ok().map(|paths| self.displaced(paths));
+        let margin = paths.as_ref().map_or(0.0, BandInterpolation::margin);
+        let opened = OpenedLens { paths, ..self.open(bands, self.focused.train(), margin)? };
         Ok(Self { opened: Some(Arc::new(opened)), ..self.clone() })
     }
 
     /// Opens the camera with its filters clear.
     pub(crate) fn opened_clear(&self, bands: &Bands) -> Result<Self, CameraError> {
         let clear = without_filters(self.focused.train());
-        Ok(Self { opened: Some(Arc::new(self.open(bands, &clear)?)), ..self.clone() })
+        Ok(Self { opened: Some(Arc::new(self.open(bands, &clear, 0.0)?)), ..self.clone() })
     }
 
-    /// The lens opened, of which `train` is as much as light of `bands` is to meet.
-    fn open(&self, bands: &Bands, train: &OpticalTrain) -> Result<OpenedLens, CameraError> {
+    /// The lens opened, of which `train` is as much as light of `bands` is to meet, for a film with a margin (mm) beside it.
+    fn open(
+        &self,
+        bands: &Bands,
+        train: &OpticalTrain,
+        margin: f64,
+    ) -> Result<OpenedLens, CameraError> {
         let fault = |why: String| CameraError::new("", why);
         for (i, element) in train.elements().iter().enumerate() {
             for curve in element.part.curves() {
@@ -294,7 +300,7 @@ impl LensCamera {
             measured.extend(few);
             groups.push(OpenedGroup { lenses });
         }
-        let half_size = self.focused.film().half_size().to_array();
+        let half_size = (self.focused.film().half_size() + margin).to_array();
         let clear = without_filters(train);
         let (accuracy, z) = (self.accuracy.pupil, self.focused.sensor_z());
         let pupil = ExitPupil::within(accuracy, &clear, &measured, z, half_size)

@@ -20,12 +20,14 @@
 //! | [`waves`] | how light is spread on the sensor as waves, and what of it arrives |
 //! | `traced_at` | bands whose rays run together through the lens |
 //! | `band_paths` | one ray of the scene for all bands: why, and by how many wavelengths |
+//! | `displacements` | where rays that are traced at one wavelength land at others |
 //! | `band_landings` | such rays, and where each band's light of them lands |
 
 mod accuracy;
 mod band_landings;
 mod band_paths;
 pub mod chief;
+mod displacements;
 pub mod focused;
 mod implausible;
 pub(crate) mod keys;

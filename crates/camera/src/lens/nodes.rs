@@ -32,6 +32,76 @@ pub(super) struct NodeWeights {
     pub(super) filters: f64,
 }
 
+/// Bounds of the weights of all wavelengths between nodes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct WeightBounds {
+    /// The least and the greatest weight of each node.
+    nodes: [[f64; 2]; MOST_NODES],
+    /// Those of the [`NextTerm`].
+    next: [f64; 2],
+    /// Those of what filters pass.
+    filters: [f64; 2],
+    /// The greatest sum of the weights' amounts.
+    amounts: f64,
+}
+
+/// Roundings of a place among some ten thousand pixels, and a little more (pixels).
+const ROUNDINGS: f64 = 1e-6;
+
+impl WeightBounds {
+    /// Those of `all` weights.
+    pub(super) fn of<'w>(all: impl Iterator<Item = &'w NodeWeights>) -> Self {
+        const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+        let nodes = [NOTHING; MOST_NODES];
+        let mut bounds = Self { nodes, next: NOTHING, filters: NOTHING, amounts: 0.0 };
+        let widen = |[low, high]: &mut [f64; 2], weight: f64| {
+            (*low, *high) = (low.min(weight), high.max(weight));
+        };
+        for NodeWeights { weights, next, filters } in all {
+            bounds.nodes.iter_mut().zip(weights).for_each(|(own, &weight)| widen(own, weight));
+            widen(&mut bounds.next, *next);
+            widen(&mut bounds.filters, *filters);
+            let amounts = weights.iter().map(|weight| weight.abs()).sum();
+            bounds.amounts = bounds.amounts.max(amounts);
+        }
+        bounds
+    }
+
+    /// Factor at most by which errors of the places at nodes grow between them.
+    pub(super) fn magnified(&self) -> f64 {
+        self.amounts
+    }
+
+    /// True if filters pass all light.
+    pub(super) fn are_unfiltered(&self) -> bool {
+        self.filters == [1.0; 2]
+    }
+
+    /// The corners of a rectangle in which a ray lands at all wavelengths, by where it lands at the nodes and by its
+    /// [`NextTerm`] (pixels).
+    #[inline(always)]
+    pub(super) fn corners<const NODES: usize>(
+        &self,
+        at: &[[f64; 2]; NODES],
+        next: [f64; 2],
+    ) -> [[f64; 2]; 2] {
+        let mut corners = [at[0].map(|x| x - ROUNDINGS), at[0].map(|x| x + ROUNDINGS)];
+        for axis in 0..2 {
+            let mut add = |by: f64, [low, high]: [f64; 2]| {
+                let ends = [by * low, by * high];
+                corners[0][axis] += ends[0].min(ends[1]);
+                corners[1][axis] += ends[0].max(ends[1]);
+            };
+            // Weights of nodes add up to 1.
+            for node in 1..NODES {
+                add(at[node][axis] - at[0][axis], self.nodes[node]);
+            }
+            add(next[axis], self.next);
+        }
+        corners
+    }
+}
+
 /// Variable in which places are polynomials.
 pub(super) struct Variable<'a> {
     train: &'a OpticalTrain,
@@ -151,6 +221,16 @@ impl NextTerm {
         }
     }
 
+    /// The same in pixels that are so many times as large.
+    pub(super) fn on_pixels(mut self, times: f64) -> Self {
+        for [constant, _, _, x, y] in &mut self.factors {
+            for factor in [constant, x, y] {
+                *factor /= times;
+            }
+        }
+        self
+    }
+
     /// That of a ray (pixels).
     #[inline(always)]
     pub(super) fn at(&self, place: [f64; 2], point: DVec3) -> [f64; 2] {
@@ -166,4 +246,45 @@ impl NextTerm {
 #[inline(always)]
 fn terms([column, row]: [f64; 2], point: DVec3) -> [f64; TERMS] {
     [1.0, column, row, point.x, point.y]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rays land within the corners at all wavelengths, and at some of them next to each side: the bounds of straight lines are
+    /// no wider than needed.
+    #[test]
+    fn corners_hold_all_places_of_a_ray() {
+        let wavelength = |k: u32| {
+            let x = f64::from(k) / 20.0;
+            let mut weights = [0.0; MOST_NODES];
+            (weights[0], weights[1]) = (1.0 - x, x);
+            NodeWeights { weights, next: 4.0 * x * (1.0 - x), filters: 1.0 }
+        };
+        let all: Vec<NodeWeights> = (0..=20).map(wavelength).collect();
+        let bounds = WeightBounds::of(all.iter());
+        assert!(bounds.are_unfiltered());
+        let place = |at: [[f64; 2]; 2], next: [f64; 2], own: &NodeWeights| -> [f64; 2] {
+            std::array::from_fn(|axis| {
+                own.weights[0] * at[0][axis] + own.weights[1] * at[1][axis] + own.next * next[axis]
+            })
+        };
+        for (at, next) in [
+            ([[10.3, 7.6], [12.1, 7.2]], [0.0, 0.0]),
+            ([[4000.9, 0.1], [3999.2, 0.3]], [-0.4, 0.2]),
+            ([[5.5, 5.5], [5.5, 5.5]], [0.7, -0.7]),
+        ] {
+            let [low, high] = bounds.corners(&at, next);
+            for own in &all {
+                let found = place(at, next, own);
+                for axis in 0..2 {
+                    assert!(low[axis] < found[axis] && found[axis] < high[axis], "{found:?}");
+                }
+            }
+        }
+        let [low, high] = bounds.corners(&[[10.3, 7.6], [12.1, 7.2]], [0.0; 2]);
+        let off = [low[0] - 10.3, high[0] - 12.1, low[1] - 7.2, high[1] - 7.6];
+        assert!(off.iter().all(|off| off.abs() < 2.0 * ROUNDINGS), "{off:?}");
+    }
 }

@@ -5,7 +5,8 @@ use etendue_optics::glass::GlassError;
 use etendue_optics::train::{ExitPupil, MonochromaticTrain, OpticalTrain};
 use etendue_spectrum::{Bands, Curve, Outside, Spread};
 
-use super::nodes::{NextTerm, NodeWeights};
+use super::displacements::Displacements;
+use super::nodes::{NextTerm, NodeWeights, WeightBounds};
 
 /// The exit pupil measured at the wavelengths that are wanted.
 #[derive(Debug)]
@@ -32,6 +33,7 @@ pub(super) struct BandInterpolation {
     pub(super) nodes: Vec<MonochromaticTrain>,
     /// By band and by wavelength that it is drawn from.
     pub(super) bands: Vec<Vec<NodeWeights>>,
+    pub(super) bounds: WeightBounds,
     pub(super) next: NextTerm,
     /// True if glass takes light.
     pub(super) has_losses: bool,
@@ -40,6 +42,23 @@ pub(super) struct BandInterpolation {
     /// Greatest distance by which places of a ray part: rows of pixels and their size (mm).
     pub(super) reach: f64,
     pub(super) error: f64,
+    /// Size of the pixels for which `next` was fitted (mm).
+    pub(super) pitch: f64,
+    /// Places at other nodes than that at which a ray is traced, where they need not be traced.
+    pub(super) displacements: Option<Displacements>,
+}
+
+impl BandInterpolation {
+    /// Width of the margin beside the film from which rays start (mm): that by which places part, and none where all
+    /// bands land on one.
+    pub(super) fn margin(&self) -> f64 {
+        if self.nodes.len() > 1 { self.reach } else { 0.0 }
+    }
+
+    /// True if no wavelength loses light, neither to glass nor to a filter.
+    pub(super) fn is_clear(&self) -> bool {
+        !self.has_losses && self.bounds.are_unfiltered()
+    }
 }
 
 impl OpenedGroup {

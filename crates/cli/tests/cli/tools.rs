@@ -98,12 +98,13 @@ fn accuracy_that_decides_nothing_is_said() {
     );
     let said = bench.run(&["plan", "scene.json"]);
     assert!(said.status.success(), "{}", text(&said.stderr));
-    insta::assert_snapshot!(notes_in(&bench.said(&said)), @"note: `accuracy.view_psnr`: decides nothing here: the camera takes no light field; leave it out");
     let row = "43 by itself; decides nothing here: the camera takes no light field [forced by accuracy.view_psnr]";
     assert!(text(&said.stdout).contains(row), "{}", text(&said.stdout));
     let checked = text(&bench.run(&["check", "scene.json"]).stdout);
     let finding = "`accuracy.view_psnr`: decides nothing here: the camera takes no light field";
     assert!(checked.contains(finding), "{checked}");
+    let rendered = bench.run(&["render", "scene.json", "-o", "out"]);
+    insta::assert_snapshot!(notes_in(&bench.said(&rendered)), @"note: `accuracy.view_psnr`: decides nothing here: the camera takes no light field; leave it out");
 }
 
 #[test]

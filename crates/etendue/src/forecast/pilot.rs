@@ -64,8 +64,8 @@ impl Pilot<'_> {
         };
         let height = camera.resolution()[1];
         let share = Shard::sample(height, STRIPS.max(STRIPS_OF_THREAD * threads()));
-        // The part of the whole picture's pixels that is traced.
-        let rows = f64::from(share.rows(height)) / f64::from(height);
+        // The part of the whole picture's samples that is traced.
+        let rows = plan.band_paths.share_of_samples(share, height);
         let traced = rows * pixels(camera) / pixels(whole);
         // What the first trace has beyond the others: tables are filled, threads and caches wake.
         let (waking, first) = self.traced(camera, share, 1)?;

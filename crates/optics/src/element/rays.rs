@@ -345,6 +345,12 @@ impl LensRays {
         self.len = 0;
     }
 
+    /// Makes the rays those of another batch, and keeps the memory.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.blocks.clone_from(&other.blocks);
+        self.len = other.len;
+    }
+
     /// Makes room for `len` rays, all of them to be set.
     pub(crate) fn resize(&mut self, len: usize) {
         self.blocks.clear();

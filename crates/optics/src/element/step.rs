@@ -5,6 +5,7 @@
 //! decides everything. Both give the same bits.
 
 mod block;
+mod narrowed;
 
 use std::sync::Arc;
 

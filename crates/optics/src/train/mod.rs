@@ -59,7 +59,7 @@ pub use opening::WidestOpening;
 pub use paraxial::{Paraxial, Pupil};
 pub use pupil::{ExitPupil, PupilSample};
 pub use report::{Inquiry, LensReport, NOTES, remove_notes};
-pub use trace::{MonochromaticTrain, RayPath, Registers, Side};
+pub use trace::{MonochromaticTrain, RayPath, Registers, RimTrace, Side};
 pub use zemax::{LensFormat, ZemaxError, ZemaxLens};
 
 /// A part at its place.

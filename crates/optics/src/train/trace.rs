@@ -1,5 +1,7 @@
 //! Rays through a lens at one wavelength.
 
+mod within;
+
 use std::sync::Arc;
 
 use etendue_spectrum::Curve;
@@ -15,6 +17,8 @@ use crate::element::{
     Action, Block, Clip, ElementStep, Fold, Frame, LensRays, Loss, Ray, RayStatus,
 };
 use crate::glass::GlassError;
+
+pub use within::RimTrace;
 
 /// More elements than these make a train long: the largest zoom lenses have some fifty surfaces.
 const LONG: f64 = 64.0;

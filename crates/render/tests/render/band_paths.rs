@@ -15,11 +15,11 @@ use serde_json::{Value, json};
 
 use crate::steps::{channels, load_json, mean, prepare, rendered};
 
-const COLUMNS: usize = 96;
-const ROWS: usize = 80;
+pub(crate) const COLUMNS: usize = 96;
+pub(crate) const ROWS: usize = 80;
 
 /// Scene of a sky and of a lamp before it, as `camera` sees it, each pixel by so many samples.
-fn scene(mut camera: Value, lamp: bool, samples: u32, more: &Value) -> Scene {
+pub(crate) fn scene(mut camera: Value, lamp: bool, samples: u32, more: &Value) -> Scene {
     camera["pose"] = json!({ "from": [0, 0, 4], "look_at": [0, 0, 0] });
     camera["sensor"] = json!({ "resolution": [COLUMNS, ROWS] });
     let mut scene = json!({
@@ -82,7 +82,7 @@ fn the_scene_says_how_nearly_shared_paths_land() {
 }
 
 /// The light of each band, with shared paths or without.
-fn light(scene: &Scene, bands: &Bands, shares: bool) -> Vec<Vec<f64>> {
+pub(crate) fn light(scene: &Scene, bands: &Bands, shares: bool) -> Vec<Vec<f64>> {
     let mut plan = Plan::new(scene, Outputs::from_list("exr").unwrap());
     assert!(plan.band_paths.are_shared(), "{:?}", plan.band_paths);
     plan.bands = bands.clone();

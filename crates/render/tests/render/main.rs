@@ -2,6 +2,7 @@
 #![allow(clippy::disallowed_methods, reason = "tests set their stage by hand")]
 
 mod adaptive;
+mod band_borders;
 mod band_paths;
 mod blocks;
 mod coarse_images;

@@ -1,0 +1,123 @@
+//! Landings of rays against those of rays that are traced.
+
+use std::path::Path;
+
+use etendue_geometry::Bounds;
+use etendue_spectrum::{Bands, Grid};
+
+use super::*;
+use crate::{CameraSpec, SharingLimits};
+
+/// The lens of a file, stopped down and focused, before 256 × 256 pixels of a sensor so high.
+fn camera_with(file: &str, f_number: f64, [distance, height]: [&str; 2]) -> crate::Camera {
+    let spec: CameraSpec = serde_json::from_value(serde_json::json!({
+        "type": "lens", "lens": format!("lenses/{file}.json"), "f_number": f_number,
+        "focus_distance": distance, "sensor_height": height, "pose": {"from": [0, 1, 4.4], "look_at": [0, 1, 0]},
+        "sensor": {"resolution": [256, 256]}
+    }))
+    .unwrap();
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+    let bounds = || Bounds { min: DVec3::splat(-0.5), max: DVec3::splat(0.5) };
+    spec.build(bounds, &|name: &str| Ok(scenes.join(name))).unwrap()
+}
+
+/// Each band's light falls on the pixel of its own ray, but for rays that land nearer to an edge than places err:
+/// behind lenses of one glass and of several, in three bands and in many. Two wavelengths place all bands behind
+/// the double Gauss, as its secondary spectrum is foreseen.
+#[test]
+fn bands_land_where_their_own_rays_do() {
+    let edges: Vec<f64> = (0..32).map(|k| 400.0 + 10.0 * f64::from(k)).collect();
+    let many = Bands::Spectral(Grid::from_edges(edges).unwrap());
+    for (file, f_number, at) in [
+        ("double-gauss", 2.8, ["4.4 m", "28 mm"]),
+        ("cooke-triplet", 5.6, ["3 m", "20 mm"]),
+        ("achromat", 8.0, ["3 m", "4 mm"]),
+        ("singlet", 4.0, ["3 m", "4 mm"]),
+    ] {
+        for bands in [&Bands::Rgb, &many] {
+            let camera = camera_with(file, f_number, at).opened(bands).unwrap();
+            let (found, error) = landings_elsewhere(&camera, 256.0, bands.count());
+            let nodes = camera.lens().unwrap().opened_paths().unwrap().traced;
+            assert!(file != "double-gauss" || nodes == 2, "{nodes}");
+            // Twice the error on either side, of columns and of rows.
+            let name = format!("{file}, {} bands, {nodes} nodes, {error}", bands.count());
+            assert!(error <= SharingLimits::DEFAULT.places, "{name}");
+            assert!(found < 4.0 * error, "{name}: {found}");
+            // Looked at on larger pixels, errors are smaller.
+            let (found, error) = landings_elsewhere(&camera.coarser(2), 128.0, bands.count());
+            assert!(found < 4.0 * (0.5 * error), "{name}: {found} on larger pixels");
+        }
+    }
+}
+
+/// Of rays that keep away from the rims of the double Gauss the places at other nodes follow from that at which they
+/// leave: they pass at all of them, and land within the limit of where they are traced to. Most rays are such rays.
+#[test]
+fn rays_away_from_rims_land_where_they_are_traced_to() {
+    let camera = camera_with("double-gauss", 2.8, ["4.4 m", "28 mm"]).opened(&Bands::Rgb);
+    let camera = camera.unwrap();
+    let lens = camera.lens().unwrap();
+    let paths = lens.opened.as_ref().unwrap().paths.as_ref().unwrap();
+    assert!(paths.displacements.is_some());
+    let samples = many_samples(20_000, 256.0);
+    let (mut rays, mut landings) = (CameraRays::default(), BandLandings::default());
+    camera.sample_band_rays(&samples, &mut rays, &mut landings);
+    let (mut known, mut worst) = (0, 0.0_f64);
+    for ray in (0..rays.sample.len()).filter(|&ray| landings.is_known[ray]) {
+        known += 1;
+        for (node, at) in paths.nodes.iter().enumerate() {
+            let [point, direction] = [landings.points[ray], landings.directions[ray]];
+            let start = Ray::new(point + direction * paths.lead, -direction).unwrap();
+            let end = at.run(Side::Object, Clip::On, start);
+            assert_eq!(end.status, RayStatus::Exited, "node {node}");
+            let Ray { position, direction } = end.ray;
+            let place = lens.focused.film().pixel(position.into(), direction.into());
+            let found = landings.places[ray * paths.nodes.len() + node];
+            worst = worst.max((place[0] - found[0]).hypot(place[1] - found[1]));
+        }
+    }
+    assert!(known * 10 > 9 * rays.sample.len(), "{known} of {}", rays.sample.len());
+    assert!(worst < SharingLimits::DEFAULT.places, "{worst}");
+}
+
+/// So many samples all over a film of so many pixels a side, the pupil and the spectrum.
+fn many_samples(count: u32, side: f64) -> FilmSamples {
+    let mut samples = FilmSamples::default();
+    for i in 0..count {
+        let steps = [0.754_877_666, 0.569_840_290, 0.618_033_988, 0.414_213_562, 0.732_050_807];
+        let [x, y, u, v, w] = steps.map(|step: f64| (0.5 + step * f64::from(i)).fract());
+        samples.push([side * x, side * y], [u, v], w);
+        samples.leading[i as usize] = (0.5 + 0.236_067_977 * f64::from(i)).fract();
+    }
+    samples
+}
+
+/// The share of landings that are not on the pixel of the band's own ray, on a film of so many pixels a side, and the error
+/// that was measured (pixels of the camera as it was opened).
+fn landings_elsewhere(camera: &crate::Camera, side: f64, bands: usize) -> (f64, f64) {
+    let lens = camera.lens().unwrap();
+    let opened = lens.opened.as_ref().unwrap();
+    let paths = opened.paths.as_ref().unwrap();
+    let samples = many_samples(60_000 / u32::try_from(bands).unwrap(), side);
+    let (mut rays, mut landings) = (CameraRays::default(), BandLandings::default());
+    camera.sample_band_rays(&samples, &mut rays, &mut landings);
+    let (mut landed, mut elsewhere) = (0, 0);
+    for (ray, &sample) in rays.sample.iter().enumerate() {
+        let u = samples.spectrum[sample as usize];
+        for band in 0..bands {
+            let wavelengths = &paths.bands[band];
+            let number = place_of(u, wavelengths.len());
+            let from = [landings.points[ray], landings.directions[ray]];
+            let ([x, y], passed) = lens.trace_back(paths.lead, band, number, from);
+            let is_seen = passed > 0.0 && x.min(y) >= 0.0 && x.max(y) < side;
+            let own = match is_seen {
+                true => y.floor() * side + x.floor(),
+                false => f64::from(BandLandings::NOWHERE),
+            };
+            landed += 1;
+            elsewhere += u32::from(own != f64::from(landings.pixel[bands * ray + band]));
+        }
+    }
+    assert!(landed > 30_000, "{landed}");
+    (f64::from(elsewhere) / f64::from(landed), paths.error)
+}

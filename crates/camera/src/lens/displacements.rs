@@ -1,0 +1,314 @@
+//! Where rays that land on the film at one wavelength land at another, without tracing them there.
+//!
+//! Both places lie within a pixel or a few, and the vector between them is that of a lens with axial symmetry: with the
+//! place h on the film and the ray's slopes r there, both from the axis, `h P(h², h·r, r²) + r Q(h², h·r, r²)`. P and
+//! Q have all terms up to the third degree, which are aberrations up to the seventh order (H. A. Buchdahl, *Optical
+//! Aberration Coefficients*, 1954), and are fitted to rays that are traced. Where they leave more than interpolation
+//! between wavelengths may be off, rays are traced.
+//!
+//! A ray that keeps away from all rims by more than wavelengths part there passes at each of them; others are
+//! traced.
+
+use etendue_optics::analysis::least_squares::LeastSquares;
+use etendue_optics::element::{Block, Clip, LANES, LensRays, RayStatus};
+use etendue_optics::train::{MonochromaticTrain, RimTrace, Side};
+use glam::{DMat3, DVec2, DVec3};
+
+use super::band_paths::SceneRay;
+use super::lens_camera::LensCamera;
+use super::opened::BandInterpolation;
+
+/// More wavelengths than these take as long to fit as many rays take to be traced. Not a setting: it changes time alone.
+const MOST_WAVELENGTHS: usize = 4;
+
+/// Rays that are fitted to, about.
+const RAYS: usize = 2500;
+
+/// Factor on the measured parting of wavelengths at rims, which may be greater in between.
+const SAFETY: f64 = 1.25;
+
+/// Terms of three numbers up to the third degree.
+const TERMS: usize = 20;
+
+/// Displacements of rays between all pairs of wavelengths.
+#[derive(Debug)]
+pub(super) struct Displacements {
+    /// The lens at each wavelength, its rims narrower by so much that rays which pass it pass all of them as they are.
+    narrowed: Vec<MonochromaticTrain>,
+    scales: Scales,
+    /// `[from][to]`.
+    shifts: Vec<Vec<Shift>>,
+    /// Greatest distance from where fitted rays land (mm).
+    error: f64,
+}
+
+/// Units of places and slopes, in which both are numbers of about one.
+#[derive(Debug, Clone, Copy)]
+struct Scales {
+    /// Factor on places (1/mm).
+    place: f64,
+    /// Slopes of the middle of the light, as a multiple of the place (1/mm).
+    chief: f64,
+    /// Factor on slopes from there.
+    slope: f64,
+}
+
+/// Polynomials of a displacement from one wavelength to another (mm): P and Q.
+#[derive(Debug, Clone, Copy)]
+struct Shift {
+    along: [f64; TERMS],
+    across: [f64; TERMS],
+}
+
+/// End of a ray on the film at a wavelength: its place from the axis (mm), its slopes, and its crossings with the elements.
+struct FilmEnd {
+    place: DVec2,
+    slopes: DVec2,
+    crossings: Vec<DVec2>,
+}
+
+impl LensCamera {
+    /// Adds the displacements between its wavelengths to what is known of `paths`, where they will do.
+    pub(super) fn displaced(&self, mut paths: BandInterpolation) -> BandInterpolation {
+        paths.displacements = self.displacements(&paths);
+        let error = paths.displacements.as_ref().map_or(0.0, |known| known.error);
+        paths.error += paths.bounds.magnified() * error / self.focused.film().pitch;
+        paths
+    }
+
+    /// Measures the displacements between the wavelengths of `paths`; `None` where these would be off by more than
+    /// there is left of what places may be, or are dear.
+    fn displacements(&self, paths: &BandInterpolation) -> Option<Displacements> {
+        let BandInterpolation { nodes, has_losses, lead, error, .. } = paths;
+        let film = self.focused.film();
+        let is_square = film.frame.rotation == DMat3::IDENTITY;
+        if *has_losses || !is_square || !(2..=MOST_WAVELENGTHS).contains(&nodes.len()) {
+            return None;
+        }
+        // Rays of the scene, and where they end at each wavelength: those that pass at all of them.
+        let rays = self.rays_to_measure(&nodes[nodes.len() / 2]);
+        let step = rays.len().div_ceil(RAYS).max(1);
+        let ends_of = |&SceneRay { point, direction }: &SceneRay| -> Option<Vec<FilmEnd>> {
+            let start = point + direction * *lead;
+            nodes.iter().map(|lens| self.film_end(lens, start, -direction)).collect()
+        };
+        let ends: Vec<Vec<FilmEnd>> = rays.iter().step_by(step).filter_map(ends_of).collect();
+        let scales = Scales::of(&ends)?;
+        let narrowed = narrowed(nodes, &ends)?;
+        let mut found = Displacements { narrowed, scales, shifts: Vec::new(), error: 0.0 };
+        for from in 0..nodes.len() {
+            let to = |to: usize| {
+                if to == from {
+                    return Some((Shift::NONE, 0.0));
+                }
+                let shift = Shift::fitted(&scales, &ends, [from, to])?;
+                Some((shift, shift.error(&scales, &ends, [from, to])))
+            };
+            let pairs = (0..nodes.len()).map(to).collect::<Option<Vec<_>>>()?;
+            found.error = pairs.iter().fold(found.error, |most, (_, error)| most.max(*error));
+            found.shifts.push(pairs.into_iter().map(|(shift, _)| shift).collect());
+        }
+        let all = error + paths.bounds.magnified() * found.error / film.pitch;
+        (all <= self.accuracy.sharing.places).then_some(found)
+    }
+
+    /// End of a ray of the scene on the film; `None` where it ends before, or meets an element more than once.
+    fn film_end(&self, lens: &MonochromaticTrain, start: DVec3, way: DVec3) -> Option<FilmEnd> {
+        let path = lens.path(Side::Object, Clip::On, start, way);
+        let (last, direction) = (path.points.last()?, path.direction?);
+        if path.status != RayStatus::Exited
+            || path.points.len() != self.focused.train().elements().len()
+        {
+            return None;
+        }
+        let slopes = direction.truncate() / direction.z;
+        let place = last.truncate() + slopes * (self.focused.sensor_z() - last.z);
+        let crossings = path.points.iter().map(|point| point.truncate()).collect();
+        (place.is_finite() && slopes.is_finite()).then_some(FilmEnd { place, slopes, crossings })
+    }
+}
+
+/// Lenses whose rims are narrower by as much as wavelengths part there.
+fn narrowed(
+    nodes: &[MonochromaticTrain],
+    ends: &[Vec<FilmEnd>],
+) -> Option<Vec<MonochromaticTrain>> {
+    let elements = ends.first()?.first()?.crossings.len();
+    let parting = |element: usize| {
+        let of_ray = |ends: &Vec<FilmEnd>| {
+            let places = ends.iter().map(|end| end.crossings[element]);
+            places.map(|at| at.distance(ends[0].crossings[element])).fold(0.0, f64::max)
+        };
+        // From the first wavelength; any two of them part by twice as much at the most.
+        let factor = if nodes.len() > 2 { 2.0 } else { 1.0 };
+        SAFETY * factor * ends.iter().map(of_ray).fold(0.0, f64::max)
+    };
+    let by: Vec<f64> = (0..elements).map(parting).collect();
+    nodes.iter().map(|lens| lens.narrowed(&by)).collect()
+}
+
+impl Displacements {
+    /// Takes the rays of a node out of the lens, and tells which of them pass it at all wavelengths.
+    pub(super) fn trace(
+        &self,
+        node: usize,
+        lens: &MonochromaticTrain,
+        rays: &mut LensRays,
+        rims: &mut RimTrace,
+    ) {
+        lens.trace_within(&self.narrowed[node], Side::Sensor, rays, rims);
+    }
+
+    /// Refills `out` with the displacements (mm) of rays from one wavelength to another, by how they start from the film.
+    pub(super) fn between(&self, [from, to]: [usize; 2], rays: &LensRays, out: &mut Vec<[f64; 2]>) {
+        out.clear();
+        for start in (0..rays.len()).step_by(LANES) {
+            let (block, count) = rays.block_at(start);
+            let mut shifts = [[0.0; LANES]; 2];
+            shift_block(&self.scales, &self.shifts[from][to], block, &mut shifts);
+            out.extend((0..count).map(|lane| [shifts[0][lane], shifts[1][lane]]));
+        }
+    }
+}
+
+impl Scales {
+    /// Those of all ends on the film; `None` where they are all on one place, or have one slope.
+    fn of(ends: &[Vec<FilmEnd>]) -> Option<Self> {
+        let all = || ends.iter().flatten();
+        let place = all().map(|end| end.place.length()).fold(0.0, f64::max).recip();
+        let squares: f64 = all().map(|end| end.place.length_squared()).sum();
+        let chief = all().map(|end| end.place.dot(end.slopes)).sum::<f64>() / squares;
+        let from_chief = |end: &FilmEnd| (end.slopes - end.place * chief).length();
+        let slope = all().map(from_chief).fold(0.0, f64::max).recip();
+        let scales = Self { place, chief, slope };
+        [place, chief, slope].iter().all(|scale| scale.is_finite()).then_some(scales)
+    }
+
+    /// Place and slopes in these units.
+    #[inline(always)]
+    fn scaled(&self, place: [f64; 2], slopes: [f64; 2]) -> [[f64; 2]; 2] {
+        let slope = |axis: usize| (slopes[axis] - place[axis] * self.chief) * self.slope;
+        [[place[0] * self.place, place[1] * self.place], [slope(0), slope(1)]]
+    }
+}
+
+/// h², h·r and r².
+#[inline(always)]
+fn invariants([h, r]: [[f64; 2]; 2]) -> [f64; 3] {
+    [h[0] * h[0] + h[1] * h[1], h[0] * r[0] + h[1] * r[1], r[0] * r[0] + r[1] * r[1]]
+}
+
+/// All products of up to three of the invariants, in the order of [`polynomial`]'s coefficients.
+fn products([u, v, w]: [f64; 3]) -> [f64; TERMS] {
+    let second = [u * u, u * v, u * w, v * v, v * w, w * w];
+    let [uu, uv, uw, vv, vw, ww] = second;
+    [
+        1.0,
+        u,
+        v,
+        w,
+        uu,
+        uv,
+        uw,
+        vv,
+        vw,
+        ww,
+        uu * u,
+        uu * v,
+        uu * w,
+        u * vv,
+        uv * w,
+        u * ww,
+        vv * v,
+        vv * w,
+        v * ww,
+        ww * w,
+    ]
+}
+
+/// The polynomial of three numbers with these coefficients.
+#[inline(always)]
+fn polynomial(c: &[f64; TERMS], [u, v, w]: [f64; 3]) -> f64 {
+    let of_u = c[1]
+        + u * (c[4] + u * c[10] + v * c[11] + w * c[12])
+        + v * (c[5] + v * c[13] + w * c[14])
+        + w * (c[6] + w * c[15]);
+    let of_v = c[2] + v * (c[7] + v * c[16] + w * c[17]) + w * (c[8] + w * c[18]);
+    let of_w = c[3] + w * (c[9] + w * c[19]);
+    c[0] + u * of_u + v * of_v + w * of_w
+}
+
+impl Shift {
+    const NONE: Self = Self { along: [0.0; TERMS], across: [0.0; TERMS] };
+
+    /// By least squares of rays that end at both wavelengths; `None` where these do not tell it.
+    fn fitted(scales: &Scales, ends: &[Vec<FilmEnd>], [from, to]: [usize; 2]) -> Option<Self> {
+        let mut fit = LeastSquares::new(2 * TERMS);
+        for ends in ends {
+            let FilmEnd { place, slopes, .. } = &ends[from];
+            let shift = ends[to].place - *place;
+            let scaled = scales.scaled((*place).into(), (*slopes).into());
+            let products = products(invariants(scaled));
+            for axis in 0..2 {
+                let [along, across] = scaled.map(|vector| products.map(|term| vector[axis] * term));
+                fit.add(&[along, across].concat(), shift[axis], 1.0);
+            }
+        }
+        let found = fit.solve()?;
+        let (along, across) = found.split_at(TERMS);
+        Some(Self { along: along.try_into().ok()?, across: across.try_into().ok()? })
+    }
+
+    /// Greatest distance from where rays end (mm).
+    fn error(&self, scales: &Scales, ends: &[Vec<FilmEnd>], [from, to]: [usize; 2]) -> f64 {
+        let off = |ends: &Vec<FilmEnd>| {
+            let FilmEnd { place, slopes, .. } = &ends[from];
+            let shift = self.at(scales.scaled((*place).into(), (*slopes).into()));
+            (DVec2::from(shift) + *place).distance(ends[to].place)
+        };
+        ends.iter().map(off).fold(0.0, f64::max)
+    }
+
+    /// That of a ray with a place and slopes in the units of [`Scales`].
+    #[inline(always)]
+    fn at(&self, [h, r]: [[f64; 2]; 2]) -> [f64; 2] {
+        let of = invariants([h, r]);
+        let (along, across) = (polynomial(&self.along, of), polynomial(&self.across, of));
+        [h[0] * along + r[0] * across, h[1] * along + r[1] * across]
+    }
+}
+
+/// Displacements of the rays of a block that start from the film.
+#[multiversion::multiversion(targets = "simd")]
+fn shift_block(scales: &Scales, shift: &Shift, block: &Block, out: &mut [[f64; LANES]; 2]) {
+    let [x, y, _] = &block.position;
+    let [u, v, w] = &block.direction;
+    let (scales, shift) = (*scales, *shift);
+    for i in 0..LANES {
+        let inverse = 1.0 / w[i];
+        let scaled = scales.scaled([x[i], y[i]], [u[i] * inverse, v[i] * inverse]);
+        [out[0][i], out[1][i]] = shift.at(scaled);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Coefficients stand before the products that they are fitted to.
+    #[test]
+    fn the_polynomial_is_the_sum_of_its_products() {
+        let of = [0.7, -0.3, 0.45];
+        let products = products(of);
+        let mut all = [0.0; TERMS];
+        let mut sum = 0.0;
+        for (k, product) in products.iter().enumerate() {
+            let mut one = [0.0; TERMS];
+            one[k] = 1.0;
+            assert!((polynomial(&one, of) - product).abs() < 1e-15, "{k}");
+            all[k] = 1.0 + k as f64;
+            sum += all[k] * product;
+        }
+        assert!((polynomial(&all, of) - sum).abs() < 1e-13);
+    }
+}
