@@ -65,6 +65,10 @@ pub fn vector<F: Float>(axes: &[Floats<F>; 3], lane: usize) -> DVec3 {
 /// between slices is a call where the function has more instructions than the standard library.)
 #[must_use]
 #[inline(always)]
+#[expect(
+    clippy::manual_memcpy,
+    reason = "a copy between slices is a call, where instructions differ"
+)]
 pub fn lanes<T: Copy + Default>(column: &[T], start: usize) -> [T; LANES] {
     let mut row = [T::default(); LANES];
     if let Some(own) = column.get(start..start + LANES) {

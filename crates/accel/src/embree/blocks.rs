@@ -236,6 +236,10 @@ macro_rules! put_rays {
 
 /// Takes the lanes of a row from `start` on.
 #[inline(always)]
+#[expect(
+    clippy::manual_memcpy,
+    reason = "a copy between slices is a call, where instructions differ"
+)]
 fn take<T: Copy, const W: usize>(lanes: &mut [T; W], row: &[T; LANES], start: usize) {
     let row = &row[start..start + W];
     for i in 0..W {
@@ -245,6 +249,10 @@ fn take<T: Copy, const W: usize>(lanes: &mut [T; W], row: &[T; LANES], start: us
 
 /// Puts lanes into a row from `start` on.
 #[inline(always)]
+#[expect(
+    clippy::manual_memcpy,
+    reason = "a copy between slices is a call, where instructions differ"
+)]
 fn put<T: Copy, const W: usize>(row: &mut [T; LANES], start: usize, lanes: &[T; W]) {
     let row = &mut row[start..start + W];
     for i in 0..W {

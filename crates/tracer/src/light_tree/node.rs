@@ -279,6 +279,10 @@ fn spread([a, b]: [&[f32; 3]; 2]) -> [[f32; TWICE]; 3] {
 
 /// The numbers of one node's branches and of another's.
 #[inline(always)]
+#[expect(
+    clippy::manual_memcpy,
+    reason = "a copy between slices is a call, where instructions differ"
+)]
 fn twice(a: &[f32; WIDTH], b: &[f32; WIDTH]) -> [f32; TWICE] {
     let mut both = [0.0; TWICE];
     for k in 0..WIDTH {

@@ -1,5 +1,4 @@
 //! Lanes of a mask put side by side.
-#![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 #![expect(
     clippy::manual_memcpy,
     reason = "a copy between slices is a call, of functions with more instructions"
