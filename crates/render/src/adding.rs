@@ -275,23 +275,23 @@ impl Adding<'_> {
             let pixels = tile.pixels().map(|at| tile.on_film(at));
             self.add_pixels(&pixels.filter(lands).collect::<Vec<_>>(), to, memory)?;
         }
-        let beside: Vec<Pixel> = self.beside(strip).filter(lands).collect();
-        self.add_pixels(&beside, to, memory)
+        let margin: Vec<Pixel> = self.margin_pixels(strip).filter(lands).collect();
+        self.add_pixels(&margin, to, memory)
     }
 
     /// Pixels beside the picture from which light may land on it: left and right of a strip, above the first one and
     /// below the last.
-    fn beside(&self, [top, height]: [u32; 2]) -> impl Iterator<Item = Pixel> {
+    fn margin_pixels(&self, [top, height]: [u32; 2]) -> impl Iterator<Item = Pixel> {
         let size = self.what.camera().resolution();
         let margin = self.what.margin().cast_signed();
         let [width, all, top, end] = [size[0], size[1], top, top + height].map(u32::cast_signed);
         let first = if top == 0 { -margin } else { top };
         let end = if end == all { all + margin } else { end };
-        let is_beside =
+        let is_outside =
             move |&[column, row]: &Pixel| !(0..width).contains(&column) || !(0..all).contains(&row);
         let rows = if margin > 0 { first..end } else { 0..0 };
         rows.flat_map(move |row| (-margin..width + margin).map(move |column| [column, row]))
-            .filter(is_beside)
+            .filter(is_outside)
     }
 
     /// Refills the batch with the samples of `runs`. A camera without a lens looks at places alone.

@@ -149,8 +149,8 @@ impl SampledStrips {
     pub(crate) fn share_of_rows(self, margin: f64) -> f64 {
         let height = self.height.cast_signed();
         let taken = (0..height).filter(|&row| self.land_from(row)).count() as f64;
-        let beside = [-1, height].into_iter().filter(|&row| self.land_from(row)).count() as f64;
-        (taken + margin * beside) / (f64::from(self.height) + 2.0 * margin)
+        let sides = [-1, height].into_iter().filter(|&row| self.land_from(row)).count() as f64;
+        (taken + margin * sides) / (f64::from(self.height) + 2.0 * margin)
     }
 }
 
