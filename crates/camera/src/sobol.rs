@@ -77,7 +77,7 @@ pub(crate) fn float(x: f64) -> f32 {
 
 /// The point of one key in two dimensions of its set.
 pub(crate) fn point(key: SobolKey, half: Half) -> [f64; 2] {
-    let [point] = side_by_side([key.index], |_| key.seed, half);
+    let [point] = side_by_side([key.index], [key.seed], half);
     point
 }
 
@@ -86,12 +86,14 @@ fn scrambled(keys: &[SobolKey], half: Half, out: &mut [[f64; 2]]) {
     let (whole, rest) = keys.as_chunks::<LANES>();
     let (to, to_rest) = out.as_chunks_mut::<LANES>();
     for (keys, out) in whole.iter().zip(to) {
-        *out = chunk(keys, half);
+        let (index, seeds) = apart(keys);
+        *out = side_by_side(index, seeds, half);
     }
     if let Some(last) = rest.last() {
         let mut lanes = [*last; LANES];
         lanes[..rest.len()].copy_from_slice(rest);
-        to_rest.copy_from_slice(&chunk(&lanes, half)[..rest.len()]);
+        let (index, seeds) = apart(&lanes);
+        to_rest.copy_from_slice(&side_by_side(index, seeds, half)[..rest.len()]);
     }
 }
 
@@ -103,53 +105,43 @@ fn scrambled_floats(
     half: Half,
     [x, y]: [&mut [f32]; 2],
 ) {
-    for ((picked, x), y) in picked.chunks(LANES).zip(x.chunks_mut(LANES)).zip(y.chunks_mut(LANES)) {
-        let mut lanes = [SobolKey::default(); LANES];
-        for (lane, &number) in lanes.iter_mut().zip(picked) {
-            *lane = keys[number as usize].shifted(shift);
-        }
-        let [across, up] = numbers_of(&lanes, half);
-        let (mut a, mut b) = ([0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
-            // Their upper 24 bits, which single precision holds.
-            a[i] = (across[i] >> 8) as f32 / 16_777_216.0;
-            b[i] = (up[i] >> 8) as f32 / 16_777_216.0;
-        }
-        put(&a, x);
-        put(&b, y);
+    let (whole, rest) = picked.as_chunks::<LANES>();
+    let ((x, x_rest), (y, y_rest)) = (x.as_chunks_mut::<LANES>(), y.as_chunks_mut::<LANES>());
+    for ((picked, x), y) in whole.iter().zip(x).zip(y) {
+        [*x, *y] = floats_of(keys, shift, picked, half);
+    }
+    if let Some(last) = rest.last() {
+        let mut lanes = [*last; LANES];
+        lanes[..rest.len()].copy_from_slice(rest);
+        let [a, b] = floats_of(keys, shift, &lanes, half);
+        x_rest.copy_from_slice(&a[..rest.len()]);
+        y_rest.copy_from_slice(&b[..rest.len()]);
     }
 }
 
-/// Puts the numbers of lanes into what there is room for, mostly all. (A copy between slices is a call.)
+/// The upper 24 bits of the points of some keys, which single precision holds.
 #[inline(always)]
-fn put(lanes: &[f32; LANES], to: &mut [f32]) {
-    match to.first_chunk_mut() {
-        Some(to) => *to = *lanes,
-        None => to.copy_from_slice(&lanes[..to.len()]),
+fn floats_of(
+    keys: &[SobolKey],
+    shift: u32,
+    picked: &[u32; LANES],
+    half: Half,
+) -> [[f32; LANES]; 2] {
+    let (mut index, mut seeds) = ([0; LANES], [0; LANES]);
+    for i in 0..LANES {
+        let SobolKey { index: at, seed } = keys[picked[i] as usize];
+        (index[i], seeds[i]) = (at, seed);
     }
-}
-
-/// The upper 32 bits of the points of some keys.
-#[inline(always)]
-fn numbers_of(keys: &[SobolKey; LANES], half: Half) -> [[u32; LANES]; 2] {
-    let (index, seeds) = apart(keys);
-    let seed = seeds[0];
-    let numbers = match differences(&seeds) {
-        0 => upper_bits(index, |_| seed, half),
-        _ => upper_bits(index, |i| seeds[i], half),
-    };
-    let [(across, _), (up, _)] = numbers;
-    [across, up]
-}
-
-/// The bits in which some differ from the first. (What folds is a function of its own, compiled without wide registers.)
-#[inline(always)]
-fn differences(seeds: &[u32; LANES]) -> u32 {
-    let mut all = 0;
-    for seed in seeds {
-        all |= seed ^ seeds[0];
+    for seed in &mut seeds {
+        *seed = seed.wrapping_add(shift);
     }
-    all
+    let [(across, _), (up, _)] = upper_bits(index, seeds, half);
+    let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
+    for i in 0..LANES {
+        x[i] = (across[i] >> 8) as f32 / 16_777_216.0;
+        y[i] = (up[i] >> 8) as f32 / 16_777_216.0;
+    }
+    [x, y]
 }
 
 /// The samples and the scramblings of some keys.
@@ -160,17 +152,6 @@ fn apart(keys: &[SobolKey; LANES]) -> ([u32; LANES], [u32; LANES]) {
         (index[i], seeds[i]) = (keys[i].index, keys[i].seed);
     }
     (index, seeds)
-}
-
-/// Evaluates a chunk of keys: where all are of one scrambling, as nearly always, what goes into it is hashed once.
-#[inline(always)]
-fn chunk(keys: &[SobolKey; LANES], half: Half) -> [[f64; 2]; LANES] {
-    let (index, seeds) = apart(keys);
-    let seed = seeds[0];
-    match differences(&seeds) {
-        0 => side_by_side(index, |_| seed, half),
-        _ => side_by_side(index, |i| seeds[i], half),
-    }
 }
 
 /// The second dimension of point `index`, its bits reversed.
@@ -187,35 +168,39 @@ fn second_reversed(index: u32) -> u32 {
 /// The scrambled upper 32 bits of each dimension, with what they were scrambled by.
 #[inline(always)]
 fn upper_bits<const N: usize>(
-    keys: [u32; N],
-    seed: impl Fn(usize) -> u32,
+    index: [u32; N],
+    seeds: [u32; N],
     half: Half,
 ) -> [([u32; N], [u32; N]); 2] {
     const SALTS: [[u32; 2]; 2] = [[0x912f_69ba, 0x174f_18ab], [0x912f_69bc, 0x174f_18ad]];
-    // The scrambled index of each sequence.
-    let mut index = [0; N];
+    let mut keys = [0; N];
     for i in 0..N {
-        let key = hash(seed(i));
-        index[i] = owen_scramble_rev(paired(keys[i], key).reverse_bits(), key).reverse_bits();
+        keys[i] = hash(seeds[i]);
+    }
+    // The scrambled index of each sequence.
+    let mut at = [0; N];
+    for i in 0..N {
+        let own = paired(index[i], keys[i]).reverse_bits();
+        at[i] = owen_scramble_rev(own, keys[i]).reverse_bits();
     }
     let salts = match half {
         Half::First => SALTS[0],
         Half::Second => {
-            for index in &mut index {
-                *index = of_second_half(*index);
+            for at in &mut at {
+                *at = of_second_half(*at);
             }
             SALTS[1]
         }
     };
     let mut second = [0; N];
     for i in 0..N {
-        second[i] = second_reversed(index[i]);
+        second[i] = second_reversed(at[i]);
     }
     let mut out = [([0; N], [0; N]); 2];
-    for (((high, scrambles), number), salt) in out.iter_mut().zip([index, second]).zip(salts) {
+    for (((high, scrambles), number), salt) in out.iter_mut().zip([at, second]).zip(salts) {
         let salt = hash(salt);
         for i in 0..N {
-            scrambles[i] = hash(hash(seed(i)) ^ salt);
+            scrambles[i] = hash(keys[i] ^ salt);
             high[i] = owen_scramble_rev(number[i], scrambles[i]).reverse_bits();
         }
     }
@@ -246,13 +231,9 @@ fn of_second_half(index: u32) -> u32 {
 
 /// 32 bits that are scrambled, and 21 more by hashing.
 #[inline(always)]
-fn side_by_side<const N: usize>(
-    keys: [u32; N],
-    seed: impl Fn(usize) -> u32,
-    half: Half,
-) -> [[f64; 2]; N] {
+fn side_by_side<const N: usize>(index: [u32; N], seeds: [u32; N], half: Half) -> [[f64; 2]; N] {
     let mut rows = [[0.0; N]; 2];
-    for (row, (high, scrambles)) in rows.iter_mut().zip(upper_bits(keys, seed, half)) {
+    for (row, (high, scrambles)) in rows.iter_mut().zip(upper_bits(index, seeds, half)) {
         for i in 0..N {
             let low = hash(high[i] ^ scrambles[i]) >> 11;
             row[i] = (f64::from(high[i]) + f64::from(low) / TWO_TO_21) / TWO_TO_32;

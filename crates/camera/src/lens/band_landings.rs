@@ -1,14 +1,16 @@
 //! Rays of the scene that all bands share, and where each band's light of them lands ([`band_paths`](super::band_paths)
 //! has why).
 
-use etendue_optics::element::{Clip, LensRays, Ray, RayStatus};
+use etendue_optics::element::{Block, Clip, LANES, LensRays, Ray, RayStatus};
 use etendue_optics::train::{MonochromaticTrain, RimTrace, Side};
 use glam::DVec3;
 
+use self::block::{BlockLandings, Placing};
 use super::lens_camera::LensCamera;
-use super::nodes::{MOST_NODES, NodeWeights};
 use super::opened::{BandInterpolation, place_of};
 use crate::{CameraRays, FilmSamples, Pose};
+
+mod block;
 
 /// Landing points of the light of each band that comes along rays which all bands share, `[ray][band]`.
 #[derive(Debug, Clone, Default)]
@@ -17,18 +19,27 @@ pub struct BandLandings {
     pub pixel: Vec<u32>,
     /// Weight of the ray's radiance in the band in the mean over the samples of that pixel.
     pub weight: Vec<f64>,
-    /// Of each ray where it leaves the lens (mm), its direction, its weight before the lens, and its node.
+    /// Rays that are traced back to find their places at other nodes.
+    traced: TracedRays,
+    /// Numbers of a node's samples.
+    numbers: Vec<u32>,
+    /// Weights of a batch before it passes the lens, and what becomes of it at the rims.
+    before: Vec<f64>,
+    rims: RimTrace,
+    /// A block whose places follow from how its rays start.
+    block: BlockLandings,
+}
+
+/// Rays that leave the lens at one node, and where they end at all of them.
+#[derive(Debug, Clone, Default)]
+struct TracedRays {
+    /// Number among the rays that leave the camera.
+    ray: Vec<usize>,
+    /// Where it leaves the lens (mm), its direction, its weight before the lens, and its node.
     points: Vec<DVec3>,
     directions: Vec<DVec3>,
     weights: Vec<f64>,
     leading: Vec<usize>,
-    /// True of rays whose places at all nodes are known without tracing them.
-    is_known: Vec<bool>,
-    /// Before the lens is passed: the weights of a batch.
-    before: Vec<f64>,
-    /// And what becomes of it at the rims, and its displacements (mm), `[node][ray]`.
-    rims: RimTrace,
-    shifts: Vec<Vec<[f64; 2]>>,
     /// `[ray][node]`: the place (pixels), and the share that the lens passes, 0 where it ends.
     places: Vec<[f64; 2]>,
     shares: Vec<f64>,
@@ -48,41 +59,26 @@ pub(super) struct StartArea {
 
 impl StartArea {
     /// True if a place is on the film.
-    #[inline(always)]
     fn is_seen(&self, [x, y]: [f64; 2]) -> bool {
-        let [width, height] = self.resolution.map(f64::from);
+        let [width, height] = self.size();
         x >= 0.0 && y >= 0.0 && x < width && y < height
     }
 
-    /// True if rays start from a place.
-    #[inline(always)]
-    fn contains(&self, [x, y]: [f64; 2]) -> bool {
-        let margin = self.margin;
-        let [width, height] = self.resolution.map(|side| f64::from(side) + margin);
-        x >= -margin && y >= -margin && x < width && y < height
+    /// Width and height of the film.
+    fn size(&self) -> [f64; 2] {
+        self.resolution.map(f64::from)
+    }
+
+    /// The lowest places from which rays start, and the first beyond the highest.
+    fn bounds(&self) -> [[f64; 2]; 2] {
+        [[-self.margin; 2], self.size().map(|side| side + self.margin)]
     }
 
     /// Index of the pixel in which a place of the film lies.
-    #[inline(always)]
-    fn pixel_at(&self, place: [f64; 2]) -> u32 {
-        let [column, row] = column_and_row(place);
-        row * self.resolution[0] + column
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "of a picture")]
+    fn pixel_at(&self, [x, y]: [f64; 2]) -> u32 {
+        y as u32 * self.resolution[0] + x as u32
     }
-
-    /// Index of the only pixel in which places between two corners lie, if there is one.
-    #[inline(always)]
-    fn only_pixel(&self, [low, high]: [[f64; 2]; 2]) -> Option<u32> {
-        let is_one =
-            self.is_seen(low) && self.is_seen(high) && column_and_row(low) == column_and_row(high);
-        is_one.then(|| self.pixel_at(low))
-    }
-}
-
-/// Column and row of the pixel in which a place of the film lies.
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a pixel of a picture")]
-fn column_and_row([x, y]: [f64; 2]) -> [u32; 2] {
-    [x as u32, y as u32]
 }
 
 impl LensCamera {
@@ -105,26 +101,30 @@ impl LensCamera {
         let paths = opened.paths.as_ref().expect("bands share rays");
         let area = StartArea { resolution, margin: self.margin(paths) };
         landings.clear();
+        let film = self.focused.film();
+        let placing = Placing {
+            paths,
+            area: &area,
+            next: paths.next.on_pixels(film.pitch / paths.pitch),
+            to_pixels: 1.0 / (film.turn * film.pitch),
+        };
         // Out of the camera, each at its leading wavelength.
         for (node, lens) in paths.nodes.iter().enumerate() {
-            let is_of_node = |u: f64| place_of(u, paths.nodes.len()) == node;
-            let starts = |&i: &usize| area.contains([samples.columns[i], samples.rows[i]]);
-            let of_node = (0..samples.len()).filter(|&i| is_of_node(samples.leading[i]));
-            #[expect(clippy::cast_possible_truncation, reason = "samples of a batch")]
-            let numbers = of_node.filter(starts).map(|i| i as u32);
+            landings.take_samples([node, paths.nodes.len()], &area, samples);
+            let numbers = landings.numbers.iter().copied();
             let first = self.aim_samples(&opened.pupil, lens, samples, numbers, out);
             landings.pass(paths, node, &mut out.in_lens);
             out.statuses.add_all(&out.in_lens);
-            let to_pixels = 1.0 / (self.focused.film().turn * self.focused.film().pitch);
-            landings.keep(node, to_pixels, samples, &out.sample[first..], &out.in_lens);
+            landings.keep(node, &placing, samples, &out.sample[first..], &out.in_lens);
             self.leave(pose, first, out);
         }
         out.rays.coherent = true;
         // Back into it at the others, where it is not known where they land.
         for (node, lens) in paths.nodes.iter().enumerate() {
-            self.bring_back([node, paths.nodes.len()], lens, paths.lead, out, landings);
+            let nodes = [node, paths.nodes.len()];
+            self.bring_back(nodes, lens, paths.lead, &mut out.in_lens, &mut landings.traced);
         }
-        self.land(paths, &area, samples, out, landings);
+        self.land(&placing, samples, &out.sample, landings);
         landings.drop_lost(&area, samples, out);
     }
 
@@ -134,119 +134,76 @@ impl LensCamera {
         [node, nodes]: [usize; 2],
         lens: &MonochromaticTrain,
         lead: f64,
-        out: &mut CameraRays,
-        landings: &mut BandLandings,
+        back: &mut LensRays,
+        traced: &mut TracedRays,
     ) {
-        let BandLandings { points, directions, leading, is_known, places, shares, .. } = landings;
-        let comes_back = |&ray: &usize| leading[ray] != node && !is_known[ray];
-        let back = &mut out.in_lens;
+        let TracedRays { points, directions, leading, places, shares, .. } = traced;
+        let comes_back = |&k: &usize| leading[k] != node;
         back.clear();
-        for ray in (0..points.len()).filter(comes_back) {
-            back.push(points[ray] + directions[ray] * lead, -directions[ray]);
+        for k in (0..points.len()).filter(comes_back) {
+            back.push(points[k] + directions[k] * lead, -directions[k]);
         }
         lens.trace(Side::Object, Clip::On, back);
         let film = self.focused.film();
-        for (ray, i) in (0..points.len()).filter(comes_back).zip(0..) {
+        for (k, i) in (0..points.len()).filter(comes_back).zip(0..) {
             if back.status(i) == RayStatus::Exited {
-                places[ray * nodes + node] = film.pixel(back.position(i), back.direction(i));
-                shares[ray * nodes + node] = back.throughput(i);
+                places[k * nodes + node] = film.pixel(back.position(i), back.direction(i));
+                shares[k * nodes + node] = back.throughput(i);
             }
         }
     }
 
-    /// Computes where each band's light of each ray lands, and its weight.
+    /// Computes where each band's light of each ray lands that was traced, and its weight.
     fn land(
         &self,
-        paths: &BandInterpolation,
-        area: &StartArea,
+        placing: &Placing<'_>,
         samples: &FilmSamples,
-        out: &CameraRays,
+        sample: &[u32],
         landings: &mut BandLandings,
     ) {
-        let land = match paths.nodes.len() {
-            1 => Self::land_between::<1>,
-            2 => Self::land_between::<2>,
-            3 => Self::land_between::<3>,
-            4 => Self::land_between::<4>,
-            _ => Self::land_between::<MOST_NODES>,
-        };
-        land(self, paths, area, samples, out, landings);
-    }
-
-    /// The same between so many nodes at most.
-    fn land_between<const NODES: usize>(
-        &self,
-        paths: &BandInterpolation,
-        area: &StartArea,
-        samples: &FilmSamples,
-        out: &CameraRays,
-        landings: &mut BandLandings,
-    ) {
-        let BandLandings { pixel, weight, points, directions, weights, places, shares, .. } =
-            landings;
-        let (count, nodes) = (out.sample.len(), paths.nodes.len());
-        let (bands, is_clear) = (paths.bands.len(), paths.is_clear());
-        let next_term = paths.next.on_pixels(self.focused.film().pitch / paths.pitch);
-        pixel.resize(count * bands, BandLandings::NOWHERE);
-        weight.resize(count * bands, 0.0);
-        let lands_of = pixel.chunks_exact_mut(bands).zip(weight.chunks_exact_mut(bands));
-        for (ray, (pixels, weights_of_bands)) in lands_of.enumerate() {
-            // Nodes that there are not count nothing.
-            let (mut at, mut share) = ([[0.0; 2]; NODES], [0.0; NODES]);
-            let (mut passes, mut makes) = (true, 0_u32);
-            for node in 0..nodes.min(NODES) {
-                let end = ray * nodes + node;
-                (at[node], share[node]) = (places[end], shares[end]);
-                passes &= share[node] > 0.0;
-                makes += u32::from(share[node] > 0.0 && area.contains(at[node]));
-            }
-            let scale = weights[ray] * nodes as f64 / f64::from(makes.max(1));
-            let more = next_term.at(at[0], points[ray]);
-            // Most rays land on one pixel in all bands.
-            if passes
-                && is_clear
-                && let Some(only) = area.only_pixel(paths.bounds.corners(&at, more))
-            {
-                pixels.fill(only);
-                weights_of_bands.fill(scale);
-                continue;
-            }
-            let u = samples.spectrum[out.sample[ray] as usize];
-            for (band, wavelengths) in paths.bands.iter().enumerate() {
-                let number = place_of(u, wavelengths.len());
-                let NodeWeights { weights, next, filters } = &wavelengths[number];
-                let (place, passed) = if passes {
-                    let (mut place, mut passed) = ([more[0] * next, more[1] * next], 0.0);
-                    for node in 0..NODES {
-                        place[0] += weights[node] * at[node][0];
-                        place[1] += weights[node] * at[node][1];
-                        passed += weights[node] * share[node];
+        let BandLandings { pixel, weight, traced, block, .. } = landings;
+        let bands = placing.paths.weights.bands();
+        for first in (0..traced.ray.len()).step_by(LANES) {
+            let count = LANES.min(traced.ray.len() - first);
+            block.read_traced(placing, traced, first..first + count, |ray| {
+                samples.spectrum[sample[ray] as usize]
+            });
+            block.place_bands(placing, u32::MAX >> (LANES - count));
+            for lane in 0..count {
+                let ray = traced.ray[first + lane];
+                let of_ray = ray * bands..(ray + 1) * bands;
+                let (pixels, weights) = (&mut pixel[of_ray.clone()], &mut weight[of_ray]);
+                if block.passes(lane, placing.paths.nodes.len()) {
+                    block.write(lane, pixels, weights);
+                    continue;
+                }
+                // What ends at some node is traced at every band's wavelength.
+                let from = [traced.points[first + lane], traced.directions[first + lane]];
+                for band in 0..bands {
+                    let (lead, u) = (placing.paths.lead, block.spectrum(lane));
+                    let (place, passed) = self.trace_back(lead, band, u, from);
+                    if passed > 0.0 && placing.area.is_seen(place) {
+                        pixels[band] = placing.area.pixel_at(place);
+                        weights[band] = block.scale(lane) * passed;
                     }
-                    (place, if paths.has_losses { passed * filters } else { *filters })
-                } else {
-                    let from = [points[ray], directions[ray]];
-                    self.trace_back(paths.lead, band, number, from)
-                };
-                if passed > 0.0 && area.is_seen(place) {
-                    pixels[band] = area.pixel_at(place);
-                    weights_of_bands[band] = scale * passed;
                 }
             }
         }
     }
 
-    /// Landing point of a ray that leaves the lens at a point (mm) in a direction, at one of a band's wavelengths (pixels), and
-    /// the share of it that passes.
+    /// Landing point of a ray that leaves the lens at a point (mm) in a direction, at a band's wavelength at `u` of the
+    /// spectrum (pixels), and the share of it that passes.
     #[inline(never)]
     fn trace_back(
         &self,
         lead: f64,
         band: usize,
-        number: usize,
+        u: f64,
         [point, direction]: [DVec3; 2],
     ) -> ([f64; 2], f64) {
         let opened = self.opened.as_ref().expect("the camera is opened before it is sampled");
-        let lens = &opened.groups[band].lenses[number];
+        let group = &opened.groups[band];
+        let lens = &group.lenses[group.lens_at(u)];
         let Some(ray) = Ray::new(point + direction * lead, -direction) else {
             return ([f64::NAN; 2], 0.0);
         };
@@ -256,32 +213,75 @@ impl LensCamera {
         (place, if end.status == RayStatus::Exited { end.throughput } else { 0.0 })
     }
 }
-impl BandLandings {
+
+impl TracedRays {
     fn clear(&mut self) {
-        self.pixel.clear();
-        self.weight.clear();
+        self.ray.clear();
         self.points.clear();
         self.directions.clear();
         self.weights.clear();
         self.leading.clear();
-        self.is_known.clear();
         self.places.clear();
         self.shares.clear();
+    }
+
+    /// Appends the ray in a lane of a block that left the lens at a node of so many: `ray` of those that leave the camera,
+    /// which started from a place of the film (pixels) with a weight.
+    fn push(
+        &mut self,
+        ray: usize,
+        [node, nodes]: [usize; 2],
+        (place, weight): ([f64; 2], f64),
+        block: &Block,
+        lane: usize,
+    ) {
+        let vector = |axes: &[[f64; LANES]; 3]| DVec3::from_array(axes.map(|axis| axis[lane]));
+        self.ray.push(ray);
+        self.points.push(vector(&block.position));
+        self.directions.push(vector(&block.direction));
+        self.weights.push(weight);
+        self.leading.push(node);
+        let end = self.places.len();
+        self.places.resize(end + nodes, [f64::NAN; 2]);
+        self.shares.resize(end + nodes, 0.0);
+        self.places[end + node] = place;
+        self.shares[end + node] = block.throughput[lane] / weight;
+    }
+}
+
+impl BandLandings {
+    fn clear(&mut self) {
+        self.pixel.clear();
+        self.weight.clear();
+        self.traced.clear();
+    }
+
+    /// Takes the numbers of the samples that start in `area` and lead at a node of so many.
+    #[expect(clippy::cast_possible_truncation, reason = "samples of a batch")]
+    fn take_samples(&mut self, [node, nodes]: [usize; 2], area: &StartArea, samples: &FilmSamples) {
+        let [[left, top], [right, bottom]] = area.bounds();
+        let starts = samples.columns.iter().zip(&samples.rows).zip(&samples.leading);
+        self.numbers.clear();
+        self.numbers.resize(samples.len(), 0);
+        let mut taken = 0;
+        for (i, ((&x, &y), &leading)) in starts.enumerate() {
+            self.numbers[taken] = i as u32;
+            let is_inside = (x >= left) & (y >= top) & (x < right) & (y < bottom);
+            taken += usize::from(is_inside & (place_of(leading, nodes) == node));
+        }
+        self.numbers.truncate(taken);
     }
 
     /// Takes the rays of a node, just aimed, out of the lens.
     fn pass(&mut self, paths: &BandInterpolation, node: usize, rays: &mut LensRays) {
         self.before.clear();
-        self.before.extend((0..rays.len()).map(|i| rays.throughput(i)));
-        let nodes = paths.nodes.len();
-        self.shifts.resize_with(nodes, Vec::new);
-        self.shifts.iter_mut().for_each(Vec::clear);
-        let Some(displacements) = &paths.displacements else {
-            return paths.nodes[node].trace(Side::Sensor, Clip::On, rays);
-        };
-        displacements.trace(node, &paths.nodes[node], rays, &mut self.rims);
-        for (other, shifts) in self.shifts.iter_mut().enumerate().filter(|(k, _)| *k != node) {
-            displacements.between([node, other], self.rims.starts(), shifts);
+        for start in (0..rays.len()).step_by(LANES) {
+            let (block, count) = rays.block_at(start);
+            self.before.extend_from_slice(&block.throughput[..count]);
+        }
+        match &paths.displacements {
+            Some(known) => known.trace(node, &paths.nodes[node], rays, &mut self.rims),
+            None => paths.nodes[node].trace(Side::Sensor, Clip::On, rays),
         }
     }
 
@@ -302,51 +302,51 @@ impl BandLandings {
         out.rays.retain(|ray| kept[ray]);
         keep_rays(&mut out.weight, &kept, 1);
         keep_rays(&mut out.sample, &kept, 1);
-        let Self { pixel, weight, points, directions, weights, leading, .. } = self;
-        keep_rays(pixel, &kept, bands);
-        keep_rays(weight, &kept, bands);
-        keep_rays(points, &kept, 1);
-        keep_rays(directions, &kept, 1);
-        keep_rays(weights, &kept, 1);
-        keep_rays(leading, &kept, 1);
+        keep_rays(&mut self.pixel, &kept, bands);
+        keep_rays(&mut self.weight, &kept, bands);
     }
 
-    /// Appends the rays that left the lens at a node's wavelength, which are of `samples` of these `numbers`, with where they
-    /// land at all nodes as far as that is known; a place on the film is `to_pixels` times its place in mm.
+    /// Appends the rays that left the lens at a node's wavelength, which are of `samples` of these `numbers`: with their
+    /// landings, where these follow from how they start, else as rays to trace.
     fn keep(
         &mut self,
         node: usize,
-        to_pixels: f64,
+        placing: &Placing<'_>,
         samples: &FilmSamples,
         numbers: &[u32],
         rays: &LensRays,
     ) {
-        let left = |&i: &usize| rays.status(i) == RayStatus::Exited && rays.throughput(i) > 0.0;
-        for i in (0..rays.len()).filter(left) {
-            self.points.push(rays.position(i));
-            self.directions.push(rays.direction(i));
-            self.weights.push(self.before[i]);
-            self.leading.push(node);
-            let sample = numbers[i] as usize;
-            let place = [samples.columns[sample], samples.rows[sample]];
-            let share = rays.throughput(i) / self.before[i];
-            let mut is_known = true;
-            for (other, shifts) in self.shifts.iter().enumerate() {
-                let (at, passed) = match shifts.get(i) {
-                    _ if other == node => (place, share),
-                    Some([x, y]) if self.rims.is_within(i) => {
-                        ([place[0] + x * to_pixels, place[1] - y * to_pixels], 1.0)
-                    }
-                    _ => {
-                        is_known = false;
-                        ([f64::NAN; 2], 0.0)
-                    }
-                };
-                self.places.push(at);
-                self.shares.push(passed);
+        let bands = placing.paths.weights.bands();
+        let mut end = self.pixel.len();
+        self.pixel.resize(end + rays.len() * bands, Self::NOWHERE);
+        self.weight.resize(end + rays.len() * bands, 0.0);
+        for start in (0..rays.len()).step_by(LANES) {
+            let (block, count) = rays.block_at(start);
+            let numbers = &numbers[start..start + count];
+            let known = placing.known_lanes(&self.rims, start, count);
+            if known != 0 {
+                self.block.read(samples, numbers, &self.before[start..start + count]);
+                self.block.displace(node, placing, &self.rims, block, start);
+                self.block.place_bands(placing, known);
             }
-            self.is_known.push(is_known);
+            for lane in (0..count).filter(|&lane| block.is_bright_at(lane)) {
+                let of_ray = end..end + bands;
+                if known >> lane & 1 == 1 {
+                    let (pixels, weights) =
+                        (&mut self.pixel[of_ray.clone()], &mut self.weight[of_ray]);
+                    self.block.write(lane, pixels, weights);
+                } else {
+                    let i = numbers[lane] as usize;
+                    let place = [samples.columns[i], samples.rows[i]];
+                    let nodes = [node, placing.paths.nodes.len()];
+                    let start = (place, self.before[start + lane]);
+                    self.traced.push(end / bands, nodes, start, block, lane);
+                }
+                end += bands;
+            }
         }
+        self.pixel.truncate(end);
+        self.weight.truncate(end);
     }
 }
 

@@ -45,7 +45,9 @@ use etendue_spectrum::{Bands, Spread};
 use glam::{DVec2, DVec3};
 
 use super::lens_camera::LensCamera;
-use super::nodes::{MOST_NODES, NextTerm, NodeWeights, RayOff, Variable, WeightBounds};
+use super::nodes::{
+    BandWeights, MOST_NODES, NextTerm, NodeWeights, RayOff, Variable, WeightBounds,
+};
 use super::opened::{BandInterpolation, filtered};
 use super::traced_at::TracedAt;
 
@@ -209,9 +211,10 @@ impl LensCamera {
             let nodes = chosen.iter().map(|&nm| at(nm)).collect::<Result<Vec<_>, _>>()?;
             let bands = self.band_weights(bands, &spreads, &chosen);
             let bounds = WeightBounds::of(bands.iter().flatten());
+            let weights = BandWeights::of(&bands, chosen.len());
             return Ok(BandInterpolation {
                 nodes,
-                bands,
+                weights,
                 bounds,
                 next,
                 has_losses,
@@ -368,7 +371,7 @@ impl NodeLandings<'_> {
             let (place, _) = found.places[ray]?;
             let (first, _) = self.landed[0].places[ray]?;
             let off = place - self.between(weights, ray)?.0;
-            Some(RayOff { place: first, point: self.rays[ray].point, off })
+            Some(RayOff { place: first, point: self.rays[ray].point.truncate(), off })
         };
         NextTerm::fitted((0..self.rays.len()).filter_map(off))
     }
@@ -384,7 +387,8 @@ impl NodeLandings<'_> {
         let of_ray = |(ray, found): (usize, &Option<(DVec2, f64)>)| {
             let ((sum, passed), (place, share)) = (self.between(weights, ray)?, (*found)?);
             let (first, _) = self.landed[0].places[ray].unwrap_or((DVec2::ZERO, 0.0));
-            let more = DVec2::from(next.at(first.into(), self.rays[ray].point)) * of_next;
+            let point = self.rays[ray].point.truncate();
+            let more = DVec2::from(next.at(first.into(), point.into())) * of_next;
             let off = (passed - share).abs();
             Some([(sum + more).distance(place), if off == 0.0 { 0.0 } else { off / share }])
         };

@@ -159,15 +159,16 @@ impl Displacements {
         lens.trace_within(&self.narrowed[node], Side::Sensor, rays, rims);
     }
 
-    /// Refills `out` with the displacements (mm) of rays from one wavelength to another, by how they start from the film.
-    pub(super) fn between(&self, [from, to]: [usize; 2], rays: &LensRays, out: &mut Vec<[f64; 2]>) {
-        out.clear();
-        for start in (0..rays.len()).step_by(LANES) {
-            let (block, count) = rays.block_at(start);
-            let mut shifts = [[0.0; LANES]; 2];
-            shift_block(&self.scales, &self.shifts[from][to], block, &mut shifts);
-            out.extend((0..count).map(|lane| [shifts[0][lane], shifts[1][lane]]));
-        }
+    /// Moves the places of a block's rays from where they land at one wavelength to where they land at another, by how they
+    /// start from the film: `scale` units of each axis are a mm.
+    pub(super) fn displace(
+        &self,
+        [from, to]: [usize; 2],
+        block: &Block,
+        scale: [f64; 2],
+        places: &mut [[f64; LANES]; 2],
+    ) {
+        displace_block(&self.scales, &self.shifts[from][to], block, scale, places);
     }
 }
 
@@ -278,16 +279,24 @@ impl Shift {
     }
 }
 
-/// Displacements of the rays of a block that start from the film.
+/// Moves the places of the rays of a block that start from the film.
 #[multiversion::multiversion(targets = "simd")]
-fn shift_block(scales: &Scales, shift: &Shift, block: &Block, out: &mut [[f64; LANES]; 2]) {
+fn displace_block(
+    scales: &Scales,
+    shift: &Shift,
+    block: &Block,
+    scale: [f64; 2],
+    places: &mut [[f64; LANES]; 2],
+) {
     let [x, y, _] = &block.position;
     let [u, v, w] = &block.direction;
     let (scales, shift) = (*scales, *shift);
     for i in 0..LANES {
         let inverse = 1.0 / w[i];
         let scaled = scales.scaled([x[i], y[i]], [u[i] * inverse, v[i] * inverse]);
-        [out[0][i], out[1][i]] = shift.at(scaled);
+        let [by_x, by_y] = shift.at(scaled);
+        places[0][i] += by_x * scale[0];
+        places[1][i] += by_y * scale[1];
     }
 }
 

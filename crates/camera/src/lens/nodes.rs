@@ -1,8 +1,13 @@
 //! Wavelengths that the rays of all bands are traced at, and polynomials between them.
 
 use etendue_optics::analysis::least_squares::LeastSquares;
+use etendue_optics::element::LANES;
 use etendue_optics::train::OpticalTrain;
-use glam::{DVec2, DVec3};
+use glam::DVec2;
+
+use super::opened::place_of;
+
+type Row = [f64; LANES];
 
 /// The most wavelengths that a ray is traced at.
 pub(super) const MOST_NODES: usize = 8;
@@ -30,6 +35,56 @@ pub(super) struct NodeWeights {
     pub(super) next: f64,
     /// Transmission of the filters.
     pub(super) filters: f64,
+}
+
+/// Weights between nodes by place in the spectrum, of all bands side by side.
+#[derive(Debug)]
+pub(super) struct BandWeights {
+    bands: usize,
+    /// Where some band's wavelength gives way to its next.
+    ends: Vec<f64>,
+    /// `[stretch][row][band]`, the rows being the nodes, the [`NextTerm`] and the filters.
+    rows: Vec<f64>,
+    /// Length of a stretch of `rows`.
+    stretch: usize,
+}
+
+impl BandWeights {
+    /// Those of bands, by the wavelengths that each is drawn from, between so many nodes.
+    pub(super) fn of(bands: &[Vec<NodeWeights>], nodes: usize) -> Self {
+        let ends_of = |count: usize| (1..count).map(move |k| k as f64 / count as f64);
+        let mut ends: Vec<f64> = bands.iter().flat_map(|own| ends_of(own.len())).collect();
+        ends.sort_by(f64::total_cmp);
+        ends.dedup();
+        let edges: Vec<f64> = [0.0].into_iter().chain(ends.iter().copied()).chain([1.0]).collect();
+        let mut rows = Vec::new();
+        for stretch in edges.windows(2) {
+            let middle = 0.5 * (stretch[0] + stretch[1]);
+            let own = |band: &Vec<NodeWeights>| band[place_of(middle, band.len())];
+            let own: Vec<NodeWeights> = bands.iter().map(own).collect();
+            for node in 0..nodes {
+                rows.extend(own.iter().map(|band| band.weights[node]));
+            }
+            rows.extend(own.iter().map(|band| band.next));
+            rows.extend(own.iter().map(|band| band.filters));
+        }
+        Self { bands: bands.len(), ends, rows, stretch: (nodes + 2) * bands.len() }
+    }
+
+    /// The number of bands.
+    pub(super) fn bands(&self) -> usize {
+        self.bands
+    }
+
+    /// The rows of the bands at a place of the spectrum.
+    #[inline(always)]
+    pub(super) fn at(&self, u: f64) -> &[f64] {
+        let mut stretch = 0;
+        for &end in &self.ends {
+            stretch += usize::from(u >= end);
+        }
+        &self.rows[stretch * self.stretch..][..self.stretch]
+    }
 }
 
 /// Bounds of the weights of all wavelengths between nodes.
@@ -77,28 +132,35 @@ impl WeightBounds {
         self.filters == [1.0; 2]
     }
 
-    /// The corners of a rectangle in which a ray lands at all wavelengths, by where it lands at the nodes and by its
-    /// [`NextTerm`] (pixels).
+    /// The low and the high corners of rectangles in which rays land at all wavelengths, by where they land at the nodes
+    /// and by their [`NextTerm`] (pixels).
     #[inline(always)]
-    pub(super) fn corners<const NODES: usize>(
-        &self,
-        at: &[[f64; 2]; NODES],
-        next: [f64; 2],
-    ) -> [[f64; 2]; 2] {
-        let mut corners = [at[0].map(|x| x - ROUNDINGS), at[0].map(|x| x + ROUNDINGS)];
+    pub(super) fn corners(&self, places: &[[Row; 2]], next: &[Row; 2]) -> [[Row; 2]; 2] {
+        let [mut low, mut high] = [places[0]; 2];
         for axis in 0..2 {
-            let mut add = |by: f64, [low, high]: [f64; 2]| {
-                let ends = [by * low, by * high];
-                corners[0][axis] += ends[0].min(ends[1]);
-                corners[1][axis] += ends[0].max(ends[1]);
-            };
-            // Weights of nodes add up to 1.
-            for node in 1..NODES {
-                add(at[node][axis] - at[0][axis], self.nodes[node]);
+            let (low, high) = (&mut low[axis], &mut high[axis]);
+            for i in 0..LANES {
+                low[i] -= ROUNDINGS;
+                high[i] += ROUNDINGS;
             }
-            add(next[axis], self.next);
+            // Weights of nodes add up to 1.
+            for (place, weights) in places.iter().zip(&self.nodes).skip(1) {
+                let [least, most] = *weights;
+                for i in 0..LANES {
+                    let by = place[axis][i] - places[0][axis][i];
+                    let (a, b) = (by * least, by * most);
+                    low[i] += if a < b { a } else { b };
+                    high[i] += if a < b { b } else { a };
+                }
+            }
+            let [least, most] = self.next;
+            for i in 0..LANES {
+                let (a, b) = (next[axis][i] * least, next[axis][i] * most);
+                low[i] += if a < b { a } else { b };
+                high[i] += if a < b { b } else { a };
+            }
         }
-        corners
+        [low, high]
     }
 }
 
@@ -199,8 +261,8 @@ const TERMS: usize = 5;
 pub(super) struct RayOff {
     /// Landing point (pixels).
     pub(super) place: DVec2,
-    /// Point where it leaves the lens (mm).
-    pub(super) point: DVec3,
+    /// Point where it leaves the lens, across its axis (mm).
+    pub(super) point: DVec2,
     /// By how much it is off (pixels).
     pub(super) off: DVec2,
 }
@@ -210,7 +272,7 @@ impl NextTerm {
     pub(super) fn fitted(rays: impl Iterator<Item = RayOff>) -> Self {
         let mut fits = [LeastSquares::new(TERMS), LeastSquares::new(TERMS)];
         for RayOff { place, point, off } in rays {
-            let row = terms(place.into(), point);
+            let row = terms(place.into(), point.into());
             fits[0].add(&row, off.x, 1.0);
             fits[1].add(&row, off.y, 1.0);
         }
@@ -231,9 +293,9 @@ impl NextTerm {
         self
     }
 
-    /// That of a ray (pixels).
+    /// That of a ray which lands on a place (pixels) and leaves the lens at a point, across its axis (mm): pixels.
     #[inline(always)]
-    pub(super) fn at(&self, place: [f64; 2], point: DVec3) -> [f64; 2] {
+    pub(super) fn at(&self, place: [f64; 2], point: [f64; 2]) -> [f64; 2] {
         let terms = terms(place, point);
         let sum = |factors: &[f64; TERMS]| {
             let [a, b, c, d, e] = *factors;
@@ -244,13 +306,24 @@ impl NextTerm {
 }
 
 #[inline(always)]
-fn terms([column, row]: [f64; 2], point: DVec3) -> [f64; TERMS] {
-    [1.0, column, row, point.x, point.y]
+fn terms([column, row]: [f64; 2], [x, y]: [f64; 2]) -> [f64; TERMS] {
+    [1.0, column, row, x, y]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The corners of one ray, which is in the third lane.
+    fn corners_of(bounds: &WeightBounds, at: [[f64; 2]; 2], next: [f64; 2]) -> [[f64; 2]; 2] {
+        let row = |x: f64| {
+            let mut row = [f64::NAN; LANES];
+            row[2] = x;
+            row
+        };
+        let corners = bounds.corners(&at.map(|place| place.map(row)), &next.map(row));
+        corners.map(|corner| corner.map(|row| row[2]))
+    }
 
     /// Rays land within the corners at all wavelengths, and at some of them next to each side: the bounds of straight lines are
     /// no wider than needed.
@@ -275,7 +348,7 @@ mod tests {
             ([[4000.9, 0.1], [3999.2, 0.3]], [-0.4, 0.2]),
             ([[5.5, 5.5], [5.5, 5.5]], [0.7, -0.7]),
         ] {
-            let [low, high] = bounds.corners(&at, next);
+            let [low, high] = corners_of(&bounds, at, next);
             for own in &all {
                 let found = place(at, next, own);
                 for axis in 0..2 {
@@ -283,7 +356,7 @@ mod tests {
                 }
             }
         }
-        let [low, high] = bounds.corners(&[[10.3, 7.6], [12.1, 7.2]], [0.0; 2]);
+        let [low, high] = corners_of(&bounds, [[10.3, 7.6], [12.1, 7.2]], [0.0; 2]);
         let off = [low[0] - 10.3, high[0] - 12.1, low[1] - 7.2, high[1] - 7.6];
         assert!(off.iter().all(|off| off.abs() < 2.0 * ROUNDINGS), "{off:?}");
     }

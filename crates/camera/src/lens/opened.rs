@@ -6,7 +6,7 @@ use etendue_optics::train::{ExitPupil, MonochromaticTrain, OpticalTrain};
 use etendue_spectrum::{Bands, Curve, Outside, Spread};
 
 use super::displacements::Displacements;
-use super::nodes::{NextTerm, NodeWeights, WeightBounds};
+use super::nodes::{BandWeights, NextTerm, WeightBounds};
 
 /// The exit pupil measured at the wavelengths that are wanted.
 #[derive(Debug)]
@@ -31,8 +31,7 @@ pub(super) struct OpenedGroup {
 pub(super) struct BandInterpolation {
     /// The lens at its leading wavelengths, with filters clear.
     pub(super) nodes: Vec<MonochromaticTrain>,
-    /// By band and by wavelength that it is drawn from.
-    pub(super) bands: Vec<Vec<NodeWeights>>,
+    pub(super) weights: BandWeights,
     pub(super) bounds: WeightBounds,
     pub(super) next: NextTerm,
     /// True if glass takes light.

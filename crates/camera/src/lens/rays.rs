@@ -58,15 +58,15 @@ impl LensCamera {
         out.sample.extend(numbers);
         let film = self.focused.film();
         let [x, y] = &mut out.places;
-        x.clear();
-        y.clear();
-        out.squares.clear();
-        for &number in &out.sample[first..] {
+        let of_rays = &out.sample[first..];
+        x.resize(of_rays.len(), 0.0);
+        y.resize(of_rays.len(), 0.0);
+        out.squares.resize(of_rays.len(), [0.0; 2]);
+        let starts = x.iter_mut().zip(y.iter_mut()).zip(&mut out.squares);
+        for (&number, ((x, y), square)) in of_rays.iter().zip(starts) {
             let i = number as usize;
-            let place = film.place(samples.columns[i], samples.rows[i]);
-            x.push(place.x);
-            y.push(place.y);
-            out.squares.push(samples.pupil[i]);
+            (*x, *y) = film.place(samples.columns[i], samples.rows[i]).into();
+            *square = samples.pupil[i];
         }
         let scale = 1.0 / self.solid_angle;
         let bundle = PupilSamples { scale, film: [x, y], squares: &out.squares };

@@ -353,8 +353,11 @@ impl LensRays {
 
     /// Makes room for `len` rays, all of them to be set.
     pub(crate) fn resize(&mut self, len: usize) {
-        self.blocks.clear();
         self.blocks.resize(len.div_ceil(LANES), Block::EMPTY);
+        // Lanes of the last one that are no rays.
+        if let Some(last) = self.blocks.last_mut() {
+            *last = Block::EMPTY;
+        }
         self.len = len;
     }
 

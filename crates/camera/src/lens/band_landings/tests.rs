@@ -6,6 +6,7 @@ use etendue_geometry::Bounds;
 use etendue_spectrum::{Bands, Grid};
 
 use super::*;
+use crate::lens::nodes::NextTerm;
 use crate::{CameraSpec, SharingLimits};
 
 /// The lens of a file, stopped down and focused, before 256 × 256 pixels of a sensor so high.
@@ -57,26 +58,43 @@ fn rays_away_from_rims_land_where_they_are_traced_to() {
     let camera = camera_with("double-gauss", 2.8, ["4.4 m", "28 mm"]).opened(&Bands::Rgb);
     let camera = camera.unwrap();
     let lens = camera.lens().unwrap();
-    let paths = lens.opened.as_ref().unwrap().paths.as_ref().unwrap();
-    assert!(paths.displacements.is_some());
+    let opened = lens.opened.as_ref().unwrap();
+    let paths = opened.paths.as_ref().unwrap();
+    let area = StartArea { resolution: [256; 2], margin: 0.0 };
+    let film = lens.focused.film();
+    let to_pixels = 1.0 / (film.turn * film.pitch);
+    let placing = Placing { paths, area: &area, next: NextTerm::default(), to_pixels };
     let samples = many_samples(20_000, 256.0);
     let (mut rays, mut landings) = (CameraRays::default(), BandLandings::default());
-    camera.sample_band_rays(&samples, &mut rays, &mut landings);
-    let (mut known, mut worst) = (0, 0.0_f64);
-    for ray in (0..rays.sample.len()).filter(|&ray| landings.is_known[ray]) {
-        known += 1;
-        for (node, at) in paths.nodes.iter().enumerate() {
-            let [point, direction] = [landings.points[ray], landings.directions[ray]];
-            let start = Ray::new(point + direction * paths.lead, -direction).unwrap();
-            let end = at.run(Side::Object, Clip::On, start);
-            assert_eq!(end.status, RayStatus::Exited, "node {node}");
-            let Ray { position, direction } = end.ray;
-            let place = lens.focused.film().pixel(position.into(), direction.into());
-            let found = landings.places[ray * paths.nodes.len() + node];
-            worst = worst.max((place[0] - found[0]).hypot(place[1] - found[1]));
+    let (mut left, mut known, mut worst) = (0, 0, 0.0_f64);
+    for (node, at) in paths.nodes.iter().enumerate() {
+        landings.take_samples([node, paths.nodes.len()], &area, &samples);
+        let numbers = landings.numbers.clone();
+        lens.aim_samples(&opened.pupil, at, &samples, numbers.iter().copied(), &mut rays);
+        landings.pass(paths, node, &mut rays.in_lens);
+        left += rays.in_lens.exited();
+        for start in (0..numbers.len()).step_by(LANES) {
+            let (block, count) = rays.in_lens.block_at(start);
+            let of_block = start..start + count;
+            let BandLandings { before, rims, block: places, .. } = &mut landings;
+            places.read(&samples, &numbers[of_block.clone()], &before[of_block.clone()]);
+            places.displace(node, &placing, rims, block, start);
+            for (lane, i) in of_block.enumerate().filter(|&(_, i)| rims.is_within(i)) {
+                known += 1;
+                let [point, direction] = [rays.in_lens.position(i), rays.in_lens.direction(i)];
+                let start = Ray::new(point + direction * paths.lead, -direction).unwrap();
+                for (other, at) in paths.nodes.iter().enumerate() {
+                    let end = at.run(Side::Object, Clip::On, start);
+                    assert_eq!(end.status, RayStatus::Exited, "node {other}");
+                    let Ray { position, direction } = end.ray;
+                    let traced = film.pixel(position.into(), direction.into());
+                    let [x, y] = places.place(other, lane);
+                    worst = worst.max((traced[0] - x).hypot(traced[1] - y));
+                }
+            }
         }
     }
-    assert!(known * 10 > 9 * rays.sample.len(), "{known} of {}", rays.sample.len());
+    assert!(known * 10 > 9 * left, "{known} of {left}");
     assert!(worst < SharingLimits::DEFAULT.places, "{worst}");
 }
 
@@ -101,14 +119,15 @@ fn landings_elsewhere(camera: &crate::Camera, side: f64, bands: usize) -> (f64, 
     let samples = many_samples(60_000 / u32::try_from(bands).unwrap(), side);
     let (mut rays, mut landings) = (CameraRays::default(), BandLandings::default());
     camera.sample_band_rays(&samples, &mut rays, &mut landings);
+    let to_lens = camera.pose().rotation.transpose();
     let (mut landed, mut elsewhere) = (0, 0);
     for (ray, &sample) in rays.sample.iter().enumerate() {
         let u = samples.spectrum[sample as usize];
+        let point = to_lens * (rays.rays.origin(ray) - camera.pose().position) * 1e3;
+        let point = point + DVec3::new(0.0, 0.0, lens.focused.origin());
+        let from = [point, to_lens * rays.rays.direction(ray)];
         for band in 0..bands {
-            let wavelengths = &paths.bands[band];
-            let number = place_of(u, wavelengths.len());
-            let from = [landings.points[ray], landings.directions[ray]];
-            let ([x, y], passed) = lens.trace_back(paths.lead, band, number, from);
+            let ([x, y], passed) = lens.trace_back(paths.lead, band, u, from);
             let is_seen = passed > 0.0 && x.min(y) >= 0.0 && x.max(y) < side;
             let own = match is_seen {
                 true => y.floor() * side + x.floor(),

@@ -6,8 +6,8 @@ use glam::DVec2;
 
 use super::coded::Anywhere;
 use super::disk::PupilSamples;
-use super::place::{NodePlace, TableAngle, angle_below, between};
-use super::{ExitPupil, PupilOutline};
+use super::place::{NodePlace, TableAngle, angle_below, between, is_among};
+use super::{ExitPupil, NodeLayout, PupilOutline};
 use crate::element::{Block, Frame, LANES, LensRays, RayStatus};
 
 /// The outline from one point of the sensor.
@@ -96,6 +96,25 @@ impl NodeRows {
         radii: [[0.0; LANES]; 2],
     };
 
+    /// Sets a lane to what two nodes have with these weights, at an angle between two of their tables.
+    #[inline(always)]
+    fn set(
+        &mut self,
+        lane: usize,
+        nodes: [&PupilOutline; 2],
+        weights: [f64; 2],
+        angle: TableAngle,
+    ) {
+        let [a, b] = nodes;
+        let mix = |of_a: f64, of_b: f64| of_a * weights[0] + of_b * weights[1];
+        self.centre[0][lane] = mix(a.centre.x, b.centre.x);
+        self.centre[1][lane] = mix(a.centre.y, b.centre.y);
+        self.half[0][lane] = mix(a.half.x, b.half.x);
+        self.half[1][lane] = mix(a.half.y, b.half.y);
+        self.radii[0][lane] = mix(between(&a.inner, angle), between(&b.inner, angle));
+        self.radii[1][lane] = mix(between(&a.reach, angle), between(&b.reach, angle));
+    }
+
     /// Adds a node's share to a lane, at an angle between two of its table.
     #[inline(always)]
     fn add(&mut self, lane: usize, node: &PupilOutline, weight: f64, angle: TableAngle) {
@@ -126,6 +145,39 @@ impl ExitPupil {
         true
     }
 
+    /// Fills the first `count` lanes with what the nodes have that lie about places on the film; false where one lies beyond
+    /// all of them.
+    fn fill_nodes(
+        &self,
+        film: &[Row; 2],
+        angles: &[TableAngle; LANES],
+        count: usize,
+        rows: &mut NodeRows,
+    ) -> bool {
+        if self.layout == NodeLayout::Radial && !self.nodes.is_empty() {
+            let intervals = self.nodes.len() - 1;
+            let mut places = RadialPlaces { low: [0; LANES], share: [0.0; LANES] };
+            if !radial_places(film, self.radius, intervals, &mut rows.axis, &mut places) {
+                return false;
+            }
+            for (lane, &angle) in angles[..count].iter().enumerate() {
+                let (low, share) = (places.low[lane] as usize, places.share[lane]);
+                let nodes = [&self.nodes[low], &self.nodes[(low + 1).min(intervals)]];
+                rows.set(lane, nodes, [1.0 - share, share], angle);
+            }
+            return true;
+        }
+        for (lane, &angle) in angles[..count].iter().enumerate() {
+            let place = self.place(DVec2::new(film[0][lane], film[1][lane]));
+            let Some(NodePlace { axis, nodes }) = place else { return false };
+            (rows.axis[0][lane], rows.axis[1][lane]) = axis.into();
+            for (node, weight) in nodes.into_iter().filter(|(_, weight)| *weight != 0.0) {
+                rows.add(lane, &self.nodes[node], weight, angle);
+            }
+        }
+        true
+    }
+
     /// Fills blocks with rays towards the bounds that were measured, a sample a ray; false where no light arrives at
     /// the place of some sample, which stays as it was.
     fn fill_bounds(&self, bundle: &PupilSamples<'_>, blocks: &mut [Block]) -> bool {
@@ -139,15 +191,9 @@ impl ExitPupil {
                 row[..count].copy_from_slice(&from[first..first + count]);
             }
             let mut rows = NodeRows::NOTHING;
-            for lane in 0..count {
-                let place = self.place(DVec2::new(film[0][lane], film[1][lane]));
-                let Some(NodePlace { axis, nodes }) = place else { return false };
-                let (_, turn) = concentric(square[lane]);
-                let angle = angle_below(turn);
-                (rows.axis[0][lane], rows.axis[1][lane]) = axis.into();
-                for (node, weight) in nodes.into_iter().filter(|(_, weight)| *weight != 0.0) {
-                    rows.add(lane, &self.nodes[node], weight, angle);
-                }
+            let angles = angles(&square);
+            if !self.fill_nodes(&film, &angles, count, &mut rows) {
+                return false;
             }
             let scale = bundle.scale * self.index2;
             aim(&rows, &self.sensor, scale, &film, &square, block);
@@ -156,6 +202,58 @@ impl ExitPupil {
         }
         are_lit
     }
+}
+
+/// Places among nodes on a radius: the interval, and the share of it that is passed.
+struct RadialPlaces {
+    low: [u32; LANES],
+    share: Row,
+}
+
+/// Places of a block among nodes at the ends of so many intervals of a radius, and their directions from the middle, as
+/// [`ExitPupil::place`] finds them one by one; false where one lies beyond the last.
+#[multiversion::multiversion(targets = "simd")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "between 0 and a few dozen"
+)]
+fn radial_places(
+    film: &[Row; 2],
+    radius: f64,
+    intervals: usize,
+    axis: &mut [Row; 2],
+    places: &mut RadialPlaces,
+) -> bool {
+    let (last, highest) = (intervals as f64, intervals.saturating_sub(1) as u32);
+    let mut are_inside = true;
+    for i in 0..LANES {
+        let (x, y) = (film[0][i], film[1][i]);
+        let r = (x * x + y * y).sqrt();
+        let at = if radius > 0.0 { r / radius * last } else { 0.0 };
+        are_inside &= is_among(at, last);
+        let low = (at as u32).min(highest);
+        let share = at - f64::from(low);
+        let share = if share < 1.0 { share } else { 1.0 };
+        (places.low[i], places.share[i]) = (low, if share > 0.0 { share } else { 0.0 });
+        (axis[0][i], axis[1][i]) = if r > 0.0 { (x / r, y / r) } else { (1.0, 0.0) };
+    }
+    are_inside
+}
+
+/// Places in the tables of angles of the directions of a block's samples.
+#[multiversion::multiversion(targets = "simd")]
+fn angles(squares: &[[f64; 2]; LANES]) -> [TableAngle; LANES] {
+    let mut turns = [0.0; LANES];
+    for i in 0..LANES {
+        (_, turns[i]) = concentric(squares[i]);
+    }
+    let mut angles = [TableAngle::FIRST; LANES];
+    for i in 0..LANES {
+        angles[i] = angle_below(turns[i]);
+    }
+    angles
 }
 
 /// Rays of a block towards places in their bounds, each with its weight; 0 where its bound is empty.

@@ -62,8 +62,7 @@ impl NodePlace {
 fn split(at: f64, intervals: usize) -> Option<(usize, f64)> {
     #[expect(clippy::cast_precision_loss, reason = "a few dozen nodes")]
     let last = intervals as f64;
-    // Points on the very rim may be rounded past it.
-    if !(at >= -1e-9 && at <= last * (1.0 + 1e-9) + 1e-9) {
+    if !is_among(at, last) {
         return None;
     }
     #[expect(
@@ -75,6 +74,12 @@ fn split(at: f64, intervals: usize) -> Option<(usize, f64)> {
     #[expect(clippy::cast_precision_loss, reason = "a few dozen nodes")]
     let share = (at - low as f64).clamp(0.0, 1.0);
     Some((low, share))
+}
+
+/// True if a place is not beyond the last of intervals; points on the very rim may be rounded past it.
+#[inline(always)]
+pub(super) fn is_among(at: f64, last: f64) -> bool {
+    (at >= -1e-9) & (at <= last * (1.0 + 1e-9) + 1e-9)
 }
 
 #[expect(clippy::cast_precision_loss, reason = "at most 256 angles")]
@@ -89,6 +94,10 @@ pub(super) struct TableAngle {
     low: usize,
     /// The share of the way to the next.
     share: f64,
+}
+
+impl TableAngle {
+    pub(super) const FIRST: Self = Self { low: 0, share: 0.0 };
 }
 
 /// The place in a table of a share of a full turn, 0..=1.
