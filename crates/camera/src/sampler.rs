@@ -217,6 +217,17 @@ impl SampleKeys {
         }
     }
 
+    /// [`Self::squares_of_all`] of the first two pairs.
+    pub fn squares_of_first_pairs(&self, [first, second]: [&mut Vec<[f64; 2]>; 2]) {
+        if !self.samples.is_empty() {
+            self.squares_of_all(0, first);
+            return self.squares_of_all(1, second);
+        }
+        first.resize(self.keys.len(), [0.0; 2]);
+        second.resize(self.keys.len(), [0.0; 2]);
+        sobol::points_of_sets(&self.keys, [first, second]);
+    }
+
     /// [`PixelSamples::square`] of one pair of dimensions for each of some samples, by their numbers: `out` is
     /// refilled.
     pub fn squares_of_pair(&self, picked: &[u32], pair: u32, out: &mut Vec<[f64; 2]>) {
@@ -428,6 +439,12 @@ mod tests {
                 let one_by_one = samples.clone().map(|of| of.pixel.square(of.index, pair));
                 assert_eq!(out, one_by_one.collect::<Vec<_>>(), "{sampler:?} pair {pair}");
                 keys.squares_of_all(pair, &mut own);
+                if pair < 2 {
+                    let mut both = [Vec::new(), Vec::new()];
+                    let [first, second] = &mut both;
+                    keys.squares_of_first_pairs([first, second]);
+                    assert_eq!(out, both[pair as usize], "{sampler:?} pair {pair}");
+                }
                 assert_eq!(out, own, "{sampler:?} pair {pair}");
                 keys.squares_of_pair(&picked, pair, &mut own);
                 out = picked.iter().map(|&number| out[number as usize]).collect();

@@ -54,6 +54,11 @@ pub(crate) fn points(keys: &[SobolKey], half: Half, out: &mut [[f64; 2]]) {
     scrambled(keys, half, out);
 }
 
+/// The points of both halves of the sets of `keys`, which `out` is as long as.
+pub(crate) fn points_of_sets(keys: &[SobolKey], out: [&mut [[f64; 2]]; 2]) {
+    scrambled_sets(keys, out);
+}
+
 /// The points of those of `keys` that are picked, of scramblings shifted by `shift`, to 24 bits in two columns as long
 /// as `picked`.
 pub(crate) fn floats(
@@ -77,7 +82,7 @@ pub(crate) fn float(x: f64) -> f32 {
 
 /// The point of one key in two dimensions of its set.
 pub(crate) fn point(key: SobolKey, half: Half) -> [f64; 2] {
-    let [point] = side_by_side([key.index], [key.seed], half);
+    let [point] = Shuffled::of([key.index], [key.seed]).points(half);
     point
 }
 
@@ -86,15 +91,37 @@ fn scrambled(keys: &[SobolKey], half: Half, out: &mut [[f64; 2]]) {
     let (whole, rest) = keys.as_chunks::<LANES>();
     let (to, to_rest) = out.as_chunks_mut::<LANES>();
     for (keys, out) in whole.iter().zip(to) {
-        let (index, seeds) = apart(keys);
-        *out = side_by_side(index, seeds, half);
+        *out = shuffled(keys).points(half);
     }
-    if let Some(last) = rest.last() {
-        let mut lanes = [*last; LANES];
-        lanes[..rest.len()].copy_from_slice(rest);
-        let (index, seeds) = apart(&lanes);
-        to_rest.copy_from_slice(&side_by_side(index, seeds, half)[..rest.len()]);
+    if !rest.is_empty() {
+        to_rest.copy_from_slice(&shuffled(&filled(rest)).points(half)[..rest.len()]);
     }
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn scrambled_sets(keys: &[SobolKey], [first, second]: [&mut [[f64; 2]]; 2]) {
+    let (whole, rest) = keys.as_chunks::<LANES>();
+    let (first, first_rest) = first.as_chunks_mut::<LANES>();
+    let (second, second_rest) = second.as_chunks_mut::<LANES>();
+    for ((keys, first), second) in whole.iter().zip(first).zip(second) {
+        let shuffled = shuffled(keys);
+        (*first, *second) = (shuffled.points(Half::First), shuffled.points(Half::Second));
+    }
+    if !rest.is_empty() {
+        let shuffled = shuffled(&filled(rest));
+        first_rest.copy_from_slice(&shuffled.points(Half::First)[..rest.len()]);
+        second_rest.copy_from_slice(&shuffled.points(Half::Second)[..rest.len()]);
+    }
+}
+
+/// Some keys or numbers, and the first of them for what is missing to a chunk.
+#[inline(always)]
+fn filled<T: Copy>(rest: &[T]) -> [T; LANES] {
+    let mut lanes = [rest[0]; LANES];
+    for (lane, &own) in lanes.iter_mut().zip(rest) {
+        *lane = own;
+    }
+    lanes
 }
 
 #[multiversion::multiversion(targets = "simd")]
@@ -110,10 +137,8 @@ fn scrambled_floats(
     for ((picked, x), y) in whole.iter().zip(x).zip(y) {
         [*x, *y] = floats_of(keys, shift, picked, half);
     }
-    if let Some(last) = rest.last() {
-        let mut lanes = [*last; LANES];
-        lanes[..rest.len()].copy_from_slice(rest);
-        let [a, b] = floats_of(keys, shift, &lanes, half);
+    if !rest.is_empty() {
+        let [a, b] = floats_of(keys, shift, &filled(rest), half);
         x_rest.copy_from_slice(&a[..rest.len()]);
         y_rest.copy_from_slice(&b[..rest.len()]);
     }
@@ -135,7 +160,7 @@ fn floats_of(
     for seed in &mut seeds {
         *seed = seed.wrapping_add(shift);
     }
-    let [(across, _), (up, _)] = upper_bits(index, seeds, half);
+    let [(across, _), (up, _)] = Shuffled::of(index, seeds).upper_bits(half);
     let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
     for i in 0..LANES {
         x[i] = (across[i] >> 8) as f32 / 16_777_216.0;
@@ -144,14 +169,13 @@ fn floats_of(
     [x, y]
 }
 
-/// The samples and the scramblings of some keys.
 #[inline(always)]
-fn apart(keys: &[SobolKey; LANES]) -> ([u32; LANES], [u32; LANES]) {
+fn shuffled(keys: &[SobolKey; LANES]) -> Shuffled<LANES> {
     let (mut index, mut seeds) = ([0; LANES], [0; LANES]);
     for i in 0..LANES {
         (index[i], seeds[i]) = (keys[i].index, keys[i].seed);
     }
-    (index, seeds)
+    Shuffled::of(index, seeds)
 }
 
 /// The second dimension of point `index`, its bits reversed.
@@ -165,46 +189,72 @@ fn second_reversed(index: u32) -> u32 {
     bits ^ ((bits >> 16) & 0x0000_ffff)
 }
 
-/// The scrambled upper 32 bits of each dimension, with what they were scrambled by.
-#[inline(always)]
-fn upper_bits<const N: usize>(
-    index: [u32; N],
-    seeds: [u32; N],
-    half: Half,
-) -> [([u32; N], [u32; N]); 2] {
-    const SALTS: [[u32; 2]; 2] = [[0x912f_69ba, 0x174f_18ab], [0x912f_69bc, 0x174f_18ad]];
-    let mut keys = [0; N];
-    for i in 0..N {
-        keys[i] = hash(seeds[i]);
-    }
-    // The scrambled index of each sequence.
-    let mut at = [0; N];
-    for i in 0..N {
-        let own = paired(index[i], keys[i]).reverse_bits();
-        at[i] = owen_scramble_rev(own, keys[i]).reverse_bits();
-    }
-    let salts = match half {
-        Half::First => SALTS[0],
-        Half::Second => {
-            for at in &mut at {
-                *at = of_second_half(*at);
-            }
-            SALTS[1]
-        }
-    };
-    let mut second = [0; N];
-    for i in 0..N {
-        second[i] = second_reversed(at[i]);
-    }
-    let mut out = [([0; N], [0; N]); 2];
-    for (((high, scrambles), number), salt) in out.iter_mut().zip([at, second]).zip(salts) {
-        let salt = hash(salt);
+/// Samples of a set: the hashes of their scramblings, and their shuffled indices.
+#[derive(Clone, Copy)]
+struct Shuffled<const N: usize> {
+    keys: [u32; N],
+    at: [u32; N],
+}
+
+impl<const N: usize> Shuffled<N> {
+    #[inline(always)]
+    fn of(index: [u32; N], seeds: [u32; N]) -> Self {
+        let (mut keys, mut at) = ([0; N], [0; N]);
         for i in 0..N {
-            scrambles[i] = hash(keys[i] ^ salt);
-            high[i] = owen_scramble_rev(number[i], scrambles[i]).reverse_bits();
+            keys[i] = hash(seeds[i]);
         }
+        for i in 0..N {
+            let own = paired(index[i], keys[i]).reverse_bits();
+            at[i] = owen_scramble_rev(own, keys[i]).reverse_bits();
+        }
+        Self { keys, at }
     }
-    out
+
+    /// The scrambled upper 32 bits of each dimension of a half, with what they were scrambled by.
+    #[inline(always)]
+    fn upper_bits(&self, half: Half) -> [([u32; N], [u32; N]); 2] {
+        const SALTS: [[u32; 2]; 2] = [[0x912f_69ba, 0x174f_18ab], [0x912f_69bc, 0x174f_18ad]];
+        let mut at = self.at;
+        let salts = match half {
+            Half::First => SALTS[0],
+            Half::Second => {
+                for at in &mut at {
+                    *at = of_second_half(*at);
+                }
+                SALTS[1]
+            }
+        };
+        let mut second = [0; N];
+        for i in 0..N {
+            second[i] = second_reversed(at[i]);
+        }
+        let mut out = [([0; N], [0; N]); 2];
+        for (((high, scrambles), number), salt) in out.iter_mut().zip([at, second]).zip(salts) {
+            let salt = hash(salt);
+            for i in 0..N {
+                scrambles[i] = hash(self.keys[i] ^ salt);
+                high[i] = owen_scramble_rev(number[i], scrambles[i]).reverse_bits();
+            }
+        }
+        out
+    }
+
+    /// The points of a half: 32 bits that are scrambled, and 21 more by hashing.
+    #[inline(always)]
+    fn points(&self, half: Half) -> [[f64; 2]; N] {
+        let mut rows = [[0.0; N]; 2];
+        for (row, (high, scrambles)) in rows.iter_mut().zip(self.upper_bits(half)) {
+            for i in 0..N {
+                let low = hash(high[i] ^ scrambles[i]) >> 11;
+                row[i] = (f64::from(high[i]) + f64::from(low) / TWO_TO_21) / TWO_TO_32;
+            }
+        }
+        let mut out = [[0.0; 2]; N];
+        for i in 0..N {
+            out[i] = [rows[0][i], rows[1][i]];
+        }
+        out
+    }
 }
 
 /// An index among its four, of which `key` draws the neighbours, that differ in the last bit alone: the first of four is
@@ -227,23 +277,6 @@ fn of_second_half(index: u32) -> u32 {
     bits ^= (bits >> 1) & 0x4f70;
     bits ^= (bits >> 2) & 0x5edf;
     bits ^ ((bits >> 3) & 0xa79b)
-}
-
-/// 32 bits that are scrambled, and 21 more by hashing.
-#[inline(always)]
-fn side_by_side<const N: usize>(index: [u32; N], seeds: [u32; N], half: Half) -> [[f64; 2]; N] {
-    let mut rows = [[0.0; N]; 2];
-    for (row, (high, scrambles)) in rows.iter_mut().zip(upper_bits(index, seeds, half)) {
-        for i in 0..N {
-            let low = hash(high[i] ^ scrambles[i]) >> 11;
-            row[i] = (f64::from(high[i]) + f64::from(low) / TWO_TO_21) / TWO_TO_32;
-        }
-    }
-    let mut out = [[0.0; 2]; N];
-    for i in 0..N {
-        out[i] = [rows[0][i], rows[1][i]];
-    }
-    out
 }
 
 const TWO_TO_24: f64 = 16_777_216.0;
@@ -301,6 +334,13 @@ mod tests {
         for half in HALVES {
             points(&keys, half, &mut out);
             assert_eq!(out, keys.iter().map(|&key| point(key, half)).collect::<Vec<_>>());
+        }
+        let mut both = [out.clone(), out.clone()];
+        let [first, second] = &mut both;
+        points_of_sets(&keys, [first, second]);
+        for (half, found) in HALVES.into_iter().zip(both) {
+            points(&keys, half, &mut out);
+            assert_eq!(out, found, "{half:?}");
         }
     }
 

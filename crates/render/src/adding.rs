@@ -6,9 +6,7 @@ use etendue_camera::{BandLandings, CameraRays, LensCamera};
 use etendue_tracer::layer::RaySource;
 
 use crate::film::{PlaneRows, Strip};
-use crate::sampling::{
-    DIFFUSION_PAIR, Memory, PUPIL_PAIR, SampleRun, SampledQuantity, Sampling, TIME_PAIR,
-};
+use crate::sampling::{DIFFUSION_PAIR, Memory, SampleRun, SampledQuantity, Sampling, TIME_PAIR};
 use crate::shard::SampledStrips;
 use crate::sum::{Sum, add_run};
 use crate::tile::{TILE, Tile};
@@ -305,7 +303,12 @@ impl Adding<'_> {
         let draw = |pair, out: &mut Vec<_>| numbers.draw(pair, out);
         film.clear();
         let mut places = Vec::new();
-        draw(0, &mut places);
+        if numbers.has_pupil {
+            numbers.draw_first_pairs([&mut places, &mut film.pupil]);
+        } else {
+            draw(0, &mut places);
+            film.pupil.resize(count, [0.5; 2]);
+        }
         let mut first = 0;
         for run in runs {
             let (corner, end) = (run.pixel.map(f64::from), first + run.range.len());
@@ -326,10 +329,6 @@ impl Adding<'_> {
             }
         }
         let lens = self.what.camera().lens();
-        match self.what.camera().has_pupil() {
-            true => draw(PUPIL_PAIR, &mut film.pupil),
-            false => film.pupil.resize(count, [0.5; 2]),
-        }
         let is_shared = self.what.shared_rows().is_some();
         if is_shared || lens.is_some_and(LensCamera::draws_wavelengths) {
             draw(2, &mut places);

@@ -197,6 +197,11 @@ impl SampleNumbers {
         self.keys.squares_of_all(pair, out);
     }
 
+    /// The places of each sample of the film in its pixel and in the pupil: the pairs 0 and [`PUPIL_PAIR`].
+    pub(crate) fn draw_first_pairs(&self, out: [&mut Vec<[f64; 2]>; 2]) {
+        self.keys.squares_of_first_pairs(out);
+    }
+
     /// Makes the rays those of so many samples of the film, by their numbers.
     pub(crate) fn set_rays(&mut self, of_ray: &[u32]) {
         self.of_ray.clear();
