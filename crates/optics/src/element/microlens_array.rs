@@ -458,14 +458,21 @@ fn cell_radius(shape: LensletShape, [x, y]: [f64; 2]) -> f64 {
 /// G. Hodgman, "Reentrant polygon clipping", 1974).
 #[must_use]
 pub fn clipped(polygon: &[[f64; 2]], by: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    let mut rest = polygon.to_vec();
+    let mut rest = Vec::with_capacity(polygon.len() + by.len());
+    rest.extend_from_slice(polygon);
+    let (mut kept, mut sides) = (Vec::with_capacity(rest.capacity()), Vec::new());
     for (k, &a) in by.iter().enumerate() {
         let b = by[(k + 1) % by.len()];
-        let side = |p: [f64; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
-        let mut kept = Vec::with_capacity(rest.len() + 1);
+        let side = |p: &[f64; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+        sides.clear();
+        sides.extend(rest.iter().map(side));
+        if sides.iter().all(|&side| side >= 0.0) {
+            continue;
+        }
+        kept.clear();
         for (i, &p) in rest.iter().enumerate() {
-            let q = rest[(i + 1) % rest.len()];
-            let (from, to) = (side(p), side(q));
+            let next = if i + 1 < rest.len() { i + 1 } else { 0 };
+            let (q, from, to): ([f64; 2], f64, f64) = (rest[next], sides[i], sides[next]);
             if from >= 0.0 {
                 kept.push(p);
             }
@@ -474,7 +481,7 @@ pub fn clipped(polygon: &[[f64; 2]], by: &[[f64; 2]]) -> Vec<[f64; 2]> {
                 kept.push([p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])]);
             }
         }
-        rest = kept;
+        std::mem::swap(&mut rest, &mut kept);
     }
     rest
 }

@@ -18,7 +18,7 @@ use etendue_report::Refusal;
 use glam::{DVec2, DVec3};
 
 use super::clear::{without_filters, without_masks};
-use super::outline_table::{centre_of, normal, outline};
+use super::outline_table::{centre_of, nearest_normal, normal, outline};
 use super::region::{Region, area_of};
 use super::{ExitPupil, LensletPupil, NORMALS, OutlineTable, dark_array};
 use crate::element::{Clip, Gaps, Grid, LensRays, LensletShape, RayStatus, clipped};
@@ -234,11 +234,20 @@ impl LensletPupil {
         }
         // The main lens' opening as the sensor sees it through the lenslet: scaled by kappa, and
         // shifted.
-        let extent = self.table.at(centre)?;
+        let corners = self.table.corners(centre);
         let away = centre - film.truncate();
         let kappa = sight.slope[0] - self.drift * sight.height[0];
         let shift = away * (sight.slope[1] - self.drift * sight.height[1]);
         let reach = kappa.abs() * self.opening_radius;
+        // Most lenslets that show nothing show it in the direction of the shift.
+        if let Some(corners) = &corners {
+            let k = nearest_normal(shift);
+            let ends = [corners.extent(k), corners.extent((k + NORMALS / 2) % NORMALS)];
+            if normal(k).dot(shift) - reach > self.widened(ends) {
+                return None;
+            }
+        }
+        let extent = self.table.between(corners.as_ref(), centre)?;
         // Whether the opening, or another array's, cuts the lenslet's own.
         let mut cut = false;
         for k in 0..NORMALS {
@@ -316,7 +325,12 @@ impl LensletPupil {
 
     /// The extent of the outline in a direction, with its margin.
     fn limit(&self, extent: &[f64; NORMALS], k: usize) -> f64 {
-        extent[k] + self.margin * (extent[k] + extent[(k + NORMALS / 2) % NORMALS])
+        self.widened([extent[k], extent[(k + NORMALS / 2) % NORMALS]])
+    }
+
+    /// An extent with its margin, by it and that in the opposite direction.
+    fn widened(&self, [here, opposite]: [f64; 2]) -> f64 {
+        here + self.margin * (here + opposite)
     }
 
     /// The corners of the outline with its margin, in slopes.

@@ -166,7 +166,14 @@ struct OutlineTable {
     half: DVec2,
     /// Nodes over each side of the array.
     across: u32,
-    nodes: Vec<Option<[f64; NORMALS]>>,
+    nodes: Vec<Option<OutlineNode>>,
+}
+
+/// An outline in slopes.
+#[derive(Debug, Clone)]
+struct OutlineNode {
+    extent: [f64; NORMALS],
+    centre: DVec2,
 }
 
 #[cfg(test)]

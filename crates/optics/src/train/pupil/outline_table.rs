@@ -4,7 +4,7 @@
 use etendue_report::Refusal;
 use glam::DVec2;
 
-use super::{ExitPupil, NORMALS, OutlineTable};
+use super::{ExitPupil, NORMALS, OutlineNode, OutlineTable};
 use crate::element::{Clip, LensRays, RayStatus};
 use crate::train::aim::towards_lens;
 use crate::train::{BehindLenslets, MonochromaticTrain, OpticalTrain, Side};
@@ -92,49 +92,93 @@ impl OutlineTable {
             true => extent_of(&main.outline(at(i))),
             false => extent_of(&tight_outline(&main, &lenses, at(i))),
         };
-        let nodes = (0..across * across).map(node).collect();
+        let with_centre = |extent| OutlineNode { extent, centre: centre_of(&extent) };
+        let nodes = (0..across * across).map(|i| node(i).map(with_centre)).collect();
         Ok(Self { main, half, across, nodes })
     }
 
     /// The outline from a point of the array (mm); `None` in the dark.
     pub(super) fn at(&self, at: DVec2) -> Option<[f64; NORMALS]> {
-        match self.corners(at) {
-            Some(corners) => {
-                Some(std::array::from_fn(|k| corners.iter().map(|(e, weight)| e[k] * weight).sum()))
-            }
-            None => extent_of(&self.main.outline(at)),
+        self.between(self.corners(at).as_ref(), at)
+    }
+
+    /// The same of a point whose [`corners`](Self::corners) are known.
+    pub(super) fn between(
+        &self,
+        corners: Option<&NodeCorners<'_>>,
+        at: DVec2,
+    ) -> Option<[f64; NORMALS]> {
+        let Some(corners) = corners else { return extent_of(&self.main.outline(at)) };
+        let mut extent = [0.0; NORMALS];
+        for (k, extent) in extent.iter_mut().enumerate() {
+            *extent = corners.extent(k);
         }
+        Some(extent)
     }
 
     /// The middle of that outline.
     pub(super) fn centre_at(&self, at: DVec2) -> Option<DVec2> {
         match self.corners(at) {
-            Some(corners) => Some(corners.iter().map(|(e, weight)| centre_of(e) * *weight).sum()),
+            Some(NodeCorners { nodes: [a, b, c, d], weights: [p, q, r, s] }) => {
+                Some(a.centre * p + b.centre * q + c.centre * r + d.centre * s)
+            }
             None => extent_of(&self.main.outline(at)).map(|extent| centre_of(&extent)),
         }
     }
 
     /// The nodes around a point of the array (mm) and their weights, where there is light at all of them.
-    fn corners(&self, at: DVec2) -> Option<[(&[f64; NORMALS], f64); 4]> {
+    pub(super) fn corners(&self, at: DVec2) -> Option<NodeCorners<'_>> {
         let last = f64::from(self.across - 1);
         let place = (0.5 * (at / self.half + 1.0) * last).clamp(DVec2::ZERO, DVec2::splat(last));
-        let low = place.floor().min(DVec2::splat(last - 1.0));
-        let share = place - low;
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "between 0 and the number of nodes"
         )]
-        let first = low.y as usize * self.across as usize + low.x as usize;
+        let [column, row] = place.to_array().map(|at| (at as u32).min(self.across - 2));
+        let (x, y) = (place.x - f64::from(column), place.y - f64::from(row));
+        let first = (row * self.across + column) as usize;
         let next = first + self.across as usize;
-        let (x, y) = (share.x, share.y);
-        let node = |i: usize, weight: f64| Some((self.nodes[i].as_ref()?, weight));
-        Some([
-            node(first, (1.0 - x) * (1.0 - y))?,
-            node(first + 1, x * (1.0 - y))?,
-            node(next, (1.0 - x) * y)?,
-            node(next + 1, x * y)?,
-        ])
+        let node = |i: usize| self.nodes[i].as_ref();
+        Some(NodeCorners {
+            nodes: [node(first)?, node(first + 1)?, node(next)?, node(next + 1)?],
+            weights: [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y],
+        })
+    }
+}
+
+/// Nodes around a point and their weights.
+pub(super) struct NodeCorners<'a> {
+    nodes: [&'a OutlineNode; 4],
+    weights: [f64; 4],
+}
+
+impl NodeCorners<'_> {
+    /// The extent in a direction.
+    #[inline]
+    pub(super) fn extent(&self, k: usize) -> f64 {
+        let [a, b, c, d] = self.nodes;
+        let [p, q, r, s] = self.weights;
+        a.extent[k] * p + b.extent[k] * q + c.extent[k] * r + d.extent[k] * s
+    }
+}
+
+/// The direction in which extents are kept that is next to that of a vector, of every other one.
+pub(super) fn nearest_normal(vector: DVec2) -> usize {
+    // tan 22.5°.
+    const HALF: f64 = std::f64::consts::SQRT_2 - 1.0;
+    let DVec2 { x, y } = vector;
+    if y.abs() <= HALF * x.abs() {
+        return if x > 0.0 { 0 } else { 8 };
+    }
+    if x.abs() <= HALF * y.abs() {
+        return if y > 0.0 { 4 } else { 12 };
+    }
+    match (x > 0.0, y > 0.0) {
+        (true, true) => 2,
+        (false, true) => 6,
+        (false, false) => 10,
+        (true, false) => 14,
     }
 }
 
