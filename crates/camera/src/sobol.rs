@@ -82,7 +82,7 @@ pub(crate) fn float(x: f64) -> f32 {
 
 /// The point of one key in two dimensions of its set.
 pub(crate) fn point(key: SobolKey, half: Half) -> [f64; 2] {
-    let [point] = Shuffled::of([key.index], [key.seed]).points(half);
+    let [point] = SetSamples::of([key.index], [key.seed]).points(half);
     point
 }
 
@@ -91,10 +91,10 @@ fn scrambled(keys: &[SobolKey], half: Half, out: &mut [[f64; 2]]) {
     let (whole, rest) = keys.as_chunks::<LANES>();
     let (to, to_rest) = out.as_chunks_mut::<LANES>();
     for (keys, out) in whole.iter().zip(to) {
-        *out = shuffled(keys).points(half);
+        *out = set_samples(keys).points(half);
     }
     if !rest.is_empty() {
-        to_rest.copy_from_slice(&shuffled(&filled(rest)).points(half)[..rest.len()]);
+        to_rest.copy_from_slice(&set_samples(&filled(rest)).points(half)[..rest.len()]);
     }
 }
 
@@ -104,13 +104,13 @@ fn scrambled_sets(keys: &[SobolKey], [first, second]: [&mut [[f64; 2]]; 2]) {
     let (first, first_rest) = first.as_chunks_mut::<LANES>();
     let (second, second_rest) = second.as_chunks_mut::<LANES>();
     for ((keys, first), second) in whole.iter().zip(first).zip(second) {
-        let shuffled = shuffled(keys);
-        (*first, *second) = (shuffled.points(Half::First), shuffled.points(Half::Second));
+        let samples = set_samples(keys);
+        (*first, *second) = (samples.points(Half::First), samples.points(Half::Second));
     }
     if !rest.is_empty() {
-        let shuffled = shuffled(&filled(rest));
-        first_rest.copy_from_slice(&shuffled.points(Half::First)[..rest.len()]);
-        second_rest.copy_from_slice(&shuffled.points(Half::Second)[..rest.len()]);
+        let samples = set_samples(&filled(rest));
+        first_rest.copy_from_slice(&samples.points(Half::First)[..rest.len()]);
+        second_rest.copy_from_slice(&samples.points(Half::Second)[..rest.len()]);
     }
 }
 
@@ -160,7 +160,7 @@ fn floats_of(
     for seed in &mut seeds {
         *seed = seed.wrapping_add(shift);
     }
-    let [(across, _), (up, _)] = Shuffled::of(index, seeds).upper_bits(half);
+    let [(across, _), (up, _)] = SetSamples::of(index, seeds).upper_bits(half);
     let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
     for i in 0..LANES {
         x[i] = (across[i] >> 8) as f32 / 16_777_216.0;
@@ -170,12 +170,12 @@ fn floats_of(
 }
 
 #[inline(always)]
-fn shuffled(keys: &[SobolKey; LANES]) -> Shuffled<LANES> {
+fn set_samples(keys: &[SobolKey; LANES]) -> SetSamples<LANES> {
     let (mut index, mut seeds) = ([0; LANES], [0; LANES]);
     for i in 0..LANES {
         (index[i], seeds[i]) = (keys[i].index, keys[i].seed);
     }
-    Shuffled::of(index, seeds)
+    SetSamples::of(index, seeds)
 }
 
 /// The second dimension of point `index`, its bits reversed.
@@ -191,12 +191,12 @@ fn second_reversed(index: u32) -> u32 {
 
 /// Samples of a set: the hashes of their scramblings, and their shuffled indices.
 #[derive(Clone, Copy)]
-struct Shuffled<const N: usize> {
+struct SetSamples<const N: usize> {
     keys: [u32; N],
     at: [u32; N],
 }
 
-impl<const N: usize> Shuffled<N> {
+impl<const N: usize> SetSamples<N> {
     #[inline(always)]
     fn of(index: [u32; N], seeds: [u32; N]) -> Self {
         let (mut keys, mut at) = ([0; N], [0; N]);

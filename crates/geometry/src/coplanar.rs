@@ -49,7 +49,7 @@ struct Overlaps {
     axis: usize,
     widest: f64,
     /// Where they are; `None` of a few.
-    cells: Option<CoveredCells>,
+    grid: Option<OverlapGrid>,
 }
 
 /// As many triangles are looked through.
@@ -61,7 +61,7 @@ const CELLS: usize = 64;
 /// A grid over the two longest sides of the box of some triangles: a bit tells that a triangle's box meets a cell. A floor
 /// on which things stand has many small triangles over it, and most places of it none.
 #[derive(Debug, Clone)]
-struct CoveredCells {
+struct OverlapGrid {
     whole: Bounds,
     axes: [usize; 2],
     /// Cells in a metre.
@@ -69,7 +69,7 @@ struct CoveredCells {
     rows: Box<[u64; CELLS]>,
 }
 
-impl CoveredCells {
+impl OverlapGrid {
     /// Those of boxes within `whole`.
     fn of(boxes: &[Bounds], whole: Bounds) -> Self {
         let size = whole.max - whole.min;
@@ -126,12 +126,12 @@ impl Overlaps {
         self.widest =
             self.boxes.iter().map(|own| own.max[axis] - own.min[axis]).fold(0.0, f64::max);
         self.axis = axis;
-        self.cells = (self.all.len() > FEW).then(|| CoveredCells::of(&self.boxes, whole));
+        self.grid = (self.all.len() > FEW).then(|| OverlapGrid::of(&self.boxes, whole));
     }
 
     /// True if one of them may come within `slack` of `point` (m).
     fn may_be_near(&self, point: DVec3, slack: f64) -> bool {
-        self.cells.as_ref().is_none_or(|cells| cells.may_be_near(point, slack))
+        self.grid.as_ref().is_none_or(|grid| grid.may_be_near(point, slack))
     }
 }
 
@@ -514,7 +514,7 @@ mod tests {
             Geometry { meshes: vec![large, flat(&corners)], placements: vec![place(0), place(1)] };
         let coplanar = Coplanar::of(&geometry);
         let over = &coplanar.others[&[0, 0]];
-        assert!(over.cells.is_some() && over.all.len() == corners.len() / 3);
+        assert!(over.grid.is_some() && over.all.len() == corners.len() / 3);
         let (mut near, mut far) = (0, 0);
         for i in 0..4000_u32 {
             let [u, v] = [0.754_877_666, 0.569_840_290].map(|step| (step * f64::from(i)).fract());

@@ -5,7 +5,7 @@ use etendue_optics::element::{Block, Clip, LANES, LensRays, Ray, RayStatus};
 use etendue_optics::train::{MonochromaticTrain, RimTrace, Side};
 use glam::DVec3;
 
-use self::block::{BlockLandings, Placing};
+use self::block::{BlockLandings, LandingContext};
 use super::lens_camera::LensCamera;
 use super::opened::{BandInterpolation, place_of};
 use crate::{CameraRays, FilmSamples, Pose};
@@ -102,7 +102,7 @@ impl LensCamera {
         let area = StartArea { resolution, margin: self.margin(paths) };
         landings.clear();
         let film = self.focused.film();
-        let placing = Placing {
+        let ctx = LandingContext {
             paths,
             area: &area,
             next: paths.next.on_pixels(film.pitch / paths.pitch),
@@ -115,7 +115,7 @@ impl LensCamera {
             let first = self.aim_samples(&opened.pupil, lens, samples, numbers, out);
             landings.pass(paths, node, &mut out.in_lens);
             out.statuses.add_all(&out.in_lens);
-            landings.keep(node, &placing, samples, &out.sample[first..], &out.in_lens);
+            landings.keep(node, &ctx, samples, &out.sample[first..], &out.in_lens);
             self.leave(pose, first, out);
         }
         out.rays.coherent = true;
@@ -124,7 +124,7 @@ impl LensCamera {
             let nodes = [node, paths.nodes.len()];
             self.bring_back(nodes, lens, paths.lead, &mut out.in_lens, &mut landings.traced);
         }
-        self.land(&placing, samples, &out.sample, landings);
+        self.land(&ctx, samples, &out.sample, landings);
         landings.drop_lost(&area, samples, out);
     }
 
@@ -156,34 +156,34 @@ impl LensCamera {
     /// Computes where each band's light of each ray lands that was traced, and its weight.
     fn land(
         &self,
-        placing: &Placing<'_>,
+        ctx: &LandingContext<'_>,
         samples: &FilmSamples,
         sample: &[u32],
         landings: &mut BandLandings,
     ) {
         let BandLandings { pixel, weight, traced, block, .. } = landings;
-        let bands = placing.paths.weights.bands();
+        let bands = ctx.paths.weights.bands();
         for first in (0..traced.ray.len()).step_by(LANES) {
             let count = LANES.min(traced.ray.len() - first);
-            block.read_traced(placing, traced, first..first + count, |ray| {
+            block.read_traced(ctx, traced, first..first + count, |ray| {
                 samples.spectrum[sample[ray] as usize]
             });
-            block.place_bands(placing, u32::MAX >> (LANES - count));
+            block.place_bands(ctx, u32::MAX >> (LANES - count));
             for lane in 0..count {
                 let ray = traced.ray[first + lane];
                 let of_ray = ray * bands..(ray + 1) * bands;
                 let (pixels, weights) = (&mut pixel[of_ray.clone()], &mut weight[of_ray]);
-                if block.passes(lane, placing.paths.nodes.len()) {
+                if block.passes(lane, ctx.paths.nodes.len()) {
                     block.write(lane, pixels, weights);
                     continue;
                 }
                 // What ends at some node is traced at every band's wavelength.
                 let from = [traced.points[first + lane], traced.directions[first + lane]];
                 for band in 0..bands {
-                    let (lead, u) = (placing.paths.lead, block.spectrum(lane));
+                    let (lead, u) = (ctx.paths.lead, block.spectrum(lane));
                     let (place, passed) = self.trace_back(lead, band, u, from);
-                    if passed > 0.0 && placing.area.is_seen(place) {
-                        pixels[band] = placing.area.pixel_at(place);
+                    if passed > 0.0 && ctx.area.is_seen(place) {
+                        pixels[band] = ctx.area.pixel_at(place);
                         weights[band] = block.scale(lane) * passed;
                     }
                 }
@@ -311,23 +311,23 @@ impl BandLandings {
     fn keep(
         &mut self,
         node: usize,
-        placing: &Placing<'_>,
+        ctx: &LandingContext<'_>,
         samples: &FilmSamples,
         numbers: &[u32],
         rays: &LensRays,
     ) {
-        let bands = placing.paths.weights.bands();
+        let bands = ctx.paths.weights.bands();
         let mut end = self.pixel.len();
         self.pixel.resize(end + rays.len() * bands, Self::NOWHERE);
         self.weight.resize(end + rays.len() * bands, 0.0);
         for start in (0..rays.len()).step_by(LANES) {
             let (block, count) = rays.block_at(start);
             let numbers = &numbers[start..start + count];
-            let known = placing.known_lanes(&self.rims, start, count);
+            let known = ctx.known_lanes(&self.rims, start, count);
             if known != 0 {
                 self.block.read(samples, numbers, &self.before[start..start + count]);
-                self.block.displace(node, placing, &self.rims, block, start);
-                self.block.place_bands(placing, known);
+                self.block.displace(node, ctx, &self.rims, block, start);
+                self.block.place_bands(ctx, known);
             }
             for lane in (0..count).filter(|&lane| block.is_bright_at(lane)) {
                 let of_ray = end..end + bands;
@@ -338,7 +338,7 @@ impl BandLandings {
                 } else {
                     let i = numbers[lane] as usize;
                     let place = [samples.columns[i], samples.rows[i]];
-                    let nodes = [node, placing.paths.nodes.len()];
+                    let nodes = [node, ctx.paths.nodes.len()];
                     let start = (place, self.before[start + lane]);
                     self.traced.push(end / bands, nodes, start, block, lane);
                 }

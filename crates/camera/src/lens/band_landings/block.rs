@@ -13,7 +13,7 @@ use crate::lens::opened::BandInterpolation;
 type Row = [f64; LANES];
 
 /// What the places of rays on the film follow from.
-pub(super) struct Placing<'a> {
+pub(super) struct LandingContext<'a> {
     pub(super) paths: &'a BandInterpolation,
     pub(super) area: &'a StartArea,
     /// The next term, in pixels of the film.
@@ -22,7 +22,7 @@ pub(super) struct Placing<'a> {
     pub(super) to_pixels: f64,
 }
 
-impl Placing<'_> {
+impl LandingContext<'_> {
     /// The lanes, a bit each, of those `count` rays from `start` on whose places at all nodes follow from how they start, as
     /// they pass at each without loss.
     pub(super) fn known_lanes(&self, rims: &RimTrace, start: usize, count: usize) -> u32 {
@@ -70,7 +70,7 @@ impl BlockLandings {
     pub(super) fn displace(
         &mut self,
         node: usize,
-        placing: &Placing<'_>,
+        ctx: &LandingContext<'_>,
         rims: &RimTrace,
         block: &Block,
         start: usize,
@@ -78,12 +78,12 @@ impl BlockLandings {
         let Self { places, shares, points, .. } = self;
         points.copy_from_slice(&block.position[..2]);
         let starts = places[0];
-        for other in 0..placing.paths.nodes.len() {
+        for other in 0..ctx.paths.nodes.len() {
             shares[other] = [1.0; LANES];
             places[other] = starts;
-            if let Some(known) = placing.paths.displacements.as_ref().filter(|_| other != node) {
+            if let Some(known) = ctx.paths.displacements.as_ref().filter(|_| other != node) {
                 let (before, _) = rims.starts().block_at(start);
-                let by = [placing.to_pixels, -placing.to_pixels];
+                let by = [ctx.to_pixels, -ctx.to_pixels];
                 known.displace([node, other], before, by, &mut places[other]);
             }
         }
@@ -92,12 +92,12 @@ impl BlockLandings {
     /// Takes rays whose places are known at all nodes, each with its place in the spectrum.
     pub(super) fn read_traced(
         &mut self,
-        placing: &Placing<'_>,
+        ctx: &LandingContext<'_>,
         traced: &TracedRays,
         range: Range<usize>,
         spectrum: impl Fn(usize) -> f64,
     ) {
-        let nodes = placing.paths.nodes.len();
+        let nodes = ctx.paths.nodes.len();
         for (lane, k) in range.enumerate() {
             for node in 0..nodes {
                 let [x, y] = traced.places[k * nodes + node];
@@ -133,23 +133,23 @@ impl BlockLandings {
     }
 
     /// Computes where each band's light of the rays in these lanes (a bit each) lands, and its weight.
-    pub(super) fn place_bands(&mut self, placing: &Placing<'_>, lanes: u32) {
-        weigh(self, placing);
+    pub(super) fn place_bands(&mut self, ctx: &LandingContext<'_>, lanes: u32) {
+        weigh(self, ctx);
         let is_one = |lane: usize| u32::from(self.only[lane] != BandLandings::NOWHERE);
         let are_one = (0..LANES).fold(0, |all, lane| all | is_one(lane) << lane);
         let lanes = lanes & !are_one;
         if lanes == 0 {
             return;
         }
-        let bands = placing.paths.weights.bands();
+        let bands = ctx.paths.weights.bands();
         self.pixel.resize(LANES * bands, BandLandings::NOWHERE);
         self.weight.resize(LANES * bands, 0.0);
-        match placing.paths.nodes.len() {
-            1 => split::<1>(self, placing, lanes),
-            2 => split::<2>(self, placing, lanes),
-            3 => split::<3>(self, placing, lanes),
-            4 => split::<4>(self, placing, lanes),
-            _ => split::<MOST_NODES>(self, placing, lanes),
+        match ctx.paths.nodes.len() {
+            1 => split::<1>(self, ctx, lanes),
+            2 => split::<2>(self, ctx, lanes),
+            3 => split::<3>(self, ctx, lanes),
+            4 => split::<4>(self, ctx, lanes),
+            _ => split::<MOST_NODES>(self, ctx, lanes),
         }
     }
 
@@ -169,11 +169,11 @@ impl BlockLandings {
 /// Computes the weights of rays, and on which pixel each lands in all bands, as most do.
 #[multiversion::multiversion(targets = "simd")]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "of a picture")]
-fn weigh(rays: &mut BlockLandings, placing: &Placing<'_>) {
+fn weigh(rays: &mut BlockLandings, ctx: &LandingContext<'_>) {
     let BlockLandings { places, shares, points, weights, scales, only, .. } = rays;
-    let nodes = placing.paths.nodes.len();
-    let [[left, top], [right, bottom]] = placing.area.bounds();
-    let [width, height] = placing.area.size();
+    let nodes = ctx.paths.nodes.len();
+    let [[left, top], [right, bottom]] = ctx.area.bounds();
+    let [width, height] = ctx.area.size();
     let mut makes = [0.0; LANES];
     for (place, share) in places[..nodes].iter().zip(&shares[..nodes]) {
         for i in 0..LANES {
@@ -186,19 +186,18 @@ fn weigh(rays: &mut BlockLandings, placing: &Placing<'_>) {
         let makes = if makes[i] > 1.0 { makes[i] } else { 1.0 };
         scales[i] = weights[i] * nodes as f64 / makes;
     }
-    if !placing.paths.is_clear() {
+    if !ctx.paths.is_clear() {
         *only = [BandLandings::NOWHERE; LANES];
         return;
     }
-    let [low, high] =
-        placing.paths.bounds.corners(&places[..nodes], &more(places, points, placing));
+    let [low, high] = ctx.paths.bounds.corners(&places[..nodes], &more(places, points, ctx));
     for i in 0..LANES {
         let is_seen = (low[0][i] >= 0.0) & (low[1][i] >= 0.0);
         let is_seen = is_seen & (high[0][i] < width) & (high[1][i] < height);
         let [x, y] = [low[0][i] as u32, low[1][i] as u32];
         let is_one = is_seen & (x == high[0][i] as u32) & (y == high[1][i] as u32);
         only[i] = if is_one {
-            y.wrapping_mul(placing.area.resolution[0]).wrapping_add(x)
+            y.wrapping_mul(ctx.area.resolution[0]).wrapping_add(x)
         } else {
             BandLandings::NOWHERE
         };
@@ -207,11 +206,10 @@ fn weigh(rays: &mut BlockLandings, placing: &Placing<'_>) {
 
 /// The next term of each ray (pixels).
 #[inline(always)]
-fn more(places: &[[Row; 2]; MOST_NODES], points: &[Row; 2], placing: &Placing<'_>) -> [Row; 2] {
+fn more(places: &[[Row; 2]; MOST_NODES], points: &[Row; 2], ctx: &LandingContext<'_>) -> [Row; 2] {
     let mut more = [[0.0; LANES]; 2];
     for i in 0..LANES {
-        let [x, y] =
-            placing.next.at([places[0][0][i], places[0][1][i]], [points[0][i], points[1][i]]);
+        let [x, y] = ctx.next.at([places[0][0][i], places[0][1][i]], [points[0][i], points[1][i]]);
         (more[0][i], more[1][i]) = (x, y);
     }
     more
@@ -221,12 +219,12 @@ fn more(places: &[[Row; 2]; MOST_NODES], points: &[Row; 2], placing: &Placing<'_
 /// which there are `NODES` at most.
 #[multiversion::multiversion(targets = "simd")]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "of a picture")]
-fn split<const NODES: usize>(rays: &mut BlockLandings, placing: &Placing<'_>, lanes: u32) {
+fn split<const NODES: usize>(rays: &mut BlockLandings, ctx: &LandingContext<'_>, lanes: u32) {
     let BlockLandings { places, shares, points, scales, spectrum, pixel, weight, .. } = rays;
-    let BandInterpolation { nodes, weights, has_losses, .. } = placing.paths;
+    let BandInterpolation { nodes, weights, has_losses, .. } = ctx.paths;
     let (nodes, bands) = (nodes.len(), weights.bands());
-    let ([width, height], row) = (placing.area.size(), placing.area.resolution[0]);
-    let [more_x, more_y] = more(places, points, placing);
+    let ([width, height], row) = (ctx.area.size(), ctx.area.resolution[0]);
+    let [more_x, more_y] = more(places, points, ctx);
     for lane in 0..LANES {
         if lanes >> lane & 1 == 0 {
             continue;

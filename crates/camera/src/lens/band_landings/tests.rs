@@ -63,7 +63,7 @@ fn rays_away_from_rims_land_where_they_are_traced_to() {
     let area = StartArea { resolution: [256; 2], margin: 0.0 };
     let film = lens.focused.film();
     let to_pixels = 1.0 / (film.turn * film.pitch);
-    let placing = Placing { paths, area: &area, next: NextTerm::default(), to_pixels };
+    let ctx = LandingContext { paths, area: &area, next: NextTerm::default(), to_pixels };
     let samples = many_samples(20_000, 256.0);
     let (mut rays, mut landings) = (CameraRays::default(), BandLandings::default());
     let (mut left, mut known, mut worst) = (0, 0, 0.0_f64);
@@ -78,7 +78,7 @@ fn rays_away_from_rims_land_where_they_are_traced_to() {
             let of_block = start..start + count;
             let BandLandings { before, rims, block: places, .. } = &mut landings;
             places.read(&samples, &numbers[of_block.clone()], &before[of_block.clone()]);
-            places.displace(node, &placing, rims, block, start);
+            places.displace(node, &ctx, rims, block, start);
             for (lane, i) in of_block.enumerate().filter(|&(_, i)| rims.is_within(i)) {
                 known += 1;
                 let [point, direction] = [rays.in_lens.position(i), rays.in_lens.direction(i)];
