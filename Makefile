@@ -144,7 +144,7 @@ bench-workers:
 	out/python/venv/bin/python benches/workers.py --output docs/measurements/benchmarks-python.md $(ARGS)
 
 bench-light: setup
-	cargo build --release -p etendue-cli -p etendue-benches
+	cargo build --release -p etendue-cli -p etendue-benches --bin etendue --bin benchmarks
 	scripts/bench-peers.sh light_peers.py $(ARGS)
 
 # Fails where pictures differ by more than their noise. ARGS='--scenes "mirror"' compares some of them.
