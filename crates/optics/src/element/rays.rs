@@ -353,11 +353,9 @@ impl LensRays {
 
     /// Makes room for `len` rays, all of them to be set.
     pub(crate) fn resize(&mut self, len: usize) {
+        // Lanes of the last block that are no rays are idle.
+        self.blocks.truncate(len / LANES);
         self.blocks.resize(len.div_ceil(LANES), Block::EMPTY);
-        // Lanes of the last one that are no rays.
-        if let Some(last) = self.blocks.last_mut() {
-            *last = Block::EMPTY;
-        }
         self.len = len;
     }
 
