@@ -38,6 +38,9 @@ use fault::{Fault, print_text};
 use progress::say;
 
 fn main() -> ExitCode {
+    if !room::has_room_for_command() {
+        return ExitCode::from(2);
+    }
     let cli = arguments::parse();
     if cli.version {
         print_version();

@@ -3,6 +3,8 @@
 //! What a scene takes is forecast and refused by name. Stacks of threads, and the lists of a few bytes
 //! that are everywhere, are not: without room for them a library ends the process.
 
+use std::io::Write as _;
+
 use etendue_report::Size;
 use etendue_scene::memory::addresses;
 
@@ -18,6 +20,22 @@ const ITSELF: u64 = 200 << 20;
 
 /// Memory that each thread takes (bytes): a stack of ours, one of Embree's, and their small lists.
 const THREAD: u64 = 8 << 20;
+
+/// Memory that the reading of a command line takes at most (bytes); it takes less than one.
+const COMMAND: u64 = 4 << 20;
+
+/// Tests whether the shell leaves addresses enough to read a command line, and says so if not. Asks for no memory
+/// itself: where there is none, whatever asks first ends the process.
+pub(crate) fn has_room_for_command() -> bool {
+    let Some(left) = addresses().filter(|&left| left < COMMAND) else { return true };
+    let (left, needed) = (Size(left), Size(COMMAND));
+    let _ = writeln!(
+        std::io::stderr(),
+        "error: the shell's limit (ulimit -v) leaves {left}, and to read a command takes {needed}\n\
+         hint: raise the limit"
+    );
+    false
+}
 
 /// Refuses to work on so many threads (all, for 0) where the shell leaves too few addresses. Under such a
 /// limit the program starts itself anew, with one arena.

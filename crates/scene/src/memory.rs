@@ -5,6 +5,7 @@
 
 use std::fmt;
 use std::fs;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -52,7 +53,10 @@ impl Limit {
         [
             of(kilobytes(&root.join("proc/meminfo"), "MemAvailable:"), LimitSource::Machine),
             of(group_has_free(root), LimitSource::Group),
-            of(addresses_left(root), LimitSource::Addresses),
+            of(
+                addresses_left(&root.join("proc/self/limits"), &root.join("proc/self/status")),
+                LimitSource::Addresses,
+            ),
         ]
         .into_iter()
         .flatten()
@@ -75,9 +79,23 @@ impl fmt::Display for Limit {
 
 /// A line of `/proc`'s tables of kilobytes, in bytes.
 fn kilobytes(file: &Path, name: &str) -> Option<u64> {
-    let text = fs::read_to_string(file).ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
-    line.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(1024)
+    number(file, name)?.checked_mul(1024)
+}
+
+/// The number after `name` in one of `/proc`'s tables. Asks for no memory: see [`addresses`].
+fn number(file: &Path, name: &str) -> Option<u64> {
+    let mut bytes = [0; 1 << 13];
+    let mut file = fs::File::open(file).ok()?;
+    let mut length = 0;
+    while let Some(rest) = bytes.get_mut(length..).filter(|rest| !rest.is_empty()) {
+        match file.read(rest).ok()? {
+            0 => break,
+            read => length += read,
+        }
+    }
+    let lines = bytes[..length].split(|&byte| byte == b'\n');
+    let line = lines.filter_map(|line| line.strip_prefix(name.as_bytes())).next()?;
+    str::from_utf8(line).ok()?.split_whitespace().next()?.parse().ok()
 }
 
 /// Memory that the control groups (version 2) of this process leave; files that can be dropped count as free.
@@ -99,10 +117,10 @@ fn group_has_free(root: &Path) -> Option<u64> {
 }
 
 /// Address space that `ulimit -v` leaves to this process (bytes); `None` without such a limit, or
-/// where the system does not tell.
+/// where the system does not tell. Asks for no memory itself, so that it answers where there is none.
 #[must_use]
 pub fn addresses() -> Option<u64> {
-    addresses_left(Path::new("/"))
+    addresses_left(Path::new("/proc/self/limits"), Path::new("/proc/self/status"))
 }
 
 /// Tests whether the system gives so many bytes in one piece now. A library that is about to take
@@ -133,11 +151,9 @@ pub fn of_json(json: &[u8]) -> u64 {
         + json.len() as u64
 }
 
-fn addresses_left(root: &Path) -> Option<u64> {
-    let text = fs::read_to_string(root.join("proc/self/limits")).ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix("Max address space"))?;
-    let most: u64 = line.split_whitespace().next()?.parse().ok()?;
-    let held = kilobytes(&root.join("proc/self/status"), "VmSize:").unwrap_or(0);
+fn addresses_left(limits: &Path, status: &Path) -> Option<u64> {
+    let most = number(limits, "Max address space")?;
+    let held = kilobytes(status, "VmSize:").unwrap_or(0);
     Some(most.saturating_sub(held))
 }
 
