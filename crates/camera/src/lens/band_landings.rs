@@ -1,13 +1,13 @@
 //! Rays of the scene that all bands share, and where each band's light of them lands ([`band_paths`](super::band_paths)
 //! has why).
 
-use etendue_optics::element::{Block, Clip, LANES, LensRays, Ray, RayStatus};
-use etendue_optics::train::{MonochromaticTrain, RimTrace, Side};
+use etendue_optics::element::{Block, Clip, LANES, LensRays, RayStatus};
+use etendue_optics::train::{RimTrace, Side};
 use glam::DVec3;
 
 use self::block::{BlockLandings, LandingContext};
 use super::lens_camera::LensCamera;
-use super::opened::{BandInterpolation, place_of};
+use super::opened::{BandInterpolation, OpenedGroup, place_of};
 use crate::{CameraRays, FilmSamples, Pose};
 
 mod block;
@@ -21,6 +21,7 @@ pub struct BandLandings {
     pub weight: Vec<f64>,
     /// Rays that are traced back to find their places at other nodes.
     traced: TracedRays,
+    strays: Vec<Stray>,
     /// Numbers of a node's samples.
     numbers: Vec<u32>,
     /// Weights of a batch before it passes the lens, and what becomes of it at the rims.
@@ -40,9 +41,26 @@ struct TracedRays {
     directions: Vec<DVec3>,
     weights: Vec<f64>,
     leading: Vec<usize>,
+    /// True of one that keeps away from rims by more than wavelengths part, as was found at its node.
+    is_inner: Vec<bool>,
+    /// True of one that passes at all wavelengths, as far as was found at other nodes.
+    is_within: Vec<bool>,
     /// `[ray][node]`: the place (pixels), and the share that the lens passes, 0 where it ends.
     places: Vec<[f64; 2]>,
     shares: Vec<f64>,
+}
+
+/// Ray that may end at some wavelengths.
+#[derive(Debug, Clone)]
+struct Stray {
+    /// Its number among those that are traced.
+    index: usize,
+    /// True if the bands' places follow from those at the nodes.
+    is_placed: bool,
+    /// Its place in the spectrum.
+    spectrum: f64,
+    /// Its weight in the mean over the samples of a pixel, but for what the lens passes.
+    scale: f64,
 }
 
 impl BandLandings {
@@ -82,8 +100,7 @@ impl StartArea {
 }
 
 impl LensCamera {
-    /// The rays of `samples` that all bands share, and where the light of each band lands. Of samples beside the film, which
-    /// stand for light that lands on it all the same, those are left out from whose places none can, or does.
+    /// The rays of `samples` that all bands share, and where the light of each band lands, of some at least.
     ///
     /// # Panics
     ///
@@ -109,7 +126,7 @@ impl LensCamera {
             to_pixels: 1.0 / (film.turn * film.pitch),
         };
         // Out of the camera, each at its leading wavelength.
-        for (node, lens) in paths.nodes.iter().enumerate() {
+        for (node, lens) in paths.leading().iter().enumerate() {
             landings.take_samples([node, paths.nodes.len()], &area, samples);
             let numbers = landings.numbers.iter().copied();
             let first = self.aim_samples(&opened.pupil, lens, samples, numbers, out);
@@ -120,97 +137,84 @@ impl LensCamera {
         }
         out.rays.coherent = true;
         // Back into it at the others, where it is not known where they land.
-        for (node, lens) in paths.nodes.iter().enumerate() {
-            let nodes = [node, paths.nodes.len()];
-            self.bring_back(nodes, lens, paths.lead, &mut out.in_lens, &mut landings.traced);
+        for node in 0..paths.nodes.len() {
+            let BandLandings { traced, rims, .. } = landings;
+            self.bring_back(node, paths, &mut out.in_lens, traced, rims);
         }
-        self.land(&ctx, samples, &out.sample, landings);
-        landings.drop_lost(&area, samples, out);
+        landings.land(&ctx, samples, &out.sample);
+        self.trace_strays(&ctx, &mut out.in_lens, landings);
+        landings.drop_lost(opened.groups.len(), out);
     }
 
-    /// Takes the rays of other leading wavelengths back through the lens at a node of so many, to where they land.
+    /// Takes the rays of other leading wavelengths back through the lens at a node, to where they land; and those of its own,
+    /// where it is not known whether they pass at all wavelengths.
     fn bring_back(
         &self,
-        [node, nodes]: [usize; 2],
-        lens: &MonochromaticTrain,
-        lead: f64,
+        node: usize,
+        paths: &BandInterpolation,
         back: &mut LensRays,
         traced: &mut TracedRays,
+        rims: &mut RimTrace,
     ) {
-        let TracedRays { points, directions, leading, places, shares, .. } = traced;
-        let comes_back = |&k: &usize| leading[k] != node;
+        let TracedRays { points, directions, leading, is_within, is_inner, places, shares, .. } =
+            traced;
+        let has_near = paths.rims.as_ref().is_some_and(|bounds| bounds.near.is_some());
+        let comes_back = |&k: &usize| leading[k] != node || (has_near && !is_inner[k]);
         back.clear();
         for k in (0..points.len()).filter(comes_back) {
-            back.push(points[k] + directions[k] * lead, -directions[k]);
+            back.push(points[k] + directions[k] * paths.lead, -directions[k]);
         }
-        lens.trace(Side::Object, Clip::On, back);
-        let film = self.focused.film();
+        match &paths.rims {
+            Some(bounds) => bounds.trace_back(node, back, rims),
+            None => paths.nodes[node].trace(Side::Object, Clip::On, back),
+        }
+        let (film, nodes) = (self.focused.film(), paths.nodes.len());
         for (k, i) in (0..points.len()).filter(comes_back).zip(0..) {
-            if back.status(i) == RayStatus::Exited {
+            is_within[k] &= is_inner[k] || (has_near && rims.is_within(i));
+            if leading[k] != node && back.status(i) == RayStatus::Exited {
                 places[k * nodes + node] = film.pixel(back.position(i), back.direction(i));
                 shares[k * nodes + node] = back.throughput(i);
             }
         }
     }
 
-    /// Computes where each band's light of each ray lands that was traced, and its weight.
-    fn land(
+    /// Looks at which wavelengths of a band rays pass that come near a rim, and leaves out what ends there. Rays that end at
+    /// a node land where they are traced to.
+    fn trace_strays(
         &self,
         ctx: &LandingContext<'_>,
-        samples: &FilmSamples,
-        sample: &[u32],
+        back: &mut LensRays,
         landings: &mut BandLandings,
     ) {
-        let BandLandings { pixel, weight, traced, block, .. } = landings;
-        let bands = ctx.paths.weights.bands();
-        for first in (0..traced.ray.len()).step_by(LANES) {
-            let count = LANES.min(traced.ray.len() - first);
-            block.read_traced(ctx, traced, first..first + count, |ray| {
-                samples.spectrum[sample[ray] as usize]
-            });
-            block.place_bands(ctx, u32::MAX >> (LANES - count));
-            for lane in 0..count {
-                let ray = traced.ray[first + lane];
-                let of_ray = ray * bands..(ray + 1) * bands;
-                let (pixels, weights) = (&mut pixel[of_ray.clone()], &mut weight[of_ray]);
-                if block.passes(lane, ctx.paths.nodes.len()) {
-                    block.write(lane, pixels, weights);
-                    continue;
+        let BandLandings { pixel, weight, traced, strays, .. } = landings;
+        let opened = self.opened.as_ref().expect("the camera is opened before it is sampled");
+        let (bands, film) = (opened.groups.len(), self.focused.film());
+        strays.sort_unstable_by(|a, b| a.spectrum.total_cmp(&b.spectrum));
+        for (band, OpenedGroup { lenses, few }) in opened.groups.iter().enumerate() {
+            // Those that end at a node are few themselves.
+            let lenses = if ctx.paths.rims.is_some() { few } else { lenses };
+            let lens_of = |stray: &Stray| place_of(stray.spectrum, lenses.len());
+            for strays in strays.chunk_by(|a, b| lens_of(a) == lens_of(b)) {
+                back.clear();
+                for &Stray { index, .. } in strays {
+                    let (point, direction) = (traced.points[index], traced.directions[index]);
+                    back.push(point + direction * ctx.paths.lead, -direction);
                 }
-                // What ends at some node is traced at every band's wavelength.
-                let from = [traced.points[first + lane], traced.directions[first + lane]];
-                for band in 0..bands {
-                    let (lead, u) = (ctx.paths.lead, block.spectrum(lane));
-                    let (place, passed) = self.trace_back(lead, band, u, from);
-                    if passed > 0.0 && ctx.area.is_seen(place) {
-                        pixels[band] = ctx.area.pixel_at(place);
-                        weights[band] = block.scale(lane) * passed;
+                lenses[lens_of(&strays[0])].trace(Side::Object, Clip::On, back);
+                for (i, stray) in strays.iter().enumerate() {
+                    let at = traced.ray[stray.index] * bands + band;
+                    let passes = back.status(i) == RayStatus::Exited && back.throughput(i) > 0.0;
+                    if passes && stray.is_placed {
+                        continue;
                     }
+                    let place = film.pixel(back.position(i), back.direction(i));
+                    (pixel[at], weight[at]) = match passes && ctx.area.is_seen(place) {
+                        true => (ctx.area.pixel_at(place), stray.scale * back.throughput(i)),
+                        false => (BandLandings::NOWHERE, 0.0),
+                    };
                 }
             }
         }
-    }
-
-    /// Landing point of a ray that leaves the lens at a point (mm) in a direction, at a band's wavelength at `u` of the
-    /// spectrum (pixels), and the share of it that passes.
-    #[inline(never)]
-    fn trace_back(
-        &self,
-        lead: f64,
-        band: usize,
-        u: f64,
-        [point, direction]: [DVec3; 2],
-    ) -> ([f64; 2], f64) {
-        let opened = self.opened.as_ref().expect("the camera is opened before it is sampled");
-        let group = &opened.groups[band];
-        let lens = &group.lenses[group.lens_at(u)];
-        let Some(ray) = Ray::new(point + direction * lead, -direction) else {
-            return ([f64::NAN; 2], 0.0);
-        };
-        let end = lens.run(Side::Object, Clip::On, ray);
-        let Ray { position, direction } = end.ray;
-        let place = self.focused.film().pixel(position.into(), direction.into());
-        (place, if end.status == RayStatus::Exited { end.throughput } else { 0.0 })
     }
 }
 
@@ -221,15 +225,17 @@ impl TracedRays {
         self.directions.clear();
         self.weights.clear();
         self.leading.clear();
+        self.is_inner.clear();
+        self.is_within.clear();
         self.places.clear();
         self.shares.clear();
     }
 
     /// Appends the ray in a lane of a block that left the lens at a node of so many: `ray` of those that leave the camera,
-    /// which started from a place of the film (pixels) with a weight.
+    /// which started from a place of the film (pixels) with a weight, and surely passes at all wavelengths or not.
     fn push(
         &mut self,
-        ray: usize,
+        (ray, is_inner): (usize, bool),
         [node, nodes]: [usize; 2],
         (place, weight): ([f64; 2], f64),
         block: &Block,
@@ -237,6 +243,8 @@ impl TracedRays {
     ) {
         let vector = |axes: &[[f64; LANES]; 3]| DVec3::from_array(axes.map(|axis| axis[lane]));
         self.ray.push(ray);
+        self.is_inner.push(is_inner);
+        self.is_within.push(true);
         self.points.push(vector(&block.position));
         self.directions.push(vector(&block.direction));
         self.weights.push(weight);
@@ -254,6 +262,32 @@ impl BandLandings {
         self.pixel.clear();
         self.weight.clear();
         self.traced.clear();
+    }
+
+    /// Computes where each band's light of each ray lands that was traced at all nodes, and its weight: of rays that pass at
+    /// all wavelengths. The others are strays.
+    fn land(&mut self, ctx: &LandingContext<'_>, samples: &FilmSamples, sample: &[u32]) {
+        let Self { pixel, weight, traced, strays, block, .. } = self;
+        let (bands, nodes) = (ctx.paths.weights.bands(), ctx.paths.nodes.len());
+        strays.clear();
+        for first in (0..traced.ray.len()).step_by(LANES) {
+            let count = LANES.min(traced.ray.len() - first);
+            block.read_traced(ctx, traced, first..first + count, |ray| {
+                samples.spectrum[sample[ray] as usize]
+            });
+            block.place_bands(ctx, u32::MAX >> (LANES - count));
+            for lane in 0..count {
+                let (index, is_placed) = (first + lane, block.passes(lane, nodes));
+                if is_placed {
+                    let of_ray = traced.ray[index] * bands..(traced.ray[index] + 1) * bands;
+                    block.write(lane, &mut pixel[of_ray.clone()], &mut weight[of_ray]);
+                }
+                if !(is_placed && traced.is_within[index]) {
+                    let (spectrum, scale) = (block.spectrum(lane), block.scale(lane));
+                    strays.push(Stray { index, is_placed, spectrum, scale });
+                }
+            }
+        }
     }
 
     /// Takes the numbers of the samples that start in `area` and lead at a node of so many.
@@ -279,26 +313,19 @@ impl BandLandings {
             let (block, count) = rays.block_at(start);
             self.before.extend_from_slice(&block.throughput[..count]);
         }
-        match &paths.displacements {
-            Some(known) => known.trace(node, &paths.nodes[node], rays, &mut self.rims),
+        match &paths.rims {
+            Some(bounds) => bounds.trace(node, rays, &mut self.rims),
             None => paths.nodes[node].trace(Side::Sensor, Clip::On, rays),
         }
     }
 
-    /// Leaves out rays that start beside the film and of which nothing lands on it: nobody asks what they see.
-    fn drop_lost(&mut self, area: &StartArea, samples: &FilmSamples, out: &mut CameraRays) {
-        let is_seen = |&sample: &u32| {
-            let i = sample as usize;
-            area.is_seen([samples.columns[i], samples.rows[i]])
-        };
-        if out.sample.iter().all(is_seen) {
+    /// Leaves out rays of which nothing lands on the film: nobody asks what they see.
+    fn drop_lost(&mut self, bands: usize, out: &mut CameraRays) {
+        let lands = |pixels: &[u32]| pixels.iter().any(|&pixel| pixel != Self::NOWHERE);
+        let kept: Vec<bool> = self.pixel.chunks_exact(bands).map(lands).collect();
+        if kept.iter().all(|&kept| kept) {
             return;
         }
-        let bands = self.pixel.len() / out.sample.len();
-        let lands = |pixels: &[u32]| pixels.iter().any(|&pixel| pixel != Self::NOWHERE);
-        let of_rays = out.sample.iter().zip(self.pixel.chunks_exact(bands));
-        let kept: Vec<bool> =
-            of_rays.map(|(sample, pixels)| is_seen(sample) || lands(pixels)).collect();
         out.rays.retain(|ray| kept[ray]);
         keep_rays(&mut out.weight, &kept, 1);
         keep_rays(&mut out.sample, &kept, 1);
@@ -339,8 +366,9 @@ impl BandLandings {
                     let i = numbers[lane] as usize;
                     let place = [samples.columns[i], samples.rows[i]];
                     let nodes = [node, ctx.paths.nodes.len()];
+                    let is_inner = ctx.paths.rims.is_none() || self.rims.is_within(start + lane);
                     let start = (place, self.before[start + lane]);
-                    self.traced.push(end / bands, nodes, start, block, lane);
+                    self.traced.push((end / bands, is_inner), nodes, start, block, lane);
                 }
                 end += bands;
             }

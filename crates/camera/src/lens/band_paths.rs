@@ -23,7 +23,9 @@
 //! As the shares 1/m that the leading wavelengths take of r add up to 1 (the condition of E. Veach,
 //! *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, eq. 9.5), the mean is that of each band
 //! traced by itself, whatever the weights are; where w is the same for all, as it nearly is, this is his balance
-//! heuristic. Rays that one wavelength loses at a rim come by another: the share of 1/m counts those that can.
+//! heuristic. Rays that one wavelength loses at a rim come by another: the share of 1/m counts those that can. The lens that
+//! rays pass at leading wavelengths has wider rims than the one that light of the bands passes ([`rims`](super::rims)), so
+//! that each ray that passes at a band's wavelength comes by one of them.
 //!
 //! Light of a band that lands on the film may come along a ray that lands beside it at all leading wavelengths, as
 //! where the middle of the spectrum is displaced against both its ends. Rays start from a margin all about the film, too,
@@ -36,7 +38,7 @@
 //! places move nearly in proportion. What that leaves, the next term of Newton's polynomial, is a straight line in the
 //! ray, fitted to measured ones ([`NextTerm`]). As many nodes are taken as bring the places of all wavelengths that are
 //! drawn within [`SharingLimits::places`](super::SharingLimits) of where rays land that are traced, over film and pupil.
-//! A ray that ends at some node is traced at every band's wavelength by itself.
+//! A ray that comes as near to a rim as wavelengths part there is traced at every band's wavelength by itself.
 
 use etendue_optics::element::{Clip, LensRays, Opening, RayStatus};
 use etendue_optics::train::pupil::without_filters;
@@ -49,6 +51,7 @@ use super::nodes::{
     BandWeights, MOST_NODES, NextTerm, NodeWeights, RayOff, Variable, WeightBounds,
 };
 use super::opened::{BandInterpolation, filtered};
+use super::rims::RimBounds;
 use super::traced_at::TracedAt;
 
 /// Wavelengths at which interpolation is checked, at most. Not a setting, as the places and directions: how near places
@@ -208,6 +211,8 @@ impl LensCamera {
             if error > limits.places || (has_losses && share > limits.shares) {
                 continue;
             }
+            let wanted = (checks.as_slice(), bands.count());
+            let rims = RimBounds::measured(&clear, &chosen, wanted, (&rays, lead));
             let nodes = chosen.iter().map(|&nm| at(nm)).collect::<Result<Vec<_>, _>>()?;
             let bands = self.band_weights(bands, &spreads, &chosen);
             let bounds = WeightBounds::of(bands.iter().flatten());
@@ -222,6 +227,7 @@ impl LensCamera {
                 reach,
                 error,
                 pitch: self.focused.film().pitch,
+                rims,
                 displacements: None,
             });
         }

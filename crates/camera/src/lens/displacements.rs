@@ -6,12 +6,12 @@
 //! Aberration Coefficients*, 1954), and are fitted to rays that are traced. Where they leave more than interpolation
 //! between wavelengths may be off, rays are traced.
 //!
-//! A ray that keeps away from all rims by more than wavelengths part there passes at each of them; others are
-//! traced.
+//! They hold of rays that pass at all wavelengths, as those that keep away from all rims ([`rims`](super::rims)); others
+//! are traced.
 
 use etendue_optics::analysis::least_squares::LeastSquares;
-use etendue_optics::element::{Block, Clip, LANES, LensRays, RayStatus};
-use etendue_optics::train::{MonochromaticTrain, RimTrace, Side};
+use etendue_optics::element::{Block, Clip, LANES, RayStatus};
+use etendue_optics::train::{MonochromaticTrain, Side};
 use glam::{DMat3, DVec2, DVec3};
 
 use super::band_paths::SceneRay;
@@ -24,17 +24,12 @@ const MOST_WAVELENGTHS: usize = 4;
 /// Rays that are fitted to, about.
 const RAYS: usize = 2500;
 
-/// Factor on the measured parting of wavelengths at rims, which may be greater in between.
-const SAFETY: f64 = 1.25;
-
 /// Terms of three numbers up to the third degree.
 const TERMS: usize = 20;
 
 /// Displacements of rays between all pairs of wavelengths.
 #[derive(Debug)]
 pub(super) struct Displacements {
-    /// The lens at each wavelength, its rims narrower by so much that rays which pass it pass all of them as they are.
-    narrowed: Vec<MonochromaticTrain>,
     scales: Scales,
     /// `[from][to]`.
     shifts: Vec<Vec<Shift>>,
@@ -60,11 +55,10 @@ struct Shift {
     across: [f64; TERMS],
 }
 
-/// End of a ray on the film at a wavelength: its place from the axis (mm), its slopes, and its crossings with the elements.
+/// End of a ray on the film at a wavelength: its place from the axis (mm), and its slopes.
 struct FilmEnd {
     place: DVec2,
     slopes: DVec2,
-    crossings: Vec<DVec2>,
 }
 
 impl LensCamera {
@@ -77,8 +71,9 @@ impl LensCamera {
     }
 
     /// Measures the displacements between the wavelengths of `paths`; `None` where these would be off by more than
-    /// there is left of what places may be, or are dear.
+    /// there is left of what places may be, or are dear, or where it is not known which rays keep away from rims.
     fn displacements(&self, paths: &BandInterpolation) -> Option<Displacements> {
+        paths.rims.as_ref()?;
         let BandInterpolation { nodes, has_losses, lead, error, .. } = paths;
         let film = self.focused.film();
         let is_square = film.frame.rotation == DMat3::IDENTITY;
@@ -94,8 +89,7 @@ impl LensCamera {
         };
         let ends: Vec<Vec<FilmEnd>> = rays.iter().step_by(step).filter_map(ends_of).collect();
         let scales = Scales::of(&ends)?;
-        let narrowed = narrowed(nodes, &ends)?;
-        let mut found = Displacements { narrowed, scales, shifts: Vec::new(), error: 0.0 };
+        let mut found = Displacements { scales, shifts: Vec::new(), error: 0.0 };
         for from in 0..nodes.len() {
             let to = |to: usize| {
                 if to == from {
@@ -112,53 +106,20 @@ impl LensCamera {
         (all <= self.accuracy.sharing.places).then_some(found)
     }
 
-    /// End of a ray of the scene on the film; `None` where it ends before, or meets an element more than once.
+    /// End of a ray of the scene on the film; `None` where it ends before.
     fn film_end(&self, lens: &MonochromaticTrain, start: DVec3, way: DVec3) -> Option<FilmEnd> {
         let path = lens.path(Side::Object, Clip::On, start, way);
         let (last, direction) = (path.points.last()?, path.direction?);
-        if path.status != RayStatus::Exited
-            || path.points.len() != self.focused.train().elements().len()
-        {
+        if path.status != RayStatus::Exited {
             return None;
         }
         let slopes = direction.truncate() / direction.z;
         let place = last.truncate() + slopes * (self.focused.sensor_z() - last.z);
-        let crossings = path.points.iter().map(|point| point.truncate()).collect();
-        (place.is_finite() && slopes.is_finite()).then_some(FilmEnd { place, slopes, crossings })
+        (place.is_finite() && slopes.is_finite()).then_some(FilmEnd { place, slopes })
     }
-}
-
-/// Lenses whose rims are narrower by as much as wavelengths part there.
-fn narrowed(
-    nodes: &[MonochromaticTrain],
-    ends: &[Vec<FilmEnd>],
-) -> Option<Vec<MonochromaticTrain>> {
-    let elements = ends.first()?.first()?.crossings.len();
-    let parting = |element: usize| {
-        let of_ray = |ends: &Vec<FilmEnd>| {
-            let places = ends.iter().map(|end| end.crossings[element]);
-            places.map(|at| at.distance(ends[0].crossings[element])).fold(0.0, f64::max)
-        };
-        // From the first wavelength; any two of them part by twice as much at the most.
-        let factor = if nodes.len() > 2 { 2.0 } else { 1.0 };
-        SAFETY * factor * ends.iter().map(of_ray).fold(0.0, f64::max)
-    };
-    let by: Vec<f64> = (0..elements).map(parting).collect();
-    nodes.iter().map(|lens| lens.narrowed(&by)).collect()
 }
 
 impl Displacements {
-    /// Takes the rays of a node out of the lens, and tells which of them pass it at all wavelengths.
-    pub(super) fn trace(
-        &self,
-        node: usize,
-        lens: &MonochromaticTrain,
-        rays: &mut LensRays,
-        rims: &mut RimTrace,
-    ) {
-        lens.trace_within(&self.narrowed[node], Side::Sensor, rays, rims);
-    }
-
     /// Moves the places of a block's rays from where they land at one wavelength to where they land at another, by how they
     /// start from the film: `scale` units of each axis are a mm.
     pub(super) fn displace(

@@ -19,7 +19,7 @@ use glam::{DVec2, DVec3};
 use super::accuracy::LensAccuracy;
 use super::chief::{ChiefTable, ImageCircle, LensletChiefs};
 use super::focused::{FocusedLens, View};
-use super::opened::{BandInterpolation, OpenedGroup, OpenedLens, through_filters, uniform_filters};
+use super::opened::{BandInterpolation, OpenedGroup, OpenedLens, uniform_filters};
 use super::traced_at::{BandGroup, TracedAt, grouped};
 
 use crate::{CameraError, Pose};
@@ -261,23 +261,24 @@ impl LensCamera {
             return Ok(self.clone());
         }
         let paths = self.band_paths(bands).ok().map(|paths| self.displaced(paths));
-        let margin = paths.as_ref().map_or(0.0, BandInterpolation::margin);
-        let opened = OpenedLens { paths, ..self.open(bands, self.focused.train(), margin)? };
+        let opened = self.open(bands, self.focused.train(), paths.as_ref())?;
+        let opened = OpenedLens { paths, ..opened };
         Ok(Self { opened: Some(Arc::new(opened)), ..self.clone() })
     }
 
     /// Opens the camera with its filters clear.
     pub(crate) fn opened_clear(&self, bands: &Bands) -> Result<Self, CameraError> {
         let clear = without_filters(self.focused.train());
-        Ok(Self { opened: Some(Arc::new(self.open(bands, &clear, 0.0)?)), ..self.clone() })
+        Ok(Self { opened: Some(Arc::new(self.open(bands, &clear, None)?)), ..self.clone() })
     }
 
-    /// The lens opened, of which `train` is as much as light of `bands` is to meet, for a film with a margin (mm) beside it.
+    /// The lens opened, of which `train` is as much as light of `bands` is to meet, for rays that start where those of
+    /// `paths` do.
     fn open(
         &self,
         bands: &Bands,
         train: &OpticalTrain,
-        margin: f64,
+        paths: Option<&BandInterpolation>,
     ) -> Result<OpenedLens, CameraError> {
         let fault = |why: String| CameraError::new("", why);
         for (i, element) in train.elements().iter().enumerate() {
@@ -290,7 +291,7 @@ impl LensCamera {
         let (mut groups, mut measured) = (Vec::new(), Vec::new());
         for group in self.band_groups(bands) {
             let spread = self.spread(bands, &group);
-            let lenses = through_filters(train, bands, group.bands.start, &spread)
+            let opened = OpenedGroup::open(train, bands, group.bands.start, &spread)
                 .map_err(|error| fault(error.to_string()))?;
             // Between its ends and its middle the pupil changes as little as the index.
             let wavelengths = &spread.wavelengths;
@@ -298,12 +299,17 @@ impl LensCamera {
             let mut few = vec![wavelengths[0], wavelengths[last / 2], wavelengths[last]];
             few.dedup();
             measured.extend(few);
-            groups.push(OpenedGroup { lenses });
+            groups.push(opened);
         }
+        let margin = paths.map_or(0.0, BandInterpolation::margin);
         let half_size = (self.focused.film().half_size() + margin).to_array();
         let clear = without_filters(train);
         let (accuracy, z) = (self.accuracy.pupil, self.focused.sensor_z());
-        let pupil = ExitPupil::within(accuracy, &clear, &measured, z, half_size)
+        let wider = paths.and_then(|paths| paths.rims.as_ref()).map(|rims| {
+            measured = rims.outer.iter().map(MonochromaticTrain::wavelength).collect();
+            &rims.wider
+        });
+        let pupil = ExitPupil::within(accuracy, wider.unwrap_or(&clear), &measured, z, half_size)
             .map_err(|error| fault(error.to_string()))?;
         let all: Vec<f64> =
             groups.iter().flat_map(|g| &g.lenses).map(MonochromaticTrain::wavelength).collect();

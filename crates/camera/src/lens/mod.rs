@@ -20,6 +20,7 @@
 //! | [`waves`] | how light is spread on the sensor as waves, and what of it arrives |
 //! | `traced_at` | bands whose rays run together through the lens |
 //! | `band_paths` | one ray of the scene for all bands: why, and by how many wavelengths |
+//! | `rims` | rays that pass at some wavelengths, and at all |
 //! | `displacements` | where rays that are traced at one wavelength land at others |
 //! | `band_landings` | such rays, and where each band's light of them lands |
 
@@ -36,6 +37,7 @@ mod nodes;
 mod opened;
 mod paths;
 mod rays;
+mod rims;
 pub mod source;
 pub mod spec;
 mod traced_at;

@@ -7,6 +7,11 @@ use etendue_spectrum::{Bands, Curve, Outside, Spread};
 
 use super::displacements::Displacements;
 use super::nodes::{BandWeights, NextTerm, WeightBounds};
+use super::rims::RimBounds;
+
+/// Wavelengths of a wide band at which rays near rims are looked at. More leave blocks of rays that are traced together
+/// nearly empty.
+const FEW: usize = 4;
 
 /// The exit pupil measured at the wavelengths that are wanted.
 #[derive(Debug)]
@@ -24,6 +29,8 @@ pub(super) struct OpenedLens {
 pub(super) struct OpenedGroup {
     /// One, or as many as share the group's light.
     pub(super) lenses: Vec<MonochromaticTrain>,
+    /// Some between them, at which rays near rims are looked at that bands share.
+    pub(super) few: Vec<MonochromaticTrain>,
 }
 
 /// Paths by which bands share rays.
@@ -43,6 +50,8 @@ pub(super) struct BandInterpolation {
     pub(super) error: f64,
     /// Size of the pixels for which `next` was fitted (mm).
     pub(super) pitch: f64,
+    /// Rims as rays of all wavelengths meet them; `None` where they meet them at the same places, or it is not known.
+    pub(super) rims: Option<RimBounds>,
     /// Places at other nodes than that at which a ray is traced, where they need not be traced.
     pub(super) displacements: Option<Displacements>,
 }
@@ -54,6 +63,11 @@ impl BandInterpolation {
         if self.nodes.len() > 1 { self.reach } else { 0.0 }
     }
 
+    /// The lens that leading rays pass, at each of their wavelengths.
+    pub(super) fn leading(&self) -> &[MonochromaticTrain] {
+        self.rims.as_ref().map_or(&self.nodes, |rims| &rims.outer)
+    }
+
     /// True if no wavelength loses light, neither to glass nor to a filter.
     pub(super) fn is_clear(&self) -> bool {
         !self.has_losses && self.bounds.are_unfiltered()
@@ -61,6 +75,22 @@ impl BandInterpolation {
 }
 
 impl OpenedGroup {
+    /// Opens the lens for a group of bands at the wavelengths of `spread`.
+    pub(super) fn open(
+        train: &OpticalTrain,
+        bands: &Bands,
+        band: usize,
+        spread: &Spread,
+    ) -> Result<Self, GlassError> {
+        // Means of as many equal shares of the light.
+        let each = spread.wavelengths.len().div_ceil(FEW);
+        let means =
+            spread.wavelengths.chunks(each).map(|nm| nm.iter().sum::<f64>() / nm.len() as f64);
+        let few = Spread { wavelengths: means.collect(), overlap: spread.overlap };
+        let through = |spread| through_filters(train, bands, band, spread);
+        Ok(Self { lenses: through(spread)?, few: through(&few)? })
+    }
+
     /// Index of the lens for a place of the spectrum in 0..1.
     pub(super) fn lens_at(&self, u: f64) -> usize {
         place_of(u, self.lenses.len())
@@ -88,7 +118,7 @@ pub(super) fn uniform_filters(train: &OpticalTrain) -> Vec<&Curve> {
 /// The wavelengths are already those that uniform filters leave, so these pass their mean over the
 /// band, all of them together the mean of their product. What a picture of filters passes differs
 /// from wavelength to wavelength, about the same mean.
-pub(super) fn through_filters(
+fn through_filters(
     train: &OpticalTrain,
     bands: &Bands,
     band: usize,

@@ -198,6 +198,37 @@ impl Part {
         Ok(())
     }
 
+    /// The part with a rim that is wider by so much (mm; narrower for less than 0); `None` where more than one circle or
+    /// polygon about its axis bounds it.
+    pub(crate) fn with_wider_rim(&self, by: f64) -> Option<Self> {
+        let wider = |radius: f64| (radius + by).max(0.0);
+        let mut own = self.clone();
+        match &mut own {
+            Self::Surface(surface) => surface.semi_diameter = wider(surface.semi_diameter),
+            Self::Biconic(surface) => surface.semi_diameter = wider(surface.semi_diameter),
+            Self::ThinLens(lens) => lens.semi_diameter = wider(lens.semi_diameter),
+            Self::Filter(filter) if filter.is_uniform() => {
+                let filter = Arc::make_mut(filter);
+                filter.semi_diameter = wider(filter.semi_diameter);
+            }
+            Self::Aperture(opening) => match Arc::make_mut(opening) {
+                Opening::Circle { radius } => *radius = wider(*radius),
+                Opening::Polygon { radius, apothem, .. } => {
+                    let corner = *radius / *apothem;
+                    *apothem = wider(*apothem);
+                    *radius = if corner.is_finite() { corner * *apothem } else { *apothem };
+                }
+                Opening::Image(_) | Opening::Shaped(_) => return None,
+            },
+            Self::Filter(_)
+            | Self::MicrolensArray(_)
+            | Self::Mirror(_)
+            | Self::Freeform(_)
+            | Self::CoordinateBreak(_) => return None,
+        }
+        Some(own)
+    }
+
     /// True if the part has no aberrations.
     #[must_use]
     pub fn is_ideal(&self) -> bool {

@@ -5,7 +5,6 @@
 //! decides everything. Both give the same bits.
 
 mod block;
-mod narrowed;
 
 use std::sync::Arc;
 

@@ -26,13 +26,12 @@ impl LandingContext<'_> {
     /// The lanes, a bit each, of those `count` rays from `start` on whose places at all nodes follow from how they start, as
     /// they pass at each without loss.
     pub(super) fn known_lanes(&self, rims: &RimTrace, start: usize, count: usize) -> u32 {
-        let BandInterpolation { nodes, displacements, has_losses, .. } = self.paths;
-        match displacements {
-            Some(_) => (0..count)
-                .fold(0, |known, lane| known | u32::from(rims.is_within(start + lane)) << lane),
-            None if nodes.len() == 1 && !has_losses => u32::MAX >> (LANES - count),
-            None => 0,
+        let BandInterpolation { nodes, rims: bounds, displacements, has_losses, .. } = self.paths;
+        if displacements.is_none() && (nodes.len() > 1 || *has_losses) {
+            return 0;
         }
+        let is_within = |lane: usize| u32::from(bounds.is_none() || rims.is_within(start + lane));
+        (0..count).fold(0, |known, lane| known | is_within(lane) << lane)
     }
 }
 

@@ -3,6 +3,9 @@
 use std::path::Path;
 
 use etendue_geometry::Bounds;
+use etendue_optics::element::Ray;
+use etendue_optics::train::MonochromaticTrain;
+use etendue_optics::train::pupil::PupilSample;
 use etendue_spectrum::{Bands, Grid};
 
 use super::*;
@@ -11,12 +14,15 @@ use crate::{CameraSpec, SharingLimits};
 
 /// The lens of a file, stopped down and focused, before 256 × 256 pixels of a sensor so high.
 fn camera_with(file: &str, f_number: f64, [distance, height]: [&str; 2]) -> crate::Camera {
-    let spec: CameraSpec = serde_json::from_value(serde_json::json!({
+    camera_of(serde_json::json!({
         "type": "lens", "lens": format!("lenses/{file}.json"), "f_number": f_number,
         "focus_distance": distance, "sensor_height": height, "pose": {"from": [0, 1, 4.4], "look_at": [0, 1, 0]},
         "sensor": {"resolution": [256, 256]}
     }))
-    .unwrap();
+}
+
+fn camera_of(spec: serde_json::Value) -> crate::Camera {
+    let spec: CameraSpec = serde_json::from_value(spec).unwrap();
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     let bounds = || Bounds { min: DVec3::splat(-0.5), max: DVec3::splat(0.5) };
     spec.build(bounds, &|name: &str| Ok(scenes.join(name))).unwrap()
@@ -67,7 +73,7 @@ fn rays_away_from_rims_land_where_they_are_traced_to() {
     let samples = many_samples(20_000, 256.0);
     let (mut rays, mut landings) = (CameraRays::default(), BandLandings::default());
     let (mut left, mut known, mut worst) = (0, 0, 0.0_f64);
-    for (node, at) in paths.nodes.iter().enumerate() {
+    for (node, at) in paths.leading().iter().enumerate() {
         landings.take_samples([node, paths.nodes.len()], &area, &samples);
         let numbers = landings.numbers.clone();
         lens.aim_samples(&opened.pupil, at, &samples, numbers.iter().copied(), &mut rays);
@@ -96,6 +102,74 @@ fn rays_away_from_rims_land_where_they_are_traced_to() {
     }
     assert!(known * 10 > 9 * left, "{known} of {left}");
     assert!(worst < SharingLimits::DEFAULT.places, "{worst}");
+}
+
+/// Rays that pass a fisheye at the wavelength of a band leave it at a leading one, though some end at the rims of all of these.
+/// Those that keep away from rims pass at all wavelengths.
+#[test]
+fn no_ray_of_a_band_ends_at_all_leading_wavelengths() {
+    let edges: Vec<f64> = (0..16).map(|k| 400.0 + 20.0 * f64::from(k)).collect();
+    let bands = Bands::Spectral(Grid::from_edges(edges).unwrap());
+    let spec = serde_json::json!({
+        "type": "lens", "lens": "lenses/fisheye.json", "focus_distance": "1 m", "fov": 150,
+        "pose": {"from": [0, 1, 4.4], "look_at": [0, 1, 0]}, "sensor": {"resolution": [256, 256]}
+    });
+    let camera = camera_of(spec).opened(&bands).unwrap();
+    let lens = camera.lens().unwrap();
+    let opened = lens.opened.as_ref().unwrap();
+    let paths = opened.paths.as_ref().unwrap();
+    let area = StartArea { resolution: [256; 2], margin: lens.margin(paths) };
+    let film = lens.focused.film();
+    let samples = many_samples(200_000, 256.0);
+    let [mut passed, mut ended, mut within] = [0_u32; 3];
+    for i in 0..samples.len() {
+        let group = &opened.groups[i % opened.groups.len()];
+        let at = &group.lenses[group.lens_at(samples.spectrum[i])];
+        let place = film.place(samples.columns[i], samples.rows[i]);
+        let found = opened.pupil.sample(place, samples.pupil[i], at.wavelength());
+        let Some(PupilSample { direction, .. }) = found else { continue };
+        let start = Ray::new(opened.pupil.film_point(place), direction).unwrap();
+        let end = at.run(Side::Sensor, Clip::On, start);
+        if end.status != RayStatus::Exited {
+            continue;
+        }
+        passed += 1;
+        let [point, direction] = [end.ray.position, end.ray.direction].map(DVec3::from);
+        let back = Ray::new(point + direction * paths.lead, -direction).unwrap();
+        let passes = |lens: &MonochromaticTrain| {
+            let end = lens.run(Side::Object, Clip::On, back);
+            let Ray { position, direction } = end.ray;
+            let [x, y] = film.pixel(position.into(), direction.into());
+            let [[left, top], [right, bottom]] = area.bounds();
+            end.status == RayStatus::Exited && x >= left && y >= top && x < right && y < bottom
+        };
+        ended += u32::from(!paths.nodes.iter().any(passes));
+        assert!(paths.leading().iter().any(passes), "sample {i}");
+        let bounds = paths.rims.as_ref().unwrap();
+        let near = bounds.near.as_ref().unwrap();
+        let is_within = bounds.inner.iter().any(passes) || near.iter().all(passes);
+        within += u32::from(is_within);
+        assert!(!is_within || opened.groups.iter().flat_map(|group| &group.lenses).all(passes));
+    }
+    assert!(ended > 20 && within * 2 > passed, "{ended} and {within} of {passed}");
+}
+
+/// Where light of a band at `u` of the spectrum lands (pixels) along a ray that leaves the lens at a point (mm) in a
+/// direction, and the share of it that passes.
+fn trace_back(
+    lens: &LensCamera,
+    band: usize,
+    u: f64,
+    [point, direction]: [DVec3; 2],
+) -> ([f64; 2], f64) {
+    let opened = lens.opened.as_ref().unwrap();
+    let group = &opened.groups[band];
+    let lead = opened.paths.as_ref().unwrap().lead;
+    let ray = Ray::new(point + direction * lead, -direction).unwrap();
+    let end = group.lenses[group.lens_at(u)].run(Side::Object, Clip::On, ray);
+    let Ray { position, direction } = end.ray;
+    let place = lens.focused.film().pixel(position.into(), direction.into());
+    (place, if end.status == RayStatus::Exited { end.throughput } else { 0.0 })
 }
 
 /// So many samples all over a film of so many pixels a side, the pupil and the spectrum.
@@ -127,7 +201,7 @@ fn landings_elsewhere(camera: &crate::Camera, side: f64, bands: usize) -> (f64, 
         let point = point + DVec3::new(0.0, 0.0, lens.focused.origin());
         let from = [point, to_lens * rays.rays.direction(ray)];
         for band in 0..bands {
-            let ([x, y], passed) = lens.trace_back(paths.lead, band, u, from);
+            let ([x, y], passed) = trace_back(lens, band, u, from);
             let is_seen = passed > 0.0 && x.min(y) >= 0.0 && x.max(y) < side;
             let own = match is_seen {
                 true => y.floor() * side + x.floor(),

@@ -1,4 +1,4 @@
-//! A lens with parts of it made clear: what its bounds do not depend on.
+//! A lens with parts of it made clear, or with other rims: what its bounds do not depend on.
 
 use std::sync::Arc;
 
@@ -19,6 +19,21 @@ pub(super) fn without_masks(train: &OpticalTrain) -> OpticalTrain {
 }
 
 impl OpticalTrain {
+    /// The lens with a rim of each element that is wider by so much (mm; narrower for less than 0), and all else as it is;
+    /// `None` where rays are ended by more than a circle or a polygon about an element's axis: at masks, obscurations,
+    /// mirrors, arrays and freeforms, and in graded media.
+    #[must_use]
+    pub fn with_wider_rims(&self, by: &[f64]) -> Option<Self> {
+        if self.gradients.iter().any(Option::is_some) {
+            return None;
+        }
+        let mut train = self.clone();
+        for (i, element) in train.elements.iter_mut().enumerate() {
+            element.part = element.part.with_wider_rim(*by.get(i)?)?;
+        }
+        Some(train)
+    }
+
     /// The first mask that lets nothing through.
     #[must_use]
     pub fn closed_mask(&self) -> Option<usize> {

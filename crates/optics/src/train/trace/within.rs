@@ -1,7 +1,7 @@
 //! Rays that keep away from all rims of a lens, told from those that come near one or end there.
 
 use super::{MonochromaticTrain, Side};
-use crate::element::{Clip, ElementStep, LANES, LensRays, RayStatus};
+use crate::element::{Clip, LANES, LensRays, RayStatus};
 
 /// What became of a batch of rays at the rims of a lens, and the batch before it.
 #[derive(Debug, Clone, Default)]
@@ -28,18 +28,9 @@ impl RimTrace {
 }
 
 impl MonochromaticTrain {
-    /// The lens with a rim of each element that is narrower by so much (mm), and all else as it is; `None` where a
-    /// rim is no circle and no polygon about the axis, and where rays are ended otherwise.
-    #[must_use]
-    pub fn narrowed(&self, by: &[f64]) -> Option<Self> {
-        let narrowed = |step: &ElementStep| step.narrowed(*by.get(step.element)?);
-        let steps = |steps: &[ElementStep]| steps.iter().map(narrowed).collect::<Option<Vec<_>>>();
-        let [forward, backward] = [steps(&self.forward)?, steps(&self.backward)?];
-        Some(Self { forward, backward, ..self.clone() })
-    }
-
-    /// As [`Self::trace`] with clipping, to the same bits, and tells which rays pass `narrowed`, too, a lens of
-    /// [`Self::narrowed`].
+    /// As [`Self::trace`] with clipping, and tells which rays pass `narrowed`, too: the lens with rims that are narrower
+    /// ([`OpticalTrain::with_wider_rims`](crate::train::OpticalTrain::with_wider_rims)), whose numbers these rays have.
+    /// They are the same to the bit but on aspheres, which are met where a search within their rim ends.
     pub fn trace_within(
         &self,
         narrowed: &Self,
@@ -91,7 +82,7 @@ mod tests {
     fn rays_end_as_they_do_without_a_look_at_the_rims() {
         let train = double_gauss();
         let lens = train.at(550.0).unwrap();
-        let narrowed = lens.narrowed(&[0.5; 11]).unwrap();
+        let narrowed = train.with_wider_rims(&[-0.5; 11]).unwrap().at(550.0).unwrap();
         let mut rays = LensRays::default();
         for i in 0..2000_u32 {
             let turn = DVec2::from_angle(2.4 * f64::from(i));
@@ -114,13 +105,13 @@ mod tests {
     }
 
     #[test]
-    fn a_lens_whose_rims_are_no_circles_is_not_narrowed() {
+    fn rims_that_are_no_circles_are_not_moved() {
         let text = r#"{"elements": [
             {"type": "surface", "radius": 40, "thickness": 3, "glass": "N-BK7", "semi_diameter": 10},
             {"type": "surface", "radius": -40, "thickness": 2, "semi_diameter": 10},
             {"type": "aperture", "shape": "annular", "radius": 5, "inner_radius": 2, "stop": true}]}"#;
         let train = LensFile::from_json(text).unwrap();
         let train = train.build(&|_: &str| Err(String::new())).unwrap();
-        assert!(train.at(550.0).unwrap().narrowed(&[0.1; 3]).is_none());
+        assert!(train.with_wider_rims(&[0.1; 3]).is_none());
     }
 }
