@@ -1,4 +1,4 @@
-//! Numbers of `accuracy` that decide nothing in a scene, as it has none of what they are of.
+//! Numbers of `accuracy`, and settings, that decide nothing in a scene, as it has none of what they are of.
 
 use etendue_accel::AccelName;
 use etendue_camera::LensCamera;
@@ -151,18 +151,21 @@ impl Scene {
 }
 
 impl SceneFile {
-    /// Notes on the numbers of `accuracy` that the file writes and that decide nothing in `scene`, which was made of it.
-    pub(crate) fn idle_accuracy(&self, scene: &Scene) -> Vec<Note> {
-        let note = |setting: AccuracySetting| {
-            let why = scene.why_idle(setting.used_for)?;
-            Some(Note {
-                kind: NoteKind::Unused,
-                subject: format!("`{}`", setting.path),
-                message: format!("decides nothing here: {why}; leave it out"),
-                count: 1,
-            })
+    /// Notes on the numbers of `accuracy` that the file writes, and on `plan.shared_paths`, where they decide nothing
+    /// in `scene`, which was made of it.
+    pub(crate) fn idle_settings(&self, scene: &Scene) -> Vec<Note> {
+        let note = |path: &str, why: &str| Note {
+            kind: NoteKind::Unused,
+            subject: format!("`{path}`"),
+            message: format!("decides nothing here: {why}; leave it out"),
+            count: 1,
         };
-        scene.accuracy.written(self.value()).filter_map(note).collect()
+        let of_number = |setting: AccuracySetting| {
+            scene.why_idle(setting.used_for).map(|why| note(setting.path, why))
+        };
+        let sharing = scene.plan.shared_paths.and_then(|_| scene.idle_sharing());
+        let sharing = sharing.map(|why| note("plan.shared_paths", why));
+        scene.accuracy.written(self.value()).filter_map(of_number).chain(sharing).collect()
     }
 }
 

@@ -111,7 +111,7 @@ impl SceneFile {
         kept.sweep();
         let mut scene = Scene { slots: slot_count, ..scene };
         self.check_contradictions(&scene)?;
-        scene.notes.extend(self.idle_accuracy(&scene));
+        scene.notes.extend(self.idle_settings(&scene));
         Ok(scene)
     }
 

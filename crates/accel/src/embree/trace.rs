@@ -334,7 +334,7 @@ macro_rules! packets {
                     query.0.hit.geomID = [MISS; $width];
                     query.0.hit.primID = [MISS; $width];
                     query.0.hit.instID[0] = [MISS; $width];
-                    if valid.0 != [0; $width] {
+                    if valid.0.iter().any(|&live| live != 0) {
                         // SAFETY: the scene is committed; packet and mask have the C types' layout and
                         // are aligned to 64 bytes by `PacketAligned`; lanes without a ray are masked off.
                         unsafe {

@@ -159,7 +159,6 @@ impl LensCamera {
             self.band_groups(bands).iter().map(|group| self.spread(bands, group)).collect();
         let clear = without_filters(train);
         let at = |nm: f64| clear.at(nm).map_err(|error| error.to_string());
-        let index = Variable::of(train);
         let mut wavelengths: Vec<f64> = match self.runs_apart() {
             true => spreads.iter().flat_map(|spread| spread.wavelengths.clone()).collect(),
             false => vec![train.wavelength()],
@@ -167,9 +166,8 @@ impl LensCamera {
         wavelengths.sort_by(f64::total_cmp);
         wavelengths.dedup();
         // Rays over film and pupil, and where they land at wavelengths that are drawn.
-        let middle = at(wavelengths[wavelengths.len() / 2])?;
         let lead = train.far_in_front(0.0);
-        let rays = self.rays_to_measure(&middle);
+        let rays = self.rays_to_measure(&at(wavelengths[wavelengths.len() / 2])?);
         if rays.len() < FEWEST {
             return Err("too few rays get through the lens to measure where they part".to_owned());
         }
@@ -185,6 +183,7 @@ impl LensCamera {
         }
         // As few nodes as will do.
         let limits = self.accuracy.sharing;
+        let index = Variable::of(train);
         let has_losses = !train.losses().is_none()
             || train.elements().iter().any(|element| element.part.is_coated_or_blazed());
         let mut least = (f64::INFINITY, f64::INFINITY);
@@ -211,8 +210,7 @@ impl LensCamera {
             if error > limits.places || (has_losses && share > limits.shares) {
                 continue;
             }
-            let wanted = (checks.as_slice(), bands.count());
-            let rims = RimBounds::measured(&clear, &chosen, wanted, (&rays, lead));
+            let of_bands = (checks.as_slice(), bands.count());
             let nodes = chosen.iter().map(|&nm| at(nm)).collect::<Result<Vec<_>, _>>()?;
             let bands = self.band_weights(bands, &spreads, &chosen);
             let bounds = WeightBounds::of(bands.iter().flatten());
@@ -227,7 +225,7 @@ impl LensCamera {
                 reach,
                 error,
                 pitch: self.focused.film().pitch,
-                rims,
+                rims: RimBounds::measured(&clear, &chosen, of_bands, (&rays, lead)),
                 displacements: None,
             });
         }

@@ -105,6 +105,16 @@ fn accuracy_that_decides_nothing_is_said() {
     assert!(checked.contains(finding), "{checked}");
     let rendered = bench.run(&["render", "scene.json", "-o", "out"]);
     insta::assert_snapshot!(notes_in(&bench.said(&rendered)), @"note: `accuracy.view_psnr`: decides nothing here: the camera takes no light field; leave it out");
+    // So is a setting by which bands share paths that run the same way.
+    bench.write(
+        "lit.json",
+        br#"{"etendue": 1, "objects": [{"shape": "box"}], "plan": {"shared_paths": true}}"#,
+    );
+    let checked = text(&bench.run(&["check", "lit.json"]).stdout);
+    assert!(
+        checked.contains("`plan.shared_paths`: decides nothing here: the camera has no lens"),
+        "{checked}"
+    );
 }
 
 #[test]
