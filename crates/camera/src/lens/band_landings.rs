@@ -158,7 +158,7 @@ impl LensCamera {
     ) {
         let TracedRays { points, directions, leading, is_within, is_inner, places, shares, .. } =
             traced;
-        let has_near = paths.rims.as_ref().is_some_and(|bounds| bounds.near.is_some());
+        let has_near = paths.has_near();
         let comes_back = |&k: &usize| leading[k] != node || (has_near && !is_inner[k]);
         back.clear();
         for k in (0..points.len()).filter(comes_back) {
@@ -232,10 +232,11 @@ impl TracedRays {
     }
 
     /// Appends the ray in a lane of a block that left the lens at a node of so many: `ray` of those that leave the camera,
-    /// which started from a place of the film (pixels) with a weight, and surely passes at all wavelengths or not.
+    /// which started from a place of the film (pixels) with a weight, and surely passes at all wavelengths, or may by what is
+    /// found at other nodes.
     fn push(
         &mut self,
-        (ray, is_inner): (usize, bool),
+        (ray, [is_inner, is_within]): (usize, [bool; 2]),
         [node, nodes]: [usize; 2],
         (place, weight): ([f64; 2], f64),
         block: &Block,
@@ -244,7 +245,7 @@ impl TracedRays {
         let vector = |axes: &[[f64; LANES]; 3]| DVec3::from_array(axes.map(|axis| axis[lane]));
         self.ray.push(ray);
         self.is_inner.push(is_inner);
-        self.is_within.push(true);
+        self.is_within.push(is_within);
         self.points.push(vector(&block.position));
         self.directions.push(vector(&block.direction));
         self.weights.push(weight);
@@ -367,8 +368,9 @@ impl BandLandings {
                     let place = [samples.columns[i], samples.rows[i]];
                     let nodes = [node, ctx.paths.nodes.len()];
                     let is_inner = ctx.paths.rims.is_none() || self.rims.is_within(start + lane);
+                    let passes = [is_inner, is_inner || ctx.paths.has_near()];
                     let start = (place, self.before[start + lane]);
-                    self.traced.push((end / bands, is_inner), nodes, start, block, lane);
+                    self.traced.push((end / bands, passes), nodes, start, block, lane);
                 }
                 end += bands;
             }

@@ -68,6 +68,11 @@ impl BandInterpolation {
         self.rims.as_ref().map_or(&self.nodes, |rims| &rims.outer)
     }
 
+    /// True if it is looked at each node whether a ray keeps away from rims by what is near it.
+    pub(super) fn has_near(&self) -> bool {
+        self.rims.as_ref().is_some_and(|rims| rims.near.is_some())
+    }
+
     /// True if no wavelength loses light, neither to glass nor to a filter.
     pub(super) fn is_clear(&self) -> bool {
         !self.has_losses && self.bounds.are_unfiltered()

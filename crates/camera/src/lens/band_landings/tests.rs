@@ -104,6 +104,26 @@ fn rays_away_from_rims_land_where_they_are_traced_to() {
     assert!(worst < SharingLimits::DEFAULT.places, "{worst}");
 }
 
+/// On pixels so large that one wavelength places all bands, each band has the rays that pass at its own wavelengths: near
+/// rims they are looked at, at a few wavelengths of a wide band, which errs for some of the few rays there.
+#[test]
+fn large_pixels_have_the_rays_that_pass() {
+    let edges: Vec<f64> = (0..16).map(|k| 400.0 + 20.0 * f64::from(k)).collect();
+    let many = Bands::Spectral(Grid::from_edges(edges).unwrap());
+    let spec = serde_json::json!({
+        "type": "lens", "lens": "lenses/double-gauss.json", "f_number": 2.8, "focus_distance": "4.4 m",
+        "sensor_height": "28 mm", "pose": {"from": [0, 1, 4.4], "look_at": [0, 1, 0]},
+        "sensor": {"resolution": [4, 4]}
+    });
+    for bands in [&Bands::Rgb, &many] {
+        let camera = camera_of(spec.clone()).opened(bands).unwrap();
+        assert_eq!(camera.lens().unwrap().opened_paths().unwrap().traced, 1);
+        // Of the band within an error of a pixel's four sides a fourth or less is on the wrong side.
+        let (found, error) = landings_elsewhere(&camera, 4.0, bands.count());
+        assert!(found < error, "{found} of {} bands are elsewhere, {error}", bands.count());
+    }
+}
+
 /// Rays that pass a fisheye at the wavelength of a band leave it at a leading one, though some end at the rims of all of these.
 /// Those that keep away from rims pass at all wavelengths.
 #[test]
