@@ -87,11 +87,7 @@ impl OpenedGroup {
         band: usize,
         spread: &Spread,
     ) -> Result<Self, GlassError> {
-        // Means of as many equal shares of the light.
-        let each = spread.wavelengths.len().div_ceil(FEW);
-        let means =
-            spread.wavelengths.chunks(each).map(|nm| nm.iter().sum::<f64>() / nm.len() as f64);
-        let few = Spread { wavelengths: means.collect(), overlap: spread.overlap };
+        let few = Spread { wavelengths: few_of(&spread.wavelengths), overlap: spread.overlap };
         let through = |spread| through_filters(train, bands, band, spread);
         Ok(Self { lenses: through(spread)?, few: through(&few)? })
     }
@@ -100,6 +96,21 @@ impl OpenedGroup {
     pub(super) fn lens_at(&self, u: f64) -> usize {
         place_of(u, self.lenses.len())
     }
+}
+
+/// The means of [`FEW`] equal shares of wavelengths that stand for as much light each; all of them if they are no more.
+fn few_of(wavelengths: &[f64]) -> Vec<f64> {
+    if wavelengths.len() <= FEW {
+        return wavelengths.to_vec();
+    }
+    let share = wavelengths.len() as f64 / FEW as f64;
+    let mean = |part: usize| {
+        let [from, to] = [part, part + 1].map(|end| end as f64 * share);
+        let within = |i: usize| ((i + 1) as f64).min(to) - (i as f64).max(from);
+        let parts = wavelengths.iter().enumerate().map(|(i, nm)| within(i).max(0.0) * nm);
+        parts.sum::<f64>() / share
+    };
+    (0..FEW).map(mean).collect()
 }
 
 /// Index of the one of `count` equal parts of 0..1 in which a number lies.
@@ -165,4 +176,19 @@ fn passed(
     let all: f64 = wavelengths.iter().map(|&nm| curve.held(nm)).sum();
     let share = curve.held(nm) * wavelengths.len() as f64 / all;
     if all > 0.0 { mean * share } else { mean }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As many as there are, or four whose mean is that of all.
+    #[test]
+    fn few_wavelengths_stand_for_as_much_light_each() {
+        assert_eq!(few_of(&[500.0, 520.0]), [500.0, 520.0]);
+        assert_eq!(few_of(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]), [1.5, 3.5, 5.5, 7.5]);
+        let of_five = few_of(&[0.0, 5.0, 10.0, 15.0, 20.0]);
+        let expected = [1.0, 7.0, 13.0, 19.0];
+        assert!(of_five.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{of_five:?}");
+    }
 }

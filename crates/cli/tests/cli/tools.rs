@@ -108,7 +108,7 @@ fn accuracy_that_decides_nothing_is_said() {
     // So is a setting by which bands share paths that run the same way.
     bench.write(
         "lit.json",
-        br#"{"etendue": 1, "objects": [{"shape": "box"}], "plan": {"shared_paths": true}}"#,
+        br#"{"etendue": 1, "tracer": {"type": "direct"}, "objects": [{"shape": "box"}], "plan": {"shared_paths": true}}"#,
     );
     let checked = text(&bench.run(&["check", "lit.json"]).stdout);
     assert!(
