@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use self::block::{BlockLandings, LandingContext};
 use super::lens_camera::LensCamera;
-use super::opened::{BandInterpolation, OpenedGroup, place_of};
+use super::opened::{BandInterpolation, place_of};
 use crate::{CameraRays, FilmSamples, Pose};
 
 mod block;
@@ -190,9 +190,9 @@ impl LensCamera {
         let opened = self.opened.as_ref().expect("the camera is opened before it is sampled");
         let (bands, film) = (opened.groups.len(), self.focused.film());
         strays.sort_unstable_by(|a, b| a.spectrum.total_cmp(&b.spectrum));
-        for (band, OpenedGroup { lenses, few }) in opened.groups.iter().enumerate() {
+        for (band, group) in opened.groups.iter().enumerate() {
             // Those that end at a node are few themselves.
-            let lenses = if ctx.paths.rims.is_some() { few } else { lenses };
+            let lenses = if ctx.paths.rims.is_some() { group.near_rims() } else { &group.lenses };
             let lens_of = |stray: &Stray| place_of(stray.spectrum, lenses.len());
             for strays in strays.chunk_by(|a, b| lens_of(a) == lens_of(b)) {
                 back.clear();

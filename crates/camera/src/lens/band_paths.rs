@@ -69,8 +69,8 @@ const FEWEST: usize = 32;
 /// kept from other threads. Not a setting: where they part farther, each band is traced by itself, as accurately.
 const FARTHEST: f64 = 32.0;
 
-/// Factor on the measured parting of places, which may be greater in between.
-const SAFETY: f64 = 1.25;
+/// Factor on the measured parting of places, on the film and at rims, which may be greater in between.
+pub(super) const SAFETY: f64 = 1.25;
 
 /// Sharing of rays among bands, as measured.
 #[derive(Debug, Clone, Copy, PartialEq)]

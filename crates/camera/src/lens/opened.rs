@@ -29,8 +29,8 @@ pub(super) struct OpenedLens {
 pub(super) struct OpenedGroup {
     /// One, or as many as share the group's light.
     pub(super) lenses: Vec<MonochromaticTrain>,
-    /// Some between them, at which rays near rims are looked at that bands share.
-    pub(super) few: Vec<MonochromaticTrain>,
+    /// A few between them, where they are many: see [`Self::near_rims`].
+    few: Option<Vec<MonochromaticTrain>>,
 }
 
 /// Paths by which bands share rays.
@@ -87,9 +87,15 @@ impl OpenedGroup {
         band: usize,
         spread: &Spread,
     ) -> Result<Self, GlassError> {
-        let few = Spread { wavelengths: few_of(&spread.wavelengths), overlap: spread.overlap };
-        let through = |spread| through_filters(train, bands, band, spread);
-        Ok(Self { lenses: through(spread)?, few: through(&few)? })
+        let through = |spread: &Spread| through_filters(train, bands, band, spread);
+        let few = few_of(&spread.wavelengths);
+        let few = few.map(|wavelengths| through(&Spread { wavelengths, overlap: spread.overlap }));
+        Ok(Self { lenses: through(spread)?, few: few.transpose()? })
+    }
+
+    /// The lenses at which rays near rims are looked at that bands share.
+    pub(super) fn near_rims(&self) -> &[MonochromaticTrain] {
+        self.few.as_deref().unwrap_or(&self.lenses)
     }
 
     /// Index of the lens for a place of the spectrum in 0..1.
@@ -98,10 +104,10 @@ impl OpenedGroup {
     }
 }
 
-/// The means of [`FEW`] equal shares of wavelengths that stand for as much light each; all of them if they are no more.
-fn few_of(wavelengths: &[f64]) -> Vec<f64> {
+/// The means of [`FEW`] equal shares of wavelengths that stand for as much light each; `None` if they are no more.
+fn few_of(wavelengths: &[f64]) -> Option<Vec<f64>> {
     if wavelengths.len() <= FEW {
-        return wavelengths.to_vec();
+        return None;
     }
     let share = wavelengths.len() as f64 / FEW as f64;
     let mean = |part: usize| {
@@ -110,7 +116,7 @@ fn few_of(wavelengths: &[f64]) -> Vec<f64> {
         let parts = wavelengths.iter().enumerate().map(|(i, nm)| within(i).max(0.0) * nm);
         parts.sum::<f64>() / share
     };
-    (0..FEW).map(mean).collect()
+    Some((0..FEW).map(mean).collect())
 }
 
 /// Index of the one of `count` equal parts of 0..1 in which a number lies.
@@ -182,12 +188,13 @@ fn passed(
 mod tests {
     use super::*;
 
-    /// As many as there are, or four whose mean is that of all.
+    /// Four whose mean is that of all, where there are more.
     #[test]
     fn few_wavelengths_stand_for_as_much_light_each() {
-        assert_eq!(few_of(&[500.0, 520.0]), [500.0, 520.0]);
-        assert_eq!(few_of(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]), [1.5, 3.5, 5.5, 7.5]);
-        let of_five = few_of(&[0.0, 5.0, 10.0, 15.0, 20.0]);
+        assert_eq!(few_of(&[500.0, 520.0]), None);
+        let of_eight = few_of(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]).unwrap();
+        assert_eq!(of_eight, [1.5, 3.5, 5.5, 7.5]);
+        let of_five = few_of(&[0.0, 5.0, 10.0, 15.0, 20.0]).unwrap();
         let expected = [1.0, 7.0, 13.0, 19.0];
         assert!(of_five.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{of_five:?}");
     }

@@ -12,13 +12,10 @@ use etendue_optics::element::{Clip, LensRays, RayStatus};
 use etendue_optics::train::{MonochromaticTrain, OpticalTrain, RimTrace, Side};
 use glam::DVec3;
 
-use super::band_paths::SceneRay;
+use super::band_paths::{SAFETY, SceneRay};
 
 /// Rays by which it is measured how far wavelengths part at rims, about.
 const RAYS: usize = 1000;
-
-/// Factor on the measured parting, which may be greater in between.
-const SAFETY: f64 = 1.25;
 
 /// To look at each node whether a ray keeps away from rims takes about as long as to trace it so many times.
 const TRACES: usize = 4;
