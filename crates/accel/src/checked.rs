@@ -8,9 +8,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use etendue_geometry::block::{LANES, vector};
-use etendue_geometry::glam::DVec3;
 use etendue_geometry::{
-    Coplanar, Detail, Geometry, HitBatch, HitPrecision, MISS, RayBatch, RayBlock, RayBlocks,
+    Coplanar, Detail, Geometry, HitBatch, HitPrecision, MISS, RayBatch, RayBlock,
 };
 
 use self::second_look::SecondLook;
@@ -350,14 +349,8 @@ impl Accel for Embree {
 }
 
 impl BlockAccel for Embree {
-    fn origin(&self) -> DVec3 {
-        self.frame.origin
-    }
-
-    fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks) {
-        SCRATCH.with_borrow_mut(|scratch| {
-            scratch.rays.convert_to_blocks(rays, &self.frame, blocks);
-        });
+    fn frame(&self) -> &F32Frame {
+        &self.frame
     }
 
     fn closest_of_blocks(&self, blocks: &mut [RayBlock], _times: &[f64], coherent: bool) {

@@ -14,11 +14,11 @@ mod faces;
 
 use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Bounds, Geometry, MISS, RayBatch, RayBlock, RayBlocks, is_degenerate};
+use etendue_geometry::{Bounds, Geometry, MISS, RayBlock, is_degenerate};
 
 use self::edges::{FewTriangle, PluckerEdge};
 use self::faces::{BlockOcclusion, Face, FaceList, FaceRun, NearestFace};
-use crate::single::{F32Frame, Rays32, round};
+use crate::single::{F32Frame, round};
 
 /// Scenes of more triangles are traced by trees.
 const MOST_TRIANGLES: usize = 64;
@@ -143,14 +143,9 @@ impl FewTriangles {
         }
     }
 
-    /// Reference point of the origins of blocks (m, world).
-    pub(crate) fn origin(&self) -> DVec3 {
-        self.frame.origin
-    }
-
-    /// The rays of a batch as blocks.
-    pub(crate) fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks) {
-        Rays32::default().convert_to_blocks(rays, &self.frame, blocks);
+    /// Frame of the coordinates of blocks.
+    pub(crate) fn frame(&self) -> &F32Frame {
+        &self.frame
     }
 
     /// The closest hits of blocks, as [`BlockAccel`](crate::BlockAccel) has them; of triangles in one place the last.
@@ -206,7 +201,8 @@ mod tests {
 
     use etendue_geometry::glam::DMat3;
     use etendue_geometry::{
-        Detail, HitBatch, HitPrecision, Mesh, Placement, Positions, Transform, Vertices,
+        Detail, HitBatch, HitPrecision, Mesh, Placement, Positions, RayBatch, RayBlocks, Transform,
+        Vertices,
     };
 
     use super::*;
@@ -335,9 +331,9 @@ mod tests {
             exact.closest(&rays, &mut hits);
             // Whatever precision the batch asks for, blocks have its rays as they are.
             let [mut blocks, mut single] = [RayBlocks::default(), RayBlocks::default()];
-            few.convert(&rays, &mut blocks);
+            few.frame.convert(&rays, &mut blocks);
             rays.precision = HitPrecision::Single;
-            few.convert(&rays, &mut single);
+            few.frame.convert(&rays, &mut single);
             for (block, single) in blocks.blocks().iter().zip(single.blocks()) {
                 assert_eq!(block.origin, single.origin);
                 assert_eq!(block.direction, single.direction);
@@ -402,7 +398,7 @@ mod tests {
         }
         rays.precision = HitPrecision::Single;
         let mut blocks = RayBlocks::default();
-        few.convert(&rays, &mut blocks);
+        few.frame.convert(&rays, &mut blocks);
         let mut shadows = blocks.clone();
         few.closest_of_blocks(blocks.blocks_mut());
         few.occluded_of_blocks(shadows.blocks_mut());

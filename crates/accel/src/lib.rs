@@ -57,6 +57,7 @@ pub use exact::Exact;
 pub use moving::{Build, build_moving};
 pub use name::AccelName;
 pub use parts::check_scale;
+pub use single::{F32Frame, Viewpoint};
 
 /// Answers nearest-hit and visibility queries about one scene. Built once, then only read.
 pub trait Accel: Send + Sync + fmt::Debug {
@@ -97,11 +98,18 @@ pub trait Accel: Send + Sync + fmt::Debug {
 /// Hits of single precision for rays in blocks: as [`Accel`] finds them for batches of
 /// [`HitPrecision::Single`](etendue_geometry::HitPrecision), without arrays on the way.
 pub trait BlockAccel: Send + Sync + fmt::Debug {
+    /// Frame of the coordinates of blocks.
+    fn frame(&self) -> &F32Frame;
+
     /// Reference point of the origins of blocks (m, world).
-    fn origin(&self) -> DVec3;
+    fn origin(&self) -> DVec3 {
+        self.frame().origin()
+    }
 
     /// The rays of a batch as blocks, which are refilled. A ray from afar starts nearer to the scene.
-    fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks);
+    fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks) {
+        self.frame().convert(rays, blocks);
+    }
 
     /// The closest hit of each ray: its distance goes to `t_max`, with placement, triangle, weights and normal.
     /// Rays of one block that run close together are faster as `coherent`.

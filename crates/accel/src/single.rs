@@ -1,13 +1,13 @@
 //! Rays in single precision, as fast backends trace them: relative to an origin near the scene, and
 //! started where they enter its box, so that f32's 24 bits are spent on the scene alone.
 
-use etendue_geometry::block::Floats;
+use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Bounds, HitPrecision, RayBatch, RayBlocks};
+use etendue_geometry::{Bounds, HitPrecision, RayBatch, RayBlock, RayBlocks};
 
 /// The box of a scene and the origin that single-precision coordinates are relative to.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct F32Frame {
+pub struct F32Frame {
     /// Origin of the single-precision coordinates (m, world).
     pub(crate) origin: DVec3,
     /// Centre of the scene's box, from `origin` (m).
@@ -57,7 +57,84 @@ const MOST_RADII: f64 = 1e12;
 /// telling so, at distances of up to 10¹² radii.
 const SPHERE_SLACK: f64 = 1e-3;
 
+/// Start of the rays of a camera near the scene, in single precision, from a frame's origin (m).
+#[derive(Debug, Clone, Copy)]
+pub struct Viewpoint {
+    position: [f32; 3],
+    /// The box's centre, from here.
+    centre: [f32; 3],
+    far: f32,
+    /// Radius of the sphere around the box that a ray must meet to be traced.
+    sphere: f32,
+}
+
+/// Viewpoints are at most this many half-diagonals from the box's centre: single precision then misplaces rays by a
+/// millionth of the scene, as it does the scene's own corners.
+const NEAR_VIEWPOINT: f64 = 16.0;
+
+impl Viewpoint {
+    /// Starts rays here, whose unit directions are set: those that may meet the scene count all hits ahead, others are not
+    /// traced.
+    pub fn start(&self, blocks: &mut RayBlocks) {
+        let len = blocks.len();
+        start_blocks(self, blocks.blocks_mut(), len);
+    }
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn start_blocks(from: &Viewpoint, blocks: &mut [RayBlock], len: usize) {
+    let Viewpoint { position, centre: [cx, cy, cz], far, sphere } = *from;
+    for (block, first) in blocks.iter_mut().zip((0..).step_by(LANES)) {
+        let RayBlock { origin, direction, t_min, t_max, .. } = block;
+        let [dx, dy, dz] = &*direction;
+        *t_min = [0.0; LANES];
+        let mut start = [0.0; LANES];
+        for i in 0..LANES {
+            let foot = cx * dx[i] + cy * dy[i] + cz * dz[i];
+            let (fx, fy, fz) = (cx - foot * dx[i], cy - foot * dy[i], cz - foot * dz[i]);
+            let meets = (fx * fx + fy * fy + fz * fz <= sphere * sphere) & (foot >= -sphere);
+            // As of rays of batches only far ones are moved ahead.
+            start[i] = (foot - far).max(0.0);
+            t_max[i] = if meets & (first + i < len) { f32::INFINITY } else { 0.0 };
+        }
+        for ((origins, from), along) in origin.iter_mut().zip(position).zip(&*direction) {
+            for i in 0..LANES {
+                origins[i] = from + along[i] * start[i];
+            }
+        }
+    }
+}
+
 impl F32Frame {
+    /// The frame of nothing, which no ray meets.
+    pub(crate) const EMPTY: &'static Self = &Self {
+        origin: DVec3::ZERO,
+        centre: DVec3::ZERO,
+        radius: f32::MIN_POSITIVE as f64,
+        half: DVec3::NEG_INFINITY,
+    };
+
+    /// Origin of the coordinates (m, world).
+    #[must_use]
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// A point that rays start from (m, world); `None` of one so far from the scene that they have to be worked out in
+    /// double precision.
+    #[must_use]
+    pub fn viewpoint(&self, position: DVec3) -> Option<Viewpoint> {
+        let own = position - self.origin;
+        let centre = self.centre - own;
+        let is_near = centre.length() <= NEAR_VIEWPOINT * self.radius;
+        is_near.then(|| Viewpoint {
+            position: own.to_array().map(round),
+            centre: centre.to_array().map(round),
+            far: round(FAR * self.radius),
+            sphere: round((1.0 + SPHERE_SLACK) * self.radius),
+        })
+    }
+
     pub(crate) fn of(bounds: Bounds) -> Self {
         let radius = (bounds.diagonal() * 0.5).max(f64::from(f32::MIN_POSITIVE));
         let centre = bounds.centre();
@@ -81,6 +158,12 @@ impl F32Frame {
             (bounds.max - bounds.min) * 0.5 + 1e-6 * (radius + (centre - origin).length())
         };
         Self { origin, centre: centre - origin, radius, half }
+    }
+
+    /// Refills `blocks` with `rays` as they are: what single precision hits there is not decided again.
+    pub(crate) fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks) {
+        blocks.refill(rays.len(), |_, _, _| {});
+        convert_blocks(blocks.blocks_mut(), rays, self);
     }
 
     /// True if ray `i`'s line may meet the scene's box, by separating axes along the cross products
@@ -174,28 +257,6 @@ impl Rays32 {
         convert(self, rays, frame, nudge);
     }
 
-    /// Refills `blocks` with `rays` as they are: what single precision hits there is not decided again.
-    pub(crate) fn convert_to_blocks(
-        &mut self,
-        rays: &RayBatch,
-        frame: &F32Frame,
-        blocks: &mut RayBlocks,
-    ) {
-        self.resize(rays.len());
-        convert(self, rays, frame, 0.0);
-        blocks.refill(self.len(), |block, start, count| {
-            let put = |to: &mut Floats, from: &[f32]| {
-                to[..count].copy_from_slice(&from[start..start + count]);
-            };
-            for axis in 0..3 {
-                put(&mut block.origin[axis], &self.origin[axis]);
-                put(&mut block.direction[axis], &self.direction[axis]);
-            }
-            put(&mut block.t_min, &self.t_near);
-            put(&mut block.t_max, &self.t_far);
-        });
-    }
-
     /// Appends ray `i` of `from`, moved sideways by `shift` (m).
     pub(crate) fn push_shifted(&mut self, from: &Self, i: usize, shift: DVec3) {
         for axis in 0..3 {
@@ -228,22 +289,46 @@ pub(crate) fn round(x: f64) -> f32 {
     x as f32
 }
 
-#[multiversion::multiversion(targets = "simd")]
-fn convert(out: &mut Rays32, rays: &RayBatch, frame: &F32Frame, nudge: f64) {
-    let n = rays.len();
-    let [ox, oy, oz] = rays.origins().map(|array| &array[..n]);
-    let [dx, dy, dz] = rays.directions().map(|array| &array[..n]);
-    let (t_min, t_max) = (&rays.t_min()[..n], &rays.t_max()[..n]);
-    let [px, py, pz] = out.origin.each_mut().map(|array| &mut array[..n]);
-    let [qx, qy, qz] = out.direction.each_mut().map(|array| &mut array[..n]);
-    let (t_near, t_far) = (&mut out.t_near[..n], &mut out.t_far[..n]);
-    let advance = &mut out.advance[..n];
-    let far = FAR * frame.radius;
-    let pull = nudge / frame.radius;
-    // As BLUR is to NUDGE.
-    let blur = 2.0 * nudge;
-    let sphere = (1.0 + SPHERE_SLACK) * frame.radius;
-    for i in 0..n {
+/// Rays of a batch, as their arrays.
+struct RayArrays<'a> {
+    origins: [&'a [f64]; 3],
+    directions: [&'a [f64]; 3],
+    t_min: &'a [f64],
+    t_max: &'a [f64],
+}
+
+/// A ray in single precision.
+struct Ray32 {
+    origin: [f32; 3],
+    direction: [f32; 3],
+    t_near: f32,
+    t_far: f32,
+    advance: f64,
+}
+
+impl<'a> RayArrays<'a> {
+    #[inline(always)]
+    fn of(rays: &'a RayBatch, first: usize, count: usize) -> Self {
+        let end = first + count;
+        let [ox, oy, oz] = rays.origins();
+        let [dx, dy, dz] = rays.directions();
+        Self {
+            origins: [&ox[first..end], &oy[first..end], &oz[first..end]],
+            directions: [&dx[first..end], &dy[first..end], &dz[first..end]],
+            t_min: &rays.t_min()[first..end],
+            t_max: &rays.t_max()[first..end],
+        }
+    }
+
+    /// Ray `i` for a scene in `frame`, turned aside by `nudge`.
+    #[inline(always)]
+    fn ray(&self, i: usize, frame: &F32Frame, nudge: f64) -> Ray32 {
+        let Self { origins: [ox, oy, oz], directions: [dx, dy, dz], t_min, t_max } = self;
+        let far = FAR * frame.radius;
+        let pull = nudge / frame.radius;
+        // As BLUR is to NUDGE.
+        let blur = 2.0 * nudge;
+        let sphere = (1.0 + SPHERE_SLACK) * frame.radius;
         let x = ox[i] - frame.origin.x;
         let y = oy[i] - frame.origin.y;
         let z = oz[i] - frame.origin.z;
@@ -255,9 +340,9 @@ fn convert(out: &mut Rays32, rays: &RayBatch, frame: &F32Frame, nudge: f64) {
         let distance = cx.abs() + cy.abs() + cz.abs();
         let reach = sphere + f64::EPSILON * 4.0 * distance;
         // Embree wants finite numbers below 10¹⁸. Any comparison with NaN is false.
-        let meets = fx * fx + fy * fy + fz * fz <= reach * reach && foot >= -reach;
+        let meets = (fx * fx + fy * fy + fz * fz <= reach * reach) & (foot >= -reach);
         let unit = dx[i] * dx[i] + dy[i] * dy[i] + dz[i] * dz[i] > 0.5;
-        let sound = unit && distance <= frame.radius * MOST_RADII && t_min[i] <= t_max[i];
+        let sound = unit & (distance <= frame.radius * MOST_RADII) & (t_min[i] <= t_max[i]);
         // Only a far ray is moved ahead, to `far` before the foot.
         let start = (foot - far).max(0.0);
         let (x, y, z) = (x + dx[i] * start, y + dy[i] * start, z + dz[i] * start);
@@ -279,17 +364,56 @@ fn convert(out: &mut Rays32, rays: &RayBatch, frame: &F32Frame, nudge: f64) {
         let more = if blur > 0.0 { pad + SLOPE * blur * end.max(0.0) } else { 0.0 };
         let end = (end + more).max(near);
         // A ray that cannot hit is put beside the scene, pointing away.
-        let traced = meets && sound;
+        let traced = meets & sound;
         let choose = |value: f64, otherwise: f64| round(if traced { value } else { otherwise });
-        advance[i] = ahead;
-        px[i] = choose(x - dx[i] * back, frame.centre.x + 2.0 * far);
-        py[i] = choose(y - dy[i] * back, frame.centre.y);
-        pz[i] = choose(z - dz[i] * back, frame.centre.z);
-        qx[i] = choose(dx[i] + sx, 1.0);
-        qy[i] = choose(dy[i] + sy, 0.0);
-        qz[i] = choose(dz[i] + sz, 0.0);
-        t_near[i] = choose(near, 0.0);
-        // Embree takes no ray that ends before it starts.
-        t_far[i] = choose(end, 0.0).max(t_near[i]);
+        let t_near = choose(near, 0.0);
+        Ray32 {
+            origin: [
+                choose(x - dx[i] * back, frame.centre.x + 2.0 * far),
+                choose(y - dy[i] * back, frame.centre.y),
+                choose(z - dz[i] * back, frame.centre.z),
+            ],
+            direction: [choose(dx[i] + sx, 1.0), choose(dy[i] + sy, 0.0), choose(dz[i] + sz, 0.0)],
+            t_near,
+            // Embree takes no ray that ends before it starts.
+            t_far: choose(end, 0.0).max(t_near),
+            advance: ahead,
+        }
+    }
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn convert(out: &mut Rays32, rays: &RayBatch, frame: &F32Frame, nudge: f64) {
+    let n = rays.len();
+    let rays = RayArrays::of(rays, 0, n);
+    let [px, py, pz] = out.origin.each_mut().map(|array| &mut array[..n]);
+    let [qx, qy, qz] = out.direction.each_mut().map(|array| &mut array[..n]);
+    let (t_near, t_far) = (&mut out.t_near[..n], &mut out.t_far[..n]);
+    let advance = &mut out.advance[..n];
+    for i in 0..n {
+        let ray = rays.ray(i, frame, nudge);
+        [px[i], py[i], pz[i]] = ray.origin;
+        [qx[i], qy[i], qz[i]] = ray.direction;
+        (t_near[i], t_far[i], advance[i]) = (ray.t_near, ray.t_far, ray.advance);
+    }
+}
+
+/// The rays of a batch as blocks that have room for them.
+#[multiversion::multiversion(targets = "simd")]
+fn convert_blocks(blocks: &mut [RayBlock], batch: &RayBatch, frame: &F32Frame) {
+    for (block, first) in blocks.iter_mut().zip((0..).step_by(LANES)) {
+        // Of a length that is not known when the program is compiled: a loop of sixteen steps would be unrolled.
+        let count = LANES.min(batch.len() - first);
+        let rays = RayArrays::of(batch, first, count);
+        let RayBlock { origin: [px, py, pz], direction: [qx, qy, qz], t_min, t_max, .. } = block;
+        let (px, py, pz) = (&mut px[..count], &mut py[..count], &mut pz[..count]);
+        let (qx, qy, qz) = (&mut qx[..count], &mut qy[..count], &mut qz[..count]);
+        let (t_min, t_max) = (&mut t_min[..count], &mut t_max[..count]);
+        for i in 0..count {
+            let ray = rays.ray(i, frame, 0.0);
+            [px[i], py[i], pz[i]] = ray.origin;
+            [qx[i], qy[i], qz[i]] = ray.direction;
+            (t_min[i], t_max[i]) = (ray.t_near, ray.t_far);
+        }
     }
 }

@@ -91,21 +91,6 @@ pub fn intersect(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> Option<Hit> {
     Some(locate(a, b, c, d, front))
 }
 
-/// Margin by which the line from the origin along `d` passes inside the triangle: the least of the three edge
-/// determinants over the error that plain f64 may make in it. Positive inside and negative outside; between −1 and 1
-/// rounding decides, so a hit that single precision reports there deserves [`intersect`]'s exact second look, and so do
-/// the triangles around it. Each unit is about 10⁻¹⁵ of the corners' distance.
-///
-/// −∞ when a number is not finite, and 0 for a triangle without area.
-#[must_use]
-#[inline]
-pub fn margin(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> f64 {
-    let bound = determinant_bound(a, b, c, d);
-    let [p, q, r] = determinants(a, b, c, d);
-    let inside = p.min(q).min(r).max(-p.max(q).max(r));
-    if bound.is_finite() && (p + q + r).is_finite() { inside / bound } else { f64::NEG_INFINITY }
-}
-
 /// The edge determinants opposite `a`, `b` and `c`, in plain f64.
 #[inline]
 fn determinants(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> [f64; 3] {
@@ -329,7 +314,6 @@ mod tests {
         for bad in [f64::NAN, f64::INFINITY] {
             assert!(intersect(DVec3::splat(bad), B, C, DVec3::Z).is_none());
             assert!(intersect(A, B, C, DVec3::new(0.0, bad, 1.0)).is_none());
-            assert_eq!(margin(A, B, DVec3::splat(bad), DVec3::Z), f64::NEG_INFINITY);
         }
     }
 
@@ -370,14 +354,6 @@ mod tests {
             let allowed = 16.0 * ROUNDING * r / cosine;
             assert!(error <= allowed, "case {case}: {error:e} over {allowed:e}, cosine {cosine}");
         }
-    }
-
-    #[test]
-    fn margin_is_large_inside_and_negative_outside() {
-        assert!(margin(A, B, C, DVec3::Z) > 1e12);
-        assert!(margin(C, B, A, DVec3::Z) > 1e12);
-        assert!(margin(A, B, C, DVec3::X) < -1e12);
-        assert!(margin(A, B, C, A + (B - A) / 3.0).abs() < 1.0, "on the edge rounding decides");
     }
 
     #[test]

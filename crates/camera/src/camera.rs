@@ -8,8 +8,8 @@ use etendue_spectrum::Bands;
 use crate::lens::{self, LensAccuracy, focused::View};
 use crate::{
     BandGroup, BandLandings, CameraError, CameraRays, CameraTime, Distortion, DistortionSpec,
-    FilmSamples, Intrinsics, LensCamera, LightField, Orthographic, Pinhole, PixelBlock, Pose,
-    SensorSpec, ViewGrid,
+    FilmSamples, Intrinsics, LensCamera, LightField, Orthographic, Pinhole, PinholeLanes,
+    PixelBlock, Pose, SensorSpec, ViewGrid,
 };
 use etendue_geometry::units::Micrometres;
 use etendue_optics::train::{Focus, OpticalTrain};
@@ -428,6 +428,15 @@ impl Camera {
         let lens = self.lens().expect("bands share rays behind lenses");
         lens.sample_band_rays(&self.pose, self.resolution(), samples, out, landings);
         self.carry_samples(samples, out);
+    }
+
+    /// The camera in single precision, where its rays are straight, start in one point at one time, and count alike.
+    #[must_use]
+    pub fn pinhole_lanes(&self) -> Option<PinholeLanes> {
+        match &self.projection {
+            Projection::Pinhole(pinhole) if self.time.is_none() => pinhole.lanes(&self.pose),
+            _ => None,
+        }
     }
 
     fn aim(&self, rays: &mut RayBatch) {

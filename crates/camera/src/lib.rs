@@ -45,7 +45,7 @@ pub use lens::{
 pub use light_field::{LightField, LightFieldSpec, ViewGrid};
 pub use motion::{CameraMotionSpec, CameraTime, Kinematics, MotionAxes, Trajectory};
 pub use opencv_fit::OpencvFit;
-pub use pinhole::{Orthographic, OrthographicSpec, Pinhole, PinholeSpec};
+pub use pinhole::{Orthographic, OrthographicSpec, Pinhole, PinholeLanes, PinholeSpec};
 pub use pose::{Convention, Maps, Pose, PoseSpec};
 pub use sampler::{PixelSample, PixelSamples, SampleKeys, Sampler, squares_of_pair};
 pub use samples::{CameraRays, FilmSamples, PixelBlock};

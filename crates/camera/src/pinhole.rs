@@ -12,9 +12,10 @@ use crate::{
     CameraError, CameraMotionSpec, Intrinsics, IntrinsicsSpec, PixelOrigin, Pose, PoseSpec,
     SensorSpec, ShutterSpec,
 };
+use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::units::{Degrees, Metres};
-use etendue_geometry::{RayBatch, RaysMut};
+use etendue_geometry::{Float, RayBatch, RayBlock, RaysMut};
 
 /// The vertical field of view of a pinhole that says nothing about it.
 const DEFAULT_FOV: Degrees = Degrees(40.0);
@@ -161,6 +162,21 @@ impl Pinhole {
         Self { intrinsics: self.intrinsics.coarser(factor), ..self.clone() }
     }
 
+    /// The camera in single precision; `None` where it distorts, or sees some places darker than others.
+    pub(crate) fn lanes(&self, pose: &Pose) -> Option<PinholeLanes> {
+        if self.distortion.is_some() || self.falloff.is_some() {
+            return None;
+        }
+        let Intrinsics { focal: [fx, fy], skew, .. } = self.intrinsics;
+        let (right, down, forward) = (pose.right(), -pose.up(), pose.forward());
+        Some(PinholeLanes {
+            position: pose.position,
+            intrinsics: self.intrinsics,
+            axes: [0, 1, 2].map(|k| [right[k], down[k], forward[k]].map(f32::of)),
+            steps: [1.0 / fx, -skew / (fx * fy), 1.0 / fy].map(f32::of),
+        })
+    }
+
     /// The tangents up to which a framed scene may reach: of the picture's edges, or of what is
     /// seen at their middles and corners, at most 60° from the axis.
     fn reach(&self, [width, height]: [u32; 2]) -> FieldExtent {
@@ -206,6 +222,61 @@ impl Pinhole {
             if !sees {
                 // Nothing lies before a negative distance: the ray hits nothing.
                 t_max[i] = -1.0;
+            }
+        }
+    }
+}
+
+/// A pinhole in single precision, for rays that are traced in blocks: places in pixels become unit directions.
+#[derive(Debug, Clone, Copy)]
+pub struct PinholeLanes {
+    /// Where its rays start (m).
+    pub position: DVec3,
+    intrinsics: Intrinsics,
+    /// Right, down and forward, by axis of the world.
+    axes: [[f32; 3]; 3],
+    /// Change of the tangents across a pixel: of the first along columns and along rows, of the second along rows.
+    steps: [f32; 3],
+}
+
+impl PinholeLanes {
+    /// The tangents at the outer corner of the pixel in this column and row.
+    #[must_use]
+    pub fn corner(&self, [column, row]: [i32; 2]) -> [f32; 2] {
+        self.intrinsics.tangents(f64::from(column), f64::from(row)).map(f32::of)
+    }
+
+    /// Sets the directions of rays through places in pixels (0..1), with the tangents at the corners of these: two columns
+    /// each, sixteen numbers a block.
+    pub fn aim(&self, places: &[Vec<f32>; 2], corners: &[Vec<f32>; 2], blocks: &mut [RayBlock]) {
+        aim_blocks(self, places, corners, blocks);
+    }
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn aim_blocks(
+    camera: &PinholeLanes,
+    [u, v]: &[Vec<f32>; 2],
+    [left, top]: &[Vec<f32>; 2],
+    blocks: &mut [RayBlock],
+) {
+    let [across, skew, down] = camera.steps;
+    let (u, v) = (u.as_chunks::<LANES>().0, v.as_chunks::<LANES>().0);
+    let (left, top) = (left.as_chunks::<LANES>().0, top.as_chunks::<LANES>().0);
+    for ((block, (u, v)), (left, top)) in
+        blocks.iter_mut().zip(u.iter().zip(v)).zip(left.iter().zip(top))
+    {
+        let (mut x, mut y, mut shorten) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            x[i] = left[i] + u[i] * across + v[i] * skew;
+            y[i] = top[i] + v[i] * down;
+            shorten[i] = 1.0 / (x[i] * x[i] + y[i] * y[i] + 1.0).sqrt();
+        }
+        for axis in 0..3 {
+            let [right, down, forward] = camera.axes[axis];
+            let directions = &mut block.direction[axis];
+            for i in 0..LANES {
+                directions[i] = (right * x[i] + down * y[i] + forward) * shorten[i];
             }
         }
     }

@@ -6,7 +6,9 @@ use etendue_camera::{BandLandings, CameraRays, LensCamera};
 use etendue_tracer::layer::RaySource;
 
 use crate::film::{PlaneRows, Strip};
-use crate::sampling::{DIFFUSION_PAIR, Memory, SampleRun, SampledQuantity, Sampling, TIME_PAIR};
+use crate::sampling::{
+    BATCH, DIFFUSION_PAIR, Memory, SampleRun, SampledQuantity, Sampling, TIME_PAIR,
+};
 use crate::shard::SampledStrips;
 use crate::sum::{Sum, add_run};
 use crate::tile::{TILE, Tile};
@@ -33,6 +35,13 @@ pub(crate) fn put(strip: &mut Strip<'_>, index: usize, sums: &[Sum], bands: usiz
 /// A pixel by column and row, which may be one beside the picture.
 type Pixel = [i32; 2];
 
+/// A pixel that samples start from, and the first sum that they are added to.
+#[derive(Clone, Copy)]
+struct StartPixel {
+    pixel: Pixel,
+    slot: u32,
+}
+
 /// Sums of the pixels of some rows, on which light of a strip lands.
 pub(crate) struct RowSums<'a> {
     /// The topmost row.
@@ -44,8 +53,8 @@ pub(crate) struct RowSums<'a> {
 
 /// Sums that the light of a batch is added to.
 enum Destination<'a, 'b> {
-    /// Those of the pixels that samples start from, in [`Memory::sums`].
-    Starts,
+    /// Those of the pixels that samples start from.
+    Starts(&'a mut [Sum]),
     /// Those of the pixels on which it lands.
     Landings(&'a mut RowSums<'b>),
 }
@@ -77,30 +86,31 @@ impl Adding<'_> {
     ) -> Result<(), Stopped> {
         let [width, _] = self.what.camera().resolution();
         let [layers, bands] = self.what.shape();
-        let count = layers * bands * self.sampling.sets as usize;
+        let (sets, count) = (self.sampling.sets, layers * bands * self.sampling.sets as usize);
+        let mut pixels = Vec::new();
         for tile in Tile::across(width, [strip.top, strip.height]) {
-            // Pixels that want more samples, with what they have so far.
-            let wants = |&at: &[u32; 2]| !self.range(tile.on_film(at)).is_empty();
-            let wanting: Vec<[u32; 2]> = tile.pixels().filter(wants).collect();
-            let pixels: Vec<Pixel> = wanting.iter().map(|&at| tile.on_film(at)).collect();
-            let places = wanting.iter().map(|&[x, y]| tile.index(x, y, width));
-            memory.sums.clear();
-            match &kept {
-                Some(kept) => places.clone().for_each(|at| {
-                    memory.sums.extend_from_slice(&kept[at * count..(at + 1) * count]);
-                }),
-                None => memory.sums.resize(pixels.len() * count, Sum::default()),
+            // Pixels that want more samples, which are added to what they have so far.
+            let wanting = tile.pixels().filter(|&at| !self.range(tile.on_film(at)).is_empty());
+            pixels.clear();
+            if let Some(kept) = &mut kept {
+                pixels.extend(wanting.map(|at| StartPixel {
+                    pixel: tile.on_film(at),
+                    slot: tile.index(at, width) * sets,
+                }));
+                self.add_pixels(&pixels, &mut Destination::Starts(kept), memory)?;
+                continue;
             }
-            // Samples for these, and back to where their sums are kept.
-            self.add_pixels(&pixels, &mut Destination::Starts, memory)?;
-            for (at, sums) in places.zip(memory.sums.chunks(count)) {
-                match (&mut kept, self.work) {
-                    (Some(kept), _) => kept[at * count..(at + 1) * count].copy_from_slice(sums),
-                    (None, Work::Pass(pass)) => put(strip, at, sums, bands, pass.end),
-                    // What pixels want is always kept.
-                    (None, Work::Wanted(_)) => {}
-                }
+            // What pixels want is always kept.
+            let Work::Pass(pass) = self.work else { continue };
+            pixels.extend(slots_of(wanting.clone().map(|at| tile.on_film(at)), sets));
+            let mut sums = std::mem::take(&mut memory.sums);
+            sums.clear();
+            sums.resize(pixels.len() * count, Sum::default());
+            self.add_pixels(&pixels, &mut Destination::Starts(&mut sums), memory)?;
+            for (at, sums) in wanting.zip(sums.chunks(count)) {
+                put(strip, tile.index(at, width) as usize, sums, bands, pass.end);
             }
+            memory.sums = sums;
         }
         Ok(())
     }
@@ -123,7 +133,7 @@ impl Adding<'_> {
     /// Adds the samples of `pixels`.
     fn add_pixels(
         &self,
-        pixels: &[Pixel],
+        pixels: &[StartPixel],
         to: &mut Destination<'_, '_>,
         memory: &mut Memory,
     ) -> Result<(), Stopped> {
@@ -136,22 +146,22 @@ impl Adding<'_> {
     /// Adds the same samples of each of `pixels`.
     fn add_pass(
         &self,
-        pixels: &[Pixel],
+        pixels: &[StartPixel],
         pass: &Range<u32>,
         to: &mut Destination<'_, '_>,
         memory: &mut Memory,
     ) -> Result<(), Stopped> {
-        let at_once = (pass.end - pass.start).clamp(1, self.what.batch());
-        let pixels_at_once = (self.what.batch() / at_once) as usize;
+        let at_once = (pass.end - pass.start).clamp(1, BATCH);
+        let pixels_at_once = (BATCH / at_once) as usize;
         let mut runs = Vec::with_capacity(pixels_at_once);
-        for (pixels, slot) in pixels.chunks(pixels_at_once).zip((0_u32..).step_by(pixels_at_once)) {
+        for pixels in pixels.chunks(pixels_at_once) {
             for first in pass.clone().step_by(at_once as usize) {
                 let range = first..pass.end.min(first + at_once);
-                let range = || range.clone();
-                let of_pixel =
-                    |(&pixel, slot)| SampleRun { pixel, set: 0, range: range(), slot, share: 1.0 };
                 runs.clear();
-                runs.extend(pixels.iter().zip(slot..).map(of_pixel));
+                runs.extend(pixels.iter().map(|&StartPixel { pixel, slot }| {
+                    let range = range.clone();
+                    SampleRun { pixel, set: 0, range, slot, share: 1.0 }
+                }));
                 self.add_runs(&runs, to, memory)?;
             }
         }
@@ -162,16 +172,16 @@ impl Adding<'_> {
     /// light lands each counts as its share of its set.
     fn add_wanted(
         &self,
-        pixels: &[Pixel],
+        pixels: &[StartPixel],
         to: &mut Destination<'_, '_>,
         memory: &mut Memory,
     ) -> Result<(), Stopped> {
-        let (batch, sets) = (self.what.batch(), self.sampling.sets);
-        let (mut runs, mut room) = (Vec::new(), batch);
-        for (&pixel, slot) in pixels.iter().zip((0..).step_by(sets as usize)) {
+        let sets = self.sampling.sets;
+        let (mut runs, mut room) = (Vec::new(), BATCH);
+        for &StartPixel { pixel, slot } in pixels {
             let Range { start, end } = self.range(pixel);
             let share = match to {
-                Destination::Starts => 1.0,
+                Destination::Starts(_) => 1.0,
                 Destination::Landings(_) => f64::from(sets) / f64::from(end - start),
             };
             for set in 0..sets {
@@ -184,7 +194,7 @@ impl Adding<'_> {
                     if room == 0 {
                         self.add_runs(&runs, to, memory)?;
                         runs.clear();
-                        room = batch;
+                        room = BATCH;
                     }
                 }
             }
@@ -199,11 +209,18 @@ impl Adding<'_> {
         to: &mut Destination<'_, '_>,
         memory: &mut Memory,
     ) -> Result<(), Stopped> {
-        self.place(runs, memory);
         memory.slots.clear();
         for run in runs {
             memory.slots.extend(run.range.clone().map(|_| run.slot));
         }
+        if let Some(rays) = self.what.block_rays() {
+            let bands = 0..self.what.shape()[1];
+            rays.aim(&self.sampling, runs, memory);
+            self.what.trace(&bands, memory);
+            memory.add(self.what.shape(), &bands, to);
+            return self.watcher.did(memory.slots.len() as u64);
+        }
+        self.place(runs, memory);
         if self.what.shared_rows().is_some() {
             return self.add_shared_runs(runs, to, memory);
         }
@@ -211,7 +228,7 @@ impl Adding<'_> {
             memory.film.group = number;
             self.what.camera().sample_rays(&memory.film, &mut memory.rays);
             self.what.trace(&group.bands, memory);
-            memory.add(self.what.shape(), &group.bands);
+            memory.add(self.what.shape(), &group.bands, to);
         }
         self.watcher.did(memory.slots.len() as u64)
     }
@@ -234,13 +251,13 @@ impl Adding<'_> {
             self.what.trace(&(0..shape[1]), memory);
         }
         let counts = |run: &&SampleRun| match to {
-            Destination::Starts => true,
+            Destination::Starts(_) => true,
             // Others count those that start beside the share, and nobody those that start beside the picture.
             Destination::Landings(_) => self.owns(run.pixel),
         };
         let counted: usize = runs.iter().filter(counts).map(|run| run.range.len()).sum();
         match to {
-            Destination::Starts => memory.add_where_it_starts(shape),
+            Destination::Starts(sums) => memory.add_where_it_starts(shape, sums),
             Destination::Landings(window) => {
                 memory.add_where_it_lands(window, shape, [width, self.sampling.sets]);
             }
@@ -264,17 +281,17 @@ impl Adding<'_> {
         window: &mut RowSums<'_>,
         memory: &mut Memory,
     ) -> Result<(), Stopped> {
-        let [width, height] = self.what.camera().resolution();
+        let ([width, height], sets) = (self.what.camera().resolution(), self.sampling.sets);
         // Rows from which light lands on rows of the share.
         let taken = SampledStrips { shard: self.sampling.shard, rows: window.rows, height };
         let lands = |pixel: &Pixel| taken.land_from(pixel[1]);
         let to = &mut Destination::Landings(window);
         for tile in Tile::across(width, strip) {
-            let pixels = tile.pixels().map(|at| tile.on_film(at));
-            self.add_pixels(&pixels.filter(lands).collect::<Vec<_>>(), to, memory)?;
+            let pixels = tile.pixels().map(|at| tile.on_film(at)).filter(lands);
+            self.add_pixels(&slots_of(pixels, sets).collect::<Vec<_>>(), to, memory)?;
         }
-        let margin: Vec<Pixel> = self.margin_pixels(strip).filter(lands).collect();
-        self.add_pixels(&margin, to, memory)
+        let margin = slots_of(self.margin_pixels(strip).filter(lands), sets);
+        self.add_pixels(&margin.collect::<Vec<_>>(), to, memory)
     }
 
     /// Pixels beside the picture from which light may land on it: left and right of a strip, above the first one and
@@ -355,18 +372,22 @@ impl Adding<'_> {
 }
 
 impl Memory {
-    /// Adds the values of the batch's rays, sample by sample, to their sums.
-    fn add(&mut self, [layers, bands]: [usize; 2], group: &Range<usize>) {
-        let Self { rays: CameraRays { sample, weight, .. }, values, sums, slots, order, .. } = self;
+    /// Adds the values of the batch's rays, sample by sample, to the sums that they start from.
+    fn add(
+        &mut self,
+        [layers, bands]: [usize; 2],
+        group: &Range<usize>,
+        to: &mut Destination<'_, '_>,
+    ) {
+        let Self { rays: CameraRays { sample, weight, .. }, values, slots, order, .. } = self;
+        let Destination::Starts(sums) = to else { return };
         let count = layers * bands;
         if group.len() == count && sample.is_sorted() {
             // Samples of one sum lie side by side.
+            let slot = |sample: &u32| slots[*sample as usize];
             let mut first = 0;
-            while let Some(&of_first) = sample.get(first) {
-                let slot = slots[of_first as usize];
-                let is_of_sum = |other: &&u32| slots[**other as usize] == slot;
-                let of_sum = sample[first..].iter().take_while(is_of_sum).count();
-                let (at, end) = (slot as usize * count, first + of_sum);
+            for run in sample.chunk_by(|a, b| slot(a) == slot(b)) {
+                let (at, end) = (slot(&run[0]) as usize * count, first + run.len());
                 let values = &values[first * count..end * count];
                 add_run(&mut sums[at..at + count], values, &weight[first..end]);
                 first = end;
@@ -387,8 +408,8 @@ impl Memory {
 
     /// Adds the values of the batch's rays whose bands share paths, sample by sample, to the sums of the pixels that they
     /// start from.
-    fn add_where_it_starts(&mut self, [layers, bands]: [usize; 2]) {
-        let Self { rays, values, sums, slots, landings, order, .. } = self;
+    fn add_where_it_starts(&mut self, [layers, bands]: [usize; 2], sums: &mut [Sum]) {
+        let Self { rays, values, slots, landings, order, .. } = self;
         let count = layers * bands;
         let mut add = |ray: usize| {
             let at = slots[rays.sample[ray] as usize] as usize * count;
@@ -450,6 +471,11 @@ impl Memory {
         };
         in_order(&rays.sample, order, &mut add);
     }
+}
+
+/// Pixels with sums side by side, as many each as there are sets.
+fn slots_of(pixels: impl Iterator<Item = Pixel>, sets: u32) -> impl Iterator<Item = StartPixel> {
+    pixels.zip((0..).step_by(sets as usize)).map(|(pixel, slot)| StartPixel { pixel, slot })
 }
 
 /// Adds rays in the order of their samples, of which each has one at most.

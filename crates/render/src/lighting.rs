@@ -154,6 +154,7 @@ fn dark_share(
             rows: None,
             margin: 0,
             layers: vec![LayerSpec::Radiance],
+            block_rays: None,
         }),
         passes: &pass,
         picture: &|_, _| Err(PictureError::empty("the look")),

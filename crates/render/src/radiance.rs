@@ -5,14 +5,10 @@ use std::sync::Arc;
 
 use etendue_camera::{BandGroup, Camera, CameraRays, FilmSamples};
 use etendue_geometry::RayBatch;
-use etendue_tracer::transport::{Parts, RaySamples};
+use etendue_tracer::transport::{Parts, PathRays, RaySamples};
 use etendue_tracer::{LayerSpec, LightGroup, LightingContext, Modulation, Rules};
 
-use crate::sampling::{Memory, SampledQuantity};
-
-/// Samples that are traced together: enough that what is left of a batch after a few bounces still
-/// fills packets, and few enough that its arrays stay in the cache.
-const BATCH: u32 = 1024;
+use crate::sampling::{BlockRays, Memory, SampledQuantity, Sampling};
 
 /// Inputs of tracing light; nothing of them changes on the way.
 #[derive(Debug)]
@@ -32,28 +28,36 @@ pub(crate) struct LightPass<'a> {
     pub(crate) margin: u32,
     /// The picture, and the parts of its light that have layers of their own.
     pub(crate) layers: Vec<LayerSpec>,
+    /// Rays in blocks, by [`Self::in_blocks`].
+    pub(crate) block_rays: Option<BlockRays>,
 }
 
 impl LightPass<'_> {
+    /// The pass with rays in blocks, where these are all that it asks of the camera, and carriers do not diffuse.
+    pub(crate) fn in_blocks(mut self, sampling: Sampling) -> Self {
+        let is_one_way = self.groups.len() == 1 && self.rows.is_none() && sampling.diffusion == 0.0;
+        let has_parts = self.layers.iter().any(|layer| layer.pupil_part().is_some());
+        if is_one_way && !has_parts && self.ctx.fits_single() && !self.ctx.lights.are_modulated() {
+            self.block_rays = BlockRays::of(self.camera, self.ctx.accel, self.ctx.precision);
+        }
+        self
+    }
+
     /// Counts what the samples of each pixel bring, that stand side by side.
     fn count_sparkles(&self, memory: &mut Memory) {
-        let Memory { numbers, values, traffic, .. } = memory;
+        let Memory { numbers, slots, values, traffic, .. } = memory;
         let Some(picture) = self.layers.iter().position(|layer| *layer == LayerSpec::Radiance)
         else {
             return;
         };
         let [layers, bands] = self.shape();
-        let light = |ray: usize| -> f64 {
-            let start = (ray * layers + picture) * bands;
-            values[start..start + bands].iter().sum()
-        };
-        let pixel = |ray: &usize| numbers.samples[numbers.of_ray[*ray] as usize].pixel;
-        let rays: Vec<usize> = (0..numbers.of_ray.len()).collect();
-        let mut of_pixel = Vec::new();
-        for run in rays.chunk_by(|a, b| pixel(a) == pixel(b)) {
-            of_pixel.clear();
-            of_pixel.extend(run.iter().map(|&ray| light(ray)));
-            traffic.sparkles.count(&of_pixel);
+        let slot = |sample: &u32| slots[*sample as usize];
+        let mut values = values.chunks_exact(layers * bands);
+        for run in numbers.of_ray.chunk_by(|a, b| slot(a) == slot(b)) {
+            let rays = values.by_ref().take(run.len());
+            let light =
+                rays.map(|ray| ray[picture * bands..(picture + 1) * bands].iter().sum::<f64>());
+            traffic.sparkles.count(light);
         }
     }
 
@@ -174,12 +178,12 @@ impl SampledQuantity for LightPass<'_> {
         true
     }
 
-    fn shape(&self) -> [usize; 2] {
-        [self.layers.len(), self.count]
+    fn block_rays(&self) -> Option<&BlockRays> {
+        self.block_rays.as_ref()
     }
 
-    fn batch(&self) -> u32 {
-        BATCH
+    fn shape(&self) -> [usize; 2] {
+        [self.layers.len(), self.count]
     }
 
     fn trace(&self, bands: &Range<usize>, memory: &mut Memory) {
@@ -192,7 +196,13 @@ impl SampledQuantity for LightPass<'_> {
         };
         let is_one_for_all = self.ctx.spectral.count() != self.count;
         let bands = if is_one_for_all { 0..self.ctx.spectral.count() } else { bands.clone() };
-        let samples = RaySamples { rays: &rays.rays, samples: numbers, bands, parts };
+        let rays_of_paths = match &self.block_rays {
+            Some(rays) => {
+                PathRays::Blocks { len: numbers.samples.len(), from: rays.camera.position }
+            }
+            None => PathRays::Batch(&rays.rays),
+        };
+        let samples = RaySamples { rays: rays_of_paths, samples: numbers, bands, parts };
         let light = if parts == Parts::Whole { &mut *values } else { &mut *light_in_parts };
         traffic.light += self.tracer.radiance(&self.ctx, &samples, scratch, light);
         if lights.are_modulated() {

@@ -186,6 +186,7 @@ pub fn trace(
         rows: shared.map(|shared| shared.rows),
         margin: shared.map_or(0, |shared| shared.margin_pixels()),
         layers: plan.layers.iter().copied().filter(|layer| layer.is_light()).collect(),
+        block_rays: None,
     });
     // The passes, kept shorter where a checkpoint is written after each.
     let so_far = |layers: &[&FilmLayer], samples| so_far(scene, plan, header, layers, samples);
@@ -195,6 +196,14 @@ pub fn trace(
     let passes = if is_kept { short_passes(plan.samples) } else { plan.passes.clone() };
     let others: Vec<&dyn OtherFrame> = others.iter().map(|other| other as _).collect();
     let rule = Rule::of(scene, plan);
+    let sampling = Sampling {
+        samples: plan.samples,
+        sampler: scene.render.sampler,
+        seed: scene.render.frame_seed(),
+        shard,
+        sets: if rule.is_some() { SETS } else { 1 },
+        diffusion: scene.sensor.as_ref().map_or(0.0, Sensor::carrier_diffusion),
+    };
     // All of it as one job, tile by tile.
     let job = Job {
         accel,
@@ -204,19 +213,12 @@ pub fn trace(
         surroundings,
         detail: plan.detail,
         precision: plan.light_precision,
-        sampling: Sampling {
-            samples: plan.samples,
-            sampler: scene.render.sampler,
-            seed: scene.render.frame_seed(),
-            shard,
-            sets: if rule.is_some() { SETS } else { 1 },
-            diffusion: scene.sensor.as_ref().map_or(0.0, Sensor::carrier_diffusion),
-        },
+        sampling,
         rule,
         time: plan.stopping.time(),
         judged: scene.picture,
         passes: &passes,
-        light,
+        light: light.map(|light| light.in_blocks(sampling)),
         picture: &so_far,
         shares: state.shares,
         keeper: checkpoint

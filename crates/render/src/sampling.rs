@@ -4,10 +4,13 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use etendue_accel::{Accel, Viewpoint};
 use etendue_camera::{
-    BandGroup, BandLandings, Camera, CameraRays, FilmSamples, PixelSample, SampleKeys, Sampler,
+    BandGroup, BandLandings, Camera, CameraRays, FilmSamples, PinholeLanes, PixelSample,
+    SampleKeys, Sampler,
 };
-use etendue_geometry::HitBatch;
+use etendue_geometry::block::LANES;
+use etendue_geometry::{HitBatch, HitPrecision};
 use etendue_tracer::layer::Columns;
 use etendue_tracer::{Samples, Scratch};
 
@@ -42,6 +45,10 @@ pub(crate) const TIME_PAIR: u32 = u32::MAX;
 
 /// The pair of random numbers by which carriers diffuse.
 pub(crate) const DIFFUSION_PAIR: u32 = u32::MAX - 1;
+
+/// Samples that are traced together: enough that what is left of a batch after a few bounces still
+/// fills packets, and few enough that its arrays stay in the cache.
+pub(crate) const BATCH: u32 = 1024;
 
 /// The passes of `samples` a pixel: the first has few, so that there is soon something to see, the second fills
 /// what is worked on side by side, and each other takes as many as all before it until they are a small share of all.
@@ -138,10 +145,56 @@ pub(crate) trait SampledQuantity: Sync {
     fn is_light(&self) -> bool;
     /// Layers, and the bands of each.
     fn shape(&self) -> [usize; 2];
-    /// Samples that are traced together.
-    fn batch(&self) -> u32;
-    /// Fills `memory.values`, `[ray][layer][band]`, for the rays of one group of bands.
+    /// Rays in blocks of single precision, where they are all that the quantity asks of the camera.
+    fn block_rays(&self) -> Option<&BlockRays> {
+        None
+    }
+    /// Fills `memory.values`, `[ray][layer][band]`, for the rays of one group of bands; they are in [`Scratch::camera_blocks`] where
+    /// there are [`Self::block_rays`].
     fn trace(&self, bands: &Range<usize>, memory: &mut Memory);
+}
+
+/// Rays of a pinhole that are traced in blocks.
+#[derive(Debug)]
+pub(crate) struct BlockRays {
+    pub(crate) camera: PinholeLanes,
+    pub(crate) from: Viewpoint,
+}
+
+impl BlockRays {
+    /// Those of a camera near a scene of which single precision finds the hits, if it has any.
+    pub(crate) fn of(camera: &Camera, accel: &dyn Accel, precision: HitPrecision) -> Option<Self> {
+        let blocks = accel.blocks().filter(|blocks| !blocks.has_times());
+        let blocks = blocks.filter(|_| precision == HitPrecision::Single)?;
+        let camera = camera.pinhole_lanes()?;
+        Some(Self { from: blocks.frame().viewpoint(camera.position)?, camera })
+    }
+
+    /// Refills the blocks with the rays of the samples of `runs`, one for each, in order.
+    pub(crate) fn aim(&self, sampling: &Sampling, runs: &[SampleRun], memory: &mut Memory) {
+        let Memory { numbers, places, corners, scratch, rays: counted, .. } = memory;
+        numbers.has_pupil = false;
+        let blocks = scratch.camera_blocks();
+        numbers.refill(|all| runs.iter().for_each(|run| sampling.extend(run, all)));
+        let count = numbers.samples.len();
+        counted.sample.clear();
+        counted.sample.extend((0_u32..).take(count));
+        numbers.draw_floats(&counted.sample, 0, places);
+        corners.iter_mut().for_each(Vec::clear);
+        for run in runs {
+            let corner = self.camera.corner(run.pixel);
+            for (corners, corner) in corners.iter_mut().zip(corner) {
+                corners.resize(corners.len() + run.range.len(), corner);
+            }
+        }
+        let whole_blocks = count.next_multiple_of(LANES);
+        places.iter_mut().chain(&mut *corners).for_each(|column| column.resize(whole_blocks, 0.0));
+        blocks.refill(count, |_, _, _| {});
+        self.camera.aim(places, corners, blocks.blocks_mut());
+        self.from.start(blocks);
+        counted.weight.clear();
+        counted.weight.resize(count, 1.0);
+    }
 }
 
 /// One thread's memory for it.
@@ -150,6 +203,9 @@ pub(crate) struct Memory {
     /// Numbers by which the samples of the batch are sampled, and the sample of each ray.
     pub(crate) numbers: SampleNumbers,
     pub(crate) rays: CameraRays,
+    /// Places of samples in pixels, and the tangents at the pixels' corners, where rays are in blocks.
+    pub(crate) places: [Vec<f32>; 2],
+    pub(crate) corners: [Vec<f32>; 2],
     pub(crate) values: Vec<f64>,
     /// `[ray][part][band]`, where light is told apart.
     pub(crate) light_in_parts: Vec<f64>,
@@ -195,6 +251,11 @@ impl SampleNumbers {
     /// A pair of random numbers of each sample of the film.
     pub(crate) fn draw(&self, pair: u32, out: &mut Vec<[f64; 2]>) {
         self.keys.squares_of_all(pair, out);
+    }
+
+    /// A pair of random numbers of single precision of some samples of the film, in two columns.
+    pub(crate) fn draw_floats(&self, samples: &[u32], pair: u32, out: &mut [Vec<f32>; 2]) {
+        self.keys.floats_of_pair(samples, pair, out);
     }
 
     /// The places of each sample of the film in its pixel and in the pupil: the pairs 0 and [`PUPIL_PAIR`].

@@ -27,13 +27,17 @@ pub(crate) struct Sparkles {
 
 impl Sparkles {
     /// Counts the samples of a pixel, by their light.
-    pub(crate) fn count(&mut self, light: &[f64]) {
-        let (sum, most) =
-            light.iter().fold((0.0, 0.0_f64), |(sum, most), &l| (sum + l, most.max(l)));
-        self.samples += light.len() as u64;
+    pub(crate) fn count(&mut self, light: impl Iterator<Item = f64>) {
+        let (mut count, mut sum, mut most) = (0, 0.0, 0.0_f64);
+        for light in light {
+            count += 1;
+            sum += light;
+            most = if light > most { light } else { most };
+        }
+        self.samples += count as u64;
         self.total += sum;
         let over = most - (sum - most);
-        if light.len() >= FEWEST && over > 0.0 {
+        if count >= FEWEST && over > 0.0 {
             self.note(over);
         }
     }

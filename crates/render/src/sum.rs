@@ -60,13 +60,20 @@ pub(crate) fn add_run(sums: &mut [Sum], values: &[f64], weights: &[f64]) {
 /// Adds a run to a known number of sums, which stay in registers.
 fn add_run_of<const N: usize>(sums: &mut [Sum], values: &[f64], weights: &[f64]) {
     let Some(sums) = sums.first_chunk_mut::<N>() else { return };
-    let mut own = *sums;
+    let (mut sum, mut lost) = (sums.map(|own| own.sum), sums.map(|own| own.lost));
     for (values, weight) in values.as_chunks::<N>().0.iter().zip(weights) {
-        for (sum, value) in own.iter_mut().zip(values) {
-            sum.add(value * weight);
+        for i in 0..N {
+            // As Sum::add does.
+            let value = values[i] * weight;
+            let more = sum[i] + value;
+            let of_value = more - sum[i];
+            lost[i] += (sum[i] - (more - of_value)) + (value - of_value);
+            sum[i] = more;
         }
     }
-    *sums = own;
+    for i in 0..N {
+        sums[i] = Sum { sum: sum[i], lost: lost[i] };
+    }
 }
 
 /// The variance of the mean of two independent sets of one size, by the difference of their means: a quarter

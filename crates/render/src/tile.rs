@@ -58,7 +58,7 @@ impl Tile {
 
     /// Pixels from the tile's corner along a Z-order curve, so that any 4, 8 or 16 of them in a row,
     /// as many as go into a packet, are a block.
-    pub(crate) fn pixels(self) -> impl Iterator<Item = [u32; 2]> {
+    pub(crate) fn pixels(self) -> impl Iterator<Item = [u32; 2]> + Clone {
         (0..TILE * TILE)
             .map(|k| [even_bits(k), even_bits(k >> 1)])
             .filter(move |&[x, y]| x < self.width && y < self.height)
@@ -70,8 +70,8 @@ impl Tile {
     }
 
     /// Index of a pixel of the tile in the rows of its strip.
-    pub(crate) fn index(self, x: u32, y: u32, width: u32) -> usize {
-        y as usize * width as usize + (self.left + x) as usize
+    pub(crate) fn index(self, [x, y]: [u32; 2], width: u32) -> u32 {
+        y * width + self.left + x
     }
 }
 

@@ -8,7 +8,7 @@ use etendue_accel::Accel;
 use etendue_camera::{BandGroup, Camera, CameraRays};
 use etendue_geometry::{Detail, HitBatch, HitPrecision, RayBatch};
 use etendue_optics::element::StatusCounts;
-use etendue_tracer::layer::{Columns, LayerContext, OtherFrame};
+use etendue_tracer::layer::{Columns, LayerContext, OtherFrame, PlainColors};
 use etendue_tracer::{LayerSpec, SceneView, TracedBatch};
 use rayon::prelude::*;
 
@@ -21,14 +21,11 @@ use crate::memory::{NoMemory, filled};
 use crate::output::{Picture, PictureError};
 use crate::radiance::LightPass;
 use crate::samples::Averaging;
-use crate::sampling::{Memory, SampledQuantity, Sampling};
+use crate::sampling::{BlockRays, Memory, SampledQuantity, Sampling};
 use crate::shard::SampledStrips;
 use crate::sum::Sum;
 use crate::tile::{RayCounts, TILE, Tile};
 use crate::watch::{Stopped, Watcher};
-
-/// Rays a batch of colours when several go through each pixel.
-const BATCH: u32 = TILE * TILE;
 
 /// Makes a picture of layers with so many samples.
 pub(crate) type ToPicture<'a> =
@@ -110,7 +107,7 @@ impl Job<'_> {
             film.into_iter().partition(|layer| layer.spec.is_light());
         let (mut mean, mut centre): (Vec<_>, Vec<_>) =
             seen.into_iter().partition(|layer| self.is_averaged(layer.spec));
-        let colors = Colors { job: self, layers: mean.iter().map(|layer| layer.spec).collect() };
+        let colors = Colors::new(self, mean.iter().map(|layer| layer.spec).collect());
         let mut averaged = Vec::new();
         // Shares of the samples and what was kept on disk are sums, whatever the passes are.
         let is_shared = self.sampling.shard.is_of_samples() || !self.shares.is_empty();
@@ -302,6 +299,17 @@ impl Job<'_> {
 struct Colors<'a> {
     job: &'a Job<'a>,
     layers: Vec<LayerSpec>,
+    /// Rays and colours where both are worked out in blocks.
+    in_blocks: Option<(BlockRays, PlainColors<'a>)>,
+}
+
+impl<'a> Colors<'a> {
+    fn new(job: &'a Job<'a>, layers: Vec<LayerSpec>) -> Self {
+        let rays = BlockRays::of(job.camera, job.accel, job.precision);
+        let rays = rays.filter(|_| job.sampling.diffusion == 0.0 && job.groups.len() == 1);
+        let plain = |rays| Some((rays, PlainColors::of(job.surroundings, &layers)?));
+        Self { in_blocks: rays.and_then(plain), job, layers }
+    }
 }
 
 impl SampledQuantity for Colors<'_> {
@@ -321,11 +329,17 @@ impl SampledQuantity for Colors<'_> {
         [self.layers.len(), 3]
     }
 
-    fn batch(&self) -> u32 {
-        BATCH
+    fn block_rays(&self) -> Option<&BlockRays> {
+        self.in_blocks.as_ref().map(|(rays, _)| rays)
     }
 
     fn trace(&self, bands: &Range<usize>, memory: &mut Memory) {
+        if let (Some((_, plain)), Some(accel)) = (&self.in_blocks, self.job.accel.blocks()) {
+            let blocks = memory.scratch.camera_blocks();
+            accel.closest_of_blocks(blocks.blocks_mut(), &[], true);
+            memory.traffic.chief_rays += blocks.len() as u64;
+            return plain.fill(blocks.blocks(), blocks.len(), &mut memory.values);
+        }
         let Memory { rays: CameraRays { rays, .. }, hits, columns, values, traffic, .. } = memory;
         hits.detail = self.job.detail;
         rays.precision = self.job.precision;

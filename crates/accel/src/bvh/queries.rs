@@ -2,8 +2,7 @@
 
 use std::marker::PhantomData;
 
-use etendue_geometry::glam::DVec3;
-use etendue_geometry::{HitBatch, RayBatch, RayBlock, RayBlocks};
+use etendue_geometry::{HitBatch, RayBatch, RayBlock};
 
 use super::lanes::{Lanes, Portable};
 use super::packet::BatchTraversal;
@@ -13,7 +12,7 @@ use super::{Bvh, Isa};
 use crate::few::FewTriangles;
 use crate::nearest::{Nearest, settle, settle_blocks};
 use crate::parts::PartInstance;
-use crate::{Accel, BlockAccel, BuildReport, Quality};
+use crate::{Accel, BlockAccel, BuildReport, F32Frame, Quality};
 
 impl Bvh {
     fn run<L: Lanes, S: Sink>(&self, lanes: L, rays: &RayBatch, sink: impl FnMut(usize, S)) {
@@ -32,20 +31,14 @@ impl Bvh {
 }
 
 impl BlockAccel for Bvh {
-    fn origin(&self) -> DVec3 {
-        self.few.as_ref().map_or(DVec3::ZERO, FewTriangles::origin)
-    }
-
-    fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks) {
-        if let Some(few) = &self.few {
-            few.convert(rays, blocks);
-        }
+    fn frame(&self) -> &F32Frame {
+        self.few.as_ref().map_or(F32Frame::EMPTY, FewTriangles::frame)
     }
 
     fn closest_of_blocks(&self, blocks: &mut [RayBlock], _times: &[f64], _coherent: bool) {
         let Some(few) = &self.few else { return };
         few.closest_of_blocks(blocks);
-        settle_blocks(&self.coplanar, &self.geometry, few.origin(), blocks);
+        settle_blocks(&self.coplanar, &self.geometry, few.frame().origin(), blocks);
     }
 
     fn occluded_of_blocks(&self, blocks: &mut [RayBlock], _times: &[f64], _coherent: bool) {

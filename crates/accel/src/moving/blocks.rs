@@ -6,7 +6,7 @@ use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Bounds, Detail, HitBatch, MISS, RayBatch, RayBlock, RayBlocks};
 
 use super::{BodyHit, BodyRays, MovingScene, RaysInFrame, meets, reach, span, turned_normal};
-use crate::single::{F32Frame, Rays32, round};
+use crate::single::{F32Frame, round};
 use crate::{Accel, BlockAccel};
 
 /// Distances that differ by no more than this share, where one of them is of single precision, are one.
@@ -40,7 +40,7 @@ impl MovingScene {
         ends: impl Fn(&RayBlock, usize) -> bool,
         ask: impl FnOnce(&RayBatch, &[BlockLane], &mut [RayBlock]),
     ) {
-        let origin = self.frame.map_or(DVec3::ZERO, |frame| frame.origin);
+        let origin = self.frame().origin();
         let (mut rays, mut lanes, mut at) = (RayBatch::default(), Vec::new(), Vec::new());
         for (number, block) in blocks.iter().enumerate() {
             for lane in 0..LANES {
@@ -69,18 +69,12 @@ impl MovingScene {
 }
 
 impl BlockAccel for MovingScene {
-    fn origin(&self) -> DVec3 {
-        self.frame.map_or(DVec3::ZERO, |frame| frame.origin)
+    fn frame(&self) -> &F32Frame {
+        self.frame.as_ref().unwrap_or(F32Frame::EMPTY)
     }
 
     fn has_times(&self) -> bool {
         true
-    }
-
-    fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks) {
-        if let Some(frame) = &self.frame {
-            Rays32::default().convert_to_blocks(rays, frame, blocks);
-        }
     }
 
     fn closest_of_blocks(&self, blocks: &mut [RayBlock], times: &[f64], coherent: bool) {

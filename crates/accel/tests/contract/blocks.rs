@@ -5,11 +5,9 @@ use std::sync::Arc;
 #[cfg(feature = "embree")]
 use etendue_accel::{Accel, Embree};
 use etendue_accel::{BuildOptions, Exact};
-#[cfg(feature = "embree")]
-use etendue_geometry::RayBlock;
 use etendue_geometry::block::LANES;
-use etendue_geometry::glam::{DQuat, DVec3};
-use etendue_geometry::{HitPrecision, MISS, Mesh, RayBatch, RayBlocks, Transform};
+use etendue_geometry::glam::{DMat3, DQuat, DVec3};
+use etendue_geometry::{HitPrecision, MISS, Mesh, RayBatch, RayBlock, RayBlocks, Transform};
 
 use super::meshes::{Random, at, mesh, placed, soup};
 use super::{closest, each, is_at_edge};
@@ -84,6 +82,66 @@ fn surfaces_in_one_plane_follow_the_rule_in_blocks() {
         }
     }
     assert!(compared >= if cfg!(feature = "embree") { 6 } else { 2 }, "{compared}");
+}
+
+/// Rays of one point start as those of a batch do, near the scene and as far as single precision takes them: they run along
+/// the same lines, and meet the same. From farther on there are none.
+#[test]
+fn rays_of_a_viewpoint_are_those_of_a_batch() {
+    // Away from the world's origin, so that blocks have an origin of their own.
+    let middle = DVec3::new(30.0, -20.0, 10.0);
+    let geometry =
+        at(vec![soup(2000, 0.3, 3)], vec![placed(0, Transform::new(DMat3::IDENTITY, middle))]);
+    let radius = 0.5 * geometry.loose_bounds().diagonal();
+    let mut random = Random(23);
+    let mut compared = 0;
+    for (name, accel) in each(&geometry) {
+        let Some(blocks) = accel.blocks() else { continue };
+        compared += 1;
+        let towards = random.cube().normalize();
+        assert!(blocks.frame().viewpoint(middle + 17.0 * radius * towards).is_none(), "{name}");
+        for far in [0.0, 0.9, 1.6, 5.0, 15.0] {
+            let position = middle + far * radius * towards;
+            let from = blocks.frame().viewpoint(position).expect("it is near");
+            let (mut batch, mut rays) = (RayBatch::default(), RayBlocks::default());
+            for _ in 0..1000 {
+                // Some miss the sphere around the scene.
+                let goal = middle + 2.0 * radius * random.cube();
+                let direction = (goal - position).normalize().as_vec3();
+                batch.push(position, direction.as_dvec3().normalize());
+                rays.push([0.0; 3], direction.to_array(), 0.0);
+            }
+            let mut due = RayBlocks::default();
+            blocks.convert(&batch, &mut due);
+            from.start(&mut rays);
+            for i in 0..batch.len() {
+                let [own, other] = [&rays, &due].map(|rays| &rays.blocks()[i / LANES]);
+                let lane = i % LANES;
+                let is_traced = [own, other].map(|block| block.t_max[lane] > 0.0);
+                assert!(!is_traced[1] || is_traced[0], "{name}, {far}: {is_traced:?}");
+                if is_traced == [true; 2] {
+                    let start = |block: &RayBlock| {
+                        DVec3::from(block.origin.map(|axis| f64::from(axis[lane])))
+                    };
+                    // Roundings of 16 radii, and of a sum of three products.
+                    let error = start(own).distance(start(other)) / radius;
+                    assert!(error < 64.0 * f64::from(f32::EPSILON), "{name}, {far}: {error}");
+                    assert_eq!(own.t_min[lane], 0.0);
+                }
+            }
+            blocks.closest_of_blocks(rays.blocks_mut(), &[], true);
+            blocks.closest_of_blocks(due.blocks_mut(), &[], true);
+            let hits = |rays: &RayBlocks, i: usize| {
+                let (block, lane) = (&rays.blocks()[i / LANES], i % LANES);
+                [block.placement[lane], block.triangle[lane]]
+            };
+            let differ = (0..batch.len()).filter(|&i| hits(&rays, i) != hits(&due, i)).count();
+            let hit = (0..batch.len()).filter(|&i| hits(&rays, i)[0] != MISS).count();
+            // Hits within a millionth of the scene of an edge.
+            assert!(differ <= 2 && hit > 100, "{name}, {far}: {differ} of {hit}");
+        }
+    }
+    assert!(compared >= usize::from(cfg!(feature = "embree")), "{compared}");
 }
 
 /// A box of 0.6 m that stands on y = 0.

@@ -149,8 +149,12 @@ fn kinds() -> Vec<Kind> {
     let unlit = json!({ "/tracer": { "type": "facing" }, "/camera": { "type": "chromatic_real_lens",
         "front_radius": 50, "rear_radius": -50, "thickness": 6, "glass": "N-BK7", "f_number": 4, "fov": 40,
         "focus_distance": 3.4 } });
+    // A blob has normals of its own, a box none.
+    let plain = json!({ "/tracer": { "type": "facing" }, "/layers": ["depth", "flat"],
+        "/objects/2/shape": "blob", "/materials/floor": { "type": "matte", "color": [0.8, 0.8, 0.7] } });
     vec![
         Kind::new("matte surfaces below a light", scene(&json!({}))),
+        Kind::new("surfaces of one colour each, without light", scene(&plain)),
         Kind::new("glass", scene(&glass)),
         Kind::new("images on surfaces", scene(&images)),
         Kind::new("a sky", scene(&sky)),

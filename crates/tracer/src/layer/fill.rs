@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use etendue_geometry::glam::{DMat3, DVec3};
-use etendue_geometry::{HitBatch, MISS, Placement};
+use etendue_geometry::{Float, HitBatch, MISS, Placement};
 
 use super::{Columns, LayerContext};
 use crate::{Color, NormalKind, Paint, SceneView, Space, TracedBatch};
@@ -75,7 +75,7 @@ impl LayerContext<'_> {
         let Self { scene, traced, .. } = *self;
         self.flats(out);
         let mut cosine = vec![0.0; traced.rays.len()];
-        let mut ambient = vec![0.15; traced.rays.len()];
+        let mut ambient = vec![AMBIENT; traced.rays.len()];
         for (run, placement) in scene.runs(traced.hits) {
             let material = scene.materials.get(placement.material as usize);
             if material.is_some_and(|material| material.occlusion.is_some()) {
@@ -88,10 +88,9 @@ impl LayerContext<'_> {
         }
         let hits = &traced.hits.placement;
         for array in &mut out[..3] {
-            let light =
-                cosine.iter().zip(&ambient).map(|(cosine, ambient)| ambient + 0.85 * cosine);
-            for ((color, light), &hit) in array.iter_mut().zip(light).zip(hits) {
-                let lit = (0.08 + 0.92 * *color) * light;
+            let light = cosine.iter().zip(&ambient);
+            for ((color, (&cosine, &ambient)), &hit) in array.iter_mut().zip(light).zip(hits) {
+                let lit = headlit(*color, cosine, ambient);
                 *color = if hit == MISS { 0.0 } else { lit };
             }
         }
@@ -171,7 +170,7 @@ impl SceneView<'_> {
     }
 
     /// The base colour of a placement that has the same everywhere.
-    fn plain_color(&self, placement: &Placement) -> Option<Color> {
+    pub(super) fn plain_color(&self, placement: &Placement) -> Option<Color> {
         let Some(material) = self.materials.get(placement.material as usize) else {
             return Some([0.0; 3]);
         };
@@ -205,6 +204,15 @@ impl SceneView<'_> {
             out[i] = (normal.unwrap_or(geometric).dot(direction) * side).max(0.0);
         }
     }
+}
+
+/// Light of a headlight that comes from all sides.
+pub(super) const AMBIENT: f64 = 0.15;
+
+/// A colour under a headlight whose light meets its surface at an angle of this cosine, beside so much from all sides.
+#[inline(always)]
+pub(super) fn headlit<F: Float>(color: F, cosine: F, ambient: F) -> F {
+    (F::of(0.08) + F::of(0.92) * color) * (ambient + F::of(0.85) * cosine)
 }
 
 /// Cosines between rays and the triangles' normals.

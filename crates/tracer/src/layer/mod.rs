@@ -5,6 +5,7 @@ pub mod context;
 mod fill;
 mod layers;
 pub mod pair;
+mod plain_colors;
 pub mod row;
 mod rows;
 pub mod table;
@@ -17,6 +18,7 @@ use serde::{Deserialize, Deserializer};
 
 pub use self::context::{Columns, LayerContext, OtherFrame, Sight};
 pub use self::pair::{FrameStep, RowMoment, StepAxis, WrittenStep};
+pub use self::plain_colors::PlainColors;
 pub use self::row::{Layer, Look, PupilPart, RaySource, ValueKind};
 pub use self::table::LayerSpec;
 use crate::Needs;

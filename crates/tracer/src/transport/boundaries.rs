@@ -4,8 +4,8 @@
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Detail, HitBatch, HitPrecision, RayBatch};
 
-use super::Tracing;
 use super::media::{CoincidentBoundary, Media, MediumInterface};
+use super::{PathRays, Tracing};
 use crate::Ior;
 use crate::surface::SurfaceInteraction;
 
@@ -101,12 +101,12 @@ impl<const RGB: bool> Tracing<'_, RGB> {
 
     /// The bodies that hold the origin of each ray: those whose back is the side that is met along a line, both ways.
     /// Empty where none can.
-    pub(super) fn media_at_origins(&self, rays: &RayBatch) -> Vec<Media> {
+    pub(super) fn media_at_origins(&self, rays: PathRays<'_>) -> Vec<Media> {
         let placed = self.ctx.placed;
         if !self.ctx.traits.has_media || placed.bodies().next().is_none() {
             return Vec::new();
         }
-        let moves = self.ctx.scene.geometry.moves();
+        let (moves, times) = (self.ctx.scene.geometry.moves(), rays.times());
         let holds = |i: usize| {
             let origin = rays.origin(i);
             moves
@@ -117,7 +117,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let mut media: Vec<Media> = Vec::with_capacity(rays.len());
         let mut last: Option<(DVec3, f64)> = None;
         for i in 0..rays.len() {
-            let place = (rays.origin(i), rays.time(i));
+            let place = (rays.origin(i), times.get(i).copied().unwrap_or(0.0));
             media.push(match (last, media.last()) {
                 (Some(same), Some(&media)) if same == place => media,
                 _ if holds(i) => self.media_at(place.0, place.1),

@@ -26,7 +26,7 @@ use std::ops::{AddAssign, Range};
 
 use etendue_accel::Accel;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Geometry, HitPrecision, RayBatch};
+use etendue_geometry::{Geometry, HitPrecision, RayBatch, RayBlocks};
 
 pub(crate) use self::encounter::RayHit;
 pub use self::rules::{Follow, Rules};
@@ -131,13 +131,62 @@ impl Traits {
 #[derive(Debug, Clone)]
 pub struct RaySamples<'a> {
     /// The rays.
-    pub rays: &'a RayBatch,
+    pub rays: PathRays<'a>,
     /// Random numbers of each ray.
     pub samples: &'a dyn Samples,
     /// The bands that these rays stand for: all, unless the camera sends wavelengths separate ways.
     pub bands: Range<usize>,
     /// Parts of their light that are told apart.
     pub parts: Parts,
+}
+
+/// Rays as which paths begin.
+#[derive(Debug, Clone, Copy)]
+pub enum PathRays<'a> {
+    /// In double precision.
+    Batch(&'a RayBatch),
+    /// So many of one point (m, world), which run close together, in [`Scratch::camera_blocks`]: where
+    /// [single precision](LightingContext::fits_single) holds the scene.
+    Blocks {
+        /// Their number.
+        len: usize,
+        /// Where they start.
+        from: DVec3,
+    },
+}
+
+impl<'a> PathRays<'a> {
+    /// Number of rays.
+    pub(crate) fn len(self) -> usize {
+        match self {
+            Self::Batch(rays) => rays.len(),
+            Self::Blocks { len, .. } => len,
+        }
+    }
+
+    /// Tests whether they run close together.
+    fn are_coherent(self) -> bool {
+        match self {
+            Self::Batch(rays) => rays.coherent,
+            Self::Blocks { .. } => true,
+        }
+    }
+
+    /// Times (s from the frame's time); none when all are at 0.
+    fn times(self) -> &'a [f64] {
+        match self {
+            Self::Batch(rays) => rays.times(),
+            Self::Blocks { .. } => &[],
+        }
+    }
+
+    /// The origin of ray `i` (m).
+    pub(crate) fn origin(self, i: usize) -> DVec3 {
+        match self {
+            Self::Batch(rays) => rays.origin(i),
+            Self::Blocks { from, .. } => from,
+        }
+    }
 }
 
 /// Parts of the light of rays that are told apart.
@@ -251,6 +300,13 @@ pub struct Scratch {
     double: Workspace<f64>,
 }
 
+impl Scratch {
+    /// Blocks for the rays of [`PathRays::Blocks`].
+    pub fn camera_blocks(&mut self) -> &mut RayBlocks {
+        &mut self.single.rays
+    }
+}
+
 /// Traces the camera's rays by `rules`.
 fn trace(
     rules: Rules,
@@ -281,7 +337,7 @@ fn trace_bands<const RGB: bool>(
         times: camera.rays.times(),
         tally: RayStats::default(),
     };
-    match tracing.fits_single() {
+    match ctx.fits_single() {
         true => tracing.trace::<f32>(camera, single, out),
         false => tracing.trace::<f64>(camera, double, out),
     }

@@ -37,7 +37,7 @@ use self::single::SingleHits;
 use self::surfaces::{Surfaces, TextureLookups};
 use super::media::Media;
 use super::{DRAWS, Draw};
-use super::{LightingContext, RaySamples, Tracing};
+use super::{LightingContext, PathRays, RaySamples, Tracing};
 use crate::emitters::Emitters;
 use crate::lights::LightBounds;
 
@@ -68,13 +68,16 @@ pub(super) struct TraceStep<'a> {
 impl TraceStep<'_> {
     /// Tests whether its rays run close together.
     fn is_coherent(self) -> bool {
-        self.number == 0 && self.camera.rays.coherent
+        self.number == 0 && self.camera.rays.are_coherent()
     }
 
     /// The direction of the path of a lane: the camera's own where it comes straight from there, else `of_block`.
     #[inline(always)]
     fn direction(self, lane: usize, of_block: impl FnOnce() -> DVec3) -> DVec3 {
-        if self.number == 0 { self.camera.rays.direction(lane) } else { of_block() }
+        match self.camera.rays {
+            PathRays::Batch(rays) if self.number == 0 => rays.direction(lane),
+            _ => of_block(),
+        }
     }
 }
 
@@ -130,7 +133,7 @@ pub(super) struct RayColumns<F> {
 /// Memory of one thread, kept between batches.
 #[derive(Debug, Default)]
 pub(super) struct Workspace<F> {
-    rays: RayBlocks<F>,
+    pub(super) rays: RayBlocks<F>,
     carried: Columns<F>,
     shadows: RayColumns<F>,
     next: RayColumns<F>,
@@ -252,10 +255,11 @@ impl<F: Lane> RayColumns<F> {
     }
 }
 
-impl<'a, const RGB: bool> Tracing<'a, RGB> {
+impl LightingContext<'_> {
     /// Tests whether single precision holds all numbers of the scene, whose hits are of it.
-    pub(super) fn fits_single(&self) -> bool {
-        let &LightingContext { accel, lights, placed, precision, .. } = self.ctx;
+    #[must_use]
+    pub fn fits_single(&self) -> bool {
+        let &Self { accel, lights, placed, precision, .. } = self;
         let Some(blocks) = accel.blocks().filter(|_| precision == HitPrecision::Single) else {
             return false;
         };
@@ -265,7 +269,9 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         let is_held = brightest == 0.0 || BRIGHTNESS.contains(&brightest);
         placed.fits_single() && least_area > least && are_near && is_held
     }
+}
 
+impl<'a, const RGB: bool> Tracing<'a, RGB> {
     /// The surfaces of the scene.
     fn surfaces<F: Lane>(&self) -> Surfaces<'a, F> {
         let &LightingContext { placed, scene, precision, .. } = self.ctx;
@@ -295,7 +301,9 @@ impl<'a, const RGB: bool> Tracing<'a, RGB> {
         let accel = self.ctx.accel;
         let surfaces = self.surfaces::<F>();
         let lights = &BlockLights::new(self.ctx.lights, F::origin(accel), self.count());
-        F::convert(accel, camera.rays, &mut workspace.rays);
+        if let PathRays::Batch(rays) = camera.rays {
+            F::convert(accel, rays, &mut workspace.rays);
+        }
         let are_smooth = surfaces.all.are_smooth;
         start(camera, self.count(), are_smooth, &mut workspace.carried);
         workspace.carried.media = self.media_at_origins(camera.rays);

@@ -139,8 +139,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             return (is_specular && width >= 0.0).then(|| Cone { width, spread }.after(t));
         }
         // A block's ray may start nearer.
-        let rays = step.camera.rays;
-        let (start, direction) = (rays.origin(lane), rays.direction(lane));
+        let start = step.camera.rays.origin(lane);
+        let direction = step.direction(lane, || vector(&block.direction, i));
         let cone = self.ctx.scene.view.cone(direction)?;
         Some(cone.after((hit() - start).dot(direction)))
     }
