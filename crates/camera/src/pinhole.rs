@@ -260,24 +260,20 @@ fn aim_blocks(
     [left, top]: &[Vec<f32>; 2],
     blocks: &mut [RayBlock],
 ) {
-    let [across, skew, down] = camera.steps;
+    let PinholeLanes { axes, steps: [across, skew, down], .. } = *camera;
     let (u, v) = (u.as_chunks::<LANES>().0, v.as_chunks::<LANES>().0);
     let (left, top) = (left.as_chunks::<LANES>().0, top.as_chunks::<LANES>().0);
     for ((block, (u, v)), (left, top)) in
         blocks.iter_mut().zip(u.iter().zip(v)).zip(left.iter().zip(top))
     {
-        let (mut x, mut y, mut shorten) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let [dx, dy, dz] = &mut block.direction;
+        // One loop: of several short ones the axes would be put side by side, lane by lane.
         for i in 0..LANES {
-            x[i] = left[i] + u[i] * across + v[i] * skew;
-            y[i] = top[i] + v[i] * down;
-            shorten[i] = 1.0 / (x[i] * x[i] + y[i] * y[i] + 1.0).sqrt();
-        }
-        for axis in 0..3 {
-            let [right, down, forward] = camera.axes[axis];
-            let directions = &mut block.direction[axis];
-            for i in 0..LANES {
-                directions[i] = (right * x[i] + down * y[i] + forward) * shorten[i];
-            }
+            let (x, y) = (left[i] + u[i] * across + v[i] * skew, top[i] + v[i] * down);
+            let shorten = 1.0 / (x * x + y * y + 1.0).sqrt();
+            dx[i] = (axes[0][0] * x + axes[0][1] * y + axes[0][2]) * shorten;
+            dy[i] = (axes[1][0] * x + axes[1][1] * y + axes[1][2]) * shorten;
+            dz[i] = (axes[2][0] * x + axes[2][1] * y + axes[2][2]) * shorten;
         }
     }
 }

@@ -74,6 +74,20 @@ impl PlaneRows<'_> {
         }
     }
 
+    /// Writes a number to each pixel of the rows.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "integer layers are given the u32 that they hold"
+    )]
+    pub(crate) fn fill(&mut self, values: impl Iterator<Item = f64>) {
+        match self {
+            Self::F32(rows) => rows.iter_mut().zip(values).for_each(|(row, v)| *row = single(v)),
+            Self::F64(rows) => rows.iter_mut().zip(values).for_each(|(row, v)| *row = v),
+            Self::U32(rows) => rows.iter_mut().zip(values).for_each(|(row, v)| *row = v as u32),
+        }
+    }
+
     /// Writes `values` to the pixels at `places` of the rows.
     #[expect(
         clippy::cast_possible_truncation,

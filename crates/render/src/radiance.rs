@@ -52,12 +52,12 @@ impl LightPass<'_> {
         };
         let [layers, bands] = self.shape();
         let slot = |sample: &u32| slots[*sample as usize];
-        let mut values = values.chunks_exact(layers * bands);
+        let (mut values, all) = (values.as_slice(), layers * bands);
         for run in numbers.of_ray.chunk_by(|a, b| slot(a) == slot(b)) {
-            let rays = values.by_ref().take(run.len());
-            let light =
-                rays.map(|ray| ray[picture * bands..(picture + 1) * bands].iter().sum::<f64>());
-            traffic.sparkles.count(light);
+            let (of_pixel, rest) = values.split_at(run.len() * all);
+            let rays = of_pixel.chunks_exact(all).map(|ray| &ray[picture * bands..][..bands]);
+            traffic.sparkles.count(rays.map(|ray| ray.iter().sum::<f64>()));
+            values = rest;
         }
     }
 

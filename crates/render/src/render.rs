@@ -196,14 +196,7 @@ pub fn trace(
     let passes = if is_kept { short_passes(plan.samples) } else { plan.passes.clone() };
     let others: Vec<&dyn OtherFrame> = others.iter().map(|other| other as _).collect();
     let rule = Rule::of(scene, plan);
-    let sampling = Sampling {
-        samples: plan.samples,
-        sampler: scene.render.sampler,
-        seed: scene.render.frame_seed(),
-        shard,
-        sets: if rule.is_some() { SETS } else { 1 },
-        diffusion: scene.sensor.as_ref().map_or(0.0, Sensor::carrier_diffusion),
-    };
+    let sampling = sampling_of(scene, plan, shard, rule.as_ref());
     // All of it as one job, tile by tile.
     let job = Job {
         accel,
@@ -234,6 +227,18 @@ pub fn trace(
     diffraction::put(&mut layers, spread, &mut counts, &mut notes);
     let (camera, resolution) = (Some(camera), scene.camera.resolution());
     Ok(Film { layers, resolution, shard, counts, passed, trace_time, sums, centres, notes, camera })
+}
+
+/// Settings of how the pixels of a share are sampled.
+fn sampling_of(scene: &Scene, plan: &Plan, shard: Shard, rule: Option<&Rule>) -> Sampling {
+    Sampling {
+        samples: plan.samples,
+        sampler: scene.render.sampler,
+        seed: scene.render.frame_seed(),
+        shard,
+        sets: if rule.is_some() { SETS } else { 1 },
+        diffusion: scene.sensor.as_ref().map_or(0.0, Sensor::carrier_diffusion),
+    }
 }
 
 pub(crate) fn empty_film(scene: &Scene, plan: &Plan) -> Result<Vec<FilmLayer>, NoMemory> {

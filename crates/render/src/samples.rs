@@ -10,7 +10,9 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use crate::adding::{Adding, RowSums, SamplesByPixel, Work, put};
+use etendue_tracer::layer::RaySource;
+
+use crate::adding::{Adding, RowSums, SamplesByPixel, Work, put, put_all};
 use crate::film::{FilmLayer, strips, take};
 use crate::memory::{NoMemory, filled};
 pub(crate) use crate::sampling::passes;
@@ -202,8 +204,12 @@ impl<'a> Averaging<'a> {
             if !shard.owns(k) {
                 return;
             }
-            for (index, sums) in sums.chunks(count * bands).enumerate() {
-                put(&mut strip, index, sums, bands, samples);
+            if strip.layers.iter().any(|layer| layer.taken == RaySource::PictureShare) {
+                for (index, sums) in sums.chunks(count * bands).enumerate() {
+                    put(&mut strip, index, sums, bands, samples);
+                }
+            } else {
+                put_all(&mut strip, sums, bands, samples);
             }
         });
     }

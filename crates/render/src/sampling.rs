@@ -9,7 +9,7 @@ use etendue_camera::{
     BandGroup, BandLandings, Camera, CameraRays, FilmSamples, PinholeLanes, PixelSample,
     SampleKeys, Sampler,
 };
-use etendue_geometry::block::LANES;
+use etendue_geometry::block::{Floats, LANES};
 use etendue_geometry::{HitBatch, HitPrecision};
 use etendue_tracer::layer::Columns;
 use etendue_tracer::{Samples, Scratch};
@@ -149,7 +149,7 @@ pub(crate) trait SampledQuantity: Sync {
     fn block_rays(&self) -> Option<&BlockRays> {
         None
     }
-    /// Fills `memory.values`, `[ray][layer][band]`, for the rays of one group of bands; they are in [`Scratch::camera_blocks`] where
+    /// Fills `memory.values`, `[ray][layer][band]`, or `memory.rows`, for the rays of one group of bands; they are in [`Scratch::camera_blocks`] where
     /// there are [`Self::block_rays`].
     fn trace(&self, bands: &Range<usize>, memory: &mut Memory);
 }
@@ -207,6 +207,8 @@ pub(crate) struct Memory {
     pub(crate) places: [Vec<f32>; 2],
     pub(crate) corners: [Vec<f32>; 2],
     pub(crate) values: Vec<f64>,
+    /// Values by blocks of rays, `[block][layer][band]`, of what is found so.
+    pub(crate) rows: Vec<Floats>,
     /// `[ray][part][band]`, where light is told apart.
     pub(crate) light_in_parts: Vec<f64>,
     pub(crate) hits: HitBatch,

@@ -3,6 +3,10 @@
 //! They are compensated (Neumaier, "Rundungsfehleranalyse einiger Verfahren zur Summation endlicher
 //! Summen", 1974), so the mean of a million samples is as exact as that of ten.
 
+use std::ops::Range;
+
+use etendue_geometry::block::{Floats, LANES};
+
 /// Bytes that sums take a value of the film when there are several passes.
 pub(crate) const BYTES_OF_SUM: u64 = size_of::<Sum>() as u64;
 
@@ -60,19 +64,29 @@ pub(crate) fn add_run(sums: &mut [Sum], values: &[f64], weights: &[f64]) {
 /// Adds a run to a known number of sums, which stay in registers.
 fn add_run_of<const N: usize>(sums: &mut [Sum], values: &[f64], weights: &[f64]) {
     let Some(sums) = sums.first_chunk_mut::<N>() else { return };
-    let (mut sum, mut lost) = (sums.map(|own| own.sum), sums.map(|own| own.lost));
+    let mut own = *sums;
     for (values, weight) in values.as_chunks::<N>().0.iter().zip(weights) {
-        for i in 0..N {
-            // As Sum::add does.
-            let value = values[i] * weight;
-            let more = sum[i] + value;
-            let of_value = more - sum[i];
-            lost[i] += (sum[i] - (more - of_value)) + (value - of_value);
-            sum[i] = more;
+        for (sum, value) in own.iter_mut().zip(values) {
+            sum.add(value * weight);
         }
     }
-    for i in 0..N {
-        sums[i] = Sum { sum: sum[i], lost: lost[i] };
+    *sums = own;
+}
+
+/// Adds the values of some rays in blocks, of which each has a row for each sum, three sums at a time.
+pub(crate) fn add_rows(sums: &mut [Sum], rows: &[Floats], rays: Range<usize>) {
+    let count = sums.len();
+    for (three, first) in sums.as_chunks_mut::<3>().0.iter_mut().zip((0..).step_by(3)) {
+        let mut own = *three;
+        for ray in rays.clone() {
+            let start = ray / LANES * count + first;
+            if let [r, g, b] = &rows[start..start + 3] {
+                for (sum, row) in own.iter_mut().zip([r, g, b]) {
+                    sum.add(f64::from(row[ray % LANES]));
+                }
+            }
+        }
+        *three = own;
     }
 }
 

@@ -338,7 +338,7 @@ impl SampledQuantity for Colors<'_> {
             let blocks = memory.scratch.camera_blocks();
             accel.closest_of_blocks(blocks.blocks_mut(), &[], true);
             memory.traffic.chief_rays += blocks.len() as u64;
-            return plain.fill(blocks.blocks(), blocks.len(), &mut memory.values);
+            return plain.fill(blocks.blocks(), &mut memory.rows);
         }
         let Memory { rays: CameraRays { rays, .. }, hits, columns, values, traffic, .. } = memory;
         hits.detail = self.job.detail;

@@ -4,10 +4,9 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use etendue_accel::{Accel, BlockAccel, BuildOptions, BuildReport, Counts};
+use etendue_accel::{Accel, BlockAccel, BuildOptions, BuildReport, Counts, F32Frame};
 use etendue_benches::contest::thread_time;
-use etendue_geometry::glam::DVec3;
-use etendue_geometry::{HitBatch, RayBatch, RayBlock, RayBlocks};
+use etendue_geometry::{HitBatch, RayBatch, RayBlock};
 use etendue_render::output::Outputs;
 use etendue_render::{Images, Plan, plan};
 use etendue_scene::{LoadOptions, SceneFile};
@@ -89,12 +88,8 @@ impl Accel for Timed {
 }
 
 impl BlockAccel for Timed {
-    fn origin(&self) -> DVec3 {
-        self.of_blocks().origin()
-    }
-
-    fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks) {
-        self.of_blocks().convert(rays, blocks);
+    fn frame(&self) -> &F32Frame {
+        self.of_blocks().frame()
     }
 
     fn closest_of_blocks(&self, blocks: &mut [RayBlock], times: &[f64], coherent: bool) {

@@ -71,7 +71,7 @@ impl CommittedScene {
     /// The closest hits of a block whose hits were cleared, as the packet that it is.
     fn closest_of_packet(&self, block: &mut RayBlock, arguments: &mut sys::RTCIntersectArguments) {
         let valid = PacketAligned(live_lanes::<LANES>(&block.t_max));
-        if !BLOCKS_ARE_PACKETS || valid.0 == [0; LANES] {
+        if !BLOCKS_ARE_PACKETS || none_is_live(&valid.0) {
             return;
         }
         let packet: *mut sys::RTCRayHit16 = std::ptr::from_mut(block).cast();
@@ -169,7 +169,7 @@ macro_rules! narrow_packets {
                 for start in (0..LANES).step_by($width) {
                     let valid =
                         PacketAligned(live_lanes::<$width>(&block.t_max[start..start + $width]));
-                    if valid.0 == [0; $width] {
+                    if none_is_live(&valid.0) {
                         continue;
                     }
                     put_rays!(query.0.ray, block, start);
@@ -201,7 +201,7 @@ macro_rules! narrow_packets {
                 for start in (0..LANES).step_by($width) {
                     let valid =
                         PacketAligned(live_lanes::<$width>(&block.t_max[start..start + $width]));
-                    if valid.0 == [0; $width] {
+                    if none_is_live(&valid.0) {
                         continue;
                     }
                     put_rays!(query.0, block, start);
@@ -277,6 +277,12 @@ fn ray_of(block: &RayBlock, lane: usize) -> sys::RTCRay {
         mask: block.mask[lane],
         ..Default::default()
     }
+}
+
+/// True if no ray of a packet is to be traced. (Arrays are compared by a call.)
+#[inline(always)]
+fn none_is_live(valid: &[i32]) -> bool {
+    valid.iter().fold(0, |any, lane| any | lane) == 0
 }
 
 /// True if the live lanes of a block spread by more than a few degrees.

@@ -340,11 +340,11 @@ fn pinholes_in_single_precision_look_the_same_way() {
         });
         let mut rays = RayBatch::default();
         camera.rays_through(&columns, &rows, &mut rays);
-        for k in 0..96 {
+        for (k, pixel) in pixels.iter().enumerate() {
             let own = vector(&blocks.blocks()[k / LANES].direction, k % LANES);
             // Some ten roundings of numbers of at most 1.
             let error = own.distance(rays.direction(k));
-            assert!(error < 10.0 * f64::from(f32::EPSILON), "{:?}: {error}", pixels[k]);
+            assert!(error < 10.0 * f64::from(f32::EPSILON), "{pixel:?}: {error}");
             assert_eq!(lanes.position, rays.origin(k));
         }
     }

@@ -90,7 +90,7 @@ impl LayerContext<'_> {
         for array in &mut out[..3] {
             let light = cosine.iter().zip(&ambient);
             for ((color, (&cosine, &ambient)), &hit) in array.iter_mut().zip(light).zip(hits) {
-                let lit = headlit(*color, cosine, ambient);
+                let lit = visible(*color) * headlight(cosine, ambient);
                 *color = if hit == MISS { 0.0 } else { lit };
             }
         }
@@ -209,10 +209,16 @@ impl SceneView<'_> {
 /// Light of a headlight that comes from all sides.
 pub(super) const AMBIENT: f64 = 0.15;
 
-/// A colour under a headlight whose light meets its surface at an angle of this cosine, beside so much from all sides.
+/// Light of a headlight that meets a surface at an angle of this cosine, beside so much from all sides.
 #[inline(always)]
-pub(super) fn headlit<F: Float>(color: F, cosine: F, ambient: F) -> F {
-    (F::of(0.08) + F::of(0.92) * color) * (ambient + F::of(0.85) * cosine)
+pub(super) fn headlight<F: Float>(cosine: F, ambient: F) -> F {
+    ambient + F::of(0.85) * cosine
+}
+
+/// A colour as a headlight shows it: black things are seen, too.
+#[inline(always)]
+pub(super) fn visible<F: Float>(color: F) -> F {
+    F::of(0.08) + F::of(0.92) * color
 }
 
 /// Cosines between rays and the triangles' normals.

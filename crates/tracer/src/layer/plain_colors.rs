@@ -1,20 +1,28 @@
 //! Layers of colours where each surface is alike all over, by blocks of rays of single precision.
+#![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
 use etendue_geometry::block::{Floats, LANES, vector};
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Float, Geometry, MISS, RayBlock};
 
 use super::LayerSpec;
-use super::fill::{AMBIENT, headlit};
+use super::fill::{AMBIENT, headlight, visible};
 use crate::SceneView;
 
 /// Layers of colours, and what they look up of each placement.
 #[derive(Debug)]
 pub struct PlainColors<'a> {
     geometry: &'a Geometry,
-    layers: Vec<LayerSpec>,
+    layers: Vec<PlainLayer>,
     placements: Vec<PlainSurface>,
     has_normals: bool,
+}
+
+/// A layer of colours.
+#[derive(Debug, Clone, Copy)]
+struct PlainLayer {
+    /// It is under a headlight.
+    is_facing: bool,
 }
 
 /// A placement of one colour.
@@ -49,15 +57,15 @@ impl<'a> PlainColors<'a> {
             placements.push(PlainSurface { color, turn });
         }
         let has_normals = placements.iter().any(|own| own.turn.is_some());
-        let (geometry, layers) = (scene.geometry, layers.to_vec());
+        let layer = |layer: &LayerSpec| PlainLayer { is_facing: *layer == LayerSpec::Facing };
+        let (geometry, layers) = (scene.geometry, layers.iter().map(layer).collect());
         Some(Self { geometry, layers, placements, has_normals })
     }
 
-    /// Refills `values`, `[ray][layer][red, green, blue]`, of blocks whose hits were found, of which the first `count`
-    /// lanes are rays.
-    pub fn fill(&self, blocks: &[RayBlock], count: usize, values: &mut Vec<f64>) {
-        values.resize(count * self.layers.len() * 3, 0.0);
-        fill(self, blocks, values);
+    /// Refills `rows`, `[block][layer][red, green, blue]`, of blocks whose hits were found.
+    pub fn fill(&self, blocks: &[RayBlock], rows: &mut Vec<Floats>) {
+        rows.resize(blocks.len() * self.layers.len() * 3, [0.0; LANES]);
+        fill(self, blocks, rows);
     }
 
     /// The colours of a block's hits; those of misses are black.
@@ -133,26 +141,23 @@ impl<'a> PlainColors<'a> {
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn fill(plain: &PlainColors<'_>, blocks: &[RayBlock], values: &mut [f64]) {
-    let bands = 3 * plain.layers.len();
-    for (block, values) in blocks.iter().zip(values.chunks_mut(LANES * bands)) {
+fn fill(plain: &PlainColors<'_>, blocks: &[RayBlock], rows: &mut [Floats]) {
+    let (layers, _) = rows.as_chunks_mut::<3>();
+    for (block, layers) in blocks.iter().zip(layers.chunks_exact_mut(plain.layers.len().max(1))) {
         let colors = plain.colors(block);
-        for (number, layer) in plain.layers.iter().enumerate() {
-            let mut own = colors;
-            if *layer == LayerSpec::Facing {
-                let cosines = plain.cosines(block);
-                for band in &mut own {
-                    for i in 0..LANES {
-                        let lit = headlit(band[i], cosines[i], f32::of(AMBIENT));
-                        band[i] = if block.placement[i] == MISS { 0.0 } else { lit };
-                    }
-                }
+        for (out, layer) in layers.iter_mut().zip(&plain.layers) {
+            *out = colors;
+            if !layer.is_facing {
+                continue;
             }
-            let [r, g, b] = &own;
-            for (((values, r), g), b) in values.chunks_exact_mut(bands).zip(r).zip(g).zip(b) {
-                values[3 * number] = f64::from(*r);
-                values[3 * number + 1] = f64::from(*g);
-                values[3 * number + 2] = f64::from(*b);
+            let cosines = plain.cosines(block);
+            let [r, g, b] = out;
+            for i in 0..LANES {
+                let light = headlight(cosines[i], f32::of(AMBIENT));
+                let light = if block.placement[i] == MISS { 0.0 } else { light };
+                r[i] = visible(r[i]) * light;
+                g[i] = visible(g[i]) * light;
+                b[i] = visible(b[i]) * light;
             }
         }
     }

@@ -405,6 +405,20 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         }
     }
 
+    /// Adds red, green and blue to a ray's light, of which no parts are told apart.
+    #[inline(always)]
+    fn add_whole(&mut self, light: [f64; 3], ray: u32, out: &mut [f64]) {
+        let [red, green, blue] = light;
+        if !(red.is_finite() && green.is_finite() && blue.is_finite()) {
+            self.tally.not_finite += 1;
+            return;
+        }
+        let start = 3 * ray as usize;
+        if let [sum_r, sum_g, sum_b] = &mut out[start..start + 3] {
+            (*sum_r, *sum_g, *sum_b) = (*sum_r + red, *sum_g + green, *sum_b + blue);
+        }
+    }
+
     /// Value of the weights of a surface in band `k`.
     #[inline]
     fn in_band(&self, bsdf: &Bsdf, value: Weights, k: usize) -> f64 {

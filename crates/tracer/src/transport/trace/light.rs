@@ -11,8 +11,8 @@ use super::sky::ask_sky;
 use super::{Columns, RayColumns, SPECULAR, TraceStep, Workspace};
 use crate::emitters::Emitters;
 use crate::footprint::{Cone, Footprint};
-use crate::transport::Tracing;
 use crate::transport::encounter::{Encounter, RayHit, Way};
+use crate::transport::{Parts, Tracing};
 
 /// Last directions, as what shines is asked about them, and what they meet of it.
 #[derive(Debug, Default)]
@@ -94,6 +94,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let mut more = if RGB { Vec::new() } else { vec![0.0; count] };
         let light: &mut [f64] = if RGB { &mut three } else { &mut more };
         let shares = &shadows.carried.throughput[..count];
+        let is_plain = RGB && self.parts == Parts::Whole && shadows.carried.media.is_empty();
         for (block, first) in shadow_rays.blocks().iter().zip((0..).step_by(LANES)) {
             for lane in 0..LANES.min(shadows.len - first) {
                 if block.is_blocked(lane) {
@@ -101,6 +102,11 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 }
                 let i = first + lane;
                 let radiance = &lights.radiance(shadows.light[i], count)[..count];
+                if is_plain && let ([r, g, b], [red, green, blue]) = (shares, radiance) {
+                    let light = [wide(r[i]) * red, wide(g[i]) * green, wide(b[i]) * blue];
+                    self.add_whole(light, shadows.carried.ray[i], out);
+                    continue;
+                }
                 for band in 0..count {
                     light[band] = wide(shares[band][i]) * radiance[band];
                 }
