@@ -434,7 +434,9 @@ impl Camera {
     #[must_use]
     pub fn pinhole_lanes(&self) -> Option<PinholeLanes> {
         match &self.projection {
-            Projection::Pinhole(pinhole) if self.time.is_none() => pinhole.lanes(&self.pose),
+            Projection::Pinhole(pinhole) if self.time.is_none() => {
+                pinhole.lanes(&self.pose, self.resolution())
+            }
             _ => None,
         }
     }

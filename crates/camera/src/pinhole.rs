@@ -23,6 +23,10 @@ const DEFAULT_FOV: Degrees = Degrees(40.0);
 /// The narrowest field of view (degrees): 4 micrometres at a kilometre.
 const NARROWEST_FOV: f64 = 2e-7;
 
+/// A pixel of a camera in single precision is at least so many times as wide as its largest tangent is rounded by: some four
+/// roundings on the way to a direction move it by a sixteenth of a pixel at most.
+const LEAST_ROUNDINGS: f64 = 64.0;
+
 /// A pinhole camera as the scene file writes it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -162,12 +166,16 @@ impl Pinhole {
         Self { intrinsics: self.intrinsics.coarser(factor), ..self.clone() }
     }
 
-    /// The camera in single precision; `None` where it distorts, or sees some places darker than others.
-    pub(crate) fn lanes(&self, pose: &Pose) -> Option<PinholeLanes> {
-        if self.distortion.is_some() || self.falloff.is_some() {
+    /// The camera in single precision for a picture of so many pixels; `None` where it distorts, sees some places darker than
+    /// others, or has pixels that single precision hardly tells apart.
+    pub(crate) fn lanes(&self, pose: &Pose, resolution: [u32; 2]) -> Option<PinholeLanes> {
+        let Intrinsics { focal: [fx, fy], skew, .. } = self.intrinsics;
+        let widest = border(resolution).flat_map(|[u, v]| self.intrinsics.tangents(u, v));
+        let widest = widest.fold(1.0_f64, |most, tangent| most.max(tangent.abs()));
+        let are_wide = LEAST_ROUNDINGS * f64::from(f32::EPSILON) * widest * fx.max(fy) <= 1.0;
+        if self.distortion.is_some() || self.falloff.is_some() || !are_wide {
             return None;
         }
-        let Intrinsics { focal: [fx, fy], skew, .. } = self.intrinsics;
         let (right, down, forward) = (pose.right(), -pose.up(), pose.forward());
         Some(PinholeLanes {
             position: pose.position,

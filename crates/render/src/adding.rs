@@ -233,25 +233,30 @@ impl Adding<'_> {
         for run in runs {
             memory.slots.extend(run.range.clone().map(|_| run.slot));
         }
+        if self.what.shared_rows().is_some() {
+            self.place(runs, memory);
+            return self.add_shared_runs(runs, to, memory);
+        }
+        let Destination::Starts(sums) = to else {
+            unreachable!("light lands elsewhere where bands share paths alone");
+        };
+        let shape = self.what.shape();
         if let Some(rays) = self.what.block_rays() {
-            let bands = 0..self.what.shape()[1];
+            let bands = 0..shape[1];
             rays.aim(&self.sampling, runs, memory);
             self.what.trace(&bands, memory);
-            match (memory.rows.is_empty(), &mut *to) {
-                (false, Destination::Starts(sums)) => memory.add_rows(self.what.shape(), sums),
-                _ => memory.add(self.what.shape(), &bands, to),
+            match memory.rows.is_empty() {
+                false => memory.add_rows(shape, sums),
+                true => memory.add(shape, &bands, sums),
             }
             return self.watcher.did(memory.slots.len() as u64);
         }
         self.place(runs, memory);
-        if self.what.shared_rows().is_some() {
-            return self.add_shared_runs(runs, to, memory);
-        }
         for (number, group) in self.what.groups().iter().enumerate() {
             memory.film.group = number;
             self.what.camera().sample_rays(&memory.film, &mut memory.rays);
             self.what.trace(&group.bands, memory);
-            memory.add(self.what.shape(), &group.bands, to);
+            memory.add(shape, &group.bands, sums);
         }
         self.watcher.did(memory.slots.len() as u64)
     }

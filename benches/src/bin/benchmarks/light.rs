@@ -92,6 +92,10 @@ impl BlockAccel for Timed {
         self.of_blocks().frame()
     }
 
+    fn has_times(&self) -> bool {
+        self.of_blocks().has_times()
+    }
+
     fn closest_of_blocks(&self, blocks: &mut [RayBlock], times: &[f64], coherent: bool) {
         let lanes = blocks.len() * etendue_geometry::block::LANES;
         self.time(lanes, || self.of_blocks().closest_of_blocks(blocks, times, coherent));

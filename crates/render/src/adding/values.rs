@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use etendue_camera::{BandLandings, CameraRays};
 
-use super::{Destination, RowSums};
+use super::RowSums;
 use crate::sampling::Memory;
 use crate::sum::{Sum, add_rows, add_run};
 
@@ -14,10 +14,9 @@ impl Memory {
         &mut self,
         [layers, bands]: [usize; 2],
         group: &Range<usize>,
-        to: &mut Destination<'_, '_>,
+        sums: &mut [Sum],
     ) {
         let Self { rays: CameraRays { sample, weight, .. }, values, slots, order, .. } = self;
-        let Destination::Starts(sums) = to else { return };
         let count = layers * bands;
         if group.len() == count && sample.is_sorted() {
             // Samples of one sum lie side by side.

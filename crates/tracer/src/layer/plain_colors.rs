@@ -29,8 +29,8 @@ struct PlainLayer {
 #[derive(Debug, Clone, Copy)]
 struct PlainSurface {
     color: [f32; 3],
-    /// Its mesh has normals of its own, which this carries into the world.
-    turn: Option<DMat3>,
+    /// Its mesh has normals of its own, which this carries into the world, column by column.
+    turn: Option<[[f32; 3]; 3]>,
 }
 
 impl<'a> PlainColors<'a> {
@@ -38,13 +38,12 @@ impl<'a> PlainColors<'a> {
     /// changes from place to place, or moves.
     #[must_use]
     pub fn of(scene: SceneView<'a>, layers: &[LayerSpec]) -> Option<Self> {
-        let is_of_colors = |layer: &LayerSpec| {
-            matches!(layer, LayerSpec::Facing | LayerSpec::Flat | LayerSpec::Albedo)
-        };
-        if !layers.iter().all(is_of_colors) {
+        let is_of_colors = |layer: &LayerSpec| matches!(layer, LayerSpec::Facing | LayerSpec::Flat);
+        if layers.is_empty() || !layers.iter().all(is_of_colors) {
             return None;
         }
-        let mut placements = Vec::with_capacity(scene.geometry.placements.len());
+        let mut placements = Vec::new();
+        placements.try_reserve_exact(scene.geometry.placements.len()).ok()?;
         for placement in &scene.geometry.placements {
             let material = scene.materials.get(placement.material as usize);
             let mesh = scene.geometry.mesh_of(placement);
@@ -53,7 +52,10 @@ impl<'a> PlainColors<'a> {
                 return None;
             }
             let color = scene.plain_color(placement)?.map(f32::of);
-            let turn = mesh.normals.is_some().then(|| placement.world_from_mesh.normal_matrix());
+            let turn = mesh.normals.is_some().then(|| {
+                let turn = placement.world_from_mesh.normal_matrix();
+                turn.to_cols_array_2d().map(|column| column.map(f32::of))
+            });
             placements.push(PlainSurface { color, turn });
         }
         let has_normals = placements.iter().any(|own| own.turn.is_some());
@@ -102,9 +104,11 @@ impl<'a> PlainColors<'a> {
         let RayBlock { direction: [dx, dy, dz], normal: [nx, ny, nz], .. } = block;
         let mut cosines = [0.0; LANES];
         for i in 0..LANES {
-            let product = nx[i] * dx[i] + ny[i] * dy[i] + nz[i] * dz[i];
-            let square = nx[i] * nx[i] + ny[i] * ny[i] + nz[i] * nz[i];
-            cosines[i] = product.abs() / square.sqrt();
+            // Normals are as long as triangles are large, whose squares single precision may not hold.
+            let largest = nx[i].abs().max(ny[i].abs()).max(nz[i].abs());
+            let (x, y, z) = (nx[i] / largest, ny[i] / largest, nz[i] / largest);
+            let product = x * dx[i] + y * dy[i] + z * dz[i];
+            cosines[i] = product.abs() / (x * x + y * y + z * z).sqrt();
         }
         if self.has_normals {
             for lane in 0..LANES {
@@ -120,7 +124,9 @@ impl<'a> PlainColors<'a> {
     /// from; `None` of meshes without, and of normals without a direction.
     fn smooth_cosine(&self, block: &RayBlock, lane: usize) -> Option<f32> {
         let number = block.placement[lane] as usize;
-        let turn = self.placements.get(number)?.turn?;
+        let turn = DMat3::from_cols_array_2d(
+            &self.placements.get(number)?.turn?.map(|column| column.map(f64::from)),
+        );
         let mesh = self.geometry.mesh_of(&self.geometry.placements[number]);
         let normals = mesh.normals.as_ref()?;
         let [a, b, c] = mesh.triangles[block.triangle[lane] as usize];
@@ -159,6 +165,41 @@ fn fill(plain: &PlainColors<'_>, blocks: &[RayBlock], rows: &mut [Floats]) {
                 g[i] = visible(g[i]) * light;
                 b[i] = visible(b[i]) * light;
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use etendue_geometry::{Mesh, Positions, Transform, Vertices};
+
+    use super::*;
+    use crate::view::View;
+
+    /// Normals are as long as triangles are large: from those of 10⁻¹² m to those of 10¹² m the headlight is as bright.
+    #[test]
+    fn the_headlight_does_not_depend_on_the_size_of_triangles() {
+        let corners = Vertices::from_arrays(&[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+        let mesh = Mesh::new("", Positions::F32(corners), vec![[0, 1, 2]].into());
+        let geometry = Geometry::alone(mesh, Transform::IDENTITY);
+        let view = View { origin: DVec3::ZERO, axes: DMat3::IDENTITY, pixel: None };
+        let scene = SceneView { geometry: &geometry, materials: &[], images: &[], view };
+        let plain = PlainColors::of(scene, &[LayerSpec::Facing, LayerSpec::Flat]).unwrap();
+        for exponent in [-24, -12, -3, 0, 6, 18, 24] {
+            let length = 10_f32.powi(exponent);
+            let mut block = RayBlock::EMPTY;
+            block.placement = [0; LANES];
+            block.placement[1] = MISS;
+            block.triangle = [0; LANES];
+            block.direction[2] = [-1.0; LANES];
+            block.normal = [[0.0; LANES], [0.6 * length; LANES], [0.8 * length; LANES]];
+            let mut rows = Vec::new();
+            plain.fill(&[block], &mut rows);
+            // Black, as of no material: what is left of it is a share of the headlight.
+            let due = 0.08 * (0.15 + 0.85 * 0.8);
+            assert!((rows[0][0] - due).abs() < 1e-6 * due, "10^{exponent}: {}", rows[0][0]);
+            // Misses are black, and so are colours without light.
+            assert_eq!([rows[0][1], rows[3][0]], [0.0; 2]);
         }
     }
 }

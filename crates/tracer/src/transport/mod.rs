@@ -337,7 +337,7 @@ fn trace_bands<const RGB: bool>(
         times: camera.rays.times(),
         tally: RayStats::default(),
     };
-    match ctx.fits_single() {
+    match matches!(camera.rays, PathRays::Blocks { .. }) || ctx.fits_single() {
         true => tracing.trace::<f32>(camera, single, out),
         false => tracing.trace::<f64>(camera, double, out),
     }
