@@ -57,7 +57,7 @@ pub use exact::Exact;
 pub use moving::{Build, build_moving};
 pub use name::AccelName;
 pub use parts::check_scale;
-pub use single::{F32Frame, Viewpoint};
+pub use single::{BlockOrigin, F32Frame};
 
 /// Answers nearest-hit and visibility queries about one scene. Built once, then only read.
 pub trait Accel: Send + Sync + fmt::Debug {

@@ -59,7 +59,7 @@ const SPHERE_SLACK: f64 = 1e-3;
 
 /// Start of the rays of a camera near the scene, in single precision, from a frame's origin (m).
 #[derive(Debug, Clone, Copy)]
-pub struct Viewpoint {
+pub struct BlockOrigin {
     position: [f32; 3],
     /// The box's centre, from here.
     centre: [f32; 3],
@@ -68,13 +68,13 @@ pub struct Viewpoint {
     sphere: f32,
 }
 
-/// Viewpoints are at most this many half-diagonals from the box's centre: single precision then misplaces rays by a
-/// millionth of the scene, as it does the scene's own corners.
-const NEAR_VIEWPOINT: f64 = 16.0;
+/// Origins of rays in blocks are at most this many half-diagonals from the box's centre: single precision then misplaces
+/// rays by a millionth of the scene, as it does the scene's own corners.
+const NEAR_ORIGIN: f64 = 16.0;
 
-impl Viewpoint {
-    /// Starts rays here, whose unit directions are set: those that may meet the scene count all hits ahead, others are not
-    /// traced.
+impl BlockOrigin {
+    /// Starts rays here that were [reset](RayBlocks::reset), and whose unit directions are set: those that may meet the
+    /// scene count all hits ahead, others are not traced.
     pub fn start(&self, blocks: &mut RayBlocks) {
         let len = blocks.len();
         start_blocks(self, blocks.blocks_mut(), len);
@@ -82,12 +82,11 @@ impl Viewpoint {
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn start_blocks(from: &Viewpoint, blocks: &mut [RayBlock], len: usize) {
-    let Viewpoint { position, centre: [cx, cy, cz], far, sphere } = *from;
+fn start_blocks(from: &BlockOrigin, blocks: &mut [RayBlock], len: usize) {
+    let BlockOrigin { position, centre: [cx, cy, cz], far, sphere } = *from;
     for (block, first) in blocks.iter_mut().zip((0..).step_by(LANES)) {
-        let RayBlock { origin, direction, t_min, t_max, .. } = block;
+        let RayBlock { origin, direction, t_max, .. } = block;
         let [dx, dy, dz] = &*direction;
-        *t_min = [0.0; LANES];
         let mut start = [0.0; LANES];
         for i in 0..LANES {
             let foot = cx * dx[i] + cy * dy[i] + cz * dz[i];
@@ -123,11 +122,11 @@ impl F32Frame {
     /// A point that rays start from (m, world); `None` of one so far from the scene that they have to be worked out in
     /// double precision.
     #[must_use]
-    pub fn viewpoint(&self, position: DVec3) -> Option<Viewpoint> {
+    pub fn block_origin(&self, position: DVec3) -> Option<BlockOrigin> {
         let own = position - self.origin;
         let centre = self.centre - own;
-        let is_near = centre.length() <= NEAR_VIEWPOINT * self.radius;
-        is_near.then(|| Viewpoint {
+        let is_near = centre.length() <= NEAR_ORIGIN * self.radius;
+        is_near.then(|| BlockOrigin {
             position: own.to_array().map(round),
             centre: centre.to_array().map(round),
             far: round(FAR * self.radius),
@@ -162,7 +161,7 @@ impl F32Frame {
 
     /// Refills `blocks` with `rays` as they are: what single precision hits there is not decided again.
     pub(crate) fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks) {
-        blocks.refill(rays.len(), |_, _, _| {});
+        blocks.reset(rays.len());
         convert_blocks(blocks.blocks_mut(), rays, self);
     }
 

@@ -171,16 +171,22 @@ impl<F: Float> RayBlocks<F> {
     /// Makes them `len` rays, which `fill` sets: a block at a time, with the number of its first ray and how many
     /// there are. Other lanes are not traced.
     pub fn refill(&mut self, len: usize, mut fill: impl FnMut(&mut RayBlock<F>, usize, usize)) {
+        self.reset(len);
+        for (block, start) in self.blocks_mut().iter_mut().zip((0..).step_by(LANES)) {
+            fill(block, start, LANES.min(len - start));
+        }
+    }
+
+    /// Makes them `len` rays, which are to be set: until then none is traced.
+    pub fn reset(&mut self, len: usize) {
         let count = len.div_ceil(LANES);
         if self.blocks.len() < count {
             self.blocks.resize(count, RayBlock::EMPTY);
         }
         self.len = len;
-        for (number, block) in self.blocks[..count].iter_mut().enumerate() {
-            let start = number * LANES;
+        for block in self.blocks_mut() {
             block.t_min = [F::ZERO; LANES];
             block.t_max = [F::ZERO; LANES];
-            fill(block, start, LANES.min(len - start));
         }
     }
 

@@ -7,7 +7,7 @@ use std::ops::Range;
 use etendue_camera::LensCamera;
 use etendue_tracer::layer::RaySource;
 
-use crate::film::{PlaneRows, Strip};
+use crate::film::Strip;
 use crate::sampling::{
     BATCH, DIFFUSION_PAIR, Memory, SampleRun, SampledQuantity, Sampling, TIME_PAIR,
 };
@@ -22,34 +22,37 @@ pub(crate) type SamplesByPixel<'a> = &'a (dyn Fn(usize) -> Range<u32> + Sync);
 /// Writes the means of a pixel of a strip; of one band those of all, where all are alike.
 pub(crate) fn put(strip: &mut Strip<'_>, index: usize, sums: &[Sum], bands: usize, samples: u32) {
     for (layer, sums) in strip.layers.iter_mut().zip(sums.chunks(bands)) {
-        if let (RaySource::PictureShare, &[part, all, _]) = (layer.taken, sums) {
-            let (part, all) = (part.total(), all.total());
-            let share = if all > 0.0 { (part / all).clamp(0.0, 1.0) } else { 0.0 };
-            layer.planes[0].put(index, share);
-            continue;
-        }
-        for (plane, sum) in layer.planes.iter_mut().zip(sums.iter().cycle()) {
-            PlaneRows::put(plane, index, sum.total() / f64::from(samples));
+        for (k, plane) in layer.planes.iter_mut().enumerate() {
+            plane.put(index, mean(layer.taken, sums, k, samples));
         }
     }
 }
 
-/// Writes the means of all pixels of a strip, as [`put`] does those of one.
+/// Writes those of all pixels of a strip, in rows from the top.
 pub(crate) fn put_all(strip: &mut Strip<'_>, sums: &[Sum], bands: usize, samples: u32) {
     let count = bands * strip.layers.len();
-    for (number, layer) in strip.layers.iter_mut().enumerate() {
+    for (layer, first) in strip.layers.iter_mut().zip((0..).step_by(bands)) {
         for (k, plane) in layer.planes.iter_mut().enumerate() {
-            let own = number * bands + k % bands;
-            let pixels = sums.chunks_exact(count);
-            plane.fill(pixels.map(|sums| sums[own].total() / f64::from(samples)));
+            let own = sums.chunks_exact(count).map(|sums| &sums[first..first + bands]);
+            plane.fill(own.map(|sums| mean(layer.taken, sums, k, samples)));
         }
     }
+}
+
+/// The mean of a layer's plane by the sums of a pixel, or the share that the first is of the second.
+#[inline(always)]
+fn mean(taken: RaySource, sums: &[Sum], plane: usize, samples: u32) -> f64 {
+    if let (RaySource::PictureShare, &[part, all, _]) = (taken, sums) {
+        let (part, all) = (part.total(), all.total());
+        return if all > 0.0 { (part / all).clamp(0.0, 1.0) } else { 0.0 };
+    }
+    sums[plane % sums.len()].total() / f64::from(samples)
 }
 
 /// A pixel by column and row, which may be one beside the picture.
 type Pixel = [i32; 2];
 
-/// A pixel that samples start from, and the first sum that they are added to.
+/// A pixel that samples start from, and the number of the first of its sets among those of all sums.
 #[derive(Clone, Copy)]
 struct StartPixel {
     pixel: Pixel,
@@ -111,12 +114,6 @@ impl Adding<'_> {
                     pixel: tile.on_film(at),
                     slot: tile.index(at, width) * sets,
                 }));
-                // They lie far apart: read side by side they are waited for once.
-                let ends = pixels.iter().flat_map(|pixel| {
-                    let first = pixel.slot as usize * count / sets as usize;
-                    [first, first + count - 1]
-                });
-                std::hint::black_box(ends.map(|at| kept[at].total()).sum::<f64>());
                 self.add_pixels(&pixels, &mut Destination::Starts(kept), memory)?;
                 continue;
             }
@@ -233,13 +230,23 @@ impl Adding<'_> {
         for run in runs {
             memory.slots.extend(run.range.clone().map(|_| run.slot));
         }
-        if self.what.shared_rows().is_some() {
-            self.place(runs, memory);
-            return self.add_shared_runs(runs, to, memory);
+        match to {
+            Destination::Starts(sums) if self.what.shared_rows().is_none() => {
+                self.add_own_runs(runs, sums, memory)
+            }
+            Destination::Starts(_) | Destination::Landings(_) => {
+                self.add_shared_runs(runs, to, memory)
+            }
         }
-        let Destination::Starts(sums) = to else {
-            unreachable!("light lands elsewhere where bands share paths alone");
-        };
+    }
+
+    /// Adds the samples of a batch whose light stays in the pixels that it starts from.
+    fn add_own_runs(
+        &self,
+        runs: &[SampleRun],
+        sums: &mut [Sum],
+        memory: &mut Memory,
+    ) -> Result<(), Stopped> {
         let shape = self.what.shape();
         if let Some(rays) = self.what.block_rays() {
             let bands = 0..shape[1];
@@ -268,6 +275,7 @@ impl Adding<'_> {
         to: &mut Destination<'_, '_>,
         memory: &mut Memory,
     ) -> Result<(), Stopped> {
+        self.place(runs, memory);
         memory.shares.clear();
         for run in runs {
             memory.shares.extend(run.range.clone().map(|_| run.share));

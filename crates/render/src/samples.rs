@@ -10,9 +10,7 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use etendue_tracer::layer::RaySource;
-
-use crate::adding::{Adding, RowSums, SamplesByPixel, Work, put, put_all};
+use crate::adding::{Adding, RowSums, SamplesByPixel, Work, put_all};
 use crate::film::{FilmLayer, strips, take};
 use crate::memory::{NoMemory, filled};
 pub(crate) use crate::sampling::passes;
@@ -194,7 +192,7 @@ impl<'a> Averaging<'a> {
             return;
         }
         let resolution = what.camera().resolution();
-        let [count, bands] = what.shape();
+        let [_, bands] = what.shape();
         let kept = split(sums, *what, 1, resolution);
         let shard = sampling.shard;
         let strips = strips(layers, resolution, TILE);
@@ -204,13 +202,7 @@ impl<'a> Averaging<'a> {
             if !shard.owns(k) {
                 return;
             }
-            if strip.layers.iter().any(|layer| layer.taken == RaySource::PictureShare) {
-                for (index, sums) in sums.chunks(count * bands).enumerate() {
-                    put(&mut strip, index, sums, bands, samples);
-                }
-            } else {
-                put_all(&mut strip, sums, bands, samples);
-            }
+            put_all(&mut strip, sums, bands, samples);
         });
     }
 }

@@ -4,7 +4,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use etendue_accel::{Accel, Viewpoint};
+use etendue_accel::{Accel, BlockOrigin};
 use etendue_camera::{
     BandGroup, BandLandings, Camera, CameraRays, FilmSamples, PinholeLanes, PixelSample,
     SampleKeys, Sampler,
@@ -158,7 +158,7 @@ pub(crate) trait SampledQuantity: Sync {
 #[derive(Debug)]
 pub(crate) struct BlockRays {
     pub(crate) camera: PinholeLanes,
-    pub(crate) from: Viewpoint,
+    pub(crate) from: BlockOrigin,
 }
 
 impl BlockRays {
@@ -167,7 +167,7 @@ impl BlockRays {
         let blocks = accel.blocks().filter(|blocks| !blocks.has_times());
         let blocks = blocks.filter(|_| precision == HitPrecision::Single)?;
         let camera = camera.pinhole_lanes()?;
-        Some(Self { from: blocks.frame().viewpoint(camera.position)?, camera })
+        Some(Self { from: blocks.frame().block_origin(camera.position)?, camera })
     }
 
     /// Refills the blocks with the rays of the samples of `runs`, one for each, in order.
@@ -189,7 +189,7 @@ impl BlockRays {
         }
         let whole_blocks = count.next_multiple_of(LANES);
         places.iter_mut().chain(&mut *corners).for_each(|column| column.resize(whole_blocks, 0.0));
-        blocks.refill(count, |_, _, _| {});
+        blocks.reset(count);
         self.camera.aim(places, corners, blocks.blocks_mut());
         self.from.start(blocks);
         counted.weight.clear();

@@ -87,7 +87,7 @@ fn surfaces_in_one_plane_follow_the_rule_in_blocks() {
 /// Rays of one point start as those of a batch do, near the scene and as far as single precision takes them: they run along
 /// the same lines, and meet the same. From farther on there are none.
 #[test]
-fn rays_of_a_viewpoint_are_those_of_a_batch() {
+fn rays_of_one_point_are_those_of_a_batch() {
     // Away from the world's origin, so that blocks have an origin of their own.
     let middle = DVec3::new(30.0, -20.0, 10.0);
     let geometry =
@@ -99,10 +99,10 @@ fn rays_of_a_viewpoint_are_those_of_a_batch() {
         let Some(blocks) = accel.blocks() else { continue };
         compared += 1;
         let towards = random.cube().normalize();
-        assert!(blocks.frame().viewpoint(middle + 17.0 * radius * towards).is_none(), "{name}");
+        assert!(blocks.frame().block_origin(middle + 17.0 * radius * towards).is_none(), "{name}");
         for far in [0.0, 0.9, 1.6, 5.0, 15.0] {
             let position = middle + far * radius * towards;
-            let from = blocks.frame().viewpoint(position).expect("it is near");
+            let from = blocks.frame().block_origin(position).expect("it is near");
             let (mut batch, mut rays) = (RayBatch::default(), RayBlocks::default());
             for _ in 0..1000 {
                 // Some miss the sphere around the scene.

@@ -13,16 +13,9 @@ use crate::SceneView;
 #[derive(Debug)]
 pub struct PlainColors<'a> {
     geometry: &'a Geometry,
-    layers: Vec<PlainLayer>,
+    layers: Vec<LayerSpec>,
     placements: Vec<PlainSurface>,
     has_normals: bool,
-}
-
-/// A layer of colours.
-#[derive(Debug, Clone, Copy)]
-struct PlainLayer {
-    /// It is under a headlight.
-    is_facing: bool,
 }
 
 /// A placement of one colour.
@@ -59,8 +52,7 @@ impl<'a> PlainColors<'a> {
             placements.push(PlainSurface { color, turn });
         }
         let has_normals = placements.iter().any(|own| own.turn.is_some());
-        let layer = |layer: &LayerSpec| PlainLayer { is_facing: *layer == LayerSpec::Facing };
-        let (geometry, layers) = (scene.geometry, layers.iter().map(layer).collect());
+        let (geometry, layers) = (scene.geometry, layers.to_vec());
         Some(Self { geometry, layers, placements, has_normals })
     }
 
@@ -153,7 +145,7 @@ fn fill(plain: &PlainColors<'_>, blocks: &[RayBlock], rows: &mut [Floats]) {
         let colors = plain.colors(block);
         for (out, layer) in layers.iter_mut().zip(&plain.layers) {
             *out = colors;
-            if !layer.is_facing {
+            if !matches!(layer, LayerSpec::Facing) {
                 continue;
             }
             let cosines = plain.cosines(block);
