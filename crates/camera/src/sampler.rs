@@ -190,16 +190,23 @@ pub struct SampleKeys {
 }
 
 impl SampleKeys {
-    /// Makes them those of `samples`.
-    pub fn refill(&mut self, samples: impl Iterator<Item = PixelSample> + Clone) {
+    /// Makes them the samples of these numbers of some pixels, one pixel behind the other.
+    pub fn refill(&mut self, runs: impl Iterator<Item = (PixelSamples, Range<u32>)> + Clone) {
         self.keys.clear();
         self.samples.clear();
-        if samples.clone().all(|sample| sample.pixel.sampler == Sampler::Sobol) {
-            let key = |PixelSample { pixel, index }: PixelSample| pixel.key_of_set(index, 0);
-            self.keys.extend(samples.map(key));
+        if runs.clone().all(|(pixel, _)| pixel.sampler == Sampler::Sobol) {
+            for (pixel, numbers) in runs {
+                self.keys.extend(numbers.map(|index| pixel.key_of_set(index, 0)));
+            }
         } else {
-            self.samples.extend(samples);
+            self.samples.extend(runs.flat_map(|(pixel, numbers)| pixel.samples(numbers)));
         }
+    }
+
+    /// Number of samples.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.keys.len() + self.samples.len()
     }
 
     /// [`PixelSamples::square`] of one pair of dimensions for each of all samples: `out` is refilled.
@@ -429,10 +436,12 @@ mod tests {
         for sampler in ALL {
             let pixel = |i: u32| sampler.pixel(5, i % 7, i / 7, 80_000);
             let samples = (0..200).map(|i| PixelSample { pixel: pixel(i), index: i * 381 });
+            let runs = samples.clone().map(|of| (of.pixel, of.index..of.index + 1));
             let [mut out, mut own] = [Vec::new(), Vec::new()];
             let mut floats = [Vec::new(), Vec::new()];
             let mut keys = SampleKeys::default();
-            keys.refill(samples.clone());
+            keys.refill(runs);
+            assert_eq!(keys.count(), 200);
             let picked: Vec<u32> = (0..200).rev().step_by(3).collect();
             for pair in [0, 1, 3, 200] {
                 squares_of_pair(samples.clone(), pair, &mut out);

@@ -228,7 +228,7 @@ impl Adding<'_> {
     ) -> Result<(), Stopped> {
         memory.slots.clear();
         for run in runs {
-            memory.slots.extend(run.range.clone().map(|_| run.slot));
+            memory.slots.extend(std::iter::repeat_n(run.slot, run.range.len()));
         }
         match to {
             Destination::Starts(sums) if self.what.shared_rows().is_none() => {
@@ -278,7 +278,7 @@ impl Adding<'_> {
         self.place(runs, memory);
         memory.shares.clear();
         for run in runs {
-            memory.shares.extend(run.range.clone().map(|_| run.share));
+            memory.shares.extend(std::iter::repeat_n(run.share, run.range.len()));
         }
         let (shape, [width, _]) = (self.what.shape(), self.what.camera().resolution());
         let Memory { film, rays, landings, .. } = memory;
@@ -349,9 +349,9 @@ impl Adding<'_> {
     fn place(&self, runs: &[SampleRun], memory: &mut Memory) {
         let Memory { numbers, film, .. } = memory;
         // The numbers of all samples of these pixels.
-        numbers.refill(|all| runs.iter().for_each(|run| self.sampling.extend(run, all)));
+        numbers.refill(&self.sampling, runs);
         numbers.has_pupil = self.what.camera().has_pupil();
-        let count = numbers.samples.len();
+        let count = numbers.count();
         // Their places on the sensor, in the pupil, and in the spectrum.
         let draw = |pair, out: &mut Vec<_>| numbers.draw(pair, out);
         film.clear();

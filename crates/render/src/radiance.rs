@@ -198,7 +198,7 @@ impl SampledQuantity for LightPass<'_> {
         let bands = if is_one_for_all { 0..self.ctx.spectral.count() } else { bands.clone() };
         let rays_of_paths = match &self.block_rays {
             Some(rays) => {
-                PathRays::Blocks { len: numbers.samples.len(), from: rays.camera.position }
+                PathRays::Blocks { len: numbers.count(), from: rays.camera.position }
             }
             None => PathRays::Batch(&rays.rays),
         };

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use etendue_accel::{Accel, BlockOrigin};
 use etendue_camera::{
-    BandGroup, BandLandings, Camera, CameraRays, FilmSamples, PinholeLanes, PixelSample,
+    BandGroup, BandLandings, Camera, CameraRays, FilmSamples, PinholeLanes, PixelSamples,
     SampleKeys, Sampler,
 };
 use etendue_geometry::block::{Floats, LANES};
@@ -113,12 +113,11 @@ pub(crate) struct SampleRun {
 }
 
 impl Sampling {
-    /// Appends the samples of a run.
-    pub(crate) fn extend(&self, run: &SampleRun, numbers: &mut Vec<PixelSample>) {
+    /// The samples of a run: those of its pixel and set, and their numbers.
+    fn of_run(&self, run: &SampleRun) -> (PixelSamples, Range<u32>) {
         let seed = if run.set == 0 { self.seed } else { self.seed ^ SECOND_SET };
         let [column, row] = run.pixel.map(i32::cast_unsigned);
-        let pixel = self.sampler.pixel(seed, column, row, self.samples);
-        numbers.extend(pixel.samples(run.range.clone()));
+        (self.sampler.pixel(seed, column, row, self.samples), run.range.clone())
     }
 
     /// The samples that the share has.
@@ -149,8 +148,8 @@ pub(crate) trait SampledQuantity: Sync {
     fn block_rays(&self) -> Option<&BlockRays> {
         None
     }
-    /// Fills `memory.values`, `[ray][layer][band]`, or `memory.rows`, for the rays of one group of bands; they are in [`Scratch::camera_blocks`] where
-    /// there are [`Self::block_rays`].
+    /// Fills `memory.values`, `[ray][layer][band]`, or `memory.rows`, for the rays of one group of bands; they are in
+    /// [`Scratch::camera_blocks`] where there are [`Self::block_rays`].
     fn trace(&self, bands: &Range<usize>, memory: &mut Memory);
 }
 
@@ -175,8 +174,8 @@ impl BlockRays {
         let Memory { numbers, places, corners, scratch, rays: counted, .. } = memory;
         numbers.has_pupil = false;
         let blocks = scratch.camera_blocks();
-        numbers.refill(|all| runs.iter().for_each(|run| sampling.extend(run, all)));
-        let count = numbers.samples.len();
+        numbers.refill(sampling, runs);
+        let count = numbers.count();
         counted.sample.clear();
         counted.sample.extend((0_u32..).take(count));
         numbers.draw_floats(&counted.sample, 0, places);
@@ -230,24 +229,25 @@ pub(crate) struct Memory {
 /// The random numbers of a batch of rays.
 #[derive(Debug, Default)]
 pub(crate) struct SampleNumbers {
-    /// The samples of the film, each by its pixel's numbers.
-    pub(crate) samples: Vec<PixelSample>,
     /// The sample of each ray.
     pub(crate) of_ray: Vec<u32>,
     /// Each sample has a ray, in order.
     is_straight: bool,
     /// Samples have places in a pupil.
     pub(crate) has_pupil: bool,
-    /// By sample.
+    /// By sample of the film.
     keys: SampleKeys,
 }
 
 impl SampleNumbers {
-    /// Makes the samples those that `fill` appends to none.
-    pub(crate) fn refill(&mut self, fill: impl FnOnce(&mut Vec<PixelSample>)) {
-        self.samples.clear();
-        fill(&mut self.samples);
-        self.keys.refill(self.samples.iter().copied());
+    /// Makes the samples of the film those of `runs`.
+    pub(crate) fn refill(&mut self, sampling: &Sampling, runs: &[SampleRun]) {
+        self.keys.refill(runs.iter().map(|run| sampling.of_run(run)));
+    }
+
+    /// Number of samples of the film.
+    pub(crate) fn count(&self) -> usize {
+        self.keys.count()
     }
 
     /// A pair of random numbers of each sample of the film.

@@ -18,13 +18,11 @@ pub(crate) struct Sum {
 }
 
 impl Sum {
-    /// By Knuth's sum of two numbers without loss, which asks neither for the larger.
     #[inline]
     pub(crate) fn add(&mut self, value: f64) {
-        let sum = self.sum + value;
-        let of_value = sum - self.sum;
-        self.lost += (self.sum - (sum - of_value)) + (value - of_value);
-        self.sum = sum;
+        let lost;
+        (self.sum, lost) = sum_and_loss(self.sum, value);
+        self.lost += lost;
     }
 
     /// The sum, and what rounding took from it.
@@ -48,6 +46,14 @@ impl Sum {
     }
 }
 
+/// The sum of two numbers and what rounding takes from it, by Knuth's way, which asks neither for the larger.
+#[inline(always)]
+fn sum_and_loss(a: f64, b: f64) -> (f64, f64) {
+    let sum = a + b;
+    let of_b = sum - a;
+    (sum, (a - (sum - of_b)) + (b - of_b))
+}
+
 /// Adds the values of rays side by side, as many each as there are sums, times the weight of each.
 pub(crate) fn add_run(sums: &mut [Sum], values: &[f64], weights: &[f64]) {
     match sums.len() {
@@ -61,16 +67,26 @@ pub(crate) fn add_run(sums: &mut [Sum], values: &[f64], weights: &[f64]) {
     }
 }
 
-/// Adds a run to a known number of sums, which stay in registers.
+/// Adds a run to a known number of sums, four at most, which stay side by side in registers.
+#[multiversion::multiversion(targets = "simd")]
 fn add_run_of<const N: usize>(sums: &mut [Sum], values: &[f64], weights: &[f64]) {
     let Some(sums) = sums.first_chunk_mut::<N>() else { return };
-    let mut own = *sums;
+    let (mut sum, mut lost) = ([0.0; 4], [0.0; 4]);
+    for (k, own) in sums.iter().enumerate() {
+        (sum[k], lost[k]) = (own.sum, own.lost);
+    }
     for (values, weight) in values.as_chunks::<N>().0.iter().zip(weights) {
-        for (sum, value) in own.iter_mut().zip(values) {
-            sum.add(value * weight);
+        let mut four = [0.0; 4];
+        four[..N].copy_from_slice(values);
+        for k in 0..4 {
+            let rounded;
+            (sum[k], rounded) = sum_and_loss(sum[k], four[k] * weight);
+            lost[k] += rounded;
         }
     }
-    *sums = own;
+    for (k, own) in sums.iter_mut().enumerate() {
+        (own.sum, own.lost) = (sum[k], lost[k]);
+    }
 }
 
 /// Adds the values of some rays in blocks, of which each has a row for each sum, three sums at a time.

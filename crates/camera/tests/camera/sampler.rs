@@ -12,7 +12,7 @@ const PAIRS: u32 = 12;
 /// picked ones in single precision.
 fn asked(samples: &[PixelSample], pair: u32) -> [Vec<[f64; 2]>; 3] {
     let mut keys = SampleKeys::default();
-    keys.refill(samples.iter().copied());
+    keys.refill(samples.iter().map(|of| (of.pixel, of.index..of.index + 1)));
     let picked: Vec<u32> = (0..COUNT).rev().collect();
     let (mut all, mut some) = (Vec::new(), Vec::new());
     let mut floats = [Vec::new(), Vec::new()];
