@@ -16,7 +16,7 @@ use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Geometry, MISS, RayBlock, is_degenerate};
 
-use self::edges::{FewTriangle, PluckerEdge};
+use self::edges::{FewTriangle, PluckerEdges};
 use self::faces::{BlockOcclusion, Face, FaceList, FaceRun, NearestFace};
 use crate::single::{F32Frame, round};
 
@@ -39,7 +39,7 @@ const RUN: usize = 12;
 #[derive(Debug)]
 pub(crate) struct FewTriangles {
     frame: F32Frame,
-    edges: Vec<PluckerEdge>,
+    edges: PluckerEdges,
     triangles: Vec<FewTriangle>,
     named: Vec<TriangleId>,
     list: FaceList,
@@ -53,7 +53,7 @@ impl FewTriangles {
         }
         let mut few = Self {
             frame: F32Frame::of(geometry.loose_bounds()),
-            edges: Vec::new(),
+            edges: PluckerEdges::default(),
             triangles: Vec::new(),
             named: Vec::new(),
             list: FaceList::default(),
@@ -98,8 +98,7 @@ impl FewTriangles {
         let is_own = |ends: &[[f64; 3]; 2]| *ends == [a, b] || *ends == [b, a];
         let at = ends.iter().position(is_own).unwrap_or_else(|| {
             ends.push([a, b]);
-            self.edges.push(PluckerEdge::between(from, to));
-            ends.len() - 1
+            self.edges.push(from, to)
         });
         self.list.radius = self.list.radius.max(round(from.length()));
         let length = from.distance(to);

@@ -197,9 +197,7 @@ impl SampledQuantity for LightPass<'_> {
         let is_one_for_all = self.ctx.spectral.count() != self.count;
         let bands = if is_one_for_all { 0..self.ctx.spectral.count() } else { bands.clone() };
         let rays_of_paths = match &self.block_rays {
-            Some(rays) => {
-                PathRays::Blocks { len: numbers.count(), from: rays.camera.position }
-            }
+            Some(rays) => PathRays::Blocks { len: numbers.count(), from: rays.camera.position },
             None => PathRays::Batch(&rays.rays),
         };
         let samples = RaySamples { rays: rays_of_paths, samples: numbers, bands, parts };

@@ -4,17 +4,53 @@ use etendue_geometry::RayBlock;
 use etendue_geometry::block::vector;
 use etendue_geometry::glam::DVec3;
 
-/// An edge, by its Plücker coordinates in the frame, the direction a unit vector.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct PluckerEdge {
-    along: DVec3,
-    moment: DVec3,
+use super::MOST_TRIANGLES;
+
+/// Edges held against a line side by side.
+const WIDTH: usize = 8;
+
+/// Edges by their Plücker coordinates in the frame, the directions unit vectors.
+#[derive(Debug, Clone, Copy, Default)]
+struct EdgeBlock {
+    along: [[f64; WIDTH]; 3],
+    moment: [[f64; WIDTH]; 3],
 }
 
-impl PluckerEdge {
-    pub(super) fn between(from: DVec3, to: DVec3) -> Self {
-        let along = (to - from).normalize();
-        Self { along, moment: from.cross(along) }
+/// The edges of a scene of few triangles.
+#[derive(Debug, Default)]
+pub(super) struct PluckerEdges {
+    blocks: Vec<EdgeBlock>,
+    count: usize,
+}
+
+/// The distances of a line from all edges, times the sines of their angles (m): the same of both triangles of an edge.
+type EdgeSides = [[f64; WIDTH]; 3 * MOST_TRIANGLES / WIDTH];
+
+impl PluckerEdges {
+    /// Appends the edge between two corners, and returns its number.
+    pub(super) fn push(&mut self, from: DVec3, to: DVec3) -> usize {
+        let (number, lane) = (self.count, self.count % WIDTH);
+        if lane == 0 {
+            self.blocks.push(EdgeBlock::default());
+        }
+        self.count += 1;
+        let direction = (to - from).normalize();
+        let moment = from.cross(direction);
+        let EdgeBlock { along, moment: moments } = &mut self.blocks[number / WIDTH];
+        for axis in 0..3 {
+            (along[axis][lane], moments[axis][lane]) = (direction[axis], moment[axis]);
+        }
+        number
+    }
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn sides_of(edges: &[EdgeBlock], line: &LaneRay, sides: &mut EdgeSides) {
+    let ([dx, dy, dz], [mx, my, mz]) = (line.direction.to_array(), line.moment.to_array());
+    for (EdgeBlock { along: [x, y, z], moment: [a, b, c] }, sides) in edges.iter().zip(sides) {
+        for i in 0..WIDTH {
+            sides[i] = (dx * a[i] + dy * b[i] + dz * c[i]) + (mx * x[i] + my * y[i] + mz * z[i]);
+        }
     }
 }
 
@@ -57,35 +93,34 @@ pub(super) struct TriangleHit {
 
 impl FewTriangle {
     /// The distance (m) and weights with which a line meets it between its ends.
-    fn hit(&self, edges: &[PluckerEdge], line: &LaneRay) -> Option<(f64, [f64; 2])> {
-        let mut sides = self.lengths;
-        for (side, &edge) in sides.iter_mut().zip(&self.edges) {
-            // The distance of the lines times the sine of their angle (m): the same of both triangles of an edge.
-            let PluckerEdge { along, moment } = &edges[edge];
-            *side *= line.direction.dot(*moment) + line.moment.dot(*along);
-        }
-        if !(sides.iter().all(|&side| side >= 0.0) || sides.iter().all(|&side| side <= 0.0)) {
+    #[inline(always)]
+    fn hit(&self, sides: &EdgeSides, line: &LaneRay) -> Option<(f64, [f64; 2])> {
+        let side = |k: usize| self.lengths[k] * sides.as_flattened()[self.edges[k]];
+        let [a, b, c] = [side(0), side(1), side(2)];
+        let is_inside = (a >= 0.0) & (b >= 0.0) & (c >= 0.0) | (a <= 0.0) & (b <= 0.0) & (c <= 0.0);
+        if !is_inside {
             return None;
         }
         let height = (self.corner - line.origin).dot(self.normal);
         let t = height / line.direction.dot(self.normal);
-        let over = 1.0 / (sides[0] + sides[1] + sides[2]);
+        let over = 1.0 / (a + b + c);
         // A line in the triangle's plane meets it nowhere.
         let is_between = t > line.t_min && t <= line.t_max && t <= f64::MAX;
-        is_between.then(|| (t, [sides[1] * over, sides[2] * over]))
+        is_between.then(|| (t, [b * over, c * over]))
     }
 }
 
 /// The closest hit of the ray of a lane; of those in one place the last.
 pub(super) fn closest(
-    edges: &[PluckerEdge],
+    edges: &PluckerEdges,
     triangles: &[FewTriangle],
     block: &RayBlock,
     lane: usize,
 ) -> Option<TriangleHit> {
-    let (mut line, mut nearest) = (LaneRay::of(block, lane), None);
+    let (mut line, mut sides, mut nearest) = (LaneRay::of(block, lane), EdgeSides::default(), None);
+    sides_of(&edges.blocks, &line, &mut sides);
     for (number, triangle) in triangles.iter().enumerate() {
-        let Some((t, weights)) = triangle.hit(edges, &line) else { continue };
+        let Some((t, weights)) = triangle.hit(&sides, &line) else { continue };
         nearest = Some(TriangleHit { number, t, weights });
         line.t_max = t;
     }
@@ -94,11 +129,12 @@ pub(super) fn closest(
 
 /// Tests whether anything is between the ends of the ray of a lane.
 pub(super) fn is_occluded(
-    edges: &[PluckerEdge],
+    edges: &PluckerEdges,
     triangles: &[FewTriangle],
     block: &RayBlock,
     lane: usize,
 ) -> bool {
-    let line = LaneRay::of(block, lane);
-    triangles.iter().any(|triangle| triangle.hit(edges, &line).is_some())
+    let (line, mut sides) = (LaneRay::of(block, lane), EdgeSides::default());
+    sides_of(&edges.blocks, &line, &mut sides);
+    triangles.iter().any(|triangle| triangle.hit(&sides, &line).is_some())
 }
