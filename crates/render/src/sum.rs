@@ -125,4 +125,22 @@ mod tests {
         // The example of Neumaier's paper: naive summation gives 0.
         assert_eq!(sum.total(), 2.0);
     }
+
+    /// Runs are added as their values are one by one, to the bit.
+    #[test]
+    fn a_run_is_added_as_its_values_are() {
+        for count in [1, 2, 3, 4, 5] {
+            let value = |k: usize| (1.0 + k as f64).sqrt() * if k % 7 == 0 { 1e12 } else { -1.0 };
+            let values: Vec<f64> = (0..20 * count).map(value).collect();
+            let weights: Vec<f64> = (0..20).map(|k| 1.0 / (3.0 + f64::from(k))).collect();
+            let mut sums: Vec<Sum> = (0..count).map(|k| Sum::of_parts([value(k), 1e-9])).collect();
+            let mut one_by_one = sums.clone();
+            add_run(&mut sums, &values, &weights);
+            for (values, weight) in values.chunks(count).zip(&weights) {
+                one_by_one.iter_mut().zip(values).for_each(|(sum, v)| sum.add(v * weight));
+            }
+            let parts = |sums: &[Sum]| sums.iter().map(|sum| sum.parts()).collect::<Vec<_>>();
+            assert_eq!(parts(&sums), parts(&one_by_one), "{count}");
+        }
+    }
 }

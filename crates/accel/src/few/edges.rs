@@ -20,7 +20,7 @@ struct EdgeBlock {
 #[derive(Debug, Default)]
 pub(super) struct PluckerEdges {
     blocks: Vec<EdgeBlock>,
-    count: usize,
+    pub(super) count: usize,
 }
 
 /// The distances of a line from all edges, times the sines of their angles (m): the same of both triangles of an edge.
@@ -106,7 +106,7 @@ impl FewTriangle {
         let over = 1.0 / (a + b + c);
         // A line in the triangle's plane meets it nowhere.
         let is_between = t > line.t_min && t <= line.t_max && t <= f64::MAX;
-        is_between.then(|| (t, [b * over, c * over]))
+        is_between.then_some((t, [b * over, c * over]))
     }
 }
 
