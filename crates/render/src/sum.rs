@@ -130,7 +130,8 @@ mod tests {
     #[test]
     fn a_run_is_added_as_its_values_are() {
         for count in [1, 2, 3, 4, 5] {
-            let value = |k: usize| (1.0 + k as f64).sqrt() * if k % 7 == 0 { 1e12 } else { -1.0 };
+            let value =
+                |k: usize| (1.0 + k as f64).sqrt() * if k.is_multiple_of(7) { 1e12 } else { -1.0 };
             let values: Vec<f64> = (0..20 * count).map(value).collect();
             let weights: Vec<f64> = (0..20).map(|k| 1.0 / (3.0 + f64::from(k))).collect();
             let mut sums: Vec<Sum> = (0..count).map(|k| Sum::of_parts([value(k), 1e-9])).collect();
