@@ -47,7 +47,7 @@ pub use motion::{CameraMotionSpec, CameraTime, Kinematics, MotionAxes, Trajector
 pub use opencv_fit::OpencvFit;
 pub use pinhole::{Orthographic, OrthographicSpec, Pinhole, PinholeLanes, PinholeSpec};
 pub use pose::{Convention, Maps, Pose, PoseSpec};
-pub use sampler::{PixelSample, PixelSamples, SampleKeys, Sampler, squares_of_pair};
+pub use sampler::{PixelRun, PixelSample, PixelSamples, SampleKeys, Sampler, squares_of_pair};
 pub use samples::{CameraRays, FilmSamples, PixelBlock};
 pub use shutter::{Readout, Shutter, ShutterKind, ShutterSpec, TruthAt};
 

@@ -82,6 +82,15 @@ pub struct PixelSample {
     pub index: u32,
 }
 
+/// Some of the samples of one pixel, by their numbers.
+#[derive(Debug, Clone)]
+pub struct PixelRun {
+    /// The samples of the pixel.
+    pub pixel: PixelSamples,
+    /// Their numbers among them.
+    pub numbers: Range<u32>,
+}
+
 impl PixelSamples {
     /// The samples of these numbers.
     pub fn samples(self, numbers: Range<u32>) -> impl Iterator<Item = PixelSample> + Clone {
@@ -190,16 +199,16 @@ pub struct SampleKeys {
 }
 
 impl SampleKeys {
-    /// Makes them the samples of these numbers of some pixels, one pixel behind the other.
-    pub fn refill(&mut self, runs: impl Iterator<Item = (PixelSamples, Range<u32>)> + Clone) {
+    /// Makes them the samples of `runs`, one run behind the other.
+    pub fn refill(&mut self, runs: impl Iterator<Item = PixelRun> + Clone) {
         self.keys.clear();
         self.samples.clear();
-        if runs.clone().all(|(pixel, _)| pixel.sampler == Sampler::Sobol) {
-            for (pixel, numbers) in runs {
+        if runs.clone().all(|run| run.pixel.sampler == Sampler::Sobol) {
+            for PixelRun { pixel, numbers } in runs {
                 self.keys.extend(numbers.map(|index| pixel.key_of_set(index, 0)));
             }
         } else {
-            self.samples.extend(runs.flat_map(|(pixel, numbers)| pixel.samples(numbers)));
+            self.samples.extend(runs.flat_map(|run| run.pixel.samples(run.numbers)));
         }
     }
 
@@ -436,7 +445,9 @@ mod tests {
         for sampler in ALL {
             let pixel = |i: u32| sampler.pixel(5, i % 7, i / 7, 80_000);
             let samples = (0..200).map(|i| PixelSample { pixel: pixel(i), index: i * 381 });
-            let runs = samples.clone().map(|of| (of.pixel, of.index..of.index + 1));
+            let runs = samples
+                .clone()
+                .map(|of| PixelRun { pixel: of.pixel, numbers: of.index..of.index + 1 });
             let [mut out, mut own] = [Vec::new(), Vec::new()];
             let mut floats = [Vec::new(), Vec::new()];
             let mut keys = SampleKeys::default();

@@ -6,8 +6,8 @@ use std::ops::Range;
 
 use etendue_accel::{Accel, BlockOrigin};
 use etendue_camera::{
-    BandGroup, BandLandings, Camera, CameraRays, FilmSamples, PinholeLanes, PixelSamples,
-    SampleKeys, Sampler,
+    BandGroup, BandLandings, Camera, CameraRays, FilmSamples, PinholeLanes, PixelRun, SampleKeys,
+    Sampler,
 };
 use etendue_geometry::block::{Floats, LANES};
 use etendue_geometry::{HitBatch, HitPrecision};
@@ -113,11 +113,12 @@ pub(crate) struct SampleRun {
 }
 
 impl Sampling {
-    /// The samples of a run: those of its pixel and set, and their numbers.
-    fn of_run(&self, run: &SampleRun) -> (PixelSamples, Range<u32>) {
+    /// The samples of a run, which are of its pixel and set.
+    fn of_run(&self, run: &SampleRun) -> PixelRun {
         let seed = if run.set == 0 { self.seed } else { self.seed ^ SECOND_SET };
         let [column, row] = run.pixel.map(i32::cast_unsigned);
-        (self.sampler.pixel(seed, column, row, self.samples), run.range.clone())
+        let pixel = self.sampler.pixel(seed, column, row, self.samples);
+        PixelRun { pixel, numbers: run.range.clone() }
     }
 
     /// The samples that the share has.

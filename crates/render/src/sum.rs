@@ -18,6 +18,7 @@ pub(crate) struct Sum {
 }
 
 impl Sum {
+    /// Adds a number, and what rounding takes from it to what is lost.
     #[inline]
     pub(crate) fn add(&mut self, value: f64) {
         let lost;

@@ -44,6 +44,7 @@ impl PluckerEdges {
     }
 }
 
+/// Holds a line against all edges.
 #[multiversion::multiversion(targets = "simd")]
 fn sides_of(edges: &[EdgeBlock], line: &LaneRay, sides: &mut EdgeSides) {
     let ([dx, dy, dz], [mx, my, mz]) = (line.direction.to_array(), line.moment.to_array());

@@ -1,6 +1,6 @@
 //! Numbers of samplers as light asks for them: how evenly they fill the square.
 
-use etendue_camera::{PixelSample, SampleKeys, Sampler};
+use etendue_camera::{PixelRun, PixelSample, SampleKeys, Sampler};
 
 /// Samples that are looked at together.
 const COUNT: u32 = 64;
@@ -12,7 +12,8 @@ const PAIRS: u32 = 12;
 /// picked ones in single precision.
 fn asked(samples: &[PixelSample], pair: u32) -> [Vec<[f64; 2]>; 3] {
     let mut keys = SampleKeys::default();
-    keys.refill(samples.iter().map(|of| (of.pixel, of.index..of.index + 1)));
+    let run = |of: &PixelSample| PixelRun { pixel: of.pixel, numbers: of.index..of.index + 1 };
+    keys.refill(samples.iter().map(run));
     let picked: Vec<u32> = (0..COUNT).rev().collect();
     let (mut all, mut some) = (Vec::new(), Vec::new());
     let mut floats = [Vec::new(), Vec::new()];
