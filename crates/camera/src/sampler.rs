@@ -14,7 +14,7 @@ use crate::sobol::{self, Half, SobolKey};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Sampler {
-    /// Owen-scrambled Sobol points (Burley, "Practical hash-based Owen scrambling", 2020): the
+    /// Scrambled Sobol points (Burley, "Practical hash-based Owen scrambling", 2020) that keep their distance: the
     /// error falls nearly as 1/n for smooth integrands, and any number of samples is a good one.
     #[default]
     Sobol,

@@ -21,7 +21,7 @@ use crate::steps::{bits, layer, load_in, prepare, rendered};
 const RESOLUTION: [u32; 2] = [20, 35];
 const SAMPLES: u32 = 6;
 
-/// How far a picture may be from the reference's, whose random numbers are the same.
+/// The permitted difference between a picture and the reference's, whose random numbers are the same.
 #[derive(Clone, Copy)]
 struct Apart {
     /// Share of the values that may differ by more than f32's rounding.

@@ -58,7 +58,7 @@ fn camera(kind: &str, microlenses: &str, resolution: [u32; 2], more: &str) -> St
 }
 
 /// Writes the set of a camera that looks at a wall of squares at `depth` (m), each of which is 3.5 columns
-/// of a view wide.
+/// of a view wide. Of 32 samples the noise alone leaves round lenslets 40 dB, of 64 it leaves 44.
 fn write(folder: &Path, depth: f64, kind: &str, microlenses: &str) -> serde_json::Value {
     let (width, z) = (80.0 * on_the_wall(3.5, depth), 0.5 - depth);
     // Stripes, nearly: a row sees one square above the other at most once.
@@ -67,7 +67,7 @@ fn write(folder: &Path, depth: f64, kind: &str, microlenses: &str) -> serde_json
     write_scene(
         folder,
         &format!(
-            r#"{{"etendue": 1, "tracer": {{"type": "flat"}}, "render": {{"samples": 32}},
+            r#"{{"etendue": 1, "tracer": {{"type": "flat"}}, "render": {{"samples": 64}},
             "camera": {camera},
             "materials": {{"a": {{"type": "checker", "colors": [[0.9, 0.8, 0.7], [0.1, 0.2, 0.3]], "squares": 80}}}},
             "objects": [{{"shape": "rectangle", "width": {width}, "height": {height}, "material": "a",
@@ -420,6 +420,7 @@ fn centroids_of_vignetted_images_are_told() {
     let camera = camera("light_field", r#", "f_number": 3.4"#, [640, 60], ring);
     let text = format!(
         r#"{{"etendue": 1, "tracer": {{"type": "flat"}}, "render": {{"samples": 1}},
+        "accuracy": {{"white_samples": 256}},
         "camera": {camera}, "objects": [{{"shape": "sphere"}}]}}"#
     );
     let geometry = write_scene(folder.path(), &text);
