@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use etendue_geometry::units::{Degrees, Metres};
-use etendue_optics::element::Resolve;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::framing::Subject;
+use crate::lens::CameraResources;
 use crate::{
     Camera, CameraError, CameraMotionSpec, CameraTime, ChromaticRealLensCameraSpec, LensCameraSpec,
     LightFieldSpec, OrthographicSpec, PinholeSpec, Pose, PoseSpec, Projection, RealLensCameraSpec,
@@ -183,7 +183,7 @@ impl CameraSpec {
     pub fn build<'a, S: Into<Subject<'a>>>(
         &self,
         subject: impl FnOnce() -> S,
-        resolve: Resolve<'_>,
+        resolve: &dyn CameraResources,
     ) -> Result<Camera, CameraError> {
         self.sensor().check()?;
         if self.shutter().is_none() && self.motion().is_none() {
@@ -224,7 +224,7 @@ impl CameraSpec {
     fn build_still<'a, S: Into<Subject<'a>>>(
         &self,
         subject: impl FnOnce() -> S,
-        resolve: Resolve<'_>,
+        resolve: &dyn CameraResources,
     ) -> Result<Camera, CameraError> {
         let subject = || subject().into();
         let (mut sensor, mut light_field) = (self.sensor().clone(), None);

@@ -39,8 +39,9 @@ pub use falloff::{FalloffSpec, LitPlace};
 pub use framing::{Subject, SupportFunction, Viewpoint};
 pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin, SensorSpec};
 pub use lens::{
-    BandGroup, BandLandings, ChromaticRealLensCameraSpec, LensAccuracy, LensCamera, LensCameraSpec,
-    RealLensCameraSpec, SharedPaths, SharingLimits, ThinLensCameraSpec, WaveAccuracy, WaveLens,
+    BandGroup, BandLandings, CameraResources, ChromaticRealLensCameraSpec, LensAccuracy,
+    LensCamera, LensCameraSpec, RealLensCameraSpec, SharedPaths, SharingLimits, ThinLensCameraSpec,
+    WaveAccuracy, WaveLens,
 };
 pub use light_field::{LightField, LightFieldSpec, ViewGrid};
 pub use motion::{CameraMotionSpec, CameraTime, Kinematics, MotionAxes, Trajectory};

@@ -101,12 +101,12 @@ fn envi_pair(
     read_envi(Path::new(written), path, Limits::default(), partner).map_err(|fault| fault.why)
 }
 
-/// Why there is no cube: of which file it is said, and a sentence that goes on after its name.
+/// The reason why there is no cube: the file of which it is said, and a sentence that goes on after its name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EnviFault {
     /// The file.
     pub path: PathBuf,
-    /// Why.
+    /// The reason.
     pub why: String,
 }
 

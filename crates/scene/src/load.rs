@@ -25,21 +25,12 @@ use crate::identity::Ingredients;
 use crate::import::{self, Import, ImportedPlacement, Note, NoteKind, Wanted};
 use crate::memory::Budget;
 use crate::parts::{Object, SceneParts};
-use crate::scene::{LoadOptions, LoadProgress, Scene};
+use crate::scene::{LoadContext, LoadOptions, LoadProgress, Scene};
 use crate::shape::{GoOn, ShapeError, ShapeSpec};
 use crate::{Cache, SceneError};
 use camera::CameraAhead;
 pub(crate) use camera::CameraFiles;
 use objects::{OriginKind, OwnParts, TriangleOrigin};
-
-/// What all steps of loading a scene share.
-#[derive(Clone, Copy)]
-struct LoadContext<'a> {
-    folder: &'a InputFolder,
-    options: &'a LoadOptions<'a>,
-    budget: &'a Arc<Budget>,
-    kept: &'a Cache,
-}
 
 impl SceneFile {
     /// Opens all that the scene names and puts it together. Of the models only what is `wanted` is

@@ -10,8 +10,9 @@ use crate::cameras::{CameraOrigin, SceneCamera};
 use crate::file::{AccuracySpec, PlanSpec, RenderSpec, ToleranceSpec, TracerSpec};
 use crate::identity::{Copies, IdName, Ingredients, SceneHash, SceneNode};
 use crate::import::{Note, Strictness};
+use crate::memory::Budget;
 use etendue_camera::Camera;
-use etendue_files::Opener;
+use etendue_files::{InputFolder, Opener};
 use etendue_geometry::Geometry;
 use etendue_optics::glass::AgfCatalogue;
 use etendue_sensor::Sensor;
@@ -173,6 +174,15 @@ impl std::fmt::Debug for LoadOptions<'_> {
             .field("copy", &self.copy)
             .finish_non_exhaustive()
     }
+}
+
+/// Context that all steps of loading a scene share.
+#[derive(Clone, Copy)]
+pub(crate) struct LoadContext<'a> {
+    pub(crate) folder: &'a InputFolder,
+    pub(crate) options: &'a LoadOptions<'a>,
+    pub(crate) budget: &'a Arc<Budget>,
+    pub(crate) kept: &'a Cache,
 }
 
 /// Progress of loading.

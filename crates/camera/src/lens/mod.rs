@@ -50,7 +50,7 @@ pub use chief::LensletChiefs;
 pub use focused::FocusedLens;
 pub use lens_camera::LensCamera;
 pub use nodes::SharingLimits;
-pub use source::{LensSource, PlacedSpec};
+pub use source::{CameraResources, LensSource, PlacedSpec};
 pub(crate) use spec::alone;
 pub use spec::{
     ChromaticRealLensCameraSpec, LensCameraSpec, RealLensCameraSpec, ThinLensCameraSpec,

@@ -9,13 +9,11 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
-use crate::curve_files::{LONGEST_TABLE, read_curves};
 use crate::{CameraError, PoseSpec, SensorSpec};
 use etendue_geometry::units::{Degrees, Metres, Millimetres};
 use etendue_optics::element::{ElementSpec, LensResources, LossesSpec, Resolve, element_schema};
 use etendue_optics::glass::AgfCatalogue;
 use etendue_optics::train::{Focus, LensError, LensFile, LensFormat, OpticalTrain, ZemaxLens};
-use etendue_spectrum::CurveFault;
 
 /// The longest text that is read as a lens (bytes).
 const LONGEST: u64 = 16 << 20;
@@ -36,7 +34,7 @@ impl LensSource {
     /// # Errors
     ///
     /// When a file may not be read or is no lens; the error names the place in it.
-    pub(crate) fn read(&self, resolve: Resolve<'_>) -> Result<OpticalTrain, CameraError> {
+    pub(crate) fn read(&self, resolve: &dyn CameraResources) -> Result<OpticalTrain, CameraError> {
         match self {
             Self::Inline(file) => file.build(resolve).map_err(|error| in_camera("lens", &error)),
             Self::File(written) => {
@@ -55,37 +53,33 @@ impl LensSource {
                 let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
                 let folder = Path::new(written).parent().unwrap_or(Path::new(""));
                 let files = LensFolder { folder, scene: resolve };
-                let text = files
-                    .with_curves(text)
-                    .map_err(|CurveFault { key, why }| error(format!("{written}, {key}: {why}")))?;
-                LensFile::from_json(&text)
-                    .and_then(|file| file.build(&files))
-                    .map_err(|fault| error(format!("{written}: {fault}")))
+                resolve.lens(written, text, &files).map_err(error)
             }
         }
     }
 }
 
+/// What a camera takes from outside its own text: what a lens takes, and lenses from lens files. A function from a file's
+/// name to its path stands for files alone.
+pub trait CameraResources: LensResources {
+    /// The lens that `text`, of the lens file `name`, describes; `files` are what it names itself. Who knows the places
+    /// in a text reads it; otherwise [`LensFile::from_json`] does, and curves in files are not read.
+    ///
+    /// # Errors
+    ///
+    /// A sentence that starts with the file and the place in it.
+    fn lens(&self, name: &str, text: &str, files: Resolve<'_>) -> Result<OpticalTrain, String> {
+        let lens = LensFile::from_json(text).and_then(|file| file.build(files));
+        lens.map_err(|fault| format!("{name}: {fault}"))
+    }
+}
+
+impl<F: Fn(&str) -> Result<PathBuf, String>> CameraResources for F {}
+
 /// Resources of a lens file: its own paths start at its own folder.
 struct LensFolder<'a> {
     folder: &'a Path,
-    scene: Resolve<'a>,
-}
-
-impl LensFolder<'_> {
-    /// The text of a lens file with curves in the place of the files that it names; as it stands, with its lines, where
-    /// it names none.
-    fn with_curves<'t>(&self, text: &'t str) -> Result<Cow<'t, str>, CurveFault> {
-        // What is no JSON is told by who reads the lens.
-        let Ok(mut value) = serde_json::from_str::<Value>(text) else { return Ok(text.into()) };
-        let read = &mut |written: &str| {
-            let path = self.path(written)?;
-            let bytes = etendue_files::read(&path, LONGEST_TABLE).map_err(|e| e.to_string())?;
-            String::from_utf8(bytes).map_err(|_| "is no text".to_owned())
-        };
-        let any = read_curves(&mut value, read)?;
-        Ok(if any { value.to_string().into() } else { text.into() })
-    }
+    scene: &'a dyn CameraResources,
 }
 
 impl LensResources for LensFolder<'_> {

@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 use super::focused::{FocusedLens, View, positive};
 use super::keys::{is_zero, lens_camera_spec};
 use super::lens_camera::LensCamera;
-use super::source::{FocusDistance, LensSource, PlacedSpec, Setup, in_part};
+use super::source::{CameraResources, FocusDistance, LensSource, PlacedSpec, Setup, in_part};
 use crate::framing::{self, FieldExtent, Subject};
 use crate::{CameraError, CameraMotionSpec, Pose, PoseSpec, SensorSpec, ShutterSpec};
 use etendue_geometry::units::{Degrees, Millimetres};
 use etendue_optics::element::{
-    ApertureSpec, ElementSpec, LossesSpec, PartSpec, Resolve, SurfaceSpec, ThinLensSpec,
+    ApertureSpec, ElementSpec, LossesSpec, PartSpec, SurfaceSpec, ThinLensSpec,
 };
 use etendue_optics::glass::GlassSpec;
 use etendue_optics::train::{Focus, LensFile, OpticalTrain};
@@ -100,7 +100,7 @@ macro_rules! build_by_train {
             pub(crate) fn build<'a>(
                 &self,
                 subject: impl FnOnce() -> Subject<'a>,
-                resolve: Resolve<'_>,
+                resolve: &dyn CameraResources,
             ) -> Result<(Pose, LensCamera), CameraError> {
                 let mut setup = self.setup()?;
                 setup.measure_past(self.reach_behind());
@@ -243,7 +243,7 @@ impl ThinLensCameraSpec {
     pub(crate) fn build<'a>(
         &self,
         subject: impl FnOnce() -> Subject<'a>,
-        resolve: Resolve<'_>,
+        resolve: &dyn CameraResources,
     ) -> Result<(Pose, LensCamera), CameraError> {
         let mut setup = self.setup()?;
         setup.measure_past(reach_behind(&self.elements, 0.0));
@@ -306,7 +306,7 @@ impl ThinLensCameraSpec {
     pub(crate) fn train(
         &self,
         focal_length: f64,
-        resolve: Resolve<'_>,
+        resolve: &dyn CameraResources,
     ) -> Result<OpticalTrain, CameraError> {
         let aperture = self.aperture.as_ref();
         thin_lens(focal_length, aperture, self.f_number, &self.elements, resolve)
@@ -320,7 +320,7 @@ pub(crate) fn thin_lens(
     aperture: Option<&ApertureSpec>,
     f_number: Option<f64>,
     elements: &[PlacedSpec],
-    resolve: Resolve<'_>,
+    resolve: &dyn CameraResources,
 ) -> Result<OpticalTrain, CameraError> {
     if focal_length == 0.0 || !focal_length.is_finite() {
         let why = format!("{focal_length} mm is no focal length");
@@ -353,7 +353,7 @@ impl RealLensCameraSpec {
         reach_behind(&self.elements, self.thickness.0)
     }
 
-    fn train(&self, resolve: Resolve<'_>) -> Result<OpticalTrain, CameraError> {
+    fn train(&self, resolve: &dyn CameraResources) -> Result<OpticalTrain, CameraError> {
         if !(self.refractive_index > 0.0 && self.refractive_index.is_finite()) {
             let why = format!("{} is not above zero", self.refractive_index);
             return Err(CameraError::new("refractive_index", why));
@@ -372,7 +372,7 @@ impl ChromaticRealLensCameraSpec {
         reach_behind(&self.elements, self.thickness.0)
     }
 
-    fn train(&self, resolve: Resolve<'_>) -> Result<OpticalTrain, CameraError> {
+    fn train(&self, resolve: &dyn CameraResources) -> Result<OpticalTrain, CameraError> {
         let glass = self.glass.resolve_in(resolve.glasses());
         glass.map_err(|fault| CameraError::new("glass", fault.to_string()))?;
         let shape = Thick {
@@ -390,7 +390,7 @@ impl LensCameraSpec {
         0.0
     }
 
-    fn train(&self, resolve: Resolve<'_>) -> Result<OpticalTrain, CameraError> {
+    fn train(&self, resolve: &dyn CameraResources) -> Result<OpticalTrain, CameraError> {
         self.lens.read(resolve)
     }
 }
@@ -407,7 +407,7 @@ impl Thick {
         self,
         glass: GlassSpec,
         elements: &[PlacedSpec],
-        resolve: Resolve<'_>,
+        resolve: &dyn CameraResources,
     ) -> Result<OpticalTrain, CameraError> {
         let keys = ["front_radius", "rear_radius"];
         let surfaces = self.radii.into_iter().zip([Some(glass), None]);
@@ -432,7 +432,7 @@ impl Thick {
 fn assemble(
     own: Vec<PlacedPart>,
     besides: &[PlacedSpec],
-    resolve: Resolve<'_>,
+    resolve: &dyn CameraResources,
 ) -> Result<OpticalTrain, CameraError> {
     let mut parts = own;
     for (index, placed) in besides.iter().enumerate() {

@@ -13,13 +13,13 @@ use crate::framing::Subject;
 use crate::lens::keys::{is_zero, lens_camera_spec};
 use crate::lens::source::{FocusDistance, PlacedSpec, Setup, in_camera};
 use crate::lens::spec::{place, thin_lens};
-use crate::lens::{LensCamera, LensSource};
+use crate::lens::{CameraResources, LensCamera, LensSource};
 use crate::{CameraError, Pose, PoseSpec, SensorSpec};
 use crate::{CameraMotionSpec, ShutterSpec};
 use etendue_geometry::units::{Degrees, Millimetres};
 use etendue_optics::element::{
     ApertureSpec, ElementSpec, Gaps, Grid, LensletShape, LensletSpec, LossesSpec,
-    MicrolensArraySpec, PartSpec, Resolve,
+    MicrolensArraySpec, PartSpec,
 };
 use etendue_optics::glass::GlassSpec;
 use etendue_optics::train::{Focus, LensFile, OpticalTrain};
@@ -151,7 +151,7 @@ impl LightFieldSpec {
     pub(crate) fn build<'a>(
         &self,
         subject: impl FnOnce() -> Subject<'a>,
-        resolve: Resolve<'_>,
+        resolve: &dyn CameraResources,
     ) -> Result<(Pose, LensCamera, LightField), CameraError> {
         let main = self.main(resolve)?;
         let train = self.microlenses.behind(&main, self.sensor_size()?)?;
@@ -184,7 +184,7 @@ impl LightFieldSpec {
     }
 
     /// The main lens with its stop set, and its picture of what is in focus.
-    fn main(&self, resolve: Resolve<'_>) -> Result<Main, CameraError> {
+    fn main(&self, resolve: &dyn CameraResources) -> Result<Main, CameraError> {
         // A thin lens with what stands around it, or a lens from its file; its stop set.
         let train = match (&self.focal_length, &self.lens) {
             (Some(Millimetres(focal_length)), None) => {

@@ -309,6 +309,8 @@ fn lens_files_name_curves_from_their_own_folder() {
     let lit = listed.iter().filter(|value| **value > 0.0).count();
     assert!(lit > 48, "no light, no test: {listed:?}");
     assert_eq!(named, listed);
+    let alone = bench.run(&["lens", "lenses/lens.json"]);
+    assert!(alone.status.success(), "{}", String::from_utf8_lossy(&alone.stderr));
     let curves = [
         json!({ "file": "none.csv" }),
         json!({ "file": "coating.csv" }),

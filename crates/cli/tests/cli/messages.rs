@@ -88,6 +88,39 @@ fn broken_containers_say_which_length_is_wrong() {
     insta::assert_snapshot!(cases.map(|(name, bytes)| refused(name, name, &bytes)).concat());
 }
 
+/// A lens file that a scene names is refused as one that `etendue lens` reads is: with its place, in words of JSON.
+#[test]
+fn a_lens_file_that_a_scene_names_says_where_it_is_wrong() {
+    let surface = |keys: &str| {
+        format!(
+            "{{\n  \"elements\": [\n    {{\"type\": \"surface\", {keys}}},\n    {{\"type\": \"surface\"}}\n  ]\n}}"
+        )
+    };
+    let scene = r#"{"etendue": 1, "camera": {"type": "lens", "lens": "l.json", "focus_distance": 2},
+                    "objects": []}"#;
+    let cases = [
+        surface(r#""radios": 50"#),
+        surface(r#""radius": "flat""#),
+        surface(r#""radius": 50, "thickness": -1"#),
+        surface(r#""glass": "N-BK77""#),
+        surface(r#""radius": 50"#).replace('}', ""),
+        surface(r#""filter": {"file": "none.csv"}"#),
+        r#"{"elements": 3}"#.to_owned(),
+        r#"{"surface_group": }"#.to_owned(),
+    ];
+    let messages = cases.map(|lens| {
+        let bench = Bench::new();
+        bench.write("l.json", lens.as_bytes());
+        bench.write("s.json", scene.as_bytes());
+        let message = bench.refusal(&["check", "s.json"]);
+        for word in PRIVATE {
+            assert!(!message.contains(word), "`{word}` in: {message}");
+        }
+        under(&lens, &message)
+    });
+    insta::assert_snapshot!(messages.concat());
+}
+
 /// A glTF document that `rest` goes on.
 fn gltf(rest: &str) -> Vec<u8> {
     format!(r#"{{"asset": {{"version": "2.0"}}, {rest}}}"#).into_bytes()

@@ -52,7 +52,7 @@ impl Bench {
         assert!(output.status.success(), "{}", text(&output.stderr));
     }
 
-    /// What a command said beside its results, with `FOLDER` for the bench's own: for a snapshot of the whole of it.
+    /// The messages of a command apart from its results, with `FOLDER` for the bench's own: for a snapshot of them all.
     pub(crate) fn said(&self, output: &Output) -> String {
         let named = self.folder.path();
         let real = named.canonicalize().expect("the bench's folder");

@@ -132,8 +132,8 @@ fn rows_of_an_exposure_in_slots_are_put_together() {
     }
 }
 
-/// Where samples stop by themselves every pixel has other ones, and the header says how many all have: of rows that are
-/// put together, too.
+/// The header of rows that are put together is that of the whole: where samples stop by themselves every pixel has
+/// other ones, and the header says how many all have.
 #[test]
 fn rows_of_slots_tell_the_samples_of_the_whole() {
     let mut serial = scene();

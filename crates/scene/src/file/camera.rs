@@ -121,6 +121,14 @@ pub(super) fn read_document(path: &Path) -> Result<(JsonDocument, Value), SceneE
     if !is_named_json && !text.trim_start().starts_with(['{', '[']) {
         return Err(not_a_scene("is text that is no JSON".to_owned()));
     }
+    parse_document(path, text)
+}
+
+/// The document of a text of the file at `path`.
+pub(super) fn parse_document(
+    path: &Path,
+    text: String,
+) -> Result<(JsonDocument, Value), SceneError> {
     JsonDocument::parse(text.clone()).map_err(|fault| {
         let Place { line, column } = fault.place;
         let why = Refusal::new(fault.reason).and(&format!("\n{}", excerpt(&text, fault.place)));

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use etendue_camera::Camera;
+use etendue_camera::curve_files::{LONGEST_TABLE, read_curves};
 use etendue_files::{InputFolder, Opener, Reach};
-use etendue_optics::element::GlassesAlone;
+use etendue_optics::element::{GlassesAlone, Resolve};
 use etendue_optics::glass::AgfCatalogue;
 use etendue_optics::train::{
     Focus, LensError, LensFile, LensFormat, OpticalTrain, RayError, RaysFile, TracedRays,
@@ -17,7 +18,8 @@ use schemars::generate::SchemaSettings;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::camera::{SCENE_KEYS, read_bytes, read_document};
+use super::camera::{SCENE_KEYS, parse_document, read_bytes, read_document};
+use super::document::JsonDocument;
 use super::written::WrittenPlaces;
 use super::{SceneFile, ScenePath, check, spec, values};
 use crate::SceneError;
@@ -126,7 +128,7 @@ pub fn read_lens_at(
     }
     let (written, value) = read(path)?;
     if !SCENE_KEYS.iter().any(|key| value.get(key).is_some()) {
-        return build(&written, &value, reach, glasses);
+        return build(&written, value, reach, glasses);
     }
     let folder = folder(path, reach)?;
     let scene = SceneFile::read_with(folder.opener(), path, &[])?;
@@ -176,9 +178,41 @@ pub fn trace_rays(lens: &OpticalTrain, path: &Path) -> Result<TracedRays, SceneE
 }
 
 fn read(path: &Path) -> Result<(WrittenPlaces, Value), SceneError> {
-    let (document, mut value) = read_document(path).map_err(not_a_lens)?;
+    let (document, value) = read_document(path).map_err(not_a_lens)?;
+    Ok(without_notes(path, document, value))
+}
+
+fn without_notes(path: &Path, document: JsonDocument, mut value: Value) -> (WrittenPlaces, Value) {
     remove_notes(&mut value);
-    Ok((WrittenPlaces::new(&Opener::default(), path, Some(document)), value))
+    (WrittenPlaces::new(&Opener::default(), path, Some(document)), value)
+}
+
+/// The lens that `text`, of the lens file `name`, describes, and what is written there; `files` are what it names itself.
+pub(crate) fn lens_of_text(
+    name: &Path,
+    text: String,
+    files: Resolve<'_>,
+) -> Result<(LensFile, OpticalTrain), SceneError> {
+    let (document, value) = parse_document(name, text)?;
+    let (written, value) = without_notes(name, document, value);
+    lens_of(&written, value, files)
+}
+
+/// The lens of a lens file's values, with curves in the place of the files that it names.
+fn lens_of(
+    written: &WrittenPlaces,
+    mut value: Value,
+    files: Resolve<'_>,
+) -> Result<(LensFile, OpticalTrain), SceneError> {
+    let read = &mut |curve: &str| {
+        let bytes = etendue_files::read(&files.path(curve)?, LONGEST_TABLE);
+        String::from_utf8(bytes.map_err(|error| error.to_string())?)
+            .map_err(|_| "is no text".to_owned())
+    };
+    read_curves(&mut value, read).map_err(|fault| written.fault(fault.key, fault.why))?;
+    let file: LensFile = read_as(&LENS, written, &value)?;
+    let train = file.build(files).map_err(|error| fault(written, &error))?;
+    Ok((file, train))
 }
 
 fn read_as<T: DeserializeOwned>(
@@ -204,14 +238,12 @@ fn inputs(file: &Path, folder: &InputFolder) -> Vec<PathBuf> {
 
 fn build(
     written: &WrittenPlaces,
-    value: &Value,
+    value: Value,
     reach: Reach,
     glasses: &[AgfCatalogue],
 ) -> Result<ReadLens, SceneError> {
-    let file: LensFile = read_as(&LENS, written, value)?;
     let folder = folder(&written.path, reach)?;
-    let files = CameraFiles::new(&folder, glasses);
-    let train = file.build(&files).map_err(|error| fault(written, &error))?;
+    let (file, train) = lens_of(written, value, &CameraFiles::new(&folder, glasses))?;
     Ok(ReadLens {
         train,
         file: Some(file),

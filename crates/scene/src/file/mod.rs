@@ -33,6 +33,7 @@ pub use frames::{
     CameraPath, FramesSpec, PixelsSpec, RigCameraSpec, SlotSpec, TrajectoryFormat, texts_of,
 };
 pub use imu::ImuSpec;
+pub(crate) use lens::lens_of_text;
 pub use lens::{ReadLens, is_lens, lens_schema, rays_schema, read_lens, read_lens_at, trace_rays};
 pub use object::{
     AnimationSpec, InstancesSpec, ObjectMotionSpec, ObjectSpec, Scale, Source, TransformSpec, Up,

@@ -1,4 +1,4 @@
-//! Where the values of a file were written: its text, the file of its camera, the command line.
+//! Places where the values of a file were written: its text, the file of its camera, the command line.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

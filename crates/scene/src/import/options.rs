@@ -1,4 +1,4 @@
-//! What is asked of an import.
+//! Options of an import, and what is wanted of a model.
 
 use std::path::PathBuf;
 use std::sync::Arc;

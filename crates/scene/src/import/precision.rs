@@ -1,4 +1,4 @@
-//! Whether f32 is enough for coordinates that a file gives in more digits.
+//! Choice of precision: whether f32 is enough for coordinates that a file gives in more digits.
 
 use rayon::prelude::*;
 

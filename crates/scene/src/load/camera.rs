@@ -5,20 +5,20 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::LoadContext;
 use crate::cache::{self, Cache, KeptCamera};
 use crate::cameras::{CameraOrigin, SceneCamera, pick};
 use crate::error::not_found;
-use crate::file::{SamplesSpec, SceneFile, ScenePath};
+use crate::file::{SamplesSpec, SceneFile, ScenePath, lens_of_text};
 use crate::import::{Note, NoteKind, Strictness};
-use crate::scene::{LoadOptions, LoadProgress};
+use crate::scene::{LoadContext, LoadOptions, LoadProgress};
 use crate::world_vertices::WorldVertices;
 use crate::{SceneError, facing};
-use etendue_camera::{Camera, CameraError, CameraSpec};
+use etendue_camera::{Camera, CameraError, CameraResources, CameraSpec};
 use etendue_files::InputFolder;
 use etendue_geometry::{Bounds, Geometry};
-use etendue_optics::element::LensResources;
+use etendue_optics::element::{LensResources, Resolve};
 use etendue_optics::glass::AgfCatalogue;
+use etendue_optics::train::OpticalTrain;
 use etendue_report::Refusal;
 use etendue_sensor::{Sensor, SensorSpec};
 use etendue_spectrum::Bands;
@@ -292,5 +292,12 @@ impl LensResources for CameraFiles<'_> {
 
     fn glasses(&self) -> &[AgfCatalogue] {
         self.glasses
+    }
+}
+
+impl CameraResources for CameraFiles<'_> {
+    fn lens(&self, name: &str, text: &str, files: Resolve<'_>) -> Result<OpticalTrain, String> {
+        let lens = lens_of_text(name.as_ref(), text.to_owned(), files);
+        lens.map(|(_, train)| train).map_err(|fault| fault.to_string())
     }
 }

@@ -106,7 +106,7 @@ fn all_as_they_are() -> Value {
     Value::Object(AccuracySpec::default().settings().iter().map(written).collect())
 }
 
-/// What `more` makes of a scene of a ball that writes all numbers.
+/// The scene of a ball that writes all numbers, loaded with the keys of `more`.
 fn loaded(more: Value) -> Result<Scene, String> {
     let mut scene = json!({ "accuracy": all_as_they_are(), "objects": [{ "shape": "sphere" }] });
     scene.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());

@@ -39,8 +39,10 @@ const DEEPEST: usize = 32;
 impl ZemaxSheet {
     /// Reads the text of a lens of optiland.
     pub(super) fn read_optiland(text: &str) -> Result<Self, ZemaxError> {
-        let value: Value = serde_json::from_str(&as_json(text))
-            .map_err(|error| ZemaxError::new(error.line(), format!("broken JSON: {error}")))?;
+        let value: Value = serde_json::from_str(&as_json(text)).map_err(|error| {
+            let why = format!("broken JSON in column {}", error.column());
+            ZemaxError::new(error.line(), why)
+        })?;
         let mut sheet = Self::of_camera(LensFormat::Optiland);
         value["name"].as_str().unwrap_or_default().clone_into(&mut sheet.name);
         let Some(surfaces) = value["surface_group"]["surfaces"].as_array() else {

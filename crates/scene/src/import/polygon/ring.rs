@@ -1,4 +1,4 @@
-//! What is left of a polygon while its ears are cut off.
+//! The rest of a polygon while its ears are cut off.
 
 use robust::{Coord, orient2d};
 
