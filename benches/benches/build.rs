@@ -1,4 +1,4 @@
-//! How long does each structure take to build, on all cores?
+//! Time to build each structure, on all cores.
 
 use std::hint::black_box;
 use std::sync::Arc;

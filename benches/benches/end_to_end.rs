@@ -1,4 +1,4 @@
-//! How long does it take from a scene to its layers, without reading or writing files?
+//! Time from a scene to its layers, without reading or writing files.
 #![allow(
     clippy::disallowed_methods,
     reason = "programs of measurements and tests write their own files"

@@ -1,5 +1,5 @@
-//! How long do the tracers of light take? A matte blob through a thin lens, under a point light and
-//! under a lamp, by direct light and by paths.
+//! Time of the tracers of light: a matte blob through a thin lens, under a point light and under an area light, by
+//! direct light and by paths.
 #![allow(
     clippy::disallowed_methods,
     reason = "programs of measurements and tests write their own files"

@@ -1,4 +1,4 @@
-//! How long does a model take from file to mesh?
+//! Time from a model's file to its mesh.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use etendue_benches::files::Format;

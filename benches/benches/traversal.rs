@@ -1,5 +1,5 @@
-//! How fast are rays: primary ones (one a pixel, and sixteen samples of one pixel), such as have nothing
-//! to do with each other, and shadow rays?
+//! Speed of rays: primary ones (one a pixel, and sixteen samples of one pixel), such as have nothing to do with each
+//! other, and shadow rays.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use etendue_benches::contest::{Query, time_of};

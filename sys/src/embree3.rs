@@ -15,7 +15,7 @@ use crate::bindings::{
     RTCRayHit16, RTCScene, RTCSceneFlags,
 };
 
-/// How a query is to be traversed.
+/// Flags of the traversal of a query.
 #[repr(transparent)]
 #[derive(Debug, Clone, Copy, Default, Hash, PartialEq, Eq)]
 pub struct RTCRayQueryFlags(pub u32);
@@ -48,7 +48,7 @@ pub const RTC_FEATURE_FLAG_ALL: RTCFeatureFlags = RTCFeatureFlags(u32::MAX);
 pub const RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS: RTCSceneFlags =
     RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
 
-/// What goes with a query to its filter: extend it by making it the first field of a `repr(C)`
+/// Record that goes with a query to its filter: extend it by making it the first field of a `repr(C)`
 /// record. On Embree 3 the ids stay as they were set.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
@@ -61,7 +61,7 @@ pub struct RTCRayQueryContext {
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct RTCIntersectArguments {
-    /// How to traverse.
+    /// Flags of the traversal.
     pub flags: RTCRayQueryFlags,
     /// Ignored.
     pub feature_mask: RTCFeatureFlags,
@@ -75,7 +75,7 @@ pub struct RTCIntersectArguments {
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct RTCOccludedArguments {
-    /// How to traverse.
+    /// Flags of the traversal.
     pub flags: RTCRayQueryFlags,
     /// Ignored.
     pub feature_mask: RTCFeatureFlags,

@@ -1,5 +1,5 @@
-//! What Embree's header defines inline, and so no library exports: how the records of a query
-//! start. The same on both releases.
+//! Functions that Embree's header defines inline, and so no library exports: initial values of the
+//! records of a query. The same on both releases.
 
 use std::ops::{BitOr, BitOrAssign};
 

@@ -41,7 +41,7 @@ impl Triangle {
 }
 
 impl Triangle {
-    /// Whether lanes that are masked off are left alone: where the processor has no packets of 16, Embree 3.13 traces
+    /// True if lanes that are masked off are left alone: where the processor has no packets of 16, Embree 3.13 traces
     /// them as a stream, which goes by the ends of rays and not by the mask.
     fn heeds_masks(&self) -> bool {
         // SAFETY: the device is live.
@@ -51,7 +51,7 @@ impl Triangle {
     }
 }
 
-/// Whether two numbers are the same but for the processor's reciprocal, which Embree refines by one step of
+/// True if two numbers are the same but for the processor's reciprocal, which Embree refines by one step of
 /// Newton's method: within two units in the last place.
 fn is_close(found: f32, known: f32) -> bool {
     found == known || (found - known).abs() <= 2.0 * f32::EPSILON * known.abs()

@@ -196,7 +196,7 @@ impl Embree {
         self.count(rechecked, corrected);
     }
 
-    /// What looks again at single rays.
+    /// The second look at single rays.
     fn second_look(&self) -> SecondLook<'_> {
         SecondLook { scene: &self.scene, frame: &self.frame }
     }

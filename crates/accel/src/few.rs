@@ -16,12 +16,9 @@ use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Geometry, MISS, RayBlock, is_degenerate};
 
-use self::edges::{FewTriangle, PluckerEdges};
+use self::edges::{FewTriangle, MOST_TRIANGLES, PluckerEdges};
 use self::faces::{BlockOcclusion, Face, FaceList, FaceRun, NearestFace};
 use crate::single::{F32Frame, round};
-
-/// Scenes of more triangles are traced by trees.
-const MOST_TRIANGLES: usize = 64;
 
 /// Identity of a triangle in the scene.
 #[derive(Debug, Clone, Copy)]

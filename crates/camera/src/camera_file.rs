@@ -42,12 +42,13 @@ pub struct CameraFile {
     /// The lens, when there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lens: Option<LensFacts>,
-    /// When the rows are seen, when the scene names a shutter.
+    /// Times at which the rows are seen, when the scene names a shutter.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shutter: Option<ShutterFile>,
 }
 
-/// When the rows of a picture are seen, and from where: times are in s since the frame's shutter opened.
+/// Times at which the rows of a picture are seen (s since the frame's shutter opened), and the poses that they are seen
+/// from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ShutterFile {
     /// Times at which rows are open.

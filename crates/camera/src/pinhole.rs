@@ -238,7 +238,7 @@ impl Pinhole {
 /// A pinhole in single precision, for rays that are traced in blocks: places in pixels become unit directions.
 #[derive(Debug, Clone, Copy)]
 pub struct PinholeLanes {
-    /// Where its rays start (m).
+    /// The point where its rays start (m).
     pub position: DVec3,
     intrinsics: Intrinsics,
     /// Right, down and forward, by axis of the world.

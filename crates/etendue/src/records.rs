@@ -1,4 +1,4 @@
-//! What a run knows of those before it: the pictures, frames and data sets that they left in a folder.
+//! Records of earlier runs: the pictures, frames and data sets that they left in a folder.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};

@@ -9,7 +9,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use glam::DVec3;
 
-use self::overlaps::Overlaps;
+use self::overlaps::{Overlaps, corners};
 use crate::batch::PlacedTriangle;
 use crate::{Bounds, Geometry, Placement};
 
@@ -327,12 +327,6 @@ fn shared_boxes(geometry: &Geometry, wanted: &dyn Fn(usize) -> bool) -> Vec<Boun
         active.push(i);
     }
     shared
-}
-
-fn corners(geometry: &Geometry, [placement, triangle]: PlacedTriangle) -> [DVec3; 3] {
-    let placement = &geometry.placements[placement as usize];
-    let mesh = geometry.mesh_of(placement);
-    mesh.corners(triangle as usize).map(|corner| placement.world_from_mesh.point(corner))
 }
 
 fn meet(a: &Bounds, b: &Bounds) -> bool {

@@ -1,4 +1,4 @@
-//! What decoders of the crate `image` have, and formats whose decoders are called here and not by it.
+//! Images from decoders of the crate `image`, and formats whose decoders are called here and not by it.
 //!
 //! OpenEXR files: colour, or luminance alone.
 //!

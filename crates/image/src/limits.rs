@@ -1,4 +1,4 @@
-//! What an image may take, how coarse it may be for that, and refusals of those that take more.
+//! Limits of what an image may take, the coarseness that it may have for that, and refusals of those that take more.
 
 /// Side of the largest image that is decoded (texels).
 pub const MOST_SIDE: u64 = 32_768;

@@ -1,5 +1,5 @@
-//! What a sensor's own noise hides: its temporal variance at a signal, beside which an error of the light
-//! is small or is not.
+//! The noise floor of a sensor, which hides what is below it: its temporal variance at a signal, against which an error
+//! of the light is small or is not.
 
 use crate::Sensor;
 use crate::normal::normal_cdf;

@@ -93,7 +93,7 @@ pub struct Image {
     pub dropped: u64,
 }
 
-/// Why an image could not be decoded.
+/// The reason why an image could not be decoded.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
@@ -102,7 +102,7 @@ pub enum ImageError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause of the error.
         source: std::io::Error,
     },
     /// The bytes are no image that we read, or a broken one.
@@ -110,7 +110,7 @@ pub enum ImageError {
     Decode {
         /// Name of the texture.
         name: String,
-        /// Why.
+        /// Cause of the error.
         source: DecodeError,
     },
 }

@@ -1,11 +1,11 @@
-//! Where the library is, and the calls of `oidn.h` that are made: those of versions 1.4 and 2, which differ in names
+//! Place of the library, and the calls of `oidn.h` that are made: those of versions 1.4 and 2, which differ in names
 //! alone. Also what may go wrong with it.
 
 use std::ffi::{OsStr, OsString, c_char, c_int, c_void};
 
 use libloading::{Error, Library};
 
-/// Why a picture was not denoised.
+/// The reason why a picture was not denoised.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OidnError {
@@ -16,7 +16,7 @@ pub enum OidnError {
          name its library by the environment variable ETENDUE_OIDN where the dynamic loader does not find it"
     )]
     Missing,
-    /// What was named is no such library, or lacks something itself.
+    /// The file that was named is no such library, or lacks something itself.
     #[error(
         "{library} cannot be used as Open Image Denoise ({why}); let ETENDUE_OIDN name the file \
          libOpenImageDenoise.so.2 of version 1.4 or later, beside the libraries that came with it"
@@ -24,7 +24,7 @@ pub enum OidnError {
     Unusable {
         /// The library.
         library: String,
-        /// What the dynamic loader or the library says.
+        /// The message of the dynamic loader or the library.
         why: String,
     },
     /// The library failed at its work.
@@ -32,7 +32,7 @@ pub enum OidnError {
     Failed {
         /// Its version.
         version: String,
-        /// What it says.
+        /// Its message.
         why: String,
     },
     /// An image has another number of values than its pixels take.
@@ -42,13 +42,13 @@ pub enum OidnError {
         width: usize,
         /// Rows.
         height: usize,
-        /// What there is.
+        /// Number of values that there are.
         found: usize,
     },
 }
 
 impl OidnError {
-    /// Whether the caller can mend it: by another library, or by installing one.
+    /// True if the caller can mend it: by another library, or by installing one.
     #[must_use]
     pub fn is_refused(&self) -> bool {
         matches!(self, Self::Missing | Self::Unusable { .. })

@@ -19,7 +19,7 @@ use api::Api;
 
 pub use api::OidnError;
 
-/// What is known of the first surfaces that a picture shows. Each image has three values a pixel, row by
+/// Knowledge of the first surfaces that a picture shows. Each image has three values a pixel, row by
 /// row, and may have noise of its own.
 #[derive(Debug, Clone)]
 pub struct Guides {
@@ -139,7 +139,7 @@ impl Denoiser {
         filter.run()
     }
 
-    /// What the library says has failed since it was last asked.
+    /// The failure that the library reports since it was last asked.
     fn error(&self) -> Option<String> {
         let mut message: *const c_char = ptr::null();
         // SAFETY: the device is valid, and `message` takes a pointer to a string of the library's, which is
@@ -167,7 +167,7 @@ impl Drop for Denoiser {
     }
 }
 
-/// Where the values of an image of this size are.
+/// Pointer to the values of an image of this size.
 fn checked([width, height]: [usize; 2], image: &mut [f32]) -> Result<*mut f32, OidnError> {
     let wanted = width.checked_mul(height).and_then(|pixels| pixels.checked_mul(3));
     match wanted {

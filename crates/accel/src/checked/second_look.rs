@@ -11,7 +11,7 @@ use crate::single::{F32Frame, Rays32};
 /// Bundles around a ray before it is believed to miss.
 const TURNS: u32 = 4;
 
-/// What looks again at rays of a scene.
+/// The second look at rays of a scene.
 #[derive(Clone, Copy)]
 pub(super) struct SecondLook<'a> {
     pub(super) scene: &'a CommittedScene,

@@ -4,7 +4,8 @@ use etendue_geometry::RayBlock;
 use etendue_geometry::block::vector;
 use etendue_geometry::glam::DVec3;
 
-use super::MOST_TRIANGLES;
+/// Scenes of more triangles are traced by trees.
+pub(super) const MOST_TRIANGLES: usize = 64;
 
 /// Edges held against a line side by side.
 const WIDTH: usize = 8;

@@ -1,4 +1,4 @@
-//! What trees are built of: boxes of things, boxes around many of them, and nodes.
+//! Parts of which trees are built: boxes of things, boxes that hold many of them, and nodes.
 
 use bytemuck::{Pod, Zeroable};
 use etendue_geometry::glam::{Vec3, Vec4};

@@ -23,7 +23,7 @@ const FEW: u64 = 64;
 /// of the way, and the far side of each body is a fifth farther at least.
 const PAST: f64 = 1.1;
 
-/// What rays are aimed at.
+/// The parts of a body that rays are aimed at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Target {
     /// Places on edges, from a two-thousandth of their length to the middle.
@@ -42,7 +42,7 @@ struct Aimed {
     rays: RayBatch,
     /// The same that end behind what they are aimed at, before the far side.
     ended: RayBatch,
-    /// How far it is to what each is aimed at (m).
+    /// The distance to what each is aimed at (m).
     distances: Vec<f64>,
 }
 
@@ -76,7 +76,8 @@ impl Aimed {
         aimed
     }
 
-    /// How many get past what they are aimed at by their closest hits, and how many are told that nothing is in the way.
+    /// Number of rays that get past what they are aimed at by their closest hits, and number of those for which nothing
+    /// is found in the way.
     fn past(&self, blocks: &dyn BlockAccel, coherent: bool) -> [usize; 2] {
         let [mut rays, mut shadows] = [RayBlocks::default(), RayBlocks::default()];
         blocks.convert(&self.rays, &mut rays);
@@ -120,7 +121,7 @@ fn cube(n: u32) -> Mesh {
     mesh("cube", &corners, triangles)
 }
 
-/// Where bodies stand: at the origin, beside it and far from it; small and large; turned, stretched and mirrored.
+/// Placements of bodies: at the origin, near it and far from it; small and large; turned, stretched and mirrored.
 fn places() -> [Transform; 5] {
     let turned = DQuat::from_rotation_y(0.7);
     [

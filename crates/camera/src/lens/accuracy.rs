@@ -1,10 +1,8 @@
-//! Numbers of a camera with a lens that trade accuracy for time, and the camera by others than its own.
+//! Numbers of a camera with a lens that trade accuracy for time.
 
 use etendue_optics::analysis::between::WAVEFRONT_ERROR;
-use etendue_optics::train::pupil::{PupilAccuracy, without_dimming};
+use etendue_optics::train::pupil::PupilAccuracy;
 
-use super::chief::ImageCircle;
-use super::lens_camera::LensCamera;
 use super::nodes::SharingLimits;
 
 /// Numbers of a camera with a lens that trade accuracy for time.
@@ -37,36 +35,4 @@ impl LensAccuracy {
         waves: WaveAccuracy { wavelengths: 3, error: WAVEFRONT_ERROR },
         fit_places: 33,
     };
-}
-
-impl LensCamera {
-    /// The numbers by which it is measured.
-    #[must_use]
-    pub fn accuracy(&self) -> LensAccuracy {
-        self.accuracy
-    }
-
-    /// Returns the camera measured by other numbers. What was measured of its pupil stays where they are the same.
-    pub(crate) fn with_accuracy(&self, accuracy: LensAccuracy) -> Self {
-        let mut own = self.clone();
-        if accuracy != self.accuracy {
-            own.opened = None;
-        }
-        let error = accuracy.pupil.image_circle;
-        if error != self.accuracy.pupil.image_circle {
-            own.lit = self.lit_within(error);
-        }
-        own.accuracy = accuracy;
-        own
-    }
-
-    /// The region of the sensor where light arrives, its edge to within a share of its distance.
-    fn lit_within(&self, error: f64) -> ImageCircle {
-        let train = without_dimming(&self.focused.train().without_arrays());
-        let film = self.focused.film();
-        match train.at(train.wavelength()) {
-            Ok(clear) => ImageCircle::measure(&train, &clear, film.frame, film.half_size(), error),
-            Err(_) => self.lit.clone(),
-        }
-    }
 }

@@ -1,13 +1,13 @@
 //! Rays of the scene that all bands share, and where each band's light of them lands ([`band_paths`](super::band_paths)
 //! has why).
 
-use etendue_optics::element::{Block, Clip, LANES, LensRays, RayStatus};
+use etendue_optics::element::{Clip, LANES, LensRays, RayStatus};
 use etendue_optics::train::{RimTrace, Side};
-use glam::DVec3;
 
-use self::block::{BlockLandings, LandingContext};
+use self::block::{BlockLandings, LandingContext, NOWHERE, StartArea, TracedRays};
 use super::lens_camera::LensCamera;
-use super::opened::{BandInterpolation, place_of};
+use super::nodes::place_of;
+use super::opened::BandInterpolation;
 use crate::{CameraRays, FilmSamples, Pose};
 
 mod block;
@@ -31,25 +31,6 @@ pub struct BandLandings {
     block: BlockLandings,
 }
 
-/// Rays that leave the lens at one node, and where they end at all of them.
-#[derive(Debug, Clone, Default)]
-struct TracedRays {
-    /// Number among the rays that leave the camera.
-    ray: Vec<usize>,
-    /// Where it leaves the lens (mm), its direction, its weight before the lens, and its node.
-    points: Vec<DVec3>,
-    directions: Vec<DVec3>,
-    weights: Vec<f64>,
-    leading: Vec<usize>,
-    /// True of one that keeps away from rims by more than wavelengths part, as was found at its node.
-    is_inner: Vec<bool>,
-    /// True of one that passes at all wavelengths, as far as was found at other nodes.
-    is_within: Vec<bool>,
-    /// `[ray][node]`: the place (pixels), and the share that the lens passes, 0 where it ends.
-    places: Vec<[f64; 2]>,
-    shares: Vec<f64>,
-}
-
 /// Ray that may end at some wavelengths.
 #[derive(Debug, Clone)]
 struct Stray {
@@ -65,38 +46,7 @@ struct Stray {
 
 impl BandLandings {
     /// No pixel.
-    pub const NOWHERE: u32 = u32::MAX;
-}
-
-/// The film, and the margin beside it from which rays start (pixels).
-#[derive(Debug, Clone, Copy)]
-pub(super) struct StartArea {
-    pub(super) resolution: [u32; 2],
-    pub(super) margin: f64,
-}
-
-impl StartArea {
-    /// True if a place is on the film.
-    fn is_seen(&self, [x, y]: [f64; 2]) -> bool {
-        let [width, height] = self.size();
-        x >= 0.0 && y >= 0.0 && x < width && y < height
-    }
-
-    /// Width and height of the film.
-    fn size(&self) -> [f64; 2] {
-        self.resolution.map(f64::from)
-    }
-
-    /// The lowest places from which rays start, and the first beyond the highest.
-    fn bounds(&self) -> [[f64; 2]; 2] {
-        [[-self.margin; 2], self.size().map(|side| side + self.margin)]
-    }
-
-    /// Index of the pixel in which a place of the film lies.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "of a picture")]
-    fn pixel_at(&self, [x, y]: [f64; 2]) -> u32 {
-        y as u32 * self.resolution[0] + x as u32
-    }
+    pub const NOWHERE: u32 = NOWHERE;
 }
 
 impl LensCamera {
@@ -215,46 +165,6 @@ impl LensCamera {
                 }
             }
         }
-    }
-}
-
-impl TracedRays {
-    fn clear(&mut self) {
-        self.ray.clear();
-        self.points.clear();
-        self.directions.clear();
-        self.weights.clear();
-        self.leading.clear();
-        self.is_inner.clear();
-        self.is_within.clear();
-        self.places.clear();
-        self.shares.clear();
-    }
-
-    /// Appends the ray in a lane of a block that left the lens at a node of so many: `ray` of those that leave the camera,
-    /// which started from a place of the film (pixels) with a weight, and surely passes at all wavelengths, or may by what is
-    /// found at other nodes.
-    fn push(
-        &mut self,
-        (ray, [is_inner, is_within]): (usize, [bool; 2]),
-        [node, nodes]: [usize; 2],
-        (place, weight): ([f64; 2], f64),
-        block: &Block,
-        lane: usize,
-    ) {
-        let vector = |axes: &[[f64; LANES]; 3]| DVec3::from_array(axes.map(|axis| axis[lane]));
-        self.ray.push(ray);
-        self.is_inner.push(is_inner);
-        self.is_within.push(is_within);
-        self.points.push(vector(&block.position));
-        self.directions.push(vector(&block.direction));
-        self.weights.push(weight);
-        self.leading.push(node);
-        let end = self.places.len();
-        self.places.resize(end + nodes, [f64::NAN; 2]);
-        self.shares.resize(end + nodes, 0.0);
-        self.places[end + node] = place;
-        self.shares[end + node] = block.throughput[lane] / weight;
     }
 }
 

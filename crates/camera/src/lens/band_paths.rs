@@ -44,14 +44,15 @@ use etendue_optics::element::{Clip, LensRays, Opening, RayStatus};
 use etendue_optics::train::pupil::without_filters;
 use etendue_optics::train::{Element, MonochromaticTrain, Side};
 use etendue_spectrum::{Bands, Spread};
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2};
 
+use super::displacements::{Displacements, MOST_WAVELENGTHS};
 use super::lens_camera::LensCamera;
 use super::nodes::{
     BandWeights, MOST_NODES, NextTerm, NodeWeights, RayOff, Variable, WeightBounds,
 };
 use super::opened::{BandInterpolation, filtered};
-use super::rims::RimBounds;
+use super::rims::{RimBounds, SAFETY, SceneRay};
 use super::traced_at::TracedAt;
 
 /// Wavelengths at which interpolation is checked, at most. Not a setting, as the places and directions: how near places
@@ -68,9 +69,6 @@ const FEWEST: usize = 32;
 /// The farthest that the places of one ray may part (rows of pixels): the sums of so many more are
 /// kept from other threads. Not a setting: where they part farther, each band is traced by itself, as accurately.
 const FARTHEST: f64 = 32.0;
-
-/// Factor on the measured parting of places, on the film and at rims, which may be greater in between.
-pub(super) const SAFETY: f64 = 1.25;
 
 /// Sharing of rays among bands, as measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -236,6 +234,30 @@ impl LensCamera {
         ))
     }
 
+    /// Adds the displacements between its wavelengths to what is known of `paths`, where they will do.
+    pub(super) fn displaced(&self, mut paths: BandInterpolation) -> BandInterpolation {
+        paths.displacements = self.displacements(&paths);
+        let error = paths.displacements.as_ref().map_or(0.0, |known| known.error);
+        paths.error += paths.bounds.magnified() * error / self.focused.film().pitch;
+        paths
+    }
+
+    /// Measures the displacements between the wavelengths of `paths`; `None` where these would be off by more than
+    /// there is left of what places may be, or are dear, or where it is not known which rays keep away from rims.
+    fn displacements(&self, paths: &BandInterpolation) -> Option<Displacements> {
+        paths.rims.as_ref()?;
+        let BandInterpolation { nodes, has_losses, lead, error, .. } = paths;
+        let film = self.focused.film();
+        let is_square = film.frame.rotation == DMat3::IDENTITY;
+        if *has_losses || !is_square || !(2..=MOST_WAVELENGTHS).contains(&nodes.len()) {
+            return None;
+        }
+        let rays = self.rays_to_measure(&nodes[nodes.len() / 2]);
+        let found = Displacements::fitted(nodes, &rays, *lead, self.focused.sensor_z())?;
+        let all = error + paths.bounds.magnified() * found.error / film.pitch;
+        (all <= self.accuracy.sharing.places).then_some(found)
+    }
+
     /// Weights of the nodes `chosen`, and what filters pass, by band and by wavelength that it is drawn from.
     fn band_weights(
         &self,
@@ -259,7 +281,7 @@ impl LensCamera {
 
     /// Rays that leave the lens at one wavelength, from all over the film and the
     /// pupil.
-    pub(super) fn rays_to_measure(&self, lens: &MonochromaticTrain) -> Vec<SceneRay> {
+    fn rays_to_measure(&self, lens: &MonochromaticTrain) -> Vec<SceneRay> {
         let film = self.focused.film();
         let train = self.focused.train();
         let rim = train.elements().last().map_or(f64::INFINITY, |e| e.clear_radius());
@@ -342,14 +364,6 @@ fn parting(landed: &[Landings]) -> f64 {
 fn greatest(errors: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
     let worse = |a: f64, b: f64| if b.is_nan() { f64::INFINITY } else { a.max(b) };
     errors.fold([0.0; 2], |[a, b], [c, d]| [worse(a, c), worse(b, d)])
-}
-
-/// A ray of the scene.
-#[derive(Clone, Copy)]
-pub(super) struct SceneRay {
-    /// A point on it (mm).
-    pub(super) point: DVec3,
-    pub(super) direction: DVec3,
 }
 
 /// Rays of the scene, and their landing points at the nodes.

@@ -1,4 +1,5 @@
-//! Where rays that land on the film at one wavelength land at another, without tracing them there.
+//! Displacements of rays from where they land on the film at one wavelength to where they land at another, without
+//! tracing them there.
 //!
 //! Both places lie within a pixel or a few, and the vector between them is that of a lens with axial symmetry: with the
 //! place h on the film and the ray's slopes r there, both from the axis, `h P(h², h·r, r²) + r Q(h², h·r, r²)`. P and
@@ -12,14 +13,12 @@
 use etendue_optics::analysis::least_squares::LeastSquares;
 use etendue_optics::element::{Block, Clip, LANES, RayStatus};
 use etendue_optics::train::{MonochromaticTrain, Side};
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
-use super::band_paths::SceneRay;
-use super::lens_camera::LensCamera;
-use super::opened::BandInterpolation;
+use super::rims::SceneRay;
 
 /// More wavelengths than these take as long to fit as many rays take to be traced. Not a setting: it changes time alone.
-const MOST_WAVELENGTHS: usize = 4;
+pub(super) const MOST_WAVELENGTHS: usize = 4;
 
 /// Rays that are fitted to, about.
 const RAYS: usize = 2500;
@@ -34,7 +33,7 @@ pub(super) struct Displacements {
     /// `[from][to]`.
     shifts: Vec<Vec<Shift>>,
     /// Greatest distance from where fitted rays land (mm).
-    error: f64,
+    pub(super) error: f64,
 }
 
 /// Units of places and slopes, in which both are numbers of about one.
@@ -61,35 +60,24 @@ struct FilmEnd {
     slopes: DVec2,
 }
 
-impl LensCamera {
-    /// Adds the displacements between its wavelengths to what is known of `paths`, where they will do.
-    pub(super) fn displaced(&self, mut paths: BandInterpolation) -> BandInterpolation {
-        paths.displacements = self.displacements(&paths);
-        let error = paths.displacements.as_ref().map_or(0.0, |known| known.error);
-        paths.error += paths.bounds.magnified() * error / self.focused.film().pitch;
-        paths
-    }
-
-    /// Measures the displacements between the wavelengths of `paths`; `None` where these would be off by more than
-    /// there is left of what places may be, or are dear, or where it is not known which rays keep away from rims.
-    fn displacements(&self, paths: &BandInterpolation) -> Option<Displacements> {
-        paths.rims.as_ref()?;
-        let BandInterpolation { nodes, has_losses, lead, error, .. } = paths;
-        let film = self.focused.film();
-        let is_square = film.frame.rotation == DMat3::IDENTITY;
-        if *has_losses || !is_square || !(2..=MOST_WAVELENGTHS).contains(&nodes.len()) {
-            return None;
-        }
-        // Rays of the scene, and where they end at each wavelength: those that pass at all of them.
-        let rays = self.rays_to_measure(&nodes[nodes.len() / 2]);
+impl Displacements {
+    /// Fits them to rays of the scene that come back into the lens at each wavelength from `lead` (mm) in front of where
+    /// they left it, to a film at `sensor_z` (mm); `None` where these do not tell them.
+    pub(super) fn fitted(
+        nodes: &[MonochromaticTrain],
+        rays: &[SceneRay],
+        lead: f64,
+        sensor_z: f64,
+    ) -> Option<Self> {
+        // Where they end at each wavelength: those that pass at all of them.
         let step = rays.len().div_ceil(RAYS).max(1);
         let ends_of = |&SceneRay { point, direction }: &SceneRay| -> Option<Vec<FilmEnd>> {
-            let start = point + direction * *lead;
-            nodes.iter().map(|lens| self.film_end(lens, start, -direction)).collect()
+            let start = point + direction * lead;
+            nodes.iter().map(|lens| film_end(lens, start, -direction, sensor_z)).collect()
         };
         let ends: Vec<Vec<FilmEnd>> = rays.iter().step_by(step).filter_map(ends_of).collect();
         let scales = Scales::of(&ends)?;
-        let mut found = Displacements { scales, shifts: Vec::new(), error: 0.0 };
+        let mut found = Self { scales, shifts: Vec::new(), error: 0.0 };
         for from in 0..nodes.len() {
             let to = |to: usize| {
                 if to == from {
@@ -102,24 +90,9 @@ impl LensCamera {
             found.error = pairs.iter().fold(found.error, |most, (_, error)| most.max(*error));
             found.shifts.push(pairs.into_iter().map(|(shift, _)| shift).collect());
         }
-        let all = error + paths.bounds.magnified() * found.error / film.pitch;
-        (all <= self.accuracy.sharing.places).then_some(found)
+        Some(found)
     }
 
-    /// End of a ray of the scene on the film; `None` where it ends before.
-    fn film_end(&self, lens: &MonochromaticTrain, start: DVec3, way: DVec3) -> Option<FilmEnd> {
-        let path = lens.path(Side::Object, Clip::On, start, way);
-        let (last, direction) = (path.points.last()?, path.direction?);
-        if path.status != RayStatus::Exited {
-            return None;
-        }
-        let slopes = direction.truncate() / direction.z;
-        let place = last.truncate() + slopes * (self.focused.sensor_z() - last.z);
-        (place.is_finite() && slopes.is_finite()).then_some(FilmEnd { place, slopes })
-    }
-}
-
-impl Displacements {
     /// Moves the places of a block's rays from where they land at one wavelength to where they land at another, by how they
     /// start from the film: `scale` units of each axis are a mm.
     pub(super) fn displace(
@@ -131,6 +104,18 @@ impl Displacements {
     ) {
         displace_block(&self.scales, &self.shifts[from][to], block, scale, places);
     }
+}
+
+/// End of a ray of the scene on a film at `sensor_z` (mm); `None` where it ends before.
+fn film_end(lens: &MonochromaticTrain, start: DVec3, way: DVec3, sensor_z: f64) -> Option<FilmEnd> {
+    let path = lens.path(Side::Object, Clip::On, start, way);
+    let (last, direction) = (path.points.last()?, path.direction?);
+    if path.status != RayStatus::Exited {
+        return None;
+    }
+    let slopes = direction.truncate() / direction.z;
+    let place = last.truncate() + slopes * (sensor_z - last.z);
+    (place.is_finite() && slopes.is_finite()).then_some(FilmEnd { place, slopes })
 }
 
 impl Scales {

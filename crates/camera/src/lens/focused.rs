@@ -5,7 +5,8 @@ use glam::{DVec2, DVec3};
 use super::source::Setup;
 use crate::{CameraError, Intrinsics};
 use etendue_optics::element::Frame;
-use etendue_optics::train::analysis::chief_height;
+use etendue_optics::train::analysis::{chief_height, projected_solid_angle};
+use etendue_optics::train::pupil::{Disk, without_dimming};
 use etendue_optics::train::{
     Focus, FocusError, LensError, MonochromaticTrain, OpticalTrain, Paraxial, SensorMount,
 };
@@ -325,4 +326,37 @@ pub(crate) fn positive(value: Option<f64>, key: &str) -> Result<f64, CameraError
         return Ok(value);
     }
     Err(CameraError::new(key, format!("{value} is not above zero")))
+}
+
+/// The pupil as seen from the axis with all filters and masks clear; from elsewhere when the axis is
+/// dark.
+pub(super) fn unvignetted(
+    train: &OpticalTrain,
+    at: &MonochromaticTrain,
+    focused: &FocusedLens,
+) -> f64 {
+    if let Some(view) = train.behind_lenslets() {
+        return view.solid_angle(focused.sensor_z()) * at.index_before_sensor().powi(2);
+    }
+    let clear = without_dimming(train);
+    let lens = clear.at(at.wavelength()).unwrap_or_else(|_| at.clone());
+    let z = focused.sensor_z();
+    let half = focused.film().half_size();
+    let disk = Disk::of(&clear, &focused.film().frame, half);
+    if let Some(angle) = disk.and_then(|disk| disk.solid_angle_from(z)) {
+        return angle * lens.index_before_sensor().powi(2);
+    }
+    let on_axis = projected_solid_angle(&clear, &lens, DVec3::new(0.0, 0.0, z));
+    if on_axis > 0.0 {
+        return on_axis;
+    }
+    let mut widest = 0.0_f64;
+    for y in [-1.0, -0.5, 0.0, 0.5, 1.0] {
+        for x in [-1.0, -0.5, 0.0, 0.5, 1.0] {
+            let film = (DVec2::new(x, y) * half).extend(0.0);
+            let point = focused.film().frame.point(film);
+            widest = widest.max(projected_solid_angle(&clear, &lens, point));
+        }
+    }
+    widest
 }

@@ -18,13 +18,12 @@ use glam::{DVec2, DVec3};
 
 use super::accuracy::LensAccuracy;
 use super::chief::{ChiefTable, ImageCircle, LensletChiefs};
-use super::focused::{FocusedLens, View};
+use super::focused::{FocusedLens, View, unvignetted};
 use super::opened::{BandInterpolation, OpenedGroup, OpenedLens, uniform_filters};
 use super::traced_at::{BandGroup, TracedAt, grouped};
 
 use crate::{CameraError, Pose};
 use etendue_optics::element::{Clip, Ray, RayStatus, Reflection};
-use etendue_optics::train::analysis::projected_solid_angle;
 use etendue_optics::train::pupil::{
     Disk, SlopeWindow, blocked, dark_array, unbounded, without_dimming, without_filters,
 };
@@ -138,6 +137,36 @@ impl LensCamera {
     /// The lens at its design wavelength.
     pub(super) fn design(&self) -> &MonochromaticTrain {
         &self.design
+    }
+
+    /// The numbers by which it is measured.
+    #[must_use]
+    pub fn accuracy(&self) -> LensAccuracy {
+        self.accuracy
+    }
+
+    /// Returns the camera measured by other numbers. What was measured of its pupil stays where they are the same.
+    pub(crate) fn with_accuracy(&self, accuracy: LensAccuracy) -> Self {
+        let mut own = self.clone();
+        if accuracy != self.accuracy {
+            own.opened = None;
+        }
+        let error = accuracy.pupil.image_circle;
+        if error != self.accuracy.pupil.image_circle {
+            own.lit = self.lit_within(error);
+        }
+        own.accuracy = accuracy;
+        own
+    }
+
+    /// The region of the sensor where light arrives, its edge to within a share of its distance.
+    fn lit_within(&self, error: f64) -> ImageCircle {
+        let train = without_dimming(&self.focused.train().without_arrays());
+        let film = self.focused.film();
+        match train.at(train.wavelength()) {
+            Ok(clear) => ImageCircle::measure(&train, &clear, film.frame, film.half_size(), error),
+            Err(_) => self.lit.clone(),
+        }
     }
 
     /// Returns the camera on pixels `factor` times as large: what was measured of the pupil holds for them too.
@@ -456,33 +485,4 @@ impl LensCamera {
             groups.flat_map(|group| self.spread(bands, &group).wavelengths).collect();
         self.focused.train().outside_of_range(&wavelengths)
     }
-}
-
-/// The pupil as seen from the axis with all filters and masks clear; from elsewhere when the axis is
-/// dark.
-fn unvignetted(train: &OpticalTrain, at: &MonochromaticTrain, focused: &FocusedLens) -> f64 {
-    if let Some(view) = train.behind_lenslets() {
-        return view.solid_angle(focused.sensor_z()) * at.index_before_sensor().powi(2);
-    }
-    let clear = without_dimming(train);
-    let lens = clear.at(at.wavelength()).unwrap_or_else(|_| at.clone());
-    let z = focused.sensor_z();
-    let half = focused.film().half_size();
-    let disk = Disk::of(&clear, &focused.film().frame, half);
-    if let Some(angle) = disk.and_then(|disk| disk.solid_angle_from(z)) {
-        return angle * lens.index_before_sensor().powi(2);
-    }
-    let on_axis = projected_solid_angle(&clear, &lens, DVec3::new(0.0, 0.0, z));
-    if on_axis > 0.0 {
-        return on_axis;
-    }
-    let mut widest = 0.0_f64;
-    for y in [-1.0, -0.5, 0.0, 0.5, 1.0] {
-        for x in [-1.0, -0.5, 0.0, 0.5, 1.0] {
-            let film = (DVec2::new(x, y) * half).extend(0.0);
-            let point = focused.film().frame.point(film);
-            widest = widest.max(projected_solid_angle(&clear, &lens, point));
-        }
-    }
-    widest
 }

@@ -5,8 +5,6 @@ use etendue_optics::element::LANES;
 use etendue_optics::train::OpticalTrain;
 use glam::DVec2;
 
-use super::opened::place_of;
-
 type Row = [f64; LANES];
 
 /// The most wavelengths that a ray is traced at.
@@ -41,7 +39,7 @@ pub(super) struct NodeWeights {
 #[derive(Debug)]
 pub(super) struct BandWeights {
     bands: usize,
-    /// Where some band's wavelength gives way to its next.
+    /// Places in the spectrum where some band's wavelength gives way to its next.
     ends: Vec<f64>,
     /// `[stretch][row][band]`, the rows being the nodes, the [`NextTerm`] and the filters.
     rows: Vec<f64>,
@@ -85,6 +83,16 @@ impl BandWeights {
         }
         &self.rows[stretch * self.stretch..][..self.stretch]
     }
+}
+
+/// Index of the one of `count` equal parts of 0..1 in which a number lies.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "at most a few dozen lenses"
+)]
+pub(super) fn place_of(u: f64, count: usize) -> usize {
+    ((u * count as f64) as usize).min(count - 1)
 }
 
 /// Bounds of the weights of all wavelengths between nodes.

@@ -6,7 +6,7 @@ use etendue_optics::train::{ExitPupil, MonochromaticTrain, OpticalTrain};
 use etendue_spectrum::{Bands, Curve, Outside, Spread};
 
 use super::displacements::Displacements;
-use super::nodes::{BandWeights, NextTerm, WeightBounds};
+use super::nodes::{BandWeights, NextTerm, WeightBounds, place_of};
 use super::rims::RimBounds;
 
 /// Wavelengths of a wide band at which rays near rims are looked at. More leave blocks of rays that are traced together
@@ -117,16 +117,6 @@ fn few_of(wavelengths: &[f64]) -> Option<Vec<f64>> {
         parts.sum::<f64>() / share
     };
     Some((0..FEW).map(mean).collect())
-}
-
-/// Index of the one of `count` equal parts of 0..1 in which a number lies.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "at most a few dozen lenses"
-)]
-pub(super) fn place_of(u: f64, count: usize) -> usize {
-    ((u * count as f64) as usize).min(count - 1)
 }
 
 /// Curves of filters that are the same all over and pass some wavelengths better than others.

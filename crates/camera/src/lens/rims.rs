@@ -12,13 +12,22 @@ use etendue_optics::element::{Clip, LensRays, RayStatus};
 use etendue_optics::train::{MonochromaticTrain, OpticalTrain, RimTrace, Side};
 use glam::DVec3;
 
-use super::band_paths::{SAFETY, SceneRay};
+/// Factor on the measured parting of places, on the film and at rims, which may be greater in between.
+pub(super) const SAFETY: f64 = 1.25;
 
 /// Rays by which it is measured how far wavelengths part at rims, about.
 const RAYS: usize = 1000;
 
 /// To look at each node whether a ray keeps away from rims takes about as long as to trace it so many times.
 const TRACES: usize = 4;
+
+/// A ray of the scene.
+#[derive(Clone, Copy)]
+pub(super) struct SceneRay {
+    /// A point on it (mm).
+    pub(super) point: DVec3,
+    pub(super) direction: DVec3,
+}
 
 /// A lens with wider and with narrower rims than it has.
 #[derive(Debug)]

@@ -1,4 +1,4 @@
-//! What a calibration set is to hold.
+//! Options of a calibration set: what it is to hold.
 
 use etendue_render::output::Outputs;
 use etendue_sensor::{Packing, Window};

@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 
-use super::corners;
 use crate::batch::PlacedTriangle;
 use crate::{Bounds, Geometry};
 
@@ -15,7 +14,7 @@ pub(super) struct Overlaps {
     /// The axis along which they reach farthest, by whose lower ends they are in order; and how wide the widest is.
     axis: usize,
     widest: f64,
-    /// Where they are; `None` of a few.
+    /// Grid of the places that they cover; `None` where they are few.
     grid: Option<OverlapGrid>,
 }
 
@@ -106,6 +105,13 @@ impl Overlaps {
         let near = self.all[first..].iter().zip(near);
         near.filter(move |(_, own)| is_near(own, point, slack)).map(|(&other, _)| other)
     }
+}
+
+/// The corners of a triangle where it stands (m).
+pub(super) fn corners(geometry: &Geometry, [placement, triangle]: PlacedTriangle) -> [DVec3; 3] {
+    let placement = &geometry.placements[placement as usize];
+    let mesh = geometry.mesh_of(placement);
+    mesh.corners(triangle as usize).map(|corner| placement.world_from_mesh.point(corner))
 }
 
 /// True if a point comes within `slack` of a box (m).

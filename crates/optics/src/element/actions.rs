@@ -1,4 +1,4 @@
-//! What a part does to light: its power, and its actions on light of either side.
+//! Effect of a part on light: its power, and its actions on light of either side.
 
 use std::sync::Arc;
 

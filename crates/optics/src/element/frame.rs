@@ -1,4 +1,4 @@
-//! Where an element stands: on the axis, or tilted and decentred.
+//! Placement of an element: on the axis, or tilted and decentred.
 
 use glam::{DMat3, DVec3};
 

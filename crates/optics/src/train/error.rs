@@ -1,4 +1,4 @@
-//! What is wrong with a lens file.
+//! Errors of a lens file.
 
 use crate::glass::GlassError;
 

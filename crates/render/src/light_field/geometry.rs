@@ -29,7 +29,7 @@ pub(super) struct LightFieldGeometry {
     cols: u32,
     /// Views along each side.
     views: u32,
-    /// Why there are no views, where there are none.
+    /// The reason why there are no views, where there are none.
     no_views: Option<String>,
     /// From a view to the next on the sensor.
     step_px: f64,
@@ -61,7 +61,7 @@ pub(super) struct LightFieldGeometry {
     refocused_m: Option<f64>,
     /// Facts by which a camera without views has its refocused picture from patches of the raw one.
     patches: Option<PatchFacts>,
-    /// Why it has none.
+    /// The reason why the camera has no such patches.
     no_patches: Option<String>,
     about: [&'static str; 6],
 }

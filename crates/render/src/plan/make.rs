@@ -1,4 +1,4 @@
-//! How a plan is made: all decisions, one after the other.
+//! Construction of a plan: all decisions, one after the other.
 
 use std::ops::Range;
 

@@ -34,7 +34,7 @@ use crate::{BandPaths, Plan, RenderError};
 pub use super::full_view::scale;
 pub use super::taken::LensModelKind;
 
-/// Why a camera has no models.
+/// The reason why a camera has no models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("there are no models of the camera's lens: {0}")]
 pub struct NoModels(

@@ -1,4 +1,4 @@
-//! What surfaces make of light, as multiples of a few colours.
+//! Factors by which surfaces change light, as multiples of a few colours.
 
 /// A value as multiples of white, the surface's colour and others that follow from it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -1,4 +1,4 @@
-//! What specifications name that stands elsewhere, where it comes from, and faults of values.
+//! Files and glasses that specifications name and that stand elsewhere, their source, and faults of values.
 
 use std::path::PathBuf;
 
@@ -73,7 +73,7 @@ pub struct ImageSpec {
 pub struct Fault {
     /// The key below the material or light.
     pub key: String,
-    /// Why.
+    /// The reason.
     pub why: String,
 }
 

@@ -150,7 +150,7 @@ pub enum PathRays<'a> {
     Blocks {
         /// Their number.
         len: usize,
-        /// Where they start.
+        /// The point where they start.
         from: DVec3,
     },
 }

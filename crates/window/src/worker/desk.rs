@@ -1,4 +1,4 @@
-//! What the window and the thread that renders tell one another.
+//! Messages between the window and the thread that renders.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;

@@ -1,18 +1,52 @@
-//! Landings of the rays of a block, side by side.
+//! Landings of the rays of a block, side by side: where rays start, those that are traced, and where they land.
 
 use std::ops::Range;
 
 use etendue_optics::element::{Block, LANES};
 use etendue_optics::train::RimTrace;
+use glam::DVec3;
 
-use super::{BandLandings, StartArea, TracedRays};
 use crate::FilmSamples;
 use crate::lens::nodes::{MOST_NODES, NextTerm};
 use crate::lens::opened::BandInterpolation;
 
 type Row = [f64; LANES];
 
-/// What the places of rays on the film follow from.
+/// No pixel.
+pub(super) const NOWHERE: u32 = u32::MAX;
+
+/// The film, and the margin beside it from which rays start (pixels).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StartArea {
+    pub(super) resolution: [u32; 2],
+    pub(super) margin: f64,
+}
+
+impl StartArea {
+    /// True if a place is on the film.
+    pub(super) fn is_seen(&self, [x, y]: [f64; 2]) -> bool {
+        let [width, height] = self.size();
+        x >= 0.0 && y >= 0.0 && x < width && y < height
+    }
+
+    /// Width and height of the film.
+    pub(super) fn size(&self) -> [f64; 2] {
+        self.resolution.map(f64::from)
+    }
+
+    /// The lowest places from which rays start, and the first beyond the highest.
+    pub(super) fn bounds(&self) -> [[f64; 2]; 2] {
+        [[-self.margin; 2], self.size().map(|side| side + self.margin)]
+    }
+
+    /// Index of the pixel in which a place of the film lies.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "of a picture")]
+    pub(super) fn pixel_at(&self, [x, y]: [f64; 2]) -> u32 {
+        y as u32 * self.resolution[0] + x as u32
+    }
+}
+
+/// Data from which the places of rays on the film follow.
 pub(super) struct LandingContext<'a> {
     pub(super) paths: &'a BandInterpolation,
     pub(super) area: &'a StartArea,
@@ -35,13 +69,72 @@ impl LandingContext<'_> {
     }
 }
 
+/// Rays that leave the lens at one node, and where they end at all of them.
+#[derive(Debug, Clone, Default)]
+pub(super) struct TracedRays {
+    /// Number among the rays that leave the camera.
+    pub(super) ray: Vec<usize>,
+    /// The point where it leaves the lens (mm), its direction, its weight before the lens, and its node.
+    pub(super) points: Vec<DVec3>,
+    pub(super) directions: Vec<DVec3>,
+    pub(super) weights: Vec<f64>,
+    pub(super) leading: Vec<usize>,
+    /// True of one that keeps away from rims by more than wavelengths part, as was found at its node.
+    pub(super) is_inner: Vec<bool>,
+    /// True of one that passes at all wavelengths, as far as was found at other nodes.
+    pub(super) is_within: Vec<bool>,
+    /// `[ray][node]`: the place (pixels), and the share that the lens passes, 0 where it ends.
+    pub(super) places: Vec<[f64; 2]>,
+    pub(super) shares: Vec<f64>,
+}
+
+impl TracedRays {
+    pub(super) fn clear(&mut self) {
+        self.ray.clear();
+        self.points.clear();
+        self.directions.clear();
+        self.weights.clear();
+        self.leading.clear();
+        self.is_inner.clear();
+        self.is_within.clear();
+        self.places.clear();
+        self.shares.clear();
+    }
+
+    /// Appends the ray in a lane of a block that left the lens at a node of so many: `ray` of those that leave the camera,
+    /// which started from a place of the film (pixels) with a weight, and surely passes at all wavelengths, or may by what is
+    /// found at other nodes.
+    pub(super) fn push(
+        &mut self,
+        (ray, [is_inner, is_within]): (usize, [bool; 2]),
+        [node, nodes]: [usize; 2],
+        (place, weight): ([f64; 2], f64),
+        block: &Block,
+        lane: usize,
+    ) {
+        let vector = |axes: &[[f64; LANES]; 3]| DVec3::from_array(axes.map(|axis| axis[lane]));
+        self.ray.push(ray);
+        self.is_inner.push(is_inner);
+        self.is_within.push(is_within);
+        self.points.push(vector(&block.position));
+        self.directions.push(vector(&block.direction));
+        self.weights.push(weight);
+        self.leading.push(node);
+        let end = self.places.len();
+        self.places.resize(end + nodes, [f64::NAN; 2]);
+        self.shares.resize(end + nodes, 0.0);
+        self.places[end + node] = place;
+        self.shares[end + node] = block.throughput[lane] / weight;
+    }
+}
+
 /// Rays of a block, and where they land.
 #[derive(Debug, Clone, Default)]
 pub(super) struct BlockLandings {
     /// Places at each node (pixels), and the shares that pass, 0 where a ray ends.
     places: [[Row; 2]; MOST_NODES],
     shares: [Row; MOST_NODES],
-    /// Where rays leave the lens, across its axis (mm).
+    /// Points where rays leave the lens, across its axis (mm).
     points: [Row; 2],
     /// Weights before the lens; and in the mean over the samples of a pixel, but for what the lens passes.
     weights: Row,
@@ -134,14 +227,14 @@ impl BlockLandings {
     /// Computes where each band's light of the rays in these lanes (a bit each) lands, and its weight.
     pub(super) fn place_bands(&mut self, ctx: &LandingContext<'_>, lanes: u32) {
         weigh(self, ctx);
-        let is_one = |lane: usize| u32::from(self.only[lane] != BandLandings::NOWHERE);
+        let is_one = |lane: usize| u32::from(self.only[lane] != NOWHERE);
         let are_one = (0..LANES).fold(0, |all, lane| all | is_one(lane) << lane);
         let lanes = lanes & !are_one;
         if lanes == 0 {
             return;
         }
         let bands = ctx.paths.weights.bands();
-        self.pixel.resize(LANES * bands, BandLandings::NOWHERE);
+        self.pixel.resize(LANES * bands, NOWHERE);
         self.weight.resize(LANES * bands, 0.0);
         match ctx.paths.nodes.len() {
             1 => split::<1>(self, ctx, lanes),
@@ -155,7 +248,7 @@ impl BlockLandings {
     /// Writes the landings of the ray in a lane, band by band.
     pub(super) fn write(&self, lane: usize, pixels: &mut [u32], weights: &mut [f64]) {
         let bands = pixels.len();
-        if self.only[lane] == BandLandings::NOWHERE {
+        if self.only[lane] == NOWHERE {
             pixels.copy_from_slice(&self.pixel[lane * bands..][..bands]);
             weights.copy_from_slice(&self.weight[lane * bands..][..bands]);
         } else {
@@ -186,7 +279,7 @@ fn weigh(rays: &mut BlockLandings, ctx: &LandingContext<'_>) {
         scales[i] = weights[i] * nodes as f64 / makes;
     }
     if !ctx.paths.is_clear() {
-        *only = [BandLandings::NOWHERE; LANES];
+        *only = [NOWHERE; LANES];
         return;
     }
     let [low, high] = ctx.paths.bounds.corners(&places[..nodes], &more(places, points, ctx));
@@ -195,11 +288,8 @@ fn weigh(rays: &mut BlockLandings, ctx: &LandingContext<'_>) {
         let is_seen = is_seen & (high[0][i] < width) & (high[1][i] < height);
         let [x, y] = [low[0][i] as u32, low[1][i] as u32];
         let is_one = is_seen & (x == high[0][i] as u32) & (y == high[1][i] as u32);
-        only[i] = if is_one {
-            y.wrapping_mul(ctx.area.resolution[0]).wrapping_add(x)
-        } else {
-            BandLandings::NOWHERE
-        };
+        only[i] =
+            if is_one { y.wrapping_mul(ctx.area.resolution[0]).wrapping_add(x) } else { NOWHERE };
     }
 }
 
@@ -255,7 +345,7 @@ fn split<const NODES: usize>(rays: &mut BlockLandings, ctx: &LandingContext<'_>,
             let is_seen = (x >= 0.0) & (y >= 0.0) & (x < width) & (y < height);
             let lands = is_seen & (passed > 0.0);
             let on = (y as u32).wrapping_mul(row).wrapping_add(x as u32);
-            pixel[band] = if lands { on } else { BandLandings::NOWHERE };
+            pixel[band] = if lands { on } else { NOWHERE };
             weight[band] = if lands { scale * passed } else { 0.0 };
         }
     }

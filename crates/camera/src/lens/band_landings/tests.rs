@@ -7,6 +7,7 @@ use etendue_optics::element::Ray;
 use etendue_optics::train::MonochromaticTrain;
 use etendue_optics::train::pupil::PupilSample;
 use etendue_spectrum::{Bands, Grid};
+use glam::DVec3;
 
 use super::*;
 use crate::lens::nodes::NextTerm;
@@ -174,8 +175,8 @@ fn no_ray_of_a_band_ends_at_all_leading_wavelengths() {
     assert!(ended > 20 && within * 2 > passed, "{ended} and {within} of {passed}");
 }
 
-/// Where light of a band at `u` of the spectrum lands (pixels) along a ray that leaves the lens at a point (mm) in a
-/// direction, and the share of it that passes.
+/// The place (pixels) where light of a band at `u` of the spectrum lands along a ray that leaves the lens at a point
+/// (mm) in a direction, and the share of it that passes.
 fn trace_back(
     lens: &LensCamera,
     band: usize,

@@ -1,4 +1,4 @@
-//! How an exit pupil is made: in closed form, behind lenslets, or measured by rays.
+//! Construction of an exit pupil: in closed form, behind lenslets, or measured by rays.
 
 use etendue_report::Refusal;
 use glam::DVec2;

@@ -3,7 +3,7 @@
 use super::{MonochromaticTrain, Side};
 use crate::element::{Clip, LANES, LensRays, RayStatus};
 
-/// What became of a batch of rays at the rims of a lens, and the batch before it.
+/// The outcome of a batch of rays at the rims of a lens, and the batch before it.
 #[derive(Debug, Clone, Default)]
 pub struct RimTrace {
     starts: LensRays,

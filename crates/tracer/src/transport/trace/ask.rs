@@ -8,9 +8,9 @@ use etendue_geometry::block::{Floats as Row, LANES};
 
 use super::RayColumns;
 use super::block_lights::{OtherPlaces, Places};
-use super::compaction::{Compaction, Instructions};
-use super::kernel::{Hits, Mask, mask};
+use super::compaction::{Compaction, Instructions, Mask, mask};
 use super::lane::Lane;
+use super::surfaces::Hits;
 
 /// The rays to lights.
 pub(super) struct LightRays<F> {

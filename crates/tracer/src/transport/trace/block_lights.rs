@@ -9,9 +9,9 @@ use etendue_geometry::glam::DVec3;
 
 use super::choose::ChosenLights;
 use super::depart::cosine_directions;
-use super::kernel::{Hits, round, single};
-use super::lane::{Lane, wide};
+use super::lane::{Lane, round, single, wide};
 use super::sky::SkyView;
+use super::surfaces::Hits;
 use crate::area_light::AreaLight;
 use crate::lights;
 use crate::reference::SceneView;

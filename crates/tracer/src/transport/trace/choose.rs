@@ -7,8 +7,8 @@ use etendue_geometry::glam::DVec3;
 
 use super::Workspace;
 use super::block_lights::{BlockLights, OTHER, SKY, flag};
-use super::kernel::{ReceiverColumns, gather_receivers, round, single};
-use super::lane::Lane;
+use super::kernel::{ReceiverColumns, gather_receivers};
+use super::lane::{Lane, round, single};
 use super::sky::place_on_sky;
 use super::surfaces::Surfaces;
 use crate::light_sampler::{LightQuery, Receiver};

@@ -1,12 +1,22 @@
-//! Lanes of a mask put side by side.
+//! Masks of lanes, and the lanes of a mask put side by side.
 #![expect(
     clippy::manual_memcpy,
     reason = "a copy between slices is a call, of functions with more instructions"
 )]
 
+use std::hint::select_unpredictable;
+
 use etendue_geometry::block::LANES;
 
-use super::kernel::Mask;
+/// Bits that are all set in lanes of which something holds, and 0 in the others: rows of `bool` are worked out one by
+/// one.
+pub(super) type Mask = [u32; LANES];
+
+/// The bits of a lane in a [`Mask`].
+#[inline(always)]
+pub(super) fn mask(holds: bool) -> u32 {
+    select_unpredictable(holds, u32::MAX, 0)
+}
 
 /// The lanes of a mask, in order, which go side by side.
 pub(super) struct Compaction {

@@ -6,10 +6,11 @@ use std::hint::select_unpredictable;
 
 use etendue_geometry::block::{Floats as Row, LANES};
 
-use super::compaction::{Compaction, Instructions};
+use super::compaction::{Compaction, Instructions, Mask, mask};
 use super::facets::BsdfSamples;
-use super::kernel::{Hits, Mask, StepRules, mask};
+use super::kernel::StepRules;
 use super::lane::Lane;
+use super::surfaces::Hits;
 use super::{LAST, RayColumns, SCATTERED, SPECULAR};
 use crate::emitters::EmitterSphere;
 

@@ -5,9 +5,9 @@
 use etendue_geometry::RayBlock;
 use etendue_geometry::block::{Floats as Row, LANES};
 
-use super::kernel::{Hits, Mask, mask, round};
-use super::lane::Lane;
-use super::surfaces::{BlockLookup, Surfaces};
+use super::compaction::{Mask, mask};
+use super::lane::{Lane, round};
+use super::surfaces::{BlockLookup, Hits, Surfaces};
 use crate::bsdf::Weights;
 use crate::bsdf::metal::{mean_reflectance, multiple};
 use crate::bsdf::sheets::{LightSamples, Sheets};

@@ -2,8 +2,6 @@
 //! the rays that leave them side by side.
 #![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
-use std::hint::select_unpredictable;
-
 use etendue_geometry::RayBlock;
 use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::glam::DVec3;
@@ -11,12 +9,12 @@ use etendue_geometry::glam::DVec3;
 use super::ask::{LightRays, ask, send};
 use super::block_lights::{BlockLights, OtherPlaces, place, place_on_chosen};
 use super::choose::ChosenLights;
-use super::compaction::{Compaction, Instructions};
+use super::compaction::{Compaction, Instructions, mask};
 use super::depart::{BlockPaths, depart, end_some, keep_those_that_may_meet, scatter};
 use super::facets::{BlockFacets, FacetHits};
-use super::lane::Lane;
+use super::lane::{Lane, single};
 use super::single::SingleHits;
-use super::surfaces::{BlockLookup, Surfaces, bend};
+use super::surfaces::{BlockLookup, Hits, Surfaces, bend};
 use super::{Columns, LAST, RayColumns};
 use crate::bsdf::sheets::LightSamples;
 use crate::emitters::EmitterSphere;
@@ -27,10 +25,6 @@ use crate::transport::{DRAWS, Draw};
 /// Distance by which rays that leave hits of f32 beside an edge start back, over the bound of [`crate::spawn`], which
 /// counts more roundings for safety than these two: of the hit, and of the origin of the ray that leaves it.
 const BACK: f64 = 0.25;
-
-/// Bits that are all set in lanes of which something holds, and 0 in the others: rows of `bool` are worked out one by
-/// one.
-pub(super) type Mask = [u32; LANES];
 
 /// The rules of a step, and its random numbers by use, a number a lane.
 pub(super) struct StepRules<'a, F> {
@@ -64,28 +58,6 @@ pub(super) struct StepOutput<'a, F> {
     /// Room for a block's colours, and for what they leave of light, by band, where bands are not red, green and blue.
     pub(super) colors: &'a mut Vec<Row<F>>,
     pub(super) shares: &'a mut Vec<Row<F>>,
-}
-
-/// The hits of a block.
-pub(super) struct Hits<F> {
-    pub(super) point: [Row<F>; 3],
-    pub(super) normal: [Row<F>; 3],
-    /// The normals of meshes that light is scattered about, on the viewer's side, where there are any.
-    pub(super) bent: [Row<F>; 3],
-    pub(super) error: Row<F>,
-    pub(super) back: [Row<F>; 3],
-    /// Lanes whose surfaces light may pass, so that rays to lights may leave them on either side.
-    pub(super) passed: Mask,
-    /// Lanes that see the front.
-    pub(super) front: Mask,
-}
-
-impl<F: Lane> Hits<F> {
-    /// The normals that light is scattered about.
-    #[inline(always)]
-    pub(super) fn shading<const TILTED: bool>(&self) -> &[Row<F>; 3] {
-        if TILTED { &self.bent } else { &self.normal }
-    }
 }
 
 /// Room for the points that choose a light each, by a column a number.
@@ -324,10 +296,6 @@ fn leave_out<F: Lane>(found: &mut BlockLookup<F>, carried: &Columns<F>) {
         found.single[i] &= goes_on;
     }
 }
-#[inline(always)]
-pub(super) fn mask(holds: bool) -> u32 {
-    select_unpredictable(holds, u32::MAX, 0)
-}
 
 /// The numbers of a block's lanes, counted from the first block.
 #[inline(always)]
@@ -391,16 +359,4 @@ fn measure<F: Lane>(
         Some(tilted) => bend(tilted, &normal, &block.direction),
     };
     Hits { point, normal, bent, error, back, passed: found.passed, front }
-}
-
-/// A vector, rounded to the precision of lanes.
-#[inline(always)]
-pub(super) fn single<F: Lane>(v: DVec3) -> [F; 3] {
-    [F::of(v.x), F::of(v.y), F::of(v.z)]
-}
-
-/// A number, rounded likewise.
-#[inline(always)]
-pub(super) fn round<F: Lane>(x: f64) -> F {
-    F::of(x)
 }

@@ -227,3 +227,15 @@ pub(super) fn wide<F: Float>(x: F) -> f64 {
 pub(super) fn widen<F: Float>([x, y, z]: [F; 3]) -> [f64; 3] {
     [x.into(), y.into(), z.into()]
 }
+
+/// A vector, rounded to the precision of lanes.
+#[inline(always)]
+pub(super) fn single<F: Lane>(v: DVec3) -> [F; 3] {
+    [F::of(v.x), F::of(v.y), F::of(v.z)]
+}
+
+/// A number, rounded likewise.
+#[inline(always)]
+pub(super) fn round<F: Lane>(x: f64) -> F {
+    F::of(x)
+}

@@ -5,8 +5,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Detail, HitBatch, RayBatch};
 
 use super::block_lights::{BlockLights, OTHER};
-use super::kernel::{round, single};
-use super::lane::{Lane, Query, wide};
+use super::lane::{Lane, Query, round, single, wide};
 use super::sky::ask_sky;
 use super::{Columns, RayColumns, SPECULAR, TraceStep, Workspace};
 use crate::emitters::Emitters;

@@ -3,8 +3,7 @@
 
 use etendue_geometry::block::LANES;
 
-use super::kernel::{round, single};
-use super::lane::{Lane, wide};
+use super::lane::{Lane, round, single, wide};
 use super::single::{SingleHit, SingleHits};
 use super::{SCATTERED, SPECULAR, TraceStep, Workspace};
 use crate::Scattering;

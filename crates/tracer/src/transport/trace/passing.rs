@@ -8,8 +8,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{MISS, PlacedTriangle};
 
 use super::block_lights::{BlockLights, number_of_light};
-use super::kernel::{round, single};
-use super::lane::{Lane, Query, RayEnds, wide};
+use super::lane::{Lane, Query, RayEnds, round, single, wide};
 use super::single::SingleHits;
 use super::{Columns, RayColumns, TraceStep, Workspace};
 use crate::footprint::{Cone, Footprint};

@@ -6,9 +6,8 @@ use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::glam::DVec3;
 
 use super::facets::BsdfSamples;
-use super::kernel::{Hits, round, single};
-use super::lane::{Lane, wide};
-use super::surfaces::BlockLookup;
+use super::lane::{Lane, round, single, wide};
+use super::surfaces::{BlockLookup, Hits};
 use crate::bsdf::sheets::LightSamples;
 use crate::bsdf::{Bsdf, Weights};
 use crate::sampling::power_heuristic;

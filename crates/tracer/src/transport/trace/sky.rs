@@ -9,8 +9,7 @@ use etendue_geometry::glam::{DMat3, DVec3};
 
 use super::block_lights::{BlockLights, OTHER};
 use super::choose::{ChosenLights, OtherPlace};
-use super::kernel::{round, single};
-use super::lane::{Lane, wide, widen};
+use super::lane::{Lane, round, single, wide, widen};
 use super::{Columns, RayColumns, SCATTERED, SPECULAR, TraceStep, Workspace};
 use crate::Spectral;
 use crate::environment::{EnvironmentMap, MapLookup, MapSampler, place};

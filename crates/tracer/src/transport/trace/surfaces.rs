@@ -7,8 +7,8 @@ use etendue_geometry::block::{Floats as Row, LANES};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Geometry, RayBlock};
 
-use super::kernel::{Mask, mask, single};
-use super::lane::Lane;
+use super::compaction::{Mask, mask};
+use super::lane::{Lane, single};
 use crate::placed::{Facets, PlacedSurfaces, SurfaceKind, SurfaceRow, SurfaceTable};
 use crate::surface::LEAST_ELEVATION;
 
@@ -250,6 +250,28 @@ impl<F: Lane> BlockLookup<F> {
                 (tilted[0][lane], tilted[1][lane], tilted[2][lane]) = normal.into();
             }
         }
+    }
+}
+
+/// The hits of a block.
+pub(super) struct Hits<F> {
+    pub(super) point: [Row<F>; 3],
+    pub(super) normal: [Row<F>; 3],
+    /// The normals of meshes that light is scattered about, on the viewer's side, where there are any.
+    pub(super) bent: [Row<F>; 3],
+    pub(super) error: Row<F>,
+    pub(super) back: [Row<F>; 3],
+    /// Lanes whose surfaces light may pass, so that rays to lights may leave them on either side.
+    pub(super) passed: Mask,
+    /// Lanes that see the front.
+    pub(super) front: Mask,
+}
+
+impl<F: Lane> Hits<F> {
+    /// The normals that light is scattered about.
+    #[inline(always)]
+    pub(super) fn shading<const TILTED: bool>(&self) -> &[Row<F>; 3] {
+        if TILTED { &self.bent } else { &self.normal }
     }
 }
 

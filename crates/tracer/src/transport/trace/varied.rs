@@ -4,8 +4,7 @@ use etendue_geometry::block::{LANES, vector};
 
 use etendue_geometry::glam::DVec3;
 
-use super::kernel::{round, single};
-use super::lane::{Lane, wide};
+use super::lane::{Lane, round, single, wide};
 use super::surfaces::{Surfaces, TextureLookup, TextureLookups};
 use super::{LAST, SPECULAR, TraceStep, Workspace};
 use crate::Scattering;

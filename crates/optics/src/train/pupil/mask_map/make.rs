@@ -1,4 +1,4 @@
-//! How a map is made: directions solved from nodes, and polynomials fitted to them.
+//! Construction of a map: directions solved from nodes, and polynomials fitted to them.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;

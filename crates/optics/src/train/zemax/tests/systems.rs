@@ -1,4 +1,4 @@
-//! What a file says of the whole lens: wavelengths, fields and the aperture; and what is told of it.
+//! Data of the whole lens in a file: wavelengths, fields and the aperture; and the notes on them.
 
 use super::*;
 use crate::train::analysis::chief_height;
