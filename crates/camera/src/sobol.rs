@@ -20,7 +20,7 @@
 //!
 //! Points of Sobol's sequence may lie close together, and Owen's scrambling leaves it to chance: an edge of a light or of a
 //! shadow then counts some of them twice. Each dimension is therefore multiplied by a lower triangular matrix, which
-//! leaves a sequence as good (Matoušek, "On the L2-discrepancy for anchored boxes", 1998, section 2.3), and its first eight
+//! leaves a sequence as good (Matoušek, "On the L2-discrepancy for anchored boxes", 1998), and its first eight
 //! bits are shifted, the same ones of all points, as keeps points apart that are; Owen's scrambling is left to what is
 //! below. The two matrices are products of three shifts, found by climbing from random ones by the mean squares of the
 //! errors of discs, half-planes and smooth bells, of 4 to 256 points, against those by Owen's scrambling alone. (Widest
