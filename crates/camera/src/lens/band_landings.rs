@@ -4,7 +4,7 @@
 use etendue_optics::element::{Clip, LANES, LensRays, RayStatus};
 use etendue_optics::train::{RimTrace, Side};
 
-use self::block::{BlockLandings, LandingContext, NOWHERE, StartArea, TracedRays};
+use self::block::{BlockLandings, LandingContext, NOWHERE, RayStart, StartArea, TracedRays};
 use super::lens_camera::LensCamera;
 use super::nodes::place_of;
 use super::opened::BandInterpolation;
@@ -275,12 +275,16 @@ impl BandLandings {
                     self.block.write(lane, pixels, weights);
                 } else {
                     let i = numbers[lane] as usize;
-                    let place = [samples.columns[i], samples.rows[i]];
                     let nodes = [node, ctx.paths.nodes.len()];
                     let is_inner = ctx.paths.rims.is_none() || self.rims.is_within(start + lane);
-                    let passes = [is_inner, is_inner || ctx.paths.has_near()];
-                    let start = (place, self.before[start + lane]);
-                    self.traced.push((end / bands, passes), nodes, start, block, lane);
+                    let start = RayStart {
+                        ray: end / bands,
+                        place: [samples.columns[i], samples.rows[i]],
+                        weight: self.before[start + lane],
+                        is_inner,
+                        is_within: is_inner || ctx.paths.has_near(),
+                    };
+                    self.traced.push(&start, nodes, block, lane);
                 }
                 end += bands;
             }

@@ -88,6 +88,19 @@ pub(super) struct TracedRays {
     pub(super) shares: Vec<f64>,
 }
 
+/// The start of a ray on the film.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RayStart {
+    /// Number among the rays that leave the camera.
+    pub(super) ray: usize,
+    /// Place on the film (pixels), and the ray's weight there.
+    pub(super) place: [f64; 2],
+    pub(super) weight: f64,
+    /// As of [`TracedRays`].
+    pub(super) is_inner: bool,
+    pub(super) is_within: bool,
+}
+
 impl TracedRays {
     pub(super) fn clear(&mut self) {
         self.ray.clear();
@@ -101,17 +114,15 @@ impl TracedRays {
         self.shares.clear();
     }
 
-    /// Appends the ray in a lane of a block that left the lens at a node of so many: `ray` of those that leave the camera,
-    /// which started from a place of the film (pixels) with a weight, and surely passes at all wavelengths, or may by what is
-    /// found at other nodes.
+    /// Appends the ray in a lane of a block that left the lens at a node of so many.
     pub(super) fn push(
         &mut self,
-        (ray, [is_inner, is_within]): (usize, [bool; 2]),
+        start: &RayStart,
         [node, nodes]: [usize; 2],
-        (place, weight): ([f64; 2], f64),
         block: &Block,
         lane: usize,
     ) {
+        let &RayStart { ray, place, weight, is_inner, is_within } = start;
         let vector = |axes: &[[f64; LANES]; 3]| DVec3::from_array(axes.map(|axis| axis[lane]));
         self.ray.push(ray);
         self.is_inner.push(is_inner);
