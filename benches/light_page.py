@@ -48,7 +48,7 @@ def introduction(rounds, about):
         f"{light_scenes.SAMPLES} samples a pixel, a matte blob of a million triangles through a thin lens with "
         f"{light_scenes.BLOB_SIDE} × {light_scenes.BLOB_SIDE} pixels, the others with {light_scenes.SIDE} × "
         f"{light_scenes.SIDE}; and `facing`, 1024 × 1024 pixels of {light_scenes.FACING_SAMPLES} samples, for which "
-        "Mitsuba finds depth and normals. Tracing alone, processor "
+        "Mitsuba finds depth and normals, and `flat`. Tracing alone, processor "
         f"seconds of all threads ({os.cpu_count()} cores), medians of {rounds} rounds in which the "
         "programs take turns, with the fastest and the slowest. *Noise* is the relative standard error of a pixel, "
         f"from as many seeds, over the calmest {CALMEST:.0%} of the pixels; *median* is that of the pixel in the "

@@ -8,10 +8,10 @@ The second form times another build of the command in place of Mitsuba, and prin
 
 The jobs are those of `light_scenes.py`: a matte blob of a million triangles through a thin lens; rooms, balls and many
 lights; a room through the traced lenses of a double Gauss beside the same through a pinhole, in red, green and blue and
-in 31 bands; and `facing`, for which Mitsuba finds depth and normals. Timed is tracing alone, from a built structure to
-pixels, on the processor's clock, all threads together, which other processes disturb less than they do the wall's: for
-etendue what a run of twice as many samples takes beyond a plain one, for Mitsuba `render` of a loaded scene, once
-warmed up.
+in 31 bands; `facing`, for which Mitsuba finds depth and normals, and `flat`. Timed is tracing alone, from a built
+structure to pixels, on the processor's clock, all threads together, which other processes disturb less than they do the
+wall's: for etendue what a run of twice as many samples takes beyond a plain one, for Mitsuba `render` of a loaded
+scene, once warmed up.
 
 How noisy a picture is: the variance of each pixel over renders of different seeds, relative to the mean;
 of the pixels the root mean square of the calmest 99 in 100, and the median. The edges of lamps that are seen
@@ -206,8 +206,8 @@ def compare(arguments, folder, job, others):
             seconds.setdefault(title, []).append(taken)
             pictures.setdefault(title, []).append(np.load(name))
     result = {"seconds": seconds, "rays": report["rays"], "bound": bound(folder, job), "profile": profile(folder, job)}
-    # Depth and normals are no light.
-    if job == light_scenes.FACING:
+    # Depth, normals and colours are no light.
+    if job in (light_scenes.FACING, light_scenes.FLAT):
         return result
     return result | {"noise": {title: noises(some) for title, some in pictures.items()},
                      "mean": {title: float(np.mean(some)) for title, some in pictures.items()}}

@@ -87,11 +87,11 @@ class Scenes:
                             "sensor": {"resolution": [BLOB_SIDE, BLOB_SIDE]}}
         return scene
 
-    def headlight(self):
-        """The blob in its own colour, as `benchmarks models` frames it."""
+    def headlight(self, tracer):
+        """The blob in its own colour, as `benchmarks models` frames it, by a tracer without lights."""
         scene = json.loads((self.folder / "glb.json").read_text())
         del scene["layers"]
-        return scene | {"tracer": {"type": "facing"}, "render": {"samples": FACING_SAMPLES}}
+        return scene | {"tracer": {"type": tracer}, "render": {"samples": FACING_SAMPLES}}
 
     def walls(self, kind=room):
         return [self.part(mesh, name) for name, mesh in kind().items()]
@@ -199,7 +199,7 @@ class Scenes:
 CORNELL = "Cornell box, path of 5 bounces"
 IN_BANDS = f"{CORNELL}, in 31 bands"
 INHABITED = "room of models from elsewhere, path of 5 bounces"
-FACING = "`facing`, 16 samples"
+FACING, FLAT = (f"`{tracer}`, {FACING_SAMPLES} samples" for tracer in ("facing", "flat"))
 BALLS = "glossy balls, sky with a sun"
 ASSET = "textured glTF surface, environment image"
 
@@ -218,7 +218,7 @@ JOBS = {
     "glass, lamp, sky": (Scenes.glass, 1.2, 1.5),
     ASSET: (Scenes.asset, 1.2, 1.5),
     # Mitsuba finds depth and normals, without light: there is no error to compare.
-    FACING: (Scenes.headlight, 1.0, None),
+    FACING: (lambda s: s.headlight("facing"), 1.0, None),
 }
 
 # Of each job of etendue alone, how its scene is made, the job beside which it is held, and how many times as long it
@@ -228,6 +228,7 @@ ALONE = {
     # With rays of all bands together, as at the design wavelength.
     f"{CORNELL}, through the double Gauss, without dispersion": (
         lambda s: s.through_lens(s.cornell(5)) | {"plan": {"dispersion": False}}, CORNELL, 1.6),
+    FLAT: (lambda s: s.headlight("flat"), None, None),
     IN_BANDS: (lambda s: s.in_bands(s.cornell(5), 31), None, None),
     f"{IN_BANDS}, through the double Gauss": (
         lambda s: s.through_lens(s.in_bands(s.cornell(5), 31)), IN_BANDS, 2.0),

@@ -196,7 +196,6 @@ impl FramePattern {
         remove_recorded(out, &record_of(out, number));
     }
 
-    #[expect(clippy::disallowed_methods, reason = "files that are whole already move")]
     fn take_to_places(
         &self,
         out: &Path,
@@ -211,14 +210,7 @@ impl FramePattern {
             let name = path.strip_prefix(&folder).ok().and_then(Path::to_str);
             let Some(name) = name else { continue };
             let place = self.place(number, name);
-            let target = out.join(&place);
-            to.refuse_inputs([&*target])?;
-            let size = target
-                .parent()
-                .map_or(Ok(()), fs::create_dir_all)
-                .and_then(|()| fs::rename(path, &target))
-                .and_then(|()| Ok(target.metadata()?.len()))
-                .map_err(|error| WriteError::io(&target, error))?;
+            let size = to.move_whole(path, &out.join(&place))?;
             remove_empty_folders(&folder, path);
             moved.push((place, size));
         }

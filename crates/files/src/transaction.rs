@@ -115,6 +115,23 @@ impl Transaction {
         part.finish()
     }
 
+    /// Moves `path`, a whole file of the same disk, to `target`, whose folder is made; gives its size (bytes).
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::create`], and when it cannot be renamed.
+    pub fn move_whole(&self, path: &Path, target: &Path) -> Result<u64, WriteError> {
+        self.refuse_inputs([target])?;
+        let size = target
+            .parent()
+            .map_or(Ok(()), fs::create_dir_all)
+            .and_then(|()| fs::rename(path, target))
+            .and_then(|()| Ok(target.metadata()?.len()))
+            .map_err(|source| WriteError::io(target, source))?;
+        self.note_finished(target.to_owned());
+        Ok(size)
+    }
+
     /// Counts `path`, which was written whole by other means, among the files of the set.
     pub fn note_finished(&self, path: PathBuf) {
         self.state().finished.push(path);

@@ -1,11 +1,11 @@
 //! The choice of the light that is asked for a point.
 //!
 //! Lights far away are chosen by the irradiance of a surface that faces them (W/m², of the mean of the three
-//! colours): `E` of parallel light, `π L` of an environment. Among lights near by, one is chosen by what it may
-//! send to the point ([`crate::light_tree`]); where there are very few or very many, and nothing is far away,
-//! by power (W): a triangle of an emissive mesh by `π A L` for one side. Between near and far the point decides
-//! by the same irradiances, but neither is chosen less often than in one of four cases: what is near may be
-//! behind a wall, and what is far outside of it.
+//! colours): `E` of parallel light, `π L` of an environment (half of that where it is alike from all sides). Among
+//! lights near by, one is chosen by what it may send to the point ([`crate::light_tree`]); where there are very few or
+//! very many, and nothing is far away, by power (W): a triangle of an emissive mesh by `π A L` for one side. Between
+//! near and far the point decides by the same irradiances, but neither is chosen less often than in one of four cases:
+//! what is near may be behind a wall, and what is far outside of it.
 
 use std::f64::consts::PI;
 

@@ -27,6 +27,10 @@ use crate::surface_point::squares_at;
 use crate::target::{Target, TargetKind};
 use crate::{LightGroup, Material, Modulation, Paint, SceneCurve};
 
+/// Share of its irradiance by which an environment that is alike from all sides is chosen: paths find it by scattering as
+/// well as by asking, so that beside other lights these are asked more often.
+const EVEN_SHARE: f64 = 0.5;
+
 /// All lights of a scene, ready to be chosen from.
 #[derive(Debug)]
 pub struct Lights {
@@ -126,7 +130,11 @@ impl Lights {
             let mean = mean(&light.modulation);
             match light.cluster(mean * light.intensity(), scene, span) {
                 Some(cluster) => Candidate::near(mean * power(light, scene), cluster),
-                None => Candidate::Far { irradiance: mean * irradiance(light, brightness) },
+                None => {
+                    let is_even = EnvironmentImage::of(light) == Some(&EnvironmentImage::Constant);
+                    let share = if is_even { EVEN_SHARE } else { 1.0 };
+                    Candidate::Far { irradiance: share * mean * irradiance(light, brightness) }
+                }
             }
         };
         let mut candidates: Vec<Candidate> = lights.iter().map(candidate).collect();

@@ -341,8 +341,7 @@ const WHITE_DECIBELS: f64 = 50.0;
 
 /// The name of the map of ratios of signal to noise of the exposure time `number`.
 pub(super) fn snr_name(sensor: &Sensor, digits: usize, number: u32) -> String {
-    let [mean, _] = moment_names(sensor, digits, number);
-    mean.replace("raw_mean", "raw_snr").replace(".npy", ".preview.png")
+    name(digits_of_moments(sensor, digits), "raw_snr", number, "preview.png")
 }
 
 /// The files of all exposures merged, and what is in them.
@@ -359,11 +358,15 @@ pub(super) type MomentFiles = [String; 2];
 
 /// These names for the exposure time `number` of a sensor. Frames of one exposure have the same moments.
 pub(super) fn moment_names(sensor: &Sensor, digits: usize, number: u32) -> MomentFiles {
+    let digits = digits_of_moments(sensor, digits);
+    ["raw_mean", "raw_variance"].map(|stem| name(digits, stem, number, "npy"))
+}
+
+/// Number of digits of the exposure's number in names of moments: none where all exposures take the same time.
+fn digits_of_moments(sensor: &Sensor, digits: usize) -> usize {
     let mut times = sensor.shots().map(|shot| shot.exposure);
     let first = times.next();
-    let several = times.any(|other| Some(other) != first);
-    let digits = if several { digits } else { 0 };
-    ["raw_mean", "raw_variance"].map(|stem| name(digits, stem, number, "npy"))
+    if times.any(|other| Some(other) != first) { digits } else { 0 }
 }
 
 /// `sensor.json`.

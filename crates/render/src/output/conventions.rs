@@ -73,7 +73,7 @@ fn scaled(layer: &Layer, factor: f64, unit: &str) -> Result<LayerImage, NoMemory
     let note = format!(
         "data: {unit} times {factor}; 0 is nothing, and what is not above 0 or beyond {most:.3} {unit}"
     );
-    Ok(LayerImage { channels: ColourType::Grey, bits: Bits::Sixteen, bytes, note })
+    Ok(LayerImage { channels: ColourType::Grey, bits: Bits::Sixteen, bytes, is_data: true, note })
 }
 
 /// Number of the layer's hits that become 0 in 16 bits of `factor` a unit.
@@ -103,7 +103,7 @@ fn flow(layer: &Layer) -> Result<LayerImage, NoMemory> {
         "data: red and green are 32768 + {KITTI_FLOW} times the flow right and down (pixels), blue is 1 \
          where it is known; flow of 512 pixels and more is not"
     );
-    Ok(LayerImage { channels: ColourType::Rgb, bits: Bits::Sixteen, bytes, note })
+    Ok(LayerImage { channels: ColourType::Rgb, bits: Bits::Sixteen, bytes, is_data: true, note })
 }
 
 /// `PIEH`, columns and rows, and two little-endian floats a pixel.

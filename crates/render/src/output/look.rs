@@ -49,6 +49,8 @@ pub(super) struct LayerImage {
     pub(super) channels: ColourType,
     pub(super) bits: Bits,
     pub(super) bytes: Vec<u8>,
+    /// It holds the layer's own numbers, where others are previews.
+    pub(super) is_data: bool,
     /// Explanation of how to read it.
     pub(super) note: String,
 }
@@ -103,7 +105,7 @@ impl LayerImage {
             }
             Bits::Sixteen => fill(planes, |i| shade(i).map(|v| quantize(v, 65535.0).to_be_bytes())),
         };
-        Ok(Self { channels, bits, bytes: bytes?, note })
+        Ok(Self { channels, bits, bytes: bytes?, is_data: false, note })
     }
 }
 
@@ -298,7 +300,13 @@ pub(super) fn mask(layer: &Layer) -> Result<Option<LayerImage>, NoMemory> {
     };
     let bytes = fill(&[plane], |i| [number(i)])?;
     let note = "data: the numbers themselves, not scaled; 0 is nothing".into();
-    Ok(Some(LayerImage { channels: ColourType::Grey, bits: Bits::Sixteen, bytes, note }))
+    Ok(Some(LayerImage {
+        channels: ColourType::Grey,
+        bits: Bits::Sixteen,
+        bytes,
+        is_data: true,
+        note,
+    }))
 }
 
 /// Numbers of a layer of ids as indices of [`palette`]; `None` when one has more than 8 bits.
@@ -314,7 +322,13 @@ pub(super) fn indices(layer: &Layer) -> Result<Option<LayerImage>, NoMemory> {
     }
     bytes.truncate(bytes.len() / 2);
     let note = "data: the index of a pixel is the number itself; 0 is nothing".into();
-    Ok(Some(LayerImage { channels: ColourType::Indexed, bits: Bits::Eight, bytes, note }))
+    Ok(Some(LayerImage {
+        channels: ColourType::Indexed,
+        bits: Bits::Eight,
+        bytes,
+        is_data: true,
+        note,
+    }))
 }
 
 /// The colours of the numbers from 0 to 255, as previews have them; nothing is black.
@@ -337,7 +351,7 @@ fn counts(planes: &[&Values], bits: u8) -> Result<LayerImage, NoMemory> {
         _ => (ColourType::Grey, fill(planes, |i| [number(planes[0], i)])?),
     };
     let note = format!("digital numbers (DN), 0 to {}, not scaled", (1_u32 << bits) - 1);
-    Ok(LayerImage { channels, bits: Bits::Sixteen, bytes, note })
+    Ok(LayerImage { channels, bits: Bits::Sixteen, bytes, is_data: true, note })
 }
 
 #[cfg(test)]

@@ -110,16 +110,9 @@ fn encode(part: &mut PartFile<'_>, info: Info<'_>, bytes: &[u8]) -> Result<(), E
 
 /// Texts of the file, beside its pixels.
 fn texts(picture: &Picture, layer: &Layer, shown: &LayerImage) -> Vec<ITXtChunk> {
-    let comment = match layer.look {
-        Look::Counts { .. } => "data",
-        _ if shown.note.starts_with("data") => "data",
-        Look::Color
-        | Look::Distance
-        | Look::Direction
-        | Look::Extent
-        | Look::Ids
-        | Look::Share
-        | Look::Cube => "preview, not data: the values are in the EXR and NPY files",
+    let comment = match shown.is_data {
+        true => "data",
+        false => "preview, not data: the values are in the EXR and NPY files",
     };
     let title = layer.title();
     let fixed = [
