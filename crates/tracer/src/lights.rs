@@ -31,6 +31,14 @@ use crate::{LightGroup, Material, Modulation, Paint, SceneCurve};
 /// well as by asking, so that beside other lights these are asked more often.
 const EVEN_SHARE: f64 = 0.5;
 
+/// The irradiance (W/m²) by which a light far away is chosen, of which an environment's image has this `brightness` in the
+/// mean.
+fn weight_of_far(light: &Light, brightness: f64) -> f64 {
+    let is_even = EnvironmentImage::of(light) == Some(&EnvironmentImage::Constant);
+    let share = if is_even { EVEN_SHARE } else { 1.0 };
+    share * irradiance(light, brightness)
+}
+
 /// All lights of a scene, ready to be chosen from.
 #[derive(Debug)]
 pub struct Lights {
@@ -130,11 +138,7 @@ impl Lights {
             let mean = mean(&light.modulation);
             match light.cluster(mean * light.intensity(), scene, span) {
                 Some(cluster) => Candidate::near(mean * power(light, scene), cluster),
-                None => {
-                    let is_even = EnvironmentImage::of(light) == Some(&EnvironmentImage::Constant);
-                    let share = if is_even { EVEN_SHARE } else { 1.0 };
-                    Candidate::Far { irradiance: share * mean * irradiance(light, brightness) }
-                }
+                None => Candidate::Far { irradiance: mean * weight_of_far(light, brightness) },
             }
         };
         let mut candidates: Vec<Candidate> = lights.iter().map(candidate).collect();

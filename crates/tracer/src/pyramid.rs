@@ -270,6 +270,14 @@ impl Wrap {
     /// Column or row `x` (a whole number) of `size` after wrapping.
     pub(crate) fn apply(self, x: f64, size: usize) -> usize {
         let n = size as f64;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "within the image, where most are"
+        )]
+        if (0.0..n).contains(&x) {
+            return x as usize;
+        }
         let wrapped = match self {
             Self::Repeat => x.rem_euclid(n),
             Self::MirroredRepeat => {

@@ -12,8 +12,6 @@
 //! * Choice on a grid: a row by the sums of rows, then a column within it (Pharr, Jakob and Humphreys,
 //!   *Physically Based Rendering*, 4th edition, section A.5).
 
-use std::f64::consts::TAU;
-
 use etendue_geometry::disk;
 use etendue_geometry::glam::DVec3;
 
@@ -74,7 +72,7 @@ pub fn cosine_direction(square: [f64; 2]) -> DVec3 {
 #[must_use]
 pub fn sphere_direction([u, v]: [f64; 2]) -> DVec3 {
     let z = 1.0 - 2.0 * u;
-    let (sin, cos) = (TAU * v).sin_cos();
+    let (sin, cos) = disk::turn(v);
     let r = (1.0 - z * z).max(0.0).sqrt();
     DVec3::new(r * cos, r * sin, z)
 }
@@ -85,7 +83,7 @@ pub fn sphere_direction([u, v]: [f64; 2]) -> DVec3 {
 pub fn cone_direction([u, v]: [f64; 2], cos_max: f64) -> DVec3 {
     // What is lacking of 1, which narrow cones need whole.
     let short = u * (1.0 - cos_max);
-    let (sin, cos) = (TAU * v).sin_cos();
+    let (sin, cos) = disk::turn(v);
     let r = (short * (2.0 - short)).max(0.0).sqrt();
     DVec3::new(r * cos, r * sin, 1.0 - short)
 }

@@ -301,7 +301,12 @@ impl Image {
             return self.sample(uv, encoding);
         };
         let [width, height] = self.size();
-        let length = |[u, v]: [f64; 2]| f64::hypot(u * width as f64, v * height as f64);
+        let length = |[u, v]: [f64; 2]| {
+            let (x, y) = (u * width as f64, v * height as f64);
+            let squared = x * x + y * y;
+            // However long it is, it has a length.
+            if squared > f64::MAX { f64::MAX.sqrt() } else { squared.sqrt() }
+        };
         let lengths = axes.map(length);
         let (long, short, axis) = if lengths[0] >= lengths[1] {
             (lengths[0], lengths[1], axes[0])

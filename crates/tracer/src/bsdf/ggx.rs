@@ -7,8 +7,9 @@
 //! * Heitz, "Understanding the Masking-Shadowing Function", JCGT 2014 (Λ, height-correlated G₂).
 //! * Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps", HPG 2023.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
+use etendue_geometry::disk;
 use etendue_geometry::glam::DVec3;
 
 /// Roughness of a surface: α along x and along y, each the square of a roughness in 0..=1.
@@ -62,7 +63,7 @@ pub fn masking_shadowing(a: DVec3, b: DVec3, alpha: impl Into<Facets>) -> f64 {
 pub fn sample_visible(w: DVec3, [u, v]: [f64; 2], alpha: impl Into<Facets>) -> DVec3 {
     let alpha = alpha.into();
     let stretched = DVec3::new(alpha.x * w.x, alpha.y * w.y, w.z).normalize();
-    let (sin, cos) = (TAU * u).sin_cos();
+    let (sin, cos) = disk::turn(u);
     let z = (1.0 - v) * (1.0 + stretched.z) - stretched.z;
     let r = (1.0 - z * z).clamp(0.0, 1.0).sqrt();
     let half = DVec3::new(r * cos, r * sin, z) + stretched;

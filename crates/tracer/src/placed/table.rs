@@ -66,18 +66,18 @@ pub(crate) struct SurfaceTable {
     /// The cones of paths count behind mirrors and smooth boundaries, too.
     pub(crate) carry_cones: bool,
     /// The colours of materials that are alike all over, `[material][band]`; 0 of others. Of measured metals what they
-    /// reflect face on. Empty where bands are red, green and blue.
+    /// reflect face on.
     colors: Vec<f32>,
-    /// Those of their facets' highlights, and the dips of measured metals, likewise; empty where all are matte.
+    /// Those of their facets' highlights, and the dips of measured metals, likewise; empty where all are matte, and where
+    /// bands are red, green and blue.
     facet_bands: Vec<[f64; 2]>,
     count: usize,
 }
 
-/// A surface that scatters light, or only shines.
+/// A surface that scatters light, or only shines, in a line of a processor's cache.
 #[derive(Debug, Clone, Copy, Default)]
+#[repr(align(64))]
 pub(crate) struct SurfaceRow {
-    /// Red, green and blue; of a measured metal what it reflects face on. Unused where bands are others.
-    pub(crate) color: [f32; 3],
     /// [`PlacedSurface::magnitudes`] (m).
     pub(crate) magnitudes: [f32; 3],
     /// Index of its material.
@@ -93,6 +93,8 @@ pub(crate) struct SurfaceRow {
     /// It scatters light about normals of its mesh's corners, which this carries into the world, row by row.
     pub(crate) turn: Option<[[f32; 3]; 3]>,
 }
+
+const _: () = assert!(size_of::<SurfaceRow>() == 64, "one line of a cache");
 
 /// As what the hits of a surface are worked on, where it is there.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -168,6 +170,13 @@ impl SurfaceTable {
         self.colors.get(first..first + self.count).unwrap_or_default()
     }
 
+    /// Red, green and blue of a material's colour, where these are the bands.
+    #[inline(always)]
+    pub(crate) fn rgb_of(&self, material: u32) -> &[f32; 3] {
+        let (rows, _) = self.colors.as_chunks();
+        rows.get(material as usize).unwrap_or(&[0.0; 3])
+    }
+
     /// Bands of the highlights and the dip of a material's facets.
     #[inline(always)]
     pub(crate) fn facet_bands_of(&self, material: u32) -> &[[f64; 2]] {
@@ -211,9 +220,9 @@ impl SurfaceTable {
         let carry_cones = are_smooth && (are_varied || has_alpha);
         let count = spectral.count();
         let (mut colors, mut facet_bands) = (Vec::new(), Vec::new());
-        for material in materials.iter().filter(|_| !spectral.is_rgb()) {
+        for material in materials {
             colors.extend((0..count).map(|k| single(face_on(material, spectral, k))));
-            if !facets.is_empty() {
+            if !facets.is_empty() && !spectral.is_rgb() {
                 facet_bands.extend((0..count).map(|k| bands_of_facets(material, spectral, k)));
             }
         }
@@ -269,12 +278,7 @@ impl SurfaceRow {
             if kind == SurfaceKind::Sheet && !is_resolved { SurfaceKind::Other } else { kind };
         let is_known = measured(material).is_some() || placed.color.is_some();
         let is_varied = !is_known || is_mapped || has_own_facets || kind == SurfaceKind::Other;
-        let color = match spectral.is_rgb() && scatters && is_known {
-            true => [0, 1, 2].map(|k| face_on(material, spectral, k)),
-            false => [0.0; 3],
-        };
         Self {
-            color: color.map(single),
             magnitudes: placed.magnitudes.to_array().map(single),
             material: placement.material,
             is_there: true,

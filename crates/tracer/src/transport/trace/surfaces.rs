@@ -208,7 +208,8 @@ impl<F: Lane> BlockLookup<F> {
             let is_varied = RICH && surface.is_varied && lane < count;
             let varied = surfaces.varied.lookups.get(first + lane).filter(|_| is_varied);
             if RGB {
-                let color = varied.map_or(&surface.color, |varied| &varied.color);
+                let own = || surfaces.all.rgb_of(surface.material);
+                let color = varied.map_or_else(own, |varied| &varied.color);
                 for band in 0..3 {
                     self.color[band][lane] = F::from(color[band]);
                 }

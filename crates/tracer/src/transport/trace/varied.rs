@@ -85,8 +85,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let bands = lane * self.count()..(lane + 1) * self.count();
         let found = &mut varied.lookups[lane];
         (found.color, found.base_peak) = (tint.color.map(round), tint.peak());
-        if is_measured {
-            found.color = own.color;
+        if is_measured && RGB {
+            found.color = *surfaces.all.rgb_of(own.material);
         }
         if !RGB {
             let known = surfaces.all.color_of(own.material);
