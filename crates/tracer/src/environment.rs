@@ -18,8 +18,6 @@ use crate::{Color, Cube};
 use etendue_geometry::Float;
 
 pub(crate) use sampler::MapLookup;
-#[cfg(test)]
-pub(crate) use sampler::MapLookups;
 pub use sampler::MapSampler;
 
 /// The most cells of the grid that directions are chosen on, across and down. Not a setting: within a cell texels are
@@ -131,12 +129,6 @@ impl EnvironmentMap {
     #[must_use]
     pub fn size(&self) -> [usize; 2] {
         [self.width, self.height]
-    }
-
-    /// Radiance from the unit direction `d`, interpolated.
-    #[must_use]
-    pub fn radiance(&self, d: DVec3) -> Color {
-        self.radiance_at(place(d))
     }
 
     /// Radiance at a [`place`].
@@ -306,6 +298,65 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
+    use crate::sampling::GridCell;
+
+    /// A direction, and what a map has there.
+    struct Lit {
+        direction: DVec3,
+        place: [f64; 2],
+        /// 1/sr.
+        density: f64,
+        color: Color,
+    }
+
+    impl Lit {
+        /// The first so many of some lanes.
+        fn of_lanes(lit: &MapLookup<f64, LANES>, count: usize) -> Vec<Self> {
+            let MapLookup { directions: [x, y, z], places: [u, v], densities, colors: [r, g, b] } =
+                lit;
+            let lane = |i: usize| Self {
+                direction: DVec3::new(x[i], y[i], z[i]),
+                place: [u[i], v[i]],
+                density: densities[i],
+                color: [r[i], g[i], b[i]],
+            };
+            (0..count).map(lane).collect()
+        }
+    }
+
+    /// Directions by their brightness, for each of `squares`.
+    fn sampled(sampler: &MapSampler, map: &EnvironmentMap, squares: &[[f64; 2]]) -> Vec<Lit> {
+        let mut cells = Vec::new();
+        sampler.cells(squares.iter().copied(), &mut cells);
+        let some = |cells: &[GridCell]| {
+            let mut patches = [GridCell::default(); LANES];
+            patches[..cells.len()].copy_from_slice(cells);
+            Lit::of_lanes(&sampler.in_patches(map, &patches), cells.len())
+        };
+        cells.chunks(LANES).flat_map(some).collect()
+    }
+
+    /// What a map has in each of some unit directions.
+    fn looked_up(sampler: &MapSampler, map: &EnvironmentMap, directions: &[DVec3]) -> Vec<Lit> {
+        let some = |some: &[DVec3]| {
+            let mut rows = [[0.0; LANES]; 3];
+            for (i, d) in some.iter().enumerate() {
+                (rows[0][i], rows[1][i], rows[2][i]) = (d.x, d.y, d.z);
+            }
+            Lit::of_lanes(&sampler.in_directions(map, rows), some.len())
+        };
+        directions.chunks(LANES).flat_map(some).collect()
+    }
+
+    /// The density (1/sr) of one direction.
+    fn pdf(sampler: &MapSampler, map: &EnvironmentMap, d: DVec3) -> f64 {
+        let [density] = sampler.in_directions(map, [[d.x], [d.y], [d.z]]).densities;
+        density
+    }
+
+    fn radiance(map: &EnvironmentMap, d: DVec3) -> Color {
+        map.radiance_at(place(d))
+    }
 
     #[test]
     fn places_and_directions_are_inverse() {
@@ -327,14 +378,14 @@ mod tests {
         for k in 0..n * n {
             let square = [((k % n) as f64 + 0.5) / n as f64, ((k / n) as f64 + 0.5) / n as f64];
             let d = crate::sampling::sphere_direction(square);
-            integral += sampler.pdf(&map, d) * 4.0 * PI / (n * n) as f64;
-            mean += map.radiance(d)[0] / (n * n) as f64;
+            integral += pdf(&sampler, &map, d) * 4.0 * PI / (n * n) as f64;
+            mean += radiance(&map, d)[0] / (n * n) as f64;
         }
         // A bright texel is 16 × 16 points wide here: its edges are met to one in sixteen of 1 − ε.
         assert!((integral - 1.0).abs() < 0.02, "{integral}");
         assert!((sampler.mean / mean - 1.0).abs() < 0.02, "{} {mean}", sampler.mean);
         let bright = direction([20.5 / 64.0, 10.5 / 32.0]);
-        assert!(sampler.pdf(&map, bright) > 50.0 * sampler.pdf(&map, DVec3::X));
+        assert!(pdf(&sampler, &map, bright) > 50.0 * pdf(&sampler, &map, DVec3::X));
     }
 
     /// A map of 64 by 32 texels that differ, one of them a sun.
@@ -352,13 +403,10 @@ mod tests {
         let n = 1_000;
         let at = |k: i32| (f64::from(k) + 0.5) / f64::from(n);
         let squares: Vec<_> = (0..n * n).map(|k| [at(k % n), at(k / n)]).collect();
-        let (mut chosen, mut sum) = (MapLookups::default(), 0.0);
-        sampler.sample(&map, &squares, &mut chosen);
-        for ((&d, &[u, _]), &pdf) in
-            chosen.directions.iter().zip(&chosen.places).zip(&chosen.densities)
-        {
-            assert!((sampler.pdf(&map, d) / pdf - 1.0).abs() < 1e-9);
-            sum += u / pdf / (2.0 * PI * PI) / f64::from(n * n);
+        let mut sum = 0.0;
+        for Lit { direction, place: [u, _], density, .. } in sampled(&sampler, &map, &squares) {
+            assert!((pdf(&sampler, &map, direction) / density - 1.0).abs() < 1e-9);
+            sum += u / density / (2.0 * PI * PI) / f64::from(n * n);
         }
         // The integral of u sin πv over the square is 1/π. Most places are in the sun; the others are some 300 by
         // 300, of 64 by 33 patches: the midpoint rule leaves about a thousandth.
@@ -373,13 +421,9 @@ mod tests {
         let at = |i: u32| (f64::from(i) + 0.5) / 200.0;
         let squares: Vec<_> = (0..40_000).map(|k| [at(k % 200), at(k / 200)]).collect();
         let whole = 4.0 * PI * sampler.mean;
-        let mut chosen = MapLookups::default();
-        sampler.sample(&map, &squares, &mut chosen);
-        for ((&d, color), &pdf) in
-            chosen.directions.iter().zip(&chosen.colors).zip(&chosen.densities)
-        {
-            assert!((map.radiance(d)[0] / color[0] - 1.0).abs() < 1e-9);
-            let worth = color[0] / pdf;
+        for Lit { direction: d, density, color, .. } in sampled(&sampler, &map, &squares) {
+            assert!((radiance(&map, d)[0] / color[0] - 1.0).abs() < 1e-9);
+            let worth = color[0] / density;
             // Half a row of 32 is 0.05 radians, by which the sine changes by less than that over its tangent.
             let bound = 0.05 * d.y.abs() / (1.0 - d.y * d.y).sqrt() + 0.01;
             assert!((worth / whole - 1.0).abs() < bound, "{worth} of {whole} from {d}");
@@ -403,27 +447,23 @@ mod tests {
             let sampler = sampler.unwrap_or_else(|| MapSampler::new(&map));
             let at = |k: u32, n: u32| (f64::from(k) + 0.5) / f64::from(n);
             let squares: Vec<_> = (0..500).map(|k| [at(k, 500), at(k % 23, 23)]).collect();
-            let mut chosen = MapLookups::default();
-            sampler.sample(&map, &squares, &mut chosen);
-            for (k, &d) in chosen.directions.iter().enumerate() {
+            for Lit { direction: d, density, color, .. } in sampled(&sampler, &map, &squares) {
                 // Directions are as good as f64, and so is where they are between texels.
-                let [pdf, expected] = [chosen.densities[k], sampler.pdf(&map, d)];
-                assert!((pdf / expected - 1.0).abs() < 1e-9, "{d}: {pdf} {expected}");
-                for (color, expected) in chosen.colors[k].iter().zip(map.radiance(d)) {
+                let expected = pdf(&sampler, &map, d);
+                assert!((density / expected - 1.0).abs() < 1e-9, "{d}: {density} {expected}");
+                for (color, expected) in color.iter().zip(radiance(&map, d)) {
                     assert!((color - expected).abs() < 1e-9 * expected, "{d}: {color} {expected}");
                 }
             }
-            let mut asked = MapLookups::default();
             let axes = [DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z, DVec3::X];
             let seam = [1e-17, -1e-17, 0.0, -0.0].map(|x| DVec3::new(x, 0.0, 1.0));
             let others =
                 (0..500).map(|k| direction([f64::from(k) / 499.0, f64::from(k % 23) / 22.0]));
-            asked.directions = axes.into_iter().chain(seam).chain(others).collect();
-            sampler.look_up(&map, &mut asked);
-            for (k, &d) in asked.directions.iter().enumerate() {
-                assert_eq!(asked.places[k], place(d));
-                assert_eq!(asked.colors[k], map.radiance(d), "{d}");
-                assert_eq!(asked.densities[k], sampler.pdf(&map, d), "{d}");
+            let asked: Vec<DVec3> = axes.into_iter().chain(seam).chain(others).collect();
+            for (d, lit) in asked.iter().copied().zip(looked_up(&sampler, &map, &asked)) {
+                assert_eq!(lit.place, place(d));
+                assert_eq!(lit.color, radiance(&map, d), "{d}");
+                assert_eq!(lit.density, pdf(&sampler, &map, d), "{d}");
             }
         }
     }
@@ -433,6 +473,6 @@ mod tests {
         let map =
             EnvironmentMap::new([2, 1], vec![[f32::NAN, 1.0, -3.0], [f32::INFINITY, 0.0, 2.0]]);
         assert_eq!(map.dropped, 2);
-        assert!(map.radiance(DVec3::X).iter().all(|c| c.is_finite()));
+        assert!(radiance(&map, DVec3::X).iter().all(|c| c.is_finite()));
     }
 }

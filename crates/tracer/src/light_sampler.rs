@@ -26,7 +26,8 @@ const FEW: usize = 8;
 /// A point that asks a light which it chose.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LightQuery {
-    pub(crate) receiver: Receiver,
+    /// m.
+    pub(crate) from: DVec3,
     /// s from the frame's time.
     pub(crate) time: f64,
     /// The light, and the chance with which it was chosen.
@@ -105,12 +106,6 @@ impl LightSampler {
     /// True if there is nothing to choose from.
     pub(crate) fn is_empty(&self) -> bool {
         self.others.is_empty() && self.tree.is_none()
-    }
-
-    /// True if there is more than one to choose from.
-    #[cfg(test)]
-    pub(crate) fn are_several(&self) -> bool {
-        self.others.len() > 1 || self.tree.is_some()
     }
 
     /// The chance with which a light of the tree is chosen for the point `from` (m), and none of the others.
@@ -284,7 +279,7 @@ mod tests {
     fn a_few_lights_alone_are_chosen_by_power_and_none_is_dark() {
         let sampler = LightSampler::new(&[facing_up(), facing_up()], scene());
         assert_eq!(sampler.chance(&open(DVec3::NEG_Y), 0), 0.5);
-        assert!(sampler.are_several() && !sampler.is_empty());
+        assert!(!sampler.is_empty());
         assert!(LightSampler::new(&[Candidate::Dark], scene()).is_empty());
         let dark = one(&LightSampler::new(&[], scene()), open(DVec3::ZERO), 0.5);
         assert_eq!(dark.chance, 0.0);

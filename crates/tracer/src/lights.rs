@@ -21,7 +21,7 @@ use crate::light_tree::Choices;
 use crate::material::Alpha;
 use crate::reference::{SceneView, SurfacePoint};
 use crate::sampling::{Frame, cone_direction, triangle_point};
-use crate::sky::{Sky, uniform_direction};
+use crate::sky::Sky;
 use crate::spectral::Spectral;
 use crate::surface_point::squares_at;
 use crate::target::{Target, TargetKind};
@@ -343,7 +343,7 @@ impl Lights {
         query: &LightQuery,
         radiance: &mut [f64],
     ) -> Option<Target> {
-        let LightQuery { receiver, choice, square, .. } = query;
+        let LightQuery { from, choice, square, .. } = query;
         let (index, chance) = (choice.light as usize, choice.chance);
         let Some(light) = self.lights.get(index) else {
             return self.place_on_area_light(scene, spectral, query, radiance);
@@ -354,20 +354,20 @@ impl Lights {
             LightKind::Point(at) => Some(Target::bare(TargetKind::Point, pose.point(*at), chance)),
             &LightKind::Spot { at, axis, cos_outer, cos_inner } => {
                 let (at, axis) = (pose.point(at), pose.direction(axis));
-                let cosine = (receiver.point - at).try_normalize().map_or(-1.0, |d| d.dot(axis));
+                let cosine = (*from - at).try_normalize().map_or(-1.0, |d| d.dot(axis));
                 let factor = spot_falloff(cosine, cos_outer, cos_inner);
                 radiance.iter_mut().for_each(|band| *band *= factor);
                 (factor > 0.0).then(|| Target::bare(TargetKind::Point, at, chance))
             }
             LightKind::Projector(projector) => {
-                let color = projector.toward(scene, pose.seen(receiver.point))?;
+                let color = projector.toward(scene, pose.seen(*from))?;
                 for (k, band) in radiance.iter_mut().enumerate() {
                     *band *= spectral.band(&color, k);
                 }
                 Some(Target::bare(TargetKind::Point, pose.point(projector.at), chance))
             }
             LightKind::Goniometric(measured) => {
-                let intensity = measured.toward(pose.seen(receiver.point));
+                let intensity = measured.toward(pose.seen(*from));
                 radiance.iter_mut().for_each(|band| *band *= intensity);
                 let place = Target::bare(TargetKind::Point, pose.point(measured.at), chance);
                 (intensity > 0.0).then_some(place)
@@ -377,11 +377,7 @@ impl Lights {
                     .world(cone_direction(*square, cos_radius));
                 Some(Target::bare(TargetKind::Parallel, toward, chance))
             }
-            LightKind::Environment { image: EnvironmentImage::Constant, .. } => {
-                let (toward, density) = uniform_direction(receiver, *square);
-                Some(Target::bare(TargetKind::Far, toward, chance * density))
-            }
-            // Directions to an image are chosen side by side.
+            // Directions to the sky, of which a scene has one, are chosen side by side.
             LightKind::Environment { .. } => None,
         }
     }

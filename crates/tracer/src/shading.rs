@@ -28,25 +28,28 @@ pub(crate) struct SheetSurface {
 }
 
 impl SurfaceInteraction<'_> {
-    /// Its scattering of light of the wavelength (nm).
-    pub(crate) fn bsdf(&self, scene: &SceneView<'_>, spectral: &Spectral, wavelength: f64) -> Bsdf {
+    /// Its scattering of light of the wavelength (nm); `None` of surfaces that are worked out in lanes alone.
+    pub(crate) fn bsdf(
+        &self,
+        scene: &SceneView<'_>,
+        spectral: &Spectral,
+        wavelength: f64,
+    ) -> Option<Bsdf> {
         self.material.scattering.bsdf(self, scene, spectral, wavelength)
     }
 }
 
 impl Scattering {
-    /// Its model at a hit, for light of a wavelength (nm).
+    /// Its model at a hit, for light of a wavelength (nm), if it has one by itself.
     fn bsdf(
         &self,
         interaction: &SurfaceInteraction<'_>,
         scene: &SceneView<'_>,
         spectral: &Spectral,
         wavelength: f64,
-    ) -> Bsdf {
+    ) -> Option<Bsdf> {
         let model = match self {
-            Self::Black | Self::Unlit => Model::Black,
-            Self::Matte => Model::Matte,
-            Self::Mirror => Model::Mirror,
+            Self::Black | Self::Unlit | Self::Matte | Self::Mirror => return None,
             Self::Metal { roughness, named } => Model::Metal {
                 alpha: roughness * roughness,
                 named: named.as_ref().map(Conductor::id),
@@ -55,10 +58,11 @@ impl Scattering {
                 alpha: glass.roughness * glass.roughness,
                 eta: interaction.eta(scene, wavelength),
             },
-            Self::Gltf(surface) => return surface.bsdf(interaction, scene, spectral),
+            Self::Gltf(surface) => return Some(surface.bsdf(interaction, scene, spectral)),
         };
         let (geometric, shading) = interaction.normals(scene);
-        Bsdf::new(model, [geometric, shading], interaction.wo, [interaction.color(), Tint::WHITE])
+        let colors = [interaction.color(), Tint::WHITE];
+        Some(Bsdf::new(model, [geometric, shading], interaction.wo, colors))
     }
 }
 

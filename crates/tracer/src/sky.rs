@@ -1,16 +1,13 @@
 //! The environment of a scene: what comes from where nothing is, and directions by how bright it is
 //! there, many at a time.
 
-use std::f64::consts::PI;
 use std::sync::Arc;
 
-use etendue_geometry::glam::{DMat3, DVec3};
+use etendue_geometry::glam::DMat3;
 use etendue_spectrum::NoOverlap;
 
 use crate::environment::{EnvironmentMap, MapSampler};
 use crate::light::{EnvironmentImage, Light, LightKind};
-use crate::light_sampler::Receiver;
-use crate::sampling::{Frame, cosine_direction, sphere_direction};
 use crate::spectral::Spectral;
 use crate::spectral_sky::{self, Spectrum};
 
@@ -114,14 +111,4 @@ impl Sky {
             Spectra::Texels(texels) => f64::from(texels.iter().copied().fold(0.0, f32::max)),
         }
     }
-}
-
-/// A direction to a sky that is alike all over, for a point, and its density (1/sr): by the cosine where the point
-/// gets light from one side alone, else any.
-pub(crate) fn uniform_direction(receiver: &Receiver, square: [f64; 2]) -> (DVec3, f64) {
-    if !receiver.is_one_sided() {
-        return (sphere_direction(square), 0.25 / PI);
-    }
-    let local = cosine_direction(square);
-    (Frame::around(receiver.normal).world(local), local.z / PI)
 }

@@ -121,29 +121,6 @@ impl Spectral {
         }
     }
 
-    /// Multiplies light in all bands by a tint: to the bit as [`Self::tint`] band by band.
-    #[inline]
-    #[cfg(test)]
-    pub(crate) fn times(&self, tint: &Tint, light: &mut [f64]) {
-        let rows = self.from_rgb.each_ref().map(Vec::as_slice);
-        let known = |number: u32| {
-            let start = number as usize * self.count();
-            self.curves.get(start..start + self.count())
-        };
-        let one_by_one = |light: &mut [f64]| {
-            light.iter_mut().enumerate().for_each(|(i, band)| *band *= self.tint(tint, i));
-        };
-        match tint.spectrum {
-            _ if self.is_rgb => one_by_one(light),
-            TintSpectrum::White => times_color(rows, &tint.color, light),
-            TintSpectrum::Curve { number, .. } => match known(number) {
-                Some(curve) => times_curve(rows, &tint.color, curve, light),
-                None => one_by_one(light),
-            },
-            TintSpectrum::Texel { .. } | TintSpectrum::Mixed { .. } => one_by_one(light),
-        }
-    }
-
     /// The bands.
     #[must_use]
     pub fn bands(&self) -> &Bands {
@@ -234,25 +211,6 @@ pub(crate) fn part(
     }
 }
 
-/// Multiplies light in bands by a colour, by the rows of red, green and blue.
-#[multiversion::multiversion(targets = "simd")]
-fn times_color([red, green, blue]: [&[f64]; 3], color: &Color, light: &mut [f64]) {
-    let [r, g, b] = *color;
-    for (((band, red), green), blue) in light.iter_mut().zip(red).zip(green).zip(blue) {
-        *band *= red * r + green * g + blue * b;
-    }
-}
-
-/// The same by a colour times a curve, of which there is a mean a band.
-#[multiversion::multiversion(targets = "simd")]
-fn times_curve([red, green, blue]: [&[f64]; 3], color: &Color, curve: &[f64], light: &mut [f64]) {
-    let [r, g, b] = *color;
-    let bands = light.iter_mut().zip(red).zip(green).zip(blue).zip(curve);
-    for ((((band, red), green), blue), mean) in bands {
-        *band *= (red * r + green * g + blue * b) * mean;
-    }
-}
-
 /// The means of a curve over bands, which goes on beyond its ends as it is there.
 fn held_in(bands: &Bands, curve: &Curve) -> Vec<f64> {
     bands
@@ -265,42 +223,4 @@ fn reflectances(named: Metal, bands: &Bands) -> Vec<[f64; 2]> {
     let at = |cosine| held_in(bands, &named.reflectance(cosine));
     let (face_on, second) = (at(1.0), at(metal::SECOND_COSINE));
     face_on.iter().zip(&second).map(|(&f, &s)| [f, metal::dip(f, s)]).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use etendue_spectrum::Grid;
-
-    use super::*;
-    use crate::{Paint, Scattering};
-
-    #[test]
-    fn light_is_multiplied_as_band_by_band_to_the_bit() {
-        let curve = Curve::sampled(vec![[380.0, 0.1], [520.0, 0.9], [780.0, 0.3]]).unwrap();
-        let curve = SceneCurve { number: 1, curve: Arc::new(curve) };
-        let paint = Paint::Curve { look: [0.2, 0.5, 0.3], curve: curve.clone() };
-        let materials = [Material::new("a", paint, Scattering::Matte)];
-        let color = [0.31, 0.47, 0.83];
-        let tints = [
-            Tint::from(color),
-            Tint { color: [1.0; 3], spectrum: curve.spectrum() },
-            Tint { color, spectrum: curve.spectrum() },
-            // Of a curve that nobody has.
-            Tint { color, spectrum: SceneCurve { number: 9, ..curve }.spectrum() },
-        ];
-        for count in [1, 3, 8, 31] {
-            let bands = Bands::Spectral(Grid::equal(400.0, 700.0, count).unwrap());
-            for bands in [bands, Bands::Rgb] {
-                let spectral = Spectral::of(&bands, &materials);
-                let light = |i: usize| 0.7 + 0.01 * i as f64;
-                for tint in &tints {
-                    let mut found: Vec<f64> = (0..spectral.count()).map(light).collect();
-                    spectral.times(tint, &mut found);
-                    for (i, found) in found.into_iter().enumerate() {
-                        assert_eq!(found, light(i) * spectral.tint(tint, i), "band {i} of {count}");
-                    }
-                }
-            }
-        }
-    }
 }

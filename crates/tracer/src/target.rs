@@ -26,8 +26,6 @@ pub(crate) enum TargetKind {
     Point,
     /// A direction, which no other is alike.
     Parallel,
-    /// A direction of the environment.
-    Far,
     /// A place on a triangle.
     Triangle {
         /// It shines to both sides.

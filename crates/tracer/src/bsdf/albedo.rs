@@ -166,13 +166,6 @@ impl Albedo {
         self.of(self.terms(w))
     }
 
-    /// The mean over directions.
-    #[must_use]
-    pub fn mean(&self) -> f64 {
-        let [a, b, _] = self.means();
-        self.of([a, b])
-    }
-
     /// From A and B of some direction, or their means.
     pub(super) fn of(&self, [a, b]: [f64; 2]) -> f64 {
         self.f0 * a + self.f90 * b

@@ -17,6 +17,7 @@ use std::sync::OnceLock;
 
 use etendue_geometry::glam::DVec3;
 
+use super::split_sum::place;
 use super::{fresnel, ggx};
 
 /// Knots in ln η, from that of 1/[`MOST`] to that of [`MOST`]; in √α; and in √μ.
@@ -198,12 +199,4 @@ impl Compensation {
         let most = self.own.mean.max(self.other.mean);
         self.own.passes * self.seen * self.other.at(mu) / (most * self.eta * self.eta)
     }
-}
-
-/// The knot of `count` below `x` in 0..=1 and the share of the next.
-fn place(x: f64, count: usize) -> (usize, f64) {
-    let scaled = x.clamp(0.0, 1.0) * (count - 1) as f64;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range")]
-    let knot = (scaled as usize).min(count - 2);
-    (knot, scaled - knot as f64)
 }

@@ -24,12 +24,10 @@ pub(crate) mod smooth;
 mod split_sum;
 mod weights;
 
-use std::f64::consts::PI;
-
 use etendue_geometry::glam::DVec3;
 
 use self::layered::mirrored;
-use crate::sampling::{Frame, cosine_direction};
+use crate::sampling::Frame;
 use crate::{ConductorId, Tint};
 pub use coat::Coat;
 pub use layered::Layered;
@@ -40,12 +38,6 @@ pub use weights::Weights;
 /// The models.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Model {
-    /// Nothing comes back.
-    Black,
-    /// Lambert.
-    Matte,
-    /// All in the mirror's direction.
-    Mirror,
     /// GGX facets of metal: the colour face on, white at grazing incidence (Schlick).
     Metal {
         /// The square of the roughness, 0..=1; at 0 a mirror.
@@ -132,11 +124,7 @@ impl Bsdf {
             Model::Layered(layered) => {
                 ModelView::Layered(layered.viewed(local, &peaks([&base, &highlight])))
             }
-            Model::Black
-            | Model::Matte
-            | Model::Mirror
-            | Model::Metal { .. }
-            | Model::Dielectric { .. } => ModelView::Plain,
+            Model::Metal { .. } | Model::Dielectric { .. } => ModelView::Plain,
         };
         Self { model, frame, geometric, wo: local, base, highlight, seen }
     }
@@ -145,11 +133,7 @@ impl Bsdf {
     pub(crate) fn named(&self) -> Option<ConductorId> {
         match self.model {
             Model::Metal { named, .. } => named,
-            Model::Black
-            | Model::Matte
-            | Model::Mirror
-            | Model::Dielectric { .. }
-            | Model::Layered(_) => None,
+            Model::Dielectric { .. } | Model::Layered(_) => None,
         }
     }
 
@@ -166,11 +150,7 @@ impl Bsdf {
     pub(crate) fn sheen(&self) -> Tint {
         match self.model {
             Model::Layered(layered) => layered.sheen.color,
-            Model::Black
-            | Model::Matte
-            | Model::Mirror
-            | Model::Metal { .. }
-            | Model::Dielectric { .. } => Tint::BLACK,
+            Model::Metal { .. } | Model::Dielectric { .. } => Tint::BLACK,
         }
     }
 
@@ -178,17 +158,15 @@ impl Bsdf {
     #[must_use]
     pub fn is_delta(&self) -> bool {
         match self.model {
-            Model::Black | Model::Mirror => true,
             Model::Metal { alpha, .. } | Model::Dielectric { alpha, .. } => alpha == 0.0,
             Model::Layered(layered) => layered.is_delta(),
-            Model::Matte => false,
         }
     }
 
     /// The shading normal of the one side that light comes from; zero where it comes from both.
     pub(crate) fn receiving_normal(&self) -> DVec3 {
         let is_one_sided = match self.model {
-            Model::Black | Model::Matte | Model::Mirror | Model::Metal { .. } => true,
+            Model::Metal { .. } => true,
             Model::Dielectric { .. } => false,
             Model::Layered(layered) => layered.transmission == 0.0,
         };
@@ -209,16 +187,10 @@ impl Bsdf {
                 layered.evaluate(self.wo, local, viewed)
             }
             (_, ModelView::Glass(rough)) => rough.evaluate(self.wo, local),
-            (Model::Matte, _) if !transmits => (Weights::base(local.z / PI), local.z / PI),
             (_, ModelView::Metal(rough)) if !transmits => rough.evaluate(self.wo, local),
             // All of their directions are single rays, or on the other side.
             (
-                Model::Black
-                | Model::Matte
-                | Model::Mirror
-                | Model::Metal { .. }
-                | Model::Dielectric { .. }
-                | Model::Layered(_),
+                Model::Metal { .. } | Model::Dielectric { .. } | Model::Layered(_),
                 ModelView::Plain | ModelView::Metal(_) | ModelView::Layered(_),
             ) => (Weights::default(), 0.0),
         }
@@ -232,12 +204,6 @@ impl Bsdf {
             return None;
         }
         match &self.model {
-            Model::Black => None,
-            Model::Matte => {
-                let local = cosine_direction(square);
-                self.given(local, Weights::base(1.0), local.z / PI)
-            }
-            Model::Mirror => self.single(mirrored(self.wo), Weights::base(1.0)),
             Model::Metal { .. } => {
                 let ModelView::Metal(rough) = &self.seen else {
                     return self.single(mirrored(self.wo), metal::facets(self.wo.z));

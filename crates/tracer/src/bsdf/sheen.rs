@@ -18,6 +18,7 @@ use std::sync::LazyLock;
 use etendue_geometry::glam::DVec3;
 
 use super::Weights;
+use super::split_sum::place;
 use crate::Tint;
 
 /// The least roughness: below, fibres are a rim finer than anything shows.
@@ -180,12 +181,4 @@ impl SheenAlbedo {
         };
         (1.0 + EXACT) * (along(self.row) * (1.0 - self.share) + along(self.row + 1) * self.share)
     }
-}
-
-/// The knot of `count` below `x` in 0..=1 and the share of the next.
-fn place(x: f64, count: usize) -> (usize, f64) {
-    let scaled = x.clamp(0.0, 1.0) * (count - 1) as f64;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range")]
-    let knot = (scaled as usize).min(count - 2);
-    (knot, scaled - knot as f64)
 }

@@ -1,4 +1,4 @@
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use etendue_spectrum::Metal;
 
@@ -20,7 +20,7 @@ fn layered(metallic: f64, roughness: f64, transmission: f64) -> Model {
 }
 
 fn all() -> Vec<(&'static str, Model)> {
-    let mut models = vec![("matte", Model::Matte), ("mirror", Model::Mirror)];
+    let mut models = Vec::new();
     for eta in [1.5, 1.0 / 1.5, 1.0] {
         models.push(("glass", Model::Dielectric { alpha: 0.0, eta }));
         if eta != 1.0 {

@@ -2,11 +2,7 @@
 
 use std::f64::consts::PI;
 
-use etendue_geometry::glam::DVec3;
-
 use super::{CELLS, Corners, EnvironmentMap, LANES, between, mean};
-#[cfg(test)]
-use crate::Color;
 use crate::angles;
 use crate::sampling::{GridCell, GridDistribution, linear_place};
 use etendue_geometry::Float;
@@ -134,26 +130,6 @@ impl MapSampler {
         self.patches.cells(squares, cells);
     }
 
-    /// A direction, its [`place`](super::place), and its density (1/sr) for each of `squares`, and the radiance of `map` there.
-    #[cfg(test)]
-    pub(crate) fn sample(&self, map: &EnvironmentMap, squares: &[[f64; 2]], out: &mut MapLookups) {
-        out.directions.clear();
-        self.cells(squares.iter().copied(), &mut out.cells);
-        out.resize(squares.len());
-        if !map.texels.is_empty() {
-            chosen(self, map, out);
-        }
-    }
-
-    /// The [`place`](super::place)s of the unit directions in `asked`, their densities (1/sr), and the radiance of `map` there.
-    #[cfg(test)]
-    pub(crate) fn look_up(&self, map: &EnvironmentMap, asked: &mut MapLookups) {
-        asked.resize(asked.directions.len());
-        if !map.texels.is_empty() {
-            looked_up(self, map, asked);
-        }
-    }
-
     /// True if the cells are the texels of a map of colours.
     fn is_of_texels(&self) -> bool {
         self.cells.bright.is_empty()
@@ -260,16 +236,6 @@ impl MapSampler {
         (places, [across, down], density)
     }
 
-    /// The density (1/sr) of a unit direction on `map`, which this is of.
-    #[must_use]
-    pub fn pdf(&self, map: &EnvironmentMap, d: DVec3) -> f64 {
-        if map.texels.is_empty() {
-            return 0.0;
-        }
-        let [pdf] = self.in_directions(map, [[d.x], [d.y], [d.z]]).densities;
-        pdf
-    }
-
     /// Densities (1/sr) of places with the sines of their polar angles, about which the texels are known, and the colours
     /// there.
     #[inline(always)]
@@ -317,71 +283,6 @@ pub(crate) struct MapLookup<F, const N: usize> {
     /// 1/sr.
     pub(crate) densities: [F; N],
     pub(crate) colors: [[F; N]; 3],
-}
-
-/// Directions, and what a map has there; kept for the next.
-#[cfg(test)]
-#[derive(Debug, Default)]
-pub(crate) struct MapLookups {
-    cells: Vec<GridCell>,
-    /// Unit.
-    pub(crate) directions: Vec<DVec3>,
-    pub(crate) places: Vec<[f64; 2]>,
-    /// 1/sr.
-    pub(crate) densities: Vec<f64>,
-    pub(crate) colors: Vec<Color>,
-}
-
-#[cfg(test)]
-impl MapLookups {
-    /// Makes room for so many, which have nothing yet.
-    fn resize(&mut self, count: usize) {
-        self.directions.resize(count, DVec3::Y);
-        self.places.clear();
-        self.places.resize(count, [0.0; 2]);
-        self.densities.clear();
-        self.densities.resize(count, 0.0);
-        self.colors.clear();
-        self.colors.resize(count, [0.0; 3]);
-    }
-}
-
-#[cfg(test)]
-impl MapLookups {
-    /// Takes what a map has in the directions from one on.
-    #[inline(always)]
-    fn put(&mut self, start: usize, lit: &MapLookup<f64, LANES>) {
-        let MapLookup { directions: [x, y, z], places: [u, v], densities, colors: [r, g, b] } = lit;
-        for i in 0..LANES.min(self.directions.len() - start) {
-            self.directions[start + i] = DVec3::new(x[i], y[i], z[i]);
-            self.places[start + i] = [u[i], v[i]];
-            self.densities[start + i] = densities[i];
-            self.colors[start + i] = [r[i], g[i], b[i]];
-        }
-    }
-}
-
-#[cfg(test)]
-#[multiversion::multiversion(targets = "simd")]
-fn chosen(sampler: &MapSampler, map: &EnvironmentMap, out: &mut MapLookups) {
-    for start in (0..out.directions.len()).step_by(LANES) {
-        let count = LANES.min(out.directions.len() - start);
-        let mut patches = [GridCell::default(); LANES];
-        patches[..count].copy_from_slice(&out.cells[start..start + count]);
-        out.put(start, &sampler.in_patches(map, &patches));
-    }
-}
-
-#[cfg(test)]
-#[multiversion::multiversion(targets = "simd")]
-fn looked_up(sampler: &MapSampler, map: &EnvironmentMap, asked: &mut MapLookups) {
-    for start in (0..asked.directions.len()).step_by(LANES) {
-        let mut directions = [[0.0; LANES]; 3];
-        for (i, d) in asked.directions[start..].iter().take(LANES).enumerate() {
-            (directions[0][i], directions[1][i], directions[2][i]) = (d.x, d.y, d.z);
-        }
-        asked.put(start, &sampler.in_directions(map, directions));
-    }
 }
 
 /// A density over the map's places as one over solid angles (1/sr), by the sine of the polar angle.

@@ -116,13 +116,6 @@ impl Choices {
         Choice { light: self.light[number], u: self.u[number], chance: self.chance[number] }
     }
 
-    /// The normal of the side of a point that gets light.
-    #[inline(always)]
-    pub(crate) fn normal(&self, number: usize) -> DVec3 {
-        let [x, y, z] = &self.normal;
-        DVec3::new(x[number].into(), y[number].into(), z[number].into())
-    }
-
     /// Irradiance that a point may get from all lights of a tree (W/m²), once that is known
     /// ([`LightTree::sum_importance`]).
     #[inline(always)]

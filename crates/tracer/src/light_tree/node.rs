@@ -45,14 +45,6 @@ pub(crate) struct Receiver {
     pub(crate) normal: DVec3,
 }
 
-impl Receiver {
-    /// True if it gets light from one side alone.
-    #[inline(always)]
-    pub(crate) fn is_one_sided(&self) -> bool {
-        self.normal != DVec3::ZERO
-    }
-}
-
 /// Clusters of lights, as they are asked side by side; what is not there has no intensity.
 #[derive(Debug, Clone)]
 pub(super) struct Clusters<const N: usize> {

@@ -253,7 +253,9 @@ impl SurfaceRow {
         let parts_media = traits.has_media || traits.has_dispersion;
         let kind = match SurfaceKind::of(&material.scattering) {
             // What media there are on its sides is known where it is hit.
-            SurfaceKind::Smooth if parts_media && !placed.is_opaque => SurfaceKind::Other,
+            SurfaceKind::Smooth if parts_media && material.scattering.is_body() => {
+                SurfaceKind::Other
+            }
             kind => kind,
         };
         let scatters = kind != SurfaceKind::Black;

@@ -48,9 +48,9 @@ impl Way {
         Receiver { point, normal: self.normal.map(f64::from).into() }
     }
 
-    /// The weight of light that was met against having asked for it with density `pdf` (1/sr).
-    pub(super) fn weight_against(self, pdf: f64) -> f64 {
-        if self.is_specular { 1.0 } else { power_heuristic(self.pdf, pdf) }
+    /// The weight of light that was met, of no specular way, against having asked for it with density `pdf` (1/sr).
+    fn weight_against(self, pdf: f64) -> f64 {
+        power_heuristic(self.pdf, if pdf.is_finite() { pdf } else { 0.0 })
     }
 }
 
@@ -80,7 +80,6 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let LightingContext { lights, scene, spectral, .. } = self.ctx;
         let Encounter { hit, receiver } = encounter;
         let is_front = encounter.is_front();
-        let weight = |pdf: f64| way.weight_against(if pdf.is_finite() { pdf } else { 0.0 });
         if let Some(index) = lights.index_of(hit.id)
             && let Some((area_light, bands)) = lights.plain_triangle(index, self.count())
         {
@@ -94,7 +93,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let cosine = hit.direction.dot(area_light.shape.normal).abs();
             let distance = hit.t + (hit.origin - receiver.point).length();
             let density = distance * distance / (cosine * area_light.shape.area);
-            return Some(weight(lights.chance(receiver, index) * density));
+            return Some(way.weight_against(lights.chance(receiver, index) * density));
         }
         let placement = scene.geometry.placements.get(hit.id[0] as usize)?;
         let [u, v] = hit.weights;
@@ -111,7 +110,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         if !lights.emitted(scene, spectral, &point, is_front, radiance) {
             return None;
         }
+        if way.is_specular {
+            return Some(1.0);
+        }
         let pdf = lights.pdf_of_surface(scene, hit.id[0], &point, receiver, hit.direction);
-        Some(weight(pdf))
+        Some(way.weight_against(pdf))
     }
 }

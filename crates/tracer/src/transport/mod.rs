@@ -229,20 +229,7 @@ pub trait Samples: Debug {
     fn squares_of_pair(&self, rays: &[u32], pair: u32, out: &mut Vec<[f64; 2]>);
 
     /// The same in single precision, the numbers below 1, in two columns.
-    fn floats_of_pair(&self, rays: &[u32], pair: u32, out: &mut [Vec<f32>; 2]) {
-        let mut squares = Vec::new();
-        self.squares_of_pair(rays, pair, &mut squares);
-        for (k, column) in out.iter_mut().enumerate() {
-            column.clear();
-            column.extend(squares.iter().map(|square| below_one(square[k])));
-        }
-    }
-}
-
-/// A number in single precision, which stays below 1.
-#[expect(clippy::cast_possible_truncation, reason = "single precision is the purpose")]
-fn below_one(x: f64) -> f32 {
-    (x as f32).min(1.0 - f32::EPSILON / 2.0)
+    fn floats_of_pair(&self, rays: &[u32], pair: u32, out: &mut [Vec<f32>; 2]);
 }
 
 /// Use that a path makes of random numbers at each step.

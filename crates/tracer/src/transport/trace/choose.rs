@@ -11,7 +11,7 @@ use super::kernel::{ReceiverColumns, gather_receivers};
 use super::lane::{Lane, round, single};
 use super::sky::place_on_sky;
 use super::surfaces::Surfaces;
-use crate::light_sampler::{LightQuery, Receiver};
+use crate::light_sampler::LightQuery;
 use crate::light_tree::Choices;
 use crate::sampling::GridCell;
 use crate::target::TargetKind;
@@ -177,11 +177,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             if has_others && self.ctx.lights.plain_light(choice.light as usize).is_none() {
                 let [x, y, z] = &chosen.points;
                 let point = DVec3::new(x[number].into(), y[number].into(), z[number].into());
-                let (point, normal) = (lights.origin + point, chosen.choices.normal(number));
                 let (lane, square) = (chosen.lanes[number], [choice.u, second[lane].into()]);
-                let receiver = Receiver { point, normal };
                 let time = self.time_of(carried.ray[lane as usize]);
-                let query = LightQuery { receiver, time, choice, square };
+                let query = LightQuery { from: lights.origin + point, time, choice, square };
                 self.place_on_other(lights, chosen, lane, &query);
                 continue;
             }
@@ -194,7 +192,6 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     fn choose_far<F: Lane>(&self, lights: &BlockLights<'_, F>, workspace: &mut Workspace<F>) {
         let Workspace { rays, carried, numbers, chosen, .. } = workspace;
         let [first, second] = &mut numbers[Draw::Light as usize];
-        let receiver = Receiver { point: DVec3::ZERO, normal: DVec3::ZERO };
         for (lane, number) in (0_u32..).zip(0..carried.len) {
             let block = &rays.blocks()[number / LANES];
             if block.placement[number % LANES] == MISS {
@@ -204,7 +201,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             first[number] = below_one(choice.u);
             let square = [choice.u, second[number].into()];
             let time = self.time_of(carried.ray[number]);
-            let query = LightQuery { receiver, time, choice, square };
+            let query = LightQuery { from: DVec3::ZERO, time, choice, square };
             self.place_on_other(lights, chosen, lane, &query);
         }
         if lights.sky.is_some() {
@@ -241,7 +238,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let mut radiance = std::mem::take(&mut chosen.bands);
         let found = self.ctx.lights.place(scene, spectral, query, &mut radiance);
         if let Some(target) = found {
-            let is_far = matches!(target.kind, TargetKind::Far | TargetKind::Parallel);
+            let is_far = target.kind == TargetKind::Parallel;
             let is_delta = matches!(target.kind, TargetKind::Point | TargetKind::Parallel);
             let origin = if is_far { DVec3::ZERO } else { lights.origin };
             let [start, rest, across] = target.place;
@@ -251,7 +248,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                     let (normal, magnitudes) = (single(target.normal), single(target.magnitudes));
                     Some(LightSide { normal, magnitudes, two_sided })
                 }
-                TargetKind::Point | TargetKind::Parallel | TargetKind::Far => None,
+                TargetKind::Point | TargetKind::Parallel => None,
             };
             let (light, density) = (choice.light, round(target.density));
             let own = OtherPlace { light, place, is_far, is_delta, density, side };

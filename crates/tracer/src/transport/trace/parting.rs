@@ -33,7 +33,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         {
             is_parted = glass.roughness == 0.0;
             if is_parted {
-                let bsdf = interaction.bsdf(scene, spectral, spectral.wavelength(0));
+                let bsdf = interaction.bsdf(scene, spectral, spectral.wavelength(0))?;
                 let boundary = Boundary { lane, interaction: &interaction, bsdf };
                 self.part(step.number, workspace, &boundary);
             } else {
@@ -41,7 +41,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             }
         }
         let wavelength = wavelength.unwrap_or_else(|| spectral.wavelength(0));
-        let bsdf = interaction.bsdf(scene, spectral, wavelength);
+        let bsdf = interaction.bsdf(scene, spectral, wavelength)?;
         let passes = self.ctx.placed.get(placement).is_some_and(|placed| !placed.is_opaque);
         let lane = u32::try_from(lane).unwrap_or(u32::MAX);
         singles.push(SingleHit { lane, bsdf, passes, crossing, is_parted });

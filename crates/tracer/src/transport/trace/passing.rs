@@ -397,8 +397,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             }
             return light.iter().any(|band| *band > 0.0);
         }
-        let pane = (is_delta && traits.has_panes)
-            .then(|| interaction.bsdf(scene, spectral, spectral.wavelength(0)));
+        let is_gltf = interaction.material.scattering.gltf().is_some();
+        let pane = (is_delta && traits.has_panes && is_gltf)
+            .then(|| interaction.bsdf(scene, spectral, spectral.wavelength(0)))
+            .flatten();
         let passed = pane.as_ref().and_then(|pane| Some((pane, pane.straight_through()?)));
         for (k, band) in light.iter_mut().enumerate() {
             let pane = passed.map_or(0.0, |(pane, weights)| self.in_band(pane, weights, k));
