@@ -27,7 +27,7 @@ pub use opener::{
     FindError, FoundFile, InputFolder, MOST_OWN_BYTES, Opener, Reach, Stamp, is_inside, open, read,
     read_head, real_place,
 };
-pub use part::{Temporary, open_parts, prepare_folder, remove_open_parts};
+pub use part::{ENDINGS, Temporary, open_parts, prepare_folder, remove_open_parts};
 pub use transaction::{PartFile, Transaction};
 
 /// Name and version of the program, for the headers of files.

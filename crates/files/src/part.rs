@@ -68,8 +68,12 @@ pub fn prepare_folder(folder: &Path) -> Result<(), WriteError> {
 /// The name of the file that is written to see whether a folder can be written to.
 const PROBE: &str = "etendue";
 
-/// The endings of the files that commands write into folders.
-const ENDINGS: [&str; 8] = [".exr", ".npy", ".png", ".dng", ".json", ".svg", ".csv", ".txt"];
+/// Endings of the files that commands write into folders. What a killed process left of others is not known to be ours, and
+/// stays.
+pub const ENDINGS: [&str; 15] = [
+    ".exr", ".npy", ".png", ".dng", ".json", ".svg", ".csv", ".txt", ".flo", ".hdr", ".img",
+    ".ply", ".pfm", ".cfg", ".film",
+];
 
 /// Removes part files of `folder` that no process writes to any more, of the targets that
 /// `is_ours` says. What cannot be looked at or removed stays.
@@ -315,8 +319,12 @@ mod tests {
         let others =
             [".depth.exr.abcdef.bak", ".depth.exr.abc.part", ".notes.abcdef.part", "a.part"];
         others.iter().for_each(|name| put(name));
-        let left =
-            [".depth.exr.abcdef.part", ".picture.preview.png.X1y2Z3.part", ".etendue.a1B2c3.part"];
+        let left = [
+            ".depth.exr.abcdef.part",
+            ".picture.preview.png.X1y2Z3.part",
+            ".flow.flo.X1y2Z3.part",
+            ".etendue.a1B2c3.part",
+        ];
         left.iter().for_each(|name| put(name));
         let files = Transaction::at_once();
         let living = files.create(&folder.path().join("depth.exr")).unwrap();

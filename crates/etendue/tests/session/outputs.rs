@@ -88,6 +88,15 @@ fn every_kind_of_file_of_every_layer_is_had_over_frames() {
             let index = rendered.unwrap_or_else(|error| panic!("{kind} of {layer}: {error}"));
             let frames = index["frames"].as_array().unwrap();
             assert_eq!(frames.len(), 2, "{kind} of {layer}");
+            // What a killed process leaves of them is found by their endings.
+            let is_known = |file: &Value| {
+                let name = file.as_str().unwrap();
+                etendue_files::ENDINGS.iter().any(|ending| name.ends_with(ending))
+            };
+            let layers =
+                frames.iter().flat_map(|frame| frame["files"].as_object().unwrap().values());
+            let files = layers.flat_map(|files| files.as_object().unwrap().values());
+            files.for_each(|file| assert!(is_known(file), "{kind} of {layer}: {file}"));
             if shows(kind, layer) == Some(true) {
                 let files = frames[0]["files"].to_string();
                 assert!(files.contains(kind), "{kind} of {layer}: {files}");
