@@ -283,12 +283,17 @@ pub(crate) fn mean(color: &Color) -> f64 {
     (color[0] + color[1] + color[2]) / 3.0
 }
 
-/// Irradiance (W/m²) of a surface that faces a light far away, of which an environment's image has this `brightness`
-/// in the mean; 0 of any other.
-pub(crate) fn irradiance(light: &Light, brightness: f64) -> f64 {
+/// Share of its irradiance by which an environment that is alike from all sides is chosen: paths find it by scattering as
+/// well as by asking, so that beside other lights these are asked more often.
+const EVEN_SHARE: f64 = 0.5;
+
+/// Irradiance (W/m²) of a surface that faces a light far away, as that is chosen beside others ([`EVEN_SHARE`]); an
+/// environment's image has this `brightness` in the mean. 0 of any other light.
+pub(crate) fn sought_irradiance(light: &Light, brightness: f64) -> f64 {
     let own = mean(&light.color);
     match &light.kind {
         LightKind::Directional { .. } => own,
+        LightKind::Environment { image: EnvironmentImage::Constant, .. } => EVEN_SHARE * PI * own,
         LightKind::Environment { .. } => PI * own * brightness,
         LightKind::Point(_)
         | LightKind::Spot { .. }
@@ -342,4 +347,18 @@ impl LightBounds {
         are_textured: false,
         are_far: false,
     };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn skies_that_are_alike_all_over_are_sought_half() {
+        let sky = |image| LightKind::Environment { image, turn: DMat3::IDENTITY, visible: true };
+        let sought = |kind| sought_irradiance(&Light::steady(kind, [1.0; 3]), 3.0);
+        assert_eq!(sought(sky(EnvironmentImage::Studio)), 3.0 * PI);
+        assert_eq!(sought(sky(EnvironmentImage::Constant)), 0.5 * PI);
+        assert_eq!(sought(LightKind::Point(DVec3::ZERO)), 0.0);
+    }
 }

@@ -15,7 +15,7 @@ use crate::area_light::{self, AreaLight, AreaLightMotion, triangle_power};
 use crate::environment::EnvironmentMap;
 use crate::group::Groups;
 pub(crate) use crate::light::LightBounds;
-use crate::light::{EnvironmentImage, Light, LightKind, irradiance, power, spot_falloff};
+use crate::light::{Light, LightKind, power, sought_irradiance, spot_falloff};
 use crate::light_sampler::{Candidate, LightQuery, LightSampler, Receiver};
 use crate::light_tree::Choices;
 use crate::material::Alpha;
@@ -26,18 +26,6 @@ use crate::spectral::Spectral;
 use crate::surface_point::squares_at;
 use crate::target::{Target, TargetKind};
 use crate::{LightGroup, Material, Modulation, Paint, SceneCurve};
-
-/// Share of its irradiance by which an environment that is alike from all sides is chosen: paths find it by scattering as
-/// well as by asking, so that beside other lights these are asked more often.
-const EVEN_SHARE: f64 = 0.5;
-
-/// The irradiance (W/m²) by which a light far away is chosen, of which an environment's image has this `brightness` in the
-/// mean.
-fn weight_of_far(light: &Light, brightness: f64) -> f64 {
-    let is_even = EnvironmentImage::of(light) == Some(&EnvironmentImage::Constant);
-    let share = if is_even { EVEN_SHARE } else { 1.0 };
-    share * irradiance(light, brightness)
-}
 
 /// All lights of a scene, ready to be chosen from.
 #[derive(Debug)]
@@ -138,7 +126,7 @@ impl Lights {
             let mean = mean(&light.modulation);
             match light.cluster(mean * light.intensity(), scene, span) {
                 Some(cluster) => Candidate::near(mean * power(light, scene), cluster),
-                None => Candidate::Far { irradiance: mean * weight_of_far(light, brightness) },
+                None => Candidate::Far { irradiance: mean * sought_irradiance(light, brightness) },
             }
         };
         let mut candidates: Vec<Candidate> = lights.iter().map(candidate).collect();
