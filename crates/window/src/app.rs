@@ -394,15 +394,15 @@ impl App {
     /// Moves the camera.
     pub(crate) fn stand(&mut self, ctx: &Context, viewpoint: &Viewpoint) {
         let Some(document) = &self.document else { return };
-        let mut edits = vec![Edit::set("/camera/pose", viewpoint.pose())];
+        let mut edits = vec![Edit::set("camera.pose", viewpoint.pose())];
         // A camera that frames the scene by itself focuses by itself: it stays focused where it is.
-        let camera = document.at("/camera");
+        let camera = document.at("camera");
         let is_free = camera["focus_distance"].is_null() && camera["sensor_distance"].is_null();
         let lens = self.inspector.as_ref().and_then(|inspector| inspector.scene().camera.lens());
         if let (true, true, Some(lens)) = (camera["pose"].is_null(), is_free, lens) {
             let distance = lens.focused().object_distance();
             if distance.is_finite() && distance > 0.0 {
-                edits.push(Edit::set("/camera/focus_distance", distance));
+                edits.push(Edit::set("camera.focus_distance", distance));
             }
         }
         self.edit(ctx, &edits);

@@ -14,23 +14,23 @@ const MOST_STEPS: usize = 200;
 /// Edits of one value that follow each other this soon (s) are one step back.
 const ONE_GESTURE: f64 = 0.7;
 
-/// A change of one value, at its JSON pointer.
+/// A change of one value, at its place.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Edit {
     /// The value is this now; objects on the way are made.
-    Set(String, Value),
+    Set(ScenePath, Value),
     /// The key is gone: the format's own default holds.
-    Remove(String),
+    Remove(ScenePath),
 }
 
 impl Edit {
-    pub(crate) fn set(pointer: impl Into<String>, value: impl Into<Value>) -> Self {
-        Self::Set(pointer.into(), value.into())
+    pub(crate) fn set(path: impl Into<ScenePath>, value: impl Into<Value>) -> Self {
+        Self::Set(path.into(), value.into())
     }
 
-    fn pointer(&self) -> &str {
+    fn path(&self) -> &ScenePath {
         match self {
-            Self::Set(pointer, _) | Self::Remove(pointer) => pointer,
+            Self::Set(path, _) | Self::Remove(path) => path,
         }
     }
 }
@@ -48,7 +48,7 @@ pub(crate) struct Document {
     past: Vec<Arc<Value>>,
     future: Vec<Arc<Value>>,
     /// The last edit's place and time (s).
-    last: Option<(String, f64)>,
+    last: Option<(ScenePath, f64)>,
 }
 
 impl Document {
@@ -72,9 +72,9 @@ impl Document {
         &self.value
     }
 
-    /// The value at a JSON pointer; null where there is none.
-    pub(crate) fn at(&self, pointer: &str) -> &Value {
-        self.value.pointer(pointer).unwrap_or(&Value::Null)
+    /// The value at a place; null where there is none.
+    pub(crate) fn at(&self, path: impl Into<ScenePath>) -> &Value {
+        path.into().get(&self.value).unwrap_or(&Value::Null)
     }
 
     pub(crate) fn is_changed(&self) -> bool {
@@ -87,12 +87,12 @@ impl Document {
         edits.iter().for_each(|edit| apply(&mut value, edit));
         let Some(first) = edits.first().filter(|_| value != *self.value) else { return false };
         let goes_on = self.last.as_ref().is_some_and(|(place, at)| {
-            place == first.pointer() && (0.0..ONE_GESTURE).contains(&(now - at))
+            place == first.path() && (0.0..ONE_GESTURE).contains(&(now - at))
         });
         if !goes_on {
             self.remember();
         }
-        self.last = Some((first.pointer().to_owned(), now));
+        self.last = Some((first.path().clone(), now));
         self.value = Arc::new(value);
         self.future.clear();
         true
@@ -154,7 +154,7 @@ impl Document {
 }
 
 fn apply(value: &mut Value, edit: &Edit) {
-    let path = ScenePath::from_pointer(edit.pointer());
+    let path = edit.path();
     let Some((holder, key)) = path.split_last() else { return };
     match (edit, holder.find(value)) {
         (Edit::Set(_, new), Some(Value::Array(elements)))
@@ -277,17 +277,17 @@ mod tests {
     fn a_drag_is_one_step_back() {
         let mut document = document();
         for (i, f_number) in [2.1, 2.2, 2.3].into_iter().enumerate() {
-            assert!(document.apply(&[Edit::set("/camera/f_number", f_number)], 0.1 * i as f64));
+            assert!(document.apply(&[Edit::set("camera.f_number", f_number)], 0.1 * i as f64));
         }
-        document.apply(&[Edit::set("/camera/f_number", 8.0)], 5.0);
+        document.apply(&[Edit::set("camera.f_number", 8.0)], 5.0);
         document.undo();
-        assert_eq!(document.at("/camera/f_number"), &json!(2.3));
+        assert_eq!(document.at("camera.f_number"), &json!(2.3));
         document.undo();
-        assert_eq!(document.at("/camera/f_number"), &json!(2.0));
+        assert_eq!(document.at("camera.f_number"), &json!(2.0));
         assert!(!document.can_undo() && !document.is_changed());
         document.redo();
         document.redo();
-        assert_eq!(document.at("/camera/f_number"), &json!(8.0));
+        assert_eq!(document.at("camera.f_number"), &json!(8.0));
         assert!(!document.can_redo() && document.is_changed());
     }
 
@@ -295,24 +295,24 @@ mod tests {
     fn edits_make_and_remove_what_they_name() {
         let mut document = document();
         let edits = [
-            Edit::set("/camera/pose/from", json!([1, 2, 3])),
-            Edit::Remove("/camera/f_number".into()),
-            Edit::set("/lights/1", json!({"b": 2})),
-            Edit::Remove("/lights/0".into()),
-            Edit::set("/materials/a~1b/color", 1),
+            Edit::set("camera.pose.from", json!([1, 2, 3])),
+            Edit::Remove("camera.f_number".into()),
+            Edit::set("lights[1]", json!({"b": 2})),
+            Edit::Remove("lights[0]".into()),
+            Edit::set("materials[\"a/b\"].color", 1),
         ];
         assert!(document.apply(&edits, 0.0));
         let expected = json!({"camera": {"type": "thin_lens", "pose": {"from": [1, 2, 3]}},
                           "lights": [{"b": 2}], "materials": {"a/b": {"color": 1}}});
         assert_eq!(**document.value(), expected);
-        assert!(!document.apply(&[Edit::Remove("/nothing/here".into())], 0.0));
+        assert!(!document.apply(&[Edit::Remove("nothing.here".into())], 0.0));
     }
 
     #[test]
     fn what_is_refused_leaves_no_step() {
         let mut document = document();
         let accepted = Arc::clone(document.value());
-        document.apply(&[Edit::set("/camera/f_number", -1)], 0.0);
+        document.apply(&[Edit::set("camera.f_number", -1)], 0.0);
         document.refuse(&accepted);
         assert_eq!(document.value(), &accepted);
         assert!(!document.can_undo());
@@ -322,7 +322,7 @@ mod tests {
     fn the_past_has_an_end() {
         let mut document = document();
         for i in 0..10_000 {
-            document.apply(&[Edit::set("/camera/f_number", i)], 10.0 * f64::from(i));
+            document.apply(&[Edit::set("camera.f_number", i)], 10.0 * f64::from(i));
         }
         assert_eq!(document.past.len(), MOST_STEPS);
     }

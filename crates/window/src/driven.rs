@@ -140,8 +140,8 @@ impl Driver {
         self.pass(egui::RawInput { dropped_files: vec![file], ..Default::default() });
     }
 
-    fn value(&self, pointer: &str) -> Value {
-        self.app.document.as_ref().unwrap().at(pointer).clone()
+    fn value(&self, path: &str) -> Value {
+        self.app.document.as_ref().unwrap().at(path).clone()
     }
 
     fn pixels(&self) -> Vec<u8> {
@@ -192,12 +192,12 @@ fn a_smaller_opening_changes_the_picture_and_can_be_undone() {
     window.settle();
     let wide = window.pixels();
     window.enter("/camera/f_number", "16");
-    assert_eq!(window.value("/camera/f_number"), json!(16.0));
+    assert_eq!(window.value("camera.f_number"), json!(16.0));
     window.settle();
     let narrow = window.pixels();
     assert_ne!(wide, narrow, "the wall behind the plane in focus is sharper");
     window.press(Key::Z, Modifiers::COMMAND);
-    assert_eq!(window.value("/camera/f_number"), json!(1.4));
+    assert_eq!(window.value("camera.f_number"), json!(1.4));
     window.settle();
     assert_eq!(window.pixels(), wide, "to the bit as before");
     window.press(Key::Z, Modifiers::COMMAND | Modifiers::SHIFT);
@@ -214,7 +214,7 @@ fn a_click_focuses_and_the_pixel_tells_what_is_there() {
     assert_eq!(window.app.tool, Tool::Focus);
     // Beside the ball, on the wall: 6 m away along the axis.
     window.click_at(window.at(0.9, 0.2));
-    let distance = window.value("/camera/focus_distance").as_f64().unwrap();
+    let distance = window.value("camera.focus_distance").as_f64().unwrap();
     assert!((distance - 6.0).abs() < 1e-9, "a plane across the axis: {distance}");
     window.settle();
     let asked = window.app.asked.clone().unwrap().probe.unwrap();
@@ -247,14 +247,14 @@ fn keys_fly_and_shortcuts_do_not() {
     window.pass(key(true, Modifiers::COMMAND));
     (0..5).for_each(|_| window.step(Vec::new()));
     window.pass(key(false, Modifiers::NONE));
-    assert_eq!(window.value("/camera/pose/from"), json!([0, 0, 2]));
+    assert_eq!(window.value("camera.pose.from"), json!([0, 0, 2]));
     window.pass(key(true, Modifiers::NONE));
     (0..5).for_each(|_| window.step(Vec::new()));
     window.pass(key(false, Modifiers::NONE));
-    let back = window.value("/camera/pose/from");
+    let back = window.value("camera.pose.from");
     assert!(back[2].as_f64().unwrap() > 2.0, "{back}");
     (0..5).for_each(|_| window.step(Vec::new()));
-    assert_eq!(window.value("/camera/pose/from"), back, "it stops when the key is let go");
+    assert_eq!(window.value("camera.pose.from"), back, "it stops when the key is let go");
 }
 
 #[test]
@@ -264,7 +264,7 @@ fn what_is_saved_renders_to_the_same_bits() {
     window.settle();
     window.enter("/camera/f_number", "5.6");
     window.drag(window.at(0.5, 0.5), Vec2::new(40.0, 16.0));
-    assert_ne!(window.value("/camera/pose/from"), json!([0, 0, 2]), "the drag turned the camera");
+    assert_ne!(window.value("camera.pose.from"), json!([0, 0, 2]), "the drag turned the camera");
     window.settle();
     assert_eq!(window.app.title(), "scene.json* - etendue");
     window.press(Key::S, Modifiers::COMMAND);
@@ -306,7 +306,7 @@ fn views_show_layers_and_the_sensor() {
     window.settle();
     let scale = window.app.picture.as_ref().unwrap().screen.scale.unwrap();
     assert!(scale.near < 1.9 && (scale.far - 6.0).abs() < 1e-9, "{scale:?}");
-    assert_eq!(window.value("/layers"), json!(["depth"]), "looking changes no scene");
+    assert_eq!(window.value("layers"), json!(["depth"]), "looking changes no scene");
 }
 
 #[test]
@@ -318,7 +318,7 @@ fn what_makes_no_sense_is_refused_and_said() {
     window.until("an error", |app| app.error.is_some());
     let error = window.app.error.clone().unwrap();
     assert!(error.contains("f_number"), "{error}");
-    assert_eq!(window.value("/camera/f_number"), json!(1.4), "the scene is as it was");
+    assert_eq!(window.value("camera.f_number"), json!(1.4), "the scene is as it was");
     assert!(!window.app.document.as_ref().unwrap().can_undo());
 }
 
@@ -347,7 +347,7 @@ fn another_camera_comes_with_what_it_needs() {
     window.settle();
     window.click("/camera/type");
     window.click("/camera/type=pinhole");
-    let camera = window.value("/camera");
+    let camera = window.value("camera");
     assert_eq!(camera["type"], "pinhole");
     assert_eq!(camera["pose"], scene()["camera"]["pose"], "what both have stays");
     assert!(camera.get("f_number").is_none(), "{camera}");
@@ -369,9 +369,9 @@ fn a_file_that_changes_is_taken_up_under_the_edits() {
     fs::write(&path, changed.to_string()).unwrap();
     window.until("the new colour", |app| {
         let document = app.document.as_ref().unwrap();
-        document.at("/materials/red/color") == &json!([0.1, 0.8, 0.1])
+        document.at("materials.red.color") == &json!([0.1, 0.8, 0.1])
     });
-    assert_eq!(window.value("/camera/f_number"), json!(8.0), "the edit stays");
+    assert_eq!(window.value("camera.f_number"), json!(8.0), "the edit stays");
     assert!(window.app.document.as_ref().unwrap().is_changed());
 }
 

@@ -29,7 +29,7 @@ pub(crate) struct Form {
 #[derive(Debug, Clone, Copy)]
 struct FormField<'a> {
     schema: &'a Value,
-    pointer: &'a str,
+    path: &'a ScenePath,
     value: &'a Value,
     is_required: bool,
 }
@@ -42,9 +42,9 @@ impl Form {
     /// Widgets for the key `key` of the top, whose value is `value`. What the user changes is added to
     /// `edits`.
     pub(crate) fn show(&self, ui: &mut Ui, key: &str, value: &Value, edits: &mut Vec<Edit>) {
-        let pointer = pointer_below("", key);
+        let path = &ScenePath::default().key(key);
         let schema = &self.schema["properties"][key];
-        let field = FormField { schema, pointer: &pointer, value, is_required: true };
+        let field = FormField { schema, path, value, is_required: true };
         self.inner(ui, field, edits);
     }
 
@@ -86,7 +86,7 @@ impl Form {
         let is_nested = field.value.is_object()
             || field.value.as_array().is_some_and(|list| list.iter().any(|v| !v.is_number()));
         if is_nested {
-            let heading = egui::CollapsingHeader::new(&label).id_salt(field.pointer);
+            let heading = egui::CollapsingHeader::new(&label).id_salt(field.path);
             let shown = heading.default_open(key == "sensor").show(ui, |ui| {
                 self.inner(ui, field, edits);
                 if field.is_required {
@@ -94,9 +94,9 @@ impl Form {
                 }
                 // Below what it removes, often beside the one of what that is in.
                 let remove = ui.small_button(format!("remove {label}"));
-                mark(ui.ctx(), &format!("{}-", field.pointer), remove.rect);
+                mark(ui.ctx(), &format!("{}-", field.path.pointer()), remove.rect);
                 if remove.clicked() {
-                    edits.push(Edit::Remove(field.pointer.to_owned()));
+                    edits.push(Edit::Remove(field.path.clone()));
                 }
             });
             hint(shown.header_response, about);
@@ -110,7 +110,7 @@ impl Form {
                     .small_button("\u{d7}")
                     .on_hover_text(format!("{label}: back to the default"));
                 if default.clicked() {
-                    edits.push(Edit::Remove(field.pointer.to_owned()));
+                    edits.push(Edit::Remove(field.path.clone()));
                 }
             }
         });
@@ -131,7 +131,7 @@ impl Form {
                 self.list(ui, field, list, edits);
             }
             Value::Null => self.absent(ui, field, edits),
-            _ => leaf::show(ui, schema, field.pointer, field.value, edits),
+            _ => leaf::show(ui, schema, field.path, field.value, edits),
         }
     }
 
@@ -144,8 +144,8 @@ impl Form {
         edits: &mut Vec<Edit>,
     ) {
         let now = field.value.get(*tag).and_then(Value::as_str);
-        let id = egui::Id::new((field.pointer, *tag));
-        let place = format!("{}/{tag}", field.pointer);
+        let id = egui::Id::new((field.path, *tag));
+        let place = field.path.key(tag).pointer();
         let combo = egui::ComboBox::from_id_salt(id).selected_text(now.unwrap_or("none"));
         let shown = combo.show_ui(ui, |ui| {
             for KindVariant { name, schema: variant } in variants {
@@ -153,7 +153,7 @@ impl Form {
                 mark(ui.ctx(), &format!("{place}={name}"), choice.rect);
                 if hint(choice, variant["description"].as_str()).clicked() {
                     let object = self.changed_to(field.value, tag, name, variant);
-                    edits.push(Edit::set(field.pointer, object));
+                    edits.push(Edit::set(field.path, object));
                 }
             }
         });
@@ -238,23 +238,22 @@ impl Form {
         let (there, absent): (Vec<_>, Vec<_>) =
             known.partition(|(key, _)| members.get(*key).is_some_and(|value| !value.is_null()));
         for (key, schema) in there {
-            let pointer = pointer_below(field.pointer, key);
+            let path = &field.path.key(key);
             let is_required = needed.contains(&&**key);
-            let below = FormField { schema, pointer: &pointer, value: &members[key], is_required };
+            let below = FormField { schema, path, value: &members[key], is_required };
             self.field(ui, key, below, edits);
         }
         // Names that the user gives: materials.
         let others = &schema["additionalProperties"];
         if others.is_object() {
             for (key, value) in members {
-                let pointer = pointer_below(field.pointer, key);
-                let below =
-                    FormField { schema: others, pointer: &pointer, value, is_required: false };
+                let path = &field.path.key(key);
+                let below = FormField { schema: others, path, value, is_required: false };
                 self.field(ui, key, below, edits);
             }
         }
         if !absent.is_empty() {
-            self.additions(ui, field.pointer, &absent, edits);
+            self.additions(ui, field.path, &absent, edits);
         }
     }
 
@@ -273,7 +272,7 @@ impl Form {
     fn additions(
         &self,
         ui: &mut Ui,
-        pointer: &str,
+        path: &ScenePath,
         absent: &[(&String, &Value)],
         edits: &mut Vec<Edit>,
     ) {
@@ -282,38 +281,37 @@ impl Form {
                 for (key, schema) in absent {
                     let about = schema["description"].as_str();
                     let button = ui.button(key.replace('_', " "));
-                    mark(ui.ctx(), &format!("{pointer}/{key}+"), button.rect);
+                    let place = path.key(key);
+                    mark(ui.ctx(), &format!("{}+", place.pointer()), button.rect);
                     if hint(button, about).clicked() {
-                        let place = pointer_below(pointer, key);
                         edits.push(Edit::set(place, self.something(schema)));
                         ui.close();
                     }
                 }
             });
         });
-        mark(ui.ctx(), &format!("{pointer}+"), menu.response.rect);
+        mark(ui.ctx(), &format!("{}+", path.pointer()), menu.response.rect);
     }
 
     fn list(&self, ui: &mut Ui, field: FormField<'_>, list: &[Value], edits: &mut Vec<Edit>) {
         let items = &field.schema["items"];
         for (i, value) in list.iter().enumerate() {
-            let pointer = format!("{}/{i}", field.pointer);
+            let path = &field.path.index(i);
             let name =
                 ["name", "file", "shape", "type"].iter().find_map(|key| value[*key].as_str());
             let title = format!("{} {}", i + 1, name.unwrap_or_default());
-            let below = FormField { schema: items, pointer: &pointer, value, is_required: false };
+            let below = FormField { schema: items, path, value, is_required: false };
             self.field(ui, &title, below, edits);
         }
         if items.is_object() && ui.small_button("add one").clicked() {
-            let place = format!("{}/{}", field.pointer, list.len());
-            edits.push(Edit::set(place, self.something(items)));
+            edits.push(Edit::set(field.path.index(list.len()), self.something(items)));
         }
     }
 
     fn absent(&self, ui: &mut Ui, field: FormField<'_>, edits: &mut Vec<Edit>) {
         ui.weak("default");
         if ui.small_button("set").clicked() {
-            edits.push(Edit::set(field.pointer, self.something(field.schema)));
+            edits.push(Edit::set(field.path, self.something(field.schema)));
         }
     }
 }
@@ -344,11 +342,6 @@ fn variants(schema: &Value) -> Option<KindChoice<'_>> {
             .collect();
         Some(KindChoice { tag, variants: named? })
     })
-}
-
-/// The JSON pointer of the key of an object.
-fn pointer_below(pointer: &str, key: &str) -> String {
-    ScenePath::from_pointer(pointer).key(key).pointer()
 }
 
 fn required(schema: &Value) -> impl Iterator<Item = &str> {

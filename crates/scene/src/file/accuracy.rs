@@ -309,7 +309,7 @@ impl AccuracySpec {
     /// The settings that a scene of these values writes, also as they are by themselves.
     pub(crate) fn written(&self, scene: &Value) -> impl Iterator<Item = AccuracySetting> {
         let all = self.settings().into_iter();
-        all.filter(move |setting| scene.pointer(&ScenePath::of(setting.path).pointer()).is_some())
+        all.filter(move |setting| ScenePath::of(setting.path).get(scene).is_some())
     }
 
     /// Those that are not as they are by themselves, as rows of the plan.

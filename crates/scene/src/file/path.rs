@@ -39,13 +39,6 @@ impl ScenePath {
         path.parse().unwrap_or_else(|_| Self(vec![PathStep::Key(path.to_owned())]))
     }
 
-    /// The place that a JSON pointer (RFC 6901) names. Its steps of digits are keys here, which lead into arrays, too.
-    #[must_use]
-    pub fn from_pointer(pointer: &str) -> Self {
-        let key = |step: &str| PathStep::Key(step.replace("~1", "/").replace("~0", "~"));
-        Self(pointer.split('/').skip(1).map(key).collect())
-    }
-
     /// Returns the place as a JSON pointer (RFC 6901).
     #[must_use]
     pub fn pointer(&self) -> String {
@@ -111,6 +104,12 @@ impl ScenePath {
     }
 
     /// The value there; `None` where there is none.
+    #[must_use]
+    pub fn get<'a>(&self, root: &'a Value) -> Option<&'a Value> {
+        root.pointer(&self.pointer())
+    }
+
+    /// The value there, to be changed; `None` where there is none.
     pub fn find<'a>(&self, root: &'a mut Value) -> Option<&'a mut Value> {
         root.pointer_mut(&self.pointer())
     }
@@ -324,8 +323,8 @@ mod tests {
         let mut value = json!({"a/b": [{"c~d": 7}]});
         let path = ScenePath::of("[\"a/b\"][0][\"c~d\"]");
         assert_eq!(path.pointer(), "/a~1b/0/c~0d");
-        assert_eq!(value.pointer(&path.pointer()), Some(&json!(7)));
-        let same = ScenePath::from_pointer(&path.pointer());
+        assert_eq!(path.get(&value), Some(&json!(7)));
+        let same = ScenePath::default().key("a/b").key("0").key("c~d");
         assert_eq!(
             same.set(&mut value, json!(8)),
             Ok(path),

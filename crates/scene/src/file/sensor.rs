@@ -49,7 +49,7 @@ impl WrittenPlaces {
             .map_err(|why| self.fault(&place, format!("\"{written}\" {why}")))?;
         *map = json!(list);
         // A map of other columns and rows belongs to another sensor.
-        let sensor = value.pointer(&sensor.pointer()).unwrap_or(&Value::Null);
+        let sensor = sensor.get(value).unwrap_or(&Value::Null);
         let resolution = sensor.get("resolution").cloned().or_else(|| {
             let model: Model = serde_json::from_value(sensor.get("model")?.clone()).ok()?;
             Some(json!(model.preset().resolution.value))
@@ -187,7 +187,7 @@ impl SensorFile {
         spec::read_resolution(&mut value, &resolution)
             .map_err(|why| written.fault(&resolution, why))?;
         written.read_defects(&mut value, &place)?;
-        let object = value.pointer(&place.pointer());
+        let object = place.get(&value);
         let object = object.ok_or_else(|| {
             let why = "the scene has no sensor\nhint: give it one, such as { \"type\": \"raw\", \
                        \"model\": \"imx183\" }";

@@ -84,7 +84,7 @@ impl App {
         self.lens_curves.forget();
         let document = self.document.as_ref().filter(|_| self.lens.is_some());
         self.written_lens =
-            document.and_then(|document| written_lens(document.at("/camera/lens"), &document.path));
+            document.and_then(|document| written_lens(document.at("camera.lens"), &document.path));
     }
 
     /// Asks the pixel at the same place again, after the scene has changed.
@@ -108,8 +108,8 @@ impl App {
             return;
         };
         let edits = [
-            Edit::Remove("/camera/sensor_distance".to_owned()),
-            Edit::set("/camera/focus_distance", probe.depth),
+            Edit::Remove("camera.sensor_distance".into()),
+            Edit::set("camera.focus_distance", probe.depth),
         ];
         self.edit(ctx, &edits);
         self.ask(place);

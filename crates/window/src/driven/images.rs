@@ -83,7 +83,7 @@ fn a_scene_follows_an_image_and_the_other_way_round() {
     window.until("the scene", |app| app.document.is_some());
     window.settle();
     assert!(window.app.still.is_none());
-    assert_eq!(window.value("/camera/pose/from"), json!([0, 0, 2]));
+    assert_eq!(window.value("camera.pose.from"), json!([0, 0, 2]));
 }
 
 #[test]

@@ -18,7 +18,7 @@ fn a_lens_by_itself_is_looked_through() {
     window.until("the lens", |app| app.lens.is_some() && app.picture.is_some());
     assert_eq!(window.app.error, None);
     assert!(window.app.shows_lens, "its panel is open");
-    assert_eq!(window.value("/camera/lens"), json!("achromat.json"));
+    assert_eq!(window.value("camera.lens"), json!("achromat.json"));
     let view = window.app.lens.as_ref().unwrap().as_ref().unwrap();
     let focal_length = view.report.paraxial.efl.unwrap();
     // 100 mm by its catalogue, and to a percent by its rounded radii.
@@ -46,15 +46,15 @@ fn surfaces_are_dragged_and_the_lens_file_stays() {
         assert_eq!(window.app.error, None);
     };
     drag(&mut window, 0, Vec2::new(0.0, 30.0));
-    let radius = window.value("/camera/lens/elements/0/radius").as_f64().unwrap();
+    let radius = window.value("camera.lens.elements[0].radius").as_f64().unwrap();
     assert!(radius > 62.8, "across the axis a drag bends the surface: {radius}");
     drag(&mut window, 1, Vec2::new(12.0, 0.0));
-    let gap = window.value("/camera/lens/elements/0/thickness").as_f64().unwrap();
+    let gap = window.value("camera.lens.elements[0].thickness").as_f64().unwrap();
     assert!(gap > 4.0, "along the axis it moves the gap before it: {gap}");
-    assert_eq!(window.value("/camera/lens/elements/1/radius"), json!(-45.7));
+    assert_eq!(window.value("camera.lens.elements[1].radius"), json!(-45.7));
     assert_eq!(fs::read(&path).unwrap(), before, "the lens' own file is as it was");
     window.press(Key::Z, Modifiers::COMMAND);
-    assert_eq!(window.value("/camera/lens/elements/0/thickness").as_f64(), Some(4.0));
+    assert_eq!(window.value("camera.lens.elements[0].thickness").as_f64(), Some(4.0));
 }
 
 /// Curves in waves come when they are chosen, and go with the lens that they are of.

@@ -104,7 +104,7 @@ fn measured_memory_stays_over_ten_thousand_changes() {
     let change = |window: &mut Driver, i: u32| {
         let ctx = window.ctx.clone();
         let opening = 1.4 + 0.001 * f64::from(i % 5000);
-        window.app.edit(&ctx, &[Edit::set("/camera/f_number", opening)]);
+        window.app.edit(&ctx, &[Edit::set("camera.f_number", opening)]);
         window.time += 1.0;
         window.until("the wish is followed", |app| !app.is_behind());
     };

@@ -12,10 +12,10 @@ fn before_and_after_share_the_canvas_by_a_line() {
     window.enter("/camera/f_number", "16");
     window.settle();
     window.step(Vec::new());
-    let (pose, split) = (window.value("/camera/pose"), window.app.canvas.split);
+    let (pose, split) = (window.value("camera.pose"), window.app.canvas.split);
     window.drag(window.place_of("split"), Vec2::new(-120.0, 0.0));
     assert!(window.app.canvas.split < split - 0.05, "{} of {split}", window.app.canvas.split);
-    assert_eq!(window.value("/camera/pose"), pose, "the line is dragged, and not the camera");
+    assert_eq!(window.value("camera.pose"), pose, "the line is dragged, and not the camera");
     window.click("compare");
     assert!(window.app.canvas.before.is_none());
 }

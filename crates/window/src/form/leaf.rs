@@ -1,6 +1,7 @@
 //! Widgets for single values: numbers with and without units, words, switches, vectors; and notes where widgets are.
 
 use eframe::egui::{self, DragValue, Ui};
+use etendue::ScenePath;
 use serde_json::{Value, json};
 
 use crate::document::Edit;
@@ -9,7 +10,7 @@ use crate::document::Edit;
 pub(super) fn show(
     ui: &mut Ui,
     schema: &Value,
-    pointer: &str,
+    path: &ScenePath,
     value: &Value,
     edits: &mut Vec<Edit>,
 ) {
@@ -18,34 +19,34 @@ pub(super) fn show(
         Value::Bool(on) => {
             let mut on = *on;
             let check = ui.checkbox(&mut on, "");
-            mark(ui.ctx(), pointer, check.rect);
+            mark(ui.ctx(), &path.pointer(), check.rect);
             if check.changed() {
-                edits.push(Edit::set(pointer, on));
+                edits.push(Edit::set(path, on));
             }
         }
         Value::String(word) if !words.is_empty() && words.contains(&&**word) => {
-            choice(ui, schema, pointer, word, &words, edits);
+            choice(ui, schema, path, word, &words, edits);
         }
         Value::String(text) => match quantity(text) {
             Some((number, unit)) => {
-                if let Some(number) = drag(ui, pointer, number, schema, &format!(" {unit}")) {
-                    edits.push(Edit::set(pointer, format!("{number} {unit}")));
+                if let Some(number) = drag(ui, path, number, schema, &format!(" {unit}")) {
+                    edits.push(Edit::set(path, format!("{number} {unit}")));
                 }
             }
-            None => line(ui, pointer, text, edits),
+            None => line(ui, path, text, edits),
         },
         Value::Number(number) => {
             let is_whole = number.is_u64() || number.is_i64();
             let unit = schema["x-unit"].as_str().map(|unit| format!(" {unit}")).unwrap_or_default();
-            let new = drag(ui, pointer, number.as_f64().unwrap_or(0.0), schema, &unit);
+            let new = drag(ui, path, number.as_f64().unwrap_or(0.0), schema, &unit);
             if let Some(new) = new {
-                edits.push(Edit::set(pointer, as_number(new, is_whole && is_integer(schema))));
+                edits.push(Edit::set(path, as_number(new, is_whole && is_integer(schema))));
             }
         }
         Value::Array(list) => {
             let items = &schema["items"];
             for (i, value) in list.iter().enumerate() {
-                show(ui, items, &format!("{pointer}/{i}"), value, edits);
+                show(ui, items, &path.index(i), value, edits);
             }
         }
         Value::Null | Value::Object(_) => {}
@@ -67,7 +68,7 @@ fn as_number(number: f64, is_whole: bool) -> Value {
 }
 
 /// A number to be dragged or typed; the new one when it was changed.
-fn drag(ui: &mut Ui, pointer: &str, now: f64, schema: &Value, unit: &str) -> Option<f64> {
+fn drag(ui: &mut Ui, path: &ScenePath, now: f64, schema: &Value, unit: &str) -> Option<f64> {
     let mut number = now;
     let bound = |key: &str, none: f64| schema[key].as_f64().unwrap_or(none);
     let range = bound("minimum", f64::NEG_INFINITY)..=bound("maximum", f64::INFINITY);
@@ -79,7 +80,7 @@ fn drag(ui: &mut Ui, pointer: &str, now: f64, schema: &Value, unit: &str) -> Opt
     let widget = widget.update_while_editing(false);
     let widget = if is_integer(schema) { widget.fixed_decimals(0) } else { widget };
     let response = ui.add(widget);
-    mark(ui.ctx(), pointer, response.rect);
+    mark(ui.ctx(), &path.pointer(), response.rect);
     (response.changed() && number.is_finite() && number != now).then_some(number)
 }
 
@@ -102,7 +103,7 @@ pub(super) fn words(schema: &Value) -> Vec<&str> {
 fn choice(
     ui: &mut Ui,
     schema: &Value,
-    pointer: &str,
+    path: &ScenePath,
     now: &str,
     words: &[&str],
     edits: &mut Vec<Edit>,
@@ -112,32 +113,32 @@ fn choice(
         let one = choices.into_iter().flatten().find(|choice| choice["const"] == word);
         one.and_then(|one| one["description"].as_str())
     };
-    let combo = egui::ComboBox::from_id_salt(pointer).selected_text(now);
+    let combo = egui::ComboBox::from_id_salt(path).selected_text(now);
     let shown = combo.show_ui(ui, |ui| {
         for &word in words {
             let one = ui.selectable_label(word == now, word);
-            mark(ui.ctx(), &format!("{pointer}={word}"), one.rect);
+            mark(ui.ctx(), &format!("{}={word}", path.pointer()), one.rect);
             if hint(one, about(word)).clicked() {
-                edits.push(Edit::set(pointer, word));
+                edits.push(Edit::set(path, word));
             }
         }
     });
-    mark(ui.ctx(), pointer, shown.response.rect);
+    mark(ui.ctx(), &path.pointer(), shown.response.rect);
 }
 
 /// A text, taken when it is complete.
-fn line(ui: &mut Ui, pointer: &str, text: &str, edits: &mut Vec<Edit>) {
-    let id = egui::Id::new(("text", pointer));
+fn line(ui: &mut Ui, path: &ScenePath, text: &str, edits: &mut Vec<Edit>) {
+    let id = egui::Id::new(("text", path));
     let mut typed: String = ui.data(|data| data.get_temp(id)).unwrap_or_else(|| text.to_owned());
     let response = ui.add(egui::TextEdit::singleline(&mut typed).desired_width(140.0));
-    mark(ui.ctx(), pointer, response.rect);
+    mark(ui.ctx(), &path.pointer(), response.rect);
     if response.lost_focus() {
         ui.data_mut(|data| data.remove::<String>(id));
         if typed != text {
             // A number where words may stand, too, is a number.
             let number = typed.trim().parse::<f64>().ok().filter(|number| number.is_finite());
             let value = number.map_or_else(|| json!(typed), |number| json!(number));
-            edits.push(Edit::set(pointer, value));
+            edits.push(Edit::set(path, value));
         }
     } else if response.has_focus() {
         ui.data_mut(|data| data.insert_temp(id, typed));

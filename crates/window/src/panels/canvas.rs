@@ -207,12 +207,12 @@ fn zoom(app: &mut App, ui: &Ui, response: &Response, canvas: Rect) {
 }
 
 fn approach(app: &mut App, ctx: &egui::Context, factor: f64) {
-    let camera = app.document.as_ref().map(|document| document.at("/camera").clone());
+    let camera = app.document.as_ref().map(|document| document.at("camera").clone());
     let is_parallel = camera.is_some_and(|camera| camera["type"] == "orthographic");
     let height = app.inspector.as_ref().and_then(etendue::Inspector::picture_height);
     match height.filter(|_| is_parallel) {
         // Parallel rays come no nearer: the picture takes in less.
-        Some(height) => app.edit(ctx, &[Edit::set("/camera/height", height * factor)]),
+        Some(height) => app.edit(ctx, &[Edit::set("camera.height", height * factor)]),
         None => turn(app, ctx, |viewpoint| viewpoint.approached(factor)),
     }
 }

@@ -204,8 +204,8 @@ fn shortcuts(ui: &mut Ui, scene: &Value, edits: &mut Vec<Edit>) {
     mark(ui.ctx(), "noise", switch.rect);
     if switch.changed() {
         edits.push(match is_noisy {
-            true => Edit::set("/camera/sensor/noise", json!("poisson")),
-            false => Edit::set("/camera/sensor/noise", json!("none")),
+            true => Edit::set("camera.sensor.noise", json!("poisson")),
+            false => Edit::set("camera.sensor.noise", json!("none")),
         });
     }
 }

@@ -168,18 +168,18 @@ fn handles(app: &App, ui: &Ui, view: &LensView, scale: &DrawingScale, edits: &mu
         let edit = match (radius, i.checked_sub(1)) {
             (Some(radius), _) if drag.y.abs() > drag.x.abs() => {
                 let bent = radius * f64::from((drag.y * 0.01).exp());
-                Edit::set(format!("/camera/lens/elements/{i}/radius"), rounded(bent))
+                Edit::set(format!("camera.lens.elements[{i}].radius"), rounded(bent))
             }
             (_, Some(before)) => {
                 let gap = lens["elements"][before]["thickness"].as_f64().unwrap_or(0.0);
                 let gap = (gap + f64::from(drag.x) / scale.points_per_mm).max(0.0);
-                Edit::set(format!("/camera/lens/elements/{before}/thickness"), rounded(gap))
+                Edit::set(format!("camera.lens.elements[{before}].thickness"), rounded(gap))
             }
             _ => continue,
         };
         if *is_file {
             // The scene holds the lens from now on; its file stays as it is.
-            edits.push(Edit::set("/camera/lens", lens.clone()));
+            edits.push(Edit::set("camera.lens", lens.clone()));
         }
         edits.push(edit);
     }
